@@ -1,0 +1,70 @@
+"""Values that may be a number or a distribution, as scenario files write them.
+
+`1.2` · `{ normal = [1.34, 0.26], clip = [0.5, 2.2] }` · `{ uniform = [0, 5] }` · `{ exponential = 3.0 }` ·
+`{ poisson = 1.1, clip = [1, 6] }` · `{ choice = [-1, 1] }`. `clip` redraws until the value lies inside (both ends
+included), so that a clipped distribution has no spikes at its ends.
+"""
+
+from __future__ import annotations
+
+from typing import Annotated, Self
+
+import numpy as np
+from pydantic import BaseModel, ConfigDict, Field, model_validator
+
+MAX_REDRAWS = 10_000
+
+
+class Distribution(BaseModel):
+    """One of five distributions; exactly one key besides `clip`."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
+
+    normal: tuple[float, Annotated[float, Field(ge=0)]] | None = None
+    uniform: tuple[float, float] | None = None
+    exponential: Annotated[float, Field(gt=0)] | None = None
+    poisson: Annotated[float, Field(gt=0)] | None = None
+    choice: Annotated[tuple[float, ...], Field(min_length=1)] | None = None
+    clip: tuple[float, float] | None = None
+
+    @model_validator(mode="after")
+    def _one_kind(self) -> Self:
+        kinds = [name for name in ("normal", "uniform", "exponential", "poisson", "choice") if getattr(self, name)]
+        if len(kinds) != 1:
+            raise ValueError(
+                f"a distribution has exactly one of normal, uniform, exponential, poisson, choice, not {kinds}"
+            )
+        if self.clip is not None and self.clip[0] > self.clip[1]:
+            raise ValueError("clip wants [low, high] with low <= high")
+        if self.uniform is not None and self.uniform[0] > self.uniform[1]:
+            raise ValueError("uniform wants [low, high] with low <= high")
+        return self
+
+    def _draw(self, rng: np.random.Generator) -> float:
+        if self.normal is not None:
+            return float(rng.normal(*self.normal))
+        if self.uniform is not None:
+            return float(rng.uniform(*self.uniform))
+        if self.exponential is not None:
+            return float(rng.exponential(self.exponential))
+        if self.poisson is not None:
+            return float(rng.poisson(self.poisson))
+        assert self.choice is not None
+        return self.choice[int(rng.integers(len(self.choice)))]
+
+    def draw(self, rng: np.random.Generator) -> float:
+        """One value; ValueError where `clip` leaves nothing in MAX_REDRAWS draws."""
+        for _ in range(MAX_REDRAWS):
+            value = self._draw(rng)
+            if self.clip is None or self.clip[0] <= value <= self.clip[1]:
+                return value
+        raise ValueError(f"no draw in clip {list(self.clip or ())} after {MAX_REDRAWS} tries")
+
+
+Value = float | Distribution
+Point = tuple[Value, Value]
+
+
+def draw(value: Value, rng: np.random.Generator) -> float:
+    """The number, or one draw of the distribution."""
+    return value.draw(rng) if isinstance(value, Distribution) else float(value)

@@ -1,0 +1,49 @@
+"""The two errors a user can meet, each one line: file, place, got, expected, remedy."""
+
+from __future__ import annotations
+
+from typing import ClassVar
+
+
+class FlockscopeError(Exception):
+    """An error for the user's eyes; `str()` is exactly one line.
+
+    file: what was read or written ("" when nothing was); place: line, key, row or frame in it;
+    got, expected: what stands there and what should; remedy: what to do.
+    """
+
+    exit_code: ClassVar[int] = 1
+
+    def __init__(self, *, file: object = "", place: object = "", got: object, expected: object, remedy: str) -> None:
+        self.file, self.place = str(file), str(place)
+        self.got, self.expected, self.remedy = str(got), str(expected), remedy
+        super().__init__(self.line())
+
+    def line(self) -> str:
+        """The error as one line, empty parts left out."""
+        where = ": ".join(part for part in (self.file, self.place) if part)
+        text = f"{where}: " if where else ""
+        text += f"got {self.got}; expected {self.expected}; {self.remedy}"
+        return " ".join(text.split())
+
+    def as_dict(self) -> dict[str, str]:
+        """The error object of `--json` (contract: Files)."""
+        names = ("file", "place", "got", "expected", "remedy")
+        return {name: getattr(self, name) for name in names}
+
+    def __reduce__(self) -> tuple[object, ...]:
+        return (_rebuild, (type(self), self.as_dict()))
+
+
+class InputError(FlockscopeError):
+    """Wrong input or usage: exit code 2."""
+
+    exit_code: ClassVar[int] = 2
+
+
+class WorkError(FlockscopeError):
+    """The work failed, or a check said no: exit code 1."""
+
+
+def _rebuild(kind: type[FlockscopeError], parts: dict[str, str]) -> FlockscopeError:
+    return kind(**parts)  # type: ignore[arg-type]

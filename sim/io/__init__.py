@@ -1,0 +1,1 @@
+"""Reading and writing sequences: MOTChallenge, BIWI, CAVIAR, our own store, exports."""

@@ -1,0 +1,1 @@
+"""From frames to scores: detectors, trackers, grouping, scoring, the commands."""

@@ -1,0 +1,1 @@
+"""The commands: everything is imported here, nothing imports this."""

@@ -1,0 +1,1 @@
+"""One file per tracker, named after its method; each docstring names the paper."""

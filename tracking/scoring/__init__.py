@@ -1,0 +1,1 @@
+"""Scores of people, groups and events; imports numpy and scipy only."""
