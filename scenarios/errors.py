@@ -46,4 +46,4 @@ class WorkError(FlockscopeError):
 
 
 def _rebuild(kind: type[FlockscopeError], parts: dict[str, str]) -> FlockscopeError:
-    return kind(**parts)  # type: ignore[arg-type]
+    return kind(**parts)

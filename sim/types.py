@@ -367,11 +367,11 @@ class Sequence:
         """What is true, or None where nothing is labelled; loaded once."""
         if self.load_truth is None:
             return None
-        cached = self.__dict__.get("_truth")
+        cached: Truth | None = self.__dict__.get("_truth")
         if cached is None:
             cached = self.load_truth()
             self.__dict__["_truth"] = cached
-        return cached  # type: ignore[no-any-return]
+        return cached
 
     def background(self) -> Image | None:
         """A sample of frames for training a background model, or None."""
