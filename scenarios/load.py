@@ -1,0 +1,85 @@
+"""From names and files to scenarios: `load` one, or `resolve` a file, scenario or suite into its entries."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from pathlib import Path
+
+from scenarios import document, override, suite
+from scenarios.check import check
+from scenarios.document import names, suite_names
+from scenarios.errors import InputError
+from scenarios.schema import Scenario
+from scenarios.validate import validate
+from scenarios.write import dump
+
+__all__ = ["Entry", "dump", "load", "names", "resolve", "suite_names"]
+
+
+@dataclass(frozen=True)
+class Entry:
+    """One sequence to make: its unique name, what to simulate, and the number of a suite's `repeat` (0: none)."""
+
+    name: str
+    scenario: Scenario
+    repeat: int = 0
+
+
+def load(name_or_path: str | Path, set: Iterable[str] = ()) -> Scenario:
+    """The scenario of a catalogue name or a *.toml file, `extends` resolved and every `key=value` of `set` applied.
+
+    InputError (file, place, got, expected, remedy) where anything is wrong that can be seen without simulating.
+    """
+    path = document.find(name_or_path)
+    return _build(path, tuple(set))
+
+
+def resolve(name: str, set: Iterable[str] = ()) -> list[Entry]:
+    """The entries of a *.toml file (scenario or suite), a scenario's name or a suite's; `suite:NAME` forces the suite.
+
+    `set` is applied to every entry, after the entry's own settings.
+    """
+    settings = tuple(set)
+    if name.startswith("suite:"):
+        return _entries(suite.find_suite(name.removeprefix("suite:")), settings)
+    if name.endswith(".toml"):
+        path = document.find(name)
+        if "entry" in document.parse(path):
+            return _entries(path, settings)
+    elif name not in names():
+        if name in suite_names():
+            return _entries(suite.find_suite(name), settings)
+        known = names() + suite_names()
+        raise InputError(
+            got=repr(name), expected="a scenario, a suite or a *.toml file", remedy=document.nearest(name, known)
+        )
+    scenario = load(name, settings)
+    return [Entry(scenario.name, scenario)]
+
+
+def _entries(path: Path, settings: tuple[str, ...]) -> list[Entry]:
+    """Every entry loaded; a repeat shares one load, and each scenario bears its entry's name."""
+    loaded: dict[tuple[str, tuple[str, ...]], Scenario] = {}
+    entries = []
+    for line in suite.lines(path):
+        key = (line.scenario, line.settings)
+        if key not in loaded:
+            loaded[key] = _load_line(line, path, settings)
+        entries.append(Entry(line.name, loaded[key].model_copy(update={"name": line.name}), line.repeat))
+    return entries
+
+
+def _load_line(line: suite.Line, path: Path, settings: tuple[str, ...]) -> Scenario:
+    try:
+        return _build(document.find(line.scenario, beside=path.parent), line.settings + settings)
+    except InputError as error:
+        where = f"{path}: entry {line.name}" + (f": {error.file}" if error.file else "")
+        raise InputError(**{**error.as_dict(), "file": where}) from None
+
+
+def _build(path: Path, settings: tuple[str, ...]) -> Scenario:
+    table, places = override.apply(document.read(path), settings, path)
+    scenario = validate(table, path, places)
+    check(scenario, path)
+    return scenario
