@@ -1,0 +1,123 @@
+"""A bank of Kalman filters in arrays: independent position-velocity blocks, and a random-walk angle.
+
+Each of D measured coordinates (centre x, y, axes h, w) has a 2-state filter of its own: x = (place, rate),
+A = [[1, dt], [0, 1]], C = [1, 0], and Q = s^2 [[dt^4/4, dt^3/2], [dt^3/2, dt^2]], a white acceleration of standard
+deviation s held over a step (filterpy's Q_discrete_white_noise). Since no block speaks to another, a filter of 2 D
+states is D times three numbers of covariance, and a bank is one array `state` (5, N, D): place, rate, and P's entries
+11, 12, 22.
+
+    predict  x = A x,  P = A P A' + Q          (Gonzalez et al. 2006, eqs 1, 2)
+    update   S = P11 + R,  K = (P11, P12) / S,  x += K y,  P -= K S K'      (eqs 3-7; eq 4 needs brackets: (I - K C) P)
+
+Places may be in a unit of their own (px) while covariances are in another (m^2): gains have no unit, so only a distance
+needs the scale (N,) between the two.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from sim.types import Array, Ints
+
+PLACE, RATE, VAR, COV, RATE_VAR = range(5)
+
+
+def white_acceleration(dt: float, sigma: Array | float) -> Array:
+    """(3, ...) entries 11, 12, 22 of Q for a white acceleration of standard deviation sigma, held over dt."""
+    q = np.square(np.asarray(sigma, float))
+    return np.stack([q * dt**4 / 4, q * dt**3 / 2, q * dt**2])
+
+
+def born(place: Array, var: Array | float, rate_var: Array | float) -> Array:
+    """(5, N, D) new filters at `place` (N, D), at rest, with uncorrelated variances."""
+    state = np.zeros((5, *place.shape))
+    state[PLACE], state[VAR], state[RATE_VAR] = place, var, rate_var
+    return state
+
+
+def predict(state: Array, dt: float, q: Array) -> None:
+    """One step of dt in place; q (3, N, D) or (3, D) from `white_acceleration`."""
+    place, rate, var, cov, rate_var = state
+    place += dt * rate
+    step = dt * rate_var
+    var += dt * (cov + cov + step)
+    cov += step
+    state[VAR:] += q if q.ndim == 3 else q[:, None]
+
+
+def update(state: Array, rows: Ints, z: Array, noise: Array | float) -> None:
+    """Measure filters `rows` (each at most once) at z (K, D) with variances `noise` (K, D) or (D,), in place."""
+    place, rate, var, cov, rate_var = state[:, rows]
+    s = var + noise
+    gain, rate_gain = var / s, cov / s
+    y = z - place
+    new = np.stack(
+        [place + gain * y, rate + rate_gain * y, var - gain * var, cov - gain * cov, rate_var - rate_gain * cov]
+    )
+    state[:, rows] = new
+
+
+def distances(state: Array, z: Array, noise: Array | float, scale: Array | float = 1.0) -> Array:
+    """(N, M) squared Mahalanobis distances y' S^-1 y between N predictions and M measurements (eq. 9).
+
+    noise (M, D) or (D,) in the covariances' unit, scale (N,) or a number: units of z per unit of covariance.
+    """
+    place, spread = state[PLACE], np.reshape(np.square(scale), (-1, 1))
+    if np.ndim(noise) < 2:
+        return _common_noise(place, z, (state[VAR] + noise) * spread)
+    y = z[None] - place[:, None]
+    s = (state[VAR][:, None] + np.asarray(noise)[None]) * spread[..., None]
+    return np.asarray(np.sum(y * y / s, 2))
+
+
+def _common_noise(place: Array, z: Array, s: Array) -> Array:
+    """Sum over d of (z - place)^2 / s: expanded to one matrix product, about a middle so that little cancels."""
+    if not len(place) or not len(z):
+        return np.zeros((len(place), len(z)))
+    middle = z.mean(0)
+    p, m, w = place - middle, z - middle, 1.0 / s
+    pw = p * w
+    left = np.concatenate([w, -2.0 * pw, np.sum(pw * p, 1, keepdims=True)], 1)
+    right = np.concatenate([m * m, m, np.ones((len(m), 1))], 1)
+    return np.asarray(np.maximum(left @ right.T, 0.0))
+
+
+def log_likelihood(state: Array, rows: Ints, z: Array, noise: Array | float) -> Array:
+    """(K,) log N(z; place, S) of measurements given to filters `rows`, one unit throughout."""
+    s = state[VAR][rows] + noise
+    y = z - state[PLACE][rows]
+    return np.asarray(-0.5 * np.sum(y * y / s + np.log(2 * np.pi * s), 1))
+
+
+def asymptote(dt: float, sigma: Array | float, noise: Array | float) -> Array:
+    """S that an unbroken run of measurements settles at: the Riccati equation of one block in closed form.
+
+    With l = sigma dt^2 / sqrt(noise):  r = (4 + l - sqrt(8 l + l^2)) / 4,  S = noise / r^2 (Kalata).
+    """
+    index = np.asarray(sigma) * dt**2 / np.sqrt(noise)
+    r = (4 + index - np.sqrt(8 * index + index**2)) / 4
+    return np.asarray(noise / r**2)
+
+
+def angle_asymptote(sigma: float, noise: float) -> float:
+    """The same for the angle, a random walk of step sigma (rad): S / noise = 1 + (l^2 + sqrt(l^4 + 4 l^2)) / 2."""
+    square = sigma**2 / noise
+    return float(noise * (1 + (square + np.sqrt(square**2 + 4 * square)) / 2))
+
+
+def angle_innovation(measured: Array, predicted: Array) -> Array:
+    """Difference of two axes' directions in [-pi/2, pi/2): an axis turned by pi is the same axis."""
+    return (measured - predicted + np.pi / 2) % np.pi - np.pi / 2
+
+
+def angle_update(angle: Array, rows: Ints, z: Array, noise: Array) -> None:
+    """Measure the axes `rows` of angle (2, N) (direction, variance) at z (K,) with variances `noise`, in place.
+
+    A measurement without a direction (variance above (30 deg)^2: a near circle) is left out.
+    """
+    usable = noise < np.radians(30.0) ** 2
+    rows, z, noise = rows[usable], z[usable], noise[usable]
+    theta, var = angle[:, rows]
+    gain = var / (var + noise)
+    theta = (theta + gain * angle_innovation(z, theta)) % np.pi
+    angle[:, rows] = np.stack([theta, var - gain * var])

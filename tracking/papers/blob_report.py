@@ -1,0 +1,54 @@
+"""What `blob` tells the world: boxes in the image, and positions on the ground where a camera is known."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from sim.types import Array, Bools, Camera
+
+STEP_PX = 0.5  # of the central differences that give the Jacobian of the ground projection
+
+
+def image_covariance(state: Array, scale: Array) -> Array:
+    """(N, 4, 4) covariance of x, y, vx, vy in px of a bank whose covariances are in m^2; scale (N,) px per m."""
+    cov = np.zeros((state.shape[1], 4, 4))
+    var, cross, rate = state[2:, :, :2] * np.square(scale)[:, None]
+    for axis in (0, 1):
+        cov[:, axis, axis], cov[:, axis + 2, axis + 2] = var[:, axis], rate[:, axis]
+        cov[:, axis, axis + 2] = cov[:, axis + 2, axis] = cross[:, axis]
+    return cov
+
+
+def on_ground(camera: Camera, state: Array, scale: Array) -> tuple[Array, Array, Array, Bools]:
+    """Positions, velocities, covariances on the ground, and which rows have one (above the horizon there is none).
+
+    The place measured is the box's bottom centre for a pinhole, its centre from above; the image's state goes through
+    sim.camera.to_ground and its Jacobian J: v = J u', P = J P_uv J' blockwise.
+    """
+    from sim.camera import to_ground
+
+    foot, rate, cov = _foot(camera, state, scale)
+    right, down = np.array([STEP_PX, 0.0]), np.array([0.0, STEP_PX])
+    probes = np.concatenate([foot, foot - right, foot + right, foot - down, foot + down])
+    ground = to_ground(camera, probes)[:, :2].reshape(5, -1, 2)
+    seen = np.isfinite(ground).all((0, 2))
+    ground = np.where(seen[:, None], ground, 0.0)
+    jacobian = np.stack([ground[2] - ground[1], ground[4] - ground[3]], -1) / (2 * STEP_PX)
+    turn = np.zeros((len(foot), 4, 4))
+    turn[:, :2, :2] = turn[:, 2:, 2:] = jacobian
+    out = turn @ cov @ turn.transpose(0, 2, 1)
+    return ground[0], np.einsum("nij,nj->ni", jacobian, rate), (out + out.transpose(0, 2, 1)) / 2, seen
+
+
+def _foot(camera: Camera, state: Array, scale: Array) -> tuple[Array, Array, Array]:
+    """Image position, rate and covariance of the point that stands on the ground."""
+    place, rate, cov = state[0, :, :2].copy(), state[1, :, :2].copy(), image_covariance(state, scale)
+    if camera.kind == "pinhole":
+        place[:, 1] += state[0, :, 2] / 2
+        rate[:, 1] += state[1, :, 2] / 2
+        height = state[2:, :, 2] * np.square(scale) / 4
+        cov[:, 1, 1] += height[0]
+        cov[:, 1, 3] += height[1]
+        cov[:, 3, 1] += height[1]
+        cov[:, 3, 3] += height[2]
+    return place, rate, cov

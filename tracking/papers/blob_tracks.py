@@ -1,0 +1,143 @@
+"""The tracks of `blob`: their filters, ages and marks, and who is born, excused, reported and buried."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from sim.types import Array, Bools, Context, Ints
+from tracking import kalman, lifecycle
+from tracking.papers import blob_measure
+from tracking.papers.blob_config import BlobConfig
+
+PERSON = 1.7  # m, what the longer side of a person's box stands for
+HIDDEN = 0.4  # share of a predicted box behind somebody else from which on a miss is explained
+SAME = 0.5  # IoU of a box with the hull of several predicted ones from which on it is taken for them all
+SLACK = 1e-9  # relative, of comparisons with rho: a filter in its steady state meets the closed form to rounding only
+
+
+class Population:
+    """N tracks as arrays.
+
+    bank (5, N, 4): tracking.kalman, places in px, covariances in m^2. scale (N,) px per m. rho (N,) at the last
+    prediction. id, born (s), score; confirmed; hit: measured in this frame; excused: unseen, and somebody else is why.
+    """
+
+    def __init__(self, config: BlobConfig, dynamics: lifecycle.Dynamics, context: Context) -> None:
+        self.config, self.dynamics, self.context = config, dynamics, context
+        self.q, self.noise, self.asymptote = dynamics.q, dynamics.noise, dynamics.asymptote
+        self.birth_rho = lifecycle.at_birth(dynamics)
+        self.death = self._after(config.coast_time)
+        self.excused_death = max(self.death, self._after(config.merged_time))
+        self.silence = self._after(config.report_coast)
+        self.excused_silence = max(self.silence, self._after(config.report_hidden))
+        self.bank = np.zeros((5, 0, 4))
+        self.scale, self.rho, self.born, self.score = (np.zeros(0) for _ in range(4))
+        self.confirmed, self.hit, self.excused = (np.zeros(0, bool) for _ in range(3))
+        self.id, self.next_id = np.zeros(0, np.int64), 1
+
+    def _after(self, seconds: float) -> float:
+        """rho in the frame that ends so many seconds without measurement; it is exceeded in the next."""
+        frames = int(np.ceil(seconds * self.context.fps - SLACK))
+        return lifecycle.after_misses(self.dynamics, frames - 1) * (1 + SLACK)
+
+    def predict(self) -> None:
+        """One frame on."""
+        kalman.predict(self.bank, self.dynamics.dt, self.q)
+        self.rho = lifecycle.rho(self.bank, self.noise, self.asymptote)
+
+    def mark(self, rows: Ints, near: Bools, score: Array) -> None:
+        """Note who was measured (near: well enough to be confirmed), and confirm."""
+        self.hit = np.zeros(len(self.id), bool)
+        self.hit[rows] = True
+        self.excused &= ~self.hit
+        self.score[rows] = score
+        self.confirmed[rows] |= near & (self.rho[rows] <= self.config.confirm_ratio)
+        self.scale = self._scale_of(self.bank[kalman.PLACE])
+
+    def _scale_of(self, place: Array) -> Array:
+        """px per m at a person of this size; from straight above the camera's own."""
+        whole, camera = self.context.px_per_m, self.context.camera
+        if camera is not None and camera.kind == "top":
+            return np.full(len(place), whole)
+        return np.asarray(np.clip(place[:, 2:].max(1) / PERSON, whole / 2, whole * 2))
+
+    def excuse(self) -> None:
+        """Excuse the unseen confirmed tracks that are behind somebody: covered by a track whose feet are lower."""
+        lost = np.flatnonzero(self.confirmed & ~self.hit & ~self.excused)
+        if not len(lost):
+            return
+        place = self.bank[kalman.PLACE]
+        in_front = self.hit & (_foot(place) > _foot(place[lost])[:, None])
+        share = np.where(in_front, blob_measure.covered(place[lost], place), 0.0)
+        self.excused[lost[share.max(1) >= HIDDEN]] = True
+
+    def merged(self, z: Array) -> Bools:
+        """(M,) is this measurement several unseen confirmed tracks at once? Those tracks are excused."""
+        lost = np.flatnonzero(self.confirmed & ~self.hit)
+        found = np.zeros(len(z), bool)
+        if len(lost) < 2 or not len(z):
+            return found
+        place = self.bank[kalman.PLACE][lost]
+        held = blob_measure.inside(place, z)
+        for column in np.flatnonzero(held.sum(0) > 1):
+            members = held[:, column]
+            if blob_measure.hull_overlap(place[members], z[column]) >= SAME:
+                found[column] = True
+                self.excused[lost[members]] = True
+        return found
+
+    def bury(self, t: float) -> None:
+        """Forget the tracks whose rho, age or place says that they are over."""
+        if self.hit.all() and self.confirmed.all():
+            return
+        c, lost = self.config, ~self.hit
+        limit = np.where(self.excused, self.excused_death, self.death)
+        over = self.confirmed & lost & (self.rho * (1 + 2 * SLACK) >= limit)
+        young = ~self.confirmed
+        over |= young & lost & (self.rho >= self.birth_rho * (1 - SLACK))
+        over |= young & (t - self.born > c.tentative_time)
+        over |= lost & self._outside()
+        if over.any():
+            self._keep(~over)
+
+    def _outside(self) -> Bools:
+        """Is the centre out of the image?"""
+        place = self.bank[kalman.PLACE]
+        if self.context.image_size is None:
+            return np.zeros(len(place), bool)
+        return np.asarray(((place[:, :2] < 0) | (place[:, :2] > self.context.image_size)).any(1))
+
+    def _keep(self, rows: Bools) -> None:
+        self.bank = self.bank[:, rows]
+        for name in ("id", "born", "score", "scale", "rho", "confirmed", "hit", "excused"):
+            setattr(self, name, getattr(self, name)[rows])
+
+    def give_birth(self, z: Array, score: Array, t: float) -> None:
+        """A tentative track for each orphan."""
+        n = len(z)
+        if not n:
+            return
+        new = {
+            "id": np.arange(self.next_id, self.next_id + n),
+            "born": np.full(n, t),
+            "score": score,
+            "scale": self._scale_of(z),
+            "rho": np.full(n, self.birth_rho),
+            "confirmed": np.zeros(n, bool),
+            "hit": np.ones(n, bool),
+            "excused": np.zeros(n, bool),
+        }
+        self.next_id += n
+        for name, values in new.items():
+            setattr(self, name, np.concatenate([getattr(self, name), values]))
+        self.bank = np.concatenate([self.bank, kalman.born(z, self.noise, self.dynamics.birth_rate_var)], 1)
+
+    def reported(self, t: float) -> Bools:
+        """Which tracks the world hears of."""
+        limit = np.where(self.excused, self.excused_silence, self.silence)
+        old = self.hit & (t - self.born >= self.config.report_delay - SLACK)
+        return np.asarray(np.where(self.confirmed, self.hit | (self.rho <= limit), old))
+
+
+def _foot(place: Array) -> Array:
+    return np.asarray(place[:, 1] + place[:, 2] / 2)

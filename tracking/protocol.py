@@ -1,0 +1,184 @@
+"""Trackers by name, by file or by module; what they need against what a source has; what they may return.
+
+A tracker is given as a registered name ("blob"), as "path/to/file.py:Class" or as "package.module:Class". Workers get
+the string, never a pickle.
+"""
+
+from __future__ import annotations
+
+import difflib
+import hashlib
+import importlib
+import importlib.util
+import sys
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from scenarios.errors import InputError, WorkError
+from sim.types import DetectionMode, Detections, Sequence, Tracker, Tracks
+
+REGISTRY = {"blob": "tracking.papers.blob:Blob"}
+NEEDS = ("pixels", "stereo", "boxes", "points")
+
+
+def names() -> tuple[str, ...]:
+    """The registered trackers."""
+    return tuple(REGISTRY)
+
+
+def find(spec: str) -> type[Tracker]:
+    """The tracker class that `spec` names; InputError when there is none, or when it is no tracker."""
+    target = REGISTRY.get(spec, spec)
+    where, colon, class_name = target.rpartition(":")
+    if not colon:
+        near = difflib.get_close_matches(spec, REGISTRY, 1, 0.0)[0]
+        remedy = f"did you mean {near}? Your own: file.py:Class or package.module:Class"
+        raise InputError(place="tracker", got=spec, expected="one of " + ", ".join(REGISTRY), remedy=remedy)
+    module = _from_file(Path(where)) if where.endswith(".py") else _from_module(where)
+    found = getattr(module, class_name, None)
+    if found is None:
+        raise InputError(file=where, got=class_name, expected="a class of this module", remedy="check the name")
+    return _checked(found, spec)
+
+
+def _from_file(path: Path) -> Any:
+    """Load a file under a private name, so that it shadows nothing and two of the same stem can live together."""
+    if not path.is_file():
+        raise InputError(file=path, got="no such file", expected="a Python file", remedy="check the path")
+    resolved = path.resolve()
+    name = f"_flockscope_{resolved.stem}_{hashlib.sha256(str(resolved).encode()).hexdigest()[:12]}"
+    spec = importlib.util.spec_from_file_location(name, resolved)
+    assert spec is not None
+    assert spec.loader is not None
+    module = importlib.util.module_from_spec(spec)
+    sys.modules[name] = module  # dataclasses of the file look their module up
+    try:
+        spec.loader.exec_module(module)
+    except Exception as error:
+        del sys.modules[name]
+        raise _broken(path, error) from error
+    return module
+
+
+def _from_module(name: str) -> Any:
+    try:
+        return importlib.import_module(name)
+    except Exception as error:
+        raise _broken(name, error) from error
+
+
+def _broken(where: object, error: Exception) -> InputError:
+    got = f"{type(error).__name__}: {error}"
+    return InputError(file=where, got=got, expected="a module that can be imported", remedy="correct it")
+
+
+def _checked(found: Any, spec: str) -> type[Tracker]:
+    missing = [name for name in ("needs", "reset", "step") if not hasattr(found, name)]
+    needs = getattr(found, "needs", ())
+    if missing or isinstance(needs, str) or not needs or not set(needs) <= set(NEEDS):
+        got = "no " + ", ".join(missing) if missing else f"needs = {needs!r}"
+        expected = f"a class with reset(context, seed), step(frame, detections) and needs, a tuple out of {NEEDS}"
+        raise InputError(file=spec, got=got, expected=expected, remedy="see docs/trackers.md")
+    return found  # type: ignore[no-any-return]
+
+
+def own_detector(needs: tuple[str, ...], sequence: Sequence) -> bool:
+    """Does the tracker run a detector of its own on this sequence's pictures?"""
+    return ("pixels" in needs and sequence.has_images) or ("stereo" in needs and sequence.has_right)
+
+
+def choose_mode(needs: tuple[str, ...], sequence: Sequence, asked: DetectionMode | None) -> DetectionMode:
+    """The detection mode: the asked one if it can work, else image, file, truth in this order; InputError if none."""
+    able = [mode for mode in ("image", "file", "truth") if _works(mode, needs, sequence)]
+    if asked in able or (asked is None and able):
+        return asked or able[0]  # type: ignore[return-value]
+    got = f"a tracker that needs {' or '.join(needs)}, and {sequence.name} with {_has(sequence)}"
+    expected = f"--detections {asked}" if asked else "detections of some kind"
+    remedy = f"try --detections {able[0]}" if able else "take another tracker or source"
+    raise InputError(place="--detections", got=got, expected=f"what {expected} needs", remedy=remedy)
+
+
+def _works(mode: str, needs: tuple[str, ...], sequence: Sequence) -> bool:
+    if mode == "image":
+        return own_detector(needs, sequence)
+    takes = {"boxes", "points"} & set(needs)
+    return bool(takes) and (sequence.has_detections if mode == "file" else sequence.load_truth is not None)
+
+
+def _has(sequence: Sequence) -> str:
+    parts = {
+        "images": sequence.has_images,
+        "a right image": sequence.has_right,
+        "detections": sequence.has_detections,
+        "truth": sequence.load_truth is not None,
+    }
+    return ", ".join(name for name, there in parts.items() if there) or "nothing"
+
+
+def check_detections(detections: Detections, needs: tuple[str, ...]) -> None:
+    """Raise InputError on NaN or infinity (frame and row named), or where the tracker needs boxes and has none."""
+    rows = len(detections.pos)
+    arrays = [a for a in (detections.pos, detections.vel, detections.box, detections.score) if a is not None]
+    for a in arrays:
+        if a.size and not np.isfinite(a).all():
+            row = int(np.argwhere(~np.isfinite(a.reshape(len(a), -1)).all(1))[0, 0])
+            place = f"frame {detections.index}: detection {row + 1}"
+            raise InputError(place=place, got="NaN or infinity", expected="finite numbers", remedy="correct this row")
+    if rows and detections.box is None and "points" not in needs:
+        place = f"frame {detections.index}"
+        raise InputError(place=place, got="points", expected="boxes", remedy="take a tracker that takes points")
+
+
+def check_tracks(tracks: Any, index: int, tracker: str) -> Tracks:
+    """The answer to frame `index` itself (a missing score filled with ones); WorkError naming tracker, frame and fault.
+
+    Checked are type, index, shapes, finiteness, and that ids are non-negative and unique in the frame. An id that is
+    not reported for a while and comes back is the same track by definition.
+    """
+    if isinstance(tracks, Tracks) and not len(tracks.score):
+        tracks = tracks.replace(score=np.ones(len(tracks.id)))
+    fault = _fault(tracks, index)
+    if fault:
+        got, expected = fault
+        remedy = "correct the tracker's step()"
+        raise WorkError(file=tracker, place=f"frame {index}", got=got, expected=expected, remedy=remedy)
+    return tracks  # type: ignore[no-any-return]
+
+
+def _fault(tracks: Any, index: int) -> tuple[str, str] | None:
+    """What is wrong with an answer, as (got, expected), or None."""
+    if not isinstance(tracks, Tracks):
+        return type(tracks).__name__, "sim.types.Tracks"
+    if tracks.index != index:
+        return f"index {tracks.index}", f"index {index}"
+    if tracks.plane not in ("ground", "space", "image") or tracks.unit not in ("person", "group"):
+        return f"plane {tracks.plane!r}, unit {tracks.unit!r}", "plane ground, space or image; unit person or group"
+    n, d = len(tracks.id), 3 if tracks.plane == "space" else 2
+    shapes: dict[str, tuple[Any, tuple[int, ...]]] = {
+        "id": (tracks.id, (n,)),
+        "group": (tracks.group, (n,)),
+        "pos": (tracks.pos, (n, d)),
+        "vel": (tracks.vel, (n, d)),
+        "cov": (tracks.cov, (n, 2 * d, 2 * d)),
+        "score": (tracks.score, (n,)),
+    }
+    if tracks.box is not None:
+        shapes["box"] = (tracks.box, (n, 4))
+    for name, (a, shape) in shapes.items():
+        if np.shape(a) != shape:
+            return f"{name} of shape {np.shape(a)}", str(shape)
+        if not np.isfinite(a).all():
+            return f"NaN or infinity in {name}", "finite numbers"
+    return _id_fault(tracks)
+
+
+def _id_fault(tracks: Tracks) -> tuple[str, str] | None:
+    if tracks.id.dtype.kind != "i" or tracks.group.dtype.kind != "i":
+        return f"ids of type {tracks.id.dtype}, groups of type {tracks.group.dtype}", "int64"
+    if len(tracks.id) and tracks.id.min() < 0:
+        return f"id {tracks.id.min()}", "non-negative ids"
+    if len(set(tracks.id.tolist())) != len(tracks.id):
+        return "the same id twice", "unique ids in a frame"
+    return None

@@ -1,0 +1,224 @@
+"""Run a tracker over a sequence: choose the detections, build what it may know, loop, check its answers.
+
+`track(...)` is the whole; `prepare(...)` is its first half, for those who drive the loop themselves.
+"""
+
+from __future__ import annotations
+
+import importlib.util
+import time
+from collections.abc import Iterator, Mapping
+from collections.abc import Sequence as SequenceOf
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any, cast, overload
+
+import numpy as np
+
+from scenarios.errors import InputError
+from sim.types import Context, DetectionMode, Frame, Sequence, Tracker, Tracks
+from tracking import protocol
+from tracking.config import Config
+
+PERSON_HEIGHT = 1.7  # m, what the median box of an uncalibrated source stands for
+
+Params = Config | Mapping[str, Any] | str | Path | None
+
+
+@dataclass(frozen=True, eq=False)
+class Run(SequenceOf[Tracks]):
+    """A tracker's answers, one per frame in order, and how they came about (`info`, what run.json holds)."""
+
+    tracks: tuple[Tracks, ...]
+    info: dict[str, Any] = field(default_factory=dict)
+
+    @overload
+    def __getitem__(self, index: int) -> Tracks: ...
+    @overload
+    def __getitem__(self, index: slice) -> tuple[Tracks, ...]: ...
+    def __getitem__(self, index: int | slice) -> Tracks | tuple[Tracks, ...]:
+        return self.tracks[index]
+
+    def __len__(self) -> int:
+        return len(self.tracks)
+
+
+@dataclass(frozen=True, eq=False)
+class Prepared:
+    """A tracker that has not been reset, and all it will be given: frames() may be called more than once."""
+
+    name: str
+    tracker: Tracker
+    config: Config | None
+    context: Context
+    mode: DetectionMode
+    sequence: Sequence
+    feed: tuple[Frame, ...] | None
+
+    def frames(self) -> Iterator[Frame]:
+        """The frames as the tracker gets them."""
+        return iter(self.sequence) if self.feed is None else iter(self.feed)
+
+    def answer(self, frame: Frame) -> Tracks:
+        """One step, its input and output checked."""
+        detections = None if self.mode == "image" else frame.detections
+        if detections is not None:
+            protocol.check_detections(detections, self.tracker.needs)
+        return protocol.check_tracks(self.tracker.step(frame, detections), frame.index, self.name)
+
+
+def track(
+    tracker: str | type[Tracker] | Tracker,
+    sequence: Sequence,
+    *,
+    params: Params = None,
+    detections: DetectionMode | None = None,
+    sensor: Mapping[str, Any] | None = None,
+    seed: int = 0,
+) -> Run:
+    """Track a sequence with a registered tracker, "file.py:Class", "module:Class", a class or an instance.
+
+    params: its config, values by name or a TOML file. detections: "image", "file" or "truth"; by default the first that
+    can work. sensor: overrides that degrade "truth" (misses, clutter, noise, hiding). InputError where tracker and
+    source do not fit, before a frame is read; WorkError where the tracker's answer is no Tracks.
+    """
+    ready = prepare(tracker, sequence, params=params, detections=detections, sensor=sensor, seed=seed)
+    ready.tracker.reset(ready.context, seed)
+    made, spent = [], 0.0
+    for frame in ready.frames():
+        start = time.perf_counter()
+        made.append(ready.answer(frame))
+        spent += time.perf_counter() - start
+    answers = _with_groups(made, ready.context)
+    return Run(answers, describe(ready, answers, seed, sensor or {}, len(made) / spent if spent else 0.0))
+
+
+def prepare(
+    tracker: str | type[Tracker] | Tracker,
+    sequence: Sequence,
+    *,
+    params: Params = None,
+    detections: DetectionMode | None = None,
+    sensor: Mapping[str, Any] | None = None,
+    seed: int = 0,
+) -> Prepared:
+    """Everything up to the tracker's reset; arguments as in `track`."""
+    name, instance, config = _make(tracker, params)
+    mode = protocol.choose_mode(instance.needs, sequence, detections)
+    if sensor and mode != "truth":
+        remedy = "add --detections truth, or leave the sensor as it is"
+        raise InputError(place="--set sensor", got=f"--detections {mode}", expected="--detections truth", remedy=remedy)
+    feed = _feed(instance.needs, mode, sequence, sensor or {}, seed)
+    context = Context(
+        fps=sequence.fps,
+        px_per_m=_px_per_m(sequence, mode, feed),
+        camera=sequence.camera,
+        scene=sequence.scene,
+        image_size=sequence.image_size,
+        background=sequence.background() if mode == "image" else None,
+    )
+    return Prepared(name, instance, config, context, mode, sequence, feed)
+
+
+def _make(tracker: str | type[Tracker] | Tracker, params: Params) -> tuple[str, Tracker, Config | None]:
+    """The tracker's name, an instance and its config; a class takes its config from its `config_class`."""
+    if not isinstance(tracker, str | type):
+        if params is not None:
+            got = f"an instance of {type(tracker).__name__}"
+            raise InputError(place="params", got=got, expected="a class or a name", remedy="configure the instance")
+        return type(tracker).__name__, tracker, getattr(tracker, "config", None)
+    name = tracker if isinstance(tracker, str) else tracker.__name__
+    made = cast(Any, protocol.find(tracker) if isinstance(tracker, str) else tracker)
+    kind: type[Config] | None = getattr(made, "config_class", None)
+    if kind is None:
+        if params is not None:
+            remedy = "leave the parameters out, or give the class a config_class (docs/trackers.md)"
+            raise InputError(place="params", got=name, expected="a tracker with parameters", remedy=remedy)
+        return name, made(), None
+    config = _config(kind, params)
+    return name, made(config), config
+
+
+def _config(kind: type[Config], params: Params) -> Config:
+    if params is None:
+        return kind()
+    if isinstance(params, str | Path):
+        return kind.from_toml(params)
+    if isinstance(params, Mapping):
+        return kind.from_dict(params)
+    if not isinstance(params, kind):
+        remedy = "give the config of this very tracker"
+        raise InputError(place="params", got=type(params).__name__, expected=kind.__name__, remedy=remedy)
+    return params
+
+
+def _feed(
+    needs: tuple[str, ...], mode: DetectionMode, sequence: Sequence, sensor: Mapping[str, Any], seed: int
+) -> tuple[Frame, ...] | None:
+    """Frames with their detections, pictures left out; None where the sequence's own frames are to be streamed."""
+    if mode == "image" or (mode == "file" and "pixels" in needs):
+        return None
+    if mode == "file":
+        return tuple(Frame(f.index, f.t, detections=f.detections) for f in sequence)
+    from tracking.labelled import from_truth
+
+    found = from_truth(sequence, sensor, seed)
+    return tuple(Frame(d.index, d.t, detections=d) for d in found)
+
+
+def _px_per_m(sequence: Sequence, mode: DetectionMode, feed: tuple[Frame, ...] | None) -> float:
+    """px per metre: the camera's, the source's own, else the median height of the boxes given / 1.7; nan if none."""
+    if sequence.camera is not None:
+        from sim.camera import px_per_m_at_centre
+
+        return float(px_per_m_at_centre(sequence.camera))
+    if np.isfinite(sequence.px_per_m) or mode == "image":
+        return sequence.px_per_m
+    found = [f.detections for f in (sequence if feed is None else feed)]
+    heights = [d.box[:, 3] for d in found if d is not None and d.box is not None and len(d.box)]
+    return float(np.median(np.concatenate(heights))) / PERSON_HEIGHT if heights else float("nan")
+
+
+def _with_groups(made: list[Tracks], context: Context) -> tuple[Tracks, ...]:
+    """Groups and events by the baseline rule where the tracker left them empty."""
+    if all(t.groups is not None for t in made) or importlib.util.find_spec("tracking.grouping") is None:
+        return tuple(made)
+    from tracking.grouping import derive
+
+    return tuple(derive(made, context.fps, context.px_per_m))
+
+
+def describe(
+    ready: Prepared, answers: SequenceOf[Tracks], seed: int, sensor: Mapping[str, Any], frames_per_second: float
+) -> dict[str, Any]:
+    """What run.json holds; `frames_per_second` is the only entry that differs between two equal runs."""
+    measured = any(t.box is not None for t in answers)
+    sample = ready.context.background
+    return {
+        "tracker": ready.name,
+        "config": ready.config.as_dict() if ready.config else {},
+        "seed": seed,
+        "sequence": ready.sequence.name,
+        "detections": ready.mode,
+        "sensor": dict(sensor),
+        "plane": answers[0].plane if len(answers) else None,
+        "boxes": "measured" if measured else "projected" if ready.context.camera else "none",
+        "fps": ready.context.fps,
+        "px_per_m": None if np.isnan(ready.context.px_per_m) else ready.context.px_per_m,
+        "background": None if sample is None else ready.sequence.source.get("background", len(sample)),
+        "frames": len(answers),
+        "frames_per_second": frames_per_second,
+        "versions": _versions(),
+    }
+
+
+def _versions() -> dict[str, str]:
+    from importlib.metadata import PackageNotFoundError, version
+
+    found = {}
+    for name in ("flockscope", "numpy", "scipy"):
+        try:
+            found[name] = version(name)
+        except PackageNotFoundError:
+            continue
+    return found
