@@ -1,0 +1,52 @@
+"""Run roboflow `trackers` over MOT text; for an environment of its own (pip install trackers supervision).
+
+usage: python run_roboflow.py TRACKER DET.txt OUT.txt      TRACKER: sort, bytetrack, ocsort; their defaults throughout
+
+Needs nothing of flockscope. Writes rows `frame,id,left,top,width,height,score,-1,-1,-1` and prints one JSON object
+{"frames", "seconds"}: the time inside the tracker's update with its input type ready made, reading and writing left out.
+"""
+
+import json
+import sys
+import time
+import warnings
+
+import numpy as np
+
+warnings.filterwarnings("ignore")
+
+
+def read(path):
+    """Detections per frame: a list of (M, 5) left, top, width, height, score for frames 1..last."""
+    rows = np.loadtxt(path, delimiter=",", ndmin=2)
+    last = int(rows[:, 0].max())
+    return [rows[rows[:, 0] == frame][:, 2:7] for frame in range(1, last + 1)]
+
+
+def main(name, det, out):
+    import supervision
+    import trackers
+
+    kinds = {"sort": "SORTTracker", "bytetrack": "ByteTrackTracker", "ocsort": "OCSORTTracker"}
+    tracker = getattr(trackers, kinds[name])()
+    given = []
+    for box in read(det):
+        corners = np.c_[box[:, :2], box[:, :2] + box[:, 2:4]]
+        none = np.zeros(len(box), int)
+        given.append(supervision.Detections(xyxy=corners, confidence=box[:, 4].copy(), class_id=none))
+    answers, start = [], time.perf_counter()
+    for detections in given:
+        answers.append(tracker.update(detections))
+    seconds = time.perf_counter() - start
+    with open(out, "w") as file:
+        for frame, answer in enumerate(answers, 1):
+            for corners, score, id in zip(answer.xyxy, answer.confidence, answer.tracker_id, strict=True):
+                if id >= 0:
+                    left, top, right, bottom = corners
+                    box = ",".join(f"{v:.3f}" for v in (left, top, right - left, bottom - top, score))
+                    file.write(f"{frame},{id},{box},-1,-1,-1\n")
+    print(json.dumps({"frames": len(given), "seconds": seconds}))
+
+
+if __name__ == "__main__":
+    main(*sys.argv[1:])

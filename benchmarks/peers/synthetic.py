@@ -1,0 +1,141 @@
+"""Box sequences with occlusion, to choose defaults on: people walking on a plane before a tilted camera.
+
+Not the simulator: its own short model, so that a tracker's defaults are not fitted to the simulator's ways. Boxes are
+lost when others cover them, jitter with memory from frame to frame, suppress each other as detectors' do, and false ones
+stay for some frames. `plain` is the field of constant-velocity squares that peers are timed on.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+WIDTH, HEIGHT = 640.0, 480.0
+
+
+@dataclass(frozen=True)
+class Boxes:
+    """fps, image size; per frame true ids, true boxes (ltwh), detected boxes with a score (M, 5)."""
+
+    name: str
+    fps: float
+    size: tuple[int, int]
+    ids: list[np.ndarray]
+    truth: list[np.ndarray]
+    found: list[np.ndarray]
+
+
+def plain(n: int, frames: int = 200, p_detect: float = 1.0, clutter: float = 0.0, seed: int = 1) -> Boxes:
+    """n squares of 40 px with constant velocity in 1920 x 1080, centre noise 1.5 px, shuffled."""
+    r = np.random.default_rng(seed)
+    p = np.c_[r.uniform(200, 1720, n), r.uniform(150, 930, n)]
+    angle, speed = r.uniform(0, 2 * np.pi, n), r.uniform(1, 3, n)
+    v = np.c_[speed * np.cos(angle), speed * np.sin(angle)]
+    ids, truth, found = [], [], []
+    for frame in range(frames):
+        c = p + v * frame
+        keep = r.random(n) < p_detect
+        z = c[keep] + r.normal(0, 1.5, (keep.sum(), 2))
+        k = r.poisson(clutter)
+        z = np.r_[z, np.c_[r.uniform(0, 1920, k), r.uniform(0, 1080, k)]]
+        z = z[r.permutation(len(z))]
+        ids.append(np.arange(n))
+        truth.append(np.c_[c - 20, np.full((n, 2), 40.0)])
+        found.append(np.c_[z - 20, np.full((len(z), 2), 40.0), np.full(len(z), 0.9)])
+    return Boxes(f"plain-{n}-{p_detect:g}-{clutter:g}", 30.0, (1920, 1080), ids, truth, found)
+
+
+def walk(seed: int, *, seconds: float = 30.0) -> Boxes:
+    """One scene: frame rate, camera height, density and detector drawn from the seed."""
+    r = np.random.default_rng(seed)
+    fps = float(r.choice([7, 10, 14, 25, 30]))
+    camera = float(r.uniform(1.6, 7.0)), float(r.uniform(5, 14)), float(r.uniform(500, 900))
+    people = int(r.integers(4, 16))
+    p_detect, clutter, jitter = r.uniform(0.8, 0.98), r.uniform(0.05, 0.6), r.uniform(0.02, 0.06)
+    paths = _paths(r, people, int(seconds * fps), fps, camera)
+    return _see(r, paths, fps, camera, p_detect, clutter, jitter, f"walk-{seed}")
+
+
+def _paths(r, people, frames, fps, camera):
+    """(T, P, 2) ground positions: walkers, some in pairs, with a slowly changing velocity, turned back at the edges."""
+    half, near, far = 0.75 * camera[1], camera[1] * 0.6, camera[1] * 2.0
+    p = np.c_[r.uniform(-half, half, people), r.uniform(near, far, people)]
+    angle = np.where(r.random(people) < 0.6, r.choice([0.0, np.pi], people), r.uniform(0, 2 * np.pi, people))
+    speed = np.clip(r.normal(1.25, 0.25, people), 0.3, 2.0) * (r.random(people) > 0.1)
+    want = np.c_[speed * np.cos(angle), speed * np.sin(angle)]
+    for i in range(1, people):
+        if r.random() < 0.4:
+            p[i], want[i] = p[i - 1] + r.normal(0, 0.2, 2) + [0.3, 0.6], want[i - 1]
+    v, dt, path = want.copy(), 1 / fps, []
+    for _ in range(frames):
+        v += (want - v) * dt / 0.7 + r.normal(0, 0.35 * np.sqrt(dt), v.shape)
+        p = p + v * dt
+        for axis, (low, high) in enumerate(((-1.4 * half, 1.4 * half), (near, far))):
+            out = ((p[:, axis] < low) & (want[:, axis] < 0)) | ((p[:, axis] > high) & (want[:, axis] > 0))
+            want[out, axis] *= -1
+        turn = r.random(people) < dt / 12
+        want[turn] = want[turn] @ np.array([[0.0, 1.0], [-1.0, 0.0]])
+        path.append(p.copy())
+    return np.array(path)
+
+
+def _see(r, paths, fps, camera, p_detect, clutter, jitter, name):
+    high, _, focal = camera
+    people = paths.shape[1]
+    tall, phase = r.normal(1.7, 0.08, people), r.uniform(0, 2 * np.pi, people)
+    horizon = HEIGHT / 2 - focal * np.tan(np.arctan2(high, camera[1] * 1.1) * 0.8)
+    error, ghosts = np.zeros((people, 4)), []
+    memory = np.exp(-1 / (fps * 0.15))
+    lost = np.zeros(people, bool)
+    stay = np.exp(-1 / (fps * 0.12))
+    ids, truth, found = [], [], []
+    for frame, p in enumerate(paths):
+        depth = p[:, 1]
+        foot, size = horizon + focal * high / depth, focal * tall / depth
+        wide = size * (0.38 + 0.08 * np.sin(2 * np.pi * 0.9 * frame / fps + phase))
+        box = np.c_[WIDTH / 2 + focal * p[:, 0] / depth - wide / 2, foot - size, wide, size]
+        centre = box[:, :2] + box[:, 2:] / 2
+        within = ((centre > 0) & (centre < [WIDTH, HEIGHT])).all(1)
+        seen = _visible(box, depth)
+        fresh = r.random(people) > p_detect
+        lost = np.where(r.random(people) < stay, lost, fresh)
+        error = memory * error + np.sqrt(1 - memory**2) * r.normal(0, jitter, (people, 4))
+        chance = np.clip((seen - 0.25) / 0.35, 0, 1)
+        hit = within & ~lost & (r.random(people) < chance)
+        noisy = box + error * size[:, None]
+        noisy[:, 2:] = np.maximum(noisy[:, 2:], 4)
+        score = np.clip(0.55 + 0.45 * seen + r.normal(0, 0.05, people), 0.3, 1)
+        ghosts = [g for g in ghosts if r.random() > 1 / (fps * 0.2)]
+        for _ in range(r.poisson(clutter * 5 / fps)):
+            side = r.uniform(0.7, 1.3) * np.median(size)
+            ghosts.append(np.r_[r.uniform(0, WIDTH), r.uniform(0, HEIGHT - side), 0.4 * side, side, r.uniform(0.5, 0.9)])
+        rows = np.r_[np.c_[noisy, score][hit], np.array(ghosts).reshape(-1, 5)]
+        ids.append(np.flatnonzero(within) + 1)
+        truth.append(box[within])
+        found.append(_suppress(rows)[: len(rows)])
+    return Boxes(name, fps, (int(WIDTH), int(HEIGHT)), ids, truth, found)
+
+
+def _visible(box, depth):
+    """Share of each box that no nearer box covers, on a 12 x 12 grid."""
+    u = (np.arange(12) + 0.5) / 12
+    grid = box[:, None, :2] + np.stack(np.meshgrid(u, u), -1).reshape(1, -1, 2) * box[:, None, 2:]
+    covers = ((grid[:, :, None] > box[None, None, :, :2]) & (grid[:, :, None] < (box[:, :2] + box[:, 2:])[None, None])).all(3)
+    covers &= (depth[None] < depth[:, None])[:, None]
+    return 1 - covers.any(2).mean(1)
+
+
+def _suppress(rows, limit=0.6):
+    """Greedy non-maximum suppression by IoU."""
+    kept = []
+    for row in rows[np.argsort(-rows[:, 4])]:
+        if all(_iou(row, other) < limit for other in kept):
+            kept.append(row)
+    return np.array(kept).reshape(-1, 5)
+
+
+def _iou(a, b):
+    low, high = np.maximum(a[:2], b[:2]), np.minimum(a[:2] + a[2:4], b[:2] + b[2:4])
+    shared = np.prod(np.maximum(high - low, 0))
+    return shared / (a[2] * a[3] + b[2] * b[3] - shared)

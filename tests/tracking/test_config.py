@@ -1,0 +1,102 @@
+"""Configs: declared once, parsed strictly, derived everywhere; the frozen first defaults still load."""
+
+from __future__ import annotations
+
+import dataclasses
+from pathlib import Path
+
+import pytest
+
+from scenarios.errors import InputError
+from tracking.config import Config, param
+from tracking.papers.blob_config import BlobConfig
+
+FROZEN = Path(__file__).resolve().parents[2] / "tracking" / "frozen" / "blob.toml"
+
+
+@dataclasses.dataclass(frozen=True)
+class Small(Config):
+    tracker = "small"
+    rate: float = param(1.0, (0.1, 10.0), "1/s", "a rate", "log")
+    count: int = param(3, (1, 9), "", "a count", "int", online=False)
+    kind: str = param("a", ("a", "b"), "", "a choice", "categorical")
+    on: bool = param(True, (True, False), "", "a switch", "categorical", tunable=False)
+
+
+def test_spaces_are_derived():
+    assert [p.name for p in Small.space()] == ["rate", "count", "kind"]
+    assert [p.name for p in Small.space(online=True)] == ["rate", "kind"]
+    rate = Small.params()["rate"]
+    assert (rate.default, rate.low, rate.high, rate.scale, rate.unit) == (1.0, 0.1, 10.0, "log", "1/s")
+
+
+def test_set_parses_each_kind():
+    config = Small().with_set("rate=2", "tracker.count=4", "kind=b", "on=false")
+    assert config == Small(2.0, 4, "b", False)
+    assert type(config.rate) is float
+
+
+@pytest.mark.parametrize(
+    ("assignment", "words"),
+    [
+        ("raet=2", "did you mean rate?"),
+        ("rate=11", "a number from 0.1 to 10"),
+        ("rate=nan", "a number from 0.1 to 10"),
+        ("rate=x", "a number from 0.1 to 10"),
+        ("count=2.5", "an integer"),
+        ("kind=c", "one of a, b"),
+        ("rate", "name=value"),
+    ],
+)
+def test_wrong_assignments_name_what_was_expected(assignment, words):
+    with pytest.raises(InputError, match=words.replace("?", r"\?")):
+        Small().with_set(assignment)
+
+
+@pytest.mark.parametrize("values", [{"rate": True}, {"rate": "1"}, {"count": 10}, {"on": 1}, {"kind": "c"}])
+def test_wrong_values_are_refused(values):
+    with pytest.raises(InputError):
+        Small.from_dict(values)
+
+
+def test_toml_round_trip(tmp_path):
+    path, config = tmp_path / "p.toml", Small(0.30000000000000004, 5, "b", False)
+    path.write_text(config.to_toml())
+    assert Small.from_toml(path) == config
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ('tracker = "blob"', "expected small"),
+        ("[params]\nrat = 1", "did you mean rate"),
+        ("rate = 1", "under"),
+        ("params = 3", "under"),
+        ("x = = 1", "TOML"),
+    ],
+)
+def test_wrong_files_are_one_line(tmp_path, text, words):
+    path = tmp_path / "p.toml"
+    path.write_text(text)
+    with pytest.raises(InputError, match=words) as caught:
+        Small.from_toml(path)
+    assert "\n" not in str(caught.value)
+    assert "p.toml" in str(caught.value)
+
+
+def test_missing_file(tmp_path):
+    with pytest.raises(InputError, match="No such file"):
+        Small.from_toml(tmp_path / "none.toml")
+
+
+def test_table_has_every_parameter():
+    table = BlobConfig.table()
+    assert all(f"| `{name}` |" in table for name in BlobConfig.params())
+    assert all(p.meaning and p.default == getattr(BlobConfig(), p.name) for p in BlobConfig.params().values())
+
+
+def test_frozen_first_defaults_still_load():
+    frozen = BlobConfig.from_toml(FROZEN)
+    assert frozen.association == "nearest"
+    assert (frozen.gate, frozen.coast_time, frozen.report_coast) == (0.99, 1.0, 0.3)
+    frozen.dynamics(25.0)
