@@ -11,7 +11,8 @@ from scenarios.document import nearest
 from scenarios.errors import InputError
 from scenarios.plan import bounds, clearance, fits, fixed
 from scenarios.schema import Merge, Queue, Scenario, Split, group_names
-from scenarios.script import check_script, fail
+from scenarios.script import QUEUE_PEOPLE, check_script, fail
+from scenarios.stage import slots
 
 BODY = 0.2
 """m: nobody's middle can be closer to a wall or pillar (the physics radius)."""
@@ -96,12 +97,12 @@ def _check_points(scenario: Scenario) -> None:
         for x, y in [] if at is None else [at, (width - at[0], at[1])][: 1 + scenario.mirror]:
             gap, what = clearance((x, y), scenario.world)
             if gap < BODY:
-                got = f"[{x:g}, {y:g}], {max(gap, 0):.2f} m from {what}"
+                got = f"[{x:.4g}, {y:.4g}], {max(gap, 0):.2f} m from {what}"
                 fail(place, got, f"{BODY} m of room for a body", "move it away")
 
 
 def points(scenario: Scenario) -> Iterator[tuple[str, Point]]:
-    """Every place that people are sent to or start from, with its key."""
+    """Every place that people are sent to or start from, with its key; a queue's least slots each under its `at`."""
     for group in scenario.group:
         yield f"group.{group.id}.start", group.start
         yield f"group.{group.id}.goal", group.goal
@@ -116,7 +117,7 @@ def points(scenario: Scenario) -> Iterator[tuple[str, Point]]:
                 yield from ((f"{key}.parts.{part.id}.via.{k}", point) for k, point in enumerate(part.via))
             continue
         if isinstance(event, Queue):
-            yield f"{key}.at", event.at
+            yield from ((f"{key}.at", slot) for slot in slots(event, QUEUE_PEOPLE))
         else:
             yield from ((f"{key}.via.{k}", point) for k, point in enumerate(event.via))
         if event.goal is not None and not isinstance(event.goal, str):

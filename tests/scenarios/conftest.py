@@ -10,13 +10,18 @@ SCENARIO = """
 schema = 1
 about = "merge, split and queue"
 duration = 30.0
-world = { size = [16, 10], walls = [[0, 9.5, 16, 9.5]], doors = [{ at = [4, 9.5], width = 1.2 }], pillars = [[2, 2, 0.5]] }
 camera = { fps = 10, tilt_deg = 40 }
 group = [
   { id = "a", size = 3, start = [5, 5], goal = [11, 5], speed = { normal = [1.2, 0.1] } },
   { id = "b", size = 2, start = [11, { uniform = [3, 5] }], goal = [8, 5], via = [[9, 4]] },
   { id = "w", size = 1, start = [13, 2], goal = [14, 2], repeat = 3 },
 ]
+
+[world]
+size = [16, 10]
+walls = [[0, 9.5, 16, 9.5]]
+doors = [{ at = [4, 9.5], width = 1.2 }]
+pillars = [[2, 2, 0.5]]
 
 [[event]]
 id = "m1"

@@ -43,6 +43,8 @@ NO_EVENT = "event=[]"
         (["group.b.via=[[9, 11]]"], "group.b.via.0", "y = 11"),
         (["event.s1.parts.d.goal=[8, 12]"], "event.s1.parts.d.goal", "y = 12"),
         (["event.q1.at=[12, 9.4]"], "event.q1.at", "the wall"),
+        (["event.q1.at=[12, 7.8]"], "event.q1.at", "the wall"),
+        (["event.q1.at=[1, 7]", "event.q1.direction_deg=180"], "event.q1.at", "x = -0.6"),
         (["group.a.start=[2.4, 2]"], "group.a.start", "the pillar"),
         (
             ["group.a.start=[14, 2.2]", "group.w.start=[8, 2]", "group.w.goal=[9, 2]", "mirror=true"],
