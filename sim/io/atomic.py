@@ -1,0 +1,118 @@
+"""Writing so that nothing is ever seen half-written: beside the target, flushed to disk, then renamed."""
+
+from __future__ import annotations
+
+import errno
+import os
+import shutil
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager, suppress
+from pathlib import Path
+
+from scenarios.errors import FlockscopeError, InputError, WorkError
+
+PARTIAL = ".partial-"
+FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
+
+
+def refusal(path: Path, error: OSError) -> FlockscopeError:
+    """What an OSError while writing means to the user."""
+    reason = error.strerror or type(error).__name__
+    if error.errno in FULL:
+        return WorkError(
+            file=path, got=reason, expected="room on the disk", remedy="free some; what was complete is kept"
+        )
+    return InputError(file=path, got=reason, expected="a folder that can be written", remedy="choose another --out")
+
+
+@contextmanager
+def writing(target: Path) -> Iterator[Path]:
+    """A partial path beside the target to write to; gone afterwards, and so are folders made for nothing."""
+    partial = target.parent / f"{PARTIAL}{target.name}-{os.getpid()}"
+    made = [p for p in (target.parent, *target.parent.parents) if not p.exists()]
+    try:
+        target.parent.mkdir(parents=True, exist_ok=True)
+        yield partial
+    except OSError as error:
+        raise refusal(target, error) from error
+    finally:
+        _remove(partial)
+        with suppress(OSError):
+            for folder in made:
+                folder.rmdir()
+
+
+def write_file(target: Path, content: bytes) -> None:
+    """A file, whole or not at all."""
+    with writing(target) as partial:
+        _flushed(partial, content)
+        os.replace(partial, target)
+        _flush_folder(target.parent)
+
+
+def write_folder(target: Path, files: Mapping[str, bytes]) -> None:
+    """A folder of files, whole or not at all; one that stood there is replaced."""
+    with writing(target) as partial:
+        _fill(partial, files)
+        if target.exists():
+            _remove(target)
+        os.rename(partial, target)
+        _flush_folder(target.parent)
+
+
+def write_into(target: Path, files: Mapping[str, bytes], stale: tuple[str, ...] = ()) -> None:
+    """Files into a folder that may hold others: all are on the disk before the first takes its place, in order.
+
+    stale: names of an earlier run that go away unless written again.
+    """
+    with writing(target) as partial:
+        _fill(partial, files)
+        target.mkdir(exist_ok=True)
+        for name in stale:
+            if name not in files:
+                (target / name).unlink(missing_ok=True)
+        for name in files:
+            (target / name).parent.mkdir(parents=True, exist_ok=True)
+            os.replace(partial / name, target / name)
+        _flush_folder(target)
+
+
+def sweep(folder: Path) -> None:
+    """Remove what killed runs left behind in a folder."""
+    if folder.is_dir():
+        for path in folder.glob(f"{PARTIAL}*"):
+            _remove(path)
+
+
+def _fill(folder: Path, files: Mapping[str, bytes]) -> None:
+    folder.mkdir()
+    for name, content in files.items():
+        path = folder / name
+        path.parent.mkdir(parents=True, exist_ok=True)
+        _flushed(path, content)
+    for path in {folder, *((folder / name).parent for name in files)}:
+        _flush_folder(path)
+
+
+def _flushed(path: Path, content: bytes) -> None:
+    with path.open("wb") as file:
+        file.write(content)
+        file.flush()
+        os.fsync(file.fileno())
+
+
+def _flush_folder(path: Path) -> None:
+    """Flush a folder's entries, where the system can."""
+    with suppress(OSError):
+        descriptor = os.open(path, os.O_RDONLY)
+        try:
+            os.fsync(descriptor)
+        finally:
+            os.close(descriptor)
+
+
+def _remove(path: Path) -> None:
+    if path.is_dir() and not path.is_symlink():
+        shutil.rmtree(path, ignore_errors=True)
+    else:
+        path.unlink(missing_ok=True)

@@ -1,0 +1,148 @@
+"""MOTChallenge folders and bare text files as Sequences."""
+
+from __future__ import annotations
+
+import configparser
+import warnings
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from scenarios.errors import InputError
+from sim.io import mot
+from sim.io.numbers import read_text
+from sim.types import Camera, Frame, Image, Sequence
+
+DEFAULT_FPS = 25.0
+IMAGE_SUFFIXES = (".jpg", ".jpeg", ".png", ".bmp")
+
+
+@dataclass(frozen=True)
+class SeqInfo:
+    """seqinfo.ini, None where it does not say."""
+
+    name: str
+    fps: float | None
+    length: int | None
+    image_size: tuple[int, int] | None
+    image_dir: str = "img1"
+
+
+def read_seqinfo(path: Path) -> SeqInfo:
+    """seqinfo.ini; InputError where a value makes no sense."""
+    parser = configparser.ConfigParser(interpolation=None)
+    try:
+        parser.read_string(read_text(path))
+    except configparser.Error as error:
+        reason = error.message.splitlines()[0]
+        raise InputError(file=path, got=reason, expected="key=value lines", remedy="correct the file") from None
+    section = dict(parser["Sequence"]) if parser.has_section("Sequence") else {}
+
+    def number(key: str) -> float | None:
+        text = section.get(key.lower())
+        try:
+            value = None if text is None else float(text)
+        except ValueError:
+            value = float("nan")
+        if value is not None and not 0 < value < mot.MAX_FRAME:
+            raise InputError(file=path, place=key, got=repr(text), expected="a positive number", remedy="correct it")
+        return value
+
+    length, w, h = number("seqLength"), number("imWidth"), number("imHeight")
+    return SeqInfo(
+        section.get("name", path.parent.name),
+        number("frameRate"),
+        None if length is None else int(length),
+        None if w is None or h is None else (int(w), int(h)),
+        section.get("imdir", "img1"),
+    )
+
+
+def frame_rate(given: float | None, found: float | None, path: Path) -> float:
+    """--fps, else what the recording says, else 25 with a warning."""
+    if given is not None:
+        if not given > 0:
+            raise InputError(place="fps", got=given, expected="a number above 0", remedy="correct --fps")
+        return given
+    if found is None:
+        warnings.warn(f"{path}: no frame rate, taken as {DEFAULT_FPS:g} fps (--fps says otherwise)", stacklevel=3)
+        return DEFAULT_FPS
+    return found
+
+
+def open_folder(
+    path: Path,
+    *,
+    fps: float | None = None,
+    px_per_m: float | None = None,
+    camera: Camera | None = None,
+    images: bool = False,
+) -> Sequence:
+    """A MOTChallenge folder as Sequence. Frames carry pixels only if `images` (decoded one by one)."""
+    ini = path / "seqinfo.ini"
+    info = read_seqinfo(ini) if ini.is_file() else SeqInfo(path.name, None, None, None)
+    rate = frame_rate(fps, info.fps, path)
+    scale = float("nan") if px_per_m is None else px_per_m
+    gt, det = path / "gt" / "gt.txt", path / "det" / "det.txt"
+    pictures = list_images(path / info.image_dir)
+    found = mot.read_detections(det, info.length) if det.is_file() else None
+    length = info.length or _length(found, gt, pictures)
+
+    def frames() -> Iterator[Frame]:
+        for index in range(1, length + 1):
+            here = None if found is None else mot.detections_at(found, index, rate)
+            image = read_image(pictures[index - 1]) if images and index <= len(pictures) else None
+            yield Frame(index, (index - 1) / rate, image, None, here)
+
+    return Sequence(
+        name=info.name, fps=rate, length=length, frames=frames,
+        load_truth=(lambda: mot.read_truth(gt, info.name, rate, length, scale)) if gt.is_file() else None,
+        image_size=info.image_size, camera=camera, px_per_m=scale, has_images=bool(pictures),
+        has_detections=found is not None, source={"kind": "mot", "path": str(path)},
+    )  # fmt: skip
+
+
+def open_text(path: Path, *, fps: float | None = None, px_per_m: float | None = None) -> Sequence:
+    """A bare MOT text file as Sequence: detections where every id is -1, else truth."""
+    rate = frame_rate(fps, None, path)
+    scale = float("nan") if px_per_m is None else px_per_m
+    found = mot.read_detections(path, None)
+    length = int(found.frame.max(initial=0))
+    nobody = bool((found.id == -1).all())
+
+    def frames() -> Iterator[Frame]:
+        for index in range(1, length + 1):
+            here = mot.detections_at(found, index, rate) if nobody else None
+            yield Frame(index, (index - 1) / rate, detections=here)
+
+    return Sequence(
+        name=path.stem, fps=rate, length=length, frames=frames,
+        load_truth=None if nobody else lambda: mot.read_truth(path, path.stem, rate, length, scale),
+        px_per_m=scale, has_detections=nobody, source={"kind": "mot text", "path": str(path)},
+    )  # fmt: skip
+
+
+def list_images(folder: Path) -> list[Path]:
+    """The images of a folder in the order of their names."""
+    if not folder.is_dir():
+        return []
+    return sorted(p for p in folder.iterdir() if p.suffix.lower() in IMAGE_SUFFIXES)
+
+
+def read_image(path: Path) -> Image:
+    """(H, W, 3) BGR uint8."""
+    import cv2
+
+    image = cv2.imread(str(path), cv2.IMREAD_COLOR)
+    if image is None:
+        raise InputError(file=path, got="no readable picture", expected="JPG or PNG", remedy="restore the file")
+    return np.asarray(image, np.uint8)
+
+
+def _length(found: mot.MotTable | None, gt: Path, pictures: list[Path]) -> int:
+    last = 0 if found is None else int(found.frame.max(initial=0))
+    if gt.is_file():
+        last = max(last, int(mot.read_table(gt).frame.max(initial=0)))
+    return max(last, len(pictures))

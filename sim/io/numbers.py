@@ -1,0 +1,95 @@
+"""Strict reading of numeric text: one table of numbers, and one clear line about the first that is wrong."""
+
+from __future__ import annotations
+
+import io
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from scenarios.errors import InputError
+from sim.types import Array, Bools, Ints
+
+
+@dataclass(frozen=True)
+class Rows:
+    """Numbers of a text file: values (N, C), line (N,) the 1-based line of each row."""
+
+    file: Path
+    values: Array
+    line: Ints
+
+    def refuse(self, wrong: Bools | np.bool_, expected: str, remedy: str) -> None:
+        """InputError about the first row where `wrong` (N,) holds."""
+        if np.any(wrong):
+            k = int(np.argmax(wrong))
+            got = ",".join(f"{v:g}" for v in self.values[k])
+            raise InputError(file=self.file, place=f"line {self.line[k]}", got=got, expected=expected, remedy=remedy)
+
+    def whole(self, column: int, name: str) -> Ints:
+        """A column as integers; InputError where a value is none."""
+        v = self.values[:, column]
+        self.refuse((v != np.round(v)) | (np.abs(v) > 2**52), f"a whole number as {name}", f"correct the {name}")
+        return v.astype(np.int64)
+
+
+def read_text(path: Path) -> str:
+    """The text of a file; InputError where there is none to be had."""
+    try:
+        return path.read_text(encoding="utf-8-sig")
+    except UnicodeDecodeError as error:
+        raise InputError(
+            file=path, place=f"byte {error.start}", got="no UTF-8 text", expected="a text file", remedy="check the path"
+        ) from None
+    except OSError as error:
+        raise InputError(
+            file=path, got=error.strerror or "no access", expected="a readable file", remedy="check the path"
+        ) from None
+
+
+def read_rows(path: Path, columns: tuple[int, int]) -> Rows:
+    """All non-empty lines as numbers, separated by commas, else by blanks; as many columns in each line.
+
+    InputError (line, got, expected) for a word, NaN or infinity, or a number of columns outside `columns`.
+    """
+    numbered = [(k, line) for k, line in enumerate(read_text(path).splitlines(), 1) if line.strip()]
+    if not numbered:
+        return Rows(path, np.zeros((0, columns[0])), np.zeros(0, np.int64))
+    lines = np.array([k for k, _ in numbered], np.int64)
+    separator = "," if "," in numbered[0][1] else None
+    try:
+        text = io.StringIO("\n".join(line for _, line in numbered))
+        values = np.loadtxt(text, delimiter=separator, comments=None, ndmin=2, dtype=np.float64)
+    except ValueError:
+        raise _first_bad_line(path, numbered, separator) from None
+    rows = Rows(path, values, lines)
+    low, high = columns
+    if not low <= values.shape[1] <= high:
+        span = str(low) if low == high else f"{low} to {high}"
+        rows.refuse(np.ones(len(lines), bool), f"{span} columns", "check that this is the right file")
+    rows.refuse(~np.isfinite(values).all(axis=1), "finite numbers", "remove or correct the line")
+    return rows
+
+
+def _first_bad_line(path: Path, numbered: list[tuple[int, str]], separator: str | None) -> InputError:
+    """What is wrong with the first line that is no row of as many numbers as the first."""
+    width = len(numbered[0][1].split(separator))
+    for k, line in numbered:
+        cells = line.split(separator)
+        bad = next((c for c in cells if not _is_number(c)), None)
+        if bad is not None or len(cells) != width:
+            got = repr(bad.strip()) if bad is not None else f"{len(cells)} columns"
+            expected = "a number" if bad is not None else f"{width} columns, as in the first line"
+            return InputError(
+                file=path, place=f"line {k}", got=got, expected=expected, remedy="remove or correct the line"
+            )
+    return InputError(file=path, got="unreadable numbers", expected="rows of numbers", remedy="check the file")
+
+
+def _is_number(cell: str) -> bool:
+    try:
+        float(cell)
+    except ValueError:
+        return False
+    return True
