@@ -1,0 +1,254 @@
+"""Many sequences at once: every entry with every seed, stored as a dataset, by as many processes as wanted.
+
+A sequence is whole or not there, so an interrupted run goes on where it was; what is stored depends on scenario,
+seed and versions alone, never on the number of workers.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Iterable, Iterator
+from contextlib import contextmanager, suppress
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+from scenarios.errors import FlockscopeError, InputError, WorkError
+from scenarios.load import Entry
+from sim.io import store
+from sim.io.atomic import refusal, sweep, write_file
+
+SPLITS = (("train", 0, 10_000), ("val", 10_000, 20_000), ("test", 20_000, 30_000), ("fit", 30_000, 40_000))
+DEMO = ("demo", 40_000, 2**63)
+Progress = Callable[[int, int, str], None]
+
+
+@dataclass(frozen=True)
+class Job:
+    """One sequence to make: where, and of what."""
+
+    folder: Path
+    entry: Entry
+    seed: int
+
+    @property
+    def name(self) -> str:
+        """The sequence's name."""
+        return self.folder.name
+
+
+def split_of(seeds: range) -> str:
+    """train, val, test, fit or demo; InputError for a range that crosses two or holds nothing."""
+    if len(seeds) == 0 or min(seeds) < 0:
+        raise InputError(
+            place="seeds", got=f"{seeds.start}:{seeds.stop}", expected="a:b with 0 <= a < b", remedy="correct --seeds"
+        )
+    for name, low, high in (*SPLITS, DEMO):
+        if low <= min(seeds) < high:
+            if max(seeds) < high:
+                return name
+            raise InputError(
+                place="seeds", got=f"{seeds.start}:{seeds.stop}", expected=f"a range inside {low}:{high} ({name})",
+                remedy=f"end the range at {high} or begin it there",
+            )  # fmt: skip
+    raise AssertionError("every seed has a split")
+
+
+def generate(
+    entries: Iterable[Entry | str],
+    seeds: range,
+    out: str | Path,
+    *,
+    set: Iterable[str] = (),
+    workers: int = 1,
+    streams: Iterable[str] = (),
+    progress: Progress | None = None,
+) -> list[Path]:
+    """Make OUT/flockscope-<split>/<name>-s<seed>/ of every entry (or name of one) and seed, and OUT/seqmaps.
+
+    Sequences that are complete and of the same scenario and seed are kept. progress(done, all, name) is called after
+    each. InputError before anything is made where names clash, the range is wrong, or a folder holds another
+    scenario's sequence; WorkError at the end, the others kept, where a sequence failed.
+    """
+    if any(s != "none" for s in streams):
+        raise InputError(
+            place="streams",
+            got=",".join(streams),
+            expected="none",
+            remedy="leave --streams out: no pixels are made yet",
+        )
+    if workers < 1:
+        raise InputError(place="workers", got=workers, expected="1 or more", remedy="correct --workers")
+    split, root = split_of(seeds), Path(out)
+    folder = root / f"flockscope-{split}"
+    jobs = plan(_resolved(entries, set), seeds, folder)
+    with _alone(root):
+        sweep(folder)
+        waiting = [job for job in jobs if not is_done(job)]
+        try:
+            errors = _run(waiting, workers, _counted(progress, len(jobs) - len(waiting), len(jobs)))
+        finally:
+            sweep(folder)
+        write_seqmap(root, split)
+    if errors:
+        raise _summary(errors, len(jobs))
+    return [job.folder for job in jobs]
+
+
+def _resolved(entries: Iterable[Entry | str], set: Iterable[str]) -> list[Entry]:
+    from scenarios.load import resolve
+
+    settings = tuple(set)
+    return [e for entry in entries for e in (resolve(entry, settings) if isinstance(entry, str) else [entry])]
+
+
+def plan(entries: list[Entry], seeds: range, folder: Path) -> list[Job]:
+    """The jobs in order of entry and seed; InputError where two entries would be one folder."""
+    names = [e.name for e in entries]
+    twice = next((n for k, n in enumerate(names) if n in names[:k]), None)
+    if twice is not None:
+        raise InputError(
+            place="entries", got=f"{twice} twice", expected="unique names", remedy="give it once, or rename one"
+        )
+    return [Job(folder / f"{e.name}-s{seed:05d}", e, seed) for e in entries for seed in seeds]
+
+
+def is_done(job: Job) -> bool:
+    """Whether the folder holds this very sequence, whole. InputError where it holds another one."""
+    from scenarios.load import dump
+
+    if not job.folder.exists():
+        return False
+    try:
+        manifest = store.read_manifest(job.folder)
+    except InputError:
+        return False
+    wanted = store.identity(dump(job.entry.scenario), job.seed, job.entry.repeat)
+    other = [key for key, value in wanted.items() if manifest.get(key) != value]
+    if other:
+        raise InputError(
+            file=job.folder, place=store.MANIFEST, got=f"another sequence ({', '.join(other)} differ)",
+            expected="the same scenario and version, or nothing", remedy="choose another --out, or delete that folder",
+        )  # fmt: skip
+    return next(store.altered(job.folder, manifest), None) is None
+
+
+def make(job: Job) -> None:
+    """Simulate and store one sequence; any failure as WorkError or InputError that names it."""
+    from scenarios.load import dump
+    from sim.sequence import simulate
+
+    try:
+        sequence = simulate(job.entry.scenario, job.seed, job.entry.repeat)
+        sequence = replace(sequence, name=job.name)
+        store.write_sequence(
+            job.folder, sequence, scenario=dump(job.entry.scenario), seed=job.seed, repeat=job.entry.repeat
+        )
+    except FlockscopeError as error:
+        if error.file:
+            raise
+        raise type(error)(**{**error.as_dict(), "file": job.name}) from error
+    except Exception as error:
+        raise WorkError(
+            file=job.name, got=f"{type(error).__name__}: {error}", expected="a sequence",
+            remedy="report it with the scenario and seed",
+        ) from error  # fmt: skip
+
+
+def _attempt(job: Job) -> FlockscopeError | None:
+    try:
+        make(job)
+    except FlockscopeError as error:
+        return error
+    return None
+
+
+def _run(jobs: list[Job], workers: int, done: Callable[[Job], None]) -> list[FlockscopeError]:
+    """Make all; the errors in the order of the jobs."""
+    errors: dict[str, FlockscopeError] = {}
+    for job, error in _attempts(jobs, min(workers, len(jobs))):
+        if error is not None:
+            errors[job.name] = error
+        done(job)
+    return [errors[job.name] for job in jobs if job.name in errors]
+
+
+def _attempts(jobs: list[Job], workers: int) -> Iterator[tuple[Job, FlockscopeError | None]]:
+    if workers <= 1:
+        yield from ((job, _attempt(job)) for job in jobs)
+        return
+    from sim.workers import pool
+
+    with pool(workers) as run:
+        yield from run(_attempt, jobs)
+
+
+def _counted(progress: Progress | None, before: int, total: int) -> Callable[[Job], None]:
+    count = before
+
+    def done(job: Job) -> None:
+        nonlocal count
+        count += 1
+        if progress is not None:
+            progress(count, total, job.name)
+
+    return done
+
+
+def write_seqmap(root: Path, split: str) -> None:
+    """seqmaps/flockscope-<split>.txt: every complete sequence of the split, sorted, as TrackEval reads it."""
+    folder = root / f"flockscope-{split}"
+    complete = sorted(p.parent.name for p in folder.glob(f"*/{store.MANIFEST}") if not p.parent.name.startswith("."))
+    if complete:
+        write_file(root / "seqmaps" / f"flockscope-{split}.txt", "\n".join(["name", *complete, ""]).encode())
+
+
+def _summary(errors: list[FlockscopeError], total: int) -> FlockscopeError:
+    """The first error, and how many there were; a single one as it is."""
+    first = errors[0]
+    if len(errors) == 1:
+        return first
+    others = ", ".join(sorted(e.file for e in errors[1:])[:5])
+    kind = type(first) if len({type(e) for e in errors}) == 1 else WorkError
+    return kind(
+        file=first.file, place=first.place, got=f"{first.got} (and {len(errors) - 1} more of {total}: {others})",
+        expected=first.expected, remedy=f"{first.remedy}; the others are kept",
+    )  # fmt: skip
+
+
+@contextmanager
+def _alone(root: Path) -> Iterator[None]:
+    """One run at a time in a folder, where the system can tell; a folder made for nothing goes away again."""
+    made = [p for p in (root, *root.parents) if not p.exists()]
+    try:
+        root.mkdir(parents=True, exist_ok=True)
+        with _lock(root):
+            yield
+    except OSError as error:
+        raise refusal(root, error) from error
+    finally:
+        with suppress(OSError):
+            for folder in made:
+                folder.rmdir()
+
+
+@contextmanager
+def _lock(root: Path) -> Iterator[None]:
+    try:
+        import fcntl
+    except ImportError:
+        yield
+        return
+    descriptor = os.open(root, os.O_RDONLY)
+    try:
+        try:
+            fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except BlockingIOError:
+            raise InputError(
+                file=root,
+                got="another run at work here",
+                expected="one at a time",
+                remedy="wait, or choose another --out",
+            ) from None
+        yield
+    finally:
+        os.close(descriptor)
