@@ -1,4 +1,4 @@
-"""Slow, obvious oracles of the tracking stage: filterpy's filters one by one, the Riccati solver, brute-force pairing."""
+"""Slow, obvious oracles of the tracking stage: filterpy one by one, the Riccati solver, brute-force pairing."""
 
 from __future__ import annotations
 

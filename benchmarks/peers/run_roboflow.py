@@ -3,7 +3,7 @@
 usage: python run_roboflow.py TRACKER DET.txt OUT.txt      TRACKER: sort, bytetrack, ocsort; their defaults throughout
 
 Needs nothing of flockscope. Writes rows `frame,id,left,top,width,height,score,-1,-1,-1` and prints one JSON object
-{"frames", "seconds"}: the time inside the tracker's update with its input type ready made, reading and writing left out.
+{"frames", "seconds"}: the time inside the tracker's update, its input type ready made; reading and writing left out.
 """
 
 import json

@@ -1,7 +1,7 @@
 """Box sequences with occlusion, to choose defaults on: people walking on a plane before a tilted camera.
 
-Not the simulator: its own short model, so that a tracker's defaults are not fitted to the simulator's ways. Boxes are
-lost when others cover them, jitter with memory from frame to frame, suppress each other as detectors' do, and false ones
+Not the simulator: its own short model, so that a tracker's defaults are not fitted to the simulator's ways. Boxes
+are lost when others cover them, jitter with memory from frame to frame, suppress each other as detectors' do, and false ones
 stay for some frames. `plain` is the field of constant-velocity squares that peers are timed on.
 """
 
@@ -109,7 +109,9 @@ def _see(r, paths, fps, camera, p_detect, clutter, jitter, name):
         ghosts = [g for g in ghosts if r.random() > 1 / (fps * 0.2)]
         for _ in range(r.poisson(clutter * 5 / fps)):
             side = r.uniform(0.7, 1.3) * np.median(size)
-            ghosts.append(np.r_[r.uniform(0, WIDTH), r.uniform(0, HEIGHT - side), 0.4 * side, side, r.uniform(0.5, 0.9)])
+            ghosts.append(
+                np.r_[r.uniform(0, WIDTH), r.uniform(0, HEIGHT - side), 0.4 * side, side, r.uniform(0.5, 0.9)]
+            )
         rows = np.r_[np.c_[noisy, score][hit], np.array(ghosts).reshape(-1, 5)]
         ids.append(np.flatnonzero(within) + 1)
         truth.append(box[within])
@@ -121,7 +123,9 @@ def _visible(box, depth):
     """Share of each box that no nearer box covers, on a 12 x 12 grid."""
     u = (np.arange(12) + 0.5) / 12
     grid = box[:, None, :2] + np.stack(np.meshgrid(u, u), -1).reshape(1, -1, 2) * box[:, None, 2:]
-    covers = ((grid[:, :, None] > box[None, None, :, :2]) & (grid[:, :, None] < (box[:, :2] + box[:, 2:])[None, None])).all(3)
+    covers = (
+        (grid[:, :, None] > box[None, None, :, :2]) & (grid[:, :, None] < (box[:, :2] + box[:, 2:])[None, None])
+    ).all(3)
     covers &= (depth[None] < depth[:, None])[:, None]
     return 1 - covers.any(2).mean(1)
 

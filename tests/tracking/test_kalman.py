@@ -1,4 +1,4 @@
-"""The bank against filterpy, the closed asymptote against the Riccati solver, gates against chi2, angles in a circle."""
+"""The bank against filterpy, the asymptote against the Riccati solver, gates against chi2, angles in a circle."""
 
 from __future__ import annotations
 

@@ -68,7 +68,9 @@ def test_from_file_under_a_private_name(tmp_path):
 def test_wrong_trackers_are_one_line(tmp_path, spec, words):
     (tmp_path / "mine.py").write_text(STRANGER)
     (tmp_path / "broken.py").write_text("1 / 0")
-    paths = {name: tmp_path / f"{stem}.py" for name, stem in (("file", "mine"), ("missing", "no"), ("broken", "broken"))}
+    paths = {
+        name: tmp_path / f"{stem}.py" for name, stem in (("file", "mine"), ("missing", "no"), ("broken", "broken"))
+    }
     with pytest.raises(InputError, match=words) as caught:
         protocol.find(spec.format(**paths))
     assert "\n" not in str(caught.value)

@@ -13,8 +13,8 @@ Departures, all ours:
 - Lengths are metres. A track's scale is px per metre at its own size (half to twice the sequence's), so that near and
   far people have the same noise in metres; from straight above it is the camera's. Accelerations are densities.
 - association = "optimal": least total cost d^2 + ln |S| (a track that has long been blind pays for its wide gate).
-- Several measurements of one track (a person in pieces): the pieces are fused by moments where the fused box fits
-  better than the best piece alone. A measurement left over starts no track in the gate of an updated track.
+- A person in pieces: boxes in the gate of a measured track (as wide as that of a track always seen), or inside the
+  predicted box of a confirmed one, start no track; they are fused by moments where that fits better than one alone.
 - A box that covers several unseen tracks as a whole starts no track; those tracks, and any that are hidden behind
   another person, may coast for merged_time rather than coast_time.
 - Detections below score_start continue tracks but start none, and choose after the others (ByteTrack, Zhang et al.
@@ -29,11 +29,13 @@ from typing import ClassVar, cast
 
 import numpy as np
 
-from sim.types import Array, Context, Detections, Frame, Ints, Plane, Tracks
+from sim.types import Array, Bools, Context, Detections, Frame, Ints, Plane, Tracks
 from tracking import assign, kalman
 from tracking.papers import blob_measure, blob_report
 from tracking.papers.blob_config import BlobConfig
 from tracking.papers.blob_tracks import Population
+
+INSIDE = 0.8  # share of a box within a track's predicted box from which on it may be a piece of that person
 
 
 class Blob:
@@ -62,12 +64,13 @@ class Blob:
         z, score = self._measurements(detections)
         people = self.people
         people.predict()
-        rows, columns, spare = self._associate(z, score)
-        near = self._update(rows, columns, spare, z)
-        people.mark(rows, near <= self.confirm_gate, score[columns])
-        orphans = self._orphans(z, score, columns)
+        rows, columns, free = self._associate(z, score)
+        rows, columns = self._without_merged(rows, columns, z)
+        rows, best, measured, free = self._with_pieces(rows, columns, free, z, score)
+        near = self._update(rows, measured)
+        people.mark(rows, near <= self.confirm_gate, best)
         people.excuse()
-        orphans = orphans[~people.merged(z[orphans])]
+        orphans = self._orphans(z, score, free)
         people.bury(frame.t)
         people.give_birth(z[orphans], score[orphans], frame.t)
         return self._report(frame)
@@ -80,71 +83,103 @@ class Blob:
         good = (score >= self.config.score_continue) & (box[:, 2:] > 0).all(1)
         return blob_measure.from_boxes(box[good]), score[good]
 
-    def _associate(self, z: Array, score: Array) -> tuple[Ints, Ints, list[tuple[int, int]]]:
-        """Tracks and measurements that belong together, one to one, and spare pieces as (track, measurement)."""
-        people = self.people
+    def _associate(self, z: Array, score: Array) -> tuple[Ints, Ints, Bools]:
+        """Tracks and measurements that belong together, one to one, and which measurements (M,) nobody took."""
+        people, free = self.people, np.ones(len(z), bool)
         if not len(z) or not len(people.id):
-            none = np.zeros(0, np.int64)
-            return none, none, []
+            return np.zeros(0, np.int64), np.zeros(0, np.int64), free
         d2 = kalman.distances(people.bank, z, self.noise, people.scale)
         cost = np.where(d2 <= self.gate, d2, np.inf)
         strong = score >= self.config.score_start
         if strong.all():
-            return self._pairs(cost)
-        first = self._pairs(np.where(strong, cost, np.inf))
-        cost[first[0]] = np.inf
-        cost[:, strong] = np.inf
-        second = self._pairs(cost)
-        rows, columns = (np.concatenate([first[i], second[i]]) for i in (0, 1))
-        return rows, columns, first[2] + second[2]
-
-    def _pairs(self, cost: Array) -> tuple[Ints, Ints, list[tuple[int, int]]]:
-        if self.config.association == "optimal":
-            blind = 2 * np.log(self.people.rho)
-            rows, columns = assign.optimal(cost + blind[:, None], self.gate + blind.max())
-            return rows, columns, self._gated_spares(cost, rows, columns)
-        pairs = assign.nearest(cost)
-        rows, columns, spare_rows, spare_columns = blob_measure.best_pieces(*pairs, cost)
-        return rows, columns, list(zip(spare_rows.tolist(), spare_columns.tolist(), strict=True))
-
-    def _gated_spares(self, cost: Array, rows: Ints, columns: Ints) -> list[tuple[int, int]]:
-        """Measurements left over, each with the assigned track in whose gate it is deepest."""
-        if len(columns) == cost.shape[1] or not len(rows):
-            return []
-        left = np.ones(cost.shape[1], bool)
-        left[columns] = False
-        r, c = assign.nearest(cost[rows][:, left])
-        return list(zip(rows[r].tolist(), np.flatnonzero(left)[c].tolist(), strict=True))
-
-    def _update(self, rows: Ints, columns: Ints, spare: list[tuple[int, int]], z: Array) -> Array:
-        """Update the measured tracks, with pieces fused; returns each one's squared distance (K,)."""
-        people = self.people
-        measured = z[columns]
-        place, s = people.bank[kalman.PLACE][rows], people.bank[kalman.VAR][rows] + self.noise
-        s = s * np.square(people.scale[rows])[:, None]
-        distance = np.sum((measured - place) ** 2 / s, 1)
-        for row in sorted({row for row, _ in spare}):
-            k = int(np.flatnonzero(rows == row)[0])
-            pieces = [columns[k]] + [column for other, column in spare if other == row]
-            whole = blob_measure.fused(z[pieces])
-            away = float(np.sum((whole - place[k]) ** 2 / s[k]))
-            if away < distance[k]:
-                measured[k], distance[k] = whole, away
-        kalman.update(people.bank, rows, measured, self.noise)
-        return np.asarray(distance)
-
-    def _orphans(self, z: Array, score: Array, columns: Ints) -> Ints:
-        """Strong measurements that no track took and that lie in nobody's gate, the gates taken after the update."""
-        free = score >= self.config.score_start
+            rows, columns = self._pairs(cost)
+        else:
+            rows, columns = self._pairs(np.where(strong, cost, np.inf))
+            cost[rows], cost[:, strong] = np.inf, np.inf
+            more = self._pairs(cost)
+            rows, columns = np.concatenate([rows, more[0]]), np.concatenate([columns, more[1]])
         free[columns] = False
-        left = np.flatnonzero(free)
-        if not len(left) or not len(self.people.id):
-            return left
+        return rows, columns, free
+
+    def _pairs(self, cost: Array) -> tuple[Ints, Ints]:
+        if self.config.association == "nearest":
+            return blob_measure.best_pieces(*assign.nearest(cost), cost)
+        blind = 2 * np.log(self.people.rho)
+        return assign.optimal(cost + blind[:, None], self.gate + float(blind.max()))
+
+    def _without_merged(self, rows: Ints, columns: Ints, z: Array) -> tuple[Ints, Ints]:
+        """The pairs without boxes that are several people at once, which a blind track's wide gate would let in.
+
+        Looked at are pairs whose size is far from the prediction by the measure of a track that is always seen.
+        """
         people = self.people
-        y = z[left][None] - people.bank[kalman.PLACE][people.hit][:, None]
-        s = self.asymptote * np.square(people.scale[people.hit])[:, None]
-        d2 = np.sum(y * y / s[:, None], 2)
-        return np.asarray(left[~(d2 <= self.orphan_gate).any(0)])
+        y = (z[columns] - people.bank[kalman.PLACE][rows])[:, 2:] / people.scale[rows, None]
+        odd = np.sum(y * y / self.asymptote[2:], 1) > self.gate
+        if not odd.any():
+            return rows, columns
+        lost = people.confirmed.copy()
+        lost[rows[~odd]] = False
+        odd[odd] = people.merged(z[columns[odd]], lost)
+        return rows[~odd], columns[~odd]
+
+    def _with_pieces(
+        self, rows: Ints, columns: Ints, free: Bools, z: Array, score: Array
+    ) -> tuple[Ints, Array, Array, Bools]:
+        """Measured tracks, their scores and measurements, with pieces fused; and what is still free.
+
+        A piece lies in the gate of a measured track, or almost wholly inside a confirmed track's predicted box. Pieces
+        update the track, with its own measurement if it has one, where the fused box is in the gate and nearer.
+        """
+        people, measured, best = self.people, z[columns], score[columns]
+        left = np.flatnonzero(free)
+        if not len(left) or not len(people.id):
+            return rows, best, measured, free
+        owner = self._owners(rows, z[left])
+        free[left[owner >= 0]] = False
+        own = dict(zip(rows.tolist(), range(len(rows)), strict=True))
+        for row in np.unique(owner[owner >= 0]).tolist():
+            k = own.get(row)
+            pieces = np.concatenate([columns[k : k + 1] if k is not None else [], left[owner == row]]).astype(np.int64)
+            whole = blob_measure.fused(z[pieces])
+            limit = self.gate if k is None else self._away(np.array([row]), z[columns[k]][None])[0]
+            if self._away(np.array([row]), whole[None])[0] >= limit:
+                continue
+            if k is None:
+                rows, measured = np.append(rows, row), np.concatenate([measured, whole[None]])
+                best = np.append(best, score[pieces].max())
+            else:
+                measured[k] = whole
+        return rows, best, measured, free
+
+    def _owners(self, rows: Ints, pieces: Array) -> Ints:
+        """(K,) the track of which each measurement is a piece, or -1."""
+        people = self.people
+        place, area = people.bank[kalman.PLACE], np.prod(people.bank[kalman.PLACE, :, 2:], 1)
+        within = blob_measure.covered(pieces, place) * (people.confirmed & (np.prod(pieces[:, 2:], 1)[:, None] < area))
+        owner = np.where(within.max(1) >= INSIDE, within.argmax(1), -1)
+        if len(rows):
+            y = (pieces[:, None] - place[rows]) / people.scale[rows, None]
+            d2 = np.sum(y * y / self.asymptote, 2)
+            owner = np.where(d2.min(1) <= self.orphan_gate, rows[d2.argmin(1)], owner)
+        return np.asarray(owner)
+
+    def _away(self, rows: Ints, measured: Array) -> Array:
+        """(K,) squared distances of tracks and their measurements."""
+        people = self.people
+        y = (measured - people.bank[kalman.PLACE][rows]) / people.scale[rows, None]
+        return np.asarray(np.sum(y * y / (people.bank[kalman.VAR][rows] + self.noise), 1))
+
+    def _update(self, rows: Ints, measured: Array) -> Array:
+        """Update the measured tracks; returns each one's squared distance (K,)."""
+        near = self._away(rows, measured)
+        kalman.update(self.people.bank, rows, measured, self.noise)
+        return near
+
+    def _orphans(self, z: Array, score: Array, free: Bools) -> Ints:
+        """Strong measurements that nobody took, no piece of anybody, nor several unseen people at once."""
+        left = np.flatnonzero(free & (score >= self.config.score_start))
+        people = self.people
+        return np.asarray(left[~people.merged(z[left], people.confirmed & ~people.hit)])
 
     def _report(self, frame: Frame) -> Tracks:
         people = self.people

@@ -17,22 +17,22 @@ class BlobConfig(Config):
 
     tracker: ClassVar[str] = "blob"
 
-    accel_noise: float = param(0.7, (0.05, 10.0), "m/s^1.5", "white acceleration of the centre, per root second", "log")
-    size_accel_noise: float = param(0.2, (0.01, 5.0), "m/s^1.5", "white acceleration of height and width", "log")
+    accel_noise: float = param(0.6, (0.05, 10.0), "m/s^1.5", "white acceleration of the centre, per root second", "log")
+    size_accel_noise: float = param(0.1, (0.01, 5.0), "m/s^1.5", "white acceleration of height and width", "log")
     position_noise: float = param(0.08, (0.005, 1.0), "m", "standard deviation of a measured centre", "log")
-    size_noise: float = param(0.12, (0.005, 1.0), "m", "standard deviation of a measured height or width", "log")
+    size_noise: float = param(0.18, (0.005, 1.0), "m", "standard deviation of a measured height or width", "log")
     speed_prior: float = param(1.3, (0.1, 5.0), "m/s", "standard deviation of a newborn's velocity", "log")
     size_rate_prior: float = param(0.2, (0.01, 3.0), "m/s", "standard deviation of a newborn's growth", "log")
-    gate: float = param(0.99, (0.5, 0.999999), "probability", "share of true measurements inside a track's gate")
+    gate: float = param(0.995, (0.5, 0.999999), "probability", "share of true measurements inside a track's gate")
     association: str = param(
-        "nearest", ("nearest", "optimal"), "", "nearest gated track (the paper) or least total cost", "categorical"
+        "optimal", ("nearest", "optimal"), "", "nearest gated track (the paper) or least total cost", "categorical"
     )
     orphan_gate: float = param(
-        0.99, (0.01, 0.999999), "probability", "gate within which a measurement left over starts no track"
+        0.9, (0.01, 0.999999), "probability", "gate within which a measurement left over starts no track"
     )
     confirm_ratio: float = param(1.5, (1.01, 2.0), "", "rho below which a track is confirmed")
     confirm_gate: float = param(0.99, (0.1, 0.999999), "probability", "gate of the confirming measurement")
-    coast_time: float = param(1.0, (0.0, 10.0), "s", "a confirmed track dies after so long without measurement")
+    coast_time: float = param(1.5, (0.0, 10.0), "s", "a confirmed track dies after so long without measurement")
     tentative_time: float = param(1.0, (0.1, 10.0), "s", "a tentative track not confirmed by then dies")
     merged_time: float = param(
         3.0, (0.0, 20.0), "s", "the same while another track, or a merged blob, explains that it is not seen"
@@ -40,7 +40,7 @@ class BlobConfig(Config):
     score_start: float = param(0.5, (0.0, 1.0), "score", "least score of a detection that starts a track")
     score_continue: float = param(0.1, (0.0, 1.0), "score", "least score of a detection that continues one")
     report_delay: float = param(0.1, (0.0, 5.0), "s", "a tentative track is reported from this age on")
-    report_coast: float = param(0.3, (0.0, 10.0), "s", "a track is reported so long after its last measurement")
+    report_coast: float = param(0.4, (0.0, 10.0), "s", "a track is reported so long after its last measurement")
     report_hidden: float = param(0.7, (0.0, 10.0), "s", "the same while it is hidden or merged")
 
     def dynamics(self, fps: float) -> Dynamics:

@@ -63,10 +63,10 @@ def hull_overlap(places: Array, box: Array) -> float:
     return shared / float(np.prod(whole[0, 2:]) + np.prod(box[2:]) - shared)
 
 
-def best_pieces(rows: Ints, columns: Ints, cost: Array) -> tuple[Ints, Ints, Ints, Ints]:
-    """Of (track, measurement) pairs the cheapest per track, and the spare ones: rows, columns of both."""
+def best_pieces(rows: Ints, columns: Ints, cost: Array) -> tuple[Ints, Ints]:
+    """Of (track, measurement) pairs the cheapest of each track."""
     order = np.lexsort((columns, cost[rows, columns], rows))
     rows, columns = rows[order], columns[order]
     first = np.ones(len(rows), bool)
     first[1:] = rows[1:] != rows[:-1]
-    return rows[first], columns[first], rows[~first], columns[~first]
+    return rows[first], columns[first]

@@ -12,7 +12,9 @@ from tracking.papers.blob_config import BlobConfig
 PERSON = 1.7  # m, what the longer side of a person's box stands for
 HIDDEN = 0.4  # share of a predicted box behind somebody else from which on a miss is explained
 SAME = 0.5  # IoU of a box with the hull of several predicted ones from which on it is taken for them all
-SLACK = 1e-9  # relative, of comparisons with rho: a filter in its steady state meets the closed form to rounding only
+SLACK = (
+    0.02  # relative, of comparisons with rho: filters near their steady state count as in it; a miss adds 10 % or more
+)
 
 
 class Population:
@@ -37,8 +39,8 @@ class Population:
 
     def _after(self, seconds: float) -> float:
         """rho in the frame that ends so many seconds without measurement; it is exceeded in the next."""
-        frames = int(np.ceil(seconds * self.context.fps - SLACK))
-        return lifecycle.after_misses(self.dynamics, frames - 1) * (1 + SLACK)
+        frames = int(np.ceil(seconds * self.context.fps - 1e-6))
+        return lifecycle.after_misses(self.dynamics, frames - 1)
 
     def predict(self) -> None:
         """One frame on."""
@@ -71,9 +73,9 @@ class Population:
         share = np.where(in_front, blob_measure.covered(place[lost], place), 0.0)
         self.excused[lost[share.max(1) >= HIDDEN]] = True
 
-    def merged(self, z: Array) -> Bools:
-        """(M,) is this measurement several unseen confirmed tracks at once? Those tracks are excused."""
-        lost = np.flatnonzero(self.confirmed & ~self.hit)
+    def merged(self, z: Array, unseen: Bools) -> Bools:
+        """(M,) is this measurement several of the `unseen` (N,) tracks at once? Those tracks are excused."""
+        lost = np.flatnonzero(unseen)
         found = np.zeros(len(z), bool)
         if len(lost) < 2 or not len(z):
             return found
@@ -92,9 +94,9 @@ class Population:
             return
         c, lost = self.config, ~self.hit
         limit = np.where(self.excused, self.excused_death, self.death)
-        over = self.confirmed & lost & (self.rho * (1 + 2 * SLACK) >= limit)
+        over = self.confirmed & lost & (self.rho >= limit * (1 - SLACK))
         young = ~self.confirmed
-        over |= young & lost & (self.rho >= self.birth_rho * (1 - SLACK))
+        over |= young & lost & (self.rho >= self.birth_rho * (1 - 1e-9))
         over |= young & (t - self.born > c.tentative_time)
         over |= lost & self._outside()
         if over.any():
@@ -135,8 +137,8 @@ class Population:
     def reported(self, t: float) -> Bools:
         """Which tracks the world hears of."""
         limit = np.where(self.excused, self.excused_silence, self.silence)
-        old = self.hit & (t - self.born >= self.config.report_delay - SLACK)
-        return np.asarray(np.where(self.confirmed, self.hit | (self.rho <= limit), old))
+        old = self.hit & (t - self.born >= self.config.report_delay - 1e-6)
+        return np.asarray(np.where(self.confirmed, self.hit | (self.rho <= limit * (1 + SLACK)), old))
 
 
 def _foot(place: Array) -> Array:

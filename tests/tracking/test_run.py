@@ -1,0 +1,145 @@
+"""`track`: modes, what a tracker may know, strangers, and that truth is not looked at."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from scenarios.errors import InputError, WorkError
+from sim.types import Context, Detections, Frame, Groups, Sequence, Tracks, Truth
+from tracking.papers.blob import Blob
+from tracking.papers.blob_config import BlobConfig
+from tracking.run import Run, prepare, track
+
+FPS, LENGTH = 10.0, 30
+
+
+def poisoned() -> Truth:
+    raise AssertionError("a tracker looked at the truth")
+
+
+def boxes_at(k):
+    return np.array([[100 + 4.0 * k, 200, 28, 68], [600 - 4.0 * k, 300, 28, 68]])
+
+
+def frames():
+    for k in range(LENGTH):
+        box = boxes_at(k)
+        box.flags.writeable = False
+        found = Detections(k + 1, k / FPS, "image", box[:, :2] + box[:, 2:] / 2, None, box, np.ones(2))
+        yield Frame(k + 1, k / FPS, detections=found)
+
+
+def truth():
+    frame, id = np.repeat(np.arange(1, LENGTH + 1), 2), np.tile([4, 9], LENGTH)
+    box = np.concatenate([boxes_at(k) for k in range(LENGTH)])
+    alone, ones = np.full(2 * LENGTH, -1), np.ones(2 * LENGTH)
+    return Truth("made", FPS, LENGTH, 40.0, frame, id, alone, None, None, box, ones)
+
+
+def source(**changes):
+    given = {"has_detections": True, "load_truth": poisoned, "image_size": (1000, 600), **changes}
+    return Sequence("made", FPS, LENGTH, frames, **given)
+
+
+class Stranger:
+    """Reports every detection under its row number."""
+
+    needs = ("boxes", "points")
+
+    def reset(self, context: Context, seed: int) -> None:
+        self.context = context
+
+    def step(self, frame: Frame, detections: Detections | None) -> Tracks:
+        n = len(detections.pos)
+        vel, cov, alone = np.zeros((n, 2)), np.tile(np.eye(4), (n, 1, 1)), np.full(n, -1)
+        groups = Groups.none()
+        plane, id = detections.plane, np.arange(n)
+        return Tracks(frame.index, frame.t, plane, "person", id, alone, detections.pos, vel, cov, groups=groups)
+
+
+class Wrong(Stranger):
+    """Forgets the velocities in frame 3."""
+
+    def step(self, frame, detections):
+        made = super().step(frame, detections)
+        return made if frame.index < 3 else made.replace(vel=np.zeros((1, 2)))
+
+
+def test_file_mode_never_looks_at_the_truth():
+    run = track("blob", source())
+    assert isinstance(run, Run)
+    assert len(run) == LENGTH
+    assert [t.index for t in run] == list(range(1, LENGTH + 1))
+    assert run.info["detections"] == "file"
+    assert run.info["px_per_m"] == pytest.approx(68 / 1.7)
+    assert run.info["boxes"] == "measured"
+    assert run.info["plane"] == "image"
+    assert run.info["config"] == BlobConfig().as_dict()
+    assert len({int(i) for t in run for i in t.id}) == 2
+
+
+def test_truth_mode_takes_the_labels():
+    run = track("blob", source(load_truth=truth), detections="truth")
+    assert run.info["detections"] == "truth"
+    assert len({int(i) for t in run for i in t.id}) == 2
+    assert run[-1].pos[run[-1].id.argmin()] == pytest.approx(boxes_at(LENGTH - 1)[0, :2] + [14, 34], abs=1.0)
+
+
+def test_default_is_truth_where_there_is_nothing_else():
+    assert prepare("blob", source(has_detections=False, load_truth=truth)).mode == "truth"
+
+
+def test_params_by_config_values_and_file(tmp_path):
+    path = tmp_path / "p.toml"
+    path.write_text("[params]\ngate = 0.95\n")
+    runs = [track("blob", source(), params=p) for p in (BlobConfig(gate=0.95), {"gate": 0.95}, path, str(path))]
+    assert all(r.info["config"]["gate"] == 0.95 for r in runs)
+    with pytest.raises(InputError, match="did you mean gate"):
+        track("blob", source(), params={"gat": 0.9})
+    with pytest.raises(InputError, match="a tracker with parameters"):
+        track(Stranger, source(), params={"gate": 0.9})
+
+
+def test_strangers_by_class_and_instance():
+    for stranger in (Stranger, Stranger()):
+        run = track(stranger, source())
+        assert run.info["tracker"] == "Stranger"
+        assert run[0].score.tolist() == [1.0, 1.0]
+    assert track(Blob(BlobConfig(gate=0.9)), source()).info["config"]["gate"] == 0.9
+
+
+def test_a_strangers_wrong_answer_is_named():
+    with pytest.raises(WorkError, match="Wrong: frame 3: got vel of shape"):
+        track(Wrong, source())
+
+
+def test_combinations_that_cannot_work():
+    with pytest.raises(InputError, match="needs boxes, and made with detections, truth"):
+        track("blob", source(), detections="image")
+    with pytest.raises(InputError, match="sensor"):
+        track("blob", source(), sensor={"detect_prob": 0.5})
+
+
+def test_nan_is_named():
+    def bad():
+        for frame in frames():
+            box = frame.detections.box.copy()
+            if frame.index == 5:
+                box[1, 0] = np.nan
+            yield frame.replace(detections=frame.detections.replace(box=box))
+
+    with pytest.raises(InputError, match="frame 5: detection 2"):
+        track("blob", Sequence("bad", FPS, LENGTH, bad, has_detections=True))
+
+
+def test_empty_sequences():
+    assert len(track("blob", Sequence("none", FPS, 0, lambda: iter(()), has_detections=True))) == 0
+    bare = Sequence("bare", FPS, 3, lambda: (Frame(k, k / FPS) for k in (1, 2, 3)), has_detections=True)
+    assert [len(t.id) for t in track("blob", bare)] == [0, 0, 0]
+
+
+def test_slices_and_repetition():
+    run, again = track("blob", source()), track("blob", source())
+    assert len(run[3:7]) == 4
+    assert all(a.pos.tobytes() == b.pos.tobytes() for a, b in zip(run, again, strict=True))
