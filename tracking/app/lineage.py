@@ -1,0 +1,74 @@
+"""Group ids over time as bars in lanes, and the merges and splits that join them."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+import numpy as np
+
+from sim.types import GroupEvent, Ints
+
+
+@dataclass(frozen=True)
+class Bar:
+    """One unbroken life of a group id: frames (both inclusive), lane from 0, most people in it."""
+
+    id: int
+    start: int
+    end: int
+    lane: int
+    size: int
+
+
+@dataclass(frozen=True)
+class Link:
+    """Group `a` becomes, or joins, group `b` at a frame: where a tracker said so, though the onset was earlier."""
+
+    frame: int
+    a: int
+    b: int
+
+
+def bars(frame: Ints, group: Ints, least: int = 2, gap: int = 1) -> list[Bar]:
+    """The lives of the groups that rows of (frame, group) make, -1 being nobody's; shorter gaps than `gap` are closed.
+
+    least: people from which a group counts (1 where a row is a whole group). Lanes are filled greedily: a bar takes
+    the lowest lane that is free, so that a page stays low.
+    """
+    rows = group >= 0
+    pairs, people = np.unique(np.stack([group[rows], frame[rows]], axis=1), axis=0, return_counts=True)
+    pairs, people = pairs[people >= least], people[people >= least]
+    if not len(pairs):
+        return []
+    new = np.flatnonzero((np.diff(pairs[:, 0]) != 0) | (np.diff(pairs[:, 1]) > gap)) + 1
+    lives = zip(np.split(pairs, new), np.split(people, new), strict=True)
+    found = [(int(p[0, 1]), int(p[-1, 1]), int(p[0, 0]), int(n.max())) for p, n in lives]
+    return _in_lanes(sorted(found))
+
+
+def _in_lanes(lives: list[tuple[int, int, int, int]]) -> list[Bar]:
+    free_from: list[int] = []
+    last: dict[int, int] = {}
+    made = []
+    for start, end, name, size in lives:
+        free = [lane for lane, frame in enumerate(free_from) if frame < start]
+        lane = last[name] if last.get(name, -1) in free else (free[0] if free else len(free_from))
+        if lane == len(free_from):
+            free_from.append(0)
+        free_from[lane] = end + 1
+        last[name] = lane
+        made.append(Bar(name, start, end, lane, size))
+    return made
+
+
+def links(events: Iterable[GroupEvent]) -> list[Link]:
+    """What merges and splits (and the forming and dissolving that scores count as such) say about ids."""
+    return [
+        Link(event.start if event.emitted is None else event.emitted, a, b)
+        for event in events
+        if event.kind in ("merge", "split")
+        for a in sorted(set(event.before) - {-1})
+        for b in sorted(set(event.after) - {-1})
+        if a != b
+    ]

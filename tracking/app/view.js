@@ -1,0 +1,217 @@
+// The page: its state, controls, keys, and what it says about the shown frame.
+
+const $ = id => document.getElementById(id);
+const state = { frame: 1, playing: false, speed: 1, clock: 0, then: 0 };
+const options = { truth: true, tracks: true, detections: false, hulls: true, trails: true, ids: true, near: true, beside: false, by: "person" };
+const TOGGLES = [
+  ["truth", "Truth", "t", truth], ["tracks", "Tracks", "k", tracks], ["beside", "Side by side", "b", truth && tracks],
+  ["detections", "Detections", "d", found], ["hulls", "Groups", "h", true], ["trails", "Trails", "l", hasPlan],
+  ["ids", "Ids", "i", true], ["near", "Near strangers", "s", data.near.length],
+];
+const SPEEDS = [0.1, 0.25, 0.5, 1, 2, 4, 8];
+const KEYS = [
+  ["space", "play, pause"], ["← →", "one frame back, on"], ["shift ← →", "one second"], ["Home End", "first, last frame"],
+  ["n p", "next, previous event"], ["+ −", "faster, slower"], ["c", "colour by person or group"],
+  ...TOGGLES.filter(toggle => toggle[3]).map(([, word, key]) => [key, word.toLowerCase()]), ["?", "this list"],
+];
+const events = sides.flatMap(side => side.events).sort((a, b) => a.start - b.start);
+let line = null, eventButtons = [];
+
+function seekTo(frame) {
+  state.frame = Math.min(Math.max(Math.round(frame), 1), data.length);
+  show();
+}
+
+function show() {
+  const frame = state.frame;
+  if (hasPlan) drawPlan($("plan"), frame, options);
+  if (hasImage) drawImage($("image"), frame, options);
+  if (line) line.move(frame);
+  $("seek").value = frame;
+  $("seek").setAttribute("aria-valuetext", `frame ${frame}, ${seconds(frame).toFixed(1)} seconds`);
+  $("clock").value = `${frame} / ${data.length} · ${seconds(frame).toFixed(2)} s`;
+  facts(frame);
+}
+
+function facts(frame) {
+  const rows = [["frame", `${frame} of ${data.length}, ${seconds(frame).toFixed(2)} s`]];
+  for (const side of sides) {
+    const what = side.hull ? "groups" : "people";
+    rows.push([`${WORDS[side.name]} ${what}`, side.rows(frame).length]);
+    const groups = [...groupsAt(side, frame)].map(([id, members]) =>
+      `${side.name === "tracks" ? "T" : "G"}${id}` + (side.hull ? "" : ` (${members.map(row => side.id[row]).join(", ")})`));
+    if (!side.hull) rows.push([`${WORDS[side.name]} groups`, groups.join(" · ") || "none"]);
+  }
+  if (found) rows.push(["detections", found.rows(frame).length]);
+  const now = events.filter(event => event.start <= frame && frame <= Math.max(event.end, event.start + data.fps / 2));
+  rows.push(["now", now.map(event => `${WORDS[event.side]} ${event.kind}`).join(", ") || "–"]);
+  $("facts").replaceChildren(...rows.flatMap(([key, value]) => [tag("dt", key), tag("dd", value)]));
+  eventButtons.forEach((button, k) => button.setAttribute("aria-current", now.includes(events[k])));
+}
+
+function tag(name, text) {
+  const node = document.createElement(name);
+  node.textContent = text;
+  return node;
+}
+
+function play(on) {
+  state.playing = on;
+  $("play").querySelector("path").setAttribute("d", on ? "M3 2h4v12H3z M9 2h4v12H9z" : "M4 2v12l10-6z");
+  $("play").setAttribute("aria-label", on ? "Pause" : "Play");
+  if (!on) return;
+  if (state.frame >= data.length) seekTo(1);
+  state.clock = state.frame;
+  state.then = performance.now();
+  requestAnimationFrame(tick);
+}
+
+function tick(now) {
+  if (!state.playing) return;
+  state.clock += ((now - state.then) / 1000) * data.fps * state.speed;
+  state.then = now;
+  const frame = Math.floor(state.clock);
+  if (frame !== state.frame) seekTo(frame);
+  if (state.frame >= data.length) play(false);
+  else requestAnimationFrame(tick);
+}
+
+function step(count) {
+  play(false);
+  seekTo(state.frame + count);
+}
+
+function toEvent(direction) {
+  const starts = events.map(event => event.start).filter(start => (start - state.frame) * direction > 0);
+  if (starts.length) jump(direction > 0 ? Math.min(...starts) : Math.max(...starts));
+}
+
+function jump(frame) {
+  play(false);
+  seekTo(frame);
+}
+
+function speed(change) {
+  const next = SPEEDS[Math.min(Math.max(SPEEDS.indexOf(state.speed) + change, 0), SPEEDS.length - 1)];
+  state.speed = next;
+  $("speed").value = next;
+}
+
+function toggle(name) {
+  options[name] = !options[name];
+  $(`show-${name}`).checked = options[name];
+  show();
+}
+
+function colourBy(by) {
+  options.by = by;
+  $("by").value = by;
+  show();
+}
+
+function onKey(event) {
+  if (event.ctrlKey || event.metaKey || event.altKey || $("help").open) return;
+  const inField = ["SELECT", "INPUT"].includes(event.target.tagName) && event.target.type !== "checkbox";
+  const onButton = event.target.tagName === "BUTTON" || event.target.type === "checkbox";
+  const one = event.shiftKey ? Math.max(Math.round(data.fps), 1) : 1;
+  const actions = {
+    " ": onButton ? null : () => play(!state.playing),
+    ArrowRight: () => step(one), ArrowLeft: () => step(-one), Home: () => jump(1), End: () => jump(data.length),
+    n: () => toEvent(1), p: () => toEvent(-1), "+": () => speed(1), "=": () => speed(1), "-": () => speed(-1),
+    c: () => colourBy(options.by === "person" ? "group" : "person"), "?": () => $("help").showModal(),
+  };
+  for (const [name, , key, there] of TOGGLES) if (there) actions[key] = () => toggle(name);
+  const action = actions[event.key.length === 1 ? event.key.toLowerCase() : event.key];
+  if (!action || (inField && event.target.tagName === "SELECT")) return;
+  event.preventDefault();
+  action();
+}
+
+function buildHead() {
+  const about = [`${data.length} frames, ${data.fps} per second, ${seconds(data.length).toFixed(1)} s`];
+  if (truth) about.push(`${new Set(truth.id).size} true people`);
+  if (tracks) about.push(`${new Set(tracks.id).size} ${tracks.hull ? "groups" : "people"} by ${data.tracker}`);
+  $("about").textContent = about.join(" · ");
+  $("scores").replaceChildren(...data.scores.map(([key, value]) => {
+    const item = document.createElement("div");
+    item.append(tag("dt", key), tag("dd", value === null ? "–" : Math.abs(value) < 100 ? value.toFixed(3) : value.toFixed(0)));
+    return item;
+  }));
+  const note = tracks && truth ? "true: bodies, solid · tracked: rings, dashed" : "";
+  $("plan-note").textContent = hasPlan ? note : "";
+  $("image-note").textContent = hasImage && tracks && truth ? "true: solid · tracked: dashed · detected: dotted" : "";
+  $("plan-stage").hidden = !hasPlan;
+  $("image-stage").hidden = !hasImage;
+}
+
+function buildControls() {
+  $("seek").max = data.length;
+  for (const value of SPEEDS) $("speed").append(new Option(`${value}×`, value, value === 1, value === 1));
+  for (const [name, word, key, there] of TOGGLES) {
+    if (!there) continue;
+    const box = Object.assign(document.createElement("input"), { type: "checkbox", id: `show-${name}`, checked: options[name] });
+    const holder = tag("label", "");
+    holder.title = `${word} (${key})`;
+    holder.append(box, word);
+    box.addEventListener("change", () => toggle(name));
+    $("toggles").append(holder);
+  }
+  const by = Object.assign(document.createElement("select"), { id: "by" });
+  by.setAttribute("aria-label", "Colour by");
+  by.append(new Option("colour by person", "person"), new Option("colour by group", "group"));
+  by.addEventListener("change", () => colourBy(by.value));
+  $("toggles").append(by);
+  $("keys").replaceChildren(...KEYS.flatMap(([key, word]) => {
+    const name = document.createElement("dt");
+    name.append(tag("kbd", key));
+    return [name, tag("dd", word)];
+  }));
+  eventButtons = events.map(event => {
+    const button = tag("button", `${seconds(event.start).toFixed(1)} s  ${WORDS[event.side]} ${eventWords(event)}`);
+    button.addEventListener("click", () => jump(event.start));
+    return button;
+  });
+  $("events").replaceChildren(...eventButtons.map(button => {
+    const item = document.createElement("li");
+    item.append(button);
+    return item;
+  }));
+  if (!events.length) $("events").append(tag("li", "none"));
+}
+
+function layOut() {
+  chooseTheme();
+  line = timeline($("timeline"), Math.max($("timeline").clientWidth, 320), jump);
+  legend($("legend"));
+  show();
+}
+
+function listen() {
+  $("first").addEventListener("click", () => jump(1));
+  $("back").addEventListener("click", () => step(-1));
+  $("next").addEventListener("click", () => step(1));
+  $("play").addEventListener("click", () => play(!state.playing));
+  $("seek").addEventListener("input", () => jump($("seek").valueAsNumber));
+  $("speed").addEventListener("change", () => { state.speed = Number($("speed").value); });
+  $("help-button").addEventListener("click", () => $("help").showModal());
+  const drag = event => {
+    if (!(event.buttons & 1)) return;
+    const left = $("timeline").firstChild.getBoundingClientRect().left;
+    if (event.clientX - left > GUTTER - 8) jump(line.frameAt(event.clientX - left));
+  };
+  $("timeline").addEventListener("pointerdown", drag);
+  $("timeline").addEventListener("pointermove", drag);
+  document.addEventListener("keydown", onKey);
+  darkQuery.addEventListener("change", layOut);
+  let width = 0;
+  new ResizeObserver(() => {
+    if (innerWidth === width) return;
+    width = innerWidth;
+    layOut();
+  }).observe(document.body);
+}
+
+buildHead();
+buildControls();
+layOut();
+listen();

@@ -1,0 +1,150 @@
+"""A replay in the browser: one self-contained HTML file, nothing fetched, nothing run elsewhere."""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Mapping
+from collections.abc import Sequence as SequenceOf
+from html import escape
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from scenarios.errors import WorkError
+from sim.types import Sequence, Tracks, Truth
+from tracking.app import view_data
+from tracking.app.view_data import Json, Rows
+
+HERE = Path(__file__).parent
+SCRIPTS = ("view_data.js", "view_draw.js", "view_plan.js", "view_image.js", "view_time.js", "view.js")
+MARGIN = 1.0
+
+
+def view(
+    sequence: Sequence,
+    tracks: SequenceOf[Tracks] | None,
+    out: str | Path,
+    scores: Mapping[str, float] | None = None,
+    title: str | None = None,
+) -> Path:
+    """Writes the page and returns its path; `tracks` and `scores` are shown where they are given.
+
+    Groups and events that a tracker left out are derived by the baseline rule.
+    """
+    name = title or sequence.name
+    data = json.dumps(payload(sequence, tracks, scores), separators=(",", ":"), allow_nan=False)
+    page = (HERE / "view.html").read_text(encoding="utf-8")
+    parts = {
+        "TITLE": escape(name),
+        "STYLE": (HERE / "view.css").read_text(encoding="utf-8"),
+        "DATA": data.replace("<", "\\u003c").replace("\u2028", "\\u2028").replace("\u2029", "\\u2029"),
+        "SCRIPT": "\n".join((HERE / script).read_text(encoding="utf-8") for script in SCRIPTS),
+    }
+    pieces = page.split("@@")
+    text = "".join(parts[piece] if k % 2 else piece for k, piece in enumerate(pieces))
+    path = Path(out)
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_text(text, encoding="utf-8")
+    except OSError as error:
+        raise WorkError(
+            file=path, got=error.strerror or error, expected="a page written", remedy="check path, rights and space"
+        ) from None
+    return path
+
+
+def payload(sequence: Sequence, tracks: SequenceOf[Tracks] | None, scores: Mapping[str, float] | None = None) -> Json:
+    """All that the page shows, ready for JSON."""
+    truth = sequence.truth
+    answers = None if tracks is None else _derived(tracks, sequence, truth)
+    true = None if truth is None else view_data.truth_rows(truth)
+    tracked = None if answers is None else view_data.track_rows(answers)
+    found = view_data.detections(sequence)
+    sides = [rows for rows in (true, tracked) if rows is not None]
+    return {
+        "name": sequence.name,
+        "tracker": _tracker(tracks),
+        "fps": sequence.fps,
+        "length": _length(sequence, sides, found),
+        "image": sequence.image_size or _image_size(sides),
+        "bounds": _bounds(sequence, sides),
+        "scene": view_data.scene_json(sequence.scene),
+        "camera": view_data.camera_json(sequence.camera),
+        "truth": None if true is None or truth is None else view_data.side(true, truth.events or ()),
+        "tracks": None
+        if tracked is None or answers is None
+        else view_data.side(tracked, [e for t in answers for e in t.events]),
+        "detections": found,
+        "unlabelled": _unlabelled(truth),
+        "near": _near(truth),
+        "scores": [[key, value if math.isfinite(value) else None] for key, value in (scores or {}).items()],
+    }
+
+
+def _derived(tracks: SequenceOf[Tracks], sequence: Sequence, truth: Truth | None) -> SequenceOf[Tracks]:
+    """The tracks, with groups and events where the tracker left them empty."""
+    if all(t.groups is not None for t in tracks):
+        return tracks
+    from tracking.grouping import derive
+
+    scale = sequence.px_per_m
+    if not math.isfinite(scale):
+        scale = truth.px_per_m if truth is not None else math.nan
+    in_image = any(t.plane == "image" for t in tracks)
+    if in_image and not math.isfinite(scale):
+        return tracks
+    return derive(tracks, sequence.fps, scale)
+
+
+def _tracker(tracks: SequenceOf[Tracks] | None) -> str:
+    info: Mapping[str, Any] = getattr(tracks, "info", {})
+    return str(info.get("tracker", "the tracker"))
+
+
+def _length(sequence: Sequence, sides: list[Rows], found: Json | None) -> int:
+    if sequence.length is not None:
+        return max(sequence.length, 1)
+    last = [int(rows.frame.max()) for rows in sides if len(rows.frame)]
+    detected = [int(found["frames"][-1][0])] if found else []
+    return max([1, *last, *detected])
+
+
+def _image_size(sides: list[Rows]) -> list[int] | None:
+    """A picture that holds all boxes, where nothing says how large it is."""
+    corners = [rows.box[:, :2] + rows.box[:, 2:] for rows in sides if np.isfinite(rows.box).any()]
+    if not corners:
+        return None
+    width, height = np.nanmax(np.concatenate(corners), axis=0)
+    return [max(math.ceil(width), 16), max(math.ceil(height), 16)]
+
+
+def _bounds(sequence: Sequence, sides: list[Rows]) -> list[float] | None:
+    """x0, y0, x1, y1 of the plan in m: the world's, else what the people need; None without ground."""
+    points = [rows.pos for rows in sides if rows.plane == "ground" and len(rows.pos)]
+    known = np.concatenate(points) if points else np.zeros((0, 2))
+    known = known[np.isfinite(known).all(axis=1)]
+    if sequence.scene is not None:
+        return [0.0, 0.0, *sequence.scene.size.tolist()]
+    if not len(known):
+        return None
+    low, high = known.min(axis=0) - MARGIN, known.max(axis=0) + MARGIN
+    return [round(float(v), 2) for v in (*low, *high)]
+
+
+def _unlabelled(truth: Truth | None) -> list[list[int]]:
+    """[first, last] frames without group labels."""
+    if truth is None or truth.labelled is None or truth.labelled.all():
+        return []
+    edge = np.flatnonzero(np.diff(np.r_[True, truth.labelled, True].astype(int)))
+    return [[int(a) + 1, int(b)] for a, b in edge.reshape(-1, 2)]
+
+
+def _near(truth: Truth | None) -> list[list[int]]:
+    """[first, last, a, b] of strangers who walk as if they belonged together."""
+    if truth is None or truth.near is None:
+        return []
+    near = truth.near
+    listed: list[list[int]] = np.stack([near.start, near.end, near.a, near.b], axis=1).tolist()
+    return listed

@@ -1,0 +1,96 @@
+// Decodes the embedded columns (view_data.py) into typed arrays, and finds the rows of a frame.
+
+const NIL = -99999;
+const data = JSON.parse(document.getElementById("data").textContent);
+
+function sums(deltas, scale) {
+  const out = new Float32Array(deltas.length);
+  let total = 0;
+  for (let k = 0; k < deltas.length; k++) {
+    total += deltas[k];
+    out[k] = total === NIL ? NaN : total / scale;
+  }
+  return out;
+}
+
+function runs(pairs, n) {
+  const out = new Int32Array(n);
+  for (let k = 0, at = 0; k < pairs.length; k += 2) {
+    out.fill(pairs[k], at, at + pairs[k + 1]);
+    at += pairs[k + 1];
+  }
+  return out;
+}
+
+// Rows in order of frames: rows of frame f are order[offset[f]] … order[offset[f + 1] - 1].
+function byFrame(frame, length) {
+  const offset = new Int32Array(length + 3), order = new Int32Array(frame.length);
+  for (const f of frame) offset[f + 1]++;
+  for (let f = 1; f < offset.length; f++) offset[f] += offset[f - 1];
+  const next = offset.slice();
+  for (let k = 0; k < frame.length; k++) order[next[frame[k]]++] = k;
+  return f => order.subarray(offset[f], offset[f + 1]);
+}
+
+function decodeSide(raw, name) {
+  if (!raw) return null;
+  const n = raw.x.length;
+  const id = new Int32Array(n), frame = new Int32Array(n), first = new Int32Array(n);
+  let row = 0;
+  for (const [person, start, count] of raw.stints) {
+    const begin = row;
+    for (let k = 0; k < count; k++, row++) {
+      id[row] = person;
+      frame[row] = start + k;
+      first[row] = begin;
+    }
+  }
+  const box = raw.box.length ? raw.box.map(column => sums(column, 2)) : null;
+  const events = raw.events.map(([kind, start, end, emitted, before, after, members, pos]) =>
+    ({ kind, start, end, emitted, before, after, members, pos, side: name }));
+  return {
+    name, n, id, frame, first, box, events,
+    plane: raw.plane,
+    x: sums(raw.x, raw.scale),
+    y: sums(raw.y, raw.scale),
+    angle: sums(raw.a, 180 / Math.PI),
+    group: runs(raw.group, n),
+    visible: runs(raw.vis, n),
+    hull: raw.hull.length ? raw.hull.map(flat => flat.map(v => v / raw.scale)) : null,
+    bars: raw.bars.map(([id, start, end, lane, size]) => ({ id, start, end, lane, size })),
+    links: raw.links.map(([frame, a, b]) => ({ frame, a, b })),
+    rows: byFrame(frame, data.length),
+  };
+}
+
+function decodeDetections(raw) {
+  if (!raw) return null;
+  const frame = new Int32Array(raw.x.length);
+  let row = 0;
+  for (const [index, count] of raw.frames) {
+    frame.fill(index, row, row + count);
+    row += count;
+  }
+  const box = raw.box.length ? raw.box.map(column => sums(column, 1)) : null;
+  return { plane: raw.plane, x: sums(raw.x, raw.scale), y: sums(raw.y, raw.scale), box, rows: byFrame(frame, data.length) };
+}
+
+// Groups of a frame: id → rows of its members, those with two or more people (any, where a row is a whole group).
+function groupsAt(side, frame) {
+  const groups = new Map();
+  for (const row of side.rows(frame)) {
+    if (side.group[row] < 0) continue;
+    if (!groups.has(side.group[row])) groups.set(side.group[row], []);
+    groups.get(side.group[row]).push(row);
+  }
+  if (!side.hull) for (const [id, rows] of groups) if (rows.length < 2) groups.delete(id);
+  return groups;
+}
+
+const truth = decodeSide(data.truth, "truth");
+const tracks = decodeSide(data.tracks, "tracks");
+const found = decodeDetections(data.detections);
+const sides = [truth, tracks].filter(Boolean);
+const hasPlan = Boolean(data.bounds);
+const hasImage = Boolean(data.image) &&
+  (sides.some(side => side.box || side.plane === "image") || Boolean(found && (found.box || found.plane === "image")));

@@ -1,0 +1,134 @@
+// Colours, shapes and text that both pictures share.
+
+const darkQuery = matchMedia("(prefers-color-scheme: dark)");
+// Apart from each other for colour-blind eyes; the two rows keep a contrast of 3 : 1 or more on their grounds.
+const COLOURS = {
+  light: ["#0072b2", "#c75000", "#00805e", "#a33a7a", "#6a51a3", "#8a6d00", "#b2182b", "#2a7f9e", "#4d7c0f", "#7a4a2a"],
+  dark: ["#56b4e9", "#f0963c", "#2fc79a", "#e58fc0", "#b3a1f0", "#e0c341", "#ff7b72", "#7fd4e8", "#a3d15c", "#d6a07a"],
+};
+const THEMES = {
+  light: { ground: "#fbfcfd", grid: "#e6eaee", wall: "#2d333b", thing: "#7d8590", floor: "#eef1f4", ink: "#1b1f24", halo: "#ffffff", alone: "#6e7781", found: "#1b1f24" },
+  dark: { ground: "#12171d", grid: "#232b34", wall: "#c5ccd4", thing: "#8b949e", floor: "#1d242c", ink: "#e8ecf1", halo: "#0f1318", alone: "#8b949e", found: "#e8ecf1" },
+};
+let theme = THEMES.light, palette = COLOURS.light;
+
+function chooseTheme() {
+  const key = darkQuery.matches ? "dark" : "light";
+  theme = THEMES[key];
+  palette = COLOURS[key];
+}
+
+function colourOf(id) {
+  return id < 0 ? theme.alone : palette[id % palette.length];
+}
+
+function rowColour(side, row, by) {
+  return colourOf(by === "group" ? side.group[row] : side.id[row]);
+}
+
+// Convex hull of [x, y] points, in the turning sense that canvas arcs take as increasing angle.
+function convex(points) {
+  const sorted = points.slice().sort((a, b) => a[0] - b[0] || a[1] - b[1]);
+  if (sorted.length < 3) return sorted;
+  const half = list => {
+    const chain = [];
+    for (const p of list) {
+      while (chain.length > 1 && turn(chain[chain.length - 2], chain[chain.length - 1], p) <= 0) chain.pop();
+      chain.push(p);
+    }
+    chain.pop();
+    return chain;
+  };
+  return [...half(sorted), ...half(sorted.reverse())];
+}
+
+function turn(a, b, c) {
+  return (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0]);
+}
+
+// The hull of discs of radius r around the points, as a path.
+function roundedPath(ctx, points, r) {
+  const hull = convex(points), n = hull.length;
+  ctx.beginPath();
+  if (n < 2) {
+    if (n) ctx.arc(hull[0][0], hull[0][1], r, 0, 2 * Math.PI);
+    return;
+  }
+  const out = (p, q) => Math.atan2(p[0] - q[0], q[1] - p[1]);
+  for (let k = 0; k < n; k++) {
+    const before = hull[(k + n - 1) % n], here = hull[k], after = hull[(k + 1) % n];
+    ctx.arc(here[0], here[1], r, out(before, here), out(here, after));
+  }
+  ctx.closePath();
+}
+
+function polygonPath(ctx, points) {
+  ctx.beginPath();
+  points.forEach((p, k) => (k ? ctx.lineTo(p[0], p[1]) : ctx.moveTo(p[0], p[1])));
+  ctx.closePath();
+}
+
+function strokeLine(ctx, points) {
+  ctx.beginPath();
+  points.forEach((p, k) => (k ? ctx.lineTo(p[0], p[1]) : ctx.moveTo(p[0], p[1])));
+  ctx.stroke();
+}
+
+function label(ctx, text, x, y, colour, bold) {
+  ctx.font = `${bold ? "700 13px" : "600 11px"} system-ui, sans-serif`;
+  ctx.textAlign = "center";
+  ctx.lineJoin = "round";
+  ctx.lineWidth = 3;
+  ctx.strokeStyle = theme.halo;
+  ctx.setLineDash([]);
+  ctx.strokeText(text, x, y);
+  ctx.fillStyle = colour;
+  ctx.fillText(text, x, y);
+}
+
+// Fills and outlines the current path as the region of a group; what is tracked is dashed, what is true is not.
+function region(ctx, colour, tracked) {
+  ctx.globalAlpha = tracked ? 0.06 : 0.14;
+  ctx.fillStyle = colour;
+  ctx.fill();
+  ctx.globalAlpha = 1;
+  ctx.setLineDash(tracked ? [7, 5] : []);
+  ctx.lineWidth = tracked ? 2.2 : 1.6;
+  ctx.strokeStyle = colour;
+  ctx.stroke();
+  ctx.setLineDash([]);
+}
+
+// Sizes the canvas to its place on the page and gives a context in CSS px.
+function prepare(canvas, aspect) {
+  const width = canvas.clientWidth, height = Math.max(Math.round(width * aspect), 60), dpr = devicePixelRatio || 1;
+  if (canvas.width !== Math.round(width * dpr) || canvas.height !== Math.round(height * dpr)) {
+    canvas.style.height = `${height}px`;
+    canvas.width = Math.round(width * dpr);
+    canvas.height = Math.round(height * dpr);
+  }
+  const ctx = canvas.getContext("2d");
+  ctx.setTransform(dpr, 0, 0, dpr, 0, 0);
+  ctx.clearRect(0, 0, width, height);
+  return [ctx, width, height];
+}
+
+// One picture with everything, or one per side where they are to stand beside each other.
+function panes(shown, beside) {
+  return beside && shown.length === 2 ? shown.map(side => [side]) : [shown];
+}
+
+function inPane(ctx, x, y, width, height, title, draw) {
+  ctx.save();
+  ctx.beginPath();
+  ctx.rect(x, y, width, height);
+  ctx.clip();
+  ctx.translate(x, y);
+  draw();
+  if (title) {
+    label(ctx, title, width / 2, 17, theme.ink, true);
+    ctx.fillStyle = theme.thing;
+    ctx.fillRect(x ? 0 : width - 1, 0, 1, height);
+  }
+  ctx.restore();
+}

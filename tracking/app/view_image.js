@@ -1,0 +1,131 @@
+// The image plane: true, tracked and detected boxes, over the ground and walls that the camera sees.
+
+function drawImage(canvas, frame, options) {
+  const [imageWidth, imageHeight] = data.image;
+  const parts = panes(sides.filter(side => options[side.name]), options.beside);
+  const [ctx, width, height] = prepare(canvas, imageHeight / imageWidth / parts.length);
+  const w = width / parts.length, scale = w / imageWidth;
+  parts.forEach((shown, k) => {
+    const title = parts.length > 1 ? shown[0].name : "";
+    inPane(ctx, k * w, 0, w, height, title, () => imagePane({ ctx, scale, frame, options }, shown));
+  });
+}
+
+function imagePane(pane, shown) {
+  if (data.camera) groundLines(pane);
+  if (pane.options.hulls) for (const side of shown) imageHulls(pane, side);
+  if (pane.options.detections && found) imageDetections(pane);
+  for (const side of shown) imageBoxes(pane, side);
+}
+
+function boxOf(source, row, scale) {
+  if (!source.box) return null;
+  const box = source.box.map(column => column[row] * scale);
+  return Number.isNaN(box[0]) ? null : box;
+}
+
+function imageBoxes({ ctx, scale, frame, options }, side) {
+  const rows = side.rows(frame), tracked = side.name === "tracks";
+  const ids = options.ids && rows.length <= MANY;
+  for (const row of rows) {
+    const colour = rowColour(side, row, options.by), box = boxOf(side, row, scale);
+    ctx.strokeStyle = colour;
+    ctx.lineWidth = tracked ? 2.4 : 1.8;
+    ctx.setLineDash(tracked ? [6, 4] : []);
+    if (box) {
+      const hidden = !tracked && side.visible[row] <= 2;
+      if (hidden) ctx.setLineDash([1, 3]);
+      ctx.strokeRect(...box);
+      ctx.globalAlpha = tracked ? 0 : 0.1;
+      ctx.fillStyle = colour;
+      ctx.fillRect(...box);
+      ctx.globalAlpha = 1;
+      const y = tracked ? box[1] + box[3] + 12 : box[1] - 4;
+      if (ids) label(ctx, side.id[row], box[0] + box[2] / 2, y, colour);
+    } else if (side.plane === "image" && !side.hull) {
+      ctx.beginPath();
+      ctx.arc(side.x[row] * scale, side.y[row] * scale, 6, 0, 2 * Math.PI);
+      ctx.stroke();
+      if (ids) label(ctx, side.id[row], side.x[row] * scale, side.y[row] * scale - 9, colour);
+    }
+  }
+  ctx.setLineDash([]);
+}
+
+function imageHulls({ ctx, scale, frame, options }, side) {
+  const tracked = side.name === "tracks";
+  for (const [id, rows] of groupsAt(side, frame)) {
+    const points = [];
+    for (const row of rows) {
+      const box = boxOf(side, row, scale);
+      if (box) for (const [p, q] of [[0, 0], [1, 0], [0, 1], [1, 1]]) points.push([box[0] + p * box[2], box[1] + q * box[3]]);
+      else if (side.hull && side.plane === "image") side.hull[row].forEach((v, k, all) => k % 2 || points.push([v * scale, all[k + 1] * scale]));
+      else if (side.plane === "image") points.push([side.x[row] * scale, side.y[row] * scale]);
+    }
+    if (!points.length) continue;
+    roundedPath(ctx, points, tracked ? 8 : 5);
+    region(ctx, colourOf(id), tracked);
+    if (!options.ids) continue;
+    const x = points.reduce((a, p) => a + p[0], 0) / points.length;
+    const y = tracked ? Math.max(...points.map(p => p[1])) + 24 : Math.min(...points.map(p => p[1])) - 18;
+    label(ctx, (tracked ? "T" : "G") + id, x, Math.max(y, 14), colourOf(id), true);
+  }
+}
+
+function imageDetections({ ctx, scale, frame }) {
+  ctx.strokeStyle = theme.found;
+  ctx.lineWidth = 1;
+  ctx.setLineDash([2, 2]);
+  for (const row of found.rows(frame)) {
+    const box = boxOf(found, row, scale);
+    if (box) ctx.strokeRect(...box);
+    else if (found.plane === "image") ctx.strokeRect(found.x[row] * scale - 3, found.y[row] * scale - 3, 6, 6);
+  }
+  ctx.setLineDash([]);
+}
+
+// World to image as sim.camera has it; null behind the camera.
+function project(x, y, z) {
+  const { kind, f, c, C, R, scale } = data.camera;
+  const p = [x - C[0], y - C[1], z - C[2]];
+  const [a, b, d] = R.map(r => r[0] * p[0] + r[1] * p[1] + r[2] * p[2]);
+  if (kind === "top") return [a * scale + c[0], b * scale + c[1]];
+  return d < 0.05 ? null : [(f[0] * a) / d + c[0], (f[1] * b) / d + c[1]];
+}
+
+function worldLine(ctx, scale, from, to) {
+  const n = Math.max(2, Math.ceil(Math.hypot(to[0] - from[0], to[1] - from[1])));
+  let before = null;
+  for (let k = 0; k <= n; k++) {
+    const p = project(...from.map((v, i) => v + ((to[i] - v) * k) / n));
+    if (p && before) strokeLine(ctx, [before.map(v => v * scale), p.map(v => v * scale)]);
+    before = p;
+  }
+}
+
+function groundLines({ ctx, scale }) {
+  const [x0, y0, x1, y1] = data.scene ? [0, 0, ...data.scene.size] : data.bounds || [0, 0, 0, 0];
+  const step = x1 - x0 > 40 ? 5 : 1;
+  ctx.strokeStyle = theme.grid;
+  ctx.lineWidth = 1;
+  for (let x = x0; x <= x1; x += step) worldLine(ctx, scale, [x, y0, 0], [x, y1, 0]);
+  for (let y = y0; y <= y1; y += step) worldLine(ctx, scale, [x0, y, 0], [x1, y, 0]);
+  if (!data.scene) return;
+  const { walls, wallHeight, pillars, pillarHeight } = data.scene;
+  ctx.fillStyle = theme.thing;
+  ctx.globalAlpha = 0.3;
+  for (const [a, b, c, d] of walls) fillWorld(ctx, scale, [[a, b, 0], [c, d, 0], [c, d, wallHeight], [a, b, wallHeight]]);
+  ctx.globalAlpha = 0.55;
+  for (const [x, y, r] of pillars) {
+    const ringAt = z => Array.from({ length: 16 }, (_, k) => [x + r * Math.cos((k * Math.PI) / 8), y + r * Math.sin((k * Math.PI) / 8), z]);
+    fillWorld(ctx, scale, [...ringAt(0), ...ringAt(pillarHeight)]);
+  }
+  ctx.globalAlpha = 1;
+}
+
+function fillWorld(ctx, scale, corners) {
+  const points = corners.map(p => project(...p)).filter(Boolean).map(p => p.map(v => v * scale));
+  if (points.length < corners.length) return;
+  polygonPath(ctx, convex(points));
+  ctx.fill();
+}

@@ -1,0 +1,207 @@
+// The plan: ground in metres, what stands on it, people from above, groups, tracks.
+
+const BODY = { shoulder: 0.24, depth: 0.13, head: 0.1, footprint: 0.25, track: 0.36 };
+const MANY = 80;
+
+function drawPlan(canvas, frame, options) {
+  const [x0, y0, x1, y1] = data.bounds;
+  const parts = panes(sides.filter(side => options[side.name]), options.beside);
+  const own = Math.min(Math.max((y1 - y0) / (x1 - x0), 0.35), 1.1);
+  const aspect = (hasImage ? data.image[1] / data.image[0] : own) / parts.length;
+  const [ctx, width, height] = prepare(canvas, aspect);
+  const w = width / parts.length;
+  parts.forEach((shown, k) => {
+    const title = parts.length > 1 ? shown[0].name : "";
+    inPane(ctx, k * w, 0, w, height, title, () => planPane(ctx, w, height, shown, frame, options));
+  });
+}
+
+function planPane(ctx, width, height, shown, frame, options) {
+  const [x0, y0, x1, y1] = data.bounds;
+  const scale = Math.min((width - 16) / (x1 - x0), (height - 16) / (y1 - y0));
+  const left = (width - (x1 - x0) * scale) / 2, top = (height - (y1 - y0) * scale) / 2;
+  const map = (x, y) => [left + (x - x0) * scale, top + (y1 - y) * scale];
+  ctx.fillStyle = theme.ground;
+  ctx.fillRect(0, 0, width, height);
+  grid(ctx, map, scale);
+  if (data.scene) scene(ctx, map, scale);
+  const plan = { ctx, map, scale, frame, options };
+  for (const side of shown) if (side.plane === "ground" && options.hulls) planHulls(plan, side);
+  if (options.near && truth && shown.includes(truth)) nearLines(plan);
+  for (const side of shown) if (side.plane === "ground" && options.trails) planTrails(plan, side);
+  if (options.detections && found && found.plane !== "image") planDetections(plan);
+  for (const side of shown) if (side.plane === "ground") planPeople(plan, side);
+}
+
+function grid(ctx, map, scale) {
+  const [x0, y0, x1, y1] = data.bounds;
+  const step = scale > 14 ? 1 : scale > 4 ? 5 : 10;
+  ctx.strokeStyle = theme.grid;
+  ctx.lineWidth = 1;
+  for (let x = Math.ceil(x0 / step) * step; x <= x1; x += step) strokeLine(ctx, [map(x, y0), map(x, y1)]);
+  for (let y = Math.ceil(y0 / step) * step; y <= y1; y += step) strokeLine(ctx, [map(x0, y), map(x1, y)]);
+  const [u, v] = map(x0, y0);
+  const bar = 5 * scale > 40 ? (scale > 40 ? 1 : 5) : 10;
+  ctx.strokeStyle = theme.thing;
+  ctx.lineWidth = 2;
+  strokeLine(ctx, [[u + 8, v - 8], [u + 8 + bar * scale, v - 8]]);
+  label(ctx, `${bar} m`, u + 8 + (bar * scale) / 2, v - 13, theme.thing);
+}
+
+function scene(ctx, map, scale) {
+  const { size, walls, pillars, doors, service, stairs } = data.scene;
+  ctx.lineWidth = 1;
+  ctx.strokeStyle = theme.thing;
+  polygonPath(ctx, [map(0, 0), map(size[0], 0), map(size[0], size[1]), map(0, size[1])]);
+  ctx.stroke();
+  for (const flight of stairs) steps(ctx, map, flight);
+  ctx.strokeStyle = theme.wall;
+  ctx.lineWidth = Math.max(0.1 * scale, 3);
+  for (const [a, b, c, d] of walls) strokeLine(ctx, [map(a, b), map(c, d)]);
+  for (const [a, b, c, d] of doors) {
+    ctx.strokeStyle = theme.ground;
+    ctx.lineWidth = Math.max(0.1 * scale, 3) + 2;
+    strokeLine(ctx, [map(a, b), map(c, d)]);
+    ctx.strokeStyle = theme.wall;
+    ctx.lineWidth = 1;
+    ctx.setLineDash([2, 3]);
+    strokeLine(ctx, [map(a, b), map(c, d)]);
+    ctx.setLineDash([]);
+  }
+  ctx.fillStyle = theme.thing;
+  for (const [x, y, r] of pillars) {
+    ctx.beginPath();
+    ctx.arc(...map(x, y), r * scale, 0, 2 * Math.PI);
+    ctx.fill();
+  }
+  ctx.strokeStyle = theme.wall;
+  ctx.lineWidth = 1.5;
+  for (const [x, y] of service) {
+    const [u, v] = map(x, y);
+    ctx.strokeRect(u - 6, v - 6, 12, 12);
+    label(ctx, "service", u, v - 10, theme.thing);
+  }
+}
+
+function steps(ctx, map, [fx, fy, hx, hy, width, , count, landing]) {
+  const length = Math.hypot(hx - fx, hy - fy), ex = (hx - fx) / length, ey = (hy - fy) / length;
+  const across = s => [map(fx + ex * s - ey * width / 2, fy + ey * s + ex * width / 2), map(fx + ex * s + ey * width / 2, fy + ey * s - ex * width / 2)];
+  ctx.fillStyle = theme.floor;
+  polygonPath(ctx, [...across(0), ...across(length + landing).reverse()]);
+  ctx.fill();
+  for (let k = 0; k <= count; k++) strokeLine(ctx, across((length * k) / count));
+}
+
+function place(plan, side, row) {
+  return plan.map(side.x[row], side.y[row]);
+}
+
+function planHulls(plan, side) {
+  const { ctx, scale } = plan, tracked = side.name === "tracks";
+  for (const [id, rows] of groupsAt(side, plan.frame)) {
+    const points = rows.map(row => place(plan, side, row)).filter(p => !Number.isNaN(p[0]));
+    if (!points.length) continue;
+    const given = side.hull ? side.hull[rows[0]] : [];
+    if (given.length) polygonPath(ctx, given.reduce((list, v, k) => (k % 2 ? list : [...list, plan.map(v, given[k + 1])]), []));
+    else roundedPath(ctx, points, Math.max((tracked ? 0.4 : BODY.footprint + 0.05) * scale, 7));
+    region(ctx, colourOf(id), tracked);
+    if (!plan.options.ids) continue;
+    const mid = points.reduce((a, p) => a + p[0], 0) / points.length;
+    const edge = tracked ? Math.max(...points.map(p => p[1])) + 0.45 * scale + 15 : Math.min(...points.map(p => p[1])) - 0.35 * scale - 7;
+    label(ctx, (tracked ? "T" : "G") + id, mid, edge, colourOf(id), true);
+  }
+}
+
+function planTrails(plan, side) {
+  const { ctx } = plan, reach = Math.round(3 * data.fps), tracked = side.name === "tracks";
+  ctx.lineCap = "round";
+  ctx.lineWidth = tracked ? 1.4 : 2;
+  ctx.setLineDash(tracked ? [3, 4] : []);
+  ctx.globalAlpha = 0.6;
+  for (const row of side.rows(plan.frame)) {
+    const points = [];
+    for (let k = Math.max(side.first[row], row - reach); k <= row; k++) points.push(place(plan, side, k));
+    ctx.strokeStyle = rowColour(side, row, plan.options.by);
+    strokeLine(ctx, points);
+  }
+  ctx.globalAlpha = 1;
+  ctx.setLineDash([]);
+}
+
+function nearLines(plan) {
+  const { ctx } = plan, rowOf = new Map();
+  for (const row of truth.rows(plan.frame)) rowOf.set(truth.id[row], row);
+  ctx.strokeStyle = theme.thing;
+  ctx.lineWidth = 1.5;
+  ctx.setLineDash([1, 4]);
+  for (const [start, end, a, b] of data.near) {
+    if (plan.frame < start || plan.frame > end || !rowOf.has(a) || !rowOf.has(b)) continue;
+    strokeLine(ctx, [place(plan, truth, rowOf.get(a)), place(plan, truth, rowOf.get(b))]);
+  }
+  ctx.setLineDash([]);
+}
+
+function planDetections(plan) {
+  const { ctx } = plan;
+  ctx.strokeStyle = theme.found;
+  ctx.lineWidth = 1.3;
+  for (const row of found.rows(plan.frame)) {
+    const [u, v] = plan.map(found.x[row], found.y[row]);
+    strokeLine(ctx, [[u - 4, v - 4], [u + 4, v + 4]]);
+    strokeLine(ctx, [[u - 4, v + 4], [u + 4, v - 4]]);
+  }
+}
+
+function planPeople(plan, side) {
+  const rows = side.rows(plan.frame);
+  const ids = plan.options.ids && rows.length <= MANY;
+  for (const row of rows) {
+    const at = place(plan, side, row);
+    if (Number.isNaN(at[0]) || (side.hull && plan.options.hulls)) continue;
+    const colour = rowColour(side, row, plan.options.by);
+    if (side.name === "truth") body(plan, side, row, at, colour);
+    else ring(plan, side, row, at, colour);
+    if (!ids) continue;
+    const off = Math.max(BODY.shoulder * plan.scale, 5) + 4, sign = side.name === "truth" ? 1 : -1;
+    label(plan.ctx, side.id[row], at[0] + sign * off, at[1] + sign * off * 0.8 + 4, colour);
+  }
+}
+
+function body({ ctx, scale }, side, row, [u, v], colour) {
+  const unit = Math.max(scale, 16), angle = side.angle[row], known = !Number.isNaN(angle);
+  ctx.save();
+  ctx.translate(u, v);
+  ctx.rotate(known ? -angle : 0);
+  ctx.fillStyle = colour;
+  ctx.strokeStyle = theme.halo;
+  ctx.lineWidth = 1;
+  ctx.beginPath();
+  if (known) ctx.ellipse(0, 0, BODY.depth * unit, BODY.shoulder * unit, 0, 0, 2 * Math.PI);
+  else ctx.arc(0, 0, 0.19 * unit, 0, 2 * Math.PI);
+  ctx.fill();
+  ctx.stroke();
+  ctx.fillStyle = theme.halo;
+  ctx.beginPath();
+  ctx.arc(known ? 0.03 * unit : 0, 0, BODY.head * unit, 0, 2 * Math.PI);
+  ctx.fill();
+  if (known) {
+    ctx.fillStyle = colour;
+    ctx.beginPath();
+    ctx.moveTo(0.34 * unit, 0);
+    ctx.lineTo(0.17 * unit, 0.09 * unit);
+    ctx.lineTo(0.17 * unit, -0.09 * unit);
+    ctx.fill();
+  }
+  ctx.restore();
+}
+
+function ring({ ctx, scale }, side, row, [u, v], colour) {
+  const r = Math.max(BODY.track * scale, 6), angle = side.angle[row];
+  ctx.strokeStyle = colour;
+  ctx.lineWidth = 2;
+  ctx.beginPath();
+  ctx.arc(u, v, r, 0, 2 * Math.PI);
+  ctx.stroke();
+  if (Number.isNaN(angle)) return;
+  strokeLine(ctx, [[u + r * Math.cos(angle), v - r * Math.sin(angle)], [u + 1.6 * r * Math.cos(angle), v - 1.6 * r * Math.sin(angle)]]);
+}

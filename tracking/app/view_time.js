@@ -1,0 +1,137 @@
+// The timeline: lanes of events, true and tracked, and the lineage of group ids as bars that join and fork.
+
+const KINDS = {
+  merge: { colour: 0, shape: "M-5,-5 L5,-5 L0,5 Z", word: "merge" },
+  split: { colour: 1, shape: "M-5,5 L5,5 L0,-5 Z", word: "split" },
+  cross: { colour: 3, shape: "M-5,-5 L5,5 M-5,5 L5,-5", word: "cross" },
+  queue: { colour: 2, shape: "M-5,-5 H5 V5 H-5 Z", word: "queue" },
+  form: { colour: 4, shape: "M0,-5 L5,0 L0,5 L-5,0 Z", word: "form" },
+  dissolve: { colour: 5, shape: "M-3.5,0 A3.5,3.5 0 1 0 3.5,0 A3.5,3.5 0 1 0 -3.5,0", word: "dissolve" },
+  enter: { colour: 7, shape: "M0,-5 V5 M0,0 H5", word: "enter" },
+  leave: { colour: 9, shape: "M0,-5 V5 M0,0 H-5", word: "leave" },
+};
+const GUTTER = 104, LANE = 15, BAR = 12;
+const WORDS = { truth: "true", tracks: "tracked" };
+
+function element(name, attributes, parent, text) {
+  const node = document.createElementNS("http://www.w3.org/2000/svg", name);
+  for (const key in attributes) node.setAttribute(key, attributes[key]);
+  if (text !== undefined) node.textContent = text;
+  if (parent) parent.append(node);
+  return node;
+}
+
+function eventWords(event) {
+  const list = ids => ids.map(id => (id < 0 ? "alone" : `${event.side === "tracks" ? "T" : "G"}${id}`)).join(" + ");
+  const ids = event.before.length || event.after.length ? ` ${list(event.before) || "–"} → ${list(event.after) || "–"}` : "";
+  const who = event.members.length ? `; people ${event.members.slice(0, 12).join(", ")}${event.members.length > 12 ? " …" : ""}` : "";
+  const said = event.emitted === null ? "" : `; said at frame ${event.emitted}`;
+  return `${event.kind}${ids}${who}${said}`;
+}
+
+function seconds(frame) {
+  return (frame - 1) / data.fps;
+}
+
+// Builds the picture for a width and returns how to move its playhead and how a place on it becomes a frame.
+function timeline(box, width, seekTo) {
+  const svg = element("svg", { role: "img", "aria-label": "Timeline of events and groups; seek with the slider or by clicking" });
+  const span = Math.max(width - GUTTER - 14, 50), last = Math.max(data.length - 1, 1);
+  const x = frame => GUTTER + ((frame - 1) / last) * span;
+  let y = axis(svg, x, width);
+  for (const [a, b] of data.unlabelled) shade(svg, x(a), x(b + 1));
+  for (const side of sides) y = eventLane(svg, side, x, y, seekTo);
+  for (const side of sides) y = lineage(svg, side, x, y, seekTo);
+  svg.setAttribute("viewBox", `0 0 ${width} ${y + 4}`);
+  svg.setAttribute("height", y + 4);
+  for (const rect of svg.querySelectorAll(".shade")) rect.setAttribute("height", y - 18);
+  const head = element("line", { y1: 16, y2: y + 2, stroke: "currentColor", "stroke-width": 1.6 }, svg);
+  const knob = element("path", { d: "M-5,13 H5 L0,21 Z", fill: "currentColor" }, svg);
+  box.replaceChildren(svg);
+  return {
+    move(frame) {
+      head.setAttribute("x1", x(frame));
+      head.setAttribute("x2", x(frame));
+      knob.setAttribute("transform", `translate(${x(frame)} 0)`);
+    },
+    frameAt: px => Math.min(Math.max(Math.round(1 + ((px - GUTTER) / span) * last), 1), data.length),
+  };
+}
+
+function axis(svg, x, width) {
+  const total = seconds(data.length), steps = [0.5, 1, 2, 5, 10, 20, 30, 60, 120, 300, 600, 1800, 3600];
+  const step = steps.find(s => total / s <= Math.max((width - GUTTER) / 70, 2)) || 7200;
+  for (let t = 0; t <= total + 1e-9; t += step) {
+    const u = x(1 + t * data.fps);
+    element("text", { x: u, y: 10, "text-anchor": "middle", fill: theme.thing }, svg, `${t} s`);
+    element("line", { x1: u, x2: u, y1: 14, y2: 20, stroke: theme.thing }, svg);
+  }
+  return 20;
+}
+
+function shade(svg, from, to) {
+  const rect = element("rect", { class: "shade", x: from, y: 18, width: Math.max(to - from, 1), fill: theme.thing, opacity: 0.18 }, svg);
+  element("title", {}, rect, "groups are not labelled here");
+}
+
+function heading(svg, y, text) {
+  element("text", { x: GUTTER - 10, y: y + 11, "text-anchor": "end" }, svg, text);
+}
+
+// Markers that would overlap stand below each other.
+function eventLane(svg, side, x, y, seekTo) {
+  heading(svg, y, `${WORDS[side.name]} events`);
+  const ends = [];
+  for (const event of side.events.slice().sort((a, b) => a.start - b.start)) {
+    const u = x(event.start), kind = KINDS[event.kind] || KINDS.form;
+    const end = x(Math.min(Math.max(event.end, event.emitted || 0), data.length));
+    let lane = ends.findIndex(e => e < u - 12);
+    if (lane < 0) lane = ends.length < 6 ? ends.length : 5;
+    ends[lane] = u;
+    const v = y + 8 + lane * LANE, colour = palette[kind.colour];
+    const mark = element("g", { transform: `translate(${u} ${v})`, style: "cursor:pointer" }, svg);
+    if (end - u > 6) element("line", { x1: 0, x2: end - u, y1: 0, y2: 0, stroke: colour, "stroke-width": 2, opacity: 0.45 }, mark);
+    const open = event.kind === "cross" || event.kind === "enter" || event.kind === "leave" || event.kind === "dissolve";
+    element("path", { d: kind.shape, fill: open ? "none" : colour, stroke: colour, "stroke-width": open ? 2.4 : 1 }, mark);
+    element("title", {}, mark, `${seconds(event.start).toFixed(1)} s: ${eventWords(event)}`);
+    mark.addEventListener("pointerdown", e => { e.stopPropagation(); seekTo(event.start); });
+  }
+  return y + Math.max(ends.length, 1) * LANE + 5;
+}
+
+function lineage(svg, side, x, y, seekTo) {
+  if (!side.bars.length) return y;
+  heading(svg, y, `${WORDS[side.name]} groups`);
+  const middle = bar => y + 3 + bar.lane * (BAR + 5) + BAR / 2;
+  const alive = (id, frame) => side.bars.find(bar => bar.id === id && bar.start - 1 <= frame && bar.end + 1 >= frame)
+    || side.bars.filter(bar => bar.id === id).sort((p, q) => Math.abs(p.start - frame) - Math.abs(q.start - frame))[0];
+  for (const { frame, a, b } of side.links) {
+    const from = alive(a, frame - 1), to = alive(b, frame + 1);
+    if (!from || !to || from === to) continue;
+    const u = x(frame), dy = [middle(from), middle(to)];
+    element("path", { d: `M${u - 9},${dy[0]} C${u},${dy[0]} ${u},${dy[1]} ${u + 9},${dy[1]}`, fill: "none", stroke: colourOf(a), "stroke-width": 3.5 }, svg);
+  }
+  for (const bar of side.bars) {
+    const from = x(bar.start), wide = Math.max(x(bar.end + 1) - from, 3), colour = colourOf(bar.id);
+    const group = element("g", { style: "cursor:pointer" }, svg);
+    const tracked = side.name === "tracks";
+    element("rect", { x: from, y: middle(bar) - BAR / 2, width: wide, height: BAR, rx: 4, fill: colour, "fill-opacity": tracked ? 0.35 : 0.9, stroke: colour, "stroke-dasharray": tracked ? "4 3" : "none" }, group);
+    const name = `${tracked ? "T" : "G"}${bar.id}`;
+    if (wide > 8 * name.length + 6) element("text", { x: from + 5, y: middle(bar) + 4, "font-size": 11, "font-weight": 650, fill: tracked ? theme.ink : theme.halo, style: "pointer-events:none" }, group, name);
+    element("title", {}, group, `${name}: ${seconds(bar.start).toFixed(1)} to ${seconds(bar.end).toFixed(1)} s, up to ${bar.size} ${side.hull ? "regions" : "people"}`);
+    group.addEventListener("dblclick", () => seekTo(bar.start));
+  }
+  return y + Math.max(...side.bars.map(bar => bar.lane + 1)) * (BAR + 5) + 8;
+}
+
+function legend(box) {
+  const kinds = Object.keys(KINDS).filter(kind => sides.some(side => side.events.some(event => event.kind === kind)));
+  box.replaceChildren(...kinds.map(kind => {
+    const item = document.createElement("span"), colour = palette[KINDS[kind].colour];
+    const svg = element("svg", { width: 14, height: 14, viewBox: "-7 -7 14 14", "aria-hidden": "true" });
+    const open = ["cross", "enter", "leave", "dissolve"].includes(kind);
+    element("path", { d: KINDS[kind].shape, fill: open ? "none" : colour, stroke: colour, "stroke-width": open ? 2.4 : 1 }, svg);
+    item.append(svg, KINDS[kind].word);
+    return item;
+  }));
+}
