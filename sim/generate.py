@@ -16,9 +16,8 @@ from scenarios.errors import FlockscopeError, InputError, WorkError
 from scenarios.load import Entry
 from sim.io import store
 from sim.io.atomic import refusal, sweep, write_file
+from sim.splits import split_of
 
-SPLITS = (("train", 0, 10_000), ("val", 10_000, 20_000), ("test", 20_000, 30_000), ("fit", 30_000, 40_000))
-DEMO = ("demo", 40_000, 2**63)
 Progress = Callable[[int, int, str], None]
 
 
@@ -34,23 +33,6 @@ class Job:
     def name(self) -> str:
         """The sequence's name."""
         return self.folder.name
-
-
-def split_of(seeds: range) -> str:
-    """train, val, test, fit or demo; InputError for a range that crosses two or holds nothing."""
-    if len(seeds) == 0 or min(seeds) < 0:
-        raise InputError(
-            place="seeds", got=f"{seeds.start}:{seeds.stop}", expected="a:b with 0 <= a < b", remedy="correct --seeds"
-        )
-    for name, low, high in (*SPLITS, DEMO):
-        if low <= min(seeds) < high:
-            if max(seeds) < high:
-                return name
-            raise InputError(
-                place="seeds", got=f"{seeds.start}:{seeds.stop}", expected=f"a range inside {low}:{high} ({name})",
-                remedy=f"end the range at {high} or begin it there",
-            )  # fmt: skip
-    raise AssertionError("every seed has a split")
 
 
 def generate(

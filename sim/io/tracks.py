@@ -19,8 +19,8 @@ from sim.io.atomic import write_into
 from sim.io.events import event_dict, read_events
 from sim.io.groups import AXES, groups_bytes, groups_csv, read_groups
 from sim.io.tables import Column, Table, table_bytes
-from sim.io.truths import BOX, scores
 from sim.io.tracks_text import from_text, with_groups
+from sim.io.truths import BOX, scores
 from sim.io.upright import upright_boxes
 from sim.types import Array, Camera, GroupEvent, Tracks
 

@@ -159,7 +159,7 @@ def scores(score: Array, rows: int) -> Array:
 
 
 def _det_text(frame: Any, box: Array | None, score: Array, ground: Array | None) -> bytes:
-    boxes = np.full((len(score), 4), -1.0) if box is None else box
+    boxes = np.full((len(score), 4), -1.0) if box is None else np.c_[box[:, :2], np.maximum(box[:, 2:], 0.01)]
     lines = []
     for k, f in enumerate(frame):
         corner = "-1,-1,-1,-1" if box is None else ",".join(f"{v:.2f}" for v in boxes[k])

@@ -1,0 +1,147 @@
+"""Random truths, tracks and sequences, with every field in use, and a strict comparison."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import fields, is_dataclass
+from typing import Any
+
+import numpy as np
+import pytest
+
+from sim.types import (
+    Camera,
+    Detections,
+    Frame,
+    GroupEvent,
+    Groups,
+    Near,
+    Order,
+    Scene,
+    Sequence,
+    Stairs,
+    Tracks,
+    Truth,
+)
+
+
+def assert_same(a: Any, b: Any, place: str = "") -> None:
+    """Equal kinds, shapes and bits, all the way down."""
+    assert type(a) is type(b), f"{place}: {type(a)} {type(b)}"
+    if isinstance(a, np.ndarray):
+        assert a.dtype == b.dtype, place
+        assert a.shape == b.shape, f"{place}: {a.shape} {b.shape}"
+        assert np.array_equal(a, b, equal_nan=a.dtype.kind == "f"), place
+    elif is_dataclass(a):
+        for f in fields(a):
+            if not callable(getattr(a, f.name)) and f.name != "source":
+                assert_same(getattr(a, f.name), getattr(b, f.name), f"{place}.{f.name}")
+    elif isinstance(a, (tuple, list)):
+        assert len(a) == len(b), place
+        for k, (x, y) in enumerate(zip(a, b, strict=True)):
+            assert_same(x, y, f"{place}[{k}]")
+    else:
+        assert a == b or (a != a and b != b), f"{place}: {a} {b}"
+
+
+def groups(r: np.random.Generator, id: np.ndarray, group: np.ndarray, scale: float = 1.0) -> Groups:
+    names = np.unique(group[group >= 0])
+    n = len(names)
+    return Groups(
+        names, tuple(id[group == g] for g in names), r.normal(size=(n, 2)) * scale, r.normal(size=(n, 2)) * scale,
+        r.normal(size=(n, 2, 2)), np.array([float((group == g).sum()) for g in names]),
+        tuple(r.normal(size=(int(r.integers(3, 9)), 2)) * scale for _ in names),
+    )  # fmt: skip
+
+
+def event(r: np.random.Generator, length: int, emitted: int | None = None) -> GroupEvent:
+    start = int(r.integers(1, length + 1))
+    pos = (float(r.normal()), float("nan") if r.random() < 0.2 else float(r.normal()))
+    return GroupEvent("merge", start, length, emitted, (-1, 2), (2,), (1, 2, 3), pos)
+
+
+def truth(r: np.random.Generator, length: int = 12, people: int = 5) -> Truth:
+    here = r.random((length, people)) < 0.8
+    frame, column = (a.astype(np.int64) for a in np.nonzero(here))
+    frame, id, n = frame + 1, column + 1, len(frame)
+    group = np.where(id <= 2, 1, np.where(id <= 4, 7, -1))
+    box = np.c_[r.normal(size=(n, 2)) * 100, r.uniform(5, 50, (n, 2))]
+    cut = [np.flatnonzero(frame == f) for f in range(1, length + 1)]
+    visible = box.copy()
+    visible[::3] = np.nan
+    labelled = np.ones(length, bool)
+    labelled[: length // 4] = False
+    return Truth(
+        name="fake", fps=10.0, length=length, px_per_m=float(r.uniform(20, 60)), frame=frame, id=id, group=group,
+        pos=r.normal(size=(n, 2)), vel=r.normal(size=(n, 2)), box=box, visibility=r.random(n), z=r.random(n),
+        heading=r.normal(size=n), height=r.uniform(1.5, 1.9, n), truncation=r.random(n), visible_box=visible,
+        groups=tuple(groups(r, id[c], group[c]) for c in cut),
+        groups_px=tuple(groups(r, id[c], group[c], 100.0) for c in cut),
+        labelled=labelled, events=tuple(event(r, length) for _ in range(3)),
+        near=Near(*(r.integers(1, length + 1, 4) for _ in range(4))),
+        orders=(
+            Order("m1", "merge", 1, ((1, 2), (3,)), ((1, 2, 3),)),
+            Order("s1", "split", None, ((1, 2),), ((1,), (2,))),
+        ),
+    )  # fmt: skip
+
+
+def detections(r: np.random.Generator, index: int, fps: float = 10.0) -> Detections:
+    m = int(r.integers(0, 5))
+    box = np.c_[r.normal(size=(m, 2)) * 100, r.uniform(5, 50, (m, 2))]
+    return Detections(index, (index - 1) / fps, "ground", r.normal(size=(m, 2)), None, box, r.random(m))
+
+
+def sequence(seed: int, length: int = 12) -> Sequence:
+    r = np.random.default_rng(seed)
+    found = truth(r, length)
+    camera = Camera(
+        "pinhole", (640, 480), (500.1, 500.2), (320.0, 240.0), r.normal(size=3), r.normal(size=(3, 3)), 0.12
+    )  # fmt: skip
+    stairs = (Stairs(np.array([[1.0, 2.0], [3.0, 2.0]]), np.array([[1.0, 4.0], [3.0, 4.0]]), 2.0, 1.5, 10, 4.0),)
+    scene = Scene(
+        np.array([16.0, 10.0]), r.normal(size=(2, 2, 2)), r.normal(size=(1, 3)), stairs=stairs, wall_height=2.4
+    )  # fmt: skip
+    every = [detections(r, k) for k in range(1, length + 1)]
+    return Sequence(
+        name="fake-s00001", fps=10.0, length=length,
+        frames=lambda: (Frame(d.index, d.t, detections=d) for d in every),
+        load_truth=lambda: found, image_size=(640, 480), camera=camera, scene=scene, px_per_m=found.px_per_m,
+        has_detections=True,
+    )  # fmt: skip
+
+
+def tracks(seed: int, length: int = 9, plane: str = "ground", unit: str = "person", boxed: bool = True) -> list[Tracks]:
+    r = np.random.default_rng(seed)
+    d = 3 if plane == "space" else 2
+    found = []
+    for index in range(1, length + 1):
+        n = int(r.integers(0, 5))
+        id = r.permutation(10)[:n].astype(np.int64)
+        group = id.copy() if unit == "group" else r.integers(-1, 3, n)
+        known = groups(r, id, group)
+        known = known.replace(members=()) if unit == "group" else known
+        box = np.c_[r.normal(size=(n, 2)) * 100, r.uniform(5, 50, (n, 2))] if boxed and index != 3 else None
+        found.append(
+            Tracks(
+                index, (index - 1) / 10, plane, unit, id, group, r.normal(size=(n, d)), r.normal(size=(n, d)),
+                r.normal(size=(n, 2 * d, 2 * d)), box, r.random(n), known if index != 2 else None,
+                (event(r, length, index),) if index % 4 == 0 else (),
+            )
+        )  # fmt: skip
+    return found
+
+
+@pytest.fixture
+def same() -> Callable[..., None]:
+    return assert_same
+
+
+@pytest.fixture
+def make_sequence() -> Callable[..., Sequence]:
+    return sequence
+
+
+@pytest.fixture
+def make_tracks() -> Callable[..., list[Tracks]]:
+    return tracks
