@@ -24,6 +24,7 @@ function seekTo(frame) {
 
 function show() {
   const frame = state.frame;
+  $("stages").classList.toggle("beside", options.beside && options.truth && options.tracks);
   if (hasPlan) drawPlan($("plan"), frame, options);
   if (hasImage) drawImage($("image"), frame, options);
   if (line) line.move(frame);
@@ -40,7 +41,8 @@ function facts(frame) {
     rows.push([`${WORDS[side.name]} ${what}`, side.rows(frame).length]);
     const groups = [...groupsAt(side, frame)].map(([id, members]) =>
       `${side.name === "tracks" ? "T" : "G"}${id}` + (side.hull ? "" : ` (${members.map(row => side.id[row]).join(", ")})`));
-    if (!side.hull) rows.push([`${WORDS[side.name]} groups`, groups.join(" · ") || "none"]);
+    const none = side === truth && data.unlabelled.some(([a, b]) => a <= frame && frame <= b) ? "not labelled" : "none";
+    if (!side.hull) rows.push([`${WORDS[side.name]} groups`, groups.join(" · ") || none]);
   }
   if (found) rows.push(["detections", found.rows(frame).length]);
   const now = events.filter(event => event.start <= frame && frame <= Math.max(event.end, event.start + data.fps / 2));

@@ -168,7 +168,7 @@ function planPeople(plan, side) {
 }
 
 function body({ ctx, scale }, side, row, [u, v], colour) {
-  const unit = Math.max(scale, 16), angle = side.angle[row], known = !Number.isNaN(angle);
+  const unit = Math.max(scale, 22), angle = side.angle[row], known = !Number.isNaN(angle);
   ctx.save();
   ctx.translate(u, v);
   ctx.rotate(known ? -angle : 0);

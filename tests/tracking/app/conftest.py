@@ -30,7 +30,7 @@ def look_at() -> Camera:
 
 def boxes(camera: Camera, pos: np.ndarray) -> np.ndarray:
     """Boxes of upright people 1.7 m high and 0.5 m wide."""
-    corners = [np.c_[pos + [dx, 0], np.full(len(pos), z)] for dx in (-0.25, 0.25) for z in (0, 1.7)]
+    corners = [np.c_[pos + np.array([dx, 0]), np.full(len(pos), z)] for dx in (-0.25, 0.25) for z in (0, 1.7)]
     uv = []
     for xyz in corners:
         p = (xyz - camera.position) @ camera.rotation.T
@@ -47,7 +47,7 @@ def paths() -> np.ndarray:
     apart = np.maximum(0, t - (SPLIT - 10) / FPS)
     a = a + np.c_[0 * t, -0.7 * apart]
     b = b + np.c_[0.5 * apart, 0.6 * apart]
-    place = [a, a + [0, 0.7], a + [-0.2, 1.4], b, b + [0.1, 0.7]]
+    place = [a, a + np.array([0, 0.7]), a + np.array([-0.2, 1.4]), b, b + np.array([0.1, 0.7])]
     stranger = np.c_[15 - 1.2 * t, 8.5 - 0.35 * t]
     stranger[(t < 1) | (t > 11)] = np.nan
     wait = np.c_[np.full(LENGTH, 3.0), 8 + 0.02 * np.sin(t)]
@@ -142,7 +142,9 @@ def tracks(truth: Truth) -> list[Tracks]:
     late = 4
     moved = {
         MERGE + late: GroupEvent("merge", MERGE, MERGE + late, MERGE + late, (0, 7), (0,), (0, 1, 2, 3, 4), (8.0, 5.4)),
-        SPLIT + late: GroupEvent("split", SPLIT, SPLIT + late, SPLIT + late, (0,), (0, 8), (0, 1, 2, 3, 4), (12.0, 5.4)),
+        SPLIT + late: GroupEvent(
+            "split", SPLIT, SPLIT + late, SPLIT + late, (0,), (0, 8), (0, 1, 2, 3, 4), (12.0, 5.4)
+        ),
     }
     for k in range(1, LENGTH + 1):
         now, before = truth.at(k), truth.at(max(k - late, 1))

@@ -1,0 +1,179 @@
+"""A contact sheet: small plan views of a sequence over time, onsets of its events preferred, as one PNG."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import cv2
+import numpy as np
+
+from scenarios.errors import InputError, WorkError
+from sim.types import Array, GroupEvent, Image, Sequence, Truth
+from tracking.app import sheet_panel
+from tracking.app.sheet_panel import INK, QUIET, THING, Colour, View, colour, text
+
+# Merges and splits are what a scenario is about; entering and leaving come last.
+RANK = {"merge": 0, "split": 0, "cross": 1, "queue": 1, "form": 2, "dissolve": 2}
+KIND_COLOUR = {"merge": 0, "split": 1, "cross": 3, "queue": 2, "form": 4, "dissolve": 5, "enter": 7, "leave": 9}
+WIDTH, HEAD, FOOT, GAP, TITLE = 880, 76, 96, 20, 40
+"""px before shrinking: a panel's width; the sheet's head and foot; gaps; a panel's title."""
+
+MANY = 40
+MARGIN = 1.0
+
+
+def sheet(sequence: Sequence, out: str | Path, frames: int = 8) -> Path:
+    """Writes the PNG and returns its path: `frames` panels, four to a row, with a time line beneath."""
+    truth = sequence.truth
+    if truth is None or len(truth.frame) == 0:
+        raise InputError(
+            file=sequence.name, got="no labelled people", expected="a sequence with truth", remedy="name one with gt/"
+        )
+    picture = compose(sequence, truth, frames)
+    path = Path(out)
+    done, code = cv2.imencode(".png", picture)
+    assert done, "PNG holds any 8-bit picture"
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_bytes(code.tobytes())
+    except OSError as error:
+        raise WorkError(
+            file=path, got=error.strerror or error, expected="a picture written", remedy="check path, rights and space"
+        ) from None
+    return path
+
+
+def compose(sequence: Sequence, truth: Truth, frames: int = 8) -> Image:
+    """The sheet as an (H, W, 3) picture."""
+    chosen = choose(truth, frames)
+    low, high = _bounds(sequence, truth)
+    height = round(WIDTH * float(np.clip((high - low)[1] / (high - low)[0], 0.4, 1.0)))
+    columns = min(4, len(chosen))
+    rows = -(-len(chosen) // columns)
+    total = (HEAD + rows * (height + TITLE + GAP) + FOOT, GAP + columns * (WIDTH + GAP))
+    canvas = np.full((*total, 3), 255, np.uint8)
+    for k, index in enumerate(chosen):
+        top, left = HEAD + k // columns * (height + TITLE + GAP), GAP + k % columns * (WIDTH + GAP)
+        _panel(canvas[top : top + TITLE + height, left : left + WIDTH], sequence, truth, index, low, high)
+    _head(canvas, sequence, truth)
+    _foot(canvas[-FOOT:], truth, chosen)
+    return np.asarray(cv2.resize(canvas, None, fx=0.5, fy=0.5, interpolation=cv2.INTER_AREA), np.uint8)
+
+
+def choose(truth: Truth, frames: int) -> list[int]:
+    """Which frames to show: onsets by rank, spread over time where there are too many; then the widest gaps halved."""
+    frames = max(1, min(frames, truth.length))
+    chosen: list[int] = []
+    events = [event for event in truth.events or () if 1 <= event.start <= truth.length and event.kind in RANK]
+    for rank in sorted(set(RANK.values())):
+        onsets = sorted({event.start for event in events if RANK[event.kind] == rank} - set(chosen))
+        room = frames - len(chosen)
+        chosen += onsets if len(onsets) <= room else [onsets[k] for k in _spread(len(onsets), room)]
+    while len(chosen) < frames:
+        chosen.append(_widest(chosen, truth.length))
+    return sorted(chosen)
+
+
+def _spread(n: int, k: int) -> list[int]:
+    """k of n places, evenly apart."""
+    return [round(place) for place in np.linspace(0, n - 1, k)] if k > 1 else [0][:k]
+
+
+def _widest(chosen: list[int], length: int) -> int:
+    """A frame in the widest gap; the first and the last frame count as half a gap from the ends."""
+    marks = np.array([1 - length // 8, *sorted(chosen), length + length // 8])
+    gaps = np.diff(marks)
+    for k in np.argsort(-gaps, kind="stable"):
+        middle = int(np.clip((marks[k] + marks[k + 1]) // 2, 1, length))
+        if middle not in chosen:
+            return middle
+    return next(index for index in range(1, length + 1) if index not in chosen)
+
+
+def _places(truth: Truth) -> Array:
+    """Where everybody is drawn: on the ground, else the middle of the boxes."""
+    if truth.pos is not None:
+        return truth.pos
+    assert truth.box is not None, "labels have positions or boxes"
+    return truth.box[:, :2] + truth.box[:, 2:] / 2
+
+
+def _bounds(sequence: Sequence, truth: Truth) -> tuple[Array, Array]:
+    if truth.pos is None and sequence.image_size is not None:
+        return np.zeros(2), np.array(sequence.image_size, float)
+    if truth.pos is not None and sequence.scene is not None:
+        return np.zeros(2), sequence.scene.size
+    places = _places(truth)
+    if truth.pos is None and truth.box is not None:
+        places = np.concatenate([truth.box[:, :2], truth.box[:, :2] + truth.box[:, 2:]])
+    places = places[np.isfinite(places).all(axis=1)]
+    margin = MARGIN if truth.pos is not None else 0.0
+    return places.min(axis=0) - margin, places.max(axis=0) + np.maximum(margin, 1e-3)
+
+
+def _panel(area: Image, sequence: Sequence, truth: Truth, index: int, low: Array, high: Array) -> None:
+    """One view with its title."""
+    plan = truth.pos is not None
+    view = View.fit(area[TITLE:], low, high, upwards=plan)
+    places, boxes = _places(truth), None if plan else truth.box
+    view.canvas[:] = sheet_panel.FLOOR
+    if plan:
+        sheet_panel.ground(view, sequence.scene)
+    sheet_panel.trails(view, truth, index, places)
+    sheet_panel.hulls(view, truth, index, places, boxes)
+    rows = truth.rows(index)
+    sheet_panel.people(view, truth, index, places, boxes, names=rows.stop - rows.start <= MANY)
+    now = [event for event in truth.events or () if event.start == index and event.kind in RANK]
+    for event in now if plan else []:
+        view.disc(np.array(event.pos), 0.9 * view.scale, _kind(event), 3)
+    words = f"{(index - 1) / truth.fps:.1f} s" + "".join(f"   {_words(event)}" for event in now)
+    ink = _kind(now[0]) if now else QUIET
+    text(area, words[:62], (2, TITLE - 12), 0.72, ink, 2 if now else 1)
+    cv2.rectangle(area, (0, TITLE), (area.shape[1] - 1, area.shape[0] - 1), ink if now else THING, 5 if now else 2)
+
+
+def _kind(event: GroupEvent) -> Colour:
+    return colour(KIND_COLOUR.get(event.kind, 6))
+
+
+def _words(event: GroupEvent) -> str:
+    def listed(ids: tuple[int, ...]) -> str:
+        return "+".join("alone" if i < 0 else f"G{i}" for i in ids)
+
+    if event.before == event.after:
+        return f"{event.kind} {listed(event.before)}"
+    return f"{event.kind} {listed(event.before)} -> {listed(event.after)}"
+
+
+def _head(canvas: Image, sequence: Sequence, truth: Truth) -> None:
+    text(canvas, sequence.name, (GAP, 48), 1.3, INK, 3)
+    width = cv2.getTextSize(sequence.name, cv2.FONT_HERSHEY_SIMPLEX, 1.3, 3)[0][0]
+    unit = "m" if truth.pos is not None else "px"
+    low, high = _bounds(sequence, truth)
+    facts = f"{len(np.unique(truth.id))} people, {truth.length} frames, {truth.fps:g}/s, "
+    facts += f"{high[0] - low[0]:.4g} x {high[1] - low[1]:.4g} {unit}; trails {sheet_panel.TRAIL:g} s"
+    text(canvas, facts, (GAP + width + 30, 46), 0.75, QUIET)
+
+
+def _foot(area: Image, truth: Truth, chosen: list[int]) -> None:
+    """A time line: the shown frames as ticks, events as dots, and which colour is which kind."""
+    width, line = area.shape[1], 34
+    left, right = GAP + 10, width - GAP - 60
+    last = max(truth.length - 1, 1)
+
+    def at(index: int) -> int:
+        return int(left + (index - 1) / last * (right - left))
+
+    cv2.line(area, (left, line), (right, line), THING, 3, cv2.LINE_AA)
+    for index in chosen:
+        cv2.line(area, (at(index), line - 13), (at(index), line + 13), INK, 3, cv2.LINE_AA)
+    text(area, f"{(truth.length - 1) / truth.fps:.0f} s", (right + 12, line + 8), 0.7, QUIET)
+    events = [event for event in truth.events or () if 1 <= event.start <= truth.length]
+    for event in events:
+        cv2.circle(area, (at(event.start), line), 9, _kind(event), -1, cv2.LINE_AA)
+    x = left
+    for kind in sorted({event.kind for event in events}, key=lambda kind: list(KIND_COLOUR).index(kind)):
+        cv2.circle(area, (x + 8, line + 42), 9, colour(KIND_COLOUR[kind]), -1, cv2.LINE_AA)
+        text(area, kind, (x + 26, line + 49), 0.7, INK)
+        x += 50 + cv2.getTextSize(kind, cv2.FONT_HERSHEY_SIMPLEX, 0.7, 1)[0][0]
+    text(area, "| shown", (x + 10, line + 49), 0.7, QUIET)
