@@ -32,8 +32,8 @@ def command(args: argparse.Namespace, out: Path, workers: int) -> list[str]:
         words = ["-m", "tracking.app.cli", "generate", *args.entry, "--seeds", args.seeds]
         return [sys.executable, *words, "--out", str(out), "--workers", str(workers)]
     low, high = args.seeds.split(":")
-    code = f"from sim.generate import generate; generate({args.entry}, range({low}, {high}), {str(out)!r}, workers={workers})"
-    return [sys.executable, "-c", f"if __name__ == '__main__':\n    {code}"]
+    call = f"generate({args.entry}, range({low}, {high}), {str(out)!r}, workers={workers})"
+    return [sys.executable, "-c", f"from sim.generate import generate\nif __name__ == '__main__':\n    {call}"]
 
 
 def start(args: argparse.Namespace, out: Path, workers: int, **env: str) -> subprocess.Popen[bytes]:

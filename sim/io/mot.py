@@ -13,7 +13,7 @@ import numpy as np
 
 from sim.io.numbers import Rows, read_rows
 from sim.io.velocity import differentiate
-from sim.types import Array, Bools, Detections, Ints, Truth
+from sim.types import Array, Bools, Detections, Ints, Plane, Truth
 
 PERSON_HEIGHT = 1.7  # m
 PEDESTRIAN = 1
@@ -66,25 +66,36 @@ def refuse_twice(table: MotTable, keep: Bools) -> None:
     table.rows.refuse(twice, "each id once in a frame", "remove one of the two lines")
 
 
-def read_detections(path: Path, length: int | None) -> MotTable:
-    """det.txt in the order of its frames."""
+@dataclass(frozen=True)
+class DetectionTable:
+    """det.txt in the order of its frames: pos (N, 2) in `plane`, box (N, 4) or None, score (N,)."""
+
+    frame: Ints
+    id: Ints
+    plane: Plane
+    pos: Array
+    box: Array | None
+    score: Array
+
+    def at(self, index: int, fps: float) -> Detections:
+        """The detections of one frame."""
+        low, high = np.searchsorted(self.frame, (index, index + 1))
+        box = None if self.box is None else self.box[low:high]
+        return Detections(index, (index - 1) / fps, self.plane, self.pos[low:high], None, box, self.score[low:high])
+
+
+def read_detections(path: Path, length: int | None) -> DetectionTable:
+    """det.txt: points on the ground where every row has one, else boxes in the image."""
     table = read_table(path, length=length, boxless=True)
+    ground, boxless = table.ground(), table.boxless()
+    score = unit_scores(table.rest[:, 0] if table.rest.shape[1] else np.ones(len(table.frame)))
+    plane: Plane = "image" if ground is None or np.isnan(ground).any() else "ground"
+    if plane == "image":
+        table.rows.refuse(boxless, "a box, or x, y, z in every line", "give each detection a box or a ground position")
+    pos = ground[:, :2] if plane == "ground" and ground is not None else table.box[:, :2] + table.box[:, 2:] / 2
     order = np.argsort(table.frame, kind="stable")
-    return MotTable(table.rows, table.frame[order], table.id[order], table.box[order], table.rest[order])
-
-
-def detections_at(table: MotTable, index: int, fps: float) -> Detections:
-    """The detections of one frame: boxes, and points on the ground where every row of the file has one."""
-    low, high = np.searchsorted(table.frame, (index, index + 1))
-    box, ground = table.box[low:high], table.ground()
-    score = unit_scores(table.rest[:, 0] if table.rest.shape[1] else np.ones(len(table.frame)))[low:high]
-    t = (index - 1) / fps
-    boxes = None if table.boxless().any() else box
-    if ground is not None and np.isfinite(ground).all():
-        return Detections(index, t, "ground", ground[low:high, :2], None, boxes, score)
-    if boxes is None:
-        table.rows.refuse(table.boxless(), "a box, or x, y, z", "give each detection a box or a ground position")
-    return Detections(index, t, "image", box[:, :2] + box[:, 2:] / 2, None, boxes, score)
+    box = None if boxless.any() else table.box[order]
+    return DetectionTable(table.frame[order], table.id[order], plane, pos[order], box, score[order])
 
 
 def unit_scores(score: Array) -> Array:

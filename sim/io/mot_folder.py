@@ -92,7 +92,7 @@ def open_folder(
 
     def frames() -> Iterator[Frame]:
         for index in range(1, length + 1):
-            here = None if found is None else mot.detections_at(found, index, rate)
+            here = None if found is None else found.at(index, rate)
             image = read_image(pictures[index - 1]) if images and index <= len(pictures) else None
             yield Frame(index, (index - 1) / rate, image, None, here)
 
@@ -114,7 +114,7 @@ def open_text(path: Path, *, fps: float | None = None, px_per_m: float | None = 
 
     def frames() -> Iterator[Frame]:
         for index in range(1, length + 1):
-            here = mot.detections_at(found, index, rate) if nobody else None
+            here = found.at(index, rate) if nobody else None
             yield Frame(index, (index - 1) / rate, detections=here)
 
     return Sequence(
@@ -141,7 +141,7 @@ def read_image(path: Path) -> Image:
     return np.asarray(image, np.uint8)
 
 
-def _length(found: mot.MotTable | None, gt: Path, pictures: list[Path]) -> int:
+def _length(found: mot.DetectionTable | None, gt: Path, pictures: list[Path]) -> int:
     last = 0 if found is None else int(found.frame.max(initial=0))
     if gt.is_file():
         last = max(last, int(mot.read_table(gt).frame.max(initial=0)))

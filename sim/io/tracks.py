@@ -22,7 +22,7 @@ from sim.io.tables import Column, Table, table_bytes
 from sim.io.tracks_text import from_text, with_groups
 from sim.io.truths import BOX, scores
 from sim.io.upright import upright_boxes
-from sim.types import Array, Camera, GroupEvent, Tracks
+from sim.types import Array, Bools, Camera, GroupEvent, Tracks
 
 NAMES = ("tracks.txt", "tracks.mot.txt", "tracks.parquet", "groups.csv", "groups.parquet", "events.json", "run.json")
 
@@ -140,20 +140,18 @@ def _table(rows: _Rows, every: list[Tracks], fps: float) -> bytes:
 
 
 def _text(rows: _Rows, box: Array, *, full: bool) -> bytes:
+    boxed: Bools = np.asarray(np.isfinite(box).all(axis=1) & (box[:, 2:] > 0).all(axis=1))
+    placed: Bools = np.asarray(np.isfinite(rows.pos).all(axis=1) & (rows.plane != "image"))
+    place = np.concatenate([rows.pos, np.zeros((len(rows.pos), 1))], axis=1)[:, :3].tolist()
     lines = []
-    for k in range(len(rows.id)):
-        known = bool(np.isfinite(box[k]).all() and (box[k, 2:] > 0).all())
-        size = f"{max(box[k, 2], 0.01):.2f},{max(box[k, 3], 0.01):.2f}"
-        corner = f"{box[k, 0]:.2f},{box[k, 1]:.2f},{size}" if known else "-1,-1,-1,-1"
-        line = f"{rows.frame[k]},{rows.id[k]},{corner},{rows.score[k]:.4f}"
-        lines.append(f"{line},{_place(rows, k)}\n" if full else f"{line}\n")
+    for k, (frame, id, score) in enumerate(
+        zip(rows.frame.tolist(), rows.id.tolist(), rows.score.tolist(), strict=True)
+    ):
+        left, top, width, height = box[k].tolist()
+        corner = f"{left:.2f},{top:.2f},{max(width, 0.01):.2f},{max(height, 0.01):.2f}" if boxed[k] else "-1,-1,-1,-1"
+        where = ",".join(f"{v:.3f}" for v in place[k]) if placed[k] else "-1,-1,-1"
+        lines.append(f"{frame},{id},{corner},{score:.4f}" + (f",{where}\n" if full else "\n"))
     return "".join(lines).encode()
-
-
-def _place(rows: _Rows, k: int) -> str:
-    if rows.plane == "image" or not np.isfinite(rows.pos[k]).all():
-        return "-1,-1,-1"
-    return ",".join(f"{v:.3f}" for v in (*rows.pos[k], 0.0)[:3])
 
 
 def read_tracks(path: str | Path, *, fps: float | None = None, length: int | None = None) -> list[Tracks]:
