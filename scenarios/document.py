@@ -100,9 +100,7 @@ def read(path: Path, chain: tuple[Path, ...] = ()) -> Table:
         raise InputError(
             file=path, place="extends", got=circle, expected="an end of the chain", remedy="take one `extends` out"
         )
-    below = read(base_path, chain)
-    below.pop("name")
-    return {**merge(below, table), "name": table.get("name", path.stem)}
+    return {**merge(read(base_path, chain), table), "name": table.get("name", path.stem)}
 
 
 def _base(path: Path, base: str) -> Path:

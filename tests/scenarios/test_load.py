@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
-from hypothesis import HealthCheck, given, settings
+from hypothesis import HealthCheck, example, given, settings
 from hypothesis import strategies as st
 
 from scenarios.document import merge
@@ -42,6 +42,7 @@ def test_dump_loads_back_equal_and_twice_the_same(path: Path) -> None:
 
 
 @settings(suppress_health_check=[HealthCheck.function_scoped_fixture], max_examples=50, deadline=None)
+@example(about='\x7f\x00\t"\\ü€\u2028', turn=1e-300, size=1)
 @given(about=st.text(), turn=st.floats(allow_nan=False, allow_infinity=False), size=st.integers(1, 10**6))
 def test_dump_holds_any_text_and_number(path: Path, about: str, turn: float, size: int) -> None:
     group = load(path).group[0].model_copy(update={"size": float(size)})

@@ -176,4 +176,4 @@ def _foot(area: Image, truth: Truth, chosen: list[int]) -> None:
         cv2.circle(area, (x + 8, line + 42), 9, colour(KIND_COLOUR[kind]), -1, cv2.LINE_AA)
         text(area, kind, (x + 26, line + 49), 0.7, INK)
         x += 50 + cv2.getTextSize(kind, cv2.FONT_HERSHEY_SIMPLEX, 0.7, 1)[0][0]
-    text(area, "| shown", (x + 10, line + 49), 0.7, QUIET)
+    text(area, "ticks: the pictures above", (x + 10, line + 49), 0.7, QUIET)

@@ -78,6 +78,12 @@ def test_tracks_come_back(sequence: Sequence, tracks: list[Tracks]) -> None:
     assert payload(sequence, tracks)["tracks"]["links"] == [[54, 7, 0], [114, 0, 8]]
 
 
+def test_whoever_leaves_and_returns_has_two_stints() -> None:
+    frame, ids = np.array([1, 2, 4, 5, 2, 3]), np.array([7, 7, 7, 7, 8, 8])
+    assert view_data.stints(ids, frame) == [[7, 1, 2], [7, 4, 2], [8, 2, 2]]
+    assert view_data.stints(ids[:0], frame[:0]) == []
+
+
 def test_detections_come_back(sequence: Sequence) -> None:
     found = payload(sequence, None)["detections"]
     boxes = np.concatenate([f.detections.box for f in sequence if f.detections is not None])
