@@ -8,7 +8,7 @@ import cv2
 import numpy as np
 
 from scenarios.errors import InputError, WorkError
-from sim.types import Array, GroupEvent, Image, Sequence, Truth
+from sim.types import Array, GroupEvent, Image, Ints, Sequence, Truth
 from tracking.app import sheet_panel
 from tracking.app.sheet_panel import INK, QUIET, THING, Colour, View, colour, text
 
@@ -69,8 +69,9 @@ def choose(truth: Truth, frames: int) -> list[int]:
         onsets = sorted({event.start for event in events if RANK[event.kind] == rank} - set(chosen))
         room = frames - len(chosen)
         chosen += onsets if len(onsets) <= room else [onsets[k] for k in _spread(len(onsets), room)]
+    people = np.bincount(truth.frame, minlength=truth.length + 1)[1 : truth.length + 1]
     while len(chosen) < frames:
-        chosen.append(_widest(chosen, truth.length))
+        chosen.append(_widest(chosen, people))
     return sorted(chosen)
 
 
@@ -79,14 +80,20 @@ def _spread(n: int, k: int) -> list[int]:
     return [round(place) for place in np.linspace(0, n - 1, k)] if k > 1 else [0][:k]
 
 
-def _widest(chosen: list[int], length: int) -> int:
-    """A frame in the widest gap; the first and the last frame count as half a gap from the ends."""
+def _widest(chosen: list[int], people: Ints) -> int:
+    """The fullest frame of the middle of the widest gap (the one nearest the middle where several are).
+
+    The ends of the sequence count as an eighth of it further out, so that neither is left out.
+    """
+    length = len(people)
     marks = np.array([1 - length // 8, *sorted(chosen), length + length // 8])
-    gaps = np.diff(marks)
-    for k in np.argsort(-gaps, kind="stable"):
-        middle = int(np.clip((marks[k] + marks[k + 1]) // 2, 1, length))
-        if middle not in chosen:
-            return middle
+    for k in np.argsort(-np.diff(marks), kind="stable"):
+        low, high = marks[k], marks[k + 1]
+        quarter = (high - low) // 4
+        inner = np.arange(max(low + quarter, low + 1, 1), min(high - quarter, high - 1, length) + 1)
+        if len(inner):
+            order = np.lexsort((np.abs(inner - (low + high) / 2), -people[inner - 1]))
+            return int(inner[order[0]])
     return next(index for index in range(1, length + 1) if index not in chosen)
 
 

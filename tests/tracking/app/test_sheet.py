@@ -30,6 +30,11 @@ def test_onsets_come_first_and_gaps_are_filled() -> None:
     assert chosen == sorted(chosen)
 
 
+def test_fuller_frames_fill_the_gaps(truth: Truth) -> None:
+    few = truth.replace(frame=np.array([70, 70, 71]), id=np.array([1, 2, 1]), events=())
+    assert choose(few, 1) == [70]
+
+
 def test_merges_and_splits_outrank_the_rest() -> None:
     events = dict.fromkeys(range(10, 100, 10), "form") | {5: "merge", 150: "split"}
     assert {5, 150} <= set(choose(bare(200, events), 3))
