@@ -64,7 +64,7 @@ def generate(
     folder = root / f"flockscope-{split}"
     jobs = plan(_resolved(entries, set), seeds, folder)
     with _alone(root):
-        sweep(folder)
+        sweep(folder, root / "seqmaps")
         waiting = [job for job in jobs if not is_done(job)]
         try:
             errors = _run(waiting, workers, _counted(progress, len(jobs) - len(waiting), len(jobs)))

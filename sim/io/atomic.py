@@ -77,11 +77,10 @@ def write_into(target: Path, files: Mapping[str, bytes], stale: tuple[str, ...] 
         _flush_folder(target)
 
 
-def sweep(folder: Path) -> None:
-    """Remove what killed runs left behind in a folder."""
-    if folder.is_dir():
-        for path in folder.glob(f"{PARTIAL}*"):
-            _remove(path)
+def sweep(*folders: Path) -> None:
+    """Remove what killed runs left behind in folders."""
+    for path in [p for folder in folders for p in folder.glob(f"{PARTIAL}*")]:
+        _remove(path)
 
 
 def _fill(folder: Path, files: Mapping[str, bytes]) -> None:

@@ -111,7 +111,9 @@ def test_complete_sequences_are_kept_and_others_redone(tmp_path, simulate):
     before = content(tmp_path)
     (made[0] / "gt/gt.txt").write_text("1,1,0,0,1,1,1,1,1\n")
     (made[1] / "manifest.json").unlink()
+    (tmp_path / "flockscope-train" / f".partial-x-s00001-{os.getpid()}").mkdir()
     (tmp_path / "flockscope-train" / ".partial-x-s00002-99").mkdir()
+    (tmp_path / "seqmaps" / ".partial-flockscope-train.txt-99").write_text("name")
     simulate.made.clear()
     generate([Entry("x", scenario())], range(3), tmp_path)
     assert simulate.made == [0, 1]

@@ -71,6 +71,8 @@ def test_biwi_without_groups_is_not_labelled(tmp_path):
     (folder / "groups.txt").unlink()
     (s,) = open_source(folder)
     assert s.length == 9
+    assert s.truth.pos[4].tolist() == [1.1, 2]
+    assert s.truth.vel[4].tolist() == [1, 0]
     assert not s.truth.labelled.any()
     assert s.truth.groups is None
     assert (s.truth.group == -1).all()

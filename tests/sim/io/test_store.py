@@ -172,6 +172,17 @@ def test_a_failing_write_leaves_nothing(tmp_path, make_sequence, monkeypatch, nu
     assert list(tmp_path.iterdir()) == []
 
 
+def test_nothing_is_seen_before_the_rename(tmp_path, make_sequence, monkeypatch):
+    def fail(source, target):
+        assert (source / "manifest.json").is_file()
+        raise OSError(errno.EIO, "Input/output error")
+
+    monkeypatch.setattr(atomic.os, "rename", fail)
+    with pytest.raises(InputError):
+        store.write_sequence(tmp_path / "a", make_sequence(1), scenario=SCENARIO, seed=1)
+    assert list(tmp_path.iterdir()) == []
+
+
 def test_a_failing_write_keeps_what_was_there(tmp_path, make_sequence, monkeypatch):
     store.write_sequence(tmp_path / "a", make_sequence(1), scenario=SCENARIO, seed=1)
     before = {n: (tmp_path / "a" / n).read_bytes() for n in files_of(tmp_path / "a")}
