@@ -1,0 +1,74 @@
+"""What labels.py hands to the measuring functions, and how it translates their answer: with stand-ins for both."""
+
+import sys
+import types
+
+import numpy as np
+import pytest
+
+from sim.io.labels import dense, label_truth
+from sim.types import GroupEvent, Groups, Near
+
+FRAME = np.array([1, 1, 1, 3, 3], np.int64)
+ID = np.array([4, 7, 9, 4, 7], np.int64)
+LABEL = np.array([-1, 0, 0, -1, 0], np.int64)
+POS = np.arange(10.0).reshape(5, 2) * 20
+
+
+@pytest.fixture
+def measured(monkeypatch):
+    """sim.groups as a stand-in that notes what it is given and answers with a merge of columns 2 and 3."""
+    seen = types.SimpleNamespace()
+
+    def memberships(pos, vel, present, intent, fps):
+        seen.given = (pos, vel, present, intent, fps)
+        group = np.full(present.shape, -1)
+        group[0, 1:] = group[2, 1] = 5
+        event = GroupEvent("merge", 1, 3, None, (-1, -1), (5,), (2, 3), (1.0, 2.0))
+        one = np.array([1], np.int64)
+        return types.SimpleNamespace(group=group, events=(event,), near=Near(one, one, one, one + 2))
+
+    def frame_groups(id, group, pos, vel):
+        names = np.unique(group[group >= 0])
+        n = len(names)
+        middle = np.array([pos[group == g].mean(axis=0) for g in names]).reshape(n, 2)
+        hulls = tuple(np.ones((3, 2)) for _ in names)
+        return Groups(
+            names, tuple(id[group == g] for g in names), middle, middle, np.ones((n, 2, 2)), np.ones(n), hulls
+        )
+
+    monkeypatch.setitem(
+        sys.modules, "sim.groups", types.SimpleNamespace(memberships=memberships, frame_groups=frame_groups)
+    )
+    return seen
+
+
+def test_rows_become_metres_over_time_and_people(measured):
+    label_truth(FRAME, ID, LABEL, POS, POS, fps=25.0, length=3, px_per_m=20.0)
+    pos, vel, present, intent, fps = measured.given
+    assert (pos.shape, vel.shape, fps) == ((3, 3, 2), (3, 3, 2), 25.0)
+    assert pos[0, 1].tolist() == [2, 3]
+    assert np.isnan(pos[1]).all()
+    assert present.tolist() == [[True] * 3, [False] * 3, [True, True, False]]
+    assert intent[0, 1] == intent[0, 2] == intent[2, 1] == 0
+    assert intent[0, 0] not in (0, -1)
+    assert (intent == -1).sum() == 4
+
+
+def test_answers_come_back_in_the_recordings_ids_and_unit(measured):
+    found = label_truth(FRAME, ID, LABEL, POS, POS, fps=25.0, length=3, px_per_m=20.0)
+    (event,) = found["events"]
+    assert (event.before, event.after, event.members, event.pos) == ((-1, -1), (0,), (7, 9), (20.0, 40.0))
+    assert (found["near"].a.tolist(), found["near"].b.tolist()) == ([4], [9])
+    first, nobody, last = found["groups"]
+    assert first.id.tolist() == last.id.tolist() == [0]
+    assert first.pos.tolist() == [POS[1:3].mean(axis=0).tolist()]
+    assert first.hull[0].tolist() == [[20, 20]] * 3
+    assert first.extent[0].tolist() == [[400, 400]] * 2
+    assert len(nobody.id) == 0
+    assert found["labelled"].all()
+
+
+def test_dense_keeps_order_of_ids():
+    values = dense(FRAME, ID, np.arange(5.0), 3)
+    assert np.array_equal(values, [[0, 1, 2], [np.nan] * 3, [3, 4, np.nan]], equal_nan=True)
