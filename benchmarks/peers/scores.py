@@ -49,15 +49,16 @@ def _iou(a, b):
 
 
 def bootstrap(ids, truth, first, second, block: int, r: np.random.Generator, rounds: int = 200) -> tuple[float, float]:
-    """95 % interval of HOTA(first) - HOTA(second), frames drawn in blocks, the same for both; ids are the block's own."""
+    """95 % interval of HOTA(first) - HOTA(second): frames drawn in moving blocks, the same for both.
+
+    Identities keep their numbers across blocks, so that what is resampled is the score of the whole recording.
+    """
     n, differences = len(ids), []
     for _ in range(rounds):
         starts = r.integers(0, n - block + 1, -(-n // block))
-        pick = [(b, k) for b, start in enumerate(starts) for k in range(start, start + block)]
-        gt = [np.asarray(ids[k]) + b * 1_000_000 for b, k in pick]
-        boxes = [truth[k] for _, k in pick]
-        both = [[(np.asarray(a[k][0]) + b * 1_000_000, a[k][1]) for b, k in pick] for a in (first, second)]
-        one, two = (_evaluate(gt, boxes, a, ())["HOTA"] for a in both)
+        pick = [k for start in starts for k in range(start, start + block)]
+        gt, boxes = [ids[k] for k in pick], [truth[k] for k in pick]
+        one, two = (_evaluate(gt, boxes, [a[k] for k in pick], ())["HOTA"] for a in (first, second))
         differences.append(one - two)
     low, high = np.percentile(differences, (2.5, 97.5))
     return float(low), float(high)

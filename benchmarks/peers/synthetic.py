@@ -1,8 +1,9 @@
 """Box sequences with occlusion, to choose defaults on: people walking on a plane before a tilted camera.
 
-Not the simulator: its own short model, so that a tracker's defaults are not fitted to the simulator's ways. Boxes
-are lost when others cover them, jitter with memory from frame to frame, suppress each other as detectors' do, and false ones
-stay for some frames. `plain` is the field of constant-velocity squares that peers are timed on.
+Not the simulator: a short model of its own, so that a tracker's defaults are not fitted to the simulator's ways. Its
+detector fails as real ones do: boxes are lost behind people and posts, jitter with memory from frame to frame, suppress
+and swallow each other, and false ones stay for some frames or come back in the same place again and again.
+`plain` is the field of constant-velocity squares that peers are timed on.
 """
 
 from __future__ import annotations
@@ -52,7 +53,7 @@ def walk(seed: int, *, seconds: float = 30.0) -> Boxes:
     fps = float(r.choice([7, 10, 14, 25, 30]))
     camera = float(r.uniform(1.6, 7.0)), float(r.uniform(5, 14)), float(r.uniform(500, 900))
     people = int(r.integers(4, 16))
-    p_detect, clutter, jitter = r.uniform(0.8, 0.98), r.uniform(0.05, 0.6), r.uniform(0.02, 0.06)
+    p_detect, clutter, jitter = r.uniform(0.8, 0.98), r.uniform(0.05, 0.6), r.uniform(0.02, 0.07)
     paths = _paths(r, people, int(seconds * fps), fps, camera)
     return _see(r, paths, fps, camera, p_detect, clutter, jitter, f"walk-{seed}")
 
@@ -81,14 +82,15 @@ def _paths(r, people, frames, fps, camera):
 
 
 def _see(r, paths, fps, camera, p_detect, clutter, jitter, name):
+    """What camera and detector make of the paths."""
     high, _, focal = camera
     people = paths.shape[1]
     tall, phase = r.normal(1.7, 0.08, people), r.uniform(0, 2 * np.pi, people)
     horizon = HEIGHT / 2 - focal * np.tan(np.arctan2(high, camera[1] * 1.1) * 0.8)
-    error, ghosts = np.zeros((people, 4)), []
-    memory = np.exp(-1 / (fps * 0.15))
-    lost = np.zeros(people, bool)
-    stay = np.exp(-1 / (fps * 0.12))
+    post, swallow = (r.uniform(0.3, 0.7) * WIDTH if r.random() < 0.5 else None), r.uniform(0, 0.4)
+    haunt = np.c_[r.uniform(0, WIDTH, 2), r.uniform(0.2, 0.6, 2) * HEIGHT]
+    error, ghosts, lost = np.zeros((people, 4)), [], np.zeros(people, bool)
+    memory, stay = np.exp(-1 / (fps * 0.15)), np.exp(-1 / (fps * 0.12))
     ids, truth, found = [], [], []
     for frame, p in enumerate(paths):
         depth = p[:, 1]
@@ -98,25 +100,47 @@ def _see(r, paths, fps, camera, p_detect, clutter, jitter, name):
         centre = box[:, :2] + box[:, 2:] / 2
         within = ((centre > 0) & (centre < [WIDTH, HEIGHT])).all(1)
         seen = _visible(box, depth)
-        fresh = r.random(people) > p_detect
-        lost = np.where(r.random(people) < stay, lost, fresh)
-        error = memory * error + np.sqrt(1 - memory**2) * r.normal(0, jitter, (people, 4))
-        chance = np.clip((seen - 0.25) / 0.35, 0, 1)
-        hit = within & ~lost & (r.random(people) < chance)
+        if post is not None:
+            seen = seen * np.clip(np.abs(centre[:, 0] - post) / wide, 0.3, 1)
+        lost = np.where(r.random(people) < stay, lost, r.random(people) > p_detect)
+        error = memory * error + np.sqrt(1 - memory**2) * r.normal(0, jitter, (people, 4)) * [1, 1, 1.5, 1.5]
+        hit = within & ~lost & (r.random(people) < np.clip((seen - 0.25) / 0.35, 0, 1))
         noisy = box + error * size[:, None]
+        noisy[:, :2] -= noisy[:, 2:] / 2 - box[:, 2:] / 2
         noisy[:, 2:] = np.maximum(noisy[:, 2:], 4)
         score = np.clip(0.55 + 0.45 * seen + r.normal(0, 0.05, people), 0.3, 1)
-        ghosts = [g for g in ghosts if r.random() > 1 / (fps * 0.2)]
-        for _ in range(r.poisson(clutter * 5 / fps)):
-            side = r.uniform(0.7, 1.3) * np.median(size)
-            ghosts.append(
-                np.r_[r.uniform(0, WIDTH), r.uniform(0, HEIGHT - side), 0.4 * side, side, r.uniform(0.5, 0.9)]
-            )
-        rows = np.r_[np.c_[noisy, score][hit], np.array(ghosts).reshape(-1, 5)]
+        ghosts = [g for g in ghosts if r.random() > 1 / (fps * 0.2)] + _ghosts(r, clutter * 5 / fps, haunt, size)
+        rows = _swallow(r, np.c_[noisy, score][hit], swallow)
         ids.append(np.flatnonzero(within) + 1)
         truth.append(box[within])
-        found.append(_suppress(rows)[: len(rows)])
+        found.append(_suppress(np.r_[rows, np.array(ghosts).reshape(-1, 5)]))
     return Boxes(name, fps, (int(WIDTH), int(HEIGHT)), ids, truth, found)
+
+
+def _ghosts(r, rate, haunt, size):
+    """New false boxes: a third of them in the haunted places."""
+    made = []
+    for _ in range(r.poisson(rate)):
+        side = r.uniform(0.7, 1.3) * np.median(size)
+        place = np.r_[r.uniform(0, WIDTH), r.uniform(0, HEIGHT - side)]
+        if r.random() < 1 / 3:
+            place = haunt[r.integers(2)] + r.normal(0, 0.04, 2) * side
+        made.append(np.r_[place, 0.4 * side, side, r.uniform(0.5, 0.9)])
+    return made
+
+
+def _swallow(r, rows, chance):
+    """Pairs of boxes that overlap much come out as one box over both, now and then."""
+    rows = list(rows)
+    for i in range(len(rows) - 1, 0, -1):
+        for j in range(i):
+            if _iou(rows[i], rows[j]) > 0.2 and r.random() < chance * 0.5:
+                low = np.minimum(rows[i][:2], rows[j][:2])
+                high = np.maximum(rows[i][:2] + rows[i][2:4], rows[j][:2] + rows[j][2:4])
+                rows[j] = np.r_[low, high - low, max(rows[i][4], rows[j][4])]
+                del rows[i]
+                break
+    return np.array(rows).reshape(-1, 5)
 
 
 def _visible(box, depth):

@@ -64,6 +64,7 @@ class Blob:
         z, score = self._measurements(detections)
         people = self.people
         people.predict()
+        people.look(z)
         rows, columns, free = self._associate(z, score)
         rows, columns = self._without_merged(rows, columns, z)
         rows, best, measured, free = self._with_pieces(rows, columns, free, z, score)

@@ -17,13 +17,13 @@ class BlobConfig(Config):
 
     tracker: ClassVar[str] = "blob"
 
-    accel_noise: float = param(0.6, (0.05, 10.0), "m/s^1.5", "white acceleration of the centre, per root second", "log")
+    accel_noise: float = param(0.5, (0.05, 10.0), "m/s^1.5", "white acceleration of the centre, per root second", "log")
     size_accel_noise: float = param(0.1, (0.01, 5.0), "m/s^1.5", "white acceleration of height and width", "log")
-    position_noise: float = param(0.08, (0.005, 1.0), "m", "standard deviation of a measured centre", "log")
-    size_noise: float = param(0.18, (0.005, 1.0), "m", "standard deviation of a measured height or width", "log")
+    position_noise: float = param(0.09, (0.005, 1.0), "m", "standard deviation of a measured centre", "log")
+    size_noise: float = param(0.2, (0.005, 1.0), "m", "standard deviation of a measured height or width", "log")
     speed_prior: float = param(1.3, (0.1, 5.0), "m/s", "standard deviation of a newborn's velocity", "log")
     size_rate_prior: float = param(0.2, (0.01, 3.0), "m/s", "standard deviation of a newborn's growth", "log")
-    gate: float = param(0.995, (0.5, 0.999999), "probability", "share of true measurements inside a track's gate")
+    gate: float = param(0.999, (0.5, 0.999999), "probability", "share of true measurements inside a track's gate")
     association: str = param(
         "optimal", ("nearest", "optimal"), "", "nearest gated track (the paper) or least total cost", "categorical"
     )

@@ -22,6 +22,7 @@ class Population:
 
     bank (5, N, 4): tracking.kalman, places in px, covariances in m^2. scale (N,) px per m. rho (N,) at the last
     prediction. id, born (s), score; confirmed; hit: measured in this frame; excused: unseen, and somebody else is why.
+    hits, misses: frames measured in all, and since then. low, high (2,) px: the field of view.
     """
 
     def __init__(self, config: BlobConfig, dynamics: lifecycle.Dynamics, context: Context) -> None:
@@ -33,7 +34,8 @@ class Population:
         self.silence = self._after(config.report_coast)
         self.excused_silence = max(self.silence, self._after(config.report_hidden))
         self.bank = np.zeros((5, 0, 4))
-        self.scale, self.rho, self.born, self.score = (np.zeros(0) for _ in range(4))
+        self.scale, self.rho, self.born, self.score, self.hits, self.misses = (np.zeros(0) for _ in range(6))
+        self.low, self.high = np.full(2, np.inf), np.full(2, -np.inf)
         self.confirmed, self.hit, self.excused = (np.zeros(0, bool) for _ in range(3))
         self.id, self.next_id = np.zeros(0, np.int64), 1
 
@@ -51,6 +53,8 @@ class Population:
         """Note who was measured (near: well enough to be confirmed), and confirm."""
         self.hit = np.zeros(len(self.id), bool)
         self.hit[rows] = True
+        self.hits += self.hit
+        self.misses = np.where(self.hit, 0.0, self.misses + 1)
         self.excused &= ~self.hit
         self.score[rows] = score
         self.confirmed[rows] |= near & (self.rho[rows] <= self.config.confirm_ratio)
@@ -74,18 +78,23 @@ class Population:
         self.excused[lost[share.max(1) >= HIDDEN]] = True
 
     def merged(self, z: Array, unseen: Bools) -> Bools:
-        """(M,) is this measurement several of the `unseen` (N,) tracks at once? Those tracks are excused."""
-        lost = np.flatnonzero(unseen)
+        """(M,) is this measurement several confirmed tracks at once, one of them `unseen` (N,) at least?
+
+        It is where the box around all tracks whose centres it holds fits it better than any one of theirs. The unseen
+        ones among them are excused.
+        """
         found = np.zeros(len(z), bool)
-        if len(lost) < 2 or not len(z):
+        known = np.flatnonzero(self.confirmed)
+        if len(known) < 2 or not len(z) or not unseen.any():
             return found
-        place = self.bank[kalman.PLACE][lost]
+        place, lost = self.bank[kalman.PLACE][known], unseen[known]
         held = blob_measure.inside(place, z)
-        for column in np.flatnonzero(held.sum(0) > 1):
+        for column in np.flatnonzero((held.sum(0) > 1) & held[lost].any(0)):
             members = held[:, column]
-            if blob_measure.hull_overlap(place[members], z[column]) >= SAME:
+            alone = max(blob_measure.hull_overlap(one[None], z[column]) for one in place[members])
+            if blob_measure.hull_overlap(place[members], z[column]) >= max(SAME, alone):
                 found[column] = True
-                self.excused[lost[members]] = True
+                self.excused[known[members & lost]] = True
         return found
 
     def bury(self, t: float) -> None:
@@ -111,7 +120,7 @@ class Population:
 
     def _keep(self, rows: Bools) -> None:
         self.bank = self.bank[:, rows]
-        for name in ("id", "born", "score", "scale", "rho", "confirmed", "hit", "excused"):
+        for name in ("id", "born", "score", "scale", "rho", "hits", "misses", "confirmed", "hit", "excused"):
             setattr(self, name, getattr(self, name)[rows])
 
     def give_birth(self, z: Array, score: Array, t: float) -> None:
@@ -125,6 +134,8 @@ class Population:
             "score": score,
             "scale": self._scale_of(z),
             "rho": np.full(n, self.birth_rho),
+            "hits": np.ones(n),
+            "misses": np.zeros(n),
             "confirmed": np.zeros(n, bool),
             "hit": np.ones(n, bool),
             "excused": np.zeros(n, bool),
@@ -135,10 +146,26 @@ class Population:
         self.bank = np.concatenate([self.bank, kalman.born(z, self.noise, self.dynamics.birth_rate_var)], 1)
 
     def reported(self, t: float) -> Bools:
-        """Which tracks the world hears of."""
+        """Which tracks the world hears of; an unseen one no longer than it was seen, nor at the edge on its way out."""
         limit = np.where(self.excused, self.excused_silence, self.silence)
-        old = self.hit & (t - self.born >= self.config.report_delay - 1e-6)
-        return np.asarray(np.where(self.confirmed, self.hit | (self.rho <= limit * (1 + SLACK)), old))
+        unseen = self.confirmed & (self.rho <= limit * (1 + SLACK)) & (self.misses <= self.hits) & ~self._leaving()
+        old = self.confirmed | (t - self.born >= self.config.report_delay - 1e-6)
+        return np.asarray(np.where(self.hit, old, unseen))
+
+    def look(self, z: Array) -> None:
+        """Widen the field of view to these measurements, where the image's size is not known."""
+        if self.context.image_size is not None:
+            self.low, self.high = np.zeros(2), np.array(self.context.image_size, float)
+        elif len(z):
+            self.low = np.minimum(self.low, (z[:, :2] - z[:, :1:-1] / 2).min(0))
+            self.high = np.maximum(self.high, (z[:, :2] + z[:, :1:-1] / 2).max(0))
+
+    def _leaving(self) -> Bools:
+        """Does the predicted box reach over the edge of the field of view, moving outwards?"""
+        place, rate = self.bank[kalman.PLACE], self.bank[kalman.RATE, :, :2]
+        half = place[:, :1:-1] / 2
+        out = ((place[:, :2] - half < self.low) & (rate < 0)) | ((place[:, :2] + half > self.high) & (rate > 0))
+        return np.asarray(out.any(1))
 
 
 def _foot(place: Array) -> Array:
