@@ -1,6 +1,6 @@
 """Is a dataset the same however it was made? Kills, resumes, repeats and varies the environment of `generate`.
 
-    python benchmarks/kill_resume.py [--kills 20] [--entry merge] [--seeds 0:6] [--workers 2]
+    python benchmarks/kill_resume.py [--kills 20] [--entry merge] [--seeds 0:12] [--workers 2]
 
 Part 1: `kill -9` at random moments of a run, then resume; after each the dataset must validate and be the same, byte
 for byte. Part 2: the same in new processes, with 1 and 2 workers, and OMP_NUM_THREADS and PYTHONHASHSEED varied.
@@ -71,7 +71,7 @@ def half_written(out: Path) -> int:
 def kills(args: argparse.Namespace, work: Path, right: str, seconds: float) -> bool:
     print(f"\n{args.kills} kills, {args.workers} workers (an undisturbed run takes {seconds:.1f} s)")
     print("| kill at s | whole then | half-written | after resuming: problems | same hash |\n|---|---|---|---|---|")
-    moments, good = np.random.default_rng(0).uniform(0.05, 1.0, args.kills) * seconds, True
+    moments, good = np.random.default_rng(0).uniform(0.3, 1.0, args.kills) * seconds, True
     for moment in sorted(moments):
         out = work / "killed"
         process = start(args, out, args.workers)
@@ -106,7 +106,7 @@ def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--kills", type=int, default=20)
     parser.add_argument("--entry", nargs="+", default=["merge"])
-    parser.add_argument("--seeds", default="0:6")
+    parser.add_argument("--seeds", default="0:12")
     parser.add_argument("--workers", type=int, default=2)
     args = parser.parse_args()
     with tempfile.TemporaryDirectory() as name:
