@@ -124,7 +124,7 @@ def real(python: str, folder: Path, data: Path) -> None:
         for who, made in answers.items():
             scores = "  ".join(f"{k} {v:.3f}" for k, v in mot_scores(ids, boxes, made).items())
             low, high = bootstrap(ids, boxes, answers["blob"], made, block, np.random.default_rng(0))
-            print(f"  {who:14s} {scores}  blob's HOTA minus this: [{low:+.3f}, {high:+.3f}]", flush=True)
+            print(f"  {who:14s} {scores}  blob less this: [{low:+.3f}, {high:+.3f}]", flush=True)
 
 
 def one_thread() -> None:

@@ -47,13 +47,16 @@ def predict(state: Array, dt: float, q: Array) -> None:
 
 def update(state: Array, rows: Ints, z: Array, noise: Array | float) -> None:
     """Measure filters `rows` (each at most once) at z (K, D) with variances `noise` (K, D) or (D,), in place."""
-    place, rate, var, cov, rate_var = state[:, rows]
+    new = state[:, rows]
+    place, rate, var, cov, rate_var = new
     s = var + noise
     gain, rate_gain = var / s, cov / s
     y = z - place
-    new = np.stack(
-        [place + gain * y, rate + rate_gain * y, var - gain * var, cov - gain * cov, rate_var - rate_gain * cov]
-    )
+    place += gain * y
+    rate += rate_gain * y
+    rate_var -= rate_gain * cov
+    var -= gain * var
+    cov -= gain * cov
     state[:, rows] = new
 
 
@@ -77,7 +80,7 @@ def _common_noise(place: Array, z: Array, s: Array) -> Array:
     middle = z.mean(0)
     p, m, w = place - middle, z - middle, 1.0 / s
     pw = p * w
-    left = np.concatenate([w, -2.0 * pw, np.sum(pw * p, 1, keepdims=True)], 1)
+    left = np.concatenate([w, -2.0 * pw, (pw * p).sum(1, keepdims=True)], 1)
     right = np.concatenate([m * m, m, np.ones((len(m), 1))], 1)
     return np.asarray(np.maximum(left @ right.T, 0.0))
 

@@ -11,6 +11,7 @@ import hashlib
 import importlib
 import importlib.util
 import sys
+from math import isfinite
 from pathlib import Path
 from typing import Any
 
@@ -122,7 +123,7 @@ def check_detections(detections: Detections, needs: tuple[str, ...]) -> None:
     rows = len(detections.pos)
     arrays = [a for a in (detections.pos, detections.vel, detections.box, detections.score) if a is not None]
     for a in arrays:
-        if a.size and not np.isfinite(a).all():
+        if not _finite(a):
             row = int(np.argwhere(~np.isfinite(a.reshape(len(a), -1)).all(1))[0, 0])
             place = f"frame {detections.index}: detection {row + 1}"
             raise InputError(place=place, got="NaN or infinity", expected="finite numbers", remedy="correct this row")
@@ -169,9 +170,14 @@ def _fault(tracks: Any, index: int) -> tuple[str, str] | None:
     for name, (a, shape) in shapes.items():
         if np.shape(a) != shape:
             return f"{name} of shape {np.shape(a)}", str(shape)
-        if not np.isfinite(a).all():
+        if not _finite(a):
             return f"NaN or infinity in {name}", "finite numbers"
     return _id_fault(tracks)
+
+
+def _finite(a: Any) -> bool:
+    """Are all numbers finite? The sum is cheap and nearly always tells; huge numbers may overflow it."""
+    return isfinite(a.sum()) or bool(np.isfinite(a).all())
 
 
 def _id_fault(tracks: Tracks) -> tuple[str, str] | None:

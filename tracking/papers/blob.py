@@ -81,8 +81,10 @@ class Blob:
             return np.zeros((0, 4)), np.zeros(0)
         box, score = detections.box, detections.score
         score = score if len(score) else np.ones(len(box))
-        good = (score >= self.config.score_continue) & (box[:, 2:] > 0).all(1)
-        return blob_measure.from_boxes(box[good]), score[good]
+        good = (score >= self.config.score_continue) & (box[:, 2] > 0) & (box[:, 3] > 0)
+        if not good.all():
+            box, score = box[good], score[good]
+        return blob_measure.from_boxes(box), score
 
     def _associate(self, z: Array, score: Array) -> tuple[Ints, Ints, Bools]:
         """Tracks and measurements that belong together, one to one, and which measurements (M,) nobody took."""
@@ -114,8 +116,10 @@ class Blob:
         Looked at are pairs whose size is far from the prediction by the measure of a track that is always seen.
         """
         people = self.people
-        y = (z[columns] - people.bank[kalman.PLACE][rows])[:, 2:] / people.scale[rows, None]
-        odd = np.sum(y * y / self.asymptote[2:], 1) > self.gate
+        if len(rows) == len(people.id):
+            return rows, columns
+        y = (z[columns, 2:] - people.bank[kalman.PLACE, rows, 2:]) / people.scale[rows, None]
+        odd = (y * y / self.asymptote[2:]).sum(1) > self.gate
         if not odd.any():
             return rows, columns
         lost = people.confirmed.copy()
@@ -132,7 +136,7 @@ class Blob:
         update the track, with its own measurement if it has one, where the fused box is in the gate and nearer.
         """
         people, measured, best = self.people, z[columns], score[columns]
-        left = np.flatnonzero(free)
+        left = free.nonzero()[0]
         if not len(left) or not len(people.id):
             return rows, best, measured, free
         owner = self._owners(rows, z[left])
@@ -155,20 +159,24 @@ class Blob:
     def _owners(self, rows: Ints, pieces: Array) -> Ints:
         """(K,) the track of which each measurement is a piece, or -1."""
         people = self.people
-        place, area = people.bank[kalman.PLACE], np.prod(people.bank[kalman.PLACE, :, 2:], 1)
-        within = blob_measure.covered(pieces, place) * (people.confirmed & (np.prod(pieces[:, 2:], 1)[:, None] < area))
-        owner = np.where(within.max(1) >= INSIDE, within.argmax(1), -1)
+        place, owner = people.bank[kalman.PLACE], np.full(len(pieces), -1)
+        possible = blob_measure.inside(pieces, place) & people.confirmed
+        near = possible.any(1).nonzero()[0]
+        if len(near):
+            smaller = np.prod(pieces[near, 2:], 1)[:, None] < np.prod(place[:, 2:], 1)
+            share = blob_measure.covered(pieces[near], place) * (possible[near] & smaller)
+            owner[near] = np.where(share.max(1) >= INSIDE, share.argmax(1), -1)
         if len(rows):
             y = (pieces[:, None] - place[rows]) / people.scale[rows, None]
-            d2 = np.sum(y * y / self.asymptote, 2)
+            d2 = (y * y / self.asymptote).sum(2)
             owner = np.where(d2.min(1) <= self.orphan_gate, rows[d2.argmin(1)], owner)
         return np.asarray(owner)
 
     def _away(self, rows: Ints, measured: Array) -> Array:
         """(K,) squared distances of tracks and their measurements."""
         people = self.people
-        y = (measured - people.bank[kalman.PLACE][rows]) / people.scale[rows, None]
-        return np.asarray(np.sum(y * y / (people.bank[kalman.VAR][rows] + self.noise), 1))
+        y = (measured - people.bank[kalman.PLACE, rows]) / people.scale[rows, None]
+        return np.asarray((y * y / (people.bank[kalman.VAR, rows] + self.noise)).sum(1))
 
     def _update(self, rows: Ints, measured: Array) -> Array:
         """Update the measured tracks; returns each one's squared distance (K,)."""
@@ -178,13 +186,14 @@ class Blob:
 
     def _orphans(self, z: Array, score: Array, free: Bools) -> Ints:
         """Strong measurements that nobody took, no piece of anybody, nor several unseen people at once."""
-        left = np.flatnonzero(free & (score >= self.config.score_start))
-        people = self.people
+        left, people = (free & (score >= self.config.score_start)).nonzero()[0], self.people
+        if not len(left):
+            return left
         return np.asarray(left[~people.merged(z[left], people.confirmed & ~people.hit)])
 
     def _report(self, frame: Frame) -> Tracks:
         people = self.people
-        rows = np.flatnonzero(people.reported(frame.t))
+        rows = people.reported(frame.t)
         state, scale = people.bank[:, rows], people.scale[rows]
         camera = self.context.camera
         box, alone = blob_measure.to_boxes(state[kalman.PLACE]), np.full(len(rows), -1)

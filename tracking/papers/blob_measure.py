@@ -41,17 +41,19 @@ def fused(pieces: Array) -> Array:
 
 def covered(place: Array, others: Array) -> Array:
     """(N, M) share of each box of `place` that lies in each box of `others`; both (., 4) x, y, h, w."""
-    half, other_half = place[:, :1:-1] / 2, others[:, :1:-1] / 2
-    low = np.maximum((place[:, :2] - half)[:, None], (others[:, :2] - other_half)[None])
-    high = np.minimum((place[:, :2] + half)[:, None], (others[:, :2] + other_half)[None])
-    shared = np.prod(np.maximum(high - low, 0.0), 2)
-    return np.asarray(shared / np.maximum(np.prod(place[:, 2:], 1), 1e-9)[:, None])
+    shared = np.ones((len(place), len(others)))
+    for centre, side in ((0, 3), (1, 2)):
+        half, other_half = place[:, side, None] / 2, others[:, side] / 2
+        low = np.maximum(place[:, centre, None] - half, others[:, centre] - other_half)
+        high = np.minimum(place[:, centre, None] + half, others[:, centre] + other_half)
+        shared *= np.maximum(high - low, 0.0)
+    return np.asarray(shared / np.maximum(place[:, 2] * place[:, 3], 1e-9)[:, None])
 
 
 def inside(points: Array, boxes: Array) -> Bools:
     """(N, M) does point (x, y) lie in box (x, y, h, w)?"""
-    away = np.abs(points[:, None, :2] - boxes[None, :, :2])
-    return np.asarray(np.all(away <= boxes[None, :, :1:-1] / 2, 2))
+    across = np.abs(points[:, :1] - boxes[:, 0]) <= boxes[:, 3] / 2
+    return np.asarray(across & (np.abs(points[:, 1:2] - boxes[:, 1]) <= boxes[:, 2] / 2))
 
 
 def hull_overlap(places: Array, box: Array) -> float:

@@ -12,13 +12,12 @@ from tracking.papers.blob_config import BlobConfig
 PERSON = 1.7  # m, what the longer side of a person's box stands for
 HIDDEN = 0.4  # share of a predicted box behind somebody else from which on a miss is explained
 SAME = 0.5  # IoU of a box with the hull of several predicted ones from which on it is taken for them all
-SLACK = (
-    0.02  # relative, of comparisons with rho: filters near their steady state count as in it; a miss adds 10 % or more
-)
+# Relative, of comparisons with rho: filters near their steady state count as in it; a miss adds 10 % or more.
+SLACK = 0.02
 
 
 class Population:
-    """N tracks as arrays.
+    """N tracks as arrays; rows of two tables, so that births and deaths touch few arrays.
 
     bank (5, N, 4): tracking.kalman, places in px, covariances in m^2. scale (N,) px per m. rho (N,) at the last
     prediction. id, born (s), score; confirmed; hit: measured in this frame; excused: unseen, and somebody else is why.
@@ -33,11 +32,16 @@ class Population:
         self.excused_death = max(self.death, self._after(config.merged_time))
         self.silence = self._after(config.report_coast)
         self.excused_silence = max(self.silence, self._after(config.report_hidden))
-        self.bank = np.zeros((5, 0, 4))
-        self.scale, self.rho, self.born, self.score, self.hits, self.misses = (np.zeros(0) for _ in range(6))
+        self.top = context.camera is not None and context.camera.kind == "top"
         self.low, self.high = np.full(2, np.inf), np.full(2, -np.inf)
-        self.confirmed, self.hit, self.excused = (np.zeros(0, bool) for _ in range(3))
-        self.id, self.next_id = np.zeros(0, np.int64), 1
+        self.bank, self.id, self.next_id = np.zeros((5, 0, 4)), np.zeros(0, np.int64), 1
+        self._bind(np.zeros((6, 0)), np.zeros((3, 0), bool))
+
+    def _bind(self, book: Array, flags: Bools) -> None:
+        """Name the rows of the two tables; whoever changes one writes in place."""
+        self.book, self.flags = book, flags
+        self.scale, self.rho, self.born, self.score, self.hits, self.misses = book
+        self.confirmed, self.hit, self.excused = flags
 
     def _after(self, seconds: float) -> float:
         """rho in the frame that ends so many seconds without measurement; it is exceeded in the next."""
@@ -47,29 +51,31 @@ class Population:
     def predict(self) -> None:
         """One frame on."""
         kalman.predict(self.bank, self.dynamics.dt, self.q)
-        self.rho = lifecycle.rho(self.bank, self.noise, self.asymptote)
+        self.rho[:] = lifecycle.rho(self.bank, self.noise, self.asymptote)
 
     def mark(self, rows: Ints, near: Bools, score: Array) -> None:
         """Note who was measured (near: well enough to be confirmed), and confirm."""
-        self.hit = np.zeros(len(self.id), bool)
+        self.hit[:] = False
         self.hit[rows] = True
         self.hits += self.hit
-        self.misses = np.where(self.hit, 0.0, self.misses + 1)
-        self.excused &= ~self.hit
+        self.misses += 1
+        self.misses[rows] = 0
+        self.excused[rows] = False
         self.score[rows] = score
         self.confirmed[rows] |= near & (self.rho[rows] <= self.config.confirm_ratio)
-        self.scale = self._scale_of(self.bank[kalman.PLACE])
+        self.scale[:] = self._scale_of(self.bank[kalman.PLACE])
 
     def _scale_of(self, place: Array) -> Array:
         """px per m at a person of this size; from straight above the camera's own."""
-        whole, camera = self.context.px_per_m, self.context.camera
-        if camera is not None and camera.kind == "top":
+        whole = self.context.px_per_m
+        if self.top:
             return np.full(len(place), whole)
-        return np.asarray(np.clip(place[:, 2:].max(1) / PERSON, whole / 2, whole * 2))
+        size = np.maximum(place[:, 2], place[:, 3]) / PERSON
+        return np.asarray(np.minimum(np.maximum(size, whole / 2), whole * 2))
 
     def excuse(self) -> None:
         """Excuse the unseen confirmed tracks that are behind somebody: covered by a track whose feet are lower."""
-        lost = np.flatnonzero(self.confirmed & ~self.hit & ~self.excused)
+        lost = (self.confirmed & ~self.hit & ~self.excused).nonzero()[0]
         if not len(lost):
             return
         place = self.bank[kalman.PLACE]
@@ -84,7 +90,7 @@ class Population:
         ones among them are excused.
         """
         found = np.zeros(len(z), bool)
-        known = np.flatnonzero(self.confirmed)
+        known = self.confirmed.nonzero()[0]
         if len(known) < 2 or not len(z) or not unseen.any():
             return found
         place, lost = self.bank[kalman.PLACE][known], unseen[known]
@@ -99,58 +105,48 @@ class Population:
 
     def bury(self, t: float) -> None:
         """Forget the tracks whose rho, age or place says that they are over."""
-        if self.hit.all() and self.confirmed.all():
+        lost = (~(self.hit & self.confirmed)).nonzero()[0]
+        if not len(lost):
             return
-        c, lost = self.config, ~self.hit
-        limit = np.where(self.excused, self.excused_death, self.death)
-        over = self.confirmed & lost & (self.rho >= limit * (1 - SLACK))
-        young = ~self.confirmed
-        over |= young & lost & (self.rho >= self.birth_rho * (1 - 1e-9))
-        over |= young & (t - self.born > c.tentative_time)
-        over |= lost & self._outside()
+        unseen, sure, rho = ~self.hit[lost], self.confirmed[lost], self.rho[lost]
+        limit = np.where(self.excused[lost], self.excused_death, self.death) * (1 - SLACK)
+        over = unseen & (rho >= np.where(sure, limit, self.birth_rho * (1 - 1e-9)))
+        over |= ~sure & (t - self.born[lost] > self.config.tentative_time)
+        over |= unseen & self._outside(self.bank[kalman.PLACE, lost])
         if over.any():
-            self._keep(~over)
+            keep = np.ones(len(self.id), bool)
+            keep[lost[over]] = False
+            self.bank, self.id = self.bank[:, keep], self.id[keep]
+            self._bind(self.book[:, keep], self.flags[:, keep])
 
-    def _outside(self) -> Bools:
+    def _outside(self, place: Array) -> Bools:
         """Is the centre out of the image?"""
-        place = self.bank[kalman.PLACE]
         if self.context.image_size is None:
             return np.zeros(len(place), bool)
         return np.asarray(((place[:, :2] < 0) | (place[:, :2] > self.context.image_size)).any(1))
-
-    def _keep(self, rows: Bools) -> None:
-        self.bank = self.bank[:, rows]
-        for name in ("id", "born", "score", "scale", "rho", "hits", "misses", "confirmed", "hit", "excused"):
-            setattr(self, name, getattr(self, name)[rows])
 
     def give_birth(self, z: Array, score: Array, t: float) -> None:
         """A tentative track for each orphan."""
         n = len(z)
         if not n:
             return
-        new = {
-            "id": np.arange(self.next_id, self.next_id + n),
-            "born": np.full(n, t),
-            "score": score,
-            "scale": self._scale_of(z),
-            "rho": np.full(n, self.birth_rho),
-            "hits": np.ones(n),
-            "misses": np.zeros(n),
-            "confirmed": np.zeros(n, bool),
-            "hit": np.ones(n, bool),
-            "excused": np.zeros(n, bool),
-        }
+        book, flags = np.zeros((6, n)), np.zeros((3, n), bool)
+        book[0], book[1], book[2], book[3], book[4] = self._scale_of(z), self.birth_rho, t, score, 1
+        flags[1] = True
+        self.id = np.concatenate([self.id, np.arange(self.next_id, self.next_id + n)])
         self.next_id += n
-        for name, values in new.items():
-            setattr(self, name, np.concatenate([getattr(self, name), values]))
+        self._bind(np.concatenate([self.book, book], 1), np.concatenate([self.flags, flags], 1))
         self.bank = np.concatenate([self.bank, kalman.born(z, self.noise, self.dynamics.birth_rate_var)], 1)
 
-    def reported(self, t: float) -> Bools:
-        """Which tracks the world hears of; an unseen one no longer than it was seen, nor at the edge on its way out."""
-        limit = np.where(self.excused, self.excused_silence, self.silence)
-        unseen = self.confirmed & (self.rho <= limit * (1 + SLACK)) & (self.misses <= self.hits) & ~self._leaving()
-        old = self.confirmed | (t - self.born >= self.config.report_delay - 1e-6)
-        return np.asarray(np.where(self.hit, old, unseen))
+    def reported(self, t: float) -> Ints:
+        """Rows that the world hears of; an unseen one no longer than it was seen, nor at the edge on its way out."""
+        told = self.hit & (self.confirmed | (t - self.born >= self.config.report_delay - 1e-6))
+        lost = (self.confirmed & ~self.hit).nonzero()[0]
+        if len(lost):
+            limit = np.where(self.excused[lost], self.excused_silence, self.silence) * (1 + SLACK)
+            fresh = (self.rho[lost] <= limit) & (self.misses[lost] <= self.hits[lost])
+            told[lost] = fresh & ~self._leaving(self.bank[:, lost])
+        return told.nonzero()[0]
 
     def look(self, z: Array) -> None:
         """Widen the field of view to these measurements, where the image's size is not known."""
@@ -160,9 +156,9 @@ class Population:
             self.low = np.minimum(self.low, (z[:, :2] - z[:, :1:-1] / 2).min(0))
             self.high = np.maximum(self.high, (z[:, :2] + z[:, :1:-1] / 2).max(0))
 
-    def _leaving(self) -> Bools:
+    def _leaving(self, bank: Array) -> Bools:
         """Does the predicted box reach over the edge of the field of view, moving outwards?"""
-        place, rate = self.bank[kalman.PLACE], self.bank[kalman.RATE, :, :2]
+        place, rate = bank[kalman.PLACE], bank[kalman.RATE, :, :2]
         half = place[:, :1:-1] / 2
         out = ((place[:, :2] - half < self.low) & (rate < 0)) | ((place[:, :2] + half > self.high) & (rate > 0))
         return np.asarray(out.any(1))
