@@ -70,10 +70,12 @@ def test_an_error_inside_an_entry_names_suite_and_entry(path: Path) -> None:
     assert "entry x" in caught.value.file
 
 
-def test_the_catalogues_suites_resolve() -> None:
-    for name in suite_names():
-        entries = resolve(f"suite:{name}")
-        assert len({e.name for e in entries}) == len(entries) > 0
+@pytest.mark.parametrize("name", suite_names())
+def test_the_catalogues_suites_resolve(name: str) -> None:
+    if not names():
+        pytest.skip("no catalogue")
+    entries = resolve(f"suite:{name}")
+    assert len({e.name for e in entries}) == len(entries) > 0
 
 
 def test_standard_has_every_scenario_at_two_densities() -> None:

@@ -3,11 +3,11 @@
 const darkQuery = matchMedia("(prefers-color-scheme: dark)");
 // Apart from each other for colour-blind eyes; the two rows keep a contrast of 3 : 1 or more on their grounds.
 const COLOURS = {
-  light: ["#0072b2", "#c75000", "#00805e", "#a33a7a", "#6a51a3", "#8a6d00", "#b2182b", "#2a7f9e", "#4d7c0f", "#7a4a2a"],
+  light: ["#0072b2", "#c75000", "#00805e", "#a33a7a", "#6a51a3", "#8a6d00", "#b2182b", "#20708c", "#4d7c0f", "#7a4a2a"],
   dark: ["#56b4e9", "#f0963c", "#2fc79a", "#e58fc0", "#b3a1f0", "#e0c341", "#ff7b72", "#7fd4e8", "#a3d15c", "#d6a07a"],
 };
 const THEMES = {
-  light: { ground: "#fbfcfd", grid: "#e6eaee", wall: "#2d333b", thing: "#7d8590", floor: "#eef1f4", ink: "#1b1f24", halo: "#ffffff", alone: "#6e7781", found: "#1b1f24" },
+  light: { ground: "#fbfcfd", grid: "#e6eaee", wall: "#2d333b", thing: "#656d76", floor: "#eef1f4", ink: "#1b1f24", halo: "#ffffff", alone: "#656d76", found: "#1b1f24" },
   dark: { ground: "#12171d", grid: "#232b34", wall: "#c5ccd4", thing: "#8b949e", floor: "#1d242c", ink: "#e8ecf1", halo: "#0f1318", alone: "#8b949e", found: "#e8ecf1" },
 };
 let theme = THEMES.light, palette = COLOURS.light;
