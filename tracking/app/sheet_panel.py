@@ -21,7 +21,7 @@ INK, QUIET, GRID, FLOOR, THING, WALL = (
     (144, 133, 125),
     (60, 51, 45),
 )
-PALETTE = ("0072b2", "c75000", "00805e", "a33a7a", "6a51a3", "8a6d00", "b2182b", "20708c", "4d7c0f", "7a4a2a")
+PALETTE = ("0072b2", "b84a00", "00805e", "a33a7a", "6a51a3", "8a6d00", "b2182b", "20708c", "4d7c0f", "7a4a2a")
 SHIFT = 4
 TRAIL = 3.0
 """s of the past that is shown."""

@@ -3,7 +3,7 @@
 const darkQuery = matchMedia("(prefers-color-scheme: dark)");
 // Apart from each other for colour-blind eyes; the two rows keep a contrast of 3 : 1 or more on their grounds.
 const COLOURS = {
-  light: ["#0072b2", "#c75000", "#00805e", "#a33a7a", "#6a51a3", "#8a6d00", "#b2182b", "#20708c", "#4d7c0f", "#7a4a2a"],
+  light: ["#0072b2", "#b84a00", "#00805e", "#a33a7a", "#6a51a3", "#8a6d00", "#b2182b", "#20708c", "#4d7c0f", "#7a4a2a"],
   dark: ["#56b4e9", "#f0963c", "#2fc79a", "#e58fc0", "#b3a1f0", "#e0c341", "#ff7b72", "#7fd4e8", "#a3d15c", "#d6a07a"],
 };
 const THEMES = {
