@@ -88,27 +88,13 @@ def read_near(path: Path) -> Near:
     return Near(*(table[:, k].copy() for k in range(4)))
 
 
-def script_bytes(orders: Iterable[Order], events: tuple[GroupEvent, ...] | None) -> bytes:
-    """script.json: the orders, and for each the position in events.json of the event that fulfilled it."""
-    return listing(
-        "orders",
-        (
-            {"id": o.id, "kind": o.kind, "fired": o.fired, "before": o.before, "after": o.after,
-             "event": fulfilment(o, events or ())}
-            for o in orders
-        ),
-    )  # fmt: skip
-
-
-def fulfilment(order: Order, events: tuple[GroupEvent, ...]) -> int | None:
-    """The first event of the order's kind, not before it fired, that concerns at least half of the same people."""
-    people = {p for group in (*order.before, *order.after) for p in group}
-    for k, event in enumerate(events):
-        concerned = set(event.members)
-        shared = len(people & concerned) / max(1, len(people | concerned))
-        if event.kind == order.kind and order.fired is not None and event.start >= order.fired and shared >= 0.5:
-            return k
-    return None
+def script_bytes(orders: Iterable[Order], fulfilled: Iterable[int | None]) -> bytes:
+    """script.json: the orders, and for each the position in events.json of the event that fulfilled it, or None."""
+    rows = (
+        {"id": o.id, "kind": o.kind, "fired": o.fired, "before": o.before, "after": o.after, "event": event}
+        for o, event in zip(orders, fulfilled, strict=True)
+    )
+    return listing("orders", rows)
 
 
 def read_script(path: Path) -> tuple[Order, ...]:

@@ -20,7 +20,7 @@ SINGLE = (("z", "m"), ("heading", "rad"), ("height", "m"), ("truncation", "1"))
 
 def truth_files(truth: Truth) -> dict[str, bytes]:
     """Everything under gt/: truth.parquet, groups, events, near, script and MOTChallenge's gt.txt."""
-    files = {"gt/truth.parquet": _table(truth), "gt/script.json": script_bytes(truth.orders, truth.events)}
+    files = {"gt/truth.parquet": _table(truth), "gt/script.json": script_bytes(truth.orders, _fulfilled(truth))}
     if truth.box is not None:
         files["gt/gt.txt"] = _mot_text(truth, truth.box)
     if truth.groups is not None:
@@ -34,6 +34,17 @@ def truth_files(truth: Truth) -> dict[str, bytes]:
     if truth.near is not None:
         files["gt/near.csv"] = near_bytes(truth.near)
     return files
+
+
+def _fulfilled(truth: Truth) -> list[int | None]:
+    """For each order the position of the event that fulfils it."""
+    if not truth.orders:
+        return []
+    from sim.orders import dense_groups, fulfilment
+
+    people = max([int(truth.id.max(initial=0)), *(p for o in truth.orders for part in o.after for p in part)])
+    group = dense_groups(truth, (truth.length, people))
+    return [fulfilment(order, truth, group) for order in truth.orders]
 
 
 def _table(truth: Truth) -> bytes:
