@@ -118,9 +118,7 @@ def real(python: str, folder: Path, data: Path) -> None:
         answers = {"blob": ours(sequence)[0], "blob, nearest": ours(sequence, {"association": "nearest"})[0]}
         answers |= {p: peer(python, p, det, folder / "out.txt", truth.length)[0] for p in PEERS}
         block = max(round(truth.fps), truth.length // 20)
-        print(
-            f"{name}: {truth.length} frames at {truth.fps:g} fps; difference to blob with 95 % interval (blocks of {block})"
-        )
+        print(f"{name}: {truth.length} frames, {truth.fps:g} fps; HOTA less the other's, 95 % by blocks of {block}")
         for who, made in answers.items():
             scores = "  ".join(f"{k} {v:.3f}" for k, v in mot_scores(ids, boxes, made).items())
             low, high = bootstrap(ids, boxes, answers["blob"], made, block, np.random.default_rng(0))

@@ -34,9 +34,9 @@ def perfect(truth: FrameTruth) -> Detections:
 
 def _sensed(truth: Truth, sequence: Sequence, sensor: Mapping[str, Any], seed: int) -> Iterator[Detections]:
     from pydantic import ValidationError
-    from sim.sensors import sense
 
     from scenarios.schema import Sensor
+    from sim.sensors import sense
 
     try:
         spec = Sensor.model_validate({**PERFECT, **ALWAYS, **sensor})
@@ -45,6 +45,4 @@ def _sensed(truth: Truth, sequence: Sequence, sensor: Mapping[str, Any], seed: i
         place = ".".join(["sensor", *map(str, first["loc"])])
         expected = first["msg"]
         raise InputError(place=place, got=first["input"], expected=expected, remedy="see docs/formats.md") from None
-    found = sense(truth, spec, seed, sequence.camera, sequence.image_size)
-    at = found if callable(found) else lambda i: found[i - 1]
-    return (at(i) for i in range(1, truth.length + 1))
+    return iter(sense(truth, spec, seed, sequence.camera, sequence.image_size))

@@ -86,6 +86,14 @@ def test_truth_mode_takes_the_labels():
     assert run[-1].pos[run[-1].id.argmin()] == pytest.approx(boxes_at(LENGTH - 1)[0, :2] + [14, 34], abs=1.0)
 
 
+def test_sensor_overrides_degrade_the_labels():
+    made = [track("blob", source(load_truth=truth), detections="truth", sensor={"detect_prob": p}) for p in (1.0, 0.0)]
+    assert [sum(len(t.id) for t in run) > 0 for run in made] == [True, False]
+    assert made[1].info["sensor"] == {"detect_prob": 0.0}
+    with pytest.raises(InputError, match=r"sensor\.detect_prob"):
+        track("blob", source(load_truth=truth), detections="truth", sensor={"detect_prob": 2.0})
+
+
 def test_default_is_truth_where_there_is_nothing_else():
     assert prepare("blob", source(has_detections=False, load_truth=truth)).mode == "truth"
 

@@ -65,9 +65,9 @@ class Blob:
         people = self.people
         people.predict()
         people.look(z)
-        rows, columns, free = self._associate(z, score)
+        rows, columns, free, d2 = self._associate(z, score)
         rows, columns = self._without_merged(rows, columns, z)
-        rows, best, measured, free = self._with_pieces(rows, columns, free, z, score)
+        rows, best, measured, free = self._with_pieces(rows, columns, free, z, score, d2)
         near = self._update(rows, measured)
         people.mark(rows, near <= self.confirm_gate, best)
         people.excuse()
@@ -86,11 +86,11 @@ class Blob:
             box, score = box[good], score[good]
         return blob_measure.from_boxes(box), score
 
-    def _associate(self, z: Array, score: Array) -> tuple[Ints, Ints, Bools]:
-        """Tracks and measurements that belong together, one to one, and which measurements (M,) nobody took."""
+    def _associate(self, z: Array, score: Array) -> tuple[Ints, Ints, Bools, Array]:
+        """Tracks and measurements that belong together, one to one; which measurements (M,) are free; distances."""
         people, free = self.people, np.ones(len(z), bool)
         if not len(z) or not len(people.id):
-            return np.zeros(0, np.int64), np.zeros(0, np.int64), free
+            return np.zeros(0, np.int64), np.zeros(0, np.int64), free, np.zeros((len(people.id), len(z)))
         d2 = kalman.distances(people.bank, z, self.noise, people.scale)
         cost = np.where(d2 <= self.gate, d2, np.inf)
         strong = score >= self.config.score_start
@@ -102,7 +102,7 @@ class Blob:
             more = self._pairs(cost)
             rows, columns = np.concatenate([rows, more[0]]), np.concatenate([columns, more[1]])
         free[columns] = False
-        return rows, columns, free
+        return rows, columns, free, d2
 
     def _pairs(self, cost: Array) -> tuple[Ints, Ints]:
         if self.config.association == "nearest":
@@ -128,7 +128,7 @@ class Blob:
         return rows[~odd], columns[~odd]
 
     def _with_pieces(
-        self, rows: Ints, columns: Ints, free: Bools, z: Array, score: Array
+        self, rows: Ints, columns: Ints, free: Bools, z: Array, score: Array, d2: Array
     ) -> tuple[Ints, Array, Array, Bools]:
         """Measured tracks, their scores and measurements, with pieces fused; and what is still free.
 
@@ -139,7 +139,7 @@ class Blob:
         left = free.nonzero()[0]
         if not len(left) or not len(people.id):
             return rows, best, measured, free
-        owner = self._owners(rows, z[left])
+        owner = self._owners(rows, z[left], d2[:, left])
         free[left[owner >= 0]] = False
         own = dict(zip(rows.tolist(), range(len(rows)), strict=True))
         for row in np.unique(owner[owner >= 0]).tolist():
@@ -156,8 +156,8 @@ class Blob:
                 measured[k] = whole
         return rows, best, measured, free
 
-    def _owners(self, rows: Ints, pieces: Array) -> Ints:
-        """(K,) the track of which each measurement is a piece, or -1."""
+    def _owners(self, rows: Ints, pieces: Array, d2: Array) -> Ints:
+        """(K,) the track of which each measurement is a piece, or -1; d2 (N, K) their distances."""
         people = self.people
         place, owner = people.bank[kalman.PLACE], np.full(len(pieces), -1)
         possible = blob_measure.inside(pieces, place) & people.confirmed
@@ -166,10 +166,10 @@ class Blob:
             smaller = np.prod(pieces[near, 2:], 1)[:, None] < np.prod(place[:, 2:], 1)
             share = blob_measure.covered(pieces[near], place) * (possible[near] & smaller)
             owner[near] = np.where(share.max(1) >= INSIDE, share.argmax(1), -1)
-        if len(rows):
+        if len(rows) and d2.min() <= self.orphan_gate:  # S is never below its asymptote, nor d2 above what it gives
             y = (pieces[:, None] - place[rows]) / people.scale[rows, None]
-            d2 = (y * y / self.asymptote).sum(2)
-            owner = np.where(d2.min(1) <= self.orphan_gate, rows[d2.argmin(1)], owner)
+            away = (y * y / self.asymptote).sum(2)
+            owner = np.where(away.min(1) <= self.orphan_gate, rows[away.argmin(1)], owner)
         return np.asarray(owner)
 
     def _away(self, rows: Ints, measured: Array) -> Array:
@@ -203,6 +203,5 @@ class Blob:
         else:
             pos, vel, cov, seen = blob_report.on_ground(camera, state, scale)
             rows, box, alone, plane = rows[seen], box[seen], alone[seen], "ground"
-            pos, vel, cov = pos[seen], vel[seen], cov[seen]
         id, score = people.id[rows], people.score[rows]
         return Tracks(frame.index, frame.t, cast(Plane, plane), "person", id, alone, pos, vel, cov, box, score)

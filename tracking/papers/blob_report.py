@@ -6,8 +6,6 @@ import numpy as np
 
 from sim.types import Array, Bools, Camera
 
-STEP_PX = 0.5  # of the central differences that give the Jacobian of the ground projection
-
 
 def image_covariance(state: Array, scale: Array) -> Array:
     """(N, 4, 4) covariance of x, y, vx, vy in px of a bank whose covariances are in m^2; scale (N,) px per m."""
@@ -20,24 +18,23 @@ def image_covariance(state: Array, scale: Array) -> Array:
 
 
 def on_ground(camera: Camera, state: Array, scale: Array) -> tuple[Array, Array, Array, Bools]:
-    """Positions, velocities, covariances on the ground, and which rows have one (above the horizon there is none).
+    """Positions, velocities, covariances on the ground of the rows that have one (above the horizon there is none),
+    and which these are.
 
     The place measured is the box's bottom centre for a pinhole, its centre from above; the image's state goes through
-    sim.camera.to_ground and its Jacobian J: v = J u', P = J P_uv J' blockwise.
+    sim.camera.to_ground and its Jacobian J: v = J (u', v'), P = J P_uv J' blockwise.
     """
-    from sim.camera import to_ground
+    from sim.camera import ground_jacobian, to_ground
 
     foot, rate, cov = _foot(camera, state, scale)
-    right, down = np.array([STEP_PX, 0.0]), np.array([0.0, STEP_PX])
-    probes = np.concatenate([foot, foot - right, foot + right, foot - down, foot + down])
-    ground = to_ground(camera, probes)[:, :2].reshape(5, -1, 2)
-    seen = np.isfinite(ground).all((0, 2))
-    ground = np.where(seen[:, None], ground, 0.0)
-    jacobian = np.stack([ground[2] - ground[1], ground[4] - ground[3]], -1) / (2 * STEP_PX)
+    ground = to_ground(camera, foot)
+    seen = np.asarray(np.isfinite(ground).all(1))
+    foot, rate, cov = foot[seen], rate[seen], cov[seen]
+    jacobian = ground_jacobian(camera, foot)
     turn = np.zeros((len(foot), 4, 4))
     turn[:, :2, :2] = turn[:, 2:, 2:] = jacobian
     out = turn @ cov @ turn.transpose(0, 2, 1)
-    return ground[0], np.einsum("nij,nj->ni", jacobian, rate), (out + out.transpose(0, 2, 1)) / 2, seen
+    return ground[seen], np.einsum("nij,nj->ni", jacobian, rate), (out + out.transpose(0, 2, 1)) / 2, seen
 
 
 def _foot(camera: Camera, state: Array, scale: Array) -> tuple[Array, Array, Array]:

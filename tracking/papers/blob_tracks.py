@@ -80,6 +80,9 @@ class Population:
             return
         place = self.bank[kalman.PLACE]
         in_front = self.hit & (_foot(place) > _foot(place[lost])[:, None])
+        in_front &= np.abs(place[lost, 0, None] - place[:, 0]) < (place[lost, 3, None] + place[:, 3]) / 2
+        if not in_front.any():
+            return
         share = np.where(in_front, blob_measure.covered(place[lost], place), 0.0)
         self.excused[lost[share.max(1) >= HIDDEN]] = True
 
@@ -146,7 +149,7 @@ class Population:
             limit = np.where(self.excused[lost], self.excused_silence, self.silence) * (1 + SLACK)
             fresh = (self.rho[lost] <= limit) & (self.misses[lost] <= self.hits[lost])
             told[lost] = fresh & ~self._leaving(self.bank[:, lost])
-        return told.nonzero()[0]
+        return np.asarray(told.nonzero()[0])
 
     def look(self, z: Array) -> None:
         """Widen the field of view to these measurements, where the image's size is not known."""

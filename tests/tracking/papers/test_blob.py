@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from sim.types import Context, Detections, Frame, Tracks
+from sim.types import Camera, Context, Detections, Frame, Tracks
+from tracking import kalman
 from tracking.papers.blob import Blob
 from tracking.papers.blob_config import BlobConfig
 
@@ -239,3 +240,56 @@ def test_innovations_are_white_and_of_unit_size_on_the_model_itself():
     assert np.mean(found**2) == pytest.approx(1.0, abs=0.08)
     for lag in range(1, 6):
         assert abs(np.mean(found[lag:] * found[:-lag])) < 0.06
+
+
+def pinhole(tilt_deg=25.0, height=4.0):
+    tilt = np.radians(tilt_deg)
+    forward, right = np.array([0.0, np.cos(tilt), -np.sin(tilt)]), np.array([1.0, 0, 0])
+    rotation = np.stack([right, np.cross(forward, right), forward])
+    return Camera("pinhole", (640, 480), (500.0, 500.0), (320.0, 240.0), np.array([0.0, 0, height]), rotation)
+
+
+def above():
+    up = np.diag([1.0, -1.0, -1.0])
+    return Camera("top", (640, 480), (1.0, 1.0), (320.0, 240.0), np.array([0.0, 0, 10]), up, px_per_m=40.0)
+
+
+@pytest.mark.parametrize("camera", [pinhole(), above()], ids=["pinhole", "top"])
+def test_reports_on_the_ground_where_the_camera_is_known(camera):
+    from sim.camera import project, px_per_m_at_centre
+
+    context = Context(fps=FPS, px_per_m=px_per_m_at_centre(camera), camera=camera, image_size=camera.image)
+    middle = np.array([0.0, 9.0]) if camera.kind == "pinhole" else np.zeros(2)
+    path = middle + np.array([[-2 + 0.1 * k, 0.03 * k] for k in range(40)])
+    boxes = []
+    for x, y in path:
+        (foot, head), _ = project(camera, np.array([[x, y, 0.0], [x, y, 1.7]]))
+        if camera.kind == "top":
+            boxes.append([[*(foot - 9), 18, 18]])
+        else:
+            boxes.append([[foot[0] - 15, head[1], 30, foot[1] - head[1]]])
+    last = run(boxes, context=context)[-1]
+    assert last.plane == "ground"
+    assert last.pos[0] == pytest.approx(path[-1], abs=0.1)
+    assert last.vel[0] == pytest.approx([1.0, 0.3], abs=0.1)
+    assert (np.linalg.eigvalsh(last.cov[0]) > 0).all()
+
+
+def test_ground_covariance_is_that_of_projected_samples():
+    from sim.camera import to_ground
+    from tracking.papers.blob_report import on_ground
+
+    camera, r, scale = pinhole(), np.random.default_rng(0), np.array([50.0])
+    state = kalman.born(np.array([[300.0, 300, 90, 35]]), np.array([2e-4, 3e-4, 4e-4, 1e-4]), 1e-3)
+    pos, _, cov, seen = on_ground(camera, state, scale)
+    draws = state[0, 0] + r.normal(size=(200_000, 4)) * np.sqrt(state[2, 0]) * scale
+    ground = to_ground(camera, np.c_[draws[:, 0], draws[:, 1] + draws[:, 2] / 2])
+    assert seen.all()
+    assert pos[0] == pytest.approx(ground.mean(0), abs=0.01)
+    assert np.allclose(cov[0, :2, :2], np.cov(ground.T), rtol=0.03, atol=1e-5)
+
+
+def test_nobody_above_the_horizon_is_reported():
+    camera = pinhole(tilt_deg=5.0)
+    context = Context(fps=FPS, px_per_m=40.0, camera=camera, image_size=camera.image)
+    assert not ids(run([[[300, 20, 28, 68]]] * 20, context=context))
