@@ -11,10 +11,13 @@ from collections.abc import Iterator
 import numpy as np
 
 from sim.camera import project, px_per_m_at_centre
+from sim.orders import check_orders
 from sim.people import contour, outlines
 from sim.types import Array, Camera, GroupEvent, Groups, Ints, Motion, Truth
 from sim.viewpoint import Bodies, recorded
 from sim.visibility import look
+
+__all__ = ["bodies", "check_orders", "image_velocities", "label"]
 
 INSTANT = 0.02  # s: half the step that turns ground velocities into image velocities
 
