@@ -98,6 +98,19 @@ def test_default_is_truth_where_there_is_nothing_else():
     assert prepare("blob", source(has_detections=False, load_truth=truth)).mode == "truth"
 
 
+def test_image_mode_hides_the_files_detections():
+    class Eyes(Stranger):
+        needs = ("pixels", "boxes")
+
+        def step(self, frame, detections):
+            assert detections is None
+            none = Detections(frame.index, frame.t, "image", np.zeros((0, 2)))
+            return super().step(frame, none)
+
+    run = track(Eyes, source(has_images=True))
+    assert run.info["detections"] == "image"
+
+
 def test_params_by_config_values_and_file(tmp_path):
     path = tmp_path / "p.toml"
     path.write_text("[params]\ngate = 0.95\n")

@@ -162,6 +162,42 @@ def test_weak_detections_continue_but_do_not_start(config):
     assert all(len(t.id) == 1 for t in fading[15:])
 
 
+def test_an_unseen_track_is_reported_no_longer_than_it_was_seen():
+    config = BlobConfig(confirm_ratio=2.0, report_coast=2.0, coast_time=3.0, report_delay=0.0)
+    made = run([at((100, 200))] * 6 + [[]] * 20, config)
+    assert [len(t.id) for t in made] == [1] * 12 + [0] * 14
+
+
+def test_an_unseen_track_on_its_way_out_is_not_reported():
+    config = BlobConfig(report_coast=1.0)
+    frames = [at((100 - 4 * k, 200)) for k in range(25)] + [[]] * 8
+    for context in (CONTEXT, Context(fps=FPS, px_per_m=40.0)):
+        made = run(frames, config, context=context)
+        assert len(made[24].id) == 1
+        assert all(len(t.id) == 0 for t in made[26:])
+    inward = run([at((200 + 4 * k, 200)) for k in range(25)] + [[]] * 8, config)
+    assert len(inward[28].id) == 1
+
+
+def test_weak_detections_choose_after_the_strong():
+    frames = [at((100, 200)) for _ in range(20)] + [at((106, 200), (100, 200))]
+    scores = [[1.0]] * 20 + [[1.0, 0.2]]
+    last = run(frames, both("optimal"), scores)[-1]
+    assert last.score.tolist() == [1.0]
+    assert last.box[0, 0] > 101.0
+
+
+def test_a_strong_detection_is_not_given_twice():
+    frames = [at((100, 200), (112, 200)) for _ in range(20)] + [at((100, 200), (600, 200))]
+    scores = [[1.0, 1.0]] * 20 + [[1.0, 0.2]]
+    tracker = Blob(both("optimal"))
+    tracker.reset(CONTEXT, 0)
+    for k, (rows, score) in enumerate(zip(frames, scores, strict=True)):
+        box = np.array(rows)
+        tracker.step(Frame(k + 1, k / FPS), Detections(k + 1, k / FPS, "image", box[:, :2], None, box, np.array(score)))
+    assert tracker.people.hit.tolist() == [True, False]
+
+
 @pytest.mark.parametrize("seed", range(6))
 def test_order_of_detections_matters_to_nothing(config, seed):
     boxes, r = crowd(seed), np.random.default_rng(seed)
