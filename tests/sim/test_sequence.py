@@ -1,0 +1,102 @@
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+
+import sim.sequence
+from scenarios.errors import InputError, WorkError
+from scenarios.schema import Scenario
+from sim.sequence import observe
+from sim.types import Order
+from tests.reference_sense import crowd, walkers
+
+
+def scenario(**keys: Any) -> Scenario:
+    group = [
+        {"id": "a", "size": 2, "start": [4, 5], "goal": [12, 5]},
+        {"id": "b", "size": 1, "start": [8, 8], "goal": [8, 2]},
+    ]
+    return Scenario.model_validate({"schema": 1, "group": group, **keys})
+
+
+def test_a_sequence_says_all_a_command_needs() -> None:
+    motion = crowd(0, frames=25)
+    sequence = observe(scenario(), motion)
+    assert (sequence.name, sequence.fps, sequence.length, sequence.image_size) == ("made-up", 10.0, 25, (640, 480))
+    assert sequence.camera is not None
+    assert sequence.scene is motion.scene
+    assert sequence.has_detections
+    assert not sequence.has_images
+    assert sequence.px_per_m > 0
+
+
+def test_frames_can_be_read_again() -> None:
+    sequence = observe(scenario(), crowd(0, frames=25))
+    first, second = list(sequence), list(sequence)
+    assert [f.index for f in first] == list(range(1, 26))
+    assert [f.t for f in first] == pytest.approx(np.arange(25) / 10)
+    for a, b in zip(first, second, strict=True):
+        assert a.detections is not None
+        assert b.detections is not None
+        assert np.array_equal(a.detections.pos, b.detections.pos)
+
+
+def test_detections_need_no_truth(monkeypatch: pytest.MonkeyPatch) -> None:
+    def poisoned(*_: object) -> None:
+        raise AssertionError("truth was asked for")
+
+    monkeypatch.setattr(sim.sequence, "label", poisoned)
+    sequence = observe(scenario(), crowd(0))
+    assert sum(len(f.detections.pos) for f in sequence if f.detections) > 0
+    with pytest.raises(AssertionError):
+        _ = sequence.truth
+
+
+def test_the_scenarios_sensor_and_camera_are_used() -> None:
+    blind = observe(scenario(sensor={"detect_prob": 0.0, "clutter_rate": 0.0}), crowd(0))
+    assert sum(len(f.detections.pos) for f in blind if f.detections) == 0
+    above = observe(scenario(camera={"kind": "top", "image": [320, 240]}), crowd(0))
+    assert above.camera is not None
+    assert above.camera.kind == "top"
+    assert above.image_size == (320, 240)
+
+
+def test_people_out_of_view_are_refused_at_once() -> None:
+    with pytest.raises(InputError, match="out of view"):
+        observe(scenario(camera={"height": 2.0}), crowd(0))
+
+
+def test_repeats_differ_in_their_draws() -> None:
+    motion = crowd(0)
+    one, two = (next(iter(observe(scenario(), motion.replace(repeat=n)))).detections for n in (1, 2))
+    assert one is not None
+    assert two is not None
+    assert not np.array_equal(one.pos, two.pos)
+
+
+def test_hiding_a_group_of_the_script() -> None:
+    keys = {"sensor": {"detect_prob": 1.0, "clutter_rate": 0.0, "min_visibility": 0.0, "occlusion_power": 0.0,
+                       "small_px": 0.0, "hide": [{"start": 1.0, "end": 2.0, "group": "a"}]}}  # fmt: skip
+    motion = walkers([[4, 5], [5, 5], [8, 8]], [[0.5, 0], [0.5, 0], [0, -0.3]], frames=30)
+    found = [len(f.detections.pos) for f in observe(scenario(**keys), motion, people={"a": (1, 2)}) if f.detections]
+    assert found == [3] * 10 + [1] * 10 + [3] * 10
+
+
+def test_truth_of_a_script_that_did_not_come_true_is_refused() -> None:
+    pytest.importorskip("sim.groups", exc_type=ImportError)
+    pytest.importorskip("sim.events", exc_type=ImportError)
+    motion = replace(crowd(0, people=2), orders=(Order("m", "merge", None, ((1,), (2,)), ((1, 2),)),))
+    with pytest.raises(WorkError, match="never fired"):
+        _ = observe(scenario(), motion).truth
+    assert observe(scenario(), motion, check=False).truth is not None
+
+
+def test_simulation_is_repeatable_and_hides_by_name() -> None:
+    pytest.importorskip("sim.world", exc_type=ImportError)
+    hide = {"hide": [{"start": 0.5, "end": 1.5, "group": "b"}]}
+    a, b = (sim.sequence.simulate(scenario(duration=2.0, sensor=hide), 3) for _ in range(2))
+    for x, y in zip(a, b, strict=True):
+        assert x.detections is not None
+        assert y.detections is not None
+        assert np.array_equal(x.detections.pos, y.detections.pos)
