@@ -91,6 +91,29 @@ def _pillar_hit(d, eye, pillar, height):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True)
+def span(start, length, cells, low, high, first, last, limit):  # type: ignore[no-untyped-def]
+    """Start and length of the visible cells low … high along one axis, cut at the image.
+
+    Where the silhouette's own first or last cell is visible, its amodal edge is taken, whatever the cell's middle.
+    """
+    a = start + (0 if low == first else low) * length / cells
+    b = start + (cells if high == last else high + 1) * length / cells
+    a = max(a, 0.0)
+    return a, min(b, limit) - a
+
+
+@njit(cache=True)
+def _meets(d, eye, walls, between, tall, pillars, before, high):  # type: ignore[no-untyped-def]
+    """Whether the ray eye + s d meets one of the walls `between` or one of the pillars `before`."""
+    hit = False
+    for w in between:
+        hit = hit or _wall_hit(d, eye, walls[w], tall)
+    for p in before:
+        hit = hit or _pillar_hit(d, eye, pillars[p], high)
+    return hit
+
+
+@njit(cache=True)
 def look(starts, box, centre, inverse, distance, pos, size, has_eye, eye, unproject, walls, tall, pillars, high):  # type: ignore[no-untyped-def]
     """Visibility (R,), truncation (R,) and visible boxes (R, 4) of all rows; see sim.visibility.look."""
     rows = len(box)
@@ -133,10 +156,7 @@ def look(starts, box, centre, inverse, distance, pos, size, has_eye, eye, unproj
                     if not hidden and n_walls + n_pillars:
                         for k in range(3):
                             d[k] = unproject[k, 0] * u + unproject[k, 1] * v + unproject[k, 2]
-                        for k in range(n_walls):
-                            hidden = hidden or _wall_hit(d, eye, walls[between[k]], tall)
-                        for k in range(n_pillars):
-                            hidden = hidden or _pillar_hit(d, eye, pillars[before[k]], high)
+                        hidden = _meets(d, eye, walls, between[:n_walls], tall, pillars, before[:n_pillars], high)
                     if not hidden:
                         visible += 1
                         low_c, high_c = min(low_c, c), max(high_c, c)
@@ -144,12 +164,7 @@ def look(starts, box, centre, inverse, distance, pos, size, has_eye, eye, unproj
             if total == 0:
                 continue
             seen[i], cut[i] = visible / total, 1 - inside / total
-            if visible:  # the outermost cells reach to the amodal edge, whatever their middle
-                u0 = left + (0 if low_c == all_low_c else low_c) * width / COLUMNS
-                u1 = left + (COLUMNS if high_c == all_high_c else high_c + 1) * width / COLUMNS
-                v0 = top + (0 if low_r == all_low_r else low_r) * height / ROWS
-                v1 = top + (ROWS if high_r == all_high_r else high_r + 1) * height / ROWS
-                u0, v0 = max(u0, 0.0), max(v0, 0.0)
-                part[i, 0], part[i, 1] = u0, v0
-                part[i, 2], part[i, 3] = min(u1, size[0]) - u0, min(v1, size[1]) - v0
+            if visible:
+                part[i, 0], part[i, 2] = span(left, width, COLUMNS, low_c, high_c, all_low_c, all_high_c, size[0])
+                part[i, 1], part[i, 3] = span(top, height, ROWS, low_r, high_r, all_low_r, all_high_r, size[1])
     return seen, cut, part

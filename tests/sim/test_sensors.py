@@ -230,6 +230,7 @@ def test_false_alarms_look_like_people(camera: Any) -> None:
     across = (box[:, 0] + box[:, 2] / 2) / 640
     assert np.histogram(across, 4, (0, 1))[0] == pytest.approx(np.full(4, len(box) / 4), rel=0.2)
     assert score.mean() < 0.3
+    assert len(np.unique(box, axis=0)) == len(box)
     clipped = everything(
         sense(truth, perfect(detect_prob=0.0, clutter_rate=4.0, box="visible"), 1, camera, SIZE), "box"
     )

@@ -8,6 +8,7 @@ import sim.sequence
 from scenarios.errors import InputError, WorkError
 from scenarios.schema import Scenario
 from sim.sequence import observe
+from sim.truth import bodies
 from sim.types import Order
 from tests.reference_sense import crowd, walkers
 
@@ -83,9 +84,8 @@ def test_hiding_a_group_of_the_script() -> None:
     assert found == [3] * 10 + [1] * 10 + [3] * 10
 
 
-def test_truth_of_a_script_that_did_not_come_true_is_refused() -> None:
-    pytest.importorskip("sim.groups", exc_type=ImportError)
-    pytest.importorskip("sim.events", exc_type=ImportError)
+def test_truth_of_a_script_that_did_not_come_true_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(sim.sequence, "label", bodies)
     motion = replace(crowd(0, people=2), orders=(Order("m", "merge", None, ((1,), (2,)), ((1, 2),)),))
     with pytest.raises(WorkError, match="never fired"):
         _ = observe(scenario(), motion).truth

@@ -4,7 +4,7 @@ import pytest
 from sim.people import boxes, distance, ellipsoids, outline_boxes, outlines
 from sim.types import Array, Camera, Scene
 from sim.visibility import Seen, look
-from sim.visibility_kernels import COLUMNS, ROWS
+from sim.visibility_kernels import COLUMNS, ROWS, span
 from tests.reference_sense import above, pinhole, raster_visibility, twin_look
 
 OPEN = Scene(np.array([16.0, 10.0]))
@@ -166,3 +166,26 @@ def test_nobody() -> None:
     seen = see(pinhole(), OPEN, np.zeros((0, 2)))
     assert seen.visibility.shape == (0,)
     assert seen.visible_box.shape == (0, 4)
+
+
+def test_a_wide_pillar_hides_who_stands_beyond_its_tangent() -> None:
+    """People close round a pillar 4 m thick, seen from 6 m off its middle: some are nearer than it and half hidden."""
+    scene = Scene(np.array([16.0, 30.0]), pillars=np.array([[8.0, 8.0, 4.0]]), pillar_height=9.0)
+    camera = pinhole(0, -30, (8, 2, 1.6))  # looks to the right, along the tangent
+    angle = np.deg2rad([-60, -30, -22, -18, -14, 0, 20])
+    xy = np.array([8.0, 8.0]) + 4.35 * np.column_stack([np.cos(angle), np.sin(angle)])
+    pos3 = np.column_stack([xy, np.zeros(len(xy))])
+    alone = [raster_visibility(camera, scene, p[None], np.zeros(1), np.full(1, 1.7), n=24)[0] for p in pos3]
+    fast = [see(camera, scene, p[None]).visibility[0] for p in xy]
+    assert fast == pytest.approx(alone, abs=0.05)
+    nearer = np.hypot(*(xy - camera.position[:2]).T) < 6
+    hidden = np.array(fast) < np.array([see(camera, OPEN, p[None]).visibility[0] for p in xy]) - 0.1
+    assert (nearer & hidden).any()
+    assert (nearer & ~hidden).any()
+
+
+def test_spans_reach_the_amodal_edge_and_end_with_the_image() -> None:
+    assert span(10.0, 16.0, 16, 3, 5, 1, 9, 100.0) == (13.0, 3.0)
+    assert span(10.0, 16.0, 16, 1, 5, 1, 9, 100.0) == (10.0, 6.0)  # nothing of the silhouette is in cell 0
+    assert span(10.0, 16.0, 16, 3, 9, 1, 9, 100.0) == (13.0, 13.0)
+    assert span(-4.0, 16.0, 16, 3, 9, 0, 15, 4.5) == (0.0, 4.5)
