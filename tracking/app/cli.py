@@ -1,0 +1,180 @@
+"""The command `flockscope`: every command with its options; what they do stands in the modules named after them."""
+
+from __future__ import annotations
+
+import sys
+import warnings
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+import typer
+
+from scenarios.errors import FlockscopeError, InputError
+from tracking.app.answer import INTERRUPTED, Answer, interrupted, refuse, show, unexpected
+
+app = typer.Typer(
+    add_completion=False,
+    rich_markup_mode=None,
+    pretty_exceptions_enable=False,
+    context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 110},
+    help="Group tracking under test: simulate labelled crowds, track people and groups, score.",
+)
+export = typer.Typer(rich_markup_mode=None, help="Turn a dataset into another form.")
+app.add_typer(export, name="export")
+
+Json = Annotated[bool, typer.Option("--json", help="Print one JSON object instead of text.")]
+Set = Annotated[list[str], typer.Option("--set", metavar="K=V", help="Set a value; may be given often.")]
+Out = Annotated[Path, typer.Option("--out", metavar="DIR", help="Folder to write to.")]
+Source = Annotated[Path, typer.Argument(metavar="SOURCE", help="Sequence or dataset: generated, MOT, BIWI, CAVIAR.")]
+Fps = Annotated[float | None, typer.Option("--fps", help="Frames per second, where the recording does not say.")]
+Scale = Annotated[float | None, typer.Option("--px-per-m", help="Pixels per metre, where there is no camera.")]
+
+
+def _version(asked: bool) -> None:
+    if asked:
+        from importlib.metadata import version
+
+        print(version("flockscope"))
+        raise typer.Exit
+
+
+@app.callback()
+def _start(
+    version: Annotated[bool, typer.Option("--version", callback=_version, is_eager=True, help="Say which.")] = False,
+) -> None:
+    """Options of the command itself."""
+
+
+@app.command()
+def demo(
+    quick: Annotated[bool, typer.Option("--quick", help="One short scene only.")] = False,
+    out: Out = Path("flockscope-demo"),
+    json: Json = False,
+) -> Answer:
+    """Generate, track with every tracker, score, and make a page to open."""
+    from tracking.app.demo import demo
+
+    return demo(out, quick=quick)
+
+
+@app.command()
+def scenarios(
+    name: Annotated[str | None, typer.Argument(help="Scenario, *.toml file or suite to explain.")] = None,
+    settings: Set = [],  # noqa: B006 (typer copies it)
+    out: Annotated[Path | None, typer.Option("--out", metavar="FILE.svg", help="Draw the plan and script.")] = None,
+    schema: Annotated[bool, typer.Option("--schema", help="List every key of a scenario file.")] = False,
+    json: Json = False,
+) -> Answer:
+    """List scenarios and suites, or explain one with a drawing of its script."""
+    from tracking.app import scenario_keys, scenarios_command
+
+    if name is not None and not schema:
+        return scenarios_command.explain(name, settings, out)
+    unused = {"NAME": name, "--out": out, "--set": settings}
+    for option, value in unused.items():
+        if value:
+            got, remedy = f"{option} with nothing to explain", "name a scenario, without --schema"
+            raise InputError(place=option, got=got, expected="NAME", remedy=remedy)
+    return scenario_keys.keys() if schema else scenarios_command.catalogue()
+
+
+@app.command()
+def generate(
+    names: Annotated[list[str], typer.Argument(metavar="NAME…", help="Scenarios, *.toml files or suites.")],
+    seeds: Annotated[str, typer.Option("--seeds", metavar="A:B", help="Seeds from A to B - 1, or one.")],
+    out: Out,
+    settings: Set = [],  # noqa: B006
+    workers: Annotated[int, typer.Option("--workers", min=1, help="Processes.")] = 1,
+    json: Json = False,
+) -> Answer:
+    """Simulate scenarios and store them as a dataset."""
+    from tracking.app.dataset_commands import generate
+
+    return generate(names, seeds, out, settings, workers)
+
+
+@app.command()
+def track(
+    tracker: Annotated[str, typer.Argument(metavar="TRACKER", help="Its name, file.py:Class or module:Class.")],
+    source: Source,
+    out: Out,
+    params: Annotated[Path | None, typer.Option("--params", metavar="FILE.toml", help="Its parameters.")] = None,
+    settings: Set = [],  # noqa: B006
+    detections: Annotated[Literal["image", "truth", "file"] | None, typer.Option(help="What it is given.")] = None,
+    seed: Annotated[int, typer.Option("--seed", min=0, help="The tracker's seed.")] = 0,
+    fps: Fps = None,
+    px_per_m: Scale = None,
+    camera: Annotated[Path | None, typer.Option("--camera", metavar="FILE", help="The recording's camera.json.")] = None,
+    json: Json = False,
+) -> Answer:
+    """Run a tracker over a sequence or dataset and store what it says."""
+    from tracking.app import track_command
+
+    job = track_command.job(tracker, params, settings, detections, seed)
+    return track_command.track(job, source, out, fps=fps, px_per_m=px_per_m, camera=camera)
+
+
+@app.command()
+def validate(
+    folder: Annotated[Path, typer.Argument(metavar="DIR", help="A generated sequence or dataset.")], json: Json = False
+) -> Answer:
+    """Check that a dataset is whole, unaltered and consistent."""
+    from tracking.app.dataset_commands import validate
+
+    return validate(folder)
+
+
+@export.command()
+def coco(
+    folder: Annotated[Path, typer.Argument(metavar="DIR", help="A sequence or dataset with labelled boxes.")],
+    out: Annotated[Path, typer.Option("--out", metavar="FILE.json", help="File to write.")],
+    json: Json = False,
+) -> Answer:
+    """One COCO file with track and group ids."""
+    from tracking.app.dataset_commands import export_coco
+
+    return export_coco(folder, out)
+
+
+def run(arguments: Sequence[str]) -> int:
+    """Run the command; everything it says is printed; its exit code."""
+    as_json = "--json" in arguments
+    command: Any = typer.main.get_command(app)
+    usage = typer.BadParameter.__base__  # the class of all usage errors, typer's own or click's
+    with warnings.catch_warnings():
+        warnings.simplefilter("always", UserWarning)
+        warnings.showwarning = _warn
+        try:
+            result = command.main(list(arguments) or ["--help"], prog_name="flockscope", standalone_mode=False)
+        except KeyboardInterrupt:
+            result = INTERRUPTED
+        except FlockscopeError as error:
+            return refuse(error, as_json)
+        except Exception as error:
+            if usage is not None and isinstance(error, usage):
+                return refuse(_usage(error), as_json)
+            return refuse(unexpected(error), as_json)
+        if isinstance(result, Answer):
+            return show(result, as_json)
+        return interrupted(as_json) if result == INTERRUPTED else int(result or 0)
+
+
+def _usage(error: Any) -> InputError:
+    """A wrong command line."""
+    where = "flockscope" if error.ctx is None else error.ctx.command_path
+    remedy = f"see {where} --help"
+    return InputError(place=where, got=error.format_message(), expected="a command as in its help", remedy=remedy)
+
+
+def _warn(message: Warning | str, *_: object) -> None:
+    print(f"warning: {message}", file=sys.stderr)
+
+
+def main() -> None:
+    """The entry point."""
+    sys.exit(run(sys.argv[1:]))
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,43 @@
+"""`flockscope generate`, `validate` and `export`: datasets made, checked and turned into other forms."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from pathlib import Path
+
+from tracking.app import options
+from tracking.app.answer import Answer
+from tracking.app.meter import Meter
+
+
+def generate(names: Iterable[str], seeds: str, out: Path, settings: Iterable[str], workers: int) -> Answer:
+    """Every named scenario or suite with every seed, as a dataset."""
+    from sim.generate import generate as make
+
+    options.folder(out)
+    chosen = options.seeds(seeds)
+    texts = options.scenario_settings(settings)
+    with Meter("generate") as meter:
+        folders = make(names, chosen, out, set=texts, workers=workers, progress=meter.update)
+    text = f"{len(folders)} sequences in {folders[0].parent}"
+    return Answer({"sequences": folders, "folder": folders[0].parent}, text)
+
+
+def validate(folder: Path) -> Answer:
+    """Whether a sequence or dataset is whole and unaltered; code 1 where it is not."""
+    from sim.io.validate import validate as check
+
+    problems = check(folder)
+    if not problems:
+        return Answer({"problems": []}, f"{folder}: nothing wrong")
+    lines = [problem.line() for problem in problems]
+    found = [problem.as_dict() for problem in problems]
+    return Answer({"problems": found, "error": found[0]}, "\n".join(lines), code=1)
+
+
+def export_coco(source: Path, out: Path) -> Answer:
+    """A COCO file of every sequence."""
+    from sim.io.export import coco
+
+    path = coco(source, out)
+    return Answer({"file": path}, str(path))

@@ -1,0 +1,70 @@
+"""A progress bar on stderr for whatever takes longer than two seconds; nothing at all before that."""
+
+from __future__ import annotations
+
+import sys
+import threading
+import time
+from types import TracebackType
+from typing import TYPE_CHECKING, Self
+
+if TYPE_CHECKING:
+    from rich.progress import Progress
+
+PATIENCE = 2.0
+"""s before anything is shown."""
+
+PAUSE = 10.0
+"""s between lines where stderr is no terminal."""
+
+
+class Meter:
+    """Counts what is done. State: how much of how much, and the bar, once it is shown."""
+
+    def __init__(self, what: str, total: int | None = None) -> None:
+        self.what, self.total, self.done, self.item = what, total, 0, ""
+        self._bar: Progress | None = None
+        self._said = time.monotonic() + PATIENCE - PAUSE
+        self._timer = threading.Timer(PATIENCE, self._show)
+        self._lock = threading.Lock()
+
+    def __enter__(self) -> Self:
+        self._timer.daemon = True
+        self._timer.start()
+        return self
+
+    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, at: TracebackType | None) -> None:
+        self._timer.cancel()
+        with self._lock:
+            self._timer.finished.set()
+            if self._bar is not None:
+                self._bar.stop()
+
+    def step(self, item: str = "", amount: int = 1) -> None:
+        """So much more is done."""
+        self.update(self.done + amount, self.total, item)
+
+    def update(self, done: int, total: int | None, item: str = "") -> None:
+        """So much of so much is done; item: what is at hand or just done."""
+        self.done, self.total, self.item = done, total, item
+        if self._bar is not None:
+            self._bar.update(self._bar.task_ids[0], completed=done, total=total, item=item)
+        elif not sys.stderr.isatty() and time.monotonic() - self._said > PAUSE:
+            self._said = time.monotonic()
+            print(f"{self.what}: {done}{'' if total is None else f' of {total}'} {item}".rstrip(), file=sys.stderr)
+
+    def _show(self) -> None:
+        """Begin the bar (from the timer's thread)."""
+        if not sys.stderr.isatty():
+            return
+        from rich.console import Console
+        from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
+
+        with self._lock:
+            if self._timer.finished.is_set():
+                return
+            columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeElapsedColumn())
+            bar = Progress(*columns, TextColumn("{task.fields[item]}"), console=Console(stderr=True), transient=True)
+            bar.add_task(self.what, completed=self.done, total=self.total, item=self.item)
+            bar.start()
+            self._bar = bar

@@ -1,0 +1,73 @@
+"""What options mean: `--seeds a:b`, `--set subject.key=value`, folders to write to."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable
+from pathlib import Path
+from typing import Any
+
+from scenarios.errors import InputError
+
+SUBJECTS = ("tracker", "sensor", "scenario")
+
+
+def seeds(text: str) -> range:
+    """`a:b`, half-open, or one seed."""
+    found = re.fullmatch(r"(\d{1,18})(?::(\d{1,18}))?", text.strip())
+    if found is None:
+        raise InputError(
+            place="--seeds", got=repr(text), expected="a:b (from a to b - 1) or one seed", remedy="write 0:10 or 7"
+        )
+    first = int(found[1])
+    return range(first, first + 1 if found[2] is None else int(found[2]))
+
+
+def settings(texts: Iterable[str], own: str, takes: Iterable[str]) -> list[tuple[str, str]]:
+    """`--set` assignments as (subject, key=value without the subject); a bare key is about `own`.
+
+    InputError for one without "=", and for a subject that the command does not take.
+    """
+    return [_setting(text, own, tuple(takes)) for text in texts]
+
+
+def _setting(text: str, own: str, takes: tuple[str, ...]) -> tuple[str, str]:
+    key, equals, value = text.partition("=")
+    if not equals or not key.strip():
+        raise InputError(
+            place=f"--set {text}", got=repr(text), expected="key=value", remedy=f"write --set {own}.key=value"
+        )
+    subject, dot, rest = key.strip().partition(".")
+    if not dot or subject not in SUBJECTS:
+        subject, rest = own, key.strip()
+    if subject not in takes:
+        raise InputError(
+            place=f"--set {text}",
+            got=f"a setting of the {subject}",
+            expected="one of the " + " or the ".join(takes),
+            remedy="give it to the command that makes the " + subject,
+        )
+    return subject, f"{rest}={value}"
+
+
+def scenario_settings(texts: Iterable[str]) -> list[str]:
+    """`--set` of commands about scenarios: `sensor.` is the scenario's own sensor."""
+    found = settings(texts, "scenario", ("scenario", "sensor"))
+    return [f"sensor.{text}" if subject == "sensor" else text for subject, text in found]
+
+
+def values(texts: Iterable[str]) -> dict[str, Any]:
+    """key=value texts as TOML values by key."""
+    from scenarios.override import parse
+
+    return {".".join(steps): value for steps, value in map(parse, texts)}
+
+
+def folder(out: Path) -> Path:
+    """A folder to write to, there or to be made; InputError before any work where it cannot be one."""
+    there = next(p for p in (out, *out.parents) if p.exists())
+    if not there.is_dir():
+        raise InputError(
+            file=there, place="--out", got="a file", expected="a folder, there or to be made", remedy="choose another"
+        )
+    return out

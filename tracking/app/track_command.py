@@ -1,0 +1,109 @@
+"""`flockscope track`: a tracker over a sequence, or over every sequence of a dataset, its answers stored."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from scenarios.errors import InputError
+from sim.types import DetectionMode, Sequence
+from tracking.app import options
+from tracking.app.answer import Answer
+from tracking.app.meter import Meter
+from tracking.config import Config
+from tracking.run import Run
+
+
+@dataclass(frozen=True)
+class Job:
+    """How a tracker is to be run: tracker as `tracking.track` takes it; config None: its own default, if it has one."""
+
+    tracker: str
+    config: Config | None = None
+    detections: DetectionMode | None = None
+    sensor: Mapping[str, Any] = field(default_factory=dict)
+    seed: int = 0
+
+    def run(self, sequence: Sequence) -> Run:
+        """The tracker's answers."""
+        from tracking.run import track
+
+        return track(
+            self.tracker, sequence, params=self.config, detections=self.detections, sensor=self.sensor, seed=self.seed
+        )
+
+
+def job(
+    tracker: str, params: Path | None, settings: Iterable[str], detections: DetectionMode | None, seed: int
+) -> Job:
+    """The options of the command as a Job; InputError for settings that the tracker does not know."""
+    found = options.settings(settings, "tracker", ("tracker", "sensor"))
+    own = [text for subject, text in found if subject == "tracker"]
+    sensor = options.values(text for subject, text in found if subject == "sensor")
+    return Job(tracker, _config(tracker, params, own), detections, sensor, seed)
+
+
+def _config(tracker: str, params: Path | None, settings: list[str]) -> Config | None:
+    from tracking.protocol import find
+
+    kind: type[Config] | None = getattr(find(tracker), "config_class", None)
+    if kind is not None:
+        config = kind() if params is None else kind.from_toml(params)
+        return config.with_set(*settings)
+    if params is None and not settings:
+        return None
+    raise InputError(
+        place="--params" if params else f"--set {settings[0]}",
+        got=tracker,
+        expected="a tracker with parameters",
+        remedy="leave it out, or give the class a config_class (docs/trackers.md)",
+    )
+
+
+def track(
+    job: Job, source: Path, out: Path, *, fps: float | None, px_per_m: float | None, camera: Path | None
+) -> Answer:
+    """Run the job on every sequence of the source and store the answers: in `out`, or in a folder of it for each."""
+    from sim.io.source import open_source
+    from sim.io.tracks import write_tracks
+    from tracking.protocol import find
+
+    options.folder(out)
+    pictures = not {"pixels", "stereo"}.isdisjoint(find(job.tracker).needs)
+    sequences = open_source(source, fps=fps, px_per_m=px_per_m, camera=camera, images=pictures)
+    rows = []
+    with Meter("track", len(sequences)) as meter:
+        for sequence, folder in places(sequences, source, out):
+            run = job.run(sequence)
+            write_tracks(folder, run, fps=sequence.fps, camera=sequence.camera, info=run.info)
+            rows.append(_row(run, folder))
+            meter.step(sequence.name)
+    return Answer({"tracker": job.tracker, "runs": rows}, "\n".join(map(_line, rows)))
+
+
+def places(sequences: list[Sequence], source: Path, out: Path) -> list[tuple[Sequence, Path]]:
+    """Where each sequence's results go: `out` itself for a source that is one sequence, else a folder by its name."""
+    own = Path(sequences[0].source.get("path", source))
+    if len(sequences) == 1 and (own == source or source.is_file() or own.is_file()):
+        return [(sequences[0], out)]
+    names = [sequence.name for sequence in sequences]
+    for k, name in enumerate(names):
+        if name in names[:k]:
+            raise InputError(
+                file=source, got=f"two sequences named {name}", expected="unique names", remedy="give one at a time"
+            )
+    return [(sequence, out / sequence.name) for sequence in sequences]
+
+
+def _row(run: Run, folder: Path) -> dict[str, Any]:
+    shown = ("sequence", "detections", "plane", "boxes", "frames", "frames_per_second")
+    ids = {int(id) for tracks in run for id in tracks.id}
+    return {**{key: run.info[key] for key in shown}, "tracks": len(ids), "folder": folder}
+
+
+def _line(row: dict[str, Any]) -> str:
+    speed = f"{row['frames_per_second']:.0f} frames/s"
+    counts = f"{row['frames']} frames, {row['tracks']} tracks, detections {row['detections']}, {speed}"
+    return f"{row['sequence']}: {counts} → {row['folder']}"
