@@ -10,16 +10,14 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from sim.camera import project, px_per_m_at_centre
+from sim.camera import px_per_m_at_centre
+from sim.image_groups import image_groups
 from sim.orders import check_orders
-from sim.people import contour, outlines
-from sim.types import Array, Camera, GroupEvent, Groups, Ints, Motion, Truth
+from sim.types import Camera, GroupEvent, Groups, Ints, Motion, Truth
 from sim.viewpoint import Bodies, recorded
 from sim.visibility import look
 
-__all__ = ["bodies", "check_orders", "image_velocities", "label"]
-
-INSTANT = 0.02  # s: half the step that turns ground velocities into image velocities
+__all__ = ["bodies", "check_orders", "label"]
 
 
 def bodies(motion: Motion, camera: Camera | None) -> Truth:
@@ -64,7 +62,7 @@ def label(motion: Motion, camera: Camera | None) -> Truth:
     ground = tuple(_ground_groups(truth))
     return truth.replace(
         groups=ground,
-        groups_px=None if camera is None else tuple(_image_groups(truth, ground, camera, people)),
+        groups_px=None if camera is None else image_groups(truth, ground, camera, people.shapes),
         labelled=np.ones(truth.length, dtype=np.bool_),
         events=_events(motion, found.group, found.events),
         near=found.near,
@@ -88,41 +86,3 @@ def _ground_groups(truth: Truth) -> Iterator[Groups]:
     for index in range(1, truth.length + 1):
         r = truth.rows(index)
         yield frame_groups(truth.id[r], truth.group[r], truth.pos[r], truth.vel[r])
-
-
-def _image_groups(truth: Truth, ground: tuple[Groups, ...], camera: Camera, people: Bodies) -> Iterator[Groups]:
-    """The same groups in the image: hulls of silhouettes, middles of boxes; who is behind the camera is left out."""
-    assert truth.box is not None
-    edge = contour(outlines(camera, people.shapes))
-    centre = truth.box[:, :2] + truth.box[:, 2:] / 2
-    vel = image_velocities(camera, people.shapes.centre[:, 0], truth.vel)
-    for index, groups in enumerate(ground, start=1):
-        r = truth.rows(index)
-        yield _in_image(groups, truth.id[r], edge[r], centre[r], vel[r])
-
-
-def image_velocities(camera: Camera, middle: Array, vel: Array | None) -> Array:
-    """px/s (N, 2) of points (N, 3) that move at vel (N, 2) m/s over level ground."""
-    assert vel is not None
-    step = INSTANT * np.column_stack([vel, np.zeros(len(vel))])
-    return np.asarray((project(camera, middle + step)[0] - project(camera, middle - step)[0]) / (2 * INSTANT))
-
-
-def _in_image(groups: Groups, id: Ints, edge: Array, centre: Array, vel: Array) -> Groups:
-    from sim.geometry import convex_hull
-
-    if not len(groups.id):
-        return Groups.none()
-    pos, speed, extent, hull = [], [], [], []
-    for members in groups.members:
-        k = np.searchsorted(id, members)
-        k = k[np.isfinite(centre[k]).all(axis=1)]
-        pos.append(_mean(centre[k]))
-        speed.append(_mean(vel[k]))
-        extent.append(np.cov(centre[k].T, bias=True) if len(k) else np.full((2, 2), np.nan))
-        hull.append(convex_hull(edge[k].reshape(-1, 2)) if len(k) else np.zeros((0, 2)))
-    return groups.replace(pos=np.array(pos), vel=np.array(speed), extent=np.array(extent), hull=tuple(hull))
-
-
-def _mean(rows: Array) -> Array:
-    return rows.mean(axis=0) if len(rows) else np.full(2, np.nan)

@@ -1,0 +1,39 @@
+# `make demo` and `make test` make the environment from constraints.txt, then run. Another Python: make PYTHON=python3.13
+
+SUPPORTED := import sys; sys.exit(not (3, 11) <= sys.version_info[:2] <= (3, 13))
+PYTHON ?= $(shell for p in python3.12 python3.13 python3.11 python3 python; do \
+	$$p -c '$(SUPPORTED)' 2>/dev/null && echo $$p && break; done)
+VENV := .venv
+BIN := $(VENV)/bin
+ENVIRONMENT := $(VENV)/made-from-constraints
+DEMO ?=
+TESTS ?=
+
+.PHONY: demo test lint types clean
+
+demo: $(ENVIRONMENT)
+	$(BIN)/flockscope demo $(DEMO)
+
+test: $(ENVIRONMENT)
+	$(BIN)/python -m pytest -q -n auto $(TESTS)
+
+lint: $(ENVIRONMENT)
+	$(BIN)/ruff check .
+	$(BIN)/ruff format --check .
+
+types: $(ENVIRONMENT)
+	$(BIN)/mypy
+
+clean:
+	rm -rf $(VENV) build dist *.egg-info .mypy_cache .ruff_cache .hypothesis flockscope-demo
+	find . -name __pycache__ -not -path './.git/*' -prune -exec rm -rf {} +
+
+# Made anew whenever what it is made from changes; whole or not there, because the last line makes it current.
+$(ENVIRONMENT): pyproject.toml constraints.txt
+	@$(PYTHON) -c '$(SUPPORTED)' || { echo "Python 3.11, 3.12 or 3.13 is needed: make PYTHON=/path/to/python" >&2; exit 2; }
+	rm -rf $(VENV)
+	$(PYTHON) -m venv $(VENV)
+	$(BIN)/python -m pip install -q --disable-pip-version-check -c constraints.txt setuptools
+	$(BIN)/python -m pip install -q --disable-pip-version-check -c constraints.txt --no-build-isolation -e ".[dev]"
+	$(BIN)/python -m pip install -q --disable-pip-version-check -c constraints.txt --no-deps trackeval
+	@touch $@

@@ -1,0 +1,95 @@
+"""Groups of people in the image: hulls of their silhouettes, all frames at once.
+
+In a direction n the ellipse (m, E) reaches h = m·n + sqrt(nᵀ E n), at the point m + E n / sqrt(nᵀ E n). The furthest
+such point of all members, for each of DIRECTIONS, lies on their convex hull; taken in turn they are a convex polygon
+inside it. The directions are denser sideways: an upright ellipse bends least there, and the polygon is nowhere more
+than about 1 % of a body short of the hull.
+"""
+
+from __future__ import annotations
+
+from itertools import pairwise
+
+import numpy as np
+
+from sim.camera import project
+from sim.people import Ellipsoids, Outlines, outlines
+from sim.types import Array, Camera, Groups, Ints, Truth
+
+DIRECTIONS = 32
+UPRIGHT = 2.5  # directions as spread evenly over an ellipse that is so many times taller than wide
+INSTANT = 0.02  # s: half the step that turns ground velocities into image velocities
+
+
+def image_groups(truth: Truth, ground: tuple[Groups, ...], camera: Camera, shapes: Ellipsoids) -> tuple[Groups, ...]:
+    """The groups on the ground, frame by frame, as the camera sees them; shapes: of the truth's rows.
+
+    pos, extent: mean and covariance of the middles of the members' boxes, px; vel: of their middles, px/s. A group of
+    which somebody is behind the camera has nan and an empty hull.
+    """
+    assert truth.box is not None
+    assert truth.vel is not None
+    rows, cuts = _members(truth, ground)
+    centre = (truth.box[:, :2] + truth.box[:, 2:] / 2)[rows]
+    vel = image_velocities(camera, shapes.centre[rows, 0], truth.vel[rows])
+    pos, speed = _means(centre, cuts), _means(vel, cuts)
+    off = centre - np.repeat(pos, np.diff(cuts), axis=0)
+    extent = _means(off[:, :, None] * off[:, None, :], cuts)
+    hull = hulls(outlines(camera, Ellipsoids(shapes.centre[rows], shapes.shape[rows])), cuts)
+    ends = np.cumsum([0, *(len(groups.id) for groups in ground)])
+    return tuple(
+        groups.replace(pos=pos[a:b], vel=speed[a:b], extent=extent[a:b], hull=tuple(hull[a:b]))
+        for groups, (a, b) in zip(ground, pairwise(ends), strict=True)
+    )
+
+
+def _members(truth: Truth, ground: tuple[Groups, ...]) -> tuple[Ints, Ints]:
+    """Rows of the members of all groups, one group after the other, and where each group begins (and the end)."""
+    starts = np.searchsorted(truth.frame, np.arange(1, len(ground) + 1))
+    rows, sizes = [np.zeros(0, np.int64)], [0]
+    for index, (start, groups) in enumerate(zip(starts, ground, strict=True), start=1):
+        if len(groups.id):
+            sizes += [len(members) for members in groups.members]
+            rows.append(start + np.searchsorted(truth.id[truth.rows(index)], np.concatenate(groups.members)))
+    return np.concatenate(rows), np.cumsum(sizes)
+
+
+def _means(values: Array, cuts: Ints) -> Array:
+    """Mean of each group's rows, (G, ...)."""
+    count = np.diff(cuts).reshape(-1, *[1] * (values.ndim - 1))
+    return np.asarray(np.add.reduceat(values, cuts[:-1], axis=0) / count) if len(count) else values[:0]
+
+
+def hulls(ellipses: Outlines, cuts: Ints) -> list[Array]:
+    """Hulls (DIRECTIONS, 2) of groups of silhouettes, counter-clockwise in (u, v); (0, 2) where a silhouette is nan."""
+    size = int(np.diff(cuts).max(initial=0))
+    if not size:
+        return []
+    reach, touch = _supports(ellipses)
+    member = cuts[:-1, None] + np.arange(size)
+    real = member < cuts[1:, None]
+    member = np.where(real, member, cuts[:-1, None])  # a short group repeats its first member
+    best = reach[member].argmax(axis=1)
+    vertex = touch[np.take_along_axis(member, best, axis=1), np.arange(DIRECTIONS)]
+    whole = np.isfinite(reach[member]).all(axis=(1, 2))
+    return [v if ok else np.zeros((0, 2)) for v, ok in zip(vertex, whole, strict=True)]
+
+
+def _supports(ellipses: Outlines) -> tuple[Array, Array]:
+    """How far each person reaches in each direction, (R, DIRECTIONS), and the point that does, (R, DIRECTIONS, 2)."""
+    angle = 2 * np.pi * np.arange(DIRECTIONS) / DIRECTIONS
+    n = np.stack([UPRIGHT * np.cos(angle), np.sin(angle)])
+    n /= np.sqrt((n * n).sum(axis=0))
+    En = ellipses.shape @ n
+    radius = np.sqrt((n * En).sum(axis=2))
+    reach = ellipses.centre @ n + radius
+    touch = ellipses.centre[..., None] + En / radius[:, :, None]
+    head = reach[:, 1] > reach[:, 0]
+    point = np.where(head[:, None], touch[:, 1], touch[:, 0])
+    return reach.max(axis=1), np.swapaxes(point, 1, 2)
+
+
+def image_velocities(camera: Camera, middle: Array, vel: Array) -> Array:
+    """px/s (N, 2) of points (N, 3) that move at vel (N, 2) m/s over level ground."""
+    step = INSTANT * np.column_stack([vel, np.zeros(len(vel))])
+    return np.asarray((project(camera, middle + step)[0] - project(camera, middle - step)[0]) / (2 * INSTANT))
