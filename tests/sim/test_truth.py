@@ -1,11 +1,10 @@
 import numpy as np
 import pytest
 
-from sim.camera import project
-from sim.people import boxes, contour, ellipsoids, outlines
-from sim.truth import bodies, image_velocities, label
+from sim.people import boxes
+from sim.truth import bodies, label
 from sim.types import Motion, Scene, Stairs
-from tests.reference_sense import above, crowd, pinhole, walkers
+from tests.reference_sense import crowd, pinhole, walkers
 
 
 def meeting(frames: int = 120) -> Motion:
@@ -63,15 +62,6 @@ def test_nobody_is_no_error() -> None:
     assert truth.box.shape == (0, 4)
 
 
-@pytest.mark.parametrize("camera", [pinhole(), above(20)])
-def test_image_velocities_are_differences_of_places(camera) -> None:  # type: ignore[no-untyped-def]
-    r = np.random.default_rng(0)
-    middle, vel = r.uniform([5, 3, 0.8], [11, 8, 0.9], (20, 3)), r.normal(size=(20, 2))
-    later = middle + 1e-4 * np.column_stack([vel, np.zeros(20)])
-    slow = (project(camera, later)[0] - project(camera, middle)[0]) / 1e-4
-    assert image_velocities(camera, middle, vel) == pytest.approx(slow, rel=1e-2, abs=0.05)
-
-
 def test_groups_come_from_the_measurement_on_the_ground_and_in_the_image() -> None:
     pytest.importorskip("sim.groups", exc_type=ImportError)
     pytest.importorskip("sim.events", exc_type=ImportError)
@@ -95,25 +85,6 @@ def test_groups_come_from_the_measurement_on_the_ground_and_in_the_image() -> No
     assert last.box is not None
     middles = last.box[:3, :2] + last.box[:3, 2:] / 2
     assert last.groups_px.pos[0] == pytest.approx(middles.mean(axis=0))
-
-
-def test_image_hulls_hold_all_silhouettes() -> None:
-    pytest.importorskip("sim.groups", exc_type=ImportError)
-    pytest.importorskip("sim.events", exc_type=ImportError)
-    motion, camera = meeting(60), pinhole()
-    truth = label(motion, camera)
-    assert truth.groups_px is not None
-    assert truth.pos is not None
-    hull = truth.groups_px[0].hull[0]
-    pair = truth.pos[truth.rows(1)][:2]
-    shapes = ellipsoids(np.column_stack([pair, np.zeros(2)]), np.zeros(2), np.full(2, 1.7))
-    edge = contour(outlines(camera, shapes)).reshape(-1, 2)
-    side = np.roll(hull, -1, axis=0) - hull
-    out = side[:, None, 0] * (edge[None, :, 1] - hull[:, None, 1]) - side[:, None, 1] * (
-        edge[None, :, 0] - hull[:, None, 0]
-    )
-    assert out.min() > -1e-6  # counter-clockwise, everything to the left of every side
-    assert set(map(tuple, hull)) <= set(map(tuple, edge))
 
 
 def test_the_orders_times_change_nothing() -> None:
