@@ -33,9 +33,12 @@ Scale = Annotated[float | None, typer.Option("--px-per-m", help="Pixels per metr
 
 def _version(asked: bool) -> None:
     if asked:
-        from importlib.metadata import version
+        from importlib.metadata import PackageNotFoundError, version
 
-        print(version("flockscope"))
+        try:
+            print(version("flockscope"))
+        except PackageNotFoundError:
+            print("unknown: not installed")
         raise typer.Exit
 
 
@@ -52,7 +55,7 @@ def demo(
     out: Out = Path("flockscope-demo"),
     json: Json = False,
 ) -> Answer:
-    """Generate, track with every tracker, score, and make a page to open."""
+    """From scenes to a page with scores, start to finish."""
     from tracking.app.demo import demo
 
     return demo(out, quick=quick)
@@ -66,7 +69,7 @@ def scenarios(
     schema: Annotated[bool, typer.Option("--schema", help="List every key of a scenario file.")] = False,
     json: Json = False,
 ) -> Answer:
-    """List scenarios and suites, or explain one with a drawing of its script."""
+    """List them, or explain one with a drawing."""
     from tracking.app import scenario_keys, scenarios_command
 
     if name is not None and not schema:
@@ -105,14 +108,47 @@ def track(
     seed: Annotated[int, typer.Option("--seed", min=0, help="The tracker's seed.")] = 0,
     fps: Fps = None,
     px_per_m: Scale = None,
-    camera: Annotated[Path | None, typer.Option("--camera", metavar="FILE", help="The recording's camera.json.")] = None,
+    camera: Annotated[
+        Path | None, typer.Option("--camera", metavar="FILE", help="The recording's camera.json.")
+    ] = None,
     json: Json = False,
 ) -> Answer:
-    """Run a tracker over a sequence or dataset and store what it says."""
+    """Run a tracker and store what it says."""
     from tracking.app import track_command
 
     job = track_command.job(tracker, params, settings, detections, seed)
     return track_command.track(job, source, out, fps=fps, px_per_m=px_per_m, camera=camera)
+
+
+@app.command()
+def view(
+    source: Source,
+    tracks: Annotated[Path | None, typer.Argument(metavar="TRACKS", help="What `track` wrote, or MOT text.")] = None,
+    *,
+    out: Annotated[Path, typer.Option("--out", metavar="FILE.html", help="Page to write; a folder for many.")],
+    fps: Fps = None,
+    px_per_m: Scale = None,
+    json: Json = False,
+) -> Answer:
+    """A replay in the browser, tracks beside truth."""
+    from tracking.app.view_command import view
+
+    return view(source, tracks, out, fps=fps, px_per_m=px_per_m)
+
+
+@app.command()
+def sheet(
+    source: Source,
+    out: Annotated[Path, typer.Option("--out", metavar="FILE.png", help="Picture to write; a folder for many.")],
+    frames: Annotated[int, typer.Option("--frames", min=1, max=64, help="Panels.")] = 8,
+    fps: Fps = None,
+    px_per_m: Scale = None,
+    json: Json = False,
+) -> Answer:
+    """A contact sheet of a sequence's truth."""
+    from tracking.app.view_command import sheet
+
+    return sheet(source, out, frames=frames, fps=fps, px_per_m=px_per_m)
 
 
 @app.command()
@@ -163,8 +199,9 @@ def run(arguments: Sequence[str]) -> int:
 def _usage(error: Any) -> InputError:
     """A wrong command line."""
     where = "flockscope" if error.ctx is None else error.ctx.command_path
-    remedy = f"see {where} --help"
-    return InputError(place=where, got=error.format_message(), expected="a command as in its help", remedy=remedy)
+    message = error.format_message().rstrip(".")
+    got, remedy = message[:1].lower() + message[1:], f"see {where} --help"
+    return InputError(place=where, got=got, expected="a command line as in the help", remedy=remedy)
 
 
 def _warn(message: Warning | str, *_: object) -> None:

@@ -35,9 +35,7 @@ class Job:
         )
 
 
-def job(
-    tracker: str, params: Path | None, settings: Iterable[str], detections: DetectionMode | None, seed: int
-) -> Job:
+def job(tracker: str, params: Path | None, settings: Iterable[str], detections: DetectionMode | None, seed: int) -> Job:
     """The options of the command as a Job; InputError for settings that the tracker does not know."""
     found = options.settings(settings, "tracker", ("tracker", "sensor"))
     own = [text for subject, text in found if subject == "tracker"]

@@ -1,0 +1,211 @@
+"""The house rules, read off the source: who may import whom, how long a module may be, which names are forbidden."""
+
+from __future__ import annotations
+
+import ast
+from collections.abc import Iterator
+from functools import cache
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).resolve().parents[1]
+PACKAGES = ("scenarios", "sim", "tracking")
+LINES = 300
+LONGER = {"sim.types": 400, "sim.steering_kernels": 400}
+"""One definition of all types; kernels that numba compiles as one unit."""
+
+SCORING = (
+    "tracking.scoring",
+    "tracking.grouping",
+    "scenarios.errors",
+    "sim.types",
+    "sim.groups",
+    "sim.events",
+    "sim.geometry",
+)
+"""What scoring may import of ours: people use it alone, on their own arrays."""
+
+LIGHT = ("cv2", "pymunk", "numba", "pyarrow", "pydantic", "filterpy", "av", "gymnasium")
+"""What scoring, and all of ours that it imports, may not."""
+
+TRUTH = ("Truth", "FrameTruth", "truth", "load_truth")
+LEGACY = (
+    "seed",
+    "rand",
+    "randn",
+    "random",
+    "normal",
+    "uniform",
+    "choice",
+    "shuffle",
+    "permutation",
+    "poisson",
+    "randint",
+)
+
+
+@cache
+def modules() -> dict[str, Path]:
+    found = [path for package in PACKAGES for path in sorted((ROOT / package).rglob("*.py"))]
+    names = [".".join(path.relative_to(ROOT).with_suffix("").parts).removesuffix(".__init__") for path in found]
+    return dict(zip(names, found, strict=True))
+
+
+@cache
+def tree(name: str) -> ast.Module:
+    return ast.parse(modules()[name].read_text(encoding="utf-8"))
+
+
+def imported(node: ast.AST, names: bool = True) -> Iterator[str]:
+    """Dotted names that an import statement brings: `from a import b` is both a and a.b."""
+    if isinstance(node, ast.Import):
+        yield from (alias.name for alias in node.names)
+    elif isinstance(node, ast.ImportFrom):
+        assert node.level == 0, "imports are absolute"
+        assert node.module is not None
+        yield node.module
+        if names:
+            yield from (f"{node.module}.{alias.name}" for alias in node.names)
+
+
+@cache
+def imports(name: str) -> frozenset[str]:
+    """All dotted names that a module imports anywhere, those for the type checker included."""
+    return frozenset(dotted for node in ast.walk(tree(name)) for dotted in imported(node))
+
+
+def inside(dotted: str, *packages: str) -> bool:
+    return any(dotted == package or dotted.startswith(package + ".") for package in packages)
+
+
+def of(*packages: str) -> list[str]:
+    return [name for name in modules() if inside(name, *packages)]
+
+
+def offences(names: list[str], *forbidden: str) -> list[str]:
+    return [
+        f"{name} imports {dotted}" for name in names for dotted in sorted(imports(name)) if inside(dotted, *forbidden)
+    ]
+
+
+def test_there_is_a_house():
+    assert len(of("scenarios")) > 10
+    assert len(of("sim")) > 30
+    assert len(of("tracking")) > 20
+    assert "sim.types" in imports("tracking.run")
+
+
+def test_imports_go_one_way():
+    assert offences(of("scenarios"), "sim", "tracking") == []
+    assert offences(of("sim"), "tracking") == []
+
+
+def test_nothing_of_ours_is_imported_that_is_not_there():
+    """A module that was renamed or taken away leaves no import behind."""
+    missing = []
+    for name in modules():
+        for node in ast.walk(tree(name)):
+            for dotted in imported(node, names=False):
+                if inside(dotted, *PACKAGES) and dotted not in modules():
+                    missing.append(f"{name} imports {dotted}")
+    assert missing == []
+
+
+def test_trackers_and_detectors_see_neither_truth_nor_scores():
+    names = of("tracking.papers", "tracking.detect")
+    assert names
+    hidden = (
+        "tracking.scoring",
+        "tracking.labelled",
+        "tracking.app",
+        "sim.truth",
+        "sim.groups",
+        "sim.events",
+        "sim.io",
+        "sim.sequence",
+    )
+    assert offences(names, *hidden) == []
+    assert offences(names, *(f"sim.types.{word}" for word in TRUTH)) == []
+    for name in names:
+        read = {node.attr for node in ast.walk(tree(name)) if isinstance(node, ast.Attribute)}
+        assert read.isdisjoint(TRUTH), f"{name} reads {read & set(TRUTH)}"
+
+
+def test_papers_do_not_lean_on_each_other():
+    """A paper's companions bear its name (blob_measure); nothing goes from one paper to another."""
+    papers = [name.rpartition(".")[2] for name in of("tracking.papers") if name != "tracking.papers"]
+    leads = [paper for paper in papers if not any(paper.startswith(other + "_") for other in papers)]
+    assert "blob" in leads
+    for lead in leads:
+        others = [f"tracking.papers.{p}" for p in papers if p != lead and not p.startswith(lead + "_")]
+        own = [f"tracking.papers.{p}" for p in papers if p == lead or p.startswith(lead + "_")]
+        assert offences(own, *others) == []
+
+
+def test_scoring_imports_little():
+    names = of("tracking.scoring")
+    ours = [
+        f"{n} imports {d}"
+        for n in names
+        for d in sorted(imports(n))
+        if inside(d, *PACKAGES) and not inside(d, *SCORING)
+    ]
+    assert ours == []
+
+
+def test_what_scoring_needs_is_light():
+    """All of ours that scoring reaches, whatever the way: none of it imports cv2, pymunk, numba and the like."""
+    reached, waiting = set(), of("tracking.scoring")
+    while waiting:
+        name = waiting.pop()
+        if name not in reached:
+            reached.add(name)
+            waiting += [dotted for dotted in imports(name) if dotted in modules()]
+    assert "sim.types" in reached
+    assert offences(sorted(reached), *LIGHT) == []
+
+
+def test_nothing_imports_the_commands():
+    others = [name for name in modules() if not inside(name, "tracking.app")]
+    assert offences(others, "tracking.app") == []
+
+
+def test_pymunk_is_met_in_one_module():
+    assert [name for name in modules() if any(inside(dotted, "pymunk") for dotted in imports(name))] == ["sim.world"]
+
+
+@pytest.mark.parametrize("name", modules())
+def test_modules_are_short(name):
+    assert len(modules()[name].read_text(encoding="utf-8").splitlines()) <= LONGER.get(name, LINES)
+
+
+@pytest.mark.parametrize("name", modules())
+def test_modules_say_what_they_are(name):
+    assert ast.get_docstring(tree(name)), "a first line that tells a newcomer whether to open it"
+    assert name.rpartition(".")[2] not in ("utils", "helpers", "common", "base")
+
+
+def dotted_name(node: ast.AST) -> str:
+    if isinstance(node, ast.Attribute):
+        return f"{dotted_name(node.value)}.{node.attr}"
+    return node.id if isinstance(node, ast.Name) else ""
+
+
+@pytest.mark.parametrize("name", modules())
+def test_no_global_state_of_chance_and_time(name):
+    """Randomness comes as a Generator (sim.rng), time from frames."""
+    assert not any(inside(dotted, "random") for dotted in imports(name)), "the random module"
+    read = {dotted_name(node) for node in ast.walk(tree(name)) if isinstance(node, ast.Attribute)}
+    assert read.isdisjoint({f"np.random.{word}" for word in LEGACY})
+    if not inside(name, "tracking.app"):
+        assert read.isdisjoint({"time.time", "datetime.now", "datetime.datetime.now"})
+
+
+@pytest.mark.parametrize("name", modules())
+def test_classes_share_no_mutable_state(name):
+    """No list, dict or set as a class attribute: ids and counters would live on between sequences."""
+    for node in ast.walk(tree(name)):
+        if isinstance(node, ast.ClassDef):
+            values = [s.value for s in node.body if isinstance(s, ast.Assign | ast.AnnAssign) and s.value is not None]
+            assert not any(isinstance(v, ast.List | ast.Dict | ast.Set) for v in values), node.name

@@ -1,0 +1,91 @@
+"""What an import brings along: `import sim, tracking, scenarios` and `--help` stay quick, scoring stays light."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).resolve().parents[1]
+HEAVY = {
+    "numpy",
+    "scipy",
+    "numba",
+    "cv2",
+    "pymunk",
+    "pyarrow",
+    "pydantic",
+    "filterpy",
+    "gymnasium",
+    "av",
+    "rich",
+    "matplotlib",
+}
+LIST = "print(*sorted({name.partition('.')[0] for name in sys.modules}))"
+
+
+def loaded(code: str) -> set[str]:
+    """Top-level packages in a fresh interpreter after `code`."""
+    program = f"import sys\n{code}\n{LIST}"
+    run = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, cwd=ROOT, check=False)
+    assert run.returncode == 0, run.stderr
+    return set(run.stdout.splitlines()[-1].split())
+
+
+def test_packages_alone_bring_nothing():
+    assert loaded("import sim, tracking, scenarios").isdisjoint(HEAVY)
+
+
+def test_help_brings_typer_only():
+    found = loaded("from tracking.app.cli import run\nassert run(['--help']) == 0")
+    assert "typer" in found
+    assert found.isdisjoint(HEAVY)
+
+
+def test_help_of_a_command_brings_what_typer_itself_needs():
+    found = loaded("from tracking.app.cli import run\nassert run(['track', '--help']) == 0")
+    assert found.isdisjoint(HEAVY - {"pydantic"})
+
+
+def test_a_listing_of_scenarios_does_without_arrays_of_the_world():
+    assert loaded("from tracking.app.cli import run\nrun(['scenarios', '--json'])").isdisjoint(
+        {"numba", "cv2", "pymunk", "pyarrow"}
+    )
+
+
+def test_scoring_alone_is_numpy_and_scipy():
+    found = loaded("from tracking import evaluate")
+    assert "numpy" in found
+    assert found.isdisjoint(HEAVY - {"numpy", "scipy"})
+
+
+def test_data_types_need_numpy_only():
+    assert loaded("import sim.types").isdisjoint(HEAVY - {"numpy"})
+
+
+@pytest.mark.parametrize(
+    ("package", "names"), [("sim", ["simulate"]), ("scenarios", ["load"]), ("tracking", ["evaluate", "track"])]
+)
+def test_lazy_names(package, names):
+    module = __import__(package)
+    assert sorted(module.__all__) == names
+    for name in names:
+        assert callable(getattr(module, name)), f"{package}.{name}"
+    with pytest.raises(AttributeError, match=f"module '{package}' has no attribute 'nothing'"):
+        _ = module.nothing
+
+
+def test_lazy_names_after_their_modules_were_imported():
+    """A submodule becomes an attribute of its package: none may take the place of a function."""
+    code = "\n".join(
+        [
+            "import pkgutil, importlib, scenarios, sim, tracking",
+            "for package in (scenarios, sim, tracking):",
+            "    for found in pkgutil.iter_modules(package.__path__):",
+            "        importlib.import_module(f'{package.__name__}.{found.name}')",
+            "    assert all(callable(getattr(package, name)) for name in package.__all__), package",
+        ]
+    )
+    loaded(code)
