@@ -66,7 +66,7 @@ def hulls(ellipses: Outlines, cuts: Ints) -> list[Array]:
     points = edge.reshape(-1, 2)
     order = np.lexsort((points[:, 1], points[:, 0], group))
     vertices, ends = chains(points[order], cuts * each)
-    return np.split(vertices, ends[:-1])
+    return np.split(vertices, ends)[: len(ends)]
 
 
 def image_velocities(camera: Camera, middle: Array, vel: Array) -> Array:
