@@ -11,12 +11,10 @@ import numpy as np
 
 from sim.footprints import footprint_hulls
 from sim.geometry import gap_pairs, pack
-from sim.lines import FIFO, Line, lines
+from sim.lines import Line, lines
 from sim.near import close_pairs, stretches
 from sim.rules import frames_of, mean
 from sim.types import Array, Bools, GroupEvent, Ints
-
-__all__ = ["crossings", "fifo", "queue_lines", "queues"]
 
 CROSS_GAP = 1.0  # m between hulls
 CROSS_SPEED = 0.6  # m/s, least difference of velocities over the encounter
@@ -31,7 +29,7 @@ def crossings(pos: Array, vel: Array, present: Bools, group: Ints, fps: float) -
     0.6 m/s, and each must get to the other's other side: the way from one middle to the other turns by more than 90°
     (who bounces back, or passes by in a lane beside, turns by less). Members are the same 2 s before and after.
     """
-    met = _encounters(pos, group & np.int64(-1) if present.all() else np.where(present, group, -1), fps)
+    met = _encounters(pos, np.where(present, group, -1), fps)
     found = (_crossing(pos, vel, group, present, fps, *one) for one in met)
     return [event for event in found if event is not None]
 
@@ -93,7 +91,7 @@ def _stays(group: Ints, present: Bools, people: Ints, first: int, last: int, fps
     own = (inside[:, people] == name) | ~there[:, people]
     # One who stays while the others have left the scene is alone, and yet has changed nothing.
     own |= there[:, people].sum(axis=1, keepdims=True) < 2
-    return bool(own.all() and not others.any() and there[:, people].any(axis=1)[first - window.start : last - window.start + 1].all())
+    return bool(own.all() and not others.any())
 
 
 def queue_lines(pos: Array, vel: Array, present: Bools, fps: float) -> list[Line]:
@@ -106,7 +104,8 @@ def queues(pos: Array, vel: Array, present: Bools, fps: float) -> list[GroupEven
     """Three or more people waiting in line for 3 s or longer; the event lasts until less than two do.
 
     Spacing along the line 0.4-1.5 m, nobody more than 0.5 m off it, slower than 0.4 m/s except when advancing.
-    start is the onset, members all who stood in the line for a second or more, pos its head's side of the middle.
+    start is the onset, members all who stood in the line for a second or more, pos its
+    middle then.
     """
     return [
         GroupEvent("queue", q.first + 1, q.last + 1, None, (), (), tuple(p + 1 for p in sorted(q.order)), q.middle)

@@ -53,11 +53,14 @@ def _runs(first: Ints, end: Ints) -> tuple[Ints, Ints]:
     return i, np.arange(len(i)) - np.repeat(np.cumsum(n) - n, n) + first[i]
 
 
-def stretches(pair: Ints, frame: Ints, least: int) -> tuple[Ints, Ints, Ints]:
-    """(pair, first, last) of each run of `least` or more consecutive frames; rows (K,) sorted by (pair, frame)."""
+def stretches(pair: Ints, frame: Ints, least: int, bridge: int = 1) -> tuple[Ints, Ints, Ints]:
+    """(pair, first, last) of each run of `least` or more frames, no more than `bridge` from one to the next.
+
+    Rows (K,) sorted by (pair, frame).
+    """
     if not len(pair):
         return pair, frame, frame
-    new = np.concatenate([[True], (np.diff(pair) != 0) | (np.diff(frame) != 1)])
+    new = np.concatenate([[True], (np.diff(pair) != 0) | (np.diff(frame) > bridge)])
     start = np.flatnonzero(new)
     end = np.append(start[1:], len(pair)) - 1
     long = frame[end] - frame[start] + 1 >= least
