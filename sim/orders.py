@@ -102,7 +102,11 @@ def closest(order: Order, motion: Motion, window: slice) -> str:
     if order.kind == "queue":
         people = [p - 1 for part in order.before for p in part]
         slow = present[:, people] & (np.linalg.norm(np.nan_to_num(vel[:, people]), axis=2) < 0.4)
-        return f"at most {slow.sum(axis=1).max(initial=0)} of {len(people)} people slower than 0.4 m/s at once"
+        most, stretch = slow.sum(axis=1).max(initial=0), _longest(slow.sum(axis=1) >= IN_QUEUE) / motion.fps
+        return (
+            f"at most {most} of {len(people)} people slower than 0.4 m/s at once, "
+            f"{IN_QUEUE} of them for {stretch:.1f} s at a stretch"
+        )
     parts = order.before if order.kind == "merge" else order.after
     columns = [np.array(part, dtype=np.int64) - 1 for part in parts]
     gap, difference = _gaps(columns, pos, vel, present, widest=order.kind == "merge")
@@ -111,6 +115,12 @@ def closest(order: Order, motion: Motion, window: slice) -> str:
     k = int(np.nanargmin(gap) if order.kind == "merge" else np.nanargmax(gap))
     word = "nearest" if order.kind == "merge" else "furthest"
     return f"{word} {gap[k]:.2f} m, velocities then differing by {difference[k]:.2f} m/s"
+
+
+def _longest(holds: Bools) -> int:
+    """Frames of the longest stretch of True."""
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], holds, [False]]).astype(np.int8)))
+    return int((edges[1::2] - edges[::2]).max(initial=0))
 
 
 def _gaps(columns: list[Ints], pos: Array, vel: Array, present: Bools, widest: bool) -> tuple[Array, Array]:
