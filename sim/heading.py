@@ -36,7 +36,7 @@ def _to_group(pos: Array, intent: Ints, slow: Bools, facing: Array) -> Array:
     groups = np.where(here, intent, 0)
     n = int(groups.max()) + 1
     count = np.bincount(groups[here], minlength=n)
-    middle = np.stack([np.bincount(groups[here], pos[here, k], minlength=n) for k in (0, 1)], 1)
-    middle /= np.maximum(count, 1)[:, None]
+    total = np.stack([np.bincount(groups[here], pos[here, k], minlength=n) for k in (0, 1)], 1)
+    middle = total / np.maximum(count, 1)[:, None]
     alone = count[groups[slow]] < 2
     return np.asarray(np.where(alone[:, None], facing[slow], middle[groups[slow]] - pos[slow]))

@@ -25,7 +25,8 @@ def _power_law(dx, dy, wx, wy, radius, strength, horizon, cap):  # type: ignore[
     b = -(dx * wx + dy * wy)
     if a < 1e-6 or c <= 0.0 or b <= 0.0:
         return 0.0, 0.0
-    root = b * b - a * c
+    cross = dx * wy - dy * wx
+    root = a * radius * radius - cross * cross  # = b^2 - a c, without its cancellation
     if root <= 1e-12:
         return 0.0, 0.0
     root = sqrt(root)
@@ -370,6 +371,9 @@ def accelerate(state, people, groups, obstacles, dt, p, push, out):  # type: ign
 
     state (N, 4): x, y, vx, vy. push (G, 2): scratch. Returns False where a state is not finite.
     """
+    for i in range(len(state)):
+        if not abs(state[i, 0]) + abs(state[i, 1]) + abs(state[i, 2]) + abs(state[i, 3]) < 1e9:
+            return False
     now = groups.now
     _sum_groups(state, people.tag, now)
     _spread(state, people.place, people.target, people.tag, groups, now)
@@ -385,8 +389,6 @@ def accelerate(state, people, groups, obstacles, dt, p, push, out):  # type: ign
             out[i, 0] += push[people.tag[i, 0], 0]
             out[i, 1] += push[people.tag[i, 0], 1]
         size = sqrt(out[i, 0] ** 2 + out[i, 1] ** 2)
-        if not size < 1e9:
-            return False
         if size > cap:
             out[i, 0] *= cap / size
             out[i, 1] *= cap / size
