@@ -112,7 +112,7 @@ class People(NamedTuple):
 
 
 class Obstacles(NamedTuple):
-    """walls (W, 4) x1 y1 x2 y2; pillars (P, 3) x y r; stairs (S, 8): foot, unit axis, length, width, slowdown, landing."""
+    """walls (W, 4) x1 y1 x2 y2; pillars (P, 3) x y r; stairs (S, 8): foot, axis, length, width, slowdown, landing."""
 
     walls: Array
     pillars: Array

@@ -183,7 +183,7 @@ def _through(groups, people, i, g, x, y, limit):  # type: ignore[no-untyped-def]
     at = groups.at[g]
     w = max(people.tag[i, 3], at)
     dx, dy = groups.route[g, w, 0] - x, groups.route[g, w, 1] - y
-    d = sqrt(dx * dx + dy * dy) + STILL
+    d = max(sqrt(dx * dx + dy * dy), STILL)
     if w == at and d < 0.45:
         people.tag[i, 3] = at + 1
     if w > at:
@@ -258,20 +258,20 @@ def _pair(state, tag, i, j, dx, dy, d2, p, out):  # type: ignore[no-untyped-def]
     if tag[i, 0] == tag[j, 0]:
         if d2 >= p[4] * p[4]:
             return
-        d = sqrt(d2) + STILL
+        d = max(sqrt(d2), STILL)
         f = p[3] * (1.0 - d / p[4]) / d
         fx, fy = f * dx, f * dy
     elif tag[i, 2] >= 0 and tag[i, 2] == tag[j, 2]:
         if d2 >= 0.25:
             return
-        d = sqrt(d2) + STILL
+        d = max(sqrt(d2), STILL)
         f = p[3] * (1.0 - d / 0.5) / d
         fx, fy = f * dx, f * dy
     else:
         size = 2.0 * p[11]
         wx, wy = state[i, 2] - state[j, 2], state[i, 3] - state[j, 3]
         if d2 < size * size:
-            d = sqrt(d2) + STILL
+            d = max(sqrt(d2), STILL)
             f = p[15] * (1.0 - d / size) / d
             fx, fy = f * dx, f * dy
         else:
@@ -349,7 +349,7 @@ def _walls(state, obstacles, p, out):  # type: ignore[no-untyped-def]
             s = ((x - ax) * ux + (y - ay) * uy) / (ux * ux + uy * uy + STILL)
             s = min(1.0, max(0.0, s))
             dx, dy = x - ax - s * ux, y - ay - s * uy
-            d = sqrt(dx * dx + dy * dy) + STILL
+            d = max(sqrt(dx * dx + dy * dy), STILL)
             if d < 1.2:
                 f = strength * exp(-(d - body) / decay) / d
                 out[i, 0] += f * dx
@@ -357,7 +357,7 @@ def _walls(state, obstacles, p, out):  # type: ignore[no-untyped-def]
         for k in range(len(obstacles.pillars)):
             dx, dy = x - obstacles.pillars[k, 0], y - obstacles.pillars[k, 1]
             r = obstacles.pillars[k, 2]
-            d = sqrt(dx * dx + dy * dy) + STILL
+            d = max(sqrt(dx * dx + dy * dy), STILL)
             if d < r + 6.0:
                 f = strength * exp(-(d - body - r) / decay) / d
                 fx, fy = _power_law(dx, dy, state[i, 2], state[i, 3], r + 1.2 * p[11], p[8], p[10], p[14])
