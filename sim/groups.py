@@ -39,12 +39,12 @@ def memberships(pos: Array, vel: Array, present: Bools, intent: Ints, fps: float
     group = np.full(present.shape, -1, np.int64)
     identities, events = Identities(), []
     hold = frames_of(HOLD, fps)
-    for t, parts in partitions(pos, vel, present, intent, fps):
+    steps = [*partitions(pos, vel, present, intent, fps), (len(present), [])]
+    for (t, parts), (until, _) in pairwise(steps):
         here = frozenset(np.flatnonzero(present[t]).tolist())
         changes = identities.step(t, here, parts)
-        group[t:] = -1
         for g, people in identities.groups.items():
-            group[t:, sorted(people)] = g
+            group[t:until, sorted(people)] = g
         events += [_event(c, t, hold, pos) for c in changes if t > 0]
     return Membership(group, tuple(events), strangers(pos, vel, present, intent, group, fps))
 

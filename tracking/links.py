@@ -1,0 +1,116 @@
+"""The baseline rule for pairs of tracked people: who is linked to whom when, never looking ahead.
+
+A pair is linked once it has been near, and moving alike, in enough of the last seconds in which both were seen; the
+link breaks once they have been far apart for long enough. All pairs of a sequence are worked on at once.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+
+from sim.near import close_pairs
+from sim.rules import APART, HOLD, SAME_WAY, TOGETHER, frames_of
+from sim.types import Array, Bools, Ints
+
+CELLS = 4_000_000  # frames times pairs held at once
+
+
+@dataclass(frozen=True)
+class Grouping:
+    """Parameters of the baseline rule; lengths in metres, multiplied by px_per_m in the image."""
+
+    near: float = TOGETHER  # m: nearer is together
+    alike: float = SAME_WAY  # m/s: velocities that differ by less are alike
+    share: float = 0.8  # of the frames of the last `window` in which both were seen
+    window: float = HOLD  # s
+    acquaintance: float = HOLD  # s that both must have been seen in the window; `window` = all of it
+    apart: float = APART  # m: further is apart
+    patience: float = HOLD  # s apart, until the link breaks
+    smooth: float = 0.0  # s: velocities are chords of positions over so long; 0 = the tracker's own
+    memory: float = 1.0  # s that a group waits for a member who is not seen
+    arrival: float = 1.0  # s: a link that began so soon after a track did is an arrival, not a merge
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Links:
+    """Changes of links, L rows sorted by time: frame (from 0), columns a < b, on or off, since: first frame of the
+    stretch that made the change."""
+
+    frame: Ints
+    a: Ints
+    b: Ints
+    on: Bools
+    since: Ints
+
+
+def find_links(frame: Ints, column: Ints, pos: Array, vel: Array, length: int, fps: float, rule: Grouping) -> Links:
+    """Links among people; rows sorted by frame (from 0), column (R,) of the person, pos, vel (R, 2) in m, m/s."""
+    i, j = close_pairs(frame, pos, max(rule.apart, rule.near))
+    swap = column[i] > column[j]
+    i, j = np.where(swap, j, i), np.where(swap, i, j)
+    distance = np.hypot(*(pos[i] - pos[j]).T)
+    near = (distance < rule.near) & ~(np.hypot(*(vel[i] - vel[j]).T) >= rule.alike)  # nan: not yet known
+    people = int(column.max(initial=0)) + 1
+    pair = column[i] * people + column[j]
+    known = np.unique(pair[near])
+    present = np.zeros((length, people), bool)
+    present[frame, column] = True
+    within = distance <= rule.apart
+    found = []
+    for some in _portions(known, max(1, CELLS // max(length, 1))):
+        rows = np.flatnonzero((pair >= some[0]) & (pair <= some[-1]))
+        place = np.searchsorted(some, pair[rows])
+        kept = some[np.minimum(place, len(some) - 1)] == pair[rows]
+        rows, place = rows[kept], place[kept]
+        found.append(_changes(frame[i[rows]], place, near[rows], within[rows], some, present, fps, rule))
+    columns = [np.concatenate([np.zeros(0, np.int64), *(f[k] for f in found)]) for k in range(4)]
+    order = np.lexsort((columns[1], columns[0]))
+    t, pair, on, since = (c[order] for c in columns)
+    return Links(t, pair // people, pair % people, on.astype(bool), since)
+
+
+def _portions(pairs: Ints, size: int) -> Iterator[Ints]:
+    for low in range(0, len(pairs), size):
+        yield pairs[low : low + size]
+
+
+def _changes(
+    frame: Ints, place: Ints, near: Bools, within: Bools, pairs: Ints, present: Bools, fps: float, rule: Grouping
+) -> tuple[Ints, Ints, Ints, Ints]:
+    """(frame, pair, on, since) of the changes of some pairs, from rows (frame, place of the pair) that are close."""
+    people = present.shape[1]
+    both = present[:, pairs // people] & present[:, pairs % people]
+    together, far = np.zeros_like(both), both.copy()
+    together[frame, place] = near
+    far[frame[within], place[within]] = False
+    window = frames_of(rule.window, fps)
+    seen, alike = _recent(both, window), _recent(together, window)
+    enough = min(frames_of(rule.acquaintance, fps), window)
+    on = both & (seen >= enough) & (alike >= rule.share * seen) & (alike > 0)
+    off = _recent(far, frames_of(rule.patience, fps)) >= frames_of(rule.patience, fps)
+    t = np.arange(len(both))[:, None]
+    last = np.maximum.accumulate(np.where(on | off, t, -1), axis=0)
+    state = (last >= 0) & np.take_along_axis(on, np.maximum(last, 0), axis=0)
+    before = np.concatenate([np.zeros_like(state[:1]), state[:-1]])
+    when, which = np.nonzero(state != before)
+    turned_on = state[when, which]
+    since = np.where(turned_on, _onset(together, window)[when, which], when - frames_of(rule.patience, fps) + 1)
+    return when, pairs[which], turned_on.astype(np.int64), since
+
+
+def _recent(flags: Bools, frames: int) -> Ints:
+    """How many of the last `frames` frames (T, K) are true, this one included."""
+    total = np.cumsum(flags, axis=0)
+    late = np.zeros_like(total)
+    late[frames:] = total[:-frames] if frames < len(total) else 0
+    return np.asarray(total - late)
+
+
+def _onset(together: Bools, window: int) -> Ints:
+    """The first frame with a true flag among the last `window` (T, K)."""
+    t = np.arange(len(together))[:, None]
+    after = np.minimum.accumulate(np.where(together, t, len(together))[::-1], axis=0)[::-1]
+    return np.asarray(np.take_along_axis(after, np.maximum(t - window + 1, 0) + np.zeros_like(after), axis=0))
