@@ -41,7 +41,8 @@ def statistics(pos: Array, label: Ints) -> tuple[Array, Array, Array]:
 def recording(folder: str) -> tuple[Array, Array, Array]:
     """The statistics of a BIWI folder."""
     truth = open_source(folder)[0].truth
-    assert truth is not None and truth.pos is not None
+    assert truth is not None
+    assert truth.pos is not None
     ids, column = np.unique(truth.id, return_inverse=True)
     pos = np.full((truth.length, len(ids), 2), np.nan)
     label = np.full(pos.shape[:2], -1, np.int64)
