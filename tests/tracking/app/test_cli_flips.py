@@ -1,0 +1,353 @@
+"""Nothing is there for show: each scenario key, command option and tracker parameter changes the output."""
+
+from __future__ import annotations
+
+import dataclasses
+from functools import cache
+from pathlib import Path
+
+import pytest
+import typer
+
+from scenarios.override import apply
+from scenarios.validate import validate
+from sim.io.store import sequence_files
+from sim.io.tracks import tracks_files
+from tracking import protocol, track
+from tracking.app.cli import app, run
+from tracking.app.scenario_keys import keys
+
+ROOT = Path(__file__).resolve().parents[3]
+FAKE = f"{ROOT / 'tests' / 'fake_tracker.py'}:Nearest"
+SCENE = """
+schema = 1
+duration = 12.0
+warmup = 1.0
+world.size = [24, 20]
+world.walls = [[0, 18, 24, 18], [16.5, 6.7, 18.5, 6.7]]
+world.doors = [{ at = [12, 18] }]
+world.pillars = [[8, 2.4, 0.3]]
+world.service = [[20, 3]]
+world.stairs = [{ foot = [14, 14], head = [18, 14] }]
+camera = { fps = 5 }
+sensor = { detect_prob = 0.9, persistence = 0.3, small_px = 40, min_visibility = 0.4, hide = [{ start = 1, end = 3 }] }
+group = [
+  { id = "a", size = 3, start = [4, 4], goal = [12, 4] },
+  { id = "b", size = 2, start = [13, 8], goal = [7, 8] },
+  { id = "s", size = 2, start = [12, 14], goal = [17, 14] },
+  { id = "q", size = 1, start = [{ uniform = [13, 17] }, { uniform = [5, 9] }], goal = [20, 6], repeat = 4 },
+]
+[[event]]
+id = "m"
+type = "merge"
+groups = ["a", "b"]
+into = "ab"
+goal = [10, 9]
+when = { time = 0.5 }
+
+[[event]]
+id = "p"
+type = "split"
+group = "ab"
+when = { time = 7 }
+parts = [{ id = "c", size = 2, goal = [4, 12] }, { id = "d", goal = [16, 11] }]
+
+[[event]]
+id = "l"
+type = "queue"
+groups = ["q-*"]
+at = [20, 6]
+direction_deg = 180
+service = 1.0
+when = { time = 0.5 }
+"""
+TOP = "camera={ kind = 'top', px_per_m = 20, fps = 5 }"
+FAR = "group.s.goal=[22, 8]"
+LOW = "camera={ height = 3, position = [12, -3] }"
+OTHERS = "[{ id = 'c', goal = [4, 12] }, { id = 'd', goal = [16, 11] }]"
+SPLIT = f"event.p={{ type = 'split', group = 's', when = {{ time = 7 }}, parts = {OTHERS} }}"
+NEAR = "event.p.parts.c.goal=[8, 10]"
+SERVED = "event.l.goal=[21, 8]"
+
+# key: what is set, then what is set instead ("" for nothing; several apart by ";"): the two outputs must differ.
+KEYS = {
+    "name": ("", "name=other"),
+    "duration": ("", "duration=10"),
+    "warmup": ("", "warmup=2"),
+    "turn_deg": ("", "turn_deg=5"),
+    "mirror": ("", "mirror=true"),
+    "world.size": ("", "world.size=[25, 20]"),
+    "world.walls": ("", "world.walls.1=[16.5, 3.2, 18.5, 3.2]"),
+    "world.pillars": ("", "world.pillars=[[8, 4, 0.3]]"),
+    "world.service": ("", "world.service=[[20, 4]]"),
+    "world.wall_height": ("", "world.wall_height=1.0"),
+    "world.pillar_height": ("", "world.pillar_height=1.0"),
+    "world.stairs[].foot": ("", "world.stairs.0.foot=[13.5, 14]"),
+    "world.stairs[].head": ("", "world.stairs.0.head=[17, 14]"),
+    "world.stairs[].width": ("", "world.stairs.0.width=1.0"),
+    "world.stairs[].rise": ("", "world.stairs.0.rise=1.0"),
+    "world.stairs[].steps": ("", "world.stairs.0.steps=5"),
+    "world.stairs[].landing": ("", "world.stairs.0.landing=2"),
+    "world.stairs[].slowdown": ("", "world.stairs.0.slowdown=1"),
+    "world.doors[].at": ("", "world.doors.0.at=[9, 18]"),
+    "world.doors[].width": ("", "world.doors.0.width=2"),
+    "camera.kind": ("", TOP),
+    "camera.image": ("", "camera.image=[320, 240]"),
+    "camera.fps": ("", "camera.fps=4"),
+    "camera.focal_px": ("", "camera.focal_px=400"),
+    "camera.baseline": ("", "camera.baseline=0.2"),
+    "camera.tilt_deg": ("", "camera.tilt_deg=50"),
+    "camera.yaw_deg": ("", "camera.yaw_deg=30"),
+    "camera.px_per_m": (TOP, TOP.replace("20", "15")),
+    "camera.height": ("", "camera.height=25"),
+    "camera.position": ("", "camera.position=[12, -14]"),
+    "camera.crop": (LOW, f"{LOW};camera.crop=true"),
+    "sensor.detect_prob": ("", "sensor.detect_prob=0.5"),
+    "sensor.clutter_rate": ("", "sensor.clutter_rate=2"),
+    "sensor.noise_px": ("", "sensor.noise_px=3"),
+    "sensor.noise_m": ("", "sensor.noise_m=0.2"),
+    "sensor.box": ("", "sensor.box=amodal"),
+    "sensor.occlusion_power": ("", "sensor.occlusion_power=4"),
+    "sensor.min_visibility": ("", "sensor.min_visibility=0.9"),
+    "sensor.small_px": ("", "sensor.small_px=80"),
+    "sensor.persistence": ("", "sensor.persistence=0.9"),
+    "sensor.hide[].start": ("", "sensor.hide.0.start=2"),
+    "sensor.hide[].end": ("", "sensor.hide.0.end=4"),
+    "sensor.hide[].group": ("", "sensor.hide.0.group=a"),
+    "crowd.free_speed": ("", "crowd.free_speed=1.0"),
+    "crowd.spacing": ("", "crowd.spacing=1.1"),
+    "crowd.height": ("", "crowd.height=1.6"),
+    "crowd.slowdown_per_member": ("", "crowd.slowdown_per_member=0.2"),
+    "group[].size": ("", "group.s.size=3"),
+    "group[].start": ("", "group.s.start=[11, 14]"),
+    "group[].goal": ("", FAR),
+    "group[].via": ("", "group.s.via=[[13, 12]]"),
+    "group[].speed": ("", "group.s.speed=1.7"),
+    "group[].enter": ("", "group.s.enter=2"),
+    "group[].at_goal": ("", "group.s.at_goal=leave"),
+    "group[].repeat": ("", "group.q.repeat=3"),
+    "event[](merge).id": ("", "event.m.id=n"),
+    "event[](merge).groups": ("", "event.m.groups=['a', 'b', 's']"),
+    "event[](merge).goal": ("", "event.m.goal=meet"),
+    "event[](merge).via": ("", "event.m.via=[[10, 6]]"),
+    "event[](merge).at_goal": ("event.p.when.time=11.9", "event.m.at_goal=leave"),
+    "event[](split).id": ("", "event.p.id=n"),
+    "event[](split).group": ("", SPLIT),
+    "event[](split).parts[].size": ("", "event.p.parts.c.size=3"),
+    "event[](split).parts[].goal": ("", "event.p.parts.c.goal=[4, 14]"),
+    "event[](split).parts[].via": ("", "event.p.parts.c.via=[[10, 13]]"),
+    "event[](split).parts[].at_goal": (NEAR, f"{NEAR};event.p.parts.c.at_goal=leave"),
+    "event[](queue).id": ("", "event.l.id=n"),
+    "event[](queue).groups": ("", "event.l.groups=['q-1', 'q-2', 'q-3']"),
+    "event[](queue).at": ("", "event.l.at=[19, 6]"),
+    "event[](queue).direction_deg": ("", "event.l.direction_deg=90"),
+    "event[](queue).spacing": ("", "event.l.spacing=1.1"),
+    "event[](queue).service": ("", "event.l.service=0.2"),
+    "event[](queue).goal": ("", "event.l.goal=[22, 9]"),
+    "event[](queue).at_goal": (SERVED, f"{SERVED};event.l.at_goal=stand"),
+}  # fmt: skip
+
+WHEN = {
+    "time": ("{ time = 1 }", "{ time = 2 }"),
+    "distance_lt": ("{ distance_lt = 4 }", "{ distance_lt = 9 }"),
+    "reach.group": ("{ reach = { group = 'a' } }", "{ reach = { group = 'q-1' } }"),
+    "reach.at": ("{ reach = { group = 'a' } }", "{ reach = { group = 'a', at = [6, 4] } }"),
+    "reach.radius": ("{ reach = { group = 'a' } }", "{ reach = { group = 'a', radius = 4 } }"),
+    "delay": ("{ time = 1 }", "{ time = 1, delay = 1 }"),
+}
+"""For the merge; one model serves all three orders."""
+
+TEXT_ONLY = {"schema", "about", "group[].id", "event[](merge).into", "event[](split).parts[].id"}
+"""Keys that name things within the file, or say what it is."""
+
+
+@cache
+def output(settings: str, seed: int) -> dict[str, bytes] | str:
+    """All files of a sequence but the scenario itself and the manifest; or what is refused."""
+    import tomllib
+
+    from scenarios.errors import FlockscopeError
+    from sim.sequence import observe
+    from sim.world import run as simulate
+
+    table, places = apply({"name": "flip", **tomllib.loads(SCENE)}, settings.split(";") if settings else [])
+    try:
+        scenario = validate(table, "flip.toml", places)
+        sequence = observe(scenario, simulate(scenario, seed), check=False)
+        files = sequence_files(sequence, scenario="", seed=seed)
+    except FlockscopeError as error:
+        return error.line()
+    return {name: body for name, body in files.items() if name not in ("scenario.toml", "manifest.json")}
+
+
+def differ(before: str, after: str) -> bool:
+    """Whether the outputs differ for one of a few seeds (a coin that falls the same way changes nothing)."""
+    for seed in (3, 4, 5, 6):
+        a, b = output(before, seed), output(after, seed)
+        assert isinstance(b, dict), b
+        if a != b:
+            return True
+    return False
+
+
+def test_every_key_is_in_the_table():
+    known = {row["key"] for row in keys().data["keys"]}
+    when = {key for key in known if ".when." in key} | {key for key in known if key.endswith(".type")}
+    assert known - when == set(KEYS) | TEXT_ONLY
+    assert {key.partition(".when.")[2] for key in when if ".when." in key} == set(WHEN) | {"after"}
+
+
+@pytest.mark.parametrize("key", KEYS)
+def test_a_key_changes_what_is_made(key):
+    assert differ(*KEYS[key])
+
+
+@pytest.mark.parametrize("key", WHEN)
+def test_a_trigger_changes_what_is_made(key):
+    assert differ(*(f"event.m.when={when}" for when in WHEN[key]))
+
+
+def test_after_waits_for_another_order():
+    assert differ("", "event.p.when={ after = 'm' }")
+
+
+def trackers() -> list[tuple[str, str]]:
+    kinds = [(name, getattr(protocol.find(name), "config_class", None)) for name in protocol.names()]
+    return [(name, parameter) for name, kind in kinds if kind is not None for parameter in kind.params()]
+
+
+@cache
+def hard_scene():
+    """Boxes of a tangle seen from low: misses, false alarms, occlusion, people in and out of view."""
+    from scenarios.loading import load
+    from sim.sequence import observe
+    from sim.world import run as simulate
+
+    scene = load("cross", ["group.passers.repeat=6", "camera.tilt_deg=15", "duration=12"])
+    sensor = scene.sensor.model_copy(update={"detect_prob": 0.75, "clutter_rate": 2.0, "persistence": 0.6})
+    scene = scene.model_copy(update={"sensor": sensor})
+    sequence = observe(scene, simulate(scene, 11), check=False)
+    return dataclasses.replace(sequence, load_truth=None)
+
+
+def answers(name: str, **values: object) -> dict[str, bytes]:
+    run = track(name, hard_scene(), params=values)
+    return {n: b for n, b in tracks_files(run, fps=hard_scene().fps).items() if n != "run.json"}
+
+
+@pytest.mark.parametrize(("name", "parameter"), trackers())
+def test_a_parameter_changes_what_a_tracker_says(name, parameter):
+    spec = protocol.find(name).config_class.params()[parameter]
+    ends = spec.choices or (spec.low, spec.high)
+    default = answers(name)
+    assert any(answers(name, **{parameter: value}) != default for value in ends if value != spec.default)
+
+
+@pytest.fixture(scope="module")
+def made(tmp_path_factory) -> Path:
+    folder = tmp_path_factory.mktemp("flips")
+    (folder / "scene.toml").write_text(SCENE.partition("[[event]]")[0])
+    assert run(["generate", str(folder / "scene.toml"), "--seeds", "40000:40002", "--out", str(folder / "data")]) == 0
+    data = folder / "data" / "flockscope-demo"
+    assert run(["track", FAKE, str(data), "--out", str(folder / "tracks")]) == 0
+    assert run(["track", FAKE, str(data), "--detections", "truth", "--out", str(folder / "perfect")]) == 0
+    (folder / "mot" / "det").mkdir(parents=True)
+    (folder / "mot" / "gt").mkdir()
+    one = data / "scene-s40000"
+    boxes = [line.split(",") for line in (one / "gt" / "gt.txt").read_text().splitlines()]
+    (folder / "mot" / "gt" / "gt.txt").write_text("".join(",".join([*b[:6], "1", "1", "1"]) + "\n" for b in boxes))
+    (folder / "mot" / "det" / "det.txt").write_text("".join(",".join([b[0], "-1", *b[2:6], "1"]) + "\n" for b in boxes))
+    assert run(["track", FAKE, str(folder / "mot"), "--fps", "5", "--out", str(folder / "mot-tracks")]) == 0
+    (folder / "params.toml").write_text("[params]\nassociation = 'nearest'\nconfirm_ratio = 1.9\n")
+    return folder
+
+
+BASE = {
+    "scenarios": "scenarios {0}/scene.toml",
+    "generate": "generate {0}/scene.toml --seeds 7 --out {1}",
+    "track": "track blob {0}/data/flockscope-demo/scene-s40000 --out {1}",
+    "score": "score {0}/data {0}/tracks",
+    "view": "view {0}/data/flockscope-demo/scene-s40000 --out {1}/page.html",
+    "sheet": "sheet {0}/data/flockscope-demo/scene-s40000 --out {1}/sheet.png",
+    "demo": "demo --out {1}",
+}
+MOT = "track " + FAKE + " {0}/mot --out {1}"
+
+# (command, option): what is run, then what is run instead.
+OPTIONS = {
+    ("scenarios", "settings"): (BASE["scenarios"], BASE["scenarios"] + " --set duration=9"),
+    ("scenarios", "out"): (BASE["scenarios"], BASE["scenarios"] + " --out {1}/plan.svg"),
+    ("scenarios", "schema"): ("scenarios", "scenarios --schema"),
+    ("scenarios", "name"): ("scenarios", BASE["scenarios"]),
+    ("generate", "names"): (BASE["generate"], "generate cross --set camera.fps=5 --seeds 7 --out {1}"),
+    ("generate", "seeds"): (BASE["generate"], "generate {0}/scene.toml --seeds 8 --out {1}"),
+    ("generate", "settings"): (BASE["generate"], BASE["generate"] + " --set scenario.duration=3"),
+    ("track", "tracker"): (BASE["track"], BASE["track"].replace("blob", FAKE)),
+    ("track", "source"): (BASE["track"], BASE["track"].replace("40000", "40001")),
+    ("track", "params"): (BASE["track"], BASE["track"] + " --params {0}/params.toml"),
+    ("track", "settings"): (BASE["track"], BASE["track"] + " --set tracker.gate=0.6"),
+    ("track", "detections"): (BASE["track"], BASE["track"] + " --detections truth"),
+    ("track", "seed"): (
+        BASE["track"] + " --detections truth --set sensor.noise_px=4",
+        BASE["track"] + " --detections truth --set sensor.noise_px=4 --seed 1",
+    ),
+    ("track", "fps"): (MOT, MOT + " --fps 5"),
+    ("track", "px_per_m"): (MOT, MOT + " --px-per-m 10"),
+    ("track", "camera"): (MOT, MOT + " --camera {0}/data/flockscope-demo/scene-s40000/camera.json"),
+    ("score", "truth"): (BASE["score"], "score {0}/data/flockscope-demo/scene-s40001 {0}/tracks"),
+    ("score", "tracks"): (BASE["score"], "score {0}/data {0}/perfect"),
+    ("score", "similarity"): (BASE["score"] + " --similarity box", BASE["score"] + " --similarity distance"),
+    ("score", "group_match"): (BASE["score"], BASE["score"] + " --group-match members"),
+    ("score", "fps"): ("score {0}/mot {0}/mot-tracks", "score {0}/mot {0}/mot-tracks --fps 5"),
+    ("score", "px_per_m"): (
+        "score {0}/mot {0}/mot-tracks --fps 5 --similarity distance",
+        "score {0}/mot {0}/mot-tracks --fps 5 --similarity distance --px-per-m 5",
+    ),
+    ("view", "source"): (BASE["view"], BASE["view"].replace("40000", "40001")),
+    ("view", "tracks"): (BASE["view"], BASE["view"] + " {0}/tracks"),
+    ("view", "fps"): ("view {0}/mot --out {1}/page.html", "view {0}/mot --fps 5 --out {1}/page.html"),
+    ("view", "px_per_m"): (
+        "view {0}/mot {0}/mot-tracks/tracks.mot.txt --fps 5 --out {1}/page.html",
+        "view {0}/mot {0}/mot-tracks/tracks.mot.txt --fps 5 --px-per-m 20 --out {1}/page.html",
+    ),
+    ("sheet", "source"): (BASE["sheet"], BASE["sheet"].replace("40000", "40001")),
+    ("sheet", "frames"): (BASE["sheet"], BASE["sheet"] + " --frames 4"),
+    ("sheet", "fps"): ("sheet {0}/mot --out {1}/sheet.png", "sheet {0}/mot --fps 5 --out {1}/sheet.png"),
+    ("validate", "folder"): ("validate {0}/data", "validate {0}/tracks"),
+    ("coco", "folder"): ("export coco {0}/data --out {1}/c.json", "export coco {0}/mot --out {1}/c.json"),
+}
+ELSEWHERE = {
+    ("generate", "workers"),  # the same bytes for any number: tests/sim/test_generate.py
+    ("demo", "quick"),  # the long one is for `make demo`
+}
+
+
+def commands(group) -> list[tuple[str, list[str]]]:
+    found = []
+    for name, command in group.commands.items():
+        inner = getattr(command, "commands", None)
+        found += commands(command) if inner else [(name, [p.name for p in command.params])]
+    return found
+
+
+def test_every_option_is_in_the_table():
+    known = {(name, option) for name, options in commands(typer.main.get_command(app)) for option in options}
+    plain = {(name, option) for name, option in known if option in ("json", "help")}
+    out = {(name, "out") for name, _ in commands(typer.main.get_command(app))} - {("scenarios", "out")}
+    assert known - plain - out == set(OPTIONS) | ELSEWHERE
+
+
+@pytest.mark.filterwarnings("ignore::UserWarning")
+@pytest.mark.parametrize("key", OPTIONS, ids=" ".join)
+def test_an_option_changes_the_output(key, made, tmp_path, capsys):
+    seen = []
+    for k, line in enumerate(OPTIONS[key]):
+        out = tmp_path / f"out{k}"
+        run([word.format(made, out) for word in line.split(" ") if word])
+        files = {
+            str(p.relative_to(out)): p.read_bytes() for p in out.rglob("*") if p.is_file() and p.name != "run.json"
+        }
+        said = "" if files else capsys.readouterr().out
+        assert files or said, line
+        seen.append((files, said.replace(str(out), "")))
+    assert seen[0] != seen[1]
