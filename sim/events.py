@@ -9,8 +9,8 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from sim.footprints import footprint_hulls
-from sim.geometry import gap_pairs, pack
+from sim.footprints import footprint_hulls, place_hulls
+from sim.geometry import FOOTPRINT, SIDES, edge_distance_pairs, gap_pairs, pack
 from sim.lines import Line, lines
 from sim.near import close_pairs, stretches
 from sim.rules import frames_of, mean
@@ -44,21 +44,36 @@ def _encounters(pos: Array, group: Ints, fps: float) -> Iterator[tuple[int, int,
     count = np.diff(np.append(start, len(t)))
     if not len(start):
         return
-    middle = np.add.reduceat(pos[t, p], start) / count[:, None]
-    hulls = pack(footprint_hulls(pos[t, p], count))
-    radius = np.hypot(*np.moveaxis(hulls.vertex - middle[:, None], -1, 0)).max(axis=1)
-    t, name = t[start], name[start]
-    i, j = close_pairs(t, middle, CROSS_GAP + 2 * float(radius.max()))
-    near = np.hypot(*(middle[i] - middle[j]).T) <= CROSS_GAP + radius[i] + radius[j]
-    i, j = i[near & (count[i] > 1) & (count[j] > 1)], j[near & (count[i] > 1) & (count[j] > 1)]
-    close = gap_pairs(hulls, hulls, i, j) <= CROSS_GAP
-    i, j = i[close], j[close]
+    places, t, name = pos[t, p], t[start], name[start]
+    i, j = _within_reach(t, places, count)
     width = int(name.max()) + 1
     pair, when = name[i] * width + name[j], t[i]  # rows are sorted by group within a frame: name[i] < name[j]
     order = np.lexsort((when, pair))
     found = zip(*stretches(pair[order], when[order], 1, frames_of(BRIDGE, fps)), strict=True)
     for first, last, g in sorted((int(a), int(b), int(k)) for k, a, b in found):
         yield first, last, g // width, g % width
+
+
+def _within_reach(t: Ints, places: Array, count: Ints) -> tuple[Ints, Ints]:
+    """Groups i < j of one frame t (G,) whose hulls are within 1.0 m; places (R, 2): members of group after group."""
+    start = np.cumsum(count) - count
+    middle = np.add.reduceat(places, start) / count[:, None]
+    radius = np.maximum.reduceat(np.hypot(*(places - np.repeat(middle, count, axis=0)).T), start) + FOOTPRINT
+    i, j = close_pairs(t, middle, CROSS_GAP + 2 * float(radius.max()))
+    near = np.hypot(*(middle[i] - middle[j]).T) <= CROSS_GAP + radius[i] + radius[j]
+    near &= (count[i] > 1) & (count[j] > 1)
+    i, j = i[near], j[near]
+    # The footprints' 16-gons lie between discs of 0.25 m and of their inner radius: mostly that settles it.
+    bare = pack(place_hulls(places, count))
+    between = edge_distance_pairs(bare, bare, i, j)
+    close = between <= CROSS_GAP + 2 * FOOTPRINT * np.cos(np.pi / SIDES)
+    overlap = (bare.box[i, :2] <= bare.box[j, 2:]).all(axis=1) & (bare.box[j, :2] <= bare.box[i, 2:]).all(axis=1)
+    doubt = np.flatnonzero(~close & ((between <= CROSS_GAP + 2 * FOOTPRINT) | overlap))
+    whom, place = np.unique(np.concatenate([i[doubt], j[doubt]]), return_inverse=True)
+    rows = np.isin(np.repeat(np.arange(len(count)), count), whom)
+    hulls = pack(footprint_hulls(places[rows], count[whom]))
+    close[doubt] = gap_pairs(hulls, hulls, *np.split(place, 2)) <= CROSS_GAP
+    return i[close], j[close]
 
 
 def _crossing(

@@ -6,6 +6,8 @@ hull of the members' places: p_i + q_k is a vertex of it where the normal cones 
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+
 import numpy as np
 
 from sim.geometry import FOOTPRINT, SIDES
@@ -23,16 +25,30 @@ def footprint_hull(pos: Array) -> Array:
     return footprint_hulls(pos, np.array([len(pos)]))[0]
 
 
+def place_hulls(pos: Array, count: Ints) -> list[Array]:
+    """Like `footprint_hulls`, of the places themselves; vertices may be repeated."""
+    hulls: list[Array] = [np.zeros((0, 2))] * len(count)
+    for rows, members in _by_size(pos, count):
+        for row, hull in zip(rows, _wrap(members)[0], strict=True):
+            hulls[row] = hull
+    return hulls
+
+
 def footprint_hulls(pos: Array, count: Ints) -> list[Array]:
     """One hull (V, 2) per group: pos (R, 2) holds the members of one group after the other, count (G,) > 0 each."""
     hulls: list[Array] = [np.zeros((0, 2))] * len(count)
-    first = np.cumsum(count) - count
-    for n in np.unique(count[count > 0]):
-        rows = np.flatnonzero(count == n)
-        members = pos[first[rows, None] + np.arange(n)]
+    for rows, members in _by_size(pos, count):
         for row, hull in zip(rows, _minkowski(*_wrap(members)), strict=True):
             hulls[row] = hull
     return hulls
+
+
+def _by_size(pos: Array, count: Ints) -> Iterator[tuple[Ints, Array]]:
+    """Groups of equal size together: their numbers (G,), places (G, n, 2)."""
+    first = np.cumsum(count) - count
+    for n in np.unique(count[count > 0]):
+        rows = np.flatnonzero(count == n)
+        yield rows, pos[first[rows, None] + np.arange(n)]
 
 
 def _wrap(pos: Array) -> tuple[Array, Array, Array]:

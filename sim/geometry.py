@@ -182,9 +182,23 @@ def gap_pairs(a: Hulls, b: Hulls, i: Ints, j: Ints) -> Array:
     return gap
 
 
+def edge_distance_pairs(a: Hulls, b: Hulls, i: Ints, j: Ints) -> Array:
+    """Least distance (K,) of a vertex of either a[i[k]] or b[j[k]] to an edge of the other: their gap, unless they
+    overlap. Cheaper than `gap_pairs`, and right for polygons without area, too."""
+    nearest = np.empty(len(i))
+    for low in range(0, len(i), CHUNK):
+        part = slice(low, low + CHUNK)
+        nearest[part] = _nearest(a.vertex[i[part]], b.vertex[j[part]])
+    return nearest
+
+
+def _nearest(a: Array, b: Array) -> Array:
+    return np.minimum(_to_edges(a, b), _to_edges(b, a))
+
+
 def _gap(a: Array, b: Array) -> Array:
     """Distance (K,): 0 unless an edge of one has the whole other on its outer side (separating axes)."""
-    nearest = np.minimum(_to_edges(a, b), _to_edges(b, a))
+    nearest = _nearest(a, b)
     apart = _beyond(b, a) | _beyond(a, b)
     return np.where(apart | np.isnan(nearest), nearest, 0.0)
 

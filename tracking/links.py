@@ -6,6 +6,7 @@ link breaks once they have been far apart for long enough. All pairs of a sequen
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 from dataclasses import dataclass
 
@@ -26,9 +27,11 @@ class Grouping:
     alike: float = SAME_WAY  # m/s: velocities that differ by less are alike
     share: float = 0.8  # of the frames of the last `window` in which both were seen
     window: float = HOLD  # s
-    acquaintance: float = HOLD  # s that both must have been seen in the window; `window` = all of it
+    acquaintance: float = 1.0  # s of the window in which both must have been seen: who has just come is judged sooner
     apart: float = APART  # m: further is apart
     patience: float = HOLD  # s apart, until the link breaks
+    idle: float = 0.0  # m/s: standing side by side (both slower) links nobody; 0 = it does, as in a conversation
+    diverge: float = math.inf  # m/s: beyond `near`, and velocities differing by more, is apart, too
     smooth: float = 0.0  # s: velocities are chords of positions over so long; 0 = the tracker's own
     memory: float = 1.0  # s that a group waits for a member who is not seen
     arrival: float = 1.0  # s: a link that began so soon after a track did is an arrival, not a merge
@@ -52,13 +55,16 @@ def find_links(frame: Ints, column: Ints, pos: Array, vel: Array, length: int, f
     swap = column[i] > column[j]
     i, j = np.where(swap, j, i), np.where(swap, i, j)
     distance = np.hypot(*(pos[i] - pos[j]).T)
-    near = (distance < rule.near) & ~(np.hypot(*(vel[i] - vel[j]).T) >= rule.alike)  # nan: not yet known
+    differ = np.hypot(*(vel[i] - vel[j]).T)
+    near = (distance < rule.near) & ~(differ >= rule.alike)  # nan: not yet known
+    speed = np.hypot(*vel.T)
+    near &= ~(np.maximum(speed[i], speed[j]) < rule.idle)
     people = int(column.max(initial=0)) + 1
     pair = column[i] * people + column[j]
     known = np.unique(pair[near])
     present = np.zeros((length, people), bool)
     present[frame, column] = True
-    within = distance <= rule.apart
+    within = (distance <= rule.apart) & ~((distance > rule.near) & (differ > rule.diverge))
     found = []
     for some in _portions(known, max(1, CELLS // max(length, 1))):
         rows = np.flatnonzero((pair >= some[0]) & (pair <= some[-1]))
