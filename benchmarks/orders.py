@@ -11,7 +11,7 @@ from collections import defaultdict
 import numpy as np
 
 from scenarios.errors import FlockscopeError
-from scenarios.load import load, names
+from scenarios.loading import load, names
 from sim.sequence import simulate
 
 

@@ -13,7 +13,7 @@ import argparse
 import numpy as np
 from scipy.stats import wasserstein_distance
 
-from scenarios.load import load, names
+from scenarios.loading import load, names
 from sim.io.source import open_source
 from sim.types import Array, Ints
 from sim.world import run

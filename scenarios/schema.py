@@ -211,7 +211,7 @@ Event = Annotated[Merge | Split | Queue, Field(discriminator="type")]
 
 
 class Scenario(Model):
-    """A whole scenario. `extends` is resolved by scenarios.load; what is stored is always the resolved form."""
+    """A whole scenario. `extends` is resolved by scenarios.loading; what is stored is always the resolved form."""
 
     schema_: Literal[1] = Field(alias="schema", description="version of this form")
     name: Name = Field("scenario", description="name of sequences made from it; the file's name where absent")

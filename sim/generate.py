@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from scenarios.errors import FlockscopeError, InputError, WorkError
-from scenarios.load import Entry
+from scenarios.loading import Entry
 from sim.io import store
 from sim.io.atomic import refusal, sweep, write_file
 from sim.splits import split_of
@@ -77,7 +77,7 @@ def generate(
 
 
 def _resolved(entries: Iterable[Entry | str], set: Iterable[str]) -> list[Entry]:
-    from scenarios.load import resolve
+    from scenarios.loading import resolve
 
     settings = tuple(set)
     return [e for entry in entries for e in (resolve(entry, settings) if isinstance(entry, str) else [entry])]
@@ -96,7 +96,7 @@ def plan(entries: list[Entry], seeds: range, folder: Path) -> list[Job]:
 
 def is_done(job: Job) -> bool:
     """Whether the folder holds this very sequence, whole. InputError where it holds another one."""
-    from scenarios.load import dump
+    from scenarios.loading import dump
 
     if not job.folder.exists():
         return False
@@ -116,7 +116,7 @@ def is_done(job: Job) -> bool:
 
 def make(job: Job) -> None:
     """Simulate and store one sequence; any failure as WorkError or InputError that names it."""
-    from scenarios.load import dump
+    from scenarios.loading import dump
     from sim.sequence import simulate
 
     try:

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from scenarios.errors import InputError
-from scenarios.load import load
+from scenarios.loading import load
 
 NO_EVENT = "event=[]"
 

@@ -10,7 +10,7 @@ import pytest
 from scenarios.describe import number, order, trigger
 from scenarios.distribution import Distribution
 from scenarios.draw import svg, text
-from scenarios.load import load, names
+from scenarios.loading import load, names
 from scenarios.stage import courses, marks, middle, slots, spread
 
 SVG = "{http://www.w3.org/2000/svg}"

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from scenarios.document import merge
 from scenarios.errors import InputError
-from scenarios.load import dump, load, names, resolve
+from scenarios.loading import dump, load, names, resolve
 from scenarios.schema import Merge, Queue, Scenario, Split
 
 

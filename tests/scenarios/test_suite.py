@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from scenarios.errors import InputError
-from scenarios.load import Entry, load, names, resolve, suite_names
+from scenarios.loading import Entry, load, names, resolve, suite_names
 
 
 def suite(path: Path, text: str) -> str:

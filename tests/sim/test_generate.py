@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from scenarios.errors import InputError, WorkError
-from scenarios.load import Entry
+from scenarios.loading import Entry
 from scenarios.schema import Scenario
 from sim.generate import generate
 from sim.io.source import open_source
@@ -28,7 +28,7 @@ fakes = importlib.util.module_from_spec(spec)
 spec.loader.exec_module(fakes)
 simulate = lambda scenario, seed, repeat: fakes.sequence(seed + 100 * repeat)
 sys.modules["sim.sequence"] = types.SimpleNamespace(simulate=simulate)
-from scenarios.load import Entry
+from scenarios.loading import Entry
 from scenarios.schema import Scenario
 from sim.generate import generate
 from sim.io import atomic

@@ -6,7 +6,7 @@ import numpy as np
 import pymunk.batch
 import pytest
 
-from scenarios.load import load, names
+from scenarios.loading import load, names
 from sim.steering import Steering
 from sim.world import READ, World, run, steps_per_frame
 

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 from scenarios import document, suite
 from scenarios.errors import InputError
-from scenarios.load import Entry, dump, load, names, resolve, suite_names
+from scenarios.loading import Entry, dump, load, names, resolve, suite_names
 from tracking.app.answer import Answer
 from tracking.app.options import scenario_settings
 
