@@ -3,7 +3,8 @@
     PYTHONPATH=. python benchmarks/realism.py ../shared/data/biwi/seq_hotel --seeds 0:20 [--scenarios crowd …]
 
 Speeds are those of people who walk (> 0.3 m/s); closest approach is the least distance of two strangers who come
-within 3 m; acceleration is the 99 % quantile. Aims: Wasserstein distances <= 0.15 m/s and 0.15 m, acceleration within 25 %.
+within 3 m; acceleration is the 99 % quantile. Aims: Wasserstein distances <= 0.15 m/s and 0.15 m, acceleration
+within 25 %.
 """
 
 from __future__ import annotations

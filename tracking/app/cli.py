@@ -121,6 +121,18 @@ def track(
 
 
 @app.command()
+def score(
+    truth: Annotated[Path, typer.Argument(metavar="TRUTH", help="A sequence or dataset with labels.")],
+    tracks: Annotated[Path, typer.Argument(metavar="TRACKS", help="What `track` wrote, or MOT text.")],
+    json: Json = False,
+) -> Answer:
+    """Score tracks against the truth."""
+    from tracking.app.score_command import score
+
+    return score(truth, tracks)
+
+
+@app.command()
 def view(
     source: Source,
     tracks: Annotated[Path | None, typer.Argument(metavar="TRACKS", help="What `track` wrote, or MOT text.")] = None,
@@ -180,7 +192,7 @@ def run(arguments: Sequence[str]) -> int:
     usage = typer.BadParameter.__base__  # the class of all usage errors, typer's own or click's
     with warnings.catch_warnings():
         warnings.simplefilter("always", UserWarning)
-        warnings.showwarning = _warn
+        warnings.showwarning = _warn  # type: ignore[assignment]
         try:
             result = command.main(list(arguments) or ["--help"], prog_name="flockscope", standalone_mode=False)
         except KeyboardInterrupt:

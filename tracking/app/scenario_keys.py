@@ -48,7 +48,7 @@ def _tables(node: Node, known: Node) -> Iterator[Node]:
 
 def _type(node: Node) -> str:
     if "$ref" in node:
-        return node["$ref"].rpartition("/")[2].lower()
+        return str(node["$ref"]).rpartition("/")[2].lower()
     for choices in (node.get("enum"), [node["const"]] if "const" in node else None):
         if choices:
             return " | ".join(map(json.dumps, choices))
