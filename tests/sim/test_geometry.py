@@ -23,7 +23,7 @@ def polygons(seed, n, spread=3.0):
     return [convex_hull(r.uniform(0, spread, (r.integers(3, 20), 2)) + r.uniform(-1, 1, 2)) for _ in range(n)]
 
 
-def raster_iou(a, b, step=0.005):
+def raster_iou(a, b, step=0.01):
     x = np.arange(-1.5, 4.5, step) + step / 2
     grid = np.stack(np.meshgrid(x, x), -1).reshape(-1, 2)
     inside = [np.ones(len(grid), bool) for _ in (a, b)]
@@ -37,7 +37,7 @@ def test_overlap_is_that_of_a_dense_raster():
     some = polygons(1, 24)
     got = iou_matrix(some[:12], some[12:])
     for k in range(12):
-        assert got[k, k] == pytest.approx(raster_iou(some[k], some[12 + k]), abs=2e-3)
+        assert got[k, k] == pytest.approx(raster_iou(some[k], some[12 + k]), abs=5e-3)
     assert (got > 0.05).sum() > 20
 
 
