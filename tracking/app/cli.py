@@ -122,14 +122,19 @@ def track(
 
 @app.command()
 def score(
-    truth: Annotated[Path, typer.Argument(metavar="TRUTH", help="A sequence or dataset with labels.")],
+    truth: Annotated[Path, typer.Argument(metavar="TRUTH", help="Labelled sequence or dataset.")],
     tracks: Annotated[Path, typer.Argument(metavar="TRACKS", help="What `track` wrote, or MOT text.")],
+    similarity: Annotated[
+        Literal["boxes", "ground", "image"] | None, typer.Option(help="What is compared; chosen where absent.")
+    ] = None,
+    fps: Fps = None,
+    px_per_m: Scale = None,
     json: Json = False,
 ) -> Answer:
-    """Score tracks against the truth."""
+    """Score tracks against truth."""
     from tracking.app.score_command import score
 
-    return score(truth, tracks)
+    return score(truth, tracks, similarity=similarity, fps=fps, px_per_m=px_per_m)
 
 
 @app.command()

@@ -1,30 +1,74 @@
-"""`flockscope score`: how good tracks are, for each sequence and in the mean."""
+"""`flockscope score`: tracks beside truth, one row for each sequence, and their mean with its interval."""
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
+
+import numpy as np
 
 from scenarios.errors import InputError
 from sim.io.source import open_source
+from sim.types import Sequence
 from tracking.app.answer import Answer
+from tracking.app.meter import Meter
 from tracking.app.paired import pair, results
+from tracking.app.score_tables import tables
+from tracking.run import Run
 from tracking.scoring import evaluate
+from tracking.scoring.evaluation import Similarity
+from tracking.stats import bootstrap
 
-SHOWN = ("HOTA", "DetA", "AssA", "MOTA", "IDF1", "IDSW")
+
+@dataclass(frozen=True)
+class Row:
+    """The scores of one sequence by key."""
+
+    sequence: str
+    scores: dict[str, float]
 
 
-def score(truth: Path, tracks: Path) -> Answer:
-    """Scores of individuals of all tracks that belong to a sequence of `truth`."""
-    sequences = open_source(truth)
+def score(
+    truth: Path, tracks: Path, *, similarity: Similarity | None, fps: float | None, px_per_m: float | None
+) -> Answer:
+    """Scores of every sequence of `truth`, matched with `tracks` by name."""
+    sequences = open_source(truth, fps=fps, px_per_m=px_per_m)
+    paired = pair(sequences, results(tracks))
     rows = []
-    for sequence, result in pair(sequences, results(tracks)):
-        labels = sequence.truth
-        if labels is None:
-            raise InputError(
-                file=truth, place=sequence.name, got="no labels", expected="gt/gt.txt or another ground truth",
-                remedy="score a sequence with truth",
-            )  # fmt: skip
-        rows.append({"sequence": sequence.name, **evaluate(labels, result.read(sequence))})
-    head = f"{'sequence':<28}" + "".join(f"{key:>8}" for key in SHOWN)
-    lines = [f"{row['sequence']:<28}" + "".join(f"{row[key]:8.3f}" for key in SHOWN) for row in rows]
-    return Answer({"scores": rows}, "\n".join([head, *lines]))
+    with Meter("score", len(paired)) as meter:
+        for sequence, result in paired:
+            rows.append(score_run(sequence, result.read(sequence), similarity))
+            meter.step(sequence.name)
+    return answer(rows)
+
+
+def score_run(sequence: Sequence, run: Run, similarity: Similarity | None = None) -> Row:
+    """The scores of one run; InputError where the sequence is not labelled or cannot be compared so."""
+    if sequence.truth is None:
+        raise InputError(
+            file=sequence.source.get("path", sequence.name), got="no labels", expected="a sequence with truth",
+            remedy="give one with gt/",
+        )  # fmt: skip
+    try:
+        return Row(sequence.name, evaluate(sequence.truth, run, similarity=similarity))
+    except ValueError as error:
+        raise InputError(
+            file=sequence.name, place="--similarity", got=str(error), expected="what both sides have",
+            remedy="choose another --similarity",
+        ) from None  # fmt: skip
+
+
+def answer(rows: list[Row]) -> Answer:
+    """Rows and their mean, for people and for --json."""
+    means = summary(rows)
+    data = {"sequences": [{"name": row.sequence, **row.scores} for row in rows], "mean": means}
+    return Answer(data, tables(rows, means))
+
+
+def summary(rows: list[Row]) -> dict[str, dict[str, float]]:
+    """mean, low, high over sequences by key; the ends are nan for a single one."""
+    names = list(rows[0].scores)
+    values = np.array([[row.scores.get(name, np.nan) for name in names] for row in rows], float)
+    ends: Any = zip(names, *bootstrap(values), strict=True)
+    return {name: {"mean": float(m), "low": float(low), "high": float(high)} for name, m, low, high in ends}
