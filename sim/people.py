@@ -113,7 +113,7 @@ def contour(ellipses: Outlines, points: int = 16) -> Array:
     l11 = np.sqrt(np.maximum(d - l10**2, 0.0))
     u = ellipses.centre[..., :1] + l00[..., None] * circle[:, 0]
     v = ellipses.centre[..., 1:] + l10[..., None] * circle[:, 0] + l11[..., None] * circle[:, 1]
-    return np.stack([u, v], axis=-1).reshape(len(a), -1, 2)
+    return np.stack([u, v], axis=-1).reshape(len(a), 2 * points, 2)
 
 
 def distance(camera: Camera, pos3: Array, height: Array) -> Array:

@@ -97,3 +97,13 @@ def test_the_orders_times_change_nothing() -> None:
     assert [(e.kind, e.start, e.members) for e in a.events or ()] == [
         (e.kind, e.start, e.members) for e in b.events or ()
     ]
+
+
+def test_a_sequence_without_groups_has_truth() -> None:
+    from scenarios.loading import load
+    from sim.sequence import simulate
+
+    truth = simulate(load("crowd", ["group.passers.size=1", "duration=3"]), 1).truth
+    assert truth is not None
+    assert truth.groups_px is not None
+    assert all(len(g.id) == 0 for g in truth.groups_px)
