@@ -6,6 +6,8 @@ the way turns by 60° at most: a conversation circle passes the first two tests 
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 
 from sim.types import Array, Bools, Ints
@@ -13,6 +15,7 @@ from sim.types import Array, Bools, Ints
 NEAREST, FURTHEST = 0.4, 1.5  # m along the line
 OFF = 0.5  # m
 STRAIGHT = 0.5  # cosine of the greatest turn from one to the next
+FAR = 1e9  # m: where those stand who are off a line
 SHARE = 2 / 3  # of a standing crowd that must be in the chain: else it is a crowd
 
 
@@ -21,10 +24,10 @@ def chain(pos: Array) -> Ints:
     whole = _along(pos, np.arange(len(pos)))
     if _fits(pos[whole]):
         return whole
-    found = sorted((_from_seed(pos, i, j) for i, j in _seeds(pos)), key=lambda c: (-len(c), _residual(pos[c])))
-    if found and len(found[0]) > 2 and len(found[0]) >= SHARE * len(pos):
-        return found[0]
-    return np.zeros(0, np.int64)
+    least = max(3, math.ceil(SHARE * len(pos)))
+    found = [_from_seed(pos, i, j) for i, j in _seeds(pos, least)] if len(pos) >= least else []
+    found = sorted((c for c in found if len(c) >= least), key=lambda c: (-len(c), _residual(pos[c])))
+    return found[0] if found else np.zeros(0, np.int64)
 
 
 def axis(pos: Array) -> Array:
@@ -61,10 +64,22 @@ def _turns_fit(pos: Array) -> Bools:
     return np.asarray((step[:-1] * step[1:]).sum(axis=1) >= STRAIGHT * length[:-1] * length[1:])
 
 
-def _seeds(pos: Array) -> list[tuple[int, int]]:
-    gap = np.hypot(*np.moveaxis(pos[:, None] - pos[None], -1, 0))
-    i, j = np.nonzero(np.triu((gap >= NEAREST) & (gap <= FURTHEST), 1))
-    return list(zip(i.tolist(), j.tolist(), strict=True))
+def _seeds(pos: Array, least: int) -> list[tuple[int, int]]:
+    """Pairs through whose line a chain of `least` people may go: so many stand along it with the right spacing."""
+    i, j = np.triu_indices(len(pos), 1)
+    step = pos[j] - pos[i]
+    length = np.hypot(*step.T)
+    kept = (length >= NEAREST) & (length <= FURTHEST)
+    i, j, u = i[kept], j[kept], step[kept] / length[kept, None]
+    arm = pos[None] - (pos[i] + pos[j])[:, None] / 2
+    off = np.abs(arm[..., 1] * u[:, :1] - arm[..., 0] * u[:, 1:])
+    along = np.sort(np.where(off <= OFF, arm[..., 0] * u[:, :1] + arm[..., 1] * u[:, 1:], FAR), axis=1)
+    gap = np.diff(along, axis=1)
+    run, longest = np.ones(len(i), np.int64), np.ones(len(i), np.int64)
+    for k in range(gap.shape[1]):
+        run = np.where((gap[:, k] >= NEAREST) & (gap[:, k] <= FURTHEST), run + 1, 1)
+        longest = np.maximum(longest, run)
+    return list(zip(i[longest >= least].tolist(), j[longest >= least].tolist(), strict=True))
 
 
 def _from_seed(pos: Array, i: int, j: int) -> Ints:

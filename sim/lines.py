@@ -36,9 +36,9 @@ class Line:
 
     @property
     def fifo(self) -> bool:
-        """Whether people left in the order in which they stood, from one end."""
-        place = [self.order.index(p) for p in self.left]
-        return place in (sorted(place), sorted(place, reverse=True))
+        """Whether all who left did so in the order in which they stood, from one end."""
+        n = len(self.left)
+        return self.left in (self.order[:n], self.order[::-1][:n])
 
 
 @dataclass
