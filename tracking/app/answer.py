@@ -19,6 +19,8 @@ from scenarios.errors import FlockscopeError, InputError, WorkError
 STATUS = {0: "ok", 1: "failed", 2: "refused", 130: "interrupted"}
 INTERRUPTED = 130
 DEBUG = "FLOCKSCOPE_DEBUG"
+WIDE = 160
+"""Columns of a table that goes to a file or another program."""
 
 
 @dataclass(frozen=True)
@@ -42,7 +44,8 @@ def show(answer: Answer, as_json: bool) -> int:
     else:
         from rich.console import Console
 
-        Console(soft_wrap=True, highlight=False).print(answer.text)
+        width = None if sys.stdout.isatty() else WIDE
+        Console(width=width, highlight=False).print(answer.text)
     return answer.code
 
 

@@ -14,14 +14,13 @@ from tracking.app import options
 from tracking.app.answer import Answer
 from tracking.app.meter import Meter
 from tracking.app.score_command import Row, score_run, summary
-from tracking.app.score_tables import number
+from tracking.app.score_tables import SHOWN, number
 from tracking.app.track_command import Job
 from tracking.run import Run
 
 SCENES = ("merge", "split", "cross", "pass-by", "queue", "side-by-side", "party", "mixed")
 SEEDS = range(40_000, 40_003)
 QUICK, QUICK_SEEDS = ("quick",), range(40_000, 40_001)
-SHOWN = ("HOTA", "DetA", "AssA", "MOTA", "IDF1", "IDSW")
 
 STYLE = """
 body { font: 16px/1.5 system-ui, sans-serif; margin: 2rem auto; max-width: 60rem; padding: 0 1rem; color: #1b1f24 }
@@ -49,13 +48,14 @@ def demo(out: Path, *, quick: bool) -> Answer:
     options.folder(out)
     names, seeds = (QUICK, QUICK_SEEDS) if quick else (SCENES, SEEDS)
     with Meter("generate") as meter:
-        folders = generate(names, seeds, out / "data", workers=os.cpu_count() or 1, progress=meter.update)
+        workers = 1 if quick else os.cpu_count() or 1
+        folders = generate(names, seeds, out / "data", workers=workers, progress=meter.update)
     sequences = [open_source(folder)[0] for folder in folders]
     with Meter("track, score, draw", len(sequences) * len(protocol.names())) as meter:
         parts = [_part(tracker, sequences, out, meter) for tracker in protocol.names()]
     page = _page(out / "index.html", parts)
     text = [f"{len(sequences)} sequences in {folders[0].parent}", *(_line(part) for part in parts)]
-    text += [f"{time.monotonic() - start:.0f} s; open this page:", str(page)]
+    text += [f"{time.monotonic() - start:.0f} s; open this page:", str(page.resolve())]
     data = {part.tracker: summary(part.rows) for part in parts}
     return Answer({"sequences": len(sequences), "scores": data, "page": page}, "\n".join(text))
 
@@ -87,7 +87,9 @@ def _store(tracker: str, sequence: Sequence, run: Run, row: Row, out: Path) -> P
 
 def _line(part: Part) -> str:
     means = summary(part.rows)
-    return f"{part.tracker}: " + ", ".join(f"{key} {number(means[key]['mean'])}" for key in SHOWN if key in means)
+    return f"{part.tracker}: " + ", ".join(
+        f"{key} {number(key, means[key]['mean'], mean=True)}" for key in SHOWN if key in means
+    )
 
 
 def _page(path: Path, parts: list[Part]) -> Path:
@@ -108,11 +110,9 @@ def _table(part: Part, root: Path) -> str:
     rows = []
     for row, page in zip(part.rows, part.pages, strict=True):
         link = f'<a href="{escape(page.relative_to(root).as_posix())}">{escape(row.sequence)}</a>'
-        rows.append(_cells("td", [link, *(number(row.scores[key]) for key in keys)]))
+        rows.append(_cells("td", [link, *(number(key, row.scores[key]) for key in keys)]))
     means = summary(part.rows)
-    ends = [
-        f"{number(m['mean'])}<br><small>{number(m['low'])} to {number(m['high'])}</small>" for m in _of(means, keys)
-    ]
+    ends = [_interval(key, means[key]) for key in keys]
     foot = _cells("td", ["mean<br><small>95 % interval</small>", *ends])
     head = _cells("th", ["sequence", *keys])
     return (
@@ -121,8 +121,9 @@ def _table(part: Part, root: Path) -> str:
     )
 
 
-def _of(means: dict[str, dict[str, float]], keys: list[str]) -> list[dict[str, float]]:
-    return [means[key] for key in keys]
+def _interval(key: str, mean: dict[str, float]) -> str:
+    low, high = number(key, mean["low"], mean=True), number(key, mean["high"], mean=True)
+    return f"{number(key, mean['mean'], mean=True)}<br><small>{low} to {high}</small>"
 
 
 def _cells(tag: str, cells: list[str]) -> str:

@@ -10,7 +10,7 @@ import numpy as np
 
 from scenarios.errors import InputError
 from sim.io.source import open_source
-from sim.types import Sequence
+from sim.types import Sequence, Truth
 from tracking.app.answer import Answer
 from tracking.app.meter import Meter
 from tracking.app.paired import pair, results
@@ -23,9 +23,10 @@ from tracking.stats import bootstrap
 
 @dataclass(frozen=True)
 class Row:
-    """The scores of one sequence by key."""
+    """The scores of one sequence by key, and by which similarity."""
 
     sequence: str
+    similarity: Similarity
     scores: dict[str, float]
 
 
@@ -50,8 +51,9 @@ def score_run(sequence: Sequence, run: Run, similarity: Similarity | None = None
             file=sequence.source.get("path", sequence.name), got="no labels", expected="a sequence with truth",
             remedy="give one with gt/",
         )  # fmt: skip
+    chosen = similarity or usual_similarity(sequence.truth, run)
     try:
-        return Row(sequence.name, evaluate(sequence.truth, run, similarity=similarity))
+        return Row(sequence.name, chosen, evaluate(sequence.truth, run, similarity=chosen))
     except ValueError as error:
         raise InputError(
             file=sequence.name, place="--similarity", got=str(error), expected="what both sides have",
@@ -59,10 +61,21 @@ def score_run(sequence: Sequence, run: Run, similarity: Similarity | None = None
         ) from None  # fmt: skip
 
 
+def usual_similarity(truth: Truth, run: Run) -> Similarity:
+    """Overlap of boxes where both sides have measured ones, else distance in the tracks' plane."""
+    some = next((tracks for tracks in run if len(tracks.id)), None)
+    if truth.box is not None and (some is None or some.box is not None):
+        return "boxes"
+    return "image" if some is not None and some.plane == "image" else "ground"
+
+
 def answer(rows: list[Row]) -> Answer:
     """Rows and their mean, for people and for --json."""
     means = summary(rows)
-    data = {"sequences": [{"name": row.sequence, **row.scores} for row in rows], "mean": means}
+    data = {
+        "sequences": [{"name": row.sequence, "similarity": row.similarity, **row.scores} for row in rows],
+        "mean": means,
+    }
     return Answer(data, tables(rows, means))
 
 

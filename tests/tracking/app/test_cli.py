@@ -95,7 +95,7 @@ WRITING = ("scenarios --out", "generate", "track", "track blob", "view", "view a
 INNER = {
     "scenarios": "scenarios.document.names",
     "scenarios NAME": "scenarios.draw.text",
-    "score": "sim.io.source.open_source",
+    "score": "tracking.app.score_command.score_run",
     "validate": "sim.io.validate._sequence",
 }
 """A function inside each command that writes nothing, to be interrupted there."""
@@ -245,7 +245,8 @@ def test_ctrl_c_in_a_real_process(place, workers):
         line, cwd=ROOT, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, start_new_session=True
     )
     end = time.monotonic() + 60
-    while process.poll() is None and not list(place.out.rglob("manifest.json")) and time.monotonic() < end:
+    first = "flockscope-train/scene-*/manifest.json"
+    while process.poll() is None and not list(place.out.glob(first)) and time.monotonic() < end:
         time.sleep(0.05)
     os.killpg(process.pid, signal.SIGINT)
     out, _ = process.communicate(timeout=60)
