@@ -181,8 +181,10 @@ def _px_per_m(sequence: Sequence, mode: DetectionMode, feed: tuple[Frame, ...] |
 
 def _with_groups(made: list[Tracks], context: Context) -> tuple[Tracks, ...]:
     """Groups and events by the baseline rule where the tracker left them empty."""
-    if all(t.groups is not None for t in made) or importlib.util.find_spec("tracking.grouping") is None:
+    if all(t.groups is not None for t in made):
         return tuple(made)
+    if made[0].plane == "image" and not np.isfinite(context.px_per_m):
+        return tuple(made)  # not one box was given: there is no scale, and nobody to group
     from tracking.grouping import derive
 
     return tuple(derive(made, context.fps, context.px_per_m))
