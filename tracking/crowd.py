@@ -113,8 +113,8 @@ def _event(
     onsets = [since for a, b, on, since in turned if on == joins and a in people and b in people]
     start = min(onsets, default=t)
     if change.kind == "leave":
-        seen = np.isfinite(pos[: t + 1, change.members, 0]).any(axis=1)
-        start = int(np.flatnonzero(seen)[-1])
+        seen = np.isfinite(pos[: t + 1, change.members, 0]).sum(axis=1)
+        start = int(np.flatnonzero(seen > 1)[-1])
     if change.kind == "enter" and start <= late:
         return None
     end = start if change.kind in ("enter", "leave") else t
