@@ -251,12 +251,13 @@ def made(tmp_path_factory) -> Path:
     data = folder / "data" / "flockscope-demo"
     assert run(["track", FAKE, str(data), "--out", str(folder / "tracks")]) == 0
     assert run(["track", FAKE, str(data), "--detections", "truth", "--out", str(folder / "perfect")]) == 0
-    (folder / "mot" / "det").mkdir(parents=True)
-    (folder / "mot" / "gt").mkdir()
     one = data / "scene-s40000"
     boxes = [line.split(",") for line in (one / "gt" / "gt.txt").read_text().splitlines()]
-    (folder / "mot" / "gt" / "gt.txt").write_text("".join(",".join([*b[:6], "1", "1", "1"]) + "\n" for b in boxes))
-    (folder / "mot" / "det" / "det.txt").write_text("".join(",".join([b[0], "-1", *b[2:6], "1"]) + "\n" for b in boxes))
+    labels = [[*b[:6], "1", "1", "1"] for b in boxes]
+    found = [[b[0], "-1", str(float(b[2]) + 6), *b[3:6], "1"] for b in boxes]
+    for name, rows in (("gt", labels), ("det", found)):
+        (folder / "mot" / name).mkdir(parents=True)
+        (folder / "mot" / name / f"{name}.txt").write_text("".join(",".join(row) + "\n" for row in rows))
     assert run(["track", FAKE, str(folder / "mot"), "--fps", "5", "--out", str(folder / "mot-tracks")]) == 0
     (folder / "params.toml").write_text("[params]\nassociation = 'nearest'\nconfirm_ratio = 1.9\n")
     return folder
@@ -311,6 +312,10 @@ OPTIONS = {
     ),
     ("sheet", "source"): (BASE["sheet"], BASE["sheet"].replace("40000", "40001")),
     ("sheet", "frames"): (BASE["sheet"], BASE["sheet"] + " --frames 4"),
+    ("sheet", "px_per_m"): (
+        "sheet {0}/mot --out {1}/sheet.png",
+        "sheet {0}/mot --px-per-m 10 --out {1}/sheet.png",
+    ),
     ("sheet", "fps"): ("sheet {0}/mot --out {1}/sheet.png", "sheet {0}/mot --fps 5 --out {1}/sheet.png"),
     ("validate", "folder"): ("validate {0}/data", "validate {0}/tracks"),
     ("coco", "folder"): ("export coco {0}/data --out {1}/c.json", "export coco {0}/mot --out {1}/c.json"),
