@@ -159,13 +159,12 @@ def sheet(
     out: Annotated[Path, typer.Option("--out", metavar="FILE.png", help="Picture to write; a folder for many.")],
     frames: Annotated[int, typer.Option("--frames", min=1, max=64, help="Panels.")] = 8,
     fps: Fps = None,
-    px_per_m: Scale = None,
     json: Json = False,
 ) -> Answer:
     """A contact sheet of a sequence's truth."""
     from tracking.app.view_command import sheet
 
-    return sheet(source, out, frames=frames, fps=fps, px_per_m=px_per_m)
+    return sheet(source, out, frames=frames, fps=fps, px_per_m=None)
 
 
 @app.command()

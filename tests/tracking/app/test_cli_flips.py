@@ -312,10 +312,6 @@ OPTIONS = {
     ),
     ("sheet", "source"): (BASE["sheet"], BASE["sheet"].replace("40000", "40001")),
     ("sheet", "frames"): (BASE["sheet"], BASE["sheet"] + " --frames 4"),
-    ("sheet", "px_per_m"): (
-        "sheet {0}/mot --out {1}/sheet.png",
-        "sheet {0}/mot --px-per-m 10 --out {1}/sheet.png",
-    ),
     ("sheet", "fps"): ("sheet {0}/mot --out {1}/sheet.png", "sheet {0}/mot --fps 5 --out {1}/sheet.png"),
     ("validate", "folder"): ("validate {0}/data", "validate {0}/tracks"),
     ("coco", "folder"): ("export coco {0}/data --out {1}/c.json", "export coco {0}/mot --out {1}/c.json"),
