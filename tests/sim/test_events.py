@@ -76,6 +76,9 @@ def test_cross_needs_equal_memberships_before_and_after():
     assert crossed(HEAD_ON, early) == []
     joined = [*HEAD_ON, np.array([20.0, 20]) + straight(0)]
     assert len(crossed(joined, groups(1, 1, 2, 2, -1))) == 1
+    grown = groups(1, 1, 2, 2, -1)
+    grown[65:, 4] = 2
+    assert crossed(joined, grown) == []
 
 
 def test_people_alone_do_not_cross():
@@ -144,7 +147,7 @@ def test_first_in_first_out_means_from_one_end(leavers, fifo):
 
 
 @pytest.mark.parametrize("people", range(3, 9))
-@pytest.mark.parametrize("radius", [0.45, 0.6, 0.8, 1.0, 1.2])
+@pytest.mark.parametrize("radius", [0.45, 0.5, 0.55, 0.6, 0.8, 1.0, 1.2])
 def test_a_circle_of_people_talking_is_not_a_queue(people, radius):
     rng = np.random.default_rng(people)
     angle = 2 * np.pi * np.arange(people) / people + 0.3
