@@ -164,7 +164,7 @@ def sheet(
     """A contact sheet of a sequence's truth."""
     from tracking.app.view_command import sheet
 
-    return sheet(source, out, frames=frames, fps=fps, px_per_m=None)
+    return sheet(source, out, frames=frames, fps=fps)
 
 
 @app.command()

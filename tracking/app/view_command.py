@@ -29,11 +29,11 @@ def view(source: Path, tracks: Path | None, out: Path, *, fps: float | None, px_
     return _each("view", sequences, out, ".html", draw)
 
 
-def sheet(source: Path, out: Path, *, frames: int, fps: float | None, px_per_m: float | None) -> Answer:
+def sheet(source: Path, out: Path, *, frames: int, fps: float | None) -> Answer:
     """A contact sheet of each sequence."""
     from tracking.app.sheet import sheet as picture
 
-    sequences = open_source(source, fps=fps, px_per_m=px_per_m)
+    sequences = open_source(source, fps=fps)
 
     def draw(sequence: Sequence, path: Path) -> None:
         picture(sequence, path, frames)
