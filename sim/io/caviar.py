@@ -22,6 +22,7 @@ from sim.types import Array, Frame, Ints, Sequence, Truth
 FPS = 25.0
 IMAGE_SIZE = (384, 288)
 PERSON_HEIGHT = 1.7  # m
+CHORD = 1.0  # s, for velocities: labels stand still for frames and then jump by pixels; shorter chords see the jumps
 
 
 @dataclass(frozen=True)
@@ -144,7 +145,7 @@ def read_truth(path: Path, fps: float = FPS, px_per_m: float | None = None) -> T
     )  # fmt: skip
     if not found.labelled or not len(box):
         return truth
-    vel = differentiate(found.frame, found.id, found.centre, fps)
+    vel = differentiate(found.frame, found.id, found.centre, fps, CHORD)
     known = label_truth(
         found.frame, found.id, found.label, found.centre, vel, fps=fps, length=found.length, px_per_m=scale
     )

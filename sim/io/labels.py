@@ -27,8 +27,9 @@ def label_truth(
 ) -> dict[str, Any]:
     """The fields groups, events and near of a Truth, for rows sorted by (frame, id); label -1: alone.
 
-    Event ids are labels: each measured group bears the label of its members.
+    Event ids are labels: each measured group bears the label of its members. Crossings are of the groups as labelled.
     """
+    from sim.events import crossings, queues
     from sim.groups import memberships
 
     metres, speed = pos / px_per_m, vel / px_per_m
@@ -38,9 +39,15 @@ def label_truth(
     alone = label.max(initial=0) + 1 + column
     intent[frame - 1, column] = np.where(label >= 0, label, alone)
     present = intent >= 0
-    measured = memberships(dense(frame, id, metres, length), dense(frame, id, speed, length), present, intent, fps)
+    places, velocities = dense(frame, id, metres, length), dense(frame, id, speed, length)
+    measured = memberships(places, velocities, present, intent, fps)
     names = _names(measured.group[frame - 1, column], label)
-    events = tuple(_named(e, names, people, px_per_m) for e in measured.events)
+    found = [_named(e, names, people, px_per_m) for e in measured.events]
+    given = np.full((length, len(people)), -1, np.int64)
+    given[frame - 1, column] = label
+    met = crossings(places, velocities, present, given, fps) + queues(places, velocities, present, fps)
+    found += [_named(e, {}, people, px_per_m) for e in met]
+    events = tuple(sorted(found, key=lambda e: (e.start, e.end, e.kind, e.members, e.after)))
     near = replace(measured.near, a=people[measured.near.a - 1], b=people[measured.near.b - 1])
     groups = _hulls(frame, id, label, metres, speed, length, px_per_m)
     return {"groups": groups, "events": events, "near": near, "labelled": np.ones(length, bool)}

@@ -1,4 +1,4 @@
-"""What labels.py hands to the measuring functions, and how it translates their answer: with stand-ins for both."""
+"""What labels.py hands to the measuring functions, and how it translates their answer; groups by a stand-in."""
 
 import sys
 import types
@@ -72,3 +72,19 @@ def test_answers_come_back_in_the_recordings_ids_and_unit(measured):
 def test_dense_keeps_order_of_ids():
     values = dense(FRAME, ID, np.arange(5.0), 3)
     assert np.array_equal(values, [[0, 1, 2], [np.nan] * 3, [3, 4, np.nan]], equal_nan=True)
+
+
+def test_labelled_groups_cross_and_queue_in_their_own_ids_and_unit():
+    """Two pairs walk through each other at 1 m/s from 10 m apart; three others stand in line all the time."""
+    t = np.arange(120) / 10
+    start = np.array([[0, 5.0], [0, 5.7], [10, 5.2], [10, 5.9], [30, 5], [30.8, 5], [31.6, 5]])
+    pos = start + t[:, None, None] * np.array([[1.0, 0]] * 2 + [[-1.0, 0]] * 2 + [[0.0, 0]] * 3)
+    vel = np.broadcast_to([[1.0, 0]] * 2 + [[-1.0, 0]] * 2 + [[0.0, 0]] * 3, pos.shape)
+    frame, id = np.repeat(np.arange(1, 121), 7), np.tile([10, 20, 30, 40, 50, 60, 70], 120)
+    label = np.tile([8, 8, 3, 3, -1, -1, -1], 120)
+    rows = (20 * x.reshape(-1, 2) for x in (pos, vel))
+    queue, cross = label_truth(frame, id, label, *rows, fps=10.0, length=120, px_per_m=20.0)["events"]
+    assert (queue.kind, queue.start, queue.end, queue.members, queue.before) == ("queue", 1, 120, (50, 60, 70), ())
+    assert (cross.kind, cross.start, cross.end, cross.members) == ("cross", 44, 58, (10, 20, 30, 40))
+    assert cross.before == cross.after == (3, 8)
+    assert cross.pos == pytest.approx((100, 20 * 5.45))

@@ -125,7 +125,10 @@ def test_meet_walk_together_truth(shared_data):
     assert t.box[0].tolist() == [18, 205, 14, 8]
     assert sum(len(g.id) for g in t.groups_px) == 182 + 82 + 10
     check_groups(t, t.groups_px)
-    assert any(e.kind == "merge" and e.members == (1, 2) for e in t.events)
+    told = [(e.kind, e.start, e.end, e.before, e.after, e.members) for e in t.events]
+    assert told == [("form", 339, 388, (-1, -1), (0,), (1, 2)), ("leave", 493, 493, (0,), (-1,), (1, 2))], (
+        "two people alone form a group, 27 frames after they are labelled as one and 10 after they are within 1.5 m"
+    )
     some = next(g for g in t.groups_px if len(g.id))
     assert some.pos[0, 0] > 20, "px"
 
