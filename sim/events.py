@@ -27,7 +27,8 @@ def crossings(pos: Array, vel: Array, present: Bools, group: Ints, fps: float) -
 
     An encounter is a stretch with hulls within 1.0 m. The mean of their relative velocity over it must be at least
     0.6 m/s, and each must get to the other's other side: the way from one middle to the other turns by more than 90°
-    (who bounces back, or passes by in a lane beside, turns by less). Members are the same 2 s before and after.
+    meanwhile, or the paths of their middles cross between 2 s before and 2 s after (who bounces back, or passes by in
+    a lane beside, does neither). Members are the same 2 s before and after.
     """
     met = _encounters(pos, np.where(present, group, -1), fps)
     found = (_crossing(pos, vel, group, present, fps, *one) for one in met)
@@ -86,12 +87,28 @@ def _crossing(
     window = slice(first, last + 1)
     apart = mean(pos[window][:, b]) - mean(pos[window][:, a])
     relative = np.nanmean(mean(vel[window][:, b]) - mean(vel[window][:, a]), axis=0)
-    if apart[0] @ apart[-1] >= 0 or np.hypot(*relative) < CROSS_SPEED:
+    if np.hypot(*relative) < CROSS_SPEED:
+        return None
+    margin = frames_of(SAME_BEFORE, fps)
+    around = slice(max(first - margin, 0), last + margin + 1)
+    if apart[0] @ apart[-1] >= 0 and not _paths_cross(mean(pos[around][:, a]), mean(pos[around][:, b])):
         return None
     closest = int(np.nanargmin(np.hypot(*apart.T)))
     x, y = (mean(pos[window][:, a])[closest] + mean(pos[window][:, b])[closest]) / 2
     people = tuple(sorted(int(p) + 1 for p in (*a, *b)))
     return GroupEvent("cross", first + 1, last + 1, None, (g, h), (g, h), people, (float(x), float(y)))
+
+
+def _paths_cross(a: Array, b: Array) -> bool:
+    """Whether two polylines (T, 2) cross each other, at whatever times; nan points are left out."""
+    a, b = a[np.isfinite(a).all(axis=1)], b[np.isfinite(b).all(axis=1)]
+
+    def sides(line: Array, points: Array) -> Array:
+        along, to = np.diff(line, axis=0)[:, None], points[None] - line[:-1, None]
+        return np.asarray(along[..., 0] * to[..., 1] - along[..., 1] * to[..., 0])
+
+    of_b, of_a = sides(a, b), sides(b, a).T
+    return bool(((of_b[:, 1:] * of_b[:, :-1] < 0) & (of_a[1:] * of_a[:-1] < 0)).any())
 
 
 def _stays(group: Ints, present: Bools, people: Ints, first: int, last: int, fps: float) -> bool:
