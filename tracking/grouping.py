@@ -24,7 +24,7 @@ from sim.types import EVENT_KINDS, Array, Bools, GroupEvent, Groups, Ints, Track
 from tracking.crowd import label_changes, label_people
 from tracking.links import Grouping, find_links
 
-__all__ = ["Grouping", "derive"]
+__all__ = ["Grouping", "derive", "with_groups"]
 
 ENCOUNTERS = frozenset({"cross", "queue"})
 MEMBERSHIP = frozenset(EVENT_KINDS) - ENCOUNTERS
@@ -63,6 +63,14 @@ class _Rows:
         out = np.full((self.length, len(self.ids), 2), np.nan)
         out[self.frame, self.column] = values
         return out
+
+
+def with_groups(tracks: Sequence[Tracks], fps: float, px_per_m: float) -> tuple[Tracks, ...]:
+    """The tracks as they are where the tracker named groups throughout, else `derive`d; px_per_m is needed for tracks
+    in the image, which stay as they are without it (not one box was given: nobody can be grouped)."""
+    if all(t.groups is not None for t in tracks) or (tracks[0].plane == "image" and not math.isfinite(px_per_m)):
+        return tuple(tracks)
+    return tuple(derive(tracks, fps, px_per_m))
 
 
 def derive(tracks: Iterable[Tracks], fps: float, px_per_m: float = 1.0, rule: Grouping | None = None) -> list[Tracks]:

@@ -81,6 +81,8 @@ def track(
     can work. sensor: overrides that degrade "truth" (misses, clutter, noise, hiding). InputError where tracker and
     source do not fit, before a frame is read; WorkError where the tracker's answer is no Tracks.
     """
+    from tracking.grouping import with_groups
+
     ready = prepare(tracker, sequence, params=params, detections=detections, sensor=sensor, seed=seed)
     ready.tracker.reset(ready.context, seed)
     made, spent = [], 0.0
@@ -88,7 +90,7 @@ def track(
         start = time.perf_counter()
         made.append(ready.answer(frame))
         spent += time.perf_counter() - start
-    answers = _with_groups(made, ready.context)
+    answers = with_groups(made, ready.context.fps, ready.context.px_per_m)
     return Run(answers, describe(ready, answers, seed, sensor or {}, len(made) / spent if spent else 0.0))
 
 
@@ -176,17 +178,6 @@ def _px_per_m(sequence: Sequence, mode: DetectionMode, feed: tuple[Frame, ...] |
     found = [f.detections for f in (sequence if feed is None else feed)]
     heights = [d.box[:, 3] for d in found if d is not None and d.box is not None and len(d.box)]
     return float(np.median(np.concatenate(heights))) / PERSON_HEIGHT if heights else float("nan")
-
-
-def _with_groups(made: list[Tracks], context: Context) -> tuple[Tracks, ...]:
-    """Groups and events by the baseline rule where the tracker left them empty."""
-    if all(t.groups is not None for t in made):
-        return tuple(made)
-    if made[0].plane == "image" and not np.isfinite(context.px_per_m):
-        return tuple(made)  # not one box was given: there is no scale, and nobody to group
-    from tracking.grouping import derive
-
-    return tuple(derive(made, context.fps, context.px_per_m))
 
 
 def describe(
