@@ -103,12 +103,12 @@ def _paths_cross(a: Array, b: Array) -> bool:
     """Whether two polylines (T, 2) cross each other, at whatever times; nan points are left out."""
     a, b = a[np.isfinite(a).all(axis=1)], b[np.isfinite(b).all(axis=1)]
 
-    def sides(line: Array, points: Array) -> Array:
+    def left(line: Array, points: Array) -> Bools:
         along, to = np.diff(line, axis=0)[:, None], points[None] - line[:-1, None]
-        return np.asarray(along[..., 0] * to[..., 1] - along[..., 1] * to[..., 0])
+        return np.asarray(along[..., 0] * to[..., 1] > along[..., 1] * to[..., 0])
 
-    of_b, of_a = sides(a, b), sides(b, a).T
-    return bool(((of_b[:, 1:] * of_b[:, :-1] < 0) & (of_a[1:] * of_a[:-1] < 0)).any())
+    of_a, of_b = left(a, b), left(b, a).T
+    return bool(((of_a[:, 1:] != of_a[:, :-1]) & (of_b[1:] != of_b[:-1])).any())
 
 
 def _stays(group: Ints, present: Bools, people: Ints, first: int, last: int, fps: float) -> bool:

@@ -51,13 +51,13 @@ def test_cross_at_a_right_angle():
 
 
 def test_politely_round_is_a_cross_where_paths_cross():
-    """At a right angle, one 1.5 s behind the other: never closer than 0.6 m, the middles' paths cross at (5, 5)."""
-    late = [np.array([5 + x, -1.6]) + straight(0, 1) for x in (-0.35, 0.35)]
+    """At a right angle, one 2.4 s behind the other, hulls never overlapping, the middles' paths cross at (5, 5)."""
+    late = [np.array([5 + x, -2.4]) + straight(0, 1) for x in (-0.35, 0.35)]
     assert [row[2:4] for row in crossed(pair((0, 5), straight(1)) + late)] == [((1, 2), (1, 2))]
     # the same encounter, but the other turns away before their paths meet
     turned = np.concatenate([straight(0, 1)[:50], np.tile(straight(0, 1)[50:51], (70, 1))])
     turned[50:, 1] -= (T[50:, 0] - T[50, 0]) * 1.0
-    away = [np.array([5 + x, -1.6]) + turned for x in (-0.35, 0.35)]
+    away = [np.array([5 + x, -2.4]) + turned for x in (-0.35, 0.35)]
     assert crossed(pair((0, 5), straight(1)) + away) == []
 
 
