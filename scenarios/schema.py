@@ -219,6 +219,9 @@ class Scenario(Model):
     duration: Annotated[float, Field(gt=0, le=3600)] = Field(20.0, description="recorded time, s")
     warmup: Annotated[float, Field(ge=0, le=60)] = Field(2.0, description="unrecorded time before the first frame, s")
     turn_deg: Value = Field(0.0, description="turns the whole script (not walls) about the world's middle")
+    lead: Value = Field(
+        0.0, description="s; how much further on their way all who walk start (negative: back), one draw for all"
+    )
     mirror: bool = Field(False, description="a coin decides whether the script is mirrored left to right")
     world: World = World()
     camera: CameraSpec = CameraSpec()

@@ -20,15 +20,17 @@ from sim.types import Array, Scene
 BODY_RADIUS = 0.20  # m, in the physics
 ROOM = 0.55  # m between people of different groups at the start
 TRIES = 400
+STANDS = 0.3  # m: a group whose goal is nearer than this stands
 
 
 @dataclass(frozen=True)
 class Frame2:
-    """The turn and the mirror that a seed gives to a whole script."""
+    """The turn, the mirror and the lead (s) that a seed gives to a whole script."""
 
     middle: Array
     turn: float
     flip: float
+    lead: float = 0.0
 
     def point(self, p: Array) -> Array:
         """A point of the script in the world."""
@@ -75,7 +77,7 @@ def frame_of(scenario: Scenario, seed: int, repeat: int) -> Frame2:
     r = rng(seed, "layout", repeat=repeat)
     turn = np.deg2rad(draw(scenario.turn_deg, r))
     flip = -1.0 if scenario.mirror and r.random() < 0.5 else 1.0
-    return Frame2(np.array(scenario.world.size) / 2, float(turn), flip)
+    return Frame2(np.array(scenario.world.size) / 2, float(turn), flip, draw(scenario.lead, r))
 
 
 def point_of(point: Point, frame: Frame2, r: np.random.Generator) -> Array:
@@ -154,6 +156,7 @@ def _find_room(
         way = first - party.start
         length = float(np.linalg.norm(way))
         heading = way / length if length > 1e-6 else frame.vector(np.array([1.0, 0.0]))
+        party.start = party.start + min(frame.lead * party.speed, length / 2) * heading * (length > STANDS)
         party.pos = place(walking(len(party.members), party.spacing), party.start, heading)
         if _is_free(party.pos, scene, taken if party.enter == 0 else []):
             return

@@ -9,7 +9,7 @@ import numpy as np
 
 from scenarios.distribution import draw
 from scenarios.schema import Merge, Queue, Scenario, Split, expand
-from sim.cast import Party, frame_of, point_of, walking_speed
+from sim.cast import STANDS, Party, frame_of, point_of, walking_speed
 from sim.formation import assign, place, standing, walking
 from sim.meeting import meeting_point, part_sizes, share_out
 from sim.navigation import Navigator
@@ -62,7 +62,7 @@ class Script:
 
     def walks(self, party: Party) -> bool:
         """Whether the group has somewhere to go at its start."""
-        return bool(np.linalg.norm(party.goal - party.start) > 0.3)
+        return bool(np.linalg.norm(party.goal - party.start) > STANDS)
 
     def enter(self, party: Party) -> None:
         """The group comes: its way begins, its members take their places."""
