@@ -219,27 +219,23 @@ def _avoid_groups(groups, n_members, p, push):  # type: ignore[no-untyped-def]
     """Groups as discs: acceleration of each group as a whole; the smaller yields more."""
     now = groups.now
     strength, horizon, radius, reach, cap = p[9], p[10], p[11], p[13], p[14]
-    m = 0
+    push[:] = 0.0
     live = np.empty(len(now), np.int64)
+    m = 0
     for g in range(len(now)):
-        push[g, 0] = 0.0
-        push[g, 1] = 0.0
-        if n_members[g] > 0 and _disc_weight(groups, g) > 0.0:
-            live[m] = g
-            m += 1
-    order = np.argsort(now[live[:m], 1])
+        live[m] = g
+        m += n_members[g] > 0 and _disc_weight(groups, g) > 0.0
+    live = live[:m][np.argsort(now[live[:m], 1])]
+    rows = np.empty((6, m))  # count, middle x y, velocity x y, disc radius; sorted by x
     for s in range(m):
-        a = live[order[s]]
-        for t in range(s + 1, m):
-            b = live[order[t]]
-            dx = now[a, 1] - now[b, 1]
-            if dx < -reach:
-                break
-            dy = now[a, 2] - now[b, 2]
-            if abs(dy) > reach or dx * dx + dy * dy > reach * reach:
-                continue
-            if now[a, 0] + now[b, 0] < 2.5:
-                continue
+        for k in range(6):
+            rows[k, s] = now[live[s], k]
+    found = np.empty(m + 1, np.int64)
+    for s in range(m):
+        a = live[s]
+        for k in range(_near_discs(rows, s, m, reach, radius, found)):
+            b = live[found[k]]
+            dx, dy = now[a, 1] - now[b, 1], now[a, 2] - now[b, 2]
             wx, wy = now[a, 3] - now[b, 3], now[a, 4] - now[b, 4]
             size = now[a, 5] + now[b, 5] + 2.0 * radius
             fx, fy = _power_law(dx, dy, wx, wy, size, strength, horizon, cap)
@@ -250,6 +246,25 @@ def _avoid_groups(groups, n_members, p, push):  # type: ignore[no-untyped-def]
             push[a, 1] += share * fy
             push[b, 0] -= (2.0 - share) * fx
             push[b, 1] -= (2.0 - share) * fy
+
+
+@njit(cache=True, inline="always")
+def _near_discs(rows, s, m, reach, radius, found):  # type: ignore[no-untyped-def]
+    """Write to `found` which discs after s, sorted by x, are within reach, about to collide, not both of one person."""
+    count, x, y, vx, vy, disc = rows[0], rows[1], rows[2], rows[3], rows[4], rows[5]
+    k = 0
+    for t in range(s + 1, m):
+        dx, dy = x[s] - x[t], y[s] - y[t]
+        if dx < -reach:
+            break
+        wx, wy = vx[s] - vx[t], vy[s] - vy[t]
+        size = disc[s] + disc[t] + 2.0 * radius
+        cross = dx * wy - dy * wx
+        root = (wx * wx + wy * wy) * size * size - cross * cross
+        found[k] = t
+        near = (dx * dx + dy * dy <= reach * reach) & (count[s] + count[t] >= 2.5)
+        k += near & (dx * wx + dy * wy < 0.0) & (root > 1e-12)
+    return k
 
 
 @njit(cache=True, inline="always")
@@ -285,17 +300,11 @@ def _pair(state, tag, i, j, dx, dy, d2, p, out):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True)
-def _pairs(state, tag, p, out):  # type: ignore[no-untyped-def]
+def _cells(state, reach):  # type: ignore[no-untyped-def]
+    """People sorted by square cells at least `reach` wide: order (N,), start of each cell in it, cells per row."""
     n = len(state)
-    reach = p[12]
     if n <= BRUTE:
-        for i in range(n):
-            for j in range(i + 1, n):
-                dx, dy = state[i, 0] - state[j, 0], state[i, 1] - state[j, 1]
-                d2 = dx * dx + dy * dy
-                if d2 < reach * reach:
-                    _pair(state, tag, i, j, dx, dy, d2, p, out)
-        return
+        return np.arange(n), np.array([0, n]), 1
     x0, y0 = state[0, 0], state[0, 1]
     x1, y1 = x0, y0
     for i in range(n):
@@ -315,27 +324,49 @@ def _pairs(state, tag, p, out):  # type: ignore[no-untyped-def]
     for i in range(n):
         order[fill[cells[i]]] = i
         fill[cells[i]] += 1
-    for cy in range(ny):
-        for cx in range(nx):
-            c = cy * nx + cx
-            for s in range(start[c], start[c + 1]):
-                i = order[s]
-                for t in range(s + 1, start[c + 1]):
-                    _near(state, tag, i, order[t], reach, p, out)
-                if cx + 1 < nx:
-                    for t in range(start[c + 1], start[c + 2]):
-                        _near(state, tag, i, order[t], reach, p, out)
-                if cy + 1 < ny:
-                    for t in range(start[c + nx - (cx > 0)], start[c + nx + (cx + 1 < nx) + 1]):
-                        _near(state, tag, i, order[t], reach, p, out)
+    return order, start, nx
 
 
 @njit(cache=True, inline="always")
-def _near(state, tag, i, j, reach, p, out):  # type: ignore[no-untyped-def]
-    dx, dy = state[i, 0] - state[j, 0], state[i, 1] - state[j, 1]
-    d2 = dx * dx + dy * dy
-    if d2 < reach * reach:
-        _pair(state, tag, i, j, dx, dy, d2, p, out)
+def _candidates(rows, s, first, last, reach, touch, radius, found, m):  # type: ignore[no-untyped-def]
+    """Append to `found` who of first … last may act on s: touching, or on the way to a collision. No branches."""
+    x, y, vx, vy = rows[0], rows[1], rows[2], rows[3]
+    for t in range(first, last):
+        dx, dy = x[s] - x[t], y[s] - y[t]
+        wx, wy = vx[s] - vx[t], vy[s] - vy[t]
+        d2 = dx * dx + dy * dy
+        cross = dx * wy - dy * wx
+        root = (wx * wx + wy * wy) * radius * radius - cross * cross
+        found[m] = t
+        m += (d2 < reach) & ((d2 < touch) | ((dx * wx + dy * wy < 0.0) & (root > 1e-12)))
+    return m
+
+
+@njit(cache=True)
+def _pairs(state, tag, p, out):  # type: ignore[no-untyped-def]
+    """Forces between all pairs within reach, each pair once."""
+    n = len(state)
+    order, start, nx = _cells(state, p[12])
+    reach, radius = p[12] * p[12], 2.0 * p[11]
+    touch = max(p[4], 0.5, radius) ** 2
+    rows = np.empty((4, n))
+    for s in range(n):
+        for k in range(4):
+            rows[k, s] = state[order[s], k]
+    found = np.empty(n + 1, np.int64)
+    for c in range(len(start) - 1):
+        left, right = c % nx > 0, c % nx + 1 < nx
+        above = c + nx < len(start) - 1
+        for s in range(start[c], start[c + 1]):
+            m = _candidates(rows, s, s + 1, start[c + 1 + right], reach, touch, radius, found, 0)
+            if above:
+                first, last = start[c + nx - left], start[c + nx + right + 1]
+                m = _candidates(rows, s, first, last, reach, touch, radius, found, m)
+            i = order[s]
+            for k in range(m):
+                j = order[found[k]]
+                dx, dy = state[i, 0] - state[j, 0], state[i, 1] - state[j, 1]
+                _pair(state, tag, i, j, dx, dy, dx * dx + dy * dy, p, out)
 
 
 @njit(cache=True)
@@ -346,6 +377,9 @@ def _walls(state, obstacles, p, out):  # type: ignore[no-untyped-def]
         for k in range(len(obstacles.walls)):
             ax, ay = obstacles.walls[k, 0], obstacles.walls[k, 1]
             ux, uy = obstacles.walls[k, 2] - ax, obstacles.walls[k, 3] - ay
+            side = (x - ax) * uy - (y - ay) * ux
+            if side * side > 1.5 * (ux * ux + uy * uy):  # further than 1.2 m from its line: the common case
+                continue
             s = ((x - ax) * ux + (y - ay) * uy) / (ux * ux + uy * uy + STILL)
             s = min(1.0, max(0.0, s))
             dx, dy = x - ax - s * ux, y - ay - s * uy
