@@ -75,6 +75,7 @@ KEYS = {
     "duration": ("", "duration=10"),
     "warmup": ("", "warmup=2"),
     "turn_deg": ("", "turn_deg=5"),
+    "lead": ("", "lead=1.5"),
     "mirror": ("", "mirror=true"),
     "world.size": ("", "world.size=[25, 20]"),
     "world.walls": ("", "world.walls.1=[16.5, 3.2, 18.5, 3.2]"),
