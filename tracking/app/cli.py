@@ -127,6 +127,9 @@ def score(
     similarity: Annotated[
         Literal["boxes", "ground", "image"] | None, typer.Option(help="What is compared; chosen where absent.")
     ] = None,
+    group_match: Annotated[
+        Literal["hull", "members"], typer.Option("--group-match", help="By what true and estimated groups are matched.")
+    ] = "hull",
     fps: Fps = None,
     px_per_m: Scale = None,
     json: Json = False,
@@ -134,7 +137,7 @@ def score(
     """Score tracks against truth."""
     from tracking.app.score_command import score
 
-    return score(truth, tracks, similarity=similarity, fps=fps, px_per_m=px_per_m)
+    return score(truth, tracks, similarity=similarity, group_match=group_match, fps=fps, px_per_m=px_per_m)
 
 
 @app.command()

@@ -10,28 +10,34 @@ import numpy as np
 
 from scenarios.errors import InputError
 from sim.io.source import open_source
-from sim.types import Sequence, Truth
+from sim.types import Sequence
 from tracking.app.answer import Answer
 from tracking.app.meter import Meter
 from tracking.app.paired import pair, results
 from tracking.app.score_tables import tables
 from tracking.run import Run
 from tracking.scoring import evaluate
-from tracking.scoring.evaluation import Similarity
+from tracking.scoring.evaluation import IncomparableError, Scores, Similarity
+from tracking.scoring.groups import GroupMatch
 from tracking.stats import bootstrap
 
 
 @dataclass(frozen=True)
 class Row:
-    """The scores of one sequence by key, and by which similarity."""
+    """The scores of one sequence."""
 
     sequence: str
-    similarity: Similarity
-    scores: dict[str, float]
+    scores: Scores
 
 
 def score(
-    truth: Path, tracks: Path, *, similarity: Similarity | None, fps: float | None, px_per_m: float | None
+    truth: Path,
+    tracks: Path,
+    *,
+    similarity: Similarity | None,
+    group_match: GroupMatch,
+    fps: float | None,
+    px_per_m: float | None,
 ) -> Answer:
     """Scores of every sequence of `truth`, matched with `tracks` by name."""
     sequences = open_source(truth, fps=fps, px_per_m=px_per_m)
@@ -39,41 +45,34 @@ def score(
     rows = []
     with Meter("score", len(paired)) as meter:
         for sequence, result in paired:
-            rows.append(score_run(sequence, result.read(sequence), similarity))
+            rows.append(score_run(sequence, result.read(sequence), similarity, group_match))
             meter.step(sequence.name)
     return answer(rows)
 
 
-def score_run(sequence: Sequence, run: Run, similarity: Similarity | None = None) -> Row:
+def score_run(
+    sequence: Sequence, run: Run, similarity: Similarity | None = None, group_match: GroupMatch = "hull"
+) -> Row:
     """The scores of one run; InputError where the sequence is not labelled or cannot be compared so."""
     if sequence.truth is None:
         raise InputError(
             file=sequence.source.get("path", sequence.name), got="no labels", expected="a sequence with truth",
             remedy="give one with gt/",
         )  # fmt: skip
-    chosen = similarity or usual_similarity(sequence.truth, run)
     try:
-        return Row(sequence.name, chosen, evaluate(sequence.truth, run, similarity=chosen))
-    except ValueError as error:
+        return Row(sequence.name, evaluate(sequence.truth, run, similarity=similarity, group_match=group_match))
+    except IncomparableError as error:
         raise InputError(
             file=sequence.name, place="--similarity", got=str(error), expected="what both sides have",
             remedy="choose another --similarity",
         ) from None  # fmt: skip
 
 
-def usual_similarity(truth: Truth, run: Run) -> Similarity:
-    """Overlap of boxes where both sides have measured ones, else distance in the tracks' plane."""
-    some = next((tracks for tracks in run if len(tracks.id)), None)
-    if truth.box is not None and (some is None or some.box is not None):
-        return "boxes"
-    return "image" if some is not None and some.plane == "image" else "ground"
-
-
 def answer(rows: list[Row]) -> Answer:
     """Rows and their mean, for people and for --json."""
     means = summary(rows)
     data = {
-        "sequences": [{"name": row.sequence, "similarity": row.similarity, **row.scores} for row in rows],
+        "sequences": [{"name": row.sequence, "similarity": row.scores.similarity, **row.scores} for row in rows],
         "mean": means,
     }
     return Answer(data, tables(rows, means))

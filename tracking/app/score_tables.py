@@ -28,7 +28,7 @@ def tables(rows: list[Row], means: Means) -> Any:
     from rich.text import Text
 
     names = [name for name in SHOWN if name in means]
-    used = ", ".join(MEANING[kind] for kind in dict.fromkeys(row.similarity for row in rows))
+    used = ", ".join(MEANING[kind] for kind in dict.fromkeys(row.scores.similarity for row in rows))
     caption = Text(f"similarity: {used}")
     table = Table(box=None, pad_edge=False, header_style="bold", caption=caption, caption_justify="left")
     table.add_column("sequence", overflow="fold")

@@ -1,0 +1,184 @@
+"""Scores of groups: matched one to one in every frame by their hulls or by their members.
+
+After Bazzani, Cristani & Murino (2012): detection by false and missed groups, GDSR; tracking by MOTP and MOTA.
+Sums run over the frames that are labelled; a score that divides by nothing is nan.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+
+from sim.geometry import iou_pairs, pack
+from sim.types import Array, Bools, Ints
+from tracking.scoring.hota import hota
+from tracking.scoring.matching import match
+from tracking.scoring.pairs import EPS, Pairs, compare
+from tracking.scoring.sides import Crowd
+
+GroupMatch = Literal["hull", "members"]
+CORRECT = 0.6  # share of members (of either side) that makes a group a right one
+FOUND = 0.5  # similarity from which a group counts as found in F1
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Shared:
+    """How many people a true and an estimated group have in common: sorted keys (K,) of true row times G_est plus
+    estimated row, and counts (K,)."""
+
+    key: Ints
+    count: Ints
+    width: int
+
+    def of(self, i: Ints, j: Ints) -> Ints:
+        """For pairs of rows."""
+        if not len(self.key):
+            return np.zeros(len(i), np.int64)
+        sought = i * self.width + j
+        place = np.minimum(np.searchsorted(self.key, sought), len(self.key) - 1)
+        return np.where(self.key[place] == sought, self.count[place], 0)
+
+
+def shared_members(true: Crowd, est: Crowd, stands_for: Ints, people: int) -> Shared:
+    """stands_for: the true person's row of each of est's members (K,), -1 unmapped; people: how many true rows."""
+    group = np.full(people + 1, -1, np.int64)
+    group[true.who] = true.of
+    i = group[stands_for]  # -1 takes the last, which is nobody's
+    known = i >= 0
+    key, count = np.unique(i[known] * len(est) + est.of[known], return_counts=True)
+    return Shared(key, count, len(est))
+
+
+def hull_pairs(true: Crowd, est: Crowd) -> Pairs:
+    """Pairs by intersection over union of hulls."""
+    a, b = pack(true.hull), pack(est.hull)
+    width = max(a.vertex.shape[1], b.vertex.shape[1])
+    a, b = pack(true.hull, width), pack(est.hull, width)
+
+    def similarity(i: Ints, j: Ints) -> tuple[Ints, Array]:
+        s = iou_pairs(a, b, i, j)
+        some = np.flatnonzero(s > EPS)
+        return some, s[some]
+
+    return compare(true.rows, est.rows, similarity)
+
+
+def member_pairs(true: Crowd, est: Crowd, shared: Shared) -> Pairs:
+    """Pairs by Jaccard index of members; who is unmapped is in nobody's true group."""
+    n, m = true.count, est.count
+
+    def similarity(i: Ints, j: Ints) -> tuple[Ints, Array]:
+        common = shared.of(i, j)
+        some = np.flatnonzero(common)
+        return some, common[some] / (n[i[some]] + m[j[some]] - common[some])
+
+    return compare(true.rows, est.rows, similarity)
+
+
+def matched(pairs: Pairs, least: float = 0.0) -> Pairs:
+    """The pairs of the one-to-one matching of each frame with the greatest total similarity, each at least `least`."""
+    near = pairs.keep(pairs.s >= least - EPS)
+    return near.keep(match(near.frame, near.i, near.j, near.s))
+
+
+@dataclass(frozen=True, eq=False)
+class Compared:
+    """Two crowds side by side. pairs: all possible; chosen: those of the matching; found: of the matching among those
+    of similarity 0.5 and more."""
+
+    true: Crowd
+    est: Crowd
+    shared: Shared
+    pairs: Pairs
+    chosen: Pairs
+    found: Pairs
+
+
+def compare_groups(true: Crowd, est: Crowd, shared: Shared, by: GroupMatch) -> Compared:
+    """Crowds compared by hulls or by members."""
+    pairs = hull_pairs(true, est) if by == "hull" else member_pairs(true, est, shared)
+    return Compared(true, est, shared, pairs, matched(pairs), matched(pairs, FOUND))
+
+
+def group_scores(compared: Compared, frames: Bools) -> dict[str, float]:
+    """Scores over the frames f with frames[f]; keys as in the catalogue, without their prefix."""
+    c = compared.chosen
+    kept = frames[c.true.frame[c.i]]
+    i, j = c.i[kept], c.j[kept]
+    n, m = (frames[side.rows.frame] for side in (compared.true, compared.est))
+    there, said, hits = int(n.sum()), int(m.sum()), len(i)
+    misses, false = there - hits, said - hits
+    switches = switched(c.true.frame[i], c.true.id[i], c.est.id[j])
+    right, clean = _correct(compared, i, j)
+    return {
+        "1-FP": _share(there - false, there),
+        "1-FN": _share(there - misses, there),
+        **_by_frame(compared, frames, i),
+        "GDSR": _share(int(right.sum()), there),
+        "GDSR2": _share(int(clean.sum()), there),
+        "MOTP": _mean(np.hypot(*(compared.true.pos[i] - compared.est.pos[j]).T)),
+        "MOTA": _share(there - misses - false - switches, there),
+        "IDSW": float(switches),
+        "TP": float(hits),
+        "FP": float(false),
+        "FN": float(misses),
+        **detection(compared, frames),
+        **hota(compared.pairs.in_frames(frames)),
+        "size_error": _mean(np.abs(_sizes(compared.true)[i] - _sizes(compared.est)[j])),
+    }
+
+
+def _share(part: float, whole: int) -> float:
+    return part / whole if whole else float("nan")
+
+
+def _mean(values: Array) -> float:
+    known = values[np.isfinite(values)]
+    return float(known.mean()) if len(known) else float("nan")
+
+
+def _correct(compared: Compared, i: Ints, j: Ints) -> tuple[Bools, Bools]:
+    """Which matches have enough of the true members inside, and which of these enough right ones among their own."""
+    common = compared.shared.of(i, j)
+    right = common >= CORRECT * compared.true.count[i] - EPS
+    clean = right & (common >= CORRECT * compared.est.count[j] - EPS) & (common > 0)
+    return right, clean
+
+
+def _by_frame(compared: Compared, frames: Bools, i: Ints) -> dict[str, float]:
+    """Means over frames of what the paper may have meant: each frame's false and missed groups by its true ones."""
+    size = len(frames)
+    n, m = (np.bincount(side.rows.frame, minlength=size)[frames] for side in (compared.true, compared.est))
+    hits = np.bincount(compared.true.rows.frame[i], minlength=size)[frames]
+    if not len(n):
+        return {"1-FP_frames": float("nan"), "1-FN_frames": float("nan")}
+    return {
+        "1-FP_frames": float(1 - ((m - hits) / np.maximum(n, 1)).mean()),
+        "1-FN_frames": float(1 - ((n - hits) / np.maximum(n, 1)).mean()),
+    }
+
+
+def switched(frame: Ints, true: Ints, est: Ints) -> int:
+    """How often a true id is matched with another estimated id than the last time; K matches."""
+    order = np.lexsort((frame, true))
+    t, e = true[order], est[order]
+    return int(((t[1:] == t[:-1]) & (e[1:] != e[:-1])).sum())
+
+
+def detection(compared: Compared, frames: Bools) -> dict[str, float]:
+    """F1, precision, recall at a similarity of 0.5."""
+    f = compared.found
+    hits = int(frames[f.true.frame[f.i]].sum())
+    there, said = (int(frames[side.rows.frame].sum()) for side in (compared.true, compared.est))
+    return {
+        "F1": _share(2 * hits, there + said),
+        "precision": _share(hits, said),
+        "recall": _share(hits, there),
+    }
+
+
+def _sizes(groups: Crowd) -> Array:
+    """People in each group: as it says, else its members."""
+    return np.where(np.isfinite(groups.size), groups.size, groups.count)

@@ -1,0 +1,137 @@
+"""Events of both sides in terms of true people, so that they can be compared: who was concerned, who came from whom."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Sequence
+
+import numpy as np
+
+from sim.types import Array, Bools, GroupEvent, Ints, Tracks
+from tracking.scoring.events import COUNTS_AS, HEADLINE, KINDS, LATE, Part, Told
+from tracking.scoring.lives import Lives
+from tracking.scoring.pairs import Rows
+from tracking.scoring.sides import Crowd, People
+
+Parts = tuple[Part, ...]
+CHANGES = frozenset(HEADLINE) | {kind for kind, as_ in COUNTS_AS.items() if as_ in HEADLINE}
+
+
+def true_events(
+    events: Iterable[GroupEvent], people: Rows, group: Ints, places: Array | None, frames: Bools
+) -> list[Told]:
+    """The truth's events that start in frames f with frames[f]; group (R,) of people.
+
+    places (R, 2): where people are in the plane compared, if that is not the events' own.
+    """
+    lives = Lives(people)
+
+    def tell(event: GroupEvent) -> Told:
+        before = _by_label(event.members, lambda m: _label(lives.last(m, event.start - 1, 0), group))
+        after = _by_label(event.members, lambda m: _label(lives.next(m, event.start, 0), group))
+        pos = event.pos if places is None else _middle(event, lives, places)
+        parents, children = _told_by_labels(event, before, after)
+        return Told(event.kind, event.start, None, Part(frozenset(event.members)), pos, parents, children)
+
+    return [tell(event) for event in events if _counts(event, frames)]
+
+
+def _counts(event: GroupEvent, frames: Bools) -> bool:
+    known = event.kind in KINDS or event.kind in COUNTS_AS
+    return known and 0 <= event.start < len(frames) and bool(frames[event.start])
+
+
+def _label(row: int, group: Ints) -> int:
+    return int(group[row]) if row >= 0 else -1
+
+
+def _by_label(members: Sequence[int], label: Callable[[int], int]) -> list[list[int]]:
+    """Members by their group; who has none is alone."""
+    parts: dict[tuple[int, int], list[int]] = {}
+    for m in members:
+        g = label(m)
+        parts.setdefault((g, -1) if g >= 0 else (-1, m), []).append(m)
+    return list(parts.values())
+
+
+def _told_by_labels(
+    event: GroupEvent, before: list[list[int]], after: list[list[int]]
+) -> tuple[Parts | None, Parts | None]:
+    """Parents and children. Labels for life are the same before and after: only form and dissolve speak for
+    themselves then."""
+    if event.kind not in CHANGES:
+        return None, None
+    if sorted(before) == sorted(after):
+        one, alone = [list(event.members)], [[m] for m in event.members]
+        known = {"form": (alone, one), "dissolve": (one, alone)}
+        if event.kind not in known:
+            return None, None
+        before, after = known[event.kind]
+    parents, children = (tuple(Part(frozenset(part)) for part in parts) for parts in (before, after))
+    return parents, children
+
+
+def _middle(event: GroupEvent, lives: Lives, places: Array) -> tuple[float, float]:
+    rows = [row for m in event.members if (row := lives.nearest(m, event.start, 0)) >= 0]
+    if not rows:
+        return float("nan"), float("nan")
+    x, y = places[rows].mean(axis=0)
+    return float(x), float(y)
+
+
+def told_events(
+    answers: Sequence[Tracks], people: People, stands_for: Ints, true: Rows, frames: Bools, fps: float
+) -> list[Told]:
+    """A tracker's events of people that start in frames f with frames[f]. stands_for (R,): the row of `true` that each
+    of `people` is mapped to, -1 nobody.
+
+    A member is who they are mapped to at the event's start, or in the nearest frame within 1 s of it. Parents are the
+    groups of the frame before the one in which the tracker said so, children those of that frame.
+    """
+    reach = round(LATE * fps)
+    identified, lives, label = Lives(people.rows, stands_for >= 0), Lives(people.rows), people.group
+
+    def part(members: Sequence[int], start: int) -> Part:
+        rows = [identified.nearest(m, start, reach) for m in members]
+        who = frozenset(int(true.id[stands_for[row]]) for row in rows if row >= 0)
+        return Part(who, len(members) - len(who))
+
+    def tell(event: GroupEvent, said: int) -> Told:
+        before = _by_label(event.members, lambda m: _label(lives.last(m, said - 1, reach), label))
+        after = _by_label(event.members, lambda m: _label(lives.next(m, said, reach), label))
+        parents, children = (tuple(part(p, event.start) for p in parts) for parts in (before, after))
+        members = part(event.members, event.start)
+        return Told(event.kind, event.start, said, members, event.pos, parents, children)
+
+    return [tell(event, said) for event, said in _said(answers, frames) if event.members]
+
+
+def told_without_people(
+    answers: Sequence[Tracks], groups: Crowd, true: Rows, frames: Bools, fps: float, people: bool
+) -> list[Told]:
+    """The events of a method that names no members: compared by their places, their parents and children by who is in
+    the hulls. groups: with rows of `true` for members. people: whether the method does name some elsewhere."""
+    reach = round(LATE * fps)
+    lives = Lives(groups.rows)
+    order = np.argsort(groups.of, kind="stable")
+    cuts = np.searchsorted(groups.of[order], np.arange(len(groups) + 1))
+    who = true.id[groups.who[order]]
+
+    def part(row: int) -> Part:
+        return Part(frozenset(who[cuts[row] : cuts[row + 1]].tolist()) if row >= 0 else frozenset())
+
+    def tell(event: GroupEvent, said: int) -> Told:
+        parents = tuple(part(lives.last(g, said - 1, reach)) for g in event.before)
+        children = tuple(part(lives.next(g, said, reach)) for g in event.after)
+        return Told(event.kind, event.start, said, None, event.pos, parents, children)
+
+    return [tell(event, said) for event, said in _said(answers, frames) if not (people and event.members)]
+
+
+def _said(answers: Sequence[Tracks], frames: Bools) -> list[tuple[GroupEvent, int]]:
+    """A tracker's events and the frame in which each was said."""
+    return [
+        (event, t.index if event.emitted is None else event.emitted)
+        for t in answers
+        for event in t.events
+        if _counts(event, frames)
+    ]
