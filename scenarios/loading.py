@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 
 from scenarios import document, override, suite
@@ -19,11 +19,15 @@ __all__ = ["Entry", "dump", "load", "names", "resolve", "suite_names"]
 
 @dataclass(frozen=True)
 class Entry:
-    """One sequence to make: its unique name, what to simulate, and the number of a suite's `repeat` (0: none)."""
+    """One sequence to make: its unique name, what to simulate, and the number of a suite's `repeat` (0: none).
+
+    file: where the scenario stands, for messages.
+    """
 
     name: str
     scenario: Scenario
     repeat: int = 0
+    file: str = field(default="", compare=False)
 
 
 def load(name_or_path: str | Path, set: Iterable[str] = ()) -> Scenario:
@@ -55,7 +59,7 @@ def resolve(name: str, set: Iterable[str] = ()) -> list[Entry]:
             got=repr(name), expected="a scenario, a suite or a *.toml file", remedy=document.nearest(name, known)
         )
     scenario = load(name, settings)
-    return [Entry(scenario.name, scenario)]
+    return [Entry(scenario.name, scenario, file=str(document.find(name)))]
 
 
 def _entries(path: Path, settings: tuple[str, ...]) -> list[Entry]:
@@ -66,7 +70,8 @@ def _entries(path: Path, settings: tuple[str, ...]) -> list[Entry]:
         key = (line.scenario, line.settings)
         if key not in loaded:
             loaded[key] = _load_line(line, path, settings)
-        entries.append(Entry(line.name, loaded[key].model_copy(update={"name": line.name}), line.repeat))
+        scenario = loaded[key].model_copy(update={"name": line.name})
+        entries.append(Entry(line.name, scenario, line.repeat, f"{path}: entry {line.name}"))
     return entries
 
 

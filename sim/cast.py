@@ -98,7 +98,7 @@ def cast(scenario: Scenario, scene: Scene, seed: int, repeat: int) -> list[Party
     for k, group in enumerate(scenario.group):
         for n, name in enumerate(group_names(group)):
             party = _party(scenario, group, name, (k, n), column, frame, seed, repeat)
-            _find_room(party, group, (k, n), frame, scene, taken, seed, repeat)
+            _find_room(scenario, party, group, (k, n), frame, scene, taken, seed, repeat)
             party.index = len(parties)
             column += len(party.members)
             parties.append(party)
@@ -139,6 +139,7 @@ def walking_speed(free: list[float], slowdown: float) -> float:
 
 
 def _find_room(
+    scenario: Scenario,
     party: Party,
     group: Group,
     key: tuple[int, int],
@@ -161,7 +162,7 @@ def _find_room(
         if _is_free(party.pos, scene, taken if party.enter == 0 else []):
             return
     raise InputError(
-        file=f"scenario {party.name}",
+        file=f"scenario {scenario.name}",
         place=f"group.{group.id}.start (seed {seed})",
         got="no free place" if _is_drawn(group.start) else "a place in a wall, a pillar or another group",
         expected=f"{len(party.members)} people {ROOM} m clear of others and {BODY_RADIUS} m of walls",

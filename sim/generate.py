@@ -15,7 +15,7 @@ from pathlib import Path
 from scenarios.errors import FlockscopeError, InputError, WorkError
 from scenarios.loading import Entry
 from sim.io import store
-from sim.io.atomic import refusal, sweep, write_file
+from sim.io.atomic import refusal, sweep, write_file, write_folder
 from sim.splits import split_of
 
 Progress = Callable[[int, int, str], None]
@@ -115,25 +115,22 @@ def is_done(job: Job) -> bool:
 
 
 def make(job: Job) -> None:
-    """Simulate and store one sequence; any failure as WorkError or InputError that names it."""
+    """Simulate and store one sequence; any failure as WorkError or InputError that names the scenario's file."""
     from scenarios.loading import dump
     from sim.sequence import simulate
 
+    entry = job.entry
     try:
-        sequence = simulate(job.entry.scenario, job.seed, job.entry.repeat)
-        sequence = replace(sequence, name=job.name)
-        store.write_sequence(
-            job.folder, sequence, scenario=dump(job.entry.scenario), seed=job.seed, repeat=job.entry.repeat
-        )
+        sequence = replace(simulate(entry.scenario, job.seed, entry.repeat), name=job.name)
+        files = store.sequence_files(sequence, scenario=dump(entry.scenario), seed=job.seed, repeat=entry.repeat)
     except FlockscopeError as error:
-        if error.file:
-            raise
-        raise type(error)(**{**error.as_dict(), "file": job.name}) from error
+        raise type(error)(**{**error.as_dict(), "file": entry.file or error.file or job.name}) from error
     except Exception as error:
         raise WorkError(
             file=job.name, got=f"{type(error).__name__}: {error}", expected="a sequence",
             remedy="report it with the scenario and seed",
         ) from error  # fmt: skip
+    write_folder(job.folder, files)
 
 
 def _attempt(job: Job) -> FlockscopeError | None:
@@ -144,14 +141,14 @@ def _attempt(job: Job) -> FlockscopeError | None:
     return None
 
 
-def _run(jobs: list[Job], workers: int, done: Callable[[Job], None]) -> list[FlockscopeError]:
-    """Make all; the errors in the order of the jobs."""
+def _run(jobs: list[Job], workers: int, done: Callable[[Job], None]) -> dict[str, FlockscopeError]:
+    """Make all; the errors by sequence, in the order of the jobs."""
     errors: dict[str, FlockscopeError] = {}
     for job, error in _attempts(jobs, min(workers, len(jobs))):
         if error is not None:
             errors[job.name] = error
         done(job)
-    return [errors[job.name] for job in jobs if job.name in errors]
+    return {job.name: errors[job.name] for job in jobs if job.name in errors}
 
 
 def _attempts(jobs: list[Job], workers: int) -> Iterator[tuple[Job, FlockscopeError | None]]:
@@ -184,16 +181,16 @@ def write_seqmap(root: Path, split: str) -> None:
         write_file(root / "seqmaps" / f"flockscope-{split}.txt", "\n".join(["name", *complete, ""]).encode())
 
 
-def _summary(errors: list[FlockscopeError], total: int) -> FlockscopeError:
-    """The first error, and how many there were; a single one as it is."""
-    first = errors[0]
+def _summary(errors: dict[str, FlockscopeError], total: int) -> FlockscopeError:
+    """The first error, and which other sequences failed; a single one as it is."""
+    first, *_ = errors.values()
     if len(errors) == 1:
         return first
-    others = ", ".join(sorted(e.file for e in errors[1:])[:5])
-    kind = type(first) if len({type(e) for e in errors}) == 1 else WorkError
+    others = ", ".join(list(errors)[1:6]) + (", …" if len(errors) > 6 else "")
+    kind = type(first) if len({type(e) for e in errors.values()}) == 1 else WorkError
     return kind(
         file=first.file, place=first.place, got=f"{first.got} (and {len(errors) - 1} more of {total}: {others})",
-        expected=first.expected, remedy=f"{first.remedy}; the others are kept",
+        expected=first.expected, remedy=first.remedy + ("" if len(errors) == total else "; the others are kept"),
     )  # fmt: skip
 
 

@@ -62,7 +62,7 @@ def solve(spec: CameraSpec, motion: Motion) -> Camera:
     aimed = _aim(everybody, motion, spec.crop)
     camera = _top(spec, aimed) if spec.kind == "top" else _pinhole(spec, aimed)
     if not spec.crop:
-        _refuse_leavers(camera, spec, everybody, motion.name)
+        _refuse_leavers(camera, spec, everybody, motion)
     return camera
 
 
@@ -173,7 +173,7 @@ def _top(spec: CameraSpec, bodies: Bodies) -> Camera:
     return _camera(spec, np.array([*xy, spec.height or TOP_HEIGHT]), rotation, scale=scale)
 
 
-def _refuse_leavers(camera: Camera, spec: CameraSpec, bodies: Bodies, name: str) -> None:
+def _refuse_leavers(camera: Camera, spec: CameraSpec, bodies: Bodies, motion: Motion) -> None:
     """InputError for the first body that is not wholly inside the image."""
     if camera.kind == "top":
         sides = np.concatenate([camera.rotation[:2], -camera.rotation[:2]])
@@ -189,8 +189,8 @@ def _refuse_leavers(camera: Camera, spec: CameraSpec, bodies: Bodies, name: str)
     k = int(out[0])
     x, y = bodies.pos3[k, :2]
     raise InputError(
-        file=f"scenario {name}",
-        place=", ".join(f"camera.{key}" for key in given) or "camera",
+        file=f"scenario {motion.name}",
+        place=(", ".join(f"camera.{key}" for key in given) or "camera") + f" (seed {motion.seed})",
         got=f"person {bodies.id[k]} out of view in frame {bodies.frame[k]} at ({x:.1f}, {y:.1f})",
         expected="all people in view in every frame",
         remedy=f"leave out {' and '.join(given) or 'tilt_deg'} to have the view solved, or set camera.crop = true",
