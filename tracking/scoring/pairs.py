@@ -10,6 +10,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -18,12 +19,13 @@ from numpy.typing import NDArray
 from sim.types import Array, Bools, Ints
 
 EPS = float(np.finfo(float).eps)
-CHUNK = 400_000  # pairs compared at once: bounds memory, stays in the cache
+CHUNK = 200_000  # pairs compared at once: bounds memory, stays in the cache
+SLACK = 1e-6  # of the extent of a frame: more than rounding can move a place on the line of all frames
 
 
 @dataclass(frozen=True, slots=True)
 class Rows:
-    """Things in frames, R rows sorted by frame: frame (R,), id (R,) any non-negative or negative numbers."""
+    """Things in frames, R rows sorted by frame: frame (R,) >= 0, id (R,) any numbers, none twice in one frame."""
 
     frame: Ints
     id: Ints
@@ -31,14 +33,23 @@ class Rows:
     def __len__(self) -> int:
         return len(self.frame)
 
-    def keep(self, mask: Bools) -> Rows:
+    def keep(self, mask: Bools | slice) -> Rows:
         """The rows where mask (R,) is true."""
         return Rows(self.frame[mask], self.id[mask])
+
+    def unique(self, side: str) -> None:
+        """ValueError where an id is twice in one frame."""
+        frame, number = self.frame, numbered(self.id)[1]
+        key = np.sort(frame * (int(number.max()) + 1 if len(number) else 1) + number)
+        if (key[1:] == key[:-1]).any():
+            order = np.lexsort((self.id, frame))
+            k = order[1:][(np.diff(frame[order]) == 0) & (np.diff(self.id[order]) == 0)][0]
+            raise ValueError(f"{side}: id {self.id[k]} is twice in frame {frame[k]}")
 
 
 @dataclass(frozen=True)
 class Pairs:
-    """Possible pairs, K of them sorted by (frame, true row, estimated row).
+    """Possible pairs, K of them sorted by true row (and so by frame).
 
     true, est: all rows of both sides; i, j (K,): row of each side; s (K,): similarity, 0 < s <= 1.
     """
@@ -48,6 +59,11 @@ class Pairs:
     i: Ints
     j: Ints
     s: Array
+
+    @property
+    def frame(self) -> Ints:
+        """Frame of each pair (K,)."""
+        return self.true.frame[self.i]
 
     def keep(self, mask: Bools) -> Pairs:
         """The same rows with the pairs where mask (K,) is true."""
@@ -71,6 +87,12 @@ class Pairs:
         distinct, which = numbered(key)
         return distinct // width, distinct % width, which
 
+    def until(self, frame: int) -> Pairs:
+        """Only what lies in the frames up to `frame`: views, no copies."""
+        n, m = (int(np.searchsorted(rows.frame, frame, side="right")) for rows in (self.true, self.est))
+        k = int(np.searchsorted(self.i, n))
+        return Pairs(self.true.keep(slice(n)), self.est.keep(slice(m)), self.i[:k], self.j[:k], self.s[:k])
+
     def in_frames(self, mask: Bools) -> Pairs:
         """Only what lies in the frames f with mask[f] (indexed by frame number)."""
         true, est = mask[self.true.frame], mask[self.est.frame]
@@ -82,61 +104,83 @@ class Pairs:
 
 
 def numbered(values: Ints) -> tuple[Ints, Ints]:
-    """Distinct values in order, and the place of each among them; counting instead of sorting where numbers are small."""
+    """Distinct values in order, and the place of each among them; counted instead of sorted where numbers are small."""
     if len(values) == 0:
         return np.zeros(0, np.int64), np.zeros(0, np.int64)
     low, high = int(values.min()), int(values.max())
     if high - low > 4 * len(values) + 1000:
         distinct, place = np.unique(values, return_inverse=True)
         return distinct, place.astype(np.int64)
-    seen = np.bincount(values - low) > 0
+    seen = np.zeros(high - low + 1, bool)
+    seen[values - low] = True
     place = np.cumsum(seen) - 1
     return np.flatnonzero(seen) + low, place[values - low]
 
 
-def same_frame(a: Ints, b: Ints) -> Iterator[tuple[Ints, Ints]]:
-    """All (row of a, row of b) of equal frame, a and b sorted, in portions of about CHUNK pairs."""
-    low = np.searchsorted(b, a, side="left")
-    count = np.searchsorted(b, a, side="right") - low
-    total = np.concatenate(([0], np.cumsum(count)))
-    cuts = [0]
-    while cuts[-1] < len(a):
-        cuts.append(max(int(np.searchsorted(total, total[cuts[-1]] + CHUNK, side="right")) - 1, cuts[-1] + 1))
-    for first, last in zip(cuts[:-1], cuts[1:], strict=True):
-        n = count[first:last]
-        i = np.repeat(np.arange(first, last), n)
-        start = low[first:last] - (total[first:last] - total[first])
-        yield i, np.arange(len(i)) + np.repeat(start, n)
+Similarity = Callable[[Ints, Ints], tuple[Ints, Array]]
+"""Takes rows (i, j) of both sides; returns which of these pairs are possible, and how similar those are."""
 
 
-def compare(true: Rows, est: Rows, similarity: Callable[[Ints, Ints], tuple[Ints, Array]]) -> Pairs:
-    """Pairs by a function that takes rows (i, j) and returns which of them are possible and how similar those are."""
-    found: list[tuple[Ints, Ints, Array]] = []
-    for i, j in same_frame(true.frame, est.frame):
+def compare(true: Rows, est: Rows, similarity: Similarity, within: tuple[Array, Array, Array] | None = None) -> Pairs:
+    """Pairs by a similarity, asked for all rows of one frame, or for those with low[i] <= at[j] <= high[i] and a few
+    more where `within` = (low, high (R,) of the true rows, at (R,) of the estimated ones) is given."""
+    found = [(np.zeros(0, np.int64), np.zeros(0, np.int64), np.zeros(0))]
+    for i, j in same_frame(true.frame, est.frame) if within is None else _near(true, est, *within):
         kept, s = similarity(i, j)
         found.append((i[kept], j[kept], s))
-    if not found:
-        none = np.zeros(0, np.int64)
-        return Pairs(true, est, none, none, np.zeros(0))
     return Pairs(true, est, *(np.concatenate(part) for part in zip(*found, strict=True)))
+
+
+def same_frame(a: Ints, b: Ints) -> Iterator[tuple[Ints, Ints]]:
+    """All (row of a, row of b) of equal frame, a and b sorted, in portions of about CHUNK pairs."""
+    first = np.searchsorted(b, a, side="left")
+    return _portions(first, np.searchsorted(b, a, side="right") - first)
+
+
+def _portions(first: Ints, count: Ints) -> Iterator[tuple[Ints, Ints]]:
+    """(k, first[k] + 0 … count[k] - 1) for all k, in portions of about CHUNK."""
+    total = np.concatenate(([0], np.cumsum(count)))
+    cuts = [0]
+    while cuts[-1] < len(count):
+        cuts.append(max(int(np.searchsorted(total, total[cuts[-1]] + CHUNK, side="right")) - 1, cuts[-1] + 1))
+    for begin, end in pairwise(cuts):
+        n = count[begin:end]
+        k = np.repeat(np.arange(begin, end), n)
+        yield k, np.arange(len(k)) + np.repeat(first[begin:end] - (total[begin:end] - total[begin]), n)
+
+
+def _near(a: Rows, b: Rows, low: Array, high: Array, at: Array) -> Iterator[tuple[Ints, Ints]]:
+    """Those of same_frame with low[row of a] <= at[row of b] <= high[row of a], and a few more; a row with a number that
+    is not finite is near nothing. All frames stand on one line, one after the other, and one search finds the rest."""
+    finite = at[np.isfinite(at)]
+    least, most = (float(finite.min()), float(finite.max())) if len(finite) else (0.0, 0.0)
+    slack = SLACK * (most - least + 1)
+    span = most - least + 3 * slack
+    place = b.frame * span + (at - least)
+    order = np.argsort(place, kind="stable")
+    line = place[order]
+    first = np.searchsorted(line, a.frame * span + np.maximum(low - least, 0.0) - slack, side="left")
+    last = np.searchsorted(line, a.frame * span + np.minimum(high - least, most - least) + slack, side="right")
+    count = np.where(np.isfinite(low + high), np.maximum(last - first, 0), 0)
+    return ((i, order[j]) for i, j in _portions(first, count))
 
 
 def box_pairs(true: Rows, est: Rows, true_box: Array, est_box: Array) -> Pairs:
     """Pairs by intersection over union of boxes (R, 4) left, top, width, height; boxes without area match nothing."""
-    a, b = _edges(true_box), _edges(est_box)
+    (la, ta, ra, ba), (lb, tb, rb, bb) = _edges(true_box), _edges(est_box)
     area_a, area_b = (np.maximum(box[:, 2], 0) * np.maximum(box[:, 3], 0) for box in (true_box, est_box))
+    widest = float(np.nanmax(est_box[:, 2], initial=0.0))
 
     def similarity(i: Ints, j: Ints) -> tuple[Ints, Array]:
-        near = np.flatnonzero((a[0][i] < b[2][j]) & (b[0][j] < a[2][i]))
-        i, j = i[near], j[near]
-        width = np.minimum(a[2][i], b[2][j]) - np.maximum(a[0][i], b[0][j])
-        height = np.minimum(a[3][i], b[3][j]) - np.maximum(a[1][i], b[1][j])
-        common = width * np.maximum(height, 0)
-        union = area_a[i] + area_b[j] - common
+        width = np.minimum(ra[i], rb[j]) - np.maximum(la[i], lb[j])
+        height = np.minimum(ba[i], bb[j]) - np.maximum(ta[i], tb[j])
+        meet = np.flatnonzero((width > 0) & (height > 0))
+        common = width[meet] * height[meet]
+        union = area_a[i[meet]] + area_b[j[meet]] - common
         some = common > EPS * np.maximum(union, EPS)
-        return near[some], common[some] / union[some]
+        return meet[some], common[some] / union[some]
 
-    return compare(true, est, similarity)
+    return compare(true, est, similarity, (la - widest, ra, lb))
 
 
 def _edges(box: Array) -> tuple[Array, Array, Array, Array]:
@@ -148,13 +192,12 @@ def point_pairs(true: Rows, est: Rows, true_pos: Array, est_pos: Array, reach: f
     ax, ay, bx, by = (np.ascontiguousarray(pos[:, k]) for pos in (true_pos, est_pos) for k in (0, 1))
 
     def similarity(i: Ints, j: Ints) -> tuple[Ints, Array]:
-        dx = ax[i] - bx[j]
-        near = np.flatnonzero(np.abs(dx) < reach)
-        s = 1 - np.hypot(dx[near], ay[i[near]] - by[j[near]]) / reach
-        some = s > EPS
-        return near[some], s[some]
+        dx, dy = ax[i] - bx[j], ay[i] - by[j]
+        s = 1 - np.sqrt(dx * dx + dy * dy) / reach
+        some = np.flatnonzero(s > EPS)
+        return some, s[some]
 
-    return compare(true, est, similarity)
+    return compare(true, est, similarity, (ax - reach, ax + reach, bx))
 
 
 def matrix_pairs(
@@ -162,21 +205,21 @@ def matrix_pairs(
 ) -> Pairs:
     """Pairs from one id list per side and one (N, M) similarity matrix per frame (frames count from 0)."""
     true, est = _stack_ids(true_ids), _stack_ids(est_ids)
-    if not similarity:
-        none = np.zeros(0, np.int64)
-        return Pairs(true, est, none, none, np.zeros(0))
-    flat = np.concatenate([np.asarray(m, float).ravel() for m in similarity])
-    found = np.flatnonzero(flat > EPS)
-    shapes = np.array([(len(a), len(b)) for a, b in zip(true_ids, est_ids, strict=True)], np.int64)
-    ends = np.cumsum(shapes.prod(axis=1))
-    frame = np.searchsorted(ends, found, side="right")
-    first = np.cumsum(shapes, axis=0) - shapes
-    local = found - (ends - shapes.prod(axis=1))[frame]
-    i, j = np.divmod(local, shapes[frame, 1])
-    return Pairs(true, est, i + first[frame, 0], j + first[frame, 1], flat[found])
+    flat = np.concatenate([np.zeros(0), *(np.asarray(m, float).ravel() for m in similarity)])
+    n, m = (np.array([len(a) for a in ids], np.int64) for ids in (true_ids, est_ids))
+    width = np.repeat(m, n)  # pairs that each true row could have
+    start = np.cumsum(width) - width
+    possible = flat > EPS
+    count = np.zeros(len(width), np.int64)
+    some = width > 0
+    if some.any():
+        count[some] = np.add.reduceat(possible, start[some], dtype=np.int64)
+    i = np.repeat(np.arange(len(width)), count)
+    j = np.flatnonzero(possible) + np.repeat(np.repeat(np.cumsum(m) - m, n) - start, count)
+    return Pairs(true, est, i, j, flat[possible])
 
 
 def _stack_ids(ids: Sequence[NDArray[Any]]) -> Rows:
     count = np.array([len(a) for a in ids], np.int64)
-    stacked = np.concatenate([np.asarray(a, np.int64) for a in ids]) if len(ids) else np.zeros(0, np.int64)
+    stacked = np.concatenate([np.zeros(0, np.int64), *(np.asarray(a, np.int64) for a in ids)])
     return Rows(np.repeat(np.arange(len(ids)), count), stacked)

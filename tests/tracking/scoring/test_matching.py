@@ -1,0 +1,89 @@
+"""The matching of whole sequences against scipy on one table per frame: as good, and where asked the very same."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from scipy.optimize import linear_sum_assignment
+
+from tracking.scoring.matching import match, match_as_table
+from tracking.scoring.pairs import Pairs, matrix_pairs
+
+EIGHTHS = st.sampled_from([0.0, 0.0, 0.0, 0.125, 0.25, 0.5, 0.5, 0.625, 1.0, 1.0])  # ties, and sums that tie
+REALS = st.floats(0, 1, allow_subnormal=False)
+
+
+@st.composite
+def tables(draw, numbers=st.one_of(EIGHTHS, REALS)):
+    """Up to four frames of up to seven by seven."""
+    sizes = draw(st.lists(st.tuples(st.integers(0, 7), st.integers(0, 7)), min_size=1, max_size=4))
+    filled = [draw(st.lists(numbers, min_size=n * m, max_size=n * m)) for n, m in sizes]
+    return [np.array(values, float).reshape(size) for values, size in zip(filled, sizes, strict=True)]
+
+
+def pairs_of(given: list[np.ndarray]) -> Pairs:
+    return matrix_pairs([np.arange(len(t)) for t in given], [np.arange(t.shape[1]) for t in given], given)
+
+
+def best_totals(given: list[np.ndarray]) -> list[float]:
+    return [float(t[linear_sum_assignment(t, maximize=True)].sum()) for t in given]
+
+
+def check(given: list[np.ndarray], pairs: Pairs, chosen: np.ndarray) -> None:
+    i, j = pairs.i[chosen], pairs.j[chosen]
+    assert len(set(i.tolist())) == len(i)
+    assert len(set(j.tolist())) == len(j)
+    assert (pairs.true.frame[i] == pairs.est.frame[j]).all()
+    totals = np.bincount(pairs.frame[chosen], weights=pairs.s[chosen], minlength=len(given))
+    assert totals == pytest.approx(np.array(best_totals(given)), abs=1e-12)
+
+
+@given(tables())
+def test_as_good_as_scipy_in_every_frame(given: list[np.ndarray]) -> None:
+    pairs = pairs_of(given)
+    check(given, pairs, match(pairs.frame, pairs.i, pairs.j, pairs.s))
+    check(given, pairs, match_as_table(pairs, pairs.s))
+
+
+@given(tables(EIGHTHS))
+def test_of_equally_good_matchings_the_one_of_scipy(given: list[np.ndarray]) -> None:
+    pairs = pairs_of(given)
+    chosen = match_as_table(pairs, pairs.s)
+    first_i = np.cumsum([0, *(len(t) for t in given)])
+    first_j = np.cumsum([0, *(t.shape[1] for t in given)])
+    expected = {
+        (first_i[k] + a, first_j[k] + b)
+        for k, table in enumerate(given)
+        for a, b in zip(*linear_sum_assignment(-table), strict=True)
+        if table[a, b] > 0
+    }
+    assert set(zip(pairs.i[chosen].tolist(), pairs.j[chosen].tolist(), strict=True)) == expected
+
+
+@pytest.mark.parametrize("seed", range(30))
+@pytest.mark.parametrize("reach", [0.3, 0.7, 1.5])
+def test_gated_crowds_with_rounded_similarities(seed: int, reach: float) -> None:
+    """People on a coarse grid, similarity 0 beyond a reach: gates and ties as sequences have them."""
+    r = np.random.default_rng(seed)
+    given = []
+    for _ in range(20):
+        a, b = (np.round(r.uniform(0, 4, (r.integers(0, 25), 2)), 1) for _ in range(2))
+        given.append(np.maximum(0, 1 - np.round(np.linalg.norm(a[:, None] - b[None], axis=2) / reach, 1)))
+    pairs = pairs_of(given)
+    check(given, pairs, match(pairs.frame, pairs.i, pairs.j, pairs.s))
+    check(given, pairs, match_as_table(pairs, pairs.s))
+
+
+def test_weights_are_counts_of_a_whole_sequence_for_identities() -> None:
+    given = [np.array([[3.0, 5.0, 5.0], [5.0, 5.0, 0.0], [4.0, 0.0, 0.0]])]
+    pairs = pairs_of(given)
+    chosen = match(pairs.frame, pairs.i, pairs.j, pairs.s)
+    assert pairs.s[chosen].sum() == 14.0
+
+
+def test_nothing_to_match() -> None:
+    pairs = pairs_of([np.zeros((3, 0)), np.zeros((2, 2))])
+    assert match(pairs.frame, pairs.i, pairs.j, pairs.s).tolist() == []
+    assert match_as_table(pairs, pairs.s).tolist() == []

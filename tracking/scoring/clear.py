@@ -1,0 +1,86 @@
+"""CLEAR (Bernardin & Stiefelhagen 2008): misses, false ones and switches at a similarity of 0.5, as TrackEval has them.
+
+TrackEval gives a pair that was matched in the frame before a bonus of 1000 and takes the matching of greatest total.
+Kept pairs share no row and no column (they were matched) and outweigh any two rivals (at most 1 each), so all of them
+are in every best matching (tracking.scoring.matching); what remains to be matched is the pairs that share nothing with
+them. Pairs without rivals are matched whatever was before. So frames are followed one by one, but cheaply: few have
+anything left to solve. The frame before is the last one with somebody on both sides.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from sim.types import Bools, Ints
+from tracking.scoring.matching import solve_frame
+from tracking.scoring.pairs import EPS, Pairs
+
+THRESHOLD = 0.5
+BONUS = 1000.0  # of a pair that was matched in the frame before
+MOSTLY, LOST = 0.8, 0.2
+"""Shares of its frames above which a person is mostly tracked, below which mostly lost."""
+
+
+def clear(pairs: Pairs) -> dict[str, float]:
+    """MOTA, MOTP, TP, FN, FP, IDSW, MT, PT, ML (people), Frag; MOTA is 0 where there is nobody true, or no answer."""
+    near = pairs.keep(pairs.s >= THRESHOLD - EPS)
+    turn = turns(pairs)
+    near = near.keep(follow(near, turn))
+    who, by, when = near.true_ids[1][near.i], near.est_ids[1][near.j], turn[near.frame]
+    order = np.argsort(who, kind="stable")
+    who, by, when = who[order], by[order], when[order]
+    same = who[1:] == who[:-1]
+    n, m, hits = len(pairs.true), len(pairs.est), len(who)
+    switches = int((same & (by[1:] != by[:-1])).sum())
+    share = np.bincount(who, minlength=len(pairs.true_ids[0])) / np.bincount(pairs.true_ids[1])
+    mostly, tracked = int((share > MOSTLY).sum()), int((share >= LOST).sum())
+    return {
+        "MOTA": (hits - (m - hits) - switches) / n if n and m else 0.0,
+        "MOTP": float(near.s.sum()) / max(1, hits),
+        "TP": float(hits),
+        "FN": float(n - hits),
+        "FP": float(m - hits),
+        "IDSW": float(switches),
+        "MT": float(mostly),
+        "PT": float(tracked - mostly),
+        "ML": float(len(share) - tracked),
+        "Frag": float((same & (when[1:] > when[:-1] + 1)).sum()),
+    }
+
+
+def turns(pairs: Pairs) -> Ints:
+    """For each frame number how many frames up to it have somebody on both sides."""
+    end = 1 + max((int(rows.frame[-1]) for rows in (pairs.true, pairs.est) if len(rows)), default=0)
+    true, est = (np.bincount(rows.frame, minlength=end) > 0 for rows in (pairs.true, pairs.est))
+    return np.cumsum(true & est)
+
+
+def follow(near: Pairs, turn: Ints) -> Bools:
+    """Which of the pairs (K,), all of them similar enough, are matched when matches of the frame before are kept."""
+    t, e = near.true_ids[1][near.i], near.est_ids[1][near.j]
+    chosen = (np.bincount(near.i)[near.i] == 1) & (np.bincount(near.j)[near.j] == 1) if len(t) else np.zeros(0, bool)
+    frame = near.frame
+    starts = np.flatnonzero(np.diff(frame, prepend=-1))
+    broken = np.diff(turn[frame[starts]], prepend=-1) > 1
+    before = np.full(len(near.true_ids[0]), -1)
+    held = t[:0]
+    taken_t, taken_e = np.full(len(before), -1), np.full(len(near.est_ids[0]), -1)
+    ends = [*starts[1:].tolist(), len(t)]
+    for k, (a, b, gap) in enumerate(zip(starts.tolist(), ends, broken.tolist(), strict=True)):
+        if gap:
+            before[held] = -1
+        ti, ej, now = t[a:b], e[a:b], chosen[a:b]
+        if not now.all():
+            kept = before[ti] == ej
+            now |= kept
+            taken_t[ti[now]] = k
+            taken_e[ej[now]] = k
+            free = np.flatnonzero((taken_t[ti] != k) & (taken_e[ej] != k))
+            if len(free) == 1:
+                now[free] = True
+            elif len(free):
+                now[:] = solve_frame(near, a, b, near.s[a:b] + BONUS * kept)
+        before[held] = -1
+        held = ti[now]
+        before[held] = ej[now]
+    return chosen
