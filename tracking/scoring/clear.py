@@ -65,7 +65,7 @@ def follow(near: Pairs, turn: Ints) -> Bools:
     before = np.full(len(near.true_ids[0]), -1)
     held = t[:0]
     taken_t, taken_e = np.full(len(before), -1), np.full(len(near.est_ids[0]), -1)
-    ends = [*starts[1:].tolist(), len(t)]
+    ends = np.append(starts, len(t))[1:].tolist()
     for k, (a, b, gap) in enumerate(zip(starts.tolist(), ends, broken.tolist(), strict=True)):
         if gap:
             before[held] = -1

@@ -5,9 +5,9 @@ best matching: put it into any matching, drop the at most two pairs it replaces,
 such pairs that share no row and no column are in one best matching together, since exchanging one in leaves the others
 alone. So whole sequences are settled in a few passes over arrays; what is left (tangles) goes to scipy, frame by frame.
 
-Where a pair weighs more than those two it is in every best matching. Scores that depend on which of several best
-matchings is taken settle only such pairs and leave frames with a tangle to scipy whole: there scipy chooses among equals
-as it does for TrackEval.
+A pair that weighs more than those two is in every best matching. Scores that depend on which of several best matchings
+is taken settle only such pairs and leave frames with a tangle to scipy whole: there it chooses among equals as it does
+for TrackEval.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""Scores of individuals: equal to TrackEval on random cases, exactly 1 for the truth itself."""
+"""Scores of individuals: equal to TrackEval on random and on real cases, ties included; exactly 1 for the truth itself."""
 
 from __future__ import annotations
 
@@ -6,55 +6,141 @@ import numpy as np
 import pytest
 
 from scenarios.loading import load
+from sim.io.mot import read_table
 from sim.sequence import simulate
 from sim.types import Tracks
+from tests.reference_trackeval import box_similarity, trackeval_scores
 from tracking.scoring import evaluate
-from tracking.scoring.individuals import scores
+from tracking.scoring.individuals import scores, scores_until
+from tracking.scoring.pairs import Rows, box_pairs, matrix_pairs
+
+SEEDS = range(60)
 
 
-def random_case(seed: int):
+def random_case(seed: int, values=None, crowd: int = 9):
+    """Frames with 0 … crowd - 1 on each side, those of equal number mostly similar; values: what similarities are."""
     r = np.random.default_rng(seed)
-    frames = int(r.integers(1, 30))
     true, est, similarity = [], [], []
-    for _ in range(frames):
-        i = r.permutation(8)[: r.integers(0, 8)]
-        j = r.permutation(9)[: r.integers(0, 9)]
-        s = r.random((len(i), len(j))) * (r.random((len(i), len(j))) < 0.5)
-        s[(i[:, None] == j[None]) & (r.random(s.shape) < 0.7)] = 0.8
+    for _ in range(int(r.integers(1, 30))):
+        i, j = (r.permutation(crowd)[: r.integers(0, crowd)] + offset for offset in (3, 500))
+        s = r.random((len(i), len(j))) if values is None else r.choice(values, (len(i), len(j)))
+        s *= r.random(s.shape) < 0.5
+        s[(i[:, None] - 3 == j[None] - 500) & (r.random(s.shape) < 0.7)] = 0.75
         true.append(i), est.append(j), similarity.append(s)
     return true, est, similarity
 
 
-@pytest.mark.filterwarnings("ignore")
-@pytest.mark.parametrize("seed", range(50))
+def assert_equal_to_trackeval(true, est, similarity, pairs=None) -> None:
+    expected = trackeval_scores(true, est, similarity)
+    assert scores(pairs or matrix_pairs(true, est, similarity)) == pytest.approx(expected, abs=1e-9)
+
+
+@pytest.mark.parametrize("seed", SEEDS)
 def test_equal_to_trackeval(seed: int) -> None:
-    metrics = pytest.importorskip("trackeval.metrics", reason="trackeval is installed by `make test`")
+    assert_equal_to_trackeval(*random_case(seed))
+
+
+@pytest.mark.parametrize("seed", SEEDS)
+def test_equal_to_trackeval_where_similarities_tie(seed: int) -> None:
+    """Quarters add up exactly: whole matchings are equally good, and which one is taken shows in switches and AssA."""
+    assert_equal_to_trackeval(*random_case(seed, values=(0.25, 0.5, 0.75, 1.0)))
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_equal_to_trackeval_in_a_crowd(seed: int) -> None:
+    assert_equal_to_trackeval(*random_case(seed, crowd=60))
+
+
+@pytest.mark.parametrize(
+    "case",
+    [
+        ([[]], [[]], [np.zeros((0, 0))]),
+        ([[1, 2], [2]], [[], []], [np.zeros((2, 0)), np.zeros((1, 0))]),
+        ([[], []], [[4], [4, 5]], [np.zeros((0, 1)), np.zeros((0, 2))]),
+        ([[1], [], [1]], [[4], [4], [5]], [np.ones((1, 1)), np.zeros((0, 1)), np.ones((1, 1))]),
+        ([[1], [1], [1]], [[4], [], [4]], [np.ones((1, 1)), np.zeros((1, 0)), np.ones((1, 1))]),
+        ([[1], [1], [1]], [[4], [5], [4]], [np.ones((1, 1)), np.zeros((1, 1)), np.ones((1, 1))]),
+        ([[1, 2]], [[4, 5]], [np.zeros((2, 2))]),
+        ([[1, 2]], [[4, 5]], [np.full((2, 2), 0.5)]),
+        ([[1]], [[4]], [np.full((1, 1), 0.5 - 1e-16)]),
+    ],
+    ids=[
+        "nothing",
+        "no tracks",
+        "no truth",
+        "nobody true",
+        "nobody said",
+        "a miss",
+        "far",
+        "all equal",
+        "rounded half",
+    ],
+)
+def test_equal_to_trackeval_at_the_edges(case) -> None:
+    assert_equal_to_trackeval(*case)
+
+
+@pytest.mark.parametrize("name", ["PETS09-S2L1-first200", "TUD-Campus"])
+@pytest.mark.parametrize("kind", ["detections", "disturbed"])
+def test_equal_to_trackeval_on_real_boxes(shared_data, name: str, kind: str) -> None:
+    """Tracks are the detections numbered anew in each frame, or true boxes that shake, are missed and change ids."""
+    folder = shared_data / "mot" / name
+    truth = by_frame(read_table(folder / "gt" / "gt.txt"))
+    if kind == "detections":
+        t = read_table(folder / "det" / "det.txt")
+        order = np.argsort(t.frame, kind="stable")
+        number = np.arange(len(order)) - np.searchsorted(t.frame[order], t.frame[order])
+        tracks = t.frame[order], number, t.box[order]
+    else:
+        tracks = disturbed(*truth)
+    frames = np.arange(1, max(truth[0].max(), tracks[0].max()) + 1)
+    true, est, similarity = [], [], []
+    for f in frames:
+        (i, a), (j, b) = ((ids[frame == f], box[frame == f]) for frame, ids, box in (truth, tracks))
+        true.append(i), est.append(j), similarity.append(box_similarity(a, b))
+    pairs = box_pairs(Rows(*truth[:2]), Rows(*tracks[:2]), truth[2], tracks[2])
+    assert_equal_to_trackeval(true, est, similarity, pairs)
+
+
+def by_frame(t):
+    order = np.argsort(t.frame, kind="stable")
+    return t.frame[order], t.id[order], t.box[order]
+
+
+def disturbed(frame, ids, box):
+    r = np.random.default_rng(0)
+    kept = r.random(len(frame)) < 0.9
+    changes = np.cumsum(r.random(len(frame)) < 0.02)
+    return frame[kept], (ids + 1000 * changes)[kept], (box + r.normal(0, 4, box.shape))[kept]
+
+
+@pytest.mark.parametrize("seed", range(10))
+def test_numbers_of_ids_and_order_of_rows_change_nothing(seed: int) -> None:
     true, est, similarity = random_case(seed)
-    ours = scores(true, est, similarity)
-    renumber = [{k: n for n, k in enumerate(np.unique(np.concatenate(x)))} for x in (true, est)]
-    data = {
-        "gt_ids": [np.array([renumber[0][k] for k in i], int) for i in true],
-        "tracker_ids": [np.array([renumber[1][k] for k in j], int) for j in est],
-        "similarity_scores": similarity,
-        "num_gt_ids": len(renumber[0]),
-        "num_tracker_ids": len(renumber[1]),
-        "num_gt_dets": sum(map(len, true)),
-        "num_tracker_dets": sum(map(len, est)),
-        "num_timesteps": len(true),
-    }
-    if data["num_gt_dets"] == 0 or data["num_tracker_dets"] == 0:
-        pytest.skip("TrackEval answers empty sides by rule, not by its formulas")
-    theirs = metrics.HOTA().eval_sequence(data)
-    for key in ("HOTA", "DetA", "AssA", "LocA"):
-        assert ours[key] == pytest.approx(float(np.mean(theirs[key])), abs=1e-6), key
-    quiet = {"THRESHOLD": 0.5, "PRINT_CONFIG": False}
-    for metric, keys in (
-        (metrics.CLEAR(quiet), ("MOTA", "MOTP", "IDSW")),
-        (metrics.Identity(quiet), ("IDF1", "IDP", "IDR")),
-    ):
-        theirs = metric.eval_sequence(data)
-        for key in keys:
-            assert ours[key] == pytest.approx(float(theirs[key]), abs=1e-6), key
+    r = np.random.default_rng(seed)
+    other = r.permutation(10_000)
+    moved = []
+    for i, j, s in zip(true, est, similarity, strict=True):
+        a, b = r.permutation(len(i)), r.permutation(len(j))
+        moved.append((other[i[a]], other[j[b]], s[a][:, b]))
+    assert scores(matrix_pairs(*zip(*moved, strict=True))) == pytest.approx(
+        scores(matrix_pairs(true, est, similarity)), abs=1e-12
+    )
+
+
+@pytest.mark.parametrize("seed", range(10))
+def test_scores_of_every_beginning(seed: int) -> None:
+    true, est, similarity = random_case(seed)
+    found = scores_until(matrix_pairs(true, est, similarity), range(len(true)))
+    for n, row in enumerate(found, start=1):
+        assert row == scores(matrix_pairs(true[:n], est[:n], similarity[:n]))
+
+
+def test_an_id_twice_in_a_frame_is_refused() -> None:
+    with pytest.raises(ValueError, match="truth: id 7 is twice in frame 1"):
+        scores(matrix_pairs([[7], [7, 8, 7]], [[], []], [np.zeros((1, 0)), np.zeros((3, 0))]))
+    with pytest.raises(ValueError, match="tracks: id 2 is twice in frame 0"):
+        scores(matrix_pairs([[]], [[2, 2]], [np.zeros((0, 2))]))
 
 
 @pytest.mark.parametrize("similarity", ["boxes", "ground", "image"])
