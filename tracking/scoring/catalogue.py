@@ -102,6 +102,7 @@ GROUPS = (
     _share("group_AssPr", "groups", "AssPr of groups"),
     _share("group_LocA", "groups", "mean similarity of matched groups"),
     Score("group_size_error", "groups", "people", 0.0, inf, "lower", "mean |estimated - true size| of matches"),
+    _length("group_extent_error", "groups", "mean Gaussian Wasserstein distance of matches, by middle and extent"),
 )
 
 MEMBERS = (

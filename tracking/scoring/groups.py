@@ -21,6 +21,7 @@ from tracking.scoring.sides import Crowd
 GroupMatch = Literal["hull", "members"]
 CORRECT = 0.6  # share of members (of either side) that makes a group a right one
 FOUND = 0.5  # similarity from which a group counts as found in F1
+TIE = 1e-9  # of similarity: what being near is worth; Jaccard indices of fewer than 10,000 people differ by more
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -43,18 +44,23 @@ class Shared:
 
 def shared_members(true: Crowd, est: Crowd, stands_for: Ints, people: int) -> Shared:
     """stands_for: the true person's row of each of est's members (K,), -1 unmapped; people: how many true rows."""
-    group = np.full(people + 1, -1, np.int64)
-    group[true.who] = true.of
-    i = group[stands_for]  # -1 takes the last, which is nobody's
+    i = group_of(true, people)[stands_for]  # -1 takes the last, which is nobody's
     known = i >= 0
     key, count = np.unique(i[known] * len(est) + est.of[known], return_counts=True)
     return Shared(key, count, len(est))
 
 
+def group_of(groups: Crowd, people: int) -> Ints:
+    """The group's row of each row of the people (people + 1,), -1 for who is in none, and for the last, nobody."""
+    group = np.full(people + 1, -1, np.int64)
+    known = groups.who >= 0
+    group[groups.who[known]] = groups.of[known]
+    return group
+
+
 def hull_pairs(true: Crowd, est: Crowd) -> Pairs:
     """Pairs by intersection over union of hulls."""
-    a, b = pack(true.hull), pack(est.hull)
-    width = max(a.vertex.shape[1], b.vertex.shape[1])
+    width = max(map(len, (*true.hull, *est.hull)), default=1)
     a, b = pack(true.hull, width), pack(est.hull, width)
 
     def similarity(i: Ints, j: Ints) -> tuple[Ints, Array]:
@@ -77,10 +83,16 @@ def member_pairs(true: Crowd, est: Crowd, shared: Shared) -> Pairs:
     return compare(true.rows, est.rows, similarity)
 
 
-def matched(pairs: Pairs, least: float = 0.0) -> Pairs:
-    """The pairs of the one-to-one matching of each frame with the greatest total similarity, each at least `least`."""
+def matched(true: Crowd, est: Crowd, pairs: Pairs, least: float = 0.0) -> Pairs:
+    """The pairs of the one-to-one matching of each frame with the greatest total similarity, each at least `least`.
+
+    Of several best matchings (Jaccard indices are often equal) the one whose middles are nearer, so that the order of
+    groups decides nothing.
+    """
     near = pairs.keep(pairs.s >= least - EPS)
-    return near.keep(match(near.frame, near.i, near.j, near.s))
+    apart = np.hypot(*(true.pos[near.i] - est.pos[near.j]).T)
+    closeness = np.nan_to_num(1 / (1 + apart), nan=0.0)
+    return near.keep(match(near.frame, near.i, near.j, near.s + TIE * closeness))
 
 
 @dataclass(frozen=True, eq=False)
@@ -99,7 +111,7 @@ class Compared:
 def compare_groups(true: Crowd, est: Crowd, shared: Shared, by: GroupMatch) -> Compared:
     """Crowds compared by hulls or by members."""
     pairs = hull_pairs(true, est) if by == "hull" else member_pairs(true, est, shared)
-    return Compared(true, est, shared, pairs, matched(pairs), matched(pairs, FOUND))
+    return Compared(true, est, shared, pairs, matched(true, est, pairs), matched(true, est, pairs, FOUND))
 
 
 def group_scores(compared: Compared, frames: Bools) -> dict[str, float]:
@@ -127,7 +139,20 @@ def group_scores(compared: Compared, frames: Bools) -> dict[str, float]:
         **detection(compared, frames),
         **hota(compared.pairs.in_frames(frames)),
         "size_error": _mean(np.abs(_sizes(compared.true)[i] - _sizes(compared.est)[j])),
+        "extent_error": _mean(gaussian_wasserstein(compared.true, compared.est, i, j)),
     }
+
+
+def gaussian_wasserstein(true: Crowd, est: Crowd, i: Ints, j: Ints) -> Array:
+    """Distance (K,) between groups as Gaussians N(m, A), N(n, B) of their places and extents: the root of
+    |m - n|² + tr A + tr B - 2 tr (A^½ B A^½)^½, the last of which is √(tr AB + 2 √(det A det B)) for 2x2 matrices."""
+    a, b = true.extent[i], est.extent[j]
+    apart = ((true.pos[i] - est.pos[j]) ** 2).sum(axis=1)
+    product = np.maximum(np.linalg.det(a) * np.linalg.det(b), 0.0)
+    common = np.sqrt(np.maximum(np.einsum("kxy,kyx->k", a, b) + 2 * np.sqrt(product), 0.0))
+    apart += np.trace(a, axis1=1, axis2=2) + np.trace(b, axis1=1, axis2=2) - 2 * common
+    same = (a == b).all(axis=(1, 2)) & (true.pos[i] == est.pos[j]).all(axis=1)
+    return np.where(same, 0.0, np.sqrt(np.maximum(apart, 0.0)))
 
 
 def _share(part: float, whole: int) -> float:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from sim.types import Array, Bools, Ints
+from tracking.scoring.groups import group_of
 from tracking.scoring.pairs import Rows, compare
 from tracking.scoring.sides import Crowd
 
@@ -16,8 +17,7 @@ def pairwise_scores(true: Crowd, est: Crowd, stands_for: Ints, frames: Bools) ->
     person whom nobody stands for are missed.
     """
     there = _pairs_in(true, frames)
-    group = np.full(max(true.who.max(initial=-1), stands_for.max(initial=-1)) + 1, -1, np.int64)
-    group[true.who] = true.of
+    group = group_of(true, int(max(true.who.max(initial=-1), stands_for.max(initial=-1))) + 1)
     kept = frames[est.rows.frame[est.of]]
     of, person = est.of[kept], stands_for[kept]
     order = np.argsort(of, kind="stable")

@@ -22,7 +22,8 @@ CORE = 1.0  # s round each true merge and split that the core leaves out
 
 @dataclass(frozen=True, eq=False)
 class Labelled:
-    """What can be compared in the labelled frames f, frames[f]: the truth, a tracker's answers, both sides' people.
+    """What can be compared in the labelled frames f, frames[f]: the truth, a tracker's answers (those of other frames,
+    too: an event may be told there), both sides' people.
 
     stands_for: the true row that each estimated person is mapped to, or -1; surface: where groups have their shapes.
     """
@@ -55,8 +56,7 @@ def labelled(
     truth: Truth, answers: Sequence[Tracks], frames: Bools, true: People, est: People, pairs: Pairs, surface: Surface
 ) -> Labelled:
     """pairs: of people, by whatever similarity; they tell who stands for whom."""
-    answered = [t for t in answers if frames[t.index]]
-    return Labelled(truth, answered, frames, true, est, mapped(pairs), surface)
+    return Labelled(truth, answers, frames, true, est, mapped(pairs), surface)
 
 
 def social_scores(case: Labelled, by: GroupMatch) -> dict[str, float]:
@@ -86,15 +86,17 @@ def true_groups(case: Labelled) -> tuple[Crowd, bool]:
     assert groups is not None, "a frame is labelled where there are groups"
     index = np.flatnonzero(case.frames)
     found = crowd(index, [groups[f - 1] for f in index.tolist()], case.true.rows)
+    found = found.keep(found.count > 1)
     return (found, True) if wanted is not None else (replace(found, pos=np.full_like(found.pos, np.nan)), False)
 
 
 def told_groups(case: Labelled) -> Told:
     """A tracker's groups of two or more. Where it names no members they are the true people in the hull: one person
     inside is left out as one person alone is; a hull with nobody inside is false."""
-    frames = np.array([t.index for t in case.answers], np.int64)
-    every = crowd(frames, [t.groups or Groups.none() for t in case.answers], case.est.rows)
-    if any(t.unit == "group" for t in case.answers) or not len(every.of):
+    answers = [t for t in case.answers if case.frames[t.index]]
+    frames = np.array([t.index for t in answers], np.int64)
+    every = crowd(frames, [t.groups or Groups.none() for t in answers], case.est.rows)
+    if any(t.unit == "group" for t in answers) or not len(every.of):
         places = case.true.places(case.surface, "ground")
         if places is not None:
             every = people_inside(every, case.true.rows, places, case.scale)

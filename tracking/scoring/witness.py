@@ -85,7 +85,8 @@ def told_events(
     of `people` is mapped to, -1 nobody.
 
     A member is who they are mapped to at the event's start, or in the nearest frame within 1 s of it. Parents are the
-    groups of the frame before the one in which the tracker said so, children those of that frame.
+    groups of the frame before the one in which the tracker said so, children those of that frame; where they are the
+    same (it changed its groups first and said so later), parents are those of the frame before the start.
     """
     reach = round(LATE * fps)
     identified, lives, label = Lives(people.rows, stands_for >= 0), Lives(people.rows), people.group
@@ -95,9 +96,13 @@ def told_events(
         who = frozenset(int(true.id[stands_for[row]]) for row in rows if row >= 0)
         return Part(who, len(members) - len(who))
 
+    def until(event: GroupEvent, frame: int) -> list[list[int]]:
+        return _by_label(event.members, lambda m: _label(lives.last(m, frame, reach), label))
+
     def tell(event: GroupEvent, said: int) -> Told:
-        before = _by_label(event.members, lambda m: _label(lives.last(m, said - 1, reach), label))
         after = _by_label(event.members, lambda m: _label(lives.next(m, said, reach), label))
+        before = until(event, said - 1)
+        before = until(event, event.start - 1) if sorted(before) == sorted(after) else before
         parents, children = (tuple(part(p, event.start) for p in parts) for parts in (before, after))
         members = part(event.members, event.start)
         return Told(event.kind, event.start, said, members, event.pos, parents, children)
