@@ -39,14 +39,20 @@ def show(answer: Answer, as_json: bool) -> int:
     """Print an answer; its exit code."""
     if as_json:
         _print_json({"status": STATUS[answer.code], **answer.data})
-    elif isinstance(answer.text, str):
-        print(answer.text.rstrip("\n"))
     else:
-        from rich.console import Console
-
-        width = None if sys.stdout.isatty() else WIDE
-        Console(width=width, highlight=False).print(answer.text)
+        text = answer.text if isinstance(answer.text, str) else _laid_out(answer.text)
+        print(text.rstrip("\n"), flush=True)
     return answer.code
+
+
+def _laid_out(tables: Any) -> str:
+    """What rich makes of tables, in colour where somebody looks."""
+    from rich.console import Console
+
+    console = Console(width=None if sys.stdout and sys.stdout.isatty() else WIDE, highlight=False)
+    with console.capture() as captured:
+        console.print(tables)
+    return captured.get()
 
 
 def refuse(error: FlockscopeError, as_json: bool) -> int:
@@ -92,7 +98,7 @@ def _of_system(error: OSError) -> FlockscopeError:
 
 
 def _print_json(data: dict[str, Any]) -> None:
-    print(json.dumps(plain(data), ensure_ascii=False, allow_nan=False))
+    print(json.dumps(plain(data), ensure_ascii=False, allow_nan=False), flush=True)
 
 
 def plain(value: Any) -> Any:

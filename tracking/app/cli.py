@@ -3,15 +3,14 @@
 from __future__ import annotations
 
 import sys
-import warnings
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Annotated, Literal
 
 import typer
 
-from scenarios.errors import FlockscopeError, InputError
-from tracking.app.answer import INTERRUPTED, Answer, interrupted, refuse, show, unexpected
+from scenarios.errors import InputError
+from tracking.app.answer import Answer
 
 app = typer.Typer(
     add_completion=False,
@@ -194,37 +193,9 @@ def coco(
 
 def run(arguments: Sequence[str]) -> int:
     """Run the command; everything it says is printed; its exit code."""
-    as_json = "--json" in arguments
-    command: Any = typer.main.get_command(app)
-    usage = typer.BadParameter.__base__  # the class of all usage errors, typer's own or click's
-    with warnings.catch_warnings():
-        warnings.simplefilter("always", UserWarning)
-        warnings.showwarning = _warn  # type: ignore[assignment]
-        try:
-            result = command.main(list(arguments) or ["--help"], prog_name="flockscope", standalone_mode=False)
-        except KeyboardInterrupt:
-            result = INTERRUPTED
-        except FlockscopeError as error:
-            return refuse(error, as_json)
-        except Exception as error:
-            if usage is not None and isinstance(error, usage):
-                return refuse(_usage(error), as_json)
-            return refuse(unexpected(error), as_json)
-        if isinstance(result, Answer):
-            return show(result, as_json)
-        return interrupted(as_json) if result == INTERRUPTED else int(result or 0)
+    from tracking.app.running import carry_out
 
-
-def _usage(error: Any) -> InputError:
-    """A wrong command line."""
-    where = "flockscope" if error.ctx is None else error.ctx.command_path
-    message = error.format_message().rstrip(".")
-    got, remedy = message[:1].lower() + message[1:], f"see {where} --help"
-    return InputError(place=where, got=got, expected="a command line as in the help", remedy=remedy)
-
-
-def _warn(message: Warning | str, *_: object) -> None:
-    print(f"warning: {message}", file=sys.stderr)
+    return carry_out(app, list(arguments) or ["--help"])
 
 
 def main() -> None:
