@@ -7,6 +7,7 @@ children the one with the smaller person id. Fewer than two in common is not the
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 
@@ -31,9 +32,15 @@ def identify(old: Members, parts: Iterable[People], born: Mapping[int, int]) -> 
     old: members of each group before; born: when each old group came up, smaller is older.
     """
     new = sorted((p for p in parts if len(p) > 1), key=min)
-    kept: dict[People, int | None] = dict.fromkeys(new)
-    shared = [(-len(people & part), born[g], g, k) for g, people in old.items() for k, part in enumerate(new)]
-    taken: set[int] = set()
+    same = {people: g for g, people in old.items()}  # mostly nothing has changed: no need to compare all with all
+    kept: dict[People, int | None] = {part: same.get(part) for part in new}
+    taken = {g for g in kept.values() if g is not None}
+    was = {p: g for g, people in old.items() if g not in taken for p in people}
+    shared = []
+    for k, part in enumerate(new):
+        if kept[part] is None:
+            common = Counter(was[p] for p in part if p in was)
+            shared += [(-n, born[g], g, k) for g, n in common.items()]
     for common, _, g, k in sorted(shared):
         if common <= -2 and g not in taken and kept[new[k]] is None:
             kept[new[k]] = g
@@ -50,11 +57,12 @@ def lineage(old: Members, new: Members, before: People, now: People, entered: Pe
     """
     stay = (before & now) - entered
     was, is_ = _unit_of(old, before), _unit_of(new, now)
+    unchanged = {g for g, people in old.items() if new.get(g) == people and people <= stay}
     found: list[Change] = []
-    for g, people in sorted(old.items()):
-        found += _of_old(g, people, stay, is_, now)
-    for g, people in sorted(new.items()):
-        found += _of_new(g, people, stay, was)
+    for g in sorted(old.keys() - unchanged):
+        found += _of_old(g, old[g], stay, is_, now)
+    for g in sorted(new.keys() - unchanged):
+        found += _of_new(g, new[g], stay, was)
     return found
 
 
