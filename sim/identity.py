@@ -39,8 +39,8 @@ def identify(old: Members, parts: Iterable[People], born: Mapping[int, int]) -> 
     shared = []
     for k, part in enumerate(new):
         if kept[part] is None:
-            common = Counter(was[p] for p in part if p in was)
-            shared += [(-n, born[g], g, k) for g, n in common.items()]
+            held = Counter(was[p] for p in part if p in was)
+            shared += [(-n, born[g], g, k) for g, n in held.items()]
     for common, _, g, k in sorted(shared):
         if common <= -2 and g not in taken and kept[new[k]] is None:
             kept[new[k]] = g
