@@ -12,17 +12,17 @@ from tracking.scoring.pairs import Pairs
 
 def scores(pairs: Pairs) -> dict[str, float]:
     """All three families by name. ValueError where an id is twice in one frame."""
-    return next(scores_until(pairs, [_last(pairs)]))
+    pairs.true.unique("truth")
+    pairs.est.unique("tracks")
+    return _families(pairs)
 
 
 def scores_until(pairs: Pairs, frames: Iterable[int]) -> Iterator[dict[str, float]]:
-    """The scores of each beginning of the sequence, up to and with these frames; who is like whom is not asked again."""
+    """The scores of each beginning of the sequence, up to these frames; who is like whom is not asked again."""
     pairs.true.unique("truth")
     pairs.est.unique("tracks")
-    for frame in frames:
-        part = pairs.until(frame)
-        yield {**hota(part), **clear(part), **identity(part)}
+    return (_families(pairs.until(frame)) for frame in frames)
 
 
-def _last(pairs: Pairs) -> int:
-    return max((int(rows.frame[-1]) for rows in (pairs.true, pairs.est) if len(rows)), default=0)
+def _families(pairs: Pairs) -> dict[str, float]:
+    return {**hota(pairs), **clear(pairs), **identity(pairs)}

@@ -17,6 +17,7 @@ import numpy as np
 from sim.types import Array, Bools, Ints
 from tracking.scoring.pairs import Pairs
 
+CLEARLY = 1 + 1e-9  # times as much is more, whatever the rounding
 WORTH = 0.2  # share of pairs that a pass must take off for another one: below, the solver is quicker
 
 
@@ -73,12 +74,12 @@ def _settle(i: Ints, j: Ints, weight: Array, strict: bool) -> tuple[Bools, Ints]
 
 def _settled(i: Ints, j: Ints, w: Array, strict: bool) -> Bools:
     """Pairs, no two in one row or column, that weigh as much as the best rivals of their row and their column together
-    (strict: more)."""
+    (strict: clearly more)."""
     best_i, rival_i = _leaders(i, w)
     best_j, rival_j = _leaders(j, w)
     candidate = np.flatnonzero((w >= best_i[i]) & (w >= best_j[j]))
     rivals = rival_i[i[candidate]] + rival_j[j[candidate]]
-    candidate = candidate[w[candidate] > rivals if strict else w[candidate] >= rivals]
+    candidate = candidate[w[candidate] > CLEARLY * rivals if strict else w[candidate] >= rivals]
     settled = np.zeros(len(w), bool)
     settled[candidate] = True
     # Equal pairs of one row, alone in their columns (or the other way round), all pass: the first of them stays.

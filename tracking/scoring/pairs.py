@@ -150,8 +150,11 @@ def _portions(first: Ints, count: Ints) -> Iterator[tuple[Ints, Ints]]:
 
 
 def _near(a: Rows, b: Rows, low: Array, high: Array, at: Array) -> Iterator[tuple[Ints, Ints]]:
-    """Those of same_frame with low[row of a] <= at[row of b] <= high[row of a], and a few more; a row with a number
-    that is not finite is near nothing. All frames stand on one line, one after the other, and one search finds the rest."""
+    """Those of same_frame with low[row of a] <= at[row of b] <= high[row of a], and a few more.
+
+    A row with a number that is not finite is near nothing. All frames stand on one line, one after the other, and one
+    search finds the rest.
+    """
     finite = at[np.isfinite(at)]
     least, most = (float(finite.min()), float(finite.max())) if len(finite) else (0.0, 0.0)
     slack = SLACK * (most - least + 1)

@@ -1,4 +1,4 @@
-"""Scores of individuals: equal to TrackEval on random and on real cases, ties included; exactly 1 for the truth itself."""
+"""Scores of individuals: equal to TrackEval on random and real cases, ties included; exactly 1 for the truth."""
 
 from __future__ import annotations
 

@@ -12,11 +12,11 @@ from tracking.scoring.matching import match, match_as_table
 from tracking.scoring.pairs import Pairs, matrix_pairs
 
 EIGHTHS = st.sampled_from([0.0, 0.0, 0.0, 0.125, 0.25, 0.5, 0.5, 0.625, 1.0, 1.0])  # ties, and sums that tie
-REALS = st.floats(0, 1, allow_subnormal=False)
+ANY = st.one_of(EIGHTHS, st.floats(0, 1, allow_subnormal=False))
 
 
 @st.composite
-def tables(draw, numbers=st.one_of(EIGHTHS, REALS)):
+def tables(draw, numbers=ANY):
     """Up to four frames of up to seven by seven."""
     sizes = draw(st.lists(st.tuples(st.integers(0, 7), st.integers(0, 7)), min_size=1, max_size=4))
     filled = [draw(st.lists(numbers, min_size=n * m, max_size=n * m)) for n, m in sizes]
