@@ -21,7 +21,7 @@ from tracking.scoring.sides import Crowd
 GroupMatch = Literal["hull", "members"]
 CORRECT = 0.6  # share of members (of either side) that makes a group a right one
 FOUND = 0.5  # similarity from which a group counts as found in F1
-TIE = 1e-9  # of similarity: what being near is worth; Jaccard indices of fewer than 10,000 people differ by more
+TIE = 1e-9  # of similarity: what being near is worth: decides between equals, outweighs nothing else
 
 
 @dataclass(frozen=True, slots=True, eq=False)
