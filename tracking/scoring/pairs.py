@@ -172,7 +172,7 @@ def box_pairs(true: Rows, est: Rows, true_box: Array, est_box: Array) -> Pairs:
     """Pairs by intersection over union of boxes (R, 4) left, top, width, height; boxes without area match nothing."""
     (la, ta, ra, ba), (lb, tb, rb, bb) = _edges(true_box), _edges(est_box)
     area_a, area_b = (np.maximum(box[:, 2], 0) * np.maximum(box[:, 3], 0) for box in (true_box, est_box))
-    widest = float(np.nanmax(est_box[:, 2], initial=0.0))
+    widest = float(est_box[np.isfinite(est_box[:, 2]), 2].max(initial=0.0))
 
     def similarity(i: Ints, j: Ints) -> tuple[Ints, Array]:
         width = np.minimum(ra[i], rb[j]) - np.maximum(la[i], lb[j])
