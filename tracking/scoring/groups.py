@@ -148,7 +148,8 @@ def gaussian_wasserstein(true: Crowd, est: Crowd, i: Ints, j: Ints) -> Array:
     |m - n|² + tr A + tr B - 2 tr (A^½ B A^½)^½, the last of which is √(tr AB + 2 √(det A det B)) for 2x2 matrices."""
     a, b = true.extent[i], est.extent[j]
     apart = ((true.pos[i] - est.pos[j]) ** 2).sum(axis=1)
-    product = np.maximum(np.linalg.det(a) * np.linalg.det(b), 0.0)
+    det_a, det_b = (m[:, 0, 0] * m[:, 1, 1] - m[:, 0, 1] * m[:, 1, 0] for m in (a, b))
+    product = np.maximum(det_a * det_b, 0.0)
     common = np.sqrt(np.maximum(np.einsum("kxy,kyx->k", a, b) + 2 * np.sqrt(product), 0.0))
     apart += np.trace(a, axis1=1, axis2=2) + np.trace(b, axis1=1, axis2=2) - 2 * common
     same = (a == b).all(axis=(1, 2)) & (true.pos[i] == est.pos[j]).all(axis=1)
