@@ -8,6 +8,7 @@ Nothing sets a position or a velocity after a person has come; a frame is the st
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
@@ -20,12 +21,13 @@ from sim.cast import BODY_RADIUS, Party, cast
 from sim.navigation import Navigator, scene_of
 from sim.script import Script
 from sim.steering import Groups, Obstacles, People, Steering
-from sim.types import Array, Motion, Scene
+from sim.types import Array, Ints, Motion, Scene
 from sim.wander import wander
 
 MAX_STEP = 0.02  # s
 WIDTH, DEPTH = 0.27, 0.16  # shoulder width and depth of a body, shares of its height
 READ = pymunk.batch.BodyFields.POSITION | pymunk.batch.BodyFields.VELOCITY
+WRITE = pymunk.batch.BodyFields.FORCE
 
 
 def run(scenario: Scenario, seed: int, repeat: int = 0, steering: Steering | None = None) -> Motion:
@@ -66,27 +68,31 @@ class World:
 
     def run(self) -> Motion:
         """Warm up, then record duration · fps frames."""
-        from sim.steering_kernels import accelerate
-
-        warm = round(self.scenario.warmup * self.fps)
         frames = max(1, round(self.scenario.duration * self.fps))
-        p = len(self.members)
-        record = np.full((frames, p, 4), np.nan)
-        intent = np.full((frames, p), -1, np.int64)
-        noise = wander([m.key for m in self.members], warm + frames, self.fps, self.seed, self.repeat)
-        for f in range(-warm, frames):
+        record = np.empty((frames, len(self.members), 4))
+        intent = np.empty((frames, len(self.members)), np.int64)
+        for f, (state, group) in enumerate(self.frames(frames)):
+            record[f], intent[f] = state, group
+        return self._motion(record, intent)
+
+    def frames(self, length: int) -> Iterator[tuple[Array, Ints]]:
+        """After the warm-up, for each of `length` frames: (P, 4) x, y, vx, vy and (P,) group; nan, -1 where absent."""
+        from sim.forces import accelerate
+
+        warm, p = round(self.scenario.warmup * self.fps), len(self.members)
+        noise = wander([m.key for m in self.members], warm + length, self.fps, self.seed, self.repeat)
+        for f in range(-warm, length):
             if f > -warm:
                 self._advance(accelerate, noise[f + warm])
             t = f / self.fps
             self._come_and_go(t, f == -warm)
-            everybody = np.full((p, 4), np.nan)
-            everybody[self.columns] = self.state
-            if f >= 0:
-                record[f] = everybody
-                intent[f, self.columns] = self.script.group_of[self.columns]
-                self.script.advance(f, t, everybody)
-                self._retag()
-        return self._motion(record, intent)
+            if f < 0:
+                continue
+            state, group = np.full((p, 4), np.nan), np.full(p, -1, np.int64)
+            state[self.columns], group[self.columns] = self.state, self.script.group_of[self.columns]
+            self.script.advance(f, t, state)
+            self._retag()
+            yield state, group
 
     def _advance(self, accelerate: Any, noise: Array) -> None:
         """One frame: `substeps` of forces, physics and reading back."""
@@ -94,37 +100,35 @@ class World:
         if n == 0:
             return
         self.people.wander[:] = noise[self.columns]
+        out = self.force[:n]
         for _ in range(self.substeps):
-            good = accelerate(
-                self.state,
-                self.people,
-                self.groups,
-                self.obstacles,
-                self.dt,
-                self.parameters,
-                self.push,
-                self.force[:n],
-            )
-            if not good:
-                raise WorkError(
-                    file=self.scenario.name,
-                    place=f"seed {self.seed}",
-                    got="a position or velocity that is not finite",
-                    expected="finite motion",
-                    remedy="report the scenario and seed as a bug",
-                )
-            pymunk.batch.set_space_bodies(self.space, pymunk.batch.BodyFields.FORCE, self._put)
+            if not accelerate(
+                self.state, self.people, self.groups, self.obstacles, self.dt, self.parameters, self.push, out
+            ):
+                raise self._blown_up()
+            pymunk.batch.set_space_bodies(self.space, WRITE, self._put)
             self.space.step(self.dt)
-            self.state = self._read(READ)[:n]
+            self._get.clear()
+            pymunk.batch.get_space_bodies(self.space, READ, self._get)
         self.script.waypoint[self.columns] = self.people.tag[:, 3]
 
-    def _read(self, fields: Any) -> Array:
+    def _blown_up(self) -> WorkError:
+        return WorkError(
+            file=self.scenario.name,
+            place=f"seed {self.seed}",
+            got="a position or velocity that is not finite",
+            expected="finite motion",
+            remedy="report the scenario and seed as a bug",
+        )
+
+    def _read(self) -> Array:
+        """(rows, 4) x, y, vx, vy: the engine's own buffer, which every further reading of as many bodies fills anew."""
         self._get.clear()
-        pymunk.batch.get_space_bodies(self.space, fields, self._get)
+        pymunk.batch.get_space_bodies(self.space, READ, self._get)
         return np.frombuffer(self._get.float_buf()).reshape(-1, 4)
 
     def _come_and_go(self, t: float, first: bool) -> None:
-        gone = self.script.leaving(self.columns)
+        gone = self.script.leaving(self.columns) if self.groups.arrived.any() else []
         coming = [party for party in self.script.waiting if (party.enter <= 0 if first else party.enter <= t)]
         coming = [party for party in coming if first or self._has_room(party)]
         if not gone and not coming:
@@ -176,7 +180,7 @@ class World:
         self.columns = np.array([column[int(i)] for i in ids[:n]], dtype=np.int64)
         self.force = np.zeros((len(ids), 2))
         self._put.set_float_buf(self.force)
-        self.state = self._read(READ)[:n]
+        self.state = self._read()[:n]
         self.people = People.empty(n)
         self._retag()
 

@@ -12,8 +12,8 @@ import pytest
 ROOT = Path(__file__).resolve().parents[1]
 PACKAGES = ("scenarios", "sim", "tracking")
 LINES = 300
-LONGER = {"sim.types": 400, "sim.steering_kernels": 400}
-"""One definition of all types; kernels that numba compiles as one unit."""
+LONGER = {"sim.types": 400}
+"""One definition of all types."""
 
 SCORING = (
     "tracking.scoring",

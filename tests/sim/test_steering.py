@@ -5,8 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from sim.avoidance_kernels import _pairs
+from sim.forces import accelerate
 from sim.steering import END, GATHER, Groups, Obstacles, People, Steering
-from sim.steering_kernels import _pairs, accelerate
 from tests.reference_steering import between_people
 
 NOTHING = Obstacles(np.zeros((0, 4)), np.zeros((0, 3)), np.zeros((0, 8)))

@@ -8,7 +8,7 @@ import pytest
 
 from scenarios.loading import load, names
 from sim.steering import Steering
-from sim.world import READ, World, run, steps_per_frame
+from sim.world import WRITE, World, run, steps_per_frame
 
 
 @pytest.mark.parametrize("name", names())
@@ -42,7 +42,7 @@ def test_batches_read_what_the_loop_reads() -> None:
     world = World(load("crowd"), 2, 0, Steering())
     world._come_and_go(0.0, True)
     by_loop = np.array([(*b.position, *b.velocity) for b in (world.bodies[c] for c in world.columns)])
-    np.testing.assert_array_equal(world._read(READ)[: len(by_loop)], by_loop)
+    np.testing.assert_array_equal(world._read()[: len(by_loop)], by_loop)
     gone = sorted(world.bodies)[:3]
     for column in gone:
         body = world.bodies.pop(column)
@@ -51,7 +51,7 @@ def test_batches_read_what_the_loop_reads() -> None:
     by_loop = np.array([(*b.position, *b.velocity) for b in (world.bodies[c] for c in world.columns)])
     np.testing.assert_array_equal(world.state, by_loop)
     world.force[: len(by_loop)] = np.arange(2 * len(by_loop)).reshape(-1, 2)
-    pymunk.batch.set_space_bodies(world.space, pymunk.batch.BodyFields.FORCE, world._put)
+    pymunk.batch.set_space_bodies(world.space, WRITE, world._put)
     assert [tuple(world.bodies[c].force) for c in world.columns] == [tuple(f) for f in world.force[: len(by_loop)]]
 
 

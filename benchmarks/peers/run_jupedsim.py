@@ -1,0 +1,49 @@
+"""Run JuPedSim's collision-free speed model; for an environment of its own (pip install jupedsim numpy).
+
+usage: python run_jupedsim.py < LAYOUT.json      {"start": [[x, y]…], "goal", "speed", "size", "margin", "dt", "steps"}
+
+Needs nothing of flockscope. An open square with a wall `margin` m round it, everybody on the way to a goal of his own,
+all positions read into an array after every step. Prints {"people", "steps", "seconds"}: CPU seconds in the loop of
+steps; building the scene is left out.
+"""
+
+import json
+import logging
+import sys
+import time
+
+import numpy as np
+
+
+def build(scene):
+    import jupedsim
+
+    low, high = -scene["margin"], scene["size"] + scene["margin"]
+    square = [(low, low), (high, low), (high, high), (low, high)]
+    simulation = jupedsim.Simulation(model=jupedsim.CollisionFreeSpeedModel(), geometry=square, dt=scene["dt"])
+    stage = simulation.add_direct_steering_stage()
+    journey = simulation.add_journey(jupedsim.JourneyDescription([stage]))
+    for start, goal, speed in zip(scene["start"], scene["goal"], scene["speed"], strict=True):
+        parameters = jupedsim.CollisionFreeSpeedModelAgentParameters(
+            journey_id=journey, stage_id=stage, position=tuple(start), desired_speed=speed, radius=0.2
+        )
+        agent = simulation.add_agent(parameters)
+        simulation.agent(agent).target = tuple(goal)
+    return simulation
+
+
+def main():
+    logging.disable(logging.CRITICAL)
+    scene = json.load(sys.stdin)
+    simulation = build(scene)
+    simulation.iterate()
+    begin = time.process_time()
+    for _ in range(scene["steps"]):
+        simulation.iterate()
+        positions = np.array([agent.position for agent in simulation.agents()])
+    seconds = time.process_time() - begin
+    print(json.dumps({"people": len(positions), "steps": scene["steps"], "seconds": seconds}))
+
+
+if __name__ == "__main__":
+    main()
