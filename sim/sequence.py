@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from functools import cache
 from typing import TYPE_CHECKING
 
 from sim.camera import px_per_m_at_centre, solve
 from sim.orders import check_orders
 from sim.truth import bodies, label
-from sim.types import Detections, Frame, Motion, Sequence, Truth
+from sim.types import Detections, Frame, Motion, Order, Scene, Sequence, Truth
 
 if TYPE_CHECKING:
     from scenarios.schema import Scenario
@@ -38,12 +38,18 @@ def observe(
     camera = solve(scenario.camera, motion)
 
     @cache
+    def named() -> Mapping[str, tuple[int, ...]]:
+        if people is not None:
+            return people
+        return named_people(scenario, motion.scene, motion.seed, motion.repeat, motion.orders)
+
+    @cache
     def detections() -> list[Detections]:
         from sim.sensors import sense
 
-        named = people if people is not None else _people(scenario, motion)
+        hidden = named() if any(hide.group is not None for hide in scenario.sensor.hide) else {}
         seen = bodies(motion, camera)
-        return sense(seen, scenario.sensor, motion.seed, camera, camera.image, motion.repeat, named)
+        return sense(seen, scenario.sensor, motion.seed, camera, camera.image, motion.repeat, hidden)
 
     def frames() -> Iterator[Frame]:
         return (Frame(d.index, d.t, detections=d) for d in detections())
@@ -65,29 +71,26 @@ def observe(
         scene=motion.scene,
         px_per_m=px_per_m_at_centre(camera),
         has_detections=True,
+        load_people=named,
         source={"kind": "simulated", "seed": motion.seed, "repeat": motion.repeat},
     )
 
 
-def _people(scenario: Scenario, motion: Motion) -> dict[str, tuple[int, ...]]:
-    """Ids of the people of each group that `sensor.hide` may name; found only where a name is used."""
-    if all(hide.group is None for hide in scenario.sensor.hide):
-        return {}
+def named_people(
+    scenario: Scenario, scene: Scene, seed: int, repeat: int, orders: Iterable[Order]
+) -> dict[str, tuple[int, ...]]:
+    """Ids of the people of each group that the script names: those it starts with, and those its orders made."""
     from sim.cast import cast
 
-    parties = cast(scenario, motion.scene, motion.seed, motion.repeat)
+    parties = cast(scenario, scene, seed, repeat)
     names = {party.name: tuple(m.column + 1 for m in party.members) for party in parties}
-    for event, order in zip(scenario.event, _ordered(scenario, motion), strict=True):
-        if order is None:
+    after = {order.id: order.after for order in orders if order.fired is not None}
+    for event in scenario.event:
+        made = after.get(event.id)
+        if made is None:
             continue
         if event.type == "merge":
-            names[event.into] = order[0]
+            names[event.into] = made[0]
         elif event.type == "split":
-            names |= {part.id: ids for part, ids in zip(event.parts, order, strict=True)}
+            names |= {part.id: ids for part, ids in zip(event.parts, made, strict=True)}
     return names
-
-
-def _ordered(scenario: Scenario, motion: Motion) -> list[tuple[tuple[int, ...], ...] | None]:
-    """The people after each of the scenario's orders; None for one that never fired."""
-    after = {order.id: order.after for order in motion.orders if order.fired is not None}
-    return [after.get(event.id) for event in scenario.event]

@@ -7,7 +7,7 @@ Arrays are float64 except ids (int64), flags (bool) and images (uint8); every ar
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field, fields, replace
 from typing import Any, Literal, Protocol, Self
 
@@ -342,6 +342,7 @@ class Sequence:
     frames(): a new iterator over Frame, `detections` being the file's (or the simulated sensor's), if any.
     truth: a function, called once when first asked for, or None. background: a function giving (K, H, W, 3) or None.
     planes: what the detections' `pos` is in, "ground" or "image"; px_per_m nan = to be found from boxes.
+    load_people: a function giving the ids of the people of each group that the script names, or None without a script.
     """
 
     name: str
@@ -357,6 +358,7 @@ class Sequence:
     has_right: bool = False
     has_detections: bool = False
     load_background: Callable[[], Image] | None = None
+    load_people: Callable[[], Mapping[str, tuple[int, ...]]] | None = None
     source: dict[str, Any] = field(default_factory=dict)
 
     def __iter__(self) -> Iterator[Frame]:

@@ -45,4 +45,6 @@ def _sensed(truth: Truth, sequence: Sequence, sensor: Mapping[str, Any], seed: i
         place = ".".join(["sensor", *map(str, first["loc"])])
         expected = first["msg"]
         raise InputError(place=place, got=first["input"], expected=expected, remedy="see docs/formats.md") from None
-    return iter(sense(truth, spec, seed, sequence.camera, sequence.image_size))
+    by_name, cast = any(hide.group is not None for hide in spec.hide), sequence.load_people
+    people = cast() if by_name and cast is not None else {}
+    return iter(sense(truth, spec, seed, sequence.camera, sequence.image_size, people=people))

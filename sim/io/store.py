@@ -18,6 +18,7 @@ from sim import hashing
 from sim.io import tables, truths
 from sim.io.atomic import write_folder
 from sim.io.cameras import camera_document, read_camera, read_scene, scene_document
+from sim.io.events import read_script
 from sim.types import Detections, Frame, Sequence
 
 __all__ = ["is_sequence", "open_sequence", "read_camera", "read_manifest", "sequence_files", "write_sequence"]
@@ -173,8 +174,18 @@ def open_sequence(folder: Path) -> Sequence:
         scene=read_scene(folder / "scene.json") if "scene.json" in has else None,
         px_per_m=tables.number(about["px_per_m"]),
         has_detections="det/det.parquet" in has,
+        load_people=(lambda: _people(folder, manifest)) if "gt/script.json" in has else None,
         source={
             "kind": "generated", "path": str(folder), "seed": manifest["seed"], "repeat": manifest["repeat"],
             "truth_hash": manifest["truth_hash"],
         },
     )  # fmt: skip
+
+
+def _people(folder: Path, manifest: dict[str, Any]) -> dict[str, tuple[int, ...]]:
+    """Ids of the people of each group of the script, cast anew from the stored scenario and seed."""
+    from scenarios import load
+    from sim.sequence import named_people
+
+    scene, orders = read_scene(folder / "scene.json"), read_script(folder / "gt" / "script.json")
+    return named_people(load(folder / "scenario.toml"), scene, manifest["seed"], manifest["repeat"], orders)

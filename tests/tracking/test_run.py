@@ -94,6 +94,37 @@ def test_sensor_overrides_degrade_the_labels():
         track("blob", source(load_truth=truth), detections="truth", sensor={"detect_prob": 2.0})
 
 
+def test_hiding_a_group_by_its_name(tmp_path):
+    """Simulated and stored alike: the script's own groups, and those that its orders made."""
+    import sim
+    from scenarios import load
+    from scenarios.write import dump
+    from sim.io.store import open_sequence, write_sequence
+
+    scenario = load("merge")
+    live = sim.simulate(scenario, seed=3)
+    write_sequence(tmp_path / "m", live, scenario=dump(scenario), seed=3)
+    stored, people = open_sequence(tmp_path / "m"), live.load_people()
+    assert stored.load_people() == people
+    assert set(people["ab"]) == set(people["a"]) | set(people["b"])
+    for sequence in (live, stored):
+        feed = prepare(
+            "blob", sequence, detections="truth", sensor={"hide": [{"start": 1.0, "end": 2.0, "group": "a"}]}
+        ).frames()
+        for frame in feed:
+            there = set(live.truth.at(frame.index).id) - (set(people["a"]) if 1.0 <= frame.t < 2.0 else set())
+            assert len(frame.detections.pos) == len(there)
+    with pytest.raises(InputError, match=r"sensor\.hide\.0\.group: got 'x'; expected one of the script's groups \(a, "):
+        prepare("blob", live, detections="truth", sensor={"hide": [{"start": 1, "end": 2, "group": "x"}]})
+    with pytest.raises(InputError, match="none is known here"):
+        prepare(
+            "blob",
+            source(load_truth=truth),
+            detections="truth",
+            sensor={"hide": [{"start": 1, "end": 2, "group": "a"}]},
+        )
+
+
 def test_default_is_truth_where_there_is_nothing_else():
     assert prepare("blob", source(has_detections=False, load_truth=truth)).mode == "truth"
 
