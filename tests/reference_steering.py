@@ -1,4 +1,4 @@
-"""The forces between people and from walls, slow and obvious: loops over all pairs, formulas as in the docstrings."""
+"""What people avoid, slow and obvious: loops over all pairs of people, groups, people and things."""
 
 from __future__ import annotations
 
@@ -42,5 +42,39 @@ def between_people(state: Array, tag: Ints, s: Steering) -> Array:
                 w = state[i, 2:] - state[j, 2:]
                 out[i] += power_law(d, w, 2 * s.person_radius, s.avoid_person, s.avoid_time, s.avoid_max)
                 continue
-            out[i] += strength * max(0.0, 1 - distance / reach) * d / distance
+            out[i] += strength * max(0.0, 1 - distance / reach) * d / max(distance, 1e-9)
+    return out
+
+
+def between_groups(now: Array, s: Steering) -> Array:
+    """Acceleration of each group as a whole, (G, 2), `now` as in sim.steering; the larger of two yields less."""
+    out = np.zeros((len(now), 2))
+    for a in range(len(now)):
+        for b in range(len(now)):
+            d, w = now[a, 1:3] - now[b, 1:3], now[a, 3:5] - now[b, 3:5]
+            alone = now[a, 0] == now[b, 0] == 1
+            if a == b or alone or not now[a, 9] or not now[b, 9] or np.linalg.norm(d) > s.group_range:
+                continue
+            radius = now[a, 5] + now[b, 5] + 2 * s.person_radius
+            share = 2 * now[b, 0] / (now[a, 0] + now[b, 0])
+            out[a] += share * power_law(d, w, radius, s.avoid_group, s.avoid_time, s.avoid_max)
+    return out
+
+
+def from_things(state: Array, walls: Array, pillars: Array, s: Steering) -> Array:
+    """Repulsion of walls within 1.2 m and of pillars within 6 m of their edge, and anticipation of pillars, (N, 2)."""
+    out, body = np.zeros((len(state), 2)), 0.2
+    for i, (x, v) in enumerate(zip(state[:, :2], state[:, 2:], strict=True)):
+        for wall in walls:
+            a, u = wall[:2], wall[2:] - wall[:2]
+            d = x - a - np.clip((x - a) @ u / (u @ u + 1e-9), 0, 1) * u
+            r = np.linalg.norm(d)
+            out[i] += (r < 1.2) * s.wall * np.exp(-(r - body) / s.wall_range) * d / max(r, 1e-9)
+        for pillar in pillars:
+            d, radius = x - pillar[:2], pillar[2]
+            r = np.linalg.norm(d)
+            if r < radius + 6:
+                out[i] += s.wall * np.exp(-(r - body - radius) / s.wall_range) * d / max(r, 1e-9)
+                wide = radius + 1.2 * s.person_radius
+                out[i] += power_law(d, v, wide, s.avoid_person, s.avoid_time, s.avoid_max)
     return out

@@ -1,14 +1,16 @@
-"""The kernel of forces against its slow twin, and what forces may not depend on."""
+"""The kernels of forces against their slow twins, and what forces may not depend on."""
 
 from __future__ import annotations
+
+from collections.abc import Callable
 
 import numpy as np
 import pytest
 
-from sim.avoidance_kernels import _pairs
+from sim.avoidance_kernels import _avoid_groups, _pairs, _walls
 from sim.forces import accelerate
 from sim.steering import END, GATHER, Groups, Obstacles, People, Steering
-from tests.reference_steering import between_people
+from tests.reference_steering import between_groups, between_people, from_things
 
 NOTHING = Obstacles(np.zeros((0, 4)), np.zeros((0, 3)), np.zeros((0, 8)))
 
@@ -39,12 +41,76 @@ def forces(state: np.ndarray, people: People, groups: Groups, obstacles: Obstacl
     return out
 
 
+def scattered(state: np.ndarray) -> None:
+    """As drawn."""
+
+
+def standing(state: np.ndarray) -> None:
+    state[:, 2:] = 0.0
+
+
+def half_standing(state: np.ndarray) -> None:
+    state[::2, 2:] = 0.0
+
+
+def in_a_row(state: np.ndarray) -> None:
+    state[:, 1] = 3.0
+
+
+def head_on(state: np.ndarray) -> None:
+    state[:, 1], state[:, 3] = 3.0, 0.0
+
+
+def touching(state: np.ndarray) -> None:
+    """On a lattice as wide as the distance strangers keep, some on one place."""
+    state[:, :2] = np.round(state[:, :2] / 0.58) * 0.58
+
+
+def at_the_edge_of_reach(state: np.ndarray) -> None:
+    state[:, :2] = np.round(state[:, :2] / 3.5) * 3.5
+
+
+PLACES = (scattered, standing, half_standing, in_a_row, head_on, touching, at_the_edge_of_reach)
+
+
 @pytest.mark.parametrize("n", [2, 12, 48, 49, 150])
-def test_pairs_equal_the_slow_twin(n: int) -> None:
+@pytest.mark.parametrize("arrange", PLACES)
+def test_pairs_equal_the_slow_twin(arrange: Callable[[np.ndarray], None], n: int) -> None:
     state, people, _ = crowd(n, n, side=4 + n / 10)
+    arrange(state)
     out = np.zeros((n, 2))
     _pairs(state, people.tag, Steering().array(), out)
     np.testing.assert_allclose(out, between_people(state, people.tag, Steering()), atol=1e-9)
+
+
+def test_very_many_equal_the_slow_twin() -> None:
+    state, people, _ = crowd(400, 0, side=32.0)
+    out = np.zeros((400, 2))
+    _pairs(state, people.tag, Steering().array(), out)
+    np.testing.assert_allclose(out, between_people(state, people.tag, Steering()), atol=1e-9)
+
+
+@pytest.mark.parametrize("seed", range(8))
+def test_groups_equal_the_slow_twin(seed: int) -> None:
+    r = np.random.default_rng(seed)
+    count = r.integers(0, 4, 40).astype(float)
+    now = np.concatenate([count[:, None], r.uniform(0, 25, (40, 2)), r.normal(size=(40, 2)), r.random((40, 5))], axis=1)
+    now[:, 9] = (count > 0) & (r.random(40) < 0.9)
+    now[seed, 3:5] = 0.0
+    push = np.ones((40, 2))
+    _avoid_groups(now, Steering().array(), push)
+    np.testing.assert_allclose(push, between_groups(now, Steering()), atol=1e-9)
+    assert np.abs(push).max() > 0.1
+
+
+def test_walls_and_pillars_equal_the_slow_twin() -> None:
+    state, _, _ = crowd(100, 4)
+    r = np.random.default_rng(4)
+    walls, pillars = r.uniform(0, 6, (5, 4)), r.uniform(0.1, 6, (3, 3)) * [1, 1, 0.1]
+    walls[0, 2:] = walls[0, :2]
+    out = np.zeros((100, 2))
+    _walls(state, walls, pillars, Steering().array(), out)
+    np.testing.assert_allclose(out, from_things(state, walls, pillars, Steering()), atol=1e-9)
 
 
 @pytest.mark.parametrize("seed", range(5))
