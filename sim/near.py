@@ -38,15 +38,15 @@ def _pairs_of(frame: Ints, pos: Array, low: int, high: int, reach: float) -> tup
     order = np.argsort(key, kind="stable")
     key = key[order]
     here = np.arange(len(key))
-    i1, j1 = _runs(here + 1, np.searchsorted(key, key + 1, side="right"))
-    i2, j2 = _runs(np.searchsorted(key, key + rows - 1), np.searchsorted(key, key + rows + 1, side="right"))
+    i1, j1 = runs(here + 1, np.searchsorted(key, key + 1, side="right"))
+    i2, j2 = runs(np.searchsorted(key, key + rows - 1), np.searchsorted(key, key + rows + 1, side="right"))
     i, j = order[np.concatenate([i1, i2])], order[np.concatenate([j1, j2])]
     near = ((p[i] - p[j]) ** 2).sum(axis=1) < reach**2
     i, j = i[near] + low, j[near] + low
     return np.minimum(i, j), np.maximum(i, j)
 
 
-def _runs(first: Ints, end: Ints) -> tuple[Ints, Ints]:
+def runs(first: Ints, end: Ints) -> tuple[Ints, Ints]:
     """For each row k the pairs (k, first[k]) … (k, end[k] - 1)."""
     n = np.maximum(end - first, 0)
     i = np.repeat(np.arange(len(n)), n)

@@ -61,6 +61,26 @@ def test_politely_round_is_a_cross_where_paths_cross():
     assert crossed(pair((0, 5), straight(1)) + away) == []
 
 
+def test_across_and_back_is_no_cross():
+    """A pair steps over the way of the other (y = 5) 3 m ahead of it, at 5.1 s; then back again at 5.9 s, or on."""
+
+    def stepping(*places):
+        y = np.interp(T, [2.5, 5.5, 8.5], places)
+        return pair((0, 5), straight(1)) + [np.concatenate([8.5 + x + 0 * T, y], axis=1) for x in (-0.35, 0.35)]
+
+    assert crossed(stepping(2.4, 5.4, 2.4)) == []
+    assert len(crossed(stepping(2.4, 5.4, 6.9))) == 1
+
+
+@pytest.mark.parametrize("angle", range(0, 360, 15))
+def test_paths_that_meet_in_a_point_of_both_cross_at_any_angle(angle):
+    """Both walk through the very place (5, 5), in different frames: turned about, rounding puts it on either side."""
+    c, s = np.cos(np.radians(angle)), np.sin(np.radians(angle))
+    late = [np.array([5 + x, -2.4]) + straight(0, 1) for x in (-0.35, 0.35)]
+    turned = [(p - 5) @ np.array([[c, -s], [s, c]]) for p in pair((0, 5), straight(1)) + late]
+    assert len(crossed(turned)) == 1
+
+
 @pytest.mark.parametrize(
     "paths",
     [
