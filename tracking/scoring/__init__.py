@@ -1,5 +1,6 @@
 """Scores of people, groups and events; imports numpy and scipy only."""
 
+from tracking.scoring.arrays import score_arrays
 from tracking.scoring.evaluation import evaluate
 
-__all__ = ["evaluate"]
+__all__ = ["evaluate", "score_arrays"]
