@@ -17,7 +17,10 @@ LAGS = 5
 
 
 def normalised(errors: Array, covariances: Array) -> Array:
-    """L^-1 e of errors (K, n), covariances (K, n, n) being L L': uncorrelated, of variance 1, if the filter is right."""
+    """L^-1 e of errors (K, n), covariances (K, n, n) being L L': white, of variance 1, if the filter is right.
+
+    LinAlgError where a covariance is not positive definite.
+    """
     return np.asarray(np.linalg.solve(np.linalg.cholesky(covariances), errors[..., None])[..., 0])
 
 

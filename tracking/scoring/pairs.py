@@ -102,6 +102,24 @@ class Pairs:
             self.true.keep(true), self.est.keep(est), place_i[self.i[kept]], place_j[self.j[kept]], self.s[kept]
         )
 
+    def take(self, frames: Ints) -> Pairs:
+        """The frames (F,) one after the other as frames 0 … F - 1, some perhaps more than once."""
+        at_true, i, shift_i = _taken(self.true.frame, frames)
+        at_est, j, shift_j = _taken(self.est.frame, frames)
+        at, k, _ = _taken(self.frame, frames)
+        return Pairs(
+            Rows(at_true, self.true.id[i]), Rows(at_est, self.est.id[j]),
+            self.i[k] + shift_i[at], self.j[k] + shift_j[at], self.s[k],
+        )  # fmt: skip
+
+
+def _taken(frame: Ints, frames: Ints) -> tuple[Ints, Ints, Ints]:
+    """Of rows sorted by `frame` those of each of `frames`: place in `frames`, old row, and new row minus old (F,)."""
+    first = np.searchsorted(frame, frames, side="left")
+    count = np.searchsorted(frame, frames, side="right") - first
+    shift = np.cumsum(count) - count - first
+    return np.repeat(np.arange(len(frames)), count), np.arange(count.sum()) - np.repeat(shift, count), shift
+
 
 def numbered(values: Ints) -> tuple[Ints, Ints]:
     """Distinct values in order, and the place of each among them; counted instead of sorted where numbers are small."""

@@ -83,6 +83,20 @@ def test_part_of_the_frames(seed: int) -> None:
         assert part.est.frame.tolist() == alone.est.frame.tolist()
 
 
+@pytest.mark.parametrize("seed", range(5))
+def test_frames_drawn_again_and_again(seed: int) -> None:
+    r = np.random.default_rng(seed)
+    ids = [(r.permutation(9)[: r.integers(0, 6)], r.permutation(9)[: r.integers(0, 6)]) for _ in range(8)]
+    tables = [r.random((len(i), len(j))) * (r.random((len(i), len(j))) < 0.5) for i, j in ids]
+    drawn = r.integers(0, 8, 15)
+    found = matrix_pairs([i for i, _ in ids], [j for _, j in ids], tables).take(drawn)
+    again = matrix_pairs([ids[k][0] for k in drawn], [ids[k][1] for k in drawn], [tables[k] for k in drawn])
+    assert as_dict(found) == as_dict(again)
+    for side in ("true", "est"):
+        assert getattr(found, side).frame.tolist() == getattr(again, side).frame.tolist()
+        assert getattr(found, side).id.tolist() == getattr(again, side).id.tolist()
+
+
 def test_tables_of_each_frame() -> None:
     pairs = matrix_pairs(
         [[5], [], [6, 7]], [[1, 2], [3], [4]], [np.array([[0.0, 0.5]]), np.zeros((0, 1)), [[0.25], [1]]]
