@@ -44,8 +44,8 @@ def _count(key: str, family: str, meaning: str, better: Better = "lower") -> Sco
     return Score(key, family, "count", 0.0, inf, better, meaning)
 
 
-def _length(key: str, family: str, meaning: str) -> Score:
-    return Score(key, family, "m | px", 0.0, inf, "lower", meaning)
+def _length(key: str, family: str, meaning: str, unit: str = "m | px") -> Score:
+    return Score(key, family, unit, 0.0, inf, "lower", meaning)
 
 
 OBJECTIVE = (
@@ -75,6 +75,17 @@ PEOPLE = (
     _share("IDP", "people", "share of estimated people under the right identity"),
     _share("IDR", "people", "share of true people under the right identity"),
     _count("IDTP", "people", "estimated people under the right identity", "higher"),
+)
+
+ERRORS = (
+    _length("RMSE_pos", "errors", "root mean square error of the places of people who are found (0.5 and more)"),
+    _length("RMSE_vel", "errors", "… of their velocities, on the ground", "m/s"),
+    _length("GOSPA", "errors", "RMS over frames of GOSPA, cut-off 2 m (Rahmathullah 2017): far off, missed and false"),
+    _length(
+        "GOSPA_localisation", "errors", "its part of people far off: GOSPA² is the sum of the squares of its parts"
+    ),
+    _length("GOSPA_missed", "errors", "its part of missed people"),
+    _length("GOSPA_false", "errors", "its part of false people"),
 )
 
 GROUPS = (
@@ -147,6 +158,7 @@ def _core(score: Score) -> Score:
 ALL = (
     *OBJECTIVE,
     *PEOPLE,
+    *ERRORS,
     *GROUPS,
     *map(_core, GROUPS),
     *MEMBERS,

@@ -13,12 +13,13 @@ from tracking.grouping import with_groups
 from tracking.scoring.catalogue import CATALOGUE
 from tracking.scoring.groups import GroupMatch
 from tracking.scoring.individuals import scores as individual_scores
+from tracking.scoring.mapping import mapped
 from tracking.scoring.pairs import Pairs, box_pairs, point_pairs
+from tracking.scoring.places import REACH, place_scores
 from tracking.scoring.sides import People, Surface, tracked_people, true_people
-from tracking.scoring.social import labelled, social_scores
+from tracking.scoring.social import Labelled, social_scores
 
 Similarity = Literal["boxes", "ground", "image"]
-REACH = 2.0  # m: places this far apart have similarity 0
 
 
 class IncomparableError(ValueError):
@@ -74,15 +75,16 @@ def evaluate(
     plane, chosen = plane_of(truth, answers), similarity or usual_similarity(truth, answers)
     true, est = true_people(truth, inside), tracked_people(answers)
     pairs = people_pairs(true, est, chosen, plane, truth.px_per_m)
-    surface: Surface = "image" if plane == "image" else "ground"
+    stands_for = mapped(pairs)
+    case = Labelled(truth, answers, told, true, est, stands_for, "image" if plane == "image" else "ground")
     found = dict.fromkeys(CATALOGUE, float("nan"))
-    follows_people = not any(t.unit == "group" for t in answers)
-    if follows_people:
+    if not any(t.unit == "group" for t in answers):
         found |= individual_scores(pairs)
+        found |= place_scores(true, est, stands_for, case.surface, plane, case.scale, int(inside.sum()))
     if told.any():
-        found |= social_scores(labelled(truth, answers, told, true, est, pairs, surface), group_match)
+        found |= social_scores(case, group_match)
     found["objective"] = _objective(found)
-    return Scores(found, chosen, surface, group_match)
+    return Scores(found, chosen, case.surface, group_match)
 
 
 def chosen_frames(frames: int | range | None, length: int) -> Bools:

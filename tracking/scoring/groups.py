@@ -13,6 +13,7 @@ import numpy as np
 
 from sim.geometry import iou_pairs, pack
 from sim.types import Array, Bools, Ints
+from tracking.scoring.errors import gaussian_wasserstein
 from tracking.scoring.hota import hota
 from tracking.scoring.matching import match
 from tracking.scoring.pairs import EPS, Pairs, compare
@@ -115,14 +116,14 @@ def compare_groups(true: Crowd, est: Crowd, shared: Shared, by: GroupMatch) -> C
 
 
 def group_scores(compared: Compared, frames: Bools) -> dict[str, float]:
-    """Scores over the frames f with frames[f]; keys as in the catalogue, without their prefix."""
-    c = compared.chosen
-    kept = frames[c.true.frame[c.i]]
-    i, j = c.i[kept], c.j[kept]
-    n, m = (frames[side.rows.frame] for side in (compared.true, compared.est))
-    there, said, hits = int(n.sum()), int(m.sum()), len(i)
+    """Scores over the frames f with frames[f]; keys as in the catalogue, without their prefix; HOTA's are missing where
+    there is no group on either side."""
+    true, est, chosen = compared.true, compared.est, compared.chosen
+    kept = frames[true.rows.frame[chosen.i]]
+    i, j = chosen.i[kept], chosen.j[kept]
+    there, said, hits = int(frames[true.rows.frame].sum()), int(frames[est.rows.frame].sum()), len(i)
     misses, false = there - hits, said - hits
-    switches = switched(c.true.frame[i], c.true.id[i], c.est.id[j])
+    switches = switched(true.rows.frame[i], true.rows.id[i], est.rows.id[j])
     right, clean = _correct(compared, i, j)
     return {
         "1-FP": _share(there - false, there),
@@ -130,30 +131,17 @@ def group_scores(compared: Compared, frames: Bools) -> dict[str, float]:
         **_by_frame(compared, frames, i),
         "GDSR": _share(int(right.sum()), there),
         "GDSR2": _share(int(clean.sum()), there),
-        "MOTP": _mean(np.hypot(*(compared.true.pos[i] - compared.est.pos[j]).T)),
+        "MOTP": _mean(np.hypot(*(true.pos[i] - est.pos[j]).T)),
         "MOTA": _share(there - misses - false - switches, there),
         "IDSW": float(switches),
         "TP": float(hits),
         "FP": float(false),
         "FN": float(misses),
         **detection(compared, frames),
-        **hota(compared.pairs.in_frames(frames)),
-        "size_error": _mean(np.abs(_sizes(compared.true)[i] - _sizes(compared.est)[j])),
-        "extent_error": _mean(gaussian_wasserstein(compared.true, compared.est, i, j)),
+        **(hota(compared.pairs.in_frames(frames)) if there + said else {}),
+        "size_error": _mean(np.abs(_sizes(true)[i] - _sizes(est)[j])),
+        "extent_error": _mean(gaussian_wasserstein(true.pos[i], true.extent[i], est.pos[j], est.extent[j])),
     }
-
-
-def gaussian_wasserstein(true: Crowd, est: Crowd, i: Ints, j: Ints) -> Array:
-    """Distance (K,) between groups as Gaussians N(m, A), N(n, B) of their places and extents: the root of
-    |m - n|² + tr A + tr B - 2 tr (A^½ B A^½)^½, the last of which is √(tr AB + 2 √(det A det B)) for 2x2 matrices."""
-    a, b = true.extent[i], est.extent[j]
-    apart = ((true.pos[i] - est.pos[j]) ** 2).sum(axis=1)
-    det_a, det_b = (m[:, 0, 0] * m[:, 1, 1] - m[:, 0, 1] * m[:, 1, 0] for m in (a, b))
-    product = np.maximum(det_a * det_b, 0.0)
-    common = np.sqrt(np.maximum(np.einsum("kxy,kyx->k", a, b) + 2 * np.sqrt(product), 0.0))
-    apart += np.trace(a, axis1=1, axis2=2) + np.trace(b, axis1=1, axis2=2) - 2 * common
-    same = (a == b).all(axis=(1, 2)) & (true.pos[i] == est.pos[j]).all(axis=1)
-    return np.where(same, 0.0, np.sqrt(np.maximum(apart, 0.0)))
 
 
 def _share(part: float, whole: int) -> float:

@@ -20,11 +20,12 @@ INSIDE = 0.3  # m: a person so near a hull is in it, where a method names no mem
 
 @dataclass(frozen=True, slots=True, eq=False)
 class People:
-    """R people in frames: group (R,) -1 alone; pos (R, 2) in the side's own plane and box (R, 4), or None."""
+    """R people in frames: group (R,) -1 alone; pos, vel (R, 2) in the side's own plane and box (R, 4), or None."""
 
     rows: Rows
     group: Ints
     pos: Array | None
+    vel: Array | None
     box: Array | None
 
     def places(self, surface: Surface, plane: str) -> Array | None:
@@ -75,8 +76,8 @@ def true_people(truth: Truth, inside: Bools) -> People:
     """The truth's people in the frames f with inside[f]."""
     kept = inside[truth.frame]
     rows = Rows(truth.frame[kept], truth.id[kept])
-    pos, box = (None if a is None else a[kept] for a in (truth.pos, truth.box))
-    return People(rows, truth.group[kept], pos, box)
+    pos, vel, box = (None if a is None else a[kept] for a in (truth.pos, truth.vel, truth.box))
+    return People(rows, truth.group[kept], pos, vel, box)
 
 
 def tracked_people(answers: Sequence[Tracks]) -> People:
@@ -85,11 +86,13 @@ def tracked_people(answers: Sequence[Tracks]) -> People:
     frame = np.repeat(np.array([t.index for t in answers], np.int64), count)
     none = np.zeros(0, np.int64)
     id, group = (np.concatenate([none, *(getattr(t, name) for t in answers)]) for name in ("id", "group"))
-    pos = np.concatenate([np.zeros((0, 2)), *(t.pos[:, :2] for t in answers)])
+    pos, vel = (
+        np.concatenate([np.zeros((0, 2)), *(getattr(t, name)[:, :2] for t in answers)]) for name in ("pos", "vel")
+    )
     boxes = [t.box for t in answers if len(t.id)]
     boxed = [b for b in boxes if b is not None]
     box = np.concatenate([np.zeros((0, 4)), *boxed]) if len(boxed) == len(boxes) else None
-    return People(Rows(frame, id), group, pos, box)
+    return People(Rows(frame, id), group, pos, vel, box)
 
 
 def crowd(frames: Ints, groups: Sequence[Groups], people: Rows) -> Crowd:

@@ -11,8 +11,6 @@ from sim.types import Bools, Groups, Ints, Tracks, Truth
 from tracking.scoring.events import COUNTS_AS, HEADLINE, event_scores, pair_events
 from tracking.scoring.groups import Compared, GroupMatch, compare_groups, detection, group_scores, shared_members
 from tracking.scoring.lineage import lineage_scores
-from tracking.scoring.mapping import mapped
-from tracking.scoring.pairs import Pairs
 from tracking.scoring.pairwise import pairwise_scores
 from tracking.scoring.sides import Crowd, People, Surface, crowd, people_inside
 from tracking.scoring.witness import told_events, told_without_people, true_events
@@ -50,13 +48,6 @@ class Told:
     every: Crowd
     counted: Crowd
     who: Ints
-
-
-def labelled(
-    truth: Truth, answers: Sequence[Tracks], frames: Bools, true: People, est: People, pairs: Pairs, surface: Surface
-) -> Labelled:
-    """pairs: of people, by whatever similarity; they tell who stands for whom."""
-    return Labelled(truth, answers, frames, true, est, mapped(pairs), surface)
 
 
 def social_scores(case: Labelled, by: GroupMatch) -> dict[str, float]:
