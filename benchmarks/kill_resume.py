@@ -1,121 +1,107 @@
-"""Is a dataset the same however it was made? Kills, resumes, repeats and varies the environment of `generate`.
+"""`kill -9` in the middle of `flockscope generate`, then the same command again: is the dataset whole and the same?
 
-    python benchmarks/kill_resume.py [--kills 20] [--entry merge] [--seeds 0:12] [--workers 2]
+    PYTHONPATH=. python benchmarks/kill_resume.py [--kills 20] [--entry merge queue] [--seeds 0:6] [--workers 1]
 
-Part 1: `kill -9` at random moments of a run, then resume; after each the dataset must validate and be the same, byte
-for byte. Part 2: the same in new processes, with 1 and 2 workers, and OMP_NUM_THREADS and PYTHONHASHSEED varied.
+Moments are random, one in each of `--kills` equal parts of the time an undisturbed run takes, the last of which is
+after its end as often as before it. As many again (`--writing`) fall into the writing of a sequence: the run is killed
+as soon as its partial folder is seen, a random number of milliseconds later. After a kill no sequence may stand there
+half-written; after resuming, `validate` must find nothing and every byte must be that of the undisturbed run.
 Exit code 1 where anything differs.
 """
 
 from __future__ import annotations
 
 import argparse
-import hashlib
 import os
 import shutil
+import signal
 import subprocess
-import sys
 import tempfile
 import time
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
+from datasets import complete, content_hashes, file_bytes_hash, sequences, start, whole_run
 
 from sim.io.validate import validate
 
-ROOT = Path(__file__).resolve().parents[1]
+Wait = Callable[[subprocess.Popen[str], Path], str]
 
 
-def command(args: argparse.Namespace, out: Path, workers: int) -> list[str]:
-    """The command line of one run: of the program, or of the function it calls."""
-    if (ROOT / "tracking" / "app" / "cli.py").is_file():
-        words = ["-m", "tracking.app.cli", "generate", *args.entry, "--seeds", args.seeds]
-        return [sys.executable, *words, "--out", str(out), "--workers", str(workers)]
-    low, high = args.seeds.split(":")
-    call = f"generate({args.entry}, range({low}, {high}), {str(out)!r}, workers={workers})"
-    return [sys.executable, "-c", f"from sim.generate import generate\nif __name__ == '__main__':\n    {call}"]
+def at(moment: float) -> Wait:
+    """Wait for a moment, s after the start."""
 
-
-def start(args: argparse.Namespace, out: Path, workers: int, **env: str) -> subprocess.Popen[bytes]:
-    variables = {**os.environ, "OMP_NUM_THREADS": "1", "PYTHONPATH": str(ROOT), **env}
-    quiet = subprocess.DEVNULL
-    return subprocess.Popen(command(args, out, workers), env=variables, cwd=ROOT, stdout=quiet, stderr=quiet)
-
-
-def whole_run(args: argparse.Namespace, out: Path, workers: int, **env: str) -> float:
-    begin = time.perf_counter()
-    code = start(args, out, workers, **env).wait()
-    if code != 0:
-        raise SystemExit(f"{' '.join(command(args, out, workers))}: exit code {code}")
-    return time.perf_counter() - begin
-
-
-def dataset_hash(out: Path) -> str:
-    """One hash over the names and bytes of all files."""
-    h = hashlib.sha256()
-    for path in sorted(p for p in out.rglob("*") if p.is_file()):
-        h.update(f"{path.relative_to(out)}\0".encode() + hashlib.sha256(path.read_bytes()).digest())
-    return h.hexdigest()
-
-
-def complete(out: Path) -> int:
-    return len([p for p in out.glob("flockscope-*/*/manifest.json") if not p.parent.name.startswith(".")])
-
-
-def half_written(out: Path) -> int:
-    """Folders that look like sequences and are not whole."""
-    folders = [p for p in out.glob("flockscope-*/*/") if not p.name.startswith(".")]
-    return sum(bool(validate(p)) for p in folders)
-
-
-def kills(args: argparse.Namespace, work: Path, right: str, seconds: float) -> bool:
-    print(f"\n{args.kills} kills, {args.workers} workers (an undisturbed run takes {seconds:.1f} s)")
-    print("| kill at s | whole then | half-written | after resuming: problems | same hash |\n|---|---|---|---|---|")
-    moments, good = np.random.default_rng(0).uniform(0.3, 1.0, args.kills) * seconds, True
-    for moment in sorted(moments):
-        out = work / "killed"
-        process = start(args, out, args.workers)
+    def wait(process: subprocess.Popen[str], out: Path) -> str:
         try:
             process.wait(moment)
         except subprocess.TimeoutExpired:
-            process.kill()
-            process.wait()
-        then, half = complete(out), half_written(out)
-        whole_run(args, out, args.workers)
-        problems, same = len(validate(out)), dataset_hash(out) == right
-        good &= not half and not problems and same
-        print(f"| {moment:.2f} | {then} | {half} | {problems} | {'yes' if same else 'NO'} |", flush=True)
-        shutil.rmtree(out)
-    return good
+            return f"{moment:.2f} s"
+        return f"{moment:.2f} s (over)"
+
+    return wait
 
 
-def variations(args: argparse.Namespace, work: Path, right: str) -> bool:
-    print("\n| workers | OMP_NUM_THREADS | PYTHONHASHSEED | s | same hash |\n|---|---|---|---|---|")
-    good = True
-    for workers, threads, seed in ((1, "1", "0"), (1, "1", "0"), (2, "1", "0"), (2, "2", "1"), (1, "2", "12345")):
-        out = work / "varied"
-        seconds = whole_run(args, out, workers, OMP_NUM_THREADS=threads, PYTHONHASHSEED=seed)
-        same = dataset_hash(out) == right
-        good &= same
-        print(f"| {workers} | {threads} | {seed} | {seconds:.1f} | {'yes' if same else 'NO'} |", flush=True)
-        shutil.rmtree(out)
-    return good
+def writing(nth: int, later: float) -> Wait:
+    """Wait for the nth partial folder, and `later` seconds more."""
+
+    def wait(process: subprocess.Popen[str], out: Path) -> str:
+        seen: set[str] = set()
+        while process.poll() is None and len(seen) < nth:
+            seen |= {p.name for p in out.glob("flockscope-*/.partial-*")}
+        time.sleep(later)
+        return f"partial folder {nth} + {1000 * later:.0f} ms"
+
+    return wait
+
+
+def kill(process: subprocess.Popen[str]) -> bool:
+    """`kill -9` of the program (not its workers: they must see for themselves); whether it was still at work."""
+    alive = process.poll() is None
+    if alive:
+        os.kill(process.pid, signal.SIGKILL)
+    process.communicate()
+    return alive
+
+
+def one(args: argparse.Namespace, wait: Wait, out: Path, right: str) -> bool:
+    process = start(args.entry, args.seeds, out, args.workers)
+    moment = wait(process, out)
+    killed = kill(process)
+    then, half = complete(out), [p for p in sequences(out) if validate(p)]
+    partial = len(list(out.glob("flockscope-*/.partial-*")))
+    whole_run(args.entry, args.seeds, out, args.workers)
+    problems, same = validate(out), file_bytes_hash(out) == right
+    print(
+        f"| {moment} | {'yes' if killed else 'no'} | {len(then)} | {partial} | {len(half)} "
+        f"| {len(problems)} | {'yes' if same else 'NO'} |",
+        flush=True,
+    )
+    shutil.rmtree(out)
+    return not half and not problems and same
 
 
 def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--kills", type=int, default=20)
-    parser.add_argument("--entry", nargs="+", default=["merge"])
-    parser.add_argument("--seeds", default="0:12")
-    parser.add_argument("--workers", type=int, default=2)
+    parser.add_argument("--writing", type=int, default=6)
+    parser.add_argument("--entry", nargs="+", default=["merge", "queue"])
+    parser.add_argument("--seeds", default="0:6")
+    parser.add_argument("--workers", type=int, default=1)
     args = parser.parse_args()
+    r = np.random.default_rng(0)
     with tempfile.TemporaryDirectory() as name:
         work = Path(name)
-        whole_run(args, work / "warm", args.workers)
-        seconds = whole_run(args, work / "right", args.workers)
-        right = dataset_hash(work / "right")
-        print(f"{complete(work / 'right')} sequences of {' '.join(args.entry)}, seeds {args.seeds}: {right[:16]}")
-        good = variations(args, work, right) & kills(args, work, right, seconds)
+        whole_run(args.entry, args.seeds, work / "warm", args.workers)
+        seconds = whole_run(args.entry, args.seeds, work / "right", args.workers)
+        right, n = file_bytes_hash(work / "right"), len(content_hashes(work / "right"))
+        print(f"{n} sequences of {', '.join(args.entry)}, seeds {args.seeds}, {args.workers} workers: {seconds:.1f} s")
+        print("| killed at | at work | whole then | partial | half-written | problems after | same bytes |")
+        print("|---|---|---|---|---|---|---|")
+        moments = (np.arange(args.kills) + r.random(args.kills)) / max(args.kills, 1) * seconds * 1.02
+        waits = [at(float(m)) for m in moments]
+        waits += [writing(int(r.integers(1, n + 1)), float(r.uniform(0, 0.02))) for _ in range(args.writing)]
+        good = sum(one(args, wait, work / "killed", right) for wait in waits) == len(waits)
     print("\nall the same" if good else "\nDIFFERENT")
     return 0 if good else 1
 

@@ -1,0 +1,80 @@
+"""Is a dataset the same however it is made? Content hashes and all bytes, over scenarios and ways of running.
+
+    PYTHONPATH=. python benchmarks/hashes.py [--entry merge split …] [--seeds 0:2]
+
+Every way is a `flockscope generate` of its own process (the first twice), but for one that makes all in this process
+in the opposite order. Exit code 1 where anything differs.
+"""
+
+from __future__ import annotations
+
+import argparse
+import shutil
+import tempfile
+from pathlib import Path
+
+from datasets import content_hashes, file_bytes_hash, whole_run
+
+from sim.generate import generate
+
+ENTRIES = ("merge", "split", "cross", "queue", "pillar", "door", "stairs", "party", "clutter", "side-by-side")
+
+
+def environment(threads: int = 1, hash_seed: int = 0, **more: str) -> dict[str, str]:
+    """Variables of a run."""
+    some = {"OMP_NUM_THREADS": str(threads), "OPENBLAS_NUM_THREADS": str(threads), "PYTHONHASHSEED": str(hash_seed)}
+    return {**some, **more}
+
+
+WAYS = {
+    "1 worker": (1, environment()),
+    "again": (1, environment()),
+    "2 workers": (2, environment()),
+    "OMP_NUM_THREADS=2": (1, environment(threads=2)),
+    "PYTHONHASHSEED=12345": (1, environment(hash_seed=12345)),
+    "2 workers, 4 threads, hash seed 7": (2, environment(threads=4, hash_seed=7)),
+    "kernels compiled anew, another zone, C locale": (1, environment(TZ="Asia/Tokyo", LC_ALL="C", NUMBA_CACHE_DIR="")),
+}
+HERE = "in this process, backwards"
+
+
+def made(way: str, args: argparse.Namespace, work: Path) -> tuple[dict[str, str], str]:
+    """Content hashes and the hash of all bytes."""
+    out = work / "out"
+    if way == HERE:
+        low, high = map(int, args.seeds.split(":"))
+        for entry in reversed(args.entry):
+            generate([entry], range(low, high), out)
+    else:
+        workers, variables = WAYS[way]
+        if "NUMBA_CACHE_DIR" in variables:
+            variables = {**variables, "NUMBA_CACHE_DIR": str(work / "cache")}
+        whole_run(args.entry, args.seeds, out, workers, **variables)
+    found = content_hashes(out), file_bytes_hash(out)
+    shutil.rmtree(out)
+    return found
+
+
+def main() -> int:
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--entry", nargs="+", default=list(ENTRIES))
+    parser.add_argument("--seeds", default="0:2")
+    args = parser.parse_args()
+    good, right = True, None
+    print("| way | sequences | content hashes that differ | all bytes |\n|---|---|---|---|")
+    with tempfile.TemporaryDirectory() as name:
+        for way in (*WAYS, HERE):
+            hashes, everything = made(way, args, Path(name))
+            right = right or (hashes, everything)
+            other = sorted(k for k in hashes.keys() | right[0].keys() if hashes.get(k) != right[0].get(k))
+            same = everything == right[1]
+            good &= same and not other
+            print(
+                f"| {way} | {len(hashes)} | {' '.join(other) or 'none'} | {'same' if same else 'DIFFER'} |", flush=True
+            )
+    print("\nall the same" if good else "\nDIFFERENT")
+    return 0 if good else 1
+
+
+if __name__ == "__main__":
+    raise SystemExit(main())
