@@ -14,7 +14,7 @@ from typing import Any, cast, overload
 
 import numpy as np
 
-from scenarios.errors import InputError
+from scenarios.errors import FlockscopeError, InputError, WorkError
 from sim.types import Context, DetectionMode, Frame, Sequence, Tracker, Tracks
 from tracking import protocol
 from tracking.config import Config
@@ -63,7 +63,15 @@ class Prepared:
         detections = None if self.mode == "image" else frame.detections
         if detections is not None:
             protocol.check_detections(detections, self.tracker.needs)
-        return protocol.check_tracks(self.tracker.step(frame, detections), frame.index, self.name)
+        try:
+            said = self.tracker.step(frame, detections)
+        except FlockscopeError:
+            raise
+        except Exception as error:
+            where, got = f"{self.sequence.name}, frame {frame.index}", f"{type(error).__name__}: {error}"
+            remedy = "correct the tracker's step(); FLOCKSCOPE_DEBUG=1 shows where"
+            raise WorkError(file=self.name, place=where, got=got, expected="sim.types.Tracks", remedy=remedy) from error
+        return protocol.check_tracks(said, frame.index, self.name)
 
 
 def track(
