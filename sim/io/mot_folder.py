@@ -104,7 +104,9 @@ def open_folder(
     )  # fmt: skip
 
 
-def open_text(path: Path, *, fps: float | None = None, px_per_m: float | None = None) -> Sequence:
+def open_text(
+    path: Path, *, fps: float | None = None, px_per_m: float | None = None, camera: Camera | None = None
+) -> Sequence:
     """A bare MOT text file as Sequence: detections where every id is -1, else truth."""
     rate = frame_rate(fps, None, path)
     scale = float("nan") if px_per_m is None else px_per_m
@@ -120,7 +122,7 @@ def open_text(path: Path, *, fps: float | None = None, px_per_m: float | None = 
     return Sequence(
         name=path.stem, fps=rate, length=length, frames=frames,
         load_truth=None if nobody else lambda: mot.read_truth(path, path.stem, rate, length, scale),
-        px_per_m=scale, has_detections=nobody, source={"kind": "mot text", "path": str(path)},
+        camera=camera, px_per_m=scale, has_detections=nobody, source={"kind": "mot text", "path": str(path)},
     )  # fmt: skip
 
 

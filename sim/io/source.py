@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from pathlib import Path
 
 from scenarios.errors import InputError
@@ -27,31 +28,32 @@ def open_source(
     and refuses them. images: let frames carry the pictures of a MOTChallenge folder. InputError for anything else.
     """
     path = Path(path)
-    for name, value in (("fps", fps), ("px_per_m", px_per_m)):
+    for option, value in (("--fps", fps), ("--px-per-m", px_per_m)):
         if value is not None and not 0 < value < float("inf"):
-            raise InputError(place=name, got=value, expected="a number above 0", remedy=f"correct --{name}")
+            raise InputError(place=option, got=value, expected="a number above 0", remedy=f"correct {option}")
     if isinstance(camera, str | Path):
         camera = store.read_camera(Path(camera))
     if not path.exists():
         raise InputError(file=path, got="nothing there", expected=KINDS, remedy="check the path")
     if path.is_file():
-        return [_open_file(path, fps, px_per_m)]
+        return [_open_file(path, fps, px_per_m, camera)]
     found = list(_find(path, DEPTH))
     if not found:
         raise InputError(file=path, got="a folder without sequences", expected=KINDS, remedy="check the path")
     return [_open_folder(p, fps, px_per_m, camera, images) for p in found]
 
 
-def _open_file(path: Path, fps: float | None, px_per_m: float | None) -> Sequence:
+def _open_file(path: Path, fps: float | None, px_per_m: float | None, camera: Camera | None) -> Sequence:
     suffix = path.suffix.lower()
     if suffix == ".xml":
+        _refuse(path, "a CAVIAR recording", "its truth is in the image alone", {"--camera": camera})
         return caviar.open_file(path, fps=fps, px_per_m=px_per_m)
     if path.name == "obsmat.txt":
-        return biwi.open_folder(path.parent, fps=fps)
+        return _open_folder(path.parent, fps, px_per_m, camera, images=False)
     if suffix in VIDEO_SUFFIXES:
         raise InputError(file=path, got="a video", expected=KINDS, remedy="videos are not read yet; give boxes")
     if suffix in (".txt", ".csv"):
-        return mot_folder.open_text(path, fps=fps, px_per_m=px_per_m)
+        return mot_folder.open_text(path, fps=fps, px_per_m=px_per_m, camera=camera)
     raise InputError(file=path, got=f"a {suffix or 'nameless'} file", expected=KINDS, remedy="check the path")
 
 
@@ -79,16 +81,22 @@ def _open_folder(
     path: Path, fps: float | None, px_per_m: float | None, camera: Camera | None, images: bool
 ) -> Sequence:
     if path.is_file():
-        return _open_file(path, fps, px_per_m)
+        return _open_file(path, fps, px_per_m, camera)
     match _kind(path):
         case "generated":
-            if fps is not None or px_per_m is not None or camera is not None:
-                raise InputError(
-                    file=path, got="--fps, --px-per-m or --camera", expected="none for a generated sequence",
-                    remedy="leave them out: it knows its own",
-                )  # fmt: skip
+            options = {"--fps": fps, "--px-per-m": px_per_m, "--camera": camera}
+            _refuse(path, "a generated sequence", "it knows its own", options)
             return store.open_sequence(path)
         case "biwi":
+            _refuse(path, "a BIWI recording", "it is in metres", {"--px-per-m": px_per_m, "--camera": camera})
             return biwi.open_folder(path, fps=fps)
         case _:
             return mot_folder.open_folder(path, fps=fps, px_per_m=px_per_m, camera=camera, images=images)
+
+
+def _refuse(path: Path, kind: str, why: str, options: Mapping[str, object]) -> None:
+    """InputError for options that would be without effect."""
+    given = [option for option, value in options.items() if value is not None]
+    if given:
+        remedy = f"leave {'it' if len(given) == 1 else 'them'} out: {why}"
+        raise InputError(file=path, got=" and ".join(given), expected=f"none for {kind}", remedy=remedy)

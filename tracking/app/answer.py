@@ -8,7 +8,6 @@ from __future__ import annotations
 import errno
 import json
 import math
-import os
 import sys
 from dataclasses import dataclass
 from pathlib import Path
@@ -76,9 +75,7 @@ def interrupted(as_json: bool) -> int:
 
 
 def unexpected(error: Exception) -> FlockscopeError:
-    """An exception nobody foresaw, as an error for the user's eyes; with FLOCKSCOPE_DEBUG it is raised as it is."""
-    if os.environ.get(DEBUG):
-        raise error
+    """An exception nobody foresaw, as an error for the user's eyes."""
     if isinstance(error, OSError):
         return _of_system(error)
     return WorkError(

@@ -11,7 +11,7 @@ from typing import Any
 import typer
 
 from scenarios.errors import FlockscopeError, InputError, WorkError
-from tracking.app.answer import INTERRUPTED, Answer, interrupted, refuse, show, unexpected
+from tracking.app.answer import DEBUG, INTERRUPTED, Answer, interrupted, refuse, show, unexpected
 
 
 def carry_out(app: typer.Typer, arguments: list[str]) -> int:
@@ -26,6 +26,8 @@ def carry_out(app: typer.Typer, arguments: list[str]) -> int:
         except KeyboardInterrupt:
             return interrupted(as_json)
         except FlockscopeError as error:
+            if error.__cause__ is not None and os.environ.get(DEBUG):
+                raise
             return refuse(error, as_json)
 
 

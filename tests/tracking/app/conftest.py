@@ -21,6 +21,12 @@ SCENE = Scene(
 )
 
 
+@pytest.fixture(autouse=True)
+def _no_progress(monkeypatch):
+    """However slow the machine: stderr is for what goes wrong."""
+    monkeypatch.setattr("tracking.app.meter.PATIENCE", 1e6)
+
+
 def look_at() -> Camera:
     """From the south, 6 m high, 40 degrees down."""
     tilt = np.radians(40)

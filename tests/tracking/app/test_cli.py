@@ -16,6 +16,7 @@ from pathlib import Path
 
 import pytest
 
+from scenarios.errors import WorkError
 from tracking.app.cli import run
 
 ROOT = Path(__file__).resolve().parents[3]
@@ -53,12 +54,6 @@ def made(tmp_path_factory) -> Path:
     assert run(["generate", str(folder / "scene.toml"), "--seeds", "40000:40002", "--out", str(folder / "data")]) == 0
     assert run(["track", FAKE, str(folder / "data"), "--out", str(folder / "tracks")]) == 0
     return folder
-
-
-@pytest.fixture(autouse=True)
-def _no_progress(monkeypatch):
-    """However slow the machine: stderr is for what goes wrong."""
-    monkeypatch.setattr("tracking.app.meter.PATIENCE", 1e6)
 
 
 @pytest.fixture
@@ -189,7 +184,7 @@ def is_whole(name: str, out: Path) -> bool:
 
 @pytest.mark.parametrize("name", [name for name in WRITING if name != "demo"])
 def test_ctrl_c_at_many_moments(name, place, capsys):
-    """From the third call of ours (run and carry_out are the first two) to the last: 130 or done, and never anything half-written."""
+    """130 or done, and never anything half-written, from the third call of ours on (run, carry_out: the first)."""
     end, line = length(name, place), words(COMMANDS[name][0], place)
     for stop in {3, *range(5, end, max(end // 6, 1)), end - 8, end - 5, end - 2}:
         with Calls(stop):
@@ -277,8 +272,9 @@ def test_a_bug_is_one_line_and_shown_whole_when_asked_for(place, capsys, monkeyp
     assert "KeyError: 'lost'" in printed
     assert "FLOCKSCOPE_DEBUG=1" in printed
     monkeypatch.setenv("FLOCKSCOPE_DEBUG", "1")
-    with pytest.raises(KeyError):
+    with pytest.raises(WorkError) as caught:
         run(line)
+    assert isinstance(caught.value.__cause__, KeyError)
 
 
 @pytest.mark.parametrize("workers", [1, 2])

@@ -3,13 +3,19 @@
 from __future__ import annotations
 
 import json
+import os
 import shutil
+import subprocess
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
 import pytest
 
 from tracking.app.cli import run
 
+ROOT = Path(__file__).resolve().parents[3]
 GROUP = '{ id = "a", size = 2, start = [4, 4], goal = [12, 4] }'
 OTHER = '{ id = "b", size = 2, start = [12, 4], goal = [4, 4] }'
 WHEN = "when = { time = 1.0 }"
@@ -72,7 +78,10 @@ def refused(line: list[str], capsys, code: int = 2) -> str:
     assert run([*line, "--json"]) == code
     answer = json.loads(capsys.readouterr().out)
     assert answer["status"] == ("refused" if code == 2 else "failed")
-    assert all(part in text for part in answer["error"].values() if part), (text, answer)
+    error = answer["error"]
+    assert all(part in text for part in error.values() if part), (text, answer)
+    assert all(error[part] for part in ("got", "expected", "remedy")), error
+    assert error["file"] or error["place"], error
     return text
 
 
@@ -87,14 +96,125 @@ def test_wrong_scenarios(name, tmp_path, capsys):
     assert not out.exists()
 
 
-def test_a_group_that_walks_out_of_view(tmp_path, capsys):
-    """Seen only when it is simulated: before anything is written."""
+SAME = GROUP.replace('"a"', '"b"')
+DRAWN = GROUP.replace("[4, 4]", "[{ uniform = [4, 4.1] }, 4]")
+NEVER = MERGE.replace("time = 1.0", "distance_lt = 0.1")
+
+# what only a simulation can tell: the file's text, the exit code, and what the line must say.
+WORLDS = {
+    "out of view": (f"camera = {{ height = 2, position = [4, 1] }}\ngroup = [{GROUP}]", 2, ["camera.height", "view"]),
+    "a place that is taken": (
+        f"group = [{GROUP}, {SAME}]",
+        2,
+        ["group.b.start", "another group"],
+    ),
+    "always in a wall": (
+        f"world = {{ walls = [[4, 0, 4, 9]] }}\ngroup = [{DRAWN}]",
+        2,
+        ["group.a.start", "no free place"],
+    ),
+    "an order that never fires": (
+        f"duration = 4\ngroup = [{GROUP}, {OTHER}]\nevent = [{NEVER}]",
+        1,
+        ["event m", "never fired"],
+    ),
+    "an order that does not come true": (
+        f"duration = 4\ngroup = [{GROUP}, {OTHER}]\nevent = [{MERGE}]",
+        1,
+        ["event m", "no such merge"],
+    ),
+}
+
+
+@pytest.mark.parametrize("name", WORLDS)
+def test_what_only_a_simulation_can_tell(name, tmp_path, capsys):
+    """The scenario's file and the seed are named, and nothing is written."""
+    text, code, said = WORLDS[name]
     scene, out = tmp_path / "scene.toml", tmp_path / "out"
-    scene.write_text(f"schema = 1\ncamera = {{ height = 2, position = [4, 1] }}\ngroup = [{GROUP}]")
-    said = refused(["generate", str(scene), "--seeds", "0", "--out", str(out)], capsys)
-    assert "view" in said
-    assert "camera" in said
-    assert not [p for p in out.rglob("*") if p.is_file()]
+    scene.write_text(f"schema = 1\n{text}")
+    line = refused(["generate", str(scene), "--seeds", "0:2", "--out", str(out)], capsys, code)
+    assert all(word in line for word in [f"{scene}: ", "(seed 0)", "scene-s00001", *said]), line
+    assert not out.exists()
+
+
+def test_an_entry_of_a_suite_is_named_with_its_file(tmp_path, capsys):
+    text, code, _ = WORLDS["out of view"]
+    (tmp_path / "scene.toml").write_text(f"schema = 1\n{text}")
+    suite = tmp_path / "suite.toml"
+    suite.write_text('[[entry]]\nname = "low"\nscenario = "scene.toml"\n')
+    line = refused(["generate", str(suite), "--seeds", "0", "--out", str(tmp_path / "out")], capsys, code)
+    assert f"{suite}: entry low: camera.height" in line
+
+
+TRACKERS = {
+    "raises": ("return 1 / 0", 1, ["ZeroDivisionError", "scene-s40000, frame 1"]),
+    "says nothing": ("return None", 1, ["NoneType", "frame 1"]),
+    "is no Python": ("return (", 2, ["SyntaxError", "line 5"]),
+    "needs what is not there": ("", 2, ["needs stereo"]),
+}
+
+
+@pytest.mark.parametrize("name", TRACKERS)
+def test_wrong_trackers(name, made, tmp_path, capsys):
+    body, code, words = TRACKERS[name]
+    file, out = tmp_path / "mine.py", tmp_path / "out"
+    needs = "boxes" if body else "stereo"
+    file.write_text(
+        f"class Mine:\n    needs = ({needs!r},)\n    def reset(self, context, seed): ...\n"
+        f"    def step(self, frame, detections):\n        {body or 'return None'}\n"
+    )
+    line = refused(["track", f"{file}:Mine", str(made / "data"), "--out", str(out)], capsys, code)
+    assert all(word in line for word in words), line
+    assert body == "" or str(file) in line
+    assert not out.exists()
+
+
+PARAMS = {
+    "no TOML": ("gate = [", ["TOML"]),
+    "unknown": ("[params]\ngaet = 0.9", ["gaet", "gate"]),
+    "wrong type": ('[params]\ngate = "wide"', ["gate", "wide"]),
+    "another table": ("[other]\ngate = 0.9", ["other", "params"]),
+    "another tracker's": ('tracker = "other"\n[params]\ngate = 0.9', ["other"]),
+}
+
+
+@pytest.mark.parametrize("name", PARAMS)
+def test_wrong_parameter_files(name, made, tmp_path, capsys):
+    text, words = PARAMS[name]
+    file, out = tmp_path / "params.toml", tmp_path / "out"
+    file.write_text(text)
+    line = refused(["track", "blob", str(made / "data"), "--params", str(file), "--out", str(out)], capsys)
+    assert all(word in line for word in [str(file), *words]), line
+    assert not out.exists()
+
+
+@pytest.mark.parametrize("text", ["{", "{}", "[1]", '{"format": 1, "kind": "fish"}', "\xff"])
+def test_wrong_cameras(text, tmp_path, capsys):
+    file, det, out = tmp_path / "camera.json", tmp_path / "det.txt", tmp_path / "out"
+    file.write_bytes(text.encode("latin-1"))
+    det.write_text("1,-1,10,10,20,50,0.9\n")
+    line = ["track", "blob", str(det), "--fps", "10", "--camera", str(file), "--out", str(out)]
+    assert str(file) in refused(line, capsys)
+    assert not out.exists()
+
+
+@pytest.mark.parametrize("option", ["--fps", "--px-per-m"])
+@pytest.mark.parametrize("value", ["0", "-1", "nan", "inf", "x"])
+def test_wrong_scales(option, value, tmp_path, capsys):
+    (tmp_path / "det.txt").write_text("1,-1,10,10,20,50,0.9\n")
+    line = ["track", "blob", str(tmp_path / "det.txt"), f"{option}={value}", "--out", str(tmp_path / "out")]
+    assert option in refused(line, capsys)
+    assert not (tmp_path / "out").exists()
+
+
+@pytest.mark.parametrize("name", ["a word", "NaN", "no width", "frame 0", "too few columns", "no text"])
+def test_wrong_detections(name, tmp_path, capsys):
+    det, out = tmp_path / "seq" / "det" / "det.txt", tmp_path / "out"
+    det.parent.mkdir(parents=True)
+    det.write_bytes(MOT[name][0].encode("latin-1"))
+    line = refused(["track", "blob", str(tmp_path / "seq"), "--fps", "10", "--out", str(out)], capsys)
+    assert all(word in line for word in [str(det), *MOT[name][1]]), line
+    assert not out.exists()
 
 
 @pytest.mark.parametrize("text", ["duration", "=3", "camera.fsp=3", "group.c.size=2", "tracker.gate=1", "duration=[1"])
@@ -177,11 +297,10 @@ def test_a_dataset_with_a_file_missing(name, made, tmp_path, capsys):
     assert not out.exists()
 
 
-def test_a_file_in_the_place_of_the_folder_to_write(made, capsys):
-    """Root may write anywhere: a path through a file is what cannot be written."""
-    out = made / "scene.toml" / "out"
+def writers(made: Path, out: Path) -> list[list[str]]:
+    """Every command that writes."""
     data = made / "data" / "flockscope-demo" / "scene-s40000"
-    for line in (
+    return [
         ["generate", str(made / "scene.toml"), "--seeds", "0", "--out", str(out)],
         ["track", "blob", str(data), "--out", str(out)],
         ["view", str(data), "--out", str(out / "page.html")],
@@ -189,8 +308,57 @@ def test_a_file_in_the_place_of_the_folder_to_write(made, capsys):
         ["export", "coco", str(data), "--out", str(out / "coco.json")],
         ["scenarios", str(made / "scene.toml"), "--out", str(out / "plan.svg")],
         ["demo", "--quick", "--out", str(out)],
-    ):
+    ]
+
+
+def test_a_file_in_the_place_of_the_folder_to_write(made, capsys):
+    """Root may write anywhere: a path through a file is what cannot be written."""
+    for line in writers(made, made / "scene.toml" / "out"):
         assert "scene.toml" in refused(line, capsys)
+
+
+@contextmanager
+def disk(folder: Path, options: str) -> Iterator[Path]:
+    """A small file system of its own."""
+    folder.mkdir()
+    mount = ["mount", "-t", "tmpfs", "-o", options, "tmpfs", folder]
+    if subprocess.run(mount, capture_output=True, check=False).returncode:
+        pytest.skip("no right to mount a file system")
+    try:
+        yield folder
+    finally:
+        subprocess.run(["umount", folder], check=True)
+
+
+def test_a_disk_that_cannot_be_written(made, tmp_path, capsys):
+    with disk(tmp_path / "disk", "ro") as root:
+        for line in writers(made, root / "out"):
+            said = refused(line, capsys)
+            assert "Read-only" in said, said
+            assert str(root) in said, said
+
+
+def test_a_full_disk(made, tmp_path, capsys):
+    with disk(tmp_path / "disk", "size=4k") as root:
+        (root / "full").write_bytes(bytes(4096))
+        for line in writers(made, root / "out"):
+            assert "No space" in refused(line, capsys, 1)
+            assert sorted(root.iterdir()) == [root / "full"], line
+
+
+def test_a_full_disk_or_nobody_behind_stdout(made):
+    """The answer is lost, and said so; a reader who has seen enough is no error."""
+    line = [sys.executable, "-m", "tracking.app.cli", "validate", str(made / "data")]
+    with Path("/dev/full").open("w") as full:
+        done = subprocess.run(line, stdout=full, stderr=subprocess.PIPE, text=True, check=False, cwd=ROOT)
+    assert done.returncode == 1
+    assert done.stderr.startswith("error: stdout: got No space left")
+    assert len(done.stderr.splitlines()) == 1
+    read, write = os.pipe()
+    os.close(read)
+    done = subprocess.run(line, stdout=write, stderr=subprocess.PIPE, text=True, check=False, cwd=ROOT)
+    os.close(write)
+    assert (done.returncode, done.stderr) == (0, "")
 
 
 def test_tracks_at_another_frame_rate(tmp_path, capsys):
@@ -229,3 +397,14 @@ def test_recordings_only_options_are_refused_for_generated_ones(made, tmp_path, 
     for option in (["--fps", "5"], ["--px-per-m", "30"], ["--camera", str(next(made.rglob("camera.json")))]):
         said = refused(["track", "blob", str(made / "data"), "--out", str(tmp_path / "t"), *option], capsys)
         assert option[0] in said
+
+
+def test_options_without_effect_are_refused_for_recordings(made, tmp_path, capsys):
+    """A BIWI recording is in metres already, a CAVIAR one knows no ground."""
+    (tmp_path / "obsmat.txt").write_text("")
+    (tmp_path / "people.xml").write_text("<dataset/>")
+    camera = next(made.rglob("camera.json"))
+    given = [("obsmat.txt", "--px-per-m", "30"), ("obsmat.txt", "--camera", camera), ("people.xml", "--camera", camera)]
+    for name, option, value in given:
+        line = ["track", "blob", str(tmp_path / name), "--out", str(tmp_path / "t"), option, str(value)]
+        assert option in refused(line, capsys)

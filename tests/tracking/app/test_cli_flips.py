@@ -299,6 +299,8 @@ OPTIONS = {
     ("score", "truth"): (BASE["score"], "score {0}/data/flockscope-demo/scene-s40001 {0}/tracks"),
     ("score", "tracks"): (BASE["score"], "score {0}/data {0}/perfect"),
     ("score", "similarity"): (BASE["score"] + " --similarity boxes", BASE["score"] + " --similarity ground"),
+    ("score", "group_match"): (BASE["score"], BASE["score"] + " --group-match members"),
+    ("score", "against"): (BASE["score"], BASE["score"] + " --against {0}/perfect"),
     ("score", "fps"): ("score {0}/mot {0}/mot-tracks", "score {0}/mot {0}/mot-tracks --fps 5"),
     ("score", "px_per_m"): (
         "score {0}/mot {0}/mot-tracks --fps 5 --similarity image",
