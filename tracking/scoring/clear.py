@@ -9,6 +9,8 @@ anything left to solve. The frame before is the last one with somebody on both s
 
 from __future__ import annotations
 
+from itertools import pairwise
+
 import numpy as np
 
 from sim.types import Bools, Ints
@@ -57,30 +59,32 @@ def turns(pairs: Pairs) -> Ints:
 
 def follow(near: Pairs, turn: Ints) -> Bools:
     """Which of the pairs (K,), all of them similar enough, are matched when matches of the frame before are kept."""
-    t, e = near.true_ids[1][near.i], near.est_ids[1][near.j]
-    chosen = (np.bincount(near.i)[near.i] == 1) & (np.bincount(near.j)[near.j] == 1) if len(t) else np.zeros(0, bool)
-    frame = near.frame
-    starts = np.flatnonzero(np.diff(frame, prepend=-1))
-    broken = np.diff(turn[frame[starts]], prepend=-1) > 1
-    before = np.full(len(near.true_ids[0]), -1)
-    held = t[:0]
-    taken_t, taken_e = np.full(len(before), -1), np.full(len(near.est_ids[0]), -1)
-    ends = np.append(starts, len(t))[1:].tolist()
-    for k, (a, b, gap) in enumerate(zip(starts.tolist(), ends, broken.tolist(), strict=True)):
-        if gap:
-            before[held] = -1
-        ti, ej, now = t[a:b], e[a:b], chosen[a:b]
-        if not now.all():
-            kept = before[ti] == ej
-            now |= kept
-            taken_t[ti[now]] = k
-            taken_e[ej[now]] = k
-            free = np.flatnonzero((taken_t[ti] != k) & (taken_e[ej] != k))
-            if len(free) == 1:
-                now[free] = True
-            elif len(free):
-                now[:] = solve_frame(near, a, b, near.s[a:b] + BONUS * kept)
-        before[held] = -1
-        held = ti[now]
-        before[held] = ej[now]
-    return chosen
+    i, j, frame = near.i, near.j, near.frame
+    before = _before(near.links[2], turn[frame])
+    chosen = np.zeros(len(i) + 1, bool)  # one more, which those point at that have nothing before
+    chosen[:-1] = (np.bincount(i)[i] == 1) & (np.bincount(j)[j] == 1)
+    taken_i, taken_j = np.zeros(len(near.true), bool), np.zeros(len(near.est), bool)
+    rivals = np.flatnonzero(~chosen[:-1])
+    cuts = np.flatnonzero(np.diff(frame[rivals], prepend=-1, append=-1))
+    for a, b in pairwise(cuts.tolist()):
+        places = rivals[a:b]
+        kept = places[chosen[before[places]]]
+        if len(kept):
+            chosen[kept] = taken_i[i[kept]] = taken_j[j[kept]] = True
+            places = places[~(taken_i[i[places]] | taken_j[j[places]])]
+        if len(places) > 1:
+            start, end = np.searchsorted(frame, (frame[places[0]], frame[places[0]] + 1)).tolist()
+            weight = near.s[start:end] + BONUS * chosen[before[start:end]]
+            chosen[start:end] = solve_frame(near, start, end, weight)
+        else:
+            chosen[places] = True
+    return chosen[:-1]
+
+
+def _before(link: Ints, turn: Ints) -> Ints:
+    """For each pair (K,) the place of the one of the same two identities a turn before, or K."""
+    order = np.argsort(link, kind="stable")
+    follows = (np.diff(link[order]) == 0) & (np.diff(turn[order]) == 1)
+    before = np.full(len(link), len(link))
+    before[order[1:][follows]] = order[:-1][follows]
+    return before
