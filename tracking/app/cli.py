@@ -129,6 +129,9 @@ def score(
     group_match: Annotated[
         Literal["hull", "members"], typer.Option("--group-match", help="By what true and estimated groups are matched.")
     ] = "hull",
+    against: Annotated[
+        Path | None, typer.Option("--against", metavar="TRACKS", help="Other tracks: say how the scores differ.")
+    ] = None,
     fps: Fps = None,
     px_per_m: Scale = None,
     json: Json = False,
@@ -136,7 +139,9 @@ def score(
     """Score tracks against truth."""
     from tracking.app.score_command import score
 
-    return score(truth, tracks, similarity=similarity, group_match=group_match, fps=fps, px_per_m=px_per_m)
+    return score(
+        truth, tracks, against=against, similarity=similarity, group_match=group_match, fps=fps, px_per_m=px_per_m
+    )
 
 
 @app.command()

@@ -10,16 +10,17 @@ import numpy as np
 
 from scenarios.errors import InputError
 from sim.io.source import open_source
-from sim.types import Sequence
+from sim.types import Array, Sequence
 from tracking.app.answer import Answer
 from tracking.app.meter import Meter
 from tracking.app.paired import pair, results
-from tracking.app.score_tables import tables
+from tracking.app.score_tables import differences, tables
 from tracking.run import Run
 from tracking.scoring import evaluate
+from tracking.scoring.catalogue import CATALOGUE
 from tracking.scoring.evaluation import IncomparableError, Scores, Similarity
 from tracking.scoring.groups import GroupMatch
-from tracking.stats import bootstrap
+from tracking.stats import bootstrap, paired
 
 
 @dataclass(frozen=True)
@@ -34,20 +35,28 @@ def score(
     truth: Path,
     tracks: Path,
     *,
+    against: Path | None,
     similarity: Similarity | None,
     group_match: GroupMatch,
     fps: float | None,
     px_per_m: float | None,
 ) -> Answer:
-    """Scores of every sequence of `truth`, matched with `tracks` by name."""
+    """Scores of every sequence of `truth`, matched with `tracks` by name; and how they differ from other tracks'."""
     sequences = open_source(truth, fps=fps, px_per_m=px_per_m)
-    paired = pair(sequences, results(tracks))
+    rows = _rows(sequences, tracks, similarity, group_match)
+    if against is None:
+        return answer(rows)
+    return compared(answer(rows), rows, _rows(sequences, against, similarity, group_match))
+
+
+def _rows(sequences: list[Sequence], tracks: Path, similarity: Similarity | None, group_match: GroupMatch) -> list[Row]:
+    found = pair(sequences, results(tracks))
     rows = []
-    with Meter("score", len(paired)) as meter:
-        for sequence, result in paired:
+    with Meter("score", len(found)) as meter:
+        for sequence, result in found:
             rows.append(score_run(sequence, result.read(sequence), similarity, group_match))
             meter.step(sequence.name)
-    return answer(rows)
+    return rows
 
 
 def score_run(
@@ -71,16 +80,32 @@ def score_run(
 def answer(rows: list[Row]) -> Answer:
     """Rows and their mean, for people and for --json."""
     means = summary(rows)
-    data = {
-        "sequences": [{"name": row.sequence, "similarity": row.scores.similarity, **row.scores} for row in rows],
-        "mean": means,
-    }
-    return Answer(data, tables(rows, means))
+    return Answer({"sequences": [_row(row) for row in rows], "mean": means}, tables(rows, means))
+
+
+def _row(row: Row) -> dict[str, Any]:
+    s = row.scores
+    chosen = {"similarity": s.similarity, "surface": s.surface, "group_match": s.group_match}
+    return {"name": row.sequence, **chosen, **s}
+
+
+def compared(found: Answer, rows: list[Row], others: list[Row]) -> Answer:
+    """The answer of `rows`, and their scores minus those of `others` on the same sequences, in pairs."""
+    from rich.console import Group
+
+    ends = _by_key(paired(_values(others), _values(rows)))
+    return Answer({**found.data, "difference": ends}, Group(found.text, differences(ends, len(rows))))
 
 
 def summary(rows: list[Row]) -> dict[str, dict[str, float]]:
     """mean, low, high over sequences by key; the ends are nan for a single one."""
-    names = list(rows[0].scores)
-    values = np.array([[row.scores.get(name, np.nan) for name in names] for row in rows], float)
-    ends: Any = zip(names, *bootstrap(values), strict=True)
-    return {name: {"mean": float(m), "low": float(low), "high": float(high)} for name, m, low, high in ends}
+    return _by_key(bootstrap(_values(rows)))
+
+
+def _values(rows: list[Row]) -> Array:
+    return np.array([[row.scores[key] for key in CATALOGUE] for row in rows])
+
+
+def _by_key(ends: tuple[Array, Array, Array]) -> dict[str, dict[str, float]]:
+    columns = zip(CATALOGUE, *(end.tolist() for end in ends), strict=True)
+    return {key: {"mean": mean, "low": low, "high": high} for key, mean, low, high in columns}

@@ -5,46 +5,98 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING, Any
 
+from tracking.scoring.catalogue import CATALOGUE
+
 if TYPE_CHECKING:
     from tracking.app.score_command import Row
 
-SHOWN = ("HOTA", "DetA", "AssA", "MOTA", "MOTP", "IDF1", "FP", "FN", "IDSW")
+SHOWN = ("HOTA", "MOTA", "IDF1", "group_F1", "group_GDSR2", "group_MOTA", "pairwise_F1", "event_F1", "event_latency")
+"""The few that stand for all, where there is room for one line."""
+
+PEOPLE = ("objective", "HOTA", "DetA", "AssA", "MOTA", "MOTP", "IDF1", "FP", "FN", "IDSW", "GOSPA")
+GROUPS = tuple(
+    f"group_{name}" for name in ("1-FP", "1-FN", "GDSR", "GDSR2", "MOTP", "MOTA", "IDSW", "F1", "HOTA", "AssA")
+)
+EVENTS = (
+    "pairwise_F1", "event_F1", "event_latency", "merge_F1", "split_F1", "cross_F1", "queue_F1", "lineage_accuracy",
+)  # fmt: skip
+TABLES = {
+    "people": PEOPLE,
+    "groups, strict": GROUPS,
+    "groups, core (without 1 s before and after each true merge and split)": tuple(f"{key}_core" for key in GROUPS),
+    "members and events": EVENTS,
+}
 """What a terminal has room for; --json holds everything."""
 
-COUNTS = ("TP", "FP", "FN", "IDSW")
-
-MEANING = {
+SIMILARITY = {
     "boxes": "overlap (IoU) of boxes",
     "ground": "1 - distance / 2 m on the ground",
     "image": "1 - distance / 2 m in the image",
 }
+MATCHED = {"hull": "overlap (IoU) of hulls", "members": "common members (Jaccard index)"}
+SURFACE = {"ground": "on the ground, m", "image": "in the image, px"}
+
+ENOUGH = 100
+"""Sequences from which a difference counts."""
 
 Means = dict[str, dict[str, float]]
 
 
 def tables(rows: list[Row], means: Means) -> Any:
-    """One column for each score that is shown; the mean and its 95 % interval where there are several sequences."""
-    from rich.table import Table
+    """A table for each family of which something is known, and by what people and groups were compared."""
+    from rich.console import Group
     from rich.text import Text
 
-    names = [name for name in SHOWN if name in means]
-    used = ", ".join(MEANING[kind] for kind in dict.fromkeys(row.scores.similarity for row in rows))
-    caption = Text(f"similarity: {used}")
-    table = Table(box=None, pad_edge=False, header_style="bold", caption=caption, caption_justify="left")
+    known = {title: keys for title, keys in TABLES.items() if any(math.isfinite(means[k]["mean"]) for k in keys)}
+    parts = [_table(title, keys, rows, means) for title, keys in known.items()]
+    return Group(*parts, Text("\n".join(_compared(rows, "groups, strict" in known))))
+
+
+def _table(title: str, keys: tuple[str, ...], rows: list[Row], means: Means) -> Any:
+    from rich.table import Table
+
+    table = Table(title=title, title_justify="left", box=None, pad_edge=False, header_style="bold")
     table.add_column("sequence", overflow="fold")
-    for name in names:
-        table.add_column(name, justify="right", no_wrap=True)
+    for key in keys:
+        table.add_column(key.removeprefix("group_").removesuffix("_core"), justify="right", no_wrap=True)
     for row in rows:
-        table.add_row(row.sequence, *(number(name, row.scores[name]) for name in names))
+        table.add_row(row.sequence, *(number(key, row.scores[key]) for key in keys))
     if len(rows) > 1:
-        table.add_row("mean", *(number(name, means[name]["mean"], mean=True) for name in names), style="bold")
-        for end in ("low", "high"):
-            table.add_row(f"95 % {end}", *(number(name, means[name][end], mean=True) for name in names))
+        for name, part in (("mean", "mean"), ("95 % low", "low"), ("95 % high", "high")):
+            cells = (number(key, means[key][part], mean=True) for key in keys)
+            table.add_row(name, *cells, style="bold" if part == "mean" else None)
     return table
 
 
-def number(name: str, value: float, *, mean: bool = False) -> str:
+def _compared(rows: list[Row], groups: bool) -> list[str]:
+    def each(words: dict[str, str], name: str) -> str:
+        return ", ".join(words[kind] for kind in dict.fromkeys(getattr(row.scores, name) for row in rows))
+
+    people = f"people by {each(SIMILARITY, 'similarity')}"
+    if not groups:
+        return [people, "groups are not labelled"]
+    return [people, f"groups by {each(MATCHED, 'group_match')}, {each(SURFACE, 'surface')}"]
+
+
+def differences(found: Means, sequences: int) -> Any:
+    """How the means differ from those of other tracks; a star where the interval is off zero."""
+    from rich.table import Table
+
+    title = f"these tracks minus --against, in pairs over {sequences} sequences"
+    title += "" if sequences >= ENOUGH else f" (fewer than {ENOUGH}: an indication)"
+    table = Table(title=title, title_justify="left", box=None, pad_edge=False, header_style="bold")
+    for name in ("score", "difference", "95 % low", "95 % high", ""):
+        table.add_column(name, justify="left" if name == "score" else "right")
+    for key in (key for keys in TABLES.values() for key in keys):
+        d = found[key]
+        if math.isfinite(d["mean"]):
+            cells = (number(key, d[part], mean=True) for part in ("mean", "low", "high"))
+            table.add_row(key, *cells, "*" if d["low"] > 0 or d["high"] < 0 else "")
+    return table
+
+
+def number(key: str, value: float, *, mean: bool = False) -> str:
     """A score as text: fractions with three digits, counts whole, their means with one; nan ("not labelled") a dash."""
     if not math.isfinite(value):
         return "–"
-    return f"{value:.3f}" if name not in COUNTS else f"{value:.{int(mean)}f}"
+    return f"{value:.3f}" if CATALOGUE[key].unit != "count" else f"{value:.{int(mean)}f}"
