@@ -62,6 +62,15 @@ def test_places_and_boxes_of_every_frame(seed: int, broken: bool, monkeypatch: p
     assert as_dict(box_pairs(true, est, a, b)) == pytest.approx(expected(true, est, overlap), abs=1e-12)
 
 
+@pytest.mark.parametrize("spread", [0.0, 0.3])
+def test_frames_stay_apart_where_all_stand_close(spread: float) -> None:
+    r = np.random.default_rng(0)
+    true, est = random_rows(r), random_rows(r)
+    a, b = (spread * places(r, rows, False) for rows in (true, est))
+    near = np.maximum(0, 1 - np.linalg.norm(a[:, None] - b[None], axis=2) / 9)
+    assert as_dict(point_pairs(true, est, a, b, 9.0)) == pytest.approx(expected(true, est, near), abs=1e-12)
+
+
 def test_overlap_of_two_boxes() -> None:
     one = Rows(np.array([1]), np.array([1]))
     found = box_pairs(one, one, np.array([[0.0, 0, 4, 2]]), np.array([[2.0, 0, 4, 2]]))
