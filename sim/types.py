@@ -8,7 +8,7 @@ Arrays are float64 except ids (int64), flags (bool) and images (uint8); every ar
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass, field, fields, replace
+from dataclasses import dataclass, field, replace
 from typing import Any, Literal, Protocol, Self
 
 import numpy as np
@@ -28,12 +28,13 @@ class _Frozen:
     """Makes the arrays of a frozen dataclass read-only and of the declared kind."""
 
     def __post_init__(self) -> None:
-        for f in fields(self):  # type: ignore[arg-type]
-            value = getattr(self, f.name)
+        for name in self.__dataclass_fields__:  # type: ignore[attr-defined]
+            value = getattr(self, name)
             if isinstance(value, np.ndarray):
-                object.__setattr__(self, f.name, _readonly(value))
+                if value.flags.writeable:
+                    object.__setattr__(self, name, _readonly(value))
             elif isinstance(value, tuple) and value and isinstance(value[0], np.ndarray):
-                object.__setattr__(self, f.name, tuple(_readonly(v) for v in value))
+                object.__setattr__(self, name, tuple(_readonly(v) for v in value))
 
     def replace(self, **changes: Any) -> Self:
         """A copy with these fields changed."""

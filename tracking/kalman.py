@@ -45,9 +45,12 @@ def predict(state: Array, dt: float, q: Array) -> None:
     state[VAR:] += q if q.ndim == 3 else q[:, None]
 
 
-def update(state: Array, rows: Ints, z: Array, noise: Array | float) -> None:
-    """Measure filters `rows` (each at most once) at z (K, D) with variances `noise` (K, D) or (D,), in place."""
-    new = state[:, rows]
+def update(state: Array, rows: Ints, z: Array, noise: Array | float) -> Array:
+    """Measure filters `rows` (each at most once) at z (K, D) with variances `noise` (K, D) or (D,), in place.
+
+    Returns (K, D) y^2 / S of each coordinate, in squared units of z per unit of covariance (summed: eq. 9).
+    """
+    new = state.take(rows, 1)
     place, rate, var, cov, rate_var = new
     s = var + noise
     gain, rate_gain = var / s, cov / s
@@ -58,6 +61,7 @@ def update(state: Array, rows: Ints, z: Array, noise: Array | float) -> None:
     var -= gain * var
     cov -= gain * cov
     state[:, rows] = new
+    return np.asarray(y * y / s)
 
 
 def distances(state: Array, z: Array, noise: Array | float, scale: Array | float = 1.0) -> Array:
@@ -67,22 +71,22 @@ def distances(state: Array, z: Array, noise: Array | float, scale: Array | float
     """
     place, spread = state[PLACE], np.reshape(np.square(scale), (-1, 1))
     if np.ndim(noise) < 2:
-        return _common_noise(place, z, (state[VAR] + noise) * spread)
+        return _common_noise(place, z, 1.0 / ((state[VAR] + noise) * spread))
     y = z[None] - place[:, None]
     s = (state[VAR][:, None] + np.asarray(noise)[None]) * spread[..., None]
     return np.asarray(np.sum(y * y / s, 2))
 
 
-def _common_noise(place: Array, z: Array, s: Array) -> Array:
-    """Sum over d of (z - place)^2 / s: expanded to one matrix product, about a middle so that little cancels."""
+def _common_noise(place: Array, z: Array, w: Array) -> Array:
+    """Sum over d of w (z - place)^2, expanded to matrix products: about one of the points, so that little cancels."""
     if not len(place) or not len(z):
         return np.zeros((len(place), len(z)))
-    middle = z.mean(0)
-    p, m, w = place - middle, z - middle, 1.0 / s
+    p, m = place - z[0], z - z[0]
     pw = p * w
-    left = np.concatenate([w, -2.0 * pw, (pw * p).sum(1, keepdims=True)], 1)
-    right = np.concatenate([m * m, m, np.ones((len(m), 1))], 1)
-    return np.asarray(np.maximum(left @ right.T, 0.0))
+    d2 = w @ (m * m).T
+    d2 -= pw @ (m + m).T
+    d2 += np.einsum("nd,nd->n", pw, p)[:, None]
+    return np.asarray(np.maximum(d2, 0.0, out=d2))
 
 
 def log_likelihood(state: Array, rows: Ints, z: Array, noise: Array | float) -> Array:

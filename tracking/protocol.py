@@ -176,8 +176,8 @@ def _fault(tracks: Any, index: int) -> tuple[str, str] | None:
 
 
 def _finite(a: Any) -> bool:
-    """Are all numbers finite? The sum is cheap and nearly always tells; huge numbers may overflow it."""
-    return isfinite(a.sum()) or bool(np.isfinite(a).all())
+    """Are all numbers finite? The sum of squares is cheap and nearly always tells; huge numbers may overflow it."""
+    return isfinite(np.vdot(a, a)) or bool(np.isfinite(a).all())
 
 
 def _id_fault(tracks: Tracks) -> tuple[str, str] | None:

@@ -81,8 +81,8 @@ class Blob:
             return np.zeros((0, 4)), np.zeros(0)
         box, score = detections.box, detections.score
         score = score if len(score) else np.ones(len(box))
-        good = (score >= self.config.score_continue) & (box[:, 2] > 0) & (box[:, 3] > 0)
-        if not good.all():
+        if score.min() < self.config.score_continue or box[:, 2:].min() <= 0:
+            good = (score >= self.config.score_continue) & (box[:, 2:] > 0).all(1)
             box, score = box[good], score[good]
         return blob_measure.from_boxes(box), score
 
@@ -118,8 +118,8 @@ class Blob:
         people = self.people
         if len(rows) == len(people.id):
             return rows, columns
-        y = (z[columns, 2:] - people.bank[kalman.PLACE, rows, 2:]) / people.scale[rows, None]
-        odd = (y * y / self.asymptote[2:]).sum(1) > self.gate
+        y = (z.take(columns, 0) - people.bank[kalman.PLACE].take(rows, 0))[:, 2:] / people.scale[rows, None]
+        odd = (y * y) @ (1 / self.asymptote[2:]) > self.gate
         if not odd.any():
             return rows, columns
         lost = people.confirmed.copy()
@@ -139,7 +139,9 @@ class Blob:
         left = free.nonzero()[0]
         if not len(left) or not len(people.id):
             return rows, best, measured, free
-        owner = self._owners(rows, z[left], d2[:, left])
+        owner = self._owners(rows, z.take(left, 0), d2.take(left, 1))
+        if owner.max() < 0:
+            return rows, best, measured, free
         free[left[owner >= 0]] = False
         own = dict(zip(rows.tolist(), range(len(rows)), strict=True))
         for row in np.unique(owner[owner >= 0]).tolist():
@@ -161,8 +163,8 @@ class Blob:
         people = self.people
         place, owner = people.bank[kalman.PLACE], np.full(len(pieces), -1)
         possible = blob_measure.inside(pieces, place) & people.confirmed
-        near = possible.any(1).nonzero()[0]
-        if len(near):
+        if possible.any():
+            near = possible.any(1).nonzero()[0]
             smaller = np.prod(pieces[near, 2:], 1)[:, None] < np.prod(place[:, 2:], 1)
             share = blob_measure.covered(pieces[near], place) * (possible[near] & smaller)
             owner[near] = np.where(share.max(1) >= INSIDE, share.argmax(1), -1)
@@ -180,9 +182,9 @@ class Blob:
 
     def _update(self, rows: Ints, measured: Array) -> Array:
         """Update the measured tracks; returns each one's squared distance (K,)."""
-        near = self._away(rows, measured)
-        kalman.update(self.people.bank, rows, measured, self.noise)
-        return near
+        people = self.people
+        terms = kalman.update(people.bank, rows, measured, self.noise)
+        return np.asarray(np.add.reduce(terms, 1) / np.square(people.scale[rows]))
 
     def _orphans(self, z: Array, score: Array, free: Bools) -> Ints:
         """Strong measurements that nobody took, no piece of anybody, nor several unseen people at once."""
@@ -194,7 +196,7 @@ class Blob:
     def _report(self, frame: Frame) -> Tracks:
         people = self.people
         rows = people.reported(frame.t)
-        state, scale = people.bank[:, rows], people.scale[rows]
+        state, scale = people.bank.take(rows, 1), people.scale[rows]
         camera = self.context.camera
         box, alone = blob_measure.to_boxes(state[kalman.PLACE]), np.full(len(rows), -1)
         if camera is None:

@@ -52,8 +52,8 @@ def covered(place: Array, others: Array) -> Array:
 
 def inside(points: Array, boxes: Array) -> Bools:
     """(N, M) does point (x, y) lie in box (x, y, h, w)?"""
-    across = np.abs(points[:, :1] - boxes[:, 0]) <= boxes[:, 3] / 2
-    return np.asarray(across & (np.abs(points[:, 1:2] - boxes[:, 1]) <= boxes[:, 2] / 2))
+    away = np.abs(points[:, None, :2] - boxes[:, :2]) <= boxes[:, :1:-1] / 2
+    return np.asarray(away[..., 0] & away[..., 1])
 
 
 def hull_overlap(places: Array, box: Array) -> float:

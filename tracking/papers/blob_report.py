@@ -9,12 +9,11 @@ from sim.types import Array, Bools, Camera
 
 def image_covariance(state: Array, scale: Array) -> Array:
     """(N, 4, 4) covariance of x, y, vx, vy in px of a bank whose covariances are in m^2; scale (N,) px per m."""
-    cov = np.zeros((state.shape[1], 4, 4))
-    var, cross, rate = state[2:, :, :2] * np.square(scale)[:, None]
-    for axis in (0, 1):
-        cov[:, axis, axis], cov[:, axis + 2, axis + 2] = var[:, axis], rate[:, axis]
-        cov[:, axis, axis + 2] = cov[:, axis + 2, axis] = cross[:, axis]
-    return cov
+    cov = np.zeros((state.shape[1], 16))  # entry (i, j) at 4 i + j: the strides below walk along diagonals
+    var, cross, rate = state[2:, :, :2] * (scale * scale)[:, None]
+    cov[:, 0:6:5], cov[:, 10:16:5] = var, rate
+    cov[:, 2:8:5] = cov[:, 8:14:5] = cross
+    return cov.reshape(-1, 4, 4)
 
 
 def on_ground(camera: Camera, state: Array, scale: Array) -> tuple[Array, Array, Array, Bools]:

@@ -79,12 +79,12 @@ class Population:
         if not len(lost):
             return
         place = self.bank[kalman.PLACE]
-        in_front = self.hit & (_foot(place) > _foot(place[lost])[:, None])
-        in_front &= np.abs(place[lost, 0, None] - place[:, 0]) < (place[lost, 3, None] + place[:, 3]) / 2
-        if not in_front.any():
-            return
-        share = np.where(in_front, blob_measure.covered(place[lost], place), 0.0)
-        self.excused[lost[share.max(1) >= HIDDEN]] = True
+        foot, hidden = place[:, 1] + place[:, 2] / 2, place.take(lost, 0)
+        in_front = self.hit & (foot > foot[lost, None])
+        in_front &= np.abs(hidden[:, :1] - place[:, 0]) < (hidden[:, 3:] + place[:, 3]) / 2
+        if in_front.any():
+            share = np.where(in_front, blob_measure.covered(hidden, place), 0.0)
+            self.excused[lost[share.max(1) >= HIDDEN]] = True
 
     def merged(self, z: Array, unseen: Bools) -> Bools:
         """(M,) is this measurement several confirmed tracks at once, one of them `unseen` (N,) at least?
@@ -93,17 +93,19 @@ class Population:
         ones among them are excused.
         """
         found = np.zeros(len(z), bool)
-        known = self.confirmed.nonzero()[0]
-        if len(known) < 2 or not len(z) or not unseen.any():
+        if not len(z) or not unseen.any():
             return found
-        place, lost = self.bank[kalman.PLACE][known], unseen[known]
-        held = blob_measure.inside(place, z)
-        for column in np.flatnonzero((held.sum(0) > 1) & held[lost].any(0)):
+        place = self.bank[kalman.PLACE]
+        held = blob_measure.inside(place, z) & self.confirmed[:, None]
+        several = np.add.reduce(held, 0) > 1
+        if not several.any():
+            return found
+        for column in np.flatnonzero(several & held[unseen].any(0)):
             members = held[:, column]
             alone = max(blob_measure.hull_overlap(one[None], z[column]) for one in place[members])
             if blob_measure.hull_overlap(place[members], z[column]) >= max(SAME, alone):
                 found[column] = True
-                self.excused[known[members & lost]] = True
+                self.excused[members & unseen] = True
         return found
 
     def bury(self, t: float) -> None:
@@ -117,10 +119,11 @@ class Population:
         over |= ~sure & (t - self.born[lost] > self.config.tentative_time)
         over |= unseen & self._outside(self.bank[kalman.PLACE, lost])
         if over.any():
-            keep = np.ones(len(self.id), bool)
-            keep[lost[over]] = False
-            self.bank, self.id = self.bank[:, keep], self.id[keep]
-            self._bind(self.book[:, keep], self.flags[:, keep])
+            stay = np.ones(len(self.id), bool)
+            stay[lost[over]] = False
+            keep = stay.nonzero()[0]
+            self.bank, self.id = self.bank.take(keep, 1), self.id.take(keep)
+            self._bind(self.book.take(keep, 1), self.flags.take(keep, 1))
 
     def _outside(self, place: Array) -> Bools:
         """Is the centre out of the image?"""
@@ -148,7 +151,7 @@ class Population:
         if len(lost):
             limit = np.where(self.excused[lost], self.excused_silence, self.silence) * (1 + SLACK)
             fresh = (self.rho[lost] <= limit) & (self.misses[lost] <= self.hits[lost])
-            told[lost] = fresh & ~self._leaving(self.bank[:, lost])
+            told[lost] = fresh & ~self._leaving(self.bank[: kalman.VAR].take(lost, 1))
         return np.asarray(told.nonzero()[0])
 
     def look(self, z: Array) -> None:
@@ -161,11 +164,6 @@ class Population:
 
     def _leaving(self, bank: Array) -> Bools:
         """Does the predicted box reach over the edge of the field of view, moving outwards?"""
-        place, rate = bank[kalman.PLACE], bank[kalman.RATE, :, :2]
-        half = place[:, :1:-1] / 2
-        out = ((place[:, :2] - half < self.low) & (rate < 0)) | ((place[:, :2] + half > self.high) & (rate > 0))
+        centre, rate, half = bank[kalman.PLACE, :, :2], bank[kalman.RATE, :, :2], bank[kalman.PLACE, :, :1:-1] / 2
+        out = ((centre - half < self.low) & (rate < 0)) | ((centre + half > self.high) & (rate > 0))
         return np.asarray(out.any(1))
-
-
-def _foot(place: Array) -> Array:
-    return np.asarray(place[:, 1] + place[:, 2] / 2)
