@@ -1,12 +1,14 @@
-"""Chains: people of one moment who stand behind one another.
+"""Chains: people of one moment who stand behind one another; those of all moments are found at once.
 
 Along the line that fits them best their spacing is 0.4-1.5 m and nobody is more than 0.5 m off it. From one to the next
 the way turns by 60° at most: a conversation circle passes the first two tests when projected, never the third.
+Tables of places (M, n, 2) hold M sets, in order, of which the first `count` (M,) places are meant.
 """
 
 from __future__ import annotations
 
-import math
+from collections.abc import Iterator
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -17,82 +19,135 @@ OFF = 0.5  # m
 STRAIGHT = 0.5  # cosine of the greatest turn from one to the next
 FAR = 1e9  # m: where those stand who are off a line
 SHARE = 2 / 3  # of a standing crowd that must be in the chain: else it is a crowd
+CELLS = 2_000_000  # seeds times people looked at together: bounds memory
 
 
-def chain(pos: Array) -> Ints:
-    """Rows of the chain among people at pos (N, 2), N > 1, who stand close to one another, in order; or none."""
-    whole = _along(pos, np.arange(len(pos)))
-    if _fits(pos[whole]):
-        return whole
-    least = max(3, math.ceil(SHARE * len(pos)))
-    found = [_from_seed(pos, i, j) for i, j in _seeds(pos, least)] if len(pos) >= least else []
-    found = sorted((c for c in found if len(c) >= least), key=lambda c: (-len(c), _residual(pos[c])))
-    return found[0] if found else np.zeros(0, np.int64)
+@dataclass(frozen=True, slots=True, eq=False)
+class Chains:
+    """M chains: rows (M, n) of people in order, the first `count` (M,) of each; u (M, 2): direction from the first
+    towards the last; middle (M, 2)."""
+
+    rows: Ints
+    count: Ints
+    u: Array
+    middle: Array
 
 
-def axis(pos: Array) -> Array:
-    """Unit vector (2,) of the line through places (N, 2) in order, from the first towards the last."""
-    if len(pos) == 2:
-        direction = pos[1] - pos[0]
-    else:
-        direction = np.linalg.svd(pos - pos.mean(axis=0), full_matrices=False)[2][0]
-        direction = direction if direction @ (pos[-1] - pos[0]) >= 0 else -direction
-    return np.asarray(direction / max(float(np.hypot(*direction)), 1e-12))
+def chains(pos: Array, i: Ints, j: Ints) -> Iterator[Chains]:
+    """The chain, if there is one, of each crowd among places pos (N, 2); i, j: rows of who stand close to each other,
+    which makes crowds. Crowds of equal size come together, each crowd's rows in ascending order."""
+    for crowd in _crowds(len(pos), i, j):
+        portion = max(1, CELLS // crowd.shape[1] ** 3)
+        for low in range(0, len(crowd), portion):
+            some = crowd[low : low + portion]
+            order, count = _best(pos[some])
+            found = count > 0
+            rows, count = np.take_along_axis(some[found], order[found], axis=1), count[found]
+            yield Chains(rows, count, *_axes(pos[rows], count)[:2])
 
 
-def _along(pos: Array, rows: Ints) -> Ints:
-    return rows[np.argsort((pos[rows] - pos[rows[0]]) @ axis(pos[rows]), kind="stable")]
+def _crowds(people: int, i: Ints, j: Ints) -> Iterator[Ints]:
+    """Rows (C, n) of the C connected crowds of n > 1 people, for each n."""
+    from scipy.sparse import coo_array
+    from scipy.sparse.csgraph import connected_components
+
+    graph = coo_array((np.ones(len(i), np.int8), (i, j)), shape=(people, people))
+    _, crowd = connected_components(graph, directed=False)
+    order = np.argsort(crowd, kind="stable")
+    size = np.bincount(crowd, minlength=1)
+    first = np.cumsum(size) - size
+    for n in np.unique(size[size > 1]):
+        yield order[first[size == n, None] + np.arange(n)]
 
 
-def _fits(pos: Array) -> bool:
-    """Whether places (N, 2), in order, are a chain."""
-    u = axis(pos)
-    arm = pos - pos.mean(axis=0)
-    if np.abs(arm @ np.array([-u[1], u[0]])).max() > OFF:
-        return False
-    return bool(_steps_fit(pos, u).all() and _turns_fit(pos).all())
+def _best(p: Array) -> tuple[Ints, Ints]:
+    """Order (C, n) and length (C,) of the chain in each crowd p (C, n, 2), 0 where there is none: all of them, or the
+    longest, straightest one along the line through two of them."""
+    n = p.shape[1]
+    everybody = np.full(len(p), n)
+    u = _axes(p, everybody)[0]
+    order = np.argsort((p * u[:, None]).sum(axis=2), axis=1, kind="stable")
+    count = np.where(_fits(np.take_along_axis(p, order[..., None], axis=1), everybody), n, 0)
+    least = max(3, int(np.ceil(SHARE * n - 1e-9)))
+    rest = np.flatnonzero(count == 0) if n >= least else np.zeros(0, np.int64)
+    if len(rest):
+        crowd, some, long, residual = _from_seeds(p[rest], least)
+        ranked = np.lexsort((residual, -long, crowd))
+        ranked = ranked[np.flatnonzero(np.diff(crowd[ranked], prepend=-1))]
+        order[rest[crowd[ranked]]], count[rest[crowd[ranked]]] = some[ranked], long[ranked]
+    return order, count
 
 
-def _steps_fit(pos: Array, u: Array) -> Bools:
-    steps = np.diff(pos @ u)
+def _axes(p: Array, count: Ints) -> tuple[Array, Array, Array]:
+    """Unit vector (M, 2) along the line that fits each set best, from the first towards the last; the middles (M, 2);
+    the root of the sum of squares of distances from the line (M,)."""
+    within = np.arange(p.shape[1]) < count[:, None]
+    middle = np.where(within[..., None], p, 0.0).sum(axis=1) / count[:, None]
+    arm = np.where(within[..., None], p - middle[:, None], 0.0)
+    xx, yy, xy = ((arm[..., a] * arm[..., b]).sum(axis=1) for a, b in ((0, 0), (1, 1), (0, 1)))
+    angle = 0.5 * np.arctan2(2 * xy, xx - yy)
+    u = np.stack([np.cos(angle), np.sin(angle)], axis=1)
+    whole = p[np.arange(len(p)), count - 1] - p[:, 0]
+    u = np.where(((u * whole).sum(axis=1) >= 0)[:, None], u, -u)
+    least = (xx + yy) / 2 - np.hypot((xx - yy) / 2, xy)
+    return u, middle, np.sqrt(np.maximum(least, 0.0))
+
+
+def _fits(p: Array, count: Ints) -> Bools:
+    """Which sets (M,) are chains."""
+    u, middle, _ = _axes(p, count)
+    arm = p - middle[:, None]
+    off = np.abs(u[:, None, 0] * arm[..., 1] - u[:, None, 1] * arm[..., 0])
+    within = np.arange(p.shape[1]) < count[:, None]
+    good = (off <= OFF) | ~within
+    good[:, 1:] &= _steps_fit((arm * u[:, None]).sum(axis=2)) | ~within[:, 1:]
+    good[:, 2:] &= _turns_fit(p) | ~within[:, 2:]
+    return np.asarray(good.all(axis=1))
+
+
+def _steps_fit(along: Array) -> Bools:
+    steps = np.diff(along, axis=1)
     return np.asarray((steps >= NEAREST) & (steps <= FURTHEST))
 
 
-def _turns_fit(pos: Array) -> Bools:
-    step = np.diff(pos, axis=0)
-    length = np.hypot(*step.T)
-    return np.asarray((step[:-1] * step[1:]).sum(axis=1) >= STRAIGHT * length[:-1] * length[1:])
+def _turns_fit(p: Array) -> Bools:
+    step = np.diff(p, axis=1)
+    length = np.hypot(step[..., 0], step[..., 1])
+    return np.asarray((step[:, :-1] * step[:, 1:]).sum(axis=2) >= STRAIGHT * length[:, :-1] * length[:, 1:])
 
 
-def _seeds(pos: Array, least: int) -> list[tuple[int, int]]:
-    """Pairs through whose line a chain of `least` people may go: so many stand along it with the right spacing."""
-    i, j = np.triu_indices(len(pos), 1)
-    step = pos[j] - pos[i]
-    length = np.hypot(*step.T)
-    kept = (length >= NEAREST) & (length <= FURTHEST)
-    i, j, u = i[kept], j[kept], step[kept] / length[kept, None]
-    arm = pos[None] - (pos[i] + pos[j])[:, None] / 2
-    off = np.abs(arm[..., 1] * u[:, :1] - arm[..., 0] * u[:, 1:])
-    along = np.sort(np.where(off <= OFF, arm[..., 0] * u[:, :1] + arm[..., 1] * u[:, 1:], FAR), axis=1)
-    gap = np.diff(along, axis=1)
-    run, longest = np.ones(len(i), np.int64), np.ones(len(i), np.int64)
-    for k in range(gap.shape[1]):
-        run = np.where((gap[:, k] >= NEAREST) & (gap[:, k] <= FURTHEST), run + 1, 1)
-        longest = np.maximum(longest, run)
-    return list(zip(i[longest >= least].tolist(), j[longest >= least].tolist(), strict=True))
+def _from_seeds(p: Array, least: int) -> tuple[Ints, Ints, Ints, Array]:
+    """Chains of `least` or more people along the lines through two who stand next to each other, in crowds (C, n, 2):
+    crowd (M,), order (M, n), length (M,), distance from the line (M,)."""
+    i, j = np.triu_indices(p.shape[1], 1)
+    crowd, seed = np.nonzero(_steps_fit(np.stack([np.zeros((len(p), len(i))), _lengths(p, i, j)], axis=1))[:, 0])
+    i, j, places = i[seed], j[seed], p[crowd]
+    rows = np.arange(len(crowd))
+    u = places[rows, j] - places[rows, i]
+    u /= np.hypot(*u.T)[:, None]
+    arm = places - (places[rows, i] + places[rows, j])[:, None] / 2
+    off = np.abs(u[:, None, 0] * arm[..., 1] - u[:, None, 1] * arm[..., 0])
+    along = np.where(off <= OFF, (arm * u[:, None]).sum(axis=2), FAR)
+    order = np.argsort(along, axis=1, kind="stable")
+    places = np.take_along_axis(places, order[..., None], axis=1)
+    links = _steps_fit(np.take_along_axis(along, order, axis=1))
+    links[:, 1:] &= _turns_fit(places) | ~links[:, :-1]
+    start, count = _longest(links)
+    order = np.take_along_axis(order, np.minimum(start[:, None] + np.arange(p.shape[1]), p.shape[1] - 1), axis=1)
+    places = np.take_along_axis(p[crowd], order[..., None], axis=1)
+    good = np.flatnonzero((count >= least) & _fits(places, count))
+    return crowd[good], order[good], count[good], _axes(places[good], count[good])[2]
 
 
-def _from_seed(pos: Array, i: int, j: int) -> Ints:
-    """The longest chain along the line through i and j."""
-    u = axis(pos[[i, j]])
-    arm = pos - (pos[i] + pos[j]) / 2
-    rows = np.flatnonzero(np.abs(arm @ np.array([-u[1], u[0]])) <= OFF)
-    rows = rows[np.argsort(arm[rows] @ u, kind="stable")]
-    links = _steps_fit(pos[rows], u)
-    links[1:] &= _turns_fit(pos[rows]) | ~links[:-1]
-    run = max(np.split(rows, np.flatnonzero(~links) + 1), key=len)
-    return run if len(run) > 1 and _fits(pos[run]) else rows[:0]
+def _lengths(p: Array, i: Ints, j: Ints) -> Array:
+    step = p[:, j] - p[:, i]
+    return np.hypot(step[..., 0], step[..., 1])
 
 
-def _residual(pos: Array) -> float:
-    return float(np.linalg.svd(pos - pos.mean(axis=0), compute_uv=False)[-1]) if len(pos) > 2 else 0.0
+def _longest(links: Bools) -> tuple[Ints, Ints]:
+    """First place and number of places (M,) of the longest run that is linked throughout, of links (M, n - 1)."""
+    start, count, run = np.zeros(len(links), np.int64), np.ones(len(links), np.int64), np.ones(len(links), np.int64)
+    for k in range(links.shape[1]):
+        run = np.where(links[:, k], run + 1, 1)
+        start, count = np.where(run > count, k + 2 - run, start), np.maximum(run, count)
+    return start, count

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass, field
-from itertools import pairwise
+from dataclasses import dataclass, field, replace
+from itertools import groupby
 
 import numpy as np
 
-from sim.chains import FURTHEST, axis, chain
+from sim.chains import FURTHEST, Chains, chains
 from sim.near import close_pairs, stretches
 from sim.rules import frames_of
 from sim.types import Array, Bools, Ints
@@ -22,6 +22,8 @@ MEMBER = 1.0  # s in line, to count as one of it
 ASIDE = 0.1  # m/s: a line that as a whole moves sideways, and less along, is a row of people abreast
 RATE = 10.0  # Hz: looked at no more often
 
+Vector = tuple[float, float]
+
 
 @dataclass(frozen=True, slots=True)
 class Line:
@@ -32,7 +34,7 @@ class Line:
     last: int
     order: tuple[int, ...]
     left: tuple[int, ...]
-    middle: tuple[float, float]
+    middle: Vector
 
     @property
     def fifo(self) -> bool:
@@ -41,21 +43,34 @@ class Line:
         return self.left in (self.order[:n], self.order[::-1][:n])
 
 
+@dataclass(frozen=True, slots=True)
+class _Moment:
+    """A chain at time t (frame from 0): columns in order, direction, middle, mean velocity along it and aside."""
+
+    t: int
+    order: tuple[int, ...]
+    u: Vector
+    middle: Vector
+    drift: Vector
+
+    def turned(self) -> _Moment:
+        """The same, looked at from its other end."""
+        return replace(self, order=self.order[::-1], u=(-self.u[0], -self.u[1]), drift=(-self.drift[0], -self.drift[1]))
+
+
 @dataclass
 class _Followed:
-    """A line being followed. State: order and direction when last seen; since when and until when it had three people;
-    until when two; moments in it and last frame of each person; sums of the velocity along and aside over moments."""
+    """A line being followed. State: when last seen, and as what; since when and until when it had three people;
+    moments in it, last frame and last place of each person; sums of the velocity along and aside over moments."""
 
-    order: tuple[int, ...]
-    u: Array
+    now: _Moment
     since: int
     three: int
-    last: int
-    middle: Array
+    middle: Vector
     seen: dict[int, int] = field(default_factory=dict)
     gone: dict[int, int] = field(default_factory=dict)
     ranks: list[int] = field(default_factory=list)
-    drift: Array = field(default_factory=lambda: np.zeros(2))
+    drift: Vector = (0.0, 0.0)
     moments: int = 0
 
 
@@ -65,12 +80,12 @@ def lines(pos: Array, vel: Array, there: Bools, fps: float) -> list[Line]:
     hold, bridge = frames_of(HOLD, fps), max(frames_of(BRIDGE, fps), stride)
     following: list[_Followed] = []
     found: list[Line] = []
-    for t, chains in _moments(pos, waiting(vel, there, fps), stride):
-        ended = [f for f in following if t - f.last > bridge]
-        following = [f for f in following if t - f.last <= bridge]
+    for t, moments in groupby(_moments(pos, vel, waiting(vel, there, fps), stride), key=lambda m: m.t):
+        ended = [f for f in following if t - f.now.t > bridge]
+        following = [f for f in following if t - f.now.t <= bridge]
         found += [line for f in ended for line in _finished(f, hold, stride, fps)]
-        for rows in chains:
-            _follow(following, rows, t, pos, vel, hold, bridge)
+        for moment in moments:
+            _follow(following, moment, hold, bridge)
     found += [line for f in following for line in _finished(f, hold, stride, fps)]
     return sorted(found, key=lambda q: (q.first, q.last, q.order))
 
@@ -87,78 +102,80 @@ def waiting(vel: Array, there: Bools, fps: float) -> Bools:
     return np.asarray((np.cumsum(out, axis=0)[:-1] > 0) & there)
 
 
-def _moments(pos: Array, waits: Bools, stride: int) -> Iterator[tuple[int, list[Ints]]]:
-    """(t, chains of columns) of each moment looked at in which any two wait near each other."""
+def _moments(pos: Array, vel: Array, waits: Bools, stride: int) -> list[_Moment]:
+    """The chains of all moments looked at, ordered by time; of two people only where both are elsewhen in a longer
+    one."""
     t, p = np.nonzero(waits[::stride])
     i, j = close_pairs(t, pos[t * stride, p], FURTHEST)
-    cuts = np.flatnonzero(np.diff(t[i], prepend=-1))
-    for a, b in pairwise([*cuts.tolist(), len(i)]):
-        moment = int(t[i[a]]) * stride
-        crowds = _crowds(p[i[a:b]].tolist(), p[j[a:b]].tolist())
-        chains = [np.array(c)[chain(pos[moment, c])] for c in crowds]
-        yield moment, [c for c in chains if len(c)]
+    tables = list(chains(pos[t * stride, p], i, j))
+    queuing = np.zeros(waits.shape[1], bool)
+    for c in tables:
+        long = np.arange(c.rows.shape[1]) < np.where(c.count >= LEAST, c.count, 0)[:, None]
+        queuing[p[c.rows[long]]] = True
+    made: list[_Moment] = []
+    for c in tables:
+        made += _of_table(c, t * stride, p, vel, (c.count >= LEAST) | queuing[p[c.rows[:, :2]]].all(axis=1))
+    return sorted(made, key=lambda m: (m.t, min(m.order)))
 
 
-def _crowds(a: list[int], b: list[int]) -> list[list[int]]:
-    """Connected people, each crowd sorted."""
-    crowd: dict[int, set[int]] = {}
-    for p, q in zip(a, b, strict=True):
-        one = crowd.get(p, {p}) | crowd.get(q, {q})
-        for member in one:
-            crowd[member] = one
-    return [sorted(c) for c in {id(c): c for c in crowd.values()}.values()]
+def _of_table(c: Chains, t: Ints, p: Ints, vel: Array, kept: Bools) -> Iterator[_Moment]:
+    within = np.arange(c.rows.shape[1]) < c.count[:, None]
+    mean = np.where(within[..., None], np.nan_to_num(vel[t[c.rows], p[c.rows]]), 0.0).sum(axis=1) / c.count[:, None]
+    along, aside = (mean * c.u).sum(axis=1), mean[:, 1] * c.u[:, 0] - mean[:, 0] * c.u[:, 1]
+    columns = [t[c.rows[:, 0]], c.count, *c.u.T, *c.middle.T, along, aside]
+    table = zip(p[c.rows][kept].tolist(), *(x[kept].tolist() for x in columns), strict=True)
+    for people, when, n, ux, uy, x, y, forward, sideways in table:
+        yield _Moment(when, tuple(people[:n]), (ux, uy), (x, y), (forward, sideways))
 
 
-def _follow(following: list[_Followed], rows: Ints, t: int, pos: Array, vel: Array, hold: int, bridge: int) -> None:
+def _follow(following: list[_Followed], now: _Moment, hold: int, bridge: int) -> None:
     """Take a chain as the next moment of the line with most of its people, or as a new line."""
-    u = axis(pos[t, rows])
-    fits = [f for f in following if f.last < t and _continues(f, rows, u)]
+    people, long = set(now.order), len(now.order) >= LEAST
+    fits = [f for f in following if f.now.t < now.t and len(people.intersection(f.now.order)) > 1]
+    fits = [f for f in fits if _continues(f.now, now)]
     if fits:
-        f = max(fits, key=lambda f: (len(set(f.order) & set(rows.tolist())), -f.since))
-        if f.u @ u < 0:
-            rows, u = rows[::-1], -u
-    elif len(rows) >= LEAST:
-        f = _Followed((), u, t, t, t, pos[t, rows].mean(axis=0))
+        f = max(fits, key=lambda f: (len(people.intersection(f.now.order)), -f.since))
+        now = now if _dot(f.now.u, now.u) >= 0 else now.turned()
+    elif long:
+        f = _Followed(now, now.t, now.t, now.middle)
         following.append(f)
     else:
         return
-    if len(rows) >= LEAST:
-        if t - f.three > bridge and f.three - f.since < hold:
-            f.since, f.seen, f.gone, f.ranks, f.drift, f.moments = t, {}, {}, [], np.zeros(2), 0
-        f.three = t
-    f.order, f.u, f.last = tuple(rows.tolist()), u, t
-    f.drift += _drift(vel[t, rows], u)
+    if long:
+        if now.t - f.three > bridge and f.three - f.since < hold:
+            f.since, f.seen, f.gone, f.ranks, f.drift, f.moments = now.t, {}, {}, [], (0.0, 0.0), 0
+        f.three = now.t
+    f.now = now
+    f.drift = (f.drift[0] + now.drift[0], f.drift[1] + now.drift[1])
     f.moments += 1
-    _note(f, t)
+    _note(f)
 
 
-def _drift(vel: Array, u: Array) -> Array:
-    mean = np.nan_to_num(vel).mean(axis=0)
-    return np.array([mean @ u, mean @ np.array([-u[1], u[0]])])
+def _dot(a: Vector, b: Vector) -> float:
+    return a[0] * b[0] + a[1] * b[1]
 
 
-def _continues(f: _Followed, rows: Ints, u: Array) -> bool:
-    """Whether two or more stand in the chain as they did in the line, in the same order."""
-    now = rows.tolist() if f.u @ u >= 0 else rows[::-1].tolist()
-    shared = [p for p in now if p in f.order]
-    return len(shared) > 1 and shared == [p for p in f.order if p in now]
+def _continues(before: _Moment, now: _Moment) -> bool:
+    """Whether those of the line who stand in the chain do so in the same order."""
+    order = now.order if _dot(before.u, now.u) >= 0 else now.order[::-1]
+    return [p for p in order if p in before.order] == [p for p in before.order if p in order]
 
 
-def _note(f: _Followed, t: int) -> None:
+def _note(f: _Followed) -> None:
     """Who is in line, and where those who are new stand among the others."""
-    for k, p in enumerate(f.order):
+    for k, p in enumerate(f.now.order):
         f.seen[p] = f.seen.get(p, 0) + 1
-        f.gone[p] = t
+        f.gone[p] = f.now.t
         if p not in f.ranks:
-            ahead = [f.ranks.index(q) for q in f.order[:k]]
+            ahead = [f.ranks.index(q) for q in f.now.order[:k]]
             f.ranks.insert(max(ahead) + 1 if ahead else 0, p)
 
 
 def _finished(f: _Followed, hold: int, stride: int, fps: float) -> list[Line]:
     """The queue that a followed line was, if it was one."""
-    along, aside = np.abs(f.drift) / f.moments
+    along, aside = (abs(v) / f.moments for v in f.drift)
     if f.three - f.since + stride < hold or (aside > ASIDE and aside > along):
         return []
     order = tuple(p for p in f.ranks if f.seen[p] * stride >= MEMBER * fps)
-    left = sorted((p for p in order if f.gone[p] < f.last), key=lambda p: f.gone[p])
-    return [Line(f.since, f.last, order, tuple(left), (float(f.middle[0]), float(f.middle[1])))]
+    left = sorted((p for p in order if f.gone[p] < f.now.t), key=lambda p: f.gone[p])
+    return [Line(f.since, f.now.t, order, tuple(left), f.middle)]
