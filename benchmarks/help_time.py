@@ -17,20 +17,7 @@ from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[1]
 MUST, AIM = 0.5, 0.25
-HEAVY = [
-    "numpy",
-    "scipy",
-    "numba",
-    "pymunk",
-    "cv2",
-    "pyarrow",
-    "pydantic",
-    "filterpy",
-    "gymnasium",
-    "av",
-    "rich",
-    "typer",
-]
+HEAVY = ("numpy", "scipy", "numba", "pymunk", "cv2", "pyarrow", "pydantic", "filterpy", "gymnasium", "av")
 LISTING = f"import sys, tracking.app.cli; print(*[m for m in {HEAVY!r} if m in sys.modules])"
 
 

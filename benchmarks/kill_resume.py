@@ -2,9 +2,9 @@
 
     PYTHONPATH=. python benchmarks/kill_resume.py [--kills 20] [--entry merge queue] [--seeds 0:6] [--workers 1]
 
-Moments are random, one in each of `--kills` equal parts of the time an undisturbed run takes, the last of which is
-after its end as often as before it. As many again (`--writing`) fall into the writing of a sequence: the run is killed
-as soon as its partial folder is seen, a random number of milliseconds later. After a kill no sequence may stand there
+Moments are random, one in each of `--kills` equal parts of the run: after so many whole sequences (the load of the
+machine must not push all kills into the beginning) and a random part of the next one's time. `--writing` more fall into
+the writing of a sequence: some milliseconds after a partial folder is seen. After a kill no sequence may stand there
 half-written; after resuming, `validate` must find nothing and every byte must be that of the undisturbed run.
 Exit code 1 where anything differs.
 """
@@ -29,15 +29,14 @@ from sim.io.validate import validate
 Wait = Callable[[subprocess.Popen[str], Path], str]
 
 
-def at(moment: float) -> Wait:
-    """Wait for a moment, s after the start."""
+def after(whole: int, later: float) -> Wait:
+    """Wait for so many whole sequences, and `later` seconds more."""
 
     def wait(process: subprocess.Popen[str], out: Path) -> str:
-        try:
-            process.wait(moment)
-        except subprocess.TimeoutExpired:
-            return f"{moment:.2f} s"
-        return f"{moment:.2f} s (over)"
+        while process.poll() is None and len(complete(out)) < whole:
+            time.sleep(0.002)
+        time.sleep(later)
+        return f"{whole} whole + {later:.2f} s"
 
     return wait
 
@@ -98,8 +97,8 @@ def main() -> int:
         print(f"{n} sequences of {', '.join(args.entry)}, seeds {args.seeds}, {args.workers} workers: {seconds:.1f} s")
         print("| killed at | at work | whole then | partial | half-written | problems after | same bytes |")
         print("|---|---|---|---|---|---|---|")
-        moments = (np.arange(args.kills) + r.random(args.kills)) / max(args.kills, 1) * seconds * 1.02
-        waits = [at(float(m)) for m in moments]
+        moments = (np.arange(args.kills) + r.random(args.kills)) / max(args.kills, 1) * n
+        waits = [after(int(m), float(m % 1) * seconds / n) for m in moments]
         waits += [writing(int(r.integers(1, n + 1)), float(r.uniform(0, 0.02))) for _ in range(args.writing)]
         good = sum(one(args, wait, work / "killed", right) for wait in waits) == len(waits)
     print("\nall the same" if good else "\nDIFFERENT")
