@@ -112,13 +112,15 @@ def groups_without_people(groups, places):
 def group_scores(true, est, by):
     """The scores of groups, without HOTA's; true, est: lists of Group, frame by frame."""
     n_true = n_est = hits = switches = right = clean = found = 0
-    distance, size, extent, by_frame, last = [], [], [], [], {}
+    distance, anywhere, size, extent, by_frame, last = [], [], [], [], [], {}
     for a, b in zip(true, est, strict=True):
         s = np.array([[similarity(p, q, by) for q in b] for p in a]).reshape(len(a), len(b))
         nearer = np.array([[1e-9 / (1 + np.linalg.norm(p.pos - q.pos)) for q in b] for p in a]).reshape(s.shape)
         pairs = best_matching(np.where(s > 0, s + nearer, 0.0))
         found += len(best_matching(np.where(s >= 0.5, s + nearer, 0.0)))
         n_true, n_est, hits = n_true + len(a), n_est + len(b), hits + len(pairs)
+        apart = np.array([[np.linalg.norm(p.pos - q.pos) for q in b] for p in a]).reshape(s.shape)
+        anywhere += [apart[i, j] for i, j in best_matching(1000 - apart)]
         by_frame.append(((len(b) - len(pairs)) / max(len(a), 1), (len(a) - len(pairs)) / max(len(a), 1)))
         for i, j in pairs:
             common = a[i].common(b[j])
@@ -135,7 +137,8 @@ def group_scores(true, est, by):
         "1-FP": ratio(n_true - false, n_true), "1-FN": ratio(n_true - misses, n_true),
         "1-FP_frames": 1 - np.mean([f for f, _ in by_frame]), "1-FN_frames": 1 - np.mean([f for _, f in by_frame]),
         "GDSR": ratio(right, n_true), "GDSR2": ratio(clean, n_true),
-        "MOTP": mean(distance), "MOTA": ratio(n_true - misses - false - switches, n_true),
+        "MOTP": mean(distance), "MOTP_ungated": mean(anywhere), "MSE": mean([d**2 for d in distance]),
+        "MOTA": ratio(n_true - misses - false - switches, n_true),
         "IDSW": switches, "TP": hits, "FP": false, "FN": misses,
         "F1": ratio(2 * found, n_true + n_est), "precision": ratio(found, n_est), "recall": ratio(found, n_true),
         "size_error": mean(size), "extent_error": mean(extent),

@@ -19,7 +19,8 @@ CORE = "groups, core"
 
 @dataclass(frozen=True)
 class Score:
-    """One key. unit: "1" for a share, "m | px" where it is the plane's; low, high: its range; family: its table."""
+    """One key. unit: "1" for a share, "m | px" where it is the plane's; low, high: its range; family: its table;
+    source: who defined it, "" for flockscope."""
 
     key: str
     family: str
@@ -28,6 +29,7 @@ class Score:
     high: float
     better: Better
     meaning: str
+    source: str = ""
 
     @property
     def best(self) -> float:
@@ -48,20 +50,29 @@ def _length(key: str, family: str, meaning: str, unit: str = "m | px") -> Score:
     return Score(key, family, unit, 0.0, inf, "lower", meaning)
 
 
+def _from(source: str, *scores: Score) -> tuple[Score, ...]:
+    return tuple(replace(score, source=source) for score in scores)
+
+
 OBJECTIVE = (
     _share("objective", "objective", "mean of HOTA and group_F1_hull, or the one that is known: reward and tuning"),
 )
 
-PEOPLE = (
-    _share("HOTA", "people", "geometric mean of DetA and AssA, mean over 19 thresholds of similarity (Luiten 2021)"),
+HOTA = _from(
+    "Luiten et al. 2021",
+    _share("HOTA", "people", "geometric mean of DetA and AssA, mean over 19 thresholds of similarity"),
     _share("DetA", "people", "found people / all true or estimated people, mean over thresholds"),
     _share("AssA", "people", "how much of both identities' lives each match explains, mean over thresholds"),
     _share("DetRe", "people", "found / true people"),
     _share("DetPr", "people", "found / estimated people"),
     _share("AssRe", "people", "share of the true life that a match's pair of identities has in common"),
     _share("AssPr", "people", "share of the track's life that a match's pair of identities has in common"),
-    _share("LocA", "people", "mean similarity of matches"),
-    _share("MOTA", "people", "1 - (FN + FP + IDSW) / true people, at similarity 0.5 (Bernardin 2008)", -inf),
+    _share("LocA", "people", "mean similarity of matches; 1 without any, as TrackEval has it"),
+)
+
+CLEAR = _from(
+    "Bernardin & Stiefelhagen 2008",
+    _share("MOTA", "people", "1 - (FN + FP + IDSW) / true people, at similarity 0.5", -inf),
     _share("MOTP", "people", "mean similarity of the matches of CLEAR (0.5 and more)"),
     _count("TP", "people", "people found at similarity 0.5", "higher"),
     _count("FN", "people", "people not found"),
@@ -71,7 +82,11 @@ PEOPLE = (
     _count("PT", "people", "… in 20 to 80 %", "neither"),
     _count("ML", "people", "… in less than 20 %"),
     _count("Frag", "people", "a true person is found again after not being found"),
-    _share("IDF1", "people", "2 IDTP / (true + estimated people), identities assigned once for all (Ristani 2016)"),
+)
+
+IDENTITY = _from(
+    "Ristani et al. 2016",
+    _share("IDF1", "people", "2 IDTP / (true + estimated people), identities assigned once for all"),
     _share("IDP", "people", "share of estimated people under the right identity"),
     _share("IDR", "people", "share of true people under the right identity"),
     _count("IDTP", "people", "estimated people under the right identity", "higher"),
@@ -80,40 +95,48 @@ PEOPLE = (
 ERRORS = (
     _length("RMSE_pos", "errors", "root mean square error of the places of people who are found (0.5 and more)"),
     _length("RMSE_vel", "errors", "… of their velocities, on the ground", "m/s"),
-    _length("GOSPA", "errors", "RMS over frames of GOSPA, cut-off 2 m (Rahmathullah 2017): far off, missed and false"),
-    _length(
-        "GOSPA_localisation", "errors", "its part of people far off: GOSPA² is the sum of the squares of its parts"
+    *_from(
+        "Rahmathullah et al. 2017",
+        _length("GOSPA", "errors", "RMS over frames of GOSPA, cut-off 2 m: who is far off, missed and false"),
+        _length("GOSPA_localisation", "errors", "its part of who is far off: GOSPA² is the sum of its parts' squares"),
+        _length("GOSPA_missed", "errors", "its part of missed people"),
+        _length("GOSPA_false", "errors", "its part of false people"),
     ),
-    _length("GOSPA_missed", "errors", "its part of missed people"),
-    _length("GOSPA_false", "errors", "its part of false people"),
 )
 
 GROUPS = (
-    _share("group_1-FP", "groups", "1 - false / true groups, sums over frames", -inf),
-    _share("group_1-FN", "groups", "1 - missed / true groups, sums over frames"),
-    _share("group_1-FP_frames", "groups", "1 - mean over frames of false / max(true groups, 1)", -inf),
-    _share("group_1-FN_frames", "groups", "1 - mean over frames of missed / max(true groups, 1)"),
-    _share("group_GDSR", "groups", "share of true groups that are matched with 60 % of their members inside"),
+    *_from(
+        "Bazzani et al. 2012",
+        _share("group_1-FP", "groups", "1 - false / true groups, sums over frames", -inf),
+        _share("group_1-FN", "groups", "1 - missed / true groups, sums over frames"),
+        _share("group_1-FP_frames", "groups", "1 - mean over frames of false / max(true groups, 1)", -inf),
+        _share("group_1-FN_frames", "groups", "1 - mean over frames of missed / max(true groups, 1)"),
+        _share("group_GDSR", "groups", "share of true groups that are matched with 60 % of their members inside"),
+    ),
     _share("group_GDSR2", "groups", "… and 60 % of the estimated members right, so that one giant group is none"),
-    _length("group_MOTP", "groups", "mean distance of matched groups' centres"),
-    _share("group_MOTA", "groups", "1 - (FN + FP + IDSW) / true groups", -inf),
-    _count("group_IDSW", "groups", "a true group is matched with another estimated id than the last time"),
-    _count("group_TP", "groups", "matched groups", "higher"),
-    _count("group_FP", "groups", "estimated groups without a match"),
-    _count("group_FN", "groups", "true groups without a match"),
+    *_from(
+        "Bernardin & Stiefelhagen 2008",
+        _length("group_MOTP", "groups", "mean distance of matched groups' middles"),
+        _length("group_MSE", "groups", "mean square of that distance", "m² | px²"),
+        _length("group_MOTP_ungated", "groups", "mean distance when groups are matched by distance alone, however far"),
+        _share("group_MOTA", "groups", "1 - (FN + FP + IDSW) / true groups", -inf),
+        _count("group_IDSW", "groups", "a true group is matched with another estimated id than the last time"),
+        _count("group_TP", "groups", "matched groups", "higher"),
+        _count("group_FP", "groups", "estimated groups without a match"),
+        _count("group_FN", "groups", "true groups without a match"),
+    ),
     _share("group_F1", "groups", "2 found / (true + estimated groups), found at similarity 0.5"),
     _share("group_precision", "groups", "found / estimated groups"),
     _share("group_recall", "groups", "found / true groups"),
-    _share("group_HOTA", "groups", "HOTA of groups by the same similarity"),
-    _share("group_DetA", "groups", "DetA of groups"),
-    _share("group_AssA", "groups", "AssA of groups"),
-    _share("group_DetRe", "groups", "DetRe of groups"),
-    _share("group_DetPr", "groups", "DetPr of groups"),
-    _share("group_AssRe", "groups", "AssRe of groups"),
-    _share("group_AssPr", "groups", "AssPr of groups"),
-    _share("group_LocA", "groups", "mean similarity of matched groups"),
+    *(
+        replace(score, key=f"group_{score.key}", family="groups", meaning=f"{score.key} of groups, same similarity")
+        for score in HOTA
+    ),
     Score("group_size_error", "groups", "people", 0.0, inf, "lower", "mean |estimated - true size| of matches"),
-    _length("group_extent_error", "groups", "mean Gaussian Wasserstein distance of matches, by middle and extent"),
+    *_from(
+        "Givens & Shortt 1984",
+        _length("group_extent_error", "groups", "mean Wasserstein distance of matches, Gaussians of middle and extent"),
+    ),
 )
 
 MEMBERS = (
@@ -157,7 +180,9 @@ def _core(score: Score) -> Score:
 
 ALL = (
     *OBJECTIVE,
-    *PEOPLE,
+    *HOTA,
+    *CLEAR,
+    *IDENTITY,
     *ERRORS,
     *GROUPS,
     *map(_core, GROUPS),
@@ -173,11 +198,11 @@ CATALOGUE = MappingProxyType({score.key: score for score in ALL})
 
 def table() -> str:
     """The catalogue in Markdown, family by family; the core's keys are those of the groups with `_core` behind."""
-    lines = ["| key | unit | range | better | meaning |", "| --- | --- | --- | --- | --- |"]
+    lines = ["| key | unit | range | better | meaning | source |", "| --- | --- | --- | --- | --- | --- |"]
     for score in ALL:
         if score.family != CORE:
             unit = score.unit.replace("|", "or")
-            cells = (f"`{score.key}`", unit, _range(score), score.better, score.meaning)
+            cells = (f"`{score.key}`", unit, _range(score), score.better, score.meaning, score.source)
             lines.append(f"| {' | '.join(cells)} |")
     return "\n".join(lines)
 

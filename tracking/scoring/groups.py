@@ -20,7 +20,7 @@ from tracking.scoring.pairs import EPS, Pairs, compare
 from tracking.scoring.sides import Crowd
 
 GroupMatch = Literal["hull", "members"]
-CORRECT = 0.6  # share of members (of either side) that makes a group a right one
+CORRECT = (3, 5)  # share of members (of either side) that makes a group a right one: 60 %, without rounding
 FOUND = 0.5  # similarity from which a group counts as found in F1
 TIE = 1e-9  # of similarity: what being near is worth: decides between equals, outweighs nothing else
 
@@ -99,7 +99,8 @@ def matched(true: Crowd, est: Crowd, pairs: Pairs, least: float = 0.0) -> Pairs:
 @dataclass(frozen=True, eq=False)
 class Compared:
     """Two crowds side by side. pairs: all possible; chosen: those of the matching; found: of the matching among those
-    of similarity 0.5 and more."""
+    of similarity 0.5 and more. nearest (G_true,): distance to the group matched by distance alone, nan where none is.
+    """
 
     true: Crowd
     est: Crowd
@@ -107,12 +108,30 @@ class Compared:
     pairs: Pairs
     chosen: Pairs
     found: Pairs
+    nearest: Array
 
 
 def compare_groups(true: Crowd, est: Crowd, shared: Shared, by: GroupMatch) -> Compared:
     """Crowds compared by hulls or by members."""
     pairs = hull_pairs(true, est) if by == "hull" else member_pairs(true, est, shared)
-    return Compared(true, est, shared, pairs, matched(true, est, pairs), matched(true, est, pairs, FOUND))
+    chosen, found = matched(true, est, pairs), matched(true, est, pairs, FOUND)
+    return Compared(true, est, shared, pairs, chosen, found, nearest(true, est))
+
+
+def nearest(true: Crowd, est: Crowd) -> Array:
+    """Distances (G_true,) when as many groups as possible are matched in each frame, so that they sum to least."""
+
+    def apart(i: Ints, j: Ints) -> tuple[Ints, Array]:
+        d = np.hypot(*(true.pos[i] - est.pos[j]).T)
+        known = np.flatnonzero(np.isfinite(d))
+        return known, d[known]
+
+    pairs = compare(true.rows, est.rows, apart)
+    far = 2 * float(pairs.s.max(initial=0.0)) + 1  # one pair more is worth more than any distances saved
+    kept = match(pairs.frame, pairs.i, pairs.j, far * len(true) - pairs.s) if len(pairs.s) else np.zeros(0, bool)
+    out = np.full(len(true), np.nan)
+    out[pairs.i[kept]] = pairs.s[kept]
+    return out
 
 
 def group_scores(compared: Compared, frames: Bools) -> dict[str, float]:
@@ -125,13 +144,16 @@ def group_scores(compared: Compared, frames: Bools) -> dict[str, float]:
     misses, false = there - hits, said - hits
     switches = switched(true.rows.frame[i], true.rows.id[i], est.rows.id[j])
     right, clean = _correct(compared, i, j)
+    distance = np.hypot(*(true.pos[i] - est.pos[j]).T)
     return {
         "1-FP": _share(there - false, there),
         "1-FN": _share(there - misses, there),
         **_by_frame(compared, frames, i),
         "GDSR": _share(int(right.sum()), there),
         "GDSR2": _share(int(clean.sum()), there),
-        "MOTP": _mean(np.hypot(*(true.pos[i] - est.pos[j]).T)),
+        "MOTP": _mean(distance),
+        "MSE": _mean(distance**2),
+        "MOTP_ungated": _mean(compared.nearest[frames[true.rows.frame]]),
         "MOTA": _share(there - misses - false - switches, there),
         "IDSW": float(switches),
         "TP": float(hits),
@@ -156,8 +178,9 @@ def _mean(values: Array) -> float:
 def _correct(compared: Compared, i: Ints, j: Ints) -> tuple[Bools, Bools]:
     """Which matches have enough of the true members inside, and which of these enough right ones among their own."""
     common = compared.shared.of(i, j)
-    right = common >= CORRECT * compared.true.count[i] - EPS
-    clean = right & (common >= CORRECT * compared.est.count[j] - EPS) & (common > 0)
+    part, whole = CORRECT
+    right = whole * common >= part * compared.true.count[i]
+    clean = right & (whole * common >= part * compared.est.count[j]) & (common > 0)
     return right, clean
 
 

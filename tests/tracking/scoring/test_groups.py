@@ -81,15 +81,17 @@ def test_a_switch_is_remembered_while_nobody_is_found():
     assert found["group_MOTA"] == near(1 - 3 / 5)
 
 
-@pytest.mark.parametrize(("inside", "of", "right"), [(3, 5, 1), (2, 4, 0), (2, 3, 1), (1, 2, 0)])
-def test_a_group_is_right_with_60_percent_of_its_people(inside, of, right):
-    # 3 of 5 is exactly 60 %.
-    people = {k: (0.5 * k, 0.0) for k in range(1, 6)} | {k: (0.5 * k, 40.0) for k in range(6, 9)}
-    members = tuple(range(1, of + 1))
-    told = (*members[:inside], *((6,) if inside == 1 else ()))
-    found = scores([Scene(people, {1: (members, None)})], [Scene(people, {1: (told, (0, -1, 3, 1))})])
-    assert found["group_TP"] == 1
-    assert found["group_GDSR"] == right
+@pytest.mark.parametrize(("size", "enough"), [(2, 2), (3, 2), (4, 3), (5, 3), (6, 4), (7, 5), (8, 5), (35, 21)])
+def test_a_group_is_right_with_60_percent_of_its_people(size, enough):
+    # ceil(0.6 n); of 5 three are exactly 60 %, of 35 twenty-one are, whatever 0.6 x 35 is in floating point.
+    people = {k: (3.0 * k, 0.0) for k in range(1, size + 3)}
+
+    def found(inside):
+        told = (*range(1, inside + 1), size + 1, size + 2)
+        est = [Scene(people, {1: (told, (0, -1, 150, 1))})]
+        return scores([Scene(people, {1: (range(1, size + 1), (0, -1, 150, 1))})], est)["group_GDSR"]
+
+    assert (found(enough - 1), found(enough)) == (0, 1)
 
 
 @pytest.mark.parametrize(("wrong", "clean"), [(1, 1), (2, 1), (3, 0)])
@@ -110,6 +112,16 @@ def test_a_member_that_is_nobody_counts_as_a_wrong_one():
     assert found["group_GDSR"] == 1
     assert found["group_GDSR2"] == 0
     assert found["pairwise_precision"] == near(1 / 10)  # 1 right pair of the 10 of five
+
+
+def test_distances_with_and_without_a_gate():
+    # Middles of the true 2 and 4.5, of the told 3 and 44.5. By hulls only 2-3 match: 1 m. By distance alone the others
+    # do, too: (1 + 40)/2; the other way round it were (42.5 + 1.5)/2.
+    people = {1: (0.5, 0.5), 2: (1.5, 0.5), 3: (3.2, 0.5), 4: (3.8, 0.5)}
+    true = [Scene(people, {1: ((1, 2), (0, 0, 4, 1)), 2: ((3, 4), (4, 0, 5, 1))})]
+    found = scores(true, [Scene(people, {1: ((1, 2), (1, 0, 5, 1)), 2: ((3, 4), (44, 0, 45, 1))})])
+    assert (found["group_MOTP"], found["group_MSE"]) == (near(1), near(1))
+    assert found["group_MOTP_ungated"] == near(20.5)
 
 
 def test_hota_of_groups():
