@@ -12,7 +12,8 @@ from sim.types import Tracks
 from tests.reference_trackeval import box_similarity, trackeval_scores
 from tracking.scoring import evaluate
 from tracking.scoring.individuals import scores, scores_until
-from tracking.scoring.pairs import Rows, box_pairs, matrix_pairs
+from tracking.scoring.pairs import Rows, box_pairs, matrix_pairs, point_pairs
+from tracking.stats import draw_blocks, moving_blocks
 
 SEEDS = range(60)
 
@@ -134,6 +135,27 @@ def test_scores_of_every_beginning(seed: int) -> None:
     found = scores_until(matrix_pairs(true, est, similarity), range(len(true)))
     for n, row in enumerate(found, start=1):
         assert row == scores(matrix_pairs(true[:n], est[:n], similarity[:n]))
+
+
+def test_interval_of_one_recording() -> None:
+    """Two people; one is lost in the second half, the other is followed under two ids: between all right and worse."""
+    rows, half = Rows(np.repeat(np.arange(1, 201), 2), np.tile([1, 2], 200)), np.arange(400) < 200
+    kept = half | (rows.id == 2)
+    places = np.column_stack([10.0 * rows.id, np.zeros(400)])
+    told = Rows(rows.frame[kept], np.where(half, rows.id, 3)[kept])
+    pairs, keys = point_pairs(rows, told, places, places[kept], 2.0), ("HOTA", "MOTA", "IDF1", "AssA", "DetRe")
+
+    def drawn(frames: np.ndarray) -> np.ndarray:
+        found = scores(pairs.take(frames + 1))
+        return np.array([found[key] for key in keys])
+
+    value, low, high = moving_blocks(drawn, 200, 10.0, draws=200)
+    assert value == pytest.approx([scores(pairs)[key] for key in keys])
+    assert (low <= value).all()  # IDF1 is at its lowest where half is right
+    assert (value < high).all()
+    r = np.random.default_rng(0)
+    share = [1 - (draw_blocks(200, 10, r) >= 100).mean() / 2 for _ in range(200)]
+    assert (low[-1], high[-1]) == pytest.approx(tuple(np.quantile(share, (0.025, 0.975))))
 
 
 def test_an_id_twice_in_a_frame_is_refused() -> None:
