@@ -3,8 +3,8 @@
     about = "what this suite is for"
     entry = [ { name = "cross-dense", scenario = "cross", set = ["group.a.size=5"], repeat = 3 }, … ]
 
-name: unique, the scenario's where absent; set: as `--set` takes it; repeat = n expands to name-1 … name-n, each with
-its number as a further random key (0 where there is no repeat).
+name: unique, the scenario's or its file's where absent; set: as `--set` takes it; repeat = n expands to name-1 …
+name-n, each with its number as a further random key (0 where there is no repeat).
 """
 
 from __future__ import annotations
@@ -79,7 +79,7 @@ def about(path: Path) -> str:
 
 def _expand(entry: Any, place: str, path: Path) -> Iterator[Line]:
     _check(entry, place, path)
-    name = entry.get("name", entry["scenario"])
+    name = entry.get("name", Path(entry["scenario"]).stem)
     settings = tuple(entry.get("set", ()))
     if "repeat" not in entry:
         yield Line(name, entry["scenario"], settings, 0)
