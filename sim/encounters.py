@@ -37,10 +37,15 @@ class Encounters:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Roll:
-    """Who is in which group when: G groups of a frame sorted by (frame t, name), member rows `first` … of `person`."""
+    """Who is in which group when: G groups of a frame sorted by (frame t, name), member rows `first` … of `person`.
+
+    key: t * width + name, ascending.
+    """
 
     t: Ints
     name: Ints
+    key: Ints
+    width: int
     first: Ints
     count: Ints
     person: Ints
@@ -49,10 +54,9 @@ class Roll:
         """(first, count) of these groups in these frames; count 0 where there is no such group."""
         if not len(self.t):
             return np.zeros_like(t), np.zeros_like(t)
-        width = int(self.name.max()) + 1
-        key = self.t * width + self.name
-        place = np.minimum(np.searchsorted(key, t * width + name), len(key) - 1)
-        found = (self.t[place] == t) & (self.name[place] == name)
+        key = t * self.width + name
+        place = np.minimum(np.searchsorted(self.key, key), len(self.key) - 1)
+        found = self.key[place] == key
         return self.first[place], np.where(found, self.count[place], 0)
 
     def members(self, t: int, name: int) -> Ints:
@@ -68,7 +72,8 @@ def roll_call(group: Ints) -> Roll:
     t, person = t[order], person[order]
     name = group[t, person]
     first = np.flatnonzero((np.diff(t, prepend=-1) != 0) | (np.diff(name, prepend=-1) != 0))
-    return Roll(t[first], name[first], first, np.diff(np.append(first, len(t))), person)
+    t, name, width = t[first], name[first], int(name.max(initial=0)) + 1
+    return Roll(t, name, t * width + name, width, first, np.diff(np.append(first, len(person))), person)
 
 
 def encounters(pos: Array, roll: Roll, fps: float) -> Encounters:
@@ -76,7 +81,7 @@ def encounters(pos: Array, roll: Roll, fps: float) -> Encounters:
     if not len(roll.t):
         return Encounters(roll.t, roll.t, roll.t, roll.t)
     i, j = _within_reach(roll.t, pos[np.repeat(roll.t, roll.count), roll.person], roll.count)
-    width = int(roll.name.max()) + 1
+    width = roll.width
     pair, when = roll.name[i] * width + roll.name[j], roll.t[i]  # sorted by group within a frame: name[i] < name[j]
     order = np.lexsort((when, pair))
     pair, first, last = stretches(pair[order], when[order], 1, frames_of(BRIDGE, fps))
@@ -124,23 +129,24 @@ def course(
     row, place = runs(first[encounter], (first + count)[encounter])
     who, start = roll.person[place], np.cumsum(count[encounter]) - count[encounter]
     when = frame[row]
-    there = np.asarray(np.isfinite(pos[when, who]).all(axis=1))
+    places, speeds = pos[when, who], vel[when, who]
+    there = np.isfinite(places[:, 0]) & np.isfinite(places[:, 1])
     own = group[when, who] == name[encounter[row]]
     present, still = (np.add.reduceat(x.astype(np.int64), start) if len(start) else start for x in (there, own & there))
     # One who stays while the others have left the scene is alone, and yet has changed nothing.
     same = (still == present) | (present < 2)
     others = roll.find(frame, name[encounter])[1] > still
-    return Course(_mean(pos[when, who], there, start), _mean(vel[when, who], there, start), same & ~others)
+    return Course(_mean(places, there, start), _mean(speeds, there, start), same & ~others)
 
 
 def _mean(values: Array, there: Bools, start: Ints) -> Array:
     """Means (R, 2) of runs of values (N, 2) that begin at `start`, of those who are there and known; nan of none."""
-    known = there & np.isfinite(values).all(axis=1)
+    known = there & np.isfinite(values[:, 0]) & np.isfinite(values[:, 1])
     if not len(start):
         return np.zeros((0, 2))
-    total = np.add.reduceat(np.where(known[:, None], values, 0.0), start)
+    total = [np.add.reduceat(np.where(known, values[:, k], 0.0), start) for k in (0, 1)]
     with np.errstate(invalid="ignore"):
-        return np.asarray(total / np.add.reduceat(known.astype(float), start)[:, None])
+        return np.asarray(np.stack(total, axis=1) / np.add.reduceat(known.astype(float), start)[:, None])
 
 
 def net_crossings(a: Array, b: Array, encounter: Ints, count: int) -> Ints:
