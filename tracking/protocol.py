@@ -10,6 +10,7 @@ import difflib
 import hashlib
 import importlib
 import importlib.util
+import inspect
 import sys
 from math import isfinite
 from pathlib import Path
@@ -19,6 +20,7 @@ import numpy as np
 
 from scenarios.errors import InputError, WorkError
 from sim.types import DetectionMode, Detections, Sequence, Tracker, Tracks
+from tracking.config import Config
 
 REGISTRY = {"blob": "tracking.papers.blob:Blob"}
 NEEDS = ("pixels", "stereo", "boxes", "points")
@@ -40,8 +42,8 @@ def find(spec: str) -> type[Tracker]:
     module = _from_file(Path(where)) if where.endswith(".py") else _from_module(where)
     found = getattr(module, class_name, None)
     if found is None:
-        raise InputError(file=where, got=class_name, expected="a class of this module", remedy="check the name")
-    return _checked(found, spec)
+        raise InputError(file=where, got=repr(class_name), expected="a class of this module", remedy="check the name")
+    return checked(found, spec)
 
 
 def _from_file(path: Path) -> Any:
@@ -57,7 +59,7 @@ def _from_file(path: Path) -> Any:
     sys.modules[name] = module  # dataclasses of the file look their module up
     try:
         spec.loader.exec_module(module)
-    except Exception as error:
+    except (Exception, SystemExit) as error:
         del sys.modules[name]
         raise _broken(path, error) from error
     return module
@@ -66,23 +68,56 @@ def _from_file(path: Path) -> Any:
 def _from_module(name: str) -> Any:
     try:
         return importlib.import_module(name)
-    except Exception as error:
+    except (Exception, SystemExit) as error:
         raise _broken(name, error) from error
 
 
-def _broken(where: object, error: Exception) -> InputError:
-    got = f"{type(error).__name__}: {error}"
-    return InputError(file=where, got=got, expected="a module that can be imported", remedy="correct it")
+def _broken(where: object, error: BaseException) -> InputError:
+    got = f"{type(error).__name__}: {error}".partition("\n")[0]
+    return InputError(file=where or "tracker", got=got, expected="a module that can be imported", remedy="correct it")
 
 
-def _checked(found: Any, spec: str) -> type[Tracker]:
-    missing = [name for name in ("needs", "reset", "step") if not hasattr(found, name)]
-    needs = getattr(found, "needs", ())
-    if missing or isinstance(needs, str) or not needs or not set(needs) <= set(NEEDS):
-        got = "no " + ", ".join(missing) if missing else f"needs = {needs!r}"
+def checked(found: Any, spec: str) -> type[Tracker]:
+    """The class itself if it is a tracker's, else InputError."""
+    fault = _class_fault(found)
+    if fault:
         expected = f"a class with reset(context, seed), step(frame, detections) and needs, a tuple out of {NEEDS}"
-        raise InputError(file=spec, got=got, expected=expected, remedy="see docs/trackers.md")
+        raise InputError(file=spec, got=fault, expected=expected, remedy="see docs/trackers.md")
     return found  # type: ignore[no-any-return]
+
+
+def _class_fault(found: Any) -> str | None:
+    """Why this is no tracker's class, or None."""
+    if not isinstance(found, type):
+        return f"a {type(found).__name__}"
+    missing = [name for name in ("needs", "reset", "step") if not hasattr(found, name)]
+    if missing:
+        return "no " + ", ".join(missing)
+    needs, kind = getattr(found, "needs", ()), getattr(found, "config_class", None)
+    if not isinstance(needs, tuple | list) or not needs or not all(need in NEEDS for need in needs):
+        return f"needs = {needs!r}"
+    if kind is not None and not (isinstance(kind, type) and issubclass(kind, Config)):
+        return f"config_class = {kind!r}, which is no tracking.config.Config"
+    if not _takes(found, 0 if kind is None else 1):
+        return f"__init__{inspect.signature(found)}, called with {'nothing' if kind is None else 'a config'}"
+    for name in ("reset", "step"):
+        method = getattr(found, name)
+        if not callable(method):
+            return f"{name} = {method!r}"
+        if not _takes(method, 2 + inspect.isfunction(inspect.getattr_static(found, name))):  # a function: self too
+            return f"{name}{inspect.signature(method)}"
+    return None
+
+
+def _takes(function: Any, count: int) -> bool:
+    """Can this be called with so many arguments? Yes, where its signature cannot be known."""
+    try:
+        inspect.signature(function).bind(*range(count))
+    except TypeError:
+        return False
+    except ValueError:
+        return True
+    return True
 
 
 def own_detector(needs: tuple[str, ...], sequence: Sequence) -> bool:

@@ -58,6 +58,15 @@ class Prepared:
         """The frames as the tracker gets them."""
         return iter(self.sequence) if self.feed is None else iter(self.feed)
 
+    def reset(self, seed: int) -> None:
+        """Reset the tracker for this sequence."""
+        try:
+            self.tracker.reset(self.context, seed)
+        except FlockscopeError:
+            raise
+        except Exception as error:
+            raise _raised(self.name, "reset", self.sequence.name, error) from error
+
     def answer(self, frame: Frame) -> Tracks:
         """One step, its input and output checked."""
         detections = None if self.mode == "image" else frame.detections
@@ -68,10 +77,15 @@ class Prepared:
         except FlockscopeError:
             raise
         except Exception as error:
-            where, got = f"{self.sequence.name}, frame {frame.index}", f"{type(error).__name__}: {error}"
-            remedy = "correct the tracker's step(); FLOCKSCOPE_DEBUG=1 shows where"
-            raise WorkError(file=self.name, place=where, got=got, expected="sim.types.Tracks", remedy=remedy) from error
+            raise _raised(self.name, "step", f"{self.sequence.name}, frame {frame.index}", error) from error
         return protocol.check_tracks(said, frame.index, self.name)
+
+
+def _raised(tracker: str, method: str, place: str, error: Exception) -> WorkError:
+    """An exception out of a tracker's own code, in one line."""
+    got = f"{type(error).__name__}: {error}".partition("\n")[0]
+    remedy = f"correct the tracker's {method}(); FLOCKSCOPE_DEBUG=1 shows where"
+    return WorkError(file=tracker, place=place, got=got, expected="no exception", remedy=remedy)
 
 
 def track(
@@ -92,7 +106,7 @@ def track(
     from tracking.grouping import with_groups
 
     ready = prepare(tracker, sequence, params=params, detections=detections, sensor=sensor, seed=seed)
-    ready.tracker.reset(ready.context, seed)
+    ready.reset(seed)
     made, spent = [], 0.0
     for frame in ready.frames():
         start = time.perf_counter()
@@ -137,15 +151,24 @@ def _make(tracker: str | type[Tracker] | Tracker, params: Params) -> tuple[str, 
             raise InputError(place="params", got=got, expected="a class or a name", remedy="configure the instance")
         return type(tracker).__name__, tracker, getattr(tracker, "config", None)
     name = tracker if isinstance(tracker, str) else tracker.__name__
-    made = cast(Any, protocol.find(tracker) if isinstance(tracker, str) else tracker)
+    made = cast(Any, protocol.find(tracker) if isinstance(tracker, str) else protocol.checked(tracker, name))
     kind: type[Config] | None = getattr(made, "config_class", None)
     if kind is None:
         if params is not None:
             remedy = "leave the parameters out, or give the class a config_class (docs/trackers.md)"
             raise InputError(place="params", got=name, expected="a tracker with parameters", remedy=remedy)
-        return name, made(), None
+        return name, _instance(name, made), None
     config = _config(kind, params)
-    return name, made(config), config
+    return name, _instance(name, made, config), config
+
+
+def _instance(name: str, made: Any, *arguments: Any) -> Tracker:
+    try:
+        return cast(Tracker, made(*arguments))
+    except FlockscopeError:
+        raise
+    except Exception as error:
+        raise _raised(name, "__init__", "before the first frame", error) from error
 
 
 def _config(kind: type[Config], params: Params) -> Config:

@@ -27,6 +27,40 @@ class NoNeeds:
     def step(self, frame, detections): ...
 
 class Nothing: ...
+
+class Number(Mine):
+    needs = 5
+
+class Listed(Mine):
+    needs = (["boxes"],)
+
+class Unknown(Mine):
+    needs = ("boxes", "sound")
+
+class Short(Mine):
+    def step(self, frame): ...
+
+class Blind(Mine):
+    def reset(self): ...
+
+class Demanding(Mine):
+    def __init__(self, x): ...
+
+class Unset(Mine):
+    step = None
+
+class Wild(Mine):
+    config_class = dict
+
+class Static(Mine):
+    @staticmethod
+    def step(frame, detections): ...
+
+class Loose(Mine):
+    def __init__(self, *args): ...
+    def step(self, *args, **more): ...
+
+def function(): ...
 """
 
 
@@ -60,6 +94,18 @@ def test_from_file_under_a_private_name(tmp_path):
         ("{file}:None_", "a class of this module"),
         ("{file}:NoNeeds", "needs = 'points'"),
         ("{file}:Nothing", "no needs, reset, step"),
+        ("{file}:Number", "needs = 5"),
+        ("{file}:Listed", "needs = "),
+        ("{file}:Unknown", "sound"),
+        ("{file}:Short", r"step\(self, frame\); expected a class"),
+        ("{file}:Blind", r"reset\(self\); expected a class"),
+        ("{file}:Demanding", r"__init__\(x\), called with nothing"),
+        ("{file}:Unset", "step = None"),
+        ("{file}:Wild", "config_class = "),
+        ("{file}:function", "got a function; expected a class"),
+        ("{file}:", "a class of this module"),
+        ("{leaves}:Mine", "SystemExit: 3"),
+        (":Mine", "Empty module name"),
         ("{missing}:Mine", "no such file"),
         ("{broken}:Mine", "ZeroDivisionError"),
         ("no.such.module:Mine", "ModuleNotFoundError"),
@@ -68,12 +114,17 @@ def test_from_file_under_a_private_name(tmp_path):
 def test_wrong_trackers_are_one_line(tmp_path, spec, words):
     (tmp_path / "mine.py").write_text(STRANGER)
     (tmp_path / "broken.py").write_text("1 / 0")
-    paths = {
-        name: tmp_path / f"{stem}.py" for name, stem in (("file", "mine"), ("missing", "no"), ("broken", "broken"))
-    }
+    (tmp_path / "leaves.py").write_text("raise SystemExit(3)")
+    paths = {name: tmp_path / f"{name}.py" for name in ("mine", "missing", "broken", "leaves")}
+    paths["file"] = paths["mine"]
     with pytest.raises(InputError, match=words) as caught:
         protocol.find(spec.format(**paths))
     assert "\n" not in str(caught.value)
+
+
+def test_signatures_that_can_be_called_pass(tmp_path):
+    (tmp_path / "mine.py").write_text(STRANGER)
+    assert [protocol.find(f"{tmp_path}/mine.py:{name}").__name__ for name in ("Static", "Loose")] == ["Static", "Loose"]
 
 
 @pytest.mark.parametrize(

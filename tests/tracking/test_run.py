@@ -166,6 +166,28 @@ def test_a_strangers_wrong_answer_is_named():
         track(Wrong, source())
 
 
+@pytest.mark.parametrize(
+    ("method", "words"),
+    [
+        ("__init__", r"Raises: before the first frame: got ValueError: boo; .*__init__\(\)"),
+        ("reset", r"Raises: made: got ValueError: boo; .*reset\(\)"),
+        ("step", r"Raises: made, frame 1: got ValueError: boo; .*step\(\)"),
+    ],
+)
+def test_a_stranger_that_raises_is_named_in_one_line(method, words):
+    def boo(self, *given):
+        raise ValueError("boo\nand more")
+
+    with pytest.raises(WorkError, match=words) as caught:
+        track(type("Raises", (Stranger,), {method: boo}), source())
+    assert "\n" not in str(caught.value)
+
+
+def test_a_class_that_is_no_tracker_is_refused():
+    with pytest.raises(InputError, match="no needs, reset, step"):
+        track(dict, source())
+
+
 def test_combinations_that_cannot_work():
     with pytest.raises(InputError, match="needs boxes, and made with detections, truth"):
         track("blob", source(), detections="image")
