@@ -33,9 +33,9 @@ class Score:
 
     @property
     def best(self) -> float:
-        """The best value there can be; nan where there is none (counts of hits)."""
-        value = {"higher": self.high, "lower": self.low, "neither": inf}[self.better]
-        return value if abs(value) < inf else float("nan")
+        """What the truth itself would have as tracks; nan where that depends on it (counts of hits)."""
+        value = {"higher": self.high, "lower": 0.0, "neither": inf}[self.better]
+        return value if value < inf else float("nan")
 
 
 def _share(key: str, family: str, meaning: str, low: float = 0.0) -> Score:

@@ -1,0 +1,166 @@
+"""evaluate as a whole: truth as tracks is perfect on every scenario, files are memory, beginnings look not ahead."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import scenarios
+from scenarios.loading import load
+from sim.io.source import open_source
+from sim.io.store import write_sequence
+from sim.io.tracks import read_tracks, write_tracks
+from sim.sequence import simulate
+from sim.types import Tracks, Truth
+from tests.hand_made import Scene, event, tracks, truth
+from tracking import track
+from tracking.scoring import evaluate
+from tracking.scoring.catalogue import CATALOGUE
+from tracking.scoring.evaluation import IncomparableError
+
+NAMES = sorted(path.stem for path in Path(scenarios.__file__).parent.glob("*.toml"))
+TWO = {1: (0.0, 0.0), 2: (1.0, 0.0)}
+
+
+def truth_as_tracks(true: Truth, plane: str = "ground", late: int = 0) -> list[Tracks]:
+    """What a tracker would say that knows everything, `late` frames late about groups."""
+    events = {e.start: [] for e in true.events or ()}
+    for e in true.events or ():
+        events[e.start].append(e)
+    found = []
+    for index in range(1, true.length + 1):
+        now, then = true.at(index), true.at(max(index - late, 1))
+        n = len(now.id)
+        of = dict(zip(then.id.tolist(), then.group.tolist(), strict=True))
+        group = np.array([of.get(p, -1) for p in now.id.tolist()], np.int64)
+        pos, groups, vel = now.pos, now.groups, now.vel
+        if plane == "image":
+            pos, groups, vel = now.box[:, :2] + now.box[:, 2:] / 2, now.groups_px, np.zeros((n, 2))
+        told = tuple(events.get(index, ()))
+        cov = np.zeros((n, 4, 4))
+        answer = Tracks(index, now.t, plane, "person", now.id, group, pos, vel, cov, now.box, np.ones(n), groups, told)
+        found.append(answer if not late else answer.replace(groups=None, events=()))
+    return found
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_truth_as_tracks_is_perfect(name: str) -> None:
+    true = simulate(load(name), 5).truth
+    assert true is not None
+    for plane, by in (("ground", "hull"), ("ground", "members"), ("image", "hull")):
+        found = evaluate(true, truth_as_tracks(true, plane), group_match=by)
+        for key, value in found.items():
+            best = CATALOGUE[key].best
+            if np.isfinite(value) and np.isfinite(best):
+                assert value == pytest.approx(best, abs=1e-6), (key, plane, by)
+        assert found["objective"] == pytest.approx(1, abs=1e-12)
+        assert np.isfinite(found["group_F1"]) == any(len(g.id) for g in true.groups)
+        for kind in {e.kind for e in true.events} & {"merge", "split", "cross", "queue"}:
+            assert found[f"{kind}_F1"] == 1, kind
+
+
+@pytest.mark.parametrize("name", ["merge", "split"])
+def test_a_second_late_is_not_perfect_but_the_core_is(name: str) -> None:
+    true = simulate(load(name), 5).truth
+    found = evaluate(true, truth_as_tracks(true, late=round(true.fps)))
+    assert found["group_GDSR"] < 0.99
+    assert found["group_F1"] < 0.99
+    assert found["group_F1_core"] == found["group_GDSR2_core"] == found["group_MOTA_core"] == 1
+
+
+@pytest.mark.parametrize("detections", ["file", "truth"])
+def test_files_are_memory(tmp_path: Path, detections: str) -> None:
+    sequence = simulate(load("party"), 5)
+    run = track("blob", sequence, detections=detections)
+    write_sequence(tmp_path / "data", sequence, scenario="party", seed=5)
+    write_tracks(tmp_path / "tracks", run, fps=sequence.fps, camera=sequence.camera, info=run.info)
+    (stored,) = open_source(tmp_path / "data")
+    again = read_tracks(tmp_path / "tracks", fps=stored.fps, length=stored.length)
+    for by in ("hull", "members"):
+        was = evaluate(sequence.truth, run, group_match=by)
+        now = evaluate(stored.truth, again, group_match=by)
+        assert (was.similarity, was.surface) == (now.similarity, now.surface)
+        for key, value in was.items():
+            assert now[key] == pytest.approx(value, abs=1e-12, nan_ok=True), key
+
+
+def test_every_key_of_the_catalogue_and_no_other_is_returned() -> None:
+    scene = [Scene(TWO, {1: ((1, 2), None)})] * 30
+    for groups, unit in ((None, "person"), (truth(scene).groups, "person"), (truth(scene).groups, "group")):
+        found = evaluate(truth(scene, groups=groups), tracks(scene, unit=unit))
+        assert list(found) == list(CATALOGUE)
+
+
+def test_every_score_lies_in_its_range() -> None:
+    r = np.random.default_rng(1)
+
+    def scene() -> Scene:
+        people = {k: tuple(r.uniform(0, 6, 2)) for k in range(1, 9)}
+        return Scene(people, {1: ((1, 2, 3), None), 2: ((4, 5), None), 3: ((6, 7), None)})
+
+    kinds = ("merge", "split", "cross", "queue", "enter", "leave")
+    happened = [event(kind, int(r.integers(1, 50)), (1, 2, 3)) for kind in kinds]
+    said = [event(kind, int(r.integers(1, 50)), (1, 2, 3), emitted=50) for kind in kinds * 3]
+    true, est = [scene() for _ in range(50)], [scene() for _ in range(50)]
+    for pair in ((true, est), (true, true), (est, true[:3])):
+        for key, value in evaluate(truth(pair[0], happened), tracks(pair[1], said)).items():
+            score = CATALOGUE[key]
+            assert not value < score.low - 1e-9, key
+            assert not value > score.high + 1e-9, key
+
+
+def test_a_beginning_is_scored_as_if_it_were_all() -> None:
+    sequence = simulate(load("merge"), 5)
+    run, true = track("blob", sequence), sequence.truth
+    for last in (1, 60, 120, true.length):
+        kept = true.frame <= last
+        cut = true.replace(
+            length=last, frame=true.frame[kept], id=true.id[kept], group=true.group[kept], pos=true.pos[kept],
+            vel=true.vel[kept], box=true.box[kept], visibility=true.visibility[kept], groups=true.groups[:last],
+            groups_px=true.groups_px[:last], labelled=true.labelled[:last],
+                events=tuple(e for e in true.events if e.start <= last),
+        )  # fmt: skip
+        for part in (last, range(1, last + 1)):
+            found, expected = evaluate(true, run, frames=part), evaluate(cut, run[:last])
+            assert dict(found) == pytest.approx(dict(expected), abs=1e-12, nan_ok=True)
+    middle = evaluate(true, run, frames=range(51, 101))
+    assert middle["TP"] + middle["FN"] == ((true.frame > 50) & (true.frame <= 100)).sum()
+
+
+def test_frames_without_an_answer_are_empty() -> None:
+    scene = [Scene(TWO, {1: ((1, 2), None)})] * 4
+    found = evaluate(truth(scene), [t for t in tracks(scene) if t.index != 2])
+    assert (found["FN"], found["group_FN"], found["group_1-FN"]) == (2, 1, 0.75)
+
+
+def test_nothing_said_and_nothing_there() -> None:
+    # Empty output: no false group, all missed.
+    scene = [Scene(TWO, {1: ((1, 2), None)})] * 4
+    found = evaluate(truth(scene), tracks([Scene({})] * 4))
+    assert (found["group_1-FP"], found["group_1-FN"], found["group_GDSR"], found["group_MOTA"]) == (1, 0, 0, 0)
+    assert np.isnan(evaluate(truth([Scene(TWO)] * 4), tracks([Scene(TWO)] * 4))["group_HOTA"])  # no groups at all
+    assert evaluate(truth([Scene({})] * 4), tracks([Scene({})] * 4))["FP"] == 0
+
+
+def test_the_similarity_is_the_one_asked_for() -> None:
+    box = np.array([[0, 0, 10, 20], [100, 0, 10, 20]], float)
+    true = truth([Scene(TWO)], box=box)
+    seen = [t.replace(box=box + np.array([5, 0, 0, 0])) for t in tracks([Scene(TWO)])]
+    assert evaluate(true, seen).similarity == "boxes"
+    assert evaluate(true, seen)["MOTA"] == -1  # IoU 1/3
+    assert evaluate(true, seen, similarity="ground")["MOTA"] == 1
+    assert evaluate(true, seen, similarity="image")["MOTA"] == 1  # 5 px of 80
+
+
+@pytest.mark.parametrize(("similarity", "lacking"), [("boxes", "no boxes"), ("image", "in the image")])
+def test_what_is_not_there_cannot_be_compared(similarity: str, lacking: str) -> None:
+    with pytest.raises(IncomparableError, match=lacking):
+        evaluate(truth([Scene(TWO)]), tracks([Scene(TWO)]), similarity=similarity)
+
+
+def test_an_id_twice_in_a_frame_is_refused() -> None:
+    (told,) = tracks([Scene(TWO)])
+    with pytest.raises(ValueError, match="tracks: id 1 is twice in frame 1"):
+        evaluate(truth([Scene(TWO)]), [told.replace(id=np.array([1, 1]))])
