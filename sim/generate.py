@@ -7,8 +7,8 @@ seed and versions alone, never on the number of workers.
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Iterable, Iterator
-from contextlib import contextmanager, suppress
+from collections.abc import Callable, Generator, Iterable, Iterator
+from contextlib import closing, contextmanager, suppress
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -49,7 +49,8 @@ def generate(
 
     Sequences that are complete and of the same scenario and seed are kept. progress(done, all, name) is called after
     each. InputError before anything is made where names clash, the range is wrong, or a folder holds another
-    scenario's sequence; WorkError at the end, the others kept, where a sequence failed.
+    scenario's sequence; WorkError at the end, the others kept, where a sequence failed; at once where nothing can be
+    written any more.
     """
     if any(s != "none" for s in streams):
         raise InputError(
@@ -70,7 +71,10 @@ def generate(
             errors = _run(waiting, workers, _counted(progress, len(jobs) - len(waiting), len(jobs)))
         finally:
             sweep(folder)
-        write_seqmap(root, split)
+        try:
+            write_seqmap(root, split)
+        except FlockscopeError as error:
+            errors["seqmaps"] = error
     if errors:
         raise _summary(errors, len(jobs))
     return [job.folder for job in jobs]
@@ -133,25 +137,29 @@ def make(job: Job) -> None:
     write_folder(job.folder, files)
 
 
-def _attempt(job: Job) -> FlockscopeError | None:
+def _attempt(job: Job) -> tuple[FlockscopeError | None, bool]:
+    """What went wrong, and whether it will with all others too: a disk that takes no more."""
     try:
         make(job)
     except FlockscopeError as error:
-        return error
-    return None
+        return error, isinstance(error.__cause__, OSError)
+    return None, False
 
 
 def _run(jobs: list[Job], workers: int, done: Callable[[Job], None]) -> dict[str, FlockscopeError]:
-    """Make all; the errors by sequence, in the order of the jobs."""
+    """Make all, as long as something can be written; the errors by sequence, in the order of the jobs."""
     errors: dict[str, FlockscopeError] = {}
-    for job, error in _attempts(jobs, min(workers, len(jobs))):
-        if error is not None:
-            errors[job.name] = error
-        done(job)
+    with closing(_attempts(jobs, min(workers, len(jobs)))) as attempts:
+        for job, (error, hopeless) in attempts:
+            if error is not None:
+                errors[job.name] = error
+            if hopeless:
+                break
+            done(job)
     return {job.name: errors[job.name] for job in jobs if job.name in errors}
 
 
-def _attempts(jobs: list[Job], workers: int) -> Iterator[tuple[Job, FlockscopeError | None]]:
+def _attempts(jobs: list[Job], workers: int) -> Generator[tuple[Job, tuple[FlockscopeError | None, bool]], None, None]:
     if workers <= 1:
         yield from ((job, _attempt(job)) for job in jobs)
         return

@@ -1,3 +1,4 @@
+import errno
 import importlib.util
 import os
 import signal
@@ -13,6 +14,7 @@ from scenarios.errors import InputError, WorkError
 from scenarios.loading import Entry
 from scenarios.schema import Scenario
 from sim.generate import generate
+from sim.io import atomic
 from sim.io.source import open_source
 from sim.io.validate import validate
 from sim.splits import split_of
@@ -188,6 +190,35 @@ def test_ctrl_c_leaves_whole_sequences_only(tmp_path, simulate):
     assert validate(tmp_path) == []
 
 
+@pytest.mark.parametrize("number", [errno.ENOSPC, errno.EDQUOT, errno.EACCES])
+def test_a_disk_that_takes_no_more_ends_all_at_once(tmp_path, simulate, monkeypatch, number):
+    """The first sequence fits, the second in part; nobody tries the third. With room again, all is as ever."""
+    generate([Entry("x", scenario())], range(3), tmp_path / "right")
+    room = 1.5 * sum(len(body) for name, body in content(tmp_path / "right").items() if "x-s00000" in name)
+    write = atomic._flushed
+    simulate.made.clear()
+
+    def write_while_there_is_room(path, body):
+        nonlocal room
+        room -= len(body)
+        if room < 0:
+            write(path, body[: len(body) // 2])
+            raise OSError(number, os.strerror(number))
+        write(path, body)
+
+    monkeypatch.setattr(atomic, "_flushed", write_while_there_is_room)
+    with pytest.raises(InputError if number == errno.EACCES else WorkError) as caught:
+        generate([Entry("x", scenario())], range(3), tmp_path / "out")
+    assert os.strerror(number) in str(caught.value)
+    assert caught.value.file.endswith("x-s00001")
+    assert simulate.made == [0, 1]
+    assert {str(p.parent.name) for p in (tmp_path / "out").rglob("manifest.json")} == {"x-s00000"}
+    assert list((tmp_path / "out").rglob(f"{atomic.PARTIAL}*")) == []
+    room = 1e9
+    generate([Entry("x", scenario())], range(3), tmp_path / "out")
+    assert content(tmp_path / "out") == content(tmp_path / "right")
+
+
 def test_one_run_at_a_time(tmp_path, simulate):
     pytest.importorskip("fcntl")
     found = []
@@ -231,6 +262,36 @@ def test_killed_in_the_middle_and_resumed(tmp_path, whole, kill_after):
     assert [p for p in open_all(tmp_path / "out") if not (p / "manifest.json").is_file()] == []
     assert run_program(tmp_path, tmp_path / "out", 1).returncode == 0
     assert content(tmp_path / "out") == whole
+
+
+@pytest.fixture
+def small_disk(tmp_path):
+    """A file system of 64 kB; may(size) makes it so large."""
+    folder = tmp_path / "disk"
+    folder.mkdir()
+
+    def may(size, *more):
+        return subprocess.run(["mount", "-t", "tmpfs", "-o", f"size={size}{''.join(more)}", "tmpfs", folder],
+                              capture_output=True, check=False).returncode == 0  # fmt: skip
+
+    if not may("64k"):
+        pytest.skip("no right to mount a file system")
+    yield folder, may
+    subprocess.run(["umount", folder], check=True)
+
+
+def test_a_disk_fills_up_under_two_workers(tmp_path, whole, small_disk):
+    folder, may = small_disk
+    done = run_program(tmp_path, folder / "out", 2)
+    assert done.returncode == 1
+    assert b"No space left" in done.stderr.splitlines()[-1]
+    there = open_all(folder / "out")
+    assert len(there) < 6
+    assert all(validate(p) == [] for p in there)
+    assert list(folder.rglob(f"{atomic.PARTIAL}*")) == []
+    assert may("10m", ",remount")
+    assert run_program(tmp_path, folder / "out", 2).returncode == 0
+    assert content(folder / "out") == whole
 
 
 def open_all(out: Path) -> list[Path]:
