@@ -132,7 +132,15 @@ GROUPS = (
         replace(score, key=f"group_{score.key}", family="groups", meaning=f"{score.key} of groups, same similarity")
         for score in HOTA
     ),
-    Score("group_size_error", "groups", "people", 0.0, inf, "lower", "mean |estimated - true size| of matches"),
+    Score(
+        "group_size_error",
+        "groups",
+        "people",
+        0.0,
+        inf,
+        "lower",
+        "mean difference of estimated and true size, without sign",
+    ),
     *_from(
         "Givens & Shortt 1984",
         _length("group_extent_error", "groups", "mean Wasserstein distance of matches, Gaussians of middle and extent"),

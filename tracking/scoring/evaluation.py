@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Literal
@@ -48,7 +49,8 @@ class Scores(Mapping[str, float]):
         return len(self.by_key)
 
     def __str__(self) -> str:
-        return "\n".join(f"{key:28} {value:.4g}" for key, value in self.items())
+        """The scores that are known, a line each."""
+        return "\n".join(f"{key:28} {value:.4g}" for key, value in self.items() if not math.isnan(value))
 
 
 def evaluate(

@@ -1,0 +1,128 @@
+"""score_arrays: a user's own columns give what files and types of ours give; README's lines run as they stand."""
+
+from __future__ import annotations
+
+import re
+import runpy
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from scenarios.loading import load
+from sim.sequence import simulate
+from sim.types import Truth
+from tracking import track
+from tracking.scoring import evaluate, score_arrays
+
+ROOT = Path(__file__).resolve().parents[3]
+ROWS = {"frame": [1, 1, 2, 2], "id": [1, 2, 1, 2], "pos": [[0, 0], [1, 0], [0, 0], [1, 0]], "group": [7, 7, 7, 7]}
+
+
+def columns(true: Truth, *names: str) -> dict[str, np.ndarray]:
+    return {name: getattr(true, name) for name in ("frame", "id", *names)}
+
+
+@pytest.fixture(scope="module")
+def merge() -> Truth:
+    true = simulate(load("merge"), 5).truth
+    assert true is not None
+    return true
+
+
+@pytest.mark.parametrize("names", [("pos", "group"), ("box", "group"), ("pos", "box", "group")])
+def test_truth_as_tracks_is_perfect(merge: Truth, names: tuple[str, ...]) -> None:
+    true = columns(merge, *names)
+    found = score_arrays(true, true, fps=merge.fps)
+    assert found.surface == ("ground" if "pos" in names else "image")
+    for key in (
+        "objective",
+        "HOTA",
+        "MOTA",
+        "IDF1",
+        "group_F1",
+        "group_GDSR2",
+        "pairwise_F1",
+        "event_F1",
+        "lineage_accuracy",
+    ):
+        assert found[key] == pytest.approx(1, abs=1e-12), key
+
+
+def test_the_same_as_with_our_types(merge: Truth) -> None:
+    run = track("blob", simulate(load("merge"), 5))
+    est = {
+        "frame": np.concatenate([np.full(len(t.id), t.index) for t in run]),
+        **{name: np.concatenate([getattr(t, name) for t in run]) for name in ("id", "pos", "box", "group")},
+    }
+    was, now = evaluate(merge, run), score_arrays(columns(merge, "pos", "box", "group"), est, fps=merge.fps)
+    for key, value in was.items():
+        if key.startswith(("group", "pairwise", "HOTA", "IDF1", "MOTA", "RMSE_pos", "GOSPA")) and "core" not in key:
+            assert now[key] == pytest.approx(value, abs=1e-9, nan_ok=True), key
+
+
+def test_groups_that_are_not_given_are_derived_or_unknown(merge: Truth) -> None:
+    true, bare = columns(merge, "pos", "group"), columns(merge, "pos")
+    derived = score_arrays(true, bare, fps=merge.fps)
+    assert 0.5 < derived["pairwise_F1"] < 1  # by the baseline rule, which is late
+    unknown = score_arrays(bare, true, fps=merge.fps)
+    assert unknown["HOTA"] == 1
+    assert np.isnan(unknown["pairwise_F1"])
+    nobody = score_arrays(true, true | {"group": np.full_like(merge.group, -1)}, fps=merge.fps)
+    assert nobody["pairwise_F1"] == 0  # it says that all are alone
+    alone = score_arrays(true | {"group": np.full_like(merge.group, -1)}, true, fps=merge.fps)
+    assert alone["pairwise_precision"] == 0  # so does the truth: it is not to be derived
+
+
+def test_rows_may_stand_in_any_order(merge: Truth) -> None:
+    true = columns(merge, "pos", "box", "group")
+    order = np.random.default_rng(0).permutation(len(merge.frame))
+    mixed = {name: values[order] for name, values in true.items()}
+    assert dict(score_arrays(mixed, true, fps=10)) == pytest.approx(dict(score_arrays(true, true, fps=10)), nan_ok=True)
+
+
+def test_empty_sides_are_no_error() -> None:
+    none = {"frame": [], "id": [], "pos": [], "group": []}
+    assert score_arrays(ROWS, none, fps=10)["FN"] == 4
+    assert score_arrays(none, ROWS, fps=10)["FP"] == 4
+    assert score_arrays(none, none, fps=10)["FP"] == 0
+
+
+@pytest.mark.parametrize(
+    ("change", "said"),
+    [
+        ({"grp": [1, 1, 1, 1]}, "'grp'"),
+        ({"pos": None}, "frame, id, and pos or box"),
+        ({"pos": [0, 1, 0, 1]}, r"pos of shape \(4,\)"),
+        ({"id": [1, 2, 1]}, "3 rows of id"),
+        ({"frame": [0, 0, 1, 1]}, "frames from 1 on"),
+        ({"id": [1, 2.5, 1, 2]}, "not whole"),
+        ({"pos": [[0, 0], [np.nan, 0], [0, 0], [1, 0]]}, "not finite"),
+        ({"frame": [1, 1, 1, 1]}, "id 1 is twice in frame 1"),
+        ({"pos": None, "box": [[0, 0, 1, 1]] * 4}, "one of them on both"),
+    ],
+)
+def test_wrong_columns(change: dict, said: str) -> None:
+    wrong = {name: values for name, values in (ROWS | change).items() if values is not None}
+    with pytest.raises(ValueError, match=said):
+        score_arrays(ROWS, wrong, fps=10)
+
+
+def test_wrong_frame_rate() -> None:
+    with pytest.raises(ValueError, match="fps: got 0"):
+        score_arrays(ROWS, ROWS, fps=0)
+
+
+def test_the_lines_of_the_readme_run(merge: Truth, tmp_path: Path, monkeypatch, capsys) -> None:
+    blocks = re.findall(r"```python\n(.*?)```", (ROOT / "README.md").read_text(encoding="utf-8"), re.DOTALL)
+    (block,) = (text for text in blocks if "score_arrays" in text)
+    assert len(block.splitlines()) == 5
+    table = np.column_stack([merge.frame, merge.id, merge.pos, merge.group])
+    for name in ("truth.csv", "mine.csv"):
+        np.savetxt(tmp_path / name, table, delimiter=",")
+    (tmp_path / "lines.py").write_text(block, encoding="utf-8")
+    monkeypatch.chdir(tmp_path)
+    runpy.run_path("lines.py")
+    said = capsys.readouterr().out
+    assert re.search(r"^HOTA +1$", said, re.MULTILINE)
+    assert re.search(r"^pairwise_F1 +1$", said, re.MULTILINE)
