@@ -7,6 +7,7 @@ hull of the members' places: p_i + q_k is a vertex of it where the normal cones 
 from __future__ import annotations
 
 from collections.abc import Iterator
+from itertools import pairwise
 
 import numpy as np
 
@@ -16,6 +17,7 @@ from sim.types import Array, Ints
 STEP = 2 * np.pi / SIDES
 Q = FOOTPRINT * np.stack([np.cos(STEP * np.arange(SIDES)), np.sin(STEP * np.arange(SIDES))], axis=1)
 CONES = STEP * (np.arange(SIDES) - 0.5)  # where the normal cone of each vertex of Q begins; all are STEP wide
+CHUNK = 512  # groups worked on at once
 FLAT = 1e-9  # rad: a narrower cone is a rounding error, its vertex lies on an edge
 
 
@@ -44,11 +46,14 @@ def footprint_hulls(pos: Array, count: Ints) -> list[Array]:
 
 
 def _by_size(pos: Array, count: Ints) -> Iterator[tuple[Ints, Array]]:
-    """Groups of equal size together: their numbers (G,), places (G, n, 2)."""
+    """Groups of equal size together: their numbers (G,), places (G, n, 2); so few that their tables stay in the
+    cache."""
     first = np.cumsum(count) - count
     for n in np.unique(count[count > 0]):
-        rows = np.flatnonzero(count == n)
-        yield rows, pos[first[rows, None] + np.arange(n)]
+        every = np.flatnonzero(count == n)
+        for low in range(0, len(every), CHUNK):
+            rows = every[low : low + CHUNK]
+            yield rows, pos[first[rows, None] + np.arange(n)]
 
 
 def _wrap(pos: Array) -> tuple[Array, Array, Array]:
@@ -94,5 +99,8 @@ def _minkowski(p: Array, start: Array, width: Array) -> list[Array]:
     key = np.where(shared > FLAT, turned + np.where(begins_inside, after, 0.0), np.inf).reshape(len(p), -1)
     corner = (p[:, :, None] + Q).reshape(len(p), -1, 2)
     order = np.argsort(key, axis=1)
-    count = np.isfinite(key).sum(axis=1)
-    return [corner[g, order[g, : count[g]]] for g in range(len(p))]
+    used = np.arange(key.shape[1]) < np.isfinite(key).sum(axis=1)[:, None]
+    group, _ = np.nonzero(used)
+    flat = corner[group, order[used]]
+    ends = np.cumsum(used.sum(axis=1)).tolist()
+    return [flat[a:b] for a, b in pairwise([0, *ends])]
