@@ -14,13 +14,13 @@ TIME = 1.5  # s, correlation time
 
 
 def wander(keys: Sequence[tuple[int, ...]], frames: int, fps: float, seed: int, repeat: int) -> Array:
-    """(frames, P, 2) in m/s, stationary from the first frame."""
-    from scipy.signal import lfilter
-
+    """(frames, P, 2) in m/s, stationary from the first frame: u_k = keep u_k-1 + sqrt(1 - keep^2) SD noise_k."""
     keep = float(np.exp(-1 / (fps * TIME)))
     out = np.empty((frames, len(keys), 2))
     for p, key in enumerate(keys):
-        noise = rng(seed, "gait", *key, repeat=repeat).normal(size=(frames, 2))
-        noise[1:] *= np.sqrt(1 - keep**2)
-        out[:, p] = lfilter([SD], [1.0, -keep], noise, axis=0)
+        out[:, p] = rng(seed, "gait", *key, repeat=repeat).normal(size=(frames, 2))
+    out[1:] *= np.sqrt(1 - keep**2)
+    out *= SD
+    for k in range(1, frames):
+        out[k] += keep * out[k - 1]
     return out
