@@ -150,7 +150,7 @@ class Population:
         lost = (self.confirmed & ~self.hit).nonzero()[0]
         if len(lost):
             limit = np.where(self.excused[lost], self.excused_silence, self.silence) * (1 + SLACK)
-            fresh = (self.rho[lost] <= limit) & (self.misses[lost] <= self.hits[lost])
+            fresh = (self.rho[lost] <= limit) & (self.misses[lost] <= self.config.report_credit * self.hits[lost])
             told[lost] = fresh & ~self._leaving(self.bank[: kalman.VAR].take(lost, 1))
         return np.asarray(told.nonzero()[0])
 
