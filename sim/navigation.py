@@ -7,6 +7,7 @@ import numpy as np
 from scenarios.schema import World
 from sim.types import Array, Bools, Scene, Stairs
 
+BEHIND = 0.7  # m behind a door, where nobody touches the wall any more
 CLEARANCE = 0.6  # m kept from a wall's end on the way round it
 
 
@@ -73,32 +74,36 @@ def blocked(a: Array, b: Array, walls: Array) -> Bools:
 
 
 class Navigator:
-    """Shortest ways in one scene. State: nodes (wall ends with clearance, door middles) and their distances."""
+    """Shortest ways in one scene. State: nodes (wall ends with clearance, door middles) and their distances.
+
+    `closed` is walls and doors alike: whoever goes through a door goes by its middle.
+    """
 
     def __init__(self, scene: Scene) -> None:
-        self.walls = np.asarray(scene.walls)
-        doors = np.asarray(scene.doors)
+        self.size, self.walls = scene.size, np.asarray(scene.walls)
+        self.doors = np.asarray(scene.doors).reshape(-1, 2, 2)
+        self.closed = np.concatenate([self.walls.reshape(-1, 2, 2), self.doors])
         ends = self._wall_ends() if len(self.walls) else np.zeros((0, 2))
-        self.nodes = np.concatenate([doors.mean(axis=1) if len(doors) else np.zeros((0, 2)), ends])
-        self.narrow = np.arange(len(self.nodes)) < len(doors)
+        self.nodes = np.concatenate([self.doors.mean(axis=1), ends])
         self.edges = self._lengths(self.nodes, self.nodes)
 
     def _wall_ends(self) -> Array:
         along = self.walls[:, 1] - self.walls[:, 0]
         along = along / np.linalg.norm(along, axis=1, keepdims=True)
         ends = np.concatenate([self.walls[:, 0] - CLEARANCE * along, self.walls[:, 1] + CLEARANCE * along])
-        free = [min(_distance(e, w) for w in self.walls) > 0.9 * CLEARANCE for e in ends]
-        return np.asarray(ends[np.array(free, dtype=bool)])
+        free = [min(_distance(e, w) for w in self.closed) > 0.9 * CLEARANCE for e in ends]
+        inside = ((ends >= 0) & (ends <= self.size)).all(axis=1)
+        return np.asarray(ends[inside & np.array(free, dtype=bool)])
 
     def _lengths(self, a: Array, b: Array) -> Array:
         d = np.linalg.norm(a[:, None] - b[None], axis=2)
-        hidden = blocked(np.repeat(a[:, None], len(b), 1), np.repeat(b[None], len(a), 0), self.walls)
+        hidden = blocked(np.repeat(a[:, None], len(b), 1), np.repeat(b[None], len(a), 0), self.closed)
         return np.asarray(np.where(hidden, np.inf, d))
 
     def way(self, start: Array, goal: Array) -> tuple[Array, Bools] | None:
         """Points to walk to, goal included, and which of them are doors; None where no way exists."""
         ends = np.stack([start, goal])
-        if not blocked(ends[:1], ends[1:], self.walls)[0]:
+        if not blocked(ends[:1], ends[1:], self.closed)[0]:
             return ends[1:], np.zeros(1, dtype=np.bool_)
         points = np.concatenate([self.nodes, ends])
         n = len(points)
@@ -109,8 +114,21 @@ class Navigator:
         path = _dijkstra(lengths, n - 2, n - 1)
         if path is None:
             return None
-        narrow = np.append(self.narrow, [False, False])
-        return points[path], narrow[path]
+        way, narrow, here = [], [], start
+        for k in path:
+            way.append(points[k])
+            narrow.append(k < len(self.doors))
+            if narrow[-1]:
+                way.append(points[k] + self._out(k, points[k] - here))
+                narrow.append(True)
+            here = points[k]
+        return np.array(way), np.array(narrow)
+
+    def _out(self, door: int, way: Array) -> Array:
+        """From the middle of a door to a place behind it, for those who come this way: straight through the wall."""
+        along = self.doors[door, 1] - self.doors[door, 0]
+        across = np.array([-along[1], along[0]]) / np.linalg.norm(along)
+        return np.asarray(BEHIND * across * (1.0 if across @ way > 0 else -1.0))
 
 
 def _dijkstra(lengths: Array, start: int, goal: int) -> list[int] | None:
