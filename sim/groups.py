@@ -119,7 +119,8 @@ def _assemble(
     speed = np.add.reduceat(vel[rows], starts) / counts[:, None]
     arm = (pos[rows] - np.repeat(middle, counts, axis=0))[:, :2]
     extent = np.add.reduceat(arm[:, :, None] * arm[:, None], starts) / counts[:, None, None]
-    members = np.split(id[rows], starts[1:])
+    people = id[rows]
+    members = [people[a:b] for a, b in pairwise([*starts.tolist(), len(rows)])]
     cuts = np.searchsorted(frame[rows[starts]], np.arange(first, first + length + 1))
     name = group[rows[starts]]
     size = counts.astype(float)

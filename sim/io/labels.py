@@ -7,7 +7,6 @@ as for simulated crowds (sim.groups). Work is done in metres; a recording in px 
 from __future__ import annotations
 
 from dataclasses import replace
-from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -30,7 +29,7 @@ def label_truth(
     Event ids are labels: each measured group bears the label of its members. Crossings are of the groups as labelled.
     """
     from sim.events import crossings, queues
-    from sim.groups import memberships
+    from sim.groups import groups_over_time, memberships
 
     metres, speed = pos / px_per_m, vel / px_per_m
     people = np.unique(id)
@@ -49,7 +48,7 @@ def label_truth(
     found += [_named(e, {}, people, px_per_m) for e in met]
     events = tuple(sorted(found, key=lambda e: (e.start, e.end, e.kind, e.members, e.after)))
     near = replace(measured.near, a=people[measured.near.a - 1], b=people[measured.near.b - 1])
-    groups = _hulls(frame, id, label, metres, speed, length, px_per_m)
+    groups = tuple(scaled(g, px_per_m) for g in groups_over_time(frame, id, label, metres, speed, 1, length))
     return {"groups": groups, "events": events, "near": near, "labelled": np.ones(length, bool)}
 
 
@@ -68,20 +67,6 @@ def _named(event: GroupEvent, names: dict[int, int], people: Ints, px_per_m: flo
         members=tuple(int(people[m - 1]) for m in event.members),
         pos=(event.pos[0] * px_per_m, event.pos[1] * px_per_m),
     )
-
-
-def _hulls(
-    frame: Ints, id: Ints, label: Ints, pos: Array, vel: Array, length: int, px_per_m: float
-) -> tuple[Groups, ...]:
-    """The labelled groups of each frame, in the recording's unit."""
-    from sim.groups import frame_groups
-
-    cuts = np.searchsorted(frame, np.arange(1, length + 2))
-    found = []
-    for low, high in pairwise(cuts):
-        r = slice(int(low), int(high))
-        found.append(scaled(frame_groups(id[r], label[r], pos[r], vel[r]), px_per_m))
-    return tuple(found)
 
 
 def scaled(groups: Groups, factor: float) -> Groups:

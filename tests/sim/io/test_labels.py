@@ -1,13 +1,12 @@
-"""What labels.py hands to the measuring functions, and how it translates their answer; groups by a stand-in."""
+"""What labels.py hands to the measuring functions, and how it translates their answer; memberships by a stand-in."""
 
-import sys
 import types
 
 import numpy as np
 import pytest
 
 from sim.io.labels import dense, label_truth
-from sim.types import GroupEvent, Groups, Near
+from sim.types import GroupEvent, Near
 
 FRAME = np.array([1, 1, 1, 3, 3], np.int64)
 ID = np.array([4, 7, 9, 4, 7], np.int64)
@@ -17,7 +16,7 @@ POS = np.arange(10.0).reshape(5, 2) * 20
 
 @pytest.fixture
 def measured(monkeypatch):
-    """sim.groups as a stand-in that notes what it is given and answers with a merge of columns 2 and 3."""
+    """memberships as a stand-in that notes what it is given and answers with a merge of columns 2 and 3."""
     seen = types.SimpleNamespace()
 
     def memberships(pos, vel, present, intent, fps):
@@ -28,18 +27,7 @@ def measured(monkeypatch):
         one = np.array([1], np.int64)
         return types.SimpleNamespace(group=group, events=(event,), near=Near(one, one, one, one + 2))
 
-    def frame_groups(id, group, pos, vel):
-        names = np.unique(group[group >= 0])
-        n = len(names)
-        middle = np.array([pos[group == g].mean(axis=0) for g in names]).reshape(n, 2)
-        hulls = tuple(np.ones((3, 2)) for _ in names)
-        return Groups(
-            names, tuple(id[group == g] for g in names), middle, middle, np.ones((n, 2, 2)), np.ones(n), hulls
-        )
-
-    monkeypatch.setitem(
-        sys.modules, "sim.groups", types.SimpleNamespace(memberships=memberships, frame_groups=frame_groups)
-    )
+    monkeypatch.setattr("sim.groups.memberships", memberships)
     return seen
 
 
@@ -61,11 +49,12 @@ def test_answers_come_back_in_the_recordings_ids_and_unit(measured):
     assert (event.before, event.after, event.members, event.pos) == ((-1, -1), (0,), (7, 9), (20.0, 40.0))
     assert (found["near"].a.tolist(), found["near"].b.tolist()) == ([4], [9])
     first, nobody, last = found["groups"]
-    assert first.id.tolist() == last.id.tolist() == [0]
+    assert first.id.tolist() == [0]
+    assert first.members[0].tolist() == [7, 9]
     assert first.pos.tolist() == [POS[1:3].mean(axis=0).tolist()]
-    assert first.hull[0].tolist() == [[20, 20]] * 3
-    assert first.extent[0].tolist() == [[400, 400]] * 2
-    assert len(nobody.id) == 0
+    assert first.extent[0] == pytest.approx(np.full((2, 2), 20.0**2)), "px²: they are 40 px apart, right and down"
+    assert first.hull[0].min(axis=0) == pytest.approx(POS[1] - 0.25 * 20), "footprints of 0.25 m, in px"
+    assert len(nobody.id) == len(last.id) == 0, "one of a group alone is none"
     assert found["labelled"].all()
 
 
