@@ -19,11 +19,15 @@ from scenarios.errors import InputError
 
 Scale = Literal["linear", "log", "int", "categorical"]
 Value = float | int | str | bool
+FROZEN = Path(__file__).parent / "frozen"
 
 
 @dataclass(frozen=True)
 class Param:
-    """One declared parameter: default, unit, meaning, and low..high or choices."""
+    """One declared parameter: default, unit, meaning, and low..high or choices.
+
+    before: of a parameter younger than the frozen first defaults, the value that leaves a tracker as it was without it.
+    """
 
     name: str
     default: Value
@@ -35,6 +39,7 @@ class Param:
     choices: tuple[Value, ...] = ()
     online: bool = True
     tunable: bool = True
+    before: Value | None = None
 
     @property
     def expected(self) -> str:
@@ -77,11 +82,12 @@ def param(
     *,
     online: bool = True,
     tunable: bool = True,
+    before: Value | None = None,
 ) -> Any:
     """A dataclass field that is a parameter; `values` is (low, high), or the choices of a categorical one."""
     ends = {"choices": values} if scale == "categorical" else {"low": values[0], "high": values[1]}
     spec = {"default": default, "unit": unit, "meaning": meaning, "scale": scale, **ends}
-    spec |= {"online": online, "tunable": tunable}
+    spec |= {"online": online, "tunable": tunable, "before": before}
     return dataclasses.field(default=default, metadata={"param": spec})
 
 
@@ -127,7 +133,23 @@ class Config:
 
     @classmethod
     def from_toml(cls, path: str | Path) -> Self:
-        """Read `tracker = "name"` (optional) and the table [params]."""
+        """Read `tracker = "name"` (optional) and the table [params]; what the file leaves out has its default."""
+        return cls.from_dict(cls._values(path), path)
+
+    @classmethod
+    def frozen(cls) -> Self:
+        """The defaults as they were first written, tracking/frozen/NAME.toml, against which tuning is judged.
+
+        Parameters that came later have their `before`.
+        """
+        path = FROZEN / f"{cls.tracker}.toml"
+        first = cls._values(path)
+        later = {name: p.before for name, p in cls.params().items() if name not in first}
+        assert None not in later.values(), f"a parameter that {path.name} lacks declares what it was before: {later}"
+        return cls.from_dict(first | later, path)
+
+    @classmethod
+    def _values(cls, path: str | Path) -> dict[str, object]:
         text = _read(path)
         try:
             content = tomllib.loads(text)
@@ -141,7 +163,7 @@ class Config:
         if content or not isinstance(values, dict):
             got, remedy = ", ".join(content) or "params", "put the parameters under [params]"
             raise InputError(file=path, got=got, expected="tracker and [params]", remedy=remedy)
-        return cls.from_dict(values, path)
+        return values
 
     def with_set(self, *assignments: str) -> Self:
         """A copy with `name=value` assignments applied; `tracker.name=value` means the same."""

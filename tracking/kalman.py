@@ -89,13 +89,6 @@ def _common_noise(place: Array, z: Array, w: Array) -> Array:
     return np.asarray(np.maximum(d2, 0.0, out=d2))
 
 
-def log_likelihood(state: Array, rows: Ints, z: Array, noise: Array | float) -> Array:
-    """(K,) log N(z; place, S) of measurements given to filters `rows`, one unit throughout."""
-    s = state[VAR][rows] + noise
-    y = z - state[PLACE][rows]
-    return np.asarray(-0.5 * np.sum(y * y / s + np.log(2 * np.pi * s), 1))
-
-
 def asymptote(dt: float, sigma: Array | float, noise: Array | float) -> Array:
     """S that an unbroken run of measurements settles at: the Riccati equation of one block in closed form.
 
