@@ -14,7 +14,7 @@ from sim.rules import frames_of
 from sim.types import Array, Bools, Ints
 
 WAITING = 0.4  # m/s
-ADVANCE = 2.0  # s: one who waited and will wait again within so long is advancing
+ADVANCE = 3.0  # s: one who waited and will wait again within so long is advancing (a pair served moves all by two)
 HOLD = 3.0  # s with three people or more
 LEAST = 3  # people, for a queue to be one
 BRIDGE = 1.5  # s: a line may be lost for so long
@@ -91,7 +91,7 @@ def lines(pos: Array, vel: Array, there: Bools, fps: float) -> list[Line]:
 
 
 def waiting(vel: Array, there: Bools, fps: float) -> Bools:
-    """Who (T, P) waits: slower than 0.4 m/s, or between two moments of that no more than 2 s apart."""
+    """Who (T, P) waits: slower than 0.4 m/s, or between two moments of that no more than 3 s apart."""
     with np.errstate(invalid="ignore"):
         slow = there & (np.hypot(vel[..., 0], vel[..., 1]) < WAITING)
     p, t = np.nonzero(slow.T)
