@@ -8,7 +8,7 @@ import cv2
 import numpy as np
 
 from scenarios.errors import InputError, WorkError
-from sim.types import Array, GroupEvent, Image, Ints, Sequence, Truth
+from sim.types import Array, GroupEvent, Image, Ints, Scene, Sequence, Truth
 from tracking.app import sheet_panel
 from tracking.app.sheet_panel import INK, QUIET, THING, Colour, View, colour, text
 
@@ -20,6 +20,8 @@ WIDTH, HEAD, FOOT, GAP, TITLE = 880, 76, 96, 20, 40
 
 MANY = 40
 MARGIN = 1.0
+SOON = 1.0
+"""s: events that begin so close to one another share a picture."""
 
 
 def sheet(sequence: Sequence, out: str | Path, frames: int = 8) -> Path:
@@ -47,7 +49,7 @@ def compose(sequence: Sequence, truth: Truth, frames: int = 8) -> Image:
     """The sheet as an (H, W, 3) picture."""
     chosen = choose(truth, frames)
     low, high = _bounds(sequence, truth)
-    height = round(WIDTH * float(np.clip((high - low)[1] / (high - low)[0], 0.4, 1.0)))
+    height = round(WIDTH * float(np.clip((high - low)[1] / (high - low)[0], 0.4, 1.2)))
     columns = min(4, len(chosen))
     rows = -(-len(chosen) // columns)
     total = (HEAD + rows * (height + TITLE + GAP) + FOOT, GAP + columns * (WIDTH + GAP))
@@ -66,13 +68,22 @@ def choose(truth: Truth, frames: int) -> list[int]:
     chosen: list[int] = []
     events = [event for event in truth.events or () if 1 <= event.start <= truth.length and event.kind in RANK]
     for rank in sorted(set(RANK.values())):
-        onsets = sorted({event.start for event in events if RANK[event.kind] == rank} - set(chosen))
+        onsets = _apart({event.start for event in events if RANK[event.kind] == rank}, chosen, SOON * truth.fps)
         room = frames - len(chosen)
         chosen += onsets if len(onsets) <= room else [onsets[k] for k in _spread(len(onsets), room)]
     people = np.bincount(truth.frame, minlength=truth.length + 1)[1 : truth.length + 1]
     while len(chosen) < frames:
         chosen.append(_widest(chosen, people))
     return sorted(chosen)
+
+
+def _apart(onsets: set[int], chosen: list[int], least: float) -> list[int]:
+    """Those further than `least` frames from what is chosen and from one another, the earlier first."""
+    found: list[int] = []
+    for onset in sorted(onsets):
+        if all(abs(onset - other) > least for other in (*chosen, *found)):
+            found.append(onset)
+    return found
 
 
 def _spread(n: int, k: int) -> list[int]:
@@ -109,13 +120,23 @@ def _bounds(sequence: Sequence, truth: Truth) -> tuple[Array, Array]:
     if truth.pos is None and sequence.image_size is not None:
         return np.zeros(2), np.array(sequence.image_size, float)
     if truth.pos is not None and sequence.scene is not None:
-        return np.zeros(2), sequence.scene.size
+        return _peopled(sequence.scene, truth.pos)
     places = _places(truth)
     if truth.pos is None and truth.box is not None:
         places = np.concatenate([truth.box[:, :2], truth.box[:, :2] + truth.box[:, 2:]])
     places = places[np.isfinite(places).all(axis=1)]
     margin = MARGIN if truth.pos is not None else 0.0
     return places.min(axis=0) - margin, places.max(axis=0) + np.maximum(margin, 1e-3)
+
+
+def _peopled(scene: Scene, pos: Array) -> tuple[Array, Array]:
+    """The part of a world in which people are, with all but its walls, and some room."""
+    things = [pos, scene.pillars[:, :2], scene.doors.reshape(-1, 2), scene.service]
+    things += [end[None] for flight in scene.stairs for end in (flight.foot, flight.head)]
+    places = np.concatenate([thing.reshape(-1, 2) for thing in things])
+    places = places[np.isfinite(places).all(axis=1)]
+    low, high = places.min(axis=0) - 2 * MARGIN, places.max(axis=0) + 2 * MARGIN
+    return np.maximum(low, np.minimum(0, low + MARGIN)), np.minimum(high, np.maximum(scene.size, high - MARGIN))
 
 
 def _panel(area: Image, sequence: Sequence, truth: Truth, index: int, low: Array, high: Array) -> None:
@@ -130,13 +151,24 @@ def _panel(area: Image, sequence: Sequence, truth: Truth, index: int, low: Array
     sheet_panel.hulls(view, truth, index, places, boxes)
     rows = truth.rows(index)
     sheet_panel.people(view, truth, index, places, boxes, names=rows.stop - rows.start <= MANY)
-    now = [event for event in truth.events or () if event.start == index and event.kind in RANK]
+    near = [event for event in truth.events or () if abs(event.start - index) <= SOON * truth.fps]
+    now = sorted((event for event in near if event.kind in RANK), key=lambda event: RANK[event.kind])
     for event in now if plan else []:
-        view.disc(np.array(event.pos), 0.9 * view.scale, _kind(event), 3)
+        at, radius = _around(event, truth.id[rows], places[rows])
+        view.disc(at, radius * view.scale, _kind(event), 3)
     words = f"{(index - 1) / truth.fps:.1f} s" + "".join(f"   {_words(event)}" for event in now)
     ink = _kind(now[0]) if now else QUIET
     text(area, words[:62], (2, TITLE - 12), 0.72, ink, 2 if now else 1)
     cv2.rectangle(area, (0, TITLE), (area.shape[1] - 1, area.shape[0] - 1), ink if now else THING, 5 if now else 2)
+
+
+def _around(event: GroupEvent, ids: Ints, places: Array) -> tuple[Array, float]:
+    """Centre and radius (m) of a ring round all whom an event concerns."""
+    members = places[np.isin(ids, event.members)]
+    if not len(members):
+        return np.array(event.pos), MARGIN
+    centre = members.mean(axis=0)
+    return centre, float(np.linalg.norm(members - centre, axis=1).max()) + 0.7
 
 
 def _kind(event: GroupEvent) -> Colour:
@@ -157,6 +189,8 @@ def _head(canvas: Image, sequence: Sequence, truth: Truth) -> None:
     width = cv2.getTextSize(sequence.name, cv2.FONT_HERSHEY_SIMPLEX, 1.3, 3)[0][0]
     unit = "m" if truth.pos is not None else "px"
     low, high = _bounds(sequence, truth)
+    if truth.pos is not None and sequence.scene is not None:
+        low, high = np.zeros(2), sequence.scene.size
     facts = f"{len(np.unique(truth.id))} people, {truth.length} frames, {truth.fps:g}/s, "
     facts += f"{high[0] - low[0]:.4g} x {high[1] - low[1]:.4g} {unit}; trails {sheet_panel.TRAIL:g} s"
     text(canvas, facts, (GAP + width + 30, 46), 0.75, QUIET)

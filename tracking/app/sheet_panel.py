@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import cv2
 import numpy as np
 
-from sim.types import Array, Image, Scene, Stairs, Truth
+from sim.types import Array, Image, Ints, Scene, Stairs, Truth
 
 INK, QUIET, GRID, FLOOR, THING, WALL = (
     (36, 31, 27),
@@ -177,11 +177,11 @@ def _outline(view: View, places: Array, boxes: Array | None) -> Array:
 
 def people(view: View, truth: Truth, index: int, places: Array, boxes: Array | None, names: bool) -> None:
     """Everybody of a frame: a disc with a nose where they head, or a box; `names` adds ids."""
-    for row in range(truth.rows(index).start, truth.rows(index).stop):
+    rows, radius = truth.rows(index), max(0.22 * view.scale, 6.0)
+    for row in range(rows.start, rows.stop):
         ink, at = colour(int(truth.id[row])), places[row]
         if not np.isfinite(at).all():
             continue
-        radius = max(0.22 * view.scale, 6.0)
         if boxes is None:
             view.disc(at, radius + 1.5, FLOOR)
             view.disc(at, radius, ink)
@@ -189,12 +189,40 @@ def people(view: View, truth: Truth, index: int, places: Array, boxes: Array | N
         else:
             x, y, w, h = boxes[row]
             view.line(np.array([[x, y], [x + w, y], [x + w, y + h], [x, y + h]]), ink, 3, closed=True)
-        if names:
-            x, y = view.map(at)[0]
-            text(view.canvas, str(truth.id[row]), (x + 0.8 * radius, y + radius + 12), 0.6, ink, 2)
+    if names:
+        _names(view, truth.id[rows], places[rows], radius)
 
 
 def _nose(view: View, truth: Truth, row: int, at: Array, ink: Colour) -> None:
     if truth.vel is None or np.hypot(*truth.vel[row]) < 0.1:
         return
     view.line(np.stack([at, at + 0.5 * truth.vel[row] / np.hypot(*truth.vel[row])]), ink, 3)
+
+
+AROUND = ((1, 1), (1, -1), (-1, 1), (-1, -1), (0, 1), (1, 0), (-1, 0), (0, -1))
+"""Where a name may stand beside its disc, the best first."""
+
+
+def _names(view: View, ids: Ints, places: Array, radius: float) -> None:
+    """Ids beside their discs, each where it covers the least of discs and of names that already stand."""
+    discs = view.map(places)
+    taken = np.concatenate([discs - radius, discs + radius], axis=1)
+    for identity, at in zip(ids.tolist(), discs, strict=True):
+        if not np.isfinite(at).all():
+            continue
+        size = np.array(cv2.getTextSize(str(identity), cv2.FONT_HERSHEY_SIMPLEX, 0.6, 2)[0], float)
+        middles = at + np.array(AROUND) * (
+            radius * np.where(np.abs(AROUND).all(axis=1), 0.7, 1.0)[:, None] + size / 2 + 1
+        )
+        spots = np.concatenate([middles - size / 2, middles + size / 2], axis=1)
+        covered = [_shared(spot, taken) for spot in spots]
+        best = spots[int(np.argmin(covered))]
+        taken = np.concatenate([taken, best[None]])
+        text(view.canvas, str(identity), (best[0], best[3]), 0.6, colour(identity), 2)
+
+
+def _shared(box: Array, others: Array) -> float:
+    """Area that a box (left, top, right, bottom) shares with others (N, 4)."""
+    wide = np.minimum(box[2], others[:, 2]) - np.maximum(box[0], others[:, 0])
+    high = np.minimum(box[3], others[:, 3]) - np.maximum(box[1], others[:, 1])
+    return float(np.nansum(np.maximum(wide, 0) * np.maximum(high, 0)))

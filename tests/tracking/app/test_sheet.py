@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 from pathlib import Path
 
 import cv2
@@ -13,7 +14,7 @@ from hypothesis import strategies as st
 from scenarios.errors import InputError, WorkError
 from sim.types import GroupEvent, Sequence, Truth
 from tracking.app.sheet import choose, sheet
-from tracking.app.sheet_panel import FLOOR, View, colour
+from tracking.app.sheet_panel import FLOOR, View, _names, colour
 
 
 def bare(length: int, starts: dict[int, str]) -> Truth:
@@ -33,6 +34,48 @@ def test_onsets_come_first_and_gaps_are_filled() -> None:
 def test_fuller_frames_fill_the_gaps(truth: Truth) -> None:
     few = truth.replace(frame=np.array([70, 70, 71]), id=np.array([1, 2, 1]), events=())
     assert choose(few, 1) == [70]
+
+
+def test_onsets_close_to_one_another_share_a_picture() -> None:
+    chosen = choose(bare(200, {50: "cross", 55: "cross", 58: "merge", 120: "cross"}), 4)
+    assert {58, 120} <= set(chosen)
+    assert not {50, 55} & set(chosen)
+
+
+def test_the_part_of_the_world_where_people_are_is_shown(sequence: Sequence, truth: Truth) -> None:
+    """With pillars, doors, stairs and service points, and not beyond the walls round it."""
+    from tracking.app.sheet import _bounds
+
+    wide = dataclasses.replace(sequence, scene=dataclasses.replace(sequence.scene, size=np.array([60.0, 40.0])))
+    low, high = _bounds(wide, truth)
+    np.testing.assert_allclose(high, truth.pos.max(axis=0) + 2)
+    low, high = _bounds(sequence, truth)
+    assert (low >= -1).all()
+    assert (high <= sequence.scene.size + 1).all()
+
+
+def test_a_ring_holds_all_whom_an_event_concerns(truth: Truth) -> None:
+    from tracking.app.sheet import _around
+
+    merge = next(event for event in truth.events if event.kind == "merge")
+    rows = truth.rows(merge.start)
+    centre, radius = _around(merge, truth.id[rows], truth.pos[rows])
+    apart = np.linalg.norm(truth.pos[rows] - centre, axis=1)
+    assert 0.5 < radius - apart[np.isin(truth.id[rows], merge.members)].max() < 1
+
+
+def test_names_stand_clear_of_discs_and_of_one_another() -> None:
+    """Five in a huddle: no name covers a disc (a covered one would lose its colour), and all are there."""
+    view = View.fit(np.full((300, 300, 3), 255, np.uint8), np.zeros(2), np.array([10.0, 10.0]), upwards=True)
+    ids, places = np.arange(1, 6), np.array([[5, 5], [5.9, 5], [4.1, 5], [5, 5.9], [5, 4.1]])
+    for identity, at in zip(ids.tolist(), places, strict=True):
+        view.disc(at, 7, colour(identity))
+    before = view.canvas.copy()
+    _names(view, ids, places, 7)
+    for identity, at in zip(ids.tolist(), places, strict=True):
+        x, y = view.map(at)[0].astype(int)
+        np.testing.assert_array_equal(view.canvas[y, x], before[y, x])
+        assert (np.abs(view.canvas.astype(int) - colour(identity)).max(axis=2) < 12).sum() > 150
 
 
 def test_merges_and_splits_outrank_the_rest() -> None:
@@ -59,16 +102,16 @@ def test_a_plan_puts_y_up_and_keeps_the_aspect() -> None:
 
 
 def test_people_are_drawn_where_they_are(sequence: Sequence, truth: Truth, tmp_path: Path) -> None:
-    from tracking.app.sheet import HEAD, TITLE, WIDTH
+    from tracking.app.sheet import HEAD, TITLE, WIDTH, _bounds
 
     index = choose(truth, 1)[0]
     path = sheet(sequence, tmp_path / "new" / "sheet.png", frames=1)
     picture = cv2.imread(str(path))
-    scale = WIDTH / 2 / 16
+    low, high = _bounds(sequence, truth)
+    scale = WIDTH / 2 / (high - low)[0]
     row = truth.rows(index).start + int(np.flatnonzero(truth.at(index).id == 7)[0])
     x, y = truth.pos[row] if truth.pos is not None else (0, 0)
-    height = round(WIDTH * 10 / 16) / 2
-    u, v = 10 + x * scale, (HEAD + TITLE) / 2 + height - y * scale
+    u, v = 10 + (x - low[0]) * scale, (HEAD + TITLE) / 2 + (high[1] - y) * scale
     np.testing.assert_allclose(picture[round(v), round(u)], colour(7), atol=12)
     np.testing.assert_allclose(picture[round(v) + 30, round(u) + 30], FLOOR, atol=12)
 
