@@ -162,10 +162,11 @@ def test_weak_detections_continue_but_do_not_start(config):
     assert all(len(t.id) == 1 for t in fading[15:])
 
 
-def test_an_unseen_track_is_reported_no_longer_than_it_was_seen():
-    config = BlobConfig(confirm_ratio=2.0, report_coast=2.0, coast_time=3.0, report_delay=0.0)
-    made = run([at((100, 200))] * 6 + [[]] * 20, config)
-    assert [len(t.id) for t in made] == [1] * 12 + [0] * 14
+@pytest.mark.parametrize(("credit", "seen", "told"), [(1.0, 6, 6), (0.5, 6, 3), (0.5, 14, 7), (0.0, 6, 0)])
+def test_an_unseen_track_is_reported_for_a_share_of_the_time_it_was_seen(credit, seen, told):
+    config = BlobConfig(confirm_ratio=2.0, report_coast=2.0, coast_time=3.0, report_delay=0.0, report_credit=credit)
+    made = run([at((100, 200))] * seen + [[]] * 20, config)
+    assert [len(t.id) for t in made] == [1] * (seen + told) + [0] * (20 - told)
 
 
 def test_an_unseen_track_on_its_way_out_is_not_reported():
