@@ -131,7 +131,7 @@ def test_crossings_and_queues_of_tracks():
     still = [walk((5, (-1, 0)), (7, (0, 0)), start=(5 + 0.8 * k, 0)) for k in range(3)]
     (row,) = [e for e in events(derive(tracks(still), FPS)) if e[1] == "queue"]
     assert row[2] == 51
-    assert row[0] == 51 + 50 - 1
+    assert row[0] == 51 + 30 + 30 - 1, "3 s, and 3 s more until waiting is told from advancing"
 
 
 def test_who_joins_as_they_come_is_no_merge():
