@@ -125,11 +125,16 @@ class Script:
 
     # each frame
 
-    def advance(self, frame: int, t: float, state: Array) -> None:
-        """Fire what is due at time t, serve the queues, let those who have arrived stand in a circle."""
+    def advance(self, frame: int, t: float, state: Array) -> bool:
+        """Fire what is due at time t, serve the queues, let those who have arrived stand in a circle.
+
+        Whether anything may have changed that `fill` writes.
+        """
+        changed = bool(self.lines)
         for pending in self.pending:
             if pending.fired is None and pending.is_due(t, state, self):
                 self._fire(pending, frame, state)
+                changed = True
             elif pending.fired is not None and pending.true_at is None:
                 pending.watch(t, self.scenario.camera.fps, has_come_true(pending, state, self))
         for k, line in self.lines.items():
@@ -137,6 +142,8 @@ class Script:
         for g in np.flatnonzero(self.groups.arrived):
             if int(g) not in self.settled and self.groups.finish[g] == STAND:
                 self._stand(int(g), state)
+                changed = True
+        return changed
 
     def _stand(self, g: int, state: Array) -> None:
         self.settled.add(g)
