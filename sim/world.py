@@ -20,7 +20,7 @@ from scenarios.schema import Scenario
 from sim.cast import BODY_RADIUS, Party, cast
 from sim.navigation import Navigator, scene_of
 from sim.script import Script
-from sim.steering import Groups, Obstacles, People, Steering
+from sim.steering import LEAVE, Groups, Obstacles, People, Steering
 from sim.types import Array, Ints, Motion, Scene
 from sim.wander import wander
 
@@ -61,6 +61,8 @@ class World:
         self.space = _space(self.scene)
         self.bodies: dict[int, pymunk.Body] = {}
         self.columns = np.zeros(0, np.int64)
+        self.everybody = np.full((len(self.members), 4), np.nan)
+        self.group_of = np.full(len(self.members), -1, np.int64)
         self.people = People.empty(0)
         self.state = np.zeros((0, 4))
         self.force = np.zeros((0, 2))
@@ -76,10 +78,13 @@ class World:
         return self._motion(record, intent)
 
     def frames(self, length: int) -> Iterator[tuple[Array, Ints]]:
-        """After the warm-up, for each of `length` frames: (P, 4) x, y, vx, vy and (P,) group; nan, -1 where absent."""
+        """After the warm-up, `length` times (P, 4) x, y, vx, vy and (P,) group, nan and -1 where absent.
+
+        Both are filled anew for the next frame.
+        """
         from sim.forces import accelerate
 
-        warm, p = round(self.scenario.warmup * self.fps), len(self.members)
+        warm = round(self.scenario.warmup * self.fps)
         noise = wander([m.key for m in self.members], warm + length, self.fps, self.seed, self.repeat)
         for f in range(-warm, length):
             if f > -warm:
@@ -88,18 +93,18 @@ class World:
             self._come_and_go(t, f == -warm)
             if f < 0:
                 continue
-            state, group = np.full((p, 4), np.nan), np.full(p, -1, np.int64)
-            state[self.columns], group[self.columns] = self.state, self.script.group_of[self.columns]
-            self.script.advance(f, t, state)
-            self._retag()
-            yield state, group
+            self.everybody[self.columns] = self.state
+            self.group_of[self.columns] = self.script.group_of[self.columns]
+            if self.script.advance(f, t, self.everybody):
+                self._retag()
+            yield self.everybody, self.group_of
 
     def _advance(self, accelerate: Any, noise: Array) -> None:
         """One frame: `substeps` of forces, physics and reading back."""
         n = len(self.columns)
         if n == 0:
             return
-        self.people.wander[:] = noise[self.columns]
+        noise.take(self.columns, axis=0, out=self.people.wander, mode="clip")
         out = self.force[:n]
         for _ in range(self.substeps):
             if not accelerate(
@@ -128,7 +133,8 @@ class World:
         return np.frombuffer(self._get.float_buf()).reshape(-1, 4)
 
     def _come_and_go(self, t: float, first: bool) -> None:
-        gone = self.script.leaving(self.columns) if self.groups.arrived.any() else []
+        out = self.groups.arrived & (self.groups.finish == LEAVE)
+        gone = self.script.leaving(self.columns) if out.any() else []
         coming = [party for party in self.script.waiting if (party.enter <= 0 if first else party.enter <= t)]
         coming = [party for party in coming if first or self._has_room(party)]
         if not gone and not coming:
@@ -182,6 +188,7 @@ class World:
         self._put.set_float_buf(self.force)
         self.state = self._read()[:n]
         self.people = People.empty(n)
+        self.everybody[:], self.group_of[:] = np.nan, -1
         self._retag()
 
     def _retag(self) -> None:

@@ -1,6 +1,7 @@
 """Run JuPedSim's collision-free speed model; for an environment of its own (pip install jupedsim numpy).
 
-usage: python run_jupedsim.py < LAYOUT.json      {"start": [[x, y]…], "goal", "speed", "size", "margin", "dt", "steps"}
+usage: python run_jupedsim.py < LAYOUT.json
+LAYOUT: {"start": [[x, y]…], "goal", "speed", "size", "margin", "dt", "steps", "episodes"}
 
 Needs nothing of flockscope. An open square with a wall `margin` m round it, everybody on the way to a goal of his own,
 all positions read into an array after every step. Prints {"people", "steps", "seconds"}: CPU seconds in the loop of
@@ -34,15 +35,16 @@ def build(scene):
 
 def main():
     logging.disable(logging.CRITICAL)
-    scene = json.load(sys.stdin)
-    simulation = build(scene)
-    simulation.iterate()
-    begin = time.process_time()
-    for _ in range(scene["steps"]):
+    scene, seconds = json.load(sys.stdin), 0.0
+    for _ in range(scene["episodes"]):
+        simulation = build(scene)
         simulation.iterate()
-        positions = np.array([agent.position for agent in simulation.agents()])
-    seconds = time.process_time() - begin
-    print(json.dumps({"people": len(positions), "steps": scene["steps"], "seconds": seconds}))
+        begin = time.process_time()
+        for _ in range(scene["steps"]):
+            simulation.iterate()
+            positions = np.array([agent.position for agent in simulation.agents()])
+        seconds += time.process_time() - begin
+    print(json.dumps({"people": len(positions), "steps": scene["steps"] * scene["episodes"], "seconds": seconds}))
 
 
 if __name__ == "__main__":
