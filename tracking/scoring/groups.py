@@ -180,7 +180,7 @@ def _correct(compared: Compared, i: Ints, j: Ints) -> tuple[Bools, Bools]:
     common = compared.shared.of(i, j)
     part, whole = CORRECT
     right = whole * common >= part * compared.true.count[i]
-    clean = right & (whole * common >= part * compared.est.count[j]) & (common > 0)
+    clean = right & (whole * common >= part * compared.est.count[j])
     return right, clean
 
 

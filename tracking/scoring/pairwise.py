@@ -4,25 +4,23 @@ from __future__ import annotations
 
 import numpy as np
 
-from sim.types import Array, Bools, Ints
+from sim.types import Array, Ints
 from tracking.scoring.groups import group_of
 from tracking.scoring.pairs import Rows, compare
 from tracking.scoring.sides import Crowd
 
 
-def pairwise_scores(true: Crowd, est: Crowd, stands_for: Ints, frames: Bools) -> dict[str, float]:
-    """F1, precision, recall of pairs over the frames f with frames[f], pooled.
+def pairwise_scores(true: Crowd, est: Crowd, stands_for: Ints) -> dict[str, float]:
+    """F1, precision, recall of pairs, those of all frames together.
 
     stands_for: the true person's row of each of est's members, -1 unmapped: such pairs are false, and those of a true
     person whom nobody stands for are missed.
     """
-    there = _pairs_in(true, frames)
+    there = _pairs_in(true)
     group = group_of(true, int(max(true.who.max(initial=-1), stands_for.max(initial=-1))) + 1)
-    kept = frames[est.rows.frame[est.of]]
-    of, person = est.of[kept], stands_for[kept]
-    order = np.argsort(of, kind="stable")
-    person = person[order]
-    inside = Rows(of[order], order)  # what lies in one "frame" here is in one group
+    order = np.argsort(est.of, kind="stable")
+    person = stands_for[order]
+    inside = Rows(est.of[order], order)  # what lies in one "frame" here is in one group
 
     def ordered(a: Ints, b: Ints) -> tuple[Ints, Array]:
         kept = np.flatnonzero((person[a] >= 0) & (person[a] < person[b]))
@@ -31,7 +29,7 @@ def pairwise_scores(true: Crowd, est: Crowd, stands_for: Ints, frames: Bools) ->
     both = compare(inside, inside, ordered)
     pairs = np.stack([person[both.i], person[both.j]])
     distinct = np.unique(pairs, axis=1)  # groups without members may overlap: a pair inside both is one pair
-    said = _pairs_in(est, frames) - (pairs.shape[1] - distinct.shape[1])
+    said = _pairs_in(est) - (pairs.shape[1] - distinct.shape[1])
     p, q = distinct
     hits = int(((group[p] >= 0) & (group[p] == group[q])).sum())
     return {
@@ -41,6 +39,6 @@ def pairwise_scores(true: Crowd, est: Crowd, stands_for: Ints, frames: Bools) ->
     }
 
 
-def _pairs_in(groups: Crowd, frames: Bools) -> int:
-    n = groups.count[frames[groups.rows.frame]]
+def _pairs_in(groups: Crowd) -> int:
+    n = groups.count
     return int((n * (n - 1) // 2).sum())

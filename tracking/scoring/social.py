@@ -54,7 +54,7 @@ def social_scores(case: Labelled, by: GroupMatch) -> dict[str, float]:
     """Scores by key; those that the truth's labels do not allow are missing."""
     ours, comparable = true_groups(case)
     told = told_groups(case)
-    found = pairwise_scores(ours, told.counted, told.who, case.frames)
+    found = pairwise_scores(ours, told.counted, told.who)
     shared = shared_members(ours, told.counted, told.who, len(case.true.rows))
     if comparable:
         compared = compare_groups(ours, told.counted, shared, "hull")

@@ -129,6 +129,34 @@ def test_a_beginning_is_scored_as_if_it_were_all() -> None:
     assert middle["TP"] + middle["FN"] == ((true.frame > 50) & (true.frame <= 100)).sum()
 
 
+def test_a_beginning_is_not_told_what_comes_later() -> None:
+    """Groups that are derived for scoring (a crossing is known 2 s after it) do not look beyond the frames scored."""
+    sequence = simulate(load("cross"), 5)
+    (crossing,) = (e for e in sequence.truth.events if e.kind == "cross")
+    bare = [t.replace(group=np.full_like(t.id, -1), groups=None, events=()) for t in track("blob", sequence)]
+    for last in (crossing.end + 3, crossing.end + 30):
+        found, expected = (
+            evaluate(sequence.truth, bare, frames=last),
+            evaluate(sequence.truth, bare[:last], frames=last),
+        )
+        assert dict(found) == pytest.approx(dict(expected), abs=1e-12, nan_ok=True)
+
+
+def test_errors_of_places() -> None:
+    # Four frames. Person 1 is told 0.3 m off, person 2 0.4 m off in two of them and in none of the others, where
+    # somebody 9 m away is told instead once. RMSE² = (4 x 0.09 + 2 x 0.16)/6. GOSPA² = that sum / 4 frames + 2 missed
+    # and 1 false at 2²/2 each / 4.
+    near = Scene({1: (0.3, 0.0), 2: (1.0, 0.4)})
+    est = [near, near, Scene({1: (0.0, 0.3)}), Scene({1: (0.0, 0.3), 2: (9.0, 0.0)})]
+    found = evaluate(truth([Scene(TWO)] * 4), tracks(est))
+    assert found["RMSE_pos"] == pytest.approx((0.68 / 6) ** 0.5, abs=1e-12)
+    assert found["RMSE_vel"] == 0
+    assert found["GOSPA_localisation"] == pytest.approx((0.68 / 4) ** 0.5, abs=1e-12)
+    assert found["GOSPA_missed"] == pytest.approx(1, abs=1e-12)
+    assert found["GOSPA_false"] == pytest.approx(0.5**0.5, abs=1e-12)
+    assert found["GOSPA"] == pytest.approx((0.17 + 1 + 0.5) ** 0.5, abs=1e-12)
+
+
 def test_frames_without_an_answer_are_empty() -> None:
     scene = [Scene(TWO, {1: ((1, 2), None)})] * 4
     found = evaluate(truth(scene), [t for t in tracks(scene) if t.index != 2])

@@ -170,8 +170,8 @@ def test_of_equal_matchings_by_members_the_nearer():
     # {1, 2, 3, 4} is told in halves: Jaccard 2/4 each. The half whose middle is nearer is the match, in either order.
     people = {k: (float(k), 0.0) for k in range(1, 5)}
     true = [Scene(people, {1: ((1, 2, 3, 4), (0, -1, 4, 1))})]
-    for a, b in ((7, 8), (8, 7)):
-        halves = {a: ((1, 2), (0, -1, 2, 1)), b: ((3, 4), (2, -1, 6, 1))}
+    near_one, far_one = ((1, 2), (0, -1, 2, 1)), ((3, 4), (2, -1, 6, 1))
+    for halves in ({7: near_one, 8: far_one}, {7: far_one, 8: near_one}):
         assert scores(true, [Scene(people, halves)], group_match="members")["group_MOTP"] == near(1)
 
 
@@ -257,6 +257,10 @@ def test_frames_without_labels_do_not_count():
     true = truth([right] * 3, labelled=np.array([True, False, True]))
     found = evaluate(true, tracks([right, wrong, right]))
     assert (found["group_TP"], found["group_FP"], found["pairwise_F1"]) == (2, 0, 1)
+    # Nor are they frames without errors: one false group in the one frame that is known.
+    known = truth([right] * 3, labelled=np.array([False, True, False]))
+    found = evaluate(known, tracks([right, wrong, right]))
+    assert found["group_1-FP_frames"] == found["group_1-FP_frames_core"] == 0
 
 
 def test_in_the_image_the_hulls_of_the_image_are_compared():
