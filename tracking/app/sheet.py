@@ -8,8 +8,9 @@ import cv2
 import numpy as np
 
 from scenarios.errors import InputError, WorkError
-from sim.types import Array, GroupEvent, Image, Ints, Scene, Sequence, Truth
+from sim.types import Array, GroupEvent, Image, Ints, Sequence, Truth
 from tracking.app import sheet_panel
+from tracking.app.extent import MARGIN, peopled
 from tracking.app.sheet_panel import INK, QUIET, THING, Colour, View, colour, text
 
 # Merges and splits are what a scenario is about; entering and leaving come last.
@@ -19,7 +20,6 @@ WIDTH, HEAD, FOOT, GAP, TITLE = 880, 76, 96, 20, 40
 """px before shrinking: a panel's width; the sheet's head and foot; gaps; a panel's title."""
 
 MANY = 40
-MARGIN = 1.0
 SOON = 1.0
 """s: events that begin so close to one another share a picture."""
 
@@ -120,23 +120,13 @@ def _bounds(sequence: Sequence, truth: Truth) -> tuple[Array, Array]:
     if truth.pos is None and sequence.image_size is not None:
         return np.zeros(2), np.array(sequence.image_size, float)
     if truth.pos is not None and sequence.scene is not None:
-        return _peopled(sequence.scene, truth.pos)
+        return peopled(sequence.scene, truth.pos)
     places = _places(truth)
     if truth.pos is None and truth.box is not None:
         places = np.concatenate([truth.box[:, :2], truth.box[:, :2] + truth.box[:, 2:]])
     places = places[np.isfinite(places).all(axis=1)]
     margin = MARGIN if truth.pos is not None else 0.0
     return places.min(axis=0) - margin, places.max(axis=0) + np.maximum(margin, 1e-3)
-
-
-def _peopled(scene: Scene, pos: Array) -> tuple[Array, Array]:
-    """The part of a world in which people are, with all but its walls, and some room."""
-    things = [pos, scene.pillars[:, :2], scene.doors.reshape(-1, 2), scene.service]
-    things += [end[None] for flight in scene.stairs for end in (flight.foot, flight.head)]
-    places = np.concatenate([thing.reshape(-1, 2) for thing in things])
-    places = places[np.isfinite(places).all(axis=1)]
-    low, high = places.min(axis=0) - 2 * MARGIN, places.max(axis=0) + 2 * MARGIN
-    return np.maximum(low, np.minimum(0, low + MARGIN)), np.minimum(high, np.maximum(scene.size, high - MARGIN))
 
 
 def _panel(area: Image, sequence: Sequence, truth: Truth, index: int, low: Array, high: Array) -> None:

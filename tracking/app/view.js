@@ -134,16 +134,30 @@ function buildHead() {
   if (truth) about.push(`${new Set(truth.id).size} true people`);
   if (tracks) about.push(`${new Set(tracks.id).size} ${tracks.hull ? "groups" : "people"} by ${data.tracker}`);
   $("about").textContent = about.join(" · ");
-  $("scores").replaceChildren(...data.scores.map(([key, value]) => {
-    const item = document.createElement("div");
-    item.append(tag("dt", key), tag("dd", value === null ? "–" : Math.abs(value) < 100 ? value.toFixed(3) : value.toFixed(0)));
-    return item;
-  }));
-  const note = tracks && truth ? "true: bodies, solid · tracked: rings, dashed" : "";
+  buildScores();
+  const note = tracks && truth ? "true: bodies, solid, ids upright · tracked: rings, dashed, ids slanted" : "";
   $("plan-note").textContent = hasPlan ? note : "";
   $("image-note").textContent = hasImage && tracks && truth ? "true: solid · tracked: dashed · detected: dotted" : "";
   $("plan-stage").hidden = !hasPlan;
   $("image-stage").hidden = !hasImage;
+}
+
+function buildScores() {
+  const families = new Map();
+  for (const [key, value, meaning, family] of data.scores) {
+    const item = document.createElement("div");
+    item.title = meaning;
+    item.append(tag("dt", key), tag("dd", value));
+    families.set(family, [...(families.get(family) || []), item]);
+  }
+  $("scores").replaceChildren(...(families.get("") || []));
+  families.delete("");
+  $("all-scores").hidden = !families.size;
+  $("all-scores").lastElementChild.replaceChildren(...[...families].flatMap(([family, items]) => {
+    const list = document.createElement("dl");
+    list.append(...items);
+    return [tag("h3", family), list];
+  }));
 }
 
 function buildControls() {

@@ -15,11 +15,11 @@ import numpy as np
 from scenarios.errors import WorkError
 from sim.types import Sequence, Tracks, Truth
 from tracking.app import view_data
+from tracking.app.extent import MARGIN, peopled
 from tracking.app.view_data import Json, Rows
 
 HERE = Path(__file__).parent
 SCRIPTS = ("view_data.js", "view_draw.js", "view_plan.js", "view_image.js", "view_time.js", "view.js")
-MARGIN = 1.0
 
 
 def view(
@@ -79,8 +79,19 @@ def payload(sequence: Sequence, tracks: SequenceOf[Tracks] | None, scores: Mappi
         "detections": found,
         "unlabelled": _unlabelled(truth),
         "near": _near(truth),
-        "scores": [[key, value if math.isfinite(value) else None] for key, value in (scores or {}).items()],
+        "scores": _scores(scores or {}),
     }
+
+
+def _scores(scores: Mapping[str, float]) -> list[list[str]]:
+    """[key, value, meaning, family] of every score of the catalogue that is known; before them, with the family "",
+    the few that stand for all."""
+    from tracking.app.score_tables import SHOWN, number
+    from tracking.scoring.catalogue import CATALOGUE
+
+    known = {key: number(key, scores[key]) for key in CATALOGUE if math.isfinite(scores.get(key, math.nan))}
+    few = [[key, known[key], CATALOGUE[key].meaning, ""] for key in SHOWN if key in known]
+    return few + [[key, text, CATALOGUE[key].meaning, CATALOGUE[key].family] for key, text in known.items()]
 
 
 def _derived(tracks: SequenceOf[Tracks], sequence: Sequence, truth: Truth | None) -> SequenceOf[Tracks]:
@@ -121,15 +132,16 @@ def _image_size(sides: list[Rows]) -> list[int] | None:
 
 
 def _bounds(sequence: Sequence, sides: list[Rows]) -> list[float] | None:
-    """x0, y0, x1, y1 of the plan in m: the world's, else what the people need; None without ground."""
+    """x0, y0, x1, y1 of the plan in m: what people and things need; None without ground."""
     points = [rows.pos for rows in sides if rows.plane == "ground" and len(rows.pos)]
     known = np.concatenate(points) if points else np.zeros((0, 2))
     known = known[np.isfinite(known).all(axis=1)]
     if sequence.scene is not None:
-        return [0.0, 0.0, *sequence.scene.size.tolist()]
-    if not len(known):
+        low, high = peopled(sequence.scene, known)
+    elif len(known):
+        low, high = known.min(axis=0) - MARGIN, known.max(axis=0) + MARGIN
+    else:
         return None
-    low, high = known.min(axis=0) - MARGIN, known.max(axis=0) + MARGIN
     return [round(float(v), 2) for v in (*low, *high)]
 
 

@@ -74,8 +74,8 @@ function strokeLine(ctx, points) {
   ctx.stroke();
 }
 
-function label(ctx, text, x, y, colour, bold) {
-  ctx.font = `${bold ? "700 13px" : "600 11px"} system-ui, sans-serif`;
+function label(ctx, text, x, y, colour, bold, slanted) {
+  ctx.font = `${slanted ? "italic " : ""}${bold ? "700 13px" : "600 11px"} system-ui, sans-serif`;
   ctx.textAlign = "center";
   ctx.lineJoin = "round";
   ctx.lineWidth = 3;
@@ -84,6 +84,25 @@ function label(ctx, text, x, y, colour, bold) {
   ctx.strokeText(text, x, y);
   ctx.fillStyle = colour;
   ctx.fillText(text, x, y);
+}
+
+// A name at whichever of some places (middles, the best first) covers the least of what is `taken` (boxes).
+function name(ctx, taken, text, spots, colour, slanted) {
+  ctx.font = `${slanted ? "italic " : ""}600 11px system-ui, sans-serif`;
+  const half = [ctx.measureText(text).width / 2 + 1, 6];
+  let best = null, least = Infinity;
+  for (const [x, y] of spots(half)) {
+    const box = [x - half[0], y - half[1], x + half[0], y + half[1]];
+    const covered = taken.reduce((sum, other) => sum + shared(box, other), 0);
+    if (covered < least) [best, least] = [box, covered];
+    if (!least) break;
+  }
+  taken.push(best);
+  label(ctx, text, best[0] + half[0], best[3] - 2, colour, false, slanted);
+}
+
+function shared(a, b) {
+  return Math.max(Math.min(a[2], b[2]) - Math.max(a[0], b[0]), 0) * Math.max(Math.min(a[3], b[3]) - Math.max(a[1], b[1]), 0);
 }
 
 // Fills and outlines the current path as the region of a group; what is tracked is dashed, what is true is not.

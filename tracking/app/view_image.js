@@ -7,7 +7,7 @@ function drawImage(canvas, frame, options) {
   const w = width / parts.length, scale = w / imageWidth;
   parts.forEach((shown, k) => {
     const title = parts.length > 1 ? shown[0].name : "";
-    inPane(ctx, k * w, 0, w, height, title, () => imagePane({ ctx, scale, frame, options }, shown));
+    inPane(ctx, k * w, 0, w, height, title, () => imagePane({ ctx, scale, frame, options, taken: [] }, shown));
   });
 }
 
@@ -24,7 +24,7 @@ function boxOf(source, row, scale) {
   return Number.isNaN(box[0]) ? null : box;
 }
 
-function imageBoxes({ ctx, scale, frame, options }, side) {
+function imageBoxes({ ctx, scale, frame, options, taken }, side) {
   const rows = side.rows(frame), tracked = side.name === "tracks";
   const ids = options.ids && rows.length <= MANY;
   for (const row of rows) {
@@ -40,8 +40,10 @@ function imageBoxes({ ctx, scale, frame, options }, side) {
       ctx.fillStyle = colour;
       ctx.fillRect(...box);
       ctx.globalAlpha = 1;
-      const y = tracked ? box[1] + box[3] + 12 : box[1] - 4;
-      if (ids) label(ctx, side.id[row], box[0] + box[2] / 2, y, colour);
+      const y = tracked ? box[1] + box[3] + 8 : box[1] - 8, away = tracked ? 12 : -12;
+      const places = [0.5, 0, 1].map(share => [box[0] + share * box[2], y]);
+      const spots = () => [...places, ...places.map(([x]) => [x, y + away])];
+      if (ids) name(ctx, taken, side.id[row], spots, colour, tracked);
     } else if (side.plane === "image" && !side.hull) {
       ctx.beginPath();
       ctx.arc(side.x[row] * scale, side.y[row] * scale, 6, 0, 2 * Math.PI);
@@ -52,7 +54,7 @@ function imageBoxes({ ctx, scale, frame, options }, side) {
   ctx.setLineDash([]);
 }
 
-function imageHulls({ ctx, scale, frame, options }, side) {
+function imageHulls({ ctx, scale, frame, options, taken }, side) {
   const tracked = side.name === "tracks";
   for (const [id, rows] of groupsAt(side, frame)) {
     const points = [];
@@ -69,6 +71,7 @@ function imageHulls({ ctx, scale, frame, options }, side) {
     const x = points.reduce((a, p) => a + p[0], 0) / points.length;
     const y = tracked ? Math.max(...points.map(p => p[1])) + 24 : Math.min(...points.map(p => p[1])) - 18;
     label(ctx, (tracked ? "T" : "G") + id, x, Math.max(y, 14), colourOf(id), true);
+    taken.push([x - 10, Math.max(y, 14) - 12, x + 10, Math.max(y, 14) + 2]);
   }
 }
 

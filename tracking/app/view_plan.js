@@ -25,12 +25,14 @@ function planPane(ctx, width, height, shown, frame, options) {
   ctx.fillRect(0, 0, width, height);
   grid(ctx, map, scale);
   if (data.scene) scene(ctx, map, scale);
-  const plan = { ctx, map, scale, frame, options };
+  const plan = { ctx, map, scale, frame, options, taken: [] };
   for (const side of shown) if (side.plane === "ground" && options.hulls) planHulls(plan, side);
   if (options.near && truth && shown.includes(truth)) nearLines(plan);
   for (const side of shown) if (side.plane === "ground" && options.trails) planTrails(plan, side);
   if (options.detections && found && found.plane !== "image") planDetections(plan);
-  for (const side of shown) if (side.plane === "ground") planPeople(plan, side);
+  const grounded = shown.filter(side => side.plane === "ground" && !(side.hull && options.hulls));
+  for (const side of grounded) planPeople(plan, side);
+  if (options.ids) planNames(plan, grounded.filter(side => side.rows(frame).length <= MANY));
 }
 
 function grid(ctx, map, scale) {
@@ -109,6 +111,7 @@ function planHulls(plan, side) {
     const mid = points.reduce((a, p) => a + p[0], 0) / points.length;
     const edge = tracked ? Math.max(...points.map(p => p[1])) + 0.45 * scale + 15 : Math.min(...points.map(p => p[1])) - 0.35 * scale - 7;
     label(ctx, (tracked ? "T" : "G") + id, mid, edge, colourOf(id), true);
+    plan.taken.push([mid - 10, edge - 12, mid + 10, edge + 2]);
   }
 }
 
@@ -153,17 +156,30 @@ function planDetections(plan) {
 }
 
 function planPeople(plan, side) {
-  const rows = side.rows(plan.frame);
-  const ids = plan.options.ids && rows.length <= MANY;
-  for (const row of rows) {
+  for (const row of side.rows(plan.frame)) {
     const at = place(plan, side, row);
-    if (Number.isNaN(at[0]) || (side.hull && plan.options.hulls)) continue;
+    if (Number.isNaN(at[0])) continue;
     const colour = rowColour(side, row, plan.options.by);
     if (side.name === "truth") body(plan, side, row, at, colour);
     else ring(plan, side, row, at, colour);
-    if (!ids) continue;
-    const off = Math.max(BODY.shoulder * plan.scale, 5) + 4, sign = side.name === "truth" ? 1 : -1;
-    label(plan.ctx, side.id[row], at[0] + sign * off, at[1] + sign * off * 0.8 + 4, colour);
+  }
+}
+
+const ROUND = [[1, 1], [1, -1], [-1, 1], [-1, -1], [0, 1], [1, 0], [-1, 0], [0, -1]];
+
+// Ids beside bodies and rings, true upright and tracked slanted, clear of one another where there is room.
+function planNames(plan, shown) {
+  const r = Math.max(BODY.shoulder * plan.scale, 6), here = [];
+  for (const side of shown) for (const row of side.rows(plan.frame)) here.push([side, row, place(plan, side, row)]);
+  const seen = here.filter(([, , at]) => !Number.isNaN(at[0]));
+  for (const [, , [u, v]] of seen) plan.taken.push([u - r, v - r, u + r, v + r]);
+  for (const [side, row, [u, v]] of seen) {
+    const tracked = side.name === "tracks", sign = tracked ? -1 : 1;
+    const spots = half => ROUND.map(([p, q]) => {
+      const near = p && q ? 0.75 * r : r + 1;
+      return [u + sign * p * (near + half[0]), v + sign * q * (near + half[1])];
+    });
+    name(plan.ctx, plan.taken, side.id[row], spots, rowColour(side, row, plan.options.by), tracked);
   }
 }
 
