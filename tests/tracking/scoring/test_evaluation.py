@@ -131,14 +131,15 @@ def test_a_beginning_is_scored_as_if_it_were_all() -> None:
 
 def test_a_beginning_is_not_told_what_comes_later() -> None:
     """Groups that are derived for scoring (a crossing is known 2 s after it) do not look beyond the frames scored."""
-    sequence = simulate(load("cross"), 5)
-    (crossing,) = (e for e in sequence.truth.events if e.kind == "cross")
-    bare = [t.replace(group=np.full_like(t.id, -1), groups=None, events=()) for t in track("blob", sequence)]
+    true = simulate(load("cross"), 5).truth
+    (crossing,) = (e for e in true.events if e.kind == "cross")
+    alone = [np.full(len(true.at(index).id), -1) for index in range(1, true.length + 1)]
+    bare = [
+        t.replace(group=group, groups=None, events=()) for t, group in zip(truth_as_tracks(true), alone, strict=True)
+    ]
     for last in (crossing.end + 3, crossing.end + 30):
-        found, expected = (
-            evaluate(sequence.truth, bare, frames=last),
-            evaluate(sequence.truth, bare[:last], frames=last),
-        )
+        found, expected = evaluate(true, bare, frames=last), evaluate(true, bare[:last], frames=last)
+        assert found["cross_TP"] == 1
         assert dict(found) == pytest.approx(dict(expected), abs=1e-12, nan_ok=True)
 
 
