@@ -15,7 +15,7 @@ from typing import Any, cast, overload
 import numpy as np
 
 from scenarios.errors import FlockscopeError, InputError, WorkError
-from sim.types import Context, DetectionMode, Frame, Sequence, Tracker, Tracks
+from sim.types import Context, DetectionMode, Detections, Frame, Sequence, Tracker, Tracks
 from tracking import protocol
 from tracking.config import Config
 
@@ -191,11 +191,16 @@ def _feed(
     if mode == "image" or (mode == "file" and "pixels" in needs):
         return None
     if mode == "file":
-        return tuple(Frame(f.index, f.t, detections=f.detections) for f in sequence)
-    from tracking.labelled import from_truth
+        found: list[Detections | None] = [f.detections for f in sequence]
+    else:
+        from tracking.labelled import from_truth
 
-    found = from_truth(sequence, sensor, seed)
-    return tuple(Frame(d.index, d.t, detections=d) for d in found)
+        found = list(from_truth(sequence, sensor, seed))
+    given = [d for d in found if d is not None and len(d.pos)]
+    if given and "points" not in needs and all(d.box is None for d in given):
+        got, remedy = f"points alone, in {sequence.name}", "take a tracker that takes points"
+        raise InputError(place=f"--detections {mode}", got=got, expected="boxes", remedy=remedy)
+    return tuple(Frame(k, (k - 1) / sequence.fps, detections=d) for k, d in enumerate(found, 1))
 
 
 def _px_per_m(sequence: Sequence, mode: DetectionMode, feed: tuple[Frame, ...] | None) -> float:

@@ -408,3 +408,12 @@ def test_options_without_effect_are_refused_for_recordings(made, tmp_path, capsy
     for name, option, value in given:
         line = ["track", "blob", str(tmp_path / name), "--out", str(tmp_path / "t"), option, str(value)]
         assert option in refused(line, capsys)
+
+
+def test_points_for_a_tracker_of_boxes(tmp_path, capsys):
+    """Said before a frame is read."""
+    (tmp_path / "det.txt").write_text("1,-1,-1,-1,-1,-1,0.9,2,3,0\n")
+    line = ["track", "blob", str(tmp_path / "det.txt"), "--fps", "10", "--out", str(tmp_path / "t")]
+    said = refused(line, capsys)
+    assert "points alone" in said
+    assert "boxes" in said
