@@ -17,15 +17,17 @@ from tracking.app.score_command import Row, score_run, summary
 from tracking.app.score_tables import SHOWN, number
 from tracking.app.track_command import Job
 from tracking.run import Run
+from tracking.scoring.catalogue import CATALOGUE
 
 SCENES = ("merge", "split", "cross", "pass-by", "queue", "side-by-side", "party", "mixed")
 SEEDS = range(40_000, 40_003)
 QUICK, QUICK_SEEDS = ("quick",), range(40_000, 40_001)
 
 STYLE = """
-body { font: 16px/1.5 system-ui, sans-serif; margin: 2rem auto; max-width: 60rem; padding: 0 1rem; color: #1b1f24 }
+body { font: 16px/1.5 system-ui, sans-serif; margin: 2rem auto; max-width: 76rem; padding: 0 1rem; color: #1b1f24 }
 table { border-collapse: collapse; margin: 0 0 2rem } th, td { padding: .25rem .8rem; text-align: right }
-th:first-child, td:first-child { text-align: left } thead th { border-bottom: 2px solid #1b1f24 }
+th:first-child, td:first-child { text-align: left; white-space: nowrap }
+th[title] { text-decoration: underline dotted #8a8f98; cursor: help } thead th { border-bottom: 2px solid #1b1f24 }
 tfoot td { border-top: 1px solid #8a8f98; font-weight: 600 } small { color: #57606a; font-weight: 400 }
 """
 
@@ -114,11 +116,17 @@ def _table(part: Part, root: Path) -> str:
     means = summary(part.rows)
     ends = [_interval(key, means[key]) for key in keys]
     foot = _cells("td", ["mean<br><small>95 % interval</small>", *ends])
-    head = _cells("th", ["sequence", *keys])
+    head = "<tr><th>sequence</th>" + "".join(map(_heading, keys)) + "</tr>"
     return (
         f"<h2>{escape(part.tracker)}</h2><table><thead>{head}</thead><tbody>{''.join(rows)}</tbody>"
         f"<tfoot>{foot}</tfoot></table>"
     )
+
+
+def _heading(key: str) -> str:
+    about = CATALOGUE[key]
+    unit = f" [{about.unit}]" if about.unit not in ("1", "count") else ""
+    return f'<th title="{escape(about.meaning)}">{escape(key)}{unit}</th>'
 
 
 def _interval(key: str, mean: dict[str, float]) -> str:

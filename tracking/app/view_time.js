@@ -134,4 +134,10 @@ function legend(box) {
     item.append(svg, KINDS[kind].word);
     return item;
   }));
+  if (!data.unlabelled.length) return;
+  const item = document.createElement("span");
+  const svg = element("svg", { width: 14, height: 14, "aria-hidden": "true" });
+  element("rect", { width: 14, height: 14, fill: theme.thing, opacity: 0.18 }, svg);
+  item.append(svg, "groups not labelled");
+  box.append(item);
 }
