@@ -137,7 +137,7 @@ def test_a_beginning_is_not_told_what_comes_later() -> None:
     bare = [
         t.replace(group=group, groups=None, events=()) for t, group in zip(truth_as_tracks(true), alone, strict=True)
     ]
-    for last in (crossing.end + 3, crossing.end + 30):
+    for last in (crossing.end + 13, crossing.end + 30):
         found, expected = evaluate(true, bare, frames=last), evaluate(true, bare[:last], frames=last)
         assert found["cross_TP"] == 1
         assert dict(found) == pytest.approx(dict(expected), abs=1e-12, nan_ok=True)
