@@ -19,9 +19,17 @@ def number(value: Value, unit: str = "") -> str:
     if value.uniform is not None:
         return f"{value.uniform[0]:g} to {value.uniform[1]:g}{tail}"
     if value.choice is not None:
-        return " or ".join(f"{v:g}" for v in value.choice) + tail
+        return _choice(value.choice) + tail
     mean = value.exponential if value.exponential is not None else value.poisson
     return f"about {mean:g}{tail}{clip}"
+
+
+def _choice(values: tuple[float, ...]) -> str:
+    """`1 or 2`; with their shares where some are likelier: `1 (67 %) or 2 (33 %)`."""
+    times = {v: values.count(v) for v in values}
+    if len(set(times.values())) == 1:
+        return " or ".join(f"{v:g}" for v in times)
+    return " or ".join(f"{v:g} ({n / len(values):.0%})".replace("%", " %") for v, n in times.items())
 
 
 def place(point: Point) -> str:
@@ -42,10 +50,11 @@ def setting(scenario: Scenario) -> list[str]:
     held = [f"{len(rows)} {name}{'s' * (len(rows) > 1)}" for name, rows in things.items() if rows]
     turned = [] if scenario.turn_deg == 0.0 else [f"turned by {number(scenario.turn_deg)}°"]
     turned += ["mirrored by a coin"] * scenario.mirror
+    turned += [] if scenario.lead == 0.0 else [f"{number(scenario.lead, 's')} further on than it says"]
     view = "from above" if camera.kind == "top" else f"looking down {camera.tilt_deg:g}°"
     solved = "" if camera.height is not None or camera.px_per_m is not None else ", placed to see everybody"
     return [
-        f"{scenario.duration:g} s after {scenario.warmup:g} s of warm-up; the script is {' and '.join(turned)}"
+        f"{scenario.duration:g} s after {scenario.warmup:g} s of warm-up; the script is {', '.join(turned)}"
         if turned
         else f"{scenario.duration:g} s after {scenario.warmup:g} s of warm-up",
         f"world {world.size[0]:g} × {world.size[1]:g} m" + (": " + ", ".join(held) if held else ", empty"),

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from html import escape
 
 from scenarios import describe
@@ -38,8 +39,9 @@ def svg(scenario: Scenario) -> str:
         body += plan.course(course, colour[course.id])
     for mark in orders:
         body += plan.mark(mark, colour)
-    for course in ways:
-        body += plan.start(course, colour[course.id])
+    for k, course in enumerate(ways):
+        lift = sum(math.dist(course.points[0], other.points[0]) * plan.scale < 24 for other in ways[:k])
+        body += plan.start(course, colour[course.id], lift)
     body += plan.numbers(orders)
     script, bottom = _script(ways, orders, colour, plan.bottom + 26)
     head = (

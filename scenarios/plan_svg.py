@@ -111,8 +111,8 @@ class Plan:
             f'fill="{colour}" opacity=".15"/>'
         ]
 
-    def start(self, course: Course, colour: str) -> list[str]:
-        """Bodies at the start, at most a dozen, with the group's name and size."""
+    def start(self, course: Course, colour: str, lift: int = 0) -> list[str]:
+        """Bodies at the start, at most a dozen, with the group's name and size, `lift` lines further up."""
         at, parts = course.points[0], self._spread(course.points[0], course.spread[0], colour)
         n = min(max(round(course.people), 1), 12)
         reach = 0.0 if n == 1 else 0.75 / (2 * math.sin(math.pi / n))
@@ -123,7 +123,7 @@ class Plan:
             r = max(0.22 * self.scale, 3)
             parts.append(f'<circle cx="{u:.1f}" cy="{v:.1f}" r="{r:.1f}" fill="{colour}" stroke="#fff"/>')
         words = course.id + (f" ×{course.repeat}" if course.repeat > 1 else "") + f" ({course.people:.2g})"
-        dy = -(reach + 0.22) * self.scale - 6
+        dy = -(reach + 0.22) * self.scale - 6 - 15 * lift
         parts.append(self.label(at, words, 0, dy, f'class="halo" text-anchor="middle" style="fill:{colour}"'))
         return parts
 

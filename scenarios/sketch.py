@@ -29,6 +29,19 @@ class Sketch:
             if not over or self.cells[row][column + k] in over:
                 self.cells[row][column + k] = character
 
+    def name(self, at: XY, text: str) -> None:
+        """A name at a point, in the nearest row where it covers nothing but ways."""
+        column = min(max(int(at[0] * self.scale), 0), self.columns - len(text))
+        step = self.size[1] / self.rows
+        for shift in (0, -1, 1, -2, 2):
+            y = at[1] + shift * step
+            row = min(max(int((self.size[1] - y) / step), 0), self.rows - 1)
+            if set(self.cells[row][column : column + len(text)]) <= {" ", "·"}:
+                break
+        else:
+            y = at[1]
+        self.put((at[0], y), text)
+
     def line(self, a: XY, b: XY, character: str, over: str = "", gap: float = 0.5) -> None:
         """Characters along a segment, `gap` columns apart."""
         steps = max(int(math.dist(a, b) * self.scale / gap), 1)
@@ -66,7 +79,8 @@ def sketch(scenario: Scenario, columns: int = 64) -> str:
         plan.put(service, "▣")
     for course in ways:
         plan.put(course.points[-1], "◎")
-        plan.put(course.points[0], course.id.upper()[:8])
+    for course in ways:
+        plan.name(course.points[0], course.id.upper()[:8])
     for mark in orders:
         plan.put(mark.at, NUMBERS[(mark.number - 1) % len(NUMBERS)])
     return plan.text() + f"\n {world.size[0]:g} × {world.size[1]:g} m\n {LEGEND}"

@@ -81,11 +81,12 @@ def test_stairs_service_and_turn(path: Path) -> None:
             "world.service=[[15, 8]]",
             "turn_deg={uniform=[0, 360]}",
             "mirror=true",
+            "lead=2",
         ],
     )
     assert "≡≡" in text(scenario)
     assert "▣" in text(scenario)
-    assert "turned by 0 to 360° and mirrored" in text(scenario)
+    assert "turned by 0 to 360°, mirrored by a coin, 2 s further on" in text(scenario)
     assert {"stairs, +1.5 m", "service"} <= set(words_of(svg(scenario)))
 
 
@@ -109,12 +110,21 @@ def test_marks_follow_the_script(path: Path) -> None:
         (Distribution(normal=(2, 0.5), clip=(1.5, 2.5)), "2 ± 0.5 s (1.5 to 2.5)", 2, 0.5),
         (Distribution(uniform=(1, 5)), "1 to 5 s", 3, 2),
         (Distribution(choice=(-1, 1)), "-1 or 1 s", 0, 1),
+        (Distribution(choice=(1, 1, 1, 2)), "1 (75 %) or 2 (25 %) s", 1.25, 0.5),
         (Distribution(exponential=3), "about 3 s", 3, 6),
         (Distribution(poisson=1.1, clip=(2, 6)), "about 1.1 s (2 to 6)", 2, 2),
     ],
 )
 def test_values_in_words_and_their_extent(value, words, mid, half) -> None:  # type: ignore[no-untyped-def]
     assert (number(value, "s"), middle(value), spread(value)) == (words, mid, half)
+
+
+def test_names_in_a_sketch_cover_no_other_name_nor_goal(path: Path) -> None:
+    """Two groups from one place, and a third whose goal is there."""
+    scenario = load(path, ["group.a.start=[9, 5]", "group.b.start=[9, 5]", "group.w.goal=[9, 5]"])
+    drawing = text(scenario).split("┘")[0]
+    assert {"A", "B", "W"} <= set(drawing)
+    assert drawing.count("◎") >= 3
 
 
 def test_every_trigger_in_words(path: Path) -> None:
