@@ -15,6 +15,7 @@ from pathlib import Path
 import numpy as np
 
 from scenarios.errors import InputError
+from sim.groups import box_groups
 from sim.io.labels import label_truth
 from sim.io.velocity import differentiate
 from sim.types import Array, Frame, Ints, Sequence, Truth
@@ -134,7 +135,7 @@ def _row(path: Path, index: int, person: ET.Element, label: dict[int, int]) -> t
 
 
 def read_truth(path: Path, fps: float = FPS, px_per_m: float | None = None) -> Truth:
-    """The recording as truth in the image; hulls are of footprints round the boxes' centres."""
+    """The recording as truth in the image; hulls are of boxes, as those of anybody who tracks boxes there."""
     found = read_xml(path)
     scale = found.px_per_m if px_per_m is None else px_per_m
     box = np.concatenate([found.centre - found.size / 2, found.size], axis=1)
@@ -149,8 +150,9 @@ def read_truth(path: Path, fps: float = FPS, px_per_m: float | None = None) -> T
     known = label_truth(
         found.frame, found.id, found.label, found.centre, vel, fps=fps, length=found.length, px_per_m=scale
     )
-    known["groups_px"] = known.pop("groups")
-    return truth.replace(**known)
+    del known["groups"]  # of footprints: in the image nobody sees any
+    shapes = box_groups(found.frame, found.id, found.label, found.centre, vel, box, 1, found.length)
+    return truth.replace(groups_px=tuple(shapes), **known)
 
 
 def open_file(path: Path, *, fps: float | None = None, px_per_m: float | None = None) -> Sequence:
