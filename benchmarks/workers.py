@@ -1,9 +1,10 @@
 """Two workers against one: wall time of `flockscope generate`, CPU time, and the largest memory of any process.
 
-    PYTHONPATH=. python benchmarks/workers.py [--entry crowd] [--seeds 0:12] [--rounds 3]
+    PYTHONPATH=. python benchmarks/workers.py [--entry crowd] [--seeds 0:32] [--rounds 3]
 
-Rounds time both in turn, and the best of each counts: the machine should have two idle cores (the load is printed).
-The first sequence's time includes what a process costs to begin; --seeds must be long enough for it not to matter.
+Rounds time both in turn, and the best of each counts: the machine should have two idle cores (the load is printed). On
+a busy one 2 CPU_1 / CPU_2 tells what two idle cores could give at most. What a process costs to begin is in it, so
+--seeds must be many enough for it not to matter.
 Memory must not grow with the number of sequences: a quarter of the seeds is made too. Exit code 1 below 1.7 times.
 """
 
@@ -39,7 +40,7 @@ def run(entries: list[str], seeds: str, workers: int) -> tuple[float, float, flo
 def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--entry", nargs="+", default=["crowd"])
-    parser.add_argument("--seeds", default="0:12")
+    parser.add_argument("--seeds", default="0:32")
     parser.add_argument("--rounds", type=int, default=3)
     args = parser.parse_args()
     low, high = map(int, args.seeds.split(":"))
@@ -55,7 +56,8 @@ def main() -> int:
     print(f"| 1, a quarter of the seeds | {few[0]:.1f} | {few[1]:.1f} | {few[2]:.0f} |")
     speedup = best[0][0] / best[1][0]
     each = ", ".join(f"{one[0] / two[0]:.2f}" for one, two in found)
-    print(f"speed-up {speedup:.2f} (rounds: {each}); must be {MUST}, aim {AIM}")
+    possible = 2 * best[0][1] / best[1][1]
+    print(f"speed-up {speedup:.2f} (rounds: {each}), by CPU time at most {possible:.2f}; must be {MUST}, aim {AIM}")
     print(f"memory with four times the sequences: x{best[0][2] / few[2]:.2f}; must be at most {GROWTH}")
     return 0 if speedup >= MUST and best[0][2] <= GROWTH * few[2] else 1
 
