@@ -27,20 +27,18 @@ Vector = tuple[float, float]
 
 @dataclass(frozen=True, slots=True)
 class Line:
-    """A queue: first and last frame (from 0), columns of its people in the order in which they stood (whichever end
-    was the head), `left`: those who left it before the end, in the order of leaving; middle: where."""
+    """A queue: first and last frame (from 0), columns of its people in the order in which they came to stand (whichever
+    end was the head), `left`: those who left it before the end, in the order of leaving; middle: where.
+
+    fifo: whether all who left stood, when last in line, at one and the same end of it (next to none but such as left
+    within a second, too)."""
 
     first: int
     last: int
     order: tuple[int, ...]
     left: tuple[int, ...]
     middle: Vector
-
-    @property
-    def fifo(self) -> bool:
-        """Whether all who left did so in the order in which they stood, from one end."""
-        n = len(self.left)
-        return self.left in (self.order[:n], self.order[::-1][:n])
+    fifo: bool
 
 
 @dataclass(frozen=True, slots=True)
@@ -61,14 +59,14 @@ class _Moment:
 @dataclass
 class _Followed:
     """A line being followed. State: when last seen, and as what; since when and until when it had three people;
-    moments in it, last frame and last place of each person; sums of the velocity along and aside over moments."""
+    moments in it, last moment and rank of each person; sums of the velocity along and aside over moments."""
 
     now: _Moment
     since: int
     three: int
     middle: Vector
     seen: dict[int, int] = field(default_factory=dict)
-    gone: dict[int, int] = field(default_factory=dict)
+    gone: dict[int, _Moment] = field(default_factory=dict)
     ranks: list[int] = field(default_factory=list)
     drift: Vector = (0.0, 0.0)
     moments: int = 0
@@ -165,7 +163,7 @@ def _note(f: _Followed) -> None:
     """Who is in line, and where those who are new stand among the others."""
     for k, p in enumerate(f.now.order):
         f.seen[p] = f.seen.get(p, 0) + 1
-        f.gone[p] = f.now.t
+        f.gone[p] = f.now
         if p not in f.ranks:
             ahead = [f.ranks.index(q) for q in f.now.order[:k]]
             f.ranks.insert(max(ahead) + 1 if ahead else 0, p)
@@ -177,5 +175,16 @@ def _finished(f: _Followed, hold: int, stride: int, fps: float) -> list[Line]:
     if f.three - f.since + stride < hold or (aside > ASIDE and aside > along):
         return []
     order = tuple(p for p in f.ranks if f.seen[p] * stride >= MEMBER * fps)
-    left = sorted((p for p in order if f.gone[p] < f.now.t), key=lambda p: f.gone[p])
-    return [Line(f.since, f.now.t, order, tuple(left), f.middle)]
+    left = sorted((p for p in order if f.gone[p].t < f.now.t), key=lambda p: f.gone[p].t)
+    return [Line(f.since, f.now.t, order, tuple(left), f.middle, _from_one_end(f, left, MEMBER * fps))]
+
+
+def _from_one_end(f: _Followed, left: list[int], late: float) -> bool:
+    """Whether all who left did so from one end: those beyond them left no more than `late` frames later."""
+
+    def stay(p: int, beyond: tuple[int, ...]) -> bool:
+        return any(f.gone[q].t > f.gone[p].t + late for q in beyond)
+
+    before = {p: f.gone[p].order.index(p) for p in left}
+    first = not any(stay(p, f.gone[p].order[: before[p]]) for p in left)
+    return first or not any(stay(p, f.gone[p].order[before[p] + 1 :]) for p in left)

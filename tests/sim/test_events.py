@@ -1,7 +1,9 @@
 import numpy as np
 import pytest
 
+from scenarios.loading import load
 from sim.events import crossings, queue_lines, queues
+from sim.world import run
 
 FPS = 10.0
 T = np.arange(120)[:, None] / FPS
@@ -175,6 +177,24 @@ def test_first_in_first_out_means_from_one_end(leavers, fifo):
     (line,) = queue_lines(*crowd([waiting(k, spacing=0.6, leave=late.get(k, 99)) for k in range(5)]), FPS)
     assert line.left == leavers
     assert line.fifo == fifo
+
+
+def test_two_served_together_leave_in_order():
+    """The first two of five leave at once, then the third; were it the fourth, one would have been passed over."""
+    for third, fifo in ((2, True), (3, False)):
+        late = {0: 7.0, 1: 7.0, third: 8.5}
+        (line,) = queue_lines(*crowd([waiting(k, spacing=0.6, leave=late.get(k, 99)) for k in range(5)]), FPS)
+        assert (set(line.left), line.fifo) == ({0, 1, third}, fifo)
+
+
+@pytest.mark.parametrize("name", ["queue", "mixed"])
+def test_simulated_queues_are_first_in_first_out(name):
+    for seed in range(3):
+        motion = run(load(name, ["camera.fps=5"]), seed)
+        found = queue_lines(motion.pos, motion.vel, motion.present, motion.fps)
+        assert len(found) == 1
+        assert found[0].fifo
+        assert found[0].left
 
 
 @pytest.mark.parametrize("people", range(3, 9))
