@@ -12,7 +12,6 @@ from tracking.scoring.lives import Lives
 from tracking.scoring.pairs import Rows
 from tracking.scoring.sides import Crowd, People
 
-Parts = tuple[Part, ...]
 CHANGES = frozenset(HEADLINE) | {kind for kind, as_ in COUNTS_AS.items() if as_ in HEADLINE}
 
 
@@ -29,8 +28,12 @@ def true_events(
         before = _by_label(event.members, lambda m: _label(lives.last(m, event.start - 1, 0), group))
         after = _by_label(event.members, lambda m: _label(lives.next(m, event.start, 0), group))
         pos = event.pos if places is None else _middle(event, lives, places)
-        parents, children = _told_by_labels(event, before, after)
-        return Told(event.kind, event.start, None, Part(frozenset(event.members)), pos, parents, children)
+        members = Part(frozenset(event.members))
+        before, after = _by_kind(event, before, after)
+        if event.kind not in CHANGES or sorted(before) == sorted(after):  # the labels tell nothing
+            return Told(event.kind, event.start, None, members, pos)
+        parents, children = (tuple(Part(frozenset(part)) for part in parts) for parts in (before, after))
+        return Told(event.kind, event.start, None, members, pos, parents, children)
 
     return [tell(event) for event in events if _counts(event, frames)]
 
@@ -53,21 +56,14 @@ def _by_label(members: Sequence[int], label: Callable[[int], int]) -> list[list[
     return list(parts.values())
 
 
-def _told_by_labels(
+def _by_kind(
     event: GroupEvent, before: list[list[int]], after: list[list[int]]
-) -> tuple[Parts | None, Parts | None]:
-    """Parents and children. Labels for life are the same before and after: only form and dissolve speak for
-    themselves then."""
-    if event.kind not in CHANGES:
-        return None, None
-    if sorted(before) == sorted(after):
-        one, alone = [list(event.members)], [[m] for m in event.members]
-        known = {"form": (alone, one), "dissolve": (one, alone)}
-        if event.kind not in known:
-            return None, None
-        before, after = known[event.kind]
-    parents, children = (tuple(Part(frozenset(part)) for part in parts) for parts in (before, after))
-    return parents, children
+) -> tuple[list[list[int]], list[list[int]]]:
+    """Parents and children. Labels for life are the same before and after: form and dissolve speak for themselves."""
+    if sorted(before) != sorted(after):
+        return before, after
+    one, alone = [list(event.members)], [[m] for m in event.members]
+    return {"form": (alone, one), "dissolve": (one, alone)}.get(event.kind, (before, after))
 
 
 def _middle(event: GroupEvent, lives: Lives, places: Array) -> tuple[float, float]:
@@ -103,6 +99,7 @@ def told_events(
         after = _by_label(event.members, lambda m: _label(lives.next(m, said, reach), label))
         before = until(event, said - 1)
         before = until(event, event.start - 1) if sorted(before) == sorted(after) else before
+        before, after = _by_kind(event, before, after)
         parents, children = (tuple(part(p, event.start) for p in parts) for parts in (before, after))
         members = part(event.members, event.start)
         return Told(event.kind, event.start, said, members, event.pos, parents, children)

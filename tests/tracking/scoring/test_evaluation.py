@@ -18,7 +18,7 @@ from tests.hand_made import Scene, event, tracks, truth
 from tracking import track
 from tracking.scoring import evaluate
 from tracking.scoring.catalogue import CATALOGUE
-from tracking.scoring.evaluation import IncomparableError
+from tracking.scoring.evaluation import IncomparableError, Scores
 
 NAMES = sorted(path.stem for path in Path(scenarios.__file__).parent.glob("*.toml"))
 TWO = {1: (0.0, 0.0), 2: (1.0, 0.0)}
@@ -51,14 +51,27 @@ def test_truth_as_tracks_is_perfect(name: str) -> None:
     assert true is not None
     for plane, by in (("ground", "hull"), ("ground", "members"), ("image", "hull")):
         found = evaluate(true, truth_as_tracks(true, plane), group_match=by)
-        for key, value in found.items():
-            best = CATALOGUE[key].best
-            if np.isfinite(value) and np.isfinite(best):
-                assert value == pytest.approx(best, abs=1e-6), (key, plane, by)
+        assert_perfect(found)
         assert found["objective"] == pytest.approx(1, abs=1e-12)
         assert np.isfinite(found["group_F1"]) == any(len(g.id) for g in true.groups)
         for kind in {e.kind for e in true.events} & {"merge", "split", "cross", "queue"}:
             assert found[f"{kind}_F1"] == 1, kind
+
+
+def assert_perfect(found: Scores) -> None:
+    for key, value in found.items():
+        best = CATALOGUE[key].best
+        if np.isfinite(value) and np.isfinite(best):
+            assert value == pytest.approx(best, abs=1e-6), (key, found.surface, found.group_match)
+
+
+@pytest.mark.parametrize(("place", "plane"), [("biwi/seq_hotel", "ground"), ("caviar/mwt1gt.xml", "image")])
+def test_labels_of_recordings_as_tracks_are_perfect(shared_data: Path, place: str, plane: str) -> None:
+    (sequence,) = open_source(shared_data / place)
+    for by in ("hull", "members"):
+        found = evaluate(sequence.truth, truth_as_tracks(sequence.truth, plane), group_match=by)
+        assert found["objective"] == found["group_F1"] == found["pairwise_F1"] == 1
+        assert_perfect(found)
 
 
 @pytest.mark.parametrize("name", ["merge", "split"])

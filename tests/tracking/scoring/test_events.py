@@ -205,6 +205,17 @@ def test_lineage_of_a_merge(before, after, right):
     assert found["lineage_accuracy"] == found["lineage_accuracy_found"] == right
 
 
+def test_lineage_of_labels_for_life() -> None:
+    # Two people are labelled as one group before they meet: who forms came from being alone, whatever labels say; of a
+    # merge such labels tell nothing, and it does not count.
+    scenes = [Scene(CROWD, {1: (AB, None), 2: (CD, None)})] * FRAMES
+    happened = [event("form", 30, AB), event("merge", 40, ABCD)]
+    said = [event("form", 30, AB, emitted=30), event("merge", 40, ABCD, emitted=40)]
+    assert evaluate(truth(scenes, happened), tracks(scenes, said))["lineage_accuracy"] == 1
+    gradual = [Scene(CROWD, {1: (AB, None), 2: (CD, None)} if k >= 30 else {2: (CD, None)}) for k in range(1, 61)]
+    assert evaluate(truth(scenes, happened), tracks(gradual, said))["lineage_accuracy"] == 1
+
+
 def test_lineage_counts_all_that_happened():
     # A merge at 20 told rightly, a split at 45 not told: 1 of 2; of those found 1 of 1.
     scenes = [Scene(CROWD, {1: (ABCD, None)} if 20 <= k < 45 else {1: (AB, None), 2: (CD, None)}) for k in range(1, 61)]
