@@ -18,6 +18,7 @@ warnings.filterwarnings("ignore")
 
 WARM = 30
 
+
 def read(path):
     """Detections per frame: a list of (M, 5) left, top, width, height, score for frames 1..last."""
     rows = np.loadtxt(path, delimiter=",", ndmin=2)

@@ -33,15 +33,15 @@ def _arrays(ids, truth, answers) -> dict:
     true, own = {}, {}
     gt = [np.array([true.setdefault(i, len(true)) for i in row], int) for row in ids]
     tr = [np.array([own.setdefault(i, len(own)) for i in row], int) for row, _ in answers]
-    iou = [_iou(a, b) for a, (_, b) in zip(truth, answers, strict=True)]
+    alike = [iou(a, b) for a, (_, b) in zip(truth, answers, strict=True)]
     return {
-        "gt_ids": gt, "tracker_ids": tr, "similarity_scores": iou, "num_timesteps": len(gt),
+        "gt_ids": gt, "tracker_ids": tr, "similarity_scores": alike, "num_timesteps": len(gt),
         "num_gt_ids": len(true), "num_tracker_ids": len(own),
         "num_gt_dets": sum(map(len, gt)), "num_tracker_dets": sum(map(len, tr)),
     }  # fmt: skip
 
 
-def _iou(a, b):
+def iou(a, b):
     low = np.maximum(a[:, None, :2], b[None, :, :2])
     high = np.minimum(a[:, None, :2] + a[:, None, 2:], b[None, :, :2] + b[None, :, 2:])
     shared = np.prod(np.maximum(high - low, 0), 2)
