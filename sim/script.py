@@ -261,7 +261,7 @@ class Script:
         queue = self.queue_of[columns]
         people.place[:] = self.places[columns]
         people.target[:] = self.targets[columns]
-        people.pace[:] = np.minimum(self.free_speed[columns], 1.4)
+        people.pace[:] = np.minimum(self.groups.speed[self.group_of[columns]], 1.4)
         people.tag[:, 0] = self.group_of[columns]
         people.tag[:, 1] = np.where(queue >= 0, TO_TARGET, IN_GROUP)
         people.tag[:, 2] = queue
