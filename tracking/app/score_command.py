@@ -94,7 +94,7 @@ def compared(found: Answer, rows: list[Row], others: list[Row]) -> Answer:
     from rich.console import Group
 
     ends = _by_key(paired(_values(others), _values(rows)))
-    return Answer({**found.data, "difference": ends}, Group(found.text, differences(ends, len(rows))))
+    return Answer({**found.data, "difference": ends}, Group(found.text, "", differences(ends, len(rows))))
 
 
 def summary(rows: list[Row]) -> dict[str, dict[str, float]]:

@@ -45,17 +45,14 @@ Means = dict[str, dict[str, float]]
 def tables(rows: list[Row], means: Means) -> Any:
     """A table for each family of which something is known, and by what people and groups were compared."""
     from rich.console import Group
-    from rich.text import Text
 
     known = {title: keys for title, keys in TABLES.items() if any(math.isfinite(means[k]["mean"]) for k in keys)}
     parts = [_table(title, keys, rows, means) for title, keys in known.items()]
-    return Group(*parts, Text("\n".join(_compared(rows, "groups, strict" in known))))
+    return Group(*parts, "\n".join(_compared(rows, "groups, strict" in known)))
 
 
 def _table(title: str, keys: tuple[str, ...], rows: list[Row], means: Means) -> Any:
-    from rich.table import Table
-
-    table = Table(title=title, title_justify="left", box=None, pad_edge=False, header_style="bold")
+    table = _empty()
     table.add_column("sequence", overflow="fold")
     for key in keys:
         table.add_column(key.removeprefix("group_").removesuffix("_core"), justify="right", no_wrap=True)
@@ -65,7 +62,21 @@ def _table(title: str, keys: tuple[str, ...], rows: list[Row], means: Means) -> 
         for name, part in (("mean", "mean"), ("95 % low", "low"), ("95 % high", "high")):
             cells = (number(key, means[key][part], mean=True) for key in keys)
             table.add_row(name, *cells, style="bold" if part == "mean" else None)
-    return table
+    return _headed(title, table)
+
+
+def _empty() -> Any:
+    from rich.table import Table
+
+    return Table(box=None, pad_edge=False, header_style="bold")
+
+
+def _headed(title: str, table: Any) -> Any:
+    """A title that is not folded into the width of its table."""
+    from rich.console import Group
+    from rich.text import Text
+
+    return Group(Text(title, style="italic"), table, "")
 
 
 def _compared(rows: list[Row], groups: bool) -> list[str]:
@@ -80,11 +91,9 @@ def _compared(rows: list[Row], groups: bool) -> list[str]:
 
 def differences(found: Means, sequences: int) -> Any:
     """How the means differ from those of other tracks; a star where the interval is off zero."""
-    from rich.table import Table
-
     title = f"these tracks minus --against, in pairs over {sequences} sequences"
     title += "" if sequences >= ENOUGH else f" (fewer than {ENOUGH}: an indication)"
-    table = Table(title=title, title_justify="left", box=None, pad_edge=False, header_style="bold")
+    table = _empty()
     for name in ("score", "difference", "95 % low", "95 % high", ""):
         table.add_column(name, justify="left" if name == "score" else "right")
     for key in (key for keys in TABLES.values() for key in keys):
@@ -92,7 +101,7 @@ def differences(found: Means, sequences: int) -> Any:
         if math.isfinite(d["mean"]):
             cells = (number(key, d[part], mean=True) for part in ("mean", "low", "high"))
             table.add_row(key, *cells, "*" if d["low"] > 0 or d["high"] < 0 else "")
-    return table
+    return _headed(title, table)
 
 
 def number(key: str, value: float, *, mean: bool = False) -> str:

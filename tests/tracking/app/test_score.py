@@ -1,0 +1,97 @@
+"""`flockscope score`: the numbers of evaluate from files, groups matched as asked, differences in pairs, tables."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from scenarios.loading import load
+from sim.sequence import simulate
+from tracking import track
+from tracking.app.cli import run
+from tracking.scoring import evaluate
+from tracking.scoring.catalogue import CATALOGUE
+from tracking.stats import bootstrap
+
+
+@pytest.fixture(scope="module")
+def made(tmp_path_factory) -> Path:
+    """Two seeds of a scene with a merge; blob's answers to what its sensor says, and to the truth."""
+    folder = tmp_path_factory.mktemp("score")
+    assert run(["generate", "merge", "--seeds", "3:5", "--out", str(folder / "data")]) == 0
+    for name in ("file", "truth"):
+        options = ["--detections", name, "--out", str(folder / name)]
+        assert run(["track", "blob", str(folder / "data"), *options]) == 0
+    return folder
+
+
+def scored(capsys, *arguments: object) -> dict:
+    capsys.readouterr()
+    assert run(["score", *map(str, arguments), "--json"]) == 0
+    return json.loads(capsys.readouterr().out)
+
+
+@pytest.mark.parametrize("by", ["hull", "members"])
+def test_files_are_memory(made: Path, capsys, by: str) -> None:
+    found = scored(capsys, made / "data", made / "file", "--group-match", by)
+    for seed, row in zip((3, 4), found["sequences"], strict=True):
+        sequence = simulate(load("merge"), seed)
+        expected = evaluate(sequence.truth, track("blob", sequence), group_match=by)
+        assert (row["name"], row["group_match"], row["surface"]) == (f"merge-s{seed:05d}", by, "ground")
+        for key, value in expected.items():
+            assert row[key] == (None if np.isnan(value) else pytest.approx(value, abs=1e-12)), key
+
+
+def test_the_mean_has_every_key_and_an_interval(made: Path, capsys) -> None:
+    found = scored(capsys, made / "data", made / "file")
+    assert list(found["mean"]) == list(CATALOGUE)
+    first, second = (row["pairwise_F1"] for row in found["sequences"])
+    mean = found["mean"]["pairwise_F1"]
+    assert mean["mean"] == pytest.approx((first + second) / 2)
+    assert min(first, second) <= mean["low"] <= mean["mean"] <= mean["high"] <= max(first, second)
+    assert found["mean"]["cross_F1"] == {"mean": None, "low": None, "high": None}
+    one = scored(capsys, made / "data" / "flockscope-train" / "merge-s00003", made / "file")["mean"]["HOTA"]
+    assert one["low"] is one["high"] is None
+
+
+def test_differences_are_taken_sequence_by_sequence(made: Path, capsys) -> None:
+    found = scored(capsys, made / "data", made / "truth", "--against", made / "file")
+    other = scored(capsys, made / "data", made / "file")
+    own = [a["HOTA"] - b["HOTA"] for a, b in zip(found["sequences"], other["sequences"], strict=True)]
+    mean, low, high = (float(v[0]) for v in bootstrap(np.array(own)[:, None]))
+    assert found["difference"]["HOTA"] == pytest.approx({"mean": mean, "low": low, "high": high})
+    assert mean > 0
+    same = scored(capsys, made / "data", made / "file", "--against", made / "file")["difference"]
+    assert {v for d in same.values() for v in d.values()} <= {0.0, None}
+
+
+def test_tables(made: Path, capsys) -> None:
+    capsys.readouterr()
+    assert run(["score", str(made / "data"), str(made / "file"), "--against", str(made / "truth")]) == 0
+    said = capsys.readouterr().out
+    for words in (
+        "groups, strict", "groups, core", "members and events", "people by overlap (IoU) of boxes",
+        "groups by overlap (IoU) of hulls, on the ground, m", "in pairs over 2 sequences (fewer than 100",
+    ):  # fmt: skip
+        assert words in said
+    assert max(map(len, said.splitlines())) <= 160
+
+
+def test_groups_that_are_not_labelled_are_no_zeros(made: Path, capsys) -> None:
+    gt = made / "data" / "flockscope-train" / "merge-s00003" / "gt" / "gt.txt"
+    told = made / "file" / "merge-s00003" / "tracks.mot.txt"
+    found = scored(capsys, gt, told, "--fps", "10")["sequences"][0]
+    assert found["HOTA"] > 0.5
+    assert {found[key] for key in CATALOGUE if key.startswith(("group", "pairwise", "merge", "event"))} == {None}
+    assert run(["score", str(gt), str(told), "--fps", "10"]) == 0
+    said = capsys.readouterr().out
+    assert "groups are not labelled" in said
+    assert "strict" not in said
+
+
+def test_other_tracks_must_be_there(made: Path, capsys) -> None:
+    assert run(["score", str(made / "data"), str(made / "file"), "--against", str(made / "nothing")]) == 2
+    assert "nothing" in capsys.readouterr().err
