@@ -1,0 +1,89 @@
+"""People walk as the literature says they do; the figures are those of benchmarks/realism.py, on other seeds."""
+
+from __future__ import annotations
+
+from functools import cache
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from benchmarks import realism
+
+SEEDS = range(1000, 1010)
+
+
+@cache
+def walk(size: int) -> realism.Walk:
+    return realism.alone(size, SEEDS)
+
+
+def test_free_speed_alone() -> None:
+    # N(1.34, 0.26): the mean of 40 is within 0.1 of it in 98 of 100 cases
+    speed = realism.free_speeds(range(1000, 1002))
+    assert len(speed) == 40
+    assert speed.mean() == pytest.approx(1.34, abs=0.1)
+    assert speed.std() == pytest.approx(0.26, abs=0.08)
+
+
+def test_groups_are_slower_by_the_member() -> None:
+    # Moussaid et al. 2010: 0.04 to 0.08 m/s per member; measured on the same free speeds, so that the draw cancels out
+    seeds = range(1000, 1030)
+    means = [realism.alone(n, seeds).speed.mean() for n in (2, 6)]
+    free = [np.mean([_drawn(n, seed) for seed in seeds]) for n in (2, 6)]
+    slower = [f - m for f, m in zip(free, means, strict=True)]
+    assert 0.04 <= (slower[1] - slower[0]) / 4 <= 0.08
+
+
+def _drawn(size: int, seed: int) -> float:
+    """Mean free speed of the people of realism.alone."""
+    return float(realism.alone_motion(size, seed).free_speed.mean())
+
+
+@pytest.mark.parametrize("size", [2, 3, 4, 5])
+def test_neighbours_are_an_arm_apart(size: int) -> None:
+    low, middle, high = np.quantile(realism.neighbours(walk(size)), (0.1, 0.5, 0.9))
+    assert 0.6 <= middle <= 0.9
+    assert low > 0.45
+    assert high < 1.1
+
+
+def test_pairs_walk_abreast() -> None:
+    angle = realism.abreast(walk(2))
+    assert np.median(angle) > 75
+    assert np.quantile(angle, 0.1) > 60
+
+
+def test_the_middle_of_a_triad_is_slightly_behind() -> None:
+    # Zanlungo & Kanda 2013: a V open to the front
+    behind = realism.middle_behind(walk(3))
+    assert (behind > 0).all()
+    assert 0.1 < np.median(behind) < 0.4
+
+
+@pytest.mark.parametrize("size", [4, 5])
+def test_larger_groups_are_two_rows_of_pairs_and_triads(size: int) -> None:
+    assert np.mean(realism.rows(walk(size)) == 2) >= 0.8
+
+
+def test_strangers_seldom_go_through_a_group() -> None:
+    # of those who come straight at it; walking on blindly, about two of three would
+    passed = np.concatenate([realism.through(n, range(1000, 1012)) for n in (2, 3)])
+    assert passed.mean() < 0.25
+
+
+def test_a_blind_stranger_would_go_through() -> None:
+    # the measure itself: one who walks a straight line through the middle of a pair
+    t = np.arange(30.0)
+    pair = np.stack([np.stack([0 * t, 0 * t + y], axis=1) for y in (-0.4, 0.4)], axis=1)
+    for off, expected in ((0.0, True), (0.7, False), (-0.7, False)):
+        stranger = np.stack([10 - t, 0 * t + off], axis=1)[:, None]
+        assert realism.passes_between(np.concatenate([pair, stranger], axis=1)) == expected
+
+
+def test_the_street_is_like_seq_hotel(shared_data: Path) -> None:
+    real = realism.recording(str(shared_data / "biwi" / "seq_hotel"))
+    speed, closest, acceleration = realism.beside(realism.simulated("street", range(1000, 1010)), real)
+    assert speed <= 0.15
+    assert closest <= 0.15
+    assert 0.75 <= acceleration <= 1.25
