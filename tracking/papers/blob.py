@@ -20,7 +20,9 @@ Departures, all ours:
 - Detections below score_start continue tracks but start none, and choose after the others (ByteTrack, Zhang et al.
   2022).
 - Reported are confirmed tracks, and tentative ones from report_delay on, until report_coast (hidden ones:
-  report_hidden) after the last measurement. An unseen track dies when its centre leaves the image.
+  report_hidden) after the last measurement, but no longer than report_credit times the time they were seen: a track
+  that was hardly seen was mostly a false alarm. An unseen track is silent on its way out of view, and dies when its
+  centre leaves the image.
 """
 
 from __future__ import annotations
