@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
@@ -76,13 +76,14 @@ def evaluate(
     answers = [t for t in given if inside[t.index]]
     plane, chosen = plane_of(truth, answers), similarity or usual_similarity(truth, answers)
     true, est = true_people(truth, inside), tracked_people(answers)
-    pairs = people_pairs(true, est, chosen, plane, truth.px_per_m)
-    stands_for = mapped(pairs)
-    case = Labelled(truth, answers, told, true, est, stands_for, "image" if plane == "image" else "ground")
+    nobody = np.full(len(est.rows), -1, np.int64)
+    case = Labelled(truth, answers, told, true, est, nobody, "image" if plane == "image" else "ground")
     found = dict.fromkeys(CATALOGUE, float("nan"))
     if not any(t.unit == "group" for t in answers):
+        pairs = people_pairs(true, est, chosen, plane, truth.px_per_m)
+        case = replace(case, stands_for=mapped(pairs))
         found |= individual_scores(pairs)
-        found |= place_scores(true, est, stands_for, case.surface, plane, case.scale, int(inside.sum()))
+        found |= place_scores(true, est, case.stands_for, case.surface, plane, case.scale, int(inside.sum()))
     if told.any():
         found |= social_scores(case, group_match)
     found["objective"] = _objective(found)
