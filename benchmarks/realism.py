@@ -86,7 +86,7 @@ def rows(walk: Walk) -> Array:
 
 
 def through(size: int, seeds: range) -> Bools:
-    """Whether a stranger who comes towards a group of `size`, up to 0.5 m off its middle, passes between its members."""
+    """Whether a stranger who comes towards a group of `size`, up to 0.5 m off its middle, goes between two."""
     found = []
     for seed in seeds:
         off = float(np.random.default_rng(seed).uniform(-0.5, 0.5))

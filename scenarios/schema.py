@@ -133,7 +133,7 @@ class Group(Model):
 class Reach(Model):
     """A trigger: a group comes near a place."""
 
-    group: Name
+    group: Name = Field(description="whose middle comes near")
     at: Fixed | None = Field(None, description="m; the group's goal where absent")
     radius: Positive = Field(1.0, description="m, from the group's middle")
 
@@ -160,32 +160,32 @@ class When(Model):
 class Part(Model):
     """One part of a group that splits."""
 
-    id: Name
+    id: Name = Field(description="name of the new group")
     size: Annotated[int, Field(ge=1)] | None = Field(None, description="people; the rest, shared evenly, where absent")
     goal: Point = Field(description="m")
-    via: tuple[Point, ...] = ()
-    at_goal: Literal["stand", "leave", "walk"] = "stand"
+    via: tuple[Point, ...] = Field((), description="points to pass on the way")
+    at_goal: Literal["stand", "leave", "walk"] = Field("stand", description="as for groups")
 
 
 class Merge(Model):
     """Groups become one."""
 
-    id: Name
-    type: Literal["merge"]
-    groups: Annotated[tuple[Name, ...], Field(min_length=2)]
+    id: Name = Field(description="name of the order")
+    type: Literal["merge"] = Field(description="groups become one")
+    groups: Annotated[tuple[Name, ...], Field(min_length=2)] = Field(description="who become one")
     into: Name = Field(description="name of the new group")
     goal: Point | Literal["meet"] = Field("meet", description='m; "meet": where they meet, to stand and converse')
-    via: tuple[Point, ...] = ()
-    at_goal: Literal["stand", "leave", "walk"] = "stand"
+    via: tuple[Point, ...] = Field((), description="points to pass on the way")
+    at_goal: Literal["stand", "leave", "walk"] = Field("stand", description="as for groups")
     when: When
 
 
 class Split(Model):
     """A group falls into parts."""
 
-    id: Name
-    type: Literal["split"]
-    group: Name
+    id: Name = Field(description="name of the order")
+    type: Literal["split"] = Field(description="a group falls into parts")
+    group: Name = Field(description="which group parts")
     parts: Annotated[tuple[Part, ...], Field(min_length=2)]
     when: When
 
@@ -193,8 +193,8 @@ class Split(Model):
 class Queue(Model):
     """Groups line up, are served one group after the other, and walk on."""
 
-    id: Name
-    type: Literal["queue"]
+    id: Name = Field(description="name of the order")
+    type: Literal["queue"] = Field(description="groups line up and are served one by one")
     groups: Annotated[tuple[Pattern, ...], Field(min_length=1)] = Field(
         description="who lines up; `g-*` for all of a repeat"
     )
@@ -203,7 +203,7 @@ class Queue(Model):
     spacing: Annotated[float, Field(ge=0.5, le=1.4)] = Field(0.8, description="m")
     service: Value = Field(Distribution(exponential=3.0), description="s per group")
     goal: Point | None = Field(None, description="where the served walk to; their own goal where absent")
-    at_goal: Literal["stand", "leave", "walk"] = "leave"
+    at_goal: Literal["stand", "leave", "walk"] = Field("leave", description="as for groups")
     when: When
 
 
