@@ -23,7 +23,7 @@ function planPane(ctx, width, height, shown, frame, options) {
   const map = (x, y) => [left + (x - x0) * scale, top + (y1 - y) * scale];
   ctx.fillStyle = theme.ground;
   ctx.fillRect(0, 0, width, height);
-  grid(ctx, map, scale);
+  grid(ctx, map, scale, [x0 - left / scale, y0 - top / scale, x1 + left / scale, y1 + top / scale]);
   if (data.scene) scene(ctx, map, scale);
   const plan = { ctx, map, scale, frame, options, taken: [] };
   for (const side of shown) if (side.plane === "ground" && options.hulls) planHulls(plan, side);
@@ -35,8 +35,8 @@ function planPane(ctx, width, height, shown, frame, options) {
   if (options.ids) planNames(plan, grounded.filter(side => side.rows(frame).length <= MANY));
 }
 
-function grid(ctx, map, scale) {
-  const [x0, y0, x1, y1] = data.bounds;
+// Lines over all that the pane shows, and a scale in its corner.
+function grid(ctx, map, scale, [x0, y0, x1, y1]) {
   const step = scale > 14 ? 1 : scale > 4 ? 5 : 10;
   ctx.strokeStyle = theme.grid;
   ctx.lineWidth = 1;
