@@ -60,9 +60,12 @@ def _avoid_groups(now, p, push):  # type: ignore[no-untyped-def]
         for k in range(6):
             rows[k, s] = now[live[s], k]
     found = np.empty(m + 1, np.int64)
+    last = 0
     for s in range(m):
         a = live[s]
-        for k in range(_near_discs(rows, s, m, reach, radius, found)):
+        while last < m and rows[1, s] - rows[1, last] >= -reach:
+            last += 1
+        for k in range(_near_discs(rows, s, last, reach, radius, found)):
             b = live[found[k]]
             dx, dy = now[a, 1] - now[b, 1], now[a, 2] - now[b, 2]
             wx, wy = now[a, 3] - now[b, 3], now[a, 4] - now[b, 4]
@@ -78,14 +81,12 @@ def _avoid_groups(now, p, push):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True, inline="always")
-def _near_discs(rows, s, m, reach, radius, found):  # type: ignore[no-untyped-def]
-    """Write to `found` which discs after s, sorted by x, are within reach, about to collide, not both of one person."""
+def _near_discs(rows, s, last, reach, radius, found):  # type: ignore[no-untyped-def]
+    """Write to `found` which discs from s to last are within reach, about to collide, and not both of one person."""
     count, x, y, vx, vy, disc = rows[0], rows[1], rows[2], rows[3], rows[4], rows[5]
     k = 0
-    for t in range(s + 1, m):
+    for t in range(s + 1, last):
         dx, dy = x[s] - x[t], y[s] - y[t]
-        if dx < -reach:
-            break
         wx, wy = vx[s] - vx[t], vy[s] - vy[t]
         size = disc[s] + disc[t] + 2.0 * radius
         cross = dx * wy - dy * wx
