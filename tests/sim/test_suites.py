@@ -18,7 +18,7 @@ def people(entry: Entry, seed: int) -> int:
 
 
 def test_friends_meet_has_18_simple_and_10_hard_entries() -> None:
-    hard = [e for e in FRIENDS if e.name.startswith("hard-")]
+    hard = [e for e in FRIENDS if e.name.startswith("friends-hard-")]
     assert (len(FRIENDS), len(hard)) == (28, 10)
     for entry in FRIENDS:
         low, high = (10, 16) if entry in hard else (4, 10)
@@ -42,7 +42,7 @@ def test_friends_meet_as_ordered(entry: Entry) -> None:
 
 @pytest.mark.parametrize(("entry", "frames"), [("cross", 400), ("merge", 400), ("stairs", 500), ("crowded", 400)])
 def test_subtraction_stereo(entry: str, frames: int) -> None:
-    found = {e.name: e for e in resolve("suite:subtraction-stereo")}[entry]
+    found = {e.name: e for e in resolve("suite:subtraction-stereo")}[f"stereo-{entry}"]
     sequence = simulate(found.scenario, 90_001)
     assert (sequence.length, sequence.fps) == (frames, 30)
     assert sequence.truth is not None
