@@ -122,7 +122,7 @@ def _ghosts(r, rate, haunt, size):
     made = []
     for _ in range(r.poisson(rate)):
         side = r.uniform(0.7, 1.3) * np.median(size)
-        place = np.r_[r.uniform(0, WIDTH), r.uniform(0, HEIGHT - side)]
+        place = np.r_[r.uniform(0, WIDTH), r.uniform(0, max(HEIGHT - side, 1.0))]
         if r.random() < 1 / 3:
             place = haunt[r.integers(2)] + r.normal(0, 0.04, 2) * side
         made.append(np.r_[place, 0.4 * side, side, r.uniform(0.5, 0.9)])
