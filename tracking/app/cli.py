@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import sys
 from collections.abc import Sequence
 from pathlib import Path
@@ -10,7 +11,7 @@ from typing import Annotated, Literal
 import typer
 
 from scenarios.errors import InputError
-from tracking.app.answer import Answer
+from tracking.app.answer import INTERRUPTED, Answer
 
 app = typer.Typer(
     add_completion=False,
@@ -205,7 +206,11 @@ def run(arguments: Sequence[str]) -> int:
 
 def main() -> None:
     """The entry point."""
-    sys.exit(run(sys.argv[1:]))
+    code = run(sys.argv[1:])
+    if code == INTERRUPTED:
+        sys.stdout.flush()
+        os._exit(code)  # sys.exit would end by SIGINT, not with 130, where Ctrl-C came inside an exec of a library
+    sys.exit(code)
 
 
 if __name__ == "__main__":

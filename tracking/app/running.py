@@ -42,10 +42,19 @@ def _answer(app: typer.Typer, arguments: list[str]) -> Answer | int:
     except usage as error:
         raise _usage(error) from None
     except Exception as error:
+        if _is_of_interruption(error):
+            raise KeyboardInterrupt from None
         raise unexpected(error) from error
     if result == INTERRUPTED:  # typer's word for Ctrl-C
         raise KeyboardInterrupt
     return result if isinstance(result, Answer) else int(result or 0)
+
+
+def _is_of_interruption(error: BaseException | None) -> bool:
+    """Whether Ctrl-C is what an error came from: an import that it ends may end in another error."""
+    while error is not None and not isinstance(error, KeyboardInterrupt):
+        error = error.__cause__ or error.__context__
+    return error is not None
 
 
 def _usage(error: Any) -> InputError:

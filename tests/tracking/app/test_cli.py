@@ -264,6 +264,20 @@ def test_without_arguments_it_explains_itself(capsys):
     assert "generate" in capsys.readouterr().out
 
 
+def test_ctrl_c_that_became_another_error(place, capsys, monkeypatch):
+    """As libraries make of one that ends their import."""
+
+    def load(*_: object) -> None:
+        try:
+            raise KeyboardInterrupt
+        except KeyboardInterrupt:
+            raise ImportError("a library failed to import")  # noqa: B904
+
+    monkeypatch.setattr("sim.io.export.coco", load)
+    assert run(words(COMMANDS["export coco"][0], place)) == 130
+    said(capsys, 130, as_json=False)
+
+
 def test_a_bug_is_one_line_and_shown_whole_when_asked_for(place, capsys, monkeypatch):
     monkeypatch.setattr("sim.io.export.coco", _raise(KeyError("lost")))
     line = words(COMMANDS["export coco"][0], place)
