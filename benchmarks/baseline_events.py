@@ -14,7 +14,7 @@ import argparse
 
 import numpy as np
 
-from scenarios.errors import WorkError
+from scenarios.errors import FlockscopeError
 from scenarios.loading import Entry, names, resolve
 from sim.sequence import simulate
 from sim.types import Tracks, Truth
@@ -47,13 +47,13 @@ def alone(truth: Truth, index: int) -> Tracks:
 
 
 def measure(entry: Entry, seeds: range) -> list[Scores]:
-    """The scores of each sequence; a seed whose orders do not come true is said and left out."""
+    """The scores of each sequence; a seed that cannot be, or whose orders do not come true, is said and left out."""
     found = []
     for seed in seeds:
         try:
             truth = simulate(entry.scenario, seed, entry.repeat).truth
-        except WorkError as error:
-            print(f"    {entry.name}, seed {seed} does not come true: {error.line()}")
+        except FlockscopeError as error:
+            print(f"    {entry.name}, seed {seed}: {error.line()}")
             continue
         assert truth is not None
         found.append(evaluate(truth, as_tracks(truth)))
