@@ -123,6 +123,20 @@ def test_who_leaves_after_a_cross_has_crossed():
     paths = [p.copy() for p in HEAD_ON]
     paths[0][62:] = paths[1][65:] = np.nan
     assert len(crossed(paths)) == 1
+    alone = groups(1, 1, 2, 2)
+    alone[62:, 1] = -1
+    assert len(crossed(paths, alone)) == 1, "the one who is left is no group, and yet stays who he was"
+    stays = [p.copy() for p in HEAD_ON]
+    assert crossed(stays, alone) == [], "but where nobody left the scene, the group fell apart"
+
+
+def test_crossings_are_the_same_in_portions(monkeypatch):
+    paths = [p + np.array([0, 20.0 * k]) for k in range(5) for p in HEAD_ON]
+    numbers = groups(*(2 * k + side for k in range(5) for side in (1, 1, 2, 2)))
+    whole = crossed(paths, numbers)
+    assert len(whole) == 5
+    monkeypatch.setattr("sim.events.ROWS", 100)
+    assert crossed(paths, numbers) == whole
 
 
 def waiting(k, arrive=3.0, leave=9.0, spacing=0.8, at=(5.0, 3.0), step=(0.0, 1.2)):
