@@ -66,6 +66,8 @@ def test_coming_and_going_is_no_merge_or_split():
     assert change({1: "12"}, {}, "12", "3") == [("leave", (1,), (), (1, 2))]
     assert change({1: "12"}, {}, "12", "2") == [("leave", (1,), (-1,), (1, 2))]
     assert change({}, {1: "12"}, "12", "12", entered="12") == [("enter", (), (1,), (1, 2))]
+    again = [("leave", (1,), (), (1, 2)), ("enter", (), (1,), (1, 2))]
+    assert change({1: "12"}, {1: "12"}, "12", "12", entered="12") == again, "the same people, and yet they came anew"
 
 
 def test_ids_are_never_used_again():
