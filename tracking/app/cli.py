@@ -133,6 +133,9 @@ def score(
     against: Annotated[
         Path | None, typer.Option("--against", metavar="TRACKS", help="Other tracks: say how the scores differ.")
     ] = None,
+    blocks: Annotated[
+        int, typer.Option("--blocks", min=0, metavar="N", help="One recording: an interval by N draws of blocks.")
+    ] = 0,
     fps: Fps = None,
     px_per_m: Scale = None,
     json: Json = False,
@@ -141,7 +144,14 @@ def score(
     from tracking.app.score_command import score
 
     return score(
-        truth, tracks, against=against, similarity=similarity, group_match=group_match, fps=fps, px_per_m=px_per_m
+        truth,
+        tracks,
+        against=against,
+        blocks=blocks,
+        similarity=similarity,
+        group_match=group_match,
+        fps=fps,
+        px_per_m=px_per_m,
     )
 
 

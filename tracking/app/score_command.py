@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -10,17 +11,18 @@ import numpy as np
 
 from scenarios.errors import InputError
 from sim.io.source import open_source
-from sim.types import Array, Sequence
+from sim.types import Array, Ints, Sequence
 from tracking.app.answer import Answer
 from tracking.app.meter import Meter
 from tracking.app.paired import pair, results
-from tracking.app.score_tables import differences, tables
+from tracking.app.score_tables import Means, differences, tables
 from tracking.run import Run
 from tracking.scoring import evaluate
 from tracking.scoring.catalogue import CATALOGUE
 from tracking.scoring.evaluation import IncomparableError, Scores, Similarity
 from tracking.scoring.groups import GroupMatch
-from tracking.stats import bootstrap, paired
+from tracking.scoring.resample import scorer
+from tracking.stats import bootstrap, moving_blocks, paired
 
 
 @dataclass(frozen=True)
@@ -36,17 +38,55 @@ def score(
     tracks: Path,
     *,
     against: Path | None,
+    blocks: int,
     similarity: Similarity | None,
     group_match: GroupMatch,
     fps: float | None,
     px_per_m: float | None,
 ) -> Answer:
-    """Scores of every sequence of `truth`, matched with `tracks` by name; and how they differ from other tracks'."""
+    """Scores of every sequence of `truth`, matched with `tracks` by name; and how they differ from other tracks'.
+
+    blocks: draws for the interval of a single recording, 0 for none.
+    """
     sequences = open_source(truth, fps=fps, px_per_m=px_per_m)
-    rows = _rows(sequences, tracks, similarity, group_match)
-    if against is None:
-        return answer(rows)
-    return compared(answer(rows), rows, _rows(sequences, against, similarity, group_match))
+    if blocks and len(sequences) > 1:
+        raise InputError(
+            place="--blocks", got=f"{len(sequences)} sequences", expected="a single recording",
+            remedy="leave it out: the interval over sequences is shown anyway",
+        )  # fmt: skip
+    paths = [tracks] if against is None else [tracks, against]
+    rows, *others = [_rows(sequences, path, similarity, group_match) for path in paths]
+    draws = [_draw(sequences, path, similarity, group_match) for path in paths] if blocks else []
+    means = _recording(sequences[0], blocks, draws[0], _values(rows)[0]) if blocks else summary(rows)
+    found = answer(rows, means)
+    if not others:
+        return found
+    if not blocks:
+        return compared(found, _by_key(paired(_values(others[0]), _values(rows))), len(rows))
+    difference = (_values(rows) - _values(others[0]))[0]
+    return compared(found, _recording(sequences[0], blocks, lambda at: draws[0](at) - draws[1](at), difference), 1)
+
+
+def _draw(
+    sequences: list[Sequence], tracks: Path, similarity: Similarity | None, group_match: GroupMatch
+) -> Callable[[Ints], Array]:
+    """Scores of a single recording made of some of its frames."""
+    ((sequence, result),) = pair(sequences, results(tracks))
+    assert sequence.truth is not None
+    return scorer(sequence.truth, result.read(sequence), similarity, group_match)
+
+
+def _recording(sequence: Sequence, draws: int, draw: Callable[[Ints], Array], values: Array) -> Means:
+    """One recording's values by key, with intervals by moving blocks for those that do not need time as it was."""
+    assert sequence.truth is not None
+    with Meter("draw", draws + 1) as meter:
+
+        def drawn(places: Ints) -> Array:
+            meter.step("blocks of frames")
+            return draw(places)
+
+        _, low, high = moving_blocks(drawn, sequence.truth.length, sequence.fps, draws)
+    return _by_key((values, low, high))
 
 
 def _rows(sequences: list[Sequence], tracks: Path, similarity: Similarity | None, group_match: GroupMatch) -> list[Row]:
@@ -69,17 +109,17 @@ def score_run(
             remedy="give one with gt/",
         )  # fmt: skip
     try:
-        return Row(sequence.name, evaluate(sequence.truth, run, similarity=similarity, group_match=group_match))
+        found = evaluate(sequence.truth, run, similarity=similarity, group_match=group_match)
     except IncomparableError as error:
         raise InputError(
             file=sequence.name, place="--similarity", got=str(error), expected="what both sides have",
             remedy="choose another --similarity",
         ) from None  # fmt: skip
+    return Row(sequence.name, found)
 
 
-def answer(rows: list[Row]) -> Answer:
+def answer(rows: list[Row], means: Means) -> Answer:
     """Rows and their mean, for people and for --json."""
-    means = summary(rows)
     return Answer({"sequences": [_row(row) for row in rows], "mean": means}, tables(rows, means))
 
 
@@ -89,15 +129,14 @@ def _row(row: Row) -> dict[str, Any]:
     return {"name": row.sequence, **chosen, **s}
 
 
-def compared(found: Answer, rows: list[Row], others: list[Row]) -> Answer:
-    """The answer of `rows`, and their scores minus those of `others` on the same sequences, in pairs."""
+def compared(found: Answer, ends: Means, sequences: int) -> Answer:
+    """The answer, and by how much it differs from other tracks on the same sequences, in pairs."""
     from rich.console import Group
 
-    ends = _by_key(paired(_values(others), _values(rows)))
-    return Answer({**found.data, "difference": ends}, Group(found.text, "", differences(ends, len(rows))))
+    return Answer({**found.data, "difference": ends}, Group(found.text, "", differences(ends, sequences)))
 
 
-def summary(rows: list[Row]) -> dict[str, dict[str, float]]:
+def summary(rows: list[Row]) -> Means:
     """mean, low, high over sequences by key; the ends are nan for a single one."""
     return _by_key(bootstrap(_values(rows)))
 
@@ -106,6 +145,6 @@ def _values(rows: list[Row]) -> Array:
     return np.array([[row.scores[key] for key in CATALOGUE] for row in rows])
 
 
-def _by_key(ends: tuple[Array, Array, Array]) -> dict[str, dict[str, float]]:
+def _by_key(ends: tuple[Array, Array, Array]) -> Means:
     columns = zip(CATALOGUE, *(end.tolist() for end in ends), strict=True)
     return {key: {"mean": mean, "low": low, "high": high} for key, mean, low, high in columns}

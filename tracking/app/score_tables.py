@@ -6,6 +6,7 @@ import math
 from typing import TYPE_CHECKING, Any
 
 from tracking.scoring.catalogue import CATALOGUE
+from tracking.stats import SURE
 
 if TYPE_CHECKING:
     from tracking.app.score_command import Row
@@ -48,7 +49,10 @@ def tables(rows: list[Row], means: Means) -> Any:
 
     known = {title: keys for title, keys in TABLES.items() if any(math.isfinite(means[k]["mean"]) for k in keys)}
     parts = [_table(title, keys, rows, means) for title, keys in known.items()]
-    return Group(*parts, "\n".join(_compared(rows, "groups, strict" in known)))
+    lines = _compared(rows, "groups, strict" in known)
+    if len(rows) == 1 and math.isfinite(means["objective"]["low"]):
+        lines.append(f"intervals by moving blocks of frames: an indication where the recording is under {SURE:g} s")
+    return Group(*parts, "\n".join(lines))
 
 
 def _table(title: str, keys: tuple[str, ...], rows: list[Row], means: Means) -> Any:
@@ -58,8 +62,8 @@ def _table(title: str, keys: tuple[str, ...], rows: list[Row], means: Means) -> 
         table.add_column(key.removeprefix("group_").removesuffix("_core"), justify="right", no_wrap=True)
     for row in rows:
         table.add_row(row.sequence, *(number(key, row.scores[key]) for key in keys))
-    if len(rows) > 1:
-        for name, part in (("mean", "mean"), ("95 % low", "low"), ("95 % high", "high")):
+    if any(math.isfinite(means[key]["low"]) for key in keys):
+        for name, part in (("mean", "mean"), ("95 % low", "low"), ("95 % high", "high"))[len(rows) == 1 :]:
             cells = (number(key, means[key][part], mean=True) for key in keys)
             table.add_row(name, *cells, style="bold" if part == "mean" else None)
     return _headed(title, table)
@@ -91,8 +95,9 @@ def _compared(rows: list[Row], groups: bool) -> list[str]:
 
 def differences(found: Means, sequences: int) -> Any:
     """How the means differ from those of other tracks; a star where the interval is off zero."""
-    title = f"these tracks minus --against, in pairs over {sequences} sequences"
-    title += "" if sequences >= ENOUGH else f" (fewer than {ENOUGH}: an indication)"
+    over = "the same frames" if sequences == 1 else f"{sequences} sequences"
+    title = f"these tracks minus --against, in pairs over {over}"
+    title += "" if sequences >= ENOUGH or sequences == 1 else f" (fewer than {ENOUGH}: an indication)"
     table = _empty()
     for name in ("score", "difference", "95 % low", "95 % high", ""):
         table.add_column(name, justify="left" if name == "score" else "right")

@@ -301,6 +301,10 @@ OPTIONS = {
     ("score", "similarity"): (BASE["score"] + " --similarity boxes", BASE["score"] + " --similarity ground"),
     ("score", "group_match"): (BASE["score"], BASE["score"] + " --group-match members"),
     ("score", "against"): (BASE["score"], BASE["score"] + " --against {0}/perfect"),
+    ("score", "blocks"): (
+        "score {0}/data/flockscope-demo/scene-s40000 {0}/tracks",
+        "score {0}/data/flockscope-demo/scene-s40000 {0}/tracks --blocks 5",
+    ),
     ("score", "fps"): ("score {0}/mot {0}/mot-tracks", "score {0}/mot {0}/mot-tracks --fps 5"),
     ("score", "px_per_m"): (
         "score {0}/mot {0}/mot-tracks --fps 5 --similarity image",

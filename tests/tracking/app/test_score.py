@@ -68,6 +68,28 @@ def test_differences_are_taken_sequence_by_sequence(made: Path, capsys) -> None:
     assert {v for d in same.values() for v in d.values()} <= {0.0, None}
 
 
+def test_blocks_of_a_single_recording(made: Path, capsys) -> None:
+    one = made / "data" / "flockscope-train" / "merge-s00003"
+    found = scored(capsys, one, made / "truth", "--against", made / "file", "--blocks", "20")
+    (row,) = found["sequences"]
+    for key in ("HOTA", "pairwise_F1", "MOTA"):
+        mean, difference = found["mean"][key], found["difference"][key]
+        assert mean["mean"] == row[key]
+        assert mean["low"] < mean["high"]
+        assert difference["low"] <= difference["high"]
+    assert found["difference"]["HOTA"]["low"] > 0
+    assert found["mean"]["event_F1"] == {"mean": row["event_F1"], "low": None, "high": None}
+    again = scored(capsys, one, made / "truth", "--against", made / "file", "--blocks", "20")
+    assert again == found
+    same = scored(capsys, one, made / "file", "--against", made / "file", "--blocks", "5")["difference"]
+    assert {v for d in same.values() for v in d.values()} <= {0.0, None}
+
+
+def test_blocks_are_for_a_single_recording(made: Path, capsys) -> None:
+    assert run(["score", str(made / "data"), str(made / "file"), "--blocks", "5"]) == 2
+    assert "2 sequences" in capsys.readouterr().err
+
+
 def test_tables(made: Path, capsys) -> None:
     capsys.readouterr()
     assert run(["score", str(made / "data"), str(made / "file"), "--against", str(made / "truth")]) == 0
