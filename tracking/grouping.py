@@ -3,7 +3,7 @@
 Linked people (tracking.links) form groups, connected through others too; ids follow the identity rule (sim.identity).
 Crossings and queues are measured by sim.events. An event is reported in the frame in which it is known, `start` being
 its onset: a merge once its link holds, a crossing 2 s after it, a queue when its people have waited 3 s (and 3 s more,
-as advancing is told from leaving by what follows); a queue's `end` is known later.
+as advancing is told from leaving by what follows); a queue's `end`, and who joins it, is known later.
 """
 
 from __future__ import annotations
