@@ -103,7 +103,8 @@ def test_a_sequence_without_groups_has_truth() -> None:
     from scenarios.loading import load
     from sim.sequence import simulate
 
-    truth = simulate(load("crowd", ["group.passers.size=1", "duration=3"]), 1).truth
+    alone = [f"group.{name}.size=1" for name in ("passers", "stop", "north", "south", "west", "east")]
+    truth = simulate(load("crowd", [*alone, "duration=3"]), 1).truth
     assert truth is not None
     assert truth.groups_px is not None
     assert all(len(g.id) == 0 for g in truth.groups_px)
