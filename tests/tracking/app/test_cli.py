@@ -56,6 +56,14 @@ def made(tmp_path_factory) -> Path:
     return folder
 
 
+@pytest.fixture(autouse=True)
+def _ctrl_c():
+    """Ctrl-C works here and in children, also where the tests themselves run in the background, without it."""
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
+    yield
+    signal.signal(signal.SIGINT, before)
+
+
 @pytest.fixture
 def place(made, tmp_path) -> Place:
     data = made / "data" / "flockscope-demo"
