@@ -5,7 +5,8 @@
 
 seq_hotel: pairwise membership F1 (pairs of labelled people of a frame, pooled over frames), baseline rule against rules
 that judge each frame alone, the best of nine settings being chosen on this very recording. Ours are not chosen on it:
-the baseline rule is what docs/formats.md says, CHOSEN is the best of six on simulated crowds (training seeds). Whom the
+the baseline rule stands in tracking/links.py, CHOSEN is the best of six on simulated crowds (training seeds; which two
+parameters the six vary was decided knowing what goes wrong here; who stands and talks pays for it, see party). Whom the
 baseline rule takes for groups wrongly are mostly people who stand about waiting: by place and velocity alone they are
 as near and as alike as people who talk, and only the label knows that they do not.
 Meet_WalkTogether1: when labelled groups come together by the event rules, and what the baseline rule says.
