@@ -40,10 +40,10 @@ class BlobConfig(Config):
     score_start: float = param(0.5, (0.0, 1.0), "score", "least score of a detection that starts a track")
     score_continue: float = param(0.1, (0.0, 1.0), "score", "least score of a detection that continues one")
     report_delay: float = param(0.1, (0.0, 5.0), "s", "a tentative track is reported from this age on")
-    report_coast: float = param(0.4, (0.0, 10.0), "s", "a track is reported so long after its last measurement")
+    report_coast: float = param(0.6, (0.0, 10.0), "s", "a track is reported so long after its last measurement")
     report_hidden: float = param(0.7, (0.0, 10.0), "s", "the same while it is hidden or merged", before=0.0)
     report_credit: float = param(
-        1.0,
+        0.33,
         (0.0, 10.0),
         "",
         "an unseen track is reported no longer than this share of the time it was seen",
