@@ -98,3 +98,12 @@ def check_birth(dynamics: Dynamics, confirm_ratio: float) -> None:
         got = f"{confirm_ratio:g}, and newborn tracks that start at {start:.3g} of the asymptote"
         remedy = "raise speed_prior or size_rate_prior, or lower confirm_ratio or the acceleration noises"
         raise InputError(place="confirm_ratio", got=got, expected="newborn tracks above it", remedy=remedy)
+
+
+def check_confirmation(dynamics: Dynamics, confirm_ratio: float, tentative_time: float) -> None:
+    """InputError where even a track that is seen in every frame dies before it can be confirmed."""
+    sightings = int(tentative_time / dynamics.dt + 1e-6) + 2  # at birth, and until the first frame after that time
+    if hits_to_confirm(dynamics, confirm_ratio, sightings + 1) > sightings:
+        got = f"{confirm_ratio:g}, which rho does not reach in {sightings} sightings at {1 / dynamics.dt:g} fps"
+        remedy = "raise tentative_time or confirm_ratio"
+        raise InputError(place="confirm_ratio", got=got, expected="confirmation within tentative_time", remedy=remedy)

@@ -12,7 +12,10 @@ angle rests until ellipses are measured.
 Departures, all ours:
 - Lengths are metres. A track's scale is px per metre at its own size (half to twice the sequence's), so that near and
   far people have the same noise in metres; from straight above it is the camera's. Accelerations are densities.
-- association = "optimal": least total cost d^2 + ln |S| (a track that has long been blind pays for its wide gate).
+- association = "optimal": one to one, least total cost d^2 + 2 ln rho, which is ln |S| in metres less a constant (a
+  track that has long been blind pays for its wide gate). A track left out costs the gate + 2 ln rho where a track dies
+  at the latest, whoever else there is, so that every pair in a gate is better than none.
+- Of several measurements whose nearest track is the same one, the nearest updates it.
 - A person in pieces: boxes in the gate of a measured track (as wide as that of a track always seen), or inside the
   predicted box of a confirmed one, start no track; they are fused by moments where that fits better than one alone.
 - A box that covers several unseen tracks as a whole starts no track; those tracks, and any that are hidden behind
@@ -60,6 +63,7 @@ class Blob:
         shares = 1 - np.array([c.gate, c.orphan_gate, c.confirm_gate])
         self.gate, self.orphan_gate, self.confirm_gate = chdtri(4, shares)
         self.people = Population(c, self.dynamics, context)
+        self.widest = max(self.people.excused_death, self.people.birth_rho)
 
     def step(self, frame: Frame, detections: Detections | None) -> Tracks:
         """Predict, gate, associate, update, manage; boxes in, boxes out."""
@@ -100,8 +104,7 @@ class Blob:
             rows, columns = self._pairs(cost)
         else:
             rows, columns = self._pairs(np.where(strong, cost, np.inf))
-            cost[rows], cost[:, strong] = np.inf, np.inf
-            more = self._pairs(cost)
+            more = self._weak_pairs(np.where(strong, np.inf, cost), rows)
             rows, columns = np.concatenate([rows, more[0]]), np.concatenate([columns, more[1]])
         free[columns] = False
         return rows, columns, free, d2
@@ -109,8 +112,17 @@ class Blob:
     def _pairs(self, cost: Array) -> tuple[Ints, Ints]:
         if self.config.association == "nearest":
             return blob_measure.best_pieces(*assign.nearest(cost), cost)
-        blind = 2 * np.log(self.people.rho)
-        return assign.optimal(cost + blind[:, None], self.gate + float(blind.max()))
+        blind = 2 * np.log(np.minimum(self.people.rho, self.widest))
+        return assign.optimal(cost + blind[:, None], self.gate + 2 * float(np.log(self.widest)))
+
+    def _weak_pairs(self, cost: Array, taken: Ints) -> tuple[Ints, Ints]:
+        """Pairs of the weak measurements with tracks that are not taken; `nearest` knows no second choice."""
+        if self.config.association == "optimal":
+            cost[taken] = np.inf
+            return self._pairs(cost)
+        rows, columns = self._pairs(cost)
+        open_rows = ~np.isin(rows, taken)
+        return rows[open_rows], columns[open_rows]
 
     def _without_merged(self, rows: Ints, columns: Ints, z: Array) -> tuple[Ints, Ints]:
         """The pairs without boxes that are several people at once, which a blind track's wide gate would let in.
@@ -170,7 +182,8 @@ class Blob:
             smaller = np.prod(pieces[near, 2:], 1)[:, None] < np.prod(place[:, 2:], 1)
             share = blob_measure.covered(pieces[near], place) * (possible[near] & smaller)
             owner[near] = np.where(share.max(1) >= INSIDE, share.argmax(1), -1)
-        if len(rows) and d2.min() <= self.orphan_gate:  # S is never below its asymptote, nor d2 above what it gives
+        least = ((people.bank[kalman.VAR] + self.noise) / self.asymptote).min()  # of S / asymptote: d2 least <= away
+        if len(rows) and d2.min() * least <= self.orphan_gate:
             y = (pieces[:, None] - place[rows]) / people.scale[rows, None]
             away = (y * y / self.asymptote).sum(2)
             owner = np.where(away.min(1) <= self.orphan_gate, rows[away.argmin(1)], owner)

@@ -8,7 +8,7 @@ from typing import ClassVar
 import numpy as np
 
 from tracking.config import Config, param
-from tracking.lifecycle import Dynamics, check_birth
+from tracking.lifecycle import Dynamics, check_birth, check_confirmation
 
 
 @dataclass(frozen=True)
@@ -61,4 +61,5 @@ class BlobConfig(Config):
             np.square([self.speed_prior, self.speed_prior, self.size_rate_prior, self.size_rate_prior]),
         )
         check_birth(made, self.confirm_ratio)
+        check_confirmation(made, self.confirm_ratio, self.tentative_time)
         return made

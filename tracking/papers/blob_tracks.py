@@ -116,7 +116,7 @@ class Population:
         unseen, sure, rho = ~self.hit[lost], self.confirmed[lost], self.rho[lost]
         limit = np.where(self.excused[lost], self.excused_death, self.death) * (1 - SLACK)
         over = unseen & (rho >= np.where(sure, limit, self.birth_rho * (1 - 1e-9)))
-        over |= ~sure & (t - self.born[lost] > self.config.tentative_time)
+        over |= ~sure & (t - self.born[lost] > self.config.tentative_time + 1e-6)
         over |= unseen & self._outside(self.bank[kalman.PLACE, lost])
         if over.any():
             stay = np.ones(len(self.id), bool)

@@ -199,6 +199,67 @@ def test_a_strong_detection_is_not_given_twice():
     assert tracker.people.hit.tolist() == [True, False]
 
 
+def test_a_weak_detection_knows_no_second_nearest_track():
+    frames = [at((100, 200), (112, 200)) for _ in range(20)] + [at((100, 200), (103, 200))]
+    scores = [[1.0, 1.0]] * 20 + [[1.0, 0.2]]
+    assert people_after(frames, both("nearest"), scores).hit.tolist() == [True, False]
+    assert people_after(frames, both("optimal"), scores).hit.tolist() == [True, True]
+
+
+def people_after(frames, config, scores=None):
+    """The tracks that `Blob` holds after these frames."""
+    tracker = Blob(config)
+    tracker.reset(CONTEXT, 0)
+    for k, rows in enumerate(frames):
+        box = np.array(rows, float).reshape(-1, 4)
+        score = np.ones(len(box)) if scores is None else np.array(scores[k], float)
+        tracker.step(Frame(k + 1, k / FPS), Detections(k + 1, k / FPS, "image", box[:, :2], None, box, score))
+    return tracker.people
+
+
+def pairs(d2, rho):
+    """Who is paired with whom at these squared distances (N, M), in order."""
+    tracker = Blob(both("optimal"))
+    tracker.reset(CONTEXT, 0)
+    tracker.people.give_birth(np.tile([100.0, 200, 68, 28], (len(d2), 1)), np.ones(len(d2)), 0.0)
+    tracker.people.rho[:] = rho
+    return sorted(zip(*(k.tolist() for k in tracker._pairs(np.array(d2))), strict=True))
+
+
+def test_a_blind_track_far_away_changes_no_pair():
+    d2, inf = [[0.1, 17.0], [17.0, np.inf]], np.inf
+    assert pairs(d2, [1.0, 1.0]) == pairs([*d2, [inf, inf]], [1.0, 1.0, np.exp(10)]) == [(0, 0)]
+    r = np.random.default_rng(0)
+    for _ in range(200):
+        d2 = r.uniform(0, 18.4, (4, 4))
+        d2[r.random(d2.shape) < 0.4] = inf
+        rho = np.exp(r.uniform(0, 4, 4))
+        with_far = pairs(np.vstack([d2, np.full(4, inf)]), [*rho, np.exp(10)])
+        assert with_far == pairs(d2, rho)
+
+
+@pytest.mark.parametrize("rho", [1.0, 5.0, 80.0, 1e6])
+def test_a_pair_in_a_gate_is_better_than_none(rho):
+    assert pairs([[18.4]], [rho]) == [(0, 0)]
+
+
+def test_pieces_are_found_by_a_track_narrower_than_one_always_seen():
+    config = BlobConfig(size_noise=0.05, size_accel_noise=5.0, size_rate_prior=0.01, speed_prior=5.0)
+    assert len(people_after([at((100, 200)), [*at((100, 200)), [100, 192.5, 28, 83]]], config).id) == 1
+
+
+@pytest.mark.parametrize("config", [BlobConfig(), BlobConfig.frozen()], ids=["default", "frozen"])
+@pytest.mark.parametrize("fps", [2.5, 7.0, 10.0, 25.0])
+def test_whoever_is_always_seen_is_confirmed(config, fps):
+    tracker = Blob(config)
+    tracker.reset(Context(fps=fps, px_per_m=40.0), 0)
+    for k in range(int(3 * fps)):
+        box = np.array(at((100, 200)))
+        tracker.step(Frame(k + 1, k / fps), Detections(k + 1, k / fps, "image", box[:, :2], None, box, np.ones(1)))
+    assert tracker.people.id.tolist() == [1]
+    assert tracker.people.confirmed.all()
+
+
 @pytest.mark.parametrize("seed", range(6))
 def test_order_of_detections_matters_to_nothing(config, seed):
     boxes, r = crowd(seed), np.random.default_rng(seed)
