@@ -40,7 +40,8 @@ CHANGES = (
     {"coast_time": 1.0},
     {"coast_time": 2.5},
     {"gate": 0.99},
-    {"orphan_gate": 0.9},
+    {"orphan_gate": 0.99},
+    {"orphan_gate": 0.999},
 )
 
 

@@ -3,6 +3,7 @@
 Both work on the gated pairs only, given as a cost matrix with inf outside the gates. They answer (track, measurement)
 pairs in which no measurement occurs twice; a track may occur twice only with `nearest`, where a measurement goes to
 whichever gate it is deepest in (Gonzalez et al. 2006, 4.4) and one person may come in several pieces.
+`optimal` is ours.
 """
 
 from __future__ import annotations
@@ -22,7 +23,7 @@ def nearest(cost: Array) -> tuple[Ints, Ints]:
 
 
 def optimal(cost: Array, unassigned: float) -> tuple[Ints, Ints]:
-    """One to one with least total cost, a track left out costing `unassigned`.
+    """One to one with least total cost, a track left out costing `unassigned`, the same for all; no pair costs more.
 
     Pairs that compete with no other pair are taken as they are; only the rest goes through scipy's solver.
     """

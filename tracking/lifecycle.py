@@ -1,13 +1,15 @@
 """Birth, confirmation and death of tracks from rho = sqrt|S| / its asymptote.
 
-Gonzalez et al. (2006, 4.5) manage tracks by the innovation covariance's determinant: it falls towards an asymptote
-while measurements come, rises while they don't, and knows nothing of their values. The numbers here are ours, because
-the paper's rule read naively cannot work (a newborn's |S| depends on its first covariance, not on the system):
+Gonzalez et al. (2006, 4.5, 5) manage tracks by the innovation covariance's determinant: it falls towards an asymptote
+while measurements come, rises while they don't, and knows nothing of their values. The paper names no numbers. It
+confirms "below a certain percentage" of the asymptote, here one above 100, as rho falls from above, and deletes beyond
+what "a certain number" of misses gives. A newborn's |S| hangs on its first covariance too, hence the checks (ours):
 
-- confirm where rho <= confirm_ratio (a little above 1) and the last measurement was near,
-- a newborn must start above it (checked when the config is made concrete), so that one sighting never confirms,
-- a confirmed track dies where rho exceeds what k misses from the steady state give,
-- a tentative one dies where rho exceeds its value at birth, or after a time limit.
+- confirm where rho <= confirm_ratio (a little above 1) and the measurement of that frame was near,
+- a newborn must start above it, so that one sighting never confirms, and must reach it before it is too old
+  (both checked when the config is made concrete),
+- a confirmed track dies where rho reaches what k misses from the steady state give: sooner if it was not there yet,
+- a tentative one dies (ours) where rho, unseen, reaches its value at birth, or after a time limit.
 """
 
 from __future__ import annotations

@@ -1,31 +1,33 @@
 """`blob`: gates, association, a bank of Kalman filters and track management on boxes.
 
 Gonzalez, Rowe, Andrade, Villanueva, "Efficient management of multiple agent tracking through observation handling",
-2006. State per track: (x, x', y, y', h, h', w, w') in image px, constant speed with white acceleration
-(tracking.kalman). The measurement is (x, y, h, w), a box's centre, height and width; a box has no axis, so the paper's
-angle rests until ellipses are measured.
+2006. State per track: (x, x', y, y', h, h', w, w') in image px, its covariance in m^2, constant speed with white
+acceleration (tracking.kalman). The measurement is (x, y, h, w), a box's centre, height and width; a box has no axis, so
+the paper's angle rests until ellipses are measured.
 
     gate       d^2 = (z - z_pred)' S^-1 (z - z_pred) <= chi2_4(gate)              (eq. 9; d^2, not d)
     associate  each measurement to the nearest track in whose gate it lies         (4.4)
     manage     rho = sqrt|S| / asymptote: confirm low, delete high                 (4.5; tracking.lifecycle)
 
 Departures, all ours:
-- Lengths are metres. A track's scale is px per metre at its own size (half to twice the sequence's), so that near and
-  far people have the same noise in metres; from straight above it is the camera's. Accelerations are densities.
+- Persons only. Lengths are metres: a track's scale is px per metre, the longer side of its box being 1.7 m (half to
+  twice the sequence's), so that near and far people have the same noise in metres; from straight above it is the
+  camera's. Accelerations are densities.
 - association = "optimal": one to one, least total cost d^2 + 2 ln rho, which is ln |S| in metres less a constant (a
   track that has long been blind pays for its wide gate). A track left out costs the gate + 2 ln rho where a track dies
-  at the latest, whoever else there is, so that every pair in a gate is better than none.
+  at the latest, whoever else there is, so that a pair in a gate, alone, is better than none.
 - Of several measurements whose nearest track is the same one, the nearest updates it.
-- A person in pieces: boxes in the gate of a measured track (as wide as that of a track always seen), or inside the
-  predicted box of a confirmed one, start no track; they are fused by moments where that fits better than one alone.
-- A box that covers several unseen tracks as a whole starts no track; those tracks, and any that are hidden behind
-  another person, may coast for merged_time rather than coast_time.
+- A person in pieces: boxes in the orphan_gate of a measured track (as wide as that of a track always seen, so narrower
+  than the gate: the paper has the gate), or inside the predicted box of a confirmed one, start no track; they are fused
+  by moments where that fits better than one alone.
+- A box that covers several confirmed tracks as a whole, an unseen one among them, starts no track; the unseen ones, and
+  any that are hidden behind another person, may coast for merged_time rather than coast_time until measured again.
 - Detections below score_start continue tracks but start none, and choose after the others (ByteTrack, Zhang et al.
-  2022).
-- Reported are confirmed tracks, and tentative ones from report_delay on, until report_coast (hidden ones:
+  2022); under `nearest` each still knows only its nearest track.
+- Reported are confirmed tracks, and measured tentative ones from report_delay on, until report_coast (hidden ones:
   report_hidden) after the last measurement, but no longer than report_credit times the time they were seen: a track
   that was hardly seen was mostly a false alarm. An unseen track is silent on its way out of view, and dies when its
-  centre leaves the image.
+  centre leaves the image, where its size is known.
 """
 
 from __future__ import annotations

@@ -25,23 +25,36 @@ class BlobConfig(Config):
     size_rate_prior: float = param(0.2, (0.01, 3.0), "m/s", "standard deviation of a newborn's growth", "log")
     gate: float = param(0.999, (0.5, 0.999999), "probability", "share of true measurements inside a track's gate")
     association: str = param(
-        "optimal", ("nearest", "optimal"), "", "nearest gated track (the paper) or least total cost", "categorical"
+        "optimal",
+        ("nearest", "optimal"),
+        "",
+        "nearest gated track (the paper) or least total cost (ours)",
+        "categorical",
     )
     orphan_gate: float = param(
-        0.9, (0.01, 0.999999), "probability", "gate within which a measurement left over starts no track"
+        0.9,
+        (0.01, 0.999999),
+        "probability",
+        "gate of a measured track within which a measurement left over starts none (ours)",
     )
-    confirm_ratio: float = param(1.5, (1.01, 2.0), "", "rho below which a track is confirmed")
+    confirm_ratio: float = param(1.5, (1.01, 2.0), "", "rho at or below which a track is confirmed")
     confirm_gate: float = param(0.99, (0.1, 0.999999), "probability", "gate of the confirming measurement")
-    coast_time: float = param(1.5, (0.0, 10.0), "s", "a confirmed track dies after so long without measurement")
+    coast_time: float = param(
+        1.5, (0.0, 10.0), "s", "a confirmed track dies after so long without measurement, from the steady state"
+    )
     tentative_time: float = param(1.0, (0.1, 10.0), "s", "a tentative track not confirmed by then dies")
     merged_time: float = param(
-        3.0, (0.0, 20.0), "s", "the same while another track, or a merged blob, explains that it is not seen"
+        3.0, (0.0, 20.0), "s", "the same once another track, or a merged blob, explained that it is not seen"
     )
     score_start: float = param(0.5, (0.0, 1.0), "score", "least score of a detection that starts a track")
     score_continue: float = param(0.1, (0.0, 1.0), "score", "least score of a detection that continues one")
-    report_delay: float = param(0.1, (0.0, 5.0), "s", "a tentative track is reported from this age on")
-    report_coast: float = param(0.6, (0.0, 10.0), "s", "a track is reported so long after its last measurement")
-    report_hidden: float = param(0.7, (0.0, 10.0), "s", "the same while it is hidden or merged", before=0.0)
+    report_delay: float = param(
+        0.1, (0.0, 5.0), "s", "a tentative track is reported, where it is measured, from this age on"
+    )
+    report_coast: float = param(
+        0.6, (0.0, 10.0), "s", "a track is reported so long after its last measurement, from the steady state"
+    )
+    report_hidden: float = param(0.7, (0.0, 10.0), "s", "the same once it was hidden or merged", before=0.0)
     report_credit: float = param(
         0.33,
         (0.0, 10.0),

@@ -12,7 +12,8 @@ from tracking.papers.blob_config import BlobConfig
 PERSON = 1.7  # m, what the longer side of a person's box stands for
 HIDDEN = 0.4  # share of a predicted box behind somebody else from which on a miss is explained
 SAME = 0.5  # IoU of a box with the hull of several predicted ones from which on it is taken for them all
-# Relative, of comparisons with rho: filters near their steady state count as in it; a miss adds 10 % or more.
+# Relative, of rho at death (earlier) and silence (later): filters near their steady state count as in it; a miss adds
+# 10 % or more.
 SLACK = 0.02
 
 
@@ -20,7 +21,8 @@ class Population:
     """N tracks as arrays; rows of two tables, so that births and deaths touch few arrays.
 
     bank (5, N, 4): tracking.kalman, places in px, covariances in m^2. scale (N,) px per m. rho (N,) at the last
-    prediction. id, born (s), score; confirmed; hit: measured in this frame; excused: unseen, and somebody else is why.
+    prediction. id, born (s), score; confirmed; hit: measured in this frame; excused: found unseen with
+    somebody else as the reason, until it is measured again.
     hits, misses: frames measured in all, and since then. low, high (2,) px: the field of view.
     """
 
@@ -44,7 +46,7 @@ class Population:
         self.confirmed, self.hit, self.excused = flags
 
     def _after(self, seconds: float) -> float:
-        """rho in the frame that ends so many seconds without measurement; it is exceeded in the next."""
+        """rho in the frame that ends so many seconds without measurement, from the steady state: sooner otherwise."""
         frames = int(np.ceil(seconds * self.context.fps - 1e-6))
         return lifecycle.after_misses(self.dynamics, frames - 1)
 
@@ -66,7 +68,7 @@ class Population:
         self.scale[:] = self._scale_of(self.bank[kalman.PLACE])
 
     def _scale_of(self, place: Array) -> Array:
-        """px per m at a person of this size; from straight above the camera's own."""
+        """px per m at a person of this size, half to twice the sequence's; from straight above the camera's own."""
         whole = self.context.px_per_m
         if self.top:
             return np.full(len(place), whole)
