@@ -89,14 +89,22 @@ def queue_lines(pos: Array, vel: Array, present: Bools, fps: float) -> list[Line
     return lines(pos, vel, there, fps)
 
 
-def queues(pos: Array, vel: Array, present: Bools, fps: float) -> list[GroupEvent]:
+def queues(pos: Array, vel: Array, present: Bools, group: Ints, fps: float) -> list[GroupEvent]:
     """Three or more people waiting in line for 3 s or longer; the event lasts until less than two do.
 
     Spacing along the line 0.4-1.5 m, nobody more than 0.5 m off it, slower than 0.4 m/s except when advancing.
     start is the onset, members all who stood in the line for a second or more, pos its
-    middle then.
+    middle then; before and after are the members' groups (T, P) in the first and in the last frame.
     """
-    return [
-        GroupEvent("queue", q.first + 1, q.last + 1, None, (), (), tuple(p + 1 for p in sorted(q.order)), q.middle)
-        for q in queue_lines(pos, vel, present, fps)
-    ]
+    found = []
+    for q in queue_lines(pos, vel, present, fps):
+        columns = np.array(sorted(q.order))
+        before, after = (_groups_of(group[t, columns[present[t, columns]]]) for t in (q.first, q.last))
+        people = tuple((columns + 1).tolist())
+        found.append(GroupEvent("queue", q.first + 1, q.last + 1, None, before, after, people, q.middle))
+    return found
+
+
+def _groups_of(label: Ints) -> tuple[int, ...]:
+    """Ascending ids of the groups among people's labels; -1 once for each person alone."""
+    return (-1,) * int((label < 0).sum()) + tuple(np.unique(label[label >= 0]).tolist())

@@ -31,7 +31,26 @@ def check_orders(motion: Motion, truth: Truth) -> dict[str, int]:
         if index is None:
             raise _unfulfilled(order, motion, truth.length)
         fulfilled[order.id] = index
+        if order.kind == "queue":
+            _check_turns(order, motion, (truth.events or ())[index])
     return fulfilled
+
+
+def _check_turns(order: Order, motion: Motion, event: GroupEvent) -> None:
+    """WorkError where people left the queue of an order in another order than they stood: first in, first out."""
+    from sim.events import queue_lines
+
+    for line in queue_lines(motion.pos, motion.vel, motion.present, motion.fps):
+        people = {p + 1 for p in line.order}
+        if (line.first + 1, line.last + 1) == (event.start, event.end) and people == set(event.members):
+            if not line.fifo:
+                raise WorkError(
+                    file=f"scenario {motion.name}", place=f"event {order.id} (seed {motion.seed})",
+                    got=f"a queue left by people {', '.join(str(p + 1) for p in line.left)} in this order",
+                    expected=f"first in, first out: {', '.join(str(p + 1) for p in line.order)} or from the other end",
+                    remedy="give the line more room, or let people come from behind it",
+                )  # fmt: skip
+            return
 
 
 def dense_groups(truth: Truth, shape: tuple[int, ...]) -> Ints:

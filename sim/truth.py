@@ -73,7 +73,7 @@ def _events(motion: Motion, group: Ints, changes: tuple[GroupEvent, ...]) -> tup
     from sim.events import crossings, queues
 
     crossed = crossings(motion.pos, motion.vel, motion.present, group, motion.fps)
-    queued = queues(motion.pos, motion.vel, motion.present, motion.fps)
+    queued = queues(motion.pos, motion.vel, motion.present, group, motion.fps)
     every = [*changes, *crossed, *queued]
     return tuple(sorted(every, key=lambda e: (e.start, e.end, e.kind, e.members, e.after)))
 

@@ -44,7 +44,7 @@ def label_truth(
     found = [_named(e, names, people, px_per_m) for e in measured.events]
     given = np.full((length, len(people)), -1, np.int64)
     given[frame - 1, column] = label
-    met = crossings(places, velocities, present, given, fps) + queues(places, velocities, present, fps)
+    met = crossings(places, velocities, present, given, fps) + queues(places, velocities, present, given, fps)
     found += [_named(e, {}, people, px_per_m) for e in met]
     events = tuple(sorted(found, key=lambda e: (e.start, e.end, e.kind, e.members, e.after)))
     near = replace(measured.near, a=people[measured.near.a - 1], b=people[measured.near.b - 1])

@@ -14,6 +14,13 @@ def crowd(paths):
     return pos, np.gradient(pos, 1 / FPS, axis=0), np.isfinite(pos).all(axis=2)
 
 
+def queued(paths, group=None):
+    """The queues of people on these paths, all alone unless `group` (P,) says otherwise."""
+    pos, vel, present = crowd(paths)
+    label = np.full(len(paths), -1) if group is None else np.array(group)
+    return queues(pos, vel, present, np.tile(label, (len(pos), 1)), FPS)
+
+
 def pair(start, path):
     """Two people 0.7 m apart across, on `path` (T, 2) from `start`."""
     return [np.array([start[0], start[1] + y]) + path for y in (-0.35, 0.35)]
@@ -149,22 +156,30 @@ def waiting(k, arrive=3.0, leave=9.0, spacing=0.8, at=(5.0, 3.0), step=(0.0, 1.2
 def test_queue_starts_at_its_onset_and_ends_below_two():
     """All slow from 3 s on (frame 31; the central difference is halved there), one after another leaves from 9 s."""
     paths = [waiting(k, leave=9 + 0.9 * k) for k in range(3)]
-    (event,) = queues(*crowd(paths), FPS)
-    assert (event.kind, event.members, event.before, event.after) == ("queue", (1, 2, 3), (), ())
+    (event,) = queued(paths)
+    assert (event.kind, event.members, event.before, event.after) == ("queue", (1, 2, 3), (-1, -1, -1), (-1, -1, -1))
     speed = np.hypot(*np.moveaxis(crowd(paths)[1], -1, 0)) < 0.4
     assert event.start == np.flatnonzero(speed.all(axis=1))[0] + 1 == 32
     assert event.end == np.flatnonzero(speed.sum(axis=1) >= 2)[-1] + 1
 
 
+def test_queue_names_groups_before_and_after():
+    """One alone, a pair and one alone line up; the first is served and away when less than two are left."""
+    paths = [waiting(k, leave=9 + 0.9 * k) for k in range(4)]
+    paths[0] = np.where(T < 10, paths[0], np.nan)
+    (event,) = queued(paths, [-1, 7, 7, -1])
+    assert (event.before, event.after) == ((-1, -1, 7), (-1, 7))
+
+
 def test_queue_of_two_or_for_less_than_three_seconds_is_none():
-    assert queues(*crowd([waiting(k) for k in range(2)]), FPS) == []
-    assert queues(*crowd([waiting(k, arrive=3, leave=5.9) for k in range(3)]), FPS) == []
-    assert len(queues(*crowd([waiting(k, arrive=3, leave=6.3) for k in range(3)]), FPS)) == 1
+    assert queued([waiting(k) for k in range(2)]) == []
+    assert queued([waiting(k, arrive=3, leave=5.9) for k in range(3)]) == []
+    assert len(queued([waiting(k, arrive=3, leave=6.3) for k in range(3)])) == 1
 
 
 @pytest.mark.parametrize(("spacing", "found"), [(0.3, 0), (0.45, 1), (1.45, 1), (1.6, 0)])
 def test_queue_spacing(spacing, found):
-    assert len(queues(*crowd([waiting(k, spacing=spacing) for k in range(4)]), FPS)) == found
+    assert len(queued([waiting(k, spacing=spacing) for k in range(4)])) == found
 
 
 def served(people=5, service=2.0, spacing=0.8):
@@ -218,23 +233,23 @@ def test_a_circle_of_people_talking_is_not_a_queue(people, radius):
     angle = 2 * np.pi * np.arange(people) / people + 0.3
     stand = [np.array([5, 5]) + radius * np.array([np.cos(a), np.sin(a)]) + 0 * T for a in angle]
     sway = [p + 0.05 * np.sin(T * rng.uniform(1, 2) + rng.uniform(0, 6, 2)) for p in stand]
-    assert queues(*crowd(stand), FPS) == []
-    assert queues(*crowd(sway), FPS) == []
+    assert queued(stand) == []
+    assert queued(sway) == []
 
 
 def test_walking_in_file_or_shuffling_abreast_is_not_a_queue():
-    assert queues(*crowd([np.array([0.8 * k, 0]) + straight(1.2) for k in range(4)]), FPS) == []
-    assert queues(*crowd([np.array([0.8 * k, 0]) + straight(0, 0.3) for k in range(4)]), FPS) == []
-    assert len(queues(*crowd([np.array([0.8 * k, 0]) + straight(0.3, 0) for k in range(4)]), FPS)) == 1
+    assert queued([np.array([0.8 * k, 0]) + straight(1.2) for k in range(4)]) == []
+    assert queued([np.array([0.8 * k, 0]) + straight(0, 0.3) for k in range(4)]) == []
+    assert len(queued([np.array([0.8 * k, 0]) + straight(0.3, 0) for k in range(4)])) == 1
 
 
 def test_two_queues_at_once():
     first, second = ([waiting(k, at=(5.0, y)) for k in range(3)] for y in (3.0, 8.0))
-    assert sorted(e.members for e in queues(*crowd(first + second), FPS)) == [(1, 2, 3), (4, 5, 6)]
+    assert sorted(e.members for e in queued(first + second)) == [(1, 2, 3), (4, 5, 6)]
 
 
 def found(pos, vel, there, group):
-    events = crossings(pos, vel, there, group, FPS) + queues(pos, vel, there, FPS)
+    events = crossings(pos, vel, there, group, FPS) + queues(pos, vel, there, group, FPS)
     return [(e.kind, e.start, e.end, set(e.members)) for e in events]
 
 
@@ -252,7 +267,7 @@ def test_place_turn_and_order_of_people_change_nothing():
 def test_nobody():
     none = np.zeros((0, 0, 2))
     assert crossings(none, none, none[..., 0] > 0, np.zeros((0, 0), np.int64), FPS) == []
-    assert queues(none, none, none[..., 0] > 0, FPS) == []
+    assert queues(none, none, none[..., 0] > 0, np.zeros((0, 0), np.int64), FPS) == []
     alone = np.zeros((20, 1, 2))
     assert crossings(alone, alone, alone[..., 0] == 0, np.full((20, 1), -1), FPS) == []
-    assert queues(alone, alone, alone[..., 0] == 0, FPS) == []
+    assert queues(alone, alone, alone[..., 0] == 0, np.full(alone.shape[:2], -1), FPS) == []

@@ -19,7 +19,7 @@ def measure(scene):
     events = [
         *found.events,
         *crossings(scene.pos, scene.vel, scene.present, found.group, scene.fps),
-        *queues(scene.pos, scene.vel, scene.present, scene.fps),
+        *queues(scene.pos, scene.vel, scene.present, found.group, scene.fps),
     ]
     return found.group, events
 

@@ -152,7 +152,7 @@ def queueing():
 
 def test_queue():
     motion = queueing()
-    assert told(motion) == [("queue", 81, 150, (), (), (1, 2, 3))]
+    assert told(motion) == [("queue", 81, 150, (-1, -1, -1), (-1, -1, -1), (1, 2, 3))]
     slow = np.hypot(*np.moveaxis(motion.vel, -1, 0)) < 0.4
     assert first(slow.sum(axis=1) >= 3) == 36, "who does not wait 3 s is early"
     still = slow[80:, :3].sum(axis=1) >= 2

@@ -2,6 +2,7 @@ import numpy as np
 import pytest
 
 from scenarios.errors import WorkError
+from sim.events import queues
 from sim.orders import check_orders
 from sim.types import GroupEvent, Motion, Order, Truth
 from tests.reference_sense import walkers
@@ -113,3 +114,24 @@ def test_queues_want_three_of_their_people() -> None:
 def test_no_orders() -> None:
     motion = merging().replace(orders=())
     assert check_orders(motion, truth_of(motion, 50)) == {}
+
+
+@pytest.mark.parametrize("leaving", [(1, 2, 3, 4), (2, 1, 3, 4)])
+def test_queues_are_first_in_first_out(leaving: tuple[int, ...]) -> None:
+    """Four stand in line from the first frame; they leave sideways 1 s after one another, from 5 s on."""
+    t = np.arange(FRAMES) / 10
+    pos = np.empty((FRAMES, 4, 2))
+    for turn, person in enumerate(leaving):
+        pos[:, person - 1] = np.stack([0 * t + 5 + 0.6 * person, np.maximum(t - 5 - turn, 0) * 1.3], axis=1)
+    base = walkers([[0, 0]] * 4, [[0, 0]] * 4, frames=FRAMES)
+    order = Order("q1", "queue", 1, ((1,), (2,), (3,), (4,)), ((1, 2, 3, 4),))
+    motion = base.replace(pos=pos, vel=np.gradient(pos, 0.1, axis=0), orders=(order,))
+    alone = np.full((FRAMES, 4), -1)
+    truth = truth_of(merging(), 50).replace(
+        events=tuple(queues(motion.pos, motion.vel, motion.present, alone, motion.fps))
+    )
+    if leaving[0] == 1:
+        assert check_orders(motion, truth) == {"q1": 0}
+    else:
+        with pytest.raises(WorkError, match=r"left by people 2, 1.* first in, first out"):
+            check_orders(motion, truth)

@@ -7,7 +7,8 @@ from pathlib import Path
 import cv2
 import numpy as np
 
-from scenarios.errors import InputError, WorkError
+from scenarios.errors import InputError
+from sim.io.atomic import write_file
 from sim.types import Array, GroupEvent, Image, Ints, Sequence, Truth
 from tracking.app import sheet_panel
 from tracking.app.extent import MARGIN, peopled
@@ -25,7 +26,7 @@ SOON = 1.0
 
 
 def sheet(sequence: Sequence, out: str | Path, frames: int = 8) -> Path:
-    """Writes the PNG and returns its path: `frames` panels, four to a row, with a time line beneath."""
+    """Writes the PNG, whole or not at all, and returns its path: `frames` panels, four to a row, with a time line beneath."""
     truth = sequence.truth
     if truth is None or len(truth.frame) == 0:
         raise InputError(
@@ -35,13 +36,7 @@ def sheet(sequence: Sequence, out: str | Path, frames: int = 8) -> Path:
     path = Path(out)
     done, code = cv2.imencode(".png", picture)
     assert done, "PNG holds any 8-bit picture"
-    try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        path.write_bytes(code.tobytes())
-    except OSError as error:
-        raise WorkError(
-            file=path, got=error.strerror or error, expected="a picture written", remedy="check path, rights and space"
-        ) from None
+    write_file(path, code.tobytes())
     return path
 
 
@@ -167,7 +162,9 @@ def _kind(event: GroupEvent) -> Colour:
 
 def _words(event: GroupEvent) -> str:
     def listed(ids: tuple[int, ...]) -> str:
-        return "+".join("alone" if i < 0 else f"G{i}" for i in ids)
+        alone = sum(i < 0 for i in ids)
+        some = ["alone" if alone == 1 else f"{alone} alone"] if alone else []
+        return "+".join([*some, *(f"G{i}" for i in ids if i >= 0)])
 
     if event.before == event.after:
         return f"{event.kind} {listed(event.before)}"

@@ -22,7 +22,11 @@ function element(name, attributes, parent, text) {
 }
 
 function eventWords(event) {
-  const list = ids => ids.map(id => (id < 0 ? "alone" : `${event.side === "tracks" ? "T" : "G"}${id}`)).join(" + ");
+  const list = ids => {
+    const alone = ids.filter(id => id < 0).length, named = ids.filter(id => id >= 0);
+    const groups = named.map(id => `${event.side === "tracks" ? "T" : "G"}${id}`);
+    return (alone ? [alone > 1 ? `${alone} alone` : "alone"] : []).concat(groups).join(" + ");
+  };
   const ids = event.before.length || event.after.length ? ` ${list(event.before) || "–"} → ${list(event.after) || "–"}` : "";
   const who = event.members.length ? `; people ${event.members.slice(0, 12).join(", ")}${event.members.length > 12 ? " …" : ""}` : "";
   const said = event.emitted === null ? "" : `; said at frame ${event.emitted}`;
