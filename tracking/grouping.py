@@ -136,7 +136,7 @@ def _encounters(rows: _Rows, fps: float) -> list[GroupEvent]:
     pos, vel = rows.places(), rows.velocities()
     present: Bools = np.isfinite(pos[..., 0])
     crossed = crossings(pos, vel, present, rows.labels(), fps)
-    queued = queues(pos, vel, present, fps)
+    queued = queues(pos, vel, present, rows.labels(), fps)
     late, waited = frames_of(SAME_BEFORE, fps), frames_of(QUEUE_HOLD, fps) + frames_of(ADVANCE, fps)
     return [replace(e, emitted=min(e.end + late, rows.length)) for e in crossed] + [
         replace(e, emitted=min(e.start + waited - 1, rows.length)) for e in queued
