@@ -118,11 +118,11 @@ def test_no_orders() -> None:
 
 @pytest.mark.parametrize("leaving", [(1, 2, 3, 4), (2, 1, 3, 4)])
 def test_queues_are_first_in_first_out(leaving: tuple[int, ...]) -> None:
-    """Four stand in line from the first frame; they leave sideways 1 s after one another, from 5 s on."""
+    """Four stand in line from the first frame; they leave sideways 2 s after one another, from 5 s on."""
     t = np.arange(FRAMES) / 10
     pos = np.empty((FRAMES, 4, 2))
     for turn, person in enumerate(leaving):
-        pos[:, person - 1] = np.stack([0 * t + 5 + 0.6 * person, np.maximum(t - 5 - turn, 0) * 1.3], axis=1)
+        pos[:, person - 1] = np.stack([0 * t + 5 + 0.6 * person, np.maximum(t - 5 - 2 * turn, 0) * 1.3], axis=1)
     base = walkers([[0, 0]] * 4, [[0, 0]] * 4, frames=FRAMES)
     order = Order("q1", "queue", 1, ((1,), (2,), (3,), (4,)), ((1, 2, 3, 4),))
     motion = base.replace(pos=pos, vel=np.gradient(pos, 0.1, axis=0), orders=(order,))
