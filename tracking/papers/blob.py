@@ -65,7 +65,7 @@ class Blob:
         shares = 1 - np.array([c.gate, c.orphan_gate, c.confirm_gate])
         self.gate, self.orphan_gate, self.confirm_gate = chdtri(4, shares)
         self.people = Population(c, self.dynamics, context)
-        self.widest = max(self.people.excused_death, self.people.birth_rho)
+        self.blindest = 2 * float(np.log(max(self.people.excused_death, self.people.birth_rho)))
 
     def step(self, frame: Frame, detections: Detections | None) -> Tracks:
         """Predict, gate, associate, update, manage; boxes in, boxes out."""
@@ -114,8 +114,8 @@ class Blob:
     def _pairs(self, cost: Array) -> tuple[Ints, Ints]:
         if self.config.association == "nearest":
             return blob_measure.best_pieces(*assign.nearest(cost), cost)
-        blind = 2 * np.log(np.minimum(self.people.rho, self.widest))
-        return assign.optimal(cost + blind[:, None], self.gate + 2 * float(np.log(self.widest)))
+        blind = np.minimum(2 * np.log(self.people.rho), self.blindest)
+        return assign.optimal(cost + blind[:, None], self.gate + self.blindest)
 
     def _weak_pairs(self, cost: Array, taken: Ints) -> tuple[Ints, Ints]:
         """Pairs of the weak measurements with tracks that are not taken; `nearest` knows no second choice."""

@@ -12,8 +12,8 @@ from tracking.papers.blob_config import BlobConfig
 PERSON = 1.7  # m, what the longer side of a person's box stands for
 HIDDEN = 0.4  # share of a predicted box behind somebody else from which on a miss is explained
 SAME = 0.5  # IoU of a box with the hull of several predicted ones from which on it is taken for them all
-# Relative, of rho at death (earlier) and silence (later): filters near their steady state count as in it; a miss adds
-# 10 % or more.
+# Relative, of rho at death (earlier) and silence (later): filters near their steady state count as in it. With the
+# default noises a miss adds more than this up to 60 fps; beyond that the times are off by a frame or two.
 SLACK = 0.02
 
 

@@ -260,6 +260,20 @@ def test_whoever_is_always_seen_is_confirmed(config, fps):
     assert tracker.people.confirmed.all()
 
 
+@pytest.mark.parametrize("start", [0.0, 0.1, 1.2, 4.1, 8.2, 1000.3])
+def test_a_tentative_track_has_its_time_whenever_it_starts(start):
+    tracker = Blob(BlobConfig(confirm_gate=0.1, tentative_time=1.0))
+    tracker.reset(CONTEXT, 0)
+    first = []
+    for k in range(14):
+        box = np.array(at((100 + 14 * (k % 2), 200)))  # never near enough to be confirmed
+        found = Detections(k + 1, start + k / FPS, "image", box[:, :2], None, box, np.ones(1))
+        tracker.step(Frame(k + 1, start + k / FPS), found)
+        first.append(1 in tracker.people.id)
+    assert not tracker.people.confirmed.any()
+    assert first == [True] * 11 + [False] * 3
+
+
 @pytest.mark.parametrize("seed", range(6))
 def test_order_of_detections_matters_to_nothing(config, seed):
     boxes, r = crowd(seed), np.random.default_rng(seed)
