@@ -20,7 +20,7 @@ Pattern = Annotated[str, Field(pattern=r"^[A-Za-z][A-Za-z0-9_.-]*\*?$")]
 Fixed = tuple[float, float]
 
 FREE_SPEED = Distribution(normal=(1.34, 0.26), clip=(0.5, 2.2))
-GROUP_SIZE = Distribution(poisson=1.1, clip=(1, 6))
+GROUP_SIZE = Distribution(poisson=1.1, clip=(1, 12))
 SPACING = Distribution(normal=(0.75, 0.12), clip=(0.5, 1.2))
 
 
