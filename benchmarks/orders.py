@@ -23,6 +23,7 @@ from sim.orders import PATIENCE
 from sim.sequence import observe
 from sim.types import Array, Motion, Truth
 from sim.world import run
+from tracking.stats import wilson
 
 WINDOW = 0.8  # s
 RULES = {"merge": 2.0, "split": 2.0, "queue": 3.0}  # s from the onset until an order has come true
@@ -66,7 +67,11 @@ def survey(entry: Entry, seeds: range) -> None:
         pace.append(paces(entry.scenario, motion, truth))
         for event in truth.events or ():
             onsets[event.kind].append((event.start - 1) / truth.fps)
-    text = [f"{entry.name}: {len(failed)} of {len(seeds)} seeds failed", f"{orders} orders came true"]
+    low, high = wilson(len(failed), len(seeds))
+    text = [
+        f"{entry.name}: {len(failed)} of {len(seeds)} seeds failed ({low:.1%} to {high:.1%} of all)",
+        f"{orders} orders came true",
+    ]
     if people:
         text.append(f"{min(people)} to {max(people)} people")
     if orders:
