@@ -7,8 +7,10 @@ Arrays are float64 except ids (int64), flags (bool) and images (uint8); every ar
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field, fields, replace
+from functools import cache
 from typing import Any, Literal, Protocol, Self
 
 import numpy as np
@@ -25,23 +27,45 @@ EVENT_KINDS = ("merge", "split", "cross", "queue", "form", "dissolve", "enter", 
 
 
 class _Frozen:
-    """Makes the arrays of a frozen dataclass read-only and of the declared kind."""
+    """Makes the arrays of a frozen dataclass read-only and, from any other width of number, float64 or int64.
+
+    What is of the right kind is not copied: the field is a read-only view, and whoever keeps the array itself can
+    still write to it. Floats given as ids stay what they are, for the check of a tracker's answer to name them.
+    """
 
     def __post_init__(self) -> None:
-        for name in self.__dataclass_fields__:  # type: ignore[attr-defined]
+        for name, kind, ragged in _array_fields(type(self)):  # type: ignore[arg-type]
             value = getattr(self, name)
-            if isinstance(value, np.ndarray):
-                if value.flags.writeable:
-                    object.__setattr__(self, name, _readonly(value))
-            elif isinstance(value, tuple) and value and isinstance(value[0], np.ndarray):
-                object.__setattr__(self, name, tuple(_readonly(v) for v in value))
+            if ragged:
+                if value and isinstance(value[0], np.ndarray):
+                    object.__setattr__(self, name, tuple(_settled(v, kind) for v in value))
+            elif isinstance(value, np.ndarray) and (value.dtype is not kind or value.flags.writeable):
+                object.__setattr__(self, name, _settled(value, kind))
 
     def replace(self, **changes: Any) -> Self:
         """A copy with these fields changed."""
         return replace(self, **changes)  # type: ignore[type-var]
 
 
-def _readonly(a: NDArray[Any]) -> NDArray[Any]:
+KINDS = {"Array": np.dtype(np.float64), "Ints": np.dtype(np.int64), "Bools": np.dtype(np.bool_)}
+KINDS["Image"] = np.dtype(np.uint8)
+
+
+@cache
+def _array_fields(kind: Any) -> tuple[tuple[str, np.dtype[Any], bool], ...]:
+    """The fields of a dataclass that are declared as arrays: name, kind of number, whether a tuple of arrays."""
+    found = []
+    for f in fields(kind):
+        declared = re.fullmatch(r"(tuple\[)?(Array|Ints|Bools|Image)\b.*", str(f.type))
+        if declared:
+            found.append((f.name, KINDS[declared[2]], declared[1] is not None))
+    return tuple(found)
+
+
+def _settled(a: NDArray[Any], kind: np.dtype[Any]) -> NDArray[Any]:
+    """The array read-only and of the wanted kind; of its own where numbers could be lost (floats as ids)."""
+    if a.dtype is not kind and a.dtype != kind and np.can_cast(a.dtype, kind, "same_kind"):
+        a = a.astype(kind)
     if a.flags.writeable:
         a = a.view()
         a.flags.writeable = False
