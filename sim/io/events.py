@@ -10,7 +10,7 @@ import numpy as np
 
 from scenarios.errors import InputError
 from sim.io.numbers import read_text
-from sim.io.tables import finite, listing, number, read_json
+from sim.io.tables import finite, listing, number, read_document
 from sim.types import EVENT_KINDS, GroupEvent, Near, Order
 
 NEAR_COLUMNS = "start,end,a,b"
@@ -33,10 +33,17 @@ def events_bytes(events: Iterable[GroupEvent]) -> bytes:
 
 def read_events(path: Path) -> list[tuple[GroupEvent, int | None]]:
     """events.json: each event, and the frame of the tracker's answer that held it, if stored."""
-    found = read_json(path).get("events")
+    found = read_document(path).get("events")
     if not isinstance(found, list):
         raise InputError(file=path, place="events", got=type(found).__name__, expected="a list", remedy="correct it")
-    return [(_event(path, k, e), e.get("frame")) for k, e in enumerate(found)]
+    return [(_event(path, k, e), _frame(path, k, e)) for k, e in enumerate(found)]
+
+
+def _frame(path: Path, k: int, e: dict[str, Any]) -> int | None:
+    try:
+        return None if e.get("frame") is None else _whole(e["frame"])
+    except TypeError as error:
+        raise _bad(path, k, f"frame {error}", "the frame of an answer, or none") from None
 
 
 def _event(path: Path, k: int, e: Any) -> GroupEvent:
@@ -99,7 +106,7 @@ def script_bytes(orders: Iterable[Order], fulfilled: Iterable[int | None]) -> by
 
 def read_script(path: Path) -> tuple[Order, ...]:
     """The orders of script.json."""
-    found = read_json(path).get("orders")
+    found = read_document(path).get("orders")
     try:
         return tuple(
             Order(str(o["id"]), str(o["kind"]), o["fired"], _people(o["before"]), _people(o["after"]))

@@ -6,6 +6,7 @@ confidence and the ground position x, y, z, unknown where all three are -1). Fra
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -96,6 +97,12 @@ def read_detections(path: Path, length: int | None) -> DetectionTable:
     order = np.argsort(table.frame, kind="stable")
     box = None if boxless.any() else table.box[order]
     return DetectionTable(table.frame[order], table.id[order], plane, pos[order], box, score[order])
+
+
+def place_text(xyz: Sequence[float]) -> str:
+    """The last three cells of a line, x,y,z in m: a z that would read as unknown is written a millimetre lower."""
+    x, y, z = (f"{v:.3f}" for v in xyz)
+    return f"{x},{y},{z if z != '-1.000' else '-1.001'}"
 
 
 def unit_scores(score: Array) -> Array:

@@ -60,14 +60,16 @@ def read_seqinfo(path: Path) -> SeqInfo:
     )
 
 
-def frame_rate(given: float | None, found: float | None, path: Path) -> float:
+def frame_rate(given: float | None, found: float | None) -> float:
     """--fps, else what the recording says, else 25 with a warning."""
     if given is not None:
         if not given > 0:
             raise InputError(place="fps", got=given, expected="a number above 0", remedy="correct --fps")
         return given
     if found is None:
-        warnings.warn(f"{path}: no frame rate, taken as {DEFAULT_FPS:g} fps (--fps says otherwise)", stacklevel=3)
+        # Names no path: of a dataset's many recordings a command says it once.
+        text = f"MOTChallenge data without a frame rate is taken at {DEFAULT_FPS:g} fps (--fps says otherwise)"
+        warnings.warn(text, stacklevel=3)
         return DEFAULT_FPS
     return found
 
@@ -83,12 +85,15 @@ def open_folder(
     """A MOTChallenge folder as Sequence. Frames carry pixels only if `images` (decoded one by one)."""
     ini = path / "seqinfo.ini"
     info = read_seqinfo(ini) if ini.is_file() else SeqInfo(path.name, None, None, None)
-    rate = frame_rate(fps, info.fps, path)
+    rate = frame_rate(fps, info.fps)
     scale = float("nan") if px_per_m is None else px_per_m
     gt, det = path / "gt" / "gt.txt", path / "det" / "det.txt"
     pictures = list_images(path / info.image_dir)
     found = mot.read_detections(det, info.length) if det.is_file() else None
     length = info.length or _length(found, gt, pictures)
+    if not length:
+        expected = "a row in gt.txt or det.txt, a picture, or seqLength in seqinfo.ini"
+        raise InputError(file=path, got="nothing that says how long it is", expected=expected, remedy="complete it")
 
     def frames() -> Iterator[Frame]:
         for index in range(1, length + 1):
@@ -108,9 +113,11 @@ def open_text(
     path: Path, *, fps: float | None = None, px_per_m: float | None = None, camera: Camera | None = None
 ) -> Sequence:
     """A bare MOT text file as Sequence: detections where every id is -1, else truth."""
-    rate = frame_rate(fps, None, path)
+    rate = frame_rate(fps, None)
     scale = float("nan") if px_per_m is None else px_per_m
     found = mot.read_detections(path, None)
+    if not len(found.frame):
+        raise InputError(file=path, got="no row", expected="people or detections", remedy="check the file")
     length = int(found.frame.max(initial=0))
     nobody = bool((found.id == -1).all())
 

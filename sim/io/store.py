@@ -48,11 +48,17 @@ def sequence_files(sequence: Sequence, *, scenario: str, seed: int, repeat: int 
     if sequence.truth is not None:
         files |= truths.truth_files(sequence.truth)
     if found:
-        files |= truths.detection_files(found, sequence.fps)
+        files |= truths.detection_files(found, sequence.fps, sequence.scene)
     files = dict(sorted(files.items()))
     manifest = _manifest(sequence, found, len(frames), scenario, seed, repeat)
     listed = {name: {"sha256": hashing.file_hash(body), "bytes": len(body)} for name, body in files.items()}
-    return {**files, MANIFEST: tables.document({**manifest, "files": listed})}
+    return {**files, MANIFEST: tables.document(sealed({**manifest, "files": listed}))}
+
+
+def sealed(manifest: dict[str, Any]) -> dict[str, Any]:
+    """The manifest with the hash of all its other fields as `sha256`, so that none can change unnoticed."""
+    body = {key: value for key, value in manifest.items() if key != "sha256"}
+    return {**body, "sha256": hashing.canonical_hash(body)}
 
 
 def identity(scenario: str, seed: int, repeat: int) -> dict[str, Any]:
@@ -119,7 +125,7 @@ def is_sequence(folder: Path) -> bool:
 
 
 def read_manifest(folder: Path) -> dict[str, Any]:
-    """The manifest; InputError where it is missing, broken or of another format."""
+    """The manifest; InputError where it is missing, broken, altered or of another format."""
     path = folder / MANIFEST
     if not path.is_file():
         raise InputError(file=path, got="missing", expected="the manifest of a complete sequence", remedy=REDO)
@@ -128,9 +134,12 @@ def read_manifest(folder: Path) -> dict[str, Any]:
         raise InputError(
             file=path, place="format", got=manifest.get("format"), expected=tables.FORMAT, remedy="use the same version"
         )
-    missing = {"sequence", "files", "seed", "repeat", "scenario_hash", "truth_hash", "content_hash"} - manifest.keys()
+    missing = {"sequence", "files", "seed", "repeat", "scenario_hash", "truth_hash", "content_hash", "sha256"}
+    missing -= manifest.keys()
     if missing:
         raise InputError(file=path, got=f"no {', '.join(sorted(missing))}", expected="all keys", remedy=REDO)
+    if manifest["sha256"] != sealed(manifest)["sha256"]:
+        raise InputError(file=path, got="altered fields", expected="those that its sha256 names", remedy=REDO)
     return manifest
 
 

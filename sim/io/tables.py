@@ -157,6 +157,15 @@ def read_json(path: Path) -> dict[str, Any]:
     return value
 
 
+def read_document(path: Path) -> dict[str, Any]:
+    """A JSON object of ours; InputError where it says another format (one that says none is taken as ours)."""
+    value = read_json(path)
+    said = value.get("format", FORMAT)
+    if said != FORMAT or isinstance(said, bool):
+        raise InputError(file=path, place="format", got=said, expected=FORMAT, remedy="use the same version")
+    return value
+
+
 def finite(value: float) -> float | None:
     """A number for JSON: None for nan."""
     return None if value != value else float(value)

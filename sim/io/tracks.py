@@ -16,13 +16,15 @@ import numpy as np
 from scenarios.errors import InputError
 from sim.io import tables
 from sim.io.atomic import write_into
+from sim.io.box_source import box_source
 from sim.io.events import event_dict, read_events
 from sim.io.groups import AXES, groups_bytes, groups_csv, read_groups
+from sim.io.mot import place_text
 from sim.io.tables import Column, Table, table_bytes
 from sim.io.tracks_text import from_text, with_groups
-from sim.io.truths import BOX, scores
+from sim.io.truths import BOX, scores, standing
 from sim.io.upright import upright_boxes
-from sim.types import Array, Bools, Camera, GroupEvent, Tracks
+from sim.types import Array, Bools, Camera, GroupEvent, Scene, Tracks
 
 NAMES = ("tracks.txt", "tracks.mot.txt", "tracks.parquet", "groups.csv", "groups.parquet", "events.json", "run.json")
 
@@ -33,32 +35,37 @@ def write_tracks(
     *,
     fps: float,
     camera: Camera | None = None,
+    scene: Scene | None = None,
     info: dict[str, Any] | None = None,
 ) -> Path:
     """Store the answers of consecutive frames in `folder`, run.json last; what an earlier run left is replaced.
 
-    A tracker on the ground without boxes gets, with a camera, those of upright people (run.json: boxes).
+    A tracker on the ground without boxes gets, with a camera, those of upright people (run.json: boxes). scene: where
+    the ground's height stands, on which they do.
     """
     folder = Path(folder)
-    write_into(folder, tracks_files(tracks, fps=fps, camera=camera, info=info), stale=NAMES)
+    write_into(folder, tracks_files(tracks, fps=fps, camera=camera, scene=scene, info=info), stale=NAMES)
     return folder
 
 
 def tracks_files(
-    tracks: Iterable[Tracks], *, fps: float, camera: Camera | None = None, info: dict[str, Any] | None = None
+    tracks: Iterable[Tracks],
+    *,
+    fps: float,
+    camera: Camera | None = None,
+    scene: Scene | None = None,
+    info: dict[str, Any] | None = None,
 ) -> dict[str, bytes]:
     """The files of `write_tracks` by name."""
     every = list(tracks)
-    rows, boxes = _flatten(every, fps), "none"
-    text_box = rows.box
-    if rows.boxless.all() and camera is not None and rows.plane != "image":
-        text_box, boxes = upright_boxes(camera, rows.pos), "projected"
-    elif not rows.boxless.all():
-        boxes = "measured"
+    rows, boxes = _flatten(every, fps), box_source(every, camera)
+    text_box, place = rows.box, None if rows.plane == "image" else standing(rows.pos, scene)
+    if boxes == "projected" and camera is not None and place is not None:
+        text_box = upright_boxes(camera, place)
     files = {
         "tracks.parquet": _table(rows, every, fps),
-        "tracks.txt": _text(rows, text_box, full=True),
-        "tracks.mot.txt": _text(rows, text_box, full=False),
+        "tracks.txt": _text(rows, text_box, place, full=True),
+        "tracks.mot.txt": _text(rows, text_box, place, full=False),
     }
     first = every[0].index if every else 1
     groups = [t.groups for t in every]
@@ -139,17 +146,17 @@ def _table(rows: _Rows, every: list[Tracks], fps: float) -> bytes:
     return table_bytes(columns, facts)
 
 
-def _text(rows: _Rows, box: Array, *, full: bool) -> bytes:
+def _text(rows: _Rows, box: Array, place: Array | None, *, full: bool) -> bytes:
     boxed: Bools = np.asarray(np.isfinite(box).all(axis=1) & (box[:, 2:] > 0).all(axis=1))
-    placed: Bools = np.asarray(np.isfinite(rows.pos).all(axis=1) & (rows.plane != "image"))
-    place = np.concatenate([rows.pos, np.zeros((len(rows.pos), 1))], axis=1)[:, :3].tolist()
+    placed = None if place is None else np.isfinite(place).all(axis=1)
+    places = [] if place is None else place.tolist()
     lines = []
     for k, (frame, id, score) in enumerate(
         zip(rows.frame.tolist(), rows.id.tolist(), rows.score.tolist(), strict=True)
     ):
         left, top, width, height = box[k].tolist()
         corner = f"{left:.2f},{top:.2f},{max(width, 0.01):.2f},{max(height, 0.01):.2f}" if boxed[k] else "-1,-1,-1,-1"
-        where = ",".join(f"{v:.3f}" for v in place[k]) if placed[k] else "-1,-1,-1"
+        where = place_text(places[k]) if placed is not None and placed[k] else "-1,-1,-1"
         lines.append(f"{frame},{id},{corner},{score:.4f}" + (f",{where}\n" if full else "\n"))
     return "".join(lines).encode()
 
@@ -158,7 +165,8 @@ def read_tracks(path: str | Path, *, fps: float | None = None, length: int | Non
     """The tracks of a folder (or of one of its files), of anybody's MOTChallenge text, or of a Parquet table.
 
     From text alone velocities are the chord over 0.5 s, covariances nan, and events and groups those of files beside
-    it; fps is then needed (25 if absent) and `length` adds empty frames at the end.
+    it; boxes that run.json says are projected are left out. fps is then needed (25 if absent), and `length` adds
+    empty frames at the end.
     """
     path = Path(path)
     folder = path if path.is_dir() else path.parent
@@ -172,11 +180,17 @@ def read_tracks(path: str | Path, *, fps: float | None = None, length: int | Non
             file=path, got="no tracks", expected="tracks.parquet, tracks.txt or a MOTChallenge text",
             remedy="give the folder that `flockscope track` made",
         )  # fmt: skip
-    found = from_text(text, 25.0 if fps is None else fps, length)
+    projected = ours and (folder / "run.json").is_file() and _boxes(folder / "run.json") == "projected"
+    found = from_text(text, 25.0 if fps is None else fps, length, projected=projected)
     if not ours:
         return found
     groups = folder / "groups.csv"
     return _with_events(with_groups(found, groups) if groups.is_file() else found, folder)
+
+
+def _boxes(path: Path) -> Any:
+    """Where the boxes of a tracks.txt come from, by the run.json beside it."""
+    return tables.read_document(path).get("boxes")
 
 
 def _exact(path: Path, groups_path: Path) -> list[Tracks]:
@@ -214,7 +228,14 @@ def _with_events(found: list[Tracks], folder: Path) -> list[Tracks]:
     path = folder / "events.json"
     if not path.is_file():
         return found
+    first, last = (found[0].index, found[-1].index) if found else (1, 0)
     held: dict[int, list[GroupEvent]] = {}
-    for event, frame in read_events(path):
-        held.setdefault(frame or event.emitted or event.end, []).append(event)
+    for k, (event, frame) in enumerate(read_events(path)):
+        at = next(index for index in (frame, event.emitted, event.end) if index is not None)
+        if not first <= at <= last:
+            raise InputError(
+                file=path, place=f"events[{k}]", got=f"an event said in frame {at}",
+                expected=f"a frame from {first} to {last}, as the tracks have", remedy="correct the event",
+            )  # fmt: skip
+        held.setdefault(at, []).append(event)
     return [t.replace(events=tuple(held[t.index])) if t.index in held else t for t in found]

@@ -10,8 +10,10 @@ import numpy as np
 from scenarios.errors import InputError
 from sim.io.events import events_bytes, near_bytes, read_events, read_near, read_script, script_bytes
 from sim.io.groups import groups_bytes, groups_csv, read_groups
+from sim.io.mot import place_text
 from sim.io.tables import REDO, Column, Table, finite, number, read_table, table_bytes
-from sim.types import Array, Bools, Detections, Groups, Truth
+from sim.terrain import height_at
+from sim.types import Array, Bools, Detections, Groups, Scene, Truth
 
 BOX = ("box_left", "box_top", "box_width", "box_height")
 VISIBLE = ("visible_left", "visible_top", "visible_width", "visible_height")
@@ -133,8 +135,11 @@ def _groups(path: Path) -> tuple[Groups, ...] | None:
     return tuple(g if g is not None else Groups.none() for g in read_groups(read_table(path)))
 
 
-def detection_files(detections: list[Detections], fps: float) -> dict[str, bytes]:
-    """det/det.parquet (exact) and det/det.txt (10 columns) of the detections of frames 1, 2, …"""
+def detection_files(detections: list[Detections], fps: float, scene: Scene | None = None) -> dict[str, bytes]:
+    """det/det.parquet (exact) and det/det.txt (10 columns) of the detections of frames 1, 2, …
+
+    scene: where the ground's height stands that det.txt gives points on the ground as z; flat without one.
+    """
     plane, boxed, moving = _form(detections)
     axes = ("x", "y", "z")[: detections[0].pos.shape[1]] if detections else ("x", "y")
     unit = "px" if plane == "image" else "m"
@@ -153,7 +158,7 @@ def detection_files(detections: list[Detections], fps: float) -> dict[str, bytes
     if box is not None:
         columns += [Column(name, box[:, k], "px") for k, name in enumerate(BOX)]
     facts = {"plane": plane, "frames": len(detections), "fps": fps}
-    text = _det_text(columns[0].values, box, score, None if plane == "image" else pos)
+    text = _det_text(columns[0].values, box, score, None if plane == "image" else standing(pos, scene))
     return {"det/det.parquet": table_bytes(columns, facts), "det/det.txt": text}
 
 
@@ -169,12 +174,20 @@ def scores(score: Array, rows: int) -> Array:
     return score if len(score) == rows else np.ones(rows)
 
 
+def standing(pos: Array, scene: Scene | None) -> Array:
+    """(N, 3) m of places (N, 2 or 3): those on the ground with the height it has there, 0 without a scene."""
+    if pos.shape[1] == 3:
+        return pos
+    z = np.zeros(len(pos)) if scene is None else height_at(scene, pos)
+    return np.concatenate([pos, z[:, None]], axis=1)
+
+
 def _det_text(frame: Any, box: Array | None, score: Array, ground: Array | None) -> bytes:
     boxes = np.full((len(score), 4), -1.0) if box is None else np.c_[box[:, :2], np.maximum(box[:, 2:], 0.01)]
     lines = []
     for k, f in enumerate(frame):
         corner = "-1,-1,-1,-1" if box is None else ",".join(f"{v:.2f}" for v in boxes[k])
-        place = "-1,-1,-1" if ground is None else ",".join(f"{v:.3f}" for v in (*ground[k], 0.0)[:3])
+        place = "-1,-1,-1" if ground is None else place_text(ground[k])
         lines.append(f"{f},-1,{corner},{score[k]:.4f},{place}\n")
     return "".join(lines).encode()
 

@@ -11,7 +11,7 @@ WIDTH = 0.50  # m
 
 
 def upright_boxes(camera: Camera, pos: Array) -> Array:
-    """(N, 4) ltwh px of cylinders standing at pos (N, 2 or 3) m; nan behind the camera."""
+    """(N, 4) ltwh px of cylinders standing at pos (N, 3) m, or on flat ground at (N, 2); nan behind the camera."""
     from sim.camera import project
 
     angle = np.arange(16) * (np.pi / 8)

@@ -11,6 +11,7 @@ from scenarios.errors import FlockscopeError, InputError
 from sim import hashing
 from sim.io import store, truths
 from sim.io.atomic import PARTIAL
+from sim.io.cameras import read_scene
 from sim.io.mot_folder import read_seqinfo
 from sim.types import Detections, Groups, Truth
 
@@ -139,4 +140,5 @@ def _groups(path: Path, truth: Truth, groups: tuple[Groups, ...] | None) -> Iter
 def _detections(folder: Path, detections: list[Detections], length: int, fps: float) -> Iterator[InputError]:
     if len(detections) != length:
         yield _problem(folder / "det/det.parquet", f"{len(detections)} frames", length)
-    yield from _text(folder / "det/det.txt", truths.detection_files(detections, fps)["det/det.txt"])
+    scene = read_scene(folder / "scene.json") if (folder / "scene.json").is_file() else None
+    yield from _text(folder / "det/det.txt", truths.detection_files(detections, fps, scene)["det/det.txt"])

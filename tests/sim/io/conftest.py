@@ -98,7 +98,7 @@ def sequence(seed: int, length: int = 12) -> Sequence:
     camera = Camera(
         "pinhole", (640, 480), (500.1, 500.2), (320.0, 240.0), r.normal(size=3), r.normal(size=(3, 3)), 0.12
     )  # fmt: skip
-    stairs = (Stairs(np.array([[1.0, 2.0], [3.0, 2.0]]), np.array([[1.0, 4.0], [3.0, 4.0]]), 2.0, 1.5, 10, 4.0),)
+    stairs = (Stairs(np.array([-1.0, 0.0]), np.array([1.0, 0.5]), 2.0, 1.5, 10, 4.0),)
     scene = Scene(
         np.array([16.0, 10.0]), r.normal(size=(2, 2, 2)), r.normal(size=(1, 3)), stairs=stairs, wall_height=2.4
     )  # fmt: skip

@@ -160,3 +160,13 @@ def test_velocity_of_straight_walks_is_exact_in_any_row_order(seed):
     near = np.array([((np.abs(frame - f) <= 2) & (id == i)).sum() > 1 for f, i in zip(frame, id, strict=True)])[mixed]
     assert np.array_equal(alone, ~near)
     assert differentiate(frame[:0], id[:0], pos[:0], 10.0).shape == (0, 2)
+
+
+def test_nothing_says_how_long_it_is(tmp_path):
+    (tmp_path / "x.txt").write_text("\n")
+    with pytest.raises(InputError, match="no row"):
+        open_source(tmp_path / "x.txt", fps=10)
+    with pytest.raises(InputError, match="how long"):
+        open_source(folder(tmp_path, det="", ini="frameRate=10\n"))
+    (s,) = open_source(folder(tmp_path, det="", ini="frameRate=10\nseqLength=3\n"))
+    assert [len(f.detections.pos) for f in s] == [0, 0, 0]

@@ -91,6 +91,44 @@ def test_each_missing_or_altered_file_is_named(tmp_path, make_sequence):
         open_source(folder)
 
 
+def test_each_altered_or_missing_field_of_the_manifest_is_told(tmp_path, make_sequence):
+    folder = tmp_path / "a"
+    store.write_sequence(folder, make_sequence(3), scenario=SCENARIO, seed=3)
+    path = folder / "manifest.json"
+    whole = json.loads(path.read_text())
+    inner = [("sequence", k) for k in whole["sequence"]] + [("files", "seqinfo.ini", k) for k in ("sha256", "bytes")]
+    for keys in [*((k,) for k in whole), *inner]:
+        for gone in (False, True):
+            manifest = json.loads(path.read_text())
+            held = manifest
+            for key in keys[:-1]:
+                held = held[key]
+            if gone:
+                del held[keys[-1]]
+            else:
+                held[keys[-1]] = 99
+            path.write_text(json.dumps(manifest))
+            with pytest.raises(InputError) as error:
+                open_source(folder)
+            assert error.value.file == str(path)
+            assert "\n" not in str(error.value)
+            assert [str(p) for p in validate(folder)] == [str(error.value)]
+            path.write_text(json.dumps(whole))
+    assert validate(folder) == []
+
+
+def test_points_of_the_sensor_stand_on_the_stairs(tmp_path, make_sequence):
+    from sim.terrain import height_at
+
+    live = make_sequence(3)
+    store.write_sequence(tmp_path / "a", live, scenario=SCENARIO, seed=3)
+    table = np.loadtxt(tmp_path / "a/det/det.txt", delimiter=",")
+    pos = np.concatenate([f.detections.pos for f in live])
+    assert (height_at(live.scene, pos) > 0.01).any()
+    np.testing.assert_allclose(table[:, 9], height_at(live.scene, pos), atol=6e-4)
+    assert validate(tmp_path / "a") == []
+
+
 def test_a_truncated_table_is_one_clear_line(tmp_path, make_sequence):
     from sim.io.tables import read_table
 
@@ -115,7 +153,7 @@ def swap(path, old, new):
     manifest = json.loads((folder / "manifest.json").read_text())
     body = path.read_bytes()
     manifest["files"][path.relative_to(folder).as_posix()] = {"sha256": file_hash(body), "bytes": len(body)}
-    (folder / "manifest.json").write_text(json.dumps(manifest))
+    (folder / "manifest.json").write_text(json.dumps(store.sealed(manifest)))
 
 
 @pytest.mark.parametrize(

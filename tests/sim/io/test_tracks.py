@@ -101,6 +101,30 @@ def test_bad_groups_are_one_line(tmp_path, row, word):
     assert error.value.place.startswith("line ")
 
 
+EVENT = '"kind": "merge", "before": [1, 2], "after": [1], "members": [1, 2], "pos": [0, 0]'
+
+
+@pytest.mark.parametrize(
+    ("body", "place"),
+    [
+        (f'{{"format": 7, "events": [{{{EVENT}, "start": 1, "end": 2, "emitted": 3}}]}}', "format"),
+        (f'{{"format": 1, "events": [{{{EVENT}, "start": 1, "end": 2, "emitted": 99}}]}}', "events[0]"),
+        (f'{{"format": 1, "events": [{{{EVENT}, "start": 1, "end": 99, "emitted": null}}]}}', "events[0]"),
+        (f'{{"format": 1, "events": [{{{EVENT}, "start": 1, "end": 2, "emitted": 3, "frame": 0}}]}}', "events[0]"),
+        (f'{{"format": 1, "events": [{{{EVENT}, "start": 1, "end": 2, "emitted": 3, "frame": "3"}}]}}', "events[0]"),
+    ],
+)
+def test_events_that_no_frame_can_hold_are_one_line(tmp_path, make_tracks, body, place):
+    write_tracks(tmp_path, make_tracks(1), fps=10.0)
+    (tmp_path / "events.json").write_text(body)
+    for name in ("tracks.parquet", "tracks.txt"):
+        with pytest.raises(InputError) as error:
+            read_tracks(tmp_path, fps=10.0, length=9)
+        assert error.value.place == place
+        assert "\n" not in str(error.value)
+        (tmp_path / name).unlink()
+
+
 @pytest.mark.parametrize("body", ['{"events": 3}', '{"events": [{"kind": "merge"}]}', "{", "[]"])
 def test_bad_events_are_one_line(tmp_path, make_tracks, body):
     write_tracks(tmp_path, make_tracks(1), fps=10.0)
@@ -108,6 +132,51 @@ def test_bad_events_are_one_line(tmp_path, make_tracks, body):
     with pytest.raises(InputError) as error:
         read_tracks(tmp_path)
     assert "\n" not in str(error.value)
+
+
+@pytest.mark.parametrize("boxes", ["projected", "measured", None])
+def test_projected_boxes_are_no_measurement(tmp_path, boxes):
+    """As run.json beside the text says; without it the boxes of a text are what somebody measured."""
+    (tmp_path / "tracks.txt").write_text("1,5,10,20,30,40,0.5,1,2,0\n")
+    if boxes is not None:
+        (tmp_path / "run.json").write_text(json.dumps({"format": 1, "boxes": boxes}))
+    (only,) = read_tracks(tmp_path, fps=10.0)
+    assert (only.plane, only.pos.tolist()) == ("ground", [[1, 2]])
+    assert (only.box is None) == (boxes == "projected")
+
+
+def test_one_metre_below_ground_is_no_unknown_place(tmp_path, make_tracks):
+    live = [t.replace(pos=np.c_[t.pos[:, :2], np.full(len(t.id), -1.0)]) for t in make_tracks(2, plane="space")]
+    (tmp_path / "tracks.txt").write_bytes(tracks_files(live, fps=10.0)["tracks.txt"])
+    for a, b in zip(live, read_tracks(tmp_path, fps=10.0, length=len(live)), strict=True):
+        assert b.plane == "ground"
+        np.testing.assert_allclose(a.pos[np.argsort(a.id), :2], b.pos, atol=6e-4)
+
+
+def test_one_unknown_place_moves_nobody_to_the_image(tmp_path):
+    (tmp_path / "x.txt").write_text("1,5,10,20,30,40,0.5,1,2,0\n2,5,10,20,30,40,0.5,1,2,-1\n")
+    with pytest.raises(InputError, match="z other than -1") as error:
+        read_tracks(tmp_path / "x.txt", fps=10.0)
+    assert error.value.place == "line 2"
+
+
+def test_a_text_without_a_row(tmp_path):
+    (tmp_path / "x.txt").write_text("\n")
+    with pytest.raises(InputError, match="no row"):
+        read_tracks(tmp_path / "x.txt", fps=10.0)
+    with pytest.warns(UserWarning, match="no row"):
+        assert len(read_tracks(tmp_path / "x.txt", fps=10.0, length=3)) == 3
+
+
+def test_tracks_stand_on_the_stairs(make_tracks, make_sequence):
+    from sim.terrain import height_at
+
+    live, scene = make_tracks(2, boxed=False), make_sequence(1).scene
+    high = height_at(scene, np.concatenate([t.pos for t in live]))
+    assert (high > 0.01).any()
+    body = tracks_files(live, fps=10.0, scene=scene)["tracks.txt"].decode()
+    z = [float(line.rsplit(",", 1)[1]) for line in body.splitlines()]
+    np.testing.assert_allclose(z, high, atol=6e-4)
 
 
 def test_nothing_there(tmp_path):

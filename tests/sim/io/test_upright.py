@@ -14,6 +14,18 @@ LEVEL = Camera(
 )  # fmt: skip
 
 
+def test_upright_people_on_stairs_are_seen_higher_up(make_tracks):
+    from sim.types import Scene, Stairs
+
+    flight = Stairs(np.array([0.0, 9.0]), np.array([0.0, 11.0]), 4.0, 1.0, 4)
+    scene = Scene(np.array([20.0, 20.0]), stairs=(flight,))
+    live = [t.replace(pos=np.tile([0.0, 10.0], (len(t.id), 1))) for t in make_tracks(1, boxed=False)]
+    text = tracks_files(live, fps=10.0, camera=LEVEL, scene=scene)["tracks.txt"].decode().splitlines()
+    rows = np.array([[float(cell) for cell in line.split(",")] for line in text])
+    assert rows[:, 9] == pytest.approx(0.5)
+    np.testing.assert_allclose(rows[:, 2:6], upright_boxes(LEVEL, np.tile([0.0, 10.0, 0.5], (len(rows), 1))), atol=0.01)
+
+
 def test_boxes_of_upright_people():
     """At 10 m the horizon cuts the head, feet are 500 * 1.7 / 10 px below, and the width is seen at about 10 m."""
     pytest.importorskip("sim.camera")
