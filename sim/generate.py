@@ -42,7 +42,6 @@ def generate(
     *,
     set: Iterable[str] = (),
     workers: int = 1,
-    streams: Iterable[str] = (),
     progress: Progress | None = None,
 ) -> list[Path]:
     """Make OUT/flockscope-<split>/<name>-s<seed>/ of every entry (or name of one) and seed, and OUT/seqmaps.
@@ -52,13 +51,6 @@ def generate(
     scenario's sequence; WorkError at the end, the others kept, where a sequence failed; at once where nothing can be
     written any more.
     """
-    if any(s != "none" for s in streams):
-        raise InputError(
-            place="streams",
-            got=",".join(streams),
-            expected="none",
-            remedy="leave --streams out: no pixels are made yet",
-        )
     if workers < 1:
         raise InputError(place="workers", got=workers, expected="1 or more", remedy="correct --workers")
     split, root = split_of(seeds), Path(out)

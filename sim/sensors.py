@@ -50,10 +50,16 @@ def sense(
     """The detections of frames 1 … length.
 
     On the ground (pos = point, box beside it where boxes are known) if the truth has positions, else in the image
-    (pos = the box's centre). people: ids of each group of the script, for `hide`; InputError for an unknown group.
+    (pos = the box's centre). people: ids of each group of the script, for `hide`; InputError for an unknown group, and
+    for visible boxes of a truth that has none.
     """
     from sim.clutter import false_alarms
 
+    if sensor.box == "visible" and truth.box is not None and truth.visible_box is None:
+        raise InputError(
+            file=truth.name, place="sensor.box", got="visible", expected="amodal: the visible parts are not labelled",
+            remedy="leave sensor.box out",
+        )  # fmt: skip
     true = _found(truth, sensor, seed, repeat, people or {}, camera)
     false = false_alarms(truth, sensor, seed, camera, image_size, repeat)
     return _by_frame(true, false, truth)
@@ -155,8 +161,8 @@ def _hidden(truth: Truth, sensor: Sensor, people: Mapping[str, tuple[int, ...]])
 
 
 def _boxes(truth: Truth, sensor: Sensor) -> Array | None:
-    """What the sensor frames: the visible part (amodal where that is unknown or nothing is visible), or all of it."""
-    if truth.box is None or sensor.box == "amodal" or truth.visible_box is None:
+    """What the sensor frames: the visible part (amodal where nothing is), or all of it."""
+    if truth.box is None or truth.visible_box is None or sensor.box == "amodal":
         return truth.box
     return np.where(np.isfinite(truth.visible_box), truth.visible_box, truth.box)
 

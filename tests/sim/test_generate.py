@@ -153,7 +153,6 @@ def test_wrong_requests_make_nothing(tmp_path, simulate):
     for entries, more, word in (
         ([x, x], {}, "twice"),
         ([x], {"workers": 0}, "workers"),
-        ([x], {"streams": ["ids"]}, "none"),
     ):
         with pytest.raises(InputError, match=word):
             generate(entries, range(2), tmp_path / "new", **more)

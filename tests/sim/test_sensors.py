@@ -243,3 +243,10 @@ def test_true_scores_are_higher() -> None:
     found = sense(truth, perfect(detect_prob=0.95), 1)
     assert 0.75 < everything(found, "score").mean() < 0.85
     assert everything(found, "score").std() > 0.1
+
+
+def test_visible_boxes_that_nobody_labelled_are_refused() -> None:
+    truth = seen(people=2, frames=3).replace(visible_box=None)
+    with pytest.raises(InputError, match="amodal") as error:
+        sense(truth, perfect(box="visible"), 1)
+    assert error.value.place == "sensor.box"
