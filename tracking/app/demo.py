@@ -75,16 +75,13 @@ def _part(tracker: str, sequences: list[Sequence], out: Path, meter: Meter) -> P
 
 def _store(tracker: str, sequence: Sequence, run: Run, row: Row, out: Path) -> Path:
     """The tracks as files and as a page."""
-    from sim.io.atomic import writing
     from sim.io.tracks import write_tracks
     from tracking.app.view import view
 
-    write_tracks(out / "tracks" / tracker / sequence.name, run, fps=sequence.fps, camera=sequence.camera, info=run.info)
+    folder = out / "tracks" / tracker / sequence.name
+    write_tracks(folder, run, fps=sequence.fps, camera=sequence.camera, scene=sequence.scene, info=run.info)
     path = out / "pages" / tracker / f"{sequence.name}.html"
-    with writing(path) as partial:
-        view(sequence, run, partial, row.scores, f"{tracker} on {sequence.name}")
-        os.replace(partial, path)
-    return path
+    return view(sequence, run, path, row.scores, f"{tracker} on {sequence.name}")
 
 
 def _line(part: Part) -> str:

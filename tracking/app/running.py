@@ -3,9 +3,12 @@
 from __future__ import annotations
 
 import errno
+import io
 import os
 import sys
 import warnings
+from collections.abc import Callable
+from contextlib import redirect_stdout
 from typing import Any
 
 import typer
@@ -13,15 +16,19 @@ import typer
 from scenarios.errors import FlockscopeError, InputError, WorkError
 from tracking.app.answer import DEBUG, INTERRUPTED, Answer, interrupted, refuse, show, unexpected
 
+HELP = {"-h", "--help", "--version"}
+
 
 def carry_out(app: typer.Typer, arguments: list[str]) -> int:
     """Run the command that the arguments name and print what it says; its exit code."""
     as_json = "--json" in arguments
+    if as_json and not HELP.isdisjoint(arguments):  # which some levels of the command line take without --json alone
+        arguments = [argument for argument in arguments if argument != "--json"]
     with warnings.catch_warnings():
         warnings.simplefilter("always", UserWarning)
-        warnings.showwarning = _warn  # type: ignore[assignment]
         try:
-            answer = _answer(app, arguments)
+            warnings.showwarning = _once()
+            answer = _spoken(app, arguments) if as_json else _answer(app, arguments)
             return _said(answer, as_json) if isinstance(answer, Answer) else answer
         except KeyboardInterrupt:
             return interrupted(as_json)
@@ -29,6 +36,20 @@ def carry_out(app: typer.Typer, arguments: list[str]) -> int:
             if error.__cause__ is not None and os.environ.get(DEBUG):
                 raise
             return refuse(error, as_json)
+
+
+def _spoken(app: typer.Typer, arguments: list[str]) -> Answer | int:
+    """The command's answer, stdout kept free for its one object: help becomes its text, all else goes to stderr."""
+    printed = io.StringIO()
+    try:
+        with redirect_stdout(printed):
+            answer = _answer(app, arguments)
+        if answer == 0:
+            text, printed = printed.getvalue().rstrip("\n"), io.StringIO()
+            return Answer({"text": text}, text)
+        return answer
+    finally:
+        print(printed.getvalue(), end="", file=sys.stderr)
 
 
 def _answer(app: typer.Typer, arguments: list[str]) -> Answer | int:
@@ -78,5 +99,13 @@ def _said(answer: Answer, as_json: bool) -> int:
         return refuse(WorkError(file="stdout", got=reason, expected="room to write", remedy=remedy), as_json=False)
 
 
-def _warn(message: Warning | str, *_: object) -> None:
-    print(f"warning: {message}", file=sys.stderr)
+def _once() -> Callable[..., None]:
+    """How a command shows warnings: each text once, however many recordings it is true of."""
+    said: set[str] = set()
+
+    def warn(message: Warning | str, *_: object) -> None:
+        if str(message) not in said:
+            print(f"warning: {message}", file=sys.stderr)
+        said.add(str(message))
+
+    return warn

@@ -26,7 +26,10 @@ SOON = 1.0
 
 
 def sheet(sequence: Sequence, out: str | Path, frames: int = 8) -> Path:
-    """Writes the PNG, whole or not at all, and returns its path: `frames` panels, four to a row, with a time line beneath."""
+    """Writes the PNG, whole or not at all, and returns its path.
+
+    `frames` panels, four to a row, with a time line beneath.
+    """
     truth = sequence.truth
     if truth is None or len(truth.frame) == 0:
         raise InputError(

@@ -75,7 +75,7 @@ def track(
     with Meter("track", len(sequences)) as meter:
         for sequence, folder in places(sequences, source, out):
             run = job.run(sequence)
-            write_tracks(folder, run, fps=sequence.fps, camera=sequence.camera, info=run.info)
+            write_tracks(folder, run, fps=sequence.fps, camera=sequence.camera, scene=sequence.scene, info=run.info)
             rows.append(_row(run, folder))
             meter.step(sequence.name)
     return Answer({"tracker": job.tracker, "runs": rows}, "\n".join(map(_line, rows)))

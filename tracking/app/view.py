@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from scenarios.errors import WorkError
+from sim.io.atomic import write_file
 from sim.types import Sequence, Tracks, Truth
 from tracking.app import view_data
 from tracking.app.extent import MARGIN, peopled
@@ -29,7 +29,7 @@ def view(
     scores: Mapping[str, float] | None = None,
     title: str | None = None,
 ) -> Path:
-    """Writes the page and returns its path; `tracks` and `scores` are shown where they are given.
+    """Writes the page, whole or not at all, and returns its path; `tracks` and `scores` are shown where they are given.
 
     Groups and events that a tracker left out are derived by the baseline rule.
     """
@@ -45,13 +45,7 @@ def view(
     pieces = page.split("@@")
     text = "".join(parts[piece] if k % 2 else piece for k, piece in enumerate(pieces))
     path = Path(out)
-    try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        path.write_text(text, encoding="utf-8")
-    except OSError as error:
-        raise WorkError(
-            file=path, got=error.strerror or error, expected="a page written", remedy="check path, rights and space"
-        ) from None
+    write_file(path, text.encode())
     return path
 
 

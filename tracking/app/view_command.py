@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Callable
 from pathlib import Path
 
 from scenarios.errors import InputError
-from sim.io.atomic import writing
 from sim.io.source import open_source
 from sim.types import Sequence
 from tracking.app.answer import Answer
@@ -48,9 +46,7 @@ def _each(
     files = _files(sequences, out, suffix)
     with Meter(what, len(files)) as meter:
         for sequence, path in zip(sequences, files, strict=True):
-            with writing(path) as partial:
-                draw(sequence, partial)
-                os.replace(partial, path)
+            draw(sequence, path)
             meter.step(sequence.name)
     return Answer({"files": files}, "\n".join(map(str, files)))
 

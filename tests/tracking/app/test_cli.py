@@ -14,6 +14,7 @@ from contextlib import nullcontext
 from dataclasses import dataclass
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from scenarios.errors import WorkError
@@ -260,6 +261,72 @@ def test_usage(line, got, as_json, capsys):
     text = json.loads(printed.out)["error"]["got"] if as_json else printed.err
     assert got in text
     assert len(printed.err.splitlines()) == (0 if as_json else 1)
+
+
+@pytest.mark.parametrize("line", ["--help", "-h", "--version", "track --help", "export --help", "export coco -h"])
+@pytest.mark.parametrize("first", [False, True])
+def test_help_and_version_as_one_object(line, first, capsys):
+    assert run(line.split()) == 0
+    text = capsys.readouterr().out
+    assert run(["--json", *line.split()] if first else [*line.split(), "--json"]) == 0
+    printed = capsys.readouterr()
+    assert json.loads(printed.out) == {"status": "ok", "text": text.rstrip("\n")}
+    assert not printed.err
+
+
+def test_what_a_tracker_prints_is_not_in_the_object(place, tmp_path, capsys):
+    loud = tmp_path / "loud.py"
+    loud.write_text(Path(FAKE.rpartition(":")[0]).read_text() + "\nprint('hello')\n")
+    assert run(["track", f"{loud}:Nearest", str(place.one), "--out", str(place.out), "--json"]) == 0
+    printed = capsys.readouterr()
+    assert json.loads(printed.out)["status"] == "ok"
+    assert set(printed.err.splitlines()) == {"hello"}
+
+
+@pytest.mark.parametrize("line", ["view {one} --out {scene}/x/page.html", "sheet {one} --out {scene}/x/sheet.png"])
+def test_an_unwritable_out_is_named_as_given(place, line, capsys):
+    assert run(words(line, place)) == 2
+    told = capsys.readouterr().err
+    assert told.startswith(f"error: {words(line, place)[-1]}: ")
+    assert ".partial" not in told
+    assert len(told.splitlines()) == 1
+
+
+def test_one_warning_for_many_recordings(tmp_path, capsys):
+    for name in ("a", "b", "c"):
+        (tmp_path / "data" / name / "gt").mkdir(parents=True)
+        (tmp_path / "data" / name / "gt" / "gt.txt").write_text("1,1,0,0,5,5,1,1,1\n2,1,0,0,5,5,1,1,1\n")
+    for _ in range(2):
+        assert run(["view", str(tmp_path / "data"), "--out", str(tmp_path / "pages")]) == 0
+        assert len(capsys.readouterr().err.splitlines()) == 1
+
+
+def test_visible_boxes_of_a_recording_without_any(tmp_path, capsys):
+    (tmp_path / "gt.txt").write_text("1,1,0,0,5,5,1,1,1\n2,1,0,0,5,5,1,1,1\n")
+    line = ["track", "blob", str(tmp_path / "gt.txt"), "--fps", "10", "--detections", "truth", "--out"]
+    assert run([*line, str(tmp_path / "a"), "--set", "sensor.box=visible"]) == 2
+    assert "sensor.box: got visible" in capsys.readouterr().err
+    assert run([*line, str(tmp_path / "a"), "--set", "sensor.box=amodal"]) == 0
+
+
+def test_a_tracker_on_the_ground_is_scored_there_from_text_alone(place, tmp_path, capsys):
+    """The truth as tracks without boxes: projected ones in the text are no measurement."""
+    from sim.io.source import open_source
+    from sim.io.tracks import write_tracks
+    from sim.types import Tracks
+
+    (sequence,) = open_source(place.one)
+    found = [sequence.truth.at(k) for k in range(1, sequence.length + 1)]
+    answers = [
+        Tracks(t.index, t.t, "ground", "person", t.id, t.group, t.pos, t.vel, np.zeros((len(t.id), 4, 4)))
+        for t in found
+    ]
+    seen = {"camera": sequence.camera, "scene": sequence.scene}
+    write_tracks(tmp_path / "t", answers, fps=sequence.fps, info={"sequence": sequence.name}, **seen)
+    (tmp_path / "t" / "tracks.parquet").unlink()
+    assert run(["score", str(place.one), str(tmp_path / "t"), "--json"]) == 0
+    (told,) = json.loads(capsys.readouterr().out)["sequences"]
+    assert (told["similarity"], told["HOTA"], told["MOTA"]) == ("ground", 1.0, 1.0)
 
 
 def test_a_family_of_commands_alone_is_refused(capsys):

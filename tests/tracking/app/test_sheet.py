@@ -11,7 +11,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from scenarios.errors import InputError, WorkError
+from scenarios.errors import InputError
 from sim.types import GroupEvent, Sequence, Truth
 from tracking.app.sheet import choose, sheet
 from tracking.app.sheet_panel import FLOOR, View, _names, colour
@@ -141,5 +141,5 @@ def test_without_people_there_is_no_sheet(sequence: Sequence, tmp_path: Path) ->
 
 def test_an_unwritable_place_is_one_clear_line(sequence: Sequence, tmp_path: Path) -> None:
     (tmp_path / "file").write_text("")
-    with pytest.raises(WorkError, match="check path"):
+    with pytest.raises(InputError, match="choose another --out"):
         sheet(sequence, tmp_path / "file" / "sheet.png", frames=1)

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from scenarios.errors import WorkError
+from scenarios.errors import InputError
 from sim.types import Groups, Sequence, Tracks, Truth
 from tracking.app import view_data
 from tracking.app.view import payload, view
@@ -187,5 +187,5 @@ def test_a_long_crowded_recording_stays_small(tmp_path: Path) -> None:
 
 def test_an_unwritable_place_is_one_clear_line(sequence: Sequence, tmp_path: Path) -> None:
     (tmp_path / "file").write_text("")
-    with pytest.raises(WorkError, match="check path"):
+    with pytest.raises(InputError, match="choose another --out"):
         view(sequence, None, tmp_path / "file" / "page.html")
