@@ -67,7 +67,7 @@ def survey(entry: Entry, seeds: range) -> None:
         pace.append(paces(entry.scenario, motion, truth))
         for event in truth.events or ():
             onsets[event.kind].append((event.start - 1) / truth.fps)
-    low, high = wilson(len(failed), len(seeds))
+    _, low, high = wilson(len(failed), len(seeds))
     text = [
         f"{entry.name}: {len(failed)} of {len(seeds)} seeds failed ({low:.1%} to {high:.1%} of all)",
         f"{orders} orders came true",
