@@ -148,15 +148,15 @@ def _table(rows: _Rows, every: list[Tracks], fps: float) -> bytes:
 
 def _text(rows: _Rows, box: Array, place: Array | None, *, full: bool) -> bytes:
     boxed: Bools = np.asarray(np.isfinite(box).all(axis=1) & (box[:, 2:] > 0).all(axis=1))
-    placed = None if place is None else np.isfinite(place).all(axis=1)
-    places = [] if place is None else place.tolist()
+    places = [[np.nan] * 3] * len(rows.id) if place is None else place.tolist()
+    placed: Bools = np.asarray(np.isfinite(np.reshape(places, (-1, 3))).all(axis=1))
     lines = []
     for k, (frame, id, score) in enumerate(
         zip(rows.frame.tolist(), rows.id.tolist(), rows.score.tolist(), strict=True)
     ):
         left, top, width, height = box[k].tolist()
         corner = f"{left:.2f},{top:.2f},{max(width, 0.01):.2f},{max(height, 0.01):.2f}" if boxed[k] else "-1,-1,-1,-1"
-        where = place_text(places[k]) if placed is not None and placed[k] else "-1,-1,-1"
+        where = place_text(places[k]) if placed[k] else "-1,-1,-1"
         lines.append(f"{frame},{id},{corner},{score:.4f}" + (f",{where}\n" if full else "\n"))
     return "".join(lines).encode()
 
