@@ -6,10 +6,10 @@ confirms "below a certain percentage" of the asymptote, here one above 100, as r
 what "a certain number" of misses gives. A newborn's |S| hangs on its first covariance too, hence the checks (ours):
 
 - confirm where rho <= confirm_ratio (a little above 1) and the measurement of that frame was near,
-- a newborn must start above it, so that one sighting never confirms, and must reach it before it is too old
-  (both checked when the config is made concrete),
+- a newborn must start above it, so that one sighting never confirms (checked when the config is made concrete),
 - a confirmed track dies where rho reaches what k misses from the steady state give: sooner if it was not there yet,
-- a tentative one dies (ours) where rho, unseen, reaches its value at birth, or after a time limit.
+- a tentative one dies (ours) where rho, unseen, reaches its value at birth, or after a time limit, never before
+  it could be confirmed.
 """
 
 from __future__ import annotations
@@ -102,10 +102,6 @@ def check_birth(dynamics: Dynamics, confirm_ratio: float) -> None:
         raise InputError(place="confirm_ratio", got=got, expected="newborn tracks above it", remedy=remedy)
 
 
-def check_confirmation(dynamics: Dynamics, confirm_ratio: float, tentative_time: float) -> None:
-    """InputError where even a track that is seen in every frame dies before it can be confirmed."""
-    sightings = int(tentative_time / dynamics.dt + 1e-6) + 2  # at birth, and until the first frame after that time
-    if hits_to_confirm(dynamics, confirm_ratio, sightings + 1) > sightings:
-        got = f"{confirm_ratio:g}, which rho does not reach in {sightings} sightings at {1 / dynamics.dt:g} fps"
-        remedy = "raise tentative_time or confirm_ratio"
-        raise InputError(place="confirm_ratio", got=got, expected="confirmation within tentative_time", remedy=remedy)
+def time_to_confirm(dynamics: Dynamics, confirm_ratio: float) -> float:
+    """s, the least age until which a track seen in every frame must live; it is confirmed in the frame after that."""
+    return (hits_to_confirm(dynamics, confirm_ratio) - 2) * dynamics.dt

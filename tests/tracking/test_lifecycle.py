@@ -63,16 +63,3 @@ def test_a_newborn_that_would_be_confirmed_at_once_is_refused():
     with pytest.raises(InputError, match="confirm_ratio"):
         BlobConfig(accel_noise=10.0, speed_prior=0.1).dynamics(2.5)
     assert BlobConfig().dynamics(2.5).dt == 0.4
-
-
-@pytest.mark.parametrize("fps", [2.5, 7.0, 10.0, 25.0])
-@pytest.mark.parametrize("confirm_ratio", [1.05, 1.2, 1.5, 1.9])
-def test_a_config_is_refused_where_nobody_could_be_confirmed(fps, confirm_ratio):
-    nominal, dt = BlobConfig().dynamics(fps), 1 / fps
-    needed = lifecycle.hits_to_confirm(nominal, confirm_ratio)
-    last_frame_before = (needed - 2) * dt  # a track is asked whether it is confirmed before it is asked for its age
-    config = BlobConfig(confirm_ratio=confirm_ratio, tentative_time=max(0.1, last_frame_before + 0.01))
-    assert config.dynamics(fps).dt == dt
-    if last_frame_before > 0.11:
-        with pytest.raises(InputError, match="confirmation within tentative_time"):
-            BlobConfig(confirm_ratio=confirm_ratio, tentative_time=last_frame_before - 0.01).dynamics(fps)

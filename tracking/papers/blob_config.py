@@ -8,7 +8,7 @@ from typing import ClassVar
 import numpy as np
 
 from tracking.config import Config, param
-from tracking.lifecycle import Dynamics, check_birth, check_confirmation
+from tracking.lifecycle import Dynamics, check_birth
 
 
 @dataclass(frozen=True)
@@ -42,7 +42,9 @@ class BlobConfig(Config):
     coast_time: float = param(
         1.5, (0.0, 10.0), "s", "a confirmed track dies after so long without measurement, from the steady state"
     )
-    tentative_time: float = param(1.0, (0.1, 10.0), "s", "a tentative track not confirmed by then dies")
+    tentative_time: float = param(
+        1.0, (0.1, 10.0), "s", "a tentative track not confirmed by then dies, but not before it could be"
+    )
     merged_time: float = param(
         3.0, (0.0, 20.0), "s", "the same once another track, or a merged blob, explained that it is not seen"
     )
@@ -74,5 +76,4 @@ class BlobConfig(Config):
             np.square([self.speed_prior, self.speed_prior, self.size_rate_prior, self.size_rate_prior]),
         )
         check_birth(made, self.confirm_ratio)
-        check_confirmation(made, self.confirm_ratio, self.tentative_time)
         return made

@@ -30,6 +30,7 @@ class Population:
         self.config, self.dynamics, self.context = config, dynamics, context
         self.q, self.noise, self.asymptote = dynamics.q, dynamics.noise, dynamics.asymptote
         self.birth_rho = lifecycle.at_birth(dynamics)
+        self.tentative = max(config.tentative_time, lifecycle.time_to_confirm(dynamics, config.confirm_ratio))
         self.death = self._after(config.coast_time)
         self.excused_death = max(self.death, self._after(config.merged_time))
         self.silence = self._after(config.report_coast)
@@ -118,7 +119,7 @@ class Population:
         unseen, sure, rho = ~self.hit[lost], self.confirmed[lost], self.rho[lost]
         limit = np.where(self.excused[lost], self.excused_death, self.death) * (1 - SLACK)
         over = unseen & (rho >= np.where(sure, limit, self.birth_rho * (1 - 1e-9)))
-        over |= ~sure & (t - self.born[lost] > self.config.tentative_time + 1e-6)
+        over |= ~sure & (t - self.born[lost] > self.tentative + 1e-6)
         over |= unseen & self._outside(self.bank[kalman.PLACE, lost])
         if over.any():
             stay = np.ones(len(self.id), bool)

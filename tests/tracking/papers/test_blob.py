@@ -248,12 +248,14 @@ def test_pieces_are_found_by_a_track_narrower_than_one_always_seen():
     assert len(people_after([at((100, 200)), [*at((100, 200)), [100, 192.5, 28, 83]]], config).id) == 1
 
 
-@pytest.mark.parametrize("config", [BlobConfig(), BlobConfig.frozen()], ids=["default", "frozen"])
+@pytest.mark.parametrize(
+    "config", [BlobConfig(), BlobConfig.frozen(), BlobConfig(confirm_ratio=1.05, tentative_time=0.1)]
+)
 @pytest.mark.parametrize("fps", [2.5, 7.0, 10.0, 25.0])
 def test_whoever_is_always_seen_is_confirmed(config, fps):
     tracker = Blob(config)
     tracker.reset(Context(fps=fps, px_per_m=40.0), 0)
-    for k in range(int(3 * fps)):
+    for k in range(int(5 * fps)):
         box = np.array(at((100, 200)))
         tracker.step(Frame(k + 1, k / fps), Detections(k + 1, k / fps, "image", box[:, :2], None, box, np.ones(1)))
     assert tracker.people.id.tolist() == [1]
