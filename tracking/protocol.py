@@ -12,15 +12,19 @@ import importlib
 import importlib.util
 import inspect
 import sys
-from math import isfinite
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from scenarios.errors import InputError, WorkError
-from sim.types import DetectionMode, Detections, Sequence, Tracker, Tracks
+from scenarios.errors import InputError
+from sim.types import DetectionMode, Detections, Sequence, Tracker
+from tracking.answers import History, check_tracks, finite
 from tracking.config import Config
+
+__all__ = [
+    "History", "check_detections", "check_tracks", "checked", "choose_mode", "find", "names", "own_detector",
+]  # fmt: skip
 
 REGISTRY = {"blob": "tracking.papers.blob:Blob"}
 NEEDS = ("pixels", "stereo", "boxes", "points")
@@ -158,68 +162,10 @@ def check_detections(detections: Detections, needs: tuple[str, ...]) -> None:
     rows = len(detections.pos)
     arrays = [a for a in (detections.pos, detections.vel, detections.box, detections.score) if a is not None]
     for a in arrays:
-        if not _finite(a):
+        if not finite(a):
             row = int(np.argwhere(~np.isfinite(a.reshape(len(a), -1)).all(1))[0, 0])
             place = f"frame {detections.index}: detection {row + 1}"
             raise InputError(place=place, got="NaN or infinity", expected="finite numbers", remedy="correct this row")
     if rows and detections.box is None and "points" not in needs:
         place = f"frame {detections.index}"
         raise InputError(place=place, got="points", expected="boxes", remedy="take a tracker that takes points")
-
-
-def check_tracks(tracks: Any, index: int, tracker: str) -> Tracks:
-    """The answer to frame `index` itself (a missing score filled with ones); WorkError naming tracker, frame and fault.
-
-    Checked are type, index, shapes, finiteness, and that ids are non-negative and unique in the frame. An id that is
-    not reported for a while and comes back is the same track by definition.
-    """
-    if isinstance(tracks, Tracks) and not len(tracks.score):
-        tracks = tracks.replace(score=np.ones(len(tracks.id)))
-    fault = _fault(tracks, index)
-    if fault:
-        got, expected = fault
-        remedy = "correct the tracker's step()"
-        raise WorkError(file=tracker, place=f"frame {index}", got=got, expected=expected, remedy=remedy)
-    return tracks  # type: ignore[no-any-return]
-
-
-def _fault(tracks: Any, index: int) -> tuple[str, str] | None:
-    """What is wrong with an answer, as (got, expected), or None."""
-    if not isinstance(tracks, Tracks):
-        return type(tracks).__name__, "sim.types.Tracks"
-    if tracks.index != index:
-        return f"index {tracks.index}", f"index {index}"
-    if tracks.plane not in ("ground", "space", "image") or tracks.unit not in ("person", "group"):
-        return f"plane {tracks.plane!r}, unit {tracks.unit!r}", "plane ground, space or image; unit person or group"
-    n, d = len(tracks.id), 3 if tracks.plane == "space" else 2
-    shapes: dict[str, tuple[Any, tuple[int, ...]]] = {
-        "id": (tracks.id, (n,)),
-        "group": (tracks.group, (n,)),
-        "pos": (tracks.pos, (n, d)),
-        "vel": (tracks.vel, (n, d)),
-        "cov": (tracks.cov, (n, 2 * d, 2 * d)),
-        "score": (tracks.score, (n,)),
-    }
-    if tracks.box is not None:
-        shapes["box"] = (tracks.box, (n, 4))
-    for name, (a, shape) in shapes.items():
-        if np.shape(a) != shape:
-            return f"{name} of shape {np.shape(a)}", str(shape)
-        if not _finite(a):
-            return f"NaN or infinity in {name}", "finite numbers"
-    return _id_fault(tracks)
-
-
-def _finite(a: Any) -> bool:
-    """Are all numbers finite? The sum of squares is cheap and nearly always tells; huge numbers may overflow it."""
-    return isfinite(np.vdot(a, a)) or bool(np.isfinite(a).all())
-
-
-def _id_fault(tracks: Tracks) -> tuple[str, str] | None:
-    if tracks.id.dtype.kind != "i" or tracks.group.dtype.kind != "i":
-        return f"ids of type {tracks.id.dtype}, groups of type {tracks.group.dtype}", "int64"
-    if len(tracks.id) and tracks.id.min() < 0:
-        return f"id {tracks.id.min()}", "non-negative ids"
-    if len(set(tracks.id.tolist())) != len(tracks.id):
-        return "the same id twice", "unique ids in a frame"
-    return None

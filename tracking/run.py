@@ -53,6 +53,7 @@ class Prepared:
     mode: DetectionMode
     sequence: Sequence
     feed: tuple[Frame, ...] | None
+    history: protocol.History = field(default_factory=protocol.History)
 
     def frames(self) -> Iterator[Frame]:
         """The frames as the tracker gets them."""
@@ -60,6 +61,7 @@ class Prepared:
 
     def reset(self, seed: int) -> None:
         """Reset the tracker for this sequence."""
+        self.history.forget()
         try:
             self.tracker.reset(self.context, seed)
         except FlockscopeError:
@@ -78,7 +80,7 @@ class Prepared:
             raise
         except Exception as error:
             raise _raised(self.name, "step", f"{self.sequence.name}, frame {frame.index}", error) from error
-        return protocol.check_tracks(said, frame.index, self.name)
+        return protocol.check_tracks(said, frame.index, self.name, self.history)
 
 
 def _raised(tracker: str, method: str, place: str, error: Exception) -> WorkError:
@@ -220,7 +222,8 @@ def describe(
     ready: Prepared, answers: SequenceOf[Tracks], seed: int, sensor: Mapping[str, Any], frames_per_second: float
 ) -> dict[str, Any]:
     """What run.json holds; `frames_per_second` is the only entry that differs between two equal runs."""
-    measured = any(t.box is not None for t in answers)
+    from sim.io.box_source import box_source
+
     sample = ready.context.background
     return {
         "tracker": ready.name,
@@ -230,7 +233,7 @@ def describe(
         "detections": ready.mode,
         "sensor": dict(sensor),
         "plane": answers[0].plane if len(answers) else None,
-        "boxes": "measured" if measured else "projected" if ready.context.camera else "none",
+        "boxes": box_source(answers, ready.context.camera),
         "fps": ready.context.fps,
         "px_per_m": None if np.isnan(ready.context.px_per_m) else ready.context.px_per_m,
         "background": None if sample is None else ready.sequence.source.get("background", len(sample)),

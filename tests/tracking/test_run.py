@@ -2,10 +2,15 @@
 
 from __future__ import annotations
 
+import json
+
 import numpy as np
 import pytest
 
 from scenarios.errors import InputError, WorkError
+from scenarios.loading import load
+from sim.io.tracks import write_tracks
+from sim.sequence import simulate
 from sim.types import Context, Detections, Frame, Groups, Sequence, Tracks, Truth
 from tracking.papers.blob import Blob
 from tracking.papers.blob_config import BlobConfig
@@ -217,3 +222,44 @@ def test_slices_and_repetition():
     run, again = track("blob", source()), track("blob", source())
     assert len(run[3:7]) == 4
     assert all(a.pos.tobytes() == b.pos.tobytes() for a, b in zip(run, again, strict=True))
+
+
+class Placed(Stranger):
+    """Knows places on the ground, or in the image, and no boxes."""
+
+    plane = "image"
+
+    def step(self, frame, detections):
+        return super().step(frame, detections).replace(plane=self.plane, box=None)
+
+
+class Grounded(Placed):
+    plane = "ground"
+
+
+@pytest.mark.parametrize(
+    ("tracker", "seen", "expected"),
+    [(Placed, True, "none"), (Grounded, True, "projected"), (Grounded, False, "none"), ("blob", True, "measured")],
+)
+def test_the_run_and_its_files_agree_on_where_boxes_come_from(tmp_path, tracker, seen, expected):
+    camera = simulate(load("merge"), seed=3).camera if seen else None
+    run = track(tracker, source(camera=camera))
+    write_tracks(tmp_path, run, fps=FPS, camera=camera, info=run.info)
+    assert run.info["boxes"] == json.loads((tmp_path / "run.json").read_text())["boxes"] == expected
+
+
+def test_one_plane_in_a_run_and_again_in_the_next():
+    class Turncoat(Stranger):
+        def step(self, frame, detections):
+            made = super().step(frame, detections)
+            return made.replace(plane="ground") if frame.index == self.turn else made
+
+    tracker = Turncoat()
+    tracker.turn = 4
+    with pytest.raises(WorkError, match="Turncoat: frame 4: got plane 'ground'"):
+        track(tracker, source())
+    ready = prepare(Turncoat(), source())
+    for turn in (1, 0):  # after a reset it may be another one
+        ready.reset(0)
+        ready.tracker.turn = turn
+        ready.answer(next(ready.frames()))

@@ -1,0 +1,146 @@
+"""What a tracker may say of groups and events, and what it must keep to from frame to frame."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from scenarios.errors import WorkError
+from sim.types import GroupEvent, Groups, Tracks
+from tracking.protocol import History, check_tracks
+
+SQUARE = np.array([[0.0, 0], [1, 0], [1, 1]])
+
+
+def group(**changes):
+    made = Groups(
+        np.array([5]), (np.array([1, 2]),), np.zeros((1, 2)), np.zeros((1, 2)), np.full((1, 2, 2), np.nan),
+        np.array([np.nan]), (SQUARE,),
+    )  # fmt: skip
+    return made.replace(**changes)
+
+
+def event(**changes):
+    given = {"kind": "merge", "start": 2, "end": 3, "emitted": 3, "before": (-1, -1), "after": (5,)}
+    return GroupEvent(**{**given, "members": (1, 2), "pos": (0.0, 0.0), **changes})
+
+
+def answer(index=3, ids=(1, 2), **changes):
+    n, id = len(ids), np.array(ids, np.int64)
+    two, alone = np.zeros((n, 2)), np.full(n, -1)
+    made = Tracks(index, 0.2, "ground", "person", id, alone, two, two, np.zeros((n, 4, 4)), None, np.ones(n))
+    return made.replace(**changes)
+
+
+def check(made, history=None):
+    return check_tracks(made, made.index, "mine.py:Mine", history)
+
+
+def refused(made, words, history=None):
+    with pytest.raises(WorkError, match=words) as caught:
+        check(made, history)
+    assert str(caught.value).startswith(f"mine.py:Mine: frame {made.index}")
+    assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    ("changes", "words"),
+    [
+        ({"id": np.array([5.0])}, "float64"),
+        ({"id": np.array([[5]])}, "groups.id"),
+        ({"id": np.array([-2])}, "group id -2"),
+        ({"pos": np.zeros((1, 3))}, r"groups.pos of shape \(1, 3\)"),
+        ({"pos": np.full((1, 2), np.nan)}, "NaN or infinity in groups.pos"),
+        ({"vel": np.zeros((2, 2))}, "groups.vel of shape"),
+        ({"extent": np.zeros((1, 2))}, "groups.extent of shape"),
+        ({"size": np.zeros(3)}, "groups.size of shape"),
+        ({"hull": (SQUARE, SQUARE)}, "2 groups.hull"),
+        ({"hull": (np.zeros(4),)}, "groups.hull of shape"),
+        ({"hull": (np.full((3, 2), np.nan),)}, "NaN or infinity in groups.hull"),
+        ({"members": (np.array([1]), np.array([2]))}, "2 groups.members"),
+        ({"members": (np.array([1, 7]),)}, "7 in groups.members"),
+        ({"members": (np.array([1.0]),)}, "no ids"),
+        ({"members": [[1]]}, "groups.members list"),
+    ],
+)
+def test_wrong_groups(changes, words):
+    refused(answer(groups=group(**changes)), words)
+
+
+def test_the_same_group_twice_and_no_groups_type():
+    two = np.zeros((2, 2))
+    refused(
+        answer(groups=Groups(np.array([5, 5]), (), two, two, np.zeros((2, 2, 2)), np.zeros(2), ())), "same group id"
+    )
+    refused(answer(groups=[5]), "groups of type list")
+
+
+@pytest.mark.parametrize(
+    ("changes", "words"),
+    [
+        ({"kind": "meet"}, "kind 'meet'; expected one of merge"),
+        ({"emitted": 2}, "emitted 2; expected 3"),
+        ({"emitted": 4}, "emitted 4; expected 3"),
+        ({"start": 4, "end": 5}, "start 4; expected a frame from 1 to 3"),
+        ({"start": 0}, "start 0"),
+        ({"start": 2.0}, "start 2.0; expected a whole number"),
+        ({"end": 1}, "end 1"),
+        ({"members": (1, 7)}, "7 in the members of a merge"),
+        ({"members": [1, 2]}, "members"),
+        ({"before": (-2,)}, "before"),
+        ({"after": 5}, "after 5"),
+        ({"pos": (0.0,)}, "pos"),
+        ({"pos": None}, "pos"),
+    ],
+)
+def test_wrong_events(changes, words):
+    refused(answer(events=(event(**changes),)), words)
+
+
+def test_what_is_no_event():
+    refused(answer(events=("merge",)), "an event of type str")
+    refused(answer(events="merge"), "events of type str")
+
+
+def test_when_an_event_was_told_is_filled_in():
+    (made,) = check(answer(events=(event(emitted=None, end=None),))).events
+    assert (made.emitted, made.start, made.end) == (3, 2, 3)
+    given = answer(events=(event(),), groups=group())
+    assert check(given) is given
+    assert check(answer(groups=Groups.none())).groups is not None
+
+
+def test_who_was_reported_before_may_be_a_member():
+    history = History()
+    check(answer(2, (1, 2)), history)
+    check(answer(3, (1,), events=(event(kind="leave"),), groups=group()), history)
+    refused(answer(3, (1,), events=(event(kind="leave"),)), "2 in the members of a leave")
+    history.forget()
+    refused(answer(3, (1,), events=(event(kind="leave"),)), "2 in the members of a leave", history)
+
+
+def test_plane_and_unit_stay():
+    history = History()
+    check(answer(2), history)
+    refused(answer(3, plane="image"), "plane 'image', unit 'person'; expected plane 'ground', unit 'person'", history)
+    refused(answer(3, unit="group", group=np.array([1, 2])), "unit 'group'; expected", history)
+
+
+def test_trackers_of_groups():
+    own = np.array([1, 2])
+    check(answer(unit="group", group=own, groups=group(members=()), events=(event(members=()),)))
+    refused(answer(unit="group", group=own[::-1].copy()), "group that is not id")
+    refused(answer(unit="group", group=own, groups=group()), "1 in groups.members")
+    refused(answer(unit="group", group=own, events=(event(),)), "1 in the members")
+
+
+@pytest.mark.parametrize("kind", [np.float64, object])
+def test_ids_are_int64(kind):
+    refused(answer(id=np.array([1, 2]).astype(kind)), "ids of type|id of type")
+    refused(answer(group=np.array([3, 3]).astype(kind)), "groups of type|group of type")
+
+
+def test_no_arrays():
+    refused(answer(pos=[[0.0, 0.0], [0.0, 0.0]]), "pos of type list")
+    refused(answer(id=np.zeros((2, 2), np.int64)), "id of shape")
+    refused(answer(group=np.array([-2, 3])), "group -2")

@@ -1,0 +1,227 @@
+"""What a tracker may answer, and the first fault of an answer in words."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass, field
+from math import isfinite
+from typing import Any
+
+import numpy as np
+
+from scenarios.errors import WorkError
+from sim.types import EVENT_KINDS, GroupEvent, Groups, Tracks
+
+Fault = tuple[str, str]
+"""What was got, what was expected."""
+
+
+@dataclass
+class History:
+    """What a tracker has answered in a sequence. State: plane and unit of its first answer, all its ids so far."""
+
+    kind: tuple[str, str] | None = None
+    ids: set[int] = field(default_factory=set)
+
+    def forget(self) -> None:
+        """Start anew, for another sequence."""
+        self.kind = None
+        self.ids.clear()
+
+
+def check_tracks(tracks: Any, index: int, tracker: str, history: History | None = None) -> Tracks:
+    """The answer to frame `index` itself, what may be left out filled in; WorkError naming tracker, frame and fault.
+
+    Checked are type, index, shapes, finiteness, ids (whole, non-negative, unique in the frame), plane and unit (those
+    of the first answer), groups and events. An id that is not reported for a while and comes back is the same track by
+    definition. Filled in: scores (1), an event's `emitted` and `end` (this frame). history: of this sequence, kept up
+    to date here.
+    """
+    if isinstance(tracks, Tracks):
+        tracks = _filled(tracks)
+    history = History() if history is None else history
+    fault = _fault(tracks, index, history)
+    if fault:
+        got, expected = fault
+        remedy = "correct the tracker's step()"
+        raise WorkError(file=tracker, place=f"frame {index}", got=got, expected=expected, remedy=remedy)
+    return tracks  # type: ignore[no-any-return]
+
+
+def _filled(tracks: Tracks) -> Tracks:
+    if not np.size(tracks.score) and np.ndim(tracks.id) == 1:
+        tracks = tracks.replace(score=np.ones(len(tracks.id)))
+    if isinstance(tracks.events, tuple) and any(map(_undated, tracks.events)):
+        tracks = tracks.replace(events=tuple(_dated(e, tracks.index) for e in tracks.events))
+    return tracks
+
+
+def _undated(event: Any) -> bool:
+    return isinstance(event, GroupEvent) and (event.emitted is None or event.end is None)
+
+
+def _dated(event: Any, index: int) -> Any:
+    """The event with its frames of telling and of ending, this one where it leaves them open."""
+    if not _undated(event):
+        return event
+    emitted = index if event.emitted is None else event.emitted
+    end = index if event.end is None else event.end
+    return GroupEvent(event.kind, event.start, end, emitted, event.before, event.after, event.members, event.pos)
+
+
+def _fault(tracks: Any, index: int, history: History) -> Fault | None:
+    """What is wrong with an answer, or None."""
+    if not isinstance(tracks, Tracks):
+        return type(tracks).__name__, "sim.types.Tracks"
+    if tracks.index != index:
+        return f"index {tracks.index}", f"index {index}"
+    if tracks.plane not in ("ground", "space", "image") or tracks.unit not in ("person", "group"):
+        return f"plane {tracks.plane!r}, unit {tracks.unit!r}", "plane ground, space or image; unit person or group"
+    history.kind = kind = history.kind or (tracks.plane, tracks.unit)
+    if (tracks.plane, tracks.unit) != kind:
+        return f"plane {tracks.plane!r}, unit {tracks.unit!r}", f"plane {kind[0]!r}, unit {kind[1]!r} as before"
+    fault = _rows_fault(tracks) or _id_fault(tracks)
+    if fault:
+        return fault
+    history.ids.update(tracks.id.tolist())
+    people = history.ids if tracks.unit == "person" else frozenset[int]()
+    if tracks.groups is not None:
+        fault = _groups_fault(tracks.groups, tracks.pos.shape[1], people)
+    return fault or _events_fault(tracks.events, index, people)
+
+
+def _rows_fault(tracks: Tracks) -> Fault | None:
+    if np.ndim(tracks.id) != 1:
+        return f"id of shape {np.shape(tracks.id)}", "(N,)"
+    n, d = len(tracks.id), 3 if tracks.plane == "space" else 2
+    shapes: dict[str, tuple[Any, tuple[int, ...]]] = {
+        "group": (tracks.group, (n,)),
+        "pos": (tracks.pos, (n, d)),
+        "vel": (tracks.vel, (n, d)),
+        "cov": (tracks.cov, (n, 2 * d, 2 * d)),
+        "score": (tracks.score, (n,)),
+    }
+    if tracks.box is not None:
+        shapes["box"] = (tracks.box, (n, 4))
+    return _arrays_fault(shapes)
+
+
+def _arrays_fault(shapes: dict[str, tuple[Any, tuple[int, ...]]]) -> Fault | None:
+    """The first that is no array of this shape, or not finite."""
+    for name, (a, shape) in shapes.items():
+        if not isinstance(a, np.ndarray) or a.dtype.kind not in "iuf":
+            return f"{name} of type {getattr(a, 'dtype', type(a).__name__)}", "an array of numbers"
+        if a.shape != shape:
+            return f"{name} of shape {a.shape}", str(shape)
+        if not finite(a):
+            return f"NaN or infinity in {name}", "finite numbers"
+    return None
+
+
+def finite(a: Any) -> bool:
+    """Are all numbers finite? The sum of squares is cheap and nearly always tells; huge numbers may overflow it."""
+    return isfinite(np.vdot(a, a)) or bool(np.isfinite(a).all())
+
+
+def _id_fault(tracks: Tracks) -> Fault | None:
+    if not isinstance(tracks.id, np.ndarray) or tracks.id.dtype != np.int64 or tracks.group.dtype != np.int64:
+        kinds = (getattr(a, "dtype", type(a).__name__) for a in (tracks.id, tracks.group))
+        return "ids of type {}, groups of type {}".format(*kinds), "int64"
+    if tracks.unit == "group" and not np.array_equal(tracks.id, tracks.group):
+        return "group that is not id", "group equal to id where the unit is group"
+    if len(tracks.id) and tracks.group.min() < -1:
+        return f"group {tracks.group.min()}", "non-negative groups, -1 alone"
+    return _ids_fault(tracks.id, "id")
+
+
+def _ids_fault(id: Any, name: str) -> Fault | None:
+    if len(id) and id.min() < 0:
+        return f"{name} {id.min()}", f"non-negative {name}s"
+    if len(set(id.tolist())) != len(id):
+        return f"the same {name} twice", f"unique {name}s in a frame"
+    return None
+
+
+def _groups_fault(groups: Any, d: int, people: Iterable[int]) -> Fault | None:
+    """people: ids that may be members; pos of the groups has d columns. Of extent, size and vel nan is unknown."""
+    if not isinstance(groups, Groups):
+        return f"groups of type {type(groups).__name__}", "sim.types.Groups or None"
+    if not isinstance(groups.id, np.ndarray) or groups.id.ndim != 1 or groups.id.dtype != np.int64:
+        return f"groups.id of type {getattr(groups.id, 'dtype', type(groups.id).__name__)}", "(G,) int64"
+    n = len(groups.id)
+    for name, shape in (("pos", (n, d)), ("vel", (n, d)), ("extent", (n, 2, 2)), ("size", (n,))):
+        a, flat = getattr(groups, name), (n, 2)  # no groups at all are those of Groups.none(), in any plane
+        if not isinstance(a, np.ndarray) or (a.shape != shape and (n or a.shape[:1] != flat[:1])):
+            return f"groups.{name} of shape {np.shape(a)}", str(shape)
+        if name == "pos" and not finite(a):
+            return "NaN or infinity in groups.pos", "finite numbers"
+    return _ids_fault(groups.id, "group id") or _ragged_fault(groups, n, people)
+
+
+def _ragged_fault(groups: Groups, n: int, people: Iterable[int]) -> Fault | None:
+    """Members and hulls: one for each group, or none for all."""
+    for name in ("members", "hull"):
+        items = getattr(groups, name)
+        if not isinstance(items, tuple) or len(items) not in (0, n):
+            got = f"{len(items)} groups.{name}" if isinstance(items, tuple) else f"groups.{name} {type(items).__name__}"
+            return got, f"a tuple of {n}, or an empty one"
+    for who in groups.members:
+        if not isinstance(who, np.ndarray) or who.ndim != 1 or (len(who) and who.dtype.kind != "i"):
+            return "groups.members that are no ids", "(k,) int64 each"
+        if fault := _members_fault(who.tolist(), people, "groups.members"):
+            return fault
+    for hull in groups.hull:
+        if not isinstance(hull, np.ndarray) or hull.ndim != 2 or hull.shape[1] != 2 or hull.dtype.kind not in "if":
+            return f"groups.hull of shape {np.shape(hull)}", "(V, 2) each"
+        if not finite(hull):
+            return "NaN or infinity in groups.hull", "finite numbers"
+    return None
+
+
+def _members_fault(members: Iterable[Any], people: Iterable[int], name: str) -> Fault | None:
+    for m in members:
+        if not isinstance(m, int | np.integer) or isinstance(m, bool) or m not in people:  # type: ignore[operator]
+            return f"{m!r} in {name}", "ids that the tracker has reported"
+    return None
+
+
+def _events_fault(events: Any, index: int, people: Iterable[int]) -> Fault | None:
+    if not isinstance(events, tuple):
+        return f"events of type {type(events).__name__}", "a tuple of sim.types.GroupEvent"
+    for event in events:
+        if fault := _event_fault(event, index, people):
+            return fault
+    return None
+
+
+def _event_fault(event: Any, index: int, people: Iterable[int]) -> Fault | None:
+    if not isinstance(event, GroupEvent):
+        return f"an event of type {type(event).__name__}", "sim.types.GroupEvent"
+    if event.kind not in EVENT_KINDS:
+        return f"an event of kind {event.kind!r}", "one of " + ", ".join(EVENT_KINDS)
+    for name in ("start", "end", "emitted"):
+        if not _whole(getattr(event, name)):
+            return f"{event.kind}: {name} {getattr(event, name)!r}", "a whole number"
+    if event.emitted != index:
+        return f"{event.kind}: emitted {event.emitted}", f"{index}, the frame answered, or None"
+    if not 1 <= event.start <= index:
+        return f"{event.kind}: start {event.start}", f"a frame from 1 to {index}"
+    if event.end < event.start:
+        return f"{event.kind}: end {event.end}", f"{event.start} or later: its start"
+    for name in ("before", "after"):
+        some = getattr(event, name)
+        if not isinstance(some, tuple) or not all(_whole(g) and g >= -1 for g in some):
+            return f"{event.kind}: {name} {some!r}", "a tuple of group ids, -1 for one alone"
+    if not isinstance(event.members, tuple):
+        return f"{event.kind}: members {event.members!r}", "a tuple of ids"
+    if np.shape(event.pos) != (2,) or not _numbers(event.pos):
+        return f"{event.kind}: pos {event.pos!r}", "x, y"
+    return _members_fault(event.members, people, f"the members of a {event.kind}")
+
+
+def _whole(value: Any) -> bool:
+    return isinstance(value, int | np.integer) and not isinstance(value, bool)
+
+
+def _numbers(values: Any) -> bool:
+    return all(isinstance(v, int | float | np.integer | np.floating) for v in values)
