@@ -98,6 +98,8 @@ def queues(pos: Array, vel: Array, present: Bools, group: Ints, fps: float) -> l
     """
     found = []
     for q in queue_lines(pos, vel, present, fps):
+        if not q.order:  # nobody stayed for a second
+            continue
         columns = np.array(sorted(q.order))
         before, after = (_groups_of(group[t, columns[present[t, columns]]]) for t in (q.first, q.last))
         people = tuple((columns + 1).tolist())
