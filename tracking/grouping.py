@@ -3,7 +3,9 @@
 Linked people (tracking.links) form groups, connected through others too; ids follow the identity rule (sim.identity).
 Crossings and queues are measured by sim.events. An event is reported in the frame in which it is known, `start` being
 its onset: a merge once its link holds, a crossing 2 s after it, a queue when its people have waited 3 s (and 3 s more,
-as advancing is told from leaving by what follows); a queue's `end`, and who joins it, is known later.
+as advancing is told from leaving by what follows); a queue's `end`, and who joins it, is known later. The end of a
+recording tells what is then known: in its last frame crossings and queues are reported without waiting for what might
+have followed, so that this one frame is not causal beside a longer recording.
 """
 
 from __future__ import annotations
@@ -26,8 +28,7 @@ from tracking.links import Grouping, find_links
 
 __all__ = ["Grouping", "derive", "with_groups"]
 
-ENCOUNTERS = frozenset({"cross", "queue"})
-MEMBERSHIP = frozenset(EVENT_KINDS) - ENCOUNTERS
+MEMBERSHIP = frozenset(EVENT_KINDS) - {"cross", "queue"}
 HALF = 0.5  # s: chord that stands for the velocities of a tracker that knows none
 
 
@@ -66,9 +67,9 @@ class _Rows:
 
 
 def with_groups(tracks: Sequence[Tracks], fps: float, px_per_m: float) -> tuple[Tracks, ...]:
-    """The tracks as they are where the tracker named groups throughout, else `derive`d; px_per_m is needed for tracks
-    in the image, which stay as they are without it (not one box was given: nobody can be grouped)."""
-    if all(t.groups is not None for t in tracks) or (tracks[0].plane == "image" and not math.isfinite(px_per_m)):
+    """The tracks `derive`d; px_per_m is needed for tracks in the image, which stay as they are without it (not one box
+    was given: nobody can be grouped). Tracks that were derived before stay what they are."""
+    if not tracks or (tracks[0].plane == "image" and not math.isfinite(px_per_m)):
         return tuple(tracks)
     return tuple(derive(tracks, fps, px_per_m))
 
@@ -76,24 +77,49 @@ def with_groups(tracks: Sequence[Tracks], fps: float, px_per_m: float) -> tuple[
 def derive(tracks: Iterable[Tracks], fps: float, px_per_m: float = 1.0, rule: Grouping | None = None) -> list[Tracks]:
     """The tracks with `group`, `groups` and `events` filled in where a tracker left them empty.
 
-    People get groups by the baseline rule unless the tracker named any; events of membership are derived unless it
-    reported any, crossings and queues likewise. Groups without people (unit "group") are left as they are.
+    People get groups by the baseline rule unless the tracker named any, in `group` or in its groups' members. Events of
+    membership are derived from these groups unless it reported any such; crossings and queues unless it reported any of
+    that kind. Groups without people (unit "group") are left as they are.
     """
     given = list(tracks)
     if not given or any(t.unit == "group" for t in given):
         return given
     rule = rule or Grouping()
     rows = _rows(given, fps, px_per_m, rule)
-    kinds = {e.kind for t in given for e in t.events}
+    named = bool((rows.group >= 0).any()) or any(t.groups is not None for t in given)
+    said = {e.kind for t in given for e in t.events}
     events: list[GroupEvent] = []
-    if (rows.group < 0).all() and all(t.groups is None for t in given):
-        links = find_links(rows.frame, rows.column, rows.pos, rows.vel, rows.length, fps, rule)
-        group, events = label_people(rows.frame, rows.column, rows.places(), links, fps, rule)
-        rows = replace(rows, group=group)
-    elif not kinds & MEMBERSHIP:
-        events = label_changes(rows.labels(), rows.places())
-    events = [] if kinds & MEMBERSHIP else events
-    return _filled(given, rows, events if kinds & ENCOUNTERS else events + _encounters(rows, fps))
+    if not named or not said & MEMBERSHIP:
+        rows, events = _membership(rows, named, fps, rule)
+    events = [e for e in events if not said & MEMBERSHIP]
+    return _filled(given, rows, events + [e for e in _encounters(rows, fps) if e.kind not in said])
+
+
+def _membership(rows: _Rows, named: bool, fps: float, rule: Grouping) -> tuple[_Rows, list[GroupEvent]]:
+    """The rows with their groups, and what happened to these.
+
+    Groups that the tracker named are kept. Where they are those of the baseline rule (it may have been applied before),
+    so are the events, onsets and all; of others the labels alone speak.
+    """
+    if named and (rows.group < 0).all():
+        return rows, []
+    links = find_links(rows.frame, rows.column, rows.pos, rows.vel, rows.length, fps, rule)
+    group, events = label_people(rows.frame, rows.column, rows.places(), links, fps, rule)
+    if named and not np.array_equal(group, rows.group):
+        return rows, label_changes(rows.labels(), rows.places())
+    return replace(rows, group=group), events
+
+
+def _labels(given: Sequence[Tracks]) -> list[Ints]:
+    """Groups of each frame's people: those they carry or, if nobody ever carries one, whose members they are."""
+    if any((t.group >= 0).any() for t in given):
+        return [t.group for t in given]
+    found = []
+    for t in given:
+        members = () if t.groups is None else zip(t.groups.id.tolist(), t.groups.members, strict=False)
+        of = {p: g for g, people in members for p in people.tolist()}
+        found.append(np.array([of.get(p, -1) for p in t.id.tolist()], np.int64))
+    return found
 
 
 def _rows(given: Sequence[Tracks], fps: float, px_per_m: float, rule: Grouping) -> _Rows:
@@ -104,7 +130,7 @@ def _rows(given: Sequence[Tracks], fps: float, px_per_m: float, rule: Grouping) 
         )
     count = [len(t.id) for t in given]
     frame = np.repeat(np.array([t.index for t in given], np.int64) - 1, count)
-    id, group = (np.concatenate([getattr(t, name) for t in given]) for name in ("id", "group"))
+    id, group = np.concatenate([t.id for t in given]), np.concatenate(_labels(given))
     pos, vel = (np.concatenate([getattr(t, name)[:, :2] for t in given]) / scale for name in ("pos", "vel"))
     order = np.lexsort((id, frame))
     frame, id, group, pos, vel = frame[order], id[order], group[order], pos[order], vel[order]

@@ -71,7 +71,7 @@ def evaluate(
     inside = chosen_frames(frames, truth.length)
     given: Sequence[Tracks] = _answers(tracks, inside)
     told = labelled_frames(truth) & inside
-    if told.any():
+    if told.any() and (truth.events is not None or any(t.groups is None for t in given)):
         given = with_groups(given, truth.fps, truth.px_per_m)
     answers = [t for t in given if inside[t.index]]
     plane, chosen = plane_of(truth, answers), similarity or usual_similarity(truth, answers)

@@ -123,6 +123,8 @@ def near_changes(truth: Truth) -> Bools:
 
 
 def _events(case: Labelled, told: Told) -> dict[str, float]:
+    """Scores of events. Crossings and queues are derived from people: of a method without any they are unknown unless
+    it tells such itself."""
     truth, rows, frames = case.truth, case.true.rows, case.frames
     assert truth.events is not None
     places = case.true.places("image", "ground") if case.surface == "image" else None
@@ -132,4 +134,8 @@ def _events(case: Labelled, told: Told) -> dict[str, float]:
     if by_people:
         said += told_events(case.answers, case.est, case.stands_for, rows, frames, truth.fps)
     pairings = pair_events(happened, said, truth.fps, case.scale)
-    return event_scores(pairings, truth.fps) | lineage_scores(pairings)
+    found = event_scores(pairings, truth.fps) | lineage_scores(pairings)
+    if by_people:
+        return found
+    silent = {"cross", "queue"} - {event.kind for t in case.answers for event in t.events}
+    return {k: float("nan") if k.partition("_")[0] in silent else v for k, v in found.items()}

@@ -130,10 +130,5 @@ def told_without_people(
 
 
 def _said(answers: Sequence[Tracks], frames: Bools) -> list[tuple[GroupEvent, int]]:
-    """A tracker's events and the frame in which each was said."""
-    return [
-        (event, t.index if event.emitted is None else event.emitted)
-        for t in answers
-        for event in t.events
-        if _counts(event, frames)
-    ]
+    """A tracker's events and the frame in which each was said: that of the answer it stands in, whatever it claims."""
+    return [(event, t.index) for t in answers for event in t.events if _counts(event, frames)]

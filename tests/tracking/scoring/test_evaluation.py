@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Set
 from pathlib import Path
 
 import numpy as np
@@ -37,7 +38,7 @@ def truth_as_tracks(true: Truth, plane: str = "ground", late: int = 0) -> list[T
         group = np.array([of.get(p, -1) for p in now.id.tolist()], np.int64)
         pos, groups, vel = now.pos, now.groups, now.vel
         if plane == "image":
-            pos, groups, vel = now.box[:, :2] + now.box[:, 2:] / 2, now.groups_px, np.zeros((n, 2))
+            pos, groups, vel = now.box[:, :2] + now.box[:, 2:] / 2, now.groups_px, np.full((n, 2), np.nan)
         told = tuple(events.get(index, ()))
         cov = np.zeros((n, 4, 4))
         answer = Tracks(index, now.t, plane, "person", now.id, group, pos, vel, cov, now.box, np.ones(n), groups, told)
@@ -51,15 +52,19 @@ def test_truth_as_tracks_is_perfect(name: str) -> None:
     assert true is not None
     for plane, by in (("ground", "hull"), ("ground", "members"), ("image", "hull")):
         found = evaluate(true, truth_as_tracks(true, plane), group_match=by)
-        assert_perfect(found)
+        # What a tracker does not tell is measured where it follows people: who passes by may cross in the picture.
+        untold = {"cross", "queue"} - {e.kind for e in true.events} if plane == "image" else set()
+        assert_perfect(found, untold)
         assert found["objective"] == pytest.approx(1, abs=1e-12)
         assert np.isfinite(found["group_F1"]) == any(len(g.id) for g in true.groups)
         for kind in {e.kind for e in true.events} & {"merge", "split", "cross", "queue"}:
             assert found[f"{kind}_F1"] == 1, kind
 
 
-def assert_perfect(found: Scores) -> None:
+def assert_perfect(found: Scores, without: Set[str] = frozenset()) -> None:
     for key, value in found.items():
+        if key.partition("_")[0] in without:
+            continue
         best = CATALOGUE[key].best
         if np.isfinite(value) and np.isfinite(best):
             assert value == pytest.approx(best, abs=1e-6), (key, found.surface, found.group_match)

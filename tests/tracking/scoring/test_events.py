@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -272,3 +274,23 @@ def test_as_many_hits_as_there_can_be(seed):
 def test_no_answer_at_all_is_no_error():
     found = evaluate(truth([Scene(CROWD, {1: (AB, None)})] * 3, [event("merge", 2, AB)]), list[Tracks]())
     assert (found["merge_FN"], found["group_FN"], found["objective"]) == (1, 3, 0)
+
+
+def test_latency_is_to_the_answer_that_told_whatever_it_claims():
+    told = tracks([Scene(CROWD)] * FRAMES, [event("merge", 30, (1, 2), emitted=45)])
+    claimed = [t.replace(events=tuple(replace(e, emitted=30) for e in t.events)) for t in told]
+    for said in (told, claimed):
+        assert evaluate(truth([Scene(CROWD)] * FRAMES, [event("merge", 30, (1, 2))]), said)["merge_latency"] == near(
+            1.5
+        )
+
+
+def test_crossings_and_queues_of_a_method_without_people_are_unknown_unless_it_tells_some():
+    kinds = ("cross", "queue", "merge")
+    true = truth([Scene(CROWD)] * FRAMES, [event(kind, 30, (1, 2, 3)) for kind in kinds])
+    silent = evaluate(true, tracks([Scene({}, {})] * FRAMES, unit="group"))
+    assert [np.isnan(silent[f"{kind}_{k}"]) for kind in kinds for k in ("F1", "FN")] == [True] * 4 + [False] * 2
+    said = [event("cross", 30, (), emitted=31)]
+    told = evaluate(true, tracks([Scene({}, {})] * FRAMES, said, unit="group"))
+    assert hits("cross", told) == (1, 0, 0)
+    assert np.isnan(told["queue_FN"])
