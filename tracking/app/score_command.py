@@ -22,7 +22,9 @@ from tracking.scoring.catalogue import CATALOGUE
 from tracking.scoring.evaluation import IncomparableError, Scores, Similarity
 from tracking.scoring.groups import GroupMatch
 from tracking.scoring.resample import scorer
-from tracking.stats import bootstrap, moving_blocks, paired
+from tracking.stats import SURE, bootstrap, moving_blocks, paired
+
+INDICATIVE = f"intervals are indicative under {SURE:g} s: the recording lasts {{seconds:.4g}} s"
 
 
 @dataclass(frozen=True)
@@ -58,7 +60,7 @@ def score(
     rows, *others = [_rows(sequences, path, similarity, group_match) for path in paths]
     draws = [_draw(sequences, path, similarity, group_match) for path in paths] if blocks else []
     means = _recording(sequences[0], blocks, draws[0], _values(rows)[0]) if blocks else summary(rows)
-    found = answer(rows, means)
+    found = answer(rows, means, notes(sequences[0]) if blocks else [])
     if not others:
         return found
     if not blocks:
@@ -118,9 +120,17 @@ def score_run(
     return Row(sequence.name, found)
 
 
-def answer(rows: list[Row], means: Means) -> Answer:
-    """Rows and their mean, for people and for --json."""
-    return Answer({"sequences": [_row(row) for row in rows], "mean": means}, tables(rows, means))
+def notes(sequence: Sequence) -> list[str]:
+    """What to know of the intervals of a single recording."""
+    assert sequence.truth is not None
+    seconds = sequence.truth.length / sequence.fps
+    return [INDICATIVE.format(seconds=seconds)] if seconds < SURE else []
+
+
+def answer(rows: list[Row], means: Means, notes: list[str] | None = None) -> Answer:
+    """Rows, their mean and notes on it, for people and for --json."""
+    notes = notes or []
+    return Answer({"sequences": [_row(row) for row in rows], "mean": means, "notes": notes}, tables(rows, means, notes))
 
 
 def _row(row: Row) -> dict[str, Any]:

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 from tracking.scoring.catalogue import CATALOGUE
-from tracking.stats import SURE
 
 if TYPE_CHECKING:
     from tracking.app.score_command import Row
@@ -43,16 +43,16 @@ ENOUGH = 100
 Means = dict[str, dict[str, float]]
 
 
-def tables(rows: list[Row], means: Means) -> Any:
-    """A table for each family of which something is known, and by what people and groups were compared."""
+def tables(rows: list[Row], means: Means, notes: Sequence[str] = ()) -> Any:
+    """A table for each family of which something is known, by what people and groups were compared, and the notes."""
     from rich.console import Group
 
     known = {title: keys for title, keys in TABLES.items() if any(math.isfinite(means[k]["mean"]) for k in keys)}
     parts = [_table(title, keys, rows, means) for title, keys in known.items()]
     lines = _compared(rows, "groups, strict" in known)
     if len(rows) == 1 and math.isfinite(means["objective"]["low"]):
-        lines.append(f"intervals by moving blocks of frames: an indication where the recording is under {SURE:g} s")
-    return Group(*parts, "\n".join(lines))
+        lines.append("intervals by moving blocks of frames")
+    return Group(*parts, "\n".join([*lines, *notes]))
 
 
 def _table(title: str, keys: tuple[str, ...], rows: list[Row], means: Means) -> Any:

@@ -85,6 +85,20 @@ def test_blocks_of_a_single_recording(made: Path, capsys) -> None:
     assert {v for d in same.values() for v in d.values()} <= {0.0, None}
 
 
+def test_a_short_recording_is_an_indication_only(made: Path, capsys, monkeypatch) -> None:
+    """The scene lasts under a minute; with the border below its length it is long enough."""
+    one = [made / "data" / "flockscope-train" / "merge-s00003", made / "file"]
+    (note,) = scored(capsys, *one, "--blocks", "2")["notes"]
+    assert "indicative under 60 s" in note
+    assert run(["score", *map(str, one), "--blocks", "2"]) == 0
+    assert "indicative under 60 s" in " ".join(capsys.readouterr().out.split())
+    assert scored(capsys, *one)["notes"] == []
+    monkeypatch.setattr("tracking.app.score_command.SURE", 5.0)
+    assert scored(capsys, *one, "--blocks", "2")["notes"] == []
+    assert run(["score", *map(str, one), "--blocks", "2"]) == 0
+    assert "indicative" not in capsys.readouterr().out
+
+
 def test_blocks_are_for_a_single_recording(made: Path, capsys) -> None:
     assert run(["score", str(made / "data"), str(made / "file"), "--blocks", "5"]) == 2
     assert "2 sequences" in capsys.readouterr().err
