@@ -73,7 +73,8 @@ def test_labelled_groups_cross_and_queue_in_their_own_ids_and_unit():
     label = np.tile([8, 8, 3, 3, -1, -1, -1], 120)
     rows = (20 * x.reshape(-1, 2) for x in (pos, vel))
     queue, cross = label_truth(frame, id, label, *rows, fps=10.0, length=120, px_per_m=20.0)["events"]
-    assert (queue.kind, queue.start, queue.end, queue.members, queue.before) == ("queue", 1, 120, (50, 60, 70), ())
+    assert (queue.kind, queue.start, queue.end, queue.members) == ("queue", 1, 120, (50, 60, 70))
+    assert queue.before == queue.after == (-1, -1, -1)
     assert (cross.kind, cross.start, cross.end, cross.members) == ("cross", 44, 58, (10, 20, 30, 40))
     assert cross.before == cross.after == (3, 8)
     assert cross.pos == pytest.approx((100, 20 * 5.45))
