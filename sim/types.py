@@ -173,8 +173,8 @@ class Tracks(_Frozen):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Stairs(_Frozen):
-    """A ramp of steps: z rises from 0 at the line `foot` to `rise` at `head`, over `width` across the axis; beyond
-    the head the plateau of `landing` metres keeps z = rise."""
+    """A ramp of steps: z rises from 0 at the edge whose middle is `foot` to `rise` at that of `head`, over `width`
+    across the axis; beyond the head the plateau of `landing` metres keeps z = rise."""
 
     foot: Array
     head: Array
