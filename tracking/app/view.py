@@ -90,17 +90,12 @@ def _scores(scores: Mapping[str, float]) -> list[list[str]]:
 
 def _derived(tracks: SequenceOf[Tracks], sequence: Sequence, truth: Truth | None) -> SequenceOf[Tracks]:
     """The tracks, with groups and events where the tracker left them empty."""
-    if all(t.groups is not None for t in tracks):
-        return tracks
-    from tracking.grouping import derive
+    from tracking.grouping import with_groups
 
     scale = sequence.px_per_m
     if not math.isfinite(scale):
         scale = truth.px_per_m if truth is not None else math.nan
-    in_image = any(t.plane == "image" for t in tracks)
-    if in_image and not math.isfinite(scale):
-        return tracks
-    return derive(tracks, sequence.fps, scale)
+    return with_groups(tracks, sequence.fps, scale)
 
 
 def _tracker(tracks: SequenceOf[Tracks] | None) -> str:
