@@ -7,78 +7,27 @@ Arrays are float64 except ids (int64), flags (bool) and images (uint8); every ar
 
 from __future__ import annotations
 
-import re
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass, field, fields, replace
-from functools import cache
-from typing import Any, Literal, Protocol, Self
+from dataclasses import dataclass, field
+from typing import Any, Literal, Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
-Ints = NDArray[np.int64]
-Bools = NDArray[np.bool_]
-Image = NDArray[np.uint8]
+from sim.arrays import Array as Array
+from sim.arrays import Bools as Bools
+from sim.arrays import Frozen
+from sim.arrays import Image as Image
+from sim.arrays import Ints as Ints
+from sim.arrays import no_ids as no_ids
+
 Plane = Literal["ground", "space", "image"]
 Unit = Literal["person", "group"]
 DetectionMode = Literal["image", "truth", "file"]
 EVENT_KINDS = ("merge", "split", "cross", "queue", "form", "dissolve", "enter", "leave")
 
 
-class _Frozen:
-    """Makes the arrays of a frozen dataclass read-only and, from any other width of number, float64 or int64.
-
-    What is of the right kind is not copied: the field is a read-only view, and whoever keeps the array itself can
-    still write to it. Floats given as ids stay what they are, for the check of a tracker's answer to name them.
-    """
-
-    def __post_init__(self) -> None:
-        for name, kind, ragged in _array_fields(type(self)):  # type: ignore[arg-type]
-            value = getattr(self, name)
-            if ragged:
-                if value and isinstance(value[0], np.ndarray):
-                    object.__setattr__(self, name, tuple(_settled(v, kind) for v in value))
-            elif isinstance(value, np.ndarray) and (value.dtype is not kind or value.flags.writeable):
-                object.__setattr__(self, name, _settled(value, kind))
-
-    def replace(self, **changes: Any) -> Self:
-        """A copy with these fields changed."""
-        return replace(self, **changes)  # type: ignore[type-var]
-
-
-KINDS = {"Array": np.dtype(np.float64), "Ints": np.dtype(np.int64), "Bools": np.dtype(np.bool_)}
-KINDS["Image"] = np.dtype(np.uint8)
-
-
-@cache
-def _array_fields(kind: Any) -> tuple[tuple[str, np.dtype[Any], bool], ...]:
-    """The fields of a dataclass that are declared as arrays: name, kind of number, whether a tuple of arrays."""
-    found = []
-    for f in fields(kind):
-        declared = re.fullmatch(r"(tuple\[)?(Array|Ints|Bools|Image)\b.*", str(f.type))
-        if declared:
-            found.append((f.name, KINDS[declared[2]], declared[1] is not None))
-    return tuple(found)
-
-
-def _settled(a: NDArray[Any], kind: np.dtype[Any]) -> NDArray[Any]:
-    """The array read-only and of the wanted kind; of its own where numbers could be lost (floats as ids)."""
-    if a.dtype is not kind and a.dtype != kind and np.can_cast(a.dtype, kind, "same_kind"):
-        a = a.astype(kind)
-    if a.flags.writeable:
-        a = a.view()
-        a.flags.writeable = False
-    return a
-
-
-def no_ids() -> Ints:
-    """An empty id array."""
-    return np.zeros(0, np.int64)
-
-
 @dataclass(frozen=True, slots=True, eq=False)
-class Detections(_Frozen):
+class Detections(Frozen):
     """What a detector found in one frame, M rows.
 
     plane says what `pos` is in: "ground" (x, y in m), "space" (x, y, z in m) or "image" (px, the box's centre).
@@ -95,7 +44,7 @@ class Detections(_Frozen):
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Frame(_Frozen):
+class Frame(Frozen):
     """What the sensors deliver at one instant, nothing else; `image`, `right` are (H, W, 3) BGR uint8."""
 
     index: int
@@ -106,7 +55,7 @@ class Frame(_Frozen):
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Groups(_Frozen):
+class Groups(Frozen):
     """Groups of one frame, G rows, in the plane of the Tracks or Truth that holds them.
 
     members: person ids of each (empty for a method that knows groups only); hull: (V, 2) polygons, counter-clockwise
@@ -148,7 +97,7 @@ class GroupEvent:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Tracks(_Frozen):
+class Tracks(Frozen):
     """A tracker's answer to one frame, N rows.
 
     unit "person": group is the id of the person's group, -1 alone. unit "group": id == group.
@@ -172,7 +121,7 @@ class Tracks(_Frozen):
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Stairs(_Frozen):
+class Stairs(Frozen):
     """A ramp of steps: z rises from 0 at the edge whose middle is `foot` to `rise` at that of `head`, over `width`
     across the axis; beyond the head the plateau of `landing` metres keeps z = rise."""
 
@@ -185,7 +134,7 @@ class Stairs(_Frozen):
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Scene(_Frozen):
+class Scene(Frozen):
     """What stands still: size (2,) m; walls (W, 2, 2) segments; pillars (P, 3) x, y, radius; doors (D, 2, 2) openings
     in walls; service (S, 2) service points. wall_height and pillar_height in m."""
 
@@ -200,7 +149,7 @@ class Scene(_Frozen):
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Camera(_Frozen):
+class Camera(Frozen):
     """A camera; see sim.camera for what it sees.
 
     kind "pinhole": x_cam = rotation (X - position), u = fx x/z + cx, v = fy y/z + cy, (cx, cy) the image's middle
@@ -219,7 +168,7 @@ class Camera(_Frozen):
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Context(_Frozen):
+class Context(Frozen):
     """What a tracker may know before the first frame. background: K frames (K, H, W, 3), or None."""
 
     fps: float
@@ -245,7 +194,7 @@ class Order:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Motion(_Frozen):
+class Motion(Frozen):
     """A whole simulated crowd before a pixel is drawn: T frames, P people; person id = column + 1.
 
     pos, vel (T, P, 2), heading (T, P): nan while absent. present (T, P). intent (T, P): number of the group that the
@@ -270,7 +219,7 @@ class Motion(_Frozen):
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Near(_Frozen):
+class Near(Frozen):
     """Hard negatives: strangers who satisfy the merge rule without belonging together (gt/near.csv), K rows."""
 
     start: Ints
@@ -285,7 +234,7 @@ class Near(_Frozen):
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class FrameTruth(_Frozen):
+class FrameTruth(Frozen):
     """What is true in one frame, N people; never reaches a tracker. Fields as in Truth."""
 
     index: int
@@ -301,7 +250,7 @@ class FrameTruth(_Frozen):
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Truth(_Frozen):
+class Truth(Frozen):
     """What is true in a sequence: R rows sorted by (frame, id), one per person and frame.
 
     frame, id, group (-1 alone). pos, vel (R, 2) on the ground in m, m/s, None if unknown; z (R,) ground height.

@@ -19,6 +19,7 @@ SCORING = (
     "tracking.scoring",
     "tracking.grouping",
     "scenarios.errors",
+    "sim.arrays",
     "sim.types",
     "sim.groups",
     "sim.events",
