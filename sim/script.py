@@ -79,8 +79,10 @@ class Script:
 
     def leaving(self, columns: Ints) -> list[int]:
         """Columns of those present whose group has arrived where it leaves the scene."""
-        g = self.group_of[columns]
-        out = self.groups.arrived[g] & (self.groups.finish[g] == LEAVE) & (self.queue_of[columns] < 0)
+        done = self.groups.arrived & (self.groups.finish == LEAVE)
+        if not done.any():
+            return []
+        out = done[self.group_of[columns]] & (self.queue_of[columns] < 0)
         gone = [int(c) for c in columns[out]]
         self.present[gone] = False
         return gone

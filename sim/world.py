@@ -20,7 +20,7 @@ from scenarios.schema import Scenario
 from sim.cast import BODY_RADIUS, Party, cast
 from sim.navigation import Navigator, scene_of
 from sim.script import Script
-from sim.steering import LEAVE, Groups, Obstacles, People, Steering
+from sim.steering import Groups, Obstacles, People, Steering
 from sim.types import Array, Ints, Motion, Scene
 from sim.wander import wander
 
@@ -133,8 +133,7 @@ class World:
         return np.frombuffer(self._get.float_buf()).reshape(-1, 4)
 
     def _come_and_go(self, t: float, first: bool) -> None:
-        out = self.groups.arrived & (self.groups.finish == LEAVE)
-        gone = self.script.leaving(self.columns) if out.any() else []
+        gone = self.script.leaving(self.columns)
         coming = [party for party in self.script.waiting if (party.enter <= 0 if first else party.enter <= t)]
         coming = [party for party in coming if first or self._has_room(party)]
         if not gone and not coming:

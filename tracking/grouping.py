@@ -159,10 +159,10 @@ def backward_velocity(frame: Ints, column: Ints, pos: Array, fps: float, window:
 
 def _encounters(rows: _Rows, fps: float) -> list[GroupEvent]:
     """Crossings and queues, and when they are known."""
-    pos, vel = rows.places(), rows.velocities()
+    pos, vel, label = rows.places(), rows.velocities(), rows.labels()
     present: Bools = np.isfinite(pos[..., 0])
-    crossed = crossings(pos, vel, present, rows.labels(), fps)
-    queued = queues(pos, vel, present, rows.labels(), fps)
+    crossed = crossings(pos, vel, present, label, fps)
+    queued = queues(pos, vel, present, label, fps)
     late, waited = frames_of(SAME_BEFORE, fps), frames_of(QUEUE_HOLD, fps) + frames_of(ADVANCE, fps)
     return [replace(e, emitted=min(e.end + late, rows.length)) for e in crossed] + [
         replace(e, emitted=min(e.start + waited - 1, rows.length)) for e in queued
