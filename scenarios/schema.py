@@ -105,6 +105,38 @@ class Sensor(Model):
     hide: tuple[Hide, ...] = Field((), description="artificial occlusions")
 
 
+class Switch(Model):
+    """The light changes at once: a lamp, a cloud."""
+
+    at: Value = Field(description="when, s")
+    gain: Value = Field(description="brightness from then on, times what it was; above 0")
+    ramp: NonNegative = Field(0.2, description="how long the change takes, s")
+
+
+class Light(Model):
+    """What falls on the scene, for pictures only."""
+
+    sun_azimuth_deg: Value = Field(
+        Distribution(uniform=(-180, 180)), description="where the light comes from; 0 = from +x, 90 = from +y"
+    )
+    sun_elevation_deg: Value = Field(Distribution(uniform=(35, 60)), description="height of the sun above the ground")
+    shadow: Share = Field(0.3, description="how much darker the ground is in a cast shadow; 0 = no shadows")
+    penumbra: NonNegative = Field(0.05, description="width of a shadow's soft edge, m")
+    drift: NonNegative = Field(0.0, description="sd of slow changes of brightness, relative")
+    drift_time: Positive = Field(20.0, description="time constant of slow changes, s")
+    flicker: NonNegative = Field(0.0, description="sd of changes from frame to frame, relative")
+    switch: tuple[Switch, ...] = Field((), description="sudden changes")
+
+
+class Picture(Model):
+    """What the camera makes of it, for pictures only."""
+
+    texture: Share = Field(0.5, description="contrast of the patterns on ground and walls")
+    noise: NonNegative = Field(3.0, description="sd of the noise of each pixel and colour, grey levels")
+    blur_px: NonNegative = Field(0.6, description="sd of the blur, px")
+    jpeg: Annotated[int, Field(ge=0, le=100)] = Field(0, description="quality of lossy artefacts; 0 = none")
+
+
 class Crowd(Model):
     """How people walk; defaults are the measured ones (docs/realism.md)."""
 
@@ -226,6 +258,8 @@ class Scenario(Model):
     world: World = World()
     camera: CameraSpec = CameraSpec()
     sensor: Sensor = Sensor()
+    light: Light = Light()
+    picture: Picture = Picture()
     crowd: Crowd = Crowd()
     group: Annotated[tuple[Group, ...], Field(min_length=1)]
     event: tuple[Event, ...] = ()

@@ -247,6 +247,30 @@ class FrameTruth(Frozen):
     visibility: Array
     groups: Groups | None
     groups_px: Groups | None
+    pixels: PixelTruth | None = None
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class PixelTruth(Frozen):
+    """What is true of one frame's pixels, N people in the order of FrameTruth's rows.
+
+    ids (H, W) int64: person id, 0 ground and walls behind everybody, -2 walls and pillars. disparity (H, W) px, nan
+    where the right camera does not see the point; None without a right camera. visible_px, amodal_px (N,): px that
+    show the person, and would if nobody and nothing were in the way (inside the image); box (N, 4) ltwh px of what
+    shows, nan where nothing does. blob (N,): people with the same number show in one connected region, -1 hidden.
+    """
+
+    ids: Ints
+    disparity: Array | None
+    visible_px: Array
+    amodal_px: Array
+    box: Array
+    blob: Ints
+
+    @property
+    def visibility(self) -> Array:
+        """(N,) visible share of each silhouette by pixels; 0 where it has none."""
+        return np.asarray(self.visible_px / np.maximum(self.amodal_px, 1.0))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -317,6 +341,8 @@ class Sequence:
     truth: a function, called once when first asked for, or None. background: a function giving (K, H, W, 3) or None.
     planes: what the detections' `pos` is in, "ground" or "image"; px_per_m nan = to be found from boxes.
     load_people: a function giving the ids of the people of each group that the script names, or None without a script.
+    bare: frames without their pictures, where making those takes time. load_pixels: a function giving the exact pixels
+    of a frame by its index, or None.
     """
 
     name: str
@@ -334,9 +360,22 @@ class Sequence:
     load_background: Callable[[], Image] | None = None
     load_people: Callable[[], Mapping[str, tuple[int, ...]]] | None = None
     source: dict[str, Any] = field(default_factory=dict)
+    bare: Callable[[], Iterator[Frame]] | None = None
+    load_pixels: Callable[[int], PixelTruth] | None = None
 
     def __iter__(self) -> Iterator[Frame]:
         return self.frames()
+
+    def without_pictures(self) -> Iterator[Frame]:
+        """A new iterator over the frames for those who need detections only."""
+        return self.frames() if self.bare is None else self.bare()
+
+    def frame_truth(self, index: int) -> FrameTruth | None:
+        """What is true in frame `index`, its pixels included where they are known."""
+        if self.truth is None:
+            return None
+        here = self.truth.at(index)
+        return here if self.load_pixels is None else here.replace(pixels=self.load_pixels(index))
 
     @property
     def truth(self) -> Truth | None:

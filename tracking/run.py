@@ -190,10 +190,10 @@ def _feed(
     needs: tuple[str, ...], mode: DetectionMode, sequence: Sequence, sensor: Mapping[str, Any], seed: int
 ) -> tuple[Frame, ...] | None:
     """Frames with their detections, pictures left out; None where the sequence's own frames are to be streamed."""
-    if mode == "image" or (mode == "file" and "pixels" in needs):
+    if mode == "image":
         return None
     if mode == "file":
-        found: list[Detections | None] = [f.detections for f in sequence]
+        found: list[Detections | None] = [f.detections for f in sequence.without_pictures()]
     else:
         from tracking.labelled import from_truth
 
@@ -213,7 +213,7 @@ def _px_per_m(sequence: Sequence, mode: DetectionMode, feed: tuple[Frame, ...] |
         return float(px_per_m_at_centre(sequence.camera))
     if np.isfinite(sequence.px_per_m) or mode == "image":
         return sequence.px_per_m
-    found = [f.detections for f in (sequence if feed is None else feed)]
+    found = [f.detections for f in (sequence.without_pictures() if feed is None else feed)]
     heights = [d.box[:, 3] for d in found if d is not None and d.box is not None and len(d.box)]
     return float(np.median(np.concatenate(heights))) / PERSON_HEIGHT if heights else float("nan")
 

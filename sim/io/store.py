@@ -37,7 +37,7 @@ def write_sequence(folder: Path, sequence: Sequence, *, scenario: str, seed: int
 
 def sequence_files(sequence: Sequence, *, scenario: str, seed: int, repeat: int = 0) -> dict[str, bytes]:
     """All files of a sequence by name, the manifest last."""
-    frames = list(sequence)
+    frames = list(sequence.without_pictures())
     found = [f.detections for f in frames if f.detections is not None]
     assert len(found) in (0, len(frames)), "a sensor answers every frame or none"
     files = {"scenario.toml": scenario.encode(), "seqinfo.ini": _seqinfo(sequence, len(frames))}
