@@ -43,11 +43,13 @@ def generate(
     set: Iterable[str] = (),
     workers: int = 1,
     progress: Progress | None = None,
+    streams: Iterable[str] = (),
+    images: str = "jpg",
 ) -> list[Path]:
     """Make OUT/flockscope-<split>/<name>-s<seed>/ of every entry (or name of one) and seed, and OUT/seqmaps.
 
     Sequences that are complete and of the same scenario and seed are kept. progress(done, all, name) is called after
-    each. InputError before anything is made where names clash, the range is wrong, or a folder holds another
+    each. streams, images: the pictures to store (sim.io.streams.STREAMS), and as what. InputError before anything is made where names clash, the range is wrong, or a folder holds another
     scenario's sequence; WorkError at the end, the others kept, where a sequence failed; at once where nothing can be
     written any more.
     """

@@ -21,11 +21,13 @@ def open_source(
     px_per_m: float | None = None,
     camera: Camera | str | Path | None = None,
     images: bool = False,
+    background: str | None = None,
 ) -> list[Sequence]:
     """The Sequences of a path, a dataset's in the order of their paths.
 
     fps, px_per_m and camera (or its file) stand in for what a recording does not know; a generated sequence knows
-    and refuses them. images: let frames carry the pictures of a MOTChallenge folder. InputError for anything else.
+    and refuses them. images: let frames carry the pictures of a MOTChallenge folder. background: which frames a
+    background model is trained on, "first:N" or "spread:N" (spread:50 if nothing is said). InputError for anything else.
     """
     path = Path(path)
     for option, value in (("--fps", fps), ("--px-per-m", px_per_m)):
