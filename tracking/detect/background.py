@@ -1,0 +1,96 @@
+"""Colour background subtraction into five classes (Horprasert, Harwood, Davis 2000; González et al. 2006, section 3).
+
+Each pixel i has a mean colour E and standard deviations sigma. A colour I is split along the line through E:
+    alpha = argmin |(I - alpha E) / sigma|,   CD = |(I - alpha E) / sigma|
+and normalised by their RMS over the training sample: (alpha - 1) / a_i, CD / b_i, so that one threshold each serves the
+whole image. Classes in the paper's order: CD above its threshold is foreground; brightness below the dark threshold is
+dark foreground; above the upper threshold highlight; below the lower one shadow; else background.
+Departures: docs/detection.md.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from scenarios.errors import InputError
+from sim.types import Array, Bools, Image
+from tracking.detect import gain as gains
+from tracking.detect.classes import BACKGROUND as BACKGROUND
+from tracking.detect.classes import DARK as DARK
+from tracking.detect.classes import FOREGROUND as FOREGROUND
+from tracking.detect.classes import HIGHLIGHT as HIGHLIGHT
+from tracking.detect.classes import SHADOW as SHADOW
+from tracking.detect.classes import foreground as foreground
+from tracking.detect.settings import BackgroundSettings
+from tracking.detect.training import FLOOR, train
+
+INTERLEAVE = 4
+"""One row in so many is adapted per frame, by as many frames' worth."""
+
+
+class Background:
+    """The model of a still scene; it changes in `classify` (the gain) and in `adapt`.
+
+    mean, var (H, W, 3): E and sigma^2 at gain 1. s, b (H, W): normalisers. valid (H, W): False where the sample showed
+    no background, which is called background until it is learned. gain (3,): brightness of the frame classified last.
+    """
+
+    def __init__(self, sample: Image, fps: float, settings: BackgroundSettings | None = None) -> None:
+        self.settings = settings or BackgroundSettings()
+        self.fps = fps
+        trained = train(sample, self.settings.detection_rate, self.settings.gain == "global")
+        self.mean, self.var = trained.mean, np.square(trained.sigma)
+        self.s, self.b, self.valid = trained.s, trained.b, trained.valid
+        self.thresholds = trained.thresholds
+        self.gain: Array = np.ones(3, np.float32)
+        self._grid = gains.grid(*self.valid.shape)
+        self._calm = self.valid[self._grid]
+        self._turn = 0
+
+    def classify(self, image: Image) -> Image:
+        """(H, W) uint8 classes of a frame (H, W, 3) BGR uint8."""
+        from tracking.detect import background_kernels
+
+        self._fits(image)
+        if self.settings.gain == "global":
+            self.gain = self._gain(image)
+        limits = np.array([*self.thresholds, self.settings.dark, self.settings.bright], np.float32)
+        classes = np.empty(self.valid.shape, np.uint8)
+        background_kernels.classify(image, self.mean, self.var, self.s, self.b, self.valid, self.gain, limits, classes)
+        self._calm = ~foreground(classes[self._grid]) & self.valid[self._grid]
+        return classes
+
+    def adapt(self, image: Image, classes: Image, protected: Bools | None = None) -> None:
+        """Learn from a classified frame; nothing where `protected` (H, W), the places of tracked people."""
+        from tracking.detect import background_kernels
+
+        self._fits(image)
+        keep = np.zeros(self.valid.shape, bool) if protected is None else protected
+        fast, slow = (
+            1 - math.exp(-INTERLEAVE / (self.fps * time))
+            for time in (self.settings.background_time, self.settings.foreground_time)
+        )
+        first, self._turn = self._turn, (self._turn + 1) % INTERLEAVE
+        background_kernels.adapt(
+            image, classes, keep, self.mean, self.var, self.gain, first, INTERLEAVE, fast, slow, FLOOR**2
+        )
+
+    def _gain(self, image: Image) -> Array:
+        """The gain over what was background in the last frame, else over all pixels, else the last one."""
+        seen, mean = image[self._grid].astype(np.float32), self.mean[self._grid]
+        found = gains.gain(seen, mean, self._calm)
+        if found is None:
+            found = gains.gain(seen, mean, self.valid[self._grid])
+        return self.gain if found is None else found.astype(np.float32)
+
+    def _fits(self, image: Image) -> None:
+        if image.dtype != np.uint8 or image.shape != self.mean.shape:
+            high, wide, _ = self.mean.shape
+            raise InputError(
+                place="frame",
+                got=f"{image.shape} of {image.dtype}",
+                expected=f"({high}, {wide}, 3) of uint8, as the background sample",
+                remedy="give frames of one size and kind",
+            )

@@ -1,0 +1,116 @@
+"""From foreground pixels to blobs: majority, opening, closing, least area, labels, ellipses (González et al., 3.3).
+
+Sizes are metres at the person, made px by the scene's scale. The ellipse keeps first and second moments: a filled one
+with full axes h >= w has variances (h/4)^2, (w/4)^2, so h = 4 sqrt(l1), w = 4 sqrt(l2) with l1 >= l2 the eigenvalues of
+the pixels' covariance (1/12 added: a pixel is a square). theta: from the abscissa to the major axis, in (-pi/2, pi/2],
+v down. Its noise: var theta = l1 l2 / (n (l1 - l2)^2).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+
+from sim.arrays import Frozen
+from sim.types import Array, Bools, Ints
+
+MAJORITY_M, OPEN_M, CLOSE_M = 0.08, 0.05, 0.15
+"""Windows of the three operations, m."""
+PERSON_M2 = 0.6
+"""Area of a person seen from the side, 1.7 m x 0.35 m."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Blobs(Frozen):
+    """Blobs of one frame, M rows, largest first.
+
+    box (M, 4) ltwh px; area (M,) px; ellipse (M, 5): x, y, h, w, theta (px, rad), centre by the corner convention (a
+    pixel's centre is at + 0.5); angle_var (M,) rad^2, inf for a circle; label (H, W) int32: row + 1, 0 elsewhere.
+    """
+
+    box: Array
+    area: Array
+    ellipse: Array
+    angle_var: Array
+    label: Ints
+
+    def __len__(self) -> int:
+        return len(self.area)
+
+    def contour(self, row: int) -> Array:
+        """(V, 2) outer contour of one blob, px, through pixel centres."""
+        left, top, wide, high = self.box[row].astype(int)
+        cut = (self.label[top : top + high, left : left + wide] == row + 1).astype(np.uint8)
+        outlines, _ = cv2.findContours(cut, cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_SIMPLE)
+        return max(outlines, key=len)[:, 0].astype(float) + (left + 0.5, top + 0.5)
+
+    def hull(self, row: int) -> Array:
+        """(V, 2) convex hull of one blob's contour, px, counter-clockwise in (x, y)."""
+        return cv2.convexHull(self.contour(row).astype(np.float32), clockwise=False)[:, 0].astype(float)
+
+
+def clean(foreground: Bools, px_per_m: float) -> Bools:
+    """(H, W) foreground after majority, opening and closing with windows that follow the scale."""
+    mask = foreground.astype(np.uint8)
+    size = odd(MAJORITY_M * px_per_m, 3)
+    mask = (cv2.boxFilter(mask, cv2.CV_16U, (size, size), normalize=False) > size * size // 2).astype(np.uint8)
+    for operation, metres, least in ((cv2.MORPH_OPEN, OPEN_M, 1), (cv2.MORPH_CLOSE, CLOSE_M, 3)):
+        mask = cv2.morphologyEx(mask, operation, disc(odd(metres * px_per_m, least)))
+    return mask.astype(bool)
+
+
+def odd(size: float, least: int) -> int:
+    """The nearest odd number of px, not below `least`."""
+    return max(least, 2 * round((size - 1) / 2) + 1)
+
+
+def disc(size: int) -> Array:
+    """A round structuring element of odd diameter."""
+    return np.asarray(cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (size, size)))
+
+
+def person_area(px_per_m: float) -> float:
+    """px^2 that a lone person covers, seen from the side."""
+    return PERSON_M2 * px_per_m**2
+
+
+def find(mask: Bools, min_area: float) -> Blobs:
+    """Connected regions (8 neighbours) of at least `min_area` px, largest first."""
+    count, label, stats, _ = cv2.connectedComponentsWithStats(mask.astype(np.uint8), connectivity=8)
+    area = stats[1:, cv2.CC_STAT_AREA]
+    order = np.argsort(-area, kind="stable")
+    order = order[area[order] >= max(min_area, 1.0)]
+    rank = np.zeros(count, np.int32)
+    rank[order + 1] = np.arange(1, len(order) + 1)
+    label = rank[label]
+    box = stats[1:][order][:, [cv2.CC_STAT_LEFT, cv2.CC_STAT_TOP, cv2.CC_STAT_WIDTH, cv2.CC_STAT_HEIGHT]]
+    ellipse, angle_var = ellipses(*moments(label, len(order)))
+    return Blobs(box.astype(float), area[order].astype(float), ellipse, angle_var, label)
+
+
+def moments(label: Ints, count: int) -> tuple[Array, Array, Array]:
+    """Of the regions 1 … count: px (M,), centre (M, 2), covariance (M, 2, 2) of their pixels as unit squares."""
+    v, u = np.nonzero(label)
+    row = label[v, u] - 1
+    n = np.bincount(row, minlength=count).astype(float)
+
+    def mean(value: Array) -> Array:
+        return np.bincount(row, value, minlength=count) / np.maximum(n, 1)
+
+    centre = np.stack([mean(u), mean(v)], axis=-1)
+    x, y = u - centre[row, 0], v - centre[row, 1]
+    xx, xy, yy = mean(x * x) + 1 / 12, mean(x * y), mean(y * y) + 1 / 12
+    return n, centre + 0.5, np.stack([xx, xy, xy, yy], axis=-1).reshape(-1, 2, 2)
+
+
+def ellipses(n: Array, centre: Array, cov: Array) -> tuple[Array, Array]:
+    """(M, 5) x, y, h, w, theta and (M,) variance of theta, from the moments of n pixels."""
+    half, differ = (cov[:, 0, 0] + cov[:, 1, 1]) / 2, (cov[:, 0, 0] - cov[:, 1, 1]) / 2
+    root = np.hypot(differ, cov[:, 0, 1])
+    major, minor = half + root, np.maximum(half - root, 0.0)
+    theta = 0.5 * np.arctan2(cov[:, 0, 1], differ)
+    with np.errstate(divide="ignore"):
+        angle_var = major * minor / (n * np.square(2 * root))
+    return np.column_stack([centre, 4 * np.sqrt(major), 4 * np.sqrt(minor), theta]), angle_var

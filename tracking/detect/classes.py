@@ -1,0 +1,14 @@
+"""The five classes of a pixel (González et al. 2006, section 3.2), and which of them are foreground."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from sim.types import Bools, Image
+
+BACKGROUND, FOREGROUND, DARK, SHADOW, HIGHLIGHT = range(5)
+
+
+def foreground(classes: Image) -> Bools:
+    """(H, W): foreground and dark foreground, fused (section 3.3)."""
+    return np.asarray((classes == FOREGROUND) | (classes == DARK))

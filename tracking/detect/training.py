@@ -1,0 +1,124 @@
+"""Robust training of the background model from a sample of frames that people may walk through.
+
+Per pixel and colour: the median and 1.4826 MAD find the inliers; E and sigma are their mean and standard deviation.
+Per pixel: a_i and b_i are the RMS of alpha - 1 and of CD over the inliers (Horprasert et al. 2000, eqs 7, 8). a_i is
+kept as s_i = a_i sqrt(sum (E/sigma)^2), which is 1 for independent Gaussian noise and stays true when the gain changes.
+Thresholds: quantiles of the normalised distortions at the detection rate (the paper's Fig. 2), over the pixels that
+nobody covered in any frame of the sample.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from scenarios.errors import InputError
+from sim.types import Array, Bools, Image
+from tracking.detect.gain import frame_gains
+
+LEAST_FRAMES = 10
+FLOOR = 0.5
+"""Grey levels: least sigma, and noise that the normalisers stand for; a quantised still picture has 1/sqrt(12) = 0.29."""
+INLIER = 3.5
+"""Robust sigmas within which a sample is background, for E, sigma and the normalisers."""
+CLEAN = 6.0
+"""The same for thresholds, where the tail counts: a pixel with any sample beyond was covered, and is left out whole."""
+WIDEST = 20.0
+"""Grey levels: a pixel with a larger robust sigma shows no background in more than half of the frames."""
+BINS, SPAN = 4000, 20.0
+CELLS = 400_000
+"""Values worked on at once."""
+
+
+@dataclass(frozen=True)
+class Trained:
+    """E, sigma (H, W, 3), s, b (H, W) float32; valid (H, W); thresholds: CD, lower and upper brightness."""
+
+    mean: Array
+    sigma: Array
+    s: Array
+    b: Array
+    valid: Bools
+    thresholds: tuple[float, float, float]
+
+
+def train(sample: Image, rate: float, follow_gain: bool) -> Trained:
+    """The model of a sample (K, H, W, 3); InputError where it is none, too short, or without background."""
+    check(sample)
+    gains = frame_gains(sample) if follow_gain else np.ones((len(sample), 3))
+    _, high, wide, _ = sample.shape
+    mean, sigma = np.empty((high, wide, 3), np.float32), np.empty((high, wide, 3), np.float32)
+    s, b, valid = np.empty((high, wide), np.float32), np.empty((high, wide), np.float32), np.empty((high, wide), bool)
+    counts = np.zeros((2, 2, BINS), np.int64)
+    rows = max(1, CELLS // (len(sample) * wide * 3))
+    for top in range(0, high, rows):
+        cut = slice(top, top + rows)
+        values = (sample[:, cut] / gains[:, None, None, :]).astype(np.float32)
+        mean[cut], sigma[cut], inlier, clean, valid[cut] = _spread(values)
+        alpha, cd = distortions(values, mean[cut], sigma[cut])
+        length = np.sqrt(np.sum(np.square(mean[cut] / sigma[cut]), axis=-1))
+        least = FLOOR / sigma[cut].mean(axis=-1)
+        s[cut] = np.maximum(_rms(alpha - 1, inlier) * length, least)
+        b[cut] = np.maximum(_rms(cd, inlier), np.sqrt(2) * least)
+        shown = (alpha - 1) * length / s[cut], cd / b[cut]
+        for level, which in enumerate((inlier & valid[cut], np.broadcast_to(clean & valid[cut], inlier.shape))):
+            for kind, value in enumerate(shown):
+                counts[level, kind] += np.histogram(value[which], BINS, (-SPAN, SPAN))[0]
+    if valid.mean() < 0.5:
+        raise InputError(
+            place="background",
+            got=f"{1 - valid.mean():.0%} of the pixels change in more than half of {len(sample)} frames",
+            expected="a still camera: no background can be had",
+            remedy="give a sample of the empty scene, or detections instead of pixels",
+        )
+    enough = counts[1, 1].sum() >= 0.05 * counts[0, 1].sum()
+    return Trained(mean, sigma, s, b, valid, _thresholds(counts[1 if enough else 0], rate))
+
+
+def check(sample: Image) -> None:
+    """InputError unless this is a sample of colour frames, enough of them."""
+    shape, kind = np.shape(sample), getattr(sample, "dtype", None)
+    expected, remedy = "", ""
+    if kind != np.uint8 or len(shape) != 4 or shape[-1] != 3 or 0 in shape[1:3]:
+        expected, remedy = "(K, H, W, 3) of uint8, BGR", "convert the frames to 8-bit colour"
+    elif shape[0] < LEAST_FRAMES:
+        expected, remedy = f"at least {LEAST_FRAMES} frames", "give a longer sample"
+    if expected:
+        raise InputError(place="background", got=f"{shape} of {kind}", expected=expected, remedy=remedy)
+
+
+def distortions(image: Array, mean: Array, sigma: Array) -> tuple[Array, Array]:
+    """alpha and CD of pixels (..., 3): min over alpha of |(I - alpha E) / sigma|, and where it is (eqs 5, 6)."""
+    line, value = mean / sigma, image / sigma
+    alpha = np.sum(value * line, axis=-1) / np.sum(line * line, axis=-1)
+    return alpha, np.sqrt(np.sum(np.square(value - alpha[..., None] * line), axis=-1))
+
+
+def _spread(values: Array) -> tuple[Array, Array, Bools, Bools, Bools]:
+    """Of (K, h, w, 3): mean and sigma of the inliers, inliers (K, h, w), pixels never covered and valid ones (h, w)."""
+    middle = np.median(values, axis=0)
+    away = np.abs(values - middle)
+    robust = np.maximum(1.4826 * np.median(away, axis=0), FLOOR)
+    inlier = np.all(away <= INLIER * robust, axis=-1)
+    clean = np.all(away <= CLEAN * robust, axis=(0, -1))
+    n = np.maximum(inlier.sum(axis=0), 1)[..., None]
+    mean = np.maximum(np.sum(values, axis=0, where=inlier[..., None]) / n, 1.0)
+    var = np.sum(np.square(values - mean), axis=0, where=inlier[..., None]) / n
+    return mean, np.maximum(np.sqrt(var), FLOOR), inlier, clean, np.all(robust <= WIDEST, axis=-1)
+
+
+def _rms(value: Array, inlier: Bools) -> Array:
+    n = np.maximum(inlier.sum(axis=0), 1)
+    return np.sqrt(np.sum(np.square(value), axis=0, where=inlier) / n)
+
+
+def _thresholds(counts: Array, rate: float) -> tuple[float, float, float]:
+    """CD, lower, upper at the detection rate, from histograms (brightness, CD) over -SPAN..SPAN."""
+    edges = np.linspace(-SPAN, SPAN, BINS + 1)
+    shares = [np.concatenate([[0], np.cumsum(c)]) / max(c.sum(), 1) for c in counts]
+
+    def at(share: Array, p: float) -> float:
+        return float(np.interp(p, share, edges))
+
+    return at(shares[1], rate), at(shares[0], 1 - rate), at(shares[0], rate)
