@@ -14,7 +14,6 @@ import math
 
 import numpy as np
 
-from scenarios.errors import InputError
 from sim.types import Array, Bools, Image
 from tracking.detect import gain as gains
 from tracking.detect.classes import BACKGROUND as BACKGROUND
@@ -24,7 +23,7 @@ from tracking.detect.classes import HIGHLIGHT as HIGHLIGHT
 from tracking.detect.classes import SHADOW as SHADOW
 from tracking.detect.classes import foreground as foreground
 from tracking.detect.settings import BackgroundSettings
-from tracking.detect.training import FLOOR, train
+from tracking.detect.training import FLOOR, check_frame, train
 
 INTERLEAVE = 4
 """One row in so many is adapted per frame, by as many frames' worth."""
@@ -53,7 +52,7 @@ class Background:
         """(H, W) uint8 classes of a frame (H, W, 3) BGR uint8."""
         from tracking.detect import background_kernels
 
-        self._fits(image)
+        check_frame(image, self.valid.shape)
         if self.settings.gain == "global":
             self.gain = self._gain(image)
         limits = np.array([*self.thresholds, self.settings.dark, self.settings.bright], np.float32)
@@ -66,7 +65,7 @@ class Background:
         """Learn from a classified frame; nothing where `protected` (H, W), the places of tracked people."""
         from tracking.detect import background_kernels
 
-        self._fits(image)
+        check_frame(image, self.valid.shape)
         keep = np.zeros(self.valid.shape, bool) if protected is None else protected
         fast, slow = (
             1 - math.exp(-INTERLEAVE / (self.fps * time))
@@ -84,13 +83,3 @@ class Background:
         if found is None:
             found = gains.gain(seen, mean, self.valid[self._grid])
         return self.gain if found is None else found.astype(np.float32)
-
-    def _fits(self, image: Image) -> None:
-        if image.dtype != np.uint8 or image.shape != self.mean.shape:
-            high, wide, _ = self.mean.shape
-            raise InputError(
-                place="frame",
-                got=f"{image.shape} of {image.dtype}",
-                expected=f"({high}, {wide}, 3) of uint8, as the background sample",
-                remedy="give frames of one size and kind",
-            )

@@ -1,4 +1,4 @@
-"""Classification and adaptation of all pixels in one pass each, as numba kernels; numpy twins: tests/reference_background.py.
+"""All pixels in one pass each, as numba kernels: classes, adaptation; numpy twins: tests/reference_background.py.
 
 E: mean colours, V: variances (H, W, 3); s, b: normalisers (H, W); g: gain per channel (3,); all float32.
 Each kernel calls none of another: numba's cache does not see changes of what is called in other files.

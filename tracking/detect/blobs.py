@@ -44,7 +44,7 @@ class Blobs(Frozen):
         left, top, wide, high = self.box[row].astype(int)
         cut = (self.label[top : top + high, left : left + wide] == row + 1).astype(np.uint8)
         outlines, _ = cv2.findContours(cut, cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_SIMPLE)
-        return max(outlines, key=len)[:, 0].astype(float) + (left + 0.5, top + 0.5)
+        return max(outlines, key=len)[:, 0].astype(float) + np.array([left + 0.5, top + 0.5])
 
     def hull(self, row: int) -> Array:
         """(V, 2) convex hull of one blob's contour, px, counter-clockwise in (x, y)."""

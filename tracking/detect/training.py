@@ -19,7 +19,7 @@ from tracking.detect.gain import frame_gains
 
 LEAST_FRAMES = 10
 FLOOR = 0.5
-"""Grey levels: least sigma, and noise that the normalisers stand for; a quantised still picture has 1/sqrt(12) = 0.29."""
+"""Grey levels: least sigma, and least noise that the normalisers stand for; quantisation alone gives 0.29."""
 INLIER = 3.5
 """Robust sigmas within which a sample is background, for E, sigma and the normalisers."""
 CLEAN = 6.0
@@ -86,6 +86,17 @@ def check(sample: Image) -> None:
         expected, remedy = f"at least {LEAST_FRAMES} frames", "give a longer sample"
     if expected:
         raise InputError(place="background", got=f"{shape} of {kind}", expected=expected, remedy=remedy)
+
+
+def check_frame(image: Image, size: tuple[int, ...]) -> None:
+    """InputError unless a frame is of the kind and size (H, W) of the sample."""
+    if image.dtype != np.uint8 or image.shape != (*size, 3):
+        raise InputError(
+            place="frame",
+            got=f"{image.shape} of {image.dtype}",
+            expected=f"{(*size, 3)} of uint8, as the background sample",
+            remedy="give frames of one size and kind",
+        )
 
 
 def distortions(image: Array, mean: Array, sigma: Array) -> tuple[Array, Array]:
