@@ -1,6 +1,8 @@
 """Robust training of the background model from a sample of frames that people may walk through.
 
-Per pixel and colour: the median and 1.4826 MAD find the inliers; E and sigma are their mean and standard deviation.
+Per pixel and colour: the shortest interval that holds SHARE of the values finds the inliers; E and sigma are their mean
+and standard deviation, twice more. (The median and MAD of a pixel where people stand about half of the time lie between
+them and the ground, with a sigma that hides both.)
 Per pixel: a_i and b_i are the RMS of alpha - 1 and of CD over the inliers (Horprasert et al. 2000, eqs 7, 8). a_i is
 kept as s_i = a_i sqrt(sum (E/sigma)^2), which is 1 for independent Gaussian noise and stays true when the gain changes.
 Thresholds: quantiles of the normalised distortions at the detection rate (the paper's Fig. 2), over the pixels that
@@ -22,6 +24,11 @@ FLOOR = 0.5
 """Grey levels: least sigma, and least noise that the normalisers stand for; quantisation alone gives 0.29."""
 INLIER = 3.5
 """Robust sigmas within which a sample is background, for E, sigma and the normalisers."""
+SHARE = 0.35
+"""Of the sample: where the ground shows less often than this there is no background."""
+AS_SIGMA = 2.2
+"""Standard deviations of a Gaussian per half length of the interval about its mean that holds SHARE."""
+ROUNDS = 3
 CLEAN = 6.0
 """The same for thresholds, where the tail counts: a pixel with any sample beyond was covered, and is left out whole."""
 WIDEST = 20.0
@@ -108,15 +115,27 @@ def distortions(image: Array, mean: Array, sigma: Array) -> tuple[Array, Array]:
 
 def _spread(values: Array) -> tuple[Array, Array, Bools, Bools, Bools]:
     """Of (K, h, w, 3): mean and sigma of the inliers, inliers (K, h, w), pixels never covered and valid ones (h, w)."""
-    middle = np.median(values, axis=0)
-    away = np.abs(values - middle)
-    robust = np.maximum(1.4826 * np.median(away, axis=0), FLOOR)
-    inlier = np.all(away <= INLIER * robust, axis=-1)
-    clean = np.all(away <= CLEAN * robust, axis=(0, -1))
-    n = np.maximum(inlier.sum(axis=0), 1)[..., None]
-    mean = np.maximum(np.sum(values, axis=0, where=inlier[..., None]) / n, 1.0)
-    var = np.sum(np.square(values - mean), axis=0, where=inlier[..., None]) / n
-    return mean, np.maximum(np.sqrt(var), FLOOR), inlier, clean, np.all(robust <= WIDEST, axis=-1)
+    mean, half = _shortest(values)
+    sigma = np.maximum(half * AS_SIGMA, FLOOR)
+    valid = np.all(sigma <= WIDEST, axis=-1)
+    for _ in range(ROUNDS):
+        away = np.abs(values - mean)
+        inlier = np.all(away <= INLIER * sigma, axis=-1)
+        clean = np.all(away <= CLEAN * sigma, axis=(0, -1))
+        n = np.maximum(inlier.sum(axis=0), 1)[..., None]
+        mean = np.maximum(np.sum(values, axis=0, where=inlier[..., None]) / n, 1.0)
+        var = np.sum(np.square(values - mean), axis=0, where=inlier[..., None]) / n
+        sigma = np.maximum(np.sqrt(var), FLOOR)
+    return mean, sigma, inlier, clean, valid
+
+
+def _shortest(values: Array) -> tuple[Array, Array]:
+    """Median of, and half, the shortest interval that holds SHARE of the values (K, ...), per pixel and colour."""
+    v = np.sort(values, axis=0)
+    held = max(int(np.ceil(SHARE * len(v))), 3)
+    first = (v[held - 1 :] - v[: len(v) - held + 1]).argmin(axis=0)[None]
+    low, middle, high = (np.take_along_axis(v, first + k, 0)[0] for k in (0, held // 2, held - 1))
+    return middle, (high - low) / 2
 
 
 def _rms(value: Array, inlier: Bools) -> Array:
