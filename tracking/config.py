@@ -140,11 +140,12 @@ class Config:
     def frozen(cls) -> Self:
         """The defaults as they were first written, tracking/frozen/NAME.toml, against which tuning is judged.
 
-        Parameters that came later have their `before`.
+        Parameters that came later have their `before`; those that the config inherits, their default.
         """
         path = FROZEN / f"{cls.tracker}.toml"
         first = cls._values(path)
-        later = {name: p.before for name, p in cls.params().items() if name not in first}
+        own = cls.__dict__.get("__annotations__", {})
+        later = {n: p.before if n in own else p.default for n, p in cls.params().items() if n not in first}
         assert None not in later.values(), f"a parameter that {path.name} lacks declares what it was before: {later}"
         return cls.from_dict(first | later, path)
 

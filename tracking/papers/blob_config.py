@@ -7,12 +7,13 @@ from typing import ClassVar
 
 import numpy as np
 
-from tracking.config import Config, param
+from tracking.config import param
+from tracking.detect.settings import BackgroundSettings
 from tracking.lifecycle import Dynamics, check_birth
 
 
 @dataclass(frozen=True)
-class BlobConfig(Config):
+class BlobConfig(BackgroundSettings):
     """Gates, noises, association, management and output of `blob`. Lengths are metres at the person."""
 
     tracker: ClassVar[str] = "blob"
@@ -63,6 +64,28 @@ class BlobConfig(Config):
         "",
         "an unseen track is reported no longer than this share of the time it was seen",
         before=1.0,
+    )
+
+    split: bool = param(
+        True, (True, False), "", "from pixels: people who share a blob are told apart (ours)", "categorical", before=True
+    )
+    evidence: float = param(
+        20.0, (1.0, 500.0), "nats", "what a wholly seen template is worth beside its distance (ours)", "log", before=20.0
+    )
+    track_support: float = param(
+        0.15, (0.02, 0.8), "share", "support from which on a template measures a confirmed track (ours)", before=0.15
+    )
+    entry_support: float = param(
+        0.5, (0.1, 0.9), "share", "support from which on a template is somebody new (ours)", before=0.5
+    )
+    angle_noise: float = param(
+        8.0, (0.5, 45.0), "deg", "standard deviation of a measured direction, beside the moments' own", "log", before=8.0
+    )
+    angle_rate: float = param(
+        15.0, (0.5, 180.0), "deg/s^0.5", "random walk of the direction, per root second", "log", before=15.0
+    )
+    most_foreground: float = param(
+        0.6, (0.05, 1.0), "share", "a frame with more foreground tells nothing: lights, camera (ours)", before=0.6
     )
 
     def dynamics(self, fps: float) -> Dynamics:

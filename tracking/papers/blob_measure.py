@@ -25,6 +25,21 @@ def to_boxes(place: Array) -> Array:
     return box
 
 
+def upright(place: Array, angle: Array) -> Array:
+    """(N, 4) box x, y, h, w round ellipses of centre and axes `place` (N, 4), the first at `angle` (N,) rad."""
+    box, c, s = place.copy(), np.square(np.cos(angle)), np.square(np.sin(angle))
+    first, second = np.square(place[:, 2]), np.square(place[:, 3])
+    box[:, 2], box[:, 3] = np.sqrt(first * s + second * c), np.sqrt(first * c + second * s)
+    return box
+
+
+def lying(box: Array) -> Array:
+    """(N, 5) ellipses x, y, h, w, theta inscribed in boxes (N, 4) x, y, h, w: h the longer axis."""
+    tall = box[:, 2] >= box[:, 3]
+    axes = np.where(tall[:, None], box[:, 2:], box[:, :1:-1])
+    return np.column_stack([box[:, :2], axes, np.where(tall, np.pi / 2, 0.0)])
+
+
 def fused(pieces: Array) -> Array:
     """One box with the area-weighted first and second moments of several (K, 4) boxes.
 

@@ -54,7 +54,15 @@ class Population:
     def predict(self) -> None:
         """One frame on."""
         kalman.predict(self.bank, self.dynamics.dt, self.q)
-        self.rho[:] = lifecycle.rho(self.bank, self.noise, self.asymptote)
+        self.rho[:] = self.quality()
+
+    def quality(self) -> Array:
+        """(N,) rho: how sure of itself each filter is."""
+        return lifecycle.rho(self.bank, self.noise, self.asymptote)
+
+    def uprights(self) -> Array:
+        """(N, 4) predicted boxes: centre x, y, height, width."""
+        return np.asarray(self.bank[kalman.PLACE])
 
     def mark(self, rows: Ints, near: Bools, score: Array) -> None:
         """Note who was measured (near: well enough to be confirmed), and confirm."""
@@ -124,9 +132,12 @@ class Population:
         if over.any():
             stay = np.ones(len(self.id), bool)
             stay[lost[over]] = False
-            keep = stay.nonzero()[0]
-            self.bank, self.id = self.bank.take(keep, 1), self.id.take(keep)
-            self._bind(self.book.take(keep, 1), self.flags.take(keep, 1))
+            self.keep(stay.nonzero()[0])
+
+    def keep(self, rows: Ints) -> None:
+        """Forget all other tracks."""
+        self.bank, self.id = self.bank.take(rows, 1), self.id.take(rows)
+        self._bind(self.book.take(rows, 1), self.flags.take(rows, 1))
 
     def _outside(self, place: Array) -> Bools:
         """Is the centre out of the image?"""

@@ -1,0 +1,196 @@
+"""`blob` from pixels: the paper's cascade on blobs, and beyond it people who share a blob (ours).
+
+    classify, clean, find                                                       3   (tracking.detect)
+    a blob of one person's size: its ellipse z = (x, y, h, w, theta), gates, association, update      4.2 to 4.4
+    the other foreground: split among the tracks expected there, by templates   ours (tracking.papers.blob_template)
+    what is left and as large as a person: new tracks                           ours (tracking.papers.blob_entry)
+    rho, births, deaths                                                         4.5
+    pixels of confirmed tracks are kept out of the background's adaptation      ours
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from sim.types import Array, Bools, Context, Detections, Frame, Image, Ints
+from tracking import assign, kalman
+from tracking.detect import blobs as detect
+from tracking.detect.background import Background
+from tracking.detect.classes import foreground
+from tracking.papers import blob_entry, blob_measure
+from tracking.papers.blob_config import BlobConfig
+from tracking.papers.blob_people import People
+from tracking.papers.blob_size import PersonSize
+from tracking.papers.blob_template import Mask
+
+SHORT, TALL, THIN, WIDE = 0.7, 1.35, 0.5, 1.6  # of a person's height and width: a blob within is one person
+SHARED = 0.35  # share of a predicted box in a blob's from which on the blob may be this track's
+LEAST_AREA = 0.05  # m^2: smaller blobs are noise
+COARSE = 20.0  # px per m that windows and areas follow while no scale is known
+LOOKED = 25  # frames of the background sample in which lone blobs are looked for
+EXTENT = 0.75, 1.3  # of the expected size, what a template may have
+BLIND = 25.0  # variance of a template's height and width relative to a lone blob's: they are expected, not seen
+LEAST_SHOWN = 0.2  # a person of whom less shows is measured as if so much did
+
+
+class Pixels:
+    """From the picture of each frame to the population's next state. State: background and person size."""
+
+    def __init__(self, config: BlobConfig, people: People, context: Context) -> None:
+        from scipy.special import chdtri
+
+        assert context.background is not None
+        self.config, self.people, self.context = config, people, context
+        self.size = PersonSize(context)
+        self.background = Background(context.background, context.fps, config)
+        self.scale = context.px_per_m
+        self._look_at_sample(context.background)
+        self.gates = chdtri(np.array([4, 5]), 1 - config.gate)
+        self.confirm_gate = float(chdtri(4, 1 - config.confirm_gate))
+        self.blindest = 2 * float(np.log(max(people.excused_death, people.birth_rho)))
+        self.angle_noise = np.radians(config.angle_noise) ** 2
+
+    def _look_at_sample(self, sample: Image) -> None:
+        """Learn sizes and scale from the lone blobs of the background sample."""
+        for image in sample[:: max(len(sample) // LOOKED, 1)]:
+            found = self._find(self._foreground(image)[1])
+            self.size.learn(found.box, ~self._cut(found.box))
+        self._take_scale()
+
+    def _take_scale(self) -> None:
+        if np.isnan(self.context.px_per_m):
+            self.scale = self.size.px_per_m
+            self.people.context = self.context.replace(px_per_m=self.scale if self.scale > 0 else COARSE)
+
+    def _foreground(self, image: Image) -> tuple[Image, Bools]:
+        classes = self.background.classify(image)
+        return classes, detect.clean(foreground(classes), self.scale if self.scale > 0 else COARSE)
+
+    def _find(self, mask: Bools) -> detect.Blobs:
+        scale = self.scale if self.scale > 0 else COARSE
+        return detect.find(mask, max(LEAST_AREA * (scale / 2) ** 2, 12.0))
+
+    def _cut(self, box: Array) -> Bools:
+        """Does the image's edge cut these blobs (M, 4)?"""
+        high, wide = self.background.valid.shape
+        right, bottom = box[:, 0] + box[:, 2], box[:, 1] + box[:, 3]
+        return np.asarray((box[:, 0] <= 1) | (box[:, 1] <= 1) | (right >= wide - 1) | (bottom >= high - 1))
+
+    def step(self, frame: Frame, detections: Detections | None) -> None:
+        """Predict; measure by the picture, if it is there and no more of it than possible is foreground; manage."""
+        people = self.people
+        people.predict()
+        people.look(np.zeros((0, 4)))
+        if frame.image is None:
+            return self._unseen(frame.t)
+        classes, mask = self._foreground(frame.image)
+        if mask.mean() > self.config.most_foreground:
+            self.background.adapt(frame.image, classes, self._protected())
+            return self._unseen(frame.t)
+        found = self._find(mask)
+        self._measure(frame.t, mask, found)
+        self.background.adapt(frame.image, classes, self._protected())
+        if len(found):
+            self.size.learn(found.box, ~self._cut(found.box) & ~self._several(found.box, self.people.uprights()))
+            self._take_scale()
+        return None
+
+    def _unseen(self, t: float) -> None:
+        people = self.people
+        people.mark(np.zeros(0, np.int64), np.zeros(0, bool), np.zeros(0))
+        people.bury(t)
+
+    def _protected(self) -> Bools:
+        """(H, W) the places of confirmed tracks."""
+        scene = Mask(np.zeros(self.background.valid.shape, bool))
+        scene.paint(_templates(self.people.uprights()[self.people.confirmed]))
+        return np.asarray(scene.cover > 0)
+
+    def _measure(self, t: float, mask: Bools, found: detect.Blobs) -> None:
+        people, c = self.people, self.config
+        expected = people.uprights()
+        split = c.split and self.size.reliable
+        lone = self._lone(found.box, expected) if split else np.ones(len(found), bool)
+        columns = lone.nonzero()[0]
+        z, angle_var = found.ellipse[columns], found.angle_var[columns]
+        rows, taken = self._associate(z, angle_var)
+        noise = np.tile(people.noise, (len(rows), 1))
+        measured, angles = z[taken], angle_var[taken] + self.angle_noise
+        support, newborn = np.ones(len(rows)), np.delete(z, taken, 0)
+        if split:
+            scene = Mask(mask)
+            scene.close(np.isin(found.label, columns + 1))
+            for sure in (True, False):
+                more = self._split(scene, expected, rows, sure)
+                rows, measured = np.concatenate([rows, more[0]]), np.concatenate([measured, more[1]])
+                noise, support = np.concatenate([noise, more[2]]), np.concatenate([support, more[3]])
+                angles = np.concatenate([angles, np.full(len(more[0]), np.inf)])
+            entered = blob_entry.newcomers(scene, self.size, c.entry_support)
+            newborn = np.concatenate([newborn, blob_measure.lying(_places(entered))])
+        d2 = people.update(rows, measured, noise, angles)
+        people.mark(rows, d2 <= self.confirm_gate, support)
+        people.excuse()
+        people.bury(t)
+        people.give_birth(newborn, np.ones(len(newborn)), t)
+
+    def _lone(self, box: Array, expected: Array) -> Bools:
+        """(M,) blobs of one person's size, whole, in which at most one confirmed track is expected."""
+        size = self.size.at(np.stack([box[:, 0] + box[:, 2] / 2, box[:, 1] + box[:, 3]], 1))
+        with np.errstate(invalid="ignore"):
+            tall, wide = (box[:, :1:-1] / size).T
+            fits = (tall >= SHORT) & (tall <= TALL) & (wide >= THIN) & (wide <= WIDE)
+        return np.asarray(fits & ~self._cut(box) & ~self._several(box, expected))
+
+    def _several(self, box: Array, expected: Array) -> Bools:
+        """(M,) blobs in which several confirmed tracks are expected."""
+        sure = expected[self.people.confirmed]
+        places = np.column_stack([box[:, 0] + box[:, 2] / 2, box[:, 1] + box[:, 3] / 2, box[:, 3], box[:, 2]])
+        return np.asarray((blob_measure.covered(sure, places) >= SHARED).sum(0) > 1)
+
+    def _associate(self, z: Array, angle_var: Array) -> tuple[Ints, Ints]:
+        """Tracks and ellipses that belong together; 5 degrees of freedom where both have a direction, else 4."""
+        people = self.people
+        if not len(z) or not len(people.id):
+            return np.zeros(0, np.int64), np.zeros(0, np.int64)
+        d2 = kalman.distances(people.bank, z[:, :4], people.noise, people.scale)
+        directed = angle_var < np.radians(30.0) ** 2
+        turn = kalman.angle_innovation(z[:, 4], people.angle[0][:, None])
+        s = people.angle[1][:, None] + angle_var + self.angle_noise
+        d2 = d2 + np.where(directed, turn * turn / s, 0.0)
+        cost = np.where(d2 <= np.where(directed, self.gates[1], self.gates[0]), d2, np.inf)
+        if self.config.association == "nearest":
+            return blob_measure.best_pieces(*assign.nearest(cost), cost)
+        blind = np.minimum(2 * np.log(people.rho), self.blindest)
+        return assign.optimal(cost + blind[:, None], float(self.gates[1]) + self.blindest)
+
+    def _split(self, scene: Mask, expected: Array, rows: Ints, sure: bool) -> tuple[Ints, Array, Array, Array]:
+        """Tracks measured by templates: rows, z (K, 5), noise (K, 4), support (K,); confirmed ones or the others."""
+        people, c = self.people, self.config
+        open_rows = np.setdiff1d(np.flatnonzero(people.confirmed == sure), rows)
+        at = _templates(expected[open_rows])
+        size = self.size.at(at[:, :2])
+        size = np.where(np.isfinite(size), size, at[:, 2:])
+        at[:, 2:] = np.clip(at[:, 2:], EXTENT[0] * size, EXTENT[1] * size)
+        var = (people.bank[kalman.VAR, open_rows] + people.noise)[:, :2]
+        spread = np.sqrt(var) * people.scale[open_rows, None]
+        at = scene.settle(at, spread, c.evidence)
+        shown = scene.shown(at)
+        keep = scene.prune(at, np.full(len(at), c.track_support if sure else c.entry_support))
+        worth, shown, at = scene.alone(at[keep]), shown[keep], at[keep]
+        noise = people.noise / np.maximum(shown, LEAST_SHOWN)[:, None] ** 2
+        noise[:, 2:] *= BLIND
+        return open_rows[keep], blob_measure.lying(_places(at)), noise, np.clip(worth, 0.0, 1.0)
+
+
+def _templates(place: Array) -> Array:
+    """(N, 4) x, foot, h, w of boxes x, y, h, w round their centre."""
+    out = place.copy()
+    out[:, 1] += place[:, 2] / 2
+    return out
+
+
+def _places(template: Array) -> Array:
+    """(N, 4) x, y, h, w round the centre of templates x, foot, h, w."""
+    out = template.copy()
+    out[:, 1] -= template[:, 2] / 2
+    return out

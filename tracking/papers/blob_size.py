@@ -1,0 +1,127 @@
+"""How large a person is where: box height and width at every foot point of the image, for `blob` from pixels (ours).
+
+With a camera: the box of an upright person of mean build (1.7 m) standing there, turned either way. Without: learned
+from lone blobs, h = a + b v over the row v of their lower edge, as a pinhole without roll has it, by least squares in
+relative errors with Cauchy weights (a blob of several people, or of a part, is an outlier); widths are a share of it.
+The slope has a prior, since blobs of one row say nothing about it. A learned size is `reliable` once enough lone blobs
+agree; before that nothing is split and every blob counts as one person, as in the paper.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from sim.types import Array, Bools, Camera, Context
+
+PERSON = 1.7  # m
+SLIM = 0.36  # width over height of a walking person's box, the prior of what is learned
+UPRIGHT = (1.5, 5.0)  # height over width of a blob that may be somebody alone
+KEPT = 400  # lone blobs remembered
+ENOUGH = 12  # lone blobs that make a learned size reliable ...
+AGREE = 0.15  # ... where their relative deviation is no more than this (median)
+STEP = 8  # px between the nodes of a camera's table
+MARGIN = 0.25  # of the image, beyond which no foot is looked for
+
+
+class PersonSize:
+    """State: a camera's table (2, V, U) of heights and widths, or the lone blobs seen and the line through them."""
+
+    def __init__(self, context: Context) -> None:
+        self.table: Array | None = None
+        self.seen = np.zeros((0, 3))  # v, h, w of lone blobs
+        self.line, self.slim, self.spread = (float("nan"), 0.0), SLIM, float("inf")
+        self.rows = float(context.image_size[1]) if context.image_size else float("nan")
+        if context.camera is not None:
+            self.low = -MARGIN * np.array(context.camera.image, float)
+            self.table = _table(context.camera, self.low)
+
+    @property
+    def reliable(self) -> bool:
+        """May this decide how many people a blob holds?"""
+        return self.table is not None or (len(self.seen) >= ENOUGH and self.spread <= AGREE)
+
+    def at(self, foot: Array) -> Array:
+        """(N, 2) height and width in px of a person whose box stands on the image points `foot` (N, 2); nan unknown."""
+        if self.table is not None:
+            return _look_up(self.table, (foot - self.low) / STEP)
+        height = np.maximum(self.line[0] + self.line[1] * foot[:, 1], 4.0)
+        return np.stack([height, self.slim * height], 1)
+
+    @property
+    def px_per_m(self) -> float:
+        """Scale of the image: the median height of the lone blobs seen / 1.7 m; nan without any."""
+        return float(np.median(self.seen[:, 1])) / PERSON if len(self.seen) else float("nan")
+
+    def learn(self, box: Array, whole: Bools) -> None:
+        """Add the blobs (M, 4) ltwh that may be somebody alone; `whole` (M,): away from the image's edge."""
+        if self.table is not None or not len(box):
+            return
+        ratio = box[:, 3] / np.maximum(box[:, 2], 1.0)
+        alone = box[whole & (ratio >= UPRIGHT[0]) & (ratio <= UPRIGHT[1])]
+        if not len(alone):
+            return
+        new = np.stack([alone[:, 1] + alone[:, 3], alone[:, 3], alone[:, 2]], 1)
+        self.seen = np.concatenate([self.seen, new])[-KEPT:]
+        self._fit()
+
+    def _fit(self) -> None:
+        """The robust line, and the share of height that is width."""
+        v, h, w = self.seen.T
+        middle, typical = float(np.median(v)), float(np.median(h))
+        rows = self.rows if np.isfinite(self.rows) else 2 * middle
+        slope = prior = typical / (middle + rows / 2)  # a horizon half an image above the image
+        level = typical
+        for _ in range(8):
+            fit = np.maximum(level + slope * (v - middle), 1.0)
+            off = h / fit - 1
+            scale = max(1.4826 * float(np.median(np.abs(off))), 0.03)
+            weight = 1 / (fit * fit * (1 + (off / scale) ** 2))
+            level, slope = _line(v - middle, h, weight, prior, float(np.median(weight)) * typical**2)
+        self.line, self.spread = (level - slope * middle, slope), float(np.median(np.abs(off)))
+        near = np.abs(off) <= 2 * scale
+        self.slim = float(np.clip((np.median(w[near] / h[near]) * near.sum() + SLIM * 4) / (near.sum() + 4), 0.2, 0.8))
+
+
+def _line(v: Array, h: Array, weight: Array, prior: float, strength: float) -> tuple[float, float]:
+    """Weighted least squares of h = level + slope v, the slope tied to `prior` by a deviation of its own size."""
+    tie = strength / prior**2
+    moments = np.array([[weight.sum(), weight @ v], [weight @ v, weight @ (v * v) + tie]])
+    level, slope = np.linalg.solve(moments, np.array([weight @ h, weight @ (v * h) + tie * prior]))
+    return float(level), float(slope)
+
+
+def _table(camera: Camera, low: Array) -> Array:
+    """(2, V, U) height and width at nodes STEP px apart from `low` on; nan where nobody can stand."""
+    from sim.camera import to_ground
+    from sim.people import boxes
+
+    size = (np.array(camera.image) * (1 + 2 * MARGIN) / STEP).astype(int) + 2
+    u, v = np.meshgrid(low[0] + STEP * np.arange(size[0]), low[1] + STEP * np.arange(size[1]))
+    foot = np.stack([u.ravel(), v.ravel()], 1)
+    found, aim = np.full((len(foot), 2), np.nan), foot.copy()
+    for _ in range(3):  # the ground point is where the box's lower edge is only if seen from the side
+        ground = to_ground(camera, aim)
+        seen = np.isfinite(ground).all(1)
+        if not seen.any():
+            break
+        place = np.column_stack([ground[seen], np.zeros(int(seen.sum()))])
+        turned = [boxes(camera, place, np.full(len(place), a), np.full(len(place), PERSON)) for a in _TURNS]
+        box = np.mean(turned, 0)
+        found[seen] = box[:, :1:-1]
+        stands = np.stack([box[:, 0] + box[:, 2] / 2, box[:, 1] + box[:, 3]], 1)
+        aim[seen] += np.nan_to_num(foot[seen] - stands)
+    return np.asarray(found.T.reshape(2, size[1], size[0]))
+
+
+_TURNS = np.radians([0.0, 45.0, 90.0, 135.0])
+
+
+def _look_up(table: Array, at: Array) -> Array:
+    """(N, 2) bilinear values of a table (2, V, U) at nodes' coordinates (u, v) (N, 2), clamped to its ends."""
+    top = np.array(table.shape[:0:-1]) - 1.001
+    at = np.clip(np.nan_to_num(at), 0.0, top)
+    i, f = at.astype(int), at - np.floor(at)
+    (u, v), (a, b) = i.T, f.T
+    low = table[:, v, u] * (1 - a) + table[:, v, u + 1] * a
+    high = table[:, v + 1, u] * (1 - a) + table[:, v + 1, u + 1] * a
+    return np.asarray((low * (1 - b) + high * b).T)
