@@ -2,6 +2,7 @@
 
 World x right, y away, z up (m); camera x right, y down, z forward: x_cam = R (X - C).
 pinhole: u = fx x/z + cx, v = fy y/z + cy.  top: u = s x + cx, v = s y + cy, s = px_per_m (orthographic, R looks down).
+A pinhole's lens may distort (`radial`, of calibrated recordings): sim.lens bends x/z, y/z before they become px.
 Where the camera stands is found by sim.viewpoint; `solve` is here for its callers.
 """
 
@@ -11,6 +12,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from sim import lens
 from sim.types import Array, Camera, Motion
 
 if TYPE_CHECKING:
@@ -35,13 +37,16 @@ def solve(spec: CameraSpec, motion: Motion) -> Camera:
 
 
 def project(camera: Camera, xyz: Array) -> tuple[Array, Array]:
-    """Image points (N, 2) px and depths (N,) m along the optical axis; nan behind a pinhole camera."""
+    """Image points (N, 2) px and depths (N,) m along the optical axis; nan behind a pinhole camera.
+
+    nan also where a lens with radial < 0 shows nothing of it.
+    """
     x = (np.asarray(xyz, dtype=float) - camera.position) @ camera.rotation.T
     depth = x[:, 2]
     if camera.kind == "top":
         return x[:, :2] * camera.px_per_m + camera.centre_px, depth
     z = np.where(depth > NEAR, depth, np.nan)
-    return x[:, :2] / z[:, None] * camera.focal_px + camera.centre_px, depth
+    return lens.bent(x[:, :2] / z[:, None], camera.radial) * camera.focal_px + camera.centre_px, depth
 
 
 def rays(camera: Camera, uv: Array) -> tuple[Array, Array]:
@@ -51,7 +56,8 @@ def rays(camera: Camera, uv: Array) -> tuple[Array, Array]:
         across = (uv - camera.centre_px) / camera.px_per_m
         origin = camera.position + across @ camera.rotation[:2]
         return origin, np.broadcast_to(camera.rotation[2], origin.shape)
-    x = np.column_stack([(uv - camera.centre_px) / camera.focal_px, np.ones(len(uv))])
+    ideal = lens.straight((uv - camera.centre_px) / camera.focal_px, camera.radial)
+    x = np.column_stack([ideal, np.ones(len(uv))])
     return np.broadcast_to(camera.position, x.shape), x @ camera.rotation
 
 
@@ -72,10 +78,12 @@ def ground_jacobian(camera: Camera, uv: Array, z: float = 0.0) -> Array:
     origin, direction = rays(camera, uv)
     if camera.kind == "top":
         return np.broadcast_to(camera.rotation[:2, :2].T / camera.px_per_m, (len(origin), 2, 2))
-    step = camera.rotation[:2] / np.array(camera.focal_px)[:, None]  # dD/du, dD/dv as rows
+    focal = np.array(camera.focal_px)
+    bend = lens.slope((np.asarray(uv, dtype=float) - camera.centre_px) / focal, camera.radial)
+    step = np.swapaxes(bend / focal, 1, 2) @ camera.rotation[:2]  # dD/du, dD/dv as rows
     s = (z - origin[:, 2]) / direction[:, 2]
     slope = direction[:, :2] / direction[:, 2:]
-    dx = step[None, :, :2] - step[None, :, 2:] * slope[:, None]
+    dx = step[:, :, :2] - step[:, :, 2:] * slope[:, None]
     return np.asarray(np.swapaxes(s[:, None, None] * dx, 1, 2))
 
 

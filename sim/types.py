@@ -155,6 +155,7 @@ class Camera(Frozen):
     kind "pinhole": x_cam = rotation (X - position), u = fx x/z + cx, v = fy y/z + cy, (cx, cy) the image's middle
     unless given. kind "top": orthographic, px_per_m, looking straight down on `position`.
     baseline (m): the right camera is at +baseline along camera x; 0 = none. image: (width, height) px.
+    radial: Tsai's distortion of a pinhole's image, x_ideal = x (1 + radial |x|²) for x = ((u - cx)/fx, (v - cy)/fy).
     """
 
     kind: Literal["pinhole", "top"]
@@ -165,6 +166,7 @@ class Camera(Frozen):
     rotation: Array
     baseline: float = 0.0
     px_per_m: float = float("nan")
+    radial: float = 0.0
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -1,4 +1,4 @@
-"""Camera and scene as JSON, exact to the last bit."""
+"""Camera and scene as JSON, exact to the last bit, and whatever a user gives as calibration of a recording."""
 
 from __future__ import annotations
 
@@ -11,10 +11,13 @@ from scenarios.errors import InputError
 from sim.io import tables
 from sim.types import Array, Camera, Scene, Stairs
 
+SHAPE = 0.01  # by which the ratio of width to height may differ between a calibration and a recording
+
 
 def camera_document(camera: Camera) -> dict[str, Any]:
     """camera.json: kind, image [width, height] px, focal_px, centre_px, position (3) m, rotation 3x3 (world to
-    camera), baseline m, px_per_m (null for a pinhole)."""
+    camera), baseline m, px_per_m (null for a pinhole), radial where the lens distorts."""
+    bend = {"radial": camera.radial} if camera.radial else {}
     return {
         "format": tables.FORMAT,
         "kind": camera.kind,
@@ -25,7 +28,40 @@ def camera_document(camera: Camera) -> dict[str, Any]:
         "rotation": camera.rotation.tolist(),
         "baseline": camera.baseline,
         "px_per_m": tables.finite(camera.px_per_m),
+        **bend,
     }
+
+
+def read_calibration(path: Path) -> Camera:
+    """A camera.json of ours or, ending in .xml, Tsai's calibration."""
+    if not path.is_file():
+        expected = "a camera.json, or Tsai's calibration as .xml"
+        raise InputError(file=path, got="no file", expected=expected, remedy="check --camera")
+    from sim.io.tsai import read_tsai
+
+    return read_tsai(path) if path.suffix.lower() == ".xml" else read_camera(path)
+
+
+def fitted(camera: Camera, image: tuple[int, int] | None, path: Path) -> Camera:
+    """The camera of a recording of that size: scaled where it was calibrated at another. None: taken as it is.
+
+    InputError where the two have different shapes: then the calibration is of another recording.
+    """
+    if image is None or image == camera.image:
+        return camera
+    x, y = image[0] / camera.image[0], image[1] / camera.image[1]
+    if abs(x / y - 1) > SHAPE:
+        raise InputError(
+            file=path, place="--camera", got="a calibration for {}×{} px".format(*camera.image),
+            expected="one for {}×{} px, or of that shape".format(*image), remedy="give this recording's calibration",
+        )  # fmt: skip
+    (fx, fy), (cx, cy) = camera.focal_px, camera.centre_px
+    return camera.replace(
+        image=image,
+        focal_px=(fx * x, fy * y),
+        centre_px=(cx * x, cy * y),
+        px_per_m=float(camera.px_per_m * np.sqrt(x * y)),
+    )
 
 
 def read_camera(path: Path) -> Camera:
@@ -45,6 +81,7 @@ def read_camera(path: Path) -> Camera:
         position=_numbers(path, d, "position", (3,)), rotation=_numbers(path, d, "rotation", (3, 3)),
         baseline=float(_numbers(path, {"baseline": d.get("baseline", 0.0)}, "baseline", ())),
         px_per_m=float("nan") if scale is None else float(_numbers(path, d, "px_per_m", ())),
+        radial=float(_numbers(path, {"radial": d.get("radial", 0.0)}, "radial", ())),
     )  # fmt: skip
 
 

@@ -8,15 +8,15 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
-import numpy as np
-
 from scenarios.errors import InputError
 from sim.io import mot
+from sim.io.cameras import fitted
 from sim.io.numbers import read_text
+from sim.io.pictures import filled, picture_folder
+from sim.io.sample import Choice, Sample
 from sim.types import Camera, Frame, Image, Sequence
 
 DEFAULT_FPS = 25.0
-IMAGE_SUFFIXES = (".jpg", ".jpeg", ".png", ".bmp")
 
 
 @dataclass(frozen=True)
@@ -81,6 +81,7 @@ def open_folder(
     px_per_m: float | None = None,
     camera: Camera | None = None,
     images: bool = False,
+    background: Choice | None = None,
 ) -> Sequence:
     """A MOTChallenge folder as Sequence. Frames carry pixels only if `images` (decoded one by one)."""
     ini = path / "seqinfo.ini"
@@ -88,25 +89,49 @@ def open_folder(
     rate = frame_rate(fps, info.fps)
     scale = float("nan") if px_per_m is None else px_per_m
     gt, det = path / "gt" / "gt.txt", path / "det" / "det.txt"
-    pictures = list_images(path / info.image_dir)
     found = mot.read_detections(det, info.length) if det.is_file() else None
-    length = info.length or _length(found, gt, pictures)
+    pictures = picture_folder(path / info.image_dir, info.length, gt.is_file() or found is not None)
+    length = info.length or max(_labelled(found, gt), pictures.last)
     if not length:
         expected = "a row in gt.txt or det.txt, a picture, or seqLength in seqinfo.ini"
         raise InputError(file=path, got="nothing that says how long it is", expected=expected, remedy="complete it")
+    seen = pictures.first_size() if images else None
+    size = _agreed(ini, info.image_size, seen)
+    if background is not None and not pictures.files:
+        got, remedy = "--background", "leave it out: it has none"
+        raise InputError(file=path, got=got, expected="none for a recording without pictures", remedy=remedy)
+    choice = (background or Choice()).of(length, path) if pictures.files else None
+
+    def bare() -> Iterator[Frame]:
+        for index in range(1, length + 1):
+            yield Frame(index, (index - 1) / rate, detections=None if found is None else found.at(index, rate))
 
     def frames() -> Iterator[Frame]:
-        for index in range(1, length + 1):
-            here = None if found is None else found.at(index, rate)
-            image = read_image(pictures[index - 1]) if images and index <= len(pictures) else None
-            yield Frame(index, (index - 1) / rate, image, None, here)
+        shown = pictures.some(range(1, length + 1), seen)
+        for frame, picture in zip(bare(), filled(shown, length, path.name), strict=True):
+            yield frame.replace(image=picture)
+
+    def sample(wanted: list[int]) -> Iterator[tuple[int, Image]]:
+        return pictures.some(wanted, seen if images else pictures.first_size())
 
     return Sequence(
-        name=info.name, fps=rate, length=length, frames=frames,
+        name=info.name, fps=rate, length=length, frames=frames if images and pictures.files else bare, bare=bare,
         load_truth=(lambda: mot.read_truth(gt, info.name, rate, length, scale)) if gt.is_file() else None,
-        image_size=info.image_size, camera=camera, px_per_m=scale, has_images=bool(pictures),
-        has_detections=found is not None, source={"kind": "mot", "path": str(path)},
+        image_size=size, camera=None if camera is None else fitted(camera, size, path),
+        px_per_m=scale, has_images=bool(pictures.files), has_detections=found is not None,
+        load_background=None if choice is None else Sample(choice, length, path, sample),
+        source={"kind": "mot", "path": str(path), **({} if choice is None else {"background": str(choice)})},
     )  # fmt: skip
+
+
+def _agreed(ini: Path, said: tuple[int, int] | None, seen: tuple[int, int] | None) -> tuple[int, int] | None:
+    """The size that seqinfo.ini and the pictures agree on."""
+    if said is not None and seen is not None and said != seen:
+        raise InputError(
+            file=ini, place="imWidth, imHeight", got="{} × {}".format(*said),
+            expected="{} × {}, the size of the pictures".format(*seen), remedy="correct it, or restore the pictures",
+        )  # fmt: skip
+    return said or seen
 
 
 def open_text(
@@ -133,25 +158,7 @@ def open_text(
     )  # fmt: skip
 
 
-def list_images(folder: Path) -> list[Path]:
-    """The images of a folder in the order of their names."""
-    if not folder.is_dir():
-        return []
-    return sorted(p for p in folder.iterdir() if p.suffix.lower() in IMAGE_SUFFIXES)
-
-
-def read_image(path: Path) -> Image:
-    """(H, W, 3) BGR uint8."""
-    import cv2
-
-    image = cv2.imread(str(path), cv2.IMREAD_COLOR)
-    if image is None:
-        raise InputError(file=path, got="no readable picture", expected="JPG or PNG", remedy="restore the file")
-    return np.asarray(image, np.uint8)
-
-
-def _length(found: mot.DetectionTable | None, gt: Path, pictures: list[Path]) -> int:
+def _labelled(found: mot.DetectionTable | None, gt: Path) -> int:
+    """The last frame that texts speak of."""
     last = 0 if found is None else int(found.frame.max(initial=0))
-    if gt.is_file():
-        last = max(last, int(mot.read_table(gt).frame.max(initial=0)))
-    return max(last, len(pictures))
+    return max(last, int(mot.read_table(gt).frame.max(initial=0))) if gt.is_file() else last

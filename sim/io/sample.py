@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable
-from dataclasses import dataclass
+import warnings
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Literal
 
@@ -27,16 +28,23 @@ class Choice:
 
     def __str__(self) -> str:
         """In words, as run.json has it."""
-        return self.words(self.count)
-
-    def words(self, count: int) -> str:
-        """In words, where `count` frames could be had."""
         if self.how == "first":
-            return f"first {count} frames"
-        return f"{count} frames spread over the recording (not causal)"
+            return f"first {self.count} frames"
+        return f"{self.count} frames spread over the recording (not causal)"
+
+    def of(self, length: int, path: Path) -> Choice:
+        """The same for a recording so long: InputError where it is shorter than asked for, all of it by default."""
+        if length >= self.count:
+            return self
+        if self.asked:
+            raise InputError(
+                file=path, place="--background", got=f"a recording of {length} frames",
+                expected=f"{self.count} or more", remedy=f"ask for {length} or fewer, or give a longer recording",
+            )  # fmt: skip
+        return replace(self, count=length)
 
     def indices(self, length: int) -> list[int]:
-        """The frames (1-based, ascending) of a recording so long; all of a shorter one."""
+        """The frames (1-based, ascending) of a recording so long."""
         if self.how == "first" or length <= self.count:
             return list(range(1, min(self.count, length) + 1))
         return [int((k + 0.5) * length / self.count) + 1 for k in range(self.count)]
@@ -54,12 +62,27 @@ def read_choice(text: str | None) -> Choice:
     return Choice("first" if found[1] == "first" else "spread", int(found[2]), True)
 
 
-def stacked(pictures: Iterable[Image], path: Path) -> Image:
-    """(K, H, W, 3); InputError where no picture of the sample could be read."""
-    found = list(pictures)
-    if not found:
-        raise InputError(
-            file=path, got="no readable picture in the background sample", expected="one at least",
-            remedy="choose others: --background first:N or spread:N",
-        )  # fmt: skip
-    return np.stack(found)
+@dataclass(frozen=True)
+class Sample:
+    """A recording's sample: called, (K, H, W, 3); InputError where none of its pictures can be read.
+
+    pictures(frames): (frame, picture) of those of these frames that can be read.
+    """
+
+    choice: Choice
+    length: int
+    path: Path
+    pictures: Callable[[list[int]], Iterable[tuple[int, Image]]]
+
+    def __call__(self) -> Image:
+        """Read it."""
+        if self.choice.count < FRAMES and not self.choice.asked:
+            text = f"{self.path.name}: shorter than a background sample of {FRAMES} frames; all {self.length} are taken"
+            warnings.warn(text, stacklevel=2)
+        found = [picture for _, picture in self.pictures(self.choice.indices(self.length))]
+        if not found:
+            raise InputError(
+                file=self.path, got="no readable picture in the background sample", expected="one at least",
+                remedy="choose others: --background first:N or spread:N",
+            )  # fmt: skip
+        return np.stack(found)

@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from dataclasses import dataclass
 from pathlib import Path
 
 from scenarios.errors import InputError
-from sim.io import biwi, caviar, mot_folder, store
+from sim.io import biwi, caviar, mot_folder, store, video
+from sim.io.cameras import read_calibration
+from sim.io.sample import Choice, read_choice
 from sim.types import Camera, Sequence
 
-KINDS = "a generated sequence or dataset, a MOTChallenge folder or text, a BIWI folder, a CAVIAR XML"
-VIDEO_SUFFIXES = (".mp4", ".avi", ".mkv", ".mov", ".mpg", ".mpeg", ".webm")
+KINDS = "a generated sequence or dataset, a MOTChallenge folder or text, a BIWI folder, a CAVIAR XML, a video"
 DEPTH = 3
 
 
@@ -27,35 +28,57 @@ def open_source(
 
     fps, px_per_m and camera (or its file) stand in for what a recording does not know; a generated sequence knows
     and refuses them. images: let frames carry the pictures of a MOTChallenge folder. background: which frames a
-    background model is trained on, "first:N" or "spread:N" (spread:50 if nothing is said). InputError for anything else.
+    background model is trained on, "first:N" or "spread:N" (spread:50 if nothing is said). InputError otherwise.
     """
     path = Path(path)
     for option, value in (("--fps", fps), ("--px-per-m", px_per_m)):
         if value is not None and not 0 < value < float("inf"):
             raise InputError(place=option, got=value, expected="a number above 0", remedy=f"correct {option}")
     if isinstance(camera, str | Path):
-        camera = store.read_camera(Path(camera))
+        camera = read_calibration(Path(camera))
+    options = Options(fps, px_per_m, camera, images, None if background is None else read_choice(background))
     if not path.exists():
         raise InputError(file=path, got="nothing there", expected=KINDS, remedy="check the path")
     if path.is_file():
-        return [_open_file(path, fps, px_per_m, camera)]
+        return [_open_file(path, options)]
     found = list(_find(path, DEPTH))
     if not found:
         raise InputError(file=path, got="a folder without sequences", expected=KINDS, remedy="check the path")
-    return [_open_folder(p, fps, px_per_m, camera, images) for p in found]
+    return [_open_folder(p, options) for p in found]
 
 
-def _open_file(path: Path, fps: float | None, px_per_m: float | None, camera: Camera | None) -> Sequence:
-    suffix = path.suffix.lower()
+@dataclass(frozen=True)
+class Options:
+    """What a user says about a recording; None: nothing."""
+
+    fps: float | None
+    px_per_m: float | None
+    camera: Camera | None
+    images: bool
+    background: Choice | None
+
+    def refuse(self, path: Path, kind: str, why: str, *names: str) -> None:
+        """InputError for options that would be without effect."""
+        given = [f"--{name.replace('_', '-')}" for name in names if getattr(self, name) is not None]
+        if given:
+            remedy = f"leave {'it' if len(given) == 1 else 'them'} out: {why}"
+            raise InputError(file=path, got=" and ".join(given), expected=f"none for {kind}", remedy=remedy)
+
+
+def _open_file(path: Path, options: Options) -> Sequence:
+    suffix, o = path.suffix.lower(), options
     if suffix == ".xml":
-        _refuse(path, "a CAVIAR recording", "its truth is in the image alone", {"--camera": camera})
-        return caviar.open_file(path, fps=fps, px_per_m=px_per_m)
+        o.refuse(path, "a CAVIAR recording", "its truth is in the image, without pictures", "camera", "background")
+        return caviar.open_file(path, fps=o.fps, px_per_m=o.px_per_m)
     if path.name == "obsmat.txt":
-        return _open_folder(path.parent, fps, px_per_m, camera, images=False)
-    if suffix in VIDEO_SUFFIXES:
-        raise InputError(file=path, got="a video", expected=KINDS, remedy="videos are not read yet; give boxes")
+        return _open_folder(path.parent, o)
+    if suffix in video.SUFFIXES:
+        return video.open_video(
+            path, fps=o.fps, px_per_m=o.px_per_m, camera=o.camera, background=o.background or video.ANY
+        )
     if suffix in (".txt", ".csv"):
-        return mot_folder.open_text(path, fps=fps, px_per_m=px_per_m, camera=camera)
+        o.refuse(path, "a text", "it has no pictures", "background")
+        return mot_folder.open_text(path, fps=o.fps, px_per_m=o.px_per_m, camera=o.camera)
     raise InputError(file=path, got=f"a {suffix or 'nameless'} file", expected=KINDS, remedy="check the path")
 
 
@@ -69,36 +92,33 @@ def _kind(folder: Path) -> str | None:
 
 
 def _find(folder: Path, depth: int) -> list[Path]:
-    """Folders of sequences below (and files of CAVIAR in) a folder, sorted."""
+    """Folders of sequences below (and videos and files of CAVIAR in) a folder, sorted."""
     if _kind(folder) is not None:
         return [folder]
     if depth == 0:
         return []
     found = [p for p in sorted(folder.iterdir()) if not p.name.startswith(".")]
     deeper = [q for p in found if p.is_dir() for q in _find(p, depth - 1)]
-    return deeper + [p for p in found if p.suffix.lower() == ".xml" and caviar.is_caviar(p)]
+    return deeper + [p for p in found if p.is_file() and _is_recording(p)]
 
 
-def _open_folder(
-    path: Path, fps: float | None, px_per_m: float | None, camera: Camera | None, images: bool
-) -> Sequence:
+def _is_recording(path: Path) -> bool:
+    suffix = path.suffix.lower()
+    return suffix in video.SUFFIXES or (suffix == ".xml" and caviar.is_caviar(path))
+
+
+def _open_folder(path: Path, options: Options) -> Sequence:
+    o = options
     if path.is_file():
-        return _open_file(path, fps, px_per_m, camera)
+        return _open_file(path, o)
     match _kind(path):
         case "generated":
-            options = {"--fps": fps, "--px-per-m": px_per_m, "--camera": camera}
-            _refuse(path, "a generated sequence", "it knows its own", options)
-            return store.open_sequence(path)
+            o.refuse(path, "a generated sequence", "it knows its own", "fps", "px_per_m", "camera")
+            return store.open_sequence(path, background=o.background)
         case "biwi":
-            _refuse(path, "a BIWI recording", "it is in metres", {"--px-per-m": px_per_m, "--camera": camera})
-            return biwi.open_folder(path, fps=fps)
+            o.refuse(path, "a BIWI recording", "it is in metres, without pictures", "px_per_m", "camera", "background")
+            return biwi.open_folder(path, fps=o.fps)
         case _:
-            return mot_folder.open_folder(path, fps=fps, px_per_m=px_per_m, camera=camera, images=images)
-
-
-def _refuse(path: Path, kind: str, why: str, options: Mapping[str, object]) -> None:
-    """InputError for options that would be without effect."""
-    given = [option for option, value in options.items() if value is not None]
-    if given:
-        remedy = f"leave {'it' if len(given) == 1 else 'them'} out: {why}"
-        raise InputError(file=path, got=" and ".join(given), expected=f"none for {kind}", remedy=remedy)
+            return mot_folder.open_folder(
+                path, fps=o.fps, px_per_m=o.px_per_m, camera=o.camera, images=o.images, background=o.background
+            )

@@ -19,6 +19,7 @@ from sim.io import tables, truths
 from sim.io.atomic import write_folder
 from sim.io.cameras import camera_document, read_camera, read_scene, scene_document
 from sim.io.events import read_script
+from sim.io.sample import Choice
 from sim.types import Detections, Frame, Sequence
 
 __all__ = ["is_sequence", "open_sequence", "read_camera", "read_manifest", "sequence_files", "write_sequence"]
@@ -158,7 +159,7 @@ def altered(folder: Path, manifest: dict[str, Any]) -> Iterator[InputError]:
             yield InputError(file=path, got=f"{kind}: {len(body)} bytes", expected=wanted, remedy=REDO)
 
 
-def open_sequence(folder: Path) -> Sequence:
+def open_sequence(folder: Path, *, background: Choice | None = None) -> Sequence:
     """A stored sequence, equal to the one written; InputError about the first file that is missing or altered."""
     manifest = read_manifest(folder)
     for error in altered(folder, manifest):

@@ -1,0 +1,152 @@
+"""Decoding a video file: its packets, when each is shown, and the pictures in their order, lost ones left out.
+
+One thread: the same pictures on any machine. A frame's number is the rank of its time stamp where these can be trusted;
+else pictures are counted, a packet that cannot be decoded counting as one.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from fractions import Fraction
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from scenarios.errors import InputError
+from sim.types import Image
+
+COVER = "attached_pic"
+HIDDEN = ("vp8",)  # codecs with packets that are never shown
+REMEDY = "give a video that a player plays to its end"
+
+
+@dataclass(frozen=True)
+class Packets:
+    """The packets of a video stream in the order of the file: when shown (units of time_base; None unknown), and
+    where groups begin that can be decoded by themselves. promised: frames that the header speaks of, 0 = none."""
+
+    stamps: tuple[int | None, ...]
+    keys: tuple[bool, ...]
+    time_base: Fraction
+    rate: float
+    promised: int
+    codec: str
+    reorders: bool
+
+    def ranks(self) -> dict[int, int] | None:
+        """Frame (1-based) by time stamp, or None where stamps do not tell."""
+        known = [s for s in self.stamps if s is not None]
+        ascending = known == sorted(known)
+        if len(set(known)) < len(self.stamps) or (self.reorders and ascending) or self.codec in HIDDEN:
+            return None
+        return {stamp: k for k, stamp in enumerate(sorted(known), 1)}
+
+    def groups(self, wanted: list[int]) -> set[int] | None:
+        """Numbers of the groups that hold these frames, or None: all."""
+        ranks = self.ranks()
+        if ranks is None:
+            return None
+        group = np.cumsum(self.keys)
+        return {
+            int(g) for g, stamp in zip(group, self.stamps, strict=True) if stamp is not None and ranks[stamp] in wanted
+        }
+
+
+@contextmanager
+def opened(path: Path) -> Iterator[tuple[Any, Any]]:
+    """The container and its first video stream; InputError where there is none to be read."""
+    import av
+
+    try:
+        container = av.open(str(path), metadata_errors="ignore")
+    except (av.FFmpegError, OSError) as error:
+        got = "an empty file" if path.stat().st_size == 0 else f"no readable video ({_reason(error)})"
+        raise InputError(file=path, got=got, expected="a whole video file", remedy=REMEDY) from None
+    with container:
+        streams = [s for s in container.streams.video if COVER not in str(getattr(s, "disposition", "")).lower()]
+        if not streams:
+            raise InputError(file=path, got="no video stream", expected="one", remedy=REMEDY)
+        stream = streams[0]
+        if stream.codec_context is None:
+            raise InputError(
+                file=path, got="a codec that is not known here", expected="H.264 or the like", remedy=REMEDY
+            )
+        stream.codec_context.thread_count = 1
+        yield container, stream
+
+
+def _reason(error: Exception) -> str:
+    return str(getattr(error, "strerror", None) or error).partition("\n")[0][:80]
+
+
+def packets(path: Path) -> Packets:
+    """What the file holds, without decoding; one that breaks off ends there."""
+    with opened(path) as (container, stream):
+        found = [(p.pts, bool(p.is_keyframe)) for p in _demuxed(container, stream) if p.size and not p.is_discard]
+        context = stream.codec_context
+        return Packets(
+            tuple(pts for pts, _ in found), tuple(key for _, key in found), stream.time_base,
+            float(stream.average_rate or 0), int(stream.frames), context.name, bool(context.has_b_frames),
+        )  # fmt: skip
+
+
+def _demuxed(container: Any, stream: Any) -> Iterator[Any]:
+    import av
+
+    packets = container.demux(stream)
+    while True:
+        try:
+            packet = next(packets, None)
+        except av.FFmpegError:
+            return
+        if packet is None:
+            return
+        yield packet
+
+
+def pictures(path: Path, index: Packets, wanted: list[int] | None = None) -> Iterator[tuple[int, Image]]:
+    """(frame, picture) in order, of all frames or of those wanted; what cannot be decoded is left out."""
+    ranks, last, count = index.ranks(), max(wanted or [0]), 0
+    groups = None if wanted is None else index.groups(wanted)
+    with opened(path) as (container, stream):
+        for frame in _decoded(container, stream, groups):
+            count += 1
+            number = count if ranks is None or frame is None else ranks.get(frame.pts, 0)
+            if frame is not None and not frame.is_corrupt and number and (wanted is None or number in wanted):
+                yield number, _picture(frame)
+            if wanted is not None and number >= last:
+                return
+
+
+def _decoded(container: Any, stream: Any, groups: set[int] | None) -> Iterator[Any]:
+    """Frames, None for a packet that cannot be decoded; of these groups only."""
+    group, running = 0, False
+    for packet in _demuxed(container, stream):
+        group += packet.is_keyframe
+        if packet.size and groups is not None and group not in groups:
+            if running:
+                yield from _some(stream, None)
+                stream.codec_context.flush_buffers()
+            running = False
+            continue
+        running = True
+        yield from _some(stream, packet)
+
+
+def _some(stream: Any, packet: Any) -> list[Any]:
+    import av
+
+    try:
+        return list(stream.codec_context.decode(packet))
+    except av.FFmpegError:
+        return [None]
+
+
+def _picture(frame: Any) -> Image:
+    """(H, W, 3) BGR, upright."""
+    image = frame.to_ndarray(format="bgr24")
+    turns = round(frame.rotation / 90) % 4
+    return np.ascontiguousarray(np.rot90(image, turns)) if turns else image
