@@ -21,7 +21,7 @@ from sim.types import Camera, Frame, Image, Sequence
 
 SUFFIXES = (".mp4", ".avi", ".mkv", ".mov", ".mpg", ".mpeg", ".webm", ".m4v")
 RATES = (0.1, 300.0)  # frames/s that make sense
-AGREE = 0.1  # by which the container's rate may differ from that of the time stamps
+AGREE = 0.02  # by which the container's rate may differ from that of the time stamps
 DEFAULT_FPS = 25.0
 ANY = Choice()
 
