@@ -79,7 +79,7 @@ class Blob:
         rows = people.reported(frame.t)
         state, scale = people.bank.take(rows, 1), people.scale[rows]
         camera = self.context.camera
-        box, alone = blob_measure.to_boxes(people.uprights()[rows]), np.full(len(rows), -1)
+        box, alone = blob_measure.to_boxes(self.cascade.reported(rows)), np.full(len(rows), -1)
         if camera is None:
             pos, vel = state[kalman.PLACE, :, :2].copy(), state[kalman.RATE, :, :2].copy()
             cov, plane = blob_report.image_covariance(state, scale), "image"

@@ -41,6 +41,10 @@ class Boxes:
         people.bury(frame.t)
         people.give_birth(z[orphans], score[orphans], frame.t)
 
+    def reported(self, rows: Ints) -> Array:
+        """(K, 4) boxes x, y, h, w of tracks, as they are told."""
+        return self.people.uprights()[rows]
+
     def _measurements(self, detections: Detections | None) -> tuple[Array, Array]:
         if detections is None or detections.box is None or not len(detections.box):
             return np.zeros((0, 4)), np.zeros(0)

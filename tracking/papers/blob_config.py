@@ -78,6 +78,9 @@ class BlobConfig(BackgroundSettings):
     entry_support: float = param(
         0.5, (0.1, 0.9), "share", "support from which on a template is somebody new (ours)", before=0.5
     )
+    person_noise: float = param(
+        0.15, (0.01, 5.0), "m", "how far people's axes are from those expected at their place (ours)", "log", before=0.15
+    )
     angle_noise: float = param(
         8.0, (0.5, 45.0), "deg", "standard deviation of a measured direction, beside the moments' own", "log", before=8.0
     )

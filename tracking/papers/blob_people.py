@@ -51,3 +51,8 @@ class People(Population):
         kalman.update(self.nominal, rows, z[:, :4], self.noise)
         kalman.angle_update(self.angle, rows, z[:, 4], angle_var)
         return np.asarray(np.add.reduce(terms, 1) / np.square(self.scale[rows]))
+
+    def expect(self, rows: Ints, z: Array, var: float) -> None:
+        """Measure the axes of tracks at z (K, 5), x, y left out, with variance `var` m^2; rho does not see it."""
+        noise = np.tile([np.inf, np.inf, var, var], (len(rows), 1))
+        kalman.update(self.bank, rows, z[:, :4], noise)

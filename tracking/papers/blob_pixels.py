@@ -23,7 +23,7 @@ from tracking.papers.blob_people import People
 from tracking.papers.blob_size import PersonSize
 from tracking.papers.blob_template import Mask
 
-SHORT, TALL, THIN, WIDE = 0.7, 1.35, 0.5, 1.6  # of a person's height and width: a blob within is one person
+SHORT, TALL, THIN, WIDE = 0.8, 1.25, 0.5, 1.6  # of a person's height and width: a blob within is one person
 SHARED = 0.35  # share of a predicted box in a blob's from which on the blob may be this track's
 LEAST_AREA = 0.05  # m^2: smaller blobs are noise
 COARSE = 20.0  # px per m that windows and areas follow while no scale is known
@@ -54,7 +54,7 @@ class Pixels:
         """Learn sizes and scale from the lone blobs of the background sample."""
         for image in sample[:: max(len(sample) // LOOKED, 1)]:
             found = self._find(self._foreground(image)[1])
-            self.size.learn(found.box, ~self._cut(found.box))
+            self.size.learn(found.box, found.ellipse, ~self._cut(found.box))
         self._take_scale()
 
     def _take_scale(self) -> None:
@@ -91,7 +91,8 @@ class Pixels:
         self._measure(frame.t, mask, found)
         self.background.adapt(frame.image, classes, self._protected())
         if len(found):
-            self.size.learn(found.box, ~self._cut(found.box) & ~self._several(found.box, self.people.uprights()))
+            alone = ~self._cut(found.box) & ~self._several(found.box, self.people.uprights())
+            self.size.learn(found.box, found.ellipse, alone)
             self._take_scale()
         return None
 
@@ -103,8 +104,12 @@ class Pixels:
     def _protected(self) -> Bools:
         """(H, W) the places of confirmed tracks."""
         scene = Mask(np.zeros(self.background.valid.shape, bool))
-        scene.paint(_templates(self.people.uprights()[self.people.confirmed]))
+        scene.paint(_templates(self._boxes(self.people.uprights()[self.people.confirmed])))
         return np.asarray(scene.cover > 0)
+
+    def reported(self, rows: Ints) -> Array:
+        """(K, 4) boxes x, y, h, w of tracks, as they are told."""
+        return self._boxes(self.people.uprights()[rows])
 
     def _measure(self, t: float, mask: Bools, found: detect.Blobs) -> None:
         people, c = self.people, self.config
@@ -126,12 +131,24 @@ class Pixels:
                 noise, support = np.concatenate([noise, more[2]]), np.concatenate([support, more[3]])
                 angles = np.concatenate([angles, np.full(len(more[0]), np.inf)])
             entered = blob_entry.newcomers(scene, self.size, c.entry_support)
-            newborn = np.concatenate([newborn, blob_measure.lying(_places(entered))])
+            newborn = np.concatenate([newborn, self._ellipses(_places(entered))])
         d2 = people.update(rows, measured, noise, angles)
+        if split:
+            self._expect_size(rows)
         people.mark(rows, d2 <= self.confirm_gate, support)
         people.excuse()
         people.bury(t)
         people.give_birth(newborn, np.ones(len(newborn)), t)
+
+    def _expect_size(self, rows: Ints) -> None:
+        """Measure the axes of these tracks by what a person's are there, too."""
+        people = self.people
+        at = _templates(people.uprights()[rows])
+        size = self.size.at(at[:, :2]) / self.size.loose
+        known = np.isfinite(size).all(1)
+        rows, size = rows[known], size[known]
+        expected = blob_measure.lying(np.column_stack([at[known, :2], size]))
+        people.expect(rows, expected, self.config.person_noise**2)
 
     def _lone(self, box: Array, expected: Array) -> Bools:
         """(M,) blobs of one person's size, whole, in which at most one confirmed track is expected."""
@@ -140,6 +157,14 @@ class Pixels:
             tall, wide = (box[:, :1:-1] / size).T
             fits = (tall >= SHORT) & (tall <= TALL) & (wide >= THIN) & (wide <= WIDE)
         return np.asarray(fits & ~self._cut(box) & ~self._several(box, expected))
+
+    def _boxes(self, upright: Array) -> Array:
+        """(N, 4) the boxes of people whose ellipses have these upright boxes."""
+        return np.concatenate([upright[:, :2], upright[:, 2:] * self.size.loose], 1)
+
+    def _ellipses(self, place: Array) -> Array:
+        """(N, 5) the ellipses of people in upright boxes."""
+        return blob_measure.lying(np.concatenate([place[:, :2], place[:, 2:] / self.size.loose], 1))
 
     def _several(self, box: Array, expected: Array) -> Bools:
         """(M,) blobs in which several confirmed tracks are expected."""
@@ -167,7 +192,7 @@ class Pixels:
         """Tracks measured by templates: rows, z (K, 5), noise (K, 4), support (K,); confirmed ones or the others."""
         people, c = self.people, self.config
         open_rows = np.setdiff1d(np.flatnonzero(people.confirmed == sure), rows)
-        at = _templates(expected[open_rows])
+        at = _templates(self._boxes(expected[open_rows]))
         size = self.size.at(at[:, :2])
         size = np.where(np.isfinite(size), size, at[:, 2:])
         at[:, 2:] = np.clip(at[:, 2:], EXTENT[0] * size, EXTENT[1] * size)
@@ -179,7 +204,7 @@ class Pixels:
         worth, shown, at = scene.alone(at[keep]), shown[keep], at[keep]
         noise = people.noise / np.maximum(shown, LEAST_SHOWN)[:, None] ** 2
         noise[:, 2:] *= BLIND
-        return open_rows[keep], blob_measure.lying(_places(at)), noise, np.clip(worth, 0.0, 1.0)
+        return open_rows[keep], self._ellipses(_places(at)), noise, np.clip(worth, 0.0, 1.0)
 
 
 def _templates(place: Array) -> Array:

@@ -12,13 +12,20 @@ from __future__ import annotations
 import numpy as np
 
 from sim.types import Array, Bools, Camera, Context
+from tracking.papers import blob_measure
 
 PERSON = 1.7  # m
 SLIM = 0.36  # width over height of a walking person's box, the prior of what is learned
 UPRIGHT = (1.5, 5.0)  # height over width of a blob that may be somebody alone
 KEPT = 400  # lone blobs remembered
 ENOUGH = 12  # lone blobs that make a learned size reliable ...
-AGREE = 0.15  # ... where their relative deviation is no more than this (median)
+AGREE = 0.3  # ... where they are this share of all
+LEVELS = np.geomspace(0.65, 1.55, 19)  # of the median height, and
+SLOPES = np.linspace(0.0, 2.4, 17)  # growth per row, times the middle row: where the densest heights are looked for
+SLOPE, DOUBT = 0.7, 0.02  # a slope to expect, and the share of votes that unit distance from it costs
+WIDTH = 0.12  # relative deviation within which heights agree
+LOOSE = 1.0, 1.1  # height and width of a person's box over those of the box round the ellipse of his pixels: a prior
+SMALLEST = 12.0  # px: people less high than this cannot be told from noise
 STEP = 8  # px between the nodes of a camera's table
 MARGIN = 0.25  # of the image, beyond which no foot is looked for
 
@@ -28,9 +35,9 @@ class PersonSize:
 
     def __init__(self, context: Context) -> None:
         self.table: Array | None = None
-        self.seen = np.zeros((0, 3))  # v, h, w of lone blobs
-        self.line, self.slim, self.spread = (float("nan"), 0.0), SLIM, float("inf")
-        self.rows = float(context.image_size[1]) if context.image_size else float("nan")
+        self.seen = np.zeros((0, 4))  # u, v, h, w of lone blobs
+        self.excess, self.loose = np.zeros((0, 2)), np.array(LOOSE)
+        self.line, self.slim, self.agreed = (float("nan"), 0.0), SLIM, 0
         if context.camera is not None:
             self.low = -MARGIN * np.array(context.camera.image, float)
             self.table = _table(context.camera, self.low)
@@ -38,53 +45,71 @@ class PersonSize:
     @property
     def reliable(self) -> bool:
         """May this decide how many people a blob holds?"""
-        return self.table is not None or (len(self.seen) >= ENOUGH and self.spread <= AGREE)
+        return self.table is not None or self.agreed >= max(ENOUGH, AGREE * len(self.seen))
 
     def at(self, foot: Array) -> Array:
         """(N, 2) height and width in px of a person whose box stands on the image points `foot` (N, 2); nan unknown."""
         if self.table is not None:
-            return _look_up(self.table, (foot - self.low) / STEP)
-        height = np.maximum(self.line[0] + self.line[1] * foot[:, 1], 4.0)
-        return np.stack([height, self.slim * height], 1)
+            size = _look_up(self.table, (foot - self.low) / STEP)
+        else:
+            height = self.line[0] + self.line[1] * foot[:, 1]
+            size = np.stack([height, self.slim * height], 1)
+        return np.where(size[:, :1] >= SMALLEST, size, np.nan)
 
     @property
     def px_per_m(self) -> float:
         """Scale of the image: the median height of the lone blobs seen / 1.7 m; nan without any."""
-        return float(np.median(self.seen[:, 1])) / PERSON if len(self.seen) else float("nan")
+        return float(np.median(self.seen[:, 2])) / PERSON if len(self.seen) else float("nan")
 
-    def learn(self, box: Array, whole: Bools) -> None:
-        """Add the blobs (M, 4) ltwh that may be somebody alone; `whole` (M,): away from the image's edge."""
-        if self.table is not None or not len(box):
-            return
+    def learn(self, box: Array, ellipse: Array, whole: Bools) -> None:
+        """Add the blobs (M, 4) ltwh, (M, 5), that may be somebody alone; `whole` (M,): away from the image's edge."""
         ratio = box[:, 3] / np.maximum(box[:, 2], 1.0)
-        alone = box[whole & (ratio >= UPRIGHT[0]) & (ratio <= UPRIGHT[1])]
-        if not len(alone):
+        good = whole & (ratio >= UPRIGHT[0]) & (ratio <= UPRIGHT[1])
+        if not good.any():
             return
-        new = np.stack([alone[:, 1] + alone[:, 3], alone[:, 3], alone[:, 2]], 1)
+        alone = box[good]
+        round_ellipse = blob_measure.upright(ellipse[good, :4], ellipse[good, 4])[:, 2:]
+        self.excess = np.concatenate([self.excess, alone[:, :1:-1] / round_ellipse])[-KEPT:]
+        self.loose = np.median(np.concatenate([self.excess, np.tile(LOOSE, (ENOUGH, 1))]), 0)
+        if self.table is not None:
+            return
+        new = np.stack([alone[:, 0] + alone[:, 2] / 2, alone[:, 1] + alone[:, 3], alone[:, 3], alone[:, 2]], 1)
         self.seen = np.concatenate([self.seen, new])[-KEPT:]
         self._fit()
 
     def _fit(self) -> None:
-        """The robust line, and the share of height that is width."""
-        v, h, w = self.seen.T
+        """The line through the densest heights, and the share of height that is width."""
+        u, v, h, w = self.seen.T
         middle, typical = float(np.median(v)), float(np.median(h))
-        rows = self.rows if np.isfinite(self.rows) else 2 * middle
-        slope = prior = typical / (middle + rows / 2)  # a horizon half an image above the image
-        level = typical
-        for _ in range(8):
-            fit = np.maximum(level + slope * (v - middle), 1.0)
-            off = h / fit - 1
-            scale = max(1.4826 * float(np.median(np.abs(off))), 0.03)
-            weight = 1 / (fit * fit * (1 + (off / scale) ** 2))
-            level, slope = _line(v - middle, h, weight, prior, float(np.median(weight)) * typical**2)
-        self.line, self.spread = (level - slope * middle, slope), float(np.median(np.abs(off)))
-        near = np.abs(off) <= 2 * scale
-        self.slim = float(np.clip((np.median(w[near] / h[near]) * near.sum() + SLIM * 4) / (near.sum() + 4), 0.2, 0.8))
+        at, count = (v - middle) / max(middle, 1.0), 1 / _crowding(np.stack([u, v], 1) / typical)
+        level, slope = (a.ravel() for a in np.meshgrid(LEVELS, SLOPES))
+        off = h / typical / np.maximum(level[:, None] * (1 + slope[:, None] * at), 0.05) - 1
+        votes = np.maximum(1 - np.square(off / WIDTH), 0) @ count - DOUBT * count.sum() * np.square(slope - SLOPE)
+        best = int(votes.argmax())
+        line = typical * level[best] * np.array([1.0, slope[best]])
+        prior = line[1]
+        for _ in range(3):
+            fit = np.maximum(line[0] + line[1] * at, 1.0)
+            weight = count * (np.abs(h / fit - 1) <= WIDTH) / (fit * fit)
+            line = np.array(_line(at, h, weight, prior, 0.01 * float(weight.sum()) * typical**2))
+        fit = np.maximum(line[0] + line[1] * at, 1.0)
+        inlier = np.abs(h / fit - 1) <= WIDTH
+        self.line = (float(line[0] - line[1] * middle / max(middle, 1.0)), float(line[1] / max(middle, 1.0)))
+        self.agreed = int(inlier.sum())
+        slim = np.append(w[inlier] / h[inlier], np.full(4, SLIM))
+        self.slim = float(np.clip(np.median(slim), 0.2, 0.8))
+
+
+def _crowding(place: Array) -> Array:
+    """(N,) how many of the places (N, 2), in person heights, share a cell: who stands still counts once."""
+    cell = np.floor(4 * place).astype(np.int64)
+    _, which, count = np.unique(cell[:, 0] * 100_003 + cell[:, 1], return_inverse=True, return_counts=True)
+    return np.asarray(count[which], float)
 
 
 def _line(v: Array, h: Array, weight: Array, prior: float, strength: float) -> tuple[float, float]:
     """Weighted least squares of h = level + slope v, the slope tied to `prior` by a deviation of its own size."""
-    tie = strength / prior**2
+    tie = strength / max(prior, 0.1 * float(h.mean())) ** 2
     moments = np.array([[weight.sum(), weight @ v], [weight @ v, weight @ (v * v) + tie]])
     level, slope = np.linalg.solve(moments, np.array([weight @ h, weight @ (v * h) + tie * prior]))
     return float(level), float(slope)
