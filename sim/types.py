@@ -102,7 +102,7 @@ class Tracks(Frozen):
 
     unit "person": group is the id of the person's group, -1 alone. unit "group": id == group.
     cov (N, 2D, 2D) ordered x, y, (z), vx, vy, (vz). box (N, 4) ltwh px or None. groups and events may be left empty:
-    they are then derived by the baseline rule (tracking.grouping).
+    they are then derived by the baseline rule (tracking.grouping). derived: this has been done, nothing is left to do.
     """
 
     index: int
@@ -118,6 +118,7 @@ class Tracks(Frozen):
     score: Array = field(default_factory=lambda: np.zeros(0))
     groups: Groups | None = None
     events: tuple[GroupEvent, ...] = ()
+    derived: bool = False
 
 
 @dataclass(frozen=True, slots=True, eq=False)

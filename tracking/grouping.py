@@ -68,14 +68,14 @@ class _Rows:
 
 def with_groups(tracks: Sequence[Tracks], fps: float, px_per_m: float) -> tuple[Tracks, ...]:
     """The tracks `derive`d; px_per_m is needed for tracks in the image, which stay as they are without it (not one box
-    was given: nobody can be grouped). Tracks that were derived before stay what they are."""
-    if not tracks or (tracks[0].plane == "image" and not math.isfinite(px_per_m)):
+    was given: nobody can be grouped). Tracks that are marked as derived stay what they are."""
+    if all(t.derived for t in tracks) or (tracks[0].plane == "image" and not math.isfinite(px_per_m)):
         return tuple(tracks)
     return tuple(derive(tracks, fps, px_per_m))
 
 
 def derive(tracks: Iterable[Tracks], fps: float, px_per_m: float = 1.0, rule: Grouping | None = None) -> list[Tracks]:
-    """The tracks with `group`, `groups` and `events` filled in where a tracker left them empty.
+    """The tracks with `group`, `groups` and `events` filled in where a tracker left them empty, marked as derived.
 
     People get groups by the baseline rule unless the tracker named any, in `group` or in its groups' members. Events of
     membership are derived from these groups unless it reported any such; crossings and queues unless it reported any of
@@ -182,7 +182,7 @@ def _filled(given: Sequence[Tracks], rows: _Rows, events: Sequence[GroupEvent]) 
         label = rows.group[r][np.searchsorted(rows.id[r], t.id)]
         new = tuple(sorted(told.pop(t.index, ()), key=lambda e: (e.start, e.end, e.kind, e.members, e.after)))
         groups = shapes[t.index - 1] if t.groups is None else t.groups
-        out.append(t.replace(group=label, groups=groups, events=(*t.events, *new)))
+        out.append(t.replace(group=label, groups=groups, events=(*t.events, *new), derived=True))
     return out
 
 

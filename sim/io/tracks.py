@@ -142,6 +142,7 @@ def _table(rows: _Rows, every: list[Tracks], fps: float) -> bytes:
     facts = {
         "plane": rows.plane, "unit": rows.unit, "fps": fps, "first": every[0].index if every else 1,
         "frames": len(every), "boxless": [t.index for t in every if t.box is None],
+        "derived": bool(every) and all(t.derived for t in every),
     }  # fmt: skip
     return table_bytes(columns, facts)
 
@@ -173,7 +174,7 @@ def read_tracks(path: str | Path, *, fps: float | None = None, length: int | Non
     exact = path if path.suffix == ".parquet" else folder / "tracks.parquet"
     ours = path.is_dir() or path.name in ("tracks.txt", "tracks.parquet")
     if ours and exact.is_file():
-        return _with_events(_exact(exact, folder / "groups.parquet"), folder)
+        return _with_events(_exact(exact, folder), folder)
     text = folder / "tracks.txt" if path.is_dir() else path
     if not text.is_file():
         raise InputError(
@@ -193,8 +194,9 @@ def _boxes(path: Path) -> Any:
     return tables.read_document(path).get("boxes")
 
 
-def _exact(path: Path, groups_path: Path) -> list[Tracks]:
-    table = tables.read_table(path)
+def _exact(path: Path, folder: Path) -> list[Tracks]:
+    table, groups_path = tables.read_table(path), folder / "groups.parquet"
+    derived = bool(table.facts.get("derived", False)) and (folder / "events.json").is_file()
     plane, fps = table.fact("plane"), float(table.fact("fps"))
     first, count, boxless = int(table.fact("first")), int(table.fact("frames")), set(table.fact("boxless"))
     state = _state(plane)
@@ -211,6 +213,7 @@ def _exact(path: Path, groups_path: Path) -> list[Tracks]:
             Tracks(
                 index, (index - 1) / fps, plane, table.fact("unit"), id[r], group[r], values[r, :d], values[r, d:],
                 cov[r], None if index in boxless else box[r], score[r], groups[k],
+                derived=derived,
             )
         )  # fmt: skip
     return found

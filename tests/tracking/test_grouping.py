@@ -229,20 +229,20 @@ def passing():
 def test_named_groups_without_events_get_them():
     """As `with_groups` has it for runs and scores: the groups are the tracker's, what happens to them is derived."""
     pairs = np.tile([3, 3, 8, 8], (120, 1))
-    named = [t.replace(events=()) for t in derive(tracks(passing(), group=pairs), FPS)]
+    named = [t.replace(events=(), derived=False) for t in derive(tracks(passing(), group=pairs), FPS)]
     assert all(t.groups is not None for t in named)
     made = with_groups(named, FPS, math.nan)
     assert events(made) == [(78, "cross", 44, (3, 8), (3, 8), (1, 2, 3, 4))]
     assert all(t.groups is g.groups for t, g in zip(made, named, strict=True))
     own = np.full((200, 2), -1)
     own[30:] = 7
-    named = [t.replace(events=()) for t in derive(tracks(side_by_side(), group=own), FPS)]
+    named = [t.replace(events=(), derived=False) for t in derive(tracks(side_by_side(), group=own), FPS)]
     assert events(with_groups(named, FPS, 1.0)) == [(31, "form", 31, (-1, -1), (7,), (1, 2))]
 
 
 def test_groups_named_by_their_members_alone():
     pairs = np.tile([3, 3, 8, 8], (120, 1))
-    named = [t.replace(events=(), group=np.full(4, -1)) for t in derive(tracks(passing(), group=pairs), FPS)]
+    named = [t.replace(events=(), group=np.full(4, -1), derived=False) for t in derive(tracks(passing(), group=pairs), FPS)]
     made = with_groups(named, FPS, 1.0)
     assert [e[1] for e in events(made)] == ["cross"]
     assert made[0].group.tolist() == [3, 3, 8, 8]
@@ -254,7 +254,7 @@ def test_a_kind_that_is_told_is_not_derived_but_the_others_are():
     cross = GroupEvent("cross", 5, 5, 6, (1, 2), (1, 2), (1, 2, 3, 4), (0.0, 0.0))
     queue = GroupEvent("queue", 5, 5, 6, (), (), (1, 2, 3), (0.0, 0.0))
     for told, kinds in ((merge, ["merge", "cross"]), (cross, ["cross"]), (queue, ["queue", "cross"])):
-        given = [t.replace(events=(told,) if t.index == 6 else ()) for t in named]
+        given = [t.replace(events=(told,) if t.index == 6 else (), derived=False) for t in named]
         assert [e[1] for e in events(with_groups(given, FPS, 1.0))] == kinds
 
 
@@ -263,9 +263,18 @@ def test_deriving_again_changes_nothing(people):
     """Also of beginnings in which nothing has happened yet."""
     made = derive(tracks(people), FPS)
     for length in (9, 40, 100, len(made)):
-        again = with_groups(made[:length], FPS, 1.0)
+        again = derive(made[:length], FPS)
         assert events(again) == events(made[:length])
         assert [t.group.tolist() for t in again] == [t.group.tolist() for t in made[:length]]
+
+
+def test_what_is_derived_is_not_derived_again(monkeypatch):
+    made = with_groups(tracks(passing()), FPS, 1.0)
+    assert all(t.derived for t in made)
+    monkeypatch.setattr("tracking.grouping.derive", None)
+    assert with_groups(made, FPS, 1.0) == made
+    with pytest.raises(TypeError):
+        with_groups([*made[:-1], made[-1].replace(derived=False)], FPS, 1.0)
 
 
 def test_the_end_tells_what_is_then_known():

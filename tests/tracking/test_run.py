@@ -194,7 +194,7 @@ def test_a_class_that_is_no_tracker_is_refused():
 
 
 def test_combinations_that_cannot_work():
-    with pytest.raises(InputError, match="needs boxes, and made with detections, truth"):
+    with pytest.raises(InputError, match="needs pixels or boxes, and made with detections, truth"):
         track("blob", source(), detections="image")
     with pytest.raises(InputError, match="sensor"):
         track("blob", source(), sensor={"detect_prob": 0.5})

@@ -27,6 +27,16 @@ def test_no_tracks_at_all(tmp_path, make_tracks, same):
     assert not (tmp_path / "t" / "groups.csv").exists()
 
 
+def test_whether_groups_and_events_were_derived_is_kept(tmp_path, make_tracks):
+    tracks = make_tracks(1)
+    for derived in (True, False):
+        write_tracks(tmp_path, [t.replace(derived=derived) for t in tracks], fps=10.0)
+        assert {t.derived for t in read_tracks(tmp_path)} == {derived}
+    write_tracks(tmp_path, [t.replace(derived=True) for t in tracks], fps=10.0)
+    (tmp_path / "events.json").unlink()
+    assert not any(t.derived for t in read_tracks(tmp_path))
+
+
 def test_what_an_earlier_run_left_goes_away_but_no_more(tmp_path, make_tracks):
     write_tracks(tmp_path / "t", make_tracks(1), fps=10.0)
     (tmp_path / "t" / "mine.txt").write_text("x")
