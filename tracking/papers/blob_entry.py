@@ -9,9 +9,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from sim.types import Array, Bools
+from sim.types import Array, Ints
 from tracking.detect import blobs as detect
-from tracking.papers.blob_size import PersonSize
+from tracking.papers.blob_size import SLIM, SMALLEST, PersonSize
 from tracking.papers.blob_template import ELLIPSE, Mask
 
 LEAST = 0.3  # of a person's area: a smaller region is nobody
@@ -23,24 +23,25 @@ EVIDENCE = 1000.0  # nats of full support: so many that a first guess holds nobo
 def newcomers(scene: Mask, size: PersonSize, support: float) -> Array:
     """(K, 4) templates of new people, painted; `support` is what each needs."""
     left = (scene.gain > 0) & (scene.cover == 0)
-    found = detect.find(left, 1.0) if left.any() else None
+    found = detect.find(left, LEAST * SMALLEST**2 * SLIM * ELLIPSE) if left.any() else None
     made = [np.zeros((0, 4))]
-    for k in range(0 if found is None else len(found)):
-        assert found is not None
-        made.append(_in_region(scene, found.label == k + 1, found.box[k], float(found.area[k]), size, support))
+    if found is not None:
+        box = found.box
+        h, w = size.at(np.stack([box[:, 0] + box[:, 2] / 2, box[:, 1] + box[:, 3]], 1)).T
+        person = ELLIPSE * h * w
+        for k in np.flatnonzero(found.area >= LEAST * person).tolist():
+            x, y, wide, high = box[k].astype(int)
+            rows, columns = np.nonzero(found.label[y : y + high, x : x + wide] == k + 1)
+            made.append(_in_region(scene, rows + y, columns + x, float(person[k]), size, support))
     return np.concatenate(made)
 
 
-def _in_region(scene: Mask, region: Bools, box: Array, area: float, size: PersonSize, support: float) -> Array:
-    left, top, wide, high = box
-    h, w = size.at(np.array([[left + wide / 2, top + high]]))[0]
-    person = ELLIPSE * h * w
-    if not area >= LEAST * person:
-        return np.zeros((0, 4))
+def _in_region(scene: Mask, rows: Ints, columns: Ints, person: float, size: PersonSize, support: float) -> Array:
     best, worth = np.zeros((0, 4)), 0.0
-    rows, columns = np.nonzero(region[int(top) : int(top + high), int(left) : int(left + wide)])
-    for count in range(1, min(int(area / person) + 2, MOST) + 1):
-        at = _guess(rows + top, columns + left, count, size)
+    for count in range(1, min(int(len(rows) / person) + 2, MOST) + 1):
+        at = _guess(rows, columns, count, size)
+        if not np.isfinite(at).all():
+            break
         at = scene.settle(at, np.maximum(ROAM * at[:, 2:3], 1.0) * np.ones(2), EVIDENCE)
         alone = scene.alone(at)
         scene.paint(at, -1)
@@ -51,7 +52,7 @@ def _in_region(scene: Mask, region: Bools, box: Array, area: float, size: Person
     return best
 
 
-def _guess(rows: Array, columns: Array, count: int, size: PersonSize) -> Array:
+def _guess(rows: Ints, columns: Ints, count: int, size: PersonSize) -> Array:
     """(count, 4) templates side by side over a region's pixels, each with as many, standing where these end."""
     order = np.argsort(columns, kind="stable")
     parts = np.array_split(order, count)

@@ -19,6 +19,7 @@ SLIM = 0.36  # width over height of a walking person's box, the prior of what is
 UPRIGHT = (1.5, 5.0)  # height over width of a blob that may be somebody alone
 KEPT = 400  # lone blobs remembered
 ENOUGH = 12  # lone blobs that make a learned size reliable ...
+RENEW = 0.05  # share of new ones from which on the line is drawn anew
 AGREE = 0.3  # ... where they are this share of all
 LEVELS = np.geomspace(0.65, 1.55, 19)  # of the median height, and
 SLOPES = np.linspace(0.0, 2.4, 17)  # growth per row, times the middle row: where the densest heights are looked for
@@ -36,6 +37,7 @@ class PersonSize:
     def __init__(self, context: Context) -> None:
         self.table: Array | None = None
         self.seen = np.zeros((0, 4))  # u, v, h, w of lone blobs
+        self.unused = 0
         self.excess, self.loose = np.zeros((0, 2)), np.array(LOOSE)
         self.line, self.slim, self.agreed = (float("nan"), 0.0), SLIM, 0
         if context.camera is not None:
@@ -74,8 +76,10 @@ class PersonSize:
         if self.table is not None:
             return
         new = np.stack([alone[:, 0] + alone[:, 2] / 2, alone[:, 1] + alone[:, 3], alone[:, 3], alone[:, 2]], 1)
-        self.seen = np.concatenate([self.seen, new])[-KEPT:]
-        self._fit()
+        self.seen, self.unused = np.concatenate([self.seen, new])[-KEPT:], self.unused + len(new)
+        if self.unused >= RENEW * len(self.seen):
+            self.unused = 0
+            self._fit()
 
     def _fit(self) -> None:
         """The line through the densest heights, and the share of height that is width."""
