@@ -1,0 +1,93 @@
+"""Person size over the image: from a camera exactly, from lone blobs where they agree."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from sim.camera import looking, project
+from sim.types import Camera, Context
+from tracking.papers.blob_size import ENOUGH, SMALLEST, PersonSize
+
+BARE = Context(10.0, float("nan"), image_size=(480, 360))
+
+
+def camera(tilt):
+    """Five metres up, looking down by `tilt` degrees."""
+    return Camera("pinhole", (480, 360), (400.0, 400.0), (240.0, 180.0), np.array([0.0, 0, 5]), looking(tilt, 0.0))
+
+
+def ellipses(box):
+    """The ellipses inscribed in boxes."""
+    right_angle = np.full(len(box), np.pi / 2)
+    return np.column_stack([box[:, :2] + box[:, 2:] / 2, box[:, 3], box[:, 2], right_angle])
+
+
+def blobs(r, n, level=15.0, slope=0.2, noise=0.04):
+    """(n, 4) boxes of people who stand all over an image."""
+    foot = np.column_stack([r.uniform(40, 440, n), r.uniform(100, 340, n)])
+    h = (level + slope * foot[:, 1]) * (1 + noise * r.normal(size=n))
+    return np.column_stack([foot[:, 0] - 0.2 * h, foot[:, 1] - h, 0.4 * h, h])
+
+
+@pytest.mark.parametrize("tilt", [0.2, 0.5])
+def test_a_camera_gives_the_projection_of_a_person(tilt):
+    size = PersonSize(Context(10.0, 60.0, camera=camera(tilt), image_size=(480, 360)))
+    assert size.reliable
+    for x, y in ((-2.0, 12.0), (3.0, 20.0)):
+        ends = np.array([[x, y, 0], [x, y, 1.7]])
+        (u, v), (_, head) = project(camera(tilt), ends)[0]
+        h, w = size.at(np.array([[u, v]]))[0]
+        assert h == pytest.approx(v - head, rel=0.06)
+        assert 0.15 < w / h < 0.4
+
+
+def test_nobody_stands_in_the_sky():
+    size = PersonSize(Context(10.0, 60.0, camera=camera(0.1), image_size=(480, 360)))
+    assert np.isnan(size.at(np.array([[240.0, 20.0]]))).all()
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_the_line_is_found_among_groups_and_pieces(seed):
+    r = np.random.default_rng(seed)
+    box = blobs(r, 120)
+    box[:30, 3] *= r.uniform(1.2, 1.6, 30)
+    box[30:60, 3] *= r.uniform(0.4, 0.85, 30)
+    size = PersonSize(BARE)
+    size.learn(box, ellipses(box), np.ones(120, bool))
+    assert size.reliable
+    foot = np.array([[240.0, 120.0], [240.0, 320.0]])
+    assert size.at(foot)[:, 0] == pytest.approx(15 + 0.2 * foot[:, 1], rel=0.08)
+
+
+def test_who_stands_still_counts_once():
+    r = np.random.default_rng(0)
+    box, stands = blobs(r, 60), np.tile([[200.0, 160.0, 20.0, 32.0]], (150, 1))
+    size = PersonSize(BARE)
+    every = np.concatenate([box, stands])
+    size.learn(every, ellipses(every), np.ones(len(every), bool))
+    assert size.at(np.array([[210.0, 192.0]]))[0, 0] == pytest.approx(15 + 0.2 * 192, rel=0.08)
+
+
+def test_few_or_wild_blobs_are_not_relied_on():
+    r = np.random.default_rng(0)
+    few, size = blobs(r, ENOUGH - 1), PersonSize(BARE)
+    size.learn(few, ellipses(few), np.ones(len(few), bool))
+    assert not size.reliable
+    wild = blobs(r, 80)
+    wild[:, 3] = wild[:, 2] * r.uniform(1.6, 4.8, 80)
+    wild[:, 2:] *= r.uniform(0.2, 3.0, (80, 1))
+    size = PersonSize(BARE)
+    size.learn(wild, ellipses(wild), np.ones(80, bool))
+    assert not size.reliable
+    cut, size = blobs(r, 80), PersonSize(BARE)
+    size.learn(cut, ellipses(cut), np.zeros(80, bool))
+    assert not size.reliable
+
+
+def test_people_too_small_to_see_are_nobody():
+    r, size = np.random.default_rng(0), PersonSize(BARE)
+    box = blobs(r, 80, level=-20.0, slope=0.3)
+    size.learn(box, ellipses(box), np.ones(80, bool))
+    assert np.isnan(size.at(np.array([[240.0, (SMALLEST + 17) / 0.3]]))).all()
+    assert size.px_per_m == pytest.approx(np.median(box[:, 3]) / 1.7, rel=0.1)

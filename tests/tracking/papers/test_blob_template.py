@@ -1,0 +1,115 @@
+"""Templates over a mask: kernels against the slow way, support, settling, pruning, and how many came in together."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from tests import reference_templates as slow
+from tracking.papers import blob_entry
+from tracking.papers import blob_template_kernels as kernels
+from tracking.papers.blob_template import EMPTY, Mask
+
+HIGH, WIDE = 90, 120
+
+
+def mask_of(*templates):
+    """(H, W) foreground of ellipses."""
+    return np.any([slow.pixels((HIGH, WIDE), *t) for t in templates], 0)
+
+
+class Fixed:
+    """People are of one size everywhere."""
+
+    def __init__(self, h, w):
+        self.size = h, w
+
+    def at(self, foot):
+        return np.tile(np.array(self.size, float), (len(foot), 1))
+
+
+def somewhere(r, n):
+    """(n, 4) templates, some of them reaching out of the image."""
+    h = r.uniform(8, 50, n)
+    return np.column_stack([r.uniform(-10, WIDE + 10, n), r.uniform(5, HIGH + 20, n), h, h * r.uniform(0.3, 0.8, n)])
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_kernels_are_the_slow_way(seed):
+    r = np.random.default_rng(seed)
+    gain, cover = r.normal(size=(HIGH, WIDE)), (r.random((HIGH, WIDE)) < 0.3).astype(np.int64)
+    sums, some = np.zeros((HIGH, WIDE + 1)), somewhere(r, 12)
+    for t in some:
+        got = kernels.moved(gain, cover, sums, t, 2, 1.5)
+        assert np.allclose(got, slow.moved(gain, cover, t, 2, 1.5), atol=1e-9)
+        painted = np.zeros((HIGH, WIDE), np.int64)
+        kernels.paint(painted, *t, 1)
+        assert np.array_equal(painted > 0, slow.pixels((HIGH, WIDE), *t))
+    got = kernels.placed(gain, cover, sums, some)
+    assert np.allclose(got, [slow.worth(gain, cover, t) for t in some], atol=1e-9)
+
+
+def test_support_is_one_on_ones_own_pixels_and_minus_empty_on_none():
+    one = np.array([[60.0, 80.0, 60.0, 24.0]])
+    assert Mask(mask_of(one[0])).support(one)[0] == pytest.approx(1.0, abs=0.02)
+    assert Mask(np.zeros((HIGH, WIDE), bool)).support(one)[0] == pytest.approx(-EMPTY, abs=0.02)
+
+
+def test_what_two_cover_supports_neither():
+    one = np.array([[60.0, 80.0, 60.0, 24.0]])
+    scene = Mask(mask_of(one[0]))
+    scene.paint(np.concatenate([one, one]))
+    assert scene.alone(np.concatenate([one, one])).tolist() == [0.0, 0.0]
+    assert len(scene.prune(np.concatenate([one, one]), np.full(2, 0.2))) == 1
+    assert scene.cover.max() == 1
+
+
+@pytest.mark.parametrize("gap", [14.0, 20.0])
+def test_two_in_one_blob_settle_where_they_are(gap):
+    true = np.array([[50.0, 80.0, 60.0, 24.0], [50.0 + gap, 76.0, 60.0, 24.0]])
+    expected = true + [[3.0, -2.0, 0, 0], [-3.0, 2.0, 0, 0]]
+    found = Mask(mask_of(*true)).settle(expected, np.full((2, 2), 4.0), 100.0)
+    assert np.abs(found - true).max() <= 1.5
+
+
+def test_a_post_in_front_keeps_the_template_whole():
+    one = np.array([[60.0, 80.0, 60.0, 24.0]])
+    cut = mask_of(one[0])
+    cut[:, 57:62] = False
+    found = Mask(cut).settle(one + [2.0, 1.0, 0, 0], np.full((1, 2), 4.0), 20.0)
+    assert np.abs(found - one).max() <= 1.5
+
+
+def test_settling_is_the_same_in_any_order_of_rows():
+    r = np.random.default_rng(2)
+    true = np.column_stack([r.uniform(20, 100, 5), 50 + 8 * np.arange(5.0), np.full(5, 40.0), np.full(5, 16.0)])
+    expected, turn = true + np.append(r.normal(0, 2, (5, 2)), np.zeros((5, 2)), 1), r.permutation(5)
+    found = Mask(mask_of(*true)).settle(expected, np.full((5, 2), 3.0), 50.0)
+    assert np.array_equal(Mask(mask_of(*true)).settle(expected[turn], np.full((5, 2), 3.0), 50.0), found[turn])
+
+
+@pytest.mark.parametrize("count", [1, 2, 3, 4])
+def test_as_many_come_in_as_there_are(count):
+    """Side by side, a head's width of each hidden behind the next."""
+    true = np.array([[20.0 + 20 * k, 80.0 - 2 * (k % 2), 60.0, 24.0] for k in range(count)])
+    scene = Mask(mask_of(*true))
+    found = blob_entry.newcomers(scene, Fixed(60.0, 24.0), 0.5)
+    assert len(found) == count
+    assert np.abs(np.sort(found[:, 0]) - true[:, 0]).max() < 4
+
+
+def test_half_a_person_and_less_is_nobody_new():
+    one = np.array([60.0, 80.0, 60.0, 24.0])
+    cut = mask_of(one)
+    cut[45:] = False
+    assert not len(blob_entry.newcomers(Mask(cut), Fixed(60.0, 24.0), 0.5))
+
+
+def test_what_is_explained_brings_nobody():
+    one = np.array([[60.0, 80.0, 60.0, 24.0]])
+    scene = Mask(mask_of(one[0]))
+    scene.paint(one)
+    assert not len(blob_entry.newcomers(scene, Fixed(60.0, 24.0), 0.5))
+    closed = Mask(mask_of(one[0]))
+    closed.close(mask_of(one[0]))
+    assert not len(blob_entry.newcomers(closed, Fixed(60.0, 24.0), 0.5))
