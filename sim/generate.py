@@ -15,7 +15,9 @@ from pathlib import Path
 from scenarios.errors import FlockscopeError, InputError, WorkError
 from scenarios.loading import Entry
 from sim.io import store
-from sim.io.atomic import refusal, sweep, write_file, write_folder
+from sim.io.atomic import refusal, sweep, write_file
+from sim.io.manifest import MANIFEST, altered, identity, read_manifest
+from sim.io.streams import chosen
 from sim.splits import split_of
 
 Progress = Callable[[int, int, str], None]
@@ -28,6 +30,8 @@ class Job:
     folder: Path
     entry: Entry
     seed: int
+    streams: tuple[str, ...] = ()
+    images: str = "jpg"
 
     @property
     def name(self) -> str:
@@ -49,15 +53,16 @@ def generate(
     """Make OUT/flockscope-<split>/<name>-s<seed>/ of every entry (or name of one) and seed, and OUT/seqmaps.
 
     Sequences that are complete and of the same scenario and seed are kept. progress(done, all, name) is called after
-    each. streams, images: the pictures to store (sim.io.streams.STREAMS), and as what. InputError before anything is made where names clash, the range is wrong, or a folder holds another
-    scenario's sequence; WorkError at the end, the others kept, where a sequence failed; at once where nothing can be
-    written any more.
+    each. streams, images: the pictures to store (sim.io.streams.STREAMS, () none), and as what. InputError before
+    anything is made where names clash, the range is wrong, or a folder holds another scenario's sequence; WorkError at
+    the end, the others kept, where a sequence failed; at once where nothing can be written any more.
     """
     if workers < 1:
         raise InputError(place="workers", got=workers, expected="1 or more", remedy="correct --workers")
     split, root = split_of(seeds), Path(out)
     folder = root / f"flockscope-{split}"
-    jobs = plan(_resolved(entries, set), seeds, folder)
+    pictures = chosen(streams, images)
+    jobs = [replace(job, streams=pictures, images=images) for job in plan(_resolved(entries, set), seeds, folder)]
     with _alone(root):
         sweep(folder, root / "seqmaps")
         waiting = [job for job in jobs if not is_done(job)]
@@ -99,17 +104,18 @@ def is_done(job: Job) -> bool:
     if not job.folder.exists():
         return False
     try:
-        manifest = store.read_manifest(job.folder)
+        manifest = read_manifest(job.folder)
     except InputError:
         return False
-    wanted = store.identity(dump(job.entry.scenario), job.seed, job.entry.repeat)
+    wanted = identity(dump(job.entry.scenario), job.seed, job.entry.repeat, job.streams, job.images)
     other = [key for key, value in wanted.items() if manifest.get(key) != value]
     if other:
+        expected = "the same scenario, version, streams and images, or nothing"
         raise InputError(
-            file=job.folder, place=store.MANIFEST, got=f"another sequence ({', '.join(other)} differ)",
-            expected="the same scenario and version, or nothing", remedy="choose another --out, or delete that folder",
+            file=job.folder, place=MANIFEST, got=f"another sequence ({', '.join(other)} differ)",
+            expected=expected, remedy="choose another --out, or delete that folder",
         )  # fmt: skip
-    return next(store.altered(job.folder, manifest), None) is None
+    return next(altered(job.folder, manifest), None) is None
 
 
 def make(job: Job) -> None:
@@ -119,16 +125,21 @@ def make(job: Job) -> None:
 
     entry = job.entry
     try:
-        sequence = replace(simulate(entry.scenario, job.seed, entry.repeat), name=job.name)
-        files = store.sequence_files(sequence, scenario=dump(entry.scenario), seed=job.seed, repeat=entry.repeat)
+        drawn = {"streams": job.streams} if job.streams else {}
+        sequence = replace(simulate(entry.scenario, job.seed, entry.repeat, **drawn), name=job.name)
+        store.write_sequence(
+            job.folder, sequence, scenario=dump(entry.scenario), seed=job.seed, repeat=entry.repeat,
+            streams=job.streams, images=job.images,
+        )  # fmt: skip
     except FlockscopeError as error:
+        if isinstance(error.__cause__, OSError):
+            raise
         raise type(error)(**{**error.as_dict(), "file": entry.file or error.file or job.name}) from error
     except Exception as error:
         raise WorkError(
             file=job.name, got=f"{type(error).__name__}: {error}", expected="a sequence",
             remedy="report it with the scenario and seed",
         ) from error  # fmt: skip
-    write_folder(job.folder, files)
 
 
 def _attempt(job: Job) -> tuple[FlockscopeError | None, bool]:
@@ -178,7 +189,7 @@ def _counted(progress: Progress | None, before: int, total: int) -> Callable[[Jo
 def write_seqmap(root: Path, split: str) -> None:
     """seqmaps/flockscope-<split>.txt: every complete sequence of the split, sorted, as TrackEval reads it."""
     folder = root / f"flockscope-{split}"
-    complete = sorted(p.parent.name for p in folder.glob(f"*/{store.MANIFEST}") if not p.parent.name.startswith("."))
+    complete = sorted(p.parent.name for p in folder.glob(f"*/{MANIFEST}") if not p.parent.name.startswith("."))
     if complete:
         write_file(root / "seqmaps" / f"flockscope-{split}.txt", "\n".join(["name", *complete, ""]).encode())
 

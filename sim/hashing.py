@@ -7,6 +7,7 @@ shape and little-endian bytes (every NaN the same), text by its UTF-8, dataclass
 from __future__ import annotations
 
 import hashlib
+from collections.abc import Mapping
 from dataclasses import fields, is_dataclass
 from typing import Any
 
@@ -42,9 +43,26 @@ def truth_hash(scenario: str, seed: int, repeat: int, truth: Truth | None) -> st
     return canonical_hash(("truth", scenario, seed, repeat, named))
 
 
-def content_hash(truth: str, detections: Any, pixels: Any = ()) -> str:
-    """Hash of a truth_hash, the detections and the raw pixels before encoding, if any."""
-    return canonical_hash(("content", truth, detections, pixels))
+def content_hash(truth: str, detections: Any, pixels: Mapping[str, str] | None = None) -> str:
+    """Hash of a truth_hash, the detections and, by stream, the hashes of raw pixels before encoding, if any."""
+    return canonical_hash(("content", truth, detections, dict(pixels) if pixels else ()))
+
+
+class PixelHash:
+    """Hash of a stream of pictures as they are added, by their shapes, types and raw bytes; `count` of them so far."""
+
+    def __init__(self) -> None:
+        self.count = 0
+        self._h = hashlib.sha256()
+
+    def add(self, picture: NDArray[Any]) -> None:
+        """The next picture."""
+        self.count += 1
+        _array(self._h, picture)
+
+    def hex(self) -> str:
+        """The hash of all so far."""
+        return self._h.hexdigest()
 
 
 def cpu_level() -> str:

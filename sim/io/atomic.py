@@ -50,14 +50,30 @@ def write_file(target: Path, content: bytes) -> None:
         _flush_folder(target.parent)
 
 
-def write_folder(target: Path, files: Mapping[str, bytes]) -> None:
-    """A folder of files, whole or not at all; one that stood there is replaced."""
+@contextmanager
+def new_folder(target: Path) -> Iterator[Path]:
+    """An empty folder beside the target to fill, which takes its place when left well; one that stood there goes."""
     with writing(target) as partial:
-        _fill(partial, files)
+        partial.mkdir()
+        yield partial
+        _flush_all(partial)
         if target.exists():
             _remove(target)
         os.rename(partial, target)
         _flush_folder(target.parent)
+
+
+def write_folder(target: Path, files: Mapping[str, bytes]) -> None:
+    """A folder of files, whole or not at all; one that stood there is replaced."""
+    with new_folder(target) as partial:
+        for name, content in files.items():
+            put(partial / name, content)
+
+
+def put(path: Path, content: bytes) -> None:
+    """A file of a new folder."""
+    path.parent.mkdir(parents=True, exist_ok=True)
+    path.write_bytes(content)
 
 
 def write_into(target: Path, files: Mapping[str, bytes], stale: tuple[str, ...] = ()) -> None:
@@ -86,11 +102,19 @@ def sweep(*folders: Path) -> None:
 def _fill(folder: Path, files: Mapping[str, bytes]) -> None:
     folder.mkdir()
     for name, content in files.items():
-        path = folder / name
-        path.parent.mkdir(parents=True, exist_ok=True)
-        _flushed(path, content)
-    for path in {folder, *((folder / name).parent for name in files)}:
-        _flush_folder(path)
+        put(folder / name, content)
+    _flush_all(folder)
+
+
+def _flush_all(folder: Path) -> None:
+    """Every file and folder in a folder, and itself."""
+    for path in sorted(folder.rglob("*")):
+        if path.is_dir():
+            _flush_folder(path)
+        else:
+            with path.open("rb+") as file:
+                os.fsync(file.fileno())
+    _flush_folder(folder)
 
 
 def _flushed(path: Path, content: bytes) -> None:

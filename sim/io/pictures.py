@@ -7,13 +7,16 @@ import warnings
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any, TypeVar
 
 import numpy as np
+from numpy.typing import NDArray
 
 from scenarios.errors import InputError
 from sim.types import Image
 
 SUFFIXES = (".jpg", ".jpeg", ".png", ".bmp", ".tif", ".tiff")
+Picture = TypeVar("Picture", bound=NDArray[Any])
 SPARSE = 100  # numbers in names that leave more than 99 of 100 out are no frames (time stamps)
 
 
@@ -37,12 +40,12 @@ def _tell(place: str, frame: int) -> bool:
     return True
 
 
-def size_of(picture: Image) -> tuple[int, int]:
+def size_of(picture: NDArray[Any]) -> tuple[int, int]:
     """Width and height."""
     return picture.shape[1], picture.shape[0]
 
 
-def checked(picture: Image, size: tuple[int, int], path: Path, place: str = "") -> Image:
+def checked(picture: Picture, size: tuple[int, int], path: Path, place: str = "") -> Picture:
     """The picture; InputError where it is not of the recording's size."""
     if size_of(picture) != size:
         got, expected = "{}×{} px".format(*size_of(picture)), "{}×{} px like the first".format(*size)

@@ -8,6 +8,7 @@ from pathlib import Path
 from scenarios.errors import InputError
 from sim.io import biwi, caviar, mot_folder, store, video
 from sim.io.cameras import read_calibration
+from sim.io.manifest import is_sequence
 from sim.io.sample import Choice, read_choice
 from sim.types import Camera, Sequence
 
@@ -83,7 +84,7 @@ def _open_file(path: Path, options: Options) -> Sequence:
 
 
 def _kind(folder: Path) -> str | None:
-    if store.is_sequence(folder):
+    if is_sequence(folder):
         return "generated"
     if (folder / "obsmat.txt").is_file():
         return "biwi"

@@ -1,47 +1,62 @@
-"""Our own store: one folder per sequence, complete when its manifest.json is there, read back equal to the last bit.
-
-The manifest names every file with its hash, the resolved scenario's hash, versions and the CPU's feature level, and
-no time, host or path: the same seed, scenario and versions give the same bytes.
-"""
+"""Our own store: one folder per sequence, complete when its manifest.json is there, read back equal to the last bit."""
 
 from __future__ import annotations
 
-import platform
-from collections.abc import Iterator
+from collections.abc import Callable, Iterable, Iterator
 from functools import lru_cache
-from importlib import metadata
+from itertools import repeat
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from scenarios.errors import InputError
 from sim import hashing
-from sim.io import tables, truths
-from sim.io.atomic import write_folder
+from sim.io import atomic, sample, tables, truths
 from sim.io.cameras import camera_document, read_camera, read_scene, scene_document
 from sim.io.events import read_script
-from sim.io.sample import Choice
-from sim.types import Detections, Frame, Sequence
-
-__all__ = ["is_sequence", "open_sequence", "read_camera", "read_manifest", "sequence_files", "write_sequence"]
-
-SCHEMA = 1
-MANIFEST = "manifest.json"
-REDO = "run the same `flockscope generate` again"
-LIBRARIES = ("numpy", "scipy", "numba", "pymunk", "pyarrow", "pydantic")
+from sim.io.manifest import MANIFEST, altered, identity, read_manifest, sealed, versions
+from sim.io.picture_reader import Stored
+from sim.io.picture_writer import NONE, Pictures, write_pictures
+from sim.io.sample import Choice, Sample
+from sim.io.streams import chosen, file_name
+from sim.types import Detections, Frame, Image, Sequence
 
 
-def write_sequence(folder: Path, sequence: Sequence, *, scenario: str, seed: int, repeat: int = 0) -> Path:
-    """Store a sequence as `folder`, whole or not at all; `scenario` is the resolved scenario's TOML."""
-    write_folder(folder, sequence_files(sequence, scenario=scenario, seed=seed, repeat=repeat))
+def write_sequence(
+    folder: Path,
+    sequence: Sequence,
+    *,
+    scenario: str,
+    seed: int,
+    repeat: int = 0,
+    streams: Iterable[str] = (),
+    images: str = "jpg",
+) -> Path:
+    """Store a sequence as `folder`, whole or not at all; `scenario` is the resolved scenario's TOML.
+
+    streams: those of its pictures to store (sim.io.streams.STREAMS), images: as jpg, png or mp4. One picture at a time
+    is in memory.
+    """
+    wanted = chosen(streams, images)
+    with atomic.new_folder(folder) as partial:
+        tables_first = sequence.truth  # a script that fails does so before a picture is drawn
+        assert tables_first is None or tables_first.length == sequence.length
+        pictures = write_pictures(partial, sequence, wanted, images)
+        files = sequence_files(sequence, scenario=scenario, seed=seed, repeat=repeat, pictures=pictures)
+        for name, body in files.items():
+            atomic.put(partial / name, body)
     return folder
 
 
-def sequence_files(sequence: Sequence, *, scenario: str, seed: int, repeat: int = 0) -> dict[str, bytes]:
-    """All files of a sequence by name, the manifest last."""
+def sequence_files(
+    sequence: Sequence, *, scenario: str, seed: int, repeat: int = 0, pictures: Pictures = NONE
+) -> dict[str, bytes]:
+    """All files of a sequence by name but its pictures, the manifest last."""
     frames = list(sequence.without_pictures())
     found = [f.detections for f in frames if f.detections is not None]
     assert len(found) in (0, len(frames)), "a sensor answers every frame or none"
-    files = {"scenario.toml": scenario.encode(), "seqinfo.ini": _seqinfo(sequence, len(frames))}
+    files = {"scenario.toml": scenario.encode(), "seqinfo.ini": _seqinfo(sequence, len(frames), pictures)}
     if sequence.camera is not None:
         files["camera.json"] = tables.document(camera_document(sequence.camera))
     if sequence.scene is not None:
@@ -51,37 +66,21 @@ def sequence_files(sequence: Sequence, *, scenario: str, seed: int, repeat: int 
     if found:
         files |= truths.detection_files(found, sequence.fps, sequence.scene)
     files = dict(sorted(files.items()))
-    manifest = _manifest(sequence, found, len(frames), scenario, seed, repeat)
+    manifest = _manifest(sequence, found, len(frames), scenario, seed, repeat, pictures)
     listed = {name: {"sha256": hashing.file_hash(body), "bytes": len(body)} for name, body in files.items()}
+    listed = dict(sorted((listed | pictures.files).items()))
     return {**files, MANIFEST: tables.document(sealed({**manifest, "files": listed}))}
 
 
-def sealed(manifest: dict[str, Any]) -> dict[str, Any]:
-    """The manifest with the hash of all its other fields as `sha256`, so that none can change unnoticed."""
-    body = {key: value for key, value in manifest.items() if key != "sha256"}
-    return {**body, "sha256": hashing.canonical_hash(body)}
-
-
-def identity(scenario: str, seed: int, repeat: int) -> dict[str, Any]:
-    """What says that a stored sequence is the one asked for."""
-    return {
-        "format": tables.FORMAT,
-        "schema": SCHEMA,
-        "engine": hashing.ENGINE,
-        "seed": seed,
-        "repeat": repeat,
-        "scenario_hash": hashing.scenario_hash(scenario),
-    }
-
-
 def _manifest(
-    sequence: Sequence, found: list[Detections], length: int, scenario: str, seed: int, repeat: int
+    sequence: Sequence, found: list[Detections], length: int, scenario: str, seed: int, repeat: int, pictures: Pictures
 ) -> dict[str, Any]:
     truth = hashing.truth_hash(scenario, seed, repeat, sequence.truth)
     return {
-        **identity(scenario, seed, repeat),
+        **identity(scenario, seed, repeat, pictures.streams, pictures.images or "jpg"),
+        "pixels": pictures.pixels,
         "truth_hash": truth,
-        "content_hash": hashing.content_hash(truth, found),
+        "content_hash": hashing.content_hash(truth, found, pictures.pixels),
         "sequence": {
             "name": sequence.name,
             "fps": sequence.fps,
@@ -89,107 +88,86 @@ def _manifest(
             "image_size": None if sequence.image_size is None else list(sequence.image_size),
             "px_per_m": tables.finite(sequence.px_per_m),
         },
-        "streams": [],
         "cpu": hashing.cpu_level(),
-        "versions": versions(),
+        "versions": versions(bool(pictures.streams)),
     }
 
 
-@lru_cache(maxsize=1)
-def versions() -> dict[str, str]:
-    """Versions of what a sequence's bytes depend on."""
-    found = {"python": platform.python_version()}
-    for name in ("flockscope", *LIBRARIES):
-        try:
-            found[name] = metadata.version(name)
-        except metadata.PackageNotFoundError:
-            found[name] = "unknown"
-    return found
-
-
-def _seqinfo(sequence: Sequence, length: int) -> bytes:
+def _seqinfo(sequence: Sequence, length: int, pictures: Pictures) -> bytes:
+    """Without pictures of its own a sequence says what MOTChallenge's would be, so that their tools read it."""
     width, height = sequence.image_size or (0, 0)
+    folder, _, name = file_name("left", "png" if pictures.images == "png" else "jpg", 1).partition("/")
     lines = [
         f"name={sequence.name}",
-        "imDir=img1",
+        f"imDir={folder}",
         f"frameRate={str(sequence.fps).removesuffix('.0')}",
         f"seqLength={length}",
     ]
     if sequence.image_size is not None:
-        lines += [f"imWidth={width}", f"imHeight={height}", "imExt=.jpg"]
+        lines += [f"imWidth={width}", f"imHeight={height}", f"imExt={Path(name).suffix}"]
     return "\n".join(["[Sequence]", *lines, ""]).encode()
 
 
-def is_sequence(folder: Path) -> bool:
-    """Whether a folder is, or was meant to be, a stored sequence of ours."""
-    return (folder / MANIFEST).is_file() or (folder / "scenario.toml").is_file()
-
-
-def read_manifest(folder: Path) -> dict[str, Any]:
-    """The manifest; InputError where it is missing, broken, altered or of another format."""
-    path = folder / MANIFEST
-    if not path.is_file():
-        raise InputError(file=path, got="missing", expected="the manifest of a complete sequence", remedy=REDO)
-    manifest = tables.read_json(path)
-    if manifest.get("format") != tables.FORMAT:
-        raise InputError(
-            file=path, place="format", got=manifest.get("format"), expected=tables.FORMAT, remedy="use the same version"
-        )
-    missing = {"sequence", "files", "seed", "repeat", "scenario_hash", "truth_hash", "content_hash", "sha256"}
-    missing -= manifest.keys()
-    if missing:
-        raise InputError(file=path, got=f"no {', '.join(sorted(missing))}", expected="all keys", remedy=REDO)
-    if manifest["sha256"] != sealed(manifest)["sha256"]:
-        raise InputError(file=path, got="altered fields", expected="those that its sha256 names", remedy=REDO)
-    return manifest
-
-
-def altered(folder: Path, manifest: dict[str, Any]) -> Iterator[InputError]:
-    """Each file that is missing or not the one of the manifest."""
-    for name, facts in manifest["files"].items():
-        path = folder / name
-        wanted = f"the file of {facts['bytes']} bytes that manifest.json names"
-        try:
-            body = path.read_bytes()
-        except OSError:
-            yield InputError(file=path, got="missing", expected=wanted, remedy=REDO)
-            continue
-        if hashing.file_hash(body) != facts["sha256"]:
-            kind = "truncated" if len(body) < facts["bytes"] else "altered"
-            yield InputError(file=path, got=f"{kind}: {len(body)} bytes", expected=wanted, remedy=REDO)
-
-
 def open_sequence(folder: Path, *, background: Choice | None = None) -> Sequence:
-    """A stored sequence, equal to the one written; InputError about the first file that is missing or altered."""
+    """A stored sequence, equal to the one written; InputError about the first file that is missing or altered.
+
+    Its pictures are checked when they are read. background: a sample of its frames instead of its own background.
+    """
     manifest = read_manifest(folder)
-    for error in altered(folder, manifest):
+    for error in altered(folder, manifest, pictures=False):
         raise error
-    about, has = manifest["sequence"], manifest["files"].keys()
+    about, has, pictures = manifest["sequence"], manifest["files"].keys(), Stored(folder, manifest)
     size, length, fps = about["image_size"], about["length"], about["fps"]
+    left, right = "left" in pictures.streams, "right" in pictures.streams
+    load_background, words = _background(pictures, background, length)
 
     @lru_cache(maxsize=1)
     def detections() -> list[Detections]:
         return truths.read_detections(folder / "det" / "det.parquet")
 
-    def frames() -> Iterator[Frame]:
+    def bare() -> Iterator[Frame]:
         for index in range(1, length + 1):
             here = detections()[index - 1] if "det/det.parquet" in has else None
             yield Frame(index, (index - 1) / fps, detections=here)
 
+    def frames() -> Iterator[Frame]:
+        nothing = repeat(None, length)
+        both = [pictures.all(name, length) if there else nothing for name, there in (("left", left), ("right", right))]
+        for frame, image, other in zip(bare(), *both, strict=True):
+            yield frame.replace(image=image, right=other)
+
     return Sequence(
-        name=about["name"], fps=fps, length=length, frames=frames,
+        name=about["name"], fps=fps, length=length, frames=frames if left or right else bare,
         load_truth=(lambda: truths.read_truth(folder)) if "gt/truth.parquet" in has else None,
         image_size=None if size is None else (size[0], size[1]),
         camera=read_camera(folder / "camera.json") if "camera.json" in has else None,
         scene=read_scene(folder / "scene.json") if "scene.json" in has else None,
         px_per_m=tables.number(about["px_per_m"]),
-        has_detections="det/det.parquet" in has,
+        has_images=left, has_right=right, has_detections="det/det.parquet" in has, load_background=load_background,
         load_people=(lambda: _people(folder, manifest)) if "gt/script.json" in has else None,
         source={
             "kind": "generated", "path": str(folder), "seed": manifest["seed"], "repeat": manifest["repeat"],
-            "truth_hash": manifest["truth_hash"],
+            "truth_hash": manifest["truth_hash"], "streams": list(pictures.streams), "images": manifest.get("images"),
+            **words,
         },
+        bare=bare if left or right else None,
+        load_pixels=pictures.pixel_loader() if {"ids"} <= set(pictures.streams) else None,
     )  # fmt: skip
+
+
+def _background(
+    pictures: Stored, choice: Choice | None, length: int
+) -> tuple[Callable[[], Image] | None, dict[str, str]]:
+    """How to load the sample that was asked for, else the sequence's own, and what it is in words."""
+    if choice is not None:
+        if "left" not in pictures.streams:
+            got, remedy = "--background", "leave it out: it has none"
+            raise InputError(file=pictures.folder, got=got, expected="none for one without pictures", remedy=remedy)
+        fits = choice.of(length, pictures.folder)
+        return Sample(fits, length, pictures.folder, pictures.sample), {"background": str(fits)}
+    if "background" not in pictures.streams:
+        return None, {}
+    return (lambda: np.stack(list(pictures.all("background", sample.FRAMES)))), {"background": sample.OWN}
 
 
 def _people(folder: Path, manifest: dict[str, Any]) -> dict[str, tuple[int, ...]]:

@@ -9,7 +9,8 @@ from typing import Any
 
 from scenarios.errors import FlockscopeError, InputError
 from sim import hashing
-from sim.io import store, truths
+from sim.io import manifest as manifests
+from sim.io import truths
 from sim.io.atomic import PARTIAL
 from sim.io.cameras import read_scene
 from sim.io.mot_folder import read_seqinfo
@@ -23,16 +24,16 @@ def validate(folder: str | Path) -> list[FlockscopeError]:
         raise InputError(
             file=folder, got="no folder", expected="a dataset or sequence of ours", remedy="check the path"
         )
-    if store.is_sequence(folder):
+    if manifests.is_sequence(folder):
         return _sequence(folder)
     found = [*_left_behind(folder), *_seqmaps(folder)]
-    sequences = sorted(p for p in folder.glob("**/") if store.is_sequence(p) and PARTIAL not in str(p))
+    sequences = sorted(p for p in folder.glob("**/") if manifests.is_sequence(p) and PARTIAL not in str(p))
     if not sequences and not found:
         raise InputError(file=folder, got="no sequences", expected="a dataset of ours", remedy="check the path")
     return found + [problem for p in sequences for problem in _sequence(p)]
 
 
-def _problem(path: Path, got: object, expected: object, place: str = "", remedy: str = store.REDO) -> InputError:
+def _problem(path: Path, got: object, expected: object, place: str = "", remedy: str = manifests.REDO) -> InputError:
     return InputError(file=path, place=place, got=got, expected=expected, remedy=remedy)
 
 
@@ -60,15 +61,15 @@ def _seqmaps(root: Path) -> Iterator[InputError]:
 
 def _sequence(folder: Path) -> list[FlockscopeError]:
     try:
-        manifest = store.read_manifest(folder)
-        problems: list[FlockscopeError] = list(store.altered(folder, manifest))
+        manifest = manifests.read_manifest(folder)
+        problems: list[FlockscopeError] = list(manifests.altered(folder, manifest))
         return problems or [*_extra(folder, manifest), *_content(folder, manifest)]
     except FlockscopeError as error:
         return [error]
 
 
 def _extra(folder: Path, manifest: dict[str, Any]) -> Iterator[InputError]:
-    named = {store.MANIFEST, *manifest["files"]}
+    named = {manifests.MANIFEST, *manifest["files"]}
     for path in sorted(folder.rglob("*")):
         if path.is_file() and path.relative_to(folder).as_posix() not in named:
             yield _problem(path, "a file the manifest does not name", "only its own", remedy="move it elsewhere")
@@ -87,9 +88,9 @@ def _content(folder: Path, manifest: dict[str, Any]) -> Iterator[InputError]:
     detections = truths.read_detections(exact) if exact.is_file() else []
     name = hashing.truth_hash(text, manifest["seed"], manifest["repeat"], truth)
     if name != manifest["truth_hash"]:
-        yield _problem(folder / store.MANIFEST, "another truth_hash", name)
-    if hashing.content_hash(name, detections) != manifest["content_hash"]:
-        yield _problem(folder / store.MANIFEST, "another content_hash", "that of the stored content")
+        yield _problem(folder / manifests.MANIFEST, "another truth_hash", name)
+    if hashing.content_hash(name, detections, manifest.get("pixels")) != manifest["content_hash"]:
+        yield _problem(folder / manifests.MANIFEST, "another content_hash", "that of the stored content")
     if truth is not None:
         yield from _truth(folder, truth, length)
     if detections:

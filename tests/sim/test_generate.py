@@ -194,7 +194,7 @@ def test_a_disk_that_takes_no_more_ends_all_at_once(tmp_path, simulate, monkeypa
     """The first sequence fits, the second in part; nobody tries the third. With room again, all is as ever."""
     generate([Entry("x", scenario())], range(3), tmp_path / "right")
     room = 1.5 * sum(len(body) for name, body in content(tmp_path / "right").items() if "x-s00000" in name)
-    write = atomic._flushed
+    write = atomic.put
     simulate.made.clear()
 
     def write_while_there_is_room(path, body):
@@ -205,7 +205,7 @@ def test_a_disk_that_takes_no_more_ends_all_at_once(tmp_path, simulate, monkeypa
             raise OSError(number, os.strerror(number))
         write(path, body)
 
-    monkeypatch.setattr(atomic, "_flushed", write_while_there_is_room)
+    monkeypatch.setattr(atomic, "put", write_while_there_is_room)
     with pytest.raises(InputError if number == errno.EACCES else WorkError) as caught:
         generate([Entry("x", scenario())], range(3), tmp_path / "out")
     assert os.strerror(number) in str(caught.value)

@@ -7,6 +7,7 @@ import pytest
 
 from scenarios.errors import InputError, WorkError
 from sim.io import atomic, store
+from sim.io.manifest import sealed
 from sim.io.source import open_source
 from sim.io.validate import validate
 from sim.types import Frame, Sequence
@@ -153,7 +154,7 @@ def swap(path, old, new):
     manifest = json.loads((folder / "manifest.json").read_text())
     body = path.read_bytes()
     manifest["files"][path.relative_to(folder).as_posix()] = {"sha256": file_hash(body), "bytes": len(body)}
-    (folder / "manifest.json").write_text(json.dumps(store.sealed(manifest)))
+    (folder / "manifest.json").write_text(json.dumps(sealed(manifest)))
 
 
 @pytest.mark.parametrize(

@@ -57,7 +57,9 @@ def test_rotation_is_undone(tmp_path):
         sequence = one(path)
         assert sequence.image_size == (SIZE if degrees == 180 else SIZE[::-1])
         other = cv2.VideoCapture(str(path)).read()[1]
-        assert np.abs(next(iter(sequence)).image.astype(int) - other).mean() < 1
+        off = np.abs(next(iter(sequence)).image.astype(int) - other).mean()
+        assert off < 2, "OpenCV's reader is a grey level darker"
+        assert np.abs(next(iter(sequence)).image[::-1, ::-1].astype(int) - other).mean() > 5
 
 
 @pytest.mark.parametrize(
