@@ -12,6 +12,7 @@ import numpy as np
 from scenarios.errors import InputError
 from sim.io.atomic import write_file
 from sim.io.source import open_source
+from sim.io.streams import file_name
 from sim.io.tables import json_text
 from sim.types import Sequence, Truth
 
@@ -22,7 +23,8 @@ def coco(source: str | Path, out: str | Path) -> Path:
     """A COCO file of every sequence of a dataset with labelled boxes: one image per frame, one video per sequence.
 
     bbox is amodal and unclipped, [left, top, width, height] px; track_id and group_id (-1 alone) are those of the
-    truth, visibility its share. The same dataset gives the same bytes.
+    truth, visibility its share. file_name is the frame's picture, or the video that holds it. The same dataset gives
+    the same bytes.
     """
     sequences = [s for s in open_source(source) if s.truth is not None and s.truth.box is not None]
     if not sequences:
@@ -66,8 +68,9 @@ def _video(k: int, sequence: Sequence) -> dict[str, Any]:
 
 def _images(k: int, sequence: Sequence, before: int) -> Iterator[dict[str, Any]]:
     size = _size(sequence)
+    images = sequence.source.get("images") or "jpg"
     for index in range(1, (sequence.length or 0) + 1):
-        name = f"{sequence.name}/img1/{index:06d}.jpg"
+        name = f"{sequence.name}/{file_name('left', images, index)}"
         yield {"id": before + index, "file_name": name, **size, "video_id": k, "frame": index}
 
 

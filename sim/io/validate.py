@@ -14,6 +14,9 @@ from sim.io import truths
 from sim.io.atomic import PARTIAL
 from sim.io.cameras import read_scene
 from sim.io.mot_folder import read_seqinfo
+from sim.io.picture_reader import Stored
+from sim.io.sample import FRAMES
+from sim.io.streams import file_name, is_picture, suffix
 from sim.types import Detections, Groups, Truth
 
 
@@ -75,7 +78,7 @@ def _extra(folder: Path, manifest: dict[str, Any]) -> Iterator[InputError]:
             yield _problem(path, "a file the manifest does not name", "only its own", remedy="move it elsewhere")
 
 
-def _content(folder: Path, manifest: dict[str, Any]) -> Iterator[InputError]:
+def _content(folder: Path, manifest: dict[str, Any]) -> Iterator[FlockscopeError]:
     """The tables against one another, and the hashes anew."""
     text = (folder / "scenario.toml").read_text(encoding="utf-8")
     if hashing.scenario_hash(text) != manifest["scenario_hash"]:
@@ -93,8 +96,28 @@ def _content(folder: Path, manifest: dict[str, Any]) -> Iterator[InputError]:
         yield _problem(folder / manifests.MANIFEST, "another content_hash", "that of the stored content")
     if truth is not None:
         yield from _truth(folder, truth, length)
+    yield from _pictures(folder, manifest, length)
     if detections:
         yield from _detections(folder, detections, length, manifest["sequence"]["fps"])
+
+
+def _pictures(folder: Path, manifest: dict[str, Any], length: int) -> Iterator[FlockscopeError]:
+    """Every picture is there, can be read and has its size; those kept exactly have the raw pixels that were drawn."""
+    stored = Stored(folder, manifest)
+    named = {name for name in manifest["files"] if is_picture(name)}
+    for stream in stored.streams:
+        count, digest = FRAMES if stream == "background" else length, hashing.PixelHash()
+        named -= {file_name(stream, stored.images, k) for k in range(1, count + 1)}
+        try:
+            for picture in stored.all(stream, count):
+                digest.add(picture)
+        except FlockscopeError as error:
+            yield error
+            continue
+        if suffix(stream, stored.images) == "png" and digest.hex() != manifest["pixels"].get(stream):
+            yield _problem(folder / manifests.MANIFEST, f"other pixels of {stream}", "the pictures of their hash")
+    for name in sorted(named):
+        yield _problem(folder / name, "a picture beyond the last frame", "as many as frames")
 
 
 def _truth(folder: Path, truth: Truth, length: int) -> Iterator[InputError]:

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import fields, is_dataclass
+from collections.abc import Callable, Iterator
+from dataclasses import fields, is_dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -17,6 +17,7 @@ from sim.types import (
     Groups,
     Near,
     Order,
+    PixelTruth,
     Scene,
     Sequence,
     Stairs,
@@ -111,6 +112,45 @@ def sequence(seed: int, length: int = 12) -> Sequence:
     )  # fmt: skip
 
 
+SIZE = (64, 48)
+
+
+def pixel_truth(r: np.random.Generator, rows: int, stereo: bool) -> PixelTruth:
+    ids = r.choice([-2, 0, 1, 2, 999], (SIZE[1], SIZE[0]), p=[0.1, 0.6, 0.1, 0.1, 0.1])
+    far = r.integers(1, 5000, ids.shape) / 64
+    box = np.c_[r.uniform(0, 40, (rows, 2)), r.uniform(1, 9, (rows, 2))]
+    box[::4] = np.nan
+    return PixelTruth(
+        ids, np.where(r.random(ids.shape) < 0.1, np.nan, far) if stereo else None,
+        np.floor(r.uniform(0, 90, rows)), np.floor(r.uniform(90, 99, rows)), box, r.integers(-1, 3, rows),
+    )  # fmt: skip
+
+
+def pictured(seed: int, streams: tuple[str, ...], length: int = 12) -> Sequence:
+    """A sequence with random soft pictures: each a function of seed and frame alone."""
+    plain = sequence(seed, length)
+    truth = plain.truth
+
+    def picture(kind: int, k: int) -> np.ndarray:
+        small = np.random.default_rng([seed, kind, k]).integers(0, 255, (3, 4, 3))
+        return np.kron(small, np.ones((16, 16, 1))).astype(np.uint8)
+
+    def frames() -> Iterator[Frame]:
+        for f in plain:
+            left = picture(0, f.index) if "left" in streams else None
+            yield f.replace(image=left, right=picture(1, f.index) if "right" in streams else None)
+
+    def pixels(index: int) -> PixelTruth:
+        rows = truth.rows(index)
+        return pixel_truth(np.random.default_rng([seed, 2, index]), rows.stop - rows.start, "disparity" in streams)
+
+    return replace(
+        plain, frames=frames, bare=plain.frames, image_size=SIZE, has_images="left" in streams,
+        has_right="right" in streams, load_pixels=pixels if streams else None,
+        load_background=(lambda: np.stack([picture(3, k) for k in range(50)])) if streams else None,
+    )  # fmt: skip
+
+
 def tracks(seed: int, length: int = 9, plane: str = "ground", unit: str = "person", boxed: bool = True) -> list[Tracks]:
     r = np.random.default_rng(seed)
     d = 3 if plane == "space" else 2
@@ -140,6 +180,11 @@ def same() -> Callable[..., None]:
 @pytest.fixture
 def make_sequence() -> Callable[..., Sequence]:
     return sequence
+
+
+@pytest.fixture
+def make_pictured() -> Callable[..., Sequence]:
+    return pictured
 
 
 @pytest.fixture
