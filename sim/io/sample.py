@@ -76,13 +76,13 @@ class Sample:
 
     def __call__(self) -> Image:
         """Read it."""
-        if self.choice.count < FRAMES and not self.choice.asked:
-            text = f"{self.path.name}: shorter than a background sample of {FRAMES} frames; all {self.length} are taken"
-            warnings.warn(text, stacklevel=2)
         found = [picture for _, picture in self.pictures(self.choice.indices(self.length))]
         if not found:
             raise InputError(
                 file=self.path, got="no readable picture in the background sample", expected="one at least",
                 remedy="choose others: --background first:N or spread:N",
             )  # fmt: skip
+        if self.choice.count < FRAMES and not self.choice.asked:
+            text = f"{self.path.name}: shorter than a background sample of {FRAMES} frames; all {self.length} are taken"
+            warnings.warn(text, stacklevel=2)
         return np.stack(found)
