@@ -28,7 +28,7 @@ import importlib.util, os, signal, sys, types
 spec = importlib.util.spec_from_file_location("fakes", {str(FAKES)!r})
 fakes = importlib.util.module_from_spec(spec)
 spec.loader.exec_module(fakes)
-simulate = lambda scenario, seed, repeat: fakes.sequence(seed + 100 * repeat)
+simulate = lambda scenario, seed, repeat, streams=(): fakes.sequence(seed + 100 * repeat)
 sys.modules["sim.sequence"] = types.SimpleNamespace(simulate=simulate)
 from scenarios.loading import Entry
 from scenarios.schema import Scenario
@@ -53,7 +53,8 @@ if __name__ == "__main__":
 
     atomic.os.fsync = die
     scenario = Scenario.model_validate({{"schema": 1, "group": [{{"id": "a", "start": [1, 1], "goal": [2, 2]}}]}})
-    generate([Entry("x", scenario, 0), Entry("y-1", scenario, 1)], range(3), out, workers=workers, progress=parent_dies)
+    entries = [Entry("x", scenario, 0), Entry("y-1", scenario, 1)]
+    generate(entries, range(3), out, workers=workers, progress=parent_dies, streams=())
 """
 
 
@@ -69,11 +70,11 @@ def simulate(monkeypatch):
     spec.loader.exec_module(fakes)
     module = types.SimpleNamespace(made=[], wrong={})
 
-    def run(scenario, seed, repeat):
+    def run(scenario, seed, repeat, streams=()):
         module.made.append(seed)
         if seed in module.wrong:
             raise module.wrong[seed]
-        return fakes.sequence(seed + 100 * repeat)
+        return fakes.pictured(seed + 100 * repeat, streams) if streams else fakes.sequence(seed + 100 * repeat)
 
     module.simulate = run
     monkeypatch.setitem(sys.modules, "sim.sequence", module)
