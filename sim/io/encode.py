@@ -18,10 +18,15 @@ QUALITY = 18  # x264's constant rate factor: hardly to be told from the original
 BT601, NARROW = 6, 1  # libav's numbers of the colour matrix and range that OpenCV converts to
 
 
+def rate_of(fps: float) -> Fraction:
+    """Frames per second as containers have them."""
+    return Fraction(fps).limit_denominator(1001)
+
+
 class Movie:
     """A video file that takes (H, W, 3) BGR pictures one after the other; a context manager, whole when left."""
 
-    def __init__(self, path: Path, size: tuple[int, int], fps: float):
+    def __init__(self, path: Path, size: tuple[int, int], fps: float, quality: int = QUALITY):
         import av
 
         if size[0] % 2 or size[1] % 2:
@@ -29,10 +34,10 @@ class Movie:
                 place="--images mp4", got="pictures of {}×{} px".format(*size), expected="an even width and height",
                 remedy="take --images jpg or png, or another camera.image",
             )  # fmt: skip
-        rate = Fraction(fps).limit_denominator(1001)
+        rate = rate_of(fps)
         self._container: Any = av.open(str(path), "w", format="mp4", options={"movflags": "faststart"})
         group = str(max(1, round(fps)))
-        options = {"crf": str(QUALITY), "preset": "veryfast", "g": group, "bf": "2", "threads": "1"}
+        options = {"crf": str(quality), "preset": "veryfast", "g": group, "bf": "2", "threads": "1"}
         self._stream: Any = self._container.add_stream("libx264", rate=rate, options=options)
         self._stream.width, self._stream.height = size
         self._stream.pix_fmt = "yuv420p"
