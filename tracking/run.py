@@ -6,7 +6,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from collections.abc import Sequence as SequenceOf
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -18,6 +18,7 @@ from scenarios.errors import FlockscopeError, InputError, WorkError
 from sim.types import Context, DetectionMode, Detections, Frame, Sequence, Tracker, Tracks
 from tracking import protocol
 from tracking.config import Config
+from tracking.provenance import Speed, describe
 
 PERSON_HEIGHT = 1.7  # m, what the median box of an uncalibrated source stands for
 
@@ -98,24 +99,31 @@ def track(
     detections: DetectionMode | None = None,
     sensor: Mapping[str, Any] | None = None,
     seed: int = 0,
+    progress: Callable[[int], None] | None = None,
 ) -> Run:
     """Track a sequence with a registered tracker, "file.py:Class", "module:Class", a class or an instance.
 
     params: its config, values by name or a TOML file. detections: "image", "file" or "truth"; by default the first that
-    can work. sensor: overrides that degrade "truth" (misses, clutter, noise, hiding). InputError where tracker and
-    source do not fit, before a frame is read; WorkError where the tracker's answer is no Tracks.
+    can work. sensor: overrides that degrade "truth" (misses, clutter, noise, hiding). progress: called with the number
+    of each frame that is done. InputError where tracker and source do not fit, before a frame is read; WorkError where
+    the tracker's answer is no Tracks.
     """
     from tracking.grouping import with_groups
 
     ready = prepare(tracker, sequence, params=params, detections=detections, sensor=sensor, seed=seed)
     ready.reset(seed)
-    made, spent = [], 0.0
+    made, spent, begun = [], 0.0, time.perf_counter()
     for frame in ready.frames():
         start = time.perf_counter()
         made.append(ready.answer(frame))
         spent += time.perf_counter() - start
-    answers = with_groups(made, ready.context.fps, ready.context.px_per_m)
-    return Run(answers, describe(ready, answers, seed, sensor or {}, len(made) / spent if spent else 0.0))
+        if progress is not None:
+            progress(frame.index)
+    whole = time.perf_counter() - begun
+    px_per_m = _scale(ready.context, made)
+    answers = with_groups(made, ready.context.fps, px_per_m)
+    speed = Speed(len(made) / spent, len(made) / whole) if made else Speed()
+    return Run(answers, describe(ready, answers, seed, sensor or {}, px_per_m, speed))
 
 
 def prepare(
@@ -205,6 +213,14 @@ def _feed(
     return tuple(Frame(k, (k - 1) / sequence.fps, detections=d) for k, d in enumerate(found, 1))
 
 
+def _scale(context: Context, answers: SequenceOf[Tracks]) -> float:
+    """px per metre; where nothing said it before, by the median height of the boxes that were answered."""
+    heights = [t.box[:, 3] for t in answers if t.box is not None and len(t.box)]
+    if np.isfinite(context.px_per_m) or not heights:
+        return context.px_per_m
+    return float(np.nanmedian(np.concatenate(heights))) / PERSON_HEIGHT
+
+
 def _px_per_m(sequence: Sequence, mode: DetectionMode, feed: tuple[Frame, ...] | None) -> float:
     """px per metre: the camera's, the source's own, else the median height of the boxes given / 1.7; nan if none."""
     if sequence.camera is not None:
@@ -216,40 +232,3 @@ def _px_per_m(sequence: Sequence, mode: DetectionMode, feed: tuple[Frame, ...] |
     found = [f.detections for f in (sequence.without_pictures() if feed is None else feed)]
     heights = [d.box[:, 3] for d in found if d is not None and d.box is not None and len(d.box)]
     return float(np.median(np.concatenate(heights))) / PERSON_HEIGHT if heights else float("nan")
-
-
-def describe(
-    ready: Prepared, answers: SequenceOf[Tracks], seed: int, sensor: Mapping[str, Any], frames_per_second: float
-) -> dict[str, Any]:
-    """What run.json holds; `frames_per_second` is the only entry that differs between two equal runs."""
-    from sim.io.box_source import box_source
-
-    sample = ready.context.background
-    return {
-        "tracker": ready.name,
-        "config": ready.config.as_dict() if ready.config else {},
-        "seed": seed,
-        "sequence": ready.sequence.name,
-        "detections": ready.mode,
-        "sensor": dict(sensor),
-        "plane": answers[0].plane if len(answers) else None,
-        "boxes": box_source(answers, ready.context.camera),
-        "fps": ready.context.fps,
-        "px_per_m": None if np.isnan(ready.context.px_per_m) else ready.context.px_per_m,
-        "background": None if sample is None else ready.sequence.source.get("background", len(sample)),
-        "frames": len(answers),
-        "frames_per_second": frames_per_second,
-        "versions": _versions(),
-    }
-
-
-def _versions() -> dict[str, str]:
-    from importlib.metadata import PackageNotFoundError, version
-
-    found = {}
-    for name in ("flockscope", "numpy", "scipy"):
-        try:
-            found[name] = version(name)
-        except PackageNotFoundError:
-            continue
-    return found

@@ -26,9 +26,15 @@ app.add_typer(export, name="export")
 Json = Annotated[bool, typer.Option("--json", help="Print one JSON object instead of text.")]
 Set = Annotated[list[str], typer.Option("--set", metavar="K=V", help="Set a value; may be given often.")]
 Out = Annotated[Path, typer.Option("--out", metavar="DIR", help="Folder to write to.")]
-Source = Annotated[Path, typer.Argument(metavar="SOURCE", help="Sequence or dataset: generated, MOT, BIWI, CAVIAR.")]
+Source = Annotated[
+    Path, typer.Argument(metavar="SOURCE", help="Sequence or dataset: generated, MOT, video, BIWI, CAVIAR.")
+]
 Fps = Annotated[float | None, typer.Option("--fps", help="Frames per second, where the recording does not say.")]
 Scale = Annotated[float | None, typer.Option("--px-per-m", help="Pixels per metre, where there is no camera.")]
+Calibration = Annotated[
+    Path | None, typer.Option("--camera", metavar="FILE", help="A recording's calibration: camera.json or Tsai's XML.")
+]
+Tracked = Annotated[Path | None, typer.Argument(metavar="TRACKS", help="What `track` wrote, or MOT text.")]
 
 
 def _version(asked: bool) -> None:
@@ -88,13 +94,18 @@ def generate(
     seeds: Annotated[str, typer.Option("--seeds", metavar="A:B", help="Seeds from A to B - 1, or one.")],
     out: Out,
     settings: Set = [],  # noqa: B006
+    streams: Annotated[
+        str,
+        typer.Option("--streams", metavar="A,B,…", help="Pictures: left, right, disparity, ids, background; or none."),
+    ] = "none",
+    images: Annotated[Literal["jpg", "png", "mp4"], typer.Option(help="How pictures are stored.")] = "jpg",
     workers: Annotated[int, typer.Option("--workers", min=1, help="Processes.")] = 1,
     json: Json = False,
 ) -> Answer:
     """Simulate scenarios and store them as a dataset."""
     from tracking.app.dataset_commands import generate
 
-    return generate(names, seeds, out, settings, workers)
+    return generate(names, seeds, out, settings, workers, streams, images)
 
 
 @app.command()
@@ -108,8 +119,10 @@ def track(
     seed: Annotated[int, typer.Option("--seed", min=0, help="The tracker's seed.")] = 0,
     fps: Fps = None,
     px_per_m: Scale = None,
-    camera: Annotated[
-        Path | None, typer.Option("--camera", metavar="FILE", help="The recording's camera.json.")
+    camera: Calibration = None,
+    background: Annotated[
+        str | None,
+        typer.Option("--background", metavar="first:N|spread:N", help="Frames a video's background is learned from."),
     ] = None,
     json: Json = False,
 ) -> Answer:
@@ -117,7 +130,7 @@ def track(
     from tracking.app import track_command
 
     job = track_command.job(tracker, params, settings, detections, seed)
-    return track_command.track(job, source, out, fps=fps, px_per_m=px_per_m, camera=camera)
+    return track_command.track(job, source, out, fps=fps, px_per_m=px_per_m, camera=camera, background=background)
 
 
 @app.command()
@@ -158,17 +171,22 @@ def score(
 @app.command()
 def view(
     source: Source,
-    tracks: Annotated[Path | None, typer.Argument(metavar="TRACKS", help="What `track` wrote, or MOT text.")] = None,
+    tracks: Tracked = None,
     *,
     out: Annotated[Path, typer.Option("--out", metavar="FILE.html", help="Page to write; a folder for many.")],
+    video: Annotated[
+        Literal["auto", "inside", "beside", "none"],
+        typer.Option(help="Pictures inside the page, as FILE.mp4 beside it (auto: from 12 MB on), or none."),
+    ] = "auto",
     fps: Fps = None,
     px_per_m: Scale = None,
+    camera: Calibration = None,
     json: Json = False,
 ) -> Answer:
-    """A replay in the browser, tracks beside truth."""
-    from tracking.app.view_command import view
+    """A replay in the browser, tracks beside truth, over the pictures where there are any."""
+    from tracking.app.view_command import Recording, view
 
-    return view(source, tracks, out, fps=fps, px_per_m=px_per_m)
+    return view(Recording(source, fps, px_per_m, camera), tracks, out, video)
 
 
 @app.command()
@@ -179,10 +197,31 @@ def sheet(
     fps: Fps = None,
     json: Json = False,
 ) -> Answer:
-    """A contact sheet of a sequence's truth."""
-    from tracking.app.view_command import sheet
+    """A contact sheet of a sequence: its pictures, its truth."""
+    from tracking.app.view_command import Recording, sheet
 
-    return sheet(source, out, frames=frames, fps=fps)
+    return sheet(Recording(source, fps), out, frames)
+
+
+@app.command()
+def overlay(
+    source: Source,
+    tracks: Tracked = None,
+    *,
+    out: Annotated[Path, typer.Option("--out", metavar="FILE.mp4", help="Video to write; a folder for many.")],
+    truth: Annotated[
+        Literal["beside", "over", "only"] | None,
+        typer.Option(help="The truth beside the tracks, over the same picture, or alone; alone without TRACKS."),
+    ] = None,
+    fps: Fps = None,
+    px_per_m: Scale = None,
+    camera: Calibration = None,
+    json: Json = False,
+) -> Answer:
+    """A video with boxes, ids, trails, groups and events drawn over the pictures."""
+    from tracking.app.view_command import Recording, overlay
+
+    return overlay(Recording(source, fps, px_per_m, camera), tracks, out, truth)
 
 
 @app.command()

@@ -10,7 +10,9 @@ from tracking.app.answer import Answer
 from tracking.app.meter import Meter
 
 
-def generate(names: Iterable[str], seeds: str, out: Path, settings: Iterable[str], workers: int) -> Answer:
+def generate(
+    names: Iterable[str], seeds: str, out: Path, settings: Iterable[str], workers: int, streams: str, images: str
+) -> Answer:
     """Every named scenario or suite with every seed, as a dataset."""
     from sim.generate import generate as make
 
@@ -18,7 +20,10 @@ def generate(names: Iterable[str], seeds: str, out: Path, settings: Iterable[str
     chosen = options.seeds(seeds)
     texts = options.scenario_settings(settings)
     with Meter("generate") as meter:
-        folders = make(names, chosen, out, set=texts, workers=workers, progress=meter.update)
+        folders = make(
+            names, chosen, out, set=texts, workers=workers, progress=meter.update,
+            streams=options.streams(streams), images=images,
+        )  # fmt: skip
     text = f"{len(folders)} sequences in {folders[0].parent}"
     return Answer({"sequences": folders, "folder": folders[0].parent}, text)
 

@@ -1,4 +1,4 @@
-"""What options mean: `--seeds a:b`, `--set subject.key=value`, folders to write to."""
+"""What options mean: `--seeds a:b`, `--streams a,b`, `--set subject.key=value`, folders to write to."""
 
 from __future__ import annotations
 
@@ -54,6 +54,11 @@ def scenario_settings(texts: Iterable[str]) -> list[str]:
     """`--set` of commands about scenarios: `sensor.` is the scenario's own sensor."""
     found = settings(texts, "scenario", ("scenario", "sensor"))
     return [f"sensor.{text}" if subject == "sensor" else text for subject, text in found]
+
+
+def streams(text: str) -> tuple[str, ...]:
+    """Words between commas; () for none."""
+    return () if text.strip() == "none" else tuple(word.strip() for word in text.split(",") if word.strip())
 
 
 def values(texts: Iterable[str]) -> dict[str, Any]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -26,13 +26,14 @@ class Job:
     sensor: Mapping[str, Any] = field(default_factory=dict)
     seed: int = 0
 
-    def run(self, sequence: Sequence) -> Run:
+    def run(self, sequence: Sequence, progress: Callable[[int], None] | None = None) -> Run:
         """The tracker's answers."""
         from tracking.run import track
 
         return track(
-            self.tracker, sequence, params=self.config, detections=self.detections, sensor=self.sensor, seed=self.seed
-        )
+            self.tracker, sequence, params=self.config, detections=self.detections, sensor=self.sensor, seed=self.seed,
+            progress=progress,
+        )  # fmt: skip
 
 
 def job(tracker: str, params: Path | None, settings: Iterable[str], detections: DetectionMode | None, seed: int) -> Job:
@@ -61,24 +62,51 @@ def _config(tracker: str, params: Path | None, settings: list[str]) -> Config | 
 
 
 def track(
-    job: Job, source: Path, out: Path, *, fps: float | None, px_per_m: float | None, camera: Path | None
+    job: Job,
+    source: Path,
+    out: Path,
+    *,
+    fps: float | None,
+    px_per_m: float | None,
+    camera: Path | None,
+    background: str | None,
 ) -> Answer:
-    """Run the job on every sequence of the source and store the answers: in `out`, or in a folder of it for each."""
+    """Run the job on every sequence of the source and store the answers: in `out`, or in a folder of it for each.
+
+    InputError before the first frame is read where the job cannot be done on one of them.
+    """
     from sim.io.source import open_source
     from sim.io.tracks import write_tracks
     from tracking.protocol import find
 
     options.folder(out)
-    pictures = not {"pixels", "stereo"}.isdisjoint(find(job.tracker).needs)
-    sequences = open_source(source, fps=fps, px_per_m=px_per_m, camera=camera, images=pictures)
+    needs = find(job.tracker).needs
+    pictures = job.detections in (None, "image") and not {"pixels", "stereo"}.isdisjoint(needs)
+    sequences = open_source(source, fps=fps, px_per_m=px_per_m, camera=camera, images=pictures, background=background)
+    chosen = places(sequences, source, out)
+    _check(job, needs, sequences, background)
     rows = []
-    with Meter("track", len(sequences)) as meter:
-        for sequence, folder in places(sequences, source, out):
-            run = job.run(sequence)
+    with Meter("track", _frames(sequences)) as meter:
+        for sequence, folder in chosen:
+            run = job.run(sequence, lambda index, name=sequence.name: meter.step(name))  # type: ignore[misc]
             write_tracks(folder, run, fps=sequence.fps, camera=sequence.camera, scene=sequence.scene, info=run.info)
             rows.append(_row(run, folder))
-            meter.step(sequence.name)
     return Answer({"tracker": job.tracker, "runs": rows}, "\n".join(map(_line, rows)))
+
+
+def _check(job: Job, needs: tuple[str, ...], sequences: list[Sequence], background: str | None) -> None:
+    from tracking.protocol import choose_mode
+
+    modes = [choose_mode(needs, sequence, job.detections) for sequence in sequences]
+    if background is not None and "image" not in modes:
+        got, expected = f"--detections {modes[0]}", "a tracker that works on pictures"
+        raise InputError(place="--background", got=got, expected=expected, remedy="leave --background out")
+
+
+def _frames(sequences: list[Sequence]) -> int | None:
+    """Frames of all, None where that is not known."""
+    lengths = [sequence.length for sequence in sequences]
+    return None if None in lengths else sum(length or 0 for length in lengths)
 
 
 def places(sequences: list[Sequence], source: Path, out: Path) -> list[tuple[Sequence, Path]]:
@@ -96,12 +124,14 @@ def places(sequences: list[Sequence], source: Path, out: Path) -> list[tuple[Seq
 
 
 def _row(run: Run, folder: Path) -> dict[str, Any]:
-    shown = ("sequence", "detections", "plane", "boxes", "frames", "frames_per_second")
+    shown = ["sequence", "detections", "background", "causal", "plane", "boxes", "frames"]
+    shown += ["frames_per_second", "whole_frames_per_second"]
     ids = {int(id) for tracks in run for id in tracks.id}
     return {**{key: run.info[key] for key in shown}, "tracks": len(ids), "folder": folder}
 
 
 def _line(row: dict[str, Any]) -> str:
-    speed = f"{row['frames_per_second']:.0f} frames/s"
-    counts = f"{row['frames']} frames, {row['tracks']} tracks, detections {row['detections']}, {speed}"
+    speed = f"{row['frames_per_second']:.0f} frames/s ({row['whole_frames_per_second']:.0f} with reading)"
+    seen = f" (background: {row['background']})" if row["background"] else ""
+    counts = f"{row['frames']} frames, {row['tracks']} tracks, detections {row['detections']}{seen}, {speed}"
     return f"{row['sequence']}: {counts} → {row['folder']}"

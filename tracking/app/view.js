@@ -2,11 +2,12 @@
 
 const $ = id => document.getElementById(id);
 const state = { frame: 1, playing: false, speed: 1, clock: 0, then: 0 };
-const options = { truth: true, tracks: true, detections: false, hulls: true, trails: true, ids: true, near: true, beside: false, by: "person" };
+const options = { truth: true, tracks: true, detections: false, hulls: true, trails: true, ids: true, near: true, beside: false, video: true, by: "person" };
+const film = makeFilm(data.video, pictured);
 const TOGGLES = [
   ["truth", "Truth", "t", truth], ["tracks", "Tracks", "k", tracks], ["beside", "Side by side", "b", truth && tracks],
   ["detections", "Detections", "d", found], ["hulls", "Groups", "h", true], ["trails", "Trails", "l", hasPlan],
-  ["ids", "Ids", "i", true], ["near", "Near strangers", "s", data.near.length],
+  ["video", "Video", "v", film], ["ids", "Ids", "i", true], ["near", "Near strangers", "s", data.near.length],
 ];
 const SPEEDS = [0.1, 0.25, 0.5, 1, 2, 4, 8];
 const KEYS = [
@@ -26,12 +27,37 @@ function show() {
   const frame = state.frame;
   $("stages").classList.toggle("beside", options.beside && options.truth && options.tracks);
   if (hasPlan) drawPlan($("plan"), frame, options);
-  if (hasImage) drawImage($("image"), frame, options);
+  showImage();
   if (line) line.move(frame);
   $("seek").value = frame;
   $("seek").setAttribute("aria-valuetext", `frame ${frame}, ${seconds(frame).toFixed(1)} seconds`);
   $("clock").value = `${frame} / ${data.length} · ${seconds(frame).toFixed(2)} s`;
   facts(frame);
+}
+
+// The image follows the video, whose frame may come a moment after it was asked for.
+function showImage() {
+  if (!hasImage) return;
+  if (rolling() && !state.playing) film.want(state.frame);
+  drawImage($("image"), rolling() && film.frame ? film.frame : state.frame, options);
+}
+
+function rolling() {
+  return Boolean(film) && film.able && options.video;
+}
+
+// The video shows another frame, or cannot be shown.
+function pictured() {
+  if (film.failed) {
+    $("image-note").textContent = `the video cannot be played here${data.video.src ? `: ${data.video.src}` : ""}`;
+    film.failed = false;
+    if (state.playing) play(true);
+    return show();
+  }
+  if (!state.playing) return showImage();
+  state.frame = film.frame;
+  show();
+  if (state.frame >= data.length) play(false);
 }
 
 function facts(frame) {
@@ -61,15 +87,20 @@ function play(on) {
   state.playing = on;
   $("play").querySelector("path").setAttribute("d", on ? "M3 2h4v12H3z M9 2h4v12H9z" : "M4 2v12l10-6z");
   $("play").setAttribute("aria-label", on ? "Pause" : "Play");
-  if (!on) return;
-  if (state.frame >= data.length) seekTo(1);
+  if (!on) return film && film.pause();
+  if (state.frame >= data.length) {
+    state.playing = false; // so that the video goes back as well
+    seekTo(1);
+    state.playing = true;
+  }
+  if (rolling() && film.plays) return film.play(state.speed);
   state.clock = state.frame;
   state.then = performance.now();
   requestAnimationFrame(tick);
 }
 
 function tick(now) {
-  if (!state.playing) return;
+  if (!state.playing || (rolling() && film.plays)) return;
   state.clock += ((now - state.then) / 1000) * data.fps * state.speed;
   state.then = now;
   const frame = Math.floor(state.clock);
@@ -97,9 +128,15 @@ function speed(change) {
   const next = SPEEDS[Math.min(Math.max(SPEEDS.indexOf(state.speed) + change, 0), SPEEDS.length - 1)];
   state.speed = next;
   $("speed").value = next;
+  hasten();
+}
+
+function hasten() {
+  if (film) film.video.playbackRate = state.speed;
 }
 
 function toggle(name) {
+  if (name === "video") play(false);
   options[name] = !options[name];
   $(`show-${name}`).checked = options[name];
   show();
@@ -208,7 +245,10 @@ function listen() {
   $("next").addEventListener("click", () => step(1));
   $("play").addEventListener("click", () => play(!state.playing));
   $("seek").addEventListener("input", () => jump($("seek").valueAsNumber));
-  $("speed").addEventListener("change", () => { state.speed = Number($("speed").value); });
+  $("speed").addEventListener("change", () => {
+    state.speed = Number($("speed").value);
+    hasten();
+  });
   $("help-button").addEventListener("click", () => $("help").showModal());
   const drag = event => {
     if (!(event.buttons & 1)) return;
@@ -227,7 +267,16 @@ function listen() {
   }).observe(document.body);
 }
 
+// FILE.html#57 shows frame 57.
+function fromAddress() {
+  const frame = Number(location.hash.slice(1));
+  if (frame >= 1) jump(frame);
+}
+
+if (film) $("under").append(film.video);
 buildHead();
 buildControls();
 layOut();
 listen();
+fromAddress();
+addEventListener("hashchange", fromAddress);

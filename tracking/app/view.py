@@ -1,4 +1,4 @@
-"""A replay in the browser: one self-contained HTML file, nothing fetched, nothing run elsewhere."""
+"""A replay in the browser: one HTML file, at most a video beside it; nothing fetched, nothing run elsewhere."""
 
 from __future__ import annotations
 
@@ -16,10 +16,11 @@ from sim.io.atomic import write_file
 from sim.types import Sequence, Tracks, Truth
 from tracking.app import view_data
 from tracking.app.extent import MARGIN, peopled
+from tracking.app.film import Film
 from tracking.app.view_data import Json, Rows
 
 HERE = Path(__file__).parent
-SCRIPTS = ("view_data.js", "view_draw.js", "view_plan.js", "view_image.js", "view_time.js", "view.js")
+SCRIPTS = ("view_data.js", "view_draw.js", "view_plan.js", "view_image.js", "view_time.js", "view_film.js", "view.js")
 
 
 def view(
@@ -28,18 +29,21 @@ def view(
     out: str | Path,
     scores: Mapping[str, float] | None = None,
     title: str | None = None,
+    film: Film | None = None,
 ) -> Path:
     """Writes the page, whole or not at all, and returns its path; `tracks` and `scores` are shown where they are given.
 
-    Groups and events that a tracker left out are derived by the baseline rule.
+    Groups and events that a tracker left out are derived by the baseline rule. film: what is played under the boxes.
     """
     name = title or sequence.name
-    data = json.dumps(payload(sequence, tracks, scores), separators=(",", ":"), allow_nan=False)
+    shown = payload(sequence, tracks, scores) | {"video": None if film is None else film.facts()}
+    data = json.dumps(shown, separators=(",", ":"), allow_nan=False)
     page = (HERE / "view.html").read_text(encoding="utf-8")
     parts = {
         "TITLE": escape(name),
         "STYLE": (HERE / "view.css").read_text(encoding="utf-8"),
         "DATA": data.replace("<", "\\u003c").replace("\u2028", "\\u2028").replace("\u2029", "\\u2029"),
+        "FILM": "" if film is None else film.inside,
         "SCRIPT": "\n".join((HERE / script).read_text(encoding="utf-8") for script in SCRIPTS),
     }
     pieces = page.split("@@")

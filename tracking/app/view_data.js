@@ -93,4 +93,4 @@ const found = decodeDetections(data.detections);
 const sides = [truth, tracks].filter(Boolean);
 const hasPlan = Boolean(data.bounds);
 const hasImage = Boolean(data.image) &&
-  (sides.some(side => side.box || side.plane === "image") || Boolean(found && (found.box || found.plane === "image")));
+  (Boolean(data.video) || sides.some(side => side.box || side.plane === "image") || Boolean(found && (found.box || found.plane === "image")));

@@ -163,7 +163,11 @@ def detections(sequence: Sequence) -> Json | None:
     """What the detector found, frame by frame: counts, and boxes in px or points (ground: cm)."""
     if not sequence.has_detections:
         return None
-    found = [(f.index, f.detections) for f in sequence.without_pictures() if f.detections is not None and len(f.detections.pos)]
+    found = [
+        (f.index, f.detections)
+        for f in sequence.without_pictures()
+        if f.detections is not None and len(f.detections.pos)
+    ]
     if not found:
         return None
     plane = found[0][1].plane

@@ -1,4 +1,4 @@
-// The image plane: true, tracked and detected boxes, over the ground and walls that the camera sees.
+// The image plane: true, tracked and detected boxes, over the video, or else the ground and walls that the camera sees.
 
 function drawImage(canvas, frame, options) {
   const [imageWidth, imageHeight] = data.image;
@@ -7,12 +7,16 @@ function drawImage(canvas, frame, options) {
   const w = width / parts.length, scale = w / imageWidth;
   parts.forEach((shown, k) => {
     const title = parts.length > 1 ? shown[0].name : "";
-    inPane(ctx, k * w, 0, w, height, title, () => imagePane({ ctx, scale, frame, options, taken: [] }, shown));
+    inPane(ctx, k * w, 0, w, height, title, () => {
+      const pictured = Boolean(film) && options.video && film.draw(ctx, w, height);
+      imagePane({ ctx, scale, frame, options, pictured, taken: [] }, shown);
+    });
   });
 }
 
 function imagePane(pane, shown) {
-  if (data.camera) groundLines(pane);
+  if (data.camera && !pane.pictured) groundLines(pane);
+  if (film && film.lost.has(pane.frame)) label(pane.ctx, "lost frame: no picture", 90, 22, theme.found, true);
   if (pane.options.hulls) for (const side of shown) imageHulls(pane, side);
   if (pane.options.detections && found) imageDetections(pane);
   for (const side of shown) imageBoxes(pane, side);
@@ -24,7 +28,7 @@ function boxOf(source, row, scale) {
   return Number.isNaN(box[0]) ? null : box;
 }
 
-function imageBoxes({ ctx, scale, frame, options, taken }, side) {
+function imageBoxes({ ctx, scale, frame, options, pictured, taken }, side) {
   const rows = side.rows(frame), tracked = side.name === "tracks";
   const ids = options.ids && rows.length <= MANY;
   for (const row of rows) {
@@ -35,8 +39,9 @@ function imageBoxes({ ctx, scale, frame, options, taken }, side) {
     if (box) {
       const hidden = !tracked && side.visible[row] <= 2;
       if (hidden) ctx.setLineDash([1, 3]);
+      if (pictured && !hidden) rim(ctx, box, colour);
       ctx.strokeRect(...box);
-      ctx.globalAlpha = tracked ? 0 : 0.1;
+      ctx.globalAlpha = tracked || pictured ? 0 : 0.1;
       ctx.fillStyle = colour;
       ctx.fillRect(...box);
       ctx.globalAlpha = 1;
@@ -52,6 +57,15 @@ function imageBoxes({ ctx, scale, frame, options, taken }, side) {
     }
   }
   ctx.setLineDash([]);
+}
+
+// A light edge, for colours on pictures.
+function rim(ctx, box, colour) {
+  ctx.strokeStyle = theme.halo;
+  ctx.lineWidth += 2;
+  ctx.strokeRect(...box);
+  ctx.strokeStyle = colour;
+  ctx.lineWidth -= 2;
 }
 
 function imageHulls({ ctx, scale, frame, options, taken }, side) {

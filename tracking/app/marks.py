@@ -1,0 +1,163 @@
+"""What is to be drawn over a picture: boxes, ids, trails, ellipses, regions of groups and events of one side, in px."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from collections.abc import Sequence as SequenceOf
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from sim.geometry import convex_hull
+from sim.io.truths import standing
+from sim.io.upright import upright_boxes
+from sim.types import Array, Bools, Camera, GroupEvent, Ints, Scene, Tracks, Truth
+
+SURE = math.sqrt(5.991)
+"""Standard deviations that hold 95 % of a plane's normal distribution."""
+
+ROUND = np.stack([f(np.linspace(0, 2 * np.pi, 32, endpoint=False)) for f in (np.cos, np.sin)], axis=1)
+AROUND = 5.0
+"""px between a member's box and the edge of the region."""
+
+QUIET = ("enter", "leave")
+"""Kinds that are told nowhere in the picture."""
+
+
+@dataclass(frozen=True, eq=False)
+class Marks:
+    """One frame of one side, N rows: box (N, 4) ltwh and at (N, 2), where trails run, nan where unknown.
+
+    ellipse (N, 32, 2): where the position is with 95 %, nan where unknown; regions: group ids and polygons (V, 2).
+    hidden (N,): labelled, yet hardly to be seen.
+    """
+
+    id: Ints
+    box: Array
+    at: Array
+    ellipse: Array
+    hidden: Bools
+    regions: tuple[tuple[int, Array], ...] = ()
+
+    @classmethod
+    def none(cls) -> Marks:
+        """Nobody."""
+        two = np.zeros((0, 2))
+        return cls(np.zeros(0, np.int64), np.zeros((0, 4)), two, np.zeros((0, 32, 2)), np.zeros(0, bool))
+
+
+@dataclass(frozen=True, eq=False)
+class Side:
+    """The truth or a tracker's answers as marks by frame, and events by the frame in which they are known."""
+
+    name: str
+    prefix: str
+    frames: dict[int, Marks]
+    events: tuple[tuple[int, GroupEvent], ...] = field(default=())
+
+    def at(self, index: int) -> Marks:
+        """The marks of a frame."""
+        return self.frames.get(index, Marks.none())
+
+    def trails(self, index: int, past: int) -> Iterator[tuple[int, Array]]:
+        """(id, (K, 2)) of everybody present: where they were in this and the last `past` frames, back to a gap."""
+        tails: dict[int, list[Array]] = {}
+        going = set(self.at(index).id.tolist())
+        for k in range(index, max(index - past, 1) - 1, -1):
+            here = self.at(k)
+            now = dict(zip(here.id.tolist(), here.at, strict=True))
+            going &= {i for i, at in now.items() if np.isfinite(at).all()}
+            for i in going:
+                tails.setdefault(i, []).append(now[i])
+        return ((i, np.array(points)) for i, points in tails.items() if len(points) > 1)
+
+    def told(self, index: int, for_frames: float) -> list[GroupEvent]:
+        """Events that became known in this frame or the last few, the newest first."""
+        now = [(known, e) for known, e in self.events if 0 <= index - known < for_frames and e.kind not in QUIET]
+        return [event for _, event in sorted(now, key=lambda pair: -pair[0])]
+
+
+def of_tracks(tracks: SequenceOf[Tracks], camera: Camera | None, scene: Scene | None) -> Side:
+    """A tracker's answers; boxes that it does not know are those of upright people where there is a camera."""
+    frames = {t.index: _of_answer(t, camera, scene) for t in tracks}
+    events = [(e.start if e.emitted is None else e.emitted, e) for t in tracks for e in t.events]
+    return Side("tracked", "T", frames, tuple(events))
+
+
+def of_truth(truth: Truth) -> Side:
+    """What is true; frames without a person have no marks."""
+    frames = {}
+    for index in range(1, truth.length + 1):
+        now = truth.at(index)
+        if now.box is None or not len(now.id):
+            continue
+        ellipse = np.full((len(now.id), 32, 2), np.nan)
+        regions = _regions(now.group, now.box)
+        if now.groups_px is not None:
+            regions = tuple((int(g), h) for g, h in zip(now.groups_px.id, now.groups_px.hull, strict=True) if len(h))
+        frames[index] = Marks(now.id, now.box, _feet(now.box), ellipse, now.visibility < 0.2, regions)
+    return Side("true", "G", frames, tuple((e.start, e) for e in truth.events or ()))
+
+
+def _of_answer(t: Tracks, camera: Camera | None, scene: Scene | None) -> Marks:
+    n = len(t.id)
+    box = t.box if t.box is not None else np.full((n, 4), np.nan)
+    if t.box is None and t.plane != "image" and t.unit == "person" and camera is not None:
+        box = upright_boxes(camera, standing(t.pos, scene))
+    at = _feet(box)
+    if t.plane == "image":
+        at = np.where(np.isfinite(at), at, t.pos)
+    regions = _hulls(t, camera, scene) if t.unit == "group" else _regions(t.group, box)
+    return Marks(t.id, box, at, _ellipses(t, camera, scene), np.zeros(n, bool), regions)
+
+
+def _feet(box: Array) -> Array:
+    """(N, 2) middles of the lower edges."""
+    return np.asarray(box[:, :2] + box[:, 2:] * np.array([0.5, 1.0]))
+
+
+def _regions(group: Ints, box: Array) -> tuple[tuple[int, Array], ...]:
+    """The hull of the boxes, a little wider, of each group of two or more."""
+    names = np.unique(group[group >= 0])
+    box = box + AROUND * np.array([-1, -1, 2, 2])
+    found = [(int(g), box[(group == g) & np.isfinite(box[:, 0])]) for g in names]
+    return tuple((g, convex_hull(_corners(own))) for g, own in found if len(own) > 1)
+
+
+def _corners(box: Array) -> Array:
+    return np.concatenate([box[:, :2] + box[:, 2:] * np.array(c) for c in ((0, 0), (1, 0), (1, 1), (0, 1))])
+
+
+def _hulls(t: Tracks, camera: Camera | None, scene: Scene | None) -> tuple[tuple[int, Array], ...]:
+    """The regions of a method that knows groups only."""
+    if t.groups is None:
+        return ()
+    pairs = [(int(g), hull) for g, hull in zip(t.groups.id, t.groups.hull, strict=True) if len(hull)]
+    return tuple((g, seen) for g, hull in pairs for seen in [_seen(hull, t.plane, camera, scene)] if len(seen))
+
+
+def _seen(points: Array, plane: str, camera: Camera | None, scene: Scene | None) -> Array:
+    """Points (K, 2 or 3) in a tracker's plane as px; none where they cannot all be seen."""
+    if plane == "image":
+        return points
+    if camera is None:
+        return np.zeros((0, 2))
+    from sim.camera import project
+
+    uv, depth = project(camera, standing(points, scene))
+    return uv if (depth > 0).all() else np.zeros((0, 2))
+
+
+def _ellipses(t: Tracks, camera: Camera | None, scene: Scene | None) -> Array:
+    """(N, 32, 2) px, nan where the covariance or a view of the place is missing."""
+    found = np.full((len(t.id), len(ROUND), 2), np.nan)
+    for k, cov in enumerate(t.cov[:, :2, :2]):
+        if not np.isfinite(cov).all():
+            continue
+        values, vectors = np.linalg.eigh(cov)
+        ring = t.pos[k, :2] + SURE * (ROUND * np.sqrt(np.maximum(values, 0.0))) @ vectors.T
+        seen = _seen(ring, t.plane, camera, scene)
+        if len(seen):
+            found[k] = seen
+    return found

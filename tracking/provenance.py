@@ -1,0 +1,75 @@
+"""What run.json says of a run: who tracked what, given what, and how fast."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from collections.abc import Sequence as SequenceOf
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from sim.types import Sequence, Tracks
+
+if TYPE_CHECKING:
+    from tracking.run import Prepared
+
+
+@dataclass(frozen=True)
+class Speed:
+    """Frames per second: of the tracker alone, and with reading and decoding what it is given."""
+
+    tracker: float = 0.0
+    whole: float = 0.0
+
+
+def describe(
+    ready: Prepared,
+    answers: SequenceOf[Tracks],
+    seed: int,
+    sensor: Mapping[str, Any],
+    px_per_m: float,
+    speed: Speed,
+) -> dict[str, Any]:
+    """What run.json holds; px_per_m: by which groups were derived. Only the speeds differ between two equal runs."""
+    from sim.io.box_source import box_source
+
+    sample = ready.context.background
+    return {
+        "tracker": ready.name,
+        "config": ready.config.as_dict() if ready.config else {},
+        "seed": seed,
+        "sequence": ready.sequence.name,
+        "detections": ready.mode,
+        "sensor": dict(sensor),
+        "plane": answers[0].plane if len(answers) else None,
+        "boxes": box_source(answers, ready.context.camera),
+        "fps": ready.context.fps,
+        "px_per_m": None if np.isnan(px_per_m) else px_per_m,
+        "background": None if sample is None else ready.sequence.source.get("background", f"{len(sample)} frames"),
+        "causal": sample is None or is_causal(ready.sequence),
+        "frames": len(answers),
+        "frames_per_second": speed.tracker,
+        "whole_frames_per_second": speed.whole,
+        "versions": _versions(),
+    }
+
+
+def is_causal(sequence: Sequence) -> bool:
+    """Whether the sequence's background sample holds no frame of its future."""
+    from sim.io.sample import Sample
+
+    sample = sequence.load_background
+    return not isinstance(sample, Sample) or sample.choice.how == "first"
+
+
+def _versions() -> dict[str, str]:
+    from importlib.metadata import PackageNotFoundError, version
+
+    found = {}
+    for name in ("flockscope", "numpy", "scipy"):
+        try:
+            found[name] = version(name)
+        except PackageNotFoundError:
+            continue
+    return found
