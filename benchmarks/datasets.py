@@ -9,14 +9,29 @@ import subprocess
 import sys
 import time
 from collections.abc import Sequence
+from dataclasses import dataclass
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[1]
 
 
-def start(entries: Sequence[str], seeds: str, out: Path, workers: int, **env: str) -> subprocess.Popen[str]:
+@dataclass(frozen=True)
+class Pictures:
+    """`--streams` and `--images` of `flockscope generate`."""
+
+    streams: str = "none"
+    images: str = "jpg"
+
+
+NONE = Pictures()
+
+
+def start(
+    entries: Sequence[str], seeds: str, out: Path, workers: int, pictures: Pictures = NONE, **env: str
+) -> subprocess.Popen[str]:
     """`flockscope generate` as a process of its own, in a session of its own; env: variables that differ from ours."""
     words = ["generate", *entries, "--seeds", seeds, "--out", str(out), "--workers", str(workers), "--json"]
+    words += ["--streams", pictures.streams, "--images", pictures.images]
     variables = {**os.environ, "PYTHONPATH": str(ROOT), **env}
     return subprocess.Popen(
         [sys.executable, "-m", "tracking.app.cli", *words],
@@ -24,10 +39,12 @@ def start(entries: Sequence[str], seeds: str, out: Path, workers: int, **env: st
     )  # fmt: skip
 
 
-def whole_run(entries: Sequence[str], seeds: str, out: Path, workers: int, **env: str) -> float:
+def whole_run(
+    entries: Sequence[str], seeds: str, out: Path, workers: int, pictures: Pictures = NONE, **env: str
+) -> float:
     """Wall seconds of a run that must end well."""
     begin = time.perf_counter()
-    process = start(entries, seeds, out, workers, **env)
+    process = start(entries, seeds, out, workers, pictures, **env)
     answer = process.communicate()[0]
     if process.returncode != 0:
         raise SystemExit(f"{' '.join(map(str, process.args))}: exit code {process.returncode}: {answer[:600]}")
@@ -52,6 +69,11 @@ def file_bytes_hash(out: Path) -> str:
     return h.hexdigest()
 
 
+def manifest_values(out: Path, key: str) -> dict[str, str]:
+    """A key of the manifests by name of sequence."""
+    return {p.name: json.loads((p / "manifest.json").read_text())[key] for p in complete(out)}
+
+
 def content_hashes(out: Path) -> dict[str, str]:
     """Content hash by name of sequence, as their manifests say."""
-    return {p.name: json.loads((p / "manifest.json").read_text())["content_hash"] for p in complete(out)}
+    return manifest_values(out, "content_hash")

@@ -1,11 +1,13 @@
 """`kill -9` in the middle of `flockscope generate`, then the same command again: is the dataset whole and the same?
 
     PYTHONPATH=. python benchmarks/kill_resume.py [--kills 20] [--entry merge queue] [--seeds 0:6] [--workers 1]
+        [--streams left] [--images mp4]
 
 Moments are random, one in each of `--kills` equal parts of the run: after so many whole sequences (the load of the
 machine must not push all kills into the beginning) and a random part of the next one's time. `--writing` more fall into
-the writing of a sequence: some milliseconds after a partial folder is seen. After a kill no sequence may stand there
-half-written; after resuming, `validate` must find nothing and every byte must be that of the undisturbed run.
+the writing of a sequence: some milliseconds after a partial folder is seen, with pictures up to a sequence's time.
+After a kill no sequence may stand there half-written; after resuming, `validate` must find nothing and every byte must
+be that of the undisturbed run.
 Exit code 1 where anything differs.
 """
 
@@ -22,7 +24,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
-from datasets import complete, content_hashes, file_bytes_hash, sequences, start, whole_run
+from datasets import Pictures, complete, content_hashes, file_bytes_hash, sequences, start, whole_run
 
 from sim.io.validate import validate
 
@@ -64,12 +66,12 @@ def kill(process: subprocess.Popen[str]) -> bool:
 
 
 def one(args: argparse.Namespace, wait: Wait, out: Path, right: str) -> bool:
-    process = start(args.entry, args.seeds, out, args.workers)
+    process = start(args.entry, args.seeds, out, args.workers, args.pictures)
     moment = wait(process, out)
     killed = kill(process)
     then, half = complete(out), [p for p in sequences(out) if validate(p)]
     partial = len(list(out.glob("flockscope-*/.partial-*")))
-    whole_run(args.entry, args.seeds, out, args.workers)
+    whole_run(args.entry, args.seeds, out, args.workers, args.pictures)
     problems, same = validate(out), file_bytes_hash(out) == right
     print(
         f"| {moment} | {'yes' if killed else 'no'} | {len(then)} | {partial} | {len(half)} "
@@ -87,19 +89,24 @@ def main() -> int:
     parser.add_argument("--entry", nargs="+", default=["merge", "queue"])
     parser.add_argument("--seeds", default="0:6")
     parser.add_argument("--workers", type=int, default=1)
+    parser.add_argument("--streams", default="none")
+    parser.add_argument("--images", default="jpg")
     args = parser.parse_args()
+    args.pictures = Pictures(args.streams, args.images)
     r = np.random.default_rng(0)
     with tempfile.TemporaryDirectory() as name:
         work = Path(name)
-        whole_run(args.entry, args.seeds, work / "warm", args.workers)
-        seconds = whole_run(args.entry, args.seeds, work / "right", args.workers)
+        whole_run(args.entry, args.seeds, work / "warm", args.workers, args.pictures)
+        seconds = whole_run(args.entry, args.seeds, work / "right", args.workers, args.pictures)
         right, n = file_bytes_hash(work / "right"), len(content_hashes(work / "right"))
         print(f"{n} sequences of {', '.join(args.entry)}, seeds {args.seeds}, {args.workers} workers: {seconds:.1f} s")
+        print(args.pictures)
         print("| killed at | at work | whole then | partial | half-written | problems after | same bytes |")
         print("|---|---|---|---|---|---|---|")
         moments = (np.arange(args.kills) + r.random(args.kills)) / max(args.kills, 1) * n
+        longest = 0.02 if args.streams == "none" else seconds / n
         waits = [after(int(m), float(m % 1) * seconds / n) for m in moments]
-        waits += [writing(int(r.integers(1, n + 1)), float(r.uniform(0, 0.02))) for _ in range(args.writing)]
+        waits += [writing(int(r.integers(1, n + 1)), float(r.uniform(0, longest))) for _ in range(args.writing)]
         good = sum(one(args, wait, work / "killed", right) for wait in waits) == len(waits)
     print("\nall the same" if good else "\nDIFFERENT")
     return 0 if good else 1
