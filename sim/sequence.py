@@ -2,40 +2,52 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from dataclasses import dataclass
 from functools import cache
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 from sim.camera import px_per_m_at_centre, solve
 from sim.orders import check_orders
+from sim.render import BACKGROUNDS, Stage, stage
 from sim.truth import bodies, label
-from sim.types import Detections, Frame, Motion, Order, Scene, Sequence, Truth
+from sim.types import Camera, Detections, Frame, Image, Motion, Order, PixelTruth, Scene, Sequence, Truth
 
 if TYPE_CHECKING:
     from scenarios.schema import Scenario
 
 
-def simulate(scenario: Scenario, seed: int, repeat: int = 0) -> Sequence:
-    """Run the world and look at it: points and boxes by the scenario's sensor, truth by its camera.
+def simulate(scenario: Scenario, seed: int, repeat: int = 0, streams: Iterable[str] = ("left",)) -> Sequence:
+    """Run the world and look at it: pictures, points and boxes by the scenario's sensor, truth by its camera.
 
-    InputError where the scenario cannot be (no room, people out of view).
+    streams: which pictures the frames have, `left` and `right`, drawn as frames are asked for; () none. InputError
+    where the scenario cannot be (no room, people out of view).
     """
     from sim.world import run
 
-    return observe(scenario, run(scenario, seed, repeat))
+    return observe(scenario, run(scenario, seed, repeat), streams=streams)
 
 
 def observe(
-    scenario: Scenario, motion: Motion, *, people: Mapping[str, tuple[int, ...]] | None = None, check: bool = True
+    scenario: Scenario,
+    motion: Motion,
+    *,
+    people: Mapping[str, tuple[int, ...]] | None = None,
+    check: bool = True,
+    streams: Iterable[str] = (),
 ) -> Sequence:
     """The sequence that the scenario's camera and sensor make of a Motion.
 
     check: asking for the truth of a Motion whose orders did not come true is a WorkError.
     The camera is solved at once (a scenario whose people leave the view is refused here); truth and detections are
     lazy, and detections never touch the truth that the sequence gives out. people: ids of each of the script's groups,
-    where `sensor.hide` names one and the motion was not made from the scenario itself.
+    where `sensor.hide` names one and the motion was not made from the scenario itself. streams: as for `simulate`;
+    any of them brings empty frames for a background and exact pixels, with disparities where `right` is drawn.
     """
     camera = solve(scenario.camera, motion)
+    drawn = _drawn(streams, scenario, motion, camera)
 
     @cache
     def named() -> Mapping[str, tuple[int, ...]]:
@@ -51,8 +63,16 @@ def observe(
         seen = bodies(motion, camera)
         return sense(seen, scenario.sensor, motion.seed, camera, camera.image, motion.repeat, hidden)
 
-    def frames() -> Iterator[Frame]:
+    def bare() -> Iterator[Frame]:
         return (Frame(d.index, d.t, detections=d) for d in detections())
+
+    def frames() -> Iterator[Frame]:
+        if drawn.stage is None:
+            yield from bare()
+            return
+        for d in detections():
+            made = drawn.stage.both(d.index, right=drawn.right)
+            yield Frame(d.index, d.t, made.image, made.right, d)
 
     def truth() -> Truth:
         found = label(motion, camera)
@@ -73,7 +93,41 @@ def observe(
         has_detections=True,
         load_people=named,
         source={"kind": "simulated", "seed": motion.seed, "repeat": motion.repeat},
+        has_images=drawn.stage is not None,
+        has_right=drawn.right,
+        bare=bare,
+        load_background=drawn.background,
+        load_pixels=drawn.pixels,
     )
+
+
+@dataclass(frozen=True)
+class _Drawn:
+    """The pictures that were asked for: what draws them, None without any, and whether there is a right one."""
+
+    stage: Stage | None
+    right: bool = False
+
+    @property
+    def background(self) -> Callable[[], Image] | None:
+        stage = self.stage
+        return None if stage is None else lambda: np.stack([stage.background(k) for k in range(BACKGROUNDS)])
+
+    @property
+    def pixels(self) -> Callable[[int], PixelTruth] | None:
+        stage, right = self.stage, self.right
+        return None if stage is None else lambda index: stage.pixels(index, right=right)
+
+
+def _drawn(streams: Iterable[str], scenario: Scenario, motion: Motion, camera: Camera) -> _Drawn:
+    wanted = set(streams)
+    if not wanted:
+        return _Drawn(None)
+    made = stage(motion, camera, scenario.light, scenario.picture)
+    right = not wanted.isdisjoint({"right", "disparity"})
+    if right:
+        made.check_pair()
+    return _Drawn(made, right)
 
 
 def named_people(

@@ -1,0 +1,162 @@
+"""Compiled: the empty scene as a camera sees it, ray by ray: colours, light, depth and places of all pixels."""
+
+from __future__ import annotations
+
+import numpy as np
+from numba import njit
+
+from sim.static_kernels import GROUND, NOTHING, PILLAR, RISER, TREAD, WALL, nearest
+from sim.texture_kernels import grain, seen, slabs, smooth
+
+GREY, GRASS, BRICK, STONE, STEP, SKY = range(6)  # rows of the palette
+
+
+@njit(cache=True)
+def at(field, u, v, out):  # type: ignore[no-untyped-def]
+    """field (3, 3) times (u, v, 1)."""
+    for k in range(3):
+        out[k] = field[k, 0] * u + field[k, 1] * v + field[k, 2]
+
+
+@njit(cache=True)
+def _tint(base, brightness, warmth, out):  # type: ignore[no-untyped-def]
+    """A palette colour (BGR) made brighter and warmer by these shares."""
+    out[0] = base[0] * max(0.0, 1 + brightness - warmth)
+    out[1] = base[1] * max(0.0, 1 + brightness)
+    out[2] = base[2] * max(0.0, 1 + brightness + warmth)
+
+
+@njit(cache=True)
+def _ground(x, y, size, footprint, contrast, slab, palette, key, out):  # type: ignore[no-untyped-def]
+    """Paving inside the world, grass outside, with a ragged border; slab: width m, 0 = asphalt."""
+    outside = max(max(-x, x - size[0]), max(-y, y - size[1])) - 1.0 + 0.3 * smooth(x, y, key + 90)
+    patches = smooth(0.31 * x, 0.31 * y, key + 20) + 0.6 * smooth(0.9 * x + 7.3, 0.9 * y, key + 21)
+    warmth = contrast * 0.06 * smooth(0.5 * x, 0.5 * y + 3.1, key + 22)
+    fine = grain(x, y, key, footprint, 0.8)
+    if outside > 0:
+        _tint(palette[GRASS], contrast * (0.35 * fine + 0.2 * patches), warmth, out)
+        return
+    tile = slabs(x, y, slab, 0.6 * slab, 0.012, key + 40, footprint) if slab > 0 else 0.0
+    _tint(palette[GREY], contrast * (0.26 * fine + 0.14 * patches + 0.16 * tile), warmth, out)
+
+
+@njit(cache=True)
+def _upright(kind, along, z, footprint, contrast, palette, key, out):  # type: ignore[no-untyped-def]
+    """Walls in bricks with a skirting, pillars and steps in stone."""
+    fine = grain(along, z, key + 60, footprint, 0.6)
+    if kind == WALL:
+        tile = slabs(along, z, 0.5, 0.25, 0.012, key + 61, footprint)
+        low = 0.35 * seen(0.3, footprint) if z < 0.12 else 0.0
+        _tint(palette[BRICK], contrast * (0.3 * fine + 0.22 * tile) - low, contrast * 0.05 * tile, out)
+    else:
+        row = STONE if kind == PILLAR else STEP
+        edge = -0.18 if kind == RISER else 0.0
+        _tint(palette[row], contrast * 0.4 * fine + edge, 0.0, out)
+
+
+@njit(cache=True)
+def _sky(d, key, palette, out):  # type: ignore[no-untyped-def]
+    """Clouded sky: brighter towards the horizon."""
+    length = np.sqrt(d[0] * d[0] + d[1] * d[1] + d[2] * d[2])
+    up = max(d[2] / length, 0.0)
+    x, y = d[0] / (d[2] + 0.1 * length), d[1] / (d[2] + 0.1 * length)
+    cloud = smooth(0.4 * x, 0.4 * y, key + 80) + 0.5 * smooth(x, y, key + 81)
+    _tint(palette[SKY], 0.08 * cloud - 0.15 * up, -0.12 * up, out)
+
+
+@njit(cache=True)
+def _sunlit(point, normal, sun, penumbra, walls, wall_height, pillars, pillar_height, flights, spare, hit):  # type: ignore[no-untyped-def]
+    """Share of four points across the penumbra from which nothing stands before the sun."""
+    if len(walls) + len(pillars) + len(flights) == 0:
+        return 1.0
+    lit = 0.0
+    for k in range(4):
+        spare[0] = point[0] + 1e-4 * normal[0] + penumbra * ((k % 2) - 0.5) * 0.7
+        spare[1] = point[1] + 1e-4 * normal[1] + penumbra * ((k // 2) - 0.5) * 0.7
+        spare[2] = point[2] + 1e-4 * normal[2]
+        if np.isinf(nearest(spare, sun, walls, wall_height, pillars, pillar_height, flights, hit)):
+            lit += 0.25
+    return lit
+
+
+@njit(cache=True)
+def depths(origin, direction, width, height, walls, wall_height, pillars, pillar_height, flights, depth, kind, place):  # type: ignore[no-untyped-def]
+    """Through the middle of each pixel: depth (inf = sky), what is met, and where (x, y, z)."""
+    o, d, hit = np.empty(3), np.empty(3), np.empty(6)
+    for v in range(height):
+        for u in range(width):
+            at(origin, u + 0.5, v + 0.5, o)
+            at(direction, u + 0.5, v + 0.5, d)
+            t = nearest(o, d, walls, wall_height, pillars, pillar_height, flights, hit)
+            depth[v, u], kind[v, u] = t, int(hit[0])
+            for k in range(3):
+                place[v, u, k] = o[k] + t * d[k] if t < 1e9 else 1e9
+
+
+@njit(cache=True)
+def colours(  # type: ignore[no-untyped-def]
+    origin,
+    direction,
+    focal,
+    sun,
+    shadow,
+    penumbra,
+    walls,
+    wall_height,
+    pillars,
+    pillar_height,
+    flights,
+    size,
+    contrast,
+    slab,
+    palette,
+    key,
+    colour,
+    direct,
+):
+    """Lit colours (H, W, 3) and the share of direct sun in them (H, W), the mean of 2 x 2 rays a pixel."""
+    height, width = direct.shape
+    o, d, hit, spare, point, normal, c = (
+        np.empty(3), np.empty(3), np.empty(6), np.empty(3), np.empty(3), np.empty(3), np.empty(3)
+    )  # fmt: skip
+    blocked = np.empty(6)
+    for v in range(height):
+        for u in range(width):
+            sunny = 0.0
+            for sub in range(4):
+                at(origin, u + 0.25 + 0.5 * (sub % 2), v + 0.25 + 0.5 * (sub // 2), o)
+                at(direction, u + 0.25 + 0.5 * (sub % 2), v + 0.25 + 0.5 * (sub // 2), d)
+                t = nearest(o, d, walls, wall_height, pillars, pillar_height, flights, hit)
+                kind = int(hit[0])
+                light, sunlight = 1.0, 0.0
+                if kind == NOTHING:
+                    _sky(d, key, palette, c)
+                else:
+                    for k in range(3):
+                        point[k], normal[k] = o[k] + t * d[k], hit[1 + k]
+                    slope = abs(d[0] * normal[0] + d[1] * normal[1] + d[2] * normal[2])
+                    slope /= np.sqrt(d[0] * d[0] + d[1] * d[1] + d[2] * d[2])
+                    distance = t if focal > 0 else 1.0
+                    footprint = distance / abs(focal) / np.sqrt(max(slope, 0.02))
+                    if kind == GROUND:
+                        _ground(point[0], point[1], size, footprint, contrast, slab, palette, key, c)
+                    elif kind == TREAD:
+                        _upright(kind, point[0], point[1], footprint, contrast, palette, key + 7 * int(hit[4]), c)
+                    else:
+                        _upright(kind, hit[5], point[2], footprint, contrast, palette, key + 7 * int(hit[4]) + 1, c)
+                    facing = max(0.0, normal[0] * sun[0] + normal[1] * sun[1] + normal[2] * sun[2]) / max(sun[2], 0.3)
+                    if shadow > 0 and facing > 0:
+                        facing *= _sunlit(
+                            point, normal, sun, penumbra, walls, wall_height, pillars, pillar_height, flights, spare,
+                            blocked,
+                        )  # fmt: skip
+                    sunlight = shadow * facing
+                    light = (1 - shadow) * (0.85 + 0.15 * normal[2]) + sunlight
+                    haze = 1 - np.exp(-max(distance - 25.0, 0.0) / 120.0)
+                    for k in range(3):
+                        c[k] = c[k] * light * (1 - haze) + palette[SKY, k] * haze
+                    sunlight *= (1 - haze) / light
+                sunny += 0.25 * sunlight
+                for k in range(3):
+                    colour[v, u, k] += 0.25 * c[k]
+            direct[v, u] = sunny
