@@ -45,7 +45,7 @@ def shadow_boxes(camera: Camera, people: Ellipsoids, foot: Array, height: Array,
                 corners.append(np.concatenate([at, np.broadcast_to(z[:, None, None], (*at.shape[:2], 1))], axis=2))
     points = np.stack(corners, axis=1).reshape(-1, 3)
     uv = project(camera, points)[0].reshape(len(foot), -1, 2)
-    behind = np.isnan(uv.reshape(len(uv), -1)).any(axis=1)
+    behind = np.isnan(uv.sum(axis=(1, 2)))
     low = np.where(behind[:, None], 0.0, np.nan_to_num(uv).min(axis=1))
     high = np.where(behind[:, None], np.array(camera.image, dtype=float), np.nan_to_num(uv).max(axis=1))
     return _clipped(low, high, camera)
