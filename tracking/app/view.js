@@ -38,7 +38,7 @@ function show() {
 // The image follows the video, whose frame may come a moment after it was asked for.
 function showImage() {
   if (!hasImage) return;
-  if (rolling() && !state.playing) film.want(state.frame);
+  if (rolling() && !(state.playing && film.plays)) film.want(state.frame);
   drawImage($("image"), rolling() && film.frame ? film.frame : state.frame, options);
 }
 
@@ -54,7 +54,7 @@ function pictured() {
     if (state.playing) play(true);
     return show();
   }
-  if (!state.playing) return showImage();
+  if (!state.playing || !film.plays) return showImage();
   state.frame = film.frame;
   show();
   if (state.frame >= data.length) play(false);
