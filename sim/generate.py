@@ -47,7 +47,7 @@ def generate(
     set: Iterable[str] = (),
     workers: int = 1,
     progress: Progress | None = None,
-    streams: Iterable[str] = (),
+    streams: Iterable[str] = ("left",),
     images: str = "jpg",
 ) -> list[Path]:
     """Make OUT/flockscope-<split>/<name>-s<seed>/ of every entry (or name of one) and seed, and OUT/seqmaps.
@@ -125,8 +125,7 @@ def make(job: Job) -> None:
 
     entry = job.entry
     try:
-        drawn = {"streams": job.streams} if job.streams else {}
-        sequence = replace(simulate(entry.scenario, job.seed, entry.repeat, **drawn), name=job.name)
+        sequence = replace(simulate(entry.scenario, job.seed, entry.repeat, job.streams), name=job.name)
         store.write_sequence(
             job.folder, sequence, scenario=dump(entry.scenario), seed=job.seed, repeat=entry.repeat,
             streams=job.streams, images=job.images,

@@ -94,7 +94,8 @@ def write_pictures(folder: Path, sequence: Sequence, wanted: tuple[str, ...], im
         if "background" in outputs:
             for picture in _background(sequence):
                 outputs["background"].add(picture)
-        for frame in sequence:
+        seen = not outputs.keys().isdisjoint({"left", "right"})
+        for frame in sequence if seen else sequence.without_pictures():
             _add(outputs, sequence, frame, known)
     files = {name: facts for output in outputs.values() for name, facts in output.files.items()}
     if known and sequence.truth is not None:
