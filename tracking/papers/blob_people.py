@@ -40,6 +40,7 @@ class People(Population):
         super().keep(rows)
 
     def give_birth(self, z: Array, score: Array, t: float) -> None:
+        """A tentative track for each z (K, 5)."""
         super().give_birth(z[:, :4], score, t)
         new = np.stack([z[:, 4], np.full(len(z), np.radians(30.0) ** 2)])
         self.angle = np.concatenate([self.angle, new], 1)

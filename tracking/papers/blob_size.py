@@ -16,7 +16,7 @@ from tracking.papers import blob_measure
 
 PERSON = 1.7  # m
 SLIM = 0.36  # width over height of a walking person's box, the prior of what is learned
-UPRIGHT = (1.5, 5.0)  # height over width of a blob that may be somebody alone
+STOUT = 1.6  # by how much the width over height of a blob that may be somebody alone differs at most
 KEPT = 400  # lone blobs remembered
 ENOUGH = 12  # lone blobs that make a learned size reliable ...
 RENEW = 0.05  # share of new ones from which on the line is drawn anew
@@ -25,6 +25,8 @@ LEVELS = np.geomspace(0.65, 1.55, 19)  # of the median height, and
 SLOPES = np.linspace(0.0, 2.4, 17)  # growth per row, times the middle row: where the densest heights are looked for
 SLOPE, DOUBT = 0.7, 0.02  # a slope to expect, and the share of votes that unit distance from it costs
 WIDTH = 0.12  # relative deviation within which heights agree
+FACTORS = np.array([0.9, 0.8]), np.array([1.1, 1.25])  # least and most by which people are higher and wider
+PRIOR = 2.0  # people who count for the factors 1
 LOOSE = 1.0, 1.1  # height and width of a person's box over those of the box round the ellipse of his pixels: a prior
 SMALLEST = 12.0  # px: people less high than this cannot be told from noise
 STEP = 8  # px between the nodes of a camera's table
@@ -32,14 +34,15 @@ MARGIN = 0.25  # of the image, beyond which no foot is looked for
 
 
 class PersonSize:
-    """State: a camera's table (2, V, U) of heights and widths, or the lone blobs seen and the line through them."""
+    """State: a camera's table (2, V, U) of heights and widths, or the line through the lone blobs seen, (K, 4) foot u, v,
+    height, width; how much higher and wider these are."""
 
     def __init__(self, context: Context) -> None:
         self.table: Array | None = None
         self.seen = np.zeros((0, 4))  # u, v, h, w of lone blobs
         self.unused = 0
         self.excess, self.loose = np.zeros((0, 2)), np.array(LOOSE)
-        self.line, self.slim, self.agreed = (float("nan"), 0.0), SLIM, 0
+        self.line, self.factor, self.agreed = (float("nan"), 0.0), np.ones(2), 0
         if context.camera is not None:
             self.low = -MARGIN * np.array(context.camera.image, float)
             self.table = _table(context.camera, self.low)
@@ -51,12 +54,14 @@ class PersonSize:
 
     def at(self, foot: Array) -> Array:
         """(N, 2) height and width in px of a person whose box stands on the image points `foot` (N, 2); nan unknown."""
-        if self.table is not None:
-            size = _look_up(self.table, (foot - self.low) / STEP)
-        else:
-            height = self.line[0] + self.line[1] * foot[:, 1]
-            size = np.stack([height, self.slim * height], 1)
+        size = self._first_guess(foot) * self.factor
         return np.where(size[:, :1] >= SMALLEST, size, np.nan)
+
+    def _first_guess(self, foot: Array) -> Array:
+        if self.table is not None:
+            return _look_up(self.table, (foot - self.low) / STEP)
+        height = self.line[0] + self.line[1] * foot[:, 1]
+        return np.stack([height, SLIM * height], 1)
 
     @property
     def px_per_m(self) -> float:
@@ -65,43 +70,61 @@ class PersonSize:
 
     def learn(self, box: Array, ellipse: Array, whole: Bools) -> None:
         """Add the blobs (M, 4) ltwh, (M, 5), that may be somebody alone; `whole` (M,): away from the image's edge."""
-        ratio = box[:, 3] / np.maximum(box[:, 2], 1.0)
-        good = whole & (ratio >= UPRIGHT[0]) & (ratio <= UPRIGHT[1])
+        foot = np.stack([box[:, 0] + box[:, 2] / 2, box[:, 1] + box[:, 3]], 1)
+        expected = SLIM if self.table is None else np.divide(*self._first_guess(foot).T[::-1])
+        with np.errstate(invalid="ignore"):
+            good = whole & (box[:, 3] >= SMALLEST) & (np.abs(np.log(box[:, 2] / box[:, 3] / expected)) <= np.log(STOUT))
         if not good.any():
             return
-        alone = box[good]
+        alone, foot = box[good], foot[good]
         round_ellipse = blob_measure.upright(ellipse[good, :4], ellipse[good, 4])[:, 2:]
         self.excess = np.concatenate([self.excess, alone[:, :1:-1] / round_ellipse])[-KEPT:]
         self.loose = np.median(np.concatenate([self.excess, np.tile(LOOSE, (ENOUGH, 1))]), 0)
-        if self.table is not None:
-            return
-        new = np.stack([alone[:, 0] + alone[:, 2] / 2, alone[:, 1] + alone[:, 3], alone[:, 3], alone[:, 2]], 1)
+        new = np.concatenate([foot, alone[:, :1:-1]], 1)
         self.seen, self.unused = np.concatenate([self.seen, new])[-KEPT:], self.unused + len(new)
         if self.unused >= RENEW * len(self.seen):
             self.unused = 0
             self._fit()
 
     def _fit(self) -> None:
-        """The line through the densest heights, and the share of height that is width."""
-        u, v, h, w = self.seen.T
-        middle, typical = float(np.median(v)), float(np.median(h))
-        at, count = (v - middle) / max(middle, 1.0), 1 / _crowding(np.stack([u, v], 1) / typical)
-        level, slope = (a.ravel() for a in np.meshgrid(LEVELS, SLOPES))
-        off = h / typical / np.maximum(level[:, None] * (1 + slope[:, None] * at), 0.05) - 1
-        votes = np.maximum(1 - np.square(off / WIDTH), 0) @ count - DOUBT * count.sum() * np.square(slope - SLOPE)
-        best = int(votes.argmax())
-        line = typical * level[best] * np.array([1.0, slope[best]])
-        prior = line[1]
-        for _ in range(3):
-            fit = np.maximum(line[0] + line[1] * at, 1.0)
-            weight = count * (np.abs(h / fit - 1) <= WIDTH) / (fit * fit)
-            line = np.array(_line(at, h, weight, prior, 0.01 * float(weight.sum()) * typical**2))
+        """Where most heights agree: the line, if there is no camera, and the factors of height and width."""
+        foot, height = self.seen[:, :2], self.seen[:, 2]
+        typical = float(np.median(height))
+        count = height / typical / _crowding(foot / typical)
+        if self.table is None:
+            self.line = _line(foot[:, 1], height, count)
+        ratio = self.seen[:, 2:] / np.maximum(self._first_guess(foot), 1.0)
+        known = np.isfinite(ratio).all(1)
+        ratio, count = ratio[known], count[known]
+        tall, agreed = _densest(ratio[:, 0], count)
+        wide, _ = _densest(ratio[agreed, 1], count[agreed])
+        self.agreed, self.factor = int(agreed.sum()), np.clip([tall, wide], *FACTORS)
+
+
+def _densest(value: Array, count: Array) -> tuple[float, Bools]:
+    """The value within relative WIDTH of which most counts lie, PRIOR of them at 1; which ones (N,) these are."""
+    value, count = np.append(value, 1.0), np.append(count, PRIOR)
+    near = np.abs(value / np.maximum(value[:, None], 1e-9) - 1) <= WIDTH
+    members = near[int((near @ count).argmax())]
+    return float(np.average(value[members], weights=count[members])), members[:-1]
+
+
+def _line(v: Array, h: Array, count: Array) -> tuple[float, float]:
+    """h = a + b v where most heights agree: the best of many lines, then least squares among those that agree."""
+    middle, typical = max(float(np.median(v)), 1.0), float(np.median(h))
+    at = v / middle - 1
+    level, slope = (a.ravel() for a in np.meshgrid(LEVELS, SLOPES))
+    off = h / typical / np.maximum(level[:, None] * (1 + slope[:, None] * at), 0.05) - 1
+    votes = np.maximum(1 - np.square(off / WIDTH), 0) @ count - DOUBT * count.sum() * np.square(slope - SLOPE)
+    best = int(votes.argmax())
+    line = first = typical * level[best] * np.array([1.0, slope[best]])
+    tie = np.diag([0.0, 0.01]) * count.sum()
+    for _ in range(3):
         fit = np.maximum(line[0] + line[1] * at, 1.0)
-        inlier = np.abs(h / fit - 1) <= WIDTH
-        self.line = (float(line[0] - line[1] * middle / max(middle, 1.0)), float(line[1] / max(middle, 1.0)))
-        self.agreed = int(inlier.sum())
-        slim = np.append(w[inlier] / h[inlier], np.full(4, SLIM))
-        self.slim = float(np.clip(np.median(slim), 0.2, 0.8))
+        weight = count * (np.abs(h / fit - 1) <= WIDTH) * np.square(typical / fit)
+        x = np.stack([np.ones_like(at), at])
+        line = np.linalg.solve((x * weight) @ x.T + tie, (x * weight) @ h + tie @ first)
+    return float(line[0] - line[1]), float(line[1] / middle)
 
 
 def _crowding(place: Array) -> Array:
@@ -109,14 +132,6 @@ def _crowding(place: Array) -> Array:
     cell = np.floor(4 * place).astype(np.int64)
     _, which, count = np.unique(cell[:, 0] * 100_003 + cell[:, 1], return_inverse=True, return_counts=True)
     return np.asarray(count[which], float)
-
-
-def _line(v: Array, h: Array, weight: Array, prior: float, strength: float) -> tuple[float, float]:
-    """Weighted least squares of h = level + slope v, the slope tied to `prior` by a deviation of its own size."""
-    tie = strength / max(prior, 0.1 * float(h.mean())) ** 2
-    moments = np.array([[weight.sum(), weight @ v], [weight @ v, weight @ (v * v) + tie]])
-    level, slope = np.linalg.solve(moments, np.array([weight @ h, weight @ (v * h) + tie * prior]))
-    return float(level), float(slope)
 
 
 def _table(camera: Camera, low: Array) -> Array:
