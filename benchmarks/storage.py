@@ -2,8 +2,8 @@
 
     PYTHONPATH=. python benchmarks/storage.py [--entry merge crowd] [--repeats 3]
 
-Each is the best of so many runs of `generate` in this process, one sequence at a time, kernels warm; `make` is all of it
-(simulation, drawing, encoding, writing), `read` the passes over the stored frames.
+Each is the best of so many runs of `generate` in this process, one sequence at a time, kernels warm; `make` is all of
+it (simulation, drawing, encoding, writing), `read` a pass over the stored frames.
 """
 
 from __future__ import annotations
