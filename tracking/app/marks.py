@@ -21,6 +21,9 @@ ROUND = np.stack([f(np.linspace(0, 2 * np.pi, 32, endpoint=False)) for f in (np.
 AROUND = 5.0
 """px between a member's box and the edge of the region."""
 
+HIDDEN = 0.2
+"""The visible share of a body below which its box is broken."""
+
 QUIET = ("enter", "leave")
 """Kinds that are told nowhere in the picture."""
 
@@ -93,10 +96,8 @@ def of_truth(truth: Truth) -> Side:
         if now.box is None or not len(now.id):
             continue
         ellipse = np.full((len(now.id), 32, 2), np.nan)
-        regions = _regions(now.group, now.box)
-        if now.groups_px is not None:
-            regions = tuple((int(g), h) for g, h in zip(now.groups_px.id, now.groups_px.hull, strict=True) if len(h))
-        frames[index] = Marks(now.id, now.box, _feet(now.box), ellipse, now.visibility < 0.2, regions)
+        hidden = now.visibility < HIDDEN
+        frames[index] = Marks(now.id, now.box, _feet(now.box), ellipse, hidden, _regions(now.group, now.box))
     return Side("true", "G", frames, tuple((e.start, e) for e in truth.events or ()))
 
 

@@ -24,9 +24,10 @@ KIND_COLOUR = {"merge": 0, "split": 1, "cross": 3, "queue": 2, "form": 4, "disso
 
 @dataclass(frozen=True)
 class Style:
-    """How one side is drawn. plain: thin and white, without ids: the truth under tracks."""
+    """How one side is drawn. plain: thin and white, without ids: the truth under tracks. rim: a light edge of boxes."""
 
     plain: bool = False
+    rim: bool = True
     trails: bool = True
     ellipses: bool = True
     names: bool = True
@@ -66,7 +67,7 @@ def paint(view: View, side: Side, index: int, fps: float, style: Style = Style()
         if style.ellipses and not style.plain and np.isfinite(marks.ellipse[k]).all():
             _ellipse(view, marks.ellipse[k], ink)
         if np.isfinite(marks.box[k]).all():
-            _box(view, marks.box[k], ink, plain=style.plain, broken=bool(marks.hidden[k]))
+            _box(view, marks.box[k], ink, style, broken=bool(marks.hidden[k]))
         elif np.isfinite(marks.at[k]).all():
             view.disc(marks.at[k], 5, ink, 2)
     if style.names and not style.plain:
@@ -80,15 +81,15 @@ def _corners(box: Array) -> Array:
     return np.array([[x, y], [x + w, y], [x + w, y + h], [x, y + h]])
 
 
-def _box(view: View, box: Array, ink: Colour, plain: bool, broken: bool) -> None:
+def _box(view: View, box: Array, ink: Colour, style: Style, broken: bool) -> None:
     corners = _corners(box)
     if broken:
         for a, b in zip(corners, np.roll(corners, -1, axis=0), strict=True):
             _dashes(view, a, b, ink)
         return
-    if not plain:
+    if style.rim and not style.plain:
         view.line(corners, FLOOR, 4, closed=True)
-    view.line(corners, ink, 1 if plain else 2, closed=True)
+    view.line(corners, ink, 1 if style.plain else 2, closed=True)
 
 
 def _dashes(view: View, a: Array, b: Array, ink: Colour) -> None:

@@ -1,7 +1,8 @@
-"""A contact sheet: small plan views of a sequence over time, onsets of its events preferred, as one PNG."""
+"""A contact sheet: pictures and plans of a sequence over time, onsets of its events preferred, as one PNG."""
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from pathlib import Path
 
 import cv2
@@ -12,11 +13,12 @@ from sim.io.atomic import write_file
 from sim.types import Array, GroupEvent, Image, Ints, Sequence, Truth
 from tracking.app import sheet_panel
 from tracking.app.extent import MARGIN, peopled
-from tracking.app.sheet_panel import INK, QUIET, THING, Colour, View, colour, text
+from tracking.app.painter import KIND_COLOUR, event_words, kind_colour
+from tracking.app.sheet_panel import INK, QUIET, THING, View, colour, text
+from tracking.app.sheet_pictures import Pictures
 
 # Merges and splits are what a scenario is about; entering and leaving come last.
 RANK = {"merge": 0, "split": 0, "cross": 1, "queue": 1, "form": 2, "dissolve": 2}
-KIND_COLOUR = {"merge": 0, "split": 1, "cross": 3, "queue": 2, "form": 4, "dissolve": 5, "enter": 7, "leave": 9}
 WIDTH, HEAD, FOOT, GAP, TITLE = 880, 76, 96, 20, 40
 """px before shrinking: a panel's width; the sheet's head and foot; gaps; a panel's title."""
 
@@ -28,14 +30,16 @@ SOON = 1.0
 def sheet(sequence: Sequence, out: str | Path, frames: int = 8) -> Path:
     """Writes the PNG, whole or not at all, and returns its path.
 
-    `frames` panels, four to a row, with a time line beneath.
+    `frames` panels, four to a row, with a time line beneath: the pictures where there are any, and the plan where
+    people's places are labelled. InputError where there are neither pictures nor labels.
     """
     truth = sequence.truth
-    if truth is None or len(truth.frame) == 0:
+    if (truth is None or not len(truth.frame)) and not sequence.has_images:
         raise InputError(
-            file=sequence.name, got="no labelled people", expected="a sequence with truth", remedy="name one with gt/"
-        )
-    picture = compose(sequence, truth, frames)
+            file=sequence.name, got="no labelled people and no pictures", expected="a sequence with gt/ or pictures",
+            remedy="name another",
+        )  # fmt: skip
+    picture = compose(sequence, _nobody(sequence) if truth is None else truth, frames)
     path = Path(out)
     done, code = cv2.imencode(".png", picture)
     assert done, "PNG holds any 8-bit picture"
@@ -43,18 +47,49 @@ def sheet(sequence: Sequence, out: str | Path, frames: int = 8) -> Path:
     return path
 
 
+def _nobody(sequence: Sequence) -> Truth:
+    """What stands for the truth of a sequence without labels."""
+    length = sequence.length or sum(1 for _ in sequence.without_pictures())
+    none, nan = np.zeros(0, np.int64), float("nan")
+    return Truth(sequence.name, sequence.fps, length, nan, none, none, none, None, None, np.zeros((0, 4)), np.zeros(0))
+
+
+@dataclass(frozen=True)
+class Panel:
+    """Heights (px) of one panel's parts from above: title, picture, small pictures, plan; 0 where there is none."""
+
+    picture: int
+    small: int
+    plan: int
+
+    @property
+    def height(self) -> int:
+        """px of the whole panel."""
+        return TITLE + self.picture + self.small + self.plan
+
+
 def compose(sequence: Sequence, truth: Truth, frames: int = 8) -> Image:
     """The sheet as an (H, W, 3) picture."""
     chosen = choose(truth, frames)
+    pictures = Pictures(sequence, truth, chosen)
     low, high = _bounds(sequence, truth)
-    height = round(WIDTH * float(np.clip((high - low)[1] / (high - low)[0], 0.4, 1.2)))
+    plan = round(WIDTH * float(np.clip((high - low)[1] / (high - low)[0], 0.4, 1.2)))
+    panel = Panel(*pictures.heights(WIDTH), plan if truth.pos is not None or not pictures.frames else 0)
     columns = min(4, len(chosen))
     rows = -(-len(chosen) // columns)
-    total = (HEAD + rows * (height + TITLE + GAP) + FOOT, GAP + columns * (WIDTH + GAP))
+    total = (HEAD + rows * (panel.height + GAP) + FOOT, GAP + columns * (WIDTH + GAP))
     canvas = np.full((*total, 3), 255, np.uint8)
     for k, index in enumerate(chosen):
-        top, left = HEAD + k // columns * (height + TITLE + GAP), GAP + k % columns * (WIDTH + GAP)
-        _panel(canvas[top : top + TITLE + height, left : left + WIDTH], sequence, truth, index, low, high)
+        top, left = HEAD + k // columns * (panel.height + GAP), GAP + k % columns * (WIDTH + GAP)
+        area = canvas[top : top + panel.height, left : left + WIDTH]
+        y = TITLE + panel.picture
+        if panel.picture:
+            pictures.large(area[TITLE:y], index)
+        if panel.small:
+            pictures.small(area[y : y + panel.small], index)
+        if panel.plan:
+            _plan(area[y + panel.small :], sequence, truth, index, low, high)
+        _title(area, truth, index)
     _head(canvas, sequence, truth)
     _foot(canvas[-FOOT:], truth, chosen)
     return np.asarray(cv2.resize(canvas, None, fx=0.5, fy=0.5, interpolation=cv2.INTER_AREA), np.uint8)
@@ -123,14 +158,16 @@ def _bounds(sequence: Sequence, truth: Truth) -> tuple[Array, Array]:
     if truth.pos is None and truth.box is not None:
         places = np.concatenate([truth.box[:, :2], truth.box[:, :2] + truth.box[:, 2:]])
     places = places[np.isfinite(places).all(axis=1)]
+    if not len(places):
+        return np.zeros(2), np.ones(2)
     margin = MARGIN if truth.pos is not None else 0.0
     return places.min(axis=0) - margin, places.max(axis=0) + np.maximum(margin, 1e-3)
 
 
-def _panel(area: Image, sequence: Sequence, truth: Truth, index: int, low: Array, high: Array) -> None:
-    """One view with its title."""
+def _plan(area: Image, sequence: Sequence, truth: Truth, index: int, low: Array, high: Array) -> None:
+    """People from above, or the boxes of a recording without pictures."""
     plan = truth.pos is not None
-    view = View.fit(area[TITLE:], low, high, upwards=plan)
+    view = View.fit(area, low, high, upwards=plan)
     places, boxes = _places(truth), None if plan else truth.box
     view.canvas[:] = sheet_panel.FLOOR
     if plan:
@@ -139,15 +176,24 @@ def _panel(area: Image, sequence: Sequence, truth: Truth, index: int, low: Array
     sheet_panel.hulls(view, truth, index, places, boxes)
     rows = truth.rows(index)
     sheet_panel.people(view, truth, index, places, boxes, names=rows.stop - rows.start <= MANY)
-    near = [event for event in truth.events or () if abs(event.start - index) <= SOON * truth.fps]
-    now = sorted((event for event in near if event.kind in RANK), key=lambda event: RANK[event.kind])
-    for event in now if plan else []:
+    for event in _now(truth, index) if plan else []:
         at, radius = _around(event, truth.id[rows], places[rows])
-        view.disc(at, radius * view.scale, _kind(event), 3)
-    words = f"{(index - 1) / truth.fps:.1f} s" + "".join(f"   {_words(event)}" for event in now)
-    ink = _kind(now[0]) if now else QUIET
+        view.disc(at, radius * view.scale, kind_colour(event.kind), 3)
+
+
+def _title(area: Image, truth: Truth, index: int) -> None:
+    """When, and what happens; a frame round the panel in the colour of that."""
+    now = _now(truth, index)
+    words = f"{(index - 1) / truth.fps:.1f} s" + "".join(f"   {event_words(event)}" for event in now)
+    ink = kind_colour(now[0].kind) if now else QUIET
     text(area, words[:62], (2, TITLE - 12), 0.72, ink, 2 if now else 1)
     cv2.rectangle(area, (0, TITLE), (area.shape[1] - 1, area.shape[0] - 1), ink if now else THING, 5 if now else 2)
+
+
+def _now(truth: Truth, index: int) -> list[GroupEvent]:
+    """Events that begin about then, those first that a scenario is about."""
+    near = [event for event in truth.events or () if abs(event.start - index) <= SOON * truth.fps]
+    return sorted((event for event in near if event.kind in RANK), key=lambda event: RANK[event.kind])
 
 
 def _around(event: GroupEvent, ids: Ints, places: Array) -> tuple[Array, float]:
@@ -159,21 +205,6 @@ def _around(event: GroupEvent, ids: Ints, places: Array) -> tuple[Array, float]:
     return centre, float(np.linalg.norm(members - centre, axis=1).max()) + 0.7
 
 
-def _kind(event: GroupEvent) -> Colour:
-    return colour(KIND_COLOUR.get(event.kind, 6))
-
-
-def _words(event: GroupEvent) -> str:
-    def listed(ids: tuple[int, ...]) -> str:
-        alone = sum(i < 0 for i in ids)
-        some = ["alone" if alone == 1 else f"{alone} alone"] if alone else []
-        return "+".join([*some, *(f"G{i}" for i in ids if i >= 0)])
-
-    if event.before == event.after:
-        return f"{event.kind} {listed(event.before)}"
-    return f"{event.kind} {listed(event.before)} -> {listed(event.after)}"
-
-
 def _head(canvas: Image, sequence: Sequence, truth: Truth) -> None:
     text(canvas, sequence.name, (GAP, 48), 1.3, INK, 3)
     width = cv2.getTextSize(sequence.name, cv2.FONT_HERSHEY_SIMPLEX, 1.3, 3)[0][0]
@@ -181,7 +212,8 @@ def _head(canvas: Image, sequence: Sequence, truth: Truth) -> None:
     low, high = _bounds(sequence, truth)
     if truth.pos is not None and sequence.scene is not None:
         low, high = np.zeros(2), sequence.scene.size
-    facts = f"{len(np.unique(truth.id))} people, {truth.length} frames, {truth.fps:g}/s, "
+    people = f"{len(np.unique(truth.id))} people, " if len(truth.id) else ""
+    facts = f"{people}{truth.length} frames, {truth.fps:g}/s, "
     facts += f"{high[0] - low[0]:.4g} x {high[1] - low[1]:.4g} {unit}; trails {sheet_panel.TRAIL:g} s"
     text(canvas, facts, (GAP + width + 30, 46), 0.75, QUIET)
 
@@ -201,7 +233,7 @@ def _foot(area: Image, truth: Truth, chosen: list[int]) -> None:
     text(area, f"{(truth.length - 1) / truth.fps:.0f} s", (right + 12, line + 8), 0.7, QUIET)
     events = [event for event in truth.events or () if 1 <= event.start <= truth.length]
     for event in events:
-        cv2.circle(area, (at(event.start), line), 9, _kind(event), -1, cv2.LINE_AA)
+        cv2.circle(area, (at(event.start), line), 9, kind_colour(event.kind), -1, cv2.LINE_AA)
     x = left
     for kind in sorted({event.kind for event in events}, key=lambda kind: list(KIND_COLOUR).index(kind)):
         cv2.circle(area, (x + 8, line + 42), 9, colour(KIND_COLOUR[kind]), -1, cv2.LINE_AA)
