@@ -38,3 +38,16 @@ def test_nothing_to_export(tmp_path):
     with pytest.warns(UserWarning, match="25 fps"), pytest.raises(InputError, match="no labelled boxes"):
         coco(tmp_path / "a.txt", tmp_path / "coco.json")
     assert not (tmp_path / "coco.json").exists()
+
+
+@pytest.mark.parametrize(
+    ("images", "name"), [("jpg", "img1/000002.jpg"), ("png", "img1/000002.png"), ("mp4", "left.mp4")]
+)
+def test_coco_names_the_pictures_that_are_there(tmp_path, make_pictured, images, name):
+    live = make_pictured(1, ("left",))
+    folder = tmp_path / "data" / live.name
+    store.write_sequence(folder, live, scenario="schema = 1\n", seed=1, streams=("left",), images=images)
+    coco(tmp_path / "data", tmp_path / "coco.json")
+    image = json.loads((tmp_path / "coco.json").read_text())["images"][1]
+    assert (image["file_name"], image["frame"]) == (f"{live.name}/{name}", 2)
+    assert (tmp_path / "data" / image["file_name"]).is_file()
