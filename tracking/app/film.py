@@ -44,19 +44,29 @@ class Film:
 def film(
     sequence: Sequence, page: Path, video: Video = "auto", step: Callable[[str], None] = lambda _: None
 ) -> Film | None:
-    """The pictures of a sequence as a video for a page, FILE.mp4 beside FILE.html where it is not to be inside.
+    """The pictures of a sequence as a video for a page, FILE.mp4 beside FILE.html where it is not to be inside
+    (FILE.view.mp4 where FILE.mp4 is the source itself).
 
     None where there are no pictures, or none are wanted. step: called after each.
     """
     if video == "none" or not sequence.has_images:
         return None
-    with writing(page.with_suffix(".mp4")) as partial:
+    beside = page.with_suffix(".mp4")
+    if is_source(sequence, beside):
+        beside = page.with_suffix(".view.mp4")
+    rate = float(rate_of(sequence.fps))
+    with writing(beside) as partial:
         lost = encode(sequence, partial, step)
-        large = partial.stat().st_size >= LARGE
-        if video == "beside" or (video == "auto" and large):
-            os.replace(partial, page.with_suffix(".mp4"))
-            return Film(quote(page.with_suffix(".mp4").name), "", float(rate_of(sequence.fps)), lost)
-        return Film("", base64.b64encode(partial.read_bytes()).decode(), float(rate_of(sequence.fps)), lost)
+        if video == "inside" or (video == "auto" and partial.stat().st_size < LARGE):
+            return Film("", base64.b64encode(partial.read_bytes()).decode(), rate, lost)
+        os.replace(partial, beside)
+    return Film(quote(beside.name), "", rate, lost)
+
+
+def is_source(sequence: Sequence, path: Path) -> bool:
+    """Whether a path is the very file that the sequence is read from."""
+    source = sequence.source.get("path")
+    return source is not None and path.exists() and path.samefile(source)
 
 
 def encode(sequence: Sequence, path: Path, step: Callable[[str], None]) -> tuple[int, ...]:

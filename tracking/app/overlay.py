@@ -16,7 +16,7 @@ from sim.io.atomic import writing
 from sim.io.encode import Movie
 from sim.types import Frame, Image, Sequence, Tracks
 from tracking.app import marks, painter
-from tracking.app.film import even
+from tracking.app.film import even, is_source
 from tracking.app.marks import Side
 from tracking.app.painter import Style
 from tracking.app.sheet_panel import View
@@ -47,8 +47,10 @@ def overlay(
             file=sequence.name, got="a sequence without pictures", expected="one with pictures",
             remedy="flockscope view shows it on plain ground",
         )  # fmt: skip
-    layers = _layers(sequence, tracks, truth)
     path = Path(out)
+    if is_source(sequence, path):
+        raise InputError(file=path, place="--out", got="the source itself", expected="another file", remedy="rename it")
+    layers = _layers(sequence, tracks, truth)
     with writing(path) as partial:
         _write(partial, sequence, layers, step)
         os.replace(partial, path)
