@@ -14,13 +14,14 @@ import math
 
 import numpy as np
 
-from sim.types import Array, Bools, Image
+from sim.types import Bools, Image
 from tracking.detect import gain as gains
 from tracking.detect.classes import BACKGROUND as BACKGROUND
 from tracking.detect.classes import DARK as DARK
 from tracking.detect.classes import FOREGROUND as FOREGROUND
 from tracking.detect.classes import HIGHLIGHT as HIGHLIGHT
 from tracking.detect.classes import SHADOW as SHADOW
+from tracking.detect.classes import Floats
 from tracking.detect.classes import foreground as foreground
 from tracking.detect.settings import BackgroundSettings
 from tracking.detect.training import FLOOR, check_frame, train
@@ -32,24 +33,29 @@ INTERLEAVE = 4
 class Background:
     """The model of a still scene; it changes in `classify` (the gain) and in `adapt`.
 
-    mean, var (H, W, 3): E and sigma^2 at gain 1. s, b (H, W): normalisers. valid (H, W): False where the sample showed
-    no background, which is called background until it is learned. gain (3,): brightness of the frame classified last.
+    mean, var (3, H, W): E and sigma^2 at gain 1. s, b (H, W): normalisers, inf where there is no background. valid
+    (H, W): False where the sample showed none; such pixels are called background for ever.
+    gain (3,): brightness of the frame classified last.
     """
 
     def __init__(self, sample: Image, fps: float, settings: BackgroundSettings | None = None) -> None:
         self.settings = settings or BackgroundSettings()
         self.fps = fps
         trained = train(sample, self.settings.detection_rate, self.settings.gain == "global")
-        self.mean, self.var = trained.mean, np.square(trained.sigma)
-        self.s, self.b, self.valid = trained.s, trained.b, trained.valid
+        self.mean: Floats = np.ascontiguousarray(np.moveaxis(trained.mean, -1, 0))
+        self.var: Floats = np.ascontiguousarray(np.moveaxis(np.square(trained.sigma), -1, 0))
+        self.valid = trained.valid
+        self.s, self.b = (np.where(self.valid, n, np.float32(np.inf)) for n in (trained.s, trained.b))
         self.thresholds = trained.thresholds
-        self.gain: Array = np.ones(3, np.float32)
+        self.gain: Floats = np.ones(3, np.float32)
         self._grid = gains.grid(*self.valid.shape)
         self._calm = self.valid[self._grid]
         self._turn = 0
 
     def classify(self, image: Image) -> Image:
         """(H, W) uint8 classes of a frame (H, W, 3) BGR uint8."""
+        import cv2
+
         from tracking.detect import background_kernels
 
         check_frame(image, self.valid.shape)
@@ -57,7 +63,11 @@ class Background:
             self.gain = self._gain(image)
         limits = np.array([*self.thresholds, self.settings.dark, self.settings.bright], np.float32)
         classes = np.empty(self.valid.shape, np.uint8)
-        background_kernels.classify(image, self.mean, self.var, self.s, self.b, self.valid, self.gain, limits, classes)
+        planes = (np.asarray(plane, np.uint8).ravel() for plane in cv2.split(image))
+        E, V = self.mean.reshape(3, -1), self.var.reshape(3, -1)
+        background_kernels.classify(
+            *planes, E, V, self.s.ravel(), self.b.ravel(), self.gain, limits, classes.reshape(-1)
+        )
         self._calm = ~foreground(classes[self._grid]) & self.valid[self._grid]
         return classes
 
@@ -76,9 +86,9 @@ class Background:
             image, classes, keep, self.mean, self.var, self.gain, first, INTERLEAVE, fast, slow, FLOOR**2
         )
 
-    def _gain(self, image: Image) -> Array:
+    def _gain(self, image: Image) -> Floats:
         """The gain over what was background in the last frame, else over all pixels, else the last one."""
-        seen, mean = image[self._grid].astype(np.float32), self.mean[self._grid]
+        seen, mean = image[self._grid].astype(np.float32), np.moveaxis(self.mean[:, *self._grid], 0, -1)
         found = gains.gain(seen, mean, self._calm)
         if found is None:
             found = gains.gain(seen, mean, self.valid[self._grid])

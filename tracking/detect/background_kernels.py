@@ -1,7 +1,7 @@
 """All pixels in one pass each, as numba kernels: classes, adaptation; numpy twins: tests/reference_background.py.
 
-E: mean colours, V: variances (H, W, 3); s, b: normalisers (H, W); g: gain per channel (3,); all float32.
-Each kernel calls none of another: numba's cache does not see changes of what is called in other files.
+Pixels lie in a row, colours in planes, so that the loops vectorise: image planes i (N,) uint8; E: mean colours, V:
+variances (3, N); s, b: normalisers (N,), inf where there is no background; g: gain per colour (3,). All float32.
 """
 
 from __future__ import annotations
@@ -9,36 +9,33 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
-from sim.types import Array, Bools, Image
+from sim.types import Bools, Image
+from tracking.detect.classes import Floats
 
 
 @njit(cache=True, error_model="numpy")
 def classify(
-    image: Image, E: Array, V: Array, s: Array, b: Array, valid: Bools, g: Array, limits: Array, out: Image
+    i0: Image, i1: Image, i2: Image, E: Floats, V: Floats, s: Floats, b: Floats, g: Floats, limits: Floats, out: Image
 ) -> None:
-    """Fill `out` (H, W) with classes; limits: (CD, lower, upper, dark, bright), see tracking.detect.background."""
+    """Fill `out` (N,) with classes; limits: (CD, lower, upper, dark, bright), see tracking.detect.background."""
     one, top = np.float32(1.0), np.float32(255.0)
-    tau2, lower, upper, dark, bright = limits[0] * limits[0], limits[1], limits[2], limits[3], limits[4]
+    tau, lower, upper, dark, bright = limits[0], limits[1], limits[2], limits[3], limits[4]
     g0, g1, g2 = g[0], g[1], g[2]
-    for r in range(image.shape[0]):
-        for c in range(image.shape[1]):
-            i0, i1, i2 = np.float32(image[r, c, 0]), np.float32(image[r, c, 1]), np.float32(image[r, c, 2])
-            e0, e1, e2 = min(g0 * E[r, c, 0], top), min(g1 * E[r, c, 1], top), min(g2 * E[r, c, 2], top)
-            w0, w1, w2 = one / V[r, c, 0], one / V[r, c, 1], one / V[r, c, 2]
-            length2 = w0 * e0 * e0 + w1 * e1 * e1 + w2 * e2 * e2
-            alpha = (w0 * e0 * i0 + w1 * e1 * i1 + w2 * e2 * i2) / length2
-            d0, d1, d2 = i0 - alpha * e0, i1 - alpha * e1, i2 - alpha * e2
-            cd2 = w0 * d0 * d0 + w1 * d1 * d1 + w2 * d2 * d2
-            brightness = (alpha - one) * np.sqrt(length2) / s[r, c]
-            low, high = brightness < lower, brightness > upper
-            kind = 0
-            if high:
-                kind = 1 if alpha > bright else 4
-            if low:
-                kind = 2 if alpha < dark else 3
-            if cd2 > tau2 * b[r, c] * b[r, c]:
-                kind = 1
-            out[r, c] = kind if valid[r, c] else 0
+    E0, E1, E2, V0, V1, V2 = E[0], E[1], E[2], V[0], V[1], V[2]
+    for n in range(len(out)):
+        x0, x1, x2 = np.float32(i0[n]), np.float32(i1[n]), np.float32(i2[n])
+        e0, e1, e2 = min(g0 * E0[n], top), min(g1 * E1[n], top), min(g2 * E2[n], top)
+        w0, w1, w2 = one / V0[n], one / V1[n], one / V2[n]
+        length2 = w0 * e0 * e0 + w1 * e1 * e1 + w2 * e2 * e2
+        alpha = (w0 * e0 * x0 + w1 * e1 * x1 + w2 * e2 * x2) / length2
+        d0, d1, d2 = x0 - alpha * e0, x1 - alpha * e1, x2 - alpha * e2
+        cd2 = w0 * d0 * d0 + w1 * d1 * d1 + w2 * d2 * d2
+        brightness = (alpha - one) * np.sqrt(length2) / s[n]
+        most = tau * b[n]
+        kind = np.uint8(0)
+        kind = (np.uint8(1) if alpha > bright else np.uint8(4)) if brightness > upper else kind
+        kind = (np.uint8(2) if alpha < dark else np.uint8(3)) if brightness < lower else kind
+        out[n] = np.uint8(1) if cd2 > most * most else kind
 
 
 @njit(cache=True, error_model="numpy")
@@ -46,17 +43,17 @@ def adapt(
     image: Image,
     classes: Image,
     protected: Bools,
-    E: Array,
-    V: Array,
-    g: Array,
+    E: Floats,
+    V: Floats,
+    g: Floats,
     first: int,
     step: int,
     fast: float,
     slow: float,
     least: float,
 ) -> None:
-    """Move E towards I / g in rows first, first + step, …: by `fast` where background, by `slow` elsewhere, not where
-    protected; V follows the squared residuals of background, never below `least`."""
+    """Move E (3, H, W) towards I / g in rows first, first + step, …: by `fast` where background, by `slow` elsewhere,
+    not where protected; V follows the squared residuals of background, never below `least`."""
     quick, late, floor = np.float32(fast), np.float32(slow), np.float32(least)
     for r in range(first, image.shape[0], step):
         for c in range(image.shape[1]):
@@ -65,7 +62,7 @@ def adapt(
             seen = classes[r, c] == 0
             rate = quick if seen else late
             for k in range(3):
-                d = np.float32(image[r, c, k]) / g[k] - E[r, c, k]
-                E[r, c, k] += rate * d
+                d = np.float32(image[r, c, k]) / g[k] - E[k, r, c]
+                E[k, r, c] += rate * d
                 if seen:
-                    V[r, c, k] = max(V[r, c, k] + rate * (d * d * g[k] * g[k] - V[r, c, k]), floor)
+                    V[k, r, c] = max(V[k, r, c] + rate * (d * d * g[k] * g[k] - V[k, r, c]), floor)

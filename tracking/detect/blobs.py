@@ -9,13 +9,16 @@ v down. Its noise: var theta = l1 l2 / (n (l1 - l2)^2).
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import cv2
 import numpy as np
+from numpy.typing import NDArray
 
 from sim.arrays import Frozen
-from sim.types import Array, Bools, Ints
+from sim.types import Array, Bools
 
+Labels = NDArray[np.int32]
 MAJORITY_M, OPEN_M, CLOSE_M = 0.08, 0.05, 0.15
 """Windows of the three operations, m."""
 PERSON_M2 = 0.6
@@ -34,7 +37,7 @@ class Blobs(Frozen):
     area: Array
     ellipse: Array
     angle_var: Array
-    label: Ints
+    label: Labels
 
     def __len__(self) -> int:
         return len(self.area)
@@ -44,16 +47,17 @@ class Blobs(Frozen):
         left, top, wide, high = self.box[row].astype(int)
         cut = (self.label[top : top + high, left : left + wide] == row + 1).astype(np.uint8)
         outlines, _ = cv2.findContours(cut, cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_SIMPLE)
-        return max(outlines, key=len)[:, 0].astype(float) + np.array([left + 0.5, top + 0.5])
+        longest = np.reshape(max(outlines, key=len), (-1, 2))
+        return np.asarray(longest + np.array([left + 0.5, top + 0.5]))
 
     def hull(self, row: int) -> Array:
         """(V, 2) convex hull of one blob's contour, px, counter-clockwise in (x, y)."""
-        return cv2.convexHull(self.contour(row).astype(np.float32), clockwise=False)[:, 0].astype(float)
+        return np.asarray(cv2.convexHull(self.contour(row).astype(np.float32), clockwise=False), float).reshape(-1, 2)
 
 
 def clean(foreground: Bools, px_per_m: float) -> Bools:
     """(H, W) foreground after majority, opening and closing with windows that follow the scale."""
-    mask = foreground.astype(np.uint8)
+    mask: NDArray[Any] = foreground.astype(np.uint8)
     size = odd(MAJORITY_M * px_per_m, 3)
     mask = (cv2.boxFilter(mask, cv2.CV_16U, (size, size), normalize=False) > size * size // 2).astype(np.uint8)
     for operation, metres, least in ((cv2.MORPH_OPEN, OPEN_M, 1), (cv2.MORPH_CLOSE, CLOSE_M, 3)):
@@ -90,19 +94,26 @@ def find(mask: Bools, min_area: float) -> Blobs:
     return Blobs(box.astype(float), area[order].astype(float), ellipse, angle_var, label)
 
 
-def moments(label: Ints, count: int) -> tuple[Array, Array, Array]:
+def moments(label: Labels, count: int) -> tuple[Array, Array, Array]:
     """Of the regions 1 … count: px (M,), centre (M, 2), covariance (M, 2, 2) of their pixels as unit squares."""
-    v, u = np.nonzero(label)
+    u, v = _pixels(label)
     row = label[v, u] - 1
     n = np.bincount(row, minlength=count).astype(float)
 
-    def mean(value: Array) -> Array:
-        return np.bincount(row, value, minlength=count) / np.maximum(n, 1)
+    def mean(value: NDArray[Any]) -> Array:
+        return np.asarray(np.bincount(row, value, minlength=count) / np.maximum(n, 1))
 
     centre = np.stack([mean(u), mean(v)], axis=-1)
     x, y = u - centre[row, 0], v - centre[row, 1]
     xx, xy, yy = mean(x * x) + 1 / 12, mean(x * y), mean(y * y) + 1 / 12
     return n, centre + 0.5, np.stack([xx, xy, xy, yy], axis=-1).reshape(-1, 2, 2)
+
+
+def _pixels(label: Labels) -> tuple[NDArray[Any], NDArray[Any]]:
+    """Columns and rows of the labelled pixels; OpenCV finds them five times as fast as numpy."""
+    found = cv2.findNonZero((label > 0).view(np.uint8))
+    found = np.zeros((0, 2), int) if found is None else found.reshape(-1, 2)
+    return found[:, 0], found[:, 1]
 
 
 def ellipses(n: Array, centre: Array, cov: Array) -> tuple[Array, Array]:

@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import numpy as np
+from numpy.typing import NDArray
 
 from sim.types import Bools, Image
 
+Floats = NDArray[np.float32]
 BACKGROUND, FOREGROUND, DARK, SHADOW, HIGHLIGHT = range(5)
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from sim.types import Array, Bools, Image
+from tracking.detect.classes import Floats
 
 POINTS = 6000
 """Pixels of the grid on which a gain is estimated."""
@@ -19,7 +20,7 @@ def grid(high: int, wide: int) -> tuple[slice, slice]:
     return slice(step // 2, None, step), slice(step // 2, None, step)
 
 
-def gain(image: Array, mean: Array, where: Bools) -> Array | None:
+def gain(image: Array | Floats, mean: Array | Floats, where: Bools) -> Array | None:
     """(3,) median of I / E over grid pixels (h, w, 3) that are `where` (h, w); None if too few can be used."""
     usable = where & np.all((mean > DARKEST) & (image > DARKEST) & (image < BRIGHTEST), axis=-1)
     if usable.sum() < FEWEST:

@@ -16,7 +16,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from scenarios.errors import InputError
-from sim.types import Array, Bools, Image
+from sim.types import Array, Bools, Image, Ints
+from tracking.detect.classes import Floats
 from tracking.detect.gain import frame_gains
 
 LEAST_FRAMES = 10
@@ -32,55 +33,46 @@ ROUNDS = 3
 CLEAN = 6.0
 """The same for thresholds, where the tail counts: a pixel with any sample beyond was covered, and is left out whole."""
 WIDEST = 20.0
-"""Grey levels: a pixel with a larger robust sigma shows no background in more than half of the frames."""
+"""Grey levels: a pixel whose shortest interval is wider than this sigma's shows no background."""
 BINS, SPAN = 4000, 20.0
-CELLS = 400_000
-"""Values worked on at once."""
 
 
 @dataclass(frozen=True)
 class Trained:
-    """E, sigma (H, W, 3), s, b (H, W) float32; valid (H, W); thresholds: CD, lower and upper brightness."""
+    """E, sigma (H, W, 3), s, b (H, W); valid (H, W); thresholds: CD, lower and upper brightness."""
 
-    mean: Array
-    sigma: Array
-    s: Array
-    b: Array
+    mean: Floats
+    sigma: Floats
+    s: Floats
+    b: Floats
     valid: Bools
     thresholds: tuple[float, float, float]
 
 
 def train(sample: Image, rate: float, follow_gain: bool) -> Trained:
     """The model of a sample (K, H, W, 3); InputError where it is none, too short, or without background."""
+    from tracking.detect import training_kernels
+
     check(sample)
     gains = frame_gains(sample) if follow_gain else np.ones((len(sample), 3))
-    _, high, wide, _ = sample.shape
-    mean, sigma = np.empty((high, wide, 3), np.float32), np.empty((high, wide, 3), np.float32)
-    s, b, valid = np.empty((high, wide), np.float32), np.empty((high, wide), np.float32), np.empty((high, wide), bool)
+    size = sample.shape[1:3]
+    mean, sigma = np.empty((*size, 3), np.float32), np.empty((*size, 3), np.float32)
+    s, b, valid = np.empty(size, np.float32), np.empty(size, np.float32), np.empty(size, bool)
     counts = np.zeros((2, 2, BINS), np.int64)
-    rows = max(1, CELLS // (len(sample) * wide * 3))
-    for top in range(0, high, rows):
-        cut = slice(top, top + rows)
-        values = (sample[:, cut] / gains[:, None, None, :]).astype(np.float32)
-        mean[cut], sigma[cut], inlier, clean, valid[cut] = _spread(values)
-        alpha, cd = distortions(values, mean[cut], sigma[cut])
-        length = np.sqrt(np.sum(np.square(mean[cut] / sigma[cut]), axis=-1))
-        least = FLOOR / sigma[cut].mean(axis=-1)
-        s[cut] = np.maximum(_rms(alpha - 1, inlier) * length, least)
-        b[cut] = np.maximum(_rms(cd, inlier), np.sqrt(2) * least)
-        shown = (alpha - 1) * length / s[cut], cd / b[cut]
-        for level, which in enumerate((inlier & valid[cut], np.broadcast_to(clean & valid[cut], inlier.shape))):
-            for kind, value in enumerate(shown):
-                counts[level, kind] += np.histogram(value[which], BINS, (-SPAN, SPAN))[0]
+    held = max(int(np.ceil(SHARE * len(sample))), 3)
+    rules = AS_SIGMA, FLOOR, WIDEST, INLIER, CLEAN, ROUNDS
+    training_kernels.learn(
+        sample, gains.astype(np.float32), held, rules, (BINS, SPAN), mean, sigma, s, b, valid, counts
+    )
     if valid.mean() < 0.5:
         raise InputError(
             place="background",
-            got=f"{1 - valid.mean():.0%} of the pixels change in more than half of {len(sample)} frames",
+            got=f"{1 - valid.mean():.0%} of the pixels never rest in {len(sample)} frames",
             expected="a still camera: no background can be had",
             remedy="give a sample of the empty scene, or detections instead of pixels",
         )
     enough = counts[1, 1].sum() >= 0.05 * counts[0, 1].sum()
-    return Trained(mean, sigma, s, b, valid, _thresholds(counts[1 if enough else 0], rate))
+    return Trained(mean, sigma, s, b, valid, thresholds(counts[1 if enough else 0], rate))
 
 
 def check(sample: Image) -> None:
@@ -106,44 +98,7 @@ def check_frame(image: Image, size: tuple[int, ...]) -> None:
         )
 
 
-def distortions(image: Array, mean: Array, sigma: Array) -> tuple[Array, Array]:
-    """alpha and CD of pixels (..., 3): min over alpha of |(I - alpha E) / sigma|, and where it is (eqs 5, 6)."""
-    line, value = mean / sigma, image / sigma
-    alpha = np.sum(value * line, axis=-1) / np.sum(line * line, axis=-1)
-    return alpha, np.sqrt(np.sum(np.square(value - alpha[..., None] * line), axis=-1))
-
-
-def _spread(values: Array) -> tuple[Array, Array, Bools, Bools, Bools]:
-    """Of (K, h, w, 3): mean and sigma of the inliers, inliers (K, h, w), pixels never covered and valid ones (h, w)."""
-    mean, half = _shortest(values)
-    sigma = np.maximum(half * AS_SIGMA, FLOOR)
-    valid = np.all(sigma <= WIDEST, axis=-1)
-    for _ in range(ROUNDS):
-        away = np.abs(values - mean)
-        inlier = np.all(away <= INLIER * sigma, axis=-1)
-        clean = np.all(away <= CLEAN * sigma, axis=(0, -1))
-        n = np.maximum(inlier.sum(axis=0), 1)[..., None]
-        mean = np.maximum(np.sum(values, axis=0, where=inlier[..., None]) / n, 1.0)
-        var = np.sum(np.square(values - mean), axis=0, where=inlier[..., None]) / n
-        sigma = np.maximum(np.sqrt(var), FLOOR)
-    return mean, sigma, inlier, clean, valid
-
-
-def _shortest(values: Array) -> tuple[Array, Array]:
-    """Median of, and half, the shortest interval that holds SHARE of the values (K, ...), per pixel and colour."""
-    v = np.sort(values, axis=0)
-    held = max(int(np.ceil(SHARE * len(v))), 3)
-    first = (v[held - 1 :] - v[: len(v) - held + 1]).argmin(axis=0)[None]
-    low, middle, high = (np.take_along_axis(v, first + k, 0)[0] for k in (0, held // 2, held - 1))
-    return middle, (high - low) / 2
-
-
-def _rms(value: Array, inlier: Bools) -> Array:
-    n = np.maximum(inlier.sum(axis=0), 1)
-    return np.sqrt(np.sum(np.square(value), axis=0, where=inlier) / n)
-
-
-def _thresholds(counts: Array, rate: float) -> tuple[float, float, float]:
+def thresholds(counts: Ints, rate: float) -> tuple[float, float, float]:
     """CD, lower, upper at the detection rate, from histograms (brightness, CD) over -SPAN..SPAN."""
     edges = np.linspace(-SPAN, SPAN, BINS + 1)
     shares = [np.concatenate([[0], np.cumsum(c)]) / max(c.sum(), 1) for c in counts]

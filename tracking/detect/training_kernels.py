@@ -1,0 +1,111 @@
+"""Robust training, all pixels in one pass, as a numba kernel; numpy twin: tests/reference_background.py."""
+
+from __future__ import annotations
+
+import numpy as np
+from numba import njit
+
+from sim.types import Bools, Image, Ints
+from tracking.detect.classes import Floats
+
+
+@njit(cache=True, error_model="numpy")
+def learn(
+    sample: Image,
+    gains: Floats,
+    held: int,
+    rules: tuple[float, float, float, float, float, int],
+    bins: tuple[int, float],
+    mean: Floats,
+    sigma: Floats,
+    s: Floats,
+    b: Floats,
+    valid: Bools,
+    counts: Ints,
+) -> None:
+    """Fill the model of (K, H, W, 3), and histograms `counts` (inlier or clean, brightness or CD, bins).
+
+    rules: sigmas per half length, least and widest sigma, sigmas of inliers and of clean pixels, rounds.
+    """
+    as_sigma, least, widest, inside, untouched, rounds = rules
+    number, span = bins
+    frames, high, wide, _ = sample.shape
+    value, order = np.empty((frames, 3), np.float32), np.empty(frames, np.float32)
+    inlier = np.empty(frames, np.bool_)
+    alpha, cd = np.empty(frames), np.empty(frames)
+    m, sd = np.empty(3), np.empty(3)
+    for r in range(high):
+        for c in range(wide):
+            good = True
+            for k in range(3):
+                for t in range(frames):
+                    x = np.float32(sample[t, r, c, k]) / gains[t, k]
+                    value[t, k] = order[t] = x
+                for gap in (13, 4, 1):
+                    for t in range(gap, frames):
+                        x, j = order[t], t
+                        while j >= gap and order[j - gap] > x:
+                            order[j] = order[j - gap]
+                            j -= gap
+                        order[j] = x
+                first, best = 0, order[held - 1] - order[0]
+                for t in range(1, frames - held + 1):
+                    length = order[t + held - 1] - order[t]
+                    if length < best:
+                        first, best = t, length
+                m[k], sd[k] = order[first + held // 2], max(0.5 * best * as_sigma, least)
+                good = good and sd[k] <= widest
+            clean = True
+            for _ in range(rounds):
+                clean = True
+                n, sums, squares = 0, np.zeros(3), np.zeros(3)
+                for t in range(frames):
+                    away = 0.0
+                    for k in range(3):
+                        away = max(away, abs(value[t, k] - m[k]) / sd[k])
+                    inlier[t] = away <= inside
+                    clean = clean and away <= untouched
+                    if inlier[t]:
+                        n += 1
+                        for k in range(3):
+                            d = value[t, k] - m[k]
+                            sums[k] += d
+                            squares[k] += d * d
+                n = max(n, 1)
+                for k in range(3):
+                    shift = sums[k] / n
+                    m[k] = max(m[k] + shift, 1.0)
+                    sd[k] = max(np.sqrt(max(squares[k] / n - shift * shift, 0.0)), least)
+            norm = 0.0
+            for k in range(3):
+                norm += (m[k] / sd[k]) ** 2
+            n, sa, sb = 0, 0.0, 0.0
+            for t in range(frames):
+                dot = 0.0
+                for k in range(3):
+                    dot += value[t, k] * m[k] / (sd[k] * sd[k])
+                a, q = dot / norm, 0.0
+                for k in range(3):
+                    q += ((value[t, k] - a * m[k]) / sd[k]) ** 2
+                alpha[t], cd[t] = (a - 1) * np.sqrt(norm), np.sqrt(q)
+                if inlier[t]:
+                    n += 1
+                    sa += alpha[t] * alpha[t]
+                    sb += q
+            n = max(n, 1)
+            noise = 3 * least / (sd[0] + sd[1] + sd[2])
+            sa, sb = max(np.sqrt(sa / n), noise), max(np.sqrt(sb / n), np.sqrt(2.0) * noise)
+            for k in range(3):
+                mean[r, c, k], sigma[r, c, k] = m[k], sd[k]
+            s[r, c], b[r, c], valid[r, c] = sa, sb, good
+            if not good:
+                continue
+            for t in range(frames):
+                i = int((alpha[t] / sa + span) / (2 * span) * number)
+                j = int((cd[t] / sb + span) / (2 * span) * number)
+                if inlier[t]:
+                    counts[0, 0, min(max(i, 0), number - 1)] += 1
+                    counts[0, 1, min(max(j, 0), number - 1)] += 1
+                if clean:
+                    counts[1, 0, min(max(i, 0), number - 1)] += 1
+                    counts[1, 1, min(max(j, 0), number - 1)] += 1
