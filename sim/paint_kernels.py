@@ -1,9 +1,8 @@
-"""Compiled: people painted over a plate, pixel by pixel, and the shadows they cast.
+"""Compiled: people and their shadows painted over a plate, row by row of their outlines. The slow twin is in the tests.
 
-A person is the two ellipsoids of sim.people. A ray o + t d meets (p - c)ᵀ M (p - c) = 1 at the smaller root t of
-t² dᵀMd + 2 t dᵀM(o - c) + (o - c)ᵀM(o - c) - 1 = 0; t is depth along the camera's axis, and the nearest t wins.
-The shadow of an ellipsoid (c, S) on level ground z along sun s is the ellipse with middle c - s (c_z - z)/s_z and shape
-P S Pᵀ, P = I - s e_zᵀ / s_z. The numpy twin is in the tests.
+A body part is a ball of radius 1 in its own axes (across, along, up, each over its half axis): there the ray of pixel
+(u, v) is q = P (u, v, 1) + t D (u, v, 1), and it meets the ball at the smaller root t of |q| = 1; t is depth along the
+camera's axis, and the nearest t wins. Only pixels inside the part's outline (sim.people.outlines) are asked.
 """
 
 from __future__ import annotations
@@ -11,189 +10,179 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
-from sim.texture_kernels import lattice, smooth
-
-SHOES, TROUSERS, SHIRT, SECOND, SKIN, HAIR = range(6)  # rows of a person's colours
-PLAIN, HOOPS, STRIPES, PATCHES, JACKET = range(5)  # how a shirt is patterned
-WHOLE = 2.0  # brightness of an unlit pixel is never above this
+UNIT = 64.0  # canvases hold grey levels times this, as int16
+MOST = 32767.0
+TILE_H, TILE_W = 16, 32  # px: what is blurred anew as a whole where something was painted
 
 
 @njit(cache=True)
-def _wear(part, across, along, up, round_, style, key, colours, out):  # type: ignore[no-untyped-def]
-    """The colour of a place on a person. across, along: of the horizontal normal, body frame; up: share of height;
-    round_: way round the body in [0, 4); style: pattern, its count, hem, hair line."""
-    if part == 1:
-        row = HAIR if up > style[3] + 0.035 * along or (along < -0.25 and up > 0.9) else SKIN
-        shade = 1.0
-    elif up < 0.045:
-        row, shade = SHOES, 1.0
-    elif up < style[2]:
-        row = TROUSERS
-        gap = abs(across) < 0.16 and up < style[2] - 0.06  # between the legs
-        shade = 0.55 if gap else 1.0
-    elif up > 0.80 and along > 0.0 and abs(across) < 0.45:
-        row, shade = SKIN, 0.9  # neck
-    else:
-        row, shade, pattern = SHIRT, 1.0, int(style[0])
-        hoop = pattern == HOOPS and int(np.floor(up * style[1] * 3.0)) % 2 == 1
-        stripe = pattern == STRIPES and int(np.floor(round_ * style[1])) % 2 == 1
-        patch = pattern == PATCHES and lattice(int(round_ * style[1] * 0.8), int(up * 4 * style[1]), key) > 0.3
-        if hoop or stripe or patch or (pattern == JACKET and along > 0.25 and abs(across) < 0.3):
-            row = SECOND
-    cloth = 1.0 + 0.16 * smooth(5.0 * round_, 22.0 * up, key) + 0.10 * smooth(13.0 * round_, 55.0 * up, key + 1)
+def span(y, inverse):  # type: ignore[no-untyped-def]
+    """Ends x0 <= x1 of the row y of the ellipse a x² + 2 b x y + d y² <= 1, inverse = (a, b, d); x0 > x1: none."""
+    a, b, d = inverse
+    root = b * b * y * y - a * (d * y * y - 1.0)
+    if not (root >= 0.0 and a > 0.0):
+        return 1.0, -1.0
+    root = np.sqrt(root)
+    return (-b * y - root) / a, (-b * y + root) / a
+
+
+@njit(cache=True)
+def columns(v, middle, inverse, width):  # type: ignore[no-untyped-def]
+    """First column and last + 1 whose middles lie in the outline in row v and in the image."""
+    x0, x1 = span(v + 0.5 - middle[1], inverse)
+    if x0 > x1:
+        return 0, 0
+    low, high = max(np.ceil(middle[0] + x0 - 0.5), 0.0), min(np.floor(middle[0] + x1 - 0.5) + 1.0, float(width))
+    return int(low), max(int(high), int(low))
+
+
+@njit(cache=True)
+def touch(dirty, top, bottom, left, right, margin, height, width):  # type: ignore[no-untyped-def]
+    """Note the tiles of rows top … bottom - 1, columns left … right - 1 and of a margin round them."""
+    for r in range(max(top - margin, 0) // TILE_H, (min(bottom + margin, height) - 1) // TILE_H + 1):
+        for c in range(max(left - margin, 0) // TILE_W, (min(right + margin, width) - 1) // TILE_W + 1):
+            dirty[r, c] = 1
+
+
+@njit(cache=True)
+def _colour(atlas, round_, up, light, out):  # type: ignore[no-untyped-def]
+    """Colour of an atlas page (H, W, 3) at round_ in [0, 4) and up in [-1, 1], between its four neighbours."""
+    rows, cols = atlas.shape[0], atlas.shape[1]
+    x, y = round_ * (0.25 * cols) - 0.5, min(max((up + 1.0) * (0.5 * rows) - 0.5, 0.0), rows - 1.001)
+    i, j = int(np.floor(x)), int(y)
+    a, b = x - i, y - j
+    left, right = i % cols, (i + 1) % cols
     for k in range(3):
-        out[k] = colours[row, k] * shade * cloth
+        low = atlas[j, left, k] * (1 - a) + atlas[j, right, k] * a
+        high = atlas[j + 1, left, k] * (1 - a) + atlas[j + 1, right, k] * a
+        out[k] = np.int16(min((low * (1 - b) + high * b) * light, MOST))
+
+
+@njit(cache=True)
+def _light(x, y, z, half, sun, shadow, sunlit):  # type: ignore[no-untyped-def]
+    """Brightness at a place of a ball: the sky's light from above more than from the side, and the sun's by Lambert."""
+    nx, ny, nz = x / half[0], y / half[1], z / half[2]
+    size = 1.0 / np.sqrt(nx * nx + ny * ny + nz * nz)
+    facing = max(0.0, nx * sun[0] + ny * sun[1] + nz * sun[2]) * size / max(sun[2], 0.3)
+    return (1.0 - shadow) * (0.8 + 0.2 * nz * size) + shadow * facing * sunlit
 
 
 @njit(cache=True)
 def people(  # type: ignore[no-untyped-def]
-    origin,
-    direction,
-    boxes,
-    centre,
+    order,
+    start,
+    step,
+    half,
+    middle,
     inverse,
-    facing,
-    foot,
-    height,
-    keys,
-    styles,
-    colours,
+    boxes,
+    id,
     sun,
     shadow,
+    sunlit,
+    pages,
+    atlas,
+    shade,
+    label,
     depth,
     ids,
-    id,
-    image,
+    canvas,
+    dirty,
+    margin,
     amodal,
 ):
-    """Paint all people: depth (H, W), ids (H, W) and image (H, W, 3) are those of the plate and become those of all.
+    """Paint people in `order` (near first is quickest; any gives the same), by depth.
 
-    boxes (N, 4) first and last + 1 column and row; amodal (N,) counts the pixels of each silhouette in the image.
-    """
-    o, d, m, n, c = np.empty(3), np.empty(3), np.empty(3), np.empty(3), np.empty(3)
-    for i in range(len(id)):
-        cos, sin = facing[i, 0], facing[i, 1]
-        for v in range(boxes[i, 2], boxes[i, 3]):
-            for u in range(boxes[i, 0], boxes[i, 1]):
-                for k in range(3):
-                    o[k] = origin[k, 0] * (u + 0.5) + origin[k, 1] * (v + 0.5) + origin[k, 2]
-                    d[k] = direction[k, 0] * (u + 0.5) + direction[k, 1] * (v + 0.5) + direction[k, 2]
-                best, part = np.inf, -1
-                for e in range(2):
-                    a = b = q = 0.0
-                    for k in range(3):
-                        x = o[k] - centre[i, e, k]
-                        md = inverse[i, e, k, 0] * d[0] + inverse[i, e, k, 1] * d[1] + inverse[i, e, k, 2] * d[2]
-                        a += d[k] * md
-                        b += x * md
-                        for j in range(3):
-                            q += x * inverse[i, e, k, j] * (o[j] - centre[i, e, j])
-                    root = b * b - a * (q - 1.0)
-                    if root < 0.0:
-                        continue
-                    t = (-b - np.sqrt(root)) / a
-                    if 0.0 < t < best:
-                        best, part = t, e
-                if part < 0:
-                    continue
-                amodal[i] += 1
-                if best >= depth[v, u]:
-                    continue
-                depth[v, u] = best
-                ids[v, u] = id[i]
-                for k in range(3):
-                    m[k] = o[k] + best * d[k] - centre[i, part, k]
-                size = 0.0
-                for k in range(3):
-                    n[k] = inverse[i, part, k, 0] * m[0] + inverse[i, part, k, 1] * m[1] + inverse[i, part, k, 2] * m[2]
-                    size += n[k] * n[k]
-                size = np.sqrt(size)
-                for k in range(3):
-                    n[k] /= size
-                along, across = n[0] * cos + n[1] * sin, n[1] * cos - n[0] * sin
-                level = abs(along) + abs(across) + 1e-9
-                round_ = 1.0 - along / level if across >= 0 else 3.0 + along / level
-                level = np.sqrt(along * along + across * across) + 1e-9
-                up = (m[2] + centre[i, part, 2] - foot[i]) / height[i]
-                _wear(part, across / level, along / level, up, round_, styles[i], keys[i], colours[i], c)
-                lit = max(0.0, n[0] * sun[0] + n[1] * sun[1] + n[2] * sun[2]) / max(sun[2], 0.3)
-                light = min((1.0 - shadow) * (0.78 + 0.22 * n[2]) + shadow * lit, WHOLE)
-                for k in range(3):
-                    image[v, u, k] = c[k] * light
-
-
-@njit(cache=True)
-def shadows(place, boxes, centre, inverse, sun, softness, sunlit):  # type: ignore[no-untyped-def]
-    """Take from sunlit (H, W) the share of the sun that people stand in.
-
-    boxes (N, 4) where the shadow of each person can be; inverse (N, 2, 3): of P S Pᵀ packed; softness (N, 2): penumbra
-    over the ellipse's mean radius.
-    """
-    for i in range(len(boxes)):
-        for v in range(boxes[i, 2], boxes[i, 3]):
-            for u in range(boxes[i, 0], boxes[i, 1]):
-                x, y, z = place[v, u, 0], place[v, u, 1], place[v, u, 2]
-                share = 0.0
-                for e in range(2):
-                    above = (centre[i, e, 2] - z) / sun[2]
-                    if above <= 0.0:
-                        continue
-                    dx, dy = x - centre[i, e, 0] + sun[0] * above, y - centre[i, e, 1] + sun[1] * above
-                    q = dx * dx * inverse[i, e, 0] + 2 * dx * dy * inverse[i, e, 1] + dy * dy * inverse[i, e, 2]
-                    if q < (1.0 + softness[i, e]) ** 2:
-                        inside = 1.0 if softness[i, e] == 0.0 else 0.5 - (np.sqrt(q) - 1.0) / softness[i, e]
-                        share = max(share, min(inside, 1.0))
-                if share > 0.0:
-                    sunlit[v, u] *= 1.0 - share
-
-
-@njit(cache=True)
-def compose(colour, direct, sunlit, ids, people, gain, out):  # type: ignore[no-untyped-def]
-    """The picture (H, W, 3) uint8: people where there are some, else the plate, darker where the sun is taken away."""
-    height, width = ids.shape
-    for v in range(height):
-        for u in range(width):
-            if ids[v, u] > 0:
-                for k in range(3):
-                    out[v, u, k] = np.uint8(min(gain * people[v, u, k] + 0.5, 255.0))
-            else:
-                light = gain * (1.0 - direct[v, u] * (1.0 - sunlit[v, u]))
-                for k in range(3):
-                    out[v, u, k] = np.uint8(min(light * colour[v, u, k] + 0.5, 255.0))
-
-
-@njit(cache=True)
-def seen_boxes(ids, row_of, count, box):  # type: ignore[no-untyped-def]
-    """Pixels (N,) of each person in the id map, and the box (N, 4) first and last + 1 column and row round them."""
-    height, width = ids.shape
-    for i in range(len(box)):
-        box[i, 0], box[i, 1], box[i, 2], box[i, 3] = width, 0, height, 0
-    for v in range(height):
-        for u in range(width):
-            if ids[v, u] > 0:
-                i = row_of[ids[v, u]]
-                count[i] += 1
-                box[i, 0], box[i, 1] = min(box[i, 0], u), max(box[i, 1], u + 1)
-                box[i, 2], box[i, 3] = min(box[i, 2], v), max(box[i, 3], v + 1)
-
-
-@njit(cache=True)
-def disparities(depth, right, scale, tolerance, out):  # type: ignore[no-untyped-def]
-    """Disparity scale / z of each pixel; nan where the right camera sees something nearer there, or nothing at all.
-
-    right: the right view's depth (H, W). A point is seen where one of the two pixels about it has its depth.
+    start, step (N, 2, 3, 3): P and D of each part; half (N, 2, 3) m; middle (N, 2, 2), inverse (N, 2, 3): outlines;
+    boxes (N, 4) first row, last + 1, first column, last + 1; sun (N, 3) in each body's axes; sunlit (N, 3): share of
+    the sun at feet, waist and head; pages (N,) of the atlas (P, 2, H, W, 3).
+    depth (H, W) is that of the plate and becomes that of all; with `label` ids (H, W) and amodal (N,), the pixels of
+    each silhouette in the image; with `shade` the canvas (H, W, 3) and the tiles that are dirty.
     """
     height, width = depth.shape
-    for v in range(height):
-        for u in range(width):
-            z = depth[v, u]
-            out[v, u] = np.nan
-            if not z < 1e9:
-                continue
-            d = scale / z
-            there = u + 0.5 - d - 0.5
-            low = int(np.floor(there))
-            if low < 0 or low + 1 >= width:
-                continue
-            if right[v, low] >= z * (1 - tolerance) or right[v, low + 1] >= z * (1 - tolerance):
-                out[v, u] = d
+    for i in order:
+        page, top = atlas[pages[i]], boxes[i, 0]
+        if shade and boxes[i, 1] > top:
+            touch(dirty, top, boxes[i, 1], boxes[i, 2], boxes[i, 3], margin, height, width)
+        for v in range(top, boxes[i, 1]):
+            first, last = 0, 0
+            for e in range(2):
+                low, high = columns(v, middle[i, e], inverse[i, e], width)
+                if label:
+                    amodal[i] += high - low
+                    if e == 1:
+                        amodal[i] -= max(0, min(last, high) - max(first, low))
+                first, last = low, high
+                p, d, h = start[i, e], step[i, e], half[i, e]
+                y = v + 0.5
+                p0, p1, p2 = p[0, 1] * y + p[0, 2], p[1, 1] * y + p[1, 2], p[2, 1] * y + p[2, 2]
+                d0, d1, d2 = d[0, 1] * y + d[0, 2], d[1, 1] * y + d[1, 2], d[2, 1] * y + d[2, 2]
+                for u in range(low, high):
+                    x = u + 0.5
+                    px, py, pz = p[0, 0] * x + p0, p[1, 0] * x + p1, p[2, 0] * x + p2
+                    dx, dy, dz = d[0, 0] * x + d0, d[1, 0] * x + d1, d[2, 0] * x + d2
+                    a, b = dx * dx + dy * dy + dz * dz, px * dx + py * dy + pz * dz
+                    root = max(b * b - a * (px * px + py * py + pz * pz - 1.0), 0.0)
+                    t = (-b - np.sqrt(root)) / a
+                    if t <= 0.0 or t >= depth[v, u]:
+                        continue
+                    depth[v, u] = t
+                    if label:
+                        ids[v, u] = id[i]
+                    if shade:
+                        qx, qy, qz = px + t * dx, py + t * dy, pz + t * dz
+                        up = qz if e == 0 else 1.0
+                        share = sunlit[i, 1] + (sunlit[i, 2 if up > 0 else 0] - sunlit[i, 1]) * abs(up)
+                        level = 1.0 / (abs(qx) + abs(qy) + 1e-12)
+                        round_ = 1.0 - qx * level if qy >= 0 else 3.0 + qx * level
+                        _colour(page[e], round_, qz, UNIT * _light(qx, qy, qz, h, sun[i], shadow, share), canvas[v, u])
+
+
+@njit(cache=True)
+def _shade(x, y, z, centre, shape, sun, softness):  # type: ignore[no-untyped-def]
+    """Share of the sun that one person (body and head) takes from the point (x, y, z)."""
+    share = 0.0
+    for e in range(2):
+        above = (centre[e, 2] - z) / sun[2]
+        if above <= 0.0:
+            continue
+        dx, dy = x - centre[e, 0] + sun[0] * above, y - centre[e, 1] + sun[1] * above
+        q = dx * dx * shape[e, 0] + 2 * dx * dy * shape[e, 1] + dy * dy * shape[e, 2]
+        if q < (1.0 + softness[e]) ** 2:
+            soft = softness[e]
+            share = max(share, 1.0 if soft == 0.0 else min((1.0 + soft - np.sqrt(q)) / (2 * soft), 1.0))
+    return share
+
+
+@njit(cache=True)
+def shadows(  # type: ignore[no-untyped-def]
+    place, direct, boxes, flat, middle, inverse, centre, shape, sun, softness, taken, canvas, dirty, margin
+):
+    """Darken the canvas (H, W, 3) where people stand before the sun; the darkest shadow counts where several fall.
+
+    place (H, W, 3) m and direct (H, W), the sun's share of the light, of the plate; boxes as for `people`, the image of
+    the shadows; flat: all that is in view is level ground, where the shadow of part e has the outline middle, inverse;
+    centre (N, 2, 3), shape (N, 2, 3): inverse of P S Pᵀ, packed; softness (N, 2): half the penumbra over the mean
+    radius; taken (H, W) uint8: 255 times the share of the sun that is gone, 0 at first.
+    """
+    height, width = direct.shape
+    for i in range(len(boxes)):
+        if boxes[i, 1] > boxes[i, 0]:
+            touch(dirty, boxes[i, 0], boxes[i, 1], boxes[i, 2], boxes[i, 3], margin, height, width)
+        for v in range(boxes[i, 0], boxes[i, 1]):
+            low, high = boxes[i, 2], boxes[i, 3]
+            if flat:
+                low, high = columns(v, middle[i, 0], inverse[i, 0], width)
+                a, b = columns(v, middle[i, 1], inverse[i, 1], width)
+                if b > a:
+                    low, high = (min(low, a), max(high, b)) if high > low else (a, b)
+            for u in range(low, high):
+                x, y, z = place[v, u, 0], place[v, u, 1], place[v, u, 2]
+                share = int(255.0 * _shade(x, y, z, centre[i], shape[i], sun, softness[i]) + 0.5)
+                old = int(taken[v, u])
+                if share > old:
+                    taken[v, u] = share
+                    part = direct[v, u] / 255.0
+                    factor = (1.0 - part * share) / (1.0 - part * old)
+                    for k in range(3):
+                        canvas[v, u, k] = np.int16(canvas[v, u, k] * factor)

@@ -51,15 +51,21 @@ class Outlines:
     shape: Array
 
 
+def half_axes(height: Array, width: Array | None = None, depth: Array | None = None) -> Array:
+    """Half axes (N, 2, 3) m of bodies and heads: across, along the heading, up; see `ellipsoids`."""
+    width = SHOULDERS * height if width is None else width
+    depth = DEPTH * height if depth is None else depth
+    half = np.empty((len(height), 2, 3))
+    half[:, 0] = np.stack([BODY.across * width, BODY.along * depth, BODY.up * height], axis=1)
+    half[:, 1] = height[:, None] * np.array([HEAD.across, HEAD.along, HEAD.up])
+    return half
+
+
 def ellipsoids(
     pos3: Array, heading: Array, height: Array, width: Array | None = None, depth: Array | None = None
 ) -> Ellipsoids:
     """Ellipsoids of N people standing at pos3 (N, 3) m, heading (N,) rad; width, depth follow height if absent."""
-    width = SHOULDERS * height if width is None else width
-    depth = DEPTH * height if depth is None else depth
-    half = np.empty((len(height), 2, 3))  # across, along, up
-    half[:, 0] = np.stack([BODY.across * width, BODY.along * depth, BODY.up * height], axis=1)
-    half[:, 1] = height[:, None] * np.array([HEAD.across, HEAD.along, HEAD.up])
+    half = half_axes(height, width, depth)
     c, s = np.cos(heading), np.sin(heading)
     a = half**2
     shape = np.zeros((len(height), 2, 3, 3))

@@ -1,8 +1,8 @@
 """Pictures of a Motion: each a pure function of the frame's index, drawn when asked for.
 
-A Stage holds what is the same in all frames: the plate (sim.plate) of each view, clothes, light, noise. A frame is
-people over the plate by depth (sim.paint_kernels), the light of its moment, blur, noise, and lossy artefacts, in this
-order. Cameras with a lens that distorts are refused: outlines of bodies would not be the truth's.
+A Stage holds what is the same in all frames: the plate of each view (sim.plate), clothes, light, noise. A frame is the
+plate, darkened by shadows, people over it by depth (sim.paint_kernels), blurred, times the brightness of its moment,
+with noise, and at last lossy artefacts.
 """
 
 from __future__ import annotations
@@ -15,61 +15,27 @@ import numpy as np
 from numpy.typing import NDArray
 
 from scenarios.errors import InputError
+from sim import camera as cameras
 from sim.light import Illumination, illuminate
-from sim.people import Ellipsoids, ellipsoids
-from sim.plate import Geometry, Plate, Rays, paint_plate, sight, survey
-from sim.sensor_noise import Grain, grain
-from sim.silhouettes import pixel_boxes, pixel_truth, shadow_boxes, shadow_shapes
-from sim.static_kernels import PILLAR, WALL
-from sim.terrain import height_at
-from sim.types import Array, Camera, Frame, Image, Ints, Motion, PixelTruth
-from sim.wear import Wear, wear
+from sim.pixel_truth import pixel_truth
+from sim.sensor_noise import offsets, pool
+from sim.silhouettes import Cast, Crowd, cast, crowd, shadows
+from sim.types import Camera, Frame, Image, Motion, PixelTruth
+from sim.view import View, blur_weights, sunlit
+from sim.wear import wear
 
 if TYPE_CHECKING:
     from scenarios.schema import Light, Picture
 
 BACKGROUNDS = 50  # empty frames before the first
 LEFT, RIGHT = 0, 1
-OCCLUDER = -2
-
-
-@dataclass(frozen=True)
-class View:
-    """One camera's constants."""
-
-    camera: Camera
-    rays: Rays
-    geometry: Geometry
-    plate: Plate
-    ids: NDArray[np.int32]
-
-
-@dataclass(frozen=True, eq=False)
-class Drawn:
-    """One view of one frame before light and noise: colour of people, depth, ids (H, W), amodal (N,) px."""
-
-    colour: NDArray[np.float32]
-    depth: NDArray[np.float32]
-    ids: NDArray[np.int32]
-    amodal: Ints
-
-
-@dataclass(frozen=True, eq=False)
-class Crowd:
-    """The people of a frame: id (N,), pos3 (N, 3), their shapes, and rows of what they wear."""
-
-    id: Ints
-    pos3: Array
-    heading: Array
-    height: Array
-    shapes: Ellipsoids
 
 
 @dataclass(frozen=True, eq=False)
 class Rendered:
     """What was asked of one frame."""
 
-    image: Image
+    image: Image | None = None
     right: Image | None = None
     pixels: PixelTruth | None = None
 
@@ -78,6 +44,11 @@ class Stage:
     """All that is the same in every frame, made when first needed. Holds nothing of any frame."""
 
     def __init__(self, motion: Motion, camera: Camera, light: Light, picture: Picture) -> None:
+        if camera.radial != 0:
+            raise InputError(
+                place="camera.radial", got=f"{camera.radial:g}", expected="0: a lens that does not distort",
+                remedy="render with the camera's ideal twin (radial 0)",
+            )  # fmt: skip
         self.motion, self.camera, self.light, self.picture = motion, camera, light, picture
 
     @cached_property
@@ -86,26 +57,15 @@ class Stage:
         return illuminate(self.light, self.motion.seed, self.motion.repeat)
 
     @cached_property
-    def wear(self) -> Wear:
-        """What everybody wears."""
-        return wear(self.motion.present.shape[1], self.motion.seed, self.motion.repeat)
-
-    @cached_property
-    def grain(self) -> Grain:
-        """The camera's noise."""
-        return grain(self.picture.noise, self.camera.image, self.motion.seed, self.motion.repeat)
-
-    @cached_property
     def left_view(self) -> View:
-        """The camera itself."""
-        return self._view(self.camera)
+        """What the camera itself sees of the empty scene."""
+        return View(self.camera, self.motion, self.illumination, self.picture)
 
     @cached_property
     def right_view(self) -> View:
-        """The right camera of the pair; InputError where there is none."""
+        """What the right camera of the pair sees; InputError where there is none."""
         self.check_pair()
-        position = self.camera.position + self.camera.baseline * self.camera.rotation[0]
-        return self._view(self.camera.replace(position=position))
+        return View(cameras.right(self.camera), self.motion, self.illumination, self.picture)
 
     def check_pair(self) -> None:
         """InputError where there is no right camera."""
@@ -115,112 +75,126 @@ class Stage:
                 expected="a pinhole pair with a baseline above 0", remedy="set camera.baseline, or leave it out",
             )  # fmt: skip
 
-    def _view(self, camera: Camera) -> View:
-        geometry = survey(camera, self.motion.scene)
-        plate = paint_plate(
-            camera, self.motion.scene, self.illumination, self.picture, self.motion.seed, self.motion.repeat
-        )
-        solid = (geometry.kind == WALL) | (geometry.kind == PILLAR)
-        return View(camera, sight(camera), geometry, plate, np.where(solid, OCCLUDER, 0).astype(np.int32))
+    @cached_property
+    def _atlas(self) -> NDArray[np.float32]:
+        return wear(self.motion.present.shape[1], self.motion.seed, self.motion.repeat)
+
+    @cached_property
+    def _noise(self) -> NDArray[np.int16]:
+        from sim.paint_kernels import UNIT
+
+        return pool(self.picture.noise, UNIT)
+
+    @cached_property
+    def _weights(self) -> NDArray[np.float32]:
+        return blur_weights(self.picture.blur_px)
+
+    @cached_property
+    def _known(self) -> NDArray[np.float64]:
+        return self.left_view.disparities(self.right_view)
 
     def frame(self, index: int) -> Image:
         """The picture of frame `index`."""
-        return self.both(index).image
+        return self._draw(self.left_view, crowd(self.motion, index), index, LEFT, shade=True, label=False)[0]
 
     def right(self, index: int) -> Image:
         """The right camera's."""
-        crowd = self._crowd(index)
-        return self._picture(self.right_view, crowd, self._draw(self.right_view, crowd), index, RIGHT)
+        return self._draw(self.right_view, crowd(self.motion, index), index, RIGHT, shade=True, label=False)[0]
 
-    def pixels(self, index: int, *, right: bool = False) -> PixelTruth:
-        """Who shows where in frame `index`; with disparities where `right`."""
-        crowd = self._crowd(index)
-        other = self._draw(self.right_view, crowd) if right else None
-        return self._pixels(crowd, self._draw(self.left_view, crowd), other)
+    def pixels(self, index: int, *, disparity: bool = False) -> PixelTruth:
+        """Who shows where in frame `index`, and how far away."""
+        truth = self._draw(
+            self.left_view, crowd(self.motion, index), index, LEFT, shade=False, label=True, disparity=disparity
+        )[1]
+        assert truth is not None
+        return truth
 
-    def both(self, index: int, *, right: bool = False, pixels: bool = False) -> Rendered:
-        """The picture with more of the same frame, nothing drawn twice; disparities where `right` is asked for too."""
-        crowd = self._crowd(index)
-        drawn = self._draw(self.left_view, crowd)
-        image = self._picture(self.left_view, crowd, drawn, index, LEFT)
-        other = self._draw(self.right_view, crowd) if right else None
-        return Rendered(
-            image,
-            None if other is None else self._picture(self.right_view, crowd, other, index, RIGHT),
-            self._pixels(crowd, drawn, other) if pixels else None,
+    def both(self, index: int, *, right: bool = False, pixels: bool = False, disparity: bool = False) -> Rendered:
+        """The picture with more of the same frame, nothing drawn twice; disparity: in `pixels`."""
+        people = crowd(self.motion, index)
+        image, truth = self._draw(
+            self.left_view, people, index, LEFT, shade=True, label=pixels, disparity=disparity and pixels
         )
+        other = self._draw(self.right_view, people, index, RIGHT, shade=True, label=False)[0] if right else None
+        return Rendered(image, other, truth)
 
     def background(self, k: int) -> Image:
         """Empty frame k = 0 … BACKGROUNDS - 1, at t = (k - BACKGROUNDS) / fps."""
-        index = k - BACKGROUNDS + 1
-        view, nobody = self.left_view, _nobody()
-        return self._picture(view, nobody, self._draw(view, nobody), index, LEFT)
+        nobody = crowd(self.motion, None)
+        return self._draw(self.left_view, nobody, k - BACKGROUNDS + 1, LEFT, shade=True, label=False)[0]
 
-    def _crowd(self, index: int) -> Crowd:
-        m = self.motion
-        who = np.flatnonzero(m.present[index - 1])
-        xy, heading, height = m.pos[index - 1, who], m.heading[index - 1, who], m.height[who]
-        pos3 = np.column_stack([xy, height_at(m.scene, xy)])
-        return Crowd(who + 1, pos3, heading, height, ellipsoids(pos3, heading, height, m.width[who], m.depth[who]))
+    def _draw(
+        self, view: View, people: Crowd, index: int, side: int, *, shade: bool, label: bool, disparity: bool = False
+    ) -> tuple[Image, PixelTruth | None]:
+        """Picture (nothing in it unless `shade`) and, with `label`, truth of one view of one frame."""
+        from sim import paint_kernels as kernels
 
-    def _draw(self, view: View, crowd: Crowd) -> Drawn:
-        from sim.paint_kernels import people
-
-        colour = np.empty((*view.ids.shape, 3), np.float32)
-        depth, ids, amodal = view.geometry.depth.copy(), view.ids.copy(), np.zeros(len(crowd.id), np.int64)
-        boxes, who, light = pixel_boxes(view.camera, crowd.shapes), crowd.id - 1, self.illumination
-        people(
-            view.rays.origin, view.rays.direction, boxes, crowd.shapes.centre, np.linalg.inv(crowd.shapes.shape),
-            np.stack([np.cos(crowd.heading), np.sin(crowd.heading)], axis=1), crowd.pos3[:, 2], crowd.height,
-            self.wear.keys[who], self.wear.styles[who], self.wear.colours[who], light.sun, light.shadow,
-            depth, ids, crowd.id, colour, amodal,
+        light, here = self.illumination, cast(view.camera, view.rays, people)
+        margin = len(self._weights) // 2
+        canvas = view.canvas.copy() if shade else view.canvas[:0]
+        dirty = np.zeros((-(-view.height // kernels.TILE_H), -(-view.width // kernels.TILE_W)), np.uint8)
+        if shade and light.shadow > 0 and len(people.id):
+            fall = shadows(view.camera, people, light.sun, light.penumbra, view.level)
+            kernels.shadows(
+                view.geometry.place, view.plate.direct, fall.outlined.boxes, view.level, fall.outlined.middle,
+                fall.outlined.inverse, people.shapes.centre, fall.shape, light.sun, fall.softness,
+                np.zeros((view.height, view.width), np.uint8), canvas, dirty, margin,
+            )  # fmt: skip
+        depth, ids = view.geometry.depth.copy(), view.ids.copy() if label else view.ids[:0]
+        amodal = np.zeros(len(people.id), np.int64)
+        kernels.people(
+            np.argsort(here.near[:, 0], kind="stable"), here.start, here.step, people.half, here.outlined.middle,
+            here.outlined.inverse, here.outlined.boxes, people.id, people.turn @ light.sun, light.shadow,
+            sunlit(view.solids, people, light.sun), people.id - 1, self._atlas,
+            shade, label, depth, ids, canvas, dirty, margin, amodal,
         )  # fmt: skip
-        return Drawn(colour, depth, ids, amodal)
+        image = self._finish(view, canvas, dirty, index, side) if shade else np.zeros((0, 0, 3), np.uint8)
+        if not label:
+            return image, None
+        apart = self._disparities(depth, ids, here, people) if disparity else None
+        return image, pixel_truth(ids, here.outlined.boxes, people.id, amodal, apart)
 
-    def _picture(self, view: View, crowd: Crowd, drawn: Drawn, index: int, side: int) -> Image:
-        from sim.paint_kernels import compose, shadows
+    def _finish(self, view: View, canvas: NDArray[np.int16], dirty: NDArray[np.uint8], index: int, side: int) -> Image:
+        from sim.finish_kernels import finish
 
-        light = self.illumination
-        sunlit = np.ones(view.ids.shape, np.float32)
-        if light.shadow > 0 and len(crowd.id):
-            shape, radius = shadow_shapes(crowd.shapes, light.sun)
-            boxes = shadow_boxes(view.camera, crowd.shapes, crowd.pos3[:, 2], crowd.height, light.sun)
-            shadows(view.geometry.place, boxes, crowd.shapes.centre, shape, light.sun, light.penumbra / radius, sunlit)
-        out = np.empty((*view.ids.shape, 3), np.uint8)
-        gain = light.gain((index - 1) / self.motion.fps, index + BACKGROUNDS)
-        compose(view.plate.colour, view.plate.direct, sunlit, drawn.ids, drawn.colour, gain, out)
-        return self._sensed(out, index, side)
+        image = np.empty((view.height, view.width, 3), np.uint8)
+        number = index + BACKGROUNDS
+        gain = self.illumination.gain((index - 1) / self.motion.fps, number)
+        rows = offsets(view.height, self.motion.seed, side, number, self.motion.repeat)
+        flat = view.height, 3 * view.width
+        finish(
+            canvas.reshape(flat), view.blurred.reshape(flat), dirty, self._weights, np.float32(gain), self._noise, rows,
+            image.reshape(flat),
+        )  # fmt: skip
+        return _lossy(image, self.picture.jpeg) if self.picture.jpeg else image
 
-    def _sensed(self, image: Image, index: int, side: int) -> Image:
-        import cv2
+    def _disparities(
+        self, depth: NDArray[np.float32], ids: NDArray[np.int64], here: Cast, people: Crowd
+    ) -> NDArray[np.float64]:
+        from sim.pixel_kernels import disparities
 
-        if self.picture.blur_px > 0:
-            image = np.asarray(cv2.GaussianBlur(image, (0, 0), self.picture.blur_px), np.uint8)
-        image = self.grain.add(image, index + BACKGROUNDS, side)
-        if self.picture.jpeg:
-            _, code = cv2.imencode(".jpg", image, [cv2.IMWRITE_JPEG_QUALITY, self.picture.jpeg])
-            image = np.asarray(cv2.imdecode(code, cv2.IMREAD_COLOR), np.uint8)
-        return image
-
-    def _pixels(self, crowd: Crowd, drawn: Drawn, other: Drawn | None) -> PixelTruth:
-        from sim.paint_kernels import disparities
-
-        disparity = None
-        if other is not None:
-            disparity = np.empty(drawn.depth.shape)
-            disparities(drawn.depth, other.depth, self.camera.focal_px[0] * self.camera.baseline, 0.02, disparity)
-        return pixel_truth(drawn.ids, crowd.id, drawn.amodal, disparity)
+        other, apart = self.right_view, self._known.copy()
+        there = cast(other.camera, other.rays, people)
+        disparities(
+            depth, ids, here.outlined.boxes, people.id, self.camera.focal_px[0] * self.camera.baseline, there.start,
+            there.step, there.outlined.middle, there.outlined.inverse, there.near, other.geometry.depth,
+            other.rays.origin, other.rays.direction, *other.solids, apart,
+        )  # fmt: skip
+        return apart
 
 
-def _nobody() -> Crowd:
-    none = np.zeros((0, 3))
-    return Crowd(
-        np.zeros(0, np.int64), none, np.zeros(0), np.zeros(0), Ellipsoids(np.zeros((0, 2, 3)), np.zeros((0, 2, 3, 3)))
-    )
+def _lossy(image: Image, quality: int) -> Image:
+    import cv2
+
+    code = cv2.imencode(".jpg", image, [cv2.IMWRITE_JPEG_QUALITY, quality])[1]
+    return np.asarray(cv2.imdecode(code, cv2.IMREAD_COLOR), np.uint8)
 
 
 def stage(motion: Motion, camera: Camera, light: Light | None = None, picture: Picture | None = None) -> Stage:
-    """What draws this motion as this camera sees it; light and picture are a scenario's, its defaults where absent."""
+    """What draws this motion as this camera sees it; light and picture are a scenario's, its defaults where absent.
+
+    InputError where the camera's lens distorts.
+    """
     from scenarios import schema
 
     return Stage(motion, camera, light or schema.Light(), picture or schema.Picture())

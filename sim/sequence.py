@@ -2,28 +2,31 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Mapping
-from dataclasses import dataclass
+from collections.abc import Iterable, Iterator, Mapping
 from functools import cache
 from typing import TYPE_CHECKING
 
 import numpy as np
 
+from scenarios.errors import InputError
 from sim.camera import px_per_m_at_centre, solve
 from sim.orders import check_orders
-from sim.render import BACKGROUNDS, Stage, stage
+from sim.render import BACKGROUNDS, Rendered, Stage, stage
 from sim.truth import bodies, label
 from sim.types import Camera, Detections, Frame, Image, Motion, Order, PixelTruth, Scene, Sequence, Truth
 
 if TYPE_CHECKING:
     from scenarios.schema import Scenario
 
+STREAMS = frozenset({"left", "right", "disparity", "ids", "background"})
+
 
 def simulate(scenario: Scenario, seed: int, repeat: int = 0, streams: Iterable[str] = ("left",)) -> Sequence:
     """Run the world and look at it: pictures, points and boxes by the scenario's sensor, truth by its camera.
 
-    streams: which pictures the frames have, `left` and `right`, drawn as frames are asked for; () none. InputError
-    where the scenario cannot be (no room, people out of view).
+    streams, some of STREAMS: which pictures the frames have (`left`, `right`), drawn as frames are asked for, and what
+    is known of pixels (`ids`, `disparity`); () none. InputError where the scenario cannot be (no room, people out of
+    view, a right view without a baseline).
     """
     from sim.world import run
 
@@ -44,10 +47,10 @@ def observe(
     The camera is solved at once (a scenario whose people leave the view is refused here); truth and detections are
     lazy, and detections never touch the truth that the sequence gives out. people: ids of each of the script's groups,
     where `sensor.hide` names one and the motion was not made from the scenario itself. streams: as for `simulate`;
-    any of them brings empty frames for a background and exact pixels, with disparities where `right` is drawn.
+    any of them brings empty frames for a background and exact pixels, with disparities if those are a stream.
     """
     camera = solve(scenario.camera, motion)
-    drawn = _drawn(streams, scenario, motion, camera)
+    drawn = _pictures(streams, scenario, motion, camera)
 
     @cache
     def named() -> Mapping[str, tuple[int, ...]]:
@@ -67,11 +70,8 @@ def observe(
         return (Frame(d.index, d.t, detections=d) for d in detections())
 
     def frames() -> Iterator[Frame]:
-        if drawn.stage is None:
-            yield from bare()
-            return
         for d in detections():
-            made = drawn.stage.both(d.index, right=drawn.right)
+            made = Rendered() if drawn is None else drawn.draw(d.index)
             yield Frame(d.index, d.t, made.image, made.right, d)
 
     def truth() -> Truth:
@@ -93,41 +93,56 @@ def observe(
         has_detections=True,
         load_people=named,
         source={"kind": "simulated", "seed": motion.seed, "repeat": motion.repeat},
-        has_images=drawn.stage is not None,
-        has_right=drawn.right,
+        has_images=drawn is not None and drawn.has_image,
+        has_right=drawn is not None and drawn.has_right,
         bare=bare,
-        load_background=drawn.background,
-        load_pixels=drawn.pixels,
+        load_background=None if drawn is None else drawn.background,
+        load_pixels=None if drawn is None else drawn.pixels,
     )
 
 
-@dataclass(frozen=True)
-class _Drawn:
-    """The pictures that were asked for: what draws them, None without any, and whether there is a right one."""
+class _Pictures:
+    """The pictures that were asked for. Holds the exact pixels of the frame drawn last: they are often asked for next."""
 
-    stage: Stage | None
-    right: bool = False
+    def __init__(self, stage: Stage, streams: frozenset[str]) -> None:
+        self.stage, self.streams = stage, streams
+        self.has_image, self.has_right = "left" in streams, "right" in streams
+        self._last: tuple[int, PixelTruth | None] = (0, None)
 
-    @property
-    def background(self) -> Callable[[], Image] | None:
-        stage = self.stage
-        return None if stage is None else lambda: np.stack([stage.background(k) for k in range(BACKGROUNDS)])
+    def draw(self, index: int) -> Rendered:
+        """The frame's pictures, and its exact pixels where a stream shows them."""
+        if not self.has_image:
+            return Rendered(right=self.stage.right(index) if self.has_right else None)
+        labels = not self.streams.isdisjoint({"ids", "disparity"})
+        made = self.stage.both(index, right=self.has_right, pixels=labels, disparity="disparity" in self.streams)
+        self._last = index, made.pixels
+        return made
 
-    @property
-    def pixels(self) -> Callable[[int], PixelTruth] | None:
-        stage, right = self.stage, self.right
-        return None if stage is None else lambda index: stage.pixels(index, right=right)
+    def pixels(self, index: int) -> PixelTruth:
+        """Exact pixels of a frame, with disparities if they are a stream."""
+        last, known = self._last
+        if known is not None and last == index:
+            return known
+        return self.stage.pixels(index, disparity="disparity" in self.streams)
+
+    def background(self) -> Image:
+        """Empty frames before the first (BACKGROUNDS, H, W, 3)."""
+        return np.stack([self.stage.background(k) for k in range(BACKGROUNDS)])
 
 
-def _drawn(streams: Iterable[str], scenario: Scenario, motion: Motion, camera: Camera) -> _Drawn:
-    wanted = set(streams)
+def _pictures(streams: Iterable[str], scenario: Scenario, motion: Motion, camera: Camera) -> _Pictures | None:
+    wanted = frozenset(streams)
+    if not wanted <= STREAMS:
+        raise InputError(
+            place="streams", got=", ".join(sorted(wanted - STREAMS)), expected=f"some of {', '.join(sorted(STREAMS))}",
+            remedy="leave it out",
+        )  # fmt: skip
     if not wanted:
-        return _Drawn(None)
+        return None
     made = stage(motion, camera, scenario.light, scenario.picture)
-    right = not wanted.isdisjoint({"right", "disparity"})
-    if right:
+    if not wanted.isdisjoint({"right", "disparity"}):
         made.check_pair()
-    return _Drawn(made, right)
+    return _Pictures(made, wanted)
 
 
 def named_people(

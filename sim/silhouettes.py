@@ -1,85 +1,129 @@
-"""Where people and their shadows can be in the image, and who shows where: counts, boxes and shared regions."""
+"""People and their shadows as the painting kernels want them: rays in each part's own axes, outlines, boxes."""
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
-from numpy.typing import NDArray
 
 from sim.camera import project
-from sim.people import Ellipsoids, outline_boxes, outlines
-from sim.types import Array, Camera, Ints, PixelTruth
+from sim.people import Ellipsoids, Outlines, ellipsoids, half_axes, outlines
+from sim.plate import Rays
+from sim.terrain import height_at
+from sim.types import Array, Camera, Ints, Motion
 from sim.visibility import packed_inverse
 
 
-def pixel_boxes(camera: Camera, people: Ellipsoids) -> Ints:
-    """(N, 4) first column, last + 1, first row, last + 1 of who can show; empty where out of the image or behind."""
-    box = outline_boxes(outlines(camera, people))
-    return _clipped(box[:, :2], box[:, :2] + box[:, 2:], camera)
+@dataclass(frozen=True, eq=False)
+class Crowd:
+    """The N people of a frame: id (N,), pos3 (N, 3), height (N,), shapes, half axes (N, 2, 3), turn (N, 3, 3).
+
+    turn: world → own axes across (to the right), along the heading, up.
+    """
+
+    id: Ints
+    pos3: Array
+    height: Array
+    shapes: Ellipsoids
+    half: Array
+    turn: Array
 
 
-def _clipped(low: Array, high: Array, camera: Camera) -> Ints:
+@dataclass(frozen=True, eq=False)
+class Outlined:
+    """Ellipses in the image: middle (N, 2, 2) px, inverse (N, 2, 3) packed; boxes (N, 4): rows, columns they touch."""
+
+    middle: Array
+    inverse: Array
+    boxes: Ints
+
+
+@dataclass(frozen=True, eq=False)
+class Cast:
+    """People as one camera sees them: start, step (N, 2, 3, 3), rays in each part's axes; outlines; near (N, 2) m."""
+
+    start: Array
+    step: Array
+    outlined: Outlined
+    near: Array
+
+
+def crowd(motion: Motion, index: int | None) -> Crowd:
+    """The people of frame `index`; nobody for None."""
+    who = np.flatnonzero(motion.present[index - 1]) if index is not None else np.zeros(0, np.int64)
+    t = 0 if index is None else index - 1
+    xy, heading = motion.pos[t, who], motion.heading[t, who]
+    pos3 = np.column_stack([xy, height_at(motion.scene, xy)])
+    size = motion.height[who], motion.width[who], motion.depth[who]
+    c, s = np.cos(heading), np.sin(heading)
+    turn = np.zeros((len(who), 3, 3))
+    turn[:, 0, 0], turn[:, 0, 1], turn[:, 1, 0], turn[:, 1, 1], turn[:, 2, 2] = s, -c, c, s, 1.0
+    return Crowd(who + 1, pos3, size[0], ellipsoids(pos3, heading, *size), half_axes(*size), turn)
+
+
+def cast(camera: Camera, rays: Rays, people: Crowd) -> Cast:
+    """These people before this camera."""
+    to_ball = people.turn[:, None] / people.half[..., None]
+    start = to_ball @ rays.origin
+    start[..., 2] -= np.einsum("npij,npj->npi", to_ball, people.shapes.centre)
+    forward = camera.rotation[2]
+    depth = (people.shapes.centre - camera.position) @ forward
+    near = depth - np.sqrt(np.einsum("i,npij,j->np", forward, people.shapes.shape, forward))
+    return Cast(start, to_ball @ rays.direction, outlined(camera, outlines(camera, people.shapes)), near)
+
+
+def outlined(camera: Camera, ellipses: Outlines) -> Outlined:
+    """Outlines ready for the kernels; the boxes of who is not in front are empty."""
+    half = np.sqrt(np.diagonal(ellipses.shape, axis1=2, axis2=3))
+    boxes = _boxes(camera, (ellipses.centre - half).min(axis=1), (ellipses.centre + half).max(axis=1))
+    return Outlined(ellipses.centre, packed_inverse(ellipses.shape), boxes)
+
+
+def _boxes(camera: Camera, low: Array, high: Array) -> Ints:
     size = np.array(camera.image, dtype=float)
-    low, high = np.clip(np.nan_to_num(low), 0, size), np.clip(np.nan_to_num(high), 0, size)
-    return np.stack([np.floor(low[:, 0]), np.ceil(high[:, 0]), np.floor(low[:, 1]), np.ceil(high[:, 1])], 1).astype(int)
+    low, high = (np.clip(np.nan_to_num(edge), 0, size) for edge in (low, high))
+    edges = np.stack([np.floor(low[:, 1]), np.ceil(high[:, 1]), np.floor(low[:, 0]), np.ceil(high[:, 0])], axis=1)
+    return edges.astype(np.int64)
 
 
-def shadow_shapes(people: Ellipsoids, sun: Array) -> tuple[Array, Array]:
-    """Inverse shapes (N, 2, 3), packed, and mean radii (N, 2) of the shadows on level ground of body and head."""
-    along = np.eye(3)[:2] - np.outer(sun[:2] / sun[2], [0.0, 0.0, 1.0])
-    shape = along @ people.shape @ along.T
-    return packed_inverse(shape), np.linalg.det(shape) ** 0.25
+@dataclass(frozen=True, eq=False)
+class Shadows:
+    """Shadows on level ground: shape (N, 2, 3), inverse of P S Pᵀ packed; softness (N, 2); their image."""
+
+    shape: Array
+    softness: Array
+    outlined: Outlined
 
 
-def shadow_boxes(camera: Camera, people: Ellipsoids, foot: Array, height: Array, sun: Array) -> Ints:
-    """(N, 4) as pixel_boxes: where shadows can be, on level ground and on walls up to the person's own height."""
-    if not len(foot):
-        return np.zeros((0, 4), np.int64)
-    along = np.eye(3)[:2] - np.outer(sun[:2] / sun[2], [0.0, 0.0, 1.0])
-    half = 1.2 * np.sqrt(np.diagonal(along @ people.shape @ along.T, axis1=2, axis2=3)) + 0.1  # (N, 2, 2) m
+def shadows(camera: Camera, people: Crowd, sun: Array, penumbra: float, level: bool) -> Shadows:
+    """The shadow of ellipsoid (c, S) along `sun` s on the plane z: middle c - s (c_z - z)/s_z, shape P S Pᵀ with
+    P = I - s e_zᵀ/s_z. Boxes are of the ground at the feet or, unless `level`, also of walls up to the head."""
+    along = np.eye(3) - np.outer(sun / sun[2], [0.0, 0.0, 1.0])
+    shape = along @ people.shapes.shape @ along.T
+    radius = np.linalg.det(shape[..., :2, :2]) ** 0.25
+    softness = 0.5 * penumbra / radius
+    foot = people.pos3[:, None, 2]
+    middle = people.shapes.centre - sun / sun[2] * (people.shapes.centre[..., 2] - foot)[..., None]
+    flat = shape * ((1 + softness) ** 2)[..., None, None]
+    found = outlined(camera, outlines(camera, Ellipsoids(middle, flat)))
+    if not level:
+        found = Outlined(found.middle, found.inverse, _tall(camera, people, sun, flat))
+    return Shadows(packed_inverse(shape[..., :2, :2]), softness, found)
+
+
+def _tall(camera: Camera, people: Crowd, sun: Array, flat: Array) -> Ints:
+    """Boxes (N, 4) round all that a shadow can fall on between the person's feet, less one flight of stairs, and head;
+    the whole image for who casts behind the camera."""
+    half = np.sqrt(np.diagonal(flat, axis1=2, axis2=3))[..., :2]
+    low_z, high_z = np.minimum(people.pos3[:, 2], 0.0), people.pos3[:, 2] + people.height
     corners = []
-    for z in (foot, foot + height):
-        middle = people.centre[..., :2] - sun[:2] / sun[2] * (people.centre[..., 2] - z[:, None])[..., None]
-        for sx in (-1, 1):
-            for sy in (-1, 1):
-                at = middle + half * (sx, sy)
-                corners.append(np.concatenate([at, np.broadcast_to(z[:, None, None], (*at.shape[:2], 1))], axis=2))
-    points = np.stack(corners, axis=1).reshape(-1, 3)
-    uv = project(camera, points)[0].reshape(len(foot), -1, 2)
-    behind = np.isnan(uv.sum(axis=(1, 2)))
-    low = np.where(behind[:, None], 0.0, np.nan_to_num(uv).min(axis=1))
-    high = np.where(behind[:, None], np.array(camera.image, dtype=float), np.nan_to_num(uv).max(axis=1))
-    return _clipped(low, high, camera)
-
-
-def pixel_truth(ids: NDArray[np.int32], id: Ints, amodal: Ints, disparity: Array | None) -> PixelTruth:
-    """Who shows where in an id map: visible pixels, boxes, connected regions."""
-    from sim.paint_kernels import seen_boxes
-
-    count, edges = np.zeros(len(id), np.int64), np.empty((len(id), 4), np.int64)
-    row_of = np.full(int(id.max(initial=0)) + 1, -1)
-    row_of[id] = np.arange(len(id))
-    seen_boxes(ids, row_of, count, edges)
-    low, high = edges[:, 0::2].astype(float), edges[:, 1::2].astype(float)
-    box = np.where(count[:, None] > 0, np.concatenate([low, high - low], axis=1), np.nan)
-    return PixelTruth(
-        ids.astype(np.int64), disparity, count.astype(float), amodal.astype(float), box, _regions(ids, row_of, len(id))
-    )
-
-
-def _regions(ids: NDArray[np.int32], row_of: Ints, people: int) -> Ints:
-    """(N,) number of the region that each person shows in, -1 hidden; who shows in several joins them."""
-    import cv2
-    from scipy.sparse import coo_array
-    from scipy.sparse.csgraph import connected_components
-
-    if not people:
-        return np.zeros(0, np.int64)
-    regions, label = cv2.connectedComponents((ids > 0).astype(np.uint8), connectivity=8)
-    shows = ids > 0
-    pairs = np.unique(row_of[ids[shows]] * regions + label[shows])
-    row, region = pairs // regions, pairs % regions
-    graph = coo_array((np.ones(len(pairs)), (row, people + region)), shape=(people + regions,) * 2)
-    joined = connected_components(graph, directed=False)[1][:people]
-    hidden = ~np.isin(np.arange(people), row)
-    _, number = np.unique(np.where(hidden, -1, joined), return_inverse=True)
-    return np.asarray(np.where(hidden, -1, number - hidden.any()), np.int64)
+    for z in (low_z, high_z):
+        middle = (
+            people.shapes.centre[..., :2] - sun[:2] / sun[2] * (people.shapes.centre[..., 2] - z[:, None])[..., None]
+        )
+        for side in ((-1, -1), (-1, 1), (1, -1), (1, 1)):
+            here = middle + half * side
+            corners.append(np.concatenate([here, np.broadcast_to(z[:, None, None], (*here.shape[:2], 1))], axis=2))
+    uv = project(camera, np.stack(corners, axis=1).reshape(-1, 3))[0].reshape(len(people.id), 16, 2)
+    behind = np.asarray(np.isnan(uv).any(axis=(1, 2)))[:, None]
+    return _boxes(camera, np.where(behind, 0.0, uv.min(axis=1)), np.where(behind, camera.image, uv.max(axis=1)))

@@ -1,13 +1,11 @@
-"""What people wear: colours and patterns, drawn for each person from a stream of their own."""
+"""What people wear: colours and patterns, drawn for each person from a stream of their own, as pages of an atlas."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
+from numpy.typing import NDArray
 
 from sim.rng import rng
-from sim.types import Array, Ints
 
 SKINS = np.array([[120, 150, 195], [105, 135, 180], [80, 110, 150], [55, 75, 105]], float)  # BGR
 HAIRS = np.array([[30, 32, 36], [35, 45, 60], [60, 85, 110], [120, 125, 128]], float)
@@ -19,31 +17,26 @@ SHIRTS = np.array(
 LEVEL_SD, TINT_SD = 0.18, 0.06  # by which a garment's brightness and hue differ from the palette, relative
 
 
-@dataclass(frozen=True)
-class Wear:
-    """P people: keys (P,) of their patterns; styles (P, 4) pattern, count, hem, hair line; colours (P, 6, 3) BGR."""
-
-    keys: Ints
-    styles: Array
-    colours: Array
+CUTS = (0.38, 0.1, 0.1, 0.12, 0.22, 0.08)  # shares of the cuts in sim.wear_kernels
 
 
-def wear(people: int, seed: int, repeat: int = 0) -> Wear:
-    """Clothes of people 1 … `people`; one person more changes nobody else."""
-    keys, styles, colours = np.zeros(people, np.int64), np.zeros((people, 4)), np.zeros((people, 6, 3))
+def wear(people: int, seed: int, repeat: int = 0) -> NDArray[np.float32]:
+    """Pages (P, 2, UP, ROUND, 3) BGR of people 1 … `people`, body and head; one person more changes nobody else."""
+    from sim.wear_kernels import ROUND, UP, page
+
+    pages = np.empty((people, 2, UP, ROUND, 3), np.float32)
     for k in range(people):
         source = rng(seed, "texture", k + 1, repeat=repeat)
-        keys[k] = source.integers(1 << 20)
-        styles[k] = [
-            source.choice(5, p=[0.4, 0.1, 0.1, 0.15, 0.25]),
-            source.integers(2, 6),
-            *source.uniform([0.42, 0.955], [0.54, 0.985]),
-        ]
+        key = int(source.integers(1 << 20))
+        cut, count = source.choice(len(CUTS), p=CUTS), source.integers(2, 5)
+        style = np.array([cut, count, *source.uniform([-0.02, -0.3, 0.3, 0.62], [0.2, 0.35, 0.6, 0.8])])
         first, second = source.choice(len(SHIRTS), 2, replace=False)
         chosen = [
             np.array([35.0, 36.0, 38.0]), TROUSERS[source.integers(len(TROUSERS))], SHIRTS[first], SHIRTS[second],
             SKINS[source.integers(len(SKINS))], HAIRS[source.integers(len(HAIRS))],
         ]  # fmt: skip
         level = np.exp(LEVEL_SD * source.normal(size=(6, 1))) * np.exp(TINT_SD * source.normal(size=(6, 3)))
-        colours[k] = np.clip(np.array(chosen) * level, 12, 240)
-    return Wear(keys, styles, colours)
+        colours = np.clip(np.array(chosen) * level, 12, 240)
+        for part in range(2):
+            page(style, key, colours, part, pages[k, part])
+    return pages

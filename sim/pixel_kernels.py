@@ -1,0 +1,150 @@
+"""Compiled: what is true of a frame's pixels: counts, boxes, who touches whom, and disparities with their validity."""
+
+from __future__ import annotations
+
+import numpy as np
+from numba import njit
+
+from sim.paint_kernels import span
+from sim.plate_kernels import at
+from sim.static_kernels import nearest
+
+SAME = 1e-3  # m: what lies nearer by less is taken for the same point
+
+
+@njit(cache=True)
+def _root(parent, i):  # type: ignore[no-untyped-def]
+    while parent[i] != i:
+        parent[i] = parent[parent[i]]
+        i = parent[i]
+    return i
+
+
+@njit(cache=True)
+def tally(ids, boxes, id, row_of, count, edges, blob):  # type: ignore[no-untyped-def]
+    """Of each person: visible pixels (N,), edges (N, 4) first column, last + 1, first row, last + 1, blob (N,).
+
+    People one of whose pixels is an 8-neighbour of another's are of one blob; blobs are numbered by their first row.
+    """
+    height, width = ids.shape
+    parent = np.arange(len(id))
+    for i in range(len(id)):
+        edges[i, 0], edges[i, 1], edges[i, 2], edges[i, 3] = width, 0, height, 0
+        for v in range(boxes[i, 0], boxes[i, 1]):
+            for u in range(boxes[i, 2], boxes[i, 3]):
+                if ids[v, u] != id[i]:
+                    continue
+                count[i] += 1
+                edges[i, 0], edges[i, 1] = min(edges[i, 0], u), max(edges[i, 1], u + 1)
+                edges[i, 2], edges[i, 3] = min(edges[i, 2], v), max(edges[i, 3], v + 1)
+                for k in range(4):  # right, and the three below: each pair of neighbours once
+                    y, x = v + (k > 0), u + (1 if k == 0 else k - 2)
+                    if y < height and 0 <= x < width and ids[y, x] > 0 and ids[y, x] != id[i]:
+                        a, b = _root(parent, i), _root(parent, row_of[ids[y, x]])
+                        parent[max(a, b)] = min(a, b)
+    number = 0
+    for i in range(len(id)):
+        blob[i] = -1
+    for i in range(len(id)):
+        if count[i] > 0:
+            r = _root(parent, i)
+            if r == i:
+                blob[r] = number
+                number += 1
+            blob[i] = blob[r]
+
+
+@njit(cache=True)
+def known(depth, scale, origin, direction, walls, wall_height, pillars, pillar_height, flights, out):  # type: ignore[no-untyped-def]
+    """Disparities out (H, W) of the empty scene: scale / depth; nan where the right camera does not see the point.
+
+    origin, direction: rays of the right camera; sky has none.
+    """
+    height, width = depth.shape
+    solid = len(walls) + len(pillars) + len(flights) > 0
+    o, d, hit = np.empty(3), np.empty(3), np.empty(6)
+    for v in range(height):
+        for u in range(width):
+            z = depth[v, u]
+            x = u + 0.5 - scale / z
+            out[v, u] = scale / z if z < np.inf and x >= 0.0 else np.nan
+            if solid and out[v, u] == out[v, u]:
+                at(origin, x, v + 0.5, o)
+                at(direction, x, v + 0.5, d)
+                if nearest(o, d, walls, wall_height, pillars, pillar_height, flights, hit) < z - SAME:
+                    out[v, u] = np.nan
+
+
+@njit(cache=True)
+def _covers(x, y, p, d, z):  # type: ignore[no-untyped-def]
+    """Whether the ball of a part (its P, D for this camera) is met before depth z by the ray of (x, y)."""
+    a = b = c = 0.0
+    for k in range(3):
+        q, s = p[k, 0] * x + p[k, 1] * y + p[k, 2], d[k, 0] * x + d[k, 1] * y + d[k, 2]
+        a += s * s
+        b += q * s
+        c += q * q
+    root = b * b - a * (c - 1.0)
+    return root >= 0.0 and (-b - np.sqrt(root)) / a < z - SAME
+
+
+@njit(cache=True)
+def disparities(  # type: ignore[no-untyped-def]
+    depth,
+    ids,
+    boxes,
+    id,
+    scale,
+    start,
+    step,
+    middle,
+    inverse,
+    near,
+    background,
+    origin,
+    direction,
+    walls,
+    wall_height,
+    pillars,
+    pillar_height,
+    flights,
+    out,
+):
+    """Make out (H, W), at first those of the empty scene, the disparities of all.
+
+    depth, ids: with people; boxes, id: of people; start … inverse: of their parts as the right camera sees them; near
+    (N, 2) m: no point of the part is nearer; background (H, W): depth of the empty scene for the right camera.
+    """
+    height, width = depth.shape
+    solid = len(walls) + len(pillars) + len(flights) > 0
+    o, d, hit = np.empty(3), np.empty(3), np.empty(6)
+    for i in range(len(id)):
+        for v in range(boxes[i, 0], boxes[i, 1]):
+            for u in range(boxes[i, 2], boxes[i, 3]):
+                if ids[v, u] != id[i]:
+                    continue
+                z = depth[v, u]
+                x = u + 0.5 - scale / z
+                out[v, u] = scale / z if x >= 0.0 else np.nan
+                if solid and x >= 0.0:
+                    c = int(x)
+                    if min(background[v, max(c - 1, 0)], background[v, c], background[v, min(c + 1, width - 1)]) < z:
+                        at(origin, x, v + 0.5, o)
+                        at(direction, x, v + 0.5, d)
+                        if nearest(o, d, walls, wall_height, pillars, pillar_height, flights, hit) < z - SAME:
+                            out[v, u] = np.nan
+    for i in range(len(id)):
+        for e in range(2):
+            m, most = middle[i, e], scale / near[i, e]
+            half = np.sqrt(inverse[i, e, 0] / (inverse[i, e, 0] * inverse[i, e, 2] - inverse[i, e, 1] ** 2))
+            if not half >= 0.0:
+                continue
+            for v in range(max(int(m[1] - half), 0), min(int(m[1] + half) + 1, height)):
+                x0, x1 = span(v + 0.5 - m[1], inverse[i, e])
+                if x0 > x1:
+                    continue
+                low, high = m[0] + x0, m[0] + x1
+                for u in range(max(int(low), 0), min(int(high + most) + 1, width)):
+                    x = u + 0.5 - out[v, u]  # nan is in no span
+                    if low <= x <= high and _covers(x, v + 0.5, start[i, e], step[i, e], depth[v, u]):
+                        out[v, u] = np.nan

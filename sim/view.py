@@ -1,0 +1,102 @@
+"""One camera's constants: the empty scene's colours ready to be painted on, its depth, its ids."""
+
+from __future__ import annotations
+
+from functools import cached_property
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sim.light import Illumination
+from sim.plate import Geometry, Plate, Rays, Solids, paint_plate, sight, solids, survey
+from sim.silhouettes import Crowd
+from sim.static_kernels import GROUND, NOTHING, PILLAR, WALL
+from sim.types import Array, Camera, Motion
+
+if TYPE_CHECKING:
+    from scenarios.schema import Picture
+
+OCCLUDER = -2  # id of walls and pillars
+
+
+class View:
+    """The empty scene as one camera sees it, each part made when first needed."""
+
+    def __init__(self, camera: Camera, motion: Motion, light: Illumination, picture: Picture) -> None:
+        self.camera, self.motion, self.light, self.picture = camera, motion, light, picture
+        self.width, self.height = camera.image
+        self.rays: Rays = sight(camera)
+        self.solids: Solids = solids(motion.scene)
+
+    @cached_property
+    def geometry(self) -> Geometry:
+        """What the middle of each pixel shows."""
+        return survey(self.camera, self.motion.scene)
+
+    @cached_property
+    def plate(self) -> Plate:
+        """Its colours."""
+        m = self.motion
+        return paint_plate(self.camera, m.scene, self.light, self.picture, m.seed, m.repeat)
+
+    @cached_property
+    def canvas(self) -> NDArray[np.int16]:
+        """(H, W, 3): the plate's colours times UNIT, sharp."""
+        from sim.paint_kernels import MOST, UNIT
+
+        return np.asarray(np.clip(np.rint(self.plate.colour * np.float32(UNIT)), 0, MOST), np.int16)
+
+    @cached_property
+    def blurred(self) -> NDArray[np.int16]:
+        """(H, W, 3): the canvas as the lens shows it."""
+        from sim.finish_kernels import blurred
+
+        out, flat = np.empty_like(self.canvas), (self.height, 3 * self.width)
+        blurred(self.canvas.reshape(flat), blur_weights(self.picture.blur_px), out.reshape(flat))
+        return out
+
+    @cached_property
+    def ids(self) -> NDArray[np.int64]:
+        """(H, W): OCCLUDER where a wall or pillar shows, else 0."""
+        solid = (self.geometry.kind == WALL) | (self.geometry.kind == PILLAR)
+        return np.where(solid, OCCLUDER, 0).astype(np.int64)
+
+    @cached_property
+    def level(self) -> bool:
+        """Whether all that shadows can fall on is the ground at z = 0."""
+        return bool(((self.geometry.kind == GROUND) | (self.geometry.kind == NOTHING)).all())
+
+    def disparities(self, other: View) -> Array:
+        """(H, W) px between this view of the empty scene and the other, to its right; nan where only this one sees."""
+        from sim.pixel_kernels import known
+
+        out = np.empty((self.height, self.width))
+        baseline = float(np.linalg.norm(other.camera.position - self.camera.position))
+        known(
+            self.geometry.depth, self.camera.focal_px[0] * baseline, other.rays.origin, other.rays.direction,
+            *self.solids, out,
+        )  # fmt: skip
+        return out
+
+
+def blur_weights(sd: float) -> NDArray[np.float32]:
+    """(2 r + 1,) weights of a Gaussian blur of `sd` px; (1,) for none."""
+    radius = int(np.ceil(3 * sd))
+    x = np.arange(-radius, radius + 1)
+    weights = np.exp(-0.5 * (x / sd) ** 2) if radius else np.ones(1)
+    return np.asarray(weights / weights.sum(), np.float32)
+
+
+def sunlit(fixed: Solids, people: Crowd, sun: Array) -> Array:
+    """(N, 3) share of the sun that walls, pillars and stairs leave to feet, waist and head: 0 or 1."""
+    lit = np.ones((len(people.id), 3))
+    if not any(len(part) for part in fixed if isinstance(part, np.ndarray)):
+        return lit
+    from sim.static_kernels import nearest
+
+    hit = np.empty(6)
+    for row, place, height in zip(lit, people.pos3, people.height, strict=True):
+        for k, up in enumerate((0.12, 0.5, 0.95)):  # feet stand a step deep in drawn stairs
+            row[k] = float(np.isinf(nearest(place + np.array([0.0, 0.0, up * height]), sun, *fixed, hit)))
+    return lit
