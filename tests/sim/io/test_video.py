@@ -194,6 +194,18 @@ def test_the_sample_decodes_the_groups_it_needs(tmp_path, monkeypatch):
     assert count < 20
 
 
+@pytest.mark.parametrize("wanted", [[5, 30, 45], [1, 60], [10, 11], [4, 5, 6], [60], [1]])
+def test_any_frames_of_any_groups(tmp_path, wanted):
+    """Also those that the decoder still holds when the next group is left out."""
+    path = write_video(tmp_path / "a.mp4", [picture(k) for k in range(60)], options={"g": "5", "bf": "3"})
+    index = decode.packets(path)
+    assert sum(index.keys) >= 12
+    every = dict(decode.pictures(path, index))
+    found = dict(decode.pictures(path, index, wanted))
+    assert list(found) == wanted
+    assert all(np.array_equal(found[k], every[k]) for k in wanted)
+
+
 def test_a_sample_longer_than_the_video(tmp_path):
     path = write_video(tmp_path / "a.mp4", [picture(k) for k in range(12)])
     with pytest.raises(InputError, match="--background: got a recording of 12 frames; expected 30 or more"):
