@@ -97,7 +97,7 @@ def generate(
     streams: Annotated[
         str,
         typer.Option("--streams", metavar="A,B,…", help="Pictures: left, right, disparity, ids, background; or none."),
-    ] = "none",
+    ] = "left",
     images: Annotated[Literal["jpg", "png", "mp4"], typer.Option(help="How pictures are stored.")] = "jpg",
     workers: Annotated[int, typer.Option("--workers", min=1, help="Processes.")] = 1,
     json: Json = False,

@@ -45,14 +45,17 @@ class Place:
     one: Path
     tracks: Path
     out: Path
+    seen: Path
 
 
 @pytest.fixture(scope="session")
 def made(tmp_path_factory) -> Path:
-    """A scene, a dataset of it with two seeds, and the fake tracker's answers."""
+    """A scene, a dataset of it with two seeds, and the fake tracker's answers; one of them with small pictures."""
     folder = tmp_path_factory.mktemp("made")
     (folder / "scene.toml").write_text(SCENE)
-    assert run(["generate", str(folder / "scene.toml"), "--seeds", "40000:40002", "--out", str(folder / "data")]) == 0
+    line = ["generate", str(folder / "scene.toml"), "--out"]
+    assert run([*line, str(folder / "data"), "--seeds", "40000:40002", "--streams", "none"]) == 0
+    assert run([*line, str(folder / "seen"), "--seeds", "40000", "--set", "camera.image=[128,96]"]) == 0
     assert run(["track", FAKE, str(folder / "data"), "--out", str(folder / "tracks")]) == 0
     return folder
 
@@ -68,7 +71,8 @@ def _ctrl_c():
 @pytest.fixture
 def place(made, tmp_path) -> Place:
     data = made / "data" / "flockscope-demo"
-    return Place(made / "scene.toml", data, data / "scene-s40000", made / "tracks", tmp_path / "out")
+    seen = made / "seen" / "flockscope-demo" / "scene-s40000"
+    return Place(made / "scene.toml", data, data / "scene-s40000", made / "tracks", tmp_path / "out", seen)
 
 
 # every command: what works, and the same with something wrong.
@@ -77,7 +81,14 @@ COMMANDS = {
     "scenarios NAME": ("scenarios {scene}", "scenarios no-such-scene"),
     "scenarios --out": ("scenarios {scene} --out {out}/plan.svg", "scenarios {scene} --set a=1 --out {out}/plan.svg"),
     "scenarios --schema": ("scenarios --schema", "scenarios {scene} --schema --out {out}/plan.svg"),
-    "generate": ("generate {scene} --seeds 5:7 --out {out}", "generate {scene} --seeds 5:5 --out {out}"),
+    "generate": (
+        "generate {scene} --seeds 5:7 --streams none --out {out}",
+        "generate {scene} --seeds 5:5 --out {out}",
+    ),
+    "generate pictures": (
+        "generate {scene} --seeds 5 --set camera.image=[128,96] --out {out}",
+        "generate {scene} --seeds 5 --streams left,centre --out {out}",
+    ),
     "track": ("track " + FAKE + " {data} --out {out}", "track " + FAKE + " {out}/nothing --out {out}/x"),
     "track blob": ("track blob {one} --out {out}", "track blobb {one} --out {out}"),
     "score": ("score {data} {tracks}", "score {data} {out}/nothing"),
@@ -88,6 +99,14 @@ COMMANDS = {
         "view {one} {out}/nothing --out {out}/page.html",
     ),
     "view all": ("view {data} {tracks} --out {out}", "view {data} {tracks} --out {out}/page.html"),
+    "view pictures": (
+        "view {seen} --video beside --out {out}/page.html",
+        "view {seen} --video outside --out {out}/page.html",
+    ),
+    "overlay": (
+        "overlay {seen} {tracks}/scene-s40000 --out {out}/film.mp4",
+        "overlay {one} {tracks}/scene-s40000 --out {out}/film.mp4",
+    ),
     "view truth": ("view {one} --out {out}/page.html", "view {scene} --out {out}/page.html"),
     "sheet": ("sheet {one} --out {out}/sheet.png", "sheet {out}/nothing --out {out}/sheet.png"),
     "validate": ("validate {data}", "validate {out}/nothing"),
@@ -179,7 +198,7 @@ def test_command(name, state, as_json, place, capsys):
 
 def is_whole(name: str, out: Path) -> bool:
     """Whether the files of an interrupted command are of finished parts only: datasets that are valid, whole pages."""
-    if name not in ("generate", "demo", "track", "view all"):
+    if name not in ("generate", "generate pictures", "demo", "track", "view all"):
         return False
     sequences = [p.parent for p in out.rglob("scenario.toml")]
     pages = [p.read_text() for p in out.rglob("*.html")]
@@ -371,7 +390,8 @@ def test_a_bug_is_one_line_and_shown_whole_when_asked_for(place, capsys, monkeyp
 @pytest.mark.parametrize("workers", [1, 2])
 def test_ctrl_c_in_a_real_process(place, workers):
     """SIGINT in the middle of `generate`: 130, one object, and whatever is there is whole."""
-    line = [sys.executable, "-m", "tracking.app.cli", *words("generate {scene} --seeds 0:400 --out {out}", place)]
+    what = "generate {scene} --seeds 0:400 --streams none --out {out}"
+    line = [sys.executable, "-m", "tracking.app.cli", *words(what, place)]
     line += ["--workers", str(workers), "--json"]
     process = subprocess.Popen(
         line, cwd=ROOT, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, start_new_session=True

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import shutil
 from functools import cache
 from pathlib import Path
 
@@ -248,7 +249,10 @@ def test_a_parameter_changes_what_a_tracker_says(name, parameter):
 def made(tmp_path_factory) -> Path:
     folder = tmp_path_factory.mktemp("flips")
     (folder / "scene.toml").write_text(SCENE.partition("[[event]]")[0])
-    assert run(["generate", str(folder / "scene.toml"), "--seeds", "40000:40002", "--out", str(folder / "data")]) == 0
+    line = ["generate", str(folder / "scene.toml"), "--out"]
+    assert run([*line, str(folder / "data"), "--seeds", "40000:40002", "--streams", "none"]) == 0
+    small = ["--set", "camera.image=[128,96]", "--set", "duration=3"]
+    assert run([*line, str(folder / "seen"), "--seeds", "40000", "--images", "mp4", *small]) == 0
     data = folder / "data" / "flockscope-demo"
     assert run(["track", FAKE, str(data), "--out", str(folder / "tracks")]) == 0
     assert run(["track", FAKE, str(data), "--detections", "truth", "--out", str(folder / "perfect")]) == 0
@@ -260,20 +264,32 @@ def made(tmp_path_factory) -> Path:
         (folder / "mot" / name).mkdir(parents=True)
         (folder / "mot" / name / f"{name}.txt").write_text("".join(",".join(row) + "\n" for row in rows))
     assert run(["track", FAKE, str(folder / "mot"), "--fps", "5", "--out", str(folder / "mot-tracks")]) == 0
+    shutil.copy(data / "scene-s40000" / "camera.json", folder)
+    pair = [f"{k},{i},{20 + 12 * i + k},40,8,20,1" for k in range(1, 16) for i in (1, 2)]
+    (folder / "pair.txt").write_text("\n".join([*pair, ""]))
+    bare = [f"{k},1,-1,-1,-1,-1,1,{5 + 0.2 * k},4,0" for k in range(1, 16)]
+    (folder / "bare.txt").write_text("\n".join([*bare, ""]))
     (folder / "params.toml").write_text("[params]\nassociation = 'nearest'\nconfirm_ratio = 1.9\n")
     return folder
 
 
 BASE = {
     "scenarios": "scenarios {0}/scene.toml",
-    "generate": "generate {0}/scene.toml --seeds 7 --out {1}",
+    "generate": "generate {0}/scene.toml --seeds 7 --streams none --out {1}",
     "track": "track blob {0}/data/flockscope-demo/scene-s40000 --out {1}",
     "score": "score {0}/data {0}/tracks",
     "view": "view {0}/data/flockscope-demo/scene-s40000 --out {1}/page.html",
     "sheet": "sheet {0}/data/flockscope-demo/scene-s40000 --out {1}/sheet.png",
     "demo": "demo --out {1}",
 }
+SEEN = "generate {0}/scene.toml --seeds 7 --set camera.image=[128,96] --set duration=1 --out {1}"
+FILM = "track blob {0}/seen/flockscope-demo/scene-s40000/left.mp4 --px-per-m 12 --out {1}"
 MOT = "track " + FAKE + " {0}/mot --out {1}"
+
+VIEW = "view {0}/seen/flockscope-demo/scene-s40000 --out {1}/page.html"
+DRAWN = "overlay {0}/seen/flockscope-demo/scene-s40000 {0}/tracks/scene-s40000 --out {1}/o.mp4"
+OVERLAY = "overlay {0}/seen/flockscope-demo/scene-s40000/left.mp4 {0}/pair.txt --out {1}/o.mp4"
+BARE = "overlay {0}/seen/flockscope-demo/scene-s40000/left.mp4 {0}/bare.txt --out {1}/o.mp4"
 
 # (command, option): what is run, then what is run instead.
 OPTIONS = {
@@ -281,9 +297,12 @@ OPTIONS = {
     ("scenarios", "out"): (BASE["scenarios"], BASE["scenarios"] + " --out {1}/plan.svg"),
     ("scenarios", "schema"): ("scenarios", "scenarios --schema"),
     ("scenarios", "name"): ("scenarios", BASE["scenarios"]),
-    ("generate", "names"): (BASE["generate"], "generate cross --set camera.fps=5 --seeds 7 --out {1}"),
-    ("generate", "seeds"): (BASE["generate"], "generate {0}/scene.toml --seeds 8 --out {1}"),
+    ("generate", "names"): (BASE["generate"], "generate cross --set camera.fps=5 --seeds 7 --streams none --out {1}"),
+    ("generate", "seeds"): (BASE["generate"], BASE["generate"].replace("--seeds 7", "--seeds 8")),
     ("generate", "settings"): (BASE["generate"], BASE["generate"] + " --set scenario.duration=3"),
+    ("generate", "streams"): (SEEN, SEEN + " --streams left,ids"),
+    ("generate", "images"): (SEEN, SEEN + " --images png"),
+    ("track", "background"): (FILM, FILM + " --background first:5"),
     ("track", "tracker"): (BASE["track"], BASE["track"].replace("blob", FAKE)),
     ("track", "source"): (BASE["track"], BASE["track"].replace("40000", "40001")),
     ("track", "params"): (BASE["track"], BASE["track"] + " --params {0}/params.toml"),
@@ -317,6 +336,17 @@ OPTIONS = {
         "view {0}/mot {0}/mot-tracks/tracks.mot.txt --fps 5 --out {1}/page.html",
         "view {0}/mot {0}/mot-tracks/tracks.mot.txt --fps 5 --px-per-m 20 --out {1}/page.html",
     ),
+    ("view", "camera"): (
+        "view {0}/mot {0}/mot-tracks --fps 5 --out {1}/page.html",
+        "view {0}/mot {0}/mot-tracks --fps 5 --camera {0}/camera.json --out {1}/page.html",
+    ),
+    ("view", "video"): (VIEW, VIEW + " --video beside"),
+    ("overlay", "source"): (OVERLAY, OVERLAY.replace("left.mp4", "background.mp4")),
+    ("overlay", "tracks"): (OVERLAY, OVERLAY.replace("pair", "bare")),
+    ("overlay", "truth"): (DRAWN, DRAWN + " --truth over"),
+    ("overlay", "fps"): (OVERLAY, OVERLAY + " --fps 7"),
+    ("overlay", "px_per_m"): (OVERLAY, OVERLAY + " --px-per-m 40"),
+    ("overlay", "camera"): (BARE, BARE + " --camera {0}/seen/flockscope-demo/scene-s40000/camera.json"),
     ("sheet", "source"): (BASE["sheet"], BASE["sheet"].replace("40000", "40001")),
     ("sheet", "frames"): (BASE["sheet"], BASE["sheet"] + " --frames 4"),
     ("sheet", "fps"): ("sheet {0}/mot --out {1}/sheet.png", "sheet {0}/mot --fps 5 --out {1}/sheet.png"),

@@ -9,9 +9,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from tests.coded_pictures import SIZE, number, sequence
 
 from sim.io.source import open_source
+from tests.coded_pictures import SIZE, number, sequence
 from tracking.app.film import Film, film
 from tracking.app.view import view
 

@@ -8,10 +8,10 @@ from pathlib import Path
 import cv2
 import numpy as np
 import pytest
-from tests.coded_pictures import SIZE, coded, number, sequence
 
 from scenarios.errors import InputError
 from sim.types import Detections, Frame, GroupEvent, Groups, Sequence, Tracks, Truth
+from tests.coded_pictures import SIZE, coded, number, sequence
 from tracking.app import marks
 from tracking.app.overlay import compose, overlay
 from tracking.app.painter import Style
@@ -52,7 +52,7 @@ def test_boxes_are_where_they_belong() -> None:
     """At twice its size: the left edge of a box at u = 40 is drawn at 80, in the colour of its id."""
     side = marks.of_tracks([answer(1, {3: [40, 30, 10, 20]})], None, None)
     (picture,) = compose(sequence(1), [[(side, Style(names=False))]])
-    edges = np.argwhere((np.abs(picture[STRIP:].astype(int) - colour(3)).max(axis=2) < 12))
+    edges = np.argwhere(np.abs(picture[STRIP:].astype(int) - colour(3)).max(axis=2) < 12)
     top, left = edges.min(axis=0)
     bottom, right = edges.max(axis=0)
     assert (left, top, right, bottom) == pytest.approx((80, 60, 100, 100), abs=2)
