@@ -102,7 +102,7 @@ def observe(
 
 
 class _Pictures:
-    """The pictures that were asked for. Holds the exact pixels of the frame drawn last: they are often asked for next."""
+    """The pictures that were asked for. Holds the exact pixels of the frame drawn last: they are often wanted next."""
 
     def __init__(self, stage: Stage, streams: frozenset[str]) -> None:
         self.stage, self.streams = stage, streams
