@@ -16,7 +16,7 @@ from tracking.papers import blob_measure
 
 PERSON = 1.7  # m
 SLIM = 0.36  # width over height of a walking person's box, the prior of what is learned
-STOUT = 1.6  # by how much the width over height of a blob that may be somebody alone differs at most
+STOUT = 2.0  # by how much the width over height of a blob that may be somebody alone differs at most
 KEPT = 400  # lone blobs remembered
 ENOUGH = 12  # lone blobs that make a learned size reliable ...
 RENEW = 0.05  # share of new ones from which on the line is drawn anew
@@ -25,7 +25,8 @@ LEVELS = np.geomspace(0.65, 1.55, 19)  # of the median height, and
 SLOPES = np.linspace(0.0, 2.4, 17)  # growth per row, times the middle row: where the densest heights are looked for
 SLOPE, DOUBT = 0.7, 0.02  # a slope to expect, and the share of votes that unit distance from it costs
 WIDTH = 0.12  # relative deviation within which heights agree
-FACTORS = np.array([0.9, 0.8]), np.array([1.1, 1.25])  # least and most by which people are higher and wider
+FACTORS = np.array([0.9, 0.6]), np.array([1.1, 1.25])  # least and most by which people are higher and wider
+NARROW = 0.7  # of the votes for the most frequent width, what a smaller one needs to be taken instead
 PRIOR = 2.0  # people who count for the factors 1
 LOOSE = 1.0, 1.1  # height and width of a person's box over those of the box round the ellipse of his pixels: a prior
 SMALLEST = 12.0  # px: people less high than this cannot be told from noise
@@ -97,15 +98,20 @@ class PersonSize:
         known = np.isfinite(ratio).all(1)
         ratio, count = ratio[known], count[known]
         tall, agreed = _densest(ratio[:, 0], count)
-        wide, _ = _densest(ratio[agreed, 1], count[agreed])
+        wide, _ = _densest(ratio[agreed, 1], count[agreed], NARROW)
         self.agreed, self.factor = int(agreed.sum()), np.clip([tall, wide], *FACTORS)
 
 
-def _densest(value: Array, count: Array) -> tuple[float, Bools]:
-    """The value within relative WIDTH of which most counts lie, PRIOR of them at 1; which ones (N,) these are."""
+def _densest(value: Array, count: Array, least: float = 1.0) -> tuple[float, Bools]:
+    """The value within relative WIDTH of which most counts lie, PRIOR of them at 1; which ones (N,) these are.
+
+    least: the smallest value that has this share of the most (one person is narrower than two).
+    """
     value, count = np.append(value, 1.0), np.append(count, PRIOR)
     near = np.abs(value / np.maximum(value[:, None], 1e-9) - 1) <= WIDTH
-    members = near[int((near @ count).argmax())]
+    votes = near @ count
+    enough = np.flatnonzero(votes >= least * votes.max())
+    members = near[enough[int(value[enough].argmin())]] if least < 1 else near[int(votes.argmax())]
     return float(np.average(value[members], weights=count[members])), members[:-1]
 
 

@@ -75,8 +75,8 @@ def test_few_or_wild_blobs_are_not_relied_on():
     size.learn(few, ellipses(few), np.ones(len(few), bool))
     assert not size.reliable
     wild = blobs(r, 80)
-    wild[:, 3] = wild[:, 2] * r.uniform(1.6, 4.8, 80)
-    wild[:, 2:] *= r.uniform(0.2, 3.0, (80, 1))
+    wild[:, 3] = np.exp(r.uniform(np.log(13), np.log(250), 80))
+    wild[:, 2] = wild[:, 3] * r.uniform(0.2, 0.6, 80)
     size = PersonSize(BARE)
     size.learn(wild, ellipses(wild), np.ones(80, bool))
     assert not size.reliable
