@@ -65,8 +65,8 @@ class Prepared:
         self.history.forget()
         try:
             self.tracker.reset(self.context, seed)
-        except FlockscopeError:
-            raise
+        except FlockscopeError as error:
+            raise _named(error, self.sequence) from error.__cause__
         except Exception as error:
             raise _raised(self.name, "reset", self.sequence.name, error) from error
 
@@ -77,11 +77,16 @@ class Prepared:
             protocol.check_detections(detections, self.tracker.needs)
         try:
             said = self.tracker.step(frame, detections)
-        except FlockscopeError:
-            raise
+        except FlockscopeError as error:
+            raise _named(error, self.sequence) from error.__cause__
         except Exception as error:
             raise _raised(self.name, "step", f"{self.sequence.name}, frame {frame.index}", error) from error
         return protocol.check_tracks(said, frame.index, self.name, self.history)
+
+
+def _named(error: FlockscopeError, sequence: Sequence) -> FlockscopeError:
+    """An error that names no file, with the sequence it is about."""
+    return error if error.file else type(error)(**{**error.as_dict(), "file": sequence.name})
 
 
 def _raised(tracker: str, method: str, place: str, error: Exception) -> WorkError:

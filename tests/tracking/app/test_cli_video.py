@@ -1,0 +1,168 @@
+"""Pictures through the command line: what works, and what users get wrong, in one clear line each."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from pathlib import Path
+
+import cv2
+import numpy as np
+import pytest
+
+from tests.small_videos import SIZE, cut, damage, picture, write_jpegs, write_video
+from tracking.app.cli import run
+
+
+def film(folder: Path, n: int = 60, name: str = "film.mp4", **more) -> Path:
+    return write_video(folder / name, [picture(k) for k in range(n)], **more)
+
+
+def jpegs(folder: Path, pictures: list[np.ndarray], suffix: str = ".jpg") -> Path:
+    (folder / "img1").mkdir(parents=True)
+    for k, image in enumerate(pictures, 1):
+        cv2.imwrite(str(folder / "img1" / f"{k:06d}{suffix}"), image)
+    return folder
+
+
+def noise(k: int, size: tuple[int, int] = SIZE) -> np.ndarray:
+    return np.random.default_rng(k).integers(0, 255, (size[1], size[0], 3), dtype=np.uint8)
+
+
+def text(path: Path) -> Path:
+    path.write_text("hello")
+    return path
+
+
+def sixteen(k: int) -> np.ndarray:
+    return picture(k).astype(np.uint16) * 257
+
+
+# what is wrong with a video: how it is made, and what the line must say.
+BROKEN: dict[str, tuple[Callable[[Path], Path], list[str]]] = {
+    "missing": (lambda f: f / "no.mp4", ["no.mp4", "nothing there"]),
+    "empty": (lambda f: cut(film(f), 0), ["film.mp4", "an empty file"]),
+    "cut off, index gone": (lambda f: cut(film(f, name="film.mkv"), 0.02), ["film.mkv"]),
+    "no video": (lambda f: text(f / "a.mp4"), ["a.mp4", "no readable video"]),
+    "too short for any background": (lambda f: film(f, 6), ["film", "at least 10 frames"]),
+    "sizes change": (
+        lambda f: write_jpegs(f / "film.avi", [picture(k, SIZE if k < 40 else (64, 48)) for k in range(60)]),
+        ["film.avi", "frame 41", "64×48 px", "96×64 px"],
+    ),
+    "sizes change in a folder": (
+        lambda f: jpegs(f / "mot", [picture(k, SIZE if k < 40 else (64, 48)) for k in range(60)]),
+        ["000041.jpg", "64×48 px", "96×64 px"],
+    ),
+    "no picture can be read": (
+        lambda f: [p.write_bytes(b"no jpeg") for p in sorted((jpegs(f / "mot", [picture(1)] * 9) / "img1").iterdir())]
+        and f / "mot",
+        ["none of which can be read"],
+    ),
+    "every pixel changes": (
+        lambda f: jpegs(f / "mot", [noise(k) for k in range(60)]),
+        ["mot", "no background can be had"],
+    ),
+}  # fmt: skip
+
+
+@pytest.mark.filterwarnings("ignore::UserWarning")
+@pytest.mark.parametrize("as_json", [False, True], ids=["text", "json"])
+@pytest.mark.parametrize("name", BROKEN)
+def test_a_broken_recording_is_one_line(name, as_json, tmp_path, capsys):
+    make, expected = BROKEN[name]
+    out = tmp_path / "out"
+    line = ["track", "blob", str(make(tmp_path)), "--fps", "10", "--px-per-m", "20", "--out", str(out)]
+    assert run(line + ["--json"] * as_json) == 2
+    printed = capsys.readouterr()
+    told = [text for text in printed.err.splitlines() if not text.startswith("warning: ")]
+    assert len(told) == (0 if as_json else 1)
+    error = " ".join(json.loads(printed.out)["error"].values()) if as_json else told[0]
+    assert all(word in error for word in expected), error
+    assert not out.exists()
+
+
+# pictures that are strange, and yet pictures: how they are made, and what a warning must say.
+STRANGE: dict[str, tuple[Callable[[Path], Path], str]] = {
+    "plain": (film, ""),
+    "no other speaks of its rate": (lambda f: jpegs(f / "mot", [picture(k) for k in range(60)]), ""),
+    "16 bits": (lambda f: jpegs(f / "mot", [sixteen(k) for k in range(60)], ".png"), ""),
+    "grey": (lambda f: jpegs(f / "mot", [picture(k)[..., 1] for k in range(60)]), ""),
+    "a grey video": (lambda f: film(f, pix_fmt="gray"), ""),
+    "shorter than the sample": (lambda f: film(f, 30), "shorter than a background sample"),
+    "damaged": (lambda f: damage(film(f), 0.7, 300), "lost"),
+    "cut off": (lambda f: cut(film(f, options={"g": "10"}), 0.9), "ends after|lost"),
+}
+
+
+@pytest.mark.parametrize("name", STRANGE)
+def test_strange_pictures_are_pictures(name, tmp_path, capsys):
+    """Frames keep their slots: as many answers as there are frames."""
+    make, word = STRANGE[name]
+    line = ["track", "blob", str(make(tmp_path)), "--fps", "10", "--px-per-m", "20", "--out", str(tmp_path / "out")]
+    assert run([*line, "--json"]) == 0
+    printed = capsys.readouterr()
+    (told,) = json.loads(printed.out)["runs"]
+    assert told["detections"] == "image"
+    assert not told["causal"]
+    assert any(part in printed.err for part in word.split("|"))
+    if not word:
+        assert told["frames"] == 60
+    for command in (["sheet"], ["view"], ["overlay"]):
+        tracks = [] if command == ["sheet"] else [str(tmp_path / "out")]
+        source, suffix = line[2], {"sheet": "png", "view": "html", "overlay": "mp4"}[command[0]]
+        made = tmp_path / f"made.{suffix}"
+        assert run([*command, source, *tracks, "--fps", "10", "--out", str(made)]) == 0, capsys.readouterr().err
+        assert made.stat().st_size > 1000
+
+
+def test_which_background_is_told(tmp_path, capsys):
+    path = str(film(tmp_path))
+    for option, words, causal in (
+        ([], "50 frames spread over the recording (not causal)", False),
+        (["--background", "first:20"], "first 20 frames", True),
+        (["--background", "spread:30"], "30 frames spread over the recording (not causal)", False),
+    ):
+        out = tmp_path / "out"
+        assert run(["track", "blob", path, "--px-per-m", "20", "--out", str(out), *option]) == 0
+        told = json.loads((out / "run.json").read_text())
+        assert (told["background"], told["causal"], told["detections"]) == (words, causal, "image")
+        assert words in capsys.readouterr().out
+
+
+@pytest.mark.parametrize(
+    ("option", "words"),
+    [
+        ("--background last:5", ["--background", "last:5", "first:N"]),
+        ("--background first:0", ["--background", "first:0"]),
+        ("--background first:61", ["--background", "60 frames", "61"]),
+        ("--detections file", ["needs pixels or boxes", "film", "images"]),
+        ("--detections truth", ["needs pixels or boxes", "film", "images"]),
+        ("--detections image --set sensor.noise_px=3", ["sensor"]),
+        ("--camera nowhere.json", ["nowhere.json"]),
+        ("--fps 0", ["--fps"]),
+        ("--px-per-m -2", ["--px-per-m"]),
+    ],
+)
+def test_options_that_cannot_work(option, words, tmp_path, capsys, monkeypatch):
+    """Before a frame is read."""
+    path = film(tmp_path)
+    monkeypatch.setattr("sim.io.sample.Sample.__call__", None)
+    assert run(["track", "blob", str(path), "--out", str(tmp_path / "out"), *option.split()]) == 2
+    (line,) = capsys.readouterr().err.splitlines()
+    assert all(word in line for word in words), line
+    assert not (tmp_path / "out").exists()
+
+
+def test_a_background_for_a_tracker_that_needs_none(tmp_path, capsys):
+    folder = jpegs(tmp_path / "mot", [picture(k) for k in range(30)])
+    (folder / "gt").mkdir()
+    (folder / "gt" / "gt.txt").write_text("".join(f"{k},1,{4 * k},20,16,16,1,1,1\n" for k in range(1, 30)))
+    line = ["track", "blob", str(folder), "--fps", "10", "--out", str(tmp_path / "out")]
+    assert run([*line, "--detections", "truth", "--background", "first:10"]) == 2
+    assert "leave --background out" in capsys.readouterr().err
+
+
+def test_an_overlay_of_what_has_no_pictures(tmp_path, capsys):
+    (tmp_path / "gt.txt").write_text("1,1,0,0,5,5,1,1,1\n2,1,0,0,5,5,1,1,1\n")
+    assert run(["overlay", str(tmp_path / "gt.txt"), "--fps", "10", "--out", str(tmp_path / "o.mp4")]) == 2
+    assert "without pictures" in capsys.readouterr().err
