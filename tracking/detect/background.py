@@ -63,10 +63,10 @@ class Background:
             self.gain = self._gain(image)
         limits = np.array([*self.thresholds, self.settings.dark, self.settings.bright], np.float32)
         classes = np.empty(self.valid.shape, np.uint8)
-        planes = (np.asarray(plane, np.uint8).ravel() for plane in cv2.split(image))
+        one, two, three = (np.asarray(plane, np.uint8).ravel() for plane in cv2.split(image))
         E, V = self.mean.reshape(3, -1), self.var.reshape(3, -1)
         background_kernels.classify(
-            *planes, E, V, self.s.ravel(), self.b.ravel(), self.gain, limits, classes.reshape(-1)
+            one, two, three, E, V, self.s.ravel(), self.b.ravel(), self.gain, limits, classes.reshape(-1)
         )
         self._calm = ~foreground(classes[self._grid]) & self.valid[self._grid]
         return classes
@@ -88,8 +88,9 @@ class Background:
 
     def _gain(self, image: Image) -> Floats:
         """The gain over what was background in the last frame, else over all pixels, else the last one."""
-        seen, mean = image[self._grid].astype(np.float32), np.moveaxis(self.mean[:, *self._grid], 0, -1)
+        seen = np.moveaxis(image[self._grid], -1, 0).astype(np.float32)
+        mean = self.mean[:, *self._grid]
         found = gains.gain(seen, mean, self._calm)
         if found is None:
             found = gains.gain(seen, mean, self.valid[self._grid])
-        return self.gain if found is None else found.astype(np.float32)
+        return self.gain if found is None else found

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 
-from sim.types import Array, Bools, Image
+from sim.types import Bools, Image
 from tracking.detect.classes import Floats
 
 POINTS = 6000
 """Pixels of the grid on which a gain is estimated."""
-DARKEST, BRIGHTEST = 16.0, 245.0
+DARKEST, BRIGHTEST = 16.0, 235.0
 """Grey levels between which I and E must lie: below noise rules, above the camera clips."""
 FEWEST = 50
 
@@ -20,19 +20,31 @@ def grid(high: int, wide: int) -> tuple[slice, slice]:
     return slice(step // 2, None, step), slice(step // 2, None, step)
 
 
-def gain(image: Array | Floats, mean: Array | Floats, where: Bools) -> Array | None:
-    """(3,) median of I / E over grid pixels (h, w, 3) that are `where` (h, w); None if too few can be used."""
-    usable = where & np.all((mean > DARKEST) & (image > DARKEST) & (image < BRIGHTEST), axis=-1)
-    if usable.sum() < FEWEST:
-        return None
-    return np.asarray(np.median(image[usable] / mean[usable], axis=0))
+def gain(image: Floats, mean: Floats, where: Bools) -> Floats | None:
+    """(3,) median of I / E over grid pixels (3, h, w) that are `where` (h, w); None if too few can be used."""
+    found = [_one_colour(i[where], e[where]) for i, e in zip(image, mean, strict=True)]
+    return None if None in found else np.array(found, np.float32)
 
 
-def frame_gains(sample: Image) -> Array:
+def _one_colour(seen: Floats, mean: Floats) -> float | None:
+    """The median ratio over pixels that neither noise rules nor the camera clips.
+
+    Which these are is told by a first guess, since to choose them by what is seen would take sides.
+    """
+    usable = (mean > DARKEST) & (seen > DARKEST) & (seen < BRIGHTEST)
+    for _ in range(2):
+        if np.count_nonzero(usable) < FEWEST:
+            return None
+        factor = float(np.median(seen[usable] / mean[usable]))
+        usable = (factor * mean > DARKEST) & (factor * mean < BRIGHTEST) & (mean > DARKEST)
+    return factor
+
+
+def frame_gains(sample: Image) -> Floats:
     """(K, 3): brightness of each frame of a sample beside their median frame; 1 where it cannot be told."""
     rows, columns = grid(*sample.shape[1:3])
-    values = sample[:, rows, columns].astype(float)
+    values = np.moveaxis(sample[:, rows, columns], -1, 1).astype(np.float32)
     middle = np.median(values, axis=0)
-    everywhere = np.ones(middle.shape[:2], bool)
+    everywhere = np.ones(middle.shape[1:], bool)
     found = [gain(v, middle, everywhere) for v in values]
-    return np.array([np.ones(3) if g is None else g for g in found])
+    return np.array([np.ones(3) if g is None else g for g in found], np.float32)

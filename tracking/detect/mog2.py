@@ -54,6 +54,7 @@ class Mog2:
 
     def adapt(self, image: Image, classes: Image, protected: Bools | None = None) -> None:
         """Learn from a frame; where `protected`, the model is shown its own background."""
+        check_frame(image, self.valid.shape)
         if protected is not None and protected.any():
             image = np.where(protected[..., None], self._model.getBackgroundImage(), image)
         self._model.apply(image, learningRate=self._rate)

@@ -1,8 +1,8 @@
 """Robust training of the background model from a sample of frames that people may walk through.
 
 Per pixel and colour: the shortest interval that holds SHARE of the values finds the inliers; E and sigma are their mean
-and standard deviation, twice more. (The median and MAD of a pixel where people stand about half of the time lie between
-them and the ground, with a sigma that hides both.)
+and standard deviation, in turn, until they settle. (The median and MAD of a pixel where people stand about half of the
+time lie between them and the ground, with a sigma that hides both.)
 Per pixel: a_i and b_i are the RMS of alpha - 1 and of CD over the inliers (Horprasert et al. 2000, eqs 7, 8). a_i is
 kept as s_i = a_i sqrt(sum (E/sigma)^2), which is 1 for independent Gaussian noise and stays true when the gain changes.
 Thresholds: quantiles of the normalised distortions at the detection rate (the paper's Fig. 2), over the pixels that
@@ -11,12 +11,14 @@ nobody covered in any frame of the sample.
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
+from statistics import NormalDist
 
 import numpy as np
 
 from scenarios.errors import InputError
-from sim.types import Array, Bools, Image, Ints
+from sim.types import Bools, Image, Ints
 from tracking.detect.classes import Floats
 from tracking.detect.gain import frame_gains
 
@@ -29,7 +31,8 @@ SHARE = 0.35
 """Of the sample: where the ground shows less often than this there is no background."""
 AS_SIGMA = 2.2
 """Standard deviations of a Gaussian per half length of the interval about its mean that holds SHARE."""
-ROUNDS = 3
+ROUNDS = 10
+"""At most; the inliers settle after three or four."""
 CLEAN = 6.0
 """The same for thresholds, where the tail counts: a pixel with any sample beyond was covered, and is left out whole."""
 WIDEST = 20.0
@@ -54,16 +57,14 @@ def train(sample: Image, rate: float, follow_gain: bool) -> Trained:
     from tracking.detect import training_kernels
 
     check(sample)
-    gains = frame_gains(sample) if follow_gain else np.ones((len(sample), 3))
+    gains = frame_gains(sample) if follow_gain else np.ones((len(sample), 3), np.float32)
     size = sample.shape[1:3]
     mean, sigma = np.empty((*size, 3), np.float32), np.empty((*size, 3), np.float32)
     s, b, valid = np.empty(size, np.float32), np.empty(size, np.float32), np.empty(size, bool)
     counts = np.zeros((2, 2, BINS), np.int64)
     held = max(int(np.ceil(SHARE * len(sample))), 3)
     rules = AS_SIGMA, FLOOR, WIDEST, INLIER, CLEAN, ROUNDS
-    training_kernels.learn(
-        sample, gains.astype(np.float32), held, rules, (BINS, SPAN), mean, sigma, s, b, valid, counts
-    )
+    training_kernels.learn(sample, gains, held, rules, (BINS, SPAN), mean, sigma, s, b, valid, counts)
     if valid.mean() < 0.5:
         raise InputError(
             place="background",
@@ -99,11 +100,14 @@ def check_frame(image: Image, size: tuple[int, ...]) -> None:
 
 
 def thresholds(counts: Ints, rate: float) -> tuple[float, float, float]:
-    """CD, lower, upper at the detection rate, from histograms (brightness, CD) over -SPAN..SPAN."""
+    """CD, lower, upper at the detection rate, from histograms (brightness, CD) over -SPAN..SPAN.
+
+    None is nearer than Gaussian noise of unit RMS would have it: a still picture has no tails.
+    """
     edges = np.linspace(-SPAN, SPAN, BINS + 1)
     shares = [np.concatenate([[0], np.cumsum(c)]) / max(c.sum(), 1) for c in counts]
-
-    def at(share: Array, p: float) -> float:
-        return float(np.interp(p, share, edges))
-
-    return at(shares[1], rate), at(shares[0], 1 - rate), at(shares[0], rate)
+    low, high, most = (
+        float(np.interp(p, share, edges)) for p, share in ((1 - rate, shares[0]), (rate, shares[0]), (rate, shares[1]))
+    )
+    normal = NormalDist().inv_cdf(rate)
+    return max(most, math.sqrt(-math.log(1 - rate))), min(low, -normal), max(high, normal)

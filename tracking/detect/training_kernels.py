@@ -56,13 +56,15 @@ def learn(
                 m[k], sd[k] = order[first + held // 2], max(0.5 * best * as_sigma, least)
                 good = good and sd[k] <= widest
             clean = True
+            inlier[:] = False
             for _ in range(rounds):
-                clean = True
+                clean, settled = True, True
                 n, sums, squares = 0, np.zeros(3), np.zeros(3)
                 for t in range(frames):
                     away = 0.0
                     for k in range(3):
                         away = max(away, abs(value[t, k] - m[k]) / sd[k])
+                    settled = settled and inlier[t] == (away <= inside)
                     inlier[t] = away <= inside
                     clean = clean and away <= untouched
                     if inlier[t]:
@@ -76,6 +78,8 @@ def learn(
                     shift = sums[k] / n
                     m[k] = max(m[k] + shift, 1.0)
                     sd[k] = max(np.sqrt(max(squares[k] / n - shift * shift, 0.0)), least)
+                if settled:
+                    break
             norm = 0.0
             for k in range(3):
                 norm += (m[k] / sd[k]) ** 2

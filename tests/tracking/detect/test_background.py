@@ -1,0 +1,391 @@
+"""Background subtraction: closed forms, people and light in the sample, lamps and removed objects, symmetries, twins."""
+
+import numpy as np
+import pytest
+from scipy.special import ndtri
+
+from scenarios.errors import InputError
+from tests import reference_background as reference
+from tracking.detect.background import (
+    BACKGROUND,
+    DARK,
+    FOREGROUND,
+    HIGHLIGHT,
+    INTERLEAVE,
+    SHADOW,
+    Background,
+    foreground,
+)
+from tracking.detect.mog2 import Mog2
+from tracking.detect.settings import BackgroundSettings
+from tracking.detect.training import FLOOR, train
+
+SIGMA = np.array([3.0, 2.0, 4.0])
+FPS = 10.0
+
+
+def scene(high=40, wide=50, seed=0, low=60, top=160):
+    return np.random.default_rng(seed).uniform(low, top, (high, wide, 3))
+
+
+def shot(colours, rng, sigma=SIGMA, gain=1.0):
+    noisy = colours * gain + rng.normal(size=colours.shape) * sigma
+    return np.clip(np.round(noisy), 0, 255).astype(np.uint8)
+
+
+def shots(colours, number=50, seed=1, **how):
+    rng = np.random.default_rng(seed)
+    return np.stack([shot(colours, rng, **how) for _ in range(number)])
+
+
+def model(colours=None, seed=1, **settings):
+    return Background(shots(scene() if colours is None else colours, seed=seed), FPS, BackgroundSettings(**settings))
+
+
+def share(classes, kind):
+    return float(np.mean(classes == kind))
+
+
+# --- closed forms -----------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("k", [0.1, 0.5, 1.0, 1.7])
+def test_a_colour_on_the_line_has_its_factor_and_no_chromaticity(k):
+    mean = scene()
+    alpha, cd = reference.distortions(k * mean, mean, SIGMA)
+    np.testing.assert_allclose(alpha, k, atol=1e-12)
+    np.testing.assert_allclose(cd, 0, atol=1e-12)
+
+
+def test_normalised_distortions_have_unit_rms_over_the_training_sample():
+    sample = shots(scene())
+    made = train(sample, 0.999, follow_gain=False)
+    alpha, cd = reference.distortions(sample.astype(float), made.mean, made.sigma)
+    length = np.sqrt(np.sum(np.square(made.mean / made.sigma), axis=-1))
+    inside = np.all(np.abs(sample - made.mean) <= 2.9 * made.sigma, axis=(0, -1))
+    assert inside.mean() > 0.4
+    for value in ((alpha - 1) * length / made.s, cd / made.b):
+        np.testing.assert_allclose(np.sqrt(np.mean(np.square(value), axis=0))[inside], 1, atol=1e-4)
+
+
+def test_normalisers_approach_their_values_for_gaussian_noise():
+    mean = np.broadcast_to(np.array([120.0, 90.0, 60.0]), (20, 20, 3))
+    made = train(shots(mean, 1000), 0.999, follow_gain=False)
+    a = made.s / np.sqrt(np.sum(np.square(made.mean / made.sigma), axis=-1))
+    assert np.mean(a) == pytest.approx(1 / np.sqrt(np.sum(np.square([120 / 3, 90 / 2, 60 / 4]))), rel=0.01)
+    assert np.mean(made.b) == pytest.approx(np.sqrt(2), rel=0.01)
+
+
+@pytest.mark.parametrize("rate", [0.99, 0.999, 0.9999])
+def test_thresholds_are_those_of_the_detection_rate(rate):
+    made = train(shots(scene(60, 60), 400), rate, follow_gain=False)
+    most, lower, upper = made.thresholds
+    assert most == pytest.approx(np.sqrt(-np.log(1 - rate)), rel=0.03)
+    assert (-lower, upper) == (pytest.approx(ndtri(rate), rel=0.04), pytest.approx(ndtri(rate), rel=0.04))
+
+
+def test_new_frames_of_the_empty_scene_are_background_at_about_the_detection_rate():
+    mean = scene(80, 80)
+    made = Background(shots(mean, 200), FPS, BackgroundSettings(detection_rate=0.99))
+    rng = np.random.default_rng(5)
+    kinds = np.concatenate([made.classify(shot(mean, rng)).ravel() for _ in range(10)])
+    for kind in (FOREGROUND, SHADOW, HIGHLIGHT):
+        assert 0.008 < share(kinds, kind) < 0.014
+
+
+# --- the five classes -------------------------------------------------------------------------------------------------
+
+
+def test_five_classes_of_known_colours():
+    mean = np.broadcast_to(np.array([90.0, 100.0, 110.0]), (30, 50, 3))
+    made = model(mean, gain="none")
+    scales = np.repeat([1.0, 0.6, 0.2, 1.5, 2.3], 10)
+    picture = mean * scales[None, :, None]
+    picture[20:] = mean[20:] * (1.6, 0.9, 0.3)
+    classes = made.classify(np.round(picture).astype(np.uint8))
+    for band, kind in enumerate((BACKGROUND, SHADOW, DARK, HIGHLIGHT, FOREGROUND)):
+        assert np.all(classes[:20, 10 * band : 10 * band + 10] == kind), band
+    assert np.all(classes[20:] == FOREGROUND)
+    assert share(foreground(classes), True) == pytest.approx((20 * 20 + 10 * 50) / 1500)
+
+
+def test_a_dark_place_that_gets_darker_by_noise_is_no_dark_foreground():
+    mean = np.full((20, 20, 3), 8.0)
+    made = model(mean, gain="none")
+    assert share(made.classify(np.full((20, 20, 3), 3, np.uint8)), DARK) < 0.2
+    assert share(model(10 * mean, gain="none").classify(np.full((20, 20, 3), 30, np.uint8)), DARK) == 1
+
+
+def test_where_the_camera_clips_the_brighter_background_stays_background():
+    mean = scene(low=150, top=240)
+    made = model(mean)
+    classes = made.classify(shot(mean, np.random.default_rng(3), gain=1.4))
+    assert share(foreground(classes), True) < 0.02
+
+
+# --- a sample with people, light and change ---------------------------------------------------------------------------
+
+
+def test_people_in_the_sample_leave_no_trace():
+    mean, rng = scene(), np.random.default_rng(2)
+    sample = shots(mean)
+    for k, frame in enumerate(sample):
+        if k % 5 < 2:
+            frame[10:30, 10:30] = rng.integers(0, 255, 3)
+    with_people, without = train(sample, 0.999, False), train(shots(mean), 0.999, False)
+    there = np.s_[10:30, 10:30]
+    assert with_people.valid.all()
+    assert np.abs(with_people.mean - mean)[there].mean() < 1.3 * np.abs(without.mean - mean)[there].mean() + 0.2
+    assert with_people.sigma[there].mean() == pytest.approx(without.sigma[there].mean(), rel=0.1)
+    np.testing.assert_allclose(with_people.thresholds, without.thresholds, rtol=0.05)
+
+
+def test_where_the_background_never_rests_nothing_is_claimed():
+    sample = shots(scene())
+    sample[:, :10, :10] = np.random.default_rng(4).integers(0, 255, (50, 10, 10, 3))
+    made = Background(sample, FPS)
+    assert not made.valid[:10, :10].any()
+    assert made.valid[10:].all()
+    classes = made.classify(np.zeros((40, 50, 3), np.uint8))
+    assert np.all(classes[:10, :10] == BACKGROUND)
+    assert share(classes[10:], DARK) > 0.9
+
+
+def test_light_that_drifts_through_the_sample_widens_nothing():
+    mean, rng = scene(), np.random.default_rng(6)
+    sample = np.stack([shot(mean, rng, gain=g) for g in np.linspace(0.8, 1.2, 50)])
+    steady, drifting = train(shots(mean), 0.999, True), train(sample, 0.999, True)
+    assert drifting.sigma.mean() < 1.1 * steady.sigma.mean()
+    assert train(sample, 0.999, False).sigma.mean() > 2 * steady.sigma.mean()
+
+
+@pytest.mark.parametrize("gain", [0.7, 1.3, (0.75, 1.0, 1.25)])
+def test_a_sudden_change_of_light_does_not_flood_the_frame(gain):
+    mean, rng = scene(), np.random.default_rng(7)
+    picture = shot(mean, rng, gain=np.array(gain))
+    picture[5:20, 5:15] = (20, 200, 20)
+    classes = model(mean).classify(picture)
+    hole = np.ones(classes.shape, bool)
+    hole[5:20, 5:15] = False
+    assert share(foreground(classes)[~hole], True) > 0.95
+    assert share(classes[hole], BACKGROUND) > 0.99
+    blind = model(mean, gain="none").classify(picture)
+    assert share(blind[hole], BACKGROUND) < 0.5
+
+
+# --- adaptation -------------------------------------------------------------------------------------------------------
+
+
+def foreground_over_time(made, picture, seconds, protected=None, seed=8):
+    rng, curve = np.random.default_rng(seed), []
+    for _ in range(int(seconds * FPS)):
+        frame = shot(picture, rng)
+        classes = made.classify(frame)
+        curve.append(foreground(classes)[8:16, 8:16].mean())
+        made.adapt(frame, classes, protected)
+    return np.array(curve)
+
+
+@pytest.mark.parametrize("colour", [(40, 200, 40), (10, 10, 10)], ids=["put down", "dark"])
+def test_what_stays_becomes_background_and_what_goes_leaves_no_ghost(colour):
+    """With foreground_time 10 s a difference of D is gone after 10 ln(D / threshold) seconds, and so is its ghost."""
+    mean = np.broadcast_to(np.array([110.0, 120.0, 100.0]), (24, 24, 3))
+    made = model(mean, background_time=5, foreground_time=10)
+    lamp = mean.copy()
+    lamp[8:16, 8:16] = colour
+    on = foreground_over_time(made, lamp, 60)
+    assert on[:10].min() > 0.95
+    assert on[-50:].max() < 0.1
+    off = foreground_over_time(made, mean, 60, seed=9)
+    assert off[:10].min() > 0.95
+    assert off[-50:].max() < 0.1
+
+
+def test_a_rate_that_leaves_foreground_alone_keeps_it_for_ever():
+    mean = np.broadcast_to(np.array([110.0, 120.0, 100.0]), (24, 24, 3))
+    lamp = mean.copy()
+    lamp[8:16, 8:16] = (40, 200, 40)
+    made = model(mean, background_time=5, foreground_time=1e9)
+    assert foreground_over_time(made, lamp, 60)[-50:].min() > 0.95
+
+
+def test_a_protected_place_learns_nothing():
+    mean = np.broadcast_to(np.array([110.0, 120.0, 100.0]), (24, 24, 3))
+    person = mean.copy()
+    person[8:16, 8:16] = (40, 200, 40)
+    keep = np.zeros((24, 24), bool)
+    keep[8:16, 8:16] = True
+    made = model(mean, background_time=5, foreground_time=10)
+    before = made.mean[:, 8:16, 8:16].copy()
+    assert foreground_over_time(made, person, 30, keep).min() > 0.95
+    assert np.array_equal(made.mean[:, 8:16, 8:16], before)
+
+
+def test_light_that_drifts_by_a_third_either_way_is_followed():
+    mean, rng, worst = scene(), np.random.default_rng(10), 0.0
+    made = model(mean)
+    for t in range(300):
+        frame = shot(mean, rng, gain=1 + 0.3 * np.sin(t / 30))
+        classes = made.classify(frame)
+        made.adapt(frame, classes)
+        worst = max(worst, float(np.mean(classes != BACKGROUND)))
+    assert worst < 0.02
+
+
+def test_all_rows_adapt_in_turn_and_by_the_time_that_passed():
+    mean = np.full((8, 8, 3), 100.0)
+    made = model(mean, gain="none", background_time=20)
+    start = made.mean.copy()
+    frame = np.full((8, 8, 3), 102, np.uint8)
+    for _ in range(INTERLEAVE * 50):
+        made.adapt(frame, np.zeros((8, 8), np.uint8))
+    expected = 102 + (start - 102) * np.exp(-INTERLEAVE * 50 / FPS / 20)
+    np.testing.assert_allclose(made.mean, expected, rtol=1e-4)
+
+
+# --- symmetries and twins ---------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("turn", [np.fliplr, np.flipud, lambda a: a.swapaxes(0, 1)])
+def test_a_turned_scene_has_turned_classes(turn):
+    mean = scene(30, 30)
+    sample, picture = shots(mean), shot(mean * scene(30, 30, 20, 0.3, 1.7), np.random.default_rng(11))
+    settings = BackgroundSettings(gain="none")
+    straight = Background(sample, FPS, settings).classify(picture)
+    turned_sample = np.ascontiguousarray(np.stack([turn(f) for f in sample]))
+    turned = Background(turned_sample, FPS, settings).classify(np.ascontiguousarray(turn(picture)))
+    assert len(np.unique(straight)) >= 3
+    assert np.array_equal(turn(straight), turned)
+
+
+def test_order_of_colours_and_of_frames_changes_nothing():
+    sample, picture = shots(scene()), shot(scene() * 0.8, np.random.default_rng(12))
+    straight = Background(sample, FPS).classify(picture)
+    order = np.random.default_rng(13).permutation(len(sample))
+    assert np.array_equal(Background(np.ascontiguousarray(sample[order]), FPS).classify(picture), straight)
+    swapped = Background(np.ascontiguousarray(sample[..., ::-1]), FPS).classify(
+        np.ascontiguousarray(picture[..., ::-1])
+    )
+    assert np.mean(swapped != straight) < 1e-3
+
+
+@pytest.mark.parametrize("follow", [True, False])
+def test_training_equals_its_twin(follow):
+    rng = np.random.default_rng(14)
+    sample = shots(scene(), 30)
+    sample[::3, 5:20, 5:20] = rng.integers(0, 255, 3)
+    sample[:, :4, :4] = rng.integers(0, 255, (30, 4, 4, 3))
+    made = train(sample, 0.999, follow)
+    from tracking.detect.gain import frame_gains
+
+    gains = frame_gains(sample) if follow else np.ones((30, 3))
+    values = (sample / gains[:, None, None, :]).astype(np.float32).astype(float)
+    mean, sigma, inlier, _, valid = reference.spread(values)
+    s, b = reference.normalisers(values, mean, sigma, inlier)
+    np.testing.assert_allclose(made.mean, mean, rtol=1e-5)
+    np.testing.assert_allclose(made.sigma, sigma, rtol=1e-4)
+    np.testing.assert_allclose(made.s, s, rtol=1e-4)
+    np.testing.assert_allclose(made.b, b, rtol=1e-4)
+    assert np.array_equal(made.valid, valid)
+    assert not valid.all()
+
+
+def test_kernels_equal_their_twins():
+    made = model(scene(), bright=1.5, dark=0.7)
+    rng = np.random.default_rng(15)
+    for _ in range(6):
+        picture = shot(scene() * rng.uniform(0.4, 1.8, (40, 50, 1)), rng)
+        picture[:6] = rng.integers(0, 255, (6, 50, 3))
+        classes = made.classify(picture)
+        planes = np.moveaxis(made.mean, 0, -1).astype(float), np.moveaxis(made.var, 0, -1).astype(float)
+        limits = (*made.thresholds, 0.7, 1.5)
+        twin = reference.classify(picture, planes[0], np.sqrt(planes[1]), made.s, made.b, made.valid, made.gain, limits)
+        assert np.bincount(classes.ravel(), minlength=5).min() > 20
+        assert np.mean(classes != twin) < 1e-3
+        keep, rows = rng.random((40, 50)) < 0.3, np.arange(40) % INTERLEAVE == made._turn
+        fast, slow = (1 - np.exp(-INTERLEAVE / (FPS * t)) for t in (20.0, 200.0))
+        twins = reference.adapt(picture, classes, keep, *planes, made.gain.astype(float), rows, fast, slow)
+        made.adapt(picture, classes, keep)
+        for kernel, twin in zip((made.mean, made.var), twins, strict=True):
+            np.testing.assert_allclose(np.moveaxis(kernel, 0, -1), twin, rtol=1e-4)
+
+
+def test_the_same_frames_give_the_same_classes():
+    answers = []
+    for _ in range(2):
+        made, rng = model(), np.random.default_rng(16)
+        for _ in range(5):
+            frame = shot(scene() * rng.uniform(0.7, 1.3), rng)
+            frame.flags.writeable = False
+            classes = made.classify(frame)
+            made.adapt(frame, classes)
+        answers.append((classes.tobytes(), made.mean.tobytes(), made.var.tobytes()))
+    assert answers[0] == answers[1]
+
+
+def test_a_still_picture_can_be_trained_on():
+    still = np.repeat(scene()[None].astype(np.uint8), 12, axis=0)
+    made = Background(still, FPS)
+    assert np.isfinite(made.mean).all()
+    assert made.var.min() >= FLOOR**2
+    assert share(made.classify(still[0]), BACKGROUND) == 1
+    assert share(made.classify(still[0] + np.uint8(1)), BACKGROUND) == 1
+    dark = still[0].copy()
+    dark[:15] //= 8
+    assert share(foreground(made.classify(dark)[:15]), True) > 0.95
+
+
+# --- bad input --------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("sample", "words"),
+    [
+        (np.zeros((50, 8, 8), np.uint8), "uint8, BGR"),
+        (np.zeros((50, 8, 8, 3)), "uint8, BGR"),
+        (np.zeros((50, 0, 8, 3), np.uint8), "uint8, BGR"),
+        (np.zeros((9, 8, 8, 3), np.uint8), "at least 10 frames"),
+        (np.random.default_rng(0).integers(0, 255, (50, 8, 8, 3), np.uint8), "no background can be had"),
+    ],
+    ids=["grey", "floats", "empty", "few", "all pixels change"],
+)
+def test_a_sample_that_is_none_is_refused_in_one_line(sample, words):
+    with pytest.raises(InputError, match=words):
+        Background(sample, FPS)
+
+
+@pytest.mark.parametrize("maker", [Background, Mog2])
+def test_a_frame_of_another_kind_is_refused(maker):
+    made = maker(shots(scene()), FPS)
+    for wrong in (np.zeros((20, 20, 3), np.uint8), np.zeros((40, 50), np.uint8), np.zeros((40, 50, 3))):
+        with pytest.raises(InputError, match="as the background sample"):
+            made.classify(wrong)
+        with pytest.raises(InputError, match="as the background sample"):
+            made.adapt(wrong, np.zeros((40, 50), np.uint8))
+
+
+def test_foreground_that_adapts_faster_than_background_is_refused():
+    with pytest.raises(InputError, match="at least background_time"):
+        BackgroundSettings(background_time=30, foreground_time=20)
+
+
+# --- the other source -------------------------------------------------------------------------------------------------
+
+
+def test_mog2_speaks_the_same_classes():
+    mean = np.broadcast_to(np.array([110.0, 120.0, 100.0]), (40, 50, 3))
+    made = Mog2(shots(mean), FPS)
+    picture = mean.copy()
+    picture[5:20, 5:20], picture[5:20, 30:45] = (30, 220, 30), mean[5:20, 30:45] * 0.7
+    picture = np.round(picture).astype(np.uint8)
+    classes = made.classify(picture)
+    assert share(classes[5:20, 5:20], FOREGROUND) > 0.95
+    assert share(classes[5:20, 30:45], SHADOW) > 0.95
+    assert share(classes[22:], BACKGROUND) > 0.95
+    keep = np.zeros((40, 50), bool)
+    keep[5:20, 5:20] = True
+    for _ in range(600):
+        made.adapt(picture, classes, keep)
+    after = made.classify(picture)
+    assert share(after[5:20, 5:20], FOREGROUND) > 0.95
+    assert share(after[5:20, 30:45], BACKGROUND) > 0.95
