@@ -107,7 +107,7 @@ def test_hiding_a_group_by_its_name(tmp_path):
     from sim.io.store import open_sequence, write_sequence
 
     scenario = load("merge")
-    live = sim.simulate(scenario, seed=3)
+    live = sim.simulate(scenario, seed=3, streams=())
     write_sequence(tmp_path / "m", live, scenario=dump(scenario), seed=3)
     stored, people = open_sequence(tmp_path / "m"), live.load_people()
     assert stored.load_people() == people

@@ -159,6 +159,25 @@ WHEN = {
 }
 """For the merge; one model serves all three orders."""
 
+LAMP = "light.switch=[{ at = 0.2, gain = 0.5 }]"
+PICTURES = {
+    "light.sun_azimuth_deg": ("light.sun_azimuth_deg=0", "light.sun_azimuth_deg=90"),
+    "light.sun_elevation_deg": ("light.sun_elevation_deg=30", "light.sun_elevation_deg=60"),
+    "light.shadow": ("", "light.shadow=0.6"),
+    "light.penumbra": ("", "light.penumbra=0.4"),
+    "light.drift": ("", "light.drift=0.1"),
+    "light.drift_time": ("light.drift=0.1", "light.drift=0.1;light.drift_time=2"),
+    "light.flicker": ("", "light.flicker=0.05"),
+    "light.switch[].at": (LAMP, LAMP.replace("0.2", "0.4")),
+    "light.switch[].gain": (LAMP, LAMP.replace("0.5", "0.7")),
+    "light.switch[].ramp": (LAMP, LAMP.replace("gain", "ramp = 0.6, gain")),
+    "picture.texture": ("", "picture.texture=0.9"),
+    "picture.noise": ("", "picture.noise=6"),
+    "picture.blur_px": ("", "picture.blur_px=1.5"),
+    "picture.jpeg": ("", "picture.jpeg=50"),
+}
+"""What pictures alone are made of: looked for in frame 3, at 0.4 s, without the noise."""
+
 TEXT_ONLY = {"schema", "about", "group[].id", "event[](merge).into", "event[](split).parts[].id"}
 """Keys that name things within the file, or say what it is."""
 
@@ -195,13 +214,45 @@ def differ(before: str, after: str) -> bool:
 def test_every_key_is_in_the_table():
     known = {row["key"] for row in keys().data["keys"]}
     when = {key for key in known if ".when." in key} | {key for key in known if key.endswith(".type")}
-    assert known - when == set(KEYS) | TEXT_ONLY
+    assert known - when == set(KEYS) | set(PICTURES) | TEXT_ONLY
     assert {key.partition(".when.")[2] for key in when if ".when." in key} == set(WHEN) | {"after"}
 
 
 @pytest.mark.parametrize("key", KEYS)
 def test_a_key_changes_what_is_made(key):
     assert differ(*KEYS[key])
+
+
+@cache
+def three_people():
+    """Two seconds of three people, and their camera."""
+    from sim.camera import solve
+    from sim.world import run as simulate
+
+    scenario = picture_scenario("")
+    motion = simulate(scenario, 3)
+    return motion, solve(scenario.camera, motion)
+
+
+def picture_scenario(settings: str):
+    import tomllib
+
+    few = {**tomllib.loads(SCENE.partition("group = [")[0]), "name": "flip", "duration": 2.0}
+    few |= {"group": [{"id": "a", "size": 3, "start": [4, 4], "goal": [12, 4]}]}
+    few["camera"]["image"] = [160, 120]
+    table, places = apply(few, settings.split(";") if settings else [])
+    return validate(table, "flip.toml", places)
+
+
+@pytest.mark.parametrize("key", PICTURES)
+def test_a_key_changes_pictures_and_only_those(key):
+    from sim.render import stage
+
+    before, after = (picture_scenario(settings) for settings in PICTURES[key])
+    assert before.model_dump(exclude={"light", "picture"}) == after.model_dump(exclude={"light", "picture"})
+    bare = {"noise": 0.0} if key != "picture.noise" else {}
+    a, b = (stage(*three_people(), s.light, s.picture.model_copy(update=bare)).frame(3) for s in (before, after))
+    assert (a != b).any()
 
 
 @pytest.mark.parametrize("key", WHEN)

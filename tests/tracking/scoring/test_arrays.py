@@ -50,7 +50,7 @@ def test_truth_as_tracks_is_perfect(merge: Truth, names: tuple[str, ...]) -> Non
 
 
 def test_the_same_as_with_our_types(merge: Truth) -> None:
-    run = track("blob", simulate(load("merge"), 5))
+    run = track("blob", simulate(load("merge"), 5, streams=()))
     est = {
         "frame": np.concatenate([np.full(len(t.id), t.index) for t in run]),
         **{name: np.concatenate([getattr(t, name) for t in run]) for name in ("id", "pos", "box", "group")},

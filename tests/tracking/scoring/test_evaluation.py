@@ -90,7 +90,7 @@ def test_a_second_late_is_not_perfect_but_the_core_is(name: str) -> None:
 
 @pytest.mark.parametrize("detections", ["file", "truth"])
 def test_files_are_memory(tmp_path: Path, detections: str) -> None:
-    sequence = simulate(load("party"), 5)
+    sequence = simulate(load("party"), 5, streams=())
     run = track("blob", sequence, detections=detections)
     write_sequence(tmp_path / "data", sequence, scenario="party", seed=5)
     write_tracks(tmp_path / "tracks", run, fps=sequence.fps, camera=sequence.camera, info=run.info)
@@ -130,7 +130,7 @@ def test_every_score_lies_in_its_range() -> None:
 
 
 def test_a_beginning_is_scored_as_if_it_were_all() -> None:
-    sequence = simulate(load("merge"), 5)
+    sequence = simulate(load("merge"), 5, streams=())
     run, true = track("blob", sequence), sequence.truth
     for last in (1, 60, 120, true.length):
         kept = true.frame <= last
