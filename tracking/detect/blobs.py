@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sim.arrays import Frozen
-from sim.types import Array, Bools
+from sim.types import Array, Bools, Image
 
 Labels = NDArray[np.int32]
 MAJORITY_M, OPEN_M, CLOSE_M = 0.08, 0.05, 0.15
@@ -70,9 +70,10 @@ def odd(size: float, least: int) -> int:
     return max(least, 2 * round((size - 1) / 2) + 1)
 
 
-def disc(size: int) -> Array:
-    """A round structuring element of odd diameter."""
-    return np.asarray(cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (size, size)))
+def disc(size: int) -> Image:
+    """A round structuring element of odd diameter (OpenCV's own ellipse is not symmetric)."""
+    v, u = np.mgrid[:size, :size] - (size - 1) / 2
+    return (np.hypot(u, v) <= size / 2).astype(np.uint8)
 
 
 def person_area(px_per_m: float) -> float:

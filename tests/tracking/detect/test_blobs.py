@@ -120,7 +120,8 @@ def test_contour_and_hull_go_round_the_blob():
     outline, hull = found.contour(0), found.hull(0)
     assert cv2.contourArea(outline.astype(np.float32)) == pytest.approx(found.area[0], rel=0.1)
     v, u = np.nonzero(found.label)
-    near = [cv2.pointPolygonTest(hull.astype(np.float32), (float(x) + 0.5, float(y) + 0.5), True) for x, y in zip(u, v)]
+    pixels = np.stack([u, v], axis=1) + 0.5
+    near = [cv2.pointPolygonTest(hull.astype(np.float32), pixel, True) for pixel in pixels.tolist()]
     assert min(near) > -0.8
     x, y = hull.T
     assert np.sum(x * np.roll(y, -1) - y * np.roll(x, -1)) > 0
