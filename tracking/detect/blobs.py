@@ -73,7 +73,7 @@ def odd(size: float, least: int) -> int:
 def disc(size: int) -> Image:
     """A round structuring element of odd diameter (OpenCV's own ellipse is not symmetric)."""
     v, u = np.mgrid[:size, :size] - (size - 1) / 2
-    return (np.hypot(u, v) <= size / 2).astype(np.uint8)
+    return np.asarray(np.hypot(u, v) <= size / 2, np.uint8)
 
 
 def person_area(px_per_m: float) -> float:

@@ -1,4 +1,4 @@
-"""Background subtraction: closed forms, people and light in the sample, lamps and removed objects, symmetries, twins."""
+"""Background subtraction: closed forms, people and light in the sample, lamps, removed objects, symmetries, twins."""
 
 import numpy as np
 import pytest
