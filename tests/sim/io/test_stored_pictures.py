@@ -197,10 +197,14 @@ def test_any_streams(tmp_path, make_pictured, same, wanted):
 
 
 def test_streams_that_are_not_there(tmp_path, make_pictured):
-    for wanted in (("right",), ("disparity",)):
+    for wanted, images in ((("right",), "jpg"), (("right",), "mp4"), (("disparity",), "jpg")):
         with pytest.raises(InputError, match=wanted[0]):
-            stored(tmp_path / "a", make_pictured(3, ("left",)), wanted)
+            stored(tmp_path / "a", make_pictured(3, ("left",)), wanted, images)
         assert list(tmp_path.iterdir()) == []
+    empty = replace(make_pictured(3, ALL), load_background=None)
+    with pytest.raises(InputError, match="background"):
+        stored(tmp_path / "a", empty, ("left",), "mp4")
+    assert list(tmp_path.iterdir()) == []
     for more, place in (({"wanted": ("top",)}, "--streams"), ({"images": "gif"}, "--images")):
         with pytest.raises(InputError, match=place):
             stored(tmp_path / "a", make_pictured(3, ALL), **more)
