@@ -200,7 +200,7 @@ class Pixels:
         spread = np.sqrt(var) * people.scale[open_rows, None]
         at = scene.settle(at, spread, c.evidence)
         shown = scene.shown(at)
-        keep = scene.prune(at, np.full(len(at), c.track_support if sure else c.entry_support))
+        keep = scene.prune(at, c.track_support if sure else c.entry_support, pieces=sure)
         worth, shown, at = scene.alone(at[keep]), shown[keep], at[keep]
         noise = people.noise / np.maximum(shown, LEAST_SHOWN)[:, None] ** 2
         noise[:, 2:] *= BLIND

@@ -87,26 +87,29 @@ class Mask:
         i, j = np.unravel_index(int(value.argmax()), value.shape)
         return at + np.array([offset[j], offset[i], 0.0, 0.0])
 
-    def prune(self, templates: Array, least: Array) -> Ints:
-        """Rows of painted templates that keep support `least` (K,) when those with too little are taken away, the
-        weakest first."""
+    def prune(self, templates: Array, least: float, *, pieces: bool = False) -> Ints:
+        """Rows of painted templates with support `least` when those with too little are taken away, the weakest first.
+
+        pieces: count foreground only, so that what shows of a person is enough, wherever the rest has gone.
+        """
         rows = np.arange(len(templates))
         while len(rows):
-            worth = self.alone(templates[rows]) - least[rows]
+            worth = self.alone(templates[rows], pieces=pieces)
             k = int(worth.argmin())
-            if worth[k] >= 0:
+            if worth[k] >= least:
                 break
             self.paint(templates[rows[k]][None], -1)
             rows = np.delete(rows, k)
         return rows
 
-    def alone(self, templates: Array) -> Array:
+    def alone(self, templates: Array, *, pieces: bool = False) -> Array:
         """(K,) support of painted templates, each by the pixels that no other covers."""
+        gain = np.maximum(self.gain, 0.0) if pieces else self.gain
         worth = np.zeros(len(templates))
         for k in range(len(templates)):
             one = templates[k : k + 1]
             self.paint(one, -1)
-            worth[k] = self.support(one)[0]
+            worth[k] = (kernels.placed(gain, self.cover, self.sums, one) / self.area(one))[0]
             self.paint(one)
         return worth
 

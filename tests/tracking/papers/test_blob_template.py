@@ -60,7 +60,7 @@ def test_what_two_cover_supports_neither():
     scene = Mask(mask_of(one[0]))
     scene.paint(np.concatenate([one, one]))
     assert scene.alone(np.concatenate([one, one])).tolist() == [0.0, 0.0]
-    assert len(scene.prune(np.concatenate([one, one]), np.full(2, 0.2))) == 1
+    assert len(scene.prune(np.concatenate([one, one]), 0.2)) == 1
     assert scene.cover.max() == 1
 
 
