@@ -1,4 +1,7 @@
-"""Compiled: from a canvas to a picture: blur where something was painted, brightness, noise, eight bits."""
+"""Compiled: from a canvas to a picture: blur where something was painted, brightness, noise, eight bits.
+
+Inner loops run over whole rows from index 0, so that the compiler can take eight numbers at a time.
+"""
 
 from __future__ import annotations
 
@@ -7,49 +10,84 @@ from numba import njit
 
 from sim.paint_kernels import TILE_H, TILE_W, UNIT
 
+SCALE, HALF, LOW, HIGH = np.float32(1.0 / UNIT), np.float32(0.5), np.float32(0.0), np.float32(255.0)
+
 
 @njit(cache=True)
-def _blur_tile(canvas, top, left, rows, cols, weights, wide, out):  # type: ignore[no-untyped-def]
-    """out (rows, cols * 3): the tile's separable blur, edges repeated; wide: scratch of rows + 2 radius rows."""
+def _add(line, weight, many, out):  # type: ignore[no-untyped-def]
+    for i in range(many):
+        out[i] += weight * np.float32(line[i])
+
+
+@njit(cache=True)
+def _five(a, b, c, d, e, w, x, y, many, out):  # type: ignore[no-untyped-def]
+    """The usual blur, of radius 2: w, x, y, x, w times five lines."""
+    for i in range(many):
+        out[i] = (
+            w * (np.float32(a[i]) + np.float32(e[i])) + x * (np.float32(b[i]) + np.float32(d[i])) + y * np.float32(c[i])
+        )
+
+
+@njit(cache=True)
+def _shown(line, grain, gain, many, out):  # type: ignore[no-untyped-def]
+    """Eight bits of gain times a line, plus noise."""
+    for i in range(many):
+        x = (np.float32(line[i]) * gain + np.float32(grain[i])) * SCALE + HALF
+        x = x if x > LOW else LOW
+        out[i] = np.uint8(np.int32(x if x < HIGH else HIGH))
+
+
+@njit(cache=True)
+def _blur_tile(canvas, top, left, rows, cols, weights, edge, wide, out):  # type: ignore[no-untyped-def]
+    """out (rows, cols * 3): the tile's separable blur, edges repeated; edge, wide: scratch, a line and lines."""
     height, width = canvas.shape[0], canvas.shape[1] // 3
-    radius = len(weights) // 2
+    radius, many = len(weights) // 2, 3 * cols
     inner = left >= radius and left + cols + radius <= width
     for r in range(rows + 2 * radius):
-        line, to = canvas[min(max(top - radius + r, 0), height - 1)], wide[r]
-        if inner:
-            to[: 3 * cols] = np.float32(0.0)
-            for k in range(2 * radius + 1):
-                w, shift = weights[k], 3 * (left - radius + k)
-                for i in range(3 * cols):
-                    to[i] += w * np.float32(line[shift + i])
+        v = min(max(top - radius + r, 0), height - 1)
+        line = canvas[v, 3 * (left - radius) :] if inner else edge
+        if not inner:
+            for i in range(3 * (cols + 2 * radius)):
+                edge[i] = canvas[v, 3 * min(max(left - radius + i // 3, 0), width - 1) + i % 3]
+        if radius == 2:
+            _five(line, line[3:], line[6:], line[9:], line[12:], weights[0], weights[1], weights[2], many, wide[r])
             continue
-        for c in range(cols):
-            for ch in range(3):
-                total = np.float32(0.0)
-                for k in range(2 * radius + 1):
-                    total += weights[k] * np.float32(line[3 * min(max(left + c - radius + k, 0), width - 1) + ch])
-                to[3 * c + ch] = total
-    for r in range(rows):
-        out[r, : 3 * cols] = np.float32(0.0)
+        for i in range(many):
+            wide[r, i] = 0
         for k in range(2 * radius + 1):
-            w = weights[k]
-            for i in range(3 * cols):
-                out[r, i] += w * wide[r + k, i]
+            _add(line[3 * k :], weights[k], many, wide[r])
+    for r in range(rows):
+        if radius == 2:
+            a, b, c, d, e = wide[r], wide[r + 1], wide[r + 2], wide[r + 3], wide[r + 4]
+            _five(a, b, c, d, e, weights[0], weights[1], weights[2], many, out[r])
+            continue
+        for i in range(many):
+            out[r, i] = 0
+        for k in range(2 * radius + 1):
+            _add(wide[r + k], weights[k], many, out[r])
+
+
+@njit(cache=True)
+def _scratch(radius):  # type: ignore[no-untyped-def]
+    return (
+        np.empty(3 * (TILE_W + 2 * radius), np.int16),
+        np.empty((TILE_H + 2 * radius, 3 * TILE_W), np.float32),
+        np.empty((TILE_H, 3 * TILE_W), np.float32),
+    )
 
 
 @njit(cache=True)
 def blurred(canvas, weights, out):  # type: ignore[no-untyped-def]
     """out: the whole canvas (H, W * 3) int16 blurred."""
     height, width = canvas.shape[0], canvas.shape[1] // 3
-    radius = len(weights) // 2
-    wide, tile = np.empty((TILE_H + 2 * radius, 3 * TILE_W), np.float32), np.empty((TILE_H, 3 * TILE_W), np.float32)
+    edge, wide, tile = _scratch(len(weights) // 2)
     for top in range(0, height, TILE_H):
         for left in range(0, width, TILE_W):
             rows, cols = min(TILE_H, height - top), min(TILE_W, width - left)
-            _blur_tile(canvas, top, left, rows, cols, weights, wide, tile)
+            _blur_tile(canvas, top, left, rows, cols, weights, edge, wide, tile)
             for r in range(rows):
                 for i in range(3 * cols):
-                    out[top + r, 3 * left + i] = np.int16(tile[r, i] + np.float32(0.5))
+                    out[top + r, 3 * left + i] = np.int16(tile[r, i] + HALF)
 
 
 @njit(cache=True)
@@ -60,25 +98,16 @@ def finish(canvas, plate, dirty, weights, gain, noise, offsets, out):  # type: i
     blurred empty scene; weights (2 r + 1,) of the blur; noise (n,) int16, of which row v shows noise[offsets[v]:].
     """
     height, width = canvas.shape[0], canvas.shape[1] // 3
-    radius = len(weights) // 2
-    wide, tile = np.empty((TILE_H + 2 * radius, 3 * TILE_W), np.float32), np.empty((TILE_H, 3 * TILE_W), np.float32)
-    scale, half, low, high = np.float32(1.0 / UNIT), np.float32(0.5), np.float32(0.0), np.float32(255.0)
+    edge, wide, tile = _scratch(len(weights) // 2)
     for top in range(0, height, TILE_H):
         rows = min(TILE_H, height - top)
         for r in range(rows):
-            source, grain, to = plate[top + r], noise[offsets[top + r] :], out[top + r]
-            for i in range(3 * width):
-                x = (np.float32(source[i]) * gain + np.float32(grain[i])) * scale + half
-                x = x if x > low else low
-                to[i] = np.uint8(np.int32(x if x < high else high))
+            _shown(plate[top + r], noise[offsets[top + r] :], gain, 3 * width, out[top + r])
         for left in range(0, width, TILE_W):
             if not dirty[top // TILE_H, left // TILE_W]:
                 continue
             cols = min(TILE_W, width - left)
-            _blur_tile(canvas, top, left, rows, cols, weights, wide, tile)
+            _blur_tile(canvas, top, left, rows, cols, weights, edge, wide, tile)
             for r in range(rows):
-                source, grain, to = tile[r], noise[offsets[top + r] + 3 * left :], out[top + r, 3 * left :]
-                for i in range(3 * cols):
-                    x = (source[i] * gain + np.float32(grain[i])) * scale + half
-                    x = x if x > low else low
-                    to[i] = np.uint8(np.int32(x if x < high else high))
+                grain, to = noise[offsets[top + r] + 3 * left :], out[top + r, 3 * left :]
+                _shown(tile[r], grain, gain, 3 * cols, to)

@@ -12,13 +12,12 @@ from numba import njit
 
 UNIT = 64.0  # canvases hold grey levels times this, as int16
 MOST = 32767.0
-TILE_H, TILE_W = 16, 32  # px: what is blurred anew as a whole where something was painted
+TILE_H, TILE_W = 8, 32  # px: what is blurred anew as a whole where something was painted
 
 
-@njit(cache=True)
-def span(y, inverse):  # type: ignore[no-untyped-def]
-    """Ends x0 <= x1 of the row y of the ellipse a x² + 2 b x y + d y² <= 1, inverse = (a, b, d); x0 > x1: none."""
-    a, b, d = inverse
+@njit(cache=True, error_model="numpy")
+def span(y, a, b, d):  # type: ignore[no-untyped-def]
+    """Ends x0 <= x1 of the row y of the ellipse a x² + 2 b x y + d y² <= 1; x0 > x1: none."""
     root = b * b * y * y - a * (d * y * y - 1.0)
     if not (root >= 0.0 and a > 0.0):
         return 1.0, -1.0
@@ -26,101 +25,82 @@ def span(y, inverse):  # type: ignore[no-untyped-def]
     return (-b * y - root) / a, (-b * y + root) / a
 
 
-@njit(cache=True)
-def columns(v, middle, inverse, width):  # type: ignore[no-untyped-def]
-    """First column and last + 1 whose middles lie in the outline in row v and in the image."""
-    x0, x1 = span(v + 0.5 - middle[1], inverse)
+@njit(cache=True, error_model="numpy")
+def columns(v, i, e, middle, inverse, width):  # type: ignore[no-untyped-def]
+    """First column and last + 1 whose middles lie in the outline (i, e) in row v and in the image."""
+    x0, x1 = span(v + 0.5 - middle[i, e, 1], inverse[i, e, 0], inverse[i, e, 1], inverse[i, e, 2])
     if x0 > x1:
         return 0, 0
-    low, high = max(np.ceil(middle[0] + x0 - 0.5), 0.0), min(np.floor(middle[0] + x1 - 0.5) + 1.0, float(width))
-    return int(low), max(int(high), int(low))
+    low = int(max(np.ceil(middle[i, e, 0] + x0 - 0.5), 0.0))
+    return low, max(int(min(np.floor(middle[i, e, 0] + x1 + 0.5), float(width))), low)
 
 
 @njit(cache=True)
-def touch(dirty, top, bottom, left, right, margin, height, width):  # type: ignore[no-untyped-def]
-    """Note the tiles of rows top … bottom - 1, columns left … right - 1 and of a margin round them."""
-    for r in range(max(top - margin, 0) // TILE_H, (min(bottom + margin, height) - 1) // TILE_H + 1):
-        for c in range(max(left - margin, 0) // TILE_W, (min(right + margin, width) - 1) // TILE_W + 1):
-            dirty[r, c] = 1
+def touch(dirty, v, left, right, margin, height, width):  # type: ignore[no-untyped-def]
+    """Note the tiles of columns left … right - 1 of row v and of a margin round them."""
+    if right > left:
+        first, last = max(left - margin, 0) // TILE_W, (min(right + margin, width) - 1) // TILE_W
+        for r in range(max(v - margin, 0) // TILE_H, min(v + margin, height - 1) // TILE_H + 1):
+            for c in range(first, last + 1):
+                dirty[r, c] = 1
 
 
-@njit(cache=True)
-def _colour(atlas, round_, up, light, out):  # type: ignore[no-untyped-def]
-    """Colour of an atlas page (H, W, 3) at round_ in [0, 4) and up in [-1, 1], between its four neighbours."""
-    rows, cols = atlas.shape[0], atlas.shape[1]
+@njit(cache=True, error_model="numpy")
+def _colour(atlas, page, e, round_, up, light, canvas, v, u):  # type: ignore[no-untyped-def]
+    """The canvas at (v, u): the atlas's colour at round_ in [0, 4) and up in [-1, 1], between its four neighbours."""
+    rows, cols = atlas.shape[2], atlas.shape[3]
     x, y = round_ * (0.25 * cols) - 0.5, min(max((up + 1.0) * (0.5 * rows) - 0.5, 0.0), rows - 1.001)
     i, j = int(np.floor(x)), int(y)
-    a, b = x - i, y - j
-    left, right = i % cols, (i + 1) % cols
+    a, b = np.float32(x - i), np.float32(y - j)
+    left, right = i if i >= 0 else cols - 1, i + 1 if i + 1 < cols else 0
+    one, bright = np.float32(1.0), np.float32(light)
     for k in range(3):
-        low = atlas[j, left, k] * (1 - a) + atlas[j, right, k] * a
-        high = atlas[j + 1, left, k] * (1 - a) + atlas[j + 1, right, k] * a
-        out[k] = np.int16(min((low * (1 - b) + high * b) * light, MOST))
+        low = atlas[page, e, j, left, k] * (one - a) + atlas[page, e, j, right, k] * a
+        high = atlas[page, e, j + 1, left, k] * (one - a) + atlas[page, e, j + 1, right, k] * a
+        c = (low * (one - b) + high * b) * bright
+        canvas[v, u, k] = np.int16(np.int32(c if c < np.float32(MOST) else np.float32(MOST)))
 
 
-@njit(cache=True)
-def _light(x, y, z, half, sun, shadow, sunlit):  # type: ignore[no-untyped-def]
-    """Brightness at a place of a ball: the sky's light from above more than from the side, and the sun's by Lambert."""
-    nx, ny, nz = x / half[0], y / half[1], z / half[2]
-    size = 1.0 / np.sqrt(nx * nx + ny * ny + nz * nz)
-    facing = max(0.0, nx * sun[0] + ny * sun[1] + nz * sun[2]) * size / max(sun[2], 0.3)
-    return (1.0 - shadow) * (0.8 + 0.2 * nz * size) + shadow * facing * sunlit
-
-
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def people(  # type: ignore[no-untyped-def]
-    order,
-    start,
-    step,
-    half,
-    middle,
-    inverse,
-    boxes,
-    id,
-    sun,
-    shadow,
-    sunlit,
-    pages,
-    atlas,
-    shade,
-    label,
-    depth,
-    ids,
-    canvas,
-    dirty,
-    margin,
-    amodal,
-):
+    order, start, step, half, middle, inverse, boxes, id, sun, shadow, sunlit, pages, atlas,
+    shade, label, depth, ids, canvas, dirty, margin, amodal,
+):  # fmt: skip
     """Paint people in `order` (near first is quickest; any gives the same), by depth.
 
     start, step (N, 2, 3, 3): P and D of each part; half (N, 2, 3) m; middle (N, 2, 2), inverse (N, 2, 3): outlines;
     boxes (N, 4) first row, last + 1, first column, last + 1; sun (N, 3) in each body's axes; sunlit (N, 3): share of
     the sun at feet, waist and head; pages (N,) of the atlas (P, 2, H, W, 3).
     depth (H, W) is that of the plate and becomes that of all; with `label` ids (H, W) and amodal (N,), the pixels of
-    each silhouette in the image; with `shade` the canvas (H, W, 3) and the tiles that are dirty.
+    each silhouette in the image; with `shade` the canvas (H, W, 3) and the tiles that are dirty. The light is the
+    sky's, from above more than from the side, and the sun's by Lambert's law.
     """
     height, width = depth.shape
     for i in order:
-        page, top = atlas[pages[i]], boxes[i, 0]
-        if shade and boxes[i, 1] > top:
-            touch(dirty, top, boxes[i, 1], boxes[i, 2], boxes[i, 3], margin, height, width)
-        for v in range(top, boxes[i, 1]):
-            first, last = 0, 0
-            for e in range(2):
-                low, high = columns(v, middle[i, e], inverse[i, e], width)
+        s0, s1, s2 = sun[i, 0], sun[i, 1], sun[i, 2]
+        low_sun = shadow / max(s2, 0.3)
+        for e in range(2):
+            h0, h1, h2 = 1.0 / half[i, e, 0], 1.0 / half[i, e, 1], 1.0 / half[i, e, 2]
+            for v in range(boxes[i, 0], boxes[i, 1]):
+                low, high = columns(v, i, e, middle, inverse, width)
+                if low == high:
+                    continue
                 if label:
                     amodal[i] += high - low
                     if e == 1:
-                        amodal[i] -= max(0, min(last, high) - max(first, low))
-                first, last = low, high
-                p, d, h = start[i, e], step[i, e], half[i, e]
+                        other, last = columns(v, i, 0, middle, inverse, width)
+                        amodal[i] -= max(0, min(last, high) - max(other, low))
+                if shade:
+                    touch(dirty, v, low, high, margin, height, width)
                 y = v + 0.5
-                p0, p1, p2 = p[0, 1] * y + p[0, 2], p[1, 1] * y + p[1, 2], p[2, 1] * y + p[2, 2]
-                d0, d1, d2 = d[0, 1] * y + d[0, 2], d[1, 1] * y + d[1, 2], d[2, 1] * y + d[2, 2]
+                px0, dx0 = start[i, e, 0, 1] * y + start[i, e, 0, 2], step[i, e, 0, 1] * y + step[i, e, 0, 2]
+                py0, dy0 = start[i, e, 1, 1] * y + start[i, e, 1, 2], step[i, e, 1, 1] * y + step[i, e, 1, 2]
+                pz0, dz0 = start[i, e, 2, 1] * y + start[i, e, 2, 2], step[i, e, 2, 1] * y + step[i, e, 2, 2]
                 for u in range(low, high):
                     x = u + 0.5
-                    px, py, pz = p[0, 0] * x + p0, p[1, 0] * x + p1, p[2, 0] * x + p2
-                    dx, dy, dz = d[0, 0] * x + d0, d[1, 0] * x + d1, d[2, 0] * x + d2
+                    px, dx = start[i, e, 0, 0] * x + px0, step[i, e, 0, 0] * x + dx0
+                    py, dy = start[i, e, 1, 0] * x + py0, step[i, e, 1, 0] * x + dy0
+                    pz, dz = start[i, e, 2, 0] * x + pz0, step[i, e, 2, 0] * x + dz0
                     a, b = dx * dx + dy * dy + dz * dz, px * dx + py * dy + pz * dz
                     root = max(b * b - a * (px * px + py * py + pz * pz - 1.0), 0.0)
                     t = (-b - np.sqrt(root)) / a
@@ -129,32 +109,36 @@ def people(  # type: ignore[no-untyped-def]
                     depth[v, u] = t
                     if label:
                         ids[v, u] = id[i]
-                    if shade:
-                        qx, qy, qz = px + t * dx, py + t * dy, pz + t * dz
-                        up = qz if e == 0 else 1.0
-                        share = sunlit[i, 1] + (sunlit[i, 2 if up > 0 else 0] - sunlit[i, 1]) * abs(up)
-                        level = 1.0 / (abs(qx) + abs(qy) + 1e-12)
-                        round_ = 1.0 - qx * level if qy >= 0 else 3.0 + qx * level
-                        _colour(page[e], round_, qz, UNIT * _light(qx, qy, qz, h, sun[i], shadow, share), canvas[v, u])
+                    if not shade:
+                        continue
+                    qx, qy, qz = px + t * dx, py + t * dy, pz + t * dz
+                    nx, ny, nz = qx * h0, qy * h1, qz * h2
+                    size = 1.0 / np.sqrt(nx * nx + ny * ny + nz * nz)
+                    facing = max(0.0, nx * s0 + ny * s1 + nz * s2) * size * low_sun
+                    up = qz if e == 0 else 1.0
+                    facing *= sunlit[i, 1] + (sunlit[i, 2 if up > 0 else 0] - sunlit[i, 1]) * abs(up)
+                    light = UNIT * ((1.0 - shadow) * (0.8 + 0.2 * nz * size) + facing)
+                    share = qx / (abs(qx) + abs(qy) + 1e-12)
+                    _colour(atlas, pages[i], e, 1.0 - share if qy >= 0 else 3.0 + share, qz, light, canvas, v, u)
 
 
-@njit(cache=True)
-def _shade(x, y, z, centre, shape, sun, softness):  # type: ignore[no-untyped-def]
-    """Share of the sun that one person (body and head) takes from the point (x, y, z)."""
+@njit(cache=True, error_model="numpy")
+def _shade(x, y, z, i, centre, shape, sun, softness):  # type: ignore[no-untyped-def]
+    """Share of the sun that person i (body and head) takes from the point (x, y, z)."""
     share = 0.0
     for e in range(2):
-        above = (centre[e, 2] - z) / sun[2]
+        above = (centre[i, e, 2] - z) / sun[2]
         if above <= 0.0:
             continue
-        dx, dy = x - centre[e, 0] + sun[0] * above, y - centre[e, 1] + sun[1] * above
-        q = dx * dx * shape[e, 0] + 2 * dx * dy * shape[e, 1] + dy * dy * shape[e, 2]
-        if q < (1.0 + softness[e]) ** 2:
-            soft = softness[e]
-            share = max(share, 1.0 if soft == 0.0 else min((1.0 + soft - np.sqrt(q)) / (2 * soft), 1.0))
-    return share
+        dx, dy = x - centre[i, e, 0] + sun[0] * above, y - centre[i, e, 1] + sun[1] * above
+        q = dx * dx * shape[i, e, 0] + 2 * dx * dy * shape[i, e, 1] + dy * dy * shape[i, e, 2]
+        soft = softness[i, e]
+        if q < (1.0 + soft) ** 2:
+            share = max(share, 1.0 if q <= (1.0 - soft) ** 2 or soft == 0.0 else (1.0 + soft - np.sqrt(q)) / (2 * soft))
+    return min(share, 1.0)
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def shadows(  # type: ignore[no-untyped-def]
     place, direct, boxes, flat, middle, inverse, centre, shape, sun, softness, taken, canvas, dirty, margin
 ):
@@ -167,22 +151,22 @@ def shadows(  # type: ignore[no-untyped-def]
     """
     height, width = direct.shape
     for i in range(len(boxes)):
-        if boxes[i, 1] > boxes[i, 0]:
-            touch(dirty, boxes[i, 0], boxes[i, 1], boxes[i, 2], boxes[i, 3], margin, height, width)
         for v in range(boxes[i, 0], boxes[i, 1]):
             low, high = boxes[i, 2], boxes[i, 3]
             if flat:
-                low, high = columns(v, middle[i, 0], inverse[i, 0], width)
-                a, b = columns(v, middle[i, 1], inverse[i, 1], width)
-                if b > a:
-                    low, high = (min(low, a), max(high, b)) if high > low else (a, b)
+                low, high = columns(v, i, 0, middle, inverse, width)
+                first, last = columns(v, i, 1, middle, inverse, width)
+                if last > first:
+                    low, high = (min(low, first), max(high, last)) if high > low else (first, last)
+            left, right = width, 0
             for u in range(low, high):
-                x, y, z = place[v, u, 0], place[v, u, 1], place[v, u, 2]
-                share = int(255.0 * _shade(x, y, z, centre[i], shape[i], sun, softness[i]) + 0.5)
-                old = int(taken[v, u])
-                if share > old:
-                    taken[v, u] = share
-                    part = direct[v, u] / 255.0
-                    factor = (1.0 - part * share) / (1.0 - part * old)
+                share = _shade(place[v, u, 0], place[v, u, 1], place[v, u, 2], i, centre, shape, sun, softness)
+                gone, old = int(255.0 * share + 0.5), int(taken[v, u])
+                if gone > old:
+                    left, right = min(left, u), u + 1
+                    taken[v, u] = gone
+                    part = direct[v, u] * (1.0 / 255.0)
+                    factor = np.float32((1.0 - part * gone) / (1.0 - part * old))
                     for k in range(3):
-                        canvas[v, u, k] = np.int16(canvas[v, u, k] * factor)
+                        canvas[v, u, k] = np.int16(np.int32(np.float32(canvas[v, u, k]) * factor))
+            touch(dirty, v, left, right, margin, height, width)

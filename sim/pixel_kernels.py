@@ -12,7 +12,7 @@ from sim.static_kernels import nearest
 SAME = 1e-3  # m: what lies nearer by less is taken for the same point
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def _root(parent, i):  # type: ignore[no-untyped-def]
     while parent[i] != i:
         parent[i] = parent[parent[i]]
@@ -20,7 +20,7 @@ def _root(parent, i):  # type: ignore[no-untyped-def]
     return i
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def tally(ids, boxes, id, row_of, count, edges, blob):  # type: ignore[no-untyped-def]
     """Of each person: visible pixels (N,), edges (N, 4) first column, last + 1, first row, last + 1, blob (N,).
 
@@ -54,7 +54,7 @@ def tally(ids, boxes, id, row_of, count, edges, blob):  # type: ignore[no-untype
             blob[i] = blob[r]
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def known(depth, scale, origin, direction, walls, wall_height, pillars, pillar_height, flights, out):  # type: ignore[no-untyped-def]
     """Disparities out (H, W) of the empty scene: scale / depth; nan where the right camera does not see the point.
 
@@ -75,20 +75,21 @@ def known(depth, scale, origin, direction, walls, wall_height, pillars, pillar_h
                     out[v, u] = np.nan
 
 
-@njit(cache=True)
-def _covers(x, y, p, d, z):  # type: ignore[no-untyped-def]
-    """Whether the ball of a part (its P, D for this camera) is met before depth z by the ray of (x, y)."""
+@njit(cache=True, error_model="numpy")
+def _covers(x, y, i, e, start, step, z):  # type: ignore[no-untyped-def]
+    """Whether the ball of part (i, e) is met before depth z by the ray of (x, y)."""
     a = b = c = 0.0
     for k in range(3):
-        q, s = p[k, 0] * x + p[k, 1] * y + p[k, 2], d[k, 0] * x + d[k, 1] * y + d[k, 2]
-        a += s * s
-        b += q * s
-        c += q * q
+        p = start[i, e, k, 0] * x + start[i, e, k, 1] * y + start[i, e, k, 2]
+        d = step[i, e, k, 0] * x + step[i, e, k, 1] * y + step[i, e, k, 2]
+        a += d * d
+        b += p * d
+        c += p * p
     root = b * b - a * (c - 1.0)
     return root >= 0.0 and (-b - np.sqrt(root)) / a < z - SAME
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def disparities(  # type: ignore[no-untyped-def]
     depth,
     ids,
@@ -127,24 +128,25 @@ def disparities(  # type: ignore[no-untyped-def]
                 x = u + 0.5 - scale / z
                 out[v, u] = scale / z if x >= 0.0 else np.nan
                 if solid and x >= 0.0:
-                    c = int(x)
-                    if min(background[v, max(c - 1, 0)], background[v, c], background[v, min(c + 1, width - 1)]) < z:
+                    j = int(x)
+                    if min(background[v, max(j - 1, 0)], background[v, j], background[v, min(j + 1, width - 1)]) < z:
                         at(origin, x, v + 0.5, o)
                         at(direction, x, v + 0.5, d)
                         if nearest(o, d, walls, wall_height, pillars, pillar_height, flights, hit) < z - SAME:
                             out[v, u] = np.nan
     for i in range(len(id)):
         for e in range(2):
-            m, most = middle[i, e], scale / near[i, e]
-            half = np.sqrt(inverse[i, e, 0] / (inverse[i, e, 0] * inverse[i, e, 2] - inverse[i, e, 1] ** 2))
+            mu, mv, most = middle[i, e, 0], middle[i, e, 1], scale / near[i, e]
+            a, b, c = inverse[i, e, 0], inverse[i, e, 1], inverse[i, e, 2]
+            half = np.sqrt(a / (a * c - b * b))
             if not half >= 0.0:
                 continue
-            for v in range(max(int(m[1] - half), 0), min(int(m[1] + half) + 1, height)):
-                x0, x1 = span(v + 0.5 - m[1], inverse[i, e])
+            for v in range(max(int(mv - half), 0), min(int(mv + half) + 1, height)):
+                x0, x1 = span(v + 0.5 - mv, a, b, c)
                 if x0 > x1:
                     continue
-                low, high = m[0] + x0, m[0] + x1
+                low, high = mu + x0, mu + x1
                 for u in range(max(int(low), 0), min(int(high + most) + 1, width)):
                     x = u + 0.5 - out[v, u]  # nan is in no span
-                    if low <= x <= high and _covers(x, v + 0.5, start[i, e], step[i, e], depth[v, u]):
+                    if low <= x <= high and _covers(x, v + 0.5, i, e, start, step, depth[v, u]):
                         out[v, u] = np.nan
