@@ -46,7 +46,9 @@ def demo(out: Path, *, quick: bool) -> Answer:
         seen = _seen(open_source(drawn)[0], out)
         parts = [_part(tracker, sequences, out, meter) for tracker in protocol.names()]
     write_file(out / "index.html", page(out, seen, parts).encode())
-    text = [f"{len(sequences)} sequences in {folders[0].parent}", *(_line(part) for part in [seen.part, *parts])]
+    text = [f"{len(sequences)} sequences in {folders[0].parent}", *(_line(part.title, part.rows) for part in parts)]
+    alone = zip(seen.part.names, seen.part.rows, strict=True)
+    text += [f"one drawn, {drawn}", *(_line(name, [row]) for name, row in alone)]
     text += [f"{time.monotonic() - start:.0f} s; open this page:", str((out / "index.html").resolve())]
     data = {part.title: summary(part.rows) for part in parts}
     return Answer({"sequences": len(sequences), "scores": data, "page": out / "index.html"}, "\n".join(text))
@@ -73,7 +75,8 @@ def _seen(sequence: Sequence, out: Path) -> Seen:
             part.names.append(f"{tracker} {words}")
             if tracker == trackers[0] and mode == "image":
                 overlay(sequence, run, drawn, "over")
-    return Seen(part, drawn, sequence.length or 0)
+    frames = sequence.length or 0
+    return Seen(part, drawn, frames, frames / sequence.fps)
 
 
 def _part(tracker: str, sequences: list[Sequence], out: Path, meter: Meter) -> Part:
@@ -100,8 +103,8 @@ def _store(who: str, sequence: Sequence, run: Run, row: Row, tracks: Path, place
     view(sequence, run, place, row.scores, f"{who} on {sequence.name}", video)
 
 
-def _line(part: Part) -> str:
-    means = summary(part.rows)
-    return f"{part.title}: " + ", ".join(
+def _line(title: str, rows: list[Row]) -> str:
+    means = summary(rows)
+    return f"{title}: " + ", ".join(
         f"{key} {number(key, means[key]['mean'], mean=True)}" for key in SHOWN if key in means
     )

@@ -27,7 +27,7 @@ SEEN = """<h2>One scene, from its pictures</h2>
 <p>The same {frames} frames tracked twice: from pixels, by background subtraction, and from the boxes of a simulated
 detector. The video shows what was found in the pixels: boxes, trails, groups and events, the truth as thin
 white boxes.</p>
-<video src="{film}" controls muted loop playsinline preload="metadata"></video>
+<video src="{film}#t={start:.1f}" controls muted loop playsinline preload="metadata"></video>
 """
 
 
@@ -48,12 +48,14 @@ class Seen:
     part: Part
     film: Path
     frames: int
+    seconds: float
 
 
 def page(root: Path, seen: Seen, parts: list[Part]) -> str:
     """The page as HTML; root: the folder in which it will stand."""
     head = f'<!doctype html><html lang="en"><meta charset="utf-8"><title>flockscope demo</title><style>{STYLE}</style>'
-    first = SEEN.format(frames=seen.frames, film=escape(_link(seen.film, root))) + _table(seen.part, root)
+    film = {"film": escape(_link(seen.film, root)), "start": 0.4 * seen.seconds}
+    first = SEEN.format(frames=seen.frames, **film) + _table(seen.part, root)
     rest = "\n".join(f"<h2>{escape(part.title)}</h2>{_table(part, root)}" for part in parts)
     return f"{head}{INTRO}{first}{rest}</html>\n"
 

@@ -1,4 +1,4 @@
-"""What README.md says can be typed as it stands; only the number of seeds is less."""
+"""What README.md says can be typed as it stands; only seeds and frames per second are fewer."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from tests.small_videos import picture, write_video
 from tracking.app.cli import run
 
 README = (Path(__file__).resolve().parents[3] / "README.md").read_text(encoding="utf-8")
@@ -23,13 +24,16 @@ def blocks(language: str) -> list[str]:
 def test_commands(tmp_path, monkeypatch, capsys):
     """In their order, in an empty folder."""
     monkeypatch.chdir(tmp_path)
+    write_video(tmp_path / "street.mp4", [picture(k) for k in range(110)])
     lines = [line for block in blocks("") for line in block.splitlines() if line.startswith("flockscope ")]
     assert len(lines) >= 6
     for line in lines:
         words = shlex.split(line, comments=True)[1:]
+        words += ["--set", "camera.fps=5"] if words[0] == "generate" else []
         assert run([word.replace("0:10", "0:1") for word in words]) == 0, (line, capsys.readouterr().err)
     assert (tmp_path / "plan.svg").is_file()
-    assert (tmp_path / "replay.html").is_file()
+    for made in ("replay.html", "replay.mp4", "street-tracked.mp4"):
+        assert (tmp_path / made).is_file()
 
 
 @pytest.mark.parametrize("code", blocks("python"), ids=["a scene", "own arrays"])
