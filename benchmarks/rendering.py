@@ -2,8 +2,8 @@
 
     PYTHONPATH=. OMP_NUM_THREADS=1 python benchmarks/rendering.py [--frames 200]
 
-640 × 480 px, 16 × 10 m, tilt 40°, default light and picture; nothing is encoded. `x` is the least that is wanted (200/s
-for ids, truth and disparity with 20 people; 100/s for a pair). The best stretch of 20 frames counts; the load of the machine is printed.
+640 × 480 px, 16 × 10 m, tilt 40°, default light and picture; nothing is encoded. Wanted: 200/s for ids, truth and
+disparity with 20 people, 100/s for a pair. CPU time of the process; the best stretch of 20 frames counts; the load of the machine is printed.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from collections.abc import Callable
 import numpy as np
 
 from scenarios.schema import Scenario
-from sim import paint_kernels, pixel_kernels, pixel_truth, render, silhouettes
+from sim import paint_kernels, render
 from sim.camera import solve
 from sim.render import Stage, stage
 from sim.world import run
@@ -55,7 +55,7 @@ ASKED: dict[str, Callable[[Stage], Callable[[int], object]]] = {
     "empty": lambda s: lambda i: s.background(i % 50),
 }
 PARTS = (
-    ("places, outlines", render, ("crowd", "cast", "shadows")),
+    ("places, outlines", render.Stretch, ("__init__", "crowd", "sight")),
     ("shadows", paint_kernels, ("shadows",)),
     ("people", paint_kernels, ("people",)),
     ("blur, light, noise", render.Stage, ("_finish",)),

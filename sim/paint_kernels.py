@@ -123,14 +123,14 @@ def people(  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True, error_model="numpy")
-def _shade(x, y, z, i, centre, shape, sun, softness):  # type: ignore[no-untyped-def]
-    """Share of the sun that person i (body and head) takes from the point (x, y, z)."""
+def _shade(x, y, z, i, centre, shape, sx, sy, softness):  # type: ignore[no-untyped-def]
+    """Share of the sun that person i (body and head) takes from the point (x, y, z); it comes along (sx, sy, 1)."""
     share = 0.0
     for e in range(2):
-        above = (centre[i, e, 2] - z) / sun[2]
-        if above <= 0.0:
+        above = centre[i, e, 2] - z
+        if above <= 0.0 or share >= 1.0:
             continue
-        dx, dy = x - centre[i, e, 0] + sun[0] * above, y - centre[i, e, 1] + sun[1] * above
+        dx, dy = x - centre[i, e, 0] + sx * above, y - centre[i, e, 1] + sy * above
         q = dx * dx * shape[i, e, 0] + 2 * dx * dy * shape[i, e, 1] + dy * dy * shape[i, e, 2]
         soft = softness[i, e]
         if q < (1.0 + soft) ** 2:
@@ -150,6 +150,7 @@ def shadows(  # type: ignore[no-untyped-def]
     radius; taken (H, W) uint8: 255 times the share of the sun that is gone, 0 at first.
     """
     height, width = direct.shape
+    sx, sy = sun[0] / sun[2], sun[1] / sun[2]
     for i in range(len(boxes)):
         for v in range(boxes[i, 0], boxes[i, 1]):
             low, high = boxes[i, 2], boxes[i, 3]
@@ -160,7 +161,7 @@ def shadows(  # type: ignore[no-untyped-def]
                     low, high = (min(low, first), max(high, last)) if high > low else (first, last)
             left, right = width, 0
             for u in range(low, high):
-                share = _shade(place[v, u, 0], place[v, u, 1], place[v, u, 2], i, centre, shape, sun, softness)
+                share = _shade(place[v, u, 0], place[v, u, 1], place[v, u, 2], i, centre, shape, sx, sy, softness)
                 gone, old = int(255.0 * share + 0.5), int(taken[v, u])
                 if gone > old:
                     left, right = min(left, u), u + 1

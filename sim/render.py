@@ -19,9 +19,10 @@ from sim import camera as cameras
 from sim.light import Illumination, illuminate
 from sim.pixel_truth import pixel_truth
 from sim.sensor_noise import offsets, pool
-from sim.silhouettes import Cast, Crowd, cast, crowd, shadows
+from sim.silhouettes import Cast, Crowd
+from sim.stretch import FRAMES, Stretch
 from sim.types import Camera, Frame, Image, Motion, PixelTruth
-from sim.view import View, blur_weights, sunlit
+from sim.view import View, blur_weights
 from sim.wear import wear
 
 if TYPE_CHECKING:
@@ -41,7 +42,7 @@ class Rendered:
 
 
 class Stage:
-    """All that is the same in every frame, made when first needed. Holds nothing of any frame."""
+    """All that is the same in every frame, made when first needed; and where people are in the stretch drawn last."""
 
     def __init__(self, motion: Motion, camera: Camera, light: Light, picture: Picture) -> None:
         if camera.radial != 0:
@@ -50,6 +51,7 @@ class Stage:
                 remedy="render with the camera's ideal twin (radial 0)",
             )  # fmt: skip
         self.motion, self.camera, self.light, self.picture = motion, camera, light, picture
+        self._last: Stretch | None = None
 
     @cached_property
     def illumination(self) -> Illumination:
@@ -95,46 +97,51 @@ class Stage:
 
     def frame(self, index: int) -> Image:
         """The picture of frame `index`."""
-        return self._draw(self.left_view, crowd(self.motion, index), index, LEFT, shade=True, label=False)[0]
+        return self._draw(index, LEFT, shade=True, label=False)[0]
 
     def right(self, index: int) -> Image:
         """The right camera's."""
-        return self._draw(self.right_view, crowd(self.motion, index), index, RIGHT, shade=True, label=False)[0]
+        return self._draw(index, RIGHT, shade=True, label=False)[0]
 
     def pixels(self, index: int, *, disparity: bool = False) -> PixelTruth:
         """Who shows where in frame `index`, and how far away."""
-        truth = self._draw(
-            self.left_view, crowd(self.motion, index), index, LEFT, shade=False, label=True, disparity=disparity
-        )[1]
+        truth = self._draw(index, LEFT, shade=False, label=True, disparity=disparity)[1]
         assert truth is not None
         return truth
 
     def both(self, index: int, *, right: bool = False, pixels: bool = False, disparity: bool = False) -> Rendered:
         """The picture with more of the same frame, nothing drawn twice; disparity: in `pixels`."""
-        people = crowd(self.motion, index)
-        image, truth = self._draw(
-            self.left_view, people, index, LEFT, shade=True, label=pixels, disparity=disparity and pixels
-        )
-        other = self._draw(self.right_view, people, index, RIGHT, shade=True, label=False)[0] if right else None
-        return Rendered(image, other, truth)
+        image, truth = self._draw(index, LEFT, shade=True, label=pixels, disparity=disparity and pixels)
+        return Rendered(image, self.right(index) if right else None, truth)
 
     def background(self, k: int) -> Image:
         """Empty frame k = 0 … BACKGROUNDS - 1, at t = (k - BACKGROUNDS) / fps."""
-        nobody = crowd(self.motion, None)
-        return self._draw(self.left_view, nobody, k - BACKGROUNDS + 1, LEFT, shade=True, label=False)[0]
+        view = self.left_view
+        return self._finish(view, view.canvas, self._clean(view), k - BACKGROUNDS + 1, LEFT)
+
+    def _stretch(self, index: int) -> Stretch:
+        if self._last is None or index not in range(self._last.first, self._last.first + FRAMES):
+            self._last = Stretch(self.motion, self.illumination, index)
+        return self._last
+
+    @staticmethod
+    def _clean(view: View) -> NDArray[np.uint8]:
+        """(rows, columns) of tiles in which nothing is painted yet."""
+        from sim.paint_kernels import TILE_H, TILE_W
+
+        return np.zeros((-(-view.height // TILE_H), -(-view.width // TILE_W)), np.uint8)
 
     def _draw(
-        self, view: View, people: Crowd, index: int, side: int, *, shade: bool, label: bool, disparity: bool = False
+        self, index: int, side: int, *, shade: bool, label: bool, disparity: bool = False
     ) -> tuple[Image, PixelTruth | None]:
         """Picture (nothing in it unless `shade`) and, with `label`, truth of one view of one frame."""
         from sim import paint_kernels as kernels
 
-        light, here = self.illumination, cast(view.camera, view.rays, people)
-        margin = len(self._weights) // 2
-        canvas = view.canvas.copy() if shade else view.canvas[:0]
-        dirty = np.zeros((-(-view.height // kernels.TILE_H), -(-view.width // kernels.TILE_W)), np.uint8)
-        if shade and light.shadow > 0 and len(people.id):
-            fall = shadows(view.camera, people, light.sun, light.penumbra, view.level)
+        view, stretch, light = self.right_view if side else self.left_view, self._stretch(index), self.illumination
+        people, sight = stretch.crowd(index), stretch.sight(view, side, index)
+        here, margin, fall = sight.cast, len(self._weights) // 2, sight.shadows
+        canvas, dirty = view.canvas.copy() if shade else view.canvas[:0], self._clean(view)
+        if shade and fall is not None:
             kernels.shadows(
                 view.geometry.place, view.plate.direct, fall.outlined.boxes, view.level, fall.outlined.middle,
                 fall.outlined.inverse, people.shapes.centre, fall.shape, light.sun, fall.softness,
@@ -145,13 +152,12 @@ class Stage:
         kernels.people(
             np.argsort(here.near[:, 0], kind="stable"), here.start, here.step, people.half, here.outlined.middle,
             here.outlined.inverse, here.outlined.boxes, people.id, people.turn @ light.sun, light.shadow,
-            sunlit(view.solids, people, light.sun), people.id - 1, self._atlas,
-            shade, label, depth, ids, canvas, dirty, margin, amodal,
+            sight.sunlit, people.id - 1, self._atlas, shade, label, depth, ids, canvas, dirty, margin, amodal,
         )  # fmt: skip
         image = self._finish(view, canvas, dirty, index, side) if shade else np.zeros((0, 0, 3), np.uint8)
         if not label:
             return image, None
-        apart = self._disparities(depth, ids, here, people) if disparity else None
+        apart = self._disparities(depth, ids, here, people, index) if disparity else None
         return image, pixel_truth(ids, here.outlined.boxes, people.id, amodal, apart)
 
     def _finish(self, view: View, canvas: NDArray[np.int16], dirty: NDArray[np.uint8], index: int, side: int) -> Image:
@@ -169,12 +175,12 @@ class Stage:
         return _lossy(image, self.picture.jpeg) if self.picture.jpeg else image
 
     def _disparities(
-        self, depth: NDArray[np.float32], ids: NDArray[np.int64], here: Cast, people: Crowd
+        self, depth: NDArray[np.float32], ids: NDArray[np.int64], here: Cast, people: Crowd, index: int
     ) -> NDArray[np.float64]:
         from sim.pixel_kernels import disparities
 
         other, apart = self.right_view, self._known.copy()
-        there = cast(other.camera, other.rays, people)
+        there = self._stretch(index).sight(other, RIGHT, index).cast
         disparities(
             depth, ids, here.outlined.boxes, people.id, self.camera.focal_px[0] * self.camera.baseline, there.start,
             there.step, there.outlined.middle, there.outlined.inverse, there.near, other.geometry.depth,

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
+from typing import TypeVar
 
 import numpy as np
 
@@ -12,6 +13,8 @@ from sim.plate import Rays
 from sim.terrain import height_at
 from sim.types import Array, Camera, Ints, Motion
 from sim.visibility import packed_inverse
+
+T = TypeVar("T")
 
 
 @dataclass(frozen=True, eq=False)
@@ -48,17 +51,27 @@ class Cast:
     near: Array
 
 
-def crowd(motion: Motion, index: int | None) -> Crowd:
-    """The people of frame `index`; nobody for None."""
-    who = np.flatnonzero(motion.present[index - 1]) if index is not None else np.zeros(0, np.int64)
-    t = 0 if index is None else index - 1
-    xy, heading = motion.pos[t, who], motion.heading[t, who]
+def crowd(motion: Motion, first: int, last: int) -> tuple[Crowd, Ints]:
+    """The people of frames first … last - 1, one frame after the other, and where each frame's begin (and the end)."""
+    present = motion.present[first - 1 : last - 1]
+    t, who = np.nonzero(present)
+    xy, heading = motion.pos[t + first - 1, who], motion.heading[t + first - 1, who]
     pos3 = np.column_stack([xy, height_at(motion.scene, xy)])
     size = motion.height[who], motion.width[who], motion.depth[who]
     c, s = np.cos(heading), np.sin(heading)
     turn = np.zeros((len(who), 3, 3))
     turn[:, 0, 0], turn[:, 0, 1], turn[:, 1, 0], turn[:, 1, 1], turn[:, 2, 2] = s, -c, c, s, 1.0
-    return Crowd(who + 1, pos3, size[0], ellipsoids(pos3, heading, *size), half_axes(*size), turn)
+    people = Crowd(who + 1, pos3, size[0], ellipsoids(pos3, heading, *size), half_axes(*size), turn)
+    return people, np.concatenate([[0], np.cumsum(present.sum(axis=1))])
+
+
+def cut(value: T, rows: slice) -> T:
+    """These rows of all arrays of a dataclass, and of the dataclasses in it."""
+    kept = {
+        f.name: v[rows] if isinstance(v := getattr(value, f.name), np.ndarray) else cut(v, rows)
+        for f in fields(value)  # type: ignore[arg-type]
+    }
+    return type(value)(**kept)
 
 
 def cast(camera: Camera, rays: Rays, people: Crowd) -> Cast:
