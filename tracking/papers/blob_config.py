@@ -70,7 +70,7 @@ class BlobConfig(BackgroundSettings):
         True, (True, False), "", "from pixels: people who share a blob are told apart (ours)", "categorical", before=True
     )
     evidence: float = param(
-        20.0, (1.0, 500.0), "nats", "what a wholly seen template is worth beside its distance (ours)", "log", before=20.0
+        10.0, (1.0, 500.0), "nats", "what a wholly seen template is worth beside its distance (ours)", "log", before=10.0
     )
     track_support: float = param(
         0.15, (0.02, 0.8), "share", "support from which on a template measures a confirmed track (ours)", before=0.15

@@ -91,7 +91,9 @@ class Pixels:
         self._measure(frame.t, mask, found)
         self.background.adapt(frame.image, classes, self._protected())
         if len(found):
-            alone = ~self._cut(found.box) & ~self._several(found.box, self.people.uprights())
+            places = self.people.uprights()
+            alone = self._lone(found.box, places) if self.size.reliable else ~self._several(found.box, places)
+            alone &= ~self._cut(found.box)
             self.size.learn(found.box, found.ellipse, alone)
             self._take_scale()
         return None
