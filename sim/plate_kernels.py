@@ -32,12 +32,12 @@ def _ground(x, y, size, footprint, contrast, slab, palette, key, out):  # type: 
     outside = max(max(-x, x - size[0]), max(-y, y - size[1])) - 1.0 + 0.3 * smooth(x, y, key + 90)
     patches = smooth(0.31 * x, 0.31 * y, key + 20) + 0.6 * smooth(0.9 * x + 7.3, 0.9 * y, key + 21)
     warmth = contrast * 0.06 * smooth(0.5 * x, 0.5 * y + 3.1, key + 22)
-    fine = grain(x, y, key, footprint, 0.8)
+    fine = grain(x, y, key, footprint, 0.4)
     if outside > 0:
-        _tint(palette[GRASS], contrast * (0.35 * fine + 0.2 * patches), warmth, out)
+        _tint(palette[GRASS], contrast * (0.4 * fine + 0.16 * patches), warmth, out)
         return
     tile = slabs(x, y, slab, 0.6 * slab, 0.012, key + 40, footprint) if slab > 0 else 0.0
-    _tint(palette[GREY], contrast * (0.26 * fine + 0.14 * patches + 0.16 * tile), warmth, out)
+    _tint(palette[GREY], contrast * (0.26 * fine + 0.1 * patches + 0.16 * tile), warmth, out)
 
 
 @njit(cache=True)

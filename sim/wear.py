@@ -9,15 +9,15 @@ from sim.rng import rng
 
 SKINS = np.array([[120, 150, 195], [105, 135, 180], [80, 110, 150], [55, 75, 105]], float)  # BGR
 HAIRS = np.array([[30, 32, 36], [35, 45, 60], [60, 85, 110], [120, 125, 128]], float)
-TROUSERS = np.array([[48, 40, 38], [95, 68, 52], [70, 72, 74], [80, 100, 118], [32, 30, 30]], float)
+TROUSERS = np.array([[42, 35, 33], [98, 70, 50], [66, 68, 70], [84, 106, 126], [28, 26, 26], [36, 32, 32]], float)
 SHIRTS = np.array(
-    [[30, 30, 32], [55, 45, 42], [95, 60, 40], [50, 45, 130], [70, 105, 70], [185, 185, 188], [150, 140, 120],
-     [80, 150, 190], [90, 90, 95], [40, 60, 90]], float,
+    [[28, 28, 30], [30, 26, 26], [52, 42, 38], [96, 60, 38], [50, 45, 135], [72, 100, 68], [205, 206, 208],
+     [160, 150, 128], [90, 165, 205], [92, 92, 96], [36, 52, 78]], float,
 )  # fmt: skip
-LEVEL_SD, TINT_SD = 0.18, 0.06  # by which a garment's brightness and hue differ from the palette, relative
+LEVEL_SD, TINT_SD = 0.28, 0.06  # by which a garment's brightness and hue differ from the palette, relative
 
 
-CUTS = (0.38, 0.1, 0.1, 0.12, 0.22, 0.08)  # shares of the cuts in sim.wear_kernels
+CUTS = (0.45, 0.06, 0.05, 0.1, 0.24, 0.1)  # shares of the cuts in sim.wear_kernels
 
 
 def wear(people: int, seed: int, repeat: int = 0) -> NDArray[np.float32]:
@@ -29,7 +29,7 @@ def wear(people: int, seed: int, repeat: int = 0) -> NDArray[np.float32]:
         source = rng(seed, "texture", k + 1, repeat=repeat)
         key = int(source.integers(1 << 20))
         cut, count = source.choice(len(CUTS), p=CUTS), source.integers(2, 5)
-        style = np.array([cut, count, *source.uniform([-0.02, -0.3, 0.3, 0.62], [0.2, 0.35, 0.6, 0.8])])
+        style = np.array([cut, count, *source.uniform([-0.05, -0.3, 0.5, 0.62], [0.2, 0.35, 0.8, 0.8])])
         first, second = source.choice(len(SHIRTS), 2, replace=False)
         chosen = [
             np.array([35.0, 36.0, 38.0]), TROUSERS[source.integers(len(TROUSERS))], SHIRTS[first], SHIRTS[second],
