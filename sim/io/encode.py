@@ -35,7 +35,8 @@ class Movie:
                 remedy="take --images jpg or png, or another camera.image",
             )  # fmt: skip
         rate = rate_of(fps)
-        self._container: Any = av.open(str(path), "w", format="mp4", options={"movflags": "faststart"})
+        self._file = _File(path)
+        self._container: Any = av.open(self._file, "w", format="mp4", options={"movflags": "faststart"})
         group = str(max(1, round(fps)))
         options = {"crf": str(quality), "preset": "veryfast", "g": group, "bf": "2", "threads": "1"}
         self._stream: Any = self._container.add_stream("libx264", rate=rate, options=options)
@@ -55,6 +56,7 @@ class Movie:
         frame = av.VideoFrame.from_ndarray(planes, format="yuv420p")
         frame.color_range, frame.colorspace = NARROW, BT601
         self._container.mux(self._stream.encode(frame))
+        self._file.check()
 
     def __enter__(self) -> Movie:
         return self
@@ -64,4 +66,34 @@ class Movie:
             if error[0] is None:
                 self._container.mux(self._stream.encode(None))
         finally:
-            self._container.close()
+            try:
+                self._container.close()
+            finally:
+                self._file.close()
+                if error[0] is None:
+                    self._file.check()
+
+
+class _File:
+    """What libav writes to, which keeps its own files open where it cannot end a video. State: the first refusal of the
+    disk, after which all goes nowhere."""
+
+    def __init__(self, path: Path):
+        self.name, self._raw = str(path), path.open("wb", buffering=0)
+        self._error: OSError | None = None
+        self.seek, self.tell, self.close = self._raw.seek, self._raw.tell, self._raw.close
+
+    def write(self, body: bytes) -> int:
+        """All of it, or nothing any more."""
+        rest = memoryview(body)
+        try:
+            while len(rest) and self._error is None:
+                rest = rest[self._raw.write(rest) :]
+        except OSError as error:
+            self._error = error
+        return len(body)
+
+    def check(self) -> None:
+        """Raise what the disk refused."""
+        if self._error is not None:
+            raise self._error
