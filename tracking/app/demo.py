@@ -22,7 +22,8 @@ SCENES = ("merge", "split", "cross", "pass-by", "queue", "side-by-side", "party"
 SEEDS = range(40_000, 40_003)
 QUICK, QUICK_SEEDS = ("quick",), range(40_000, 40_001)
 SEEN, SEEN_SEED = "split", range(40_000, 40_001)
-"""The scene that is drawn."""
+SEEN_QUICKLY = ("camera.fps=5",)
+"""The scene that is drawn, and what --quick changes of it."""
 
 MODES: dict[DetectionMode, str] = {"image": "from pixels", "file": "from boxes"}
 
@@ -39,8 +40,8 @@ def demo(out: Path, *, quick: bool) -> Answer:
     with Meter("generate") as meter:
         workers = 1 if quick else os.cpu_count() or 1
         folders = generate(names, seeds, out / "data", workers=workers, progress=meter.update, streams=())
-        rate = ("camera.fps=5",) if quick else ()
-        (drawn,) = generate([SEEN], SEEN_SEED, out / "pictures", set=rate, streams=("left",), images="mp4")
+        how = SEEN_QUICKLY if quick else ()
+        (drawn,) = generate([SEEN], SEEN_SEED, out / "pictures", set=how, streams=("left",), images="mp4")
     sequences = [open_source(folder)[0] for folder in folders]
     with Meter("track, score, draw", len(sequences) * len(protocol.names())) as meter:
         seen = _seen(open_source(drawn)[0], out)

@@ -68,6 +68,12 @@ def _ctrl_c():
     signal.signal(signal.SIGINT, before)
 
 
+@pytest.fixture(autouse=True)
+def _small_pictures(monkeypatch):
+    """The demo's one drawn scene is quickly tracked."""
+    monkeypatch.setattr("tracking.app.demo.SEEN_QUICKLY", ("camera.fps=5", "camera.image=[160,120]"))
+
+
 @pytest.fixture
 def place(made, tmp_path) -> Place:
     data = made / "data" / "flockscope-demo"

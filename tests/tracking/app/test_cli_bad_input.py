@@ -305,6 +305,7 @@ def writers(made: Path, out: Path) -> list[list[str]]:
         ["track", "blob", str(data), "--out", str(out)],
         ["view", str(data), "--out", str(out / "page.html")],
         ["sheet", str(data), "--out", str(out / "sheet.png")],
+        ["overlay", str(data), "--out", str(out / "film.mp4")],
         ["export", "coco", str(data), "--out", str(out / "coco.json")],
         ["scenarios", str(made / "scene.toml"), "--out", str(out / "plan.svg")],
         ["demo", "--quick", "--out", str(out)],
