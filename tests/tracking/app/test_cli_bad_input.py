@@ -64,7 +64,8 @@ def made(tmp_path_factory) -> Path:
     folder = tmp_path_factory.mktemp("bad")
     scene = folder / "scene.toml"
     scene.write_text(f"schema = 1\nduration = 2.0\ncamera = {{ fps = 5 }}\ngroup = [{GROUP}]")
-    assert run(["generate", str(scene), "--seeds", "40000", "--out", str(folder / "data")]) == 0
+    small = ["--set", "camera.image=[160,120]"]
+    assert run(["generate", str(scene), "--seeds", "40000", "--out", str(folder / "data"), *small]) == 0
     return folder
 
 
