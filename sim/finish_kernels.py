@@ -38,8 +38,8 @@ def _shown(line, grain, gain, many, out):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True)
-def _blur_tile(canvas, top, left, rows, cols, weights, edge, wide, out):  # type: ignore[no-untyped-def]
-    """out (rows, cols * 3): the tile's separable blur, edges repeated; edge, wide: scratch, a line and lines."""
+def _blur_run(canvas, top, left, rows, cols, weights, edge, wide, out):  # type: ignore[no-untyped-def]
+    """out (rows, cols * 3): blur from (top, left) on, edges repeated; edge, wide: scratch, a line and lines."""
     height, width = canvas.shape[0], canvas.shape[1] // 3
     radius, many = len(weights) // 2, 3 * cols
     inner = left >= radius and left + cols + radius <= width
@@ -68,11 +68,11 @@ def _blur_tile(canvas, top, left, rows, cols, weights, edge, wide, out):  # type
 
 
 @njit(cache=True)
-def _scratch(radius):  # type: ignore[no-untyped-def]
+def _scratch(radius, width):  # type: ignore[no-untyped-def]
     return (
-        np.empty(3 * (TILE_W + 2 * radius), np.int16),
-        np.empty((TILE_H + 2 * radius, 3 * TILE_W), np.float32),
-        np.empty((TILE_H, 3 * TILE_W), np.float32),
+        np.empty(3 * (width + 2 * radius), np.int16),
+        np.empty((TILE_H + 2 * radius, 3 * width), np.float32),
+        np.empty((TILE_H, 3 * width), np.float32),
     )
 
 
@@ -80,14 +80,13 @@ def _scratch(radius):  # type: ignore[no-untyped-def]
 def blurred(canvas, weights, out):  # type: ignore[no-untyped-def]
     """out: the whole canvas (H, W * 3) int16 blurred."""
     height, width = canvas.shape[0], canvas.shape[1] // 3
-    edge, wide, tile = _scratch(len(weights) // 2)
+    edge, wide, tile = _scratch(len(weights) // 2, width)
     for top in range(0, height, TILE_H):
-        for left in range(0, width, TILE_W):
-            rows, cols = min(TILE_H, height - top), min(TILE_W, width - left)
-            _blur_tile(canvas, top, left, rows, cols, weights, edge, wide, tile)
-            for r in range(rows):
-                for i in range(3 * cols):
-                    out[top + r, 3 * left + i] = np.int16(tile[r, i] + HALF)
+        rows = min(TILE_H, height - top)
+        _blur_run(canvas, top, 0, rows, width, weights, edge, wide, tile)
+        for r in range(rows):
+            for i in range(3 * width):
+                out[top + r, i] = np.int16(tile[r, i] + HALF)
 
 
 @njit(cache=True)
@@ -98,16 +97,20 @@ def finish(canvas, plate, dirty, weights, gain, noise, offsets, out):  # type: i
     blurred empty scene; weights (2 r + 1,) of the blur; noise (n,) int16, of which row v shows noise[offsets[v]:].
     """
     height, width = canvas.shape[0], canvas.shape[1] // 3
-    edge, wide, tile = _scratch(len(weights) // 2)
+    edge, wide, tile = _scratch(len(weights) // 2, width)
     for top in range(0, height, TILE_H):
         rows = min(TILE_H, height - top)
         for r in range(rows):
             _shown(plate[top + r], noise[offsets[top + r] :], gain, 3 * width, out[top + r])
-        for left in range(0, width, TILE_W):
+        last = 0
+        while last < width:  # runs of dirty tiles
+            left = last
+            while last < width and dirty[top // TILE_H, last // TILE_W] == dirty[top // TILE_H, left // TILE_W]:
+                last += TILE_W
             if not dirty[top // TILE_H, left // TILE_W]:
                 continue
-            cols = min(TILE_W, width - left)
-            _blur_tile(canvas, top, left, rows, cols, weights, edge, wide, tile)
+            cols = min(last, width) - left
+            _blur_run(canvas, top, left, rows, cols, weights, edge, wide, tile)
             for r in range(rows):
                 grain, to = noise[offsets[top + r] + 3 * left :], out[top + r, 3 * left :]
                 _shown(tile[r], grain, gain, 3 * cols, to)

@@ -12,7 +12,7 @@ from numba import njit
 
 UNIT = 64.0  # canvases hold grey levels times this, as int16
 MOST = 32767.0
-TILE_H, TILE_W = 8, 32  # px: what is blurred anew as a whole where something was painted
+TILE_H, TILE_W = 8, 16  # px: what is blurred anew as a whole where something was painted
 
 
 @njit(cache=True, error_model="numpy")
@@ -55,8 +55,8 @@ def _colour(atlas, page, e, round_, up, light, canvas, v, u):  # type: ignore[no
     left, right = i if i >= 0 else cols - 1, i + 1 if i + 1 < cols else 0
     one, bright = np.float32(1.0), np.float32(light)
     for k in range(3):
-        low = atlas[page, e, j, left, k] * (one - a) + atlas[page, e, j, right, k] * a
-        high = atlas[page, e, j + 1, left, k] * (one - a) + atlas[page, e, j + 1, right, k] * a
+        low = np.float32(atlas[page, e, j, left, k]) * (one - a) + np.float32(atlas[page, e, j, right, k]) * a
+        high = np.float32(atlas[page, e, j + 1, left, k]) * (one - a) + np.float32(atlas[page, e, j + 1, right, k]) * a
         c = (low * (one - b) + high * b) * bright
         canvas[v, u, k] = np.int16(np.int32(c if c < np.float32(MOST) else np.float32(MOST)))
 

@@ -76,12 +76,11 @@ def known(depth, scale, origin, direction, walls, wall_height, pillars, pillar_h
 
 
 @njit(cache=True, error_model="numpy")
-def _covers(x, y, i, e, start, step, z):  # type: ignore[no-untyped-def]
-    """Whether the ball of part (i, e) is met before depth z by the ray of (x, y)."""
+def _covers(x, i, e, start, step, row, z):  # type: ignore[no-untyped-def]
+    """Whether the ball of part (i, e) is met before depth z by the ray of (x, y); row: what y adds to each."""
     a = b = c = 0.0
     for k in range(3):
-        p = start[i, e, k, 0] * x + start[i, e, k, 1] * y + start[i, e, k, 2]
-        d = step[i, e, k, 0] * x + step[i, e, k, 1] * y + step[i, e, k, 2]
+        p, d = start[i, e, k, 0] * x + row[k], step[i, e, k, 0] * x + row[3 + k]
         a += d * d
         b += p * d
         c += p * p
@@ -118,7 +117,7 @@ def disparities(  # type: ignore[no-untyped-def]
     """
     height, width = depth.shape
     solid = len(walls) + len(pillars) + len(flights) > 0
-    o, d, hit = np.empty(3), np.empty(3), np.empty(6)
+    o, d, hit, row = np.empty(3), np.empty(3), np.empty(6), np.empty(6)
     for i in range(len(id)):
         for v in range(boxes[i, 0], boxes[i, 1]):
             for u in range(boxes[i, 2], boxes[i, 3]):
@@ -146,7 +145,10 @@ def disparities(  # type: ignore[no-untyped-def]
                 if x0 > x1:
                     continue
                 low, high = mu + x0, mu + x1
+                for k in range(3):
+                    row[k] = start[i, e, k, 1] * (v + 0.5) + start[i, e, k, 2]
+                    row[3 + k] = step[i, e, k, 1] * (v + 0.5) + step[i, e, k, 2]
                 for u in range(max(int(low), 0), min(int(high + most) + 1, width)):
                     x = u + 0.5 - out[v, u]  # nan is in no span
-                    if low <= x <= high and _covers(x, v + 0.5, i, e, start, step, depth[v, u]):
+                    if low <= x <= high and _covers(x, i, e, start, step, row, depth[v, u]):
                         out[v, u] = np.nan

@@ -78,7 +78,7 @@ class Stage:
             )  # fmt: skip
 
     @cached_property
-    def _atlas(self) -> NDArray[np.float32]:
+    def _atlas(self) -> NDArray[np.uint8]:
         return wear(self.motion.present.shape[1], self.motion.seed, self.motion.repeat)
 
     @cached_property

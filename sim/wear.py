@@ -20,11 +20,11 @@ LEVEL_SD, TINT_SD = 0.28, 0.06  # by which a garment's brightness and hue differ
 CUTS = (0.45, 0.06, 0.05, 0.1, 0.24, 0.1)  # shares of the cuts in sim.wear_kernels
 
 
-def wear(people: int, seed: int, repeat: int = 0) -> NDArray[np.float32]:
+def wear(people: int, seed: int, repeat: int = 0) -> NDArray[np.uint8]:
     """Pages (P, 2, UP, ROUND, 3) BGR of people 1 … `people`, body and head; one person more changes nobody else."""
     from sim.wear_kernels import ROUND, UP, page
 
-    pages = np.empty((people, 2, UP, ROUND, 3), np.float32)
+    pages, drawn = np.empty((people, 2, UP, ROUND, 3), np.uint8), np.empty((UP, ROUND, 3))
     for k in range(people):
         source = rng(seed, "texture", k + 1, repeat=repeat)
         key = int(source.integers(1 << 20))
@@ -38,5 +38,6 @@ def wear(people: int, seed: int, repeat: int = 0) -> NDArray[np.float32]:
         level = np.exp(LEVEL_SD * source.normal(size=(6, 1))) * np.exp(TINT_SD * source.normal(size=(6, 3)))
         colours = np.clip(np.array(chosen) * level, 12, 240)
         for part in range(2):
-            page(style, key, colours, part, pages[k, part])
+            page(style, key, colours, part, drawn)
+            pages[k, part] = np.clip(drawn + 0.5, 0, 255)
     return pages
