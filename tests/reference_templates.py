@@ -19,4 +19,4 @@ def worth(gain, cover, template):
 def moved(gain, cover, template, steps, step):
     """The same for the template moved by -steps..steps times step, rows down, columns right."""
     offset = step * np.arange(-steps, steps + 1)
-    return np.array([[worth(gain, cover, template + [a, b, 0, 0]) for a in offset] for b in offset])
+    return np.array([[worth(gain, cover, np.add(template, (a, b, 0, 0))) for a in offset] for b in offset])

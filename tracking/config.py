@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import dataclasses
 import difflib
+import inspect
 import tomllib
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -144,7 +145,7 @@ class Config:
         """
         path = FROZEN / f"{cls.tracker}.toml"
         first = cls._values(path)
-        own = cls.__dict__.get("__annotations__", {})
+        own = inspect.get_annotations(cls)
         later = {n: p.before if n in own else p.default for n, p in cls.params().items() if n not in first}
         assert None not in later.values(), f"a parameter that {path.name} lacks declares what it was before: {later}"
         return cls.from_dict(first | later, path)

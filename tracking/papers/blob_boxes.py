@@ -1,4 +1,4 @@
-"""The cascade of `blob` on boxes: measurements, gates, association, pieces, update, management; see tracking.papers.blob."""
+"""The cascade of `blob` on boxes: gates, association, pieces, update, management; see tracking.papers.blob."""
 
 from __future__ import annotations
 

@@ -66,11 +66,30 @@ class BlobConfig(BackgroundSettings):
         before=1.0,
     )
 
+    segmentation: str = param(
+        "horprasert",
+        ("horprasert", "mog2"),
+        "",
+        "from pixels: five classes (the paper's), or OpenCV's mixture of Gaussians",
+        "categorical",
+        online=False,
+        before="horprasert",
+    )
     split: bool = param(
-        True, (True, False), "", "from pixels: people who share a blob are told apart (ours)", "categorical", before=True
+        True,
+        (True, False),
+        "",
+        "from pixels: people who share a blob are told apart (ours)",
+        "categorical",
+        before=True,
     )
     evidence: float = param(
-        10.0, (1.0, 500.0), "nats", "what a wholly seen template is worth beside its distance (ours)", "log", before=10.0
+        10.0,
+        (1.0, 500.0),
+        "nats",
+        "what a wholly seen template is worth beside its distance (ours)",
+        "log",
+        before=10.0,
     )
     track_support: float = param(
         0.15, (0.02, 0.8), "share", "support from which on a template measures a confirmed track (ours)", before=0.15
@@ -79,10 +98,20 @@ class BlobConfig(BackgroundSettings):
         0.5, (0.1, 0.9), "share", "support from which on a template is somebody new (ours)", before=0.5
     )
     person_noise: float = param(
-        0.15, (0.01, 5.0), "m", "how far people's axes are from those expected at their place (ours)", "log", before=0.15
+        0.15,
+        (0.01, 5.0),
+        "m",
+        "how far people's axes are from those expected at their place (ours)",
+        "log",
+        before=0.15,
     )
     angle_noise: float = param(
-        8.0, (0.5, 45.0), "deg", "standard deviation of a measured direction, beside the moments' own", "log", before=8.0
+        8.0,
+        (0.5, 45.0),
+        "deg",
+        "standard deviation of a measured direction, beside the moments' own",
+        "log",
+        before=8.0,
     )
     angle_rate: float = param(
         15.0, (0.5, 180.0), "deg/s^0.5", "random walk of the direction, per root second", "log", before=15.0

@@ -25,17 +25,21 @@ class People(Population):
         super().__init__(config, dynamics, context)
 
     def predict(self) -> None:
+        """One frame on."""
         kalman.predict(self.nominal, self.dynamics.dt, self.q)
         self.angle[1] += self.turn
         super().predict()
 
     def quality(self) -> Array:
+        """(N,) rho by the nominal covariance."""
         return lifecycle.rho(self.nominal, self.noise, self.asymptote)
 
     def uprights(self) -> Array:
+        """(N, 4) boxes x, y, h, w round the predicted ellipses."""
         return blob_measure.upright(self.bank[kalman.PLACE], self.angle[0])
 
     def keep(self, rows: Ints) -> None:
+        """Forget all other tracks."""
         self.angle, self.nominal = self.angle.take(rows, 1), self.nominal.take(rows, 1)
         super().keep(rows)
 

@@ -1,11 +1,11 @@
 """`blob` from pixels: the paper's cascade on blobs, and beyond it people who share a blob (ours).
 
-    classify, clean, find                                                       3   (tracking.detect)
-    a blob of one person's size: its ellipse z = (x, y, h, w, theta), gates, association, update      4.2 to 4.4
-    the other foreground: split among the tracks expected there, by templates   ours (tracking.papers.blob_template)
-    what is left and as large as a person: new tracks                           ours (tracking.papers.blob_entry)
-    rho, births, deaths                                                         4.5
-    pixels of confirmed tracks are kept out of the background's adaptation      ours
+classify, clean, find                                                       3   (tracking.detect)
+a blob of one person's size: its ellipse z = (x, y, h, w, theta), gates, association, update      4.2 to 4.4
+the other foreground: split among the tracks expected there, by templates   ours (tracking.papers.blob_template)
+what is left and as large as a person: new tracks                           ours (tracking.papers.blob_entry)
+rho, births, deaths                                                         4.5
+pixels of confirmed tracks are kept out of the background's adaptation      ours
 """
 
 from __future__ import annotations
@@ -17,6 +17,7 @@ from tracking import assign, kalman
 from tracking.detect import blobs as detect
 from tracking.detect.background import Background
 from tracking.detect.classes import foreground
+from tracking.detect.mog2 import Mog2
 from tracking.papers import blob_entry, blob_measure
 from tracking.papers.blob_config import BlobConfig
 from tracking.papers.blob_people import People
@@ -42,7 +43,11 @@ class Pixels:
         assert context.background is not None
         self.config, self.people, self.context = config, people, context
         self.size = PersonSize(context)
-        self.background = Background(context.background, context.fps, config)
+        self.background: Background | Mog2
+        if config.segmentation == "mog2":
+            self.background = Mog2(context.background, context.fps)
+        else:
+            self.background = Background(context.background, context.fps, config)
         self.scale = context.px_per_m
         self._look_at_sample(context.background)
         self.gates = chdtri(np.array([4, 5]), 1 - config.gate)
@@ -203,7 +208,8 @@ class Pixels:
         at = scene.settle(at, spread, c.evidence)
         shown = scene.shown(at)
         keep = scene.prune(at, c.track_support if sure else c.entry_support, pieces=sure)
-        worth, shown, at = scene.alone(at[keep]), shown[keep], at[keep]
+        worth, at = scene.alone(at[keep], pieces=True), at[keep]
+        shown = np.minimum(shown[keep], worth)
         noise = people.noise / np.maximum(shown, LEAST_SHOWN)[:, None] ** 2
         noise[:, 2:] *= BLIND
         return open_rows[keep], self._ellipses(_places(at)), noise, np.clip(worth, 0.0, 1.0)

@@ -28,6 +28,9 @@ WIDTH = 0.12  # relative deviation within which heights agree
 FACTORS = np.array([0.9, 0.6]), np.array([1.1, 1.25])  # least and most by which people are higher and wider
 NARROW = 0.7  # of the votes for the most frequent width, what a smaller one needs to be taken instead
 PRIOR = 2.0  # people who count for the factors 1
+EATEN = (
+    1.3  # px of a person's height, at the head, that blur, majority and opening leave out: median of rendered scenes
+)
 LOOSE = 1.0, 1.1  # height and width of a person's box over those of the box round the ellipse of his pixels: a prior
 SMALLEST = 12.0  # px: people less high than this cannot be told from noise
 STEP = 8  # px between the nodes of a camera's table
@@ -35,8 +38,10 @@ MARGIN = 0.25  # of the image, beyond which no foot is looked for
 
 
 class PersonSize:
-    """State: a camera's table (2, V, U) of heights and widths, or the line through the lone blobs seen, (K, 4) foot u, v,
-    height, width; how much higher and wider these are."""
+    """State: a camera's table (2, V, U) of heights and widths, or the line through the lone blobs seen.
+
+    seen (K, 4): these blobs' foot u, v, height, width. factor (2,): how much higher and wider than expected they are.
+    """
 
     def __init__(self, context: Context) -> None:
         self.table: Array | None = None
@@ -77,7 +82,7 @@ class PersonSize:
             good = whole & (box[:, 3] >= SMALLEST) & (np.abs(np.log(box[:, 2] / box[:, 3] / expected)) <= np.log(STOUT))
         if not good.any():
             return
-        alone, foot = box[good], foot[good]
+        alone, foot = box[good] + [0.0, -EATEN, 0.0, EATEN], foot[good]
         round_ellipse = blob_measure.upright(ellipse[good, :4], ellipse[good, 4])[:, 2:]
         self.excess = np.concatenate([self.excess, alone[:, :1:-1] / round_ellipse])[-KEPT:]
         self.loose = np.median(np.concatenate([self.excess, np.tile(LOOSE, (ENOUGH, 1))]), 0)

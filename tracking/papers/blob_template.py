@@ -45,9 +45,9 @@ class Mask:
     def area(self, templates: Array) -> Array:
         """(K,) px of templates inside the image."""
         x, foot, h, w = templates.T
-        rows, columns = self.cover.shape
-        across = np.minimum(x + w / 2, columns) - np.maximum(x - w / 2, 0)
-        down = np.minimum(foot, rows) - np.maximum(foot - h, 0)
+        high, wide = self.gain.shape[0], self.gain.shape[1]
+        across = np.minimum(x + w / 2, wide) - np.maximum(x - w / 2, 0)
+        down = np.minimum(foot, high) - np.maximum(foot - h, 0)
         inside = np.maximum(across / w, 0) * np.maximum(down / h, 0)
         return np.asarray(ELLIPSE * h * w * np.maximum(inside, LEAST_INSIDE))
 
@@ -85,7 +85,7 @@ class Mask:
         if value.max() <= value[steps, steps]:
             return at
         i, j = np.unravel_index(int(value.argmax()), value.shape)
-        return at + np.array([offset[j], offset[i], 0.0, 0.0])
+        return np.asarray(at + np.array([offset[j], offset[i], 0.0, 0.0]))
 
     def prune(self, templates: Array, least: float, *, pieces: bool = False) -> Ints:
         """Rows of painted templates with support `least` when those with too little are taken away, the weakest first.

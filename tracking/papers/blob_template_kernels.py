@@ -1,7 +1,7 @@
 """Kernels of tracking.papers.blob_template: sums over upright ellipses, row by row.
 
 A template is an ellipse filling a box of h x w px that stands on the row `foot` at column x. A row of it from column
-left to right (right excluded) takes one difference of that row's running sum. Numpy twins: tests/reference_templates.py.
+left to right (right excluded) takes one difference of that row's running sum.
 """
 
 from __future__ import annotations

@@ -11,7 +11,6 @@ from tracking import kalman
 from tracking.papers.blob_config import BlobConfig
 
 
-
 def walk(x, foot, step, frames):
     """One person who walks to the right."""
     return [(x + step * k, foot, TALL) for k in range(frames)]

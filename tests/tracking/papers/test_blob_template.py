@@ -67,7 +67,7 @@ def test_what_two_cover_supports_neither():
 @pytest.mark.parametrize("gap", [14.0, 20.0])
 def test_two_in_one_blob_settle_where_they_are(gap):
     true = np.array([[50.0, 80.0, 60.0, 24.0], [50.0 + gap, 76.0, 60.0, 24.0]])
-    expected = true + [[3.0, -2.0, 0, 0], [-3.0, 2.0, 0, 0]]
+    expected = true + np.array([[3.0, -2.0, 0, 0], [-3.0, 2.0, 0, 0]])
     found = Mask(mask_of(*true)).settle(expected, np.full((2, 2), 4.0), 100.0)
     assert np.abs(found - true).max() <= 1.5
 
@@ -76,7 +76,7 @@ def test_a_post_in_front_keeps_the_template_whole():
     one = np.array([[60.0, 80.0, 60.0, 24.0]])
     cut = mask_of(one[0])
     cut[:, 57:62] = False
-    found = Mask(cut).settle(one + [2.0, 1.0, 0, 0], np.full((1, 2), 4.0), 20.0)
+    found = Mask(cut).settle(one + np.array([2.0, 1.0, 0, 0]), np.full((1, 2), 4.0), 20.0)
     assert np.abs(found - one).max() <= 1.5
 
 
