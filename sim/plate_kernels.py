@@ -65,18 +65,14 @@ def _sky(d, key, palette, out):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True)
-def _sunlit(point, normal, sun, penumbra, walls, wall_height, pillars, pillar_height, flights, spare, hit):  # type: ignore[no-untyped-def]
-    """Share of four points across the penumbra from which nothing stands before the sun."""
+def _sunlit(point, normal, sun, penumbra, k, walls, wall_height, pillars, pillar_height, flights, spare, hit):  # type: ignore[no-untyped-def]
+    """Whether nothing stands before the sun at the k-th of four points across the penumbra."""
     if len(walls) + len(pillars) + len(flights) == 0:
         return 1.0
-    lit = 0.0
-    for k in range(4):
-        spare[0] = point[0] + 1e-4 * normal[0] + penumbra * ((k % 2) - 0.5) * 0.7
-        spare[1] = point[1] + 1e-4 * normal[1] + penumbra * ((k // 2) - 0.5) * 0.7
-        spare[2] = point[2] + 1e-4 * normal[2]
-        if np.isinf(nearest(spare, sun, walls, wall_height, pillars, pillar_height, flights, hit)):
-            lit += 0.25
-    return lit
+    spare[0] = point[0] + 1e-4 * normal[0] + penumbra * ((k % 2) - 0.5) * 0.7
+    spare[1] = point[1] + 1e-4 * normal[1] + penumbra * ((k // 2) - 0.5) * 0.7
+    spare[2] = point[2] + 1e-4 * normal[2]
+    return 1.0 if np.isinf(nearest(spare, sun, walls, wall_height, pillars, pillar_height, flights, hit)) else 0.0
 
 
 @njit(cache=True)
@@ -147,8 +143,8 @@ def colours(  # type: ignore[no-untyped-def]
                     facing = max(0.0, normal[0] * sun[0] + normal[1] * sun[1] + normal[2] * sun[2]) / max(sun[2], 0.3)
                     if shadow > 0 and facing > 0:
                         facing *= _sunlit(
-                            point, normal, sun, penumbra, walls, wall_height, pillars, pillar_height, flights, spare,
-                            blocked,
+                            point, normal, sun, penumbra, sub, walls, wall_height, pillars, pillar_height, flights,
+                            spare, blocked,
                         )  # fmt: skip
                     sunlight = shadow * facing
                     light = (1 - shadow) * (0.85 + 0.15 * normal[2]) + sunlight

@@ -7,6 +7,7 @@ import pytest
 import sim.sequence
 from scenarios.errors import InputError, WorkError
 from scenarios.schema import Scenario
+from sim.hashing import canonical_hash, truth_hash
 from sim.sequence import observe
 from sim.truth import bodies
 from sim.types import Order
@@ -100,3 +101,54 @@ def test_simulation_is_repeatable_and_hides_by_name() -> None:
         assert x.detections is not None
         assert y.detections is not None
         assert np.array_equal(x.detections.pos, y.detections.pos)
+
+
+SMALL = {"image": [160, 120], "focal_px": 125}
+
+
+def test_pictures_are_drawn_when_they_are_asked_for() -> None:
+    motion, streams = crowd(0, frames=6), ("left", "right", "ids", "disparity")
+    sequence = observe(scenario(camera=SMALL), motion, streams=streams)
+    assert sequence.has_images
+    assert sequence.has_right
+    frame = list(sequence)[3]
+    assert frame.image is not None
+    assert frame.right is not None
+    assert (frame.image.shape, frame.image.dtype) == ((120, 160, 3), np.uint8)
+    assert all(f.image is None and f.detections is not None for f in sequence.without_pictures())
+    truth = sequence.frame_truth(4)
+    assert truth is not None
+    assert truth.pixels is not None
+    assert len(truth.pixels.visible_px) == len(truth.id)
+    assert truth.pixels.disparity is not None
+    background = sequence.background()
+    assert background is not None
+    assert background.shape == (50, 120, 160, 3)
+
+
+def test_pixels_asked_for_after_a_frame_are_those_asked_for_alone() -> None:
+    motion = crowd(0, frames=4)
+    drawn, alone = (observe(scenario(camera=SMALL), motion, streams=("left", "ids", "disparity")) for _ in range(2))
+    assert drawn.load_pixels is not None
+    assert alone.load_pixels is not None
+    for frame in drawn:
+        one, two = drawn.load_pixels(frame.index), alone.load_pixels(frame.index)
+        assert canonical_hash(one) == canonical_hash(two)
+
+
+def test_what_is_drawn_changes_no_truth() -> None:
+    motion = crowd(0, frames=4)
+    hashes = []
+    for streams in ((), ("left",), ("left", "right", "ids", "disparity", "background")):
+        sequence = observe(scenario(camera=SMALL), motion, streams=streams)
+        assert sequence.has_images == bool(streams)
+        list(sequence)
+        hashes.append(truth_hash("text", 1, 0, sequence.truth))
+    assert len(set(hashes)) == 1
+
+
+def test_streams_that_cannot_be_are_refused_at_once() -> None:
+    with pytest.raises(InputError, match="rigth"):
+        observe(scenario(), crowd(0), streams=("left", "rigth"))
+    with pytest.raises(InputError, match="baseline"):
+        observe(scenario(camera={"kind": "top"}), crowd(0), streams=("right",))
