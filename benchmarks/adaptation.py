@@ -25,14 +25,15 @@ from sim import simulate
 from tracking.detect.background import BACKGROUND, Background, foreground
 from tracking.detect.settings import BackgroundSettings
 
-SECONDS, CHANGE = 900, 60
+SECONDS, CHANGE, SHOWN = 900, 60, 6
+"""How long, when it changes, and how many seconds lie between points that are drawn."""
 RATES = {
     "two rates: 20 s, 200 s": BackgroundSettings(),
     "one rate: 20 s": BackgroundSettings(foreground_time=20.0),
     "one rate: 200 s": BackgroundSettings(background_time=200.0),
     "20 s, foreground left alone": BackgroundSettings(foreground_time=1e9),
 }
-GAINS = {"gain followed": BackgroundSettings(), "gain not followed": BackgroundSettings(gain="none")}
+GAINS = {"two rates: 20 s, 200 s": BackgroundSettings(), "gain not followed": BackgroundSettings(gain="none")}
 
 
 def small(name: str, seed: int, *settings: str):
@@ -112,7 +113,8 @@ def changes(seed: int) -> dict[str, Panel]:
         if change is with_person:
             curves["two rates, place protected"] = staying(trained, seen(), where, BackgroundSettings(), wide)
         report(title, curves)
-        panels[title] = Panel(title, range(SECONDS), curves, "s", "share called foreground", (0.0, 1.02))
+        drawn = {name: curve[::SHOWN] for name, curve in curves.items()}
+        panels[title] = Panel(title, range(0, SECONDS, SHOWN), drawn, "s", "share called foreground", (0.0, 1.02))
     return panels
 
 
