@@ -21,7 +21,8 @@ from tracking.stats import bootstrap
 def made(tmp_path_factory) -> Path:
     """Two seeds of a scene with a merge; blob's answers to what its sensor says, and to the truth."""
     folder = tmp_path_factory.mktemp("score")
-    assert run(["generate", "merge", "--seeds", "3:5", "--out", str(folder / "data")]) == 0
+    line = ["generate", "merge", "--seeds", "3:5", "--streams", "none", "--out", str(folder / "data")]
+    assert run(line) == 0
     for name in ("file", "truth"):
         options = ["--detections", name, "--out", str(folder / name)]
         assert run(["track", "blob", str(folder / "data"), *options]) == 0
@@ -39,10 +40,26 @@ def test_files_are_memory(made: Path, capsys, by: str) -> None:
     found = scored(capsys, made / "data", made / "file", "--group-match", by)
     for seed, row in zip((3, 4), found["sequences"], strict=True):
         sequence = simulate(load("merge"), seed)
-        expected = evaluate(sequence.truth, track("blob", sequence), group_match=by)
+        expected = evaluate(sequence.truth, track("blob", sequence, detections="file"), group_match=by)
         assert (row["name"], row["group_match"], row["surface"]) == (f"merge-s{seed:05d}", by, "ground")
         for key, value in expected.items():
             assert row[key] == (None if np.isnan(value) else pytest.approx(value, abs=1e-12)), key
+
+
+def test_files_are_memory_from_pixels(tmp_path: Path, capsys) -> None:
+    """Through pictures without loss."""
+    settings = ["camera.fps=5", "camera.image=[320,240]"]
+    data, tracks = tmp_path / "data", tmp_path / "tracks"
+    line = ["generate", "merge", "--seeds", "3", "--images", "png", "--out", str(data)]
+    assert run([*line, *(word for text in settings for word in ("--set", text))]) == 0
+    assert run(["track", "blob", str(data), "--out", str(tracks)]) == 0
+    (row,) = scored(capsys, data, tracks)["sequences"]
+    sequence = simulate(load("merge", settings), 3)
+    answers = track("blob", sequence)
+    assert answers.info["detections"] == "image"
+    assert sum(len(t.id) for t in answers) > 100
+    for key, value in evaluate(sequence.truth, answers).items():
+        assert row[key] == (None if np.isnan(value) else pytest.approx(value, abs=1e-12)), key
 
 
 def test_the_mean_has_every_key_and_an_interval(made: Path, capsys) -> None:
