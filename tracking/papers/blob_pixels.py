@@ -208,8 +208,7 @@ class Pixels:
         at = scene.settle(at, spread, c.evidence)
         shown = scene.shown(at)
         keep = scene.prune(at, c.track_support if sure else c.entry_support, pieces=sure)
-        worth, at = scene.alone(at[keep], pieces=True), at[keep]
-        shown = np.minimum(shown[keep], worth)
+        worth, shown, at = scene.alone(at[keep]), shown[keep], at[keep]
         noise = people.noise / np.maximum(shown, LEAST_SHOWN)[:, None] ** 2
         noise[:, 2:] *= BLIND
         return open_rows[keep], self._ellipses(_places(at)), noise, np.clip(worth, 0.0, 1.0)

@@ -1,0 +1,164 @@
+"""`blob` from pixels: on PETS and on rendered scenes, with parts of it switched off; frames per second by parts.
+
+usage: python benchmarks/blob_pixels.py [pets] [rendered] [speed] [overlay] [--data DIR] [--seeds 0:2] [--out DIR]
+
+pets: PETS09-S2L1-first200 (--data, default ../shared/data), boxes by IoU, and with View_001.xml the position on the
+ground at 1 m (similarity 0.5 of 1 - d / 2 m). One table for backgrounds spread over the recording, one for causal ones.
+rendered: catalogue scenes under a camera like PETS's (480 x 360, 7 frames/s, tilts of 15 and 20 degrees, JPEG at 80),
+once with camera and empty background, once as bare video with a background spread over it.
+speed: 640 x 480, about 20 people, best of three, and the shares of the parts. overlay: pictures with boxes into --out.
+"""
+
+from __future__ import annotations
+
+import argparse
+import cProfile
+import pstats
+import time
+from collections.abc import Iterator
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+
+import tracking
+from scenarios.loading import load
+from sim.io.source import open_source
+from sim.sequence import simulate
+from sim.types import Frame, Sequence
+from tracking.run import prepare, track
+
+KEYS = "HOTA", "DetA", "AssA", "MOTA", "IDF1"
+NEVER = {"split": False}
+ABLATIONS = (
+    ("blob", {}),
+    ("no splitting, no person size", NEVER),
+    ("nearest", {"association": "nearest"}),
+    ("expected size is no measurement", {"person_noise": 5.0}),
+    ("MOG2", {"segmentation": "mog2"}),
+)
+SCENES = (("street", 15), ("street", 20), ("cross", 15), ("mixed", 15), ("pillar", 20), ("split", 15), ("crowd", 20))
+VIEW = ("image=[480,360]", "fps=7", "focal_px=600", "crop=true", "baseline=0")
+LONGEST = 120  # frames of a rendered scene
+PARTS = ("classify", "clean", "find", "_associate", "_split", "newcomers", "learn", "adapt", "_report")
+
+
+def row(title: str, scores: list[list[float]], speed: float = float("nan")) -> None:
+    mean = np.mean(scores, 0)
+    print(f"| {title} | " + " | ".join(f"{v:.3f}" for v in mean) + f" | {speed:.0f} |", flush=True)
+
+
+def head(title: str) -> None:
+    print(f"\n| {title} | " + " | ".join(KEYS) + " | frames/s |\n|---" + "|---" * (len(KEYS) + 1) + "|")
+
+
+def one(sequence: Sequence, params: dict[str, object], similarity: str = "boxes") -> tuple[list[float], float]:
+    run = track("blob", sequence, params=params, detections="image")
+    assert sequence.truth is not None
+    scores = tracking.evaluate(sequence.truth, run, similarity=similarity)
+    return [scores[k] for k in KEYS], run.info["frames_per_second"]
+
+
+def pets(folder: Path) -> None:
+    for background in ("spread:50", "first:50"):
+        head(f"PETS, background {background}")
+        sequence = open_source(folder, images=True, background=background)[0]
+        for title, params in ABLATIONS if background == "spread:50" else ABLATIONS[:1]:
+            scores, speed = one(sequence, params)
+            row(title, [scores], speed)
+    sequence = open_source(folder, images=True, camera=folder / "View_001.xml")[0]
+    for similarity in ("boxes", "ground"):
+        scores, speed = one(sequence, {}, similarity)
+        row(f"with View_001.xml, {similarity}", [scores], speed)
+
+
+def rendered(seeds: range) -> None:
+    for bare in (False, True):
+        made = [held(name, tilt, seed, bare) for name, tilt in SCENES for seed in seeds]
+        head("rendered, " + ("bare video" if bare else "camera and empty background"))
+        for title, params in ABLATIONS:
+            found = [one(sequence, params) for sequence in made]
+            row(title, [s for s, _ in found], float(np.mean([f for _, f in found])))
+
+
+def held(name: str, tilt: int, seed: int, bare: bool) -> Sequence:
+    """A rendered scene, its pictures in memory; people mostly out of view are no truth of a picture."""
+    settings = [f"camera.{s}" for s in (f"tilt_deg={tilt}", *VIEW)]
+    live = simulate(load(name, set=[*settings, "picture.jpeg=80"]), seed)
+    frames = [f for f in live.frames() if f.index <= LONGEST]
+    truth = live.truth
+    assert truth is not None
+    assert truth.truncation is not None
+    keep = (truth.frame <= LONGEST) & (truth.truncation < 0.5)
+    rows = ("frame", "id", "group", "pos", "vel", "box", "visibility", "z", "heading", "height", "truncation")
+    cut = {k: getattr(truth, k)[keep] for k in (*rows, "visible_box") if getattr(truth, k) is not None}
+    none = {"groups": None, "groups_px": None, "labelled": None, "events": None, "near": None, "orders": ()}
+    seen = truth.replace(length=len(frames), **cut, **none)
+    spread = [frames[k].image for k in np.linspace(0, len(frames) - 1, 50).astype(int)]
+
+    def again() -> Iterator[Frame]:
+        return iter(frames)
+
+    video = replace(live, length=len(frames), frames=again, load_truth=lambda: seen, bare=None, load_pixels=None)
+    if not bare:
+        return video
+    return replace(video, camera=None, scene=None, px_per_m=float("nan"), load_background=lambda: np.stack(spread))
+
+
+def speed() -> None:
+    live = simulate(load("crowd", set=["camera.tilt_deg=25", "camera.crop=true", "camera.baseline=0"]), 3)
+    frames = [f for f in live.frames() if f.index <= 60]
+    ready = prepare("blob", replace(live, frames=lambda: iter(frames)), detections="image")
+    best = float("inf")
+    for _ in range(3):
+        ready.reset(0)
+        start = time.perf_counter()
+        people = [len(ready.answer(f).id) for f in frames]
+        best = min(best, time.perf_counter() - start)
+    print(f"\n640 x 480, {np.mean(people[10:]):.0f} people told: {len(frames) / best:.0f} frames/s")
+    ready.reset(0)
+    profile = cProfile.Profile()
+    profile.enable()
+    for f in frames:
+        ready.answer(f)
+    profile.disable()
+    found = pstats.Stats(profile).stats  # type: ignore[attr-defined]
+    for (file, _, name), (_, _, _, spent, _) in sorted(found.items(), key=lambda item: -item[1][3]):
+        if name in PARTS and "/tracking/" in file:
+            print(f"  {Path(file).stem}.{name}: {1000 * spent / len(frames):.2f} ms a frame")
+
+
+def overlay(folder: Path, out: Path) -> None:
+    import cv2
+
+    out.mkdir(parents=True, exist_ok=True)
+    sequence = open_source(folder, images=True)[0]
+    for frame, told in zip(sequence, track("blob", sequence, detections="image"), strict=True):
+        image = np.repeat(np.repeat(frame.image, 2, 0), 2, 1)
+        for (x, y, w, h), id in zip(2 * told.box, told.id, strict=True):
+            colour = tuple(int(c) for c in np.random.default_rng(int(id)).integers(60, 255, 3))
+            cv2.rectangle(image, (round(x), round(y)), (round(x + w), round(y + h)), colour, 2)
+            cv2.putText(image, str(id), (round(x), round(y) - 4), cv2.FONT_HERSHEY_SIMPLEX, 0.5, colour, 1)
+        cv2.imwrite(str(out / f"{frame.index:06d}.jpg"), image)
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("what", nargs="*", default=["pets", "rendered", "speed"])
+    parser.add_argument("--data", type=Path, default=Path(__file__).parents[2] / "shared" / "data")
+    parser.add_argument("--seeds", default="0:2")
+    parser.add_argument("--out", type=Path, default=Path("overlay"))
+    given = parser.parse_args()
+    folder = given.data / "mot" / "PETS09-S2L1-first200"
+    if "pets" in given.what:
+        pets(folder)
+    if "overlay" in given.what:
+        overlay(folder, given.out)
+    if "rendered" in given.what:
+        rendered(range(*(int(n) for n in given.seeds.split(":"))))
+    if "speed" in given.what:
+        speed()
+
+
+if __name__ == "__main__":
+    main()
