@@ -75,8 +75,15 @@ def moved(gain: Array, cover: Ints, sums: Array, template: Array, steps: int, st
         return found
     running(gain, cover, low, high, left, right, sums)
     for i in range(2 * steps + 1):
-        for j in range(2 * steps + 1):
-            found[i, j] = template_sum(sums, x + (j - steps) * step, foot + (i - steps) * step, h, w, left, right)
+        down = foot + (i - steps) * step
+        for row in range(max(int(down - h), 0), min(int(down) + 1, gain.shape[0])):
+            half = half_width(row, down, h, w)
+            if half > 0:
+                for j in range(2 * steps + 1):
+                    a, b = span(x + (j - steps) * step, half, gain.shape[1])
+                    a, b = max(a, left), min(b, right)
+                    if b > a:
+                        found[i, j] += sums[row, b] - sums[row, a]
     return found
 
 
