@@ -13,7 +13,7 @@ from sim.render import BACKGROUNDS, render, stage
 from sim.truth import bodies
 from sim.types import Camera, Motion, Scene, Stairs
 from tests import reference_render as slow
-from tests.reference_sense import above, crowd, pinhole
+from tests.reference_sense import above, crowd, pinhole, walkers
 
 STAIRS = Stairs(np.array([9.0, 5.0]), np.array([12.0, 6.0]), 3.0, 1.2, 6, 2.0)
 BARE = Scene(np.array([16.0, 10.0]))
@@ -78,6 +78,14 @@ def test_disparities_are_those_of_a_slow_renderer(view: str, scene: str) -> None
     off = np.abs(wanted - found)[both]
     assert np.sort(off)[-3] < 1e-4
     assert np.isnan(found).sum() == pytest.approx(np.isnan(wanted).sum(), abs=12)
+
+
+def test_people_closer_than_a_step_hide_each_other_surface_by_surface() -> None:
+    start = np.array([8.0, 5.0]) + 0.2 * np.stack([np.cos(np.arange(9) * 0.7), np.sin(np.arange(9) * 1.9)], axis=1)
+    motion, camera = walkers(start, np.full((9, 2), 0.1), frames=2), small(pinhole(30.0, at=(8.0, 0.5, 3.5)))
+    seen, pixels = slow.look(camera, motion, 1), stage(motion, camera).pixels(1)
+    assert len(np.unique(seen.ids)) > 6
+    assert (pixels.ids != seen.ids).sum() <= 2
 
 
 def test_blobs_are_connected_regions() -> None:
