@@ -1,9 +1,9 @@
-"""`blob`: gates, association, a bank of Kalman filters and track management on boxes.
+"""`blob`: gates, association, a bank of Kalman filters and track management, on boxes or from pixels.
 
 Gonzalez, Rowe, Andrade, Villanueva, "Efficient management of multiple agent tracking through observation handling",
 2006. State per track: (x, x', y, y', h, h', w, w') in image px, its covariance in m^2, constant speed with white
 acceleration (tracking.kalman). The measurement is (x, y, h, w), a box's centre, height and width; a box has no axis, so
-the paper's angle rests until ellipses are measured.
+the paper's angle is measured from pixels only, by a blob's ellipse (tracking.papers.blob_pixels, with what is ours).
 
     gate       d^2 = (z - z_pred)' S^-1 (z - z_pred) <= chi2_4(gate)              (eq. 9; d^2, not d)
     associate  each measurement to the nearest track in whose gate it lies         (4.4)
