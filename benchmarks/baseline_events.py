@@ -51,7 +51,7 @@ def measure(entry: Entry, seeds: range) -> list[Scores]:
     found = []
     for seed in seeds:
         try:
-            truth = simulate(entry.scenario, seed, entry.repeat).truth
+            truth = simulate(entry.scenario, seed, entry.repeat, streams=()).truth
         except FlockscopeError as error:
             print(f"    {entry.name}, seed {seed}: {error.line()}")
             continue

@@ -116,7 +116,7 @@ def walks(seeds: range) -> list[Scene]:
 
 
 def generated(seeds: range) -> list[Scene]:
-    return [labelled(simulate(load(name), seed)) for name in CATALOGUE for seed in seeds]
+    return [labelled(simulate(load(name), seed, streams=())) for name in CATALOGUE for seed in seeds]
 
 
 def labelled(sequence: Sequence) -> Scene:
@@ -149,7 +149,7 @@ def scenes(python: str, folder: Path, title: str, made: list[Scene]) -> None:
 
 def real(python: str, folder: Path, data: Path) -> None:
     for name in REAL:
-        (sequence,) = open_source(data / "mot" / name)
+        (sequence,) = open_source(data / "mot" / name, images=False)
         scene = labelled(sequence)
         answers = everybody(python, folder, sequence)
         block = max(round(sequence.fps), sequence.length // 20)

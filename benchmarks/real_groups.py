@@ -109,7 +109,7 @@ def choose(seeds: range) -> None:
     """Pairwise F1 of each rule of the grid on simulated crowds: mean over the catalogue, seeds pooled."""
     found: dict[str, list[float]] = {}
     for name in names():
-        truths = [simulate(load(name), seed).truth for seed in seeds]
+        truths = [simulate(load(name), seed, streams=()).truth for seed in seeds]
         where = [pairs(truth) for truth in truths]
         same = np.concatenate([s for _, _, s in where])
         row = []
@@ -171,7 +171,7 @@ def caviar(root: Path) -> None:
 
 
 def pets(root: Path) -> None:
-    truth = open_source(root / "mot" / "PETS09-S2L1-first200")[0].truth
+    truth = open_source(root / "mot" / "PETS09-S2L1-first200", images=False)[0].truth
     made = derive(as_tracks(truth), truth.fps, truth.px_per_m)
     both = [t for t in made if {11, 12} <= set(t.id.tolist())]
     one = [t.index for t in both if t.group[t.id == 11] >= 0 and t.group[t.id == 11] == t.group[t.id == 12]]

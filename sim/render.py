@@ -21,14 +21,13 @@ from sim.pixel_truth import pixel_truth
 from sim.sensor_noise import offsets, pool
 from sim.silhouettes import Cast, Crowd
 from sim.stretch import FRAMES, Stretch
-from sim.types import Camera, Frame, Image, Motion, PixelTruth
+from sim.types import BACKGROUNDS, Camera, Frame, Image, Motion, PixelTruth
 from sim.view import View, blur_weights
 from sim.wear import wear
 
 if TYPE_CHECKING:
     from scenarios.schema import Light, Picture
 
-BACKGROUNDS = 50  # empty frames before the first
 LEFT, RIGHT = 0, 1
 
 

@@ -10,10 +10,11 @@ import numpy as np
 
 from scenarios.errors import InputError
 from sim.camera import px_per_m_at_centre, solve
+from sim.io.sample import OWN
 from sim.orders import check_orders
-from sim.render import BACKGROUNDS, Rendered, Stage, stage
+from sim.render import Rendered, Stage, stage
 from sim.truth import bodies, label
-from sim.types import Camera, Detections, Frame, Image, Motion, Order, PixelTruth, Scene, Sequence, Truth
+from sim.types import BACKGROUNDS, Camera, Detections, Frame, Image, Motion, Order, PixelTruth, Scene, Sequence, Truth
 
 if TYPE_CHECKING:
     from scenarios.schema import Scenario
@@ -92,7 +93,12 @@ def observe(
         px_per_m=px_per_m_at_centre(camera),
         has_detections=True,
         load_people=named,
-        source={"kind": "simulated", "seed": motion.seed, "repeat": motion.repeat},
+        source={
+            "kind": "simulated",
+            "seed": motion.seed,
+            "repeat": motion.repeat,
+            **({} if drawn is None else {"background": OWN}),
+        },
         has_images=drawn is not None and drawn.has_image,
         has_right=drawn is not None and drawn.has_right,
         bare=bare,

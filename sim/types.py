@@ -23,6 +23,7 @@ from sim.arrays import no_ids as no_ids
 Plane = Literal["ground", "space", "image"]
 Unit = Literal["person", "group"]
 DetectionMode = Literal["image", "truth", "file"]
+BACKGROUNDS = 50  # empty frames before the first, of a sequence of ours
 EVENT_KINDS = ("merge", "split", "cross", "queue", "form", "dissolve", "enter", "leave")
 
 
@@ -257,7 +258,7 @@ class FrameTruth(Frozen):
 class PixelTruth(Frozen):
     """What is true of one frame's pixels, N people in the order of FrameTruth's rows.
 
-    ids (H, W) int64: person id, 0 ground and walls behind everybody, -2 walls and pillars. disparity (H, W) px, nan
+    ids (H, W) int64: person id, -2 walls and pillars, 0 all else (ground, stairs, sky). disparity (H, W) px, nan
     where the right camera does not see the point; None without a right camera. visible_px, amodal_px (N,): px that
     show the person, and would if nobody and nothing were in the way (inside the image); box (N, 4) ltwh px of what
     shows, nan where nothing does. blob (N,): people with the same number show in one connected region, -1 hidden.

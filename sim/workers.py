@@ -11,7 +11,7 @@ from typing import Any, TypeVar
 
 from scenarios.errors import WorkError
 
-THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS")
+THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS", "OPENCV_FOR_THREADS_NUM")
 T = TypeVar("T")
 R = TypeVar("R")
 Run = Callable[[Callable[[T], R], list[T]], Iterator[tuple[T, R]]]

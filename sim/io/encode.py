@@ -5,6 +5,8 @@ One thread and no dates: the same pictures give the same bytes.
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from fractions import Fraction
 from pathlib import Path
 from typing import Any
@@ -23,23 +25,35 @@ def rate_of(fps: float) -> Fraction:
     return Fraction(fps).limit_denominator(1001)
 
 
-class Movie:
-    """A video file that takes (H, W, 3) BGR pictures one after the other; a context manager, whole when left."""
+@contextmanager
+def movie(path: Path, size: tuple[int, int], fps: float, quality: int = QUALITY) -> Iterator[Movie]:
+    """A video file of pictures of this size (width, height) to write; it is whole when left without an error."""
+    if size[0] % 2 or size[1] % 2:
+        raise InputError(
+            place="--images mp4", got="pictures of {}×{} px".format(*size), expected="an even width and height",
+            remedy="take --images jpg or png, or another camera.image",
+        )  # fmt: skip
+    # The file is ours, as libav keeps its own open where a video cannot be ended; and it is without Python code, which
+    # Ctrl-C would end unseen in a callback of libav.
+    with path.open("wb", buffering=0) as file:
+        made = Movie(file, size, fps, quality)
+        try:
+            yield made
+            made.end()
+        finally:
+            made.close()
 
-    def __init__(self, path: Path, size: tuple[int, int], fps: float, quality: int = QUALITY):
+
+class Movie:
+    """A video that takes (H, W, 3) BGR pictures one after the other; see `movie`."""
+
+    def __init__(self, file: Any, size: tuple[int, int], fps: float, quality: int):
         import av
 
-        if size[0] % 2 or size[1] % 2:
-            raise InputError(
-                place="--images mp4", got="pictures of {}×{} px".format(*size), expected="an even width and height",
-                remedy="take --images jpg or png, or another camera.image",
-            )  # fmt: skip
-        rate = rate_of(fps)
-        self._file = _File(path)
-        self._container: Any = av.open(self._file, "w", format="mp4", options={"movflags": "faststart"})
+        self._container: Any = av.open(file, "w", format="mp4", options={"movflags": "faststart"})
         group = str(max(1, round(fps)))
         options = {"crf": str(quality), "preset": "veryfast", "g": group, "bf": "2", "threads": "1"}
-        self._stream: Any = self._container.add_stream("libx264", rate=rate, options=options)
+        self._stream: Any = self._container.add_stream("libx264", rate=rate_of(fps), options=options)
         self._stream.width, self._stream.height = size
         self._stream.pix_fmt = "yuv420p"
         context = self._stream.codec_context
@@ -56,44 +70,11 @@ class Movie:
         frame = av.VideoFrame.from_ndarray(planes, format="yuv420p")
         frame.color_range, frame.colorspace = NARROW, BT601
         self._container.mux(self._stream.encode(frame))
-        self._file.check()
 
-    def __enter__(self) -> Movie:
-        return self
+    def end(self) -> None:
+        """Nothing comes any more."""
+        self._container.mux(self._stream.encode(None))
 
-    def __exit__(self, *error: object) -> None:
-        try:
-            if error[0] is None:
-                self._container.mux(self._stream.encode(None))
-        finally:
-            try:
-                self._container.close()
-            finally:
-                self._file.close()
-                if error[0] is None:
-                    self._file.check()
-
-
-class _File:
-    """What libav writes to, which keeps its own files open where it cannot end a video. State: the first refusal of the
-    disk, after which all goes nowhere."""
-
-    def __init__(self, path: Path):
-        self.name, self._raw = str(path), path.open("wb", buffering=0)
-        self._error: OSError | None = None
-        self.seek, self.tell, self.close = self._raw.seek, self._raw.tell, self._raw.close
-
-    def write(self, body: bytes) -> int:
-        """All of it, or nothing any more."""
-        rest = memoryview(body)
-        try:
-            while len(rest) and self._error is None:
-                rest = rest[self._raw.write(rest) :]
-        except OSError as error:
-            self._error = error
-        return len(body)
-
-    def check(self) -> None:
-        """Raise what the disk refused."""
-        if self._error is not None:
-            raise self._error
+    def close(self) -> None:
+        """Write what is left, and where it lies."""
+        self._container.close()

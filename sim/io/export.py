@@ -26,7 +26,7 @@ def coco(source: str | Path, out: str | Path) -> Path:
     truth, visibility its share. file_name is the frame's picture, or the video that holds it. The same dataset gives
     the same bytes.
     """
-    sequences = [s for s in open_source(source) if s.truth is not None and s.truth.box is not None]
+    sequences = [s for s in open_source(source, images=False) if s.truth is not None and s.truth.box is not None]
     if not sequences:
         raise InputError(
             file=source, got="no labelled boxes", expected="a dataset with boxes", remedy="give a generated dataset"

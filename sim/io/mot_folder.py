@@ -80,10 +80,10 @@ def open_folder(
     fps: float | None = None,
     px_per_m: float | None = None,
     camera: Camera | None = None,
-    images: bool = False,
+    images: bool = True,
     background: Choice | None = None,
 ) -> Sequence:
-    """A MOTChallenge folder as Sequence. Frames carry pixels only if `images` (decoded one by one)."""
+    """A MOTChallenge folder as Sequence; its pictures, decoded one by one, are left out where not `images`."""
     ini = path / "seqinfo.ini"
     info = read_seqinfo(ini) if ini.is_file() else SeqInfo(path.name, None, None, None)
     rate = frame_rate(fps, info.fps)
@@ -118,7 +118,7 @@ def open_folder(
         name=info.name, fps=rate, length=length, frames=frames if images and pictures.files else bare, bare=bare,
         load_truth=(lambda: mot.read_truth(gt, info.name, rate, length, scale)) if gt.is_file() else None,
         image_size=size, camera=None if camera is None else fitted(camera, size, path),
-        px_per_m=scale, has_images=bool(pictures.files), has_detections=found is not None,
+        px_per_m=scale, has_images=images and bool(pictures.files), has_detections=found is not None,
         load_background=None if choice is None else Sample(choice, length, path, sample),
         source={"kind": "mot", "path": str(path), **({} if choice is None else {"background": str(choice)})},
     )  # fmt: skip

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import hashlib
-from contextlib import ExitStack
+from contextlib import AbstractContextManager, ExitStack, nullcontext
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from scenarios.errors import InputError
 from sim import hashing
 from sim.io import atomic, streams
-from sim.io.encode import Movie
+from sim.io.encode import Movie, movie
 from sim.io.tables import Column, table_bytes
 from sim.types import Frame, Image, PixelTruth, Sequence, Truth
 
@@ -44,8 +44,9 @@ class Output:
     def __init__(self, folder: Path, stream: str, images: str, size: tuple[int, int], fps: float):
         self.stream, self.images, self.folder = stream, images, folder
         self.pixels, self.files = hashing.PixelHash(), Facts()
-        movie = streams.suffix(stream, images) == "mp4"
-        self._movie = Movie(folder / streams.file_name(stream, images, 1), size, fps) if movie else None
+        self._open: AbstractContextManager[Movie | None] = nullcontext()
+        if streams.suffix(stream, images) == "mp4":
+            self._open = movie(folder / streams.file_name(stream, images, 1), size, fps)
 
     def add(self, picture: NDArray[Any]) -> None:
         """The next picture: (H, W, 3) uint8, or (H, W) uint16 of an exact stream."""
@@ -59,13 +60,12 @@ class Output:
         self.files[name] = {"sha256": hashing.file_hash(body), "bytes": len(body)}
 
     def __enter__(self) -> Output:
+        self._movie = self._open.__enter__()
         return self
 
     def __exit__(self, *error: Any) -> None:
-        if self._movie is None:
-            return
-        self._movie.__exit__(*error)
-        if error[0] is None:
+        self._open.__exit__(*error)
+        if self._movie is not None and error[0] is None:
             name = streams.file_name(self.stream, self.images, 1)
             with (self.folder / name).open("rb") as file:
                 digest = hashlib.file_digest(file, "sha256").hexdigest()

@@ -12,9 +12,9 @@ from typing import Literal
 import numpy as np
 
 from scenarios.errors import InputError
-from sim.types import Image
+from sim.types import BACKGROUNDS, Image
 
-FRAMES = 50
+FRAMES = BACKGROUNDS
 OWN = f"{FRAMES} empty frames before frame 1"
 
 

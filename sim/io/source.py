@@ -22,7 +22,7 @@ def open_source(
     fps: float | None = None,
     px_per_m: float | None = None,
     camera: Camera | str | Path | None = None,
-    images: bool = False,
+    images: bool = True,
     background: str | None = None,
 ) -> list[Sequence]:
     """The Sequences of a path, a dataset's in the order of their paths.

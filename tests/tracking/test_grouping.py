@@ -242,7 +242,9 @@ def test_named_groups_without_events_get_them():
 
 def test_groups_named_by_their_members_alone():
     pairs = np.tile([3, 3, 8, 8], (120, 1))
-    named = [t.replace(events=(), group=np.full(4, -1), derived=False) for t in derive(tracks(passing(), group=pairs), FPS)]
+    named = [
+        t.replace(events=(), group=np.full(4, -1), derived=False) for t in derive(tracks(passing(), group=pairs), FPS)
+    ]
     made = with_groups(named, FPS, 1.0)
     assert [e[1] for e in events(made)] == ["cross"]
     assert made[0].group.tolist() == [3, 3, 8, 8]

@@ -13,7 +13,7 @@ from urllib.parse import quote
 import numpy as np
 
 from sim.io.atomic import writing
-from sim.io.encode import Movie, rate_of
+from sim.io.encode import movie, rate_of
 from sim.types import Image, Sequence
 
 Video = Literal["auto", "inside", "beside", "none"]
@@ -75,13 +75,13 @@ def encode(sequence: Sequence, path: Path, step: Callable[[str], None]) -> tuple
     width, height = sequence.image_size
     last: Image = np.full((height, width, 3), GREY, np.uint8)
     lost = []
-    with Movie(path, (width + width % 2, height + height % 2), sequence.fps, QUALITY) as movie:
+    with movie(path, (width + width % 2, height + height % 2), sequence.fps, QUALITY) as film:
         for frame in sequence:
             if frame.image is None:
                 lost.append(frame.index)
             else:
                 last = frame.image
-            movie.add(even(last))
+            film.add(even(last))
             step(sequence.name)
     return tuple(lost)
 

@@ -13,7 +13,7 @@ import numpy as np
 
 from scenarios.errors import InputError
 from sim.io.atomic import writing
-from sim.io.encode import Movie
+from sim.io.encode import movie
 from sim.types import Frame, Image, Sequence, Tracks
 from tracking.app import marks, painter
 from tracking.app.film import even, is_source
@@ -81,11 +81,11 @@ def _layers(
 def _write(path: Path, sequence: Sequence, layers: list[list[tuple[Side, Style]]], step: Callable[[str], None]) -> None:
     pictures = compose(sequence, layers)
     first = next(pictures)
-    with Movie(path, (first.shape[1], first.shape[0]), sequence.fps) as movie:
-        movie.add(first)
+    with movie(path, (first.shape[1], first.shape[0]), sequence.fps) as film:
+        film.add(first)
         step(sequence.name)
         for picture in pictures:
-            movie.add(picture)
+            film.add(picture)
             step(sequence.name)
 
 

@@ -50,7 +50,7 @@ def score(
 
     blocks: draws for the interval of a single recording, 0 for none.
     """
-    sequences = open_source(truth, fps=fps, px_per_m=px_per_m)
+    sequences = open_source(truth, fps=fps, px_per_m=px_per_m, images=False)
     if blocks and len(sequences) > 1:
         raise InputError(
             place="--blocks", got=f"{len(sequences)} sequences", expected="a single recording",
