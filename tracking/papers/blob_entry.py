@@ -1,8 +1,9 @@
 """Who is new in the foreground that no track explains, and how many they are: for `blob` from pixels (ours).
 
 A region left over is tried with 1, 2, ... templates of the size that a person has there, side by side to begin with,
-each where its columns reach down to, then moved in turn to where they explain most. The number is the one whose
-templates together explain most, each costing `support` of a whole person; none may have less.
+each where its columns reach down to (from above: in a row along the region's longer axis), then moved in turn to where
+they explain most. The number is the one whose templates together explain most, each costing `support` of a whole
+person; none may have less.
 """
 
 from __future__ import annotations
@@ -54,10 +55,22 @@ def _in_region(scene: Mask, rows: Ints, columns: Ints, person: float, size: Pers
 
 def _guess(rows: Ints, columns: Ints, count: int, size: PersonSize) -> Array:
     """(count, 4) templates side by side over a region's pixels, each with as many, standing where these end."""
+    if size.above:
+        return _from_above(rows, columns, count, size)
     order = np.argsort(columns, kind="stable")
     parts = np.array_split(order, count)
     foot = np.array([[columns[p].mean() + 0.5, np.quantile(rows[p], 0.98) + 1] for p in parts])
     return np.column_stack([foot, size.at(foot)])
+
+
+def _from_above(rows: Ints, columns: Ints, count: int, size: PersonSize) -> Array:
+    """(count, 4) templates along the longer axis of a region's pixels, each in the middle of as many."""
+    at = np.column_stack([columns, rows]) + 0.5
+    axis = np.linalg.eigh(np.cov(at.T))[1][:, -1]
+    parts = np.array_split(np.argsort(at @ axis, kind="stable"), count)
+    found = np.array([at[p].mean(0) for p in parts])
+    extent = size.at(found)
+    return np.column_stack([found[:, 0], found[:, 1] + extent[:, 0] / 2, extent])
 
 
 def _explained(scene: Mask, at: Array) -> float:

@@ -15,14 +15,17 @@ from tracking.papers import blob_measure
 from tracking.papers.blob_config import BlobConfig
 from tracking.papers.blob_tracks import Population
 
+HEADING = 6.0  # times faster than they lean people turn: from straight above the direction is the heading's
+
 
 class People(Population):
     """N tracks; angle (2, N): direction rad and its variance; nominal (5, N, 4): as bank, with nominal noise."""
 
     def __init__(self, config: BlobConfig, dynamics: lifecycle.Dynamics, context: Context) -> None:
         self.angle, self.nominal = np.zeros((2, 0)), np.zeros((5, 0, 4))
-        self.turn = np.radians(config.angle_rate) ** 2 * dynamics.dt
         super().__init__(config, dynamics, context)
+        rate = config.angle_rate * (HEADING if self.top else 1.0)
+        self.turn = np.radians(rate) ** 2 * dynamics.dt
 
     def predict(self) -> None:
         """One frame on."""

@@ -24,7 +24,6 @@ from tracking.papers.blob_people import People
 from tracking.papers.blob_size import PersonSize
 from tracking.papers.blob_template import Mask
 
-SHORT, TALL, THIN, WIDE = 0.8, 1.25, 0.5, 1.6  # of a person's height and width: a blob within is one person
 SHARED = 0.35  # share of a predicted box in a blob's from which on the blob may be this track's
 LEAST_AREA = 0.05  # m^2: smaller blobs are noise
 COARSE = 20.0  # px per m that windows and areas follow while no scale is known
@@ -97,7 +96,7 @@ class Pixels:
         self.background.adapt(frame.image, classes, self._protected())
         if len(found):
             places = self.people.uprights()
-            alone = self._lone(found.box, places) if self.size.reliable else ~self._several(found.box, places)
+            alone = self._lone(found, places) if self.size.reliable else ~self._several(found.box, places)
             alone &= ~self._cut(found.box)
             self.size.learn(found.box, found.ellipse, alone)
             self._take_scale()
@@ -122,7 +121,7 @@ class Pixels:
         people, c = self.people, self.config
         expected = people.uprights()
         split = c.split and self.size.reliable
-        lone = self._lone(found.box, expected) if split else np.ones(len(found), bool)
+        lone = self._lone(found, expected) if split else np.ones(len(found), bool)
         columns = lone.nonzero()[0]
         z, angle_var = found.ellipse[columns], found.angle_var[columns]
         rows, taken = self._associate(z, angle_var)
@@ -151,19 +150,16 @@ class Pixels:
         """Measure the axes of these tracks by what a person's are there, too."""
         people = self.people
         at = _templates(people.uprights()[rows])
-        size = self.size.at(at[:, :2]) / self.size.loose
+        size = self.size.axes(at[:, :2])
         known = np.isfinite(size).all(1)
         rows, size = rows[known], size[known]
         expected = blob_measure.lying(np.column_stack([at[known, :2], size]))
         people.expect(rows, expected, self.config.person_noise**2)
 
-    def _lone(self, box: Array, expected: Array) -> Bools:
+    def _lone(self, found: detect.Blobs, expected: Array) -> Bools:
         """(M,) blobs of one person's size, whole, in which at most one confirmed track is expected."""
-        size = self.size.at(np.stack([box[:, 0] + box[:, 2] / 2, box[:, 1] + box[:, 3]], 1))
-        with np.errstate(invalid="ignore"):
-            tall, wide = (box[:, :1:-1] / size).T
-            fits = (tall >= SHORT) & (tall <= TALL) & (wide >= THIN) & (wide <= WIDE)
-        return np.asarray(fits & ~self._cut(box) & ~self._several(box, expected))
+        box = found.box
+        return np.asarray(self.size.one(box, found.ellipse) & ~self._cut(box) & ~self._several(box, expected))
 
     def _boxes(self, upright: Array) -> Array:
         """(N, 4) the boxes of people whose ellipses have these upright boxes."""
@@ -180,12 +176,15 @@ class Pixels:
         return np.asarray((blob_measure.covered(sure, places) >= SHARED).sum(0) > 1)
 
     def _associate(self, z: Array, angle_var: Array) -> tuple[Ints, Ints]:
-        """Tracks and ellipses that belong together; 5 degrees of freedom where both have a direction, else 4."""
+        """Tracks and ellipses that belong together; 5 degrees of freedom where both have a direction, else 4.
+
+        From straight above 4: people turn on the spot.
+        """
         people = self.people
         if not len(z) or not len(people.id):
             return np.zeros(0, np.int64), np.zeros(0, np.int64)
         d2 = kalman.distances(people.bank, z[:, :4], people.noise, people.scale)
-        directed = angle_var < np.radians(30.0) ** 2
+        directed = (angle_var < np.radians(30.0) ** 2) & ~np.bool_(self.size.above)
         turn = kalman.angle_innovation(z[:, 4], people.angle[0][:, None])
         s = people.angle[1][:, None] + angle_var + self.angle_noise
         d2 = d2 + np.where(directed, turn * turn / s, 0.0)

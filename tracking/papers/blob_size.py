@@ -5,6 +5,7 @@ from lone blobs, h = a + b v over the row v of their lower edge, as a pinhole wi
 relative errors with Cauchy weights (a blob of several people, or of a part, is an outlier); widths are a share of it.
 The slope has a prior, since blobs of one row say nothing about it. A learned size is `reliable` once enough lone blobs
 agree; before that nothing is split and every blob counts as one person, as in the paper.
+From straight above everybody is the same ellipse, turned as he walks: measured are a blob's axes, not its box's sides.
 """
 
 from __future__ import annotations
@@ -32,7 +33,10 @@ EATEN = (
     1.3  # px of a person's height, at the head, that blur, majority and opening leave out: median of rendered scenes
 )
 LOOSE = 1.0, 1.1  # height and width of a person's box over those of the box round the ellipse of his pixels: a prior
-SMALLEST = 12.0  # px: people less high than this cannot be told from noise
+SMALLEST = 12.0  # px: people less high than this cannot be told from noise,
+FLAT = 6.0  # ... and from above people less wide
+SHORT, TALL, THIN, WIDE = 0.8, 1.25, 0.5, 1.6  # of a person's height and width: a blob within is one person
+PART = 0.6  # SHORT from above, where what is as small can only be part of one, half his colours the shadow's
 STEP = 8  # px between the nodes of a camera's table
 MARGIN = 0.25  # of the image, beyond which no foot is looked for
 
@@ -41,29 +45,60 @@ class PersonSize:
     """State: a camera's table (2, V, U) of heights and widths, or the line through the lone blobs seen.
 
     seen (K, 4): these blobs' foot u, v, height, width. factor (2,): how much higher and wider than expected they are.
+    flat (2,): from straight above height and width are the axes of a person's ellipse, px, instead; else None.
     """
 
     def __init__(self, context: Context) -> None:
         self.table: Array | None = None
+        self.flat: Array | None = None
         self.seen = np.zeros((0, 4))  # u, v, h, w of lone blobs
         self.unused = 0
         self.excess, self.loose = np.zeros((0, 2)), np.array(LOOSE)
         self.line, self.factor, self.agreed = (float("nan"), 0.0), np.ones(2), 0
-        if context.camera is not None:
+        if context.camera is not None and context.camera.kind == "top":
+            self.flat, self.loose = _from_above(context.camera), np.ones(2)
+        elif context.camera is not None:
             self.low = -MARGIN * np.array(context.camera.image, float)
             self.table = _table(context.camera, self.low)
 
     @property
     def reliable(self) -> bool:
         """May this decide how many people a blob holds?"""
-        return self.table is not None or self.agreed >= max(ENOUGH, AGREE * len(self.seen))
+        return self.table is not None or self.above or self.agreed >= max(ENOUGH, AGREE * len(self.seen))
+
+    @property
+    def above(self) -> bool:
+        """Is the camera straight above?"""
+        return self.flat is not None
 
     def at(self, foot: Array) -> Array:
-        """(N, 2) height and width in px of a person whose box stands on the image points `foot` (N, 2); nan unknown."""
+        """(N, 2) height and width in px of a person whose box stands on the image points `foot` (N, 2); nan unknown.
+
+        From above that of a disc, the box of a person turned by 45 degrees.
+        """
+        size = self._known(foot)
+        return np.sqrt(np.square(size).mean(1, keepdims=True) * np.ones(2)) if self.above else size
+
+    def axes(self, foot: Array) -> Array:
+        """(N, 2) the same of the ellipse of a person's pixels, from above the longer axis first."""
+        return self._known(foot) if self.above else self._known(foot) / self.loose
+
+    def _known(self, foot: Array) -> Array:
         size = self._first_guess(foot) * self.factor
-        return np.where(size[:, :1] >= SMALLEST, size, np.nan)
+        return np.where(size[:, :1] >= (FLAT if self.above else SMALLEST), size, np.nan)
+
+    def one(self, box: Array, ellipse: Array) -> Bools:
+        """(M,) are these blobs, boxes ltwh (M, 4) and ellipses (M, 5), of one person's size?"""
+        size = ellipse[:, 2:4] if self.above else box[:, :1:-1]
+        with np.errstate(invalid="ignore"):
+            tall, wide = (size / self._known(_feet(box))).T
+            return np.asarray(
+                (tall >= (PART if self.above else SHORT)) & (tall <= TALL) & (wide >= THIN) & (wide <= WIDE)
+            )
 
     def _first_guess(self, foot: Array) -> Array:
+        if self.flat is not None:
+            return np.tile(self.flat, (len(foot), 1))
         if self.table is not None:
             return _look_up(self.table, (foot - self.low) / STEP)
         height = self.line[0] + self.line[1] * foot[:, 1]
@@ -76,17 +111,20 @@ class PersonSize:
 
     def learn(self, box: Array, ellipse: Array, whole: Bools) -> None:
         """Add the blobs (M, 4) ltwh, (M, 5), that may be somebody alone; `whole` (M,): away from the image's edge."""
-        foot = np.stack([box[:, 0] + box[:, 2] / 2, box[:, 1] + box[:, 3]], 1)
-        expected = SLIM if self.table is None else np.divide(*self._first_guess(foot).T[::-1])
+        foot, size = _feet(box), ellipse[:, 2:4] if self.above else box[:, :1:-1]
+        expected = np.divide(*self._first_guess(foot).T[::-1]) if self.table is not None or self.above else SLIM
         with np.errstate(invalid="ignore"):
-            good = whole & (box[:, 3] >= SMALLEST) & (np.abs(np.log(box[:, 2] / box[:, 3] / expected)) <= np.log(STOUT))
+            slim = np.abs(np.log(size[:, 1] / size[:, 0] / expected)) <= np.log(STOUT)
+        good = whole & slim & (size[:, 0] >= (FLAT if self.above else SMALLEST))
         if not good.any():
             return
-        alone, foot = box[good] + [0.0, -EATEN, 0.0, EATEN], foot[good]
-        round_ellipse = blob_measure.upright(ellipse[good, :4], ellipse[good, 4])[:, 2:]
-        self.excess = np.concatenate([self.excess, alone[:, :1:-1] / round_ellipse])[-KEPT:]
-        self.loose = np.median(np.concatenate([self.excess, np.tile(LOOSE, (ENOUGH, 1))]), 0)
-        new = np.concatenate([foot, alone[:, :1:-1]], 1)
+        size, foot = size[good], foot[good]
+        if not self.above:
+            size = size + np.array([EATEN, 0.0])
+            round_ellipse = blob_measure.upright(ellipse[good, :4], ellipse[good, 4])[:, 2:]
+            self.excess = np.concatenate([self.excess, size / round_ellipse])[-KEPT:]
+            self.loose = np.median(np.concatenate([self.excess, np.tile(LOOSE, (ENOUGH, 1))]), 0)
+        new = np.concatenate([foot, size], 1)
         self.seen, self.unused = np.concatenate([self.seen, new])[-KEPT:], self.unused + len(new)
         if self.unused >= RENEW * len(self.seen):
             self.unused = 0
@@ -97,7 +135,7 @@ class PersonSize:
         foot, height = self.seen[:, :2], self.seen[:, 2]
         typical = float(np.median(height))
         count = height / typical / _crowding(foot / typical)
-        if self.table is None:
+        if self.table is None and not self.above:
             self.line = _line(foot[:, 1], height, count)
         ratio = self.seen[:, 2:] / np.maximum(self._first_guess(foot), 1.0)
         known = np.isfinite(ratio).all(1)
@@ -105,6 +143,11 @@ class PersonSize:
         tall, agreed = _densest(ratio[:, 0], count)
         wide, _ = _densest(ratio[agreed, 1], count[agreed], NARROW)
         self.agreed, self.factor = int(agreed.sum()), np.clip([tall, wide], *FACTORS)
+
+
+def _feet(box: Array) -> Array:
+    """(M, 2) where boxes ltwh stand."""
+    return np.stack([box[:, 0] + box[:, 2] / 2, box[:, 1] + box[:, 3]], 1)
 
 
 def _densest(value: Array, count: Array, least: float = 1.0) -> tuple[float, Bools]:
@@ -163,9 +206,15 @@ def _table(camera: Camera, low: Array) -> Array:
         turned = [boxes(camera, place, np.full(len(place), a), np.full(len(place), PERSON)) for a in _TURNS]
         box = np.mean(turned, 0)
         found[seen] = box[:, :1:-1]
-        stands = np.stack([box[:, 0] + box[:, 2] / 2, box[:, 1] + box[:, 3]], 1)
-        aim[seen] += np.nan_to_num(foot[seen] - stands)
+        aim[seen] += np.nan_to_num(foot[seen] - _feet(box))
     return np.asarray(found.T.reshape(2, size[1], size[0]))
+
+
+def _from_above(camera: Camera) -> Array:
+    """(2,) longer and shorter axis of a person, px."""
+    from sim.people import boxes
+
+    return np.sort(boxes(camera, np.zeros((1, 3)), np.zeros(1), np.array([PERSON]))[0, 2:])[::-1]
 
 
 _TURNS = np.radians([0.0, 45.0, 90.0, 135.0])

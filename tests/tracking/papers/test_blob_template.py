@@ -21,6 +21,8 @@ def mask_of(*templates):
 class Fixed:
     """People are of one size everywhere."""
 
+    above = False
+
     def __init__(self, h, w):
         self.size = h, w
 
