@@ -68,8 +68,8 @@ def classify(image, mean, sigma, s, b, valid, gain, limits):
 
 def adapt(image, classes, protected, mean, var, gain, rows, fast, slow):
     """mean, var (H, W, 3) after a frame: exponential averages where background is seen, slower elsewhere."""
-    moves = ~protected[..., None] & rows[:, None, None]
+    moves = ~protected[..., None] & rows[:, None, None] & ~((image == 255) & (gain * mean >= 255))
     seen = (classes == 0)[..., None]
     away = image / gain - mean
     spread = np.maximum(var + fast * (np.square(away * gain) - var), training.FLOOR**2)
-    return mean + moves * np.where(seen, fast, slow) * away, np.where(moves & seen, spread, var)
+    return np.where(moves, np.maximum(mean + np.where(seen, fast, slow) * away, 1.0), mean), np.where(moves & seen, spread, var)

@@ -5,7 +5,9 @@ Each pixel i has a mean colour E and standard deviations sigma. A colour I is sp
 and normalised by their RMS over the training sample: (alpha - 1) / a_i, CD / b_i, so that one threshold each serves the
 whole image. Classes in the paper's order: CD above its threshold is foreground; brightness below the dark threshold is
 dark foreground; above the upper threshold highlight; below the lower one shadow; else background.
-Departures: docs/detection.md.
+Departures: docs/detection.md; of these: a shadow must be darker than normal noise, too, and not dark foreground;
+above `bright` (relative) is foreground. Without colours (R = G = B) there is no chromaticity to tell a shadow or a
+highlight by: whatever is darker is dark foreground, whatever is brighter foreground.
 """
 
 from __future__ import annotations
@@ -35,7 +37,8 @@ class Background:
 
     mean, var (3, H, W): E and sigma^2 at gain 1. s, b (H, W): normalisers, inf where there is no background. valid
     (H, W): False where the sample showed none; such pixels are called background for ever.
-    gain (3,): brightness of the frame classified last.
+    gain (3,): brightness of the frame classified last. bounds: relative brightness of dark foreground and of highlights
+    at most.
     """
 
     def __init__(self, sample: Image, fps: float, settings: BackgroundSettings | None = None) -> None:
@@ -51,6 +54,8 @@ class Background:
         self._grid = gains.grid(*self.valid.shape)
         self._calm = self.valid[self._grid]
         self._turn = 0
+        grey = bool((sample[..., :1] == sample).all())
+        self.bounds = (1.0, 1.0) if grey else (self.settings.dark, self.settings.bright)
 
     def classify(self, image: Image) -> Image:
         """(H, W) uint8 classes of a frame (H, W, 3) BGR uint8."""
@@ -61,7 +66,7 @@ class Background:
         check_frame(image, self.valid.shape)
         if self.settings.gain == "global":
             self.gain = self._gain(image)
-        limits = np.array([*self.thresholds, self.settings.dark, self.settings.bright], np.float32)
+        limits = np.array([*self.thresholds, *self.bounds], np.float32)
         classes = np.empty(self.valid.shape, np.uint8)
         one, two, three = (np.asarray(plane, np.uint8).ravel() for plane in cv2.split(image))
         E, V = self.mean.reshape(3, -1), self.var.reshape(3, -1)

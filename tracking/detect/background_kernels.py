@@ -53,7 +53,9 @@ def adapt(
     least: float,
 ) -> None:
     """Move E (3, H, W) towards I / g in rows first, first + step, …: by `fast` where background, by `slow` elsewhere,
-    not where protected; V follows the squared residuals of background, never below `least`."""
+    not where protected; V follows the squared residuals of background, never below `least`, E never below 1 (a black
+    pixel's brightness would have no measure). A clipped value that was to be clipped tells nothing.
+    """
     quick, late, floor = np.float32(fast), np.float32(slow), np.float32(least)
     for r in range(first, image.shape[0], step):
         for c in range(image.shape[1]):
@@ -62,7 +64,10 @@ def adapt(
             seen = classes[r, c] == 0
             rate = quick if seen else late
             for k in range(3):
-                d = np.float32(image[r, c, k]) / g[k] - E[k, r, c]
-                E[k, r, c] += rate * d
+                value = image[r, c, k]
+                if value == 255 and g[k] * E[k, r, c] >= np.float32(255.0):
+                    continue
+                d = np.float32(value) / g[k] - E[k, r, c]
+                E[k, r, c] = max(E[k, r, c] + rate * d, np.float32(1.0))
                 if seen:
                     V[k, r, c] = max(V[k, r, c] + rate * (d * d * g[k] * g[k] - V[k, r, c]), floor)

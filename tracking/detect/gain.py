@@ -21,9 +21,15 @@ def grid(high: int, wide: int) -> tuple[slice, slice]:
 
 
 def gain(image: Floats, mean: Floats, where: Bools) -> Floats | None:
-    """(3,) median of I / E over grid pixels (3, h, w) that are `where` (h, w); None if too few can be used."""
+    """(3,) median of I / E over grid pixels (3, h, w) that are `where` (h, w); None if too few can be used.
+
+    A colour that cannot be used, as blue under sodium lamps, is taken to change as the others do on average.
+    """
     found = [_one_colour(i[where], e[where]) for i, e in zip(image, mean, strict=True)]
-    return None if None in found else np.array(found, np.float32)
+    known = [factor for factor in found if factor is not None]
+    if not known:
+        return None
+    return np.array([np.mean(known) if factor is None else factor for factor in found], np.float32)
 
 
 def _one_colour(seen: Floats, mean: Floats) -> float | None:

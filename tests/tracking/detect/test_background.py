@@ -389,3 +389,51 @@ def test_mog2_speaks_the_same_classes():
     after = made.classify(picture)
     assert share(after[5:20, 5:20], FOREGROUND) > 0.95
     assert share(after[5:20, 30:45], BACKGROUND) > 0.95
+
+
+def test_without_colours_whatever_differs_in_brightness_is_foreground():
+    """A grey camera: no chromaticity tells a shadow from a dark coat."""
+    grey = np.full((40, 50, 3), 100.0)
+    rng = np.random.default_rng(3)
+    sample = np.stack([np.repeat(shot(grey, rng)[..., :1], 3, -1) for _ in range(40)])
+    made = Background(sample, 10.0)
+    for level, kind in ((45, DARK), (80, DARK), (150, FOREGROUND), (190, FOREGROUND), (100, BACKGROUND)):
+        picture = np.full((40, 50, 3), 100, np.uint8)
+        picture[10:20, 10:20] = level
+        classes = made.classify(picture)
+        assert (classes[10:20, 10:20] == kind).all(), level
+        assert (classes[25:] == BACKGROUND).all()
+
+
+def test_black_never_becomes_so_black_that_noise_is_foreground():
+    black = np.zeros((40, 50, 3), np.uint8)
+    black[:, :25] = 90
+    made = Background(np.stack([black] * 20), 10.0)
+    for _ in range(30_000 // 4):
+        made.adapt(black, np.zeros((40, 50), np.uint8))
+    assert made.mean.min() >= 1.0
+    noisy = black.copy()
+    noisy[:, 25:] = 1
+    assert (made.classify(noisy) == BACKGROUND).all()
+
+
+def test_what_the_camera_clips_is_not_learned():
+    """A bright sky under brighter light, for minutes, is the same sky when the light is as before."""
+    colours = np.full((40, 50, 3), 120.0)
+    colours[:12] = 250.0
+    sample = shots(colours, 30)
+    made = Background(sample, 10.0)
+    rng = np.random.default_rng(5)
+    for _ in range(600):
+        bright = shot(colours, rng, gain=1.6)
+        made.adapt(bright, made.classify(bright))
+    assert (made.classify(shot(colours, rng)) == BACKGROUND).mean() > 0.99
+
+
+def test_a_colour_too_dark_to_be_measured_follows_the_others():
+    colours = np.zeros((60, 80, 3))
+    colours[:] = (10.0, 90.0, 150.0)
+    made = Background(shots(colours, 30), 10.0)
+    classes = made.classify(shot(colours, np.random.default_rng(6), gain=1.4))
+    assert (classes == BACKGROUND).mean() > 0.99
+    assert made.gain[0] == pytest.approx(1.4, abs=0.03)
