@@ -286,7 +286,7 @@ def hard_scene():
 
 @cache
 def seen_scene():
-    """A few seconds of it as pictures, in which people share blobs, shadows fall and the light jumps."""
+    """A few seconds of it as pictures: people share blobs, shadows fall, the light jumps, a hand is before the lens."""
     from scenarios.loading import load
     from sim.sequence import observe
     from sim.world import run as simulate
@@ -301,6 +301,9 @@ def seen_scene():
     scene = load("cross", ["group.passers.repeat=6", *size, *light])
     sequence = observe(scene, simulate(scene, 11), check=False, streams=("left",))
     frames = list(sequence)
+    covered = frames[50].image.copy()
+    covered[:, :250] = (60, 120, 220)
+    frames[50] = dataclasses.replace(frames[50], image=covered)
     sample = sequence.background()
     return dataclasses.replace(sequence, frames=lambda: iter(frames), load_background=lambda: sample, load_truth=None)
 
