@@ -92,7 +92,7 @@ class BlobConfig(BackgroundSettings):
         before=10.0,
     )
     track_support: float = param(
-        0.15, (0.02, 0.8), "share", "support from which on a template measures a confirmed track (ours)", before=0.15
+        0.3, (0.02, 0.8), "share", "foreground in what no other covers of a confirmed track measured (ours)", before=0.3
     )
     entry_support: float = param(
         0.5, (0.1, 0.9), "share", "support from which on a template is somebody new (ours)", before=0.5

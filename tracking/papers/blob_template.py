@@ -19,6 +19,7 @@ from tracking.papers import blob_template_kernels as kernels
 EMPTY = 0.5  # what a background pixel inside a template costs, a foreground pixel being worth 1
 ELLIPSE = np.pi / 4  # share of its box that an ellipse fills
 LEAST_INSIDE = 0.3  # a template further out of the image than this counts as so large
+BARE = 0.1  # share of a template that no other covers below which he is hidden, not seen
 STEPS_PER_HEIGHT = 24  # the coarse grid of moves
 MOST_STEPS = 8
 SWEEPS = 3
@@ -90,11 +91,13 @@ class Mask:
     def prune(self, templates: Array, least: float, *, pieces: bool = False) -> Ints:
         """Rows of painted templates with support `least` when those with too little are taken away, the weakest first.
 
-        pieces: count foreground only, so that what shows of a person is enough, wherever the rest has gone.
+        pieces: how much of what could be seen of somebody is foreground, so that a piece of him is enough, wherever the
+        rest has gone: foreground over the pixels that no other template covers, if these are BARE of his own or more.
+        Of two on one person either has less, and so goes.
         """
         rows = np.arange(len(templates))
         while len(rows):
-            worth = self.alone(templates[rows], pieces=pieces)
+            worth = self.pieces(templates[rows]) if pieces else self.alone(templates[rows])
             k = int(worth.argmin())
             if worth[k] >= least:
                 break
@@ -102,9 +105,17 @@ class Mask:
             rows = np.delete(rows, k)
         return rows
 
-    def alone(self, templates: Array, *, pieces: bool = False) -> Array:
+    def alone(self, templates: Array) -> Array:
         """(K,) support of painted templates, each by the pixels that no other covers."""
-        gain = np.maximum(self.gain, 0.0) if pieces else self.gain
+        return self._by_own_pixels(self.gain, templates)
+
+    def pieces(self, templates: Array) -> Array:
+        """(K,) share of foreground in the pixels that no other painted template covers; 0 where these are few."""
+        bare = self._by_own_pixels(np.ones_like(self.gain), templates)
+        seen = self._by_own_pixels(np.maximum(self.gain, 0.0), templates)
+        return np.where(bare >= BARE, seen / np.maximum(bare, BARE), 0.0)
+
+    def _by_own_pixels(self, gain: Array, templates: Array) -> Array:
         worth = np.zeros(len(templates))
         for k in range(len(templates)):
             one = templates[k : k + 1]

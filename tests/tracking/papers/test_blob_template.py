@@ -115,3 +115,26 @@ def test_what_is_explained_brings_nobody():
     closed = Mask(mask_of(one[0]))
     closed.close(mask_of(one[0]))
     assert not len(blob_entry.newcomers(closed, Fixed(60.0, 24.0), 0.5))
+
+
+def test_a_piece_of_who_is_partly_covered_is_enough_but_two_on_one_are_one():
+    """Half hidden behind another template and half of the rest gone; then the same person twice."""
+    near, far = np.array([60.0, 84.0, 60.0, 24.0]), np.array([72.0, 80.0, 60.0, 24.0])
+    cut = mask_of(near, far)
+    cut[:48, 73:] = False
+    scene, both = Mask(cut), np.stack([near, far])
+    scene.paint(both)
+    assert 0.4 < scene.pieces(both)[1] < 0.9
+    assert scene.prune(both, 0.3, pieces=True).tolist() == [0, 1]
+    twice = np.stack([near, near + np.array([4.0, 0, 0, 0])])
+    scene = Mask(mask_of(near))
+    scene.paint(twice)
+    assert scene.prune(twice, 0.3, pieces=True).tolist() == [0]
+
+
+def test_who_is_all_but_covered_is_hidden():
+    one = np.array([[60.0, 80.0, 60.0, 24.0]])
+    both = np.concatenate([one, one + np.array([0.5, 0, 0, 0])])
+    scene = Mask(mask_of(*both))
+    scene.paint(both)
+    assert scene.pieces(both).tolist() == [0.0, 0.0]
