@@ -72,4 +72,5 @@ def adapt(image, classes, protected, mean, var, gain, rows, fast, slow):
     seen = (classes == 0)[..., None]
     away = image / gain - mean
     spread = np.maximum(var + fast * (np.square(away * gain) - var), training.FLOOR**2)
-    return np.where(moves, np.maximum(mean + np.where(seen, fast, slow) * away, 1.0), mean), np.where(moves & seen, spread, var)
+    moved = np.maximum(mean + np.where(seen, fast, slow) * away, 1.0)
+    return np.where(moves, moved, mean), np.where(moves & seen, spread, var)
