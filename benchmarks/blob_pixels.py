@@ -1,11 +1,13 @@
 """`blob` from pixels: on PETS and on rendered scenes, with parts of it switched off; frames per second by parts.
 
-usage: python benchmarks/blob_pixels.py [pets] [rendered] [speed] [overlay] [--data DIR] [--seeds 0:2] [--out DIR]
+usage: python benchmarks/blob_pixels.py [pets] [rendered] [above] [speed] [overlay] [--data DIR] [--seeds 0:2]
+       [--out DIR]
 
 pets: PETS09-S2L1-first200 (--data, default ../shared/data), boxes by IoU, and with View_001.xml the position on the
 ground at 1 m (similarity 0.5 of 1 - d / 2 m). One table for backgrounds spread over the recording, one for causal ones.
 rendered: catalogue scenes under a camera like PETS's (480 x 360, 7 frames/s, tilts of 15 and 20 degrees, JPEG at 80),
 once with camera and empty background, once as bare video with a background spread over it.
+above: from straight above at 20 px per m, and Friends Meet's scenes at 40, beside the same tracker on boxes.
 speed: 640 x 480, about 20 people, best of three, and the shares of the parts. overlay: pictures with boxes into --out.
 """
 
@@ -39,6 +41,8 @@ ABLATIONS = (
 )
 SCENES = (("street", 15), ("street", 20), ("cross", 15), ("mixed", 15), ("pillar", 20), ("split", 15), ("crowd", 20))
 VIEW = ("image=[480,360]", "fps=7", "focal_px=600", "crop=true", "baseline=0")
+FLAT = [(name, ['camera.kind="top"']) for name in ("merge", "cross")]
+FRIENDS = [(f"scenarios/suites/friends-meet/{name}.toml", []) for name in ("merge", "queue", "hard-party")]
 LONGEST = 120  # frames of a rendered scene
 PARTS = ("classify", "clean", "find", "_associate", "_split", "newcomers", "learn", "adapt", "_report")
 
@@ -52,8 +56,10 @@ def head(title: str) -> None:
     print(f"\n| {title} | " + " | ".join(KEYS) + " | frames/s |\n|---" + "|---" * (len(KEYS) + 1) + "|")
 
 
-def one(sequence: Sequence, params: dict[str, object], similarity: str = "boxes") -> tuple[list[float], float]:
-    run = track("blob", sequence, params=params, detections="image")
+def one(
+    sequence: Sequence, params: dict[str, object], similarity: str = "boxes", mode: str = "image"
+) -> tuple[list[float], float]:
+    run = track("blob", sequence, params=params, detections=mode)  # type: ignore[arg-type]
     assert sequence.truth is not None
     scores = tracking.evaluate(sequence.truth, run, similarity=similarity)
     return [scores[k] for k in KEYS], run.info["frames_per_second"]
@@ -103,6 +109,15 @@ def held(name: str, tilt: int, seed: int, bare: bool) -> Sequence:
     if not bare:
         return video
     return replace(video, camera=None, scene=None, px_per_m=float("nan"), load_background=lambda: np.stack(spread))
+
+
+def above(seeds: range) -> None:
+    head("from straight above")
+    for title, scenes in (("20 px per m", FLAT), ("Friends Meet, 40 px per m", FRIENDS)):
+        made = [simulate(load(name, set=settings), seed) for name, settings in scenes for seed in seeds]
+        for mode in ("image", "file"):
+            found = [one(sequence, {}, mode=mode) for sequence in made]
+            row(f"{title}, {'pixels' if mode == 'image' else 'boxes'}", [s for s, _ in found])
 
 
 def speed() -> None:
@@ -156,6 +171,8 @@ def main() -> None:
         overlay(folder, given.out)
     if "rendered" in given.what:
         rendered(range(*(int(n) for n in given.seeds.split(":"))))
+    if "above" in given.what:
+        above(range(*(int(n) for n in given.seeds.split(":"))))
     if "speed" in given.what:
         speed()
 
