@@ -79,14 +79,18 @@ def track(
     people: Sequence[Person] | None = None,
     seed: int = 0,
     watch=None,
+    size: tuple[int, int] | None = (WIDE, HIGH),
     **kind,
 ) -> list[Tracks]:
-    """Tracks of `blob` on pictures, or on people to be painted; None is a lost frame. people: those in the sample."""
+    """Tracks of `blob` on pictures, or on people to be painted; None is a lost frame.
+
+    people: those in the sample; size: what the tracker is told of the image.
+    """
     r = np.random.default_rng(seed)
     shown = spread() if people is None else people
     still = {k: v for k, v in kind.items() if k != "shadow"}
     tracker = Blob(config)
-    tracker.reset(Context(FPS, TALL / 1.7, image_size=(WIDE, HIGH), background=sample(r, 28, shown, **still)), 0)
+    tracker.reset(Context(FPS, TALL / 1.7, image_size=size, background=sample(r, 28, shown, **still)), 0)
     made = []
     for k, people_or_image in enumerate(frames):
         image = people_or_image

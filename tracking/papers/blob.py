@@ -58,6 +58,8 @@ class Blob:
     def reset(self, context: Context, seed: int) -> None:
         """Forget everything; `seed` is unused, nothing here is random."""
         c = self.config
+        if context.image_size is None and context.background is not None:
+            context = context.replace(image_size=context.background.shape[2:0:-1])
         self.context = context
         dynamics = c.dynamics(context.fps)
         self.people: Population

@@ -175,3 +175,17 @@ def test_a_moved_scene_moves_the_answer():
         assert a.id.tolist() == b.id.tolist()
         if len(a.id):
             assert np.abs(b.box - a.box - [24, 0, 0, 0]).max() < 1.5
+
+
+def test_the_pictures_tell_the_size_that_nobody_told():
+    """An unseen track is carried on, and one that left dies, whether the image's size was given or not."""
+    way = (
+        [[(60.0 + 6 * k, 200.0, TALL)] for k in range(20)]
+        + [None] * 4
+        + [[(204.0 + 6 * k, 200.0, TALL)] for k in range(6)]
+    )
+    told, untold = (painted.track(way, size=size) for size in ((painted.WIDE, painted.HIGH), None))
+    assert [len(t.id) for t in untold[20:24]] == [1] * 4
+    for a, b in zip(told, untold, strict=True):
+        assert a.id.tolist() == b.id.tolist()
+        np.testing.assert_array_equal(a.box, b.box)
