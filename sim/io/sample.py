@@ -29,7 +29,7 @@ class Choice:
     def __str__(self) -> str:
         """In words, as run.json has it."""
         if self.how == "first":
-            return f"first {self.count} frames"
+            return f"first {self.count} frames (causal from frame {self.count})"
         return f"{self.count} frames spread over the recording (not causal)"
 
     def of(self, length: int, path: Path) -> Choice:

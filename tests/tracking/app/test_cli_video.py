@@ -117,15 +117,16 @@ def test_strange_pictures_are_pictures(name, tmp_path, capsys):
 
 def test_which_background_is_told(tmp_path, capsys):
     path = str(film(tmp_path))
-    for option, words, causal in (
-        ([], "50 frames spread over the recording (not causal)", False),
-        (["--background", "first:20"], "first 20 frames", True),
-        (["--background", "spread:30"], "30 frames spread over the recording (not causal)", False),
+    for option, words, begins in (
+        ([], "50 frames spread over the recording (not causal)", None),
+        (["--background", "first:20"], "first 20 frames (causal from frame 20)", 20),
+        (["--background", "spread:30"], "30 frames spread over the recording (not causal)", None),
     ):
         out = tmp_path / "out"
         assert run(["track", "blob", path, "--px-per-m", "20", "--out", str(out), *option]) == 0
         told = json.loads((out / "run.json").read_text())
-        assert (told["background"], told["causal"], told["detections"]) == (words, causal, "image")
+        assert (told["background"], told["causal_from"], told["detections"]) == (words, begins, "image")
+        assert not told["causal"]
         assert words in capsys.readouterr().out
 
 
