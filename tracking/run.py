@@ -85,8 +85,9 @@ class Prepared:
 
 
 def _named(error: FlockscopeError, sequence: Sequence) -> FlockscopeError:
-    """An error that names no file, with the sequence it is about."""
-    return error if error.file else type(error)(**{**error.as_dict(), "file": sequence.name})
+    """An error that names no file, with the recording it is about."""
+    about = sequence.source.get("path", sequence.name)
+    return error if error.file else type(error)(**{**error.as_dict(), "file": about})
 
 
 def _raised(tracker: str, method: str, place: str, error: Exception) -> WorkError:

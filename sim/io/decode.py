@@ -6,6 +6,7 @@ else pictures are counted, a packet that cannot be decoded counting as one.
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -16,7 +17,7 @@ from typing import Any
 import numpy as np
 
 from scenarios.errors import InputError
-from sim.types import Image
+from sim.types import Array, Image
 
 COVER = "attached_pic"
 HIDDEN = ("vp8",)  # codecs with packets that are never shown
@@ -28,15 +29,21 @@ REMEDY = "give a video that a player plays to its end"
 @dataclass(frozen=True)
 class Packets:
     """The packets of a video stream in the order of the file: when shown (units of time_base; None unknown), and
-    where groups begin that can be decoded by themselves. promised: frames that the header speaks of, 0 = none."""
+    where groups begin that can be decoded by themselves. promised, seconds: frames and length that the header speaks of,
+    0 = none."""
 
     stamps: tuple[int | None, ...]
     keys: tuple[bool, ...]
     time_base: Fraction
     rate: float
     promised: int
+    seconds: float
     codec: str
     reorders: bool
+
+    def times(self) -> Array:
+        """When frames are shown, in their order, s; those that are known."""
+        return np.array(sorted({s for s in self.stamps if s is not None}), float) * float(self.time_base)
 
     def ranks(self) -> dict[int, int] | None:
         """Frame (1-based) by time stamp, or None where stamps do not tell."""
@@ -91,8 +98,17 @@ def packets(path: Path) -> Packets:
         context = stream.codec_context
         return Packets(
             tuple(pts for pts, _ in found), tuple(key for _, key in found), stream.time_base,
-            float(stream.average_rate or 0), int(stream.frames), context.name, bool(context.has_b_frames),
+            float(stream.average_rate or 0), int(stream.frames), _seconds(stream), context.name,
+            bool(context.has_b_frames),
         )  # fmt: skip
+
+
+def _seconds(stream: Any) -> float:
+    """How long the header says the stream is, s; Matroska has it as a text, 00:00:11.429000000."""
+    if stream.duration is not None:
+        return float(stream.duration * stream.time_base)
+    found = re.fullmatch(r"(\d+):(\d\d):(\d\d(?:\.\d+)?)", stream.metadata.get("DURATION", ""))
+    return 3600.0 * int(found[1]) + 60.0 * int(found[2]) + float(found[3]) if found else 0.0
 
 
 def _demuxed(container: Any, stream: Any) -> Iterator[Any]:

@@ -152,7 +152,7 @@ def test_the_sample_of_a_folder(tmp_path):
     path = folder(tmp_path / "a", [f"{k:06d}.png" for k in range(1, 13)])
     (path / "img1/000002.png").unlink()
     (sequence,) = open_source(path, images=True, background="first:3")
-    assert sequence.source["background"] == "first 3 frames"
+    assert sequence.source["background"] == "first 3 frames (causal from frame 3)"
     assert np.array_equal(sequence.background(), np.stack([picture(0), picture(2)]))
     (sequence,) = open_source(path, background="spread:3")
     assert np.array_equal(sequence.background(), np.stack([picture(k) for k in (2, 6, 10)]))

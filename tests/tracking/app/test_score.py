@@ -47,7 +47,7 @@ def test_files_are_memory(made: Path, capsys, by: str) -> None:
 
 
 def test_no_mean_over_what_trackers_saw_differently(made: Path, tmp_path: Path, capsys) -> None:
-    """A seed tracked from its sensor's boxes, one from labels, one from noisy ones, one as a text of nobody knows whom."""
+    """A seed tracked from its sensor's boxes, one from labels, one from noisy ones, one as a text without run.json."""
     line = ["generate", "merge", "--seeds", "3:7", "--streams", "none", "--out", str(tmp_path / "data")]
     assert run(line) == 0
     data, tracks = tmp_path / "data" / "flockscope-train", tmp_path / "tracks"
