@@ -9,8 +9,10 @@ import numpy as np
 from numba import njit
 
 from sim.paint_kernels import TILE_H, TILE_W, UNIT
+from sim.sensor_noise import MIDDLE
 
 SCALE, HALF, LOW, HIGH = np.float32(1.0 / UNIT), np.float32(0.5), np.float32(0.0), np.float32(255.0)
+ONE, GREY = np.float32(1.0), np.float32(1.0 / (MIDDLE * UNIT))
 
 
 @njit(cache=True)
@@ -29,12 +31,28 @@ def _five(a, b, c, d, e, w, x, y, many, out):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True)
-def _shown(line, grain, gain, many, out):  # type: ignore[no-untyped-def]
-    """Eight bits of gain times a line, plus noise."""
+def _shown(line, grain, gain, shot, many, out):  # type: ignore[no-untyped-def]
+    """Eight bits of gain (many,) times a line, plus noise, whose variance grows with light by the share `shot`."""
+    read, slope = ONE - shot, shot * GREY
     for i in range(many):
-        x = (np.float32(line[i]) * gain + np.float32(grain[i])) * SCALE + HALF
+        x = np.float32(line[i]) * gain[i]
+        x = (x + np.float32(grain[i]) * np.sqrt(read + slope * x)) * SCALE + HALF
         x = x if x > LOW else LOW
         out[i] = np.uint8(np.int32(x if x < HIGH else HIGH))
+
+
+@njit(cache=True)
+def brightness(nodes, step, v, width, out):  # type: ignore[no-untyped-def]
+    """out (W * 3,): the brightness of row v, linear between its nodes (J, I) at every `step`-th pixel."""
+    y = (v + np.float32(0.5)) / np.float32(step)
+    j = min(int(y), nodes.shape[0] - 2)
+    b = np.float32(y - j)
+    for i in range(nodes.shape[1] - 1):
+        low = nodes[j, i] + b * (nodes[j + 1, i] - nodes[j, i])
+        rise = (nodes[j, i + 1] + b * (nodes[j + 1, i + 1] - nodes[j, i + 1]) - low) / np.float32(step)
+        for u in range(i * step, min((i + 1) * step, width)):
+            bright = low + rise * (np.float32(u - i * step) + HALF)
+            out[3 * u], out[3 * u + 1], out[3 * u + 2] = bright, bright, bright
 
 
 @njit(cache=True)
@@ -90,18 +108,22 @@ def blurred(canvas, weights, out):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True)
-def finish(canvas, plate, dirty, weights, gain, noise, offsets, out):  # type: ignore[no-untyped-def]
-    """The picture, out (H, W * 3) uint8: gain times the blurred scene, plus noise.
+def finish(canvas, plate, dirty, weights, nodes, step, noise, shot, offsets, out):  # type: ignore[no-untyped-def]
+    """The picture, out (H, W * 3) uint8: brightness times the blurred scene, plus noise.
 
     canvas (H, W * 3) int16: the sharp scene, of which only dirty tiles and their surroundings are read; plate: the
-    blurred empty scene; weights (2 r + 1,) of the blur; noise (n,) int16, of which row v shows noise[offsets[v]:].
+    blurred empty scene; weights (2 r + 1,) of the blur; nodes (J, I): brightness at every `step`-th pixel, or (1, 1)
+    for one everywhere; noise (n,) int16, of which row v shows noise[offsets[v]:], and its share `shot`.
     """
     height, width = canvas.shape[0], canvas.shape[1] // 3
     edge, wide, tile = _scratch(len(weights) // 2, width)
+    bright = np.full((TILE_H, 3 * width), nodes[0, 0], np.float32)
     for top in range(0, height, TILE_H):
         rows = min(TILE_H, height - top)
         for r in range(rows):
-            _shown(plate[top + r], noise[offsets[top + r] :], gain, 3 * width, out[top + r])
+            if nodes.size > 1:
+                brightness(nodes, step, top + r, width, bright[r])
+            _shown(plate[top + r], noise[offsets[top + r] :], bright[r], shot, 3 * width, out[top + r])
         last = 0
         while last < width:  # runs of dirty tiles
             left = last
@@ -113,4 +135,4 @@ def finish(canvas, plate, dirty, weights, gain, noise, offsets, out):  # type: i
             _blur_run(canvas, top, left, rows, cols, weights, edge, wide, tile)
             for r in range(rows):
                 grain, to = noise[offsets[top + r] + 3 * left :], out[top + r, 3 * left :]
-                _shown(tile[r], grain, gain, 3 * cols, to)
+                _shown(tile[r], grain, bright[r, 3 * left :], shot, 3 * cols, to)

@@ -1,8 +1,8 @@
 """Pictures of a Motion: each a pure function of the frame's index, drawn when asked for.
 
 A Stage holds what is the same in all frames: the plate of each view (sim.plate), clothes, light, noise. A frame is the
-plate, darkened by shadows, people over it by depth (sim.paint_kernels), blurred, times the brightness of its moment,
-with noise, and at last lossy artefacts.
+plate, its plants moved by wind, darkened by shadows, people over it by depth (sim.paint_kernels), blurred, times the
+brightness of its moment, with noise, and at last lossy artefacts.
 """
 
 from __future__ import annotations
@@ -16,13 +16,14 @@ from numpy.typing import NDArray
 
 from scenarios.errors import InputError
 from sim import camera as cameras
+from sim.foliage import Foliage, grow
 from sim.light import Illumination, illuminate
 from sim.pixel_truth import pixel_truth
 from sim.sensor_noise import offsets, pool
 from sim.silhouettes import Cast, Crowd
 from sim.stretch import FRAMES, Stretch
 from sim.types import BACKGROUNDS, Camera, Frame, Image, Motion, PixelTruth
-from sim.view import View, blur_weights
+from sim.view import NODES, View, blur_weights
 from sim.wear import wear
 
 if TYPE_CHECKING:
@@ -60,13 +61,13 @@ class Stage:
     @cached_property
     def left_view(self) -> View:
         """What the camera itself sees of the empty scene."""
-        return View(self.camera, self.motion, self.illumination, self.picture)
+        return View(self.camera, self.motion, self.illumination, self.picture, self._plants)
 
     @cached_property
     def right_view(self) -> View:
         """What the right camera of the pair sees; InputError where there is none."""
         self.check_pair()
-        return View(cameras.right(self.camera), self.motion, self.illumination, self.picture)
+        return View(cameras.right(self.camera), self.motion, self.illumination, self.picture, self._plants)
 
     def check_pair(self) -> None:
         """InputError where there is no right camera."""
@@ -75,6 +76,10 @@ class Stage:
                 place="camera.baseline", got=f"{self.camera.kind}, baseline {self.camera.baseline:g}",
                 expected="a pinhole pair with a baseline above 0", remedy="set camera.baseline, or leave it out",
             )  # fmt: skip
+
+    @cached_property
+    def _plants(self) -> Foliage | None:
+        return grow(self.picture, self.camera, self.motion.scene, self.motion.seed, self.motion.repeat)
 
     @cached_property
     def _atlas(self) -> NDArray[np.uint8]:
@@ -115,20 +120,28 @@ class Stage:
 
     def background(self, k: int) -> Image:
         """Empty frame k = 0 … BACKGROUNDS - 1, at t = (k - BACKGROUNDS) / fps."""
-        view = self.left_view
-        return self._finish(view, view.canvas, self._clean(view), k - BACKGROUNDS + 1, LEFT)
+        view, index = self.left_view, k - BACKGROUNDS + 1
+        return self._finish(view, *self._empty(view, index), index, LEFT)
+
+    def _time(self, index: int) -> float:
+        return (index - 1) / self.motion.fps
 
     def _stretch(self, index: int) -> Stretch:
         if self._last is None or index not in range(self._last.first, self._last.first + FRAMES):
             self._last = Stretch(self.motion, self.illumination, index)
         return self._last
 
-    @staticmethod
-    def _clean(view: View) -> NDArray[np.uint8]:
-        """(rows, columns) of tiles in which nothing is painted yet."""
+    def _empty(self, view: View, index: int) -> tuple[NDArray[np.int16], NDArray[np.uint8]]:
+        """The scene without people to paint on, its plants moved, and the tiles (rows, columns) that were painted."""
         from sim.paint_kernels import TILE_H, TILE_W
 
-        return np.zeros((-(-view.height // TILE_H), -(-view.width // TILE_W)), np.uint8)
+        canvas, dirty = view.canvas.copy(), np.zeros((-(-view.height // TILE_H), -(-view.width // TILE_W)), np.uint8)
+        if view.plants is not None:
+            from sim.foliage_kernels import sway
+
+            wind = view.wind(self._time(index))
+            sway(view.canvas, view.plate.plants, view.moving, wind, NODES, canvas, dirty, len(self._weights) // 2)
+        return canvas, dirty
 
     def _draw(
         self, index: int, side: int, *, shade: bool, label: bool, disparity: bool = False
@@ -139,7 +152,7 @@ class Stage:
         view, stretch, light = self.right_view if side else self.left_view, self._stretch(index), self.illumination
         people, sight = stretch.crowd(index), stretch.sight(view, side, index)
         here, margin, fall = sight.cast, len(self._weights) // 2, sight.shadows
-        canvas, dirty = view.canvas.copy() if shade else view.canvas[:0], self._clean(view)
+        canvas, dirty = self._empty(view, index) if shade else (view.canvas[:0], np.zeros((0, 0), np.uint8))
         if shade and fall is not None:
             kernels.shadows(
                 view.geometry.place, view.plate.direct, fall.outlined.boxes, view.level, fall.outlined.middle,
@@ -164,12 +177,12 @@ class Stage:
 
         image = np.empty((view.height, view.width, 3), np.uint8)
         number = index + BACKGROUNDS
-        gain = self.illumination.gain((index - 1) / self.motion.fps, number)
+        bright = view.brightness(self._time(index), number)
         rows = offsets(view.height, self.motion.seed, side, number, self.motion.repeat)
         flat = view.height, 3 * view.width
         finish(
-            canvas.reshape(flat), view.blurred.reshape(flat), dirty, self._weights, np.float32(gain), self._noise, rows,
-            image.reshape(flat),
+            canvas.reshape(flat), view.blurred.reshape(flat), dirty, self._weights, bright, NODES, self._noise,
+            np.float32(self.picture.shot), rows, image.reshape(flat),
         )  # fmt: skip
         return _lossy(image, self.picture.jpeg) if self.picture.jpeg else image
 
@@ -183,7 +196,7 @@ class Stage:
         disparities(
             depth, ids, here.outlined.boxes, people.id, self.camera.focal_px[0] * self.camera.baseline, there.start,
             there.step, there.outlined.middle, there.outlined.inverse, there.near, other.geometry.depth,
-            other.rays.origin, other.rays.direction, *other.solids, apart,
+            other.rays.origin, other.rays.direction, other.solids, apart,
         )  # fmt: skip
         return apart
 

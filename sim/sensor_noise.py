@@ -1,4 +1,6 @@
-"""A camera's noise: normal, independent in each pixel and colour.
+"""A camera's noise: normal, independent in each pixel and colour; part of its variance grows with brightness.
+
+At grey level x the variance is sd² (1 - shot + shot x / MIDDLE): what the circuits add, and the counted light's own.
 
 Fresh normal numbers for each frame would cost more than all the rest, so a long pool is drawn once, and each row of
 each picture shows a stretch of it that begins anywhere: what two pixels, rows or frames show is independent but for
@@ -16,6 +18,7 @@ from sim.rng import rng
 from sim.types import Ints
 
 POOL = 1 << 20
+MIDDLE = 128.0  # grey level at which the sd is as told
 LONGEST = 3 * 8192  # numbers that a row may need
 
 

@@ -143,15 +143,16 @@ def test_walls_and_pillars_cast_shadows_and_stairs_show_steps() -> None:
 
 def test_frames_are_pure_functions_of_their_index() -> None:
     motion, camera = motion_in(BUILT), VIEWS["high"]
-    light = Light(drift=0.1, flicker=0.02, switch=(Switch(at=0.5, gain=0.7),))
-    one, two = (stage(motion, camera, light, Picture(jpeg=80)) for _ in range(2))
+    light = Light(drift=0.1, flicker=0.02, cloud=0.1, switch=(Switch(at=0.5, gain=0.7),))
+    picture = Picture(jpeg=80, foliage=0.1)
+    one, two = (stage(motion, camera, light, picture) for _ in range(2))
     forwards = [one.both(i, right=True, pixels=True, disparity=True) for i in range(1, 5)]
     for i in (3, 1, 4, 2):
         other = forwards[i - 1]
         assert np.array_equal(two.frame(i), other.image)
         assert np.array_equal(two.right(i), other.right)
         assert canonical_hash(two.pixels(i, disparity=True)) == canonical_hash(other.pixels)
-        assert np.array_equal(render(motion, camera, i, light, Picture(jpeg=80)).image, other.image)
+        assert np.array_equal(render(motion, camera, i, light, picture).image, other.image)
     assert not np.array_equal(forwards[0].image, forwards[0].right)
     assert np.array_equal(one.background(7), two.background(7))
 
@@ -176,7 +177,7 @@ def test_a_person_changes_no_frame_in_which_it_is_not() -> None:
 
 def test_noise_is_normal_independent_and_the_same_in_empty_frames() -> None:
     motion, camera = motion_in(BARE, 3), small(pinhole(60.0))
-    made = stage(motion, camera, Light(), Picture(noise=4.0, texture=0.0))
+    made = stage(motion, camera, Light(), Picture(noise=4.0, shot=0.0, texture=0.0))
     empty = np.stack([made.background(k) for k in range(BACKGROUNDS)]).astype(float)
     noise = empty - empty.mean(axis=0)
     assert noise.std() == pytest.approx(4.0 * np.sqrt(1 - 1 / BACKGROUNDS), rel=0.02)
