@@ -29,8 +29,7 @@ REMEDY = "give a video that a player plays to its end"
 @dataclass(frozen=True)
 class Packets:
     """The packets of a video stream in the order of the file: when shown (units of time_base; None unknown), and
-    where groups begin that can be decoded by themselves. promised, seconds: frames and length that the header speaks of,
-    0 = none."""
+    where groups begin that can be decoded by themselves. promised, seconds: what the header says, 0 = nothing."""
 
     stamps: tuple[int | None, ...]
     keys: tuple[bool, ...]

@@ -122,7 +122,7 @@ def test_times_without_frames_are_told(tmp_path, name):
     """Two gaps; a pause of half a second, as phones make them, is none."""
     stamps = [40 * k + 3000 * (k > 9) + 2000 * (k > 14) + 500 * (k > 17) for k in range(20)]
     path = write_video(tmp_path / name, [picture(k) for k in range(20)], rate=1000, stamps=stamps)
-    with pytest.warns(UserWarning) as told:
+    with pytest.warns(UserWarning, match="without the gap") as told:
         sequence = one(path, fps=25)
     (words,) = (str(warning.message) for warning in told)
     assert words == f"{name}: nothing for 3.0 s after frame 10 (1 more such); frames are numbered without the gap"
