@@ -176,7 +176,7 @@ def view(
     out: Annotated[Path, typer.Option("--out", metavar="FILE.html", help="Page to write; a folder for many.")],
     video: Annotated[
         Literal["auto", "inside", "beside", "none"],
-        typer.Option(help="Pictures inside the page, as FILE.mp4 beside it (auto: from 12 MB on), or none."),
+        typer.Option(help="Pictures inside the page, as FILE.view.mp4 beside it (auto: from 12 MB on), or none."),
     ] = "auto",
     fps: Fps = None,
     px_per_m: Scale = None,

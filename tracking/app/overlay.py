@@ -16,7 +16,7 @@ from sim.io.atomic import writing
 from sim.io.encode import movie
 from sim.types import Frame, Image, Sequence, Tracks
 from tracking.app import marks, painter
-from tracking.app.film import even, is_source
+from tracking.app.film import even, refuse_source
 from tracking.app.marks import Side
 from tracking.app.painter import Style
 from tracking.app.sheet_panel import View
@@ -48,8 +48,7 @@ def overlay(
             remedy="flockscope view shows it on plain ground",
         )  # fmt: skip
     path = Path(out)
-    if is_source(sequence, path):
-        raise InputError(file=path, place="--out", got="the source itself", expected="another file", remedy="rename it")
+    refuse_source(sequence, path)
     layers = _layers(sequence, tracks, truth)
     with writing(path) as partial:
         _write(partial, sequence, layers, step)
