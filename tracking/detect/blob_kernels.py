@@ -34,7 +34,7 @@ def runs(mask: Bools) -> Labels:
                 first = at
                 while at < end and pixels[at] != 0:
                     at += 1
-                found[n] = row, first - row * wide, at - row * wide
+                found[n, 0], found[n, 1], found[n, 2] = row, first - row * wide, at - row * wide
                 n += 1
     return found[:n].copy()
 
@@ -105,11 +105,11 @@ def moments(runs: Labels, region: Ints, area: Ints) -> tuple[Array, Array]:
         m = region[k]
         if m >= 0:
             y = row - centre[m, 1]
-            xx, xy, yy = spread[m]
+            xx, xy, yy = spread[m, 0], spread[m, 1], spread[m, 2]
             for column in range(first, end):
                 x = column - centre[m, 0]
                 xx, xy, yy = xx + x * x, xy + x * y, yy + y * y
-            spread[m] = xx, xy, yy
+            spread[m, 0], spread[m, 1], spread[m, 2] = xx, xy, yy
     return centre, spread / area.reshape(-1, 1)
 
 

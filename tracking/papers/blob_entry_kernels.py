@@ -34,7 +34,7 @@ def feet(label: Labels, which: int, box: Ints, most: int) -> Array:
                     taken, total = taken + 1, total + column
                     per_row[row - top] += 1
                     if taken == size + (part < more):
-                        found[n] = total / taken + 0.5, quantile(per_row, taken, LOWEST, top) + 1
+                        found[n, 0], found[n, 1] = total / taken + 0.5, quantile(per_row, taken, LOWEST, top) + 1
                         n, part, taken, total = n + 1, part + 1, 0, 0
                         per_row[:] = 0
     return found
@@ -76,8 +76,7 @@ def enter(
     for count in range(1, most + 1):
         one, far = guesses[first : first + count], spread[first : first + count]
         first += count
-        order = np.argsort(-one[:, 1], kind="mergesort")
-        at = kernels.settle(foreground, cover, one, far, order, nats)
+        at = kernels.settle(foreground, cover, one, far, near_first(one), nats)
         alone = kernels.supports(foreground, cover, at, 1)
         kernels.paint_all(cover, at, -1)
         value = explained(foreground, cover, at) / person - count * support
@@ -85,6 +84,17 @@ def enter(
             best, worth = at, value
     kernels.paint_all(cover, best, 1)
     return best
+
+
+@kernel
+def near_first(templates: Array) -> Ints:
+    """(K,) rows of a few templates, low feet first."""
+    order = np.arange(len(templates))
+    for k in range(1, len(order)):
+        while k > 0 and templates[order[k], 1] > templates[order[k - 1], 1]:
+            order[k], order[k - 1] = order[k - 1], order[k]
+            k -= 1
+    return order
 
 
 @kernel
