@@ -19,9 +19,10 @@ from sim.io.pictures import checked, filled, size_of
 from sim.io.sample import Choice, Sample
 from sim.types import Camera, Frame, Image, Sequence
 
-SUFFIXES = tuple(
-    ".mp4 .m4v .mov .3gp .mkv .webm .avi .wmv .flv .ogv .mpg .mpeg .ts .mts .m2ts .h264 .h265 .hevc .y4m".split()
-)
+SUFFIXES = (
+    ".mp4", ".m4v", ".mov", ".3gp", ".mkv", ".webm", ".avi", ".wmv", ".flv", ".ogv", ".mpg", ".mpeg",
+    ".ts", ".mts", ".m2ts", ".h264", ".h265", ".hevc", ".y4m",
+)  # fmt: skip
 RATES = (0.1, 300.0)  # frames/s that make sense
 AGREE = 0.02  # by which the container's rate may differ from that of the time stamps
 GAP, GAPS = 1.0, 5.0  # s, and times the usual step: time without a frame that is told
