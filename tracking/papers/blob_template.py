@@ -14,9 +14,9 @@ from __future__ import annotations
 import numpy as np
 
 from sim.types import Array, Bools, Ints
+from tracking.detect.blobs import Labels
 from tracking.papers import blob_template_kernels as kernels
 from tracking.papers.blob_template_kernels import ELLIPSE as ELLIPSE
-from tracking.papers.blob_template_kernels import EXPLAINED
 
 
 class Mask:
@@ -27,9 +27,11 @@ class Mask:
         self.foreground = foreground
         self.cover: kernels.Cover = np.zeros(foreground.shape, np.int16)
 
-    def close(self, region: Bools) -> None:
-        """These pixels are explained: nobody is measured by them."""
-        self.cover[region] += EXPLAINED
+    def close(self, label: Labels, rows: Ints) -> None:
+        """The regions row + 1 of labels (H, W) are explained: nobody is measured by them."""
+        which = np.zeros(int(rows.max(initial=-1)) + 2, bool)
+        which[rows + 1] = True
+        kernels.close(self.cover, label, which)
 
     def paint(self, templates: Array, more: int = 1) -> None:
         """Add (or take away) templates (K, 4)."""
@@ -79,6 +81,6 @@ def near_first(templates: Array) -> Ints:
 
 def painted(shape: tuple[int, ...], templates: Array) -> Bools:
     """(H, W) the pixels that templates (K, 4) cover."""
-    scene = Mask(np.zeros(shape, bool))
-    scene.paint(templates)
-    return scene.cover > 0
+    cover = np.zeros(shape, np.int16)
+    kernels.paint_all(cover, templates, 1)
+    return cover > 0

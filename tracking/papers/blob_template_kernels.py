@@ -12,6 +12,7 @@ from numba import njit
 from numpy.typing import NDArray
 
 from sim.types import Array, Bools, Ints
+from tracking.detect.blobs import Labels
 
 Cover = NDArray[np.int16]
 HALVES, EMPTY = 2, -1  # what a foreground pixel is worth and a background pixel costs
@@ -74,6 +75,16 @@ def paint_all(cover: Cover, templates: Array, more: int) -> None:
     """Add `more` to the pixels of templates (K, 4), for each of them."""
     for k in range(len(templates)):
         paint(cover, templates[k], more)
+
+
+@kernel
+def close(cover: Cover, label: Labels, which: Bools) -> None:
+    """Add EXPLAINED to the pixels whose label k has which[k]; labels beyond have not."""
+    for row in range(cover.shape[0]):
+        for column in range(cover.shape[1]):
+            k = label[row, column]
+            if 0 < k < len(which) and which[k]:
+                cover[row, column] += EXPLAINED
 
 
 @kernel

@@ -99,5 +99,5 @@ def test_what_is_explained_brings_nobody():
     scene.paint(one)
     assert not len(blob_entry.newcomers(scene, Fixed(60.0, 24.0), 0.5))
     closed = Mask(mask_of(one[0]))
-    closed.close(mask_of(one[0]))
+    closed.close(mask_of(one[0]).astype(np.int32), np.array([0]))
     assert not len(blob_entry.newcomers(closed, Fixed(60.0, 24.0), 0.5))

@@ -66,6 +66,14 @@ def test_all_together_are_the_slow_way(seed):
         assert np.array_equal(again.cover, cover + slow.painted(cover.shape, at[rows]))
 
 
+def test_closed_regions_are_explained_and_no_others():
+    label = np.random.default_rng(0).integers(0, 6, (HIGH, WIDE)).astype(np.int32)
+    for rows in ([], [0], [1, 3]):
+        scene = Mask(label > 0)
+        scene.close(label, np.array(rows, int))
+        assert np.array_equal(scene.cover >= EXPLAINED, np.isin(label, np.add(rows, 1)))
+
+
 def test_support_is_one_on_ones_own_pixels_and_minus_a_half_on_none():
     one = np.array([[60.0, 80.0, 60.0, 24.0]])
     assert Mask(mask_of(one[0])).support(one)[0] == pytest.approx(1.0, abs=0.02)
