@@ -5,6 +5,7 @@ import numpy as np
 import pytest
 
 from scenarios.errors import InputError
+from sim.io import pictures
 from sim.io.pictures import read_picture
 from sim.io.source import open_source
 from tests.small_videos import SIZE, picture
@@ -79,9 +80,15 @@ def test_a_lost_picture_is_told_once(tmp_path, capfd, suffix):
     assert capfd.readouterr().err == ""
 
 
-def test_pictures_cost_nothing_where_nobody_asks(tmp_path, monkeypatch):
-    from sim.io import pictures
+@pytest.mark.parametrize("kind", [".jpg", ".png"])
+def test_a_picture_cut_off_anywhere_is_none(kind):
+    """Seen without decoding: OpenCV 4 makes half a picture of it."""
+    body = cv2.imencode(kind, picture(3))[1].tobytes()
+    assert pictures.ends(body)
+    assert not any(pictures.ends(body[:n]) for n in range(1, len(body) - 8, 7))
 
+
+def test_pictures_cost_nothing_where_nobody_asks(tmp_path, monkeypatch):
     path = folder(tmp_path / "a", ["000001.jpg", "000002.jpg"])
     monkeypatch.setattr(pictures, "read_picture", None)
     (sequence,) = open_source(path, images=False)
