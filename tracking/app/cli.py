@@ -98,7 +98,9 @@ def generate(
         str,
         typer.Option("--streams", metavar="A,B,…", help="Pictures: left, right, disparity, ids, background; or none."),
     ] = "left",
-    images: Annotated[Literal["jpg", "png", "mp4"], typer.Option(help="How pictures are stored.")] = "jpg",
+    images: Annotated[
+        Literal["jpg", "png", "mp4"] | None, typer.Option(help="How pictures are stored; jpg if nothing is said.")
+    ] = None,
     workers: Annotated[int, typer.Option("--workers", min=1, help="Processes.")] = 1,
     json: Json = False,
 ) -> Answer:
