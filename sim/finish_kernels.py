@@ -31,14 +31,27 @@ def _five(a, b, c, d, e, w, x, y, many, out):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True)
-def _shown(line, grain, gain, shot, many, out):  # type: ignore[no-untyped-def]
-    """Eight bits of gain (many,) times a line, plus noise, whose variance grows with light by the share `shot`."""
+def _noisy(x, grain, read, slope):  # type: ignore[no-untyped-def]
+    """Eight bits of x, UNIT times a grey level, plus noise whose variance is read + slope x times the grain's."""
+    x = (x + np.float32(grain) * np.sqrt(read + slope * x)) * SCALE + HALF
+    x = x if x > LOW else LOW
+    return np.uint8(np.int32(x if x < HIGH else HIGH))
+
+
+@njit(cache=True)
+def _shown(line, gain, grain, shot, many, out):  # type: ignore[no-untyped-def]
+    """Eight bits of gain times a line, plus noise, whose variance grows with light by the share `shot`."""
     read, slope = ONE - shot, shot * GREY
     for i in range(many):
-        x = np.float32(line[i]) * gain[i]
-        x = (x + np.float32(grain[i]) * np.sqrt(read + slope * x)) * SCALE + HALF
-        x = x if x > LOW else LOW
-        out[i] = np.uint8(np.int32(x if x < HIGH else HIGH))
+        out[i] = _noisy(np.float32(line[i]) * gain, grain[i], read, slope)
+
+
+@njit(cache=True)
+def _shown_in_parts(line, gain, grain, shot, many, out):  # type: ignore[no-untyped-def]
+    """As `_shown`, of gains (many,)."""
+    read, slope = ONE - shot, shot * GREY
+    for i in range(many):
+        out[i] = _noisy(np.float32(line[i]) * gain[i], grain[i], read, slope)
 
 
 @njit(cache=True)
@@ -117,22 +130,52 @@ def finish(canvas, plate, dirty, weights, nodes, step, noise, shot, offsets, out
     """
     height, width = canvas.shape[0], canvas.shape[1] // 3
     edge, wide, tile = _scratch(len(weights) // 2, width)
-    bright = np.full((TILE_H, 3 * width), nodes[0, 0], np.float32)
+    bright, even = np.empty((TILE_H, 3 * width), np.float32), nodes.size == 1
     for top in range(0, height, TILE_H):
-        rows = min(TILE_H, height - top)
-        for r in range(rows):
-            if nodes.size > 1:
-                brightness(nodes, step, top + r, width, bright[r])
-            _shown(plate[top + r], noise[offsets[top + r] :], bright[r], shot, 3 * width, out[top + r])
+        rows, marks = min(TILE_H, height - top), dirty[top // TILE_H]
+        for r in range(0 if even else rows):
+            brightness(nodes, step, top + r, width, bright[r])
         last = 0
-        while last < width:  # runs of dirty tiles
-            left = last
-            while last < width and dirty[top // TILE_H, last // TILE_W] == dirty[top // TILE_H, left // TILE_W]:
+        while last < width:  # runs of tiles, dirty or clean
+            left, painted = last, marks[last // TILE_W]
+            while last < width and marks[last // TILE_W] == painted:
                 last += TILE_W
-            if not dirty[top // TILE_H, left // TILE_W]:
-                continue
             cols = min(last, width) - left
-            _blur_run(canvas, top, left, rows, cols, weights, edge, wide, tile)
+            if painted:
+                _blur_run(canvas, top, left, rows, cols, weights, edge, wide, tile)
             for r in range(rows):
                 grain, to = noise[offsets[top + r] + 3 * left :], out[top + r, 3 * left :]
-                _shown(tile[r], grain, bright[r, 3 * left :], shot, 3 * cols, to)
+                line, gain, clean = tile[r], bright[r, 3 * left :], plate[top + r, 3 * left :]
+                if even and painted:
+                    _shown(line, nodes[0, 0], grain, shot, 3 * cols, to)
+                elif even:
+                    _shown(clean, nodes[0, 0], grain, shot, 3 * cols, to)
+                elif painted:
+                    _shown_in_parts(line, gain, grain, shot, 3 * cols, to)
+                else:
+                    _shown_in_parts(clean, gain, grain, shot, 3 * cols, to)
+
+
+@njit(cache=True)
+def _copy(line, many, out):  # type: ignore[no-untyped-def]
+    for i in range(many):
+        out[i] = line[i]
+
+
+@njit(cache=True)
+def wipe(dirty, plate, background, canvas, depth, taken):  # type: ignore[no-untyped-def]
+    """Make the dirty tiles of canvas (H, W * 3), depth (H, W) and taken (H, W) those of the empty scene, and clean."""
+    height, width = depth.shape
+    for j in range(dirty.shape[0]):
+        last = 0
+        while last < dirty.shape[1]:  # runs of dirty tiles
+            first = last
+            while last < dirty.shape[1] and dirty[j, last]:
+                dirty[j, last] = 0
+                last += 1
+            left, many = first * TILE_W, min(last * TILE_W, width) - first * TILE_W
+            last += last == first
+            for v in range(j * TILE_H, min((j + 1) * TILE_H, height)):
+                _copy(plate[v, 3 * left :], 3 * many, canvas[v, 3 * left :])
+                _copy(background[v, left:], many, depth[v, left:])
+                taken[v, left : left + many] = 0

@@ -23,7 +23,7 @@ from sim.sensor_noise import offsets, pool
 from sim.silhouettes import Cast, Crowd
 from sim.stretch import FRAMES, Stretch
 from sim.types import BACKGROUNDS, Camera, Frame, Image, Motion, PixelTruth
-from sim.view import NODES, View, blur_weights
+from sim.view import NODES, Easel, View, blur_weights
 from sim.wear import wear
 
 if TYPE_CHECKING:
@@ -121,7 +121,10 @@ class Stage:
     def background(self, k: int) -> Image:
         """Empty frame k = 0 … BACKGROUNDS - 1, at t = (k - BACKGROUNDS) / fps."""
         view, index = self.left_view, k - BACKGROUNDS + 1
-        return self._finish(view, *self._empty(view, index), index, LEFT)
+        easel = self._easel(view, index)
+        image = self._finish(view, easel, index, LEFT)
+        view.give_back(easel)
+        return image
 
     def _time(self, index: int) -> float:
         return (index - 1) / self.motion.fps
@@ -131,17 +134,15 @@ class Stage:
             self._last = Stretch(self.motion, self.illumination, index)
         return self._last
 
-    def _empty(self, view: View, index: int) -> tuple[NDArray[np.int16], NDArray[np.uint8]]:
-        """The scene without people to paint on, its plants moved, and the tiles (rows, columns) that were painted."""
-        from sim.paint_kernels import TILE_H, TILE_W
-
-        canvas, dirty = view.canvas.copy(), np.zeros((-(-view.height // TILE_H), -(-view.width // TILE_W)), np.uint8)
+    def _easel(self, view: View, index: int) -> Easel:
+        """The scene without people to paint on, its plants moved."""
+        easel = view.easel()
         if view.plants is not None:
             from sim.foliage_kernels import sway
 
-            wind = view.wind(self._time(index))
-            sway(view.canvas, view.plate.plants, view.moving, wind, NODES, canvas, dirty, len(self._weights) // 2)
-        return canvas, dirty
+            wind, margin = view.wind(self._time(index)), len(self._weights) // 2
+            sway(view.canvas, view.plate.plants, view.moving, wind, NODES, easel.canvas, easel.dirty, margin)
+        return easel
 
     def _draw(
         self, index: int, side: int, *, shade: bool, label: bool, disparity: bool = False
@@ -152,27 +153,30 @@ class Stage:
         view, stretch, light = self.right_view if side else self.left_view, self._stretch(index), self.illumination
         people, sight = stretch.crowd(index), stretch.sight(view, side, index)
         here, margin, fall = sight.cast, len(self._weights) // 2, sight.shadows
-        canvas, dirty = self._empty(view, index) if shade else (view.canvas[:0], np.zeros((0, 0), np.uint8))
+        easel = self._easel(view, index) if shade else view.easel()
         if shade and fall is not None:
             kernels.shadows(
                 view.geometry.place, view.plate.direct, fall.outlined.boxes, view.level, fall.outlined.middle,
-                fall.outlined.inverse, people.shapes.centre, fall.shape, light.sun, fall.softness,
-                np.zeros((view.height, view.width), np.uint8), canvas, dirty, margin,
+                fall.outlined.inverse, people.shapes.centre, fall.shape, light.sun, fall.softness, easel.taken,
+                easel.canvas, easel.dirty, margin,
             )  # fmt: skip
-        depth, ids = view.geometry.depth.copy(), view.ids.copy() if label else view.ids[:0]
+        ids = view.empty_ids() if label else np.zeros((0, 0), np.int64)
         amodal = np.zeros(len(people.id), np.int64)
         kernels.people(
             np.argsort(here.near[:, 0], kind="stable"), here.start, here.step, people.half, here.outlined.middle,
             here.outlined.inverse, here.outlined.boxes, people.id, people.turn @ light.sun, light.shadow,
-            sight.sunlit, people.id - 1, self._atlas, shade, label, depth, ids, canvas, dirty, margin, amodal,
+            sight.sunlit, people.id - 1, self._atlas, shade, label, easel.depth, ids, easel.canvas, easel.dirty,
+            margin, amodal,
         )  # fmt: skip
-        image = self._finish(view, canvas, dirty, index, side) if shade else np.zeros((0, 0, 3), np.uint8)
-        if not label:
-            return image, None
-        apart = self._disparities(depth, ids, here, people, index) if disparity else None
-        return image, pixel_truth(ids, here.outlined.boxes, people.id, amodal, apart)
+        image = self._finish(view, easel, index, side) if shade else np.zeros((0, 0, 3), np.uint8)
+        truth = None
+        if label:
+            apart = self._disparities(easel.depth, ids, here, people, index) if disparity else None
+            truth = pixel_truth(ids, here.outlined.boxes, people.id, amodal, apart)
+        view.give_back(easel)
+        return image, truth
 
-    def _finish(self, view: View, canvas: NDArray[np.int16], dirty: NDArray[np.uint8], index: int, side: int) -> Image:
+    def _finish(self, view: View, easel: Easel, index: int, side: int) -> Image:
         from sim.finish_kernels import finish
 
         image = np.empty((view.height, view.width, 3), np.uint8)
@@ -181,8 +185,8 @@ class Stage:
         rows = offsets(view.height, self.motion.seed, side, number, self.motion.repeat)
         flat = view.height, 3 * view.width
         finish(
-            canvas.reshape(flat), view.blurred.reshape(flat), dirty, self._weights, bright, NODES, self._noise,
-            np.float32(self.picture.shot), rows, image.reshape(flat),
+            easel.canvas.reshape(flat), view.blurred.reshape(flat), easel.dirty, self._weights, bright, NODES,
+            self._noise, np.float32(self.picture.shot), rows, image.reshape(flat),
         )  # fmt: skip
         return _lossy(image, self.picture.jpeg) if self.picture.jpeg else image
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING
 
@@ -23,6 +24,17 @@ NODES = 16  # px between the places at which clouds and wind are asked for; line
 OCCLUDER = -2  # id of walls and pillars
 
 
+@dataclass(frozen=True, eq=False)
+class Easel:
+    """What a frame is painted on: canvas (H, W, 3) and depth (H, W), at first the empty scene's, taken (H, W), the sun
+    that people take, 0 … 255, and dirty (rows, columns), the tiles in which any of it has changed."""
+
+    canvas: NDArray[np.int16]
+    depth: NDArray[np.float32]
+    taken: NDArray[np.uint8]
+    dirty: NDArray[np.uint8]
+
+
 class View:
     """The empty scene as one camera sees it, each part made when first needed."""
 
@@ -33,6 +45,26 @@ class View:
         self.width, self.height = camera.image
         self.rays: Rays = sight(camera)
         self.solids: Solids = solids(motion.scene)
+        self._spare: list[Easel] = []
+
+    def easel(self) -> Easel:
+        """The empty scene to paint on: one that was given back, or a new one."""
+        from sim.paint_kernels import TILE_H, TILE_W
+
+        if self._spare:
+            return self._spare.pop()
+        size = self.height, self.width
+        dirty = np.zeros((-(-self.height // TILE_H), -(-self.width // TILE_W)), np.uint8)
+        return Easel(self.canvas.copy(), self.geometry.depth.copy(), np.zeros(size, np.uint8), dirty)
+
+    def give_back(self, easel: Easel) -> None:
+        """Wipe it for the next frame."""
+        from sim.finish_kernels import wipe
+
+        flat = self.height, 3 * self.width
+        plate, canvas = self.canvas.reshape(flat), easel.canvas.reshape(flat)
+        wipe(easel.dirty, plate, self.geometry.depth, canvas, easel.depth, easel.taken)
+        self._spare.append(easel)
 
     @cached_property
     def geometry(self) -> Geometry:
@@ -62,10 +94,13 @@ class View:
         return out
 
     @cached_property
-    def ids(self) -> NDArray[np.int64]:
-        """(H, W): OCCLUDER where a wall or pillar shows, else 0."""
+    def _occluders(self) -> NDArray[np.int64] | None:
         solid = (self.geometry.kind == WALL) | (self.geometry.kind == PILLAR)
-        return np.where(solid, OCCLUDER, 0).astype(np.int64)
+        return np.where(solid, OCCLUDER, 0).astype(np.int64) if solid.any() else None
+
+    def empty_ids(self) -> NDArray[np.int64]:
+        """(H, W), new: OCCLUDER where a wall or pillar shows, else 0."""
+        return np.zeros((self.height, self.width), np.int64) if self._occluders is None else self._occluders.copy()
 
     @cached_property
     def level(self) -> bool:
