@@ -70,7 +70,7 @@ def missing(index: decode.Packets) -> Iterator[str]:
     times, length = index.times(), len(index.stamps)
     step = np.diff(times)
     usual = float(np.median(step)) if len(step) else 0.0
-    shown = float(times[-1]) + usual if len(times) else 0.0
+    shown = float(times[-1]) + usual if len(times) else index.seconds
     if length < index.promised:
         yield f"ends after {length} of the {index.promised} frames it promises"
     elif not index.promised and index.seconds - shown > max(GAP, GAPS * usual):
