@@ -52,7 +52,7 @@ class Packets:
             return None
         return {stamp: k for k, stamp in enumerate(sorted(known), 1)}
 
-    def groups(self, wanted: list[int]) -> set[int] | None:
+    def groups(self, wanted: set[int]) -> set[int] | None:
         """Numbers of the groups that hold these frames, or None: all."""
         ranks = self.ranks()
         if ranks is None:
@@ -127,14 +127,15 @@ def _demuxed(container: Any, stream: Any) -> Iterator[Any]:
 def pictures(path: Path, index: Packets, wanted: list[int] | None = None) -> Iterator[tuple[int, Image]]:
     """(frame, picture) in order, of all frames or of those wanted; what cannot be decoded is left out."""
     ranks, last, count = index.ranks(), max(wanted or [0]), 0
-    groups = None if wanted is None else index.groups(wanted)
+    some = None if wanted is None else set(wanted)
+    groups = None if some is None else index.groups(some)
     with opened(path) as (container, stream):
         for frame in _decoded(container, stream, groups):
             count += 1
             number = count if ranks is None or frame is None else ranks.get(frame.pts, 0)
-            if frame is not None and not frame.is_corrupt and number and (wanted is None or number in wanted):
+            if frame is not None and not frame.is_corrupt and number and (some is None or number in some):
                 yield number, _picture(frame)
-            if wanted is not None and number >= last:
+            if some is not None and number >= last:
                 return
 
 
