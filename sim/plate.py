@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from sim.light import Illumination
 from sim.rng import rng
+from sim.terrain import flights
 from sim.types import Array, Camera, Scene
 from sim.visibility import unprojection
 
@@ -72,17 +73,15 @@ Solids = tuple[Array, float, Array, float, Array]
 
 
 def solids(scene: Scene) -> Solids:
-    """All that stands still, as the kernels want it: walls (W, 4), height, pillars (P, 3), height, flights (S, 9).
-
-    A flight is foot x, y, unit axis x, y, length, half width, rise, steps, landing.
-    """
-    flights = np.zeros((len(scene.stairs), 9))
-    for row, stairs in zip(flights, scene.stairs, strict=True):
-        axis = stairs.head - stairs.foot
-        length = float(np.hypot(*axis))
-        row[:] = [*stairs.foot, *(axis / length), length, stairs.width / 2, stairs.rise, stairs.steps, stairs.landing]
+    """All that stands still, as the kernels want it: walls (W, 4), height, pillars (P, 3), height, flights (S, 9)."""
     walls = np.array(scene.walls, dtype=float).reshape(-1, 4)
-    return walls, float(scene.wall_height), np.array(scene.pillars, dtype=float), float(scene.pillar_height), flights
+    return (
+        walls,
+        float(scene.wall_height),
+        np.array(scene.pillars, dtype=float),
+        float(scene.pillar_height),
+        flights(scene),
+    )
 
 
 def survey(camera: Camera, scene: Scene) -> Geometry:

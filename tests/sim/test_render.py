@@ -273,14 +273,29 @@ def test_textures_repeat_nowhere() -> None:
     assert alike[~near].max() < 0.5
 
 
-def test_geometric_visibility_is_that_of_the_pixels() -> None:
-    motion, camera = crowd(5, people=14, frames=3), pinhole(25.0, at=(8.0, -6.0, 4.5))
+@pytest.mark.parametrize("scene", SCENES)
+def test_geometric_visibility_is_that_of_the_pixels(scene: str) -> None:
+    motion, camera = crowd(5, people=14, frames=3, scene=SCENES[scene]), pinhole(25.0, at=(8.0, -6.0, 4.5))
     truth, pixels = bodies(motion, camera), stage(motion, camera).pixels(2)
     here = truth.rows(2)
     assert truth.box is not None
     assert np.abs(truth.visibility[here] - pixels.visibility).max() < 0.06
     whole = pixels.visibility == 1
     assert np.abs(truth.box[here] - pixels.box)[whole].max() <= 1.0
+
+
+@pytest.mark.parametrize("rise", [1.6, -1.6])
+def test_stairs_hide_people_in_geometry_as_in_pixels(rise: float) -> None:
+    flight = Stairs(np.array([6.0, 6.0]), np.array([9.0, 6.0]), 3.0, rise, 8, 2.0)
+    scene = Scene(np.array([16.0, 10.0]), stairs=(flight,))
+    x, y = np.meshgrid(np.linspace(5.0, 11.5, 9), [3.8, 5.0, 6.0, 7.0, 8.2, 9.0])  # before, on and behind the flight
+    motion = walkers(np.column_stack([x.ravel(), y.ravel()]), np.full((x.size, 2), 0.3), frames=2, scene=scene)
+    camera = pinhole(15.0, at=(8.0, -5.0, 3.2))
+    truth, pixels = bodies(motion, camera), stage(motion, camera).pixels(1)
+    off = truth.visibility[truth.rows(1)] - pixels.visibility
+    assert np.abs(off).max() < 0.06
+    alone = stage(motion.replace(scene=BARE), camera).pixels(1)
+    assert (pixels.visible_px < 0.7 * alone.visible_px).sum() >= 3  # they do hide somebody
 
 
 def test_what_cannot_be_drawn_is_refused() -> None:
