@@ -29,7 +29,8 @@ REMEDY = "give a video that a player plays to its end"
 @dataclass(frozen=True)
 class Packets:
     """The packets of a video stream in the order of the file: when shown (units of time_base; None unknown), and
-    where groups begin that can be decoded by themselves. promised, seconds: what the header says, 0 = nothing."""
+    where groups begin that can be decoded by themselves. promised, seconds: what the header says, 0 = nothing.
+    broken: why reading ended before the file does, "" = it did not."""
 
     stamps: tuple[int | None, ...]
     keys: tuple[bool, ...]
@@ -37,6 +38,7 @@ class Packets:
     rate: float
     promised: int
     seconds: float
+    broken: str
     codec: str
     reorders: bool
 
@@ -92,12 +94,20 @@ def _reason(error: Exception) -> str:
 
 def packets(path: Path) -> Packets:
     """What the file holds, without decoding; one that breaks off ends there."""
+    import av
+
+    found, broken = [], ""
     with opened(path) as (container, stream):
-        found = [(p.pts, bool(p.is_keyframe)) for p in _demuxed(container, stream) if p.size and not p.is_discard]
+        try:
+            for p in container.demux(stream):
+                if p.size and not p.is_discard:
+                    found.append((p.pts, bool(p.is_keyframe)))
+        except av.FFmpegError as error:
+            broken = _reason(error)
         context = stream.codec_context
         return Packets(
             tuple(pts for pts, _ in found), tuple(key for _, key in found), stream.time_base,
-            float(stream.average_rate or 0), int(stream.frames), _seconds(stream), context.name,
+            float(stream.average_rate or 0), int(stream.frames), _seconds(stream), broken, context.name,
             bool(context.has_b_frames),
         )  # fmt: skip
 
@@ -111,6 +121,7 @@ def _seconds(stream: Any) -> float:
 
 
 def _demuxed(container: Any, stream: Any) -> Iterator[Any]:
+    """Packets up to where `packets` ended."""
     import av
 
     packets = container.demux(stream)

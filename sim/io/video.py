@@ -71,7 +71,9 @@ def missing(index: decode.Packets) -> Iterator[str]:
     step = np.diff(times)
     usual = float(np.median(step)) if len(step) else 0.0
     shown = float(times[-1]) + usual if len(times) else index.seconds
-    if length < index.promised:
+    if index.broken:
+        yield f"breaks off after {length} frames ({index.broken})"
+    elif length < index.promised:
         yield f"ends after {length} of the {index.promised} frames it promises"
     elif not index.promised and index.seconds - shown > max(GAP, GAPS * usual):
         yield f"ends after {shown:.1f} of the {index.seconds:.1f} s it promises"

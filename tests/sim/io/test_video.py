@@ -122,6 +122,14 @@ def test_a_matroska_that_breaks_off_is_told(tmp_path):
     assert 20 <= sequence.length < 30
 
 
+def test_a_container_that_breaks_within_is_told(tmp_path):
+    path = write_video(tmp_path / "a.y4m", [picture(k) for k in range(20)], codec="wrapped_avframe")
+    with pytest.warns(UserWarning, match=r"a\.y4m: breaks off after \d+ frames \(Invalid data"):
+        sequence = one(damage(path, 0.5, 9000))
+    assert 5 < sequence.length < 15
+    assert [disc(frame.image) for frame in sequence][:5] == pytest.approx([4.0 * k for k in range(5)], abs=5)
+
+
 @pytest.mark.parametrize("name", ["a.mkv", "a.mp4"])
 def test_times_without_frames_are_told(tmp_path, name):
     """Two gaps; a pause of half a second, as phones make them, is none."""
