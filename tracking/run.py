@@ -227,6 +227,14 @@ def _scale(context: Context, answers: SequenceOf[Tracks]) -> float:
     return float(np.nanmedian(np.concatenate(heights))) / PERSON_HEIGHT
 
 
+def grouped(tracks: SequenceOf[Tracks], sequence: Sequence) -> tuple[Tracks, ...]:
+    """Stored or a stranger's tracks of a sequence, with groups and events where the tracker left them empty."""
+    from tracking.grouping import with_groups
+
+    scale, truth = sequence.px_per_m, None if np.isfinite(sequence.px_per_m) else sequence.truth
+    return with_groups(tracks, sequence.fps, scale if truth is None else truth.px_per_m)
+
+
 def _px_per_m(sequence: Sequence, mode: DetectionMode, feed: tuple[Frame, ...] | None) -> float:
     """px per metre: the camera's, the source's own, else the median height of the boxes given / 1.7; nan if none."""
     if sequence.camera is not None:

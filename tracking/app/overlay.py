@@ -20,7 +20,7 @@ from tracking.app.film import even, refuse_source
 from tracking.app.marks import Side
 from tracking.app.painter import Style
 from tracking.app.sheet_panel import View
-from tracking.grouping import with_groups
+from tracking.run import grouped
 
 HowTrue = Literal["beside", "over", "only"]
 LEAST = 400
@@ -68,10 +68,7 @@ def _layers(
         true = marks.of_truth(sequence.truth)
     if tracks is None or how == "only":
         return [[(true, Style())]]
-    scale = sequence.px_per_m
-    if not np.isfinite(scale) and sequence.truth is not None:
-        scale = sequence.truth.px_per_m
-    said = marks.of_tracks(with_groups(tracks, sequence.fps, scale), sequence.camera, sequence.scene)
+    said = marks.of_tracks(grouped(tracks, sequence), sequence.camera, sequence.scene)
     if how == "beside":
         return [[(true, Style())], [(said, Style())]]
     return [[(true, Style(plain=True)), (said, Style())] if how == "over" else [(said, Style())]]
