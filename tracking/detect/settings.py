@@ -16,7 +16,7 @@ class BackgroundSettings(Config):
     tracker: ClassVar[str] = "background"
 
     detection_rate: float = param(
-        0.9999, (0.9, 0.999999), "probability", "share of background pixels inside each threshold, by training", "log"
+        0.999, (0.9, 0.999999), "probability", "share of background pixels inside each threshold, by training", "log"
     )
     dark: float = param(0.4, (0.0, 1.0), "", "brightness, relative, below which a pixel is dark foreground, no shadow")
     bright: float = param(
