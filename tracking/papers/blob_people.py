@@ -55,7 +55,7 @@ class People(Population):
         self.nominal = np.concatenate([self.nominal, self.bank[:, self.bank.shape[1] - len(z) :]], 1)
 
     def turned(self, z: Array, angle_var: Array) -> Array:
-        """(N, M) squared distances of directions: y^2 / S of tracks and axes z (M,); 0 for those without a direction."""
+        """(N, M) squared distances y^2 / S of tracks' directions and axes z (M,); 0 for those without a direction."""
         s = self.angle[1][:, None] + angle_var
         turn = kalman.angle_innovation(z, self.angle[0][:, None])
         return np.where(kalman.directed(angle_var), turn * turn / s, 0.0)
@@ -69,9 +69,9 @@ class People(Population):
         return np.asarray(np.add.reduce(terms, 1) / np.square(self.scale[rows]) + turn)
 
     def settle(self, rows: Ints, axes: Array, var: float) -> None:
-        """Axes of tracks return to those (K, 2) px expected at their place, with variance `var` m^2; rho does not know.
+        """Axes of tracks return to those (K, 2) px expected there, with variance `var` m^2; rho does not know of it.
 
-        An Ornstein-Uhlenbeck step: with s = e^(-dt / SETTLING), x = s x + (1 - s) expected and P = s^2 P + (1 - s^2) var.
+        An Ornstein-Uhlenbeck step: s = e^(-dt / SETTLING), x = s x + (1 - s) expected, P = s^2 P + (1 - s^2) var.
         What is expected is the same in every frame, so it must not be counted as a measurement of each.
         """
         stay = np.exp(-self.dynamics.dt / SETTLING)

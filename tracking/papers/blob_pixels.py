@@ -157,7 +157,7 @@ class Pixels:
         """Tracks' axes return to what a person's are at their places."""
         at = _templates(self.people.uprights())
         axes = self.size.axes(at[:, :2])
-        rows = np.isfinite(axes).all(1).nonzero()[0]
+        rows = np.flatnonzero(np.isfinite(axes).all(1))
         self.people.settle(rows, -np.sort(-axes[rows]), self.config.person_noise**2)
 
     def _lone(self, found: detect.Blobs, expected: Array) -> Bools:

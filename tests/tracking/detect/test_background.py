@@ -99,7 +99,7 @@ def test_new_frames_of_the_empty_scene_are_background_at_about_the_detection_rat
 def test_five_classes_of_known_colours():
     mean = np.broadcast_to(np.array([90.0, 100.0, 110.0]), (30, 50, 3))
     made = model(mean, gain="none")
-    scales = np.repeat([1.0, 0.6, 0.2, 1.5, 2.3], 10)
+    scales = np.repeat([1.0, 0.6, 0.2, 1.2, 2.3], 10)
     picture = mean * scales[None, :, None]
     picture[20:] = mean[20:] * (1.6, 0.9, 0.3)
     classes = made.classify(np.round(picture).astype(np.uint8))

@@ -412,5 +412,5 @@ def test_nobody_above_the_horizon_is_reported():
 
 @pytest.mark.parametrize("scale", [float("nan"), 0.0])
 def test_boxes_without_a_scale_are_refused(scale):
-    with pytest.raises(InputError, match="context.px_per_m"):
+    with pytest.raises(InputError, match=r"context\.px_per_m"):
         Blob().reset(Context(fps=FPS, px_per_m=scale), 0)
