@@ -7,8 +7,8 @@ that the right camera sees the point and the other does not; `px`: largest diffe
 pixels. The rest is of every `step`-th frame in full size. `box`: largest difference of an edge of the analytic box from
 that of the pixels, of people wholly visible. `visibility - visibility_px`: mean, mean absolute, 95 % and largest
 difference of the column of gt.txt from visible / amodal pixels, of people with at least 50 amodal pixels and nothing
-outside the image. The geometric one knows a grid of 16 × 32 samples a person, orders people by their distance, and does
-not know that stairs hide anybody.
+outside the image. The geometric one knows a grid of 16 × 32 samples a person, orders people by their distance, and
+takes a person for flat where stairs come before it.
 """
 
 from __future__ import annotations

@@ -125,6 +125,9 @@ class Light(Model):
     drift: NonNegative = Field(0.0, description="sd of slow changes of brightness, relative")
     drift_time: Positive = Field(20.0, description="time constant of slow changes, s")
     flicker: NonNegative = Field(0.0, description="sd of changes from frame to frame, relative")
+    cloud: Value = Field(0.0, description="sd of soft patches of brightness that pass over the ground, relative")
+    cloud_size: Positive = Field(8.0, description="size of these patches (correlation 0.6 so far apart), m")
+    cloud_speed: NonNegative = Field(1.0, description="how fast they pass, m/s")
     switch: tuple[Switch, ...] = Field((), description="sudden changes")
 
 
@@ -132,9 +135,15 @@ class Picture(Model):
     """What the camera makes of it, for pictures only."""
 
     texture: Share = Field(0.5, description="contrast of the patterns on ground and walls")
-    noise: NonNegative = Field(3.0, description="sd of the noise of each pixel and colour, grey levels")
+    noise: NonNegative = Field(
+        3.0, description="sd of the noise of each pixel and colour at grey level 128, grey levels"
+    )
+    shot: Share = Field(0.5, description="share of the noise's variance there that is in proportion to brightness")
     blur_px: NonNegative = Field(0.6, description="sd of the blur, px")
     jpeg: Annotated[int, Field(ge=0, le=100)] = Field(0, description="quality of lossy artefacts; 0 = none")
+    foliage: Value = Field(0.0, description="share of the image that plants cover, which wind moves; ground only")
+    sway_px: NonNegative = Field(1.5, description="sd of the plants' sway along each axis, px")
+    sway_time: Positive = Field(0.4, description="how long the sway stays alike (correlation 0.6), s")
 
 
 class Crowd(Model):

@@ -10,6 +10,8 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
+from sim.wear_kernels import ROUND, UP
+
 UNIT = 64.0  # canvases hold grey levels times this, as int16
 MOST = 32767.0
 TILE_H, TILE_W = 8, 16  # px: what is blurred anew as a whole where something was painted
@@ -46,19 +48,61 @@ def touch(dirty, v, left, right, margin, height, width):  # type: ignore[no-unty
 
 
 @njit(cache=True, error_model="numpy")
-def _colour(atlas, page, e, round_, up, light, canvas, v, u):  # type: ignore[no-untyped-def]
-    """The canvas at (v, u): the atlas's colour at round_ in [0, 4) and up in [-1, 1], between its four neighbours."""
-    rows, cols = atlas.shape[2], atlas.shape[3]
-    x, y = round_ * (0.25 * cols) - 0.5, min(max((up + 1.0) * (0.5 * rows) - 0.5, 0.0), rows - 1.001)
-    i, j = int(np.floor(x)), int(y)
-    a, b = np.float32(x - i), np.float32(y - j)
-    left, right = i if i >= 0 else cols - 1, i + 1 if i + 1 < cols else 0
-    one, bright = np.float32(1.0), np.float32(light)
-    for k in range(3):
-        low = np.float32(atlas[page, e, j, left, k]) * (one - a) + np.float32(atlas[page, e, j, right, k]) * a
-        high = np.float32(atlas[page, e, j + 1, left, k]) * (one - a) + np.float32(atlas[page, e, j + 1, right, k]) * a
-        c = (low * (one - b) + high * b) * bright
-        canvas[v, u, k] = np.int16(np.int32(c if c < np.float32(MOST) else np.float32(MOST)))
+def _met(ray, left, many, t):  # type: ignore[no-untyped-def]
+    """t (many,): depths at which the rays of a row's pixels from column `left` on meet a ball.
+
+    ray (3, 4): of each own axis what P and D are at column 0 and gain with each column.
+    """
+    px0, px1, dx0, dx1 = ray[0, 0], ray[0, 1], ray[0, 2], ray[0, 3]
+    py0, py1, dy0, dy1 = ray[1, 0], ray[1, 1], ray[1, 2], ray[1, 3]
+    pz0, pz1, dz0, dz1 = ray[2, 0], ray[2, 1], ray[2, 2], ray[2, 3]
+    for k in range(many):
+        x = left + k + 0.5
+        px, dx = px1 * x + px0, dx1 * x + dx0
+        py, dy = py1 * x + py0, dy1 * x + dy0
+        pz, dz = pz1 * x + pz0, dz1 * x + dz0
+        a, b = dx * dx + dy * dy + dz * dz, px * dx + py * dy + pz * dz
+        root = b * b - a * (px * px + py * py + pz * pz - 1.0)
+        t[k] = (-b - np.sqrt(root if root > 0.0 else 0.0)) / a
+
+
+@njit(cache=True, error_model="numpy")
+def _shaded(ray, left, many, t, half, sun, shadow, sunlit, head, place, across, up, light):  # type: ignore[no-untyped-def]
+    """Of the points at depths t (many,): where on a page of the atlas they are, and light times UNIT.
+
+    half (3,) m, sun (3,): in own axes; sunlit (3,): at feet, waist and head; head: whether the part is one. place:
+    number of the upper left one of four texels; across, up: from its middle to theirs, 0 … 1. float32 is exact to
+    1e-4 of a page.
+    """
+    f = np.float32
+    px0, px1, dx0, dx1 = f(ray[0, 0]), f(ray[0, 1]), f(ray[0, 2]), f(ray[0, 3])
+    py0, py1, dy0, dy1 = f(ray[1, 0]), f(ray[1, 1]), f(ray[1, 2]), f(ray[1, 3])
+    pz0, pz1, dz0, dz1 = f(ray[2, 0]), f(ray[2, 1]), f(ray[2, 2]), f(ray[2, 3])
+    h0, h1, h2 = f(1.0 / half[0]), f(1.0 / half[1]), f(1.0 / half[2])
+    low_sun = shadow / max(sun[2], 0.3)
+    s0, s1, s2 = f(sun[0] * low_sun), f(sun[1] * low_sun), f(sun[2] * low_sun)
+    waist, above, below = f(sunlit[1]), f(sunlit[2] - sunlit[1]), f(sunlit[0] - sunlit[1])
+    sky, zero, one = f(UNIT * (1.0 - shadow)), f(0.0), f(1.0)
+    for k in range(many):
+        x, depth = f(left + k) + f(0.5), f(t[k])
+        qx = px1 * x + px0 + depth * (dx1 * x + dx0)
+        qy = py1 * x + py0 + depth * (dy1 * x + dy0)
+        qz = pz1 * x + pz0 + depth * (dz1 * x + dz0)
+        nx, ny, nz = qx * h0, qy * h1, qz * h2
+        size = one / np.sqrt(nx * nx + ny * ny + nz * nz)
+        facing = nx * s0 + ny * s1 + nz * s2
+        facing = (facing if facing > zero else zero) * size
+        high = one if head else qz
+        facing *= waist + (above * high if high > zero else -below * high)
+        light[k] = sky * (f(0.8) + f(0.2) * nz * size) + f(UNIT) * facing
+        share = qx / (abs(qx) + abs(qy) + f(1e-12))
+        x = (one - share if qy >= zero else f(3.0) + share) * f(0.25 * ROUND) - f(0.5)
+        x = x if x >= zero else x + f(ROUND)
+        y = (qz + one) * f(0.5 * UP) - f(0.5)
+        y = min(max(y, zero), f(UP - 1.001))
+        i, j = np.int32(x), np.int32(y)
+        across[k], up[k] = x - f(i), y - f(j)
+        place[k] = j * np.int32(ROUND + 1) + i
 
 
 @njit(cache=True, error_model="numpy")
@@ -70,17 +114,18 @@ def people(  # type: ignore[no-untyped-def]
 
     start, step (N, 2, 3, 3): P and D of each part; half (N, 2, 3) m; middle (N, 2, 2), inverse (N, 2, 3): outlines;
     boxes (N, 4) first row, last + 1, first column, last + 1; sun (N, 3) in each body's axes; sunlit (N, 3): share of
-    the sun at feet, waist and head; pages (N,) of the atlas (P, 2, H, W, 3).
-    depth (H, W) is that of the plate and becomes that of all; with `label` ids (H, W) and amodal (N,), the pixels of
-    each silhouette in the image; with `shade` the canvas (H, W, 3) and the tiles that are dirty. The light is the
+    the sun at feet, waist and head; pages (N,) of the atlas (P, 2, texels; see sim.wear).
+    depth (H, W) is that of the plate and becomes that of all, tiles in which it does are dirty; with `label` ids (H, W)
+    and amodal (N,), the pixels of each silhouette in the image; with `shade` the canvas (H, W, 3). The light is the
     sky's, from above more than from the side, and the sun's by Lambert's law.
     """
     height, width = depth.shape
+    t, ray = np.empty(width), np.empty((3, 4))
+    place, one = np.empty(width, np.int32), np.float32(1.0)
+    across, up, light = np.empty(width, np.float32), np.empty(width, np.float32), np.empty(width, np.float32)
     for i in order:
-        s0, s1, s2 = sun[i, 0], sun[i, 1], sun[i, 2]
-        low_sun = shadow / max(s2, 0.3)
         for e in range(2):
-            h0, h1, h2 = 1.0 / half[i, e, 0], 1.0 / half[i, e, 1], 1.0 / half[i, e, 2]
+            page = atlas[pages[i], e]
             for v in range(boxes[i, 0], boxes[i, 1]):
                 low, high = columns(v, i, e, middle, inverse, width)
                 if low == high:
@@ -90,52 +135,57 @@ def people(  # type: ignore[no-untyped-def]
                     if e == 1:
                         other, last = columns(v, i, 0, middle, inverse, width)
                         amodal[i] -= max(0, min(last, high) - max(other, low))
-                if shade:
-                    touch(dirty, v, low, high, margin, height, width)
-                y = v + 0.5
-                px0, dx0 = start[i, e, 0, 1] * y + start[i, e, 0, 2], step[i, e, 0, 1] * y + step[i, e, 0, 2]
-                py0, dy0 = start[i, e, 1, 1] * y + start[i, e, 1, 2], step[i, e, 1, 1] * y + step[i, e, 1, 2]
-                pz0, dz0 = start[i, e, 2, 1] * y + start[i, e, 2, 2], step[i, e, 2, 1] * y + step[i, e, 2, 2]
+                for k in range(3):
+                    ray[k, 0], ray[k, 1] = start[i, e, k, 1] * (v + 0.5) + start[i, e, k, 2], start[i, e, k, 0]
+                    ray[k, 2], ray[k, 3] = step[i, e, k, 1] * (v + 0.5) + step[i, e, k, 2], step[i, e, k, 0]
+                _met(ray, low, high - low, t)
+                shown = 0
                 for u in range(low, high):
-                    x = u + 0.5
-                    px, dx = start[i, e, 0, 0] * x + px0, step[i, e, 0, 0] * x + dx0
-                    py, dy = start[i, e, 1, 0] * x + py0, step[i, e, 1, 0] * x + dy0
-                    pz, dz = start[i, e, 2, 0] * x + pz0, step[i, e, 2, 0] * x + dz0
-                    a, b = dx * dx + dy * dy + dz * dz, px * dx + py * dy + pz * dz
-                    root = max(b * b - a * (px * px + py * py + pz * pz - 1.0), 0.0)
-                    t = (-b - np.sqrt(root)) / a
-                    if t <= 0.0 or t >= depth[v, u]:
+                    near = t[u - low]
+                    if near <= 0.0 or near >= depth[v, u]:
+                        t[u - low] = -1.0
                         continue
-                    depth[v, u] = t
+                    shown += 1
+                    depth[v, u] = near
                     if label:
                         ids[v, u] = id[i]
-                    if not shade:
-                        continue
-                    qx, qy, qz = px + t * dx, py + t * dy, pz + t * dz
-                    nx, ny, nz = qx * h0, qy * h1, qz * h2
-                    size = 1.0 / np.sqrt(nx * nx + ny * ny + nz * nz)
-                    facing = max(0.0, nx * s0 + ny * s1 + nz * s2) * size * low_sun
-                    up = qz if e == 0 else 1.0
-                    facing *= sunlit[i, 1] + (sunlit[i, 2 if up > 0 else 0] - sunlit[i, 1]) * abs(up)
-                    light = UNIT * ((1.0 - shadow) * (0.8 + 0.2 * nz * size) + facing)
-                    share = qx / (abs(qx) + abs(qy) + 1e-12)
-                    _colour(atlas, pages[i], e, 1.0 - share if qy >= 0 else 3.0 + share, qz, light, canvas, v, u)
+                if shown == 0:
+                    continue
+                touch(dirty, v, low, high, margin, height, width)
+                if not shade:
+                    continue
+                _shaded(
+                    ray, low, high - low, t, half[i, e], sun[i], shadow, sunlit[i], e == 1, place, across, up, light
+                )  # fmt: skip
+                for u in range(low, high):
+                    n = u - low
+                    if t[n] > 0.0:
+                        a, b, here, beneath = across[n], up[n], 3 * place[n], 3 * (place[n] + ROUND + 1)
+                        for k in range(3):
+                            first = np.float32(page[here + k]) * (one - a) + np.float32(page[here + 3 + k]) * a
+                            second = np.float32(page[beneath + k]) * (one - a) + np.float32(page[beneath + 3 + k]) * a
+                            c = (first * (one - b) + second * b) * light[n]
+                            canvas[v, u, k] = np.int16(np.int32(min(c, np.float32(MOST))))
 
 
 @njit(cache=True, error_model="numpy")
-def _shade(x, y, z, i, centre, shape, sx, sy, softness):  # type: ignore[no-untyped-def]
-    """Share of the sun that person i (body and head) takes from the point (x, y, z); it comes along (sx, sy, 1)."""
-    share = 0.0
-    for e in range(2):
-        above = centre[i, e, 2] - z
-        if above <= 0.0 or share >= 1.0:
-            continue
-        dx, dy = x - centre[i, e, 0] + sx * above, y - centre[i, e, 1] + sy * above
-        q = dx * dx * shape[i, e, 0] + 2 * dx * dy * shape[i, e, 1] + dy * dy * shape[i, e, 2]
-        soft = softness[i, e]
-        if q < (1.0 + soft) ** 2:
-            share = max(share, 1.0 if q <= (1.0 - soft) ** 2 or soft == 0.0 else (1.0 + soft - np.sqrt(q)) / (2 * soft))
-    return min(share, 1.0)
+def _shade(place, many, centre, shape, sx, sy, softness, gone):  # type: ignore[no-untyped-def]
+    """gone (many,), at first 0: made 255 times the share of the sun that a part takes at places (many, 3), if more.
+
+    The sun comes along (sx, sy, 1); centre (3,), shape (3,), softness of the part: as for `shadows`.
+    """
+    f = np.float32
+    x, y, z, a, b, c = f(centre[0]), f(centre[1]), f(centre[2]), f(shape[0]), f(2 * shape[1]), f(shape[2])
+    slope_x, slope_y, zero, one, most = f(sx), f(sy), f(0.0), f(1.0), f(255.0)
+    edge, per = f(1.0 + softness), f(1.0 / max(2 * softness, 1e-6))
+    for k in range(many):
+        above = z - place[k, 2]
+        dx, dy = place[k, 0] - x + slope_x * above, place[k, 1] - y + slope_y * above
+        q = dx * dx * a + dx * dy * b + dy * dy * c
+        share = (edge - np.sqrt(max(q, zero))) * per
+        share = share if above > zero else zero
+        dark = most * min(max(share, zero), one)
+        gone[k] = max(gone[k], dark)
 
 
 @njit(cache=True, error_model="numpy")
@@ -151,6 +201,7 @@ def shadows(  # type: ignore[no-untyped-def]
     """
     height, width = direct.shape
     sx, sy = sun[0] / sun[2], sun[1] / sun[2]
+    gone, half = np.empty(width, np.float32), np.float32(0.5)
     for i in range(len(boxes)):
         for v in range(boxes[i, 0], boxes[i, 1]):
             low, high = boxes[i, 2], boxes[i, 3]
@@ -159,15 +210,19 @@ def shadows(  # type: ignore[no-untyped-def]
                 first, last = columns(v, i, 1, middle, inverse, width)
                 if last > first:
                     low, high = (min(low, first), max(high, last)) if high > low else (first, last)
+            if high <= low:
+                continue
+            gone[: high - low] = 0.0
+            for e in range(2):
+                _shade(place[v, low:], high - low, centre[i, e], shape[i, e], sx, sy, softness[i, e], gone)
             left, right = width, 0
             for u in range(low, high):
-                share = _shade(place[v, u, 0], place[v, u, 1], place[v, u, 2], i, centre, shape, sx, sy, softness)
-                gone, old = int(255.0 * share + 0.5), int(taken[v, u])
-                if gone > old:
+                new, old = int(gone[u - low] + half), int(taken[v, u])
+                if new > old:
                     left, right = min(left, u), u + 1
-                    taken[v, u] = gone
-                    part = direct[v, u] * (1.0 / 255.0)
-                    factor = np.float32((1.0 - part * gone) / (1.0 - part * old))
+                    taken[v, u] = new
+                    part = direct[v, u] * np.float32(1.0 / 255.0)
+                    factor = (np.float32(1.0) - part * np.float32(new)) / (np.float32(1.0) - part * np.float32(old))
                     for k in range(3):
                         canvas[v, u, k] = np.int16(np.int32(np.float32(canvas[v, u, k]) * factor))
             touch(dirty, v, left, right, margin, height, width)

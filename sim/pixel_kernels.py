@@ -55,13 +55,13 @@ def tally(ids, boxes, id, row_of, count, edges, blob):  # type: ignore[no-untype
 
 
 @njit(cache=True, error_model="numpy")
-def known(depth, scale, origin, direction, walls, wall_height, pillars, pillar_height, flights, out):  # type: ignore[no-untyped-def]
+def known(depth, scale, origin, direction, still, out):  # type: ignore[no-untyped-def]
     """Disparities out (H, W) of the empty scene: scale / depth; nan where the right camera does not see the point.
 
     origin, direction: rays of the right camera; sky has none.
     """
     height, width = depth.shape
-    solid = len(walls) + len(pillars) + len(flights) > 0
+    solid = len(still[0]) + len(still[2]) + len(still[4]) > 0
     o, d, hit = np.empty(3), np.empty(3), np.empty(6)
     for v in range(height):
         for u in range(width):
@@ -71,7 +71,7 @@ def known(depth, scale, origin, direction, walls, wall_height, pillars, pillar_h
             if solid and out[v, u] == out[v, u]:
                 at(origin, x, v + 0.5, o)
                 at(direction, x, v + 0.5, d)
-                if nearest(o, d, walls, wall_height, pillars, pillar_height, flights, hit) < z - SAME:
+                if nearest(o, d, still, hit) < z - SAME:
                     out[v, u] = np.nan
 
 
@@ -103,11 +103,7 @@ def disparities(  # type: ignore[no-untyped-def]
     background,
     origin,
     direction,
-    walls,
-    wall_height,
-    pillars,
-    pillar_height,
-    flights,
+    still,
     out,
 ):
     """Make out (H, W), at first those of the empty scene, the disparities of all.
@@ -116,7 +112,7 @@ def disparities(  # type: ignore[no-untyped-def]
     (N, 2) m: no point of the part is nearer; background (H, W): depth of the empty scene for the right camera.
     """
     height, width = depth.shape
-    solid = len(walls) + len(pillars) + len(flights) > 0
+    solid = len(still[0]) + len(still[2]) + len(still[4]) > 0
     o, d, hit, row = np.empty(3), np.empty(3), np.empty(6), np.empty(6)
     for i in range(len(id)):
         for v in range(boxes[i, 0], boxes[i, 1]):
@@ -131,7 +127,7 @@ def disparities(  # type: ignore[no-untyped-def]
                     if min(background[v, max(j - 1, 0)], background[v, j], background[v, min(j + 1, width - 1)]) < z:
                         at(origin, x, v + 0.5, o)
                         at(direction, x, v + 0.5, d)
-                        if nearest(o, d, walls, wall_height, pillars, pillar_height, flights, hit) < z - SAME:
+                        if nearest(o, d, still, hit) < z - SAME:
                             out[v, u] = np.nan
     for i in range(len(id)):
         for e in range(2):

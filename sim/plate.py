@@ -13,11 +13,12 @@ from numpy.typing import NDArray
 
 from sim.light import Illumination
 from sim.rng import rng
+from sim.terrain import flights
 from sim.types import Array, Camera, Scene
 from sim.visibility import unprojection
 
 if TYPE_CHECKING:
-    from scenarios.schema import Picture
+    from sim.foliage import Foliage
 
 Floats = NDArray[np.float32]
 
@@ -48,10 +49,11 @@ class Geometry:
 
 @dataclass(frozen=True)
 class Plate:
-    """Lit colours (H, W, 3) in grey levels, and the share of direct sun in each pixel's light (H, W)."""
+    """Lit colours (H, W, 3) in grey levels; shares of each pixel (H, W): direct sun in its light, and plants."""
 
     colour: Floats
     direct: Floats
+    plants: Floats
 
 
 def sight(camera: Camera) -> Rays:
@@ -71,17 +73,15 @@ Solids = tuple[Array, float, Array, float, Array]
 
 
 def solids(scene: Scene) -> Solids:
-    """All that stands still, as the kernels want it: walls (W, 4), height, pillars (P, 3), height, flights (S, 9).
-
-    A flight is foot x, y, unit axis x, y, length, half width, rise, steps, landing.
-    """
-    flights = np.zeros((len(scene.stairs), 9))
-    for row, stairs in zip(flights, scene.stairs, strict=True):
-        axis = stairs.head - stairs.foot
-        length = float(np.hypot(*axis))
-        row[:] = [*stairs.foot, *(axis / length), length, stairs.width / 2, stairs.rise, stairs.steps, stairs.landing]
+    """All that stands still, as the kernels want it: walls (W, 4), height, pillars (P, 3), height, flights (S, 9)."""
     walls = np.array(scene.walls, dtype=float).reshape(-1, 4)
-    return walls, float(scene.wall_height), np.array(scene.pillars, dtype=float), float(scene.pillar_height), flights
+    return (
+        walls,
+        float(scene.wall_height),
+        np.array(scene.pillars, dtype=float),
+        float(scene.pillar_height),
+        flights(scene),
+    )
 
 
 def survey(camera: Camera, scene: Scene) -> Geometry:
@@ -92,18 +92,32 @@ def survey(camera: Camera, scene: Scene) -> Geometry:
     depth, place = np.empty((height, width), np.float32), np.empty((height, width, 3), np.float32)
     kind = np.empty((height, width), np.uint8)
     rays = sight(camera)
-    depths(rays.origin, rays.direction, width, height, *solids(scene), depth, kind, place)
+    depths(rays.origin, rays.direction, solids(scene), depth, kind, place)
     return Geometry(depth, kind, place)
 
 
+def scale(camera: Camera) -> float:
+    """px per m at a depth of 1 m; negative: px per m at any depth."""
+    return float(camera.focal_px[0]) if camera.kind == "pinhole" else -camera.px_per_m
+
+
 def paint_plate(
-    camera: Camera, scene: Scene, light: Illumination, picture: Picture, seed: int, repeat: int = 0
+    camera: Camera,
+    scene: Scene,
+    light: Illumination,
+    texture: float,
+    plants: Foliage | None,
+    seed: int,
+    repeat: int = 0,
 ) -> Plate:
-    """The empty scene's colours under steady light; materials are the seed's."""
+    """The empty scene's colours under steady light, nothing moving; materials are the seed's.
+
+    texture: contrast of the patterns.
+    """
     from sim.plate_kernels import colours
 
     width, height = camera.image
-    colour, direct = np.zeros((height, width, 3), np.float32), np.zeros((height, width), np.float32)
+    colour, direct, green = np.empty((height, width, 3), np.float32), *np.empty((2, height, width), np.float32)
     rays = sight(camera)
     source = rng(seed, "texture", GROUND, repeat=repeat)
     palette = (
@@ -111,9 +125,9 @@ def paint_plate(
     )
     slab = float(source.choice([0.0, 0.5, 0.8, 1.2]))
     key = int(source.integers(1 << 20))
-    focal = camera.focal_px[0] if camera.kind == "pinhole" else -camera.px_per_m
+    look = np.array([texture, slab, *((plants.key, plants.level) if plants else (0.0, np.inf))])
     colours(
-        rays.origin, rays.direction, focal, light.sun, light.shadow, light.penumbra, *solids(scene),
-        np.array(scene.size, dtype=float), picture.texture, slab, np.clip(palette, 20, 240), key, colour, direct,
+        (rays.origin, rays.direction), scale(camera), light.sun, light.shadow, light.penumbra, solids(scene),
+        np.array(scene.size, dtype=float), look, np.clip(palette, 20, 240), key, colour, direct, green,
     )  # fmt: skip
-    return Plate(colour, direct)
+    return Plate(colour, direct, green)

@@ -1,8 +1,8 @@
 """Pictures of a Motion: each a pure function of the frame's index, drawn when asked for.
 
 A Stage holds what is the same in all frames: the plate of each view (sim.plate), clothes, light, noise. A frame is the
-plate, darkened by shadows, people over it by depth (sim.paint_kernels), blurred, times the brightness of its moment,
-with noise, and at last lossy artefacts.
+plate, its plants moved by wind, darkened by shadows, people over it by depth (sim.paint_kernels), blurred, times the
+brightness of its moment, with noise, and at last lossy artefacts.
 """
 
 from __future__ import annotations
@@ -16,13 +16,14 @@ from numpy.typing import NDArray
 
 from scenarios.errors import InputError
 from sim import camera as cameras
+from sim.foliage import Foliage, grow
 from sim.light import Illumination, illuminate
 from sim.pixel_truth import pixel_truth
 from sim.sensor_noise import offsets, pool
 from sim.silhouettes import Cast, Crowd
 from sim.stretch import FRAMES, Stretch
 from sim.types import BACKGROUNDS, Camera, Frame, Image, Motion, PixelTruth
-from sim.view import View, blur_weights
+from sim.view import NODES, Easel, View, blur_weights
 from sim.wear import wear
 
 if TYPE_CHECKING:
@@ -60,13 +61,13 @@ class Stage:
     @cached_property
     def left_view(self) -> View:
         """What the camera itself sees of the empty scene."""
-        return View(self.camera, self.motion, self.illumination, self.picture)
+        return View(self.camera, self.motion, self.illumination, self.picture, self._plants)
 
     @cached_property
     def right_view(self) -> View:
         """What the right camera of the pair sees; InputError where there is none."""
         self.check_pair()
-        return View(cameras.right(self.camera), self.motion, self.illumination, self.picture)
+        return View(cameras.right(self.camera), self.motion, self.illumination, self.picture, self._plants)
 
     def check_pair(self) -> None:
         """InputError where there is no right camera."""
@@ -75,6 +76,10 @@ class Stage:
                 place="camera.baseline", got=f"{self.camera.kind}, baseline {self.camera.baseline:g}",
                 expected="a pinhole pair with a baseline above 0", remedy="set camera.baseline, or leave it out",
             )  # fmt: skip
+
+    @cached_property
+    def _plants(self) -> Foliage | None:
+        return grow(self.picture, self.camera, self.motion.scene, self.motion.seed, self.motion.repeat)
 
     @cached_property
     def _atlas(self) -> NDArray[np.uint8]:
@@ -115,20 +120,29 @@ class Stage:
 
     def background(self, k: int) -> Image:
         """Empty frame k = 0 … BACKGROUNDS - 1, at t = (k - BACKGROUNDS) / fps."""
-        view = self.left_view
-        return self._finish(view, view.canvas, self._clean(view), k - BACKGROUNDS + 1, LEFT)
+        view, index = self.left_view, k - BACKGROUNDS + 1
+        easel = self._easel(view, index)
+        image = self._finish(view, easel, index, LEFT)
+        view.give_back(easel)
+        return image
+
+    def _time(self, index: int) -> float:
+        return (index - 1) / self.motion.fps
 
     def _stretch(self, index: int) -> Stretch:
         if self._last is None or index not in range(self._last.first, self._last.first + FRAMES):
             self._last = Stretch(self.motion, self.illumination, index)
         return self._last
 
-    @staticmethod
-    def _clean(view: View) -> NDArray[np.uint8]:
-        """(rows, columns) of tiles in which nothing is painted yet."""
-        from sim.paint_kernels import TILE_H, TILE_W
+    def _easel(self, view: View, index: int) -> Easel:
+        """The scene without people to paint on, its plants moved."""
+        easel = view.easel()
+        if view.plants is not None:
+            from sim.foliage_kernels import sway
 
-        return np.zeros((-(-view.height // TILE_H), -(-view.width // TILE_W)), np.uint8)
+            wind, margin = view.wind(self._time(index)), len(self._weights) // 2
+            sway(view.canvas, view.plate.plants, view.moving, wind, NODES, easel.canvas, easel.dirty, margin)
+        return easel
 
     def _draw(
         self, index: int, side: int, *, shade: bool, label: bool, disparity: bool = False
@@ -139,37 +153,40 @@ class Stage:
         view, stretch, light = self.right_view if side else self.left_view, self._stretch(index), self.illumination
         people, sight = stretch.crowd(index), stretch.sight(view, side, index)
         here, margin, fall = sight.cast, len(self._weights) // 2, sight.shadows
-        canvas, dirty = view.canvas.copy() if shade else view.canvas[:0], self._clean(view)
+        easel = self._easel(view, index) if shade else view.easel()
         if shade and fall is not None:
             kernels.shadows(
                 view.geometry.place, view.plate.direct, fall.outlined.boxes, view.level, fall.outlined.middle,
-                fall.outlined.inverse, people.shapes.centre, fall.shape, light.sun, fall.softness,
-                np.zeros((view.height, view.width), np.uint8), canvas, dirty, margin,
+                fall.outlined.inverse, people.shapes.centre, fall.shape, light.sun, fall.softness, easel.taken,
+                easel.canvas, easel.dirty, margin,
             )  # fmt: skip
-        depth, ids = view.geometry.depth.copy(), view.ids.copy() if label else view.ids[:0]
+        ids = view.empty_ids() if label else np.zeros((0, 0), np.int64)
         amodal = np.zeros(len(people.id), np.int64)
         kernels.people(
             np.argsort(here.near[:, 0], kind="stable"), here.start, here.step, people.half, here.outlined.middle,
             here.outlined.inverse, here.outlined.boxes, people.id, people.turn @ light.sun, light.shadow,
-            sight.sunlit, people.id - 1, self._atlas, shade, label, depth, ids, canvas, dirty, margin, amodal,
+            sight.sunlit, people.id - 1, self._atlas, shade, label, easel.depth, ids, easel.canvas, easel.dirty,
+            margin, amodal,
         )  # fmt: skip
-        image = self._finish(view, canvas, dirty, index, side) if shade else np.zeros((0, 0, 3), np.uint8)
-        if not label:
-            return image, None
-        apart = self._disparities(depth, ids, here, people, index) if disparity else None
-        return image, pixel_truth(ids, here.outlined.boxes, people.id, amodal, apart)
+        image = self._finish(view, easel, index, side) if shade else np.zeros((0, 0, 3), np.uint8)
+        truth = None
+        if label:
+            apart = self._disparities(easel.depth, ids, here, people, index) if disparity else None
+            truth = pixel_truth(ids, here.outlined.boxes, people.id, amodal, apart)
+        view.give_back(easel)
+        return image, truth
 
-    def _finish(self, view: View, canvas: NDArray[np.int16], dirty: NDArray[np.uint8], index: int, side: int) -> Image:
+    def _finish(self, view: View, easel: Easel, index: int, side: int) -> Image:
         from sim.finish_kernels import finish
 
         image = np.empty((view.height, view.width, 3), np.uint8)
         number = index + BACKGROUNDS
-        gain = self.illumination.gain((index - 1) / self.motion.fps, number)
+        bright = view.brightness(self._time(index), number)
         rows = offsets(view.height, self.motion.seed, side, number, self.motion.repeat)
         flat = view.height, 3 * view.width
         finish(
-            canvas.reshape(flat), view.blurred.reshape(flat), dirty, self._weights, np.float32(gain), self._noise, rows,
-            image.reshape(flat),
+            easel.canvas.reshape(flat), view.blurred.reshape(flat), easel.dirty, self._weights, bright, NODES,
+            self._noise, np.float32(self.picture.shot), rows, image.reshape(flat),
         )  # fmt: skip
         return _lossy(image, self.picture.jpeg) if self.picture.jpeg else image
 
@@ -183,7 +200,7 @@ class Stage:
         disparities(
             depth, ids, here.outlined.boxes, people.id, self.camera.focal_px[0] * self.camera.baseline, there.start,
             there.step, there.outlined.middle, there.outlined.inverse, there.near, other.geometry.depth,
-            other.rays.origin, other.rays.direction, *other.solids, apart,
+            other.rays.origin, other.rays.direction, other.solids, apart,
         )  # fmt: skip
         return apart
 

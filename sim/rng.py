@@ -19,6 +19,7 @@ ROLE = {
     "noise": 10,
     "tracker": 11,
     "camera": 12,
+    "wind": 13,
 }
 
 

@@ -77,11 +77,26 @@ def _put(hit, kind, flight, along, across, up, index, place):  # type: ignore[no
 
 
 @njit(cache=True)
+def _within(o, d, low, high, first, last):  # type: ignore[no-untyped-def]
+    """The part of first <= t <= last in which low <= o + t d <= high (and a little more); empty: first > last."""
+    low, high = low - TINY, high + TINY
+    if d == 0.0:
+        return (first, last) if low <= o <= high else (1.0, 0.0)
+    a, b = (low - o) / d, (high - o) / d
+    return max(first, min(a, b)), min(last, max(a, b))
+
+
+@njit(cache=True)
 def _stairs(o, d, flight, hit, best, index):  # type: ignore[no-untyped-def]
     """Nearest hit with treads, risers, both sides and the back of one flight."""
     oa, oc, da, dc = _turned(o, d, flight)
     length, half, rise, n, end = flight[4], flight[5], flight[6], int(flight[7]), flight[4] + flight[8]
     first = 0.5 / n * length
+    enter, leave = _within(oa, da, first, end, 0.0, best)
+    enter, leave = _within(oc, dc, -half, half, enter, leave)
+    enter, leave = _within(o[2], d[2], min(0.0, rise), max(0.0, rise), enter, leave)
+    if enter > leave + TINY:
+        return best
     for k in range(1, n + 1):
         low, z = (k - 0.5) / n * length, k * rise / n
         high = end if k == n else (k + 0.5) / n * length
@@ -127,8 +142,10 @@ def _on_stairs(x, y, flights):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True)
-def nearest(o, d, walls, wall_height, pillars, pillar_height, flights, hit):  # type: ignore[no-untyped-def]
-    """t of the first thing on the ray, inf if none; hit: kind, normal (3), index, place along it (m)."""
+def nearest(o, d, still, hit):  # type: ignore[no-untyped-def]
+    """t of the first thing on the ray, inf if none; still: see sim.plate.solids; hit: kind, normal (3), index, place
+    along it (m)."""
+    walls, wall_height, pillars, pillar_height, flights = still
     best = np.inf
     hit[0] = NOTHING
     if d[2] != 0.0:

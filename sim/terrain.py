@@ -35,3 +35,13 @@ def _flight(stairs: Stairs, xy: Array) -> Array:
     h = stairs.rise / n * (k - np.sin(2 * np.pi * k) / (2 * np.pi))
     inside = (along > 0) & (along <= length + stairs.landing) & (across <= stairs.width / 2)
     return np.where(inside, h, 0.0)
+
+
+def flights(scene: Scene) -> Array:
+    """Stairs as rows (S, 9): foot x, y, unit axis x, y, length, half width, rise, steps, landing; m."""
+    rows = np.zeros((len(scene.stairs), 9))
+    for row, stairs in zip(rows, scene.stairs, strict=True):
+        axis = stairs.head - stairs.foot
+        length = float(np.hypot(*axis))
+        row[:] = [*stairs.foot, *(axis / length), length, stairs.width / 2, stairs.rise, stairs.steps, stairs.landing]
+    return rows

@@ -67,3 +67,19 @@ def slabs(x, y, width, depth, joint, key, footprint):  # type: ignore[no-untyped
     soft = max(joint, 0.7 * footprint)  # a joint narrower than a pixel is drawn wider and fainter
     dark = max(0.0, 1.0 - edge / soft) * min(joint / soft, 1.0) * seen(min(width, depth), footprint)
     return own * (1 - dark) - 1.5 * dark
+
+
+@njit(cache=True)
+def wild(x, y, size, key):  # type: ignore[no-untyped-def]
+    """A pattern over the ground: plants grow where it is high, first outside the world of this size (m)."""
+    outside = max(max(-x, x - size[0]), max(-y, y - size[1]))
+    patches = smooth(0.4 * x, 0.4 * y, key) + 0.5 * smooth(1.1 * x, 1.1 * y, key + 1)
+    return patches + min(max(outside, -1.0), 1.0)
+
+
+@njit(cache=True)
+def overgrown(x, y, size, key, level, footprint):  # type: ignore[no-untyped-def]
+    """Share of a pixel of this footprint (m) that shows plants, which grow where `wild` is above `level`; leaves that
+    are finer than pixels are not drawn."""
+    near = min(max(2.0 * seen(0.3, footprint) - 0.5, 0.0), 1.0)
+    return near * min(max((wild(x, y, size, key) - level) / 0.1 + 0.5, 0.0), 1.0)

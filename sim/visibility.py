@@ -1,8 +1,9 @@
 """How much of each person a camera sees, by geometry alone: whatever is rendered, this stands in the truth.
 
 Each silhouette (body and head, sim.people) is sampled on a grid over its amodal box. A sample is visible if it lies in
-the image and in no nearer silhouette, and if its line of sight meets no wall or pillar first. Order of people:
-sim.people.distance. A wall hides who stands beyond its line; a pillar who is further away than the tangent to it.
+the image and in no nearer silhouette, and if its line of sight meets no wall, pillar or step first. Order of people:
+sim.people.distance. A wall hides who stands beyond its line; a pillar who is further away than the tangent to it;
+stairs whose steps are met before the upright plane through the person that faces the camera.
 Seen from above nothing upright hides anybody.
 """
 
@@ -13,6 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from sim.people import Ellipsoids, distance, outline_boxes, outlines
+from sim.terrain import flights
 from sim.types import Array, Camera, Ints, Scene
 
 
@@ -52,6 +54,7 @@ def look(camera: Camera, scene: Scene, frame: Ints, pos3: Array, height: Array, 
         scene.wall_height,
         np.array(scene.pillars, dtype=float),
         scene.pillar_height,
+        (np.zeros((0, 4)), 0.0, np.zeros((0, 3)), 0.0, flights(scene)),
     )
     return Seen(box, visibility, truncation, visible_box)
 

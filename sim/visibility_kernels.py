@@ -5,6 +5,8 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
+from sim.static_kernels import nearest
+
 COLUMNS, ROWS = 16, 32  # cells laid over each amodal box
 
 
@@ -114,13 +116,23 @@ def _meets(d, eye, walls, between, tall, pillars, before, high):  # type: ignore
 
 
 @njit(cache=True)
-def look(starts, box, centre, inverse, distance, pos, size, has_eye, eye, unproject, walls, tall, pillars, high):  # type: ignore[no-untyped-def]
+def _stairs_before(d, eye, x, y, still, hit):  # type: ignore[no-untyped-def]
+    """Whether the ray eye + s d meets stairs, or ground before a flight that goes down, before the upright plane
+    through (x, y) that faces the eye."""
+    dx, dy = x - eye[0], y - eye[1]
+    towards = d[0] * dx + d[1] * dy
+    return towards > 0.0 and nearest(eye, d, still, hit) < (dx * dx + dy * dy) / towards
+
+
+@njit(cache=True)
+def look(starts, box, centre, inverse, distance, pos, size, has_eye, eye, unproject, walls, tall, pillars, high, still):  # type: ignore[no-untyped-def]
     """Visibility (R,), truncation (R,) and visible boxes (R, 4) of all rows; see sim.visibility.look."""
     rows = len(box)
     seen, cut, part = np.zeros(rows), np.ones(rows), np.full((rows, 4), np.nan)
     people = np.empty(rows, np.int64)
     between, before = np.empty(len(walls), np.int64), np.empty(len(pillars), np.int64)
-    d = np.empty(3)
+    d, hit = np.empty(3), np.empty(6)
+    stairs = has_eye and len(still[4]) > 0
     for f in range(len(starts) - 1):
         for i in range(starts[f], starts[f + 1]):
             left, top, width, height = box[i, 0], box[i, 1], box[i, 2], box[i, 3]
@@ -130,7 +142,7 @@ def look(starts, box, centre, inverse, distance, pos, size, has_eye, eye, unproj
             n_walls = _walls_between(pos[i, 0], pos[i, 1], eye, walls, between) if has_eye else 0
             n_pillars = _pillars_before(pos[i, 0], pos[i, 1], eye, pillars, before) if has_eye else 0
             whole = left >= 0 and top >= 0 and left + width <= size[0] and top + height <= size[1]
-            if whole and n + n_walls + n_pillars == 0:
+            if whole and n + n_walls + n_pillars == 0 and not stairs:
                 seen[i], cut[i], part[i] = 1.0, 0.0, box[i]
                 continue
             total = inside = visible = 0
@@ -153,10 +165,12 @@ def look(starts, box, centre, inverse, distance, pos, size, has_eye, eye, unproj
                         if _inside(centre, inverse, people[k], u, v):
                             hidden = True
                             break
-                    if not hidden and n_walls + n_pillars:
+                    if not hidden and (stairs or n_walls + n_pillars):
                         for k in range(3):
                             d[k] = unproject[k, 0] * u + unproject[k, 1] * v + unproject[k, 2]
                         hidden = _meets(d, eye, walls, between[:n_walls], tall, pillars, before[:n_pillars], high)
+                        if not hidden and stairs:
+                            hidden = _stairs_before(d, eye, pos[i, 0], pos[i, 1], still, hit)
                     if not hidden:
                         visible += 1
                         low_c, high_c = min(low_c, c), max(high_c, c)

@@ -21,10 +21,11 @@ CUTS = (0.45, 0.06, 0.05, 0.1, 0.24, 0.1)  # shares of the cuts in sim.wear_kern
 
 
 def wear(people: int, seed: int, repeat: int = 0) -> NDArray[np.uint8]:
-    """Pages (P, 2, UP, ROUND, 3) BGR of people 1 … `people`, body and head; one person more changes nobody else."""
+    """Pages (P, 2, UP * (ROUND + 1) * 3) BGR of people 1 … `people`, body and head, the first column repeated at the
+    end; one person more changes nobody else."""
     from sim.wear_kernels import ROUND, UP, page
 
-    pages, drawn = np.empty((people, 2, UP, ROUND, 3), np.uint8), np.empty((UP, ROUND, 3))
+    pages, drawn = np.empty((people, 2, UP, ROUND + 1, 3), np.uint8), np.empty((UP, ROUND, 3))
     for k in range(people):
         source = rng(seed, "texture", k + 1, repeat=repeat)
         key = int(source.integers(1 << 20))
@@ -39,5 +40,6 @@ def wear(people: int, seed: int, repeat: int = 0) -> NDArray[np.uint8]:
         colours = np.clip(np.array(chosen) * level, 12, 240)
         for part in range(2):
             page(style, key, colours, part, drawn)
-            pages[k, part] = np.clip(drawn + 0.5, 0, 255)
-    return pages
+            pages[k, part, :, :ROUND] = np.clip(drawn + 0.5, 0, 255)
+    pages[..., ROUND, :] = pages[..., 0, :]
+    return pages.reshape(people, 2, UP * (ROUND + 1) * 3)

@@ -35,6 +35,7 @@ def describe(
     from sim.io.box_source import box_source
 
     sample = ready.context.background
+    begins = 1 if sample is None else causal_from(ready.sequence)
     return {
         "tracker": ready.name,
         "config": ready.config.as_dict() if ready.config else {},
@@ -47,7 +48,8 @@ def describe(
         "fps": ready.context.fps,
         "px_per_m": None if np.isnan(px_per_m) else px_per_m,
         "background": None if sample is None else ready.sequence.source.get("background", f"{len(sample)} frames"),
-        "causal": sample is None or is_causal(ready.sequence),
+        "causal": begins == 1,
+        "causal_from": begins,
         "frames": len(answers),
         "frames_per_second": speed.tracker,
         "whole_frames_per_second": speed.whole,
@@ -55,12 +57,25 @@ def describe(
     }
 
 
-def is_causal(sequence: Sequence) -> bool:
-    """Whether the sequence's background sample holds no frame of its future."""
+def causal_from(sequence: Sequence) -> int | None:
+    """The first frame from which answers owe the background to no later frame, None where all do.
+
+    What was learned from the first N frames has seen ahead for whoever answers one of those before N.
+    """
     from sim.io.sample import Sample
 
     sample = sequence.load_background
-    return not isinstance(sample, Sample) or sample.choice.how == "first"
+    if not isinstance(sample, Sample):
+        return 1
+    return sample.choice.count if sample.choice.how == "first" else None
+
+
+def given(info: Mapping[str, Any]) -> str:
+    """What a tracker was given, in words, by its run.json; "" where that does not say."""
+    mode, background, sensor = (info.get(key) for key in ("detections", "background", "sensor"))
+    more = [f"background: {background}"] if background else []
+    more += [f"{key} = {value}" for key, value in (sensor or {}).items()]
+    return f"{mode} ({', '.join(more)})" if more else str(mode or "")
 
 
 def _versions() -> dict[str, str]:

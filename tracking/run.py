@@ -85,8 +85,9 @@ class Prepared:
 
 
 def _named(error: FlockscopeError, sequence: Sequence) -> FlockscopeError:
-    """An error that names no file, with the sequence it is about."""
-    return error if error.file else type(error)(**{**error.as_dict(), "file": sequence.name})
+    """An error that names no file, with the recording it is about."""
+    about = sequence.source.get("path", sequence.name)
+    return error if error.file else type(error)(**{**error.as_dict(), "file": about})
 
 
 def _raised(tracker: str, method: str, place: str, error: Exception) -> WorkError:
@@ -224,6 +225,14 @@ def _scale(context: Context, answers: SequenceOf[Tracks]) -> float:
     if np.isfinite(context.px_per_m) or not heights:
         return context.px_per_m
     return float(np.nanmedian(np.concatenate(heights))) / PERSON_HEIGHT
+
+
+def grouped(tracks: SequenceOf[Tracks], sequence: Sequence) -> tuple[Tracks, ...]:
+    """Stored or a stranger's tracks of a sequence, with groups and events where the tracker left them empty."""
+    from tracking.grouping import with_groups
+
+    scale, truth = sequence.px_per_m, None if np.isfinite(sequence.px_per_m) else sequence.truth
+    return with_groups(tracks, sequence.fps, scale if truth is None else truth.px_per_m)
 
 
 def _px_per_m(sequence: Sequence, mode: DetectionMode, feed: tuple[Frame, ...] | None) -> float:

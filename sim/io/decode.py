@@ -6,6 +6,7 @@ else pictures are counted, a packet that cannot be decoded counting as one.
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -16,7 +17,7 @@ from typing import Any
 import numpy as np
 
 from scenarios.errors import InputError
-from sim.types import Image
+from sim.types import Array, Image
 
 COVER = "attached_pic"
 HIDDEN = ("vp8",)  # codecs with packets that are never shown
@@ -28,15 +29,22 @@ REMEDY = "give a video that a player plays to its end"
 @dataclass(frozen=True)
 class Packets:
     """The packets of a video stream in the order of the file: when shown (units of time_base; None unknown), and
-    where groups begin that can be decoded by themselves. promised: frames that the header speaks of, 0 = none."""
+    where groups begin that can be decoded by themselves. promised, seconds: what the header says, 0 = nothing.
+    broken: why reading ended before the file does, "" = it did not."""
 
     stamps: tuple[int | None, ...]
     keys: tuple[bool, ...]
     time_base: Fraction
     rate: float
     promised: int
+    seconds: float
+    broken: str
     codec: str
     reorders: bool
+
+    def times(self) -> Array:
+        """When frames are shown, in their order, s; those that are known."""
+        return np.array(sorted({s for s in self.stamps if s is not None}), float) * float(self.time_base)
 
     def ranks(self) -> dict[int, int] | None:
         """Frame (1-based) by time stamp, or None where stamps do not tell."""
@@ -46,7 +54,7 @@ class Packets:
             return None
         return {stamp: k for k, stamp in enumerate(sorted(known), 1)}
 
-    def groups(self, wanted: list[int]) -> set[int] | None:
+    def groups(self, wanted: set[int]) -> set[int] | None:
         """Numbers of the groups that hold these frames, or None: all."""
         ranks = self.ranks()
         if ranks is None:
@@ -86,16 +94,34 @@ def _reason(error: Exception) -> str:
 
 def packets(path: Path) -> Packets:
     """What the file holds, without decoding; one that breaks off ends there."""
+    import av
+
+    found, broken = [], ""
     with opened(path) as (container, stream):
-        found = [(p.pts, bool(p.is_keyframe)) for p in _demuxed(container, stream) if p.size and not p.is_discard]
+        try:
+            for p in container.demux(stream):
+                if p.size and not p.is_discard:
+                    found.append((p.pts, bool(p.is_keyframe)))
+        except av.FFmpegError as error:
+            broken = _reason(error)
         context = stream.codec_context
         return Packets(
             tuple(pts for pts, _ in found), tuple(key for _, key in found), stream.time_base,
-            float(stream.average_rate or 0), int(stream.frames), context.name, bool(context.has_b_frames),
+            float(stream.average_rate or 0), int(stream.frames), _seconds(stream), broken, context.name,
+            bool(context.has_b_frames),
         )  # fmt: skip
 
 
+def _seconds(stream: Any) -> float:
+    """How long the header says the stream is, s; Matroska has it as a text, 00:00:11.429000000."""
+    if stream.duration is not None:
+        return float(stream.duration * stream.time_base)
+    found = re.fullmatch(r"(\d+):(\d\d):(\d\d(?:\.\d+)?)", stream.metadata.get("DURATION", ""))
+    return 3600.0 * int(found[1]) + 60.0 * int(found[2]) + float(found[3]) if found else 0.0
+
+
 def _demuxed(container: Any, stream: Any) -> Iterator[Any]:
+    """Packets up to where `packets` ended."""
     import av
 
     packets = container.demux(stream)
@@ -112,14 +138,15 @@ def _demuxed(container: Any, stream: Any) -> Iterator[Any]:
 def pictures(path: Path, index: Packets, wanted: list[int] | None = None) -> Iterator[tuple[int, Image]]:
     """(frame, picture) in order, of all frames or of those wanted; what cannot be decoded is left out."""
     ranks, last, count = index.ranks(), max(wanted or [0]), 0
-    groups = None if wanted is None else index.groups(wanted)
+    some = None if wanted is None else set(wanted)
+    groups = None if some is None else index.groups(some)
     with opened(path) as (container, stream):
         for frame in _decoded(container, stream, groups):
             count += 1
             number = count if ranks is None or frame is None else ranks.get(frame.pts, 0)
-            if frame is not None and not frame.is_corrupt and number and (wanted is None or number in wanted):
+            if frame is not None and not frame.is_corrupt and number and (some is None or number in some):
                 yield number, _picture(frame)
-            if wanted is not None and number >= last:
+            if some is not None and number >= last:
                 return
 
 

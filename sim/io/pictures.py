@@ -64,7 +64,7 @@ def read_picture(path: Path) -> Image | None:
         body = path.read_bytes()
     except OSError:
         return None
-    if not _ends(body):
+    if not ends(body):
         return None
     level = cv2.utils.logging.setLogLevel(cv2.utils.logging.LOG_LEVEL_SILENT)
     try:
@@ -76,7 +76,7 @@ def read_picture(path: Path) -> Image | None:
     return None if picture is None else np.asarray(picture, np.uint8)
 
 
-def _ends(body: bytes) -> bool:
+def ends(body: bytes) -> bool:
     """Whether a JPEG or PNG goes on to its end; older decoders give half a picture, and libraries grumble on stderr."""
     if body.startswith(b"\xff\xd8"):
         return body.rfind(b"\xff\xd9") > body.rfind(b"\xff\xda") > 0

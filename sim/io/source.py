@@ -13,6 +13,7 @@ from sim.io.sample import Choice, read_choice
 from sim.types import Camera, Sequence
 
 KINDS = "a generated sequence or dataset, a MOTChallenge folder or text, a BIWI folder, a CAVIAR XML, a video"
+VIDEOS = f"{KINDS} ({' '.join(video.SUFFIXES)})"
 DEPTH = 3
 
 
@@ -80,7 +81,7 @@ def _open_file(path: Path, options: Options) -> Sequence:
     if suffix in (".txt", ".csv"):
         o.refuse(path, "a text", "it has no pictures", "background")
         return mot_folder.open_text(path, fps=o.fps, px_per_m=o.px_per_m, camera=o.camera)
-    raise InputError(file=path, got=f"a {suffix or 'nameless'} file", expected=KINDS, remedy="check the path")
+    raise InputError(file=path, got=f"a {suffix or 'nameless'} file", expected=VIDEOS, remedy="check the path")
 
 
 def _kind(folder: Path) -> str | None:

@@ -40,8 +40,8 @@ def write_sequence(
     """
     wanted = chosen(streams, images)
     with atomic.new_folder(folder) as partial:
-        tables_first = sequence.truth  # a script that fails does so before a picture is drawn
-        assert tables_first is None or tables_first.length == sequence.length
+        truth = sequence.truth  # a script that fails does so before a picture is drawn
+        assert truth is None or truth.length == sequence.length
         pictures = write_pictures(partial, sequence, wanted, images)
         files = sequence_files(sequence, scenario=scenario, seed=seed, repeat=repeat, pictures=pictures)
         for name, body in files.items():

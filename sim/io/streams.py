@@ -17,10 +17,7 @@ EXACT = ("disparity", "ids")
 """Streams of 16-bit numbers, always PNG."""
 
 STEPS = 64  # of disparity per px
-PERSON, STANDING = (
-    2000,
-    3000,
-)  # class × 1000, as in MOTS: pedestrians are class 2; of walls and pillars it knows nothing
+PERSON, STANDING = 2000, 3000  # class × 1000: pedestrians are class 2 in MOTS, which has none for walls and pillars
 PEOPLE = 999  # that class × 1000 + id leaves room for
 
 Codes = NDArray[np.uint16]

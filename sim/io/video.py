@@ -19,9 +19,13 @@ from sim.io.pictures import checked, filled, size_of
 from sim.io.sample import Choice, Sample
 from sim.types import Camera, Frame, Image, Sequence
 
-SUFFIXES = (".mp4", ".avi", ".mkv", ".mov", ".mpg", ".mpeg", ".webm", ".m4v")
+SUFFIXES = (
+    ".mp4", ".m4v", ".mov", ".3gp", ".mkv", ".webm", ".avi", ".wmv", ".flv", ".ogv", ".mpg", ".mpeg",
+    ".ts", ".mts", ".m2ts", ".h264", ".h265", ".hevc", ".y4m",
+)  # fmt: skip
 RATES = (0.1, 300.0)  # frames/s that make sense
 AGREE = 0.02  # by which the container's rate may differ from that of the time stamps
+GAP, GAPS = 1.0, 5.0  # s, and times the usual step: time without a frame that is told
 DEFAULT_FPS = 25.0
 ANY = Choice()
 
@@ -41,8 +45,8 @@ def open_video(
     if first is None:
         got = f"{length} frames, none of which can be decoded" if length else "no frame"
         raise InputError(file=path, got=got, expected="a video with pictures", remedy=decode.REMEDY)
-    if length < index.promised:
-        warnings.warn(f"{path.name}: ends after {length} of the {index.promised} frames it promises", stacklevel=2)
+    for words in missing(index):
+        warnings.warn(f"{path.name}: {words}", stacklevel=2)
     size, known = size_of(first), None if index.codec in decode.HIDDEN else length
     rate, words = frame_rate(path.name, fps, index)
     choice = background.of(length, path)
@@ -59,6 +63,24 @@ def open_video(
         source={"kind": "video", "path": str(path), "fps": words, "background": str(choice)},
         bare=None if known is None else lambda: (Frame(k, (k - 1) / rate) for k in range(1, known + 1)),
     )  # fmt: skip
+
+
+def missing(index: decode.Packets) -> Iterator[str]:
+    """In words, what of a video is not there: its end, by its own header, and times at which it shows nothing."""
+    times, length = index.times(), len(index.stamps)
+    step = np.diff(times)
+    usual = float(np.median(step)) if len(step) else 0.0
+    shown = float(times[-1]) + usual if len(times) else index.seconds
+    if index.broken:
+        yield f"breaks off after {length} frames ({index.broken})"
+    elif length < index.promised:
+        yield f"ends after {length} of the {index.promised} frames it promises"
+    elif not index.promised and index.seconds - shown > max(GAP, GAPS * usual):
+        yield f"ends after {shown:.1f} of the {index.seconds:.1f} s it promises"
+    gaps = np.flatnonzero(step > max(GAP, GAPS * usual)) + 1
+    if len(gaps):
+        more = f" ({len(gaps) - 1} more such)" if len(gaps) > 1 else ""
+        yield f"nothing for {step[gaps[0] - 1]:.1f} s after frame {gaps[0]}{more}; frames are numbered without the gap"
 
 
 def frame_rate(name: str, given: float | None, index: decode.Packets) -> tuple[float, str]:
@@ -84,7 +106,7 @@ def _sensible(rate: float) -> bool:
 
 def stamped_rate(index: decode.Packets) -> float:
     """Frames per second by the time stamps, to 1e-3, gaps left out; 0 where stamps do not tell."""
-    step = np.diff(sorted({s for s in index.stamps if s is not None})) * float(index.time_base)
+    step = np.diff(index.times())
     if not len(step):
         return 0.0
     usual = np.abs(step - np.median(step)) <= np.median(step) / 2

@@ -145,11 +145,17 @@ def test_words_that_are_no_streams_make_nothing(tmp_path, simulate):
     assert not (tmp_path / "new").exists()
 
 
-def test_altered_pictures_are_made_anew(tmp_path, simulate):
+def altered(path: Path) -> None:
+    """Other bytes, as many as before."""
+    path.write_bytes(path.read_bytes()[:-5] + bytes(5))
+
+
+@pytest.mark.parametrize("harm", [altered, Path.unlink])
+@pytest.mark.parametrize("name", ["img1/000003.jpg", "background/000009.jpg"])
+def test_altered_pictures_are_made_anew(tmp_path, simulate, harm, name):
     (made,) = generate([Entry("x", scenario())], range(1), tmp_path, streams=("left",))
     before = content(tmp_path)
-    (made / "img1/000003.jpg").write_bytes((made / "img1/000003.jpg").read_bytes()[:-5] + bytes(5))
-    (made / "background/000009.jpg").unlink()
+    harm(made / name)
     simulate.asked.clear()
     generate([Entry("x", scenario())], range(1), tmp_path, streams=("left",))
     assert [seed for seed, _ in simulate.asked] == [0]

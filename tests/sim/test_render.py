@@ -143,15 +143,16 @@ def test_walls_and_pillars_cast_shadows_and_stairs_show_steps() -> None:
 
 def test_frames_are_pure_functions_of_their_index() -> None:
     motion, camera = motion_in(BUILT), VIEWS["high"]
-    light = Light(drift=0.1, flicker=0.02, switch=(Switch(at=0.5, gain=0.7),))
-    one, two = (stage(motion, camera, light, Picture(jpeg=80)) for _ in range(2))
+    light = Light(drift=0.1, flicker=0.02, cloud=0.1, switch=(Switch(at=0.5, gain=0.7),))
+    picture = Picture(jpeg=80, foliage=0.1)
+    one, two = (stage(motion, camera, light, picture) for _ in range(2))
     forwards = [one.both(i, right=True, pixels=True, disparity=True) for i in range(1, 5)]
     for i in (3, 1, 4, 2):
         other = forwards[i - 1]
         assert np.array_equal(two.frame(i), other.image)
         assert np.array_equal(two.right(i), other.right)
         assert canonical_hash(two.pixels(i, disparity=True)) == canonical_hash(other.pixels)
-        assert np.array_equal(render(motion, camera, i, light, Picture(jpeg=80)).image, other.image)
+        assert np.array_equal(render(motion, camera, i, light, picture).image, other.image)
     assert not np.array_equal(forwards[0].image, forwards[0].right)
     assert np.array_equal(one.background(7), two.background(7))
 
@@ -176,7 +177,7 @@ def test_a_person_changes_no_frame_in_which_it_is_not() -> None:
 
 def test_noise_is_normal_independent_and_the_same_in_empty_frames() -> None:
     motion, camera = motion_in(BARE, 3), small(pinhole(60.0))
-    made = stage(motion, camera, Light(), Picture(noise=4.0, texture=0.0))
+    made = stage(motion, camera, Light(), Picture(noise=4.0, shot=0.0, texture=0.0))
     empty = np.stack([made.background(k) for k in range(BACKGROUNDS)]).astype(float)
     noise = empty - empty.mean(axis=0)
     assert noise.std() == pytest.approx(4.0 * np.sqrt(1 - 1 / BACKGROUNDS), rel=0.02)
@@ -272,14 +273,29 @@ def test_textures_repeat_nowhere() -> None:
     assert alike[~near].max() < 0.5
 
 
-def test_geometric_visibility_is_that_of_the_pixels() -> None:
-    motion, camera = crowd(5, people=14, frames=3), pinhole(25.0, at=(8.0, -6.0, 4.5))
+@pytest.mark.parametrize("scene", SCENES)
+def test_geometric_visibility_is_that_of_the_pixels(scene: str) -> None:
+    motion, camera = crowd(5, people=14, frames=3, scene=SCENES[scene]), pinhole(25.0, at=(8.0, -6.0, 4.5))
     truth, pixels = bodies(motion, camera), stage(motion, camera).pixels(2)
     here = truth.rows(2)
     assert truth.box is not None
     assert np.abs(truth.visibility[here] - pixels.visibility).max() < 0.06
     whole = pixels.visibility == 1
     assert np.abs(truth.box[here] - pixels.box)[whole].max() <= 1.0
+
+
+@pytest.mark.parametrize("rise", [1.6, -1.6])
+def test_stairs_hide_people_in_geometry_as_in_pixels(rise: float) -> None:
+    flight = Stairs(np.array([6.0, 6.0]), np.array([9.0, 6.0]), 3.0, rise, 8, 2.0)
+    scene = Scene(np.array([16.0, 10.0]), stairs=(flight,))
+    x, y = np.meshgrid(np.linspace(5.0, 11.5, 9), [3.8, 5.0, 6.0, 7.0, 8.2, 9.0])  # before, on and behind the flight
+    motion = walkers(np.column_stack([x.ravel(), y.ravel()]), np.full((x.size, 2), 0.3), frames=2, scene=scene)
+    camera = pinhole(15.0, at=(8.0, -5.0, 3.2))
+    truth, pixels = bodies(motion, camera), stage(motion, camera).pixels(1)
+    off = truth.visibility[truth.rows(1)] - pixels.visibility
+    assert np.abs(off).max() < 0.06
+    alone = stage(motion.replace(scene=BARE), camera).pixels(1)
+    assert (pixels.visible_px < 0.7 * alone.visible_px).sum() >= 3  # they do hide somebody
 
 
 def test_what_cannot_be_drawn_is_refused() -> None:

@@ -98,7 +98,9 @@ def generate(
         str,
         typer.Option("--streams", metavar="A,B,…", help="Pictures: left, right, disparity, ids, background; or none."),
     ] = "left",
-    images: Annotated[Literal["jpg", "png", "mp4"], typer.Option(help="How pictures are stored.")] = "jpg",
+    images: Annotated[
+        Literal["jpg", "png", "mp4"] | None, typer.Option(help="How pictures are stored; jpg if nothing is said.")
+    ] = None,
     workers: Annotated[int, typer.Option("--workers", min=1, help="Processes.")] = 1,
     json: Json = False,
 ) -> Answer:
@@ -176,7 +178,7 @@ def view(
     out: Annotated[Path, typer.Option("--out", metavar="FILE.html", help="Page to write; a folder for many.")],
     video: Annotated[
         Literal["auto", "inside", "beside", "none"],
-        typer.Option(help="Pictures inside the page, as FILE.mp4 beside it (auto: from 12 MB on), or none."),
+        typer.Option(help="Pictures inside the page, as FILE.view.mp4 beside it (auto: from 12 MB on), or none."),
     ] = "auto",
     fps: Fps = None,
     px_per_m: Scale = None,

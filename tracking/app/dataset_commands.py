@@ -5,24 +5,29 @@ from __future__ import annotations
 from collections.abc import Iterable
 from pathlib import Path
 
+from scenarios.errors import InputError
 from tracking.app import options
 from tracking.app.answer import Answer
 from tracking.app.meter import Meter
 
 
 def generate(
-    names: Iterable[str], seeds: str, out: Path, settings: Iterable[str], workers: int, streams: str, images: str
+    names: Iterable[str], seeds: str, out: Path, settings: Iterable[str], workers: int, streams: str, images: str | None
 ) -> Answer:
     """Every named scenario or suite with every seed, as a dataset."""
     from sim.generate import generate as make
+    from sim.io.streams import coding
 
     options.folder(out)
     chosen = options.seeds(seeds)
-    texts = options.scenario_settings(settings)
+    texts, wanted = options.scenario_settings(settings), options.streams(streams)
+    if images is not None and coding(wanted, images) is None:
+        got, remedy = f"{images} with --streams {streams}", "leave --images out: ids and disparity are always png"
+        raise InputError(place="--images", got=got, expected="left, right or background", remedy=remedy)
     with Meter("generate") as meter:
         folders = make(
             names, chosen, out, set=texts, workers=workers, progress=meter.update,
-            streams=options.streams(streams), images=images,
+            streams=wanted, images=images or "jpg",
         )  # fmt: skip
     text = f"{len(folders)} sequences in {folders[0].parent}"
     return Answer({"sequences": folders, "folder": folders[0].parent}, text)

@@ -12,6 +12,7 @@ from urllib.parse import quote
 
 import numpy as np
 
+from scenarios.errors import InputError
 from sim.io.atomic import writing
 from sim.io.encode import movie, rate_of
 from sim.types import Image, Sequence
@@ -44,16 +45,15 @@ class Film:
 def film(
     sequence: Sequence, page: Path, video: Video = "auto", step: Callable[[str], None] = lambda _: None
 ) -> Film | None:
-    """The pictures of a sequence as a video for a page, FILE.mp4 beside FILE.html where it is not to be inside
-    (FILE.view.mp4 where FILE.mp4 is the source itself).
+    """The pictures of a sequence as a video for a page, FILE.view.mp4 beside FILE.html where it is not to be inside.
 
-    None where there are no pictures, or none are wanted. step: called after each.
+    FILE.mp4 may be an overlay, or the source itself. None where there are no pictures, or none are wanted. step: called
+    after each.
     """
     if video == "none" or not sequence.has_images:
         return None
-    beside = page.with_suffix(".mp4")
-    if is_source(sequence, beside):
-        beside = page.with_suffix(".view.mp4")
+    beside = page.with_suffix(".view.mp4")
+    refuse_source(sequence, beside)
     rate = float(rate_of(sequence.fps))
     with writing(beside) as partial:
         lost = encode(sequence, partial, step)
@@ -63,10 +63,11 @@ def film(
     return Film(quote(beside.name), "", rate, lost)
 
 
-def is_source(sequence: Sequence, path: Path) -> bool:
-    """Whether a path is the very file that the sequence is read from."""
+def refuse_source(sequence: Sequence, path: Path) -> None:
+    """InputError where a path is the very file that the sequence is read from."""
     source = sequence.source.get("path")
-    return source is not None and path.exists() and path.samefile(source)
+    if source is not None and path.exists() and path.samefile(source):
+        raise InputError(file=path, place="--out", got="the source itself", expected="another file", remedy="rename it")
 
 
 def encode(sequence: Sequence, path: Path, step: Callable[[str], None]) -> tuple[int, ...]:

@@ -16,11 +16,11 @@ from sim.io.atomic import writing
 from sim.io.encode import movie
 from sim.types import Frame, Image, Sequence, Tracks
 from tracking.app import marks, painter
-from tracking.app.film import even, is_source
+from tracking.app.film import even, refuse_source
 from tracking.app.marks import Side
 from tracking.app.painter import Style
 from tracking.app.sheet_panel import View
-from tracking.grouping import with_groups
+from tracking.run import grouped
 
 HowTrue = Literal["beside", "over", "only"]
 LEAST = 400
@@ -48,8 +48,7 @@ def overlay(
             remedy="flockscope view shows it on plain ground",
         )  # fmt: skip
     path = Path(out)
-    if is_source(sequence, path):
-        raise InputError(file=path, place="--out", got="the source itself", expected="another file", remedy="rename it")
+    refuse_source(sequence, path)
     layers = _layers(sequence, tracks, truth)
     with writing(path) as partial:
         _write(partial, sequence, layers, step)
@@ -69,10 +68,7 @@ def _layers(
         true = marks.of_truth(sequence.truth)
     if tracks is None or how == "only":
         return [[(true, Style())]]
-    scale = sequence.px_per_m
-    if not np.isfinite(scale) and sequence.truth is not None:
-        scale = sequence.truth.px_per_m
-    said = marks.of_tracks(with_groups(tracks, sequence.fps, scale), sequence.camera, sequence.scene)
+    said = marks.of_tracks(grouped(tracks, sequence), sequence.camera, sequence.scene)
     if how == "beside":
         return [[(true, Style())], [(said, Style())]]
     return [[(true, Style(plain=True)), (said, Style())] if how == "over" else [(said, Style())]]

@@ -28,9 +28,6 @@ class Style:
 
     plain: bool = False
     rim: bool = True
-    trails: bool = True
-    ellipses: bool = True
-    names: bool = True
 
 
 def kind_colour(kind: str) -> Colour:
@@ -59,18 +56,18 @@ def paint(view: View, side: Side, index: int, fps: float, style: Style = Style()
         ink = colour(group)
         view.wash(view.map(polygon), ink, 0.18)
         view.line(polygon, ink, 2, closed=True)
-    if style.trails and not style.plain:
+    if not style.plain:
         for name, points in side.trails(index, round(TRAIL * fps)):
             view.line(points, colour(name), 2)
     for k, name in enumerate(marks.id.tolist()):
         ink = PAPER if style.plain else colour(name)
-        if style.ellipses and not style.plain and np.isfinite(marks.ellipse[k]).all():
+        if not style.plain and np.isfinite(marks.ellipse[k]).all():
             _ellipse(view, marks.ellipse[k], ink)
         if np.isfinite(marks.box[k]).all():
             _box(view, marks.box[k], ink, style, broken=bool(marks.hidden[k]))
         elif np.isfinite(marks.at[k]).all():
             view.disc(marks.at[k], 5, ink, 2)
-    if style.names and not style.plain:
+    if not style.plain:
         _names(view, side, index)
         for group, polygon in regions:
             _group_name(view, f"{side.prefix}{group}", polygon, colour(group))

@@ -15,7 +15,8 @@ from sim.types import Array, Ints, Sequence
 from tracking.app.answer import Answer
 from tracking.app.meter import Meter
 from tracking.app.paired import pair, results
-from tracking.app.score_tables import Means, differences, tables
+from tracking.app.score_tables import Means, differences, said, tables
+from tracking.provenance import given
 from tracking.run import Run
 from tracking.scoring import evaluate
 from tracking.scoring.catalogue import CATALOGUE
@@ -29,10 +30,11 @@ INDICATIVE = f"intervals are indicative under {SURE:g} s: the recording lasts {{
 
 @dataclass(frozen=True)
 class Row:
-    """The scores of one sequence."""
+    """The scores of one sequence. given: what the tracker saw, in words, "" where nothing says it."""
 
     sequence: str
     scores: Scores
+    given: str = ""
 
 
 def score(
@@ -59,14 +61,18 @@ def score(
     paths = [tracks] if against is None else [tracks, against]
     rows, *others = [_rows(sequences, path, similarity, group_match) for path in paths]
     draws = [_draw(sequences, path, similarity, group_match) for path in paths] if blocks else []
-    means = _recording(sequences[0], blocks, draws[0], _values(rows)[0]) if blocks else summary(rows)
-    found = answer(rows, means, notes(sequences[0]) if blocks else [])
+    found = (
+        answer([(rows, _recording(sequences[0], blocks, draws[0], _values(rows)[0]))], notes(sequences[0]))
+        if blocks
+        else answer([(part, summary(part)) for part in alike(rows)])
+    )
     if not others:
         return found
     if not blocks:
-        return compared(found, _by_key(paired(_values(others[0]), _values(rows))), len(rows))
+        return compared(found, _by_key(paired(_values(others[0]), _values(rows))), len(rows), _givens(others[0]))
     difference = (_values(rows) - _values(others[0]))[0]
-    return compared(found, _recording(sequences[0], blocks, lambda at: draws[0](at) - draws[1](at), difference), 1)
+    ends = _recording(sequences[0], blocks, lambda at: draws[0](at) - draws[1](at), difference)
+    return compared(found, ends, 1, _givens(others[0]))
 
 
 def _draw(
@@ -117,7 +123,7 @@ def score_run(
             file=sequence.name, place="--similarity", got=str(error), expected="what both sides have",
             remedy="choose another --similarity",
         ) from None  # fmt: skip
-    return Row(sequence.name, found)
+    return Row(sequence.name, found, given(run.info))
 
 
 def notes(sequence: Sequence) -> list[str]:
@@ -127,23 +133,48 @@ def notes(sequence: Sequence) -> list[str]:
     return [INDICATIVE.format(seconds=seconds)] if seconds < SURE else []
 
 
-def answer(rows: list[Row], means: Means, notes: list[str] | None = None) -> Answer:
-    """Rows, their mean and notes on it, for people and for --json."""
+def alike(rows: list[Row]) -> list[list[Row]]:
+    """The rows by what their tracker saw: figures from pixels, from boxes, from look-ahead share no mean."""
+    return [[row for row in rows if row.given == given] for given in _givens(rows)]
+
+
+def _givens(rows: list[Row]) -> list[str]:
+    return list(dict.fromkeys(row.given for row in rows))
+
+
+def answer(parts: list[tuple[list[Row], Means]], notes: list[str] | None = None) -> Answer:
+    """Rows that belong together, their means, and notes on them, for people and for --json."""
+    from rich.console import Group
+
     notes = notes or []
-    return Answer({"sequences": [_row(row) for row in rows], "mean": means, "notes": notes}, tables(rows, means, notes))
+    total = sum(len(rows) for rows, _ in parts)
+    texts = [tables(rows, means, notes, total) for rows, means in parts]
+    data = {
+        "sequences": [_row(row) for rows, _ in parts for row in rows],
+        "mean": parts[0][1] if len(parts) == 1 else None,
+        "means": [{"given": rows[0].given, "sequences": len(rows), "mean": means} for rows, means in parts],
+        "notes": notes,
+    }
+    return Answer(data, Group(*texts))
 
 
 def _row(row: Row) -> dict[str, Any]:
     s = row.scores
-    chosen = {"similarity": s.similarity, "surface": s.surface, "group_match": s.group_match}
+    chosen = {"similarity": s.similarity, "surface": s.surface, "group_match": s.group_match, "given": row.given}
     return {"name": row.sequence, **chosen, **s}
 
 
-def compared(found: Answer, ends: Means, sequences: int) -> Answer:
-    """The answer, and by how much it differs from other tracks on the same sequences, in pairs."""
+def compared(found: Answer, ends: Means, sequences: int, against: list[str]) -> Answer:
+    """The answer, and by how much it differs from other tracks on the same sequences, in pairs.
+
+    against: what the other tracks' trackers saw.
+    """
     from rich.console import Group
 
-    return Answer({**found.data, "difference": ends}, Group(found.text, "", differences(ends, sequences)))
+    return Answer(
+        {**found.data, "difference": ends, "against": against},
+        Group(found.text, "", differences(ends, sequences), f"--against: detections {said(against)}"),
+    )
 
 
 def summary(rows: list[Row]) -> Means:

@@ -43,16 +43,27 @@ ENOUGH = 100
 Means = dict[str, dict[str, float]]
 
 
-def tables(rows: list[Row], means: Means, notes: Sequence[str] = ()) -> Any:
-    """A table for each family of which something is known, by what people and groups were compared, and the notes."""
+def tables(rows: list[Row], means: Means, notes: Sequence[str] = (), total: int = 0) -> Any:
+    """A table for each family of which something is known, by what people and groups were compared, and the notes.
+
+    total: so many sequences have been scored; where these are not all, what their tracker saw stands above them.
+    """
     from rich.console import Group
 
+    seen = f"detections {said([rows[0].given])}"
     known = {title: keys for title, keys in TABLES.items() if any(math.isfinite(means[k]["mean"]) for k in keys)}
     parts = [_table(title, keys, rows, means) for title, keys in known.items()]
-    lines = _compared(rows, "groups, strict" in known)
+    lines = [seen, *_compared(rows, "groups, strict" in known)]
     if len(rows) == 1 and math.isfinite(means["objective"]["low"]):
         lines.append("intervals by moving blocks of frames")
-    return Group(*parts, "\n".join([*lines, *notes]))
+    some = len(rows) < total
+    head = [f"{len(rows)} of {total} sequences, {seen}", ""] if some else []
+    return Group(*head, *parts, "\n".join([*lines, *notes]), *([""] if some else []))
+
+
+def said(given: Sequence[str]) -> str:
+    """What trackers saw, in words."""
+    return ", ".join(words or "not said (no run.json)" for words in given)
 
 
 def _table(title: str, keys: tuple[str, ...], rows: list[Row], means: Means) -> Any:

@@ -13,6 +13,7 @@ from tracking.app import options
 from tracking.app.answer import Answer
 from tracking.app.meter import Meter
 from tracking.config import Config
+from tracking.provenance import given
 from tracking.run import Run
 
 
@@ -124,7 +125,7 @@ def places(sequences: list[Sequence], source: Path, out: Path) -> list[tuple[Seq
 
 
 def _row(run: Run, folder: Path) -> dict[str, Any]:
-    shown = ["sequence", "detections", "background", "causal", "plane", "boxes", "frames"]
+    shown = ["sequence", "detections", "sensor", "background", "causal", "causal_from", "plane", "boxes", "frames"]
     shown += ["frames_per_second", "whole_frames_per_second"]
     ids = {int(id) for tracks in run for id in tracks.id}
     return {**{key: run.info[key] for key in shown}, "tracks": len(ids), "folder": folder}
@@ -132,6 +133,5 @@ def _row(run: Run, folder: Path) -> dict[str, Any]:
 
 def _line(row: dict[str, Any]) -> str:
     speed = f"{row['frames_per_second']:.0f} frames/s ({row['whole_frames_per_second']:.0f} with reading)"
-    seen = f" (background: {row['background']})" if row["background"] else ""
-    counts = f"{row['frames']} frames, {row['tracks']} tracks, detections {row['detections']}{seen}, {speed}"
+    counts = f"{row['frames']} frames, {row['tracks']} tracks, detections {given(row)}, {speed}"
     return f"{row['sequence']}: {counts} → {row['folder']}"

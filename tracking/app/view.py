@@ -18,6 +18,7 @@ from tracking.app import view_data
 from tracking.app.extent import MARGIN, peopled
 from tracking.app.film import Film
 from tracking.app.view_data import Json, Rows
+from tracking.run import grouped
 
 HERE = Path(__file__).parent
 SCRIPTS = ("view_data.js", "view_draw.js", "view_plan.js", "view_image.js", "view_time.js", "view_film.js", "view.js")
@@ -56,7 +57,7 @@ def view(
 def payload(sequence: Sequence, tracks: SequenceOf[Tracks] | None, scores: Mapping[str, float] | None = None) -> Json:
     """All that the page shows, ready for JSON."""
     truth = sequence.truth
-    answers = None if tracks is None else _derived(tracks, sequence, truth)
+    answers = None if tracks is None else grouped(tracks, sequence)
     true = None if truth is None else view_data.truth_rows(truth)
     tracked = None if answers is None else view_data.track_rows(answers)
     found = view_data.detections(sequence)
@@ -90,16 +91,6 @@ def _scores(scores: Mapping[str, float]) -> list[list[str]]:
     known = {key: number(key, scores[key]) for key in CATALOGUE if math.isfinite(scores.get(key, math.nan))}
     few = [[key, known[key], CATALOGUE[key].meaning, ""] for key in SHOWN if key in known]
     return few + [[key, text, CATALOGUE[key].meaning, CATALOGUE[key].family] for key, text in known.items()]
-
-
-def _derived(tracks: SequenceOf[Tracks], sequence: Sequence, truth: Truth | None) -> SequenceOf[Tracks]:
-    """The tracks, with groups and events where the tracker left them empty."""
-    from tracking.grouping import with_groups
-
-    scale = sequence.px_per_m
-    if not math.isfinite(scale):
-        scale = truth.px_per_m if truth is not None else math.nan
-    return with_groups(tracks, sequence.fps, scale)
 
 
 def _tracker(tracks: SequenceOf[Tracks] | None) -> str:

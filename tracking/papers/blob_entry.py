@@ -12,6 +12,7 @@ import numpy as np
 
 from sim.types import Array, Ints
 from tracking.detect import blobs as detect
+from tracking.papers import blob_entry_kernels as kernels
 from tracking.papers.blob_size import SLIM, SMALLEST, PersonSize
 from tracking.papers.blob_template import ELLIPSE, Mask
 
@@ -23,61 +24,43 @@ EVIDENCE = 1000.0  # nats of full support: so many that a first guess holds nobo
 
 def newcomers(scene: Mask, size: PersonSize, support: float) -> Array:
     """(K, 4) templates of new people, painted; `support` is what each needs."""
-    left = (scene.gain > 0) & (scene.cover == 0)
-    found = detect.find(left, LEAST * SMALLEST**2 * SLIM * ELLIPSE) if left.any() else None
-    made = [np.zeros((0, 4))]
-    if found is not None:
-        box = found.box
-        h, w = size.at(np.stack([box[:, 0] + box[:, 2] / 2, box[:, 1] + box[:, 3]], 1)).T
-        person = ELLIPSE * h * w
-        for k in np.flatnonzero(found.area >= LEAST * person).tolist():
-            x, y, wide, high = box[k].astype(int)
-            rows, columns = np.nonzero(found.label[y : y + high, x : x + wide] == k + 1)
-            made.append(_in_region(scene, rows + y, columns + x, float(person[k]), size, support))
-    return np.concatenate(made)
+    found = detect.find(scene.left(), LEAST * SMALLEST**2 * SLIM * ELLIPSE)
+    box = found.box
+    h, w = size.at(np.stack([box[:, 0] + box[:, 2] / 2, box[:, 1] + box[:, 3]], 1)).T
+    person = ELLIPSE * h * w
+    rows = np.flatnonzero(found.area >= LEAST * person)
+    if not len(rows):
+        return np.zeros((0, 4))
+    most = np.minimum((found.area[rows] / person[rows]).astype(int) + 2, MOST)
+    guesses = _guesses(found, rows, most, size)
+    return np.concatenate([_in_region(scene, g, p, support) for g, p in zip(guesses, person[rows], strict=True)])
 
 
-def _in_region(scene: Mask, rows: Ints, columns: Ints, person: float, size: PersonSize, support: float) -> Array:
-    best, worth = np.zeros((0, 4)), 0.0
-    for count in range(1, min(int(len(rows) / person) + 2, MOST) + 1):
-        at = _guess(rows, columns, count, size)
-        if not np.isfinite(at).all():
-            break
-        at = scene.settle(at, np.maximum(ROAM * at[:, 2:3], 1.0) * np.ones(2), EVIDENCE)
-        alone = scene.alone(at)
-        scene.paint(at, -1)
-        value = _explained(scene, at) / person - count * support
-        if value > worth and alone.min() >= support:
-            best, worth = at, value
-    scene.paint(best)
-    return best
+def _in_region(scene: Mask, guesses: Array, person: float, support: float) -> Array:
+    """(K, 4) as many of a region's newcomers as explain most, out of guesses for 1, 2, ... of them, painted."""
+    known = np.asarray(np.isfinite(guesses).all(1))
+    sure = len(known) if known.all() else int(known.argmin())
+    most = int((np.sqrt(8 * sure + 1) - 1) / 2)  # 1 + 2 + ... + most <= sure
+    spread = np.maximum(ROAM * guesses[:, 2:3], 1.0) * np.ones(2)
+    return kernels.enter(scene.foreground, scene.cover, guesses, most, person, support, spread, EVIDENCE)
 
 
-def _guess(rows: Ints, columns: Ints, count: int, size: PersonSize) -> Array:
-    """(count, 4) templates side by side over a region's pixels, each with as many, standing where these end."""
+def _guesses(found: detect.Blobs, rows: Ints, most: Ints, size: PersonSize) -> list[Array]:
+    """For each of these regions (1 + 2 + ... + most, 4) templates: 1, 2, ... `most` that share its pixels evenly."""
     if size.above:
-        return _from_above(rows, columns, count, size)
-    order = np.argsort(columns, kind="stable")
-    parts = np.array_split(order, count)
-    foot = np.array([[columns[p].mean() + 0.5, np.quantile(rows[p], 0.98) + 1] for p in parts])
-    return np.column_stack([foot, size.at(foot)])
+        return [_from_above(found, row, n, size) for row, n in zip(rows.tolist(), most.tolist(), strict=True)]
+    box = found.box.astype(int)
+    feet = [kernels.feet(found.label, k + 1, box[k], n) for k, n in zip(rows.tolist(), most.tolist(), strict=True)]
+    stand = np.concatenate(feet)
+    return np.split(np.column_stack([stand, size.at(stand)]), np.cumsum([len(f) for f in feet])[:-1])
 
 
-def _from_above(rows: Ints, columns: Ints, count: int, size: PersonSize) -> Array:
-    """(count, 4) templates along the longer axis of a region's pixels, each in the middle of as many."""
-    at = np.column_stack([columns, rows]) + 0.5
+def _from_above(found: detect.Blobs, row: int, most: int, size: PersonSize) -> Array:
+    """The same along the longer axis of a region's pixels, each template in the middle of as many."""
+    left, top, wide, high = found.box[row].astype(int)
+    at = np.argwhere(found.label[top : top + high, left : left + wide] == row + 1)[:, ::-1] + (left, top) + 0.5
     axis = np.linalg.eigh(np.cov(at.T))[1][:, -1]
-    parts = np.array_split(np.argsort(at @ axis, kind="stable"), count)
-    found = np.array([at[p].mean(0) for p in parts])
-    extent = size.at(found)
-    return np.column_stack([found[:, 0], found[:, 1] + extent[:, 0] / 2, extent])
-
-
-def _explained(scene: Mask, at: Array) -> float:
-    """Sum of what pixels are worth that these templates cover; none of them painted."""
-    total = 0.0
-    for k in range(len(at)):
-        total += float((scene.support(at[k : k + 1]) * scene.area(at[k : k + 1]))[0])
-        scene.paint(at[k : k + 1])
-    scene.paint(at, -1)
-    return total
+    order = np.argsort(at @ axis, kind="stable")
+    middle = np.array([at[p].mean(0) for n in range(1, most + 1) for p in np.array_split(order, n)])
+    extent = size.at(middle)
+    return np.column_stack([middle[:, 0], middle[:, 1] + extent[:, 0] / 2, extent])

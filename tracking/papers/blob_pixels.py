@@ -22,7 +22,7 @@ from tracking.papers import blob_entry, blob_measure
 from tracking.papers.blob_config import BlobConfig
 from tracking.papers.blob_people import People
 from tracking.papers.blob_size import PersonSize
-from tracking.papers.blob_template import Mask
+from tracking.papers.blob_template import Mask, painted
 
 SHARED = 0.35  # share of a predicted box in a blob's from which on the blob may be this track's
 LEAST_AREA, LEAST_PIXELS = 0.0125, 12.0  # m^2 at the scale, px: smaller blobs are noise
@@ -94,7 +94,7 @@ class Pixels:
         if frame.image is None:
             return self._unseen(frame.t)
         classes, mask = self._foreground(frame.image)
-        if mask.mean() > self.config.most_foreground:
+        if np.count_nonzero(mask) / mask.size > self.config.most_foreground:
             self.background.adapt(frame.image, classes, self._protected())
             return self._unseen(frame.t)
         found = self._find(mask)
@@ -115,9 +115,8 @@ class Pixels:
 
     def _protected(self) -> Bools:
         """(H, W) the places of confirmed tracks."""
-        scene = Mask(np.zeros(self.background.valid.shape, bool))
-        scene.paint(_templates(self._boxes(self.people.uprights()[self.people.confirmed])))
-        return np.asarray(scene.cover > 0)
+        places = _templates(self._boxes(self.people.uprights()[self.people.confirmed]))
+        return painted(self.background.valid.shape, places)
 
     def reported(self, rows: Ints) -> Array:
         """(K, 4) boxes x, y, h, w of tracks, as they are told."""
@@ -136,7 +135,7 @@ class Pixels:
         support, newborn = np.ones(len(rows)), np.delete(z, taken, 0)
         if split:
             scene = Mask(mask)
-            scene.close(np.isin(found.label, columns + 1))
+            scene.close(found.label, columns)
             for sure in (True, False):
                 more = self._split(scene, expected, rows, sure)
                 rows, measured = np.concatenate([rows, more[0]]), np.concatenate([measured, more[1]])

@@ -1,35 +1,68 @@
-"""Kernels of tracking.papers.blob_template: sums over upright ellipses, row by row.
+"""Kernels of tracking.papers.blob_template: sums over upright ellipses, row by row; twins: tests/reference_templates.
 
-A template is an ellipse filling a box of h x w px that stands on the row `foot` at column x. A row of it from column
-left to right (right excluded) takes one difference of that row's running sum.
+A template is an ellipse filling a box of h x w px that stands on the row `foot` at column x. `foreground` (H, W) bool:
+the frame, `cover` (H, W) the number of templates painted over each pixel, EXPLAINED more where it is explained already.
+Worth is counted in halves of a foreground pixel, so that all sums are of whole numbers and exact in any order.
 """
 
 from __future__ import annotations
 
 import numpy as np
 from numba import njit
+from numpy.typing import NDArray
 
-from sim.types import Array, Ints
+from sim.types import Array, Bools, Ints
+from tracking.detect.blobs import Labels
+
+Cover = NDArray[np.int16]
+HALVES, EMPTY = 2, -1  # what a foreground pixel is worth and a background pixel costs
+EXPLAINED = 1000
+ELLIPSE = np.pi / 4  # share of its box that an ellipse fills
+LEAST_INSIDE = 0.3  # a template further out of the image than this counts as so large
+BARE = 0.1  # share of a template that no other covers below which he is hidden, not seen
+STEPS_PER_HEIGHT = 24  # the coarse grid of moves
+MOST_STEPS = 8
+FINE_STEPS = 2
+SWEEPS = 3
+
+kernel = njit(cache=True, error_model="numpy")
 
 
-@njit(cache=True)
+@kernel
 def span(x: float, half: float, width: int) -> tuple[int, int]:
     """Columns whose middle lies within `half` of x, clipped to the image: left, right (excluded)."""
     left, right = int(np.ceil(x - half - 0.5)), int(np.floor(x + half - 0.5)) + 1
     return min(max(left, 0), width), min(max(right, 0), width)
 
 
-@njit(cache=True)
+@kernel
 def half_width(row: int, foot: float, h: float, w: float) -> float:
     """Half the ellipse's width in the middle of a row; negative outside."""
     t = 2 * (row + 0.5 - foot) / h + 1
     return 0.5 * w * np.sqrt(1 - t * t) if abs(t) < 1 else -1.0
 
 
-@njit(cache=True)
-def paint(cover: Ints, x: float, foot: float, h: float, w: float, more: int) -> None:
+@kernel
+def rows_of(foot: float, h: float, high: int) -> tuple[int, int]:
+    """Rows in which a template may have pixels: first, last + 1."""
+    return max(int(foot - h), 0), min(int(foot) + 1, high)
+
+
+@kernel
+def area(template: Array, high: int, wide: int) -> float:
+    """px of a template inside the image."""
+    x, foot, h, w = template
+    across = min(x + w / 2, wide) - max(x - w / 2, 0.0)
+    down = min(foot, high) - max(foot - h, 0.0)
+    return float(ELLIPSE * h * w * max(max(across / w, 0.0) * max(down / h, 0.0), LEAST_INSIDE))
+
+
+@kernel
+def paint(cover: Cover, template: Array, more: int) -> None:
     """Add `more` to the pixels of a template."""
-    for row in range(max(int(foot - h), 0), min(int(foot) + 1, cover.shape[0])):
+    x, foot, h, w = template
+    low, high = rows_of(foot, h, cover.shape[0])
+    for row in range(low, high):
         half = half_width(row, foot, h, w)
         if half > 0:
             left, right = span(x, half, cover.shape[1])
@@ -37,70 +70,200 @@ def paint(cover: Ints, x: float, foot: float, h: float, w: float, more: int) -> 
                 cover[row, column] += more
 
 
-@njit(cache=True)
-def running(gain: Array, cover: Ints, low: int, high: int, left: int, right: int, sums: Array) -> None:
-    """Running sums of gain over uncovered pixels along the rows low..high, columns left..right; sums (., width + 1)."""
+@kernel
+def paint_all(cover: Cover, templates: Array, more: int) -> None:
+    """Add `more` to the pixels of templates (K, 4), for each of them."""
+    for k in range(len(templates)):
+        paint(cover, templates[k], more)
+
+
+@kernel
+def close(cover: Cover, label: Labels, which: Bools) -> None:
+    """Add EXPLAINED to the pixels whose label k has which[k]; labels beyond have not."""
+    for row in range(cover.shape[0]):
+        for column in range(cover.shape[1]):
+            k = label[row, column]
+            if 0 < k < len(which) and which[k]:
+                cover[row, column] += EXPLAINED
+
+
+@kernel
+def count(foreground: Bools, cover: Cover, template: Array, covered: int) -> tuple[int, int]:
+    """Pixels of a template that so many templates cover, and those of them that are foreground."""
+    x, foot, h, w = template
+    low, high = rows_of(foot, h, cover.shape[0])
+    bare, seen = 0, 0
     for row in range(low, high):
-        total = 0.0
-        sums[row, left] = 0.0
-        for column in range(left, right):
-            if cover[row, column] == 0:
-                total += gain[row, column]
-            sums[row, column + 1] = total
-
-
-@njit(cache=True)
-def template_sum(sums: Array, x: float, foot: float, h: float, w: float, left: int, right: int) -> float:
-    """Sum over a template's pixels in the columns left..right for which there are running sums."""
-    total = 0.0
-    for row in range(max(int(foot - h), 0), min(int(foot) + 1, sums.shape[0])):
         half = half_width(row, foot, h, w)
         if half > 0:
-            a, b = span(x, half, sums.shape[1] - 1)
-            a, b = max(a, left), min(b, right)
-            if b > a:
-                total += sums[row, b] - sums[row, a]
-    return total
+            left, right = span(x, half, cover.shape[1])
+            for column in range(left, right):
+                own = cover[row, column] == covered
+                bare += own
+                seen += own & foreground[row, column]
+    return bare, seen
 
 
-@njit(cache=True)
-def moved(gain: Array, cover: Ints, sums: Array, template: Array, steps: int, step: float) -> Array:
-    """(2 steps + 1, 2 steps + 1) sums over uncovered pixels of the template moved by multiples of step (rows: down)."""
+@kernel
+def support(foreground: Bools, cover: Cover, template: Array, covered: int) -> float:
+    """Support of a template by the pixels that so many cover: 0 if it is not painted, 1 if it is."""
+    bare, seen = count(foreground, cover, template, covered)
+    halves = HALVES * seen + EMPTY * (bare - seen)
+    return halves / HALVES / area(template, cover.shape[0], cover.shape[1])
+
+
+@kernel
+def supports(foreground: Bools, cover: Cover, templates: Array, covered: int) -> Array:
+    """(K,) support of each of the templates (K, 4)."""
+    found = np.zeros(len(templates))
+    for k in range(len(templates)):
+        found[k] = support(foreground, cover, templates[k], covered)
+    return found
+
+
+@kernel
+def piece(foreground: Bools, cover: Cover, template: Array) -> float:
+    """Share of foreground in the pixels of a painted template that no other covers; 0 where these are few."""
+    bare, seen = count(foreground, cover, template, 1)
+    whole = area(template, cover.shape[0], cover.shape[1])
+    return seen / whole / (bare / whole) if bare / whole >= BARE else 0.0
+
+
+@kernel
+def pieces(foreground: Bools, cover: Cover, templates: Array) -> Array:
+    """(K,) the same of each of the templates (K, 4)."""
+    found = np.zeros(len(templates))
+    for k in range(len(templates)):
+        found[k] = piece(foreground, cover, templates[k])
+    return found
+
+
+@kernel
+def shown(cover: Cover, templates: Array, order: Ints) -> Array:
+    """(K,) share of each template that no earlier one in `order`, and nothing explained, covers."""
+    hidden = np.zeros(cover.shape, np.bool_)
+    share = np.zeros(len(templates))
+    for k in order:
+        x, foot, h, w = templates[k]
+        low, high = rows_of(foot, h, cover.shape[0])
+        bare = 0
+        for row in range(low, high):
+            half = half_width(row, foot, h, w)
+            if half > 0:
+                left, right = span(x, half, cover.shape[1])
+                for column in range(left, right):
+                    bare += not (hidden[row, column] or cover[row, column] >= EXPLAINED)
+                    hidden[row, column] = True
+        share[k] = min(bare / area(templates[k], cover.shape[0], cover.shape[1]), 1.0)
+    return share
+
+
+@kernel
+def moved(foreground: Bools, cover: Cover, template: Array, steps: int, step: float) -> Ints:
+    """(2 steps + 1, 2 steps + 1) what uncovered pixels of the template are worth, in halves, when it is moved by
+    multiples of step (rows: down). Each of its rows takes one difference of the image row's running sum."""
     x, foot, h, w = template
     reach = steps * step
-    low, high = max(int(foot - h - reach) - 1, 0), min(int(foot + reach) + 2, gain.shape[0])
-    left, right = max(int(x - w / 2 - reach) - 1, 0), min(int(x + w / 2 + reach) + 2, gain.shape[1])
-    found = np.zeros((2 * steps + 1, 2 * steps + 1))
+    low, high = max(int(foot - h - reach) - 1, 0), min(int(foot + reach) + 2, cover.shape[0])
+    left, right = max(int(x - w / 2 - reach) - 1, 0), min(int(x + w / 2 + reach) + 2, cover.shape[1])
+    found = np.zeros((2 * steps + 1, 2 * steps + 1), np.int64)
     if high <= low or right <= left:
         return found
-    running(gain, cover, low, high, left, right, sums)
+    sums = running(foreground[low:high, left:right], cover[low:high, left:right])
     for i in range(2 * steps + 1):
         down = foot + (i - steps) * step
-        for row in range(max(int(down - h), 0), min(int(down) + 1, gain.shape[0])):
+        first, last = rows_of(down, h, cover.shape[0])
+        for row in range(first, last):
             half = half_width(row, down, h, w)
             if half > 0:
                 for j in range(2 * steps + 1):
-                    a, b = span(x + (j - steps) * step, half, gain.shape[1])
+                    a, b = span(x + (j - steps) * step, half, cover.shape[1])
                     a, b = max(a, left), min(b, right)
                     if b > a:
-                        found[i, j] += sums[row, b] - sums[row, a]
+                        found[i, j] += sums[row - low, b - left] - sums[row - low, a - left]
     return found
 
 
-@njit(cache=True)
-def placed(gain: Array, cover: Ints, sums: Array, templates: Array) -> Array:
-    """(K,) sums over uncovered pixels of templates (K, 4) x, foot, h, w."""
-    found = np.zeros(len(templates))
-    if not len(templates):
-        return found
-    low = max(int((templates[:, 1] - templates[:, 2]).min()) - 1, 0)
-    high = min(int(templates[:, 1].max()) + 2, gain.shape[0])
-    left = max(int((templates[:, 0] - templates[:, 3] / 2).min()) - 1, 0)
-    right = min(int((templates[:, 0] + templates[:, 3] / 2).max()) + 2, gain.shape[1])
-    if high <= low or right <= left:
-        return found
-    running(gain, cover, low, high, left, right, sums)
-    for k in range(len(templates)):
-        x, foot, h, w = templates[k]
-        found[k] = template_sum(sums, x, foot, h, w, left, right)
+@kernel
+def running(foreground: Bools, cover: Cover) -> NDArray[np.int32]:
+    """(H, W + 1) sums along rows of what uncovered pixels are worth, in halves."""
+    sums = np.empty((cover.shape[0], cover.shape[1] + 1), np.int32)
+    for row in range(cover.shape[0]):
+        total = 0
+        sums[row, 0] = 0
+        for column in range(cover.shape[1]):
+            worth = HALVES if foreground[row, column] else EMPTY
+            total += worth if cover[row, column] == 0 else 0
+            sums[row, column + 1] = total
+    return sums
+
+
+@kernel
+def better(
+    foreground: Bools, cover: Cover, at: Array, expected: Array, spread: Array, evidence: float, fine: bool
+) -> tuple[float, float]:
+    """The best x, foot round `at` of a template that is not painted: evidence * support - d^2 / 2, see settle."""
+    step, steps = max(at[2] / STEPS_PER_HEIGHT, 1.0), FINE_STEPS
+    if fine:
+        step /= 2
+    else:
+        steps = int(min(max(np.ceil(2.5 * max(spread[0], spread[1]) / step), FINE_STEPS), MOST_STEPS))
+    halves = moved(foreground, cover, at, steps, step)
+    whole = area(at, cover.shape[0], cover.shape[1])
+    best, right, down = -np.inf, 0.0, 0.0
+    for i in range(2 * steps + 1):
+        v = (at[1] - expected[1] + (i - steps) * step) / spread[1]
+        for j in range(2 * steps + 1):
+            u = (at[0] - expected[0] + (j - steps) * step) / spread[0]
+            value = evidence * (halves[i, j] / HALVES) / whole - (u * u + v * v) / 2
+            if value > best:
+                best, right, down = value, (j - steps) * step, (i - steps) * step
+            if i == steps and j == steps:
+                here = value
+    return (at[0] + right, at[1] + down) if best > here else (at[0], at[1])
+
+
+@kernel
+def settle(foreground: Bools, cover: Cover, templates: Array, spread: Array, order: Ints, evidence: float) -> Array:
+    """(K, 4) templates where they explain most, each in turn by `order` while the others rest; painted when done.
+
+    spread (K, 2): standard deviation px of each one's expected x and foot; evidence: nats for full support.
+    """
+    found = templates.copy()
+    paint_all(cover, found, 1)
+    for sweep in range(SWEEPS):
+        any_moved = False
+        for k in order:
+            paint(cover, found[k], -1)
+            x, foot = better(foreground, cover, found[k], templates[k], spread[k], evidence, sweep > 0)
+            any_moved |= x != found[k, 0] or foot != found[k, 1]
+            found[k, 0], found[k, 1] = x, foot
+            paint(cover, found[k], 1)
+        if not any_moved:
+            break
     return found
+
+
+@kernel
+def prune(foreground: Bools, cover: Cover, templates: Array, least: float, by_pieces: bool) -> Bools:
+    """(K,) which painted templates have `least` when the others are taken away, the weakest first."""
+    stays = np.ones(len(templates), np.bool_)
+    worth = pieces(foreground, cover, templates) if by_pieces else supports(foreground, cover, templates, 1)
+    while stays.any():
+        k = worth.argmin()
+        if worth[k] >= least:
+            break
+        stays[k], worth[k] = False, np.inf
+        paint(cover, templates[k], -1)
+        for other in np.flatnonzero(stays):
+            if meet(templates[k], templates[other]):
+                one = templates[other]
+                worth[other] = piece(foreground, cover, one) if by_pieces else support(foreground, cover, one, 1)
+    return stays
+
+
+@kernel
+def meet(one: Array, other: Array) -> bool:
+    """Do the boxes of two templates touch?"""
+    aside = abs(one[0] - other[0]) <= (one[3] + other[3]) / 2 + 1
+    return bool(aside and one[1] - one[2] <= other[1] + 1 and other[1] - other[2] <= one[1] + 1)

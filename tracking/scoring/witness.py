@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 
 import numpy as np
 
@@ -22,11 +22,11 @@ def true_events(
 
     places (R, 2): where people are in the plane compared, if that is not the events' own.
     """
-    lives = Lives(people)
+    lives, label = Lives(people), _labels(group)
 
     def tell(event: GroupEvent) -> Told:
-        before = _by_label(event.members, lambda m: _label(lives.last(m, event.start - 1, 0), group))
-        after = _by_label(event.members, lambda m: _label(lives.next(m, event.start, 0), group))
+        before = _by_label(event.members, lambda m: label[lives.last(m, event.start - 1, 0)])
+        after = _by_label(event.members, lambda m: label[lives.next(m, event.start, 0)])
         pos = event.pos if places is None else _middle(event, lives, places)
         members = Part(frozenset(event.members))
         before, after = _by_kind(event, before, after)
@@ -43,8 +43,9 @@ def _counts(event: GroupEvent, frames: Bools) -> bool:
     return known and 0 <= event.start < len(frames) and bool(frames[event.start])
 
 
-def _label(row: int, group: Ints) -> int:
-    return int(group[row]) if row >= 0 else -1
+def _labels(group: Ints) -> list[int]:
+    """The group of each row, and -1 for the row -1, which is nobody's."""
+    return [*group.tolist(), -1]
 
 
 def _by_label(members: Sequence[int], label: Callable[[int], int]) -> list[list[int]]:
@@ -85,26 +86,29 @@ def told_events(
     same (it changed its groups first and said so later), parents are those of the frame before the start.
     """
     reach = round(LATE * fps)
-    identified, lives, label = Lives(people.rows, stands_for >= 0), Lives(people.rows), people.group
-
-    def part(members: Sequence[int], start: int) -> Part:
-        rows = [identified.nearest(m, start, reach) for m in members]
-        who = frozenset(int(true.id[stands_for[row]]) for row in rows if row >= 0)
-        return Part(who, len(members) - len(who))
+    identified, lives, label = Lives(people.rows, stands_for >= 0), Lives(people.rows), _labels(people.group)
+    person = np.append(true.id, -1)[stands_for].tolist()
 
     def until(event: GroupEvent, frame: int) -> list[list[int]]:
-        return _by_label(event.members, lambda m: _label(lives.last(m, frame, reach), label))
+        return _by_label(event.members, lambda m: label[lives.last(m, frame, reach)])
 
     def tell(event: GroupEvent, said: int) -> Told:
-        after = _by_label(event.members, lambda m: _label(lives.next(m, said, reach), label))
+        after = _by_label(event.members, lambda m: label[lives.next(m, said, reach)])
         before = until(event, said - 1)
         before = until(event, event.start - 1) if sorted(before) == sorted(after) else before
         before, after = _by_kind(event, before, after)
-        parents, children = (tuple(part(p, event.start) for p in parts) for parts in (before, after))
-        members = part(event.members, event.start)
-        return Told(event.kind, event.start, said, members, event.pos, parents, children)
+        rows = {m: identified.nearest(m, event.start, reach) for m in event.members}
+        known = {m: person[row] for m, row in rows.items() if row >= 0}
+        parents, children = (tuple(_part(p, known) for p in parts) for parts in (before, after))
+        return Told(event.kind, event.start, said, _part(event.members, known), event.pos, parents, children)
 
     return [tell(event, said) for event, said in _said(answers, frames) if event.members]
+
+
+def _part(members: Sequence[int], known: Mapping[int, int]) -> Part:
+    """These tracks as the people they are known to be."""
+    who = frozenset(known[m] for m in members if m in known)
+    return Part(who, len(members) - len(who))
 
 
 def told_without_people(

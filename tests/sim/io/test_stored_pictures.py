@@ -250,7 +250,7 @@ def test_another_sample_than_its_own(tmp_path, make_pictured):
     own = stored(tmp_path / "a", live, ("left",), "png")
     assert own.source["background"] == "50 empty frames before frame 1"
     (read,) = open_source(tmp_path / "a", background="first:3")
-    assert read.source["background"] == "first 3 frames"
+    assert read.source["background"] == "first 3 frames (causal from frame 3)"
     assert np.array_equal(read.background(), np.stack([f.image for f in live][:3]))
     stored(tmp_path / "m", live, ("left",), "mp4")
     (read,) = open_source(tmp_path / "m", background="spread:4")

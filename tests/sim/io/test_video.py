@@ -16,6 +16,11 @@ KINDS = {
     "mpeg4.avi": {"codec": "mpeg4"},
     "jpegs.avi": {"codec": "mjpeg", "pix_fmt": "yuvj420p"},
     "mpeg2.mpg": {"codec": "mpeg2video", "rate": 25},
+    "transport.ts": {"rate": 25},
+    "bare.h264": {"rate": 25},
+    "bare.y4m": {"codec": "wrapped_avframe"},
+    "phone.3gp": {"codec": "mpeg4"},
+    "media.wmv": {"codec": "wmv2"},
     "vp9.webm": {"codec": "libvpx-vp9"},
     "vp8.webm": {"codec": "libvpx"},
     "quick.mov": {"audio": True},
@@ -108,6 +113,35 @@ def test_a_video_cut_off_ends_there_with_a_warning(tmp_path):
         assert len(list(sequence)) == sequence.length
 
 
+def test_a_matroska_that_breaks_off_is_told(tmp_path):
+    """Its header says how many seconds, not how many frames."""
+    whole = write_video(tmp_path / "a.mkv", [picture(k) for k in range(40)], options={"g": "10", "bf": "0"})
+    one(whole)  # warnings are errors
+    with pytest.warns(UserWarning, match=r"a.mkv: ends after 2\.\d of the 4\.0 s it promises"):
+        sequence = one(cut(whole, 0.7))
+    assert 20 <= sequence.length < 30
+
+
+def test_a_container_that_breaks_within_is_told(tmp_path):
+    path = write_video(tmp_path / "a.y4m", [picture(k) for k in range(20)], codec="wrapped_avframe")
+    with pytest.warns(UserWarning, match=r"a\.y4m: breaks off after \d+ frames \(Invalid data"):
+        sequence = one(damage(path, 0.5, 9000))
+    assert 5 < sequence.length < 15
+    assert [disc(frame.image) for frame in sequence][:5] == pytest.approx([4.0 * k for k in range(5)], abs=5)
+
+
+@pytest.mark.parametrize("name", ["a.mkv", "a.mp4"])
+def test_times_without_frames_are_told(tmp_path, name):
+    """Two gaps; a pause of half a second, as phones make them, is none."""
+    stamps = [40 * k + 3000 * (k > 9) + 2000 * (k > 14) + 500 * (k > 17) for k in range(20)]
+    path = write_video(tmp_path / name, [picture(k) for k in range(20)], rate=1000, stamps=stamps)
+    with pytest.warns(UserWarning, match="without the gap") as told:
+        sequence = one(path, fps=25)
+    (words,) = (str(warning.message) for warning in told)
+    assert words == f"{name}: nothing for 3.0 s after frame 10 (1 more such); frames are numbered without the gap"
+    assert [frame.index for frame in sequence] == list(range(1, 21))
+
+
 def empty(path):
     path.write_bytes(b"")
 
@@ -167,7 +201,7 @@ def test_pictures_of_another_size_are_one_line(tmp_path):
     [
         (None, [int((k + 0.5) * 60 / 50) + 1 for k in range(50)], "50 frames spread over the recording (not causal)"),
         ("spread:3", [11, 31, 51], "3 frames spread over the recording (not causal)"),
-        ("first:4", [1, 2, 3, 4], "first 4 frames"),
+        ("first:4", [1, 2, 3, 4], "first 4 frames (causal from frame 4)"),
     ],
 )
 def test_the_background_sample(tmp_path, name, asked, wanted, words):

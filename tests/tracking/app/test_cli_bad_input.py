@@ -245,6 +245,13 @@ def test_wrong_seeds(text, made, tmp_path, capsys):
     assert not (tmp_path / "out").exists()
 
 
+@pytest.mark.parametrize("streams", ["none", "ids", "disparity,ids"])
+def test_a_kind_of_pictures_that_nothing_is_stored_as(streams, made, tmp_path, capsys):
+    line = ["generate", str(made / "scene.toml"), "--seeds", "0", "--out", str(tmp_path / "out")]
+    assert "--images" in refused([*line, "--streams", streams, "--images", "png"], capsys)
+    assert not (tmp_path / "out").exists()
+
+
 @pytest.mark.parametrize("name", MOT)
 def test_wrong_mot_text(name, tmp_path, capsys):
     text, words = MOT[name]

@@ -169,6 +169,9 @@ PICTURES = {
     "light.drift": ("", "light.drift=0.1"),
     "light.drift_time": ("light.drift=0.1", "light.drift=0.1;light.drift_time=2"),
     "light.flicker": ("", "light.flicker=0.05"),
+    "light.cloud": ("", "light.cloud=0.2"),
+    "light.cloud_size": ("light.cloud=0.2", "light.cloud=0.2;light.cloud_size=2"),
+    "light.cloud_speed": ("light.cloud=0.2", "light.cloud=0.2;light.cloud_speed=3"),
     "light.switch[].at": (LAMP, LAMP.replace("0.2", "0.4")),
     "light.switch[].gain": (LAMP, LAMP.replace("0.5", "0.7")),
     "light.switch[].ramp": (LAMP, LAMP.replace("gain", "ramp = 0.6, gain")),
@@ -176,6 +179,10 @@ PICTURES = {
     "picture.noise": ("", "picture.noise=6"),
     "picture.blur_px": ("", "picture.blur_px=1.5"),
     "picture.jpeg": ("", "picture.jpeg=50"),
+    "picture.shot": ("", "picture.shot=1"),
+    "picture.foliage": ("", "picture.foliage=0.3"),
+    "picture.sway_px": ("picture.foliage=0.3", "picture.foliage=0.3;picture.sway_px=4"),
+    "picture.sway_time": ("picture.foliage=0.3", "picture.foliage=0.3;picture.sway_time=2"),
 }
 """What pictures alone are made of: looked for in frame 3, at 0.4 s, without the noise."""
 
@@ -251,7 +258,7 @@ def test_a_key_changes_pictures_and_only_those(key):
 
     before, after = (picture_scenario(settings) for settings in PICTURES[key])
     assert before.model_dump(exclude={"light", "picture"}) == after.model_dump(exclude={"light", "picture"})
-    bare = {"noise": 0.0} if key != "picture.noise" else {}
+    bare = {} if key in ("picture.noise", "picture.shot") else {"noise": 0.0}
     a, b = (stage(*three_people(), s.light, s.picture.model_copy(update=bare)).frame(3) for s in (before, after))
     assert (a != b).any()
 

@@ -44,7 +44,7 @@ BROKEN: dict[str, tuple[Callable[[Path], Path], list[str]]] = {
     "empty": (lambda f: cut(film(f), 0), ["film.mp4", "an empty file"]),
     "cut off, index gone": (lambda f: cut(film(f, name="film.mkv"), 0.02), ["film.mkv"]),
     "no video": (lambda f: text(f / "a.mp4"), ["a.mp4", "no readable video"]),
-    "too short for any background": (lambda f: film(f, 6), ["film", "at least 10 frames"]),
+    "too short for any background": (lambda f: film(f, 6), ["film.mp4", "at least 10 frames"]),
     "sizes change": (
         lambda f: write_jpegs(f / "film.avi", [picture(k, SIZE if k < 40 else (64, 48)) for k in range(60)]),
         ["film.avi", "frame 41", "64×48 px", "96×64 px"],
@@ -60,7 +60,7 @@ BROKEN: dict[str, tuple[Callable[[Path], Path], list[str]]] = {
     ),
     "every pixel changes": (
         lambda f: jpegs(f / "mot", [noise(k) for k in range(60)]),
-        ["mot", "no background can be had"],
+        ["/mot: ", "no background can be had"],
     ),
 }  # fmt: skip
 
@@ -76,7 +76,7 @@ def test_a_broken_recording_is_one_line(name, as_json, tmp_path, capsys):
     printed = capsys.readouterr()
     told = [text for text in printed.err.splitlines() if not text.startswith("warning: ")]
     assert len(told) == (0 if as_json else 1)
-    error = " ".join(json.loads(printed.out)["error"].values()) if as_json else told[0]
+    error = ": ".join(json.loads(printed.out)["error"].values()) if as_json else told[0]
     assert all(word in error for word in expected), error
     assert not out.exists()
 
@@ -117,15 +117,16 @@ def test_strange_pictures_are_pictures(name, tmp_path, capsys):
 
 def test_which_background_is_told(tmp_path, capsys):
     path = str(film(tmp_path))
-    for option, words, causal in (
-        ([], "50 frames spread over the recording (not causal)", False),
-        (["--background", "first:20"], "first 20 frames", True),
-        (["--background", "spread:30"], "30 frames spread over the recording (not causal)", False),
+    for option, words, begins in (
+        ([], "50 frames spread over the recording (not causal)", None),
+        (["--background", "first:20"], "first 20 frames (causal from frame 20)", 20),
+        (["--background", "spread:30"], "30 frames spread over the recording (not causal)", None),
     ):
         out = tmp_path / "out"
         assert run(["track", "blob", path, "--px-per-m", "20", "--out", str(out), *option]) == 0
         told = json.loads((out / "run.json").read_text())
-        assert (told["background"], told["causal"], told["detections"]) == (words, causal, "image")
+        assert (told["background"], told["causal_from"], told["detections"]) == (words, begins, "image")
+        assert not told["causal"]
         assert words in capsys.readouterr().out
 
 

@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from scenarios.errors import InputError
 from sim.io.source import open_source
 from tests.coded_pictures import SIZE, number, sequence
 from tracking.app.film import Film, film
@@ -35,7 +36,7 @@ def test_each_frame_is_in_its_slot(tmp_path: Path, fps: float) -> None:
     found = shown(made, tmp_path)
     assert [k for _, k in found] == list(range(1, 71))
     np.testing.assert_allclose([t for t, _ in found], np.arange(70) / fps, atol=1e-4)
-    assert not (tmp_path / "page.mp4").exists()
+    assert not (tmp_path / "page.view.mp4").exists()
 
 
 def test_a_lost_frame_keeps_its_slot_and_is_told(tmp_path: Path) -> None:
@@ -49,19 +50,24 @@ def test_a_lost_frame_keeps_its_slot_and_is_told(tmp_path: Path) -> None:
 def test_large_ones_stand_beside_the_page(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("tracking.app.film.LARGE", 100)
     made = film(sequence(5), tmp_path / "a page.html")
-    assert (made.source, made.inside) == ("a%20page.mp4", "")
-    assert (tmp_path / "a page.mp4").exists()
+    assert (made.source, made.inside) == ("a%20page.view.mp4", "")
+    assert (tmp_path / "a page.view.mp4").exists()
     assert film(sequence(5), tmp_path / "b.html", "inside").source == ""
     assert film(sequence(5), tmp_path / "b.html", "none") is None
-    assert sorted(p.name for p in tmp_path.iterdir()) == ["a page.mp4"]
+    assert sorted(p.name for p in tmp_path.iterdir()) == ["a page.view.mp4"]
 
 
-def test_the_source_itself_is_not_replaced(tmp_path: Path) -> None:
+def test_neither_source_nor_overlay_is_replaced(tmp_path: Path) -> None:
+    """README: `view --out replay.html` and `overlay --out replay.mp4`."""
+    made = film(sequence(5), tmp_path / "a.html", "beside")
+    (tmp_path / "a.mp4").write_bytes(before := b"an overlay")
     film(sequence(5), tmp_path / "a.html", "beside")
-    before = (tmp_path / "a.mp4").read_bytes()
-    (read,) = open_source(tmp_path / "a.mp4")
-    assert film(read, tmp_path / "a.html", "beside").source == "a.view.mp4"
     assert (tmp_path / "a.mp4").read_bytes() == before
+    whole = (tmp_path / made.source).read_bytes()
+    (read,) = open_source(tmp_path / made.source)
+    with pytest.raises(InputError, match="the source itself"):
+        film(read, tmp_path / "a.html", "beside")
+    assert (tmp_path / made.source).read_bytes() == whole
 
 
 def test_the_page_holds_the_video(tmp_path: Path) -> None:

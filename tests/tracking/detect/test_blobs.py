@@ -4,6 +4,7 @@ import cv2
 import numpy as np
 import pytest
 
+from tests import reference_blobs as slow
 from tracking.detect import blobs
 
 
@@ -62,6 +63,19 @@ def test_moments_of_all_equal_a_loop_over_each(seed):
         assert abs(axis @ vectors[:, 1]) == pytest.approx(1, abs=1e-6)
         assert -np.pi / 2 < theta <= np.pi / 2
     assert np.all(np.diff(found.area) <= 0)
+
+
+@pytest.mark.parametrize("size", [(1, 1), (1, 70), (70, 1), (37, 64), (40, 61), (33, 8)])
+def test_regions_are_the_slow_way(size):
+    """Specks, lines and spirals; widths that eight divides and others; the same from any view of memory."""
+    r = np.random.default_rng(size[1])
+    for share in (0.0, 0.1, 0.4, 0.6, 0.9, 1.0):
+        mask = r.random(size) < share
+        for least in (1, 4):
+            found = blobs.find(mask, least)
+            assert np.array_equal(found.label, slow.regions(mask, least))
+            assert np.array_equal(blobs.find(np.asfortranarray(mask), least).label, found.label)
+            assert np.array_equal(found.area, np.bincount(found.label.ravel(), minlength=len(found) + 1)[1:])
 
 
 def test_small_regions_are_left_out_of_everything():

@@ -1,4 +1,4 @@
-"""Templates over a mask: kernels against the slow way, support, settling, pruning, and how many came in together."""
+"""Templates over a mask: kernels against the slow way, support, settling, pruning."""
 
 from __future__ import annotations
 
@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from tests import reference_templates as slow
-from tracking.papers import blob_entry
 from tracking.papers import blob_template_kernels as kernels
-from tracking.papers.blob_template import EMPTY, Mask
+from tracking.papers.blob_template import Mask, painted
+from tracking.papers.blob_template_kernels import EXPLAINED
 
 HIGH, WIDE = 90, 120
 
@@ -18,43 +18,66 @@ def mask_of(*templates):
     return np.any([slow.pixels((HIGH, WIDE), *t) for t in templates], 0)
 
 
-class Fixed:
-    """People are of one size everywhere."""
-
-    above = False
-
-    def __init__(self, h, w):
-        self.size = h, w
-
-    def at(self, foot):
-        return np.tile(np.array(self.size, float), (len(foot), 1))
-
-
 def somewhere(r, n):
     """(n, 4) templates, some of them reaching out of the image."""
     h = r.uniform(8, 50, n)
     return np.column_stack([r.uniform(-10, WIDE + 10, n), r.uniform(5, HIGH + 20, n), h, h * r.uniform(0.3, 0.8, n)])
 
 
+def scenery(seed):
+    """Foreground with holes, people some of whom stand elsewhere, and pixels that are explained already."""
+    r = np.random.default_rng(seed)
+    true = somewhere(r, 8)
+    foreground = mask_of(*true) & (r.random((HIGH, WIDE)) < 0.9) | (r.random((HIGH, WIDE)) < 0.02)
+    cover = np.where(slow.pixels((HIGH, WIDE), *somewhere(r, 1)[0]), EXPLAINED, 0).astype(np.int16)
+    expected = np.concatenate([true + np.append(r.normal(0, 3, (8, 2)), np.zeros((8, 2)), 1), somewhere(r, 2)])
+    return r, foreground, cover, expected
+
+
 @pytest.mark.parametrize("seed", range(5))
 def test_kernels_are_the_slow_way(seed):
-    r = np.random.default_rng(seed)
-    gain, cover = r.normal(size=(HIGH, WIDE)), (r.random((HIGH, WIDE)) < 0.3).astype(np.int64)
-    sums, some = np.zeros((HIGH, WIDE + 1)), somewhere(r, 12)
+    _, foreground, cover, some = scenery(seed)
     for t in some:
-        got = kernels.moved(gain, cover, sums, t, 2, 1.5)
-        assert np.allclose(got, slow.moved(gain, cover, t, 2, 1.5), atol=1e-9)
-        painted = np.zeros((HIGH, WIDE), np.int64)
-        kernels.paint(painted, *t, 1)
-        assert np.array_equal(painted > 0, slow.pixels((HIGH, WIDE), *t))
-    got = kernels.placed(gain, cover, sums, some)
-    assert np.allclose(got, [slow.worth(gain, cover, t) for t in some], atol=1e-9)
+        got = kernels.moved(foreground, cover, t, 2, 1.5)
+        assert np.array_equal(got / 2, slow.moved(foreground, cover, t, 2, 1.5))
+    area = [slow.area(cover.shape, t) for t in some]
+    got = kernels.supports(foreground, cover, some, 0)
+    assert np.allclose(got * area, [slow.worth(foreground, cover, t) for t in some], atol=1e-9)
+    assert np.array_equal(painted((HIGH, WIDE), some), slow.painted((HIGH, WIDE), some) > 0)
 
 
-def test_support_is_one_on_ones_own_pixels_and_minus_empty_on_none():
+@pytest.mark.parametrize("seed", range(8))
+def test_all_together_are_the_slow_way(seed):
+    r, foreground, cover, expected = scenery(seed)
+    scene, spread = Mask(foreground), r.uniform(1, 6, (len(expected), 2))
+    scene.cover[:] = cover
+    at = scene.settle(expected, spread, 40.0)
+    assert np.array_equal(at, slow.settle(foreground, cover, expected, spread, 40.0))
+    assert np.array_equal(scene.cover, cover + slow.painted(cover.shape, at))
+    assert np.allclose(scene.alone(at), slow.alone(foreground, cover, at), atol=1e-12)
+    assert np.allclose(scene.pieces(at), slow.pieces(foreground, cover, at), atol=1e-12)
+    assert np.allclose(scene.shown(at), slow.shown(cover, at), atol=1e-12)
+    for by_pieces in (True, False):
+        again = Mask(foreground)
+        again.cover[:] = scene.cover
+        rows = again.prune(at, 0.45, pieces=by_pieces)
+        assert rows.tolist() == slow.prune(foreground, cover, at, 0.45, by_pieces).tolist()
+        assert 0 < len(rows) < len(at)
+        assert np.array_equal(again.cover, cover + slow.painted(cover.shape, at[rows]))
+
+
+def test_closed_regions_are_explained_and_no_others():
+    label = np.random.default_rng(0).integers(0, 6, (HIGH, WIDE)).astype(np.int32)
+    for rows in ([], [0], [1, 3]):
+        scene = Mask(label > 0)
+        scene.close(label, np.array(rows, int))
+        assert np.array_equal(scene.cover >= EXPLAINED, np.isin(label, np.add(rows, 1)))
+
+
+def test_support_is_one_on_ones_own_pixels_and_minus_a_half_on_none():
     one = np.array([[60.0, 80.0, 60.0, 24.0]])
     assert Mask(mask_of(one[0])).support(one)[0] == pytest.approx(1.0, abs=0.02)
-    assert Mask(np.zeros((HIGH, WIDE), bool)).support(one)[0] == pytest.approx(-EMPTY, abs=0.02)
+    assert Mask(np.zeros((HIGH, WIDE), bool)).support(one)[0] == pytest.approx(-0.5, abs=0.02)
 
 
 def test_what_two_cover_supports_neither():
@@ -88,33 +111,6 @@ def test_settling_is_the_same_in_any_order_of_rows():
     expected, turn = true + np.append(r.normal(0, 2, (5, 2)), np.zeros((5, 2)), 1), r.permutation(5)
     found = Mask(mask_of(*true)).settle(expected, np.full((5, 2), 3.0), 50.0)
     assert np.array_equal(Mask(mask_of(*true)).settle(expected[turn], np.full((5, 2), 3.0), 50.0), found[turn])
-
-
-@pytest.mark.parametrize("count", [1, 2, 3, 4])
-def test_as_many_come_in_as_there_are(count):
-    """Side by side, a head's width of each hidden behind the next."""
-    true = np.array([[20.0 + 20 * k, 80.0 - 2 * (k % 2), 60.0, 24.0] for k in range(count)])
-    scene = Mask(mask_of(*true))
-    found = blob_entry.newcomers(scene, Fixed(60.0, 24.0), 0.5)
-    assert len(found) == count
-    assert np.abs(np.sort(found[:, 0]) - true[:, 0]).max() < 4
-
-
-def test_half_a_person_and_less_is_nobody_new():
-    one = np.array([60.0, 80.0, 60.0, 24.0])
-    cut = mask_of(one)
-    cut[45:] = False
-    assert not len(blob_entry.newcomers(Mask(cut), Fixed(60.0, 24.0), 0.5))
-
-
-def test_what_is_explained_brings_nobody():
-    one = np.array([[60.0, 80.0, 60.0, 24.0]])
-    scene = Mask(mask_of(one[0]))
-    scene.paint(one)
-    assert not len(blob_entry.newcomers(scene, Fixed(60.0, 24.0), 0.5))
-    closed = Mask(mask_of(one[0]))
-    closed.close(mask_of(one[0]))
-    assert not len(blob_entry.newcomers(closed, Fixed(60.0, 24.0), 0.5))
 
 
 def test_a_piece_of_who_is_partly_covered_is_enough_but_two_on_one_are_one():

@@ -1,0 +1,121 @@
+"""Kernels of tracking.detect.blobs: connected regions by runs, so that the picture is read once.
+
+A run is a row of foreground pixels without a gap: row, first column, last column + 1. Runs are in raster order. Slow
+twins: tests/reference_blobs.py.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from sim.types import Array, Bools, Ints
+
+Labels = NDArray[np.int32]
+
+
+@njit(cache=True)
+def runs(mask: Bools) -> Labels:
+    """(R, 3) the runs of a mask (H, W); where eight pixels in a row are background they are passed in one step."""
+    high, wide = mask.shape
+    pixels = mask.ravel().view(np.uint8)
+    eights = pixels[: len(pixels) // 8 * 8].view(np.uint64)
+    found = np.empty((high * ((wide + 1) // 2), 3), np.int32)
+    n = 0
+    for row in range(high):
+        at, end = row * wide, (row + 1) * wide
+        while at < end:
+            if at % 8 == 0 and at // 8 < len(eights) and eights[at // 8] == 0:
+                at += 8
+            elif pixels[at] == 0:
+                at += 1
+            else:
+                first = at
+                while at < end and pixels[at] != 0:
+                    at += 1
+                found[n, 0], found[n, 1], found[n, 2] = row, first - row * wide, at - row * wide
+                n += 1
+    return found[:n].copy()
+
+
+@njit(cache=True)
+def root(parent: Ints, k: int) -> int:
+    """The first run of k's region as far as it is known; halves the way there."""
+    while parent[k] != k:
+        parent[k] = parent[parent[k]]
+        k = parent[k]
+    return k
+
+
+@njit(cache=True)
+def connect(runs: Labels) -> tuple[Ints, int]:
+    """(R,) the region of each run, 0, 1, … in the order of their first pixels, 8 neighbours; how many there are."""
+    parent = np.arange(len(runs))
+    above = 0
+    for k in range(len(runs)):
+        row, first, end = runs[k]
+        while runs[above, 0] < row - 1 or (runs[above, 0] == row - 1 and runs[above, 2] < first):
+            above += 1
+        other = above
+        while runs[other, 0] == row - 1 and runs[other, 1] <= end:
+            a, b = root(parent, k), root(parent, other)
+            parent[max(a, b)] = min(a, b)
+            other += 1
+    count = 0
+    for k in range(len(runs)):
+        if parent[k] == k:
+            parent[k] = count
+            count += 1
+        else:
+            parent[k] = parent[parent[k]]
+    return parent, count
+
+
+@njit(cache=True)
+def extents(runs: Labels, region: Ints, count: int) -> tuple[Ints, Ints]:
+    """(M,) px of each region and (M, 4) its first column and row, last column and row + 1."""
+    area, corners = np.zeros(count, np.int64), np.zeros((count, 4), np.int64)
+    for k in range(len(runs)):
+        row, first, end = runs[k]
+        m = region[k]
+        if area[m] == 0:
+            corners[m, 0], corners[m, 1] = first, row
+        area[m] += end - first
+        corners[m, 0], corners[m, 2] = min(corners[m, 0], first), max(corners[m, 2], end)
+        corners[m, 3] = row + 1
+    return area, corners
+
+
+@njit(cache=True)
+def moments(runs: Labels, region: Ints, area: Ints) -> tuple[Array, Array]:
+    """Of the regions 0 … M - 1, as if there were no others: (M, 2) mean column and row; (M, 3) variance of columns,
+    covariance, variance of rows."""
+    centre, spread = np.zeros((len(area), 2)), np.zeros((len(area), 3))
+    for k in range(len(runs)):
+        row, first, end = runs[k]
+        m = region[k]
+        if m >= 0:
+            n = end - first
+            centre[m, 0] += n * (first + end - 1) / 2
+            centre[m, 1] += n * row
+    centre /= area.reshape(-1, 1)
+    for k in range(len(runs)):
+        row, first, end = runs[k]
+        m = region[k]
+        if m >= 0:
+            y = row - centre[m, 1]
+            xx, xy, yy = spread[m, 0], spread[m, 1], spread[m, 2]
+            for column in range(first, end):
+                x = column - centre[m, 0]
+                xx, xy, yy = xx + x * x, xy + x * y, yy + y * y
+            spread[m, 0], spread[m, 1], spread[m, 2] = xx, xy, yy
+    return centre, spread / area.reshape(-1, 1)
+
+
+@njit(cache=True)
+def labelled(runs: Labels, region: Ints, label: Labels) -> None:
+    """Write region + 1 into the pixels of `label` (H, W); nothing where it is below 0."""
+    for k in range(len(runs)):
+        if region[k] >= 0:
+            label[runs[k, 0], runs[k, 1] : runs[k, 2]] = region[k] + 1
