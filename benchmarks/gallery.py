@@ -15,7 +15,15 @@ from sim.camera import solve
 from sim.render import Stage, stage
 from sim.world import run
 
-SHOWN = (("crowd", 60), ("stairs", 110), ("pillar", 80), ("lights", 60), ("mixed", 80))
+SHOWN = (
+    ("crowd", 60),
+    ("stairs", 110),
+    ("pillar", 80),
+    ("lights", 60),
+    ("mixed", 80),
+    ("clutter", 60),
+    ("street", 150),
+)
 SEED, QUALITY = 40_001, 82
 
 

@@ -9,6 +9,7 @@ v down. Its noise: var theta = l1 l2 / (n (l1 - l2)^2).
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cache
 from typing import Any
 
 import cv2
@@ -71,6 +72,7 @@ def odd(size: float, least: int) -> int:
     return max(least, 2 * round((size - 1) / 2) + 1)
 
 
+@cache
 def disc(size: int) -> Image:
     """A round structuring element of odd diameter (OpenCV's own ellipse is not symmetric)."""
     v, u = np.mgrid[:size, :size] - (size - 1) / 2

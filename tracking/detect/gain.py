@@ -41,9 +41,17 @@ def _one_colour(seen: Floats, mean: Floats) -> float | None:
     for _ in range(2):
         if np.count_nonzero(usable) < FEWEST:
             return None
-        factor = float(np.median(seen[usable] / mean[usable]))
+        factor = _median(seen[usable] / mean[usable])
         usable = (factor * mean > DARKEST) & (factor * mean < BRIGHTEST) & (mean > DARKEST)
     return factor
+
+
+def _median(values: Floats) -> float:
+    """numpy's median of one or more numbers, in a quarter of its time: none of them is nan."""
+    half = len(values) // 2
+    middle = np.partition(values, half)
+    above = middle[half]
+    return float(above if len(values) % 2 else (middle[:half].max() + above) / 2)
 
 
 def frame_gains(sample: Image) -> Floats:

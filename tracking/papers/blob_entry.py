@@ -41,6 +41,7 @@ def _in_region(scene: Mask, guesses: Array, person: float, support: float) -> Ar
     known = np.asarray(np.isfinite(guesses).all(1))
     sure = len(known) if known.all() else int(known.argmin())
     most = int((np.sqrt(8 * sure + 1) - 1) / 2)  # 1 + 2 + ... + most <= sure
+    guesses = guesses[: most * (most + 1) // 2]
     spread = np.maximum(ROAM * guesses[:, 2:3], 1.0) * np.ones(2)
     return kernels.enter(scene.foreground, scene.cover, guesses, most, person, support, spread, EVIDENCE)
 

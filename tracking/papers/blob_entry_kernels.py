@@ -10,6 +10,8 @@ from tracking.papers import blob_template_kernels as kernels
 from tracking.papers.blob_template_kernels import Cover, kernel
 
 LOWEST = 0.98  # quantile of a part's rows: where it stands
+REACH = kernels.MOST_STEPS + kernels.SWEEPS * kernels.FINE_STEPS  # coarse steps that settle takes, and some to spare
+ROUNDING = 1e-9
 
 
 @kernel
@@ -70,10 +72,12 @@ def enter(
 ) -> Array:
     """(K, 4) the templates that explain most for their number, painted: of 1, 2, … `most`, settled from their guesses
     (1 + 2 + … + most, 4), each number's after the other; each costs `support` of a person's area, and needs as much of
-    its own. spread, nats: as settle has them."""
+    its own. spread, nats: as settle has them. Numbers too great to be worth more are not tried."""
     best, worth = np.zeros((0, 4)), 0.0
-    first = 0
+    first, bound = 0, within_reach(foreground, cover, guesses) / person + ROUNDING
     for count in range(1, most + 1):
+        if bound - count * support <= worth:
+            break
         one, far = guesses[first : first + count], spread[first : first + count]
         first += count
         at = kernels.settle(foreground, cover, one, far, near_first(one), nats)
@@ -84,6 +88,22 @@ def enter(
             best, worth = at, value
     kernels.paint_all(cover, best, 1)
     return best
+
+
+@kernel
+def within_reach(foreground: Bools, cover: Cover, guesses: Array) -> int:
+    """Uncovered foreground pixels in the box that holds these templates wherever settle may take them."""
+    low, high, left, right = np.inf, -np.inf, np.inf, -np.inf
+    for k in range(len(guesses)):
+        x, foot, h, w = guesses[k]
+        far = REACH * max(h / kernels.STEPS_PER_HEIGHT, 1.0)
+        low, high = min(low, foot - h - far), max(high, foot + far)
+        left, right = min(left, x - w / 2 - far), max(right, x + w / 2 + far)
+    found = 0
+    for row in range(int(max(low, 0)), int(min(high + 1, foreground.shape[0]))):
+        for column in range(int(max(left, 0)), int(min(right + 1, foreground.shape[1]))):
+            found += foreground[row, column] and cover[row, column] == 0
+    return found
 
 
 @kernel

@@ -14,6 +14,7 @@ import numpy as np
 
 from sim.types import Array, Bools, Camera, Context
 from tracking.papers import blob_measure
+from tracking.papers import blob_size_kernels as kernels
 
 PERSON = 1.7  # m
 SLIM = 0.36  # width over height of a walking person's box, the prior of what is learned
@@ -101,7 +102,7 @@ class PersonSize:
         if self.flat is not None:
             return np.tile(self.flat, (len(foot), 1))
         if self.table is not None:
-            return _look_up(self.table, (foot - self.low) / STEP)
+            return kernels.look_up(self.table, (foot - self.low) / STEP)
         height = self.line[0] + self.line[1] * foot[:, 1]
         return np.stack([height, SLIM * height], 1)
 
@@ -227,14 +228,3 @@ def _from_above(camera: Camera) -> Array:
 
 
 _TURNS = np.radians([0.0, 45.0, 90.0, 135.0])
-
-
-def _look_up(table: Array, at: Array) -> Array:
-    """(N, 2) bilinear values of a table (2, V, U) at nodes' coordinates (u, v) (N, 2), clamped to its ends."""
-    top = np.array(table.shape[:0:-1]) - 1.001
-    at = np.clip(np.nan_to_num(at), 0.0, top)
-    i, f = at.astype(int), at - np.floor(at)
-    (u, v), (a, b) = i.T, f.T
-    low = table[:, v, u] * (1 - a) + table[:, v, u + 1] * a
-    high = table[:, v + 1, u] * (1 - a) + table[:, v + 1, u + 1] * a
-    return np.asarray((low * (1 - b) + high * b).T)

@@ -15,6 +15,7 @@ from sim.types import Array, Bools, Ints
 from tracking.detect.blobs import Labels
 
 Cover = NDArray[np.int16]
+Whole = NDArray[np.int32]
 HALVES, EMPTY = 2, -1  # what a foreground pixel is worth and a background pixel costs
 EXPLAINED = 1000
 ELLIPSE = np.pi / 4  # share of its box that an ellipse fills
@@ -33,6 +34,14 @@ def span(x: float, half: float, width: int) -> tuple[int, int]:
     """Columns whose middle lies within `half` of x, clipped to the image: left, right (excluded)."""
     left, right = int(np.ceil(x - half - 0.5)), int(np.floor(x + half - 0.5)) + 1
     return min(max(left, 0), width), min(max(right, 0), width)
+
+
+@kernel
+def span_within(x: float, half: float, low: np.int32, high: np.int32) -> tuple[np.int32, np.int32]:
+    """The same within the columns low..high and counted from low; both ends are equal where there are none."""
+    left, right = np.int32(np.ceil(x - half - 0.5)), np.int32(np.floor(x + half - 0.5)) + np.int32(1)
+    left = min(max(left, low), high)
+    return left - low, min(max(right, left), high) - low
 
 
 @kernel
@@ -159,33 +168,35 @@ def shown(cover: Cover, templates: Array, order: Ints) -> Array:
 
 
 @kernel
-def moved(foreground: Bools, cover: Cover, template: Array, steps: int, step: float) -> Ints:
+def moved(foreground: Bools, cover: Cover, template: Array, steps: int, step: float) -> Whole:
     """(2 steps + 1, 2 steps + 1) what uncovered pixels of the template are worth, in halves, when it is moved by
     multiples of step (rows: down). Each of its rows takes one difference of the image row's running sum."""
     x, foot, h, w = template
     reach = steps * step
     low, high = max(int(foot - h - reach) - 1, 0), min(int(foot + reach) + 2, cover.shape[0])
     left, right = max(int(x - w / 2 - reach) - 1, 0), min(int(x + w / 2 + reach) + 2, cover.shape[1])
-    found = np.zeros((2 * steps + 1, 2 * steps + 1), np.int64)
+    n = 2 * steps + 1
+    found = np.zeros((n, n), np.int32)
     if high <= low or right <= left:
         return found
+    middle, edges = x + step * np.arange(-steps, steps + 1), (np.int32(left), np.int32(right))
+    begin, end = np.empty(n, np.int32), np.empty(n, np.int32)
     sums = running(foreground[low:high, left:right], cover[low:high, left:right])
-    for i in range(2 * steps + 1):
+    for i in range(n):
         down = foot + (i - steps) * step
         first, last = rows_of(down, h, cover.shape[0])
         for row in range(first, last):
             half = half_width(row, down, h, w)
             if half > 0:
-                for j in range(2 * steps + 1):
-                    a, b = span(x + (j - steps) * step, half, cover.shape[1])
-                    a, b = max(a, left), min(b, right)
-                    if b > a:
-                        found[i, j] += sums[row - low, b - left] - sums[row - low, a - left]
+                for j in range(n):
+                    begin[j], end[j] = span_within(middle[j], half, *edges)
+                for j in range(n):
+                    found[i, j] += sums[row - low, end[j]] - sums[row - low, begin[j]]
     return found
 
 
 @kernel
-def running(foreground: Bools, cover: Cover) -> NDArray[np.int32]:
+def running(foreground: Bools, cover: Cover) -> Whole:
     """(H, W + 1) sums along rows of what uncovered pixels are worth, in halves."""
     sums = np.empty((cover.shape[0], cover.shape[1] + 1), np.int32)
     for row in range(cover.shape[0]):

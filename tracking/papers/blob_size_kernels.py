@@ -1,0 +1,31 @@
+"""Kernel of tracking.papers.blob_size: values of a table between its nodes."""
+
+from __future__ import annotations
+
+import numpy as np
+from numba import njit
+
+from sim.types import Array
+
+
+@njit(cache=True)
+def look_up(table: Array, at: Array) -> Array:
+    """(N, C) bilinear values of a table (C, V, U) at nodes' coordinates (u, v) (N, 2), clamped to its ends; where one
+    is no number, that at 0."""
+    last_u, last_v = table.shape[2] - 1.001, table.shape[1] - 1.001
+    found = np.empty((len(at), table.shape[0]))
+    for n in range(len(at)):
+        x, y = within(at[n, 0], last_u), within(at[n, 1], last_v)
+        u, v = int(x), int(y)
+        a, b = x - u, y - v
+        for c in range(table.shape[0]):
+            low = table[c, v, u] * (1 - a) + table[c, v, u + 1] * a
+            high = table[c, v + 1, u] * (1 - a) + table[c, v + 1, u + 1] * a
+            found[n, c] = low * (1 - b) + high * b
+    return found
+
+
+@njit(cache=True)
+def within(x: float, last: float) -> float:
+    """x clamped to 0 ... last; 0 where it is no number."""
+    return min(max(x, 0.0), last) if x == x else 0.0
