@@ -17,7 +17,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from sim.types import Array, Ints
+from sim.types import Array, Bools, Ints
 
 PLACE, RATE, VAR, COV, RATE_VAR = range(5)
 
@@ -99,23 +99,22 @@ def asymptote(dt: float, sigma: Array | float, noise: Array | float) -> Array:
     return np.asarray(noise / r**2)
 
 
-def angle_asymptote(sigma: float, noise: float) -> float:
-    """The same for the angle, a random walk of step sigma (rad): S / noise = 1 + (l^2 + sqrt(l^4 + 4 l^2)) / 2."""
-    square = sigma**2 / noise
-    return float(noise * (1 + (square + np.sqrt(square**2 + 4 * square)) / 2))
-
-
 def angle_innovation(measured: Array, predicted: Array) -> Array:
     """Difference of two axes' directions in [-pi/2, pi/2): an axis turned by pi is the same axis."""
     return (measured - predicted + np.pi / 2) % np.pi - np.pi / 2
 
 
+def directed(noise: Array) -> Bools:
+    """Do axes measured with these variances have a direction at all? Those of a near circle, (30 deg)^2, have none."""
+    return np.asarray(noise < np.radians(30.0) ** 2)
+
+
 def angle_update(angle: Array, rows: Ints, z: Array, noise: Array) -> None:
     """Measure the axes `rows` of angle (2, N) (direction, variance) at z (K,) with variances `noise`, in place.
 
-    A measurement without a direction (variance above (30 deg)^2: a near circle) is left out.
+    A measurement without a direction is left out.
     """
-    usable = noise < np.radians(30.0) ** 2
+    usable = directed(noise)
     rows, z, noise = rows[usable], z[usable], noise[usable]
     theta, var = angle[:, rows]
     gain = var / (var + noise)

@@ -82,14 +82,6 @@ def test_asymptote_by_hand():
     assert kalman.asymptote(1.0, np.array([0.1, 1.0]), 1.0) == pytest.approx([1.5625, 4.0])
 
 
-def test_angle_asymptote_is_the_limit():
-    sigma, noise, p = 0.3, 0.05, 1.0
-    for _ in range(500):
-        s = p + sigma**2 + noise
-        p = (p + sigma**2) * noise / s
-    assert kalman.angle_asymptote(sigma, noise) == pytest.approx(s, rel=1e-9)
-
-
 @pytest.mark.parametrize("p", [0.9, 0.99, 0.999])
 def test_gate_holds_its_share(p):
     r = np.random.default_rng(1)

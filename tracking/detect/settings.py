@@ -16,11 +16,11 @@ class BackgroundSettings(Config):
     tracker: ClassVar[str] = "background"
 
     detection_rate: float = param(
-        0.9999, (0.9, 0.999999), "probability", "share of background pixels inside each threshold, by training", "log"
+        0.9995, (0.9, 0.999999), "probability", "share of background pixels inside each threshold, by training", "log"
     )
-    dark: float = param(0.4, (0.0, 1.0), "", "brightness, relative, below which a pixel is dark foreground, no shadow")
+    dark: float = param(0.5, (0.0, 1.0), "", "brightness, relative, below which a pixel is dark foreground, no shadow")
     bright: float = param(
-        2.0, (1.0, 100.0), "", "brightness, relative, above which a pixel is foreground, no highlight (ours)", "log"
+        1.3, (1.0, 100.0), "", "brightness, relative, above which a pixel is foreground, no highlight (ours)", "log"
     )
     background_time: float = param(20.0, (1.0, 1e6), "s", "time constant of adaptation where background is seen", "log")
     foreground_time: float = param(

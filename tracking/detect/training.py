@@ -23,8 +23,9 @@ from tracking.detect.classes import Floats
 from tracking.detect.gain import frame_gains
 
 LEAST_FRAMES = 10
-FLOOR = 0.5
-"""Grey levels: least sigma, and least noise that the normalisers stand for; quantisation alone gives 0.29."""
+FLOOR = 2.0
+"""Grey levels: least sigma, and least noise that the normalisers stand for. Compressed pictures rest and then
+jump by a level or two; with less, the thresholds stand for these jumps (OpenCV's MOG2 has 2, too)."""
 INLIER = 3.5
 """Robust sigmas within which a sample is background, for E, sigma and the normalisers."""
 SHARE = 0.35

@@ -15,6 +15,7 @@ from tracking.papers import blob_measure
 from tracking.papers.blob_config import BlobConfig
 from tracking.papers.blob_tracks import Population
 
+SETTLING = 0.5  # s in which the axes return to the expected ones
 HEADING = 6.0  # times faster than they lean people turn: from straight above the direction is the heading's
 
 
@@ -53,14 +54,29 @@ class People(Population):
         self.angle = np.concatenate([self.angle, new], 1)
         self.nominal = np.concatenate([self.nominal, self.bank[:, self.bank.shape[1] - len(z) :]], 1)
 
+    def turned(self, z: Array, angle_var: Array) -> Array:
+        """(N, M) squared distances y^2 / S of tracks' directions and axes z (M,); 0 for those without a direction."""
+        s = self.angle[1][:, None] + angle_var
+        turn = kalman.angle_innovation(z, self.angle[0][:, None])
+        return np.where(kalman.directed(angle_var), turn * turn / s, 0.0)
+
     def update(self, rows: Ints, z: Array, noise: Array, angle_var: Array) -> Array:
         """Measure tracks at z (K, 5) with variances noise (K, 4) m^2 and angle_var (K,); squared distances (K,)."""
         terms = kalman.update(self.bank, rows, z[:, :4], noise)
+        turn = np.diagonal(self.turned(z[:, 4], angle_var)[rows])
         kalman.update(self.nominal, rows, z[:, :4], self.noise)
         kalman.angle_update(self.angle, rows, z[:, 4], angle_var)
-        return np.asarray(np.add.reduce(terms, 1) / np.square(self.scale[rows]))
+        return np.asarray(np.add.reduce(terms, 1) / np.square(self.scale[rows]) + turn)
 
-    def expect(self, rows: Ints, z: Array, var: float) -> None:
-        """Measure the axes of tracks at z (K, 5), x, y left out, with variance `var` m^2; rho does not see it."""
-        noise = np.tile([np.inf, np.inf, var, var], (len(rows), 1))
-        kalman.update(self.bank, rows, z[:, :4], noise)
+    def settle(self, rows: Ints, axes: Array, var: float) -> None:
+        """Axes of tracks return to those (K, 2) px expected there, with variance `var` m^2; rho does not know of it.
+
+        An Ornstein-Uhlenbeck step: s = e^(-dt / SETTLING), x = s x + (1 - s) expected, P = s^2 P + (1 - s^2) var.
+        What is expected is the same in every frame, so it must not be counted as a measurement of each.
+        """
+        stay = np.exp(-self.dynamics.dt / SETTLING)
+        bank = self.bank[:, rows, 2:]
+        bank[kalman.PLACE] += (1 - stay) * (axes - bank[kalman.PLACE])
+        bank[kalman.VAR] = stay**2 * bank[kalman.VAR] + (1 - stay**2) * var
+        bank[kalman.COV] *= stay
+        self.bank[:, rows, 2:] = bank

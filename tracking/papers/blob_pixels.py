@@ -17,7 +17,7 @@ from tracking import assign, kalman
 from tracking.detect import blobs as detect
 from tracking.detect.background import Background
 from tracking.detect.classes import foreground
-from tracking.detect.mog2 import Mog2
+from tracking.detect.mog2 import Mog2, Mog2Settings
 from tracking.papers import blob_entry, blob_measure
 from tracking.papers.blob_config import BlobConfig
 from tracking.papers.blob_people import People
@@ -25,8 +25,9 @@ from tracking.papers.blob_size import PersonSize
 from tracking.papers.blob_template import Mask, painted
 
 SHARED = 0.35  # share of a predicted box in a blob's from which on the blob may be this track's
-LEAST_AREA = 0.05  # m^2: smaller blobs are noise
-COARSE = 20.0  # px per m that windows and areas follow while no scale is known
+LEAST_AREA, LEAST_PIXELS = 0.0125, 12.0  # m^2 at the scale, px: smaller blobs are noise
+COARSE = 18.0  # m that an image is high, while no scale is known
+UPRIGHT = 25.0  # deg, deviation of the direction of somebody measured by a template, which stands upright
 LOOKED = 25  # frames of the background sample in which lone blobs are looked for
 EXTENT = 0.75, 1.3  # of the expected size, what a template may have
 BLIND = 25.0  # variance of a template's height and width relative to a lone blob's: they are expected, not seen
@@ -44,15 +45,17 @@ class Pixels:
         self.size = PersonSize(context)
         self.background: Background | Mog2
         if config.segmentation == "mog2":
-            self.background = Mog2(context.background, context.fps)
+            mog2 = Mog2Settings(shadow=config.dark, background_time=config.background_time)
+            self.background = Mog2(context.background, context.fps, mog2)
         else:
             self.background = Background(context.background, context.fps, config)
         self.scale = context.px_per_m
         self._look_at_sample(context.background)
         self.gates = chdtri(np.array([4, 5]), 1 - config.gate)
-        self.confirm_gate = float(chdtri(4, 1 - config.confirm_gate))
+        self.confirm_gates = chdtri(np.array([4, 5]), 1 - config.confirm_gate)
         self.blindest = 2 * float(np.log(max(people.excused_death, people.birth_rho)))
         self.angle_noise = np.radians(config.angle_noise) ** 2
+        self.upright = np.inf if self.size.above else np.radians(UPRIGHT) ** 2
 
     def _look_at_sample(self, sample: Image) -> None:
         """Learn sizes and scale from the lone blobs of the background sample."""
@@ -64,15 +67,18 @@ class Pixels:
     def _take_scale(self) -> None:
         if np.isnan(self.context.px_per_m):
             self.scale = self.size.px_per_m
-            self.people.context = self.context.replace(px_per_m=self.scale if self.scale > 0 else COARSE)
+            self.people.context = self.context.replace(px_per_m=self._known_scale())
 
     def _foreground(self, image: Image) -> tuple[Image, Bools]:
         classes = self.background.classify(image)
-        return classes, detect.clean(foreground(classes), self.scale if self.scale > 0 else COARSE)
+        return classes, detect.clean(foreground(classes), self._known_scale())
 
     def _find(self, mask: Bools) -> detect.Blobs:
-        scale = self.scale if self.scale > 0 else COARSE
-        return detect.find(mask, max(LEAST_AREA * (scale / 2) ** 2, 12.0))
+        return detect.find(mask, max(LEAST_AREA * self._known_scale() ** 2, LEAST_PIXELS))
+
+    def _known_scale(self) -> float:
+        """px per m; a guess as long as nobody was seen."""
+        return self.scale if self.scale > 0 else self.background.valid.shape[0] / COARSE
 
     def _cut(self, box: Array) -> Bools:
         """Does the image's edge cut these blobs (M, 4)?"""
@@ -122,10 +128,10 @@ class Pixels:
         split = c.split and self.size.reliable
         lone = self._lone(found, expected) if split else np.ones(len(found), bool)
         columns = lone.nonzero()[0]
-        z, angle_var = found.ellipse[columns], found.angle_var[columns]
+        z, angle_var = found.ellipse[columns], found.angle_var[columns] + self.angle_noise
         rows, taken = self._associate(z, angle_var)
         noise = np.tile(people.noise, (len(rows), 1))
-        measured, angles = z[taken], angle_var[taken] + self.angle_noise
+        measured, angles = z[taken], angle_var[taken]
         support, newborn = np.ones(len(rows)), np.delete(z, taken, 0)
         if split:
             scene = Mask(mask)
@@ -134,26 +140,24 @@ class Pixels:
                 more = self._split(scene, expected, rows, sure)
                 rows, measured = np.concatenate([rows, more[0]]), np.concatenate([measured, more[1]])
                 noise, support = np.concatenate([noise, more[2]]), np.concatenate([support, more[3]])
-                angles = np.concatenate([angles, np.full(len(more[0]), np.inf)])
+                angles = np.concatenate([angles, np.full(len(more[0]), self.upright)])
             entered = blob_entry.newcomers(scene, self.size, c.entry_support)
             newborn = np.concatenate([newborn, self._ellipses(_places(entered))])
         d2 = people.update(rows, measured, noise, angles)
         if split:
-            self._expect_size(rows)
-        people.mark(rows, d2 <= self.confirm_gate, support)
+            self._settle_sizes()
+        near = d2 <= self.confirm_gates[kalman.directed(angles).astype(int)]
+        people.mark(rows, near, support)
         people.excuse()
         people.bury(t)
         people.give_birth(newborn, np.ones(len(newborn)), t)
 
-    def _expect_size(self, rows: Ints) -> None:
-        """Measure the axes of these tracks by what a person's are there, too."""
-        people = self.people
-        at = _templates(people.uprights()[rows])
-        size = self.size.axes(at[:, :2])
-        known = np.isfinite(size).all(1)
-        rows, size = rows[known], size[known]
-        expected = blob_measure.lying(np.column_stack([at[known, :2], size]))
-        people.expect(rows, expected, self.config.person_noise**2)
+    def _settle_sizes(self) -> None:
+        """Tracks' axes return to what a person's are at their places."""
+        at = _templates(self.people.uprights())
+        axes = self.size.axes(at[:, :2])
+        rows = np.flatnonzero(np.isfinite(axes).all(1))
+        self.people.settle(rows, -np.sort(-axes[rows]), self.config.person_noise**2)
 
     def _lone(self, found: detect.Blobs, expected: Array) -> Bools:
         """(M,) blobs of one person's size, whole, in which at most one confirmed track is expected."""
@@ -183,11 +187,11 @@ class Pixels:
         if not len(z) or not len(people.id):
             return np.zeros(0, np.int64), np.zeros(0, np.int64)
         d2 = kalman.distances(people.bank, z[:, :4], people.noise, people.scale)
-        directed = (angle_var < np.radians(30.0) ** 2) & ~np.bool_(self.size.above)
-        turn = kalman.angle_innovation(z[:, 4], people.angle[0][:, None])
-        s = people.angle[1][:, None] + angle_var + self.angle_noise
-        d2 = d2 + np.where(directed, turn * turn / s, 0.0)
-        cost = np.where(d2 <= np.where(directed, self.gates[1], self.gates[0]), d2, np.inf)
+        gate = np.tile(self.gates[0], len(z))
+        if not self.size.above:
+            d2 = d2 + people.turned(z[:, 4], angle_var)
+            gate = self.gates[kalman.directed(angle_var).astype(int)]
+        cost = np.where(d2 <= gate, d2, np.inf)
         if self.config.association == "nearest":
             return blob_measure.best_pieces(*assign.nearest(cost), cost)
         blind = np.minimum(2 * np.log(people.rho), self.blindest)

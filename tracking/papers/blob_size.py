@@ -19,6 +19,7 @@ from tracking.papers import blob_size_kernels as kernels
 PERSON = 1.7  # m
 SLIM = 0.36  # width over height of a walking person's box, the prior of what is learned
 STOUT = 2.0  # by how much the width over height of a blob that may be somebody alone differs at most
+UNLIKE = 1.4  # by how much his height differs at most from what a camera leads to expect
 KEPT = 400  # lone blobs remembered
 ENOUGH = 12  # lone blobs that make a learned size reliable ...
 RENEW = 0.05  # share of new ones from which on the line is drawn anew
@@ -116,7 +117,7 @@ class PersonSize:
         expected = np.divide(*self._first_guess(foot).T[::-1]) if self.table is not None or self.above else SLIM
         with np.errstate(invalid="ignore"):
             slim = np.abs(np.log(size[:, 1] / size[:, 0] / expected)) <= np.log(STOUT)
-        good = whole & slim & (size[:, 0] >= (FLAT if self.above else SMALLEST))
+        good = whole & slim & (size[:, 0] >= (FLAT if self.above else SMALLEST)) & self._likely(foot, size)
         if not good.any():
             return
         size, foot = size[good], foot[good]
@@ -130,6 +131,14 @@ class PersonSize:
         if self.unused >= RENEW * len(self.seen):
             self.unused = 0
             self._fit()
+
+    def _likely(self, foot: Array, size: Array) -> Bools:
+        """(M,) are these as high as somebody may be of whom a camera tells how high? Specks are nobody."""
+        if self.table is None and not self.above:
+            return np.ones(len(size), bool)
+        with np.errstate(invalid="ignore"):
+            off = np.abs(np.log(size[:, 0] / self._first_guess(foot)[:, 0]))
+        return np.asarray(off <= np.log(UNLIKE))
 
     def _fit(self) -> None:
         """Where most heights agree: the line, if there is no camera, and the factors of height and width."""

@@ -89,7 +89,7 @@ class Population:
         lost = (self.confirmed & ~self.hit & ~self.excused).nonzero()[0]
         if not len(lost):
             return
-        place = self.bank[kalman.PLACE]
+        place = self.uprights()
         foot, hidden = place[:, 1] + place[:, 2] / 2, place.take(lost, 0)
         in_front = self.hit & (foot > foot[lost, None])
         in_front &= np.abs(hidden[:, :1] - place[:, 0]) < (hidden[:, 3:] + place[:, 3]) / 2
@@ -165,7 +165,7 @@ class Population:
         if len(lost):
             limit = np.where(self.excused[lost], self.excused_silence, self.silence) * (1 + SLACK)
             fresh = (self.rho[lost] <= limit) & (self.misses[lost] <= self.config.report_credit * self.hits[lost])
-            told[lost] = fresh & ~self._leaving(self.bank[: kalman.VAR].take(lost, 1))
+            told[lost] = fresh & ~self._leaving(lost)
         return np.asarray(told.nonzero()[0])
 
     def look(self, z: Array) -> None:
@@ -176,8 +176,9 @@ class Population:
             self.low = np.minimum(self.low, (z[:, :2] - z[:, :1:-1] / 2).min(0))
             self.high = np.maximum(self.high, (z[:, :2] + z[:, :1:-1] / 2).max(0))
 
-    def _leaving(self, bank: Array) -> Bools:
-        """Does the predicted box reach over the edge of the field of view, moving outwards?"""
-        centre, rate, half = bank[kalman.PLACE, :, :2], bank[kalman.RATE, :, :2], bank[kalman.PLACE, :, :1:-1] / 2
+    def _leaving(self, rows: Ints) -> Bools:
+        """Do the predicted boxes of these reach over the edge of the field of view, moving outwards?"""
+        place, rate = self.uprights()[rows], self.bank[kalman.RATE, rows, :2]
+        centre, half = place[:, :2], place[:, :1:-1] / 2
         out = ((centre - half < self.low) & (rate < 0)) | ((centre + half > self.high) & (rate > 0))
         return np.asarray(out.any(1))

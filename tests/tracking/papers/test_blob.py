@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from scenarios.errors import InputError
 from sim.types import Camera, Context, Detections, Frame, Tracks
 from tracking import kalman
 from tracking.papers.blob import Blob
@@ -407,3 +408,9 @@ def test_nobody_above_the_horizon_is_reported():
     camera = pinhole(tilt_deg=5.0)
     context = Context(fps=FPS, px_per_m=40.0, camera=camera, image_size=camera.image)
     assert not ids(run([[[300, 20, 28, 68]]] * 20, context=context))
+
+
+@pytest.mark.parametrize("scale", [float("nan"), 0.0])
+def test_boxes_without_a_scale_are_refused(scale):
+    with pytest.raises(InputError, match=r"context\.px_per_m"):
+        Blob().reset(Context(fps=FPS, px_per_m=scale), 0)

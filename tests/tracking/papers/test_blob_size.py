@@ -91,3 +91,15 @@ def test_people_too_small_to_see_are_nobody():
     size.learn(box, ellipses(box), np.ones(80, bool))
     assert np.isnan(size.at(np.array([[240.0, (SMALLEST + 17) / 0.3]]))).all()
     assert size.px_per_m == pytest.approx(np.median(box[:, 3]) / 1.7, rel=0.1)
+
+
+def test_specks_are_nobody_where_a_camera_says_how_high_people_are():
+    """Hundreds of specks a fifth as high, as narrow as people: compression flickers."""
+    r, seen = np.random.default_rng(0), camera(0.5)
+    context = Context(10.0, 40.0, camera=seen, image_size=seen.image)
+    size, alike = PersonSize(context), PersonSize(context)
+    foot = np.column_stack([r.uniform(60, 420, 400), r.uniform(200, 340, 400)])
+    h, w = size.at(foot).T * 0.25
+    specks = np.column_stack([foot[:, 0] - w / 2, foot[:, 1] - h, w, h])
+    size.learn(specks, ellipses(specks), np.ones(400, bool))
+    assert size.at(foot) == pytest.approx(alike.at(foot))
