@@ -36,7 +36,6 @@ from typing import ClassVar, cast
 
 import numpy as np
 
-from scenarios.errors import InputError
 from sim.types import Context, Detections, Frame, Plane, Tracks
 from tracking import kalman
 from tracking.papers import blob_measure, blob_report
@@ -66,7 +65,6 @@ class Blob:
         self.people: Population
         self.cascade: Boxes | Pixels
         if context.background is None:
-            _check_scale(context)
             self.people = Population(c, dynamics, context)
             self.cascade = Boxes(c, self.people)
         else:
@@ -92,14 +90,3 @@ class Blob:
             rows, box, alone, plane = rows[seen], box[seen], alone[seen], "ground"
         id, score = people.id[rows], people.score[rows]
         return Tracks(frame.index, frame.t, cast(Plane, plane), "person", id, alone, pos, vel, cov, box, score)
-
-
-def _check_scale(context: Context) -> None:
-    """InputError where boxes come without a scale: noises in metres would mean nothing, and nothing be tracked."""
-    if not context.px_per_m > 0:
-        raise InputError(
-            place="context.px_per_m",
-            got=f"{context.px_per_m:g}",
-            expected="px per m at people, above 0, to track boxes",
-            remedy="give it, for instance the median height of boxes / 1.7 m, or a background sample to track pixels",
-        )

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from sim.types import Array, Bools, Detections, Frame, Ints
+from scenarios.errors import InputError
+from sim.types import Array, Bools, Context, Detections, Frame, Ints
 from tracking import assign, kalman
 from tracking.papers import blob_measure
 from tracking.papers.blob_config import BlobConfig
@@ -29,6 +30,8 @@ class Boxes:
         """Predict, gate, associate, update, manage."""
         z, score = self._measurements(detections)
         people = self.people
+        if len(z):
+            _check_scale(people.context)
         people.predict()
         people.look(z)
         rows, columns, free, d2 = self._associate(z, score)
@@ -170,3 +173,14 @@ class Boxes:
         if not len(left):
             return left
         return np.asarray(left[~people.merged(z[left], people.confirmed & ~people.hit)])
+
+
+def _check_scale(context: Context) -> None:
+    """InputError where boxes come without a scale: noises in metres would mean nothing, and nothing be tracked."""
+    if not context.px_per_m > 0:
+        raise InputError(
+            place="context.px_per_m",
+            got=f"{context.px_per_m:g}",
+            expected="px per m at people, above 0, to track boxes",
+            remedy="give it, for instance the median height of boxes / 1.7 m, or a background sample to track pixels",
+        )

@@ -413,4 +413,4 @@ def test_nobody_above_the_horizon_is_reported():
 @pytest.mark.parametrize("scale", [float("nan"), 0.0])
 def test_boxes_without_a_scale_are_refused(scale):
     with pytest.raises(InputError, match=r"context\.px_per_m"):
-        Blob().reset(Context(fps=FPS, px_per_m=scale), 0)
+        run([at((100, 100))], context=Context(fps=FPS, px_per_m=scale))
