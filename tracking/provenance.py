@@ -48,7 +48,7 @@ def describe(
         "fps": ready.context.fps,
         "px_per_m": None if np.isnan(px_per_m) else px_per_m,
         "background": None if sample is None else ready.sequence.source.get("background", f"{len(sample)} frames"),
-        "causal": begins == 1,
+        "causal": begins is not None,
         "causal_from": begins,
         "frames": len(answers),
         "frames_per_second": speed.tracker,
