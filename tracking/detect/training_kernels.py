@@ -23,9 +23,11 @@ def learn(
     valid: Bools,
     counts: Ints,
 ) -> None:
-    """Fill the model of (K, H, W, 3), and histograms `counts` (inlier or clean, brightness or CD, bins).
+    """Fill the model of (K, H, W, 3) uint8, and histograms `counts` (2 inlier or clean, 2 brightness or CD, bins).
 
-    rules: sigmas per half length, least and widest sigma, sigmas of inliers and of clean pixels, rounds.
+    gains (K, 3): brightness of each frame, which it is divided by. held: values in the shortest interval. rules: sigmas
+    per half length, least and widest sigma, sigmas of inliers and of clean pixels, rounds. bins: number, span.
+    Equations are those of Horprasert et al. (2000).
     """
     as_sigma, least, widest, inside, untouched, rounds = rules
     number, span = bins
@@ -76,7 +78,7 @@ def learn(
                 n = max(n, 1)
                 for k in range(3):
                     shift = sums[k] / n
-                    m[k] = max(m[k] + shift, 1.0)
+                    m[k] = max(m[k] + shift, 1.0)  # E (eq. 3) and sigma (eq. 4) of the inliers
                     sd[k] = max(np.sqrt(max(squares[k] / n - shift * shift, 0.0)), least)
                 if settled:
                     break
@@ -88,16 +90,17 @@ def learn(
                 dot = 0.0
                 for k in range(3):
                     dot += value[t, k] * m[k] / (sd[k] * sd[k])
-                a, q = dot / norm, 0.0
+                a, q = dot / norm, 0.0  # alpha (eq. 5) and CD^2 (eq. 6)
                 for k in range(3):
                     q += ((value[t, k] - a * m[k]) / sd[k]) ** 2
-                alpha[t], cd[t] = (a - 1) * np.sqrt(norm), np.sqrt(q)
+                alpha[t], cd[t] = (a - 1) * np.sqrt(norm), np.sqrt(q)  # (alpha - 1) |E / sigma|, CD
                 if inlier[t]:
                     n += 1
                     sa += alpha[t] * alpha[t]
                     sb += q
             n = max(n, 1)
             noise = 3 * least / (sd[0] + sd[1] + sd[2])
+            # s = a |E / sigma| (eq. 7) and b (eq. 8); of noise `least` alone s would be `noise`, and b sqrt(2) times it
             sa, sb = max(np.sqrt(sa / n), noise), max(np.sqrt(sb / n), np.sqrt(2.0) * noise)
             for k in range(3):
                 mean[r, c, k], sigma[r, c, k] = m[k], sd[k]
@@ -105,6 +108,7 @@ def learn(
             if not good:
                 continue
             for t in range(frames):
+                # bins of (alpha - 1) / a (eq. 9) and CD / b (eq. 10)
                 i = int((alpha[t] / sa + span) / (2 * span) * number)
                 j = int((cd[t] / sb + span) / (2 * span) * number)
                 if inlier[t]:

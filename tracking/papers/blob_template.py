@@ -70,7 +70,7 @@ class Mask:
         return kernels.pieces(self.foreground, self.cover, templates)
 
     def shown(self, templates: Array) -> Array:
-        """(K,) share of each painted template that no template with a lower foot, and nothing explained, covers."""
+        """(K,) share of each template that none of these with a lower foot, and nothing explained, covers."""
         return kernels.shown(self.cover, templates, near_first(templates))
 
 
