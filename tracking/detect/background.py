@@ -40,7 +40,7 @@ class Background:
 
     mean (3, H, W): E at gain 1, grey levels. var (3, H, W): sigma^2, grey levels squared, whatever the gain. s, b
     (H, W): normalisers of brightness (s = a |E / sigma|, see tracking.detect.training) and of CD, no unit, inf where
-    there is no background. valid (H, W): False where the sample showed none; such pixels are called background for ever.
+    there is no background. valid (H, W): False where the sample showed none; such pixels are background for ever.
     thresholds: of CD / b, lower and upper of (alpha - 1) / a. gain (3,): brightness of the frame classified last.
     bounds: alpha below which a dark pixel is dark foreground, alpha up to which a bright one is a highlight.
     """

@@ -10,6 +10,29 @@ from tracking.detect.classes import Floats
 
 
 @njit(cache=True, error_model="numpy")
+def sort(values: Floats) -> None:
+    """Sort a few values (K,) in place, by Shell's method."""
+    for gap in (13, 4, 1):
+        for t in range(gap, len(values)):
+            x, j = values[t], t
+            while j >= gap and values[j - gap] > x:
+                values[j] = values[j - gap]
+                j -= gap
+            values[j] = x
+
+
+@njit(cache=True, error_model="numpy")
+def shortest(values: Floats, held: int) -> tuple[int, float]:
+    """Of sorted values (K,): where the shortest interval that holds `held` of them begins, and its length."""
+    first, best = 0, values[held - 1] - values[0]
+    for t in range(1, len(values) - held + 1):
+        length = values[t + held - 1] - values[t]
+        if length < best:
+            first, best = t, length
+    return first, best
+
+
+@njit(cache=True, error_model="numpy")
 def learn(
     sample: Image,
     gains: Floats,
@@ -43,18 +66,8 @@ def learn(
                 for t in range(frames):
                     x = np.float32(sample[t, r, c, k]) / gains[t, k]
                     value[t, k] = order[t] = x
-                for gap in (13, 4, 1):
-                    for t in range(gap, frames):
-                        x, j = order[t], t
-                        while j >= gap and order[j - gap] > x:
-                            order[j] = order[j - gap]
-                            j -= gap
-                        order[j] = x
-                first, best = 0, order[held - 1] - order[0]
-                for t in range(1, frames - held + 1):
-                    length = order[t + held - 1] - order[t]
-                    if length < best:
-                        first, best = t, length
+                sort(order)
+                first, best = shortest(order, held)
                 m[k], sd[k] = order[first + held // 2], max(0.5 * best * as_sigma, least)
                 good = good and sd[k] <= widest
             clean = True

@@ -2,7 +2,7 @@
 
 Where a person is partly hidden the measurement is noisier than R, and axes are drawn to the expected ones; the paper's
 rho, which counts measurements (4.5), is therefore taken from a second covariance that knows the nominal R only. The
-state's h, w are the ellipse's axes, the longer one first as they are measured, and theta is the direction of h, from the
+state's h, w are the ellipse's axes, the longer one first as they are measured, and theta is the direction of h from the
 abscissa, v down, modulo pi: a random walk (4.1). A track's upright box is the box round its ellipse.
 """
 

@@ -3,7 +3,7 @@
 A template is an upright ellipse in a box: x (its middle), foot (lower edge), h, w in px. Every foreground pixel that
 some template covers counts 1, every background pixel against 1/2, once however many templates cover it: so who is
 partly hidden is measured by what shows of him, and a gap in the mask (a lamp post, camouflage) costs less than a second
-person. Moving one template while the others rest needs sums over its rows only (tracking.papers.blob_template_kernels).
+person. Moving one template while the others rest needs sums over its rows only (tracking.papers.blob_settle_kernels).
 
     support  of a template = (sum over the pixels that it alone covers) / its area in the image, at most 1
     settle   each in turn to the place of largest evidence * support - d^2 / 2, d from where it was expected
@@ -15,6 +15,7 @@ import numpy as np
 
 from sim.types import Array, Bools, Ints
 from tracking.detect.blobs import Labels
+from tracking.papers import blob_settle_kernels as moves
 from tracking.papers import blob_template_kernels as kernels
 from tracking.papers.blob_template_kernels import ELLIPSE as ELLIPSE
 
@@ -50,7 +51,7 @@ class Mask:
 
         spread (K, 2): standard deviation px of each one's expected x and foot; evidence: nats for full support.
         """
-        return kernels.settle(self.foreground, self.cover, templates, spread, near_first(templates), evidence)
+        return moves.settle(self.foreground, self.cover, templates, spread, near_first(templates), evidence)
 
     def prune(self, templates: Array, least: float, *, pieces: bool = False) -> Ints:
         """Rows of painted templates with support `least` when those with too little are taken away, the weakest first.

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from tests import reference_templates as slow
+from tracking.papers import blob_settle_kernels
 from tracking.papers import blob_template_kernels as kernels
 from tracking.papers.blob_template import Mask, painted
 from tracking.papers.blob_template_kernels import EXPLAINED
@@ -38,7 +39,7 @@ def scenery(seed):
 def test_kernels_are_the_slow_way(seed):
     _, foreground, cover, some = scenery(seed)
     for t in some:
-        got = kernels.moved(foreground, cover, t, 2, 1.5)
+        got = blob_settle_kernels.moved(foreground, cover, t, 2, 1.5)
         assert np.array_equal(got / 2, slow.moved(foreground, cover, t, 2, 1.5))
     area = [slow.area(cover.shape, t) for t in some]
     got = kernels.supports(foreground, cover, some, 0)
