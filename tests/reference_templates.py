@@ -7,7 +7,6 @@ import numpy as np
 from tracking.papers import blob_entry
 from tracking.papers.blob_settle_kernels import FINE_STEPS, MOST_STEPS, STEPS_PER_HEIGHT, SWEEPS
 from tracking.papers.blob_template_kernels import BARE, ELLIPSE, EXPLAINED, LEAST_INSIDE
-)
 
 
 def pixels(shape, x, foot, h, w):
