@@ -34,17 +34,9 @@ class Mask:
         which[rows + 1] = True
         kernels.close(self.cover, label, which)
 
-    def paint(self, templates: Array, more: int = 1) -> None:
-        """Add (or take away) templates (K, 4)."""
-        kernels.paint_all(self.cover, templates, more)
-
     def left(self) -> Bools:
         """(H, W) the foreground that nothing explains."""
         return np.asarray(self.foreground & (self.cover == 0))
-
-    def support(self, templates: Array) -> Array:
-        """(K,) support of templates that are not painted."""
-        return kernels.supports(self.foreground, self.cover, templates, 0)
 
     def settle(self, templates: Array, spread: Array, evidence: float) -> Array:
         """Places (K, 4) of all templates together, near people (low feet) first; painted when done.
@@ -65,10 +57,6 @@ class Mask:
     def alone(self, templates: Array) -> Array:
         """(K,) support of painted templates, each by the pixels that no other covers."""
         return kernels.supports(self.foreground, self.cover, templates, 1)
-
-    def pieces(self, templates: Array) -> Array:
-        """(K,) share of foreground in the pixels that no other painted template covers; 0 where these are few."""
-        return kernels.pieces(self.foreground, self.cover, templates)
 
     def shown(self, templates: Array) -> Array:
         """(K,) share of each template that none of these with a lower foot, and nothing explained, covers."""
