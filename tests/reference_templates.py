@@ -4,12 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from tracking.papers import blob_entry, blob_template_kernels
+from tracking.papers import blob_entry
+from tracking.papers.blob_settle_kernels import FINE_STEPS, MOST_STEPS, STEPS_PER_HEIGHT, SWEEPS
 from tracking.papers.blob_template_kernels import BARE, ELLIPSE, EXPLAINED, LEAST_INSIDE
-
-STEPS_PER_HEIGHT, MOST_STEPS, FINE_STEPS, SWEEPS = (
-    getattr(blob_template_kernels, name) for name in ("STEPS_PER_HEIGHT", "MOST_STEPS", "FINE_STEPS", "SWEEPS")
-)
 
 
 def pixels(shape, x, foot, h, w):

@@ -1,8 +1,8 @@
 """Who measured whom: gated nearest neighbour, or the assignment of least total cost.
 
 Both work on the gated pairs only, given as a cost matrix with inf outside the gates. They answer (track, measurement)
-pairs in which no measurement occurs twice; a track may occur twice only with `nearest`, where a measurement goes to
-whichever gate it is deepest in (Gonzalez et al. 2006, 4.4) and one person may come in several pieces.
+pairs in which no measurement occurs twice; a track may occur twice only with `nearest`, where a measurement goes to the
+track of least d^2 in whose gate it lies (Gonzalez et al. 2006, 4.4) and one person may come in several pieces.
 `optimal` is ours.
 """
 

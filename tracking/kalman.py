@@ -6,7 +6,7 @@ deviation s held over a step (filterpy's Q_discrete_white_noise). Since no block
 states is D times three numbers of covariance, and a bank is one array `state` (5, N, D): place, rate, and P's entries
 11, 12, 22.
 
-    predict  x = A x,  P = A P A' + Q          (Gonzalez et al. 2006, eqs 1, 2)
+    predict  x = A x,  P = A P A' + Q          (Gonzalez et al. 2006, eqs 1, 2; eq. 8: C A x is the predicted place)
     update   S = P11 + R,  K = (P11, P12) / S,  x += K y,  P -= K S K'      (eqs 3-7; eq 4 needs brackets: (I - K C) P)
 
 Places may be in a unit of their own (px) while covariances are in another (m^2): gains have no unit, so only a distance
@@ -20,6 +20,7 @@ import numpy as np
 from sim.types import Array, Bools, Ints
 
 PLACE, RATE, VAR, COV, RATE_VAR = range(5)
+VAGUE = np.radians(30.0) ** 2  # rad^2: an axis is within pi / 2 of any other, with (52 deg)^2 if nothing is known
 
 
 def white_acceleration(dt: float, sigma: Array | float) -> Array:
@@ -36,10 +37,10 @@ def born(place: Array, var: Array | float, rate_var: Array | float) -> Array:
 
 
 def predict(state: Array, dt: float, q: Array) -> None:
-    """One step of dt in place; q (3, N, D) or (3, D) from `white_acceleration`."""
+    """One step of dt, s, in place; q (3, N, D) or (3, D) from `white_acceleration`."""
     place, rate, var, cov, rate_var = state
-    place += dt * rate
-    step = dt * rate_var
+    place += dt * rate  # eq. 1
+    step = dt * rate_var  # eq. 2, to the end
     var += dt * (cov + cov + step)
     cov += step
     state[VAR:] += q if q.ndim == 3 else q[:, None]
@@ -52,12 +53,12 @@ def update(state: Array, rows: Ints, z: Array, noise: Array | float) -> Array:
     """
     new = state.take(rows, 1)
     place, rate, var, cov, rate_var = new
-    s = var + noise
-    gain, rate_gain = var / s, cov / s
-    y = z - place
-    place += gain * y
+    s = var + noise  # eq. 6
+    gain, rate_gain = var / s, cov / s  # eq. 7
+    y = z - place  # eq. 5
+    place += gain * y  # eq. 3
     rate += rate_gain * y
-    rate_var -= rate_gain * cov
+    rate_var -= rate_gain * cov  # eq. 4, with brackets: (I - K C) P
     var -= gain * var
     cov -= gain * cov
     state[:, rows] = new
@@ -65,7 +66,7 @@ def update(state: Array, rows: Ints, z: Array, noise: Array | float) -> Array:
 
 
 def distances(state: Array, z: Array, noise: Array | float, scale: Array | float = 1.0) -> Array:
-    """(N, M) squared Mahalanobis distances y' S^-1 y between N predictions and M measurements (eq. 9).
+    """(N, M) squared Mahalanobis distances y' S^-1 y between N predictions and M measurements (the paper's MSD, eq. 9).
 
     noise (M, D) or (D,) in the covariances' unit, scale (N,) or a number: units of z per unit of covariance.
     """
@@ -100,17 +101,17 @@ def asymptote(dt: float, sigma: Array | float, noise: Array | float) -> Array:
 
 
 def angle_innovation(measured: Array, predicted: Array) -> Array:
-    """Difference of two axes' directions in [-pi/2, pi/2): an axis turned by pi is the same axis."""
+    """Difference of two axes' directions (eq. 5), rad, in [-pi/2, pi/2): an axis turned by pi is the same axis."""
     return (measured - predicted + np.pi / 2) % np.pi - np.pi / 2
 
 
 def directed(noise: Array) -> Bools:
-    """Do axes measured with these variances have a direction at all? Those of a near circle, (30 deg)^2, have none."""
-    return np.asarray(noise < np.radians(30.0) ** 2)
+    """Do axes measured with these variances (N,), rad^2, have a direction at all? Those of a near circle have none."""
+    return np.asarray(noise < VAGUE)
 
 
 def angle_update(angle: Array, rows: Ints, z: Array, noise: Array) -> None:
-    """Measure the axes `rows` of angle (2, N) (direction, variance) at z (K,) with variances `noise`, in place.
+    """Measure the axes `rows` of angle (2, N), direction rad and its variance, at z (K,) with `noise` (K,), in place.
 
     A measurement without a direction is left out.
     """

@@ -62,7 +62,10 @@ class Dynamics:
 
 
 def rho(state: Array, noise: Array, asymptote: Array) -> Array:
-    """(N,) sqrt|S| of predicted filters relative to the asymptote."""
+    """(N,) sqrt|S| of predicted filters (S: eq. 6) relative to its asymptote (4.5).
+
+    state (5, N, D), noise and asymptote (D,) in its covariances' unit; S is diagonal, so |S| is a product.
+    """
     return np.asarray(np.sqrt(np.multiply.reduce((state[kalman.VAR] + noise) / asymptote, 1)))
 
 

@@ -1,13 +1,16 @@
 """Colour background subtraction into five classes (Horprasert, Harwood, Davis 2000; González et al. 2006, section 3).
 
 Each pixel i has a mean colour E and standard deviations sigma. A colour I is split along the line through E:
-    alpha = argmin |(I - alpha E) / sigma|,   CD = |(I - alpha E) / sigma|
-and normalised by their RMS over the training sample: (alpha - 1) / a_i, CD / b_i, so that one threshold each serves the
-whole image. Classes in the paper's order: CD above its threshold is foreground; brightness below the dark threshold is
-dark foreground; above the upper threshold highlight; below the lower one shadow; else background.
-Departures: docs/detection.md; of these: a shadow must be darker than normal noise, too, and not dark foreground;
-above `bright` (relative) is foreground. Without colours (R = G = B) there is no chromaticity to tell a shadow or a
-highlight by: whatever is darker is dark foreground, whatever is brighter foreground.
+    alpha = argmin |(I - alpha E) / sigma|,   CD = |(I - alpha E) / sigma|      (Horprasert et al., eqs 5, 6)
+and normalised by their RMS over the training sample, so that one threshold each serves the whole image:
+    (alpha - 1) / a_i,   CD / b_i                                               (eqs 9, 10; a_i, b_i: eqs 7, 8)
+Classes, asked for in the order of González et al., 3.2: CD above its threshold is foreground; darker than the lower
+threshold and than `dark` is dark foreground; above the upper threshold highlight; below the lower one shadow; else
+background. The equations stand in tracking.detect.background_kernels (5, 6, 9, 10) and training_kernels (5 to 8).
+Departures: docs/detection.md; of these: `dark` is a share of E's brightness, not a normalised threshold, and no pixel
+within the noise is dark foreground; a highlight above `bright`, likewise a share, is foreground. Without colours
+(R = G = B) there is no chromaticity to tell a shadow or a highlight by: whatever is darker is dark foreground, whatever
+is brighter foreground.
 """
 
 from __future__ import annotations
@@ -35,10 +38,11 @@ INTERLEAVE = 4
 class Background:
     """The model of a still scene; it changes in `classify` (the gain) and in `adapt`.
 
-    mean, var (3, H, W): E and sigma^2 at gain 1. s, b (H, W): normalisers, inf where there is no background. valid
-    (H, W): False where the sample showed none; such pixels are called background for ever.
-    gain (3,): brightness of the frame classified last. bounds: relative brightness of dark foreground and of highlights
-    at most.
+    mean (3, H, W): E at gain 1, grey levels. var (3, H, W): sigma^2, grey levels squared, whatever the gain. s, b
+    (H, W): normalisers of brightness (s = a |E / sigma|, see tracking.detect.training) and of CD, no unit, inf where
+    there is no background. valid (H, W): False where the sample showed none; such pixels are background for ever.
+    thresholds: of CD / b, lower and upper of (alpha - 1) / a. gain (3,): brightness of the frame classified last.
+    bounds: alpha below which a dark pixel is dark foreground, alpha up to which a bright one is a highlight.
     """
 
     def __init__(self, sample: Image, fps: float, settings: BackgroundSettings | None = None) -> None:
@@ -77,7 +81,8 @@ class Background:
         return classes
 
     def adapt(self, image: Image, classes: Image, protected: Bools | None = None) -> None:
-        """Learn from a classified frame; nothing where `protected` (H, W), the places of tracked people."""
+        """Learn from a frame (H, W, 3) BGR uint8 and its classes (H, W), which must be those of the last `classify`, as
+        the gain is; nothing where `protected` (H, W), the places of tracked people."""
         from tracking.detect import background_kernels
 
         check_frame(image, self.valid.shape)
@@ -92,7 +97,7 @@ class Background:
         )
 
     def _gain(self, image: Image) -> Floats:
-        """The gain over what was background in the last frame, else over all pixels, else the last one."""
+        """(3,) the gain over what was no foreground in the last frame, else over all pixels, else the last one."""
         seen = np.moveaxis(image[self._grid], -1, 0).astype(np.float32)
         mean = self.mean[:, *self._grid]
         found = gains.gain(seen, mean, self._calm)

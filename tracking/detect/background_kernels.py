@@ -17,7 +17,8 @@ from tracking.detect.classes import Floats
 def classify(
     i0: Image, i1: Image, i2: Image, E: Floats, V: Floats, s: Floats, b: Floats, g: Floats, limits: Floats, out: Image
 ) -> None:
-    """Fill `out` (N,) with classes; limits: (CD, lower, upper, dark, bright), see tracking.detect.background."""
+    """Fill `out` (N,) with classes; limits (5,): thresholds of CD / b, lower and upper of (alpha - 1) / a; dark, bright
+    of alpha; see tracking.detect.background. What is asked first in the paper is written last here."""
     one, top = np.float32(1.0), np.float32(255.0)
     tau, lower, upper, dark, bright = limits[0], limits[1], limits[2], limits[3], limits[4]
     g0, g1, g2 = g[0], g[1], g[2]
@@ -27,11 +28,11 @@ def classify(
         e0, e1, e2 = min(g0 * E0[n], top), min(g1 * E1[n], top), min(g2 * E2[n], top)
         w0, w1, w2 = one / V0[n], one / V1[n], one / V2[n]
         length2 = w0 * e0 * e0 + w1 * e1 * e1 + w2 * e2 * e2
-        alpha = (w0 * e0 * x0 + w1 * e1 * x1 + w2 * e2 * x2) / length2
+        alpha = (w0 * e0 * x0 + w1 * e1 * x1 + w2 * e2 * x2) / length2  # Horprasert et al., eq. 5
         d0, d1, d2 = x0 - alpha * e0, x1 - alpha * e1, x2 - alpha * e2
-        cd2 = w0 * d0 * d0 + w1 * d1 * d1 + w2 * d2 * d2
-        brightness = (alpha - one) * np.sqrt(length2) / s[n]
-        most = tau * b[n]
+        cd2 = w0 * d0 * d0 + w1 * d1 * d1 + w2 * d2 * d2  # eq. 6, squared
+        brightness = (alpha - one) * np.sqrt(length2) / s[n]  # eq. 9, with a_i = s_i / sqrt(length2)
+        most = tau * b[n]  # eq. 10: CD / b_i > tau, without a root or a division
         kind = np.uint8(0)
         kind = (np.uint8(1) if alpha > bright else np.uint8(4)) if brightness > upper else kind
         kind = (np.uint8(2) if alpha < dark else np.uint8(3)) if brightness < lower else kind
@@ -52,9 +53,11 @@ def adapt(
     slow: float,
     least: float,
 ) -> None:
-    """Move E (3, H, W) towards I / g in rows first, first + step, …: by `fast` where background, by `slow` elsewhere,
-    not where protected; V follows the squared residuals of background, never below `least`, E never below 1 (a black
-    pixel's brightness would have no measure). A clipped value that was to be clipped tells nothing.
+    """Move E and V (3, H, W) by a frame (H, W, 3) uint8 of gain g in rows first, first + step, …; not where protected.
+
+    E goes towards I / g by `fast` where background, by `slow` elsewhere, never below 1 (a black pixel's brightness
+    would have no measure); V follows the squared residuals of background, never below `least`. A clipped value that was
+    to be clipped tells nothing.
     """
     quick, late, floor = np.float32(fast), np.float32(slow), np.float32(least)
     for r in range(first, image.shape[0], step):

@@ -22,9 +22,7 @@ from tracking.detect import blob_kernels as kernels
 
 Labels = NDArray[np.int32]
 MAJORITY_M, OPEN_M, CLOSE_M = 0.08, 0.05, 0.15
-"""Windows of the three operations, m."""
-PERSON_M2 = 0.6
-"""Area of a person seen from the side, 1.7 m x 0.35 m."""
+"""Windows of the three operations, m: opening removes what is narrower than its own, closing fills narrower gaps."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -58,7 +56,7 @@ class Blobs(Frozen):
 
 
 def clean(foreground: Bools, px_per_m: float) -> Bools:
-    """(H, W) foreground after majority, opening and closing with windows that follow the scale."""
+    """(H, W) foreground after majority, opening and closing with windows that follow the scale, px per m (3.3)."""
     mask: NDArray[Any] = foreground.astype(np.uint8)
     size = odd(MAJORITY_M * px_per_m, 3)
     mask = (cv2.boxFilter(mask, cv2.CV_16U, (size, size), normalize=False) > size * size // 2).astype(np.uint8)
@@ -79,13 +77,9 @@ def disc(size: int) -> Image:
     return np.asarray(np.hypot(u, v) <= size / 2, np.uint8)
 
 
-def person_area(px_per_m: float) -> float:
-    """px^2 that a lone person covers, seen from the side."""
-    return PERSON_M2 * px_per_m**2
-
-
 def find(mask: Bools, min_area: float) -> Blobs:
-    """Connected regions (8 neighbours) of at least `min_area` px, largest first, then by their first pixels."""
+    """Connected regions of a mask (H, W), 8 neighbours, of at least `min_area` px^2, largest first, then by their first
+    pixels."""
     runs = kernels.runs(mask)
     region, count = kernels.connect(runs)
     area, corners = kernels.extents(runs, region, count)
@@ -109,7 +103,10 @@ def _moments(centre: Array, spread: Array) -> tuple[Array, Array]:
 
 
 def ellipses(n: Array, centre: Array, cov: Array) -> tuple[Array, Array]:
-    """(M, 5) x, y, h, w, theta and (M,) variance of theta, from the moments of n pixels."""
+    """(M, 5) z = x, y, h, w, theta (3.3; px, rad) and (M,) variance of theta, rad^2, from the moments of n (M,) pixels.
+
+    centre (M, 2) px, cov (M, 2, 2) px^2.
+    """
     half, differ = (cov[:, 0, 0] + cov[:, 1, 1]) / 2, (cov[:, 0, 0] - cov[:, 1, 1]) / 2
     root = np.hypot(differ, cov[:, 0, 1])
     major, minor = half + root, np.maximum(half - root, 0.0)

@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 from sim.types import Bools, Image
 
 Floats = NDArray[np.float32]
+# DARK: dark foreground. background_kernels writes these numbers out.
 BACKGROUND, FOREGROUND, DARK, SHADOW, HIGHLIGHT = range(5)
 
 

@@ -12,6 +12,7 @@ POINTS = 6000
 DARKEST, BRIGHTEST = 16.0, 235.0
 """Grey levels between which I and E must lie: below noise rules, above the camera clips."""
 FEWEST = 50
+"""Usable grid pixels without which a colour tells no gain."""
 
 
 def grid(high: int, wide: int) -> tuple[slice, slice]:

@@ -14,6 +14,7 @@ from tracking.detect.classes import BACKGROUND, FOREGROUND, SHADOW
 from tracking.detect.training import check, check_frame
 
 SHADOW_VALUE = 127
+"""What OpenCV writes where it finds a shadow; foreground is 255."""
 
 
 @dataclass(frozen=True)
@@ -28,7 +29,10 @@ class Mog2Settings(Config):
 
 
 class Mog2:
-    """The mixture model behind the interface of `Background`; everything is valid, highlights are foreground."""
+    """The mixture model behind the interface of `Background`; state: OpenCV's, per pixel.
+
+    valid (H, W): True everywhere. Highlights are foreground, nothing is dark foreground; there is no gain.
+    """
 
     def __init__(self, sample: Image, fps: float, settings: Mog2Settings | None = None) -> None:
         import cv2
@@ -53,7 +57,7 @@ class Mog2:
         return classes
 
     def adapt(self, image: Image, classes: Image, protected: Bools | None = None) -> None:
-        """Learn from a frame; where `protected`, the model is shown its own background."""
+        """Learn from a frame; `classes` are unused. Where `protected` (H, W), the model sees its own background."""
         check_frame(image, self.valid.shape)
         if protected is not None and protected.any():
             image = np.where(protected[..., None], self._model.getBackgroundImage(), image)

@@ -1,10 +1,11 @@
 """Robust training of the background model from a sample of frames that people may walk through.
 
-Per pixel and colour: the shortest interval that holds SHARE of the values finds the inliers; E and sigma are their mean
-and standard deviation, in turn, until they settle. (The median and MAD of a pixel where people stand about half of the
-time lie between them and the ground, with a sigma that hides both.)
-Per pixel: a_i and b_i are the RMS of alpha - 1 and of CD over the inliers (Horprasert et al. 2000, eqs 7, 8). a_i is
-kept as s_i = a_i sqrt(sum (E/sigma)^2), which is 1 for independent Gaussian noise and stays true when the gain changes.
+Equations are those of Horprasert et al. (2000). Per pixel and colour: the shortest interval that holds SHARE of the
+values finds the inliers; E and sigma are their mean and standard deviation (eqs 3, 4, of all frames there), in turn,
+until they settle. (The median and MAD of a pixel where people stand about half of the time lie between them and the
+ground, with a sigma that hides both.)
+Per pixel: a_i and b_i are the RMS of alpha - 1 and of CD over the inliers (eqs 7, 8). a_i is kept as
+s_i = a_i sqrt(sum (E/sigma)^2), which is 1 for independent Gaussian noise and stays true when the gain changes.
 Thresholds: quantiles of the normalised distortions at the detection rate (the paper's Fig. 2), over the pixels that
 nobody covered in any frame of the sample.
 """
@@ -23,27 +24,30 @@ from tracking.detect.classes import Floats
 from tracking.detect.gain import frame_gains
 
 LEAST_FRAMES = 10
+"""With fewer, SHARE of them are too few values to tell a spread by."""
 FLOOR = 2.0
 """Grey levels: least sigma, and least noise that the normalisers stand for. Compressed pictures rest and then
 jump by a level or two; with less, the thresholds stand for these jumps (OpenCV's MOG2 has 2, too)."""
 INLIER = 3.5
 """Robust sigmas within which a sample is background, for E, sigma and the normalisers."""
 SHARE = 0.35
-"""Of the sample: where the ground shows less often than this there is no background."""
+"""Of the sample: the ground must show as often as this to be found; else whatever rests so often is taken for it."""
 AS_SIGMA = 2.2
 """Standard deviations of a Gaussian per half length of the interval about its mean that holds SHARE."""
 ROUNDS = 10
 """At most; the inliers settle after three or four."""
 CLEAN = 6.0
-"""The same for thresholds, where the tail counts: a pixel with any sample beyond was covered, and is left out whole."""
+"""As INLIER, for thresholds, where the tail counts: a pixel with any value beyond was covered; it is left out whole."""
 WIDEST = 20.0
 """Grey levels: a pixel whose shortest interval is wider than this sigma's shows no background."""
 BINS, SPAN = 4000, 20.0
+"""Of the histograms: bins from -SPAN to SPAN, so wide that thresholds lie within; what is beyond counts at the ends."""
 
 
 @dataclass(frozen=True)
 class Trained:
-    """E, sigma (H, W, 3), s, b (H, W); valid (H, W); thresholds: CD, lower and upper brightness."""
+    """E, sigma (H, W, 3), grey levels; s, b (H, W), no unit; valid (H, W); thresholds of CD / b, of (alpha - 1) / a
+    the lower and the upper one."""
 
     mean: Floats
     sigma: Floats
@@ -103,7 +107,8 @@ def check_frame(image: Image, size: tuple[int, ...]) -> None:
 def thresholds(counts: Ints, rate: float) -> tuple[float, float, float]:
     """CD, lower, upper at the detection rate, from histograms (brightness, CD) over -SPAN..SPAN.
 
-    None is nearer than Gaussian noise of unit RMS would have it: a still picture has no tails.
+    None is nearer than Gaussian noise of unit RMS would have it: a still picture has no tails. Such brightness is
+    normal; CD^2 is then chi2 of 2 degrees of freedom over its mean 2, so that P(CD > t) = exp(-t^2).
     """
     edges = np.linspace(-SPAN, SPAN, BINS + 1)
     shares = [np.concatenate([[0], np.cumsum(c)]) / max(c.sum(), 1) for c in counts]

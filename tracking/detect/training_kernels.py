@@ -5,8 +5,89 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
-from sim.types import Bools, Image, Ints
+from sim.types import Array, Bools, Image, Ints
 from tracking.detect.classes import Floats
+
+
+@njit(cache=True, error_model="numpy")
+def sort(values: Floats) -> None:
+    """Sort a few values (K,) in place, by Shell's method."""
+    for gap in (13, 4, 1):
+        for t in range(gap, len(values)):
+            x, j = values[t], t
+            while j >= gap and values[j - gap] > x:
+                values[j] = values[j - gap]
+                j -= gap
+            values[j] = x
+
+
+@njit(cache=True, error_model="numpy")
+def shortest(values: Floats, held: int) -> tuple[int, float]:
+    """Of sorted values (K,): where the shortest interval that holds `held` of them begins, and its length."""
+    first, best = 0, values[held - 1] - values[0]
+    for t in range(1, len(values) - held + 1):
+        length = values[t + held - 1] - values[t]
+        if length < best:
+            first, best = t, length
+    return first, best
+
+
+@njit(cache=True, error_model="numpy")
+def inliers(value: Floats, m: Array, sd: Array, inlier: Bools, rules: tuple[float, float, float, int]) -> bool:
+    """Settle E and sigma, m and sd (3,), and which of a pixel's values (K, 3) are `inlier` (K,), all in place.
+
+    rules: least sigma, sigmas of inliers and of clean pixels, rounds. Is the pixel clean?
+    """
+    least, inside, untouched, rounds = rules
+    clean = True
+    inlier[:] = False
+    for _ in range(rounds):
+        clean, settled = True, True
+        n, sums, squares = 0, np.zeros(3), np.zeros(3)
+        for t in range(len(value)):
+            away = 0.0
+            for k in range(3):
+                away = max(away, abs(value[t, k] - m[k]) / sd[k])
+            settled = settled and inlier[t] == (away <= inside)
+            inlier[t] = away <= inside
+            clean = clean and away <= untouched
+            if inlier[t]:
+                n += 1
+                for k in range(3):
+                    d = value[t, k] - m[k]
+                    sums[k] += d
+                    squares[k] += d * d
+        n = max(n, 1)
+        for k in range(3):
+            shift = sums[k] / n
+            m[k] = max(m[k] + shift, 1.0)  # E (eq. 3) and sigma (eq. 4) of the inliers
+            sd[k] = max(np.sqrt(max(squares[k] / n - shift * shift, 0.0)), least)
+        if settled:
+            break
+    return clean
+
+
+@njit(cache=True, error_model="numpy")
+def distortions(value: Floats, m: Array, sd: Array, inlier: Bools, alpha: Array, cd: Array) -> tuple[float, float]:
+    """Fill alpha and cd (K,): (alpha - 1) |E / sigma| and CD of a pixel's values (K, 3); their RMS over the inliers."""
+    norm = 0.0
+    for k in range(3):
+        norm += (m[k] / sd[k]) ** 2
+    n, sa, sb = 0, 0.0, 0.0
+    for t in range(len(value)):
+        dot = 0.0
+        for k in range(3):
+            dot += value[t, k] * m[k] / (sd[k] * sd[k])
+        a, q = dot / norm, 0.0  # alpha (eq. 5) and CD^2 (eq. 6)
+        for k in range(3):
+            q += ((value[t, k] - a * m[k]) / sd[k]) ** 2
+        alpha[t], cd[t] = (a - 1) * np.sqrt(norm), np.sqrt(q)
+        if inlier[t]:
+            n += 1
+            sa += alpha[t] * alpha[t]
+            sb += q
+    n = max(n, 1)
+    return np.sqrt(sa / n), np.sqrt(sb / n)
 
 
 @njit(cache=True, error_model="numpy")
@@ -23,9 +104,11 @@ def learn(
     valid: Bools,
     counts: Ints,
 ) -> None:
-    """Fill the model of (K, H, W, 3), and histograms `counts` (inlier or clean, brightness or CD, bins).
+    """Fill the model of (K, H, W, 3) uint8, and histograms `counts` (2 inlier or clean, 2 brightness or CD, bins).
 
-    rules: sigmas per half length, least and widest sigma, sigmas of inliers and of clean pixels, rounds.
+    gains (K, 3): brightness of each frame, which it is divided by. held: values in the shortest interval. rules: sigmas
+    per half length, least and widest sigma, sigmas of inliers and of clean pixels, rounds. bins: number, span.
+    Equations are those of Horprasert et al. (2000).
     """
     as_sigma, least, widest, inside, untouched, rounds = rules
     number, span = bins
@@ -41,70 +124,22 @@ def learn(
                 for t in range(frames):
                     x = np.float32(sample[t, r, c, k]) / gains[t, k]
                     value[t, k] = order[t] = x
-                for gap in (13, 4, 1):
-                    for t in range(gap, frames):
-                        x, j = order[t], t
-                        while j >= gap and order[j - gap] > x:
-                            order[j] = order[j - gap]
-                            j -= gap
-                        order[j] = x
-                first, best = 0, order[held - 1] - order[0]
-                for t in range(1, frames - held + 1):
-                    length = order[t + held - 1] - order[t]
-                    if length < best:
-                        first, best = t, length
+                sort(order)
+                first, best = shortest(order, held)
                 m[k], sd[k] = order[first + held // 2], max(0.5 * best * as_sigma, least)
                 good = good and sd[k] <= widest
-            clean = True
-            inlier[:] = False
-            for _ in range(rounds):
-                clean, settled = True, True
-                n, sums, squares = 0, np.zeros(3), np.zeros(3)
-                for t in range(frames):
-                    away = 0.0
-                    for k in range(3):
-                        away = max(away, abs(value[t, k] - m[k]) / sd[k])
-                    settled = settled and inlier[t] == (away <= inside)
-                    inlier[t] = away <= inside
-                    clean = clean and away <= untouched
-                    if inlier[t]:
-                        n += 1
-                        for k in range(3):
-                            d = value[t, k] - m[k]
-                            sums[k] += d
-                            squares[k] += d * d
-                n = max(n, 1)
-                for k in range(3):
-                    shift = sums[k] / n
-                    m[k] = max(m[k] + shift, 1.0)
-                    sd[k] = max(np.sqrt(max(squares[k] / n - shift * shift, 0.0)), least)
-                if settled:
-                    break
-            norm = 0.0
-            for k in range(3):
-                norm += (m[k] / sd[k]) ** 2
-            n, sa, sb = 0, 0.0, 0.0
-            for t in range(frames):
-                dot = 0.0
-                for k in range(3):
-                    dot += value[t, k] * m[k] / (sd[k] * sd[k])
-                a, q = dot / norm, 0.0
-                for k in range(3):
-                    q += ((value[t, k] - a * m[k]) / sd[k]) ** 2
-                alpha[t], cd[t] = (a - 1) * np.sqrt(norm), np.sqrt(q)
-                if inlier[t]:
-                    n += 1
-                    sa += alpha[t] * alpha[t]
-                    sb += q
-            n = max(n, 1)
+            clean = inliers(value, m, sd, inlier, (least, inside, untouched, rounds))
+            sa, sb = distortions(value, m, sd, inlier, alpha, cd)
             noise = 3 * least / (sd[0] + sd[1] + sd[2])
-            sa, sb = max(np.sqrt(sa / n), noise), max(np.sqrt(sb / n), np.sqrt(2.0) * noise)
+            # s = a |E / sigma| (eq. 7) and b (eq. 8); of noise `least` alone s would be `noise`, and b sqrt(2) times it
+            sa, sb = max(sa, noise), max(sb, np.sqrt(2.0) * noise)
             for k in range(3):
                 mean[r, c, k], sigma[r, c, k] = m[k], sd[k]
             s[r, c], b[r, c], valid[r, c] = sa, sb, good
             if not good:
                 continue
             for t in range(frames):
+                # bins of (alpha - 1) / a (eq. 9) and CD / b (eq. 10)
                 i = int((alpha[t] / sa + span) / (2 * span) * number)
                 j = int((cd[t] / sb + span) / (2 * span) * number)
                 if inlier[t]:

@@ -1,18 +1,23 @@
 """`blob`: gates, association, a bank of Kalman filters and track management, on boxes or from pixels.
 
 Gonzalez, Rowe, Andrade, Villanueva, "Efficient management of multiple agent tracking through observation handling",
-2006. State per track: (x, x', y, y', h, h', w, w') in image px, its covariance in m^2, constant speed with white
-acceleration (tracking.kalman). The measurement is (x, y, h, w), a box's centre, height and width; a box has no axis, so
-the paper's angle is measured from pixels only, by a blob's ellipse (tracking.papers.blob_pixels, with what is ours).
+2006. State per track: (x, x', y, y', h, h', w, w') in image px and s, its covariance in m and s, constant speed with
+white acceleration (tracking.kalman). The measurement is (x, y, h, w), a box's centre, height and width; a box has no
+axis, so the paper's angle, its ninth state, is measured from pixels only, by a blob's ellipse; h and w are then its
+axes (tracking.papers.blob_pixels, with what is ours).
 
-    gate       d^2 = (z - z_pred)' S^-1 (z - z_pred) <= chi2_4(gate)              (eq. 9; d^2, not d)
+    predict    x = A x, P = A P A' + Q                                             (eqs 1, 2; tracking.kalman)
+    gate       z_pred = C A x, d^2 = (z - z_pred)' S^-1 (z - z_pred) <= q          (eqs 8, 9; d^2, not d, is chi2)
+               q the quantile `gate` of chi2 of 4 degrees of freedom, 5 with the angle  (eq. 10)
     associate  each measurement to the nearest track in whose gate it lies         (4.4)
-    manage     rho = sqrt|S| / asymptote: confirm low, delete high                 (4.5; tracking.lifecycle)
+    update     y, S, K, x, P                                                       (eqs 3 to 7; tracking.kalman)
+    manage     rho = sqrt|S| / asymptote: confirm low, delete high                 (4.5, 5; tracking.lifecycle)
 
 Departures, all ours:
 - Persons only. Lengths are metres: a track's scale is px per metre, the longer side of its box being 1.7 m (half to
   twice the sequence's), so that near and far people have the same noise in metres; from straight above it is the
   camera's. Accelerations are densities.
+- rho is that of x, y, h, w; the angle's S is no part of it.
 - association = "optimal": one to one, least total cost d^2 + 2 ln rho, which is ln |S| in metres less a constant (a
   track that has long been blind pays for its wide gate). A track left out costs the gate + 2 ln rho where a track dies
   at the latest, whoever else there is, so that a pair in a gate, alone, is better than none.
@@ -56,7 +61,7 @@ class Blob:
         self.config = config or BlobConfig()
 
     def reset(self, context: Context, seed: int) -> None:
-        """Forget everything; `seed` is unused, nothing here is random."""
+        """Forget everything; with a background sample pixels will be tracked, else boxes. `seed` is unused."""
         c = self.config
         if context.image_size is None and context.background is not None:
             context = context.replace(image_size=context.background.shape[2:0:-1])

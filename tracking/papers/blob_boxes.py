@@ -1,4 +1,7 @@
-"""The cascade of `blob` on boxes: gates, association, pieces, update, management; see tracking.papers.blob."""
+"""The cascade of `blob` on boxes: gates (4.3), association (4.4), pieces, update (4.2), management (4.5).
+
+Sections are those of Gonzalez et al. (2006); see tracking.papers.blob. z (M, 4): x, y, h, w in px, score (M,).
+"""
 
 from __future__ import annotations
 
@@ -23,7 +26,7 @@ class Boxes:
         self.config, self.people = config, people
         self.noise, self.asymptote = people.noise, people.asymptote
         shares = 1 - np.array([config.gate, config.orphan_gate, config.confirm_gate])
-        self.gate, self.orphan_gate, self.confirm_gate = chdtri(4, shares)
+        self.gate, self.orphan_gate, self.confirm_gate = chdtri(4, shares)  # d^2 at these shares (eq. 10)
         self.blindest = 2 * float(np.log(max(people.excused_death, people.birth_rho)))
 
     def step(self, frame: Frame, detections: Detections | None) -> None:
@@ -59,7 +62,8 @@ class Boxes:
         return blob_measure.from_boxes(box), score
 
     def _associate(self, z: Array, score: Array) -> tuple[Ints, Ints, Bools, Array]:
-        """Tracks and measurements that belong together, one to one; which measurements (M,) are free; distances."""
+        """Tracks and measurements (K,) that belong together, one to one; which measurements (M,) are free; distances
+        d^2 (N, M) (eq. 9)."""
         people, free = self.people, np.ones(len(z), bool)
         if not len(z) or not len(people.id):
             return np.zeros(0, np.int64), np.zeros(0, np.int64), free, np.zeros((len(people.id), len(z)))
@@ -76,6 +80,7 @@ class Boxes:
         return rows, columns, free, d2
 
     def _pairs(self, cost: Array) -> tuple[Ints, Ints]:
+        """Tracks and measurements (K,) one to one; cost (N, M): d^2 within gates, inf elsewhere."""
         if self.config.association == "nearest":
             return blob_measure.best_pieces(*assign.nearest(cost), cost)
         blind = np.minimum(2 * np.log(self.people.rho), self.blindest)
@@ -156,7 +161,7 @@ class Boxes:
         return np.asarray(owner)
 
     def _away(self, rows: Ints, measured: Array) -> Array:
-        """(K,) squared distances of tracks and their measurements."""
+        """(K,) squared distances (eq. 9) of tracks `rows` (K,) and their measurements (K, 4)."""
         people = self.people
         y = (measured - people.bank[kalman.PLACE, rows]) / people.scale[rows, None]
         return np.asarray((y * y / (people.bank[kalman.VAR, rows] + self.noise)).sum(1))

@@ -121,7 +121,8 @@ class BlobConfig(BackgroundSettings):
     )
 
     def dynamics(self, fps: float) -> Dynamics:
-        """The nominal filter of (x, y, h, w); accelerations are spectral densities, so sigma = noise / sqrt(dt)."""
+        """The nominal filter of (x, y, h, w): Q, R and a newborn's P. Accelerations are spectral densities, so
+        sigma = noise / sqrt(dt)."""
         root = np.sqrt(fps)
         accel, size = self.accel_noise * root, self.size_accel_noise * root
         made = Dynamics(

@@ -6,11 +6,12 @@ import numpy as np
 
 from sim.types import Array, Bools, Ints
 from tracking.detect.blobs import Labels
+from tracking.papers import blob_settle_kernels as moves
 from tracking.papers import blob_template_kernels as kernels
 from tracking.papers.blob_template_kernels import Cover, kernel
 
 LOWEST = 0.98  # quantile of a part's rows: where it stands
-REACH = kernels.MOST_STEPS + kernels.SWEEPS * kernels.FINE_STEPS  # coarse steps that settle takes, and some to spare
+REACH = moves.MOST_STEPS + moves.SWEEPS * moves.FINE_STEPS  # coarse steps that settle takes, and some to spare
 ROUNDING = 1e-9
 
 
@@ -80,7 +81,7 @@ def enter(
             break
         one, far = guesses[first : first + count], spread[first : first + count]
         first += count
-        at = kernels.settle(foreground, cover, one, far, near_first(one), nats)
+        at = moves.settle(foreground, cover, one, far, near_first(one), nats)
         alone = kernels.supports(foreground, cover, at, 1)
         kernels.paint_all(cover, at, -1)
         value = explained(foreground, cover, at) / person - count * support
@@ -96,7 +97,7 @@ def within_reach(foreground: Bools, cover: Cover, guesses: Array) -> int:
     low, high, left, right = np.inf, -np.inf, np.inf, -np.inf
     for k in range(len(guesses)):
         x, foot, h, w = guesses[k]
-        far = REACH * max(h / kernels.STEPS_PER_HEIGHT, 1.0)
+        far = REACH * max(h / moves.STEPS_PER_HEIGHT, 1.0)
         low, high = min(low, foot - h - far), max(high, foot + far)
         left, right = min(left, x - w / 2 - far), max(right, x + w / 2 + far)
     found = 0

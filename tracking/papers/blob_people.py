@@ -1,8 +1,9 @@
 """The tracks of `blob` from pixels: the population of boxes, and for each track an angle and a nominal covariance.
 
-Where a person is partly hidden the measurement is noisier than R; the paper's rho, which counts measurements, is then
-taken from a second covariance that knows the nominal R only. The state's h, w are the ellipse's axes and theta the
-angle of the longer one, so that a track's upright box is the box round its ellipse.
+Where a person is partly hidden the measurement is noisier than R, and axes are drawn to the expected ones; the paper's
+rho, which counts measurements (4.5), is therefore taken from a second covariance that knows the nominal R only. The
+state's h, w are the ellipse's axes, the longer one first as they are measured, and theta is the direction of h from the
+abscissa, v down, modulo pi: a random walk (4.1). A track's upright box is the box round its ellipse.
 """
 
 from __future__ import annotations
@@ -16,7 +17,7 @@ from tracking.papers.blob_config import BlobConfig
 from tracking.papers.blob_tracks import Population
 
 SETTLING = 0.5  # s in which the axes return to the expected ones
-HEADING = 6.0  # times faster than they lean people turn: from straight above the direction is the heading's
+HEADING = 6.0  # times faster than they lean people turn: from straight above the direction turns with the heading
 
 
 class People(Population):
@@ -48,20 +49,20 @@ class People(Population):
         super().keep(rows)
 
     def give_birth(self, z: Array, score: Array, t: float) -> None:
-        """A tentative track for each z (K, 5)."""
+        """A tentative track for each z (K, 5), its direction hardly known, so that the next one counts for more."""
         super().give_birth(z[:, :4], score, t)
-        new = np.stack([z[:, 4], np.full(len(z), np.radians(30.0) ** 2)])
+        new = np.stack([z[:, 4], np.full(len(z), kalman.VAGUE)])
         self.angle = np.concatenate([self.angle, new], 1)
         self.nominal = np.concatenate([self.nominal, self.bank[:, self.bank.shape[1] - len(z) :]], 1)
 
     def turned(self, z: Array, angle_var: Array) -> Array:
-        """(N, M) squared distances y^2 / S of tracks' directions and axes z (M,); 0 for those without a direction."""
+        """(N, M) the direction's term y^2 / S of d^2 (eq. 9); z (M,) rad, angle_var (M,) rad^2; 0 for z without one."""
         s = self.angle[1][:, None] + angle_var
         turn = kalman.angle_innovation(z, self.angle[0][:, None])
         return np.where(kalman.directed(angle_var), turn * turn / s, 0.0)
 
     def update(self, rows: Ints, z: Array, noise: Array, angle_var: Array) -> Array:
-        """Measure tracks at z (K, 5) with variances noise (K, 4) m^2 and angle_var (K,); squared distances (K,)."""
+        """Measure tracks at z (K, 5) with R noise (K, 4) m^2 and angle_var (K,) rad^2; d^2 (K,), direction included."""
         terms = kalman.update(self.bank, rows, z[:, :4], noise)
         turn = np.diagonal(self.turned(z[:, 4], angle_var)[rows])
         kalman.update(self.nominal, rows, z[:, :4], self.noise)

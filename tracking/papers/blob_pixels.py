@@ -1,11 +1,15 @@
-"""`blob` from pixels: the paper's cascade on blobs, and beyond it people who share a blob (ours).
+"""`blob` from pixels: the cascade of Gonzalez et al. (2006) on blobs, and beyond it people who share a blob (ours).
 
 classify, clean, find                                                       3   (tracking.detect)
-a blob of one person's size: its ellipse z = (x, y, h, w, theta), gates, association, update      4.2 to 4.4
+a blob of one person's size: its ellipse z = (x, y, h, w, theta), gates, association, update      3.3, 4.2 to 4.4
 the other foreground: split among the tracks expected there, by templates   ours (tracking.papers.blob_template)
 what is left and as large as a person: new tracks                           ours (tracking.papers.blob_entry)
-rho, births, deaths                                                         4.5
+axes return to those of a person at his place, where it is known            ours (tracking.papers.blob_people)
+rho, births, deaths                                                         4.5, 5
 pixels of confirmed tracks are kept out of the background's adaptation      ours
+
+A blob that is given to no track starts one, even in the gate of a track that a nearer blob was given to: unlike boxes,
+blobs have no `orphan_gate` (in the paper's frame 367 none starts).
 """
 
 from __future__ import annotations
@@ -25,12 +29,12 @@ from tracking.papers.blob_size import PersonSize
 from tracking.papers.blob_template import Mask, painted
 
 SHARED = 0.35  # share of a predicted box in a blob's from which on the blob may be this track's
-LEAST_AREA, LEAST_PIXELS = 0.0125, 12.0  # m^2 at the scale, px: smaller blobs are noise
+LEAST_AREA, LEAST_PIXELS = 0.0125, 12.0  # m^2 at the scale, px^2: smaller blobs are noise
 COARSE = 18.0  # m that an image is high, while no scale is known
-UPRIGHT = 25.0  # deg, deviation of the direction of somebody measured by a template, which stands upright
+UPRIGHT = 25.0  # deg, standard deviation of the direction of somebody measured by a template, which stands upright
 LOOKED = 25  # frames of the background sample in which lone blobs are looked for
 EXTENT = 0.75, 1.3  # of the expected size, what a template may have
-BLIND = 25.0  # variance of a template's height and width relative to a lone blob's: they are expected, not seen
+BLIND = 25.0  # variance of a template's height and width relative to a lone blob's: they are predicted, not seen
 LEAST_SHOWN = 0.2  # a person of whom less shows is measured as if so much did
 
 
@@ -51,6 +55,7 @@ class Pixels:
             self.background = Background(context.background, context.fps, config)
         self.scale = context.px_per_m
         self._look_at_sample(context.background)
+        # d^2 of 4 and 5 degrees of freedom, without and with a direction, at these shares (eq. 10)
         self.gates = chdtri(np.array([4, 5]), 1 - config.gate)
         self.confirm_gates = chdtri(np.array([4, 5]), 1 - config.confirm_gate)
         self.blindest = 2 * float(np.log(max(people.excused_death, people.birth_rho)))
@@ -65,15 +70,18 @@ class Pixels:
         self._take_scale()
 
     def _take_scale(self) -> None:
+        """The learned px per m, where the context has none."""
         if np.isnan(self.context.px_per_m):
             self.scale = self.size.px_per_m
             self.people.context = self.context.replace(px_per_m=self._known_scale())
 
     def _foreground(self, image: Image) -> tuple[Image, Bools]:
+        """(H, W) classes, and foreground after cleaning (3.2, 3.3)."""
         classes = self.background.classify(image)
         return classes, detect.clean(foreground(classes), self._known_scale())
 
     def _find(self, mask: Bools) -> detect.Blobs:
+        """The blobs that are no noise (3.3)."""
         return detect.find(mask, max(LEAST_AREA * self._known_scale() ** 2, LEAST_PIXELS))
 
     def _known_scale(self) -> float:
@@ -109,6 +117,7 @@ class Pixels:
         return None
 
     def _unseen(self, t: float) -> None:
+        """Nobody was measured: gain 0 for all (4.4)."""
         people = self.people
         people.mark(np.zeros(0, np.int64), np.zeros(0, bool), np.zeros(0))
         people.bury(t)
@@ -123,6 +132,7 @@ class Pixels:
         return self._boxes(self.people.uprights()[rows])
 
     def _measure(self, t: float, mask: Bools, found: detect.Blobs) -> None:
+        """Associate, split, update and manage by the cleaned foreground (H, W) and its blobs."""
         people, c = self.people, self.config
         expected = people.uprights()
         split = c.split and self.size.reliable
@@ -165,23 +175,22 @@ class Pixels:
         return np.asarray(self.size.one(box, found.ellipse) & ~self._cut(box) & ~self._several(box, expected))
 
     def _boxes(self, upright: Array) -> Array:
-        """(N, 4) the boxes of people whose ellipses have these upright boxes."""
+        """(N, 4) x, y, h, w: boxes of people whose ellipses have these upright boxes (N, 4)."""
         return np.concatenate([upright[:, :2], upright[:, 2:] * self.size.loose], 1)
 
     def _ellipses(self, place: Array) -> Array:
-        """(N, 5) the ellipses of people in upright boxes."""
+        """(N, 5) x, y, h, w, theta: the ellipses of people in upright boxes (N, 4) x, y, h, w."""
         return blob_measure.lying(np.concatenate([place[:, :2], place[:, 2:] / self.size.loose], 1))
 
     def _several(self, box: Array, expected: Array) -> Bools:
-        """(M,) blobs in which several confirmed tracks are expected."""
+        """(M,) blobs, boxes ltwh (M, 4), in which several confirmed tracks are expected; expected (N, 4) x, y, h, w."""
         sure = expected[self.people.confirmed]
         places = np.column_stack([box[:, 0] + box[:, 2] / 2, box[:, 1] + box[:, 3] / 2, box[:, 3], box[:, 2]])
         return np.asarray((blob_measure.covered(sure, places) >= SHARED).sum(0) > 1)
 
     def _associate(self, z: Array, angle_var: Array) -> tuple[Ints, Ints]:
-        """Tracks and ellipses that belong together; 5 degrees of freedom where both have a direction, else 4.
-
-        From straight above 4: people turn on the spot.
+        """Tracks and ellipses z (M, 5) that belong together: gates of 5 degrees of freedom where the ellipse has a
+        direction, else of 4 (eqs 9, 10). From straight above of 4 always: people turn on the spot.
         """
         people = self.people
         if not len(z) or not len(people.id):
@@ -198,7 +207,10 @@ class Pixels:
         return assign.optimal(cost + blind[:, None], float(self.gates[1]) + self.blindest)
 
     def _split(self, scene: Mask, expected: Array, rows: Ints, sure: bool) -> tuple[Ints, Array, Array, Array]:
-        """Tracks measured by templates: rows, z (K, 5), noise (K, 4), support (K,); confirmed ones or the others."""
+        """Tracks but `rows` measured by templates, the confirmed (`sure`) or the others: rows (K,), z (K, 5), R (K, 4)
+        m^2, support (K,). R grows with the inverse square of the share `shown`; h and w, little but the track's own,
+        get BLIND times it.
+        """
         people, c = self.people, self.config
         open_rows = np.setdiff1d(np.flatnonzero(people.confirmed == sure), rows)
         at = _templates(self._boxes(expected[open_rows]))

@@ -1,9 +1,10 @@
 """How large a person is where: box height and width at every foot point of the image, for `blob` from pixels (ours).
 
 With a camera: the box of an upright person of mean build (1.7 m) standing there, turned either way. Without: learned
-from lone blobs, h = a + b v over the row v of their lower edge, as a pinhole without roll has it, by least squares in
-relative errors with Cauchy weights (a blob of several people, or of a part, is an outlier); widths are a share of it.
-The slope has a prior, since blobs of one row say nothing about it. A learned size is `reliable` once enough lone blobs
+from lone blobs, h = a + b v over the row v of their lower edge, as a pinhole without roll has it: of many lines the one
+on which most heights agree, then least squares of relative errors among those within WIDTH of it (a blob of several
+people, or of a part, is an outlier); widths are a share of it. Votes prefer the slope SLOPE, since blobs of one row say
+nothing about it. A learned size is `reliable` once enough lone blobs
 agree; before that nothing is split and every blob counts as one person, as in the paper.
 From straight above everybody is the same ellipse, turned as he walks: measured are a blob's axes, not its box's sides.
 """
@@ -22,8 +23,8 @@ STOUT = 2.0  # by how much the width over height of a blob that may be somebody 
 UNLIKE = 1.4  # by how much his height differs at most from what a camera leads to expect
 KEPT = 400  # lone blobs remembered
 ENOUGH = 12  # lone blobs that make a learned size reliable ...
-RENEW = 0.05  # share of new ones from which on the line is drawn anew
 AGREE = 0.3  # ... where they are this share of all
+RENEW = 0.05  # share of new ones from which on the line is drawn anew
 LEVELS = np.geomspace(0.65, 1.55, 19)  # of the median height, and
 SLOPES = np.linspace(0.0, 2.4, 17)  # growth per row, times the middle row: where the densest heights are looked for
 SLOPE, DOUBT = 0.7, 0.02  # a slope to expect, and the share of votes that unit distance from it costs
@@ -31,9 +32,7 @@ WIDTH = 0.12  # relative deviation within which heights agree
 FACTORS = np.array([0.9, 0.6]), np.array([1.1, 1.25])  # least and most by which people are higher and wider
 NARROW = 0.7  # of the votes for the most frequent width, what a smaller one needs to be taken instead
 PRIOR = 2.0  # people who count for the factors 1
-EATEN = (
-    1.3  # px of a person's height, at the head, that blur, majority and opening leave out: median of rendered scenes
-)
+EATEN = 1.3  # px of a person's height, at the head, that blur and cleaning leave out: median of rendered scenes
 LOOSE = 1.0, 1.1  # height and width of a person's box over those of the box round the ellipse of his pixels: a prior
 SMALLEST = 12.0  # px: people less high than this cannot be told from noise,
 FLAT = 6.0  # ... and from above people less wide
@@ -44,9 +43,11 @@ MARGIN = 0.25  # of the image, beyond which no foot is looked for
 
 
 class PersonSize:
-    """State: a camera's table (2, V, U) of heights and widths, or the line through the lone blobs seen.
+    """State: a camera's table (2, V, U) of heights and widths, or the line through the lone blobs seen; px.
 
     seen (K, 4): these blobs' foot u, v, height, width. factor (2,): how much higher and wider than expected they are.
+    excess (K, 2): their height and width over those of the box round their ellipse; loose (2,): the median.
+    line: a, b. agreed: how many heights agree. unused: blobs seen since the last fit.
     flat (2,): from straight above height and width are the axes of a person's ellipse, px, instead; else None.
     """
 
@@ -82,7 +83,7 @@ class PersonSize:
         return np.sqrt(np.square(size).mean(1, keepdims=True) * np.ones(2)) if self.above else size
 
     def axes(self, foot: Array) -> Array:
-        """(N, 2) the same of the ellipse of a person's pixels, from above the longer axis first."""
+        """(N, 2) px: height and width of the ellipse of a person's pixels; from above its axes, the longer first."""
         return self._known(foot) if self.above else self._known(foot) / self.loose
 
     def _known(self, foot: Array) -> Array:
@@ -161,7 +162,7 @@ def _feet(box: Array) -> Array:
 
 
 def _densest(value: Array, count: Array, least: float = 1.0) -> tuple[float, Bools]:
-    """The value within relative WIDTH of which most counts lie, PRIOR of them at 1; which ones (N,) these are.
+    """The value (N,) within relative WIDTH of which most counts lie, PRIOR more at 1; which ones (N,) lie there.
 
     least: the smallest value that has this share of the most (one person is narrower than two).
     """

@@ -10,8 +10,8 @@ from sim.types import Array
 
 @njit(cache=True)
 def look_up(table: Array, at: Array) -> Array:
-    """(N, C) bilinear values of a table (C, V, U) at nodes' coordinates (u, v) (N, 2), clamped to its ends; where one
-    is no number, that at 0."""
+    """(N, C) bilinear values of a table (C, V, U) at nodes' coordinates (u, v) (N, 2), clamped to its ends in u
+    and v; a coordinate that is no number counts as 0."""
     last_u, last_v = table.shape[2] - 1.001, table.shape[1] - 1.001
     found = np.empty((len(at), table.shape[0]))
     for n in range(len(at)):

@@ -3,7 +3,7 @@
 A template is an upright ellipse in a box: x (its middle), foot (lower edge), h, w in px. Every foreground pixel that
 some template covers counts 1, every background pixel against 1/2, once however many templates cover it: so who is
 partly hidden is measured by what shows of him, and a gap in the mask (a lamp post, camouflage) costs less than a second
-person. Moving one template while the others rest needs sums over its rows only (tracking.papers.blob_template_kernels).
+person. Moving one template while the others rest needs sums over its rows only (tracking.papers.blob_settle_kernels).
 
     support  of a template = (sum over the pixels that it alone covers) / its area in the image, at most 1
     settle   each in turn to the place of largest evidence * support - d^2 / 2, d from where it was expected
@@ -15,6 +15,7 @@ import numpy as np
 
 from sim.types import Array, Bools, Ints
 from tracking.detect.blobs import Labels
+from tracking.papers import blob_settle_kernels as moves
 from tracking.papers import blob_template_kernels as kernels
 from tracking.papers.blob_template_kernels import ELLIPSE as ELLIPSE
 
@@ -33,24 +34,16 @@ class Mask:
         which[rows + 1] = True
         kernels.close(self.cover, label, which)
 
-    def paint(self, templates: Array, more: int = 1) -> None:
-        """Add (or take away) templates (K, 4)."""
-        kernels.paint_all(self.cover, templates, more)
-
     def left(self) -> Bools:
         """(H, W) the foreground that nothing explains."""
         return np.asarray(self.foreground & (self.cover == 0))
-
-    def support(self, templates: Array) -> Array:
-        """(K,) support of templates that are not painted."""
-        return kernels.supports(self.foreground, self.cover, templates, 0)
 
     def settle(self, templates: Array, spread: Array, evidence: float) -> Array:
         """Places (K, 4) of all templates together, near people (low feet) first; painted when done.
 
         spread (K, 2): standard deviation px of each one's expected x and foot; evidence: nats for full support.
         """
-        return kernels.settle(self.foreground, self.cover, templates, spread, near_first(templates), evidence)
+        return moves.settle(self.foreground, self.cover, templates, spread, near_first(templates), evidence)
 
     def prune(self, templates: Array, least: float, *, pieces: bool = False) -> Ints:
         """Rows of painted templates with support `least` when those with too little are taken away, the weakest first.
@@ -65,12 +58,8 @@ class Mask:
         """(K,) support of painted templates, each by the pixels that no other covers."""
         return kernels.supports(self.foreground, self.cover, templates, 1)
 
-    def pieces(self, templates: Array) -> Array:
-        """(K,) share of foreground in the pixels that no other painted template covers; 0 where these are few."""
-        return kernels.pieces(self.foreground, self.cover, templates)
-
     def shown(self, templates: Array) -> Array:
-        """(K,) share of each painted template that no template with a lower foot, and nothing explained, covers."""
+        """(K,) share of each template that none of these with a lower foot, and nothing explained, covers."""
         return kernels.shown(self.cover, templates, near_first(templates))
 
 

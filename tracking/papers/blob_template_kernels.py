@@ -15,16 +15,11 @@ from sim.types import Array, Bools, Ints
 from tracking.detect.blobs import Labels
 
 Cover = NDArray[np.int16]
-Whole = NDArray[np.int32]
 HALVES, EMPTY = 2, -1  # what a foreground pixel is worth and a background pixel costs
 EXPLAINED = 1000
 ELLIPSE = np.pi / 4  # share of its box that an ellipse fills
 LEAST_INSIDE = 0.3  # a template further out of the image than this counts as so large
 BARE = 0.1  # share of a template that no other covers below which he is hidden, not seen
-STEPS_PER_HEIGHT = 24  # the coarse grid of moves
-MOST_STEPS = 8
-FINE_STEPS = 2
-SWEEPS = 3
 
 kernel = njit(cache=True, error_model="numpy")
 
@@ -34,14 +29,6 @@ def span(x: float, half: float, width: int) -> tuple[int, int]:
     """Columns whose middle lies within `half` of x, clipped to the image: left, right (excluded)."""
     left, right = int(np.ceil(x - half - 0.5)), int(np.floor(x + half - 0.5)) + 1
     return min(max(left, 0), width), min(max(right, 0), width)
-
-
-@kernel
-def span_within(x: float, half: float, low: np.int32, high: np.int32) -> tuple[np.int32, np.int32]:
-    """The same within the columns low..high and counted from low; both ends are equal where there are none."""
-    left, right = np.int32(np.ceil(x - half - 0.5)), np.int32(np.floor(x + half - 0.5)) + np.int32(1)
-    left = min(max(left, low), high)
-    return left - low, min(max(right, left), high) - low
 
 
 @kernel
@@ -165,94 +152,6 @@ def shown(cover: Cover, templates: Array, order: Ints) -> Array:
                     hidden[row, column] = True
         share[k] = min(bare / area(templates[k], cover.shape[0], cover.shape[1]), 1.0)
     return share
-
-
-@kernel
-def moved(foreground: Bools, cover: Cover, template: Array, steps: int, step: float) -> Whole:
-    """(2 steps + 1, 2 steps + 1) what uncovered pixels of the template are worth, in halves, when it is moved by
-    multiples of step (rows: down). Each of its rows takes one difference of the image row's running sum."""
-    x, foot, h, w = template
-    reach = steps * step
-    low, high = max(int(foot - h - reach) - 1, 0), min(int(foot + reach) + 2, cover.shape[0])
-    left, right = max(int(x - w / 2 - reach) - 1, 0), min(int(x + w / 2 + reach) + 2, cover.shape[1])
-    n = 2 * steps + 1
-    found = np.zeros((n, n), np.int32)
-    if high <= low or right <= left:
-        return found
-    middle, edges = x + step * np.arange(-steps, steps + 1), (np.int32(left), np.int32(right))
-    begin, end = np.empty(n, np.int32), np.empty(n, np.int32)
-    sums = running(foreground[low:high, left:right], cover[low:high, left:right])
-    for i in range(n):
-        down = foot + (i - steps) * step
-        first, last = rows_of(down, h, cover.shape[0])
-        for row in range(first, last):
-            half = half_width(row, down, h, w)
-            if half > 0:
-                for j in range(n):
-                    begin[j], end[j] = span_within(middle[j], half, *edges)
-                for j in range(n):
-                    found[i, j] += sums[row - low, end[j]] - sums[row - low, begin[j]]
-    return found
-
-
-@kernel
-def running(foreground: Bools, cover: Cover) -> Whole:
-    """(H, W + 1) sums along rows of what uncovered pixels are worth, in halves."""
-    sums = np.empty((cover.shape[0], cover.shape[1] + 1), np.int32)
-    for row in range(cover.shape[0]):
-        total = 0
-        sums[row, 0] = 0
-        for column in range(cover.shape[1]):
-            worth = HALVES if foreground[row, column] else EMPTY
-            total += worth if cover[row, column] == 0 else 0
-            sums[row, column + 1] = total
-    return sums
-
-
-@kernel
-def better(
-    foreground: Bools, cover: Cover, at: Array, expected: Array, spread: Array, evidence: float, fine: bool
-) -> tuple[float, float]:
-    """The best x, foot round `at` of a template that is not painted: evidence * support - d^2 / 2, see settle."""
-    step, steps = max(at[2] / STEPS_PER_HEIGHT, 1.0), FINE_STEPS
-    if fine:
-        step /= 2
-    else:
-        steps = int(min(max(np.ceil(2.5 * max(spread[0], spread[1]) / step), FINE_STEPS), MOST_STEPS))
-    halves = moved(foreground, cover, at, steps, step)
-    whole = area(at, cover.shape[0], cover.shape[1])
-    best, right, down = -np.inf, 0.0, 0.0
-    for i in range(2 * steps + 1):
-        v = (at[1] - expected[1] + (i - steps) * step) / spread[1]
-        for j in range(2 * steps + 1):
-            u = (at[0] - expected[0] + (j - steps) * step) / spread[0]
-            value = evidence * (halves[i, j] / HALVES) / whole - (u * u + v * v) / 2
-            if value > best:
-                best, right, down = value, (j - steps) * step, (i - steps) * step
-            if i == steps and j == steps:
-                here = value
-    return (at[0] + right, at[1] + down) if best > here else (at[0], at[1])
-
-
-@kernel
-def settle(foreground: Bools, cover: Cover, templates: Array, spread: Array, order: Ints, evidence: float) -> Array:
-    """(K, 4) templates where they explain most, each in turn by `order` while the others rest; painted when done.
-
-    spread (K, 2): standard deviation px of each one's expected x and foot; evidence: nats for full support.
-    """
-    found = templates.copy()
-    paint_all(cover, found, 1)
-    for sweep in range(SWEEPS):
-        any_moved = False
-        for k in order:
-            paint(cover, found[k], -1)
-            x, foot = better(foreground, cover, found[k], templates[k], spread[k], evidence, sweep > 0)
-            any_moved |= x != found[k, 0] or foot != found[k, 1]
-            found[k, 0], found[k, 1] = x, foot
-            paint(cover, found[k], 1)
-        if not any_moved:
-            break
-    return found
 
 
 @kernel

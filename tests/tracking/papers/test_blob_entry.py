@@ -7,7 +7,7 @@ import pytest
 
 from tests import reference_templates as slow
 from tracking.detect import blobs
-from tracking.papers import blob_entry, blob_entry_kernels
+from tracking.papers import blob_entry, blob_entry_kernels, blob_template_kernels
 from tracking.papers.blob_template import Mask
 
 HIGH, WIDE = 90, 120
@@ -96,7 +96,7 @@ def test_half_a_person_and_less_is_nobody_new():
 def test_what_is_explained_brings_nobody():
     one = np.array([[60.0, 80.0, 60.0, 24.0]])
     scene = Mask(mask_of(one[0]))
-    scene.paint(one)
+    blob_template_kernels.paint_all(scene.cover, one, 1)
     assert not len(blob_entry.newcomers(scene, Fixed(60.0, 24.0), 0.5))
     closed = Mask(mask_of(one[0]))
     closed.close(mask_of(one[0]).astype(np.int32), np.array([0]))

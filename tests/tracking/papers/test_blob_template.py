@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from tests import reference_templates as slow
+from tracking.papers import blob_settle_kernels
 from tracking.papers import blob_template_kernels as kernels
 from tracking.papers.blob_template import Mask, painted
 from tracking.papers.blob_template_kernels import EXPLAINED
@@ -38,7 +39,7 @@ def scenery(seed):
 def test_kernels_are_the_slow_way(seed):
     _, foreground, cover, some = scenery(seed)
     for t in some:
-        got = kernels.moved(foreground, cover, t, 2, 1.5)
+        got = blob_settle_kernels.moved(foreground, cover, t, 2, 1.5)
         assert np.array_equal(got / 2, slow.moved(foreground, cover, t, 2, 1.5))
     area = [slow.area(cover.shape, t) for t in some]
     got = kernels.supports(foreground, cover, some, 0)
@@ -55,7 +56,9 @@ def test_all_together_are_the_slow_way(seed):
     assert np.array_equal(at, slow.settle(foreground, cover, expected, spread, 40.0))
     assert np.array_equal(scene.cover, cover + slow.painted(cover.shape, at))
     assert np.allclose(scene.alone(at), slow.alone(foreground, cover, at), atol=1e-12)
-    assert np.allclose(scene.pieces(at), slow.pieces(foreground, cover, at), atol=1e-12)
+    assert np.allclose(
+        kernels.pieces(scene.foreground, scene.cover, at), slow.pieces(foreground, cover, at), atol=1e-12
+    )
     assert np.allclose(scene.shown(at), slow.shown(cover, at), atol=1e-12)
     for by_pieces in (True, False):
         again = Mask(foreground)
@@ -76,14 +79,15 @@ def test_closed_regions_are_explained_and_no_others():
 
 def test_support_is_one_on_ones_own_pixels_and_minus_a_half_on_none():
     one = np.array([[60.0, 80.0, 60.0, 24.0]])
-    assert Mask(mask_of(one[0])).support(one)[0] == pytest.approx(1.0, abs=0.02)
-    assert Mask(np.zeros((HIGH, WIDE), bool)).support(one)[0] == pytest.approx(-0.5, abs=0.02)
+    empty = np.zeros((HIGH, WIDE), np.int16)
+    assert kernels.supports(mask_of(one[0]), empty, one, 0)[0] == pytest.approx(1.0, abs=0.02)
+    assert kernels.supports(np.zeros((HIGH, WIDE), bool), empty, one, 0)[0] == pytest.approx(-0.5, abs=0.02)
 
 
 def test_what_two_cover_supports_neither():
     one = np.array([[60.0, 80.0, 60.0, 24.0]])
     scene = Mask(mask_of(one[0]))
-    scene.paint(np.concatenate([one, one]))
+    kernels.paint_all(scene.cover, np.concatenate([one, one]), 1)
     assert scene.alone(np.concatenate([one, one])).tolist() == [0.0, 0.0]
     assert len(scene.prune(np.concatenate([one, one]), 0.2)) == 1
     assert scene.cover.max() == 1
@@ -119,12 +123,12 @@ def test_a_piece_of_who_is_partly_covered_is_enough_but_two_on_one_are_one():
     cut = mask_of(near, far)
     cut[:48, 73:] = False
     scene, both = Mask(cut), np.stack([near, far])
-    scene.paint(both)
-    assert 0.4 < scene.pieces(both)[1] < 0.9
+    kernels.paint_all(scene.cover, both, 1)
+    assert 0.4 < kernels.pieces(scene.foreground, scene.cover, both)[1] < 0.9
     assert scene.prune(both, 0.3, pieces=True).tolist() == [0, 1]
     twice = np.stack([near, near + np.array([4.0, 0, 0, 0])])
     scene = Mask(mask_of(near))
-    scene.paint(twice)
+    kernels.paint_all(scene.cover, twice, 1)
     assert scene.prune(twice, 0.3, pieces=True).tolist() == [0]
 
 
@@ -132,5 +136,5 @@ def test_who_is_all_but_covered_is_hidden():
     one = np.array([[60.0, 80.0, 60.0, 24.0]])
     both = np.concatenate([one, one + np.array([0.5, 0, 0, 0])])
     scene = Mask(mask_of(*both))
-    scene.paint(both)
-    assert scene.pieces(both).tolist() == [0.0, 0.0]
+    kernels.paint_all(scene.cover, both, 1)
+    assert kernels.pieces(scene.foreground, scene.cover, both).tolist() == [0.0, 0.0]
