@@ -24,7 +24,7 @@ class Mog2Settings(Config):
     tracker: ClassVar[str] = "mog2"
 
     variance: float = param(16.0, (1.0, 1000.0), "", "squared Mahalanobis distance beyond which a pixel is new", "log")
-    shadow: float = param(0.5, (0.01, 1.0), "", "brightness, relative, below which a pixel is no shadow")
+    shadow: float = param(0.5, (0.0, 1.0), "", "brightness, relative, below which a pixel is no shadow")
     background_time: float = param(20.0, (1.0, 1e6), "s", "time constant of adaptation", "log")
 
 

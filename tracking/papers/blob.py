@@ -86,11 +86,13 @@ class Blob:
         rows = people.reported(frame.t)
         state, scale = people.bank.take(rows, 1), people.scale[rows]
         camera = self.context.camera
-        box, alone = blob_measure.to_boxes(self.cascade.reported(rows)), np.full(len(rows), -1)
+        place, alone = self.cascade.reported(rows), np.full(len(rows), -1)
+        box = blob_measure.to_boxes(place)
         if camera is None:
             pos, vel = state[kalman.PLACE, :, :2].copy(), state[kalman.RATE, :, :2].copy()
             cov, plane = blob_report.image_covariance(state, scale), "image"
         else:
+            state[kalman.PLACE] = place
             pos, vel, cov, seen = blob_report.on_ground(camera, state, scale)
             rows, box, alone, plane = rows[seen], box[seen], alone[seen], "ground"
         id, score = people.id[rows], people.score[rows]

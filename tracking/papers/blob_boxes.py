@@ -34,7 +34,7 @@ class Boxes:
         z, score = self._measurements(detections)
         people = self.people
         if len(z):
-            _check_scale(people.context)
+            check_scale(people.context)
         people.predict()
         people.look(z)
         rows, columns, free, d2 = self._associate(z, score)
@@ -180,8 +180,8 @@ class Boxes:
         return np.asarray(left[~people.merged(z[left], people.confirmed & ~people.hit)])
 
 
-def _check_scale(context: Context) -> None:
-    """InputError where boxes come without a scale: noises in metres would mean nothing, and nothing be tracked."""
+def check_scale(context: Context) -> None:
+    """InputError without a scale: noises in metres would mean nothing, and nothing be tracked."""
     if not context.px_per_m > 0:
         raise InputError(
             place="context.px_per_m",

@@ -23,6 +23,7 @@ from tracking.detect.background import Background
 from tracking.detect.classes import foreground
 from tracking.detect.mog2 import Mog2, Mog2Settings
 from tracking.papers import blob_entry, blob_measure
+from tracking.papers.blob_boxes import check_scale
 from tracking.papers.blob_config import BlobConfig
 from tracking.papers.blob_people import People
 from tracking.papers.blob_size import PersonSize
@@ -45,6 +46,8 @@ class Pixels:
         from scipy.special import chdtri
 
         assert context.background is not None
+        if not np.isnan(context.px_per_m):
+            check_scale(context)
         self.config, self.people, self.context = config, people, context
         self.size = PersonSize(context)
         self.background: Background | Mog2
@@ -139,10 +142,12 @@ class Pixels:
         lone = self._lone(found, expected) if split else np.ones(len(found), bool)
         columns = lone.nonzero()[0]
         z, angle_var = found.ellipse[columns], found.angle_var[columns] + self.angle_noise
-        rows, taken = self._associate(z, angle_var)
+        rows, taken, gated = self._associate(z, angle_var)
         noise = np.tile(people.noise, (len(rows), 1))
         measured, angles = z[taken], angle_var[taken]
-        support, newborn = np.ones(len(rows)), np.delete(z, taken, 0)
+        support = np.ones(len(rows))
+        free = ~np.isin(np.arange(len(z)), taken)
+        newborn = z[free if split else free & ~gated]
         if split:
             scene = Mask(mask)
             scene.close(found.label, columns)
@@ -188,23 +193,25 @@ class Pixels:
         places = np.column_stack([box[:, 0] + box[:, 2] / 2, box[:, 1] + box[:, 3] / 2, box[:, 3], box[:, 2]])
         return np.asarray((blob_measure.covered(sure, places) >= SHARED).sum(0) > 1)
 
-    def _associate(self, z: Array, angle_var: Array) -> tuple[Ints, Ints]:
-        """Tracks and ellipses z (M, 5) that belong together: gates of 5 degrees of freedom where the ellipse has a
-        direction, else of 4 (eqs 9, 10). From straight above of 4 always: people turn on the spot.
+    def _associate(self, z: Array, angle_var: Array) -> tuple[Ints, Ints, Bools]:
+        """Tracks and ellipses z (M, 5) that belong together, and which ellipses (M,) lie in some track's gate: of 5
+        degrees of freedom where the ellipse has a direction, else of 4 (eqs 9, 10). From straight above of 4 always:
+        people turn on the spot.
         """
         people = self.people
         if not len(z) or not len(people.id):
-            return np.zeros(0, np.int64), np.zeros(0, np.int64)
+            return np.zeros(0, np.int64), np.zeros(0, np.int64), np.zeros(len(z), bool)
         d2 = kalman.distances(people.bank, z[:, :4], people.noise, people.scale)
         gate = np.tile(self.gates[0], len(z))
         if not self.size.above:
             d2 = d2 + people.turned(z[:, 4], angle_var)
             gate = self.gates[kalman.directed(angle_var).astype(int)]
         cost = np.where(d2 <= gate, d2, np.inf)
+        gated = np.asarray(np.isfinite(cost).any(0))
         if self.config.association == "nearest":
-            return blob_measure.best_pieces(*assign.nearest(cost), cost)
+            return *blob_measure.best_pieces(*assign.nearest(cost), cost), gated
         blind = np.minimum(2 * np.log(people.rho), self.blindest)
-        return assign.optimal(cost + blind[:, None], float(self.gates[1]) + self.blindest)
+        return *assign.optimal(cost + blind[:, None], float(self.gates[1]) + self.blindest), gated
 
     def _split(self, scene: Mask, expected: Array, rows: Ints, sure: bool) -> tuple[Ints, Array, Array, Array]:
         """Tracks but `rows` measured by templates, the confirmed (`sure`) or the others: rows (K,), z (K, 5), R (K, 4)
@@ -220,9 +227,9 @@ class Pixels:
         var = (people.bank[kalman.VAR, open_rows] + people.noise)[:, :2]
         spread = np.sqrt(var) * people.scale[open_rows, None]
         at = scene.settle(at, spread, c.evidence)
-        shown = scene.shown(at)
         keep = scene.prune(at, c.track_support if sure else c.entry_support, pieces=sure)
-        worth, shown, at = scene.alone(at[keep]), shown[keep], at[keep]
+        at = at[keep]
+        worth, shown = scene.alone(at), scene.shown(at)
         noise = people.noise / np.maximum(shown, LEAST_SHOWN)[:, None] ** 2
         noise[:, 2:] *= BLIND
         return open_rows[keep], self._ellipses(_places(at)), noise, np.clip(worth, 0.0, 1.0)

@@ -37,8 +37,8 @@ def on_ground(camera: Camera, state: Array, scale: Array) -> tuple[Array, Array,
 
 
 def _foot(camera: Camera, state: Array, scale: Array) -> tuple[Array, Array, Array]:
-    """(N, 2) px, (N, 2) px/s and (N, 4, 4) covariance of the point that stands on the ground: y + h / 2 of the state,
-    whose h, from pixels, is the longer axis, whatever its direction."""
+    """(N, 2) px, (N, 2) px/s and (N, 4, 4) covariance of the point that stands on the ground, y + h / 2 of the state,
+    whose place is the upright box that is told; its variance takes h for the box's height."""
     place, rate, cov = state[0, :, :2].copy(), state[1, :, :2].copy(), image_covariance(state, scale)
     if camera.kind == "pinhole":
         place[:, 1] += state[0, :, 2] / 2

@@ -87,7 +87,7 @@ class Population:
     def excuse(self) -> None:
         """Excuse the unseen confirmed tracks that are behind somebody: covered by a track whose feet are lower."""
         lost = (self.confirmed & ~self.hit & ~self.excused).nonzero()[0]
-        if not len(lost):
+        if not len(lost) or self.top:
             return
         place = self.uprights()
         foot, hidden = place[:, 1] + place[:, 2] / 2, place.take(lost, 0)

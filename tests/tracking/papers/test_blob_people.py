@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from sim.types import Context
+from sim.camera import looking
+from sim.types import Camera, Context
 from tracking import kalman
 from tracking.papers.blob_config import BlobConfig
 from tracking.papers.blob_people import People
@@ -73,3 +74,14 @@ def test_who_lies_at_the_edge_leaves_by_his_length():
     one.hits[:], one.misses[:] = 10, 0
     one.mark(np.zeros(0, np.int64), np.zeros(0, bool), np.zeros(0))
     assert one.reported(1.0).tolist() == [1]
+
+
+def test_from_straight_above_nobody_is_behind_anybody():
+    settings = BlobConfig()
+    camera = Camera("top", (320, 240), (20, 20), (160, 120), np.array([0.0, 0, 10]), looking(UP, 0.0), px_per_m=20.0)
+    one = People(settings, settings.dynamics(FPS), Context(FPS, 20.0, camera=camera, image_size=(320, 240)))
+    one.give_birth(np.array([[100.0, 100, 12, 8, UP], [100, 106, 12, 12, UP]]), np.ones(2), 0.0)
+    one.confirmed[:] = True
+    one.mark(np.array([1]), np.ones(1, bool), np.ones(1))
+    one.excuse()
+    assert not one.excused.any()

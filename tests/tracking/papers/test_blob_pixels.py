@@ -5,10 +5,12 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from scenarios.errors import InputError
 from tests import painted
 from tests.painted import TALL, box, overlap, track
 from tracking import kalman
 from tracking.papers.blob_config import BlobConfig
+from tracking.papers.blob_template import Mask
 
 
 def walk(x, foot, step, frames):
@@ -49,6 +51,42 @@ def test_a_person_in_two_pieces_for_ten_frames_stays_one_track():
     assert max(known) == 1
     assert len(ids(made)) == 1
     assert all(overlap(t.box[0], box(p)) > 0.5 for t, p in zip(made[5:], way[5:], strict=True))
+
+
+@pytest.mark.parametrize("association", ["nearest", "optimal"])
+def test_a_piece_in_the_gate_starts_no_track_in_the_papers_own_cascade(association):
+    """Frame 367 without splitting: the waist hides for one frame."""
+    way, frames, r, known = walk(60, 180, 4, 30), [], np.random.default_rng(5), []
+    for k, p in enumerate(way):
+        image = painted.picture([p], r)
+        if k == 20:
+            waist = slice(int(p[1] - 0.5 * TALL) - 4, int(p[1] - 0.5 * TALL) + 4)
+            image[waist] = painted.picture([], r)[waist]
+        frames.append(image)
+    paper = BlobConfig(split=False, association=association, size_noise=0.6, position_noise=0.3)
+    track(frames, paper, watch=lambda tracker, _: known.append(len(tracker.people.id)))
+    assert set(known[3:]) == {1}
+
+
+@pytest.mark.parametrize("scale", [0.0, -1.0])
+def test_a_scale_that_is_none_is_refused(scale):
+    sample = painted.sample(np.random.default_rng(0))
+    with pytest.raises(InputError, match=r"context\.px_per_m"):
+        painted.Blob().reset(painted.Context(painted.FPS, scale, background=sample), 0)
+
+
+def test_a_ghost_that_is_pruned_hides_nobody():
+    """The template of a track that is lost, before one person: he is measured as wholly seen."""
+    last = []
+    track([[p] for p in walk(60, 180, 4, 20)], watch=lambda tracker, _: last.append(tracker))
+    people, cascade = last[-1].people, last[-1].cascade
+    x, y, h, w = people.uprights()[0]
+    people.give_birth(np.array([[x + 0.3 * w, y + 2, h, w, np.pi / 2]]), np.ones(1), 2.0)
+    people.confirmed[:] = True
+    scene = Mask(painted.shape((x, y + h / 2, h)))
+    rows, _, noise, _ = cascade._split(scene, people.uprights(), np.zeros(0, np.int64), True)
+    assert len(rows) == 1
+    assert noise[0, :2] == pytest.approx(people.noise[:2], rel=0.1)
 
 
 def test_a_post_does_not_cut_a_person_in_two():
