@@ -36,7 +36,7 @@ ABLATIONS = (
     ("blob", {}),
     ("no splitting, no person size", NEVER),
     ("nearest", {"association": "nearest"}),
-    ("expected size is no measurement", {"person_noise": 5.0}),
+    ("axes hardly expected (5 m)", {"person_noise": 5.0}),
     ("MOG2", {"segmentation": "mog2"}),
 )
 SCENES = (("street", 15), ("street", 20), ("cross", 15), ("mixed", 15), ("pillar", 20), ("split", 15), ("crowd", 20))
