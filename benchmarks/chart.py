@@ -43,6 +43,7 @@ def lines(panels: Sequence[Panel], path: Path, columns: int = 2) -> Path:
         x, y = 20 + k % in_row * 240, rows * HEIGHT + 14 + k // in_row * KEY
         body.append(f'<line x1="{x}" y1="{y}" x2="{x + 22}" y2="{y}" stroke="{colour[name]}" stroke-width="2.5"/>')
         body.append(_text(x + 28, y + 4, name))
+    wide += RIGHT  # the last tick's label reaches over the panel
     head = f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {wide} {high}" width="{wide}" height="{high}"'
     style = ' font-family="sans-serif" font-size="12"><rect width="100%" height="100%" fill="#fff"/>'
     path.parent.mkdir(parents=True, exist_ok=True)
