@@ -40,7 +40,7 @@ PARTS: dict[str, tuple[tuple[object, str], ...]] = {
     "associate": ((Pixels, "_associate"),),
     "split": ((Pixels, "_split"),),
     "newcomers": ((blob_entry, "newcomers"),),
-    "person size": ((PersonSize, "learn"), (Pixels, "_lone"), (Pixels, "_expect_size")),
+    "person size": ((PersonSize, "learn"), (Pixels, "_lone"), (Pixels, "_settle_sizes")),
     "adapt": ((Background, "adapt"), (Pixels, "_protected")),
 }
 

@@ -8,8 +8,9 @@ axes return to those of a person at his place, where it is known            ours
 rho, births, deaths                                                         4.5, 5
 pixels of confirmed tracks are kept out of the background's adaptation      ours
 
-A blob that is given to no track starts one, even in the gate of a track that a nearer blob was given to: unlike boxes,
-blobs have no `orphan_gate` (in the paper's frame 367 none starts).
+A blob that is given to no track starts one. Where blobs are split that is so even in the gate of a track that a nearer
+blob was given to, since its pieces have been measured together before; where they are not, none starts within a gate
+(the paper's frame 367). Blobs have no `orphan_gate`.
 """
 
 from __future__ import annotations
