@@ -1,22 +1,18 @@
-"""`blob` from pixels: on PETS and on rendered scenes, with parts of it switched off; frames per second by parts.
+"""`blob` from pixels: on PETS and on rendered scenes, with parts of it switched off.
 
-usage: python benchmarks/blob_pixels.py [pets] [rendered] [above] [speed] [overlay] [--data DIR] [--seeds 0:2]
-       [--out DIR]
+usage: python benchmarks/blob_pixels.py [pets] [rendered] [above] [--data DIR] [--seeds 0:2]
 
 pets: PETS09-S2L1-first200 (--data, default ../shared/data), boxes by IoU, and with View_001.xml the position on the
 ground at 1 m (similarity 0.5 of 1 - d / 2 m). One table for backgrounds spread over the recording, one for causal ones.
 rendered: catalogue scenes under a camera like PETS's (480 x 360, 7 frames/s, tilts of 15 and 20 degrees, JPEG at 80),
 once with camera and empty background, once as bare video with a background spread over it.
 above: from straight above at 20 px per m, and Friends Meet's scenes at 40, beside the same tracker on boxes.
-speed: 640 x 480, about 20 people, best of three, and the shares of the parts. overlay: pictures with boxes into --out.
+Speed by parts: benchmarks/tracking_speed.py. Boxes over the pictures: flockscope overlay.
 """
 
 from __future__ import annotations
 
 import argparse
-import cProfile
-import pstats
-import time
 from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
@@ -28,7 +24,7 @@ from scenarios.loading import load
 from sim.io.source import open_source
 from sim.sequence import simulate
 from sim.types import Frame, Sequence
-from tracking.run import prepare, track
+from tracking.run import track
 
 KEYS = "HOTA", "DetA", "AssA", "MOTA", "IDF1"
 NEVER = {"split": False}
@@ -44,7 +40,6 @@ VIEW = ("image=[480,360]", "fps=7", "focal_px=600", "crop=true", "baseline=0")
 FLAT = [(name, ['camera.kind="top"']) for name in ("merge", "cross")]
 FRIENDS = [(f"scenarios/suites/friends-meet/{name}.toml", []) for name in ("merge", "queue", "hard-party")]
 LONGEST = 120  # frames of a rendered scene
-PARTS = ("classify", "clean", "find", "_associate", "_split", "newcomers", "learn", "adapt", "_report")
 
 
 def row(title: str, scores: list[list[float]], speed: float = float("nan")) -> None:
@@ -72,10 +67,11 @@ def pets(folder: Path) -> None:
         for title, params in ABLATIONS if background == "spread:50" else ABLATIONS[:1]:
             scores, speed = one(sequence, params)
             row(title, [scores], speed)
+    head("PETS with View_001.xml, background spread:50")
     sequence = open_source(folder, images=True, camera=folder / "View_001.xml")[0]
     for similarity in ("boxes", "ground"):
         scores, speed = one(sequence, {}, similarity)
-        row(f"with View_001.xml, {similarity}", [scores], speed)
+        row(similarity, [scores], speed)
 
 
 def rendered(seeds: range) -> None:
@@ -120,61 +116,19 @@ def above(seeds: range) -> None:
             row(f"{title}, {'pixels' if mode == 'image' else 'boxes'}", [s for s, _ in found])
 
 
-def speed() -> None:
-    live = simulate(load("crowd", set=["camera.tilt_deg=25", "camera.crop=true", "camera.baseline=0"]), 3)
-    frames = [f for f in live.frames() if f.index <= 60]
-    ready = prepare("blob", replace(live, frames=lambda: iter(frames)), detections="image")
-    best = float("inf")
-    for _ in range(3):
-        ready.reset(0)
-        start = time.perf_counter()
-        people = [len(ready.answer(f).id) for f in frames]
-        best = min(best, time.perf_counter() - start)
-    print(f"\n640 x 480, {np.mean(people[10:]):.0f} people told: {len(frames) / best:.0f} frames/s")
-    ready.reset(0)
-    profile = cProfile.Profile()
-    profile.enable()
-    for f in frames:
-        ready.answer(f)
-    profile.disable()
-    found = pstats.Stats(profile).stats  # type: ignore[attr-defined]
-    for (file, _, name), (_, _, _, spent, _) in sorted(found.items(), key=lambda item: -item[1][3]):
-        if name in PARTS and "/tracking/" in file:
-            print(f"  {Path(file).stem}.{name}: {1000 * spent / len(frames):.2f} ms a frame")
-
-
-def overlay(folder: Path, out: Path) -> None:
-    import cv2
-
-    out.mkdir(parents=True, exist_ok=True)
-    sequence = open_source(folder, images=True)[0]
-    for frame, told in zip(sequence, track("blob", sequence, detections="image"), strict=True):
-        image = np.repeat(np.repeat(frame.image, 2, 0), 2, 1)
-        for (x, y, w, h), id in zip(2 * told.box, told.id, strict=True):
-            colour = tuple(int(c) for c in np.random.default_rng(int(id)).integers(60, 255, 3))
-            cv2.rectangle(image, (round(x), round(y)), (round(x + w), round(y + h)), colour, 2)
-            cv2.putText(image, str(id), (round(x), round(y) - 4), cv2.FONT_HERSHEY_SIMPLEX, 0.5, colour, 1)
-        cv2.imwrite(str(out / f"{frame.index:06d}.jpg"), image)
-
-
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("what", nargs="*", default=["pets", "rendered", "speed"])
+    parser.add_argument("what", nargs="*", default=["pets", "rendered"])
     parser.add_argument("--data", type=Path, default=Path(__file__).parents[2] / "shared" / "data")
     parser.add_argument("--seeds", default="0:2")
-    parser.add_argument("--out", type=Path, default=Path("overlay"))
     given = parser.parse_args()
     folder = given.data / "mot" / "PETS09-S2L1-first200"
     if "pets" in given.what:
         pets(folder)
-    if "overlay" in given.what:
-        overlay(folder, given.out)
     if "rendered" in given.what:
         rendered(range(*(int(n) for n in given.seeds.split(":"))))
     if "above" in given.what:
         above(range(*(int(n) for n in given.seeds.split(":"))))
-    if "speed" in given.what:
-        speed()
 
 
 if __name__ == "__main__":

@@ -7,9 +7,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from scenarios.errors import InputError
-from sim.types import Array, Bools, Context, Detections, Frame, Ints
-from tracking import assign, kalman
+from sim.types import Array, Bools, Detections, Frame, Ints
+from tracking import kalman
 from tracking.papers import blob_measure
 from tracking.papers.blob_config import BlobConfig
 from tracking.papers.blob_tracks import Population
@@ -27,14 +26,13 @@ class Boxes:
         self.noise, self.asymptote = people.noise, people.asymptote
         shares = 1 - np.array([config.gate, config.orphan_gate, config.confirm_gate])
         self.gate, self.orphan_gate, self.confirm_gate = chdtri(4, shares)  # d^2 at these shares (eq. 10)
-        self.blindest = 2 * float(np.log(max(people.excused_death, people.birth_rho)))
 
     def step(self, frame: Frame, detections: Detections | None) -> None:
         """Predict, gate, associate, update, manage."""
         z, score = self._measurements(detections)
         people = self.people
         if len(z):
-            check_scale(people.context)
+            people.check_scale()
         people.predict()
         people.look(z)
         rows, columns, free, d2 = self._associate(z, score)
@@ -71,27 +69,20 @@ class Boxes:
         cost = np.where(d2 <= self.gate, d2, np.inf)
         strong = score >= self.config.score_start
         if strong.all():
-            rows, columns = self._pairs(cost)
+            rows, columns = people.pairs(cost, self.gate)
         else:
-            rows, columns = self._pairs(np.where(strong, cost, np.inf))
+            rows, columns = people.pairs(np.where(strong, cost, np.inf), self.gate)
             more = self._weak_pairs(np.where(strong, np.inf, cost), rows)
             rows, columns = np.concatenate([rows, more[0]]), np.concatenate([columns, more[1]])
         free[columns] = False
         return rows, columns, free, d2
 
-    def _pairs(self, cost: Array) -> tuple[Ints, Ints]:
-        """Tracks and measurements (K,) one to one; cost (N, M): d^2 within gates, inf elsewhere."""
-        if self.config.association == "nearest":
-            return blob_measure.best_pieces(*assign.nearest(cost), cost)
-        blind = np.minimum(2 * np.log(self.people.rho), self.blindest)
-        return assign.optimal(cost + blind[:, None], self.gate + self.blindest)
-
     def _weak_pairs(self, cost: Array, taken: Ints) -> tuple[Ints, Ints]:
         """Pairs of the weak measurements with tracks that are not taken; `nearest` knows no second choice."""
         if self.config.association == "optimal":
             cost[taken] = np.inf
-            return self._pairs(cost)
-        rows, columns = self._pairs(cost)
+            return self.people.pairs(cost, self.gate)
+        rows, columns = self.people.pairs(cost, self.gate)
         open_rows = ~np.isin(rows, taken)
         return rows[open_rows], columns[open_rows]
 
@@ -178,14 +169,3 @@ class Boxes:
         if not len(left):
             return left
         return np.asarray(left[~people.merged(z[left], people.confirmed & ~people.hit)])
-
-
-def check_scale(context: Context) -> None:
-    """InputError without a scale: noises in metres would mean nothing, and nothing be tracked."""
-    if not context.px_per_m > 0:
-        raise InputError(
-            place="context.px_per_m",
-            got=f"{context.px_per_m:g}",
-            expected="px per m at people, above 0, to track boxes",
-            remedy="give it, for instance the median height of boxes / 1.7 m, or a background sample to track pixels",
-        )

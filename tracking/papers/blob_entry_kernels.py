@@ -81,7 +81,7 @@ def enter(
             break
         one, far = guesses[first : first + count], spread[first : first + count]
         first += count
-        at = moves.settle(foreground, cover, one, far, near_first(one), nats)
+        at = moves.settle(foreground, cover, one, far, nats)
         alone = kernels.supports(foreground, cover, at, 1)
         kernels.paint_all(cover, at, -1)
         value = explained(foreground, cover, at) / person - count * support
@@ -105,17 +105,6 @@ def within_reach(foreground: Bools, cover: Cover, guesses: Array) -> int:
         for column in range(int(max(left, 0)), int(min(right + 1, foreground.shape[1]))):
             found += foreground[row, column] and cover[row, column] == 0
     return found
-
-
-@kernel
-def near_first(templates: Array) -> Ints:
-    """(K,) rows of a few templates, low feet first."""
-    order = np.arange(len(templates))
-    for k in range(1, len(order)):
-        while k > 0 and templates[order[k], 1] > templates[order[k - 1], 1]:
-            order[k], order[k - 1] = order[k - 1], order[k]
-            k -= 1
-    return order
 
 
 @kernel

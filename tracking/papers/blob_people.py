@@ -64,7 +64,7 @@ class People(Population):
     def update(self, rows: Ints, z: Array, noise: Array, angle_var: Array) -> Array:
         """Measure tracks at z (K, 5) with R noise (K, 4) m^2 and angle_var (K,) rad^2; d^2 (K,), direction included."""
         terms = kalman.update(self.bank, rows, z[:, :4], noise)
-        turn = np.diagonal(self.turned(z[:, 4], angle_var)[rows])
+        turn = self.turned(z[:, 4], angle_var)[rows, np.arange(len(rows))]
         kalman.update(self.nominal, rows, z[:, :4], self.noise)
         kalman.angle_update(self.angle, rows, z[:, 4], angle_var)
         return np.asarray(np.add.reduce(terms, 1) / np.square(self.scale[rows]) + turn)

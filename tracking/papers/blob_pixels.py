@@ -18,13 +18,12 @@ from __future__ import annotations
 import numpy as np
 
 from sim.types import Array, Bools, Context, Detections, Frame, Image, Ints
-from tracking import assign, kalman
+from tracking import kalman
 from tracking.detect import blobs as detect
 from tracking.detect.background import Background
 from tracking.detect.classes import foreground
 from tracking.detect.mog2 import Mog2, Mog2Settings
 from tracking.papers import blob_entry, blob_measure
-from tracking.papers.blob_boxes import check_scale
 from tracking.papers.blob_config import BlobConfig
 from tracking.papers.blob_people import People
 from tracking.papers.blob_size import PersonSize
@@ -48,7 +47,7 @@ class Pixels:
 
         assert context.background is not None
         if not np.isnan(context.px_per_m):
-            check_scale(context)
+            people.check_scale()
         self.config, self.people, self.context = config, people, context
         self.size = PersonSize(context)
         self.background: Background | Mog2
@@ -62,7 +61,6 @@ class Pixels:
         # d^2 of 4 and 5 degrees of freedom, without and with a direction, at these shares (eq. 10)
         self.gates = chdtri(np.array([4, 5]), 1 - config.gate)
         self.confirm_gates = chdtri(np.array([4, 5]), 1 - config.confirm_gate)
-        self.blindest = 2 * float(np.log(max(people.excused_death, people.birth_rho)))
         self.angle_noise = np.radians(config.angle_noise) ** 2
         self.upright = np.inf if self.size.above else np.radians(UPRIGHT) ** 2
 
@@ -209,10 +207,7 @@ class Pixels:
             gate = self.gates[kalman.directed(angle_var).astype(int)]
         cost = np.where(d2 <= gate, d2, np.inf)
         gated = np.asarray(np.isfinite(cost).any(0))
-        if self.config.association == "nearest":
-            return *blob_measure.best_pieces(*assign.nearest(cost), cost), gated
-        blind = np.minimum(2 * np.log(people.rho), self.blindest)
-        return *assign.optimal(cost + blind[:, None], float(self.gates[1]) + self.blindest), gated
+        return *people.pairs(cost, self.gates[1]), gated
 
     def _split(self, scene: Mask, expected: Array, rows: Ints, sure: bool) -> tuple[Ints, Array, Array, Array]:
         """Tracks but `rows` measured by templates, the confirmed (`sure`) or the others: rows (K,), z (K, 5), R (K, 4)

@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from sim.types import Array, Bools, Ints
+from sim.types import Array, Bools
 from tracking.papers.blob_template_kernels import (
     EMPTY,
     HALVES,
@@ -17,6 +17,7 @@ from tracking.papers.blob_template_kernels import (
     area,
     half_width,
     kernel,
+    near_first,
     paint,
     paint_all,
     rows_of,
@@ -105,12 +106,12 @@ def better(
 
 
 @kernel
-def settle(foreground: Bools, cover: Cover, templates: Array, spread: Array, order: Ints, evidence: float) -> Array:
-    """(K, 4) templates where they explain most, each in turn by `order` while the others rest; painted when done.
+def settle(foreground: Bools, cover: Cover, templates: Array, spread: Array, evidence: float) -> Array:
+    """(K, 4) templates where they explain most, near ones first, each while the others rest; painted when done.
 
     spread (K, 2): standard deviation px of each one's expected x and foot; evidence: nats for full support.
     """
-    found = templates.copy()
+    found, order = templates.copy(), near_first(templates)
     paint_all(cover, found, 1)
     for sweep in range(SWEEPS):
         any_moved = False

@@ -67,7 +67,12 @@ class PersonSize:
     @property
     def reliable(self) -> bool:
         """May this decide how many people a blob holds?"""
-        return self.table is not None or self.above or self.agreed >= max(ENOUGH, AGREE * len(self.seen))
+        return self.told or self.agreed >= max(ENOUGH, AGREE * len(self.seen))
+
+    @property
+    def told(self) -> bool:
+        """Does a camera tell how large people are?"""
+        return self.table is not None or self.above
 
     @property
     def above(self) -> bool:
@@ -115,7 +120,7 @@ class PersonSize:
     def learn(self, box: Array, ellipse: Array, whole: Bools) -> None:
         """Add the blobs (M, 4) ltwh, (M, 5), that may be somebody alone; `whole` (M,): away from the image's edge."""
         foot, size = _feet(box), ellipse[:, 2:4] if self.above else box[:, :1:-1]
-        expected = np.divide(*self._first_guess(foot).T[::-1]) if self.table is not None or self.above else SLIM
+        expected = np.divide(*self._first_guess(foot).T[::-1]) if self.told else SLIM
         with np.errstate(invalid="ignore"):
             slim = np.abs(np.log(size[:, 1] / size[:, 0] / expected)) <= np.log(STOUT)
         good = whole & slim & (size[:, 0] >= (FLAT if self.above else SMALLEST)) & self._likely(foot, size)
@@ -135,7 +140,7 @@ class PersonSize:
 
     def _likely(self, foot: Array, size: Array) -> Bools:
         """(M,) are these as high as somebody may be of whom a camera tells how high? Specks are nobody."""
-        if self.table is None and not self.above:
+        if not self.told:
             return np.ones(len(size), bool)
         with np.errstate(invalid="ignore"):
             off = np.abs(np.log(size[:, 0] / self._first_guess(foot)[:, 0]))
@@ -146,7 +151,7 @@ class PersonSize:
         foot, height = self.seen[:, :2], self.seen[:, 2]
         typical = float(np.median(height))
         count = height / typical / _crowding(foot / typical)
-        if self.table is None and not self.above:
+        if not self.told:
             self.line = _line(foot[:, 1], height, count)
         ratio = self.seen[:, 2:] / np.maximum(self._first_guess(foot), 1.0)
         known = np.isfinite(ratio).all(1)

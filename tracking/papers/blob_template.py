@@ -43,7 +43,7 @@ class Mask:
 
         spread (K, 2): standard deviation px of each one's expected x and foot; evidence: nats for full support.
         """
-        return moves.settle(self.foreground, self.cover, templates, spread, near_first(templates), evidence)
+        return moves.settle(self.foreground, self.cover, templates, spread, evidence)
 
     def prune(self, templates: Array, least: float, *, pieces: bool = False) -> Ints:
         """Rows of painted templates with support `least` when those with too little are taken away, the weakest first.
@@ -60,12 +60,7 @@ class Mask:
 
     def shown(self, templates: Array) -> Array:
         """(K,) share of each template that none of these with a lower foot, and nothing explained, covers."""
-        return kernels.shown(self.cover, templates, near_first(templates))
-
-
-def near_first(templates: Array) -> Ints:
-    """(K,) rows of templates, near people (low feet) first."""
-    return np.argsort(-templates[:, 1], kind="stable")
+        return kernels.shown(self.cover, templates)
 
 
 def painted(shape: tuple[int, ...], templates: Array) -> Bools:

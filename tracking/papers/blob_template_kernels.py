@@ -135,11 +135,22 @@ def pieces(foreground: Bools, cover: Cover, templates: Array) -> Array:
 
 
 @kernel
-def shown(cover: Cover, templates: Array, order: Ints) -> Array:
-    """(K,) share of each template that no earlier one in `order`, and nothing explained, covers."""
+def near_first(templates: Array) -> Ints:
+    """(K,) rows of templates, near people (low feet) first; these are few."""
+    order = np.arange(len(templates))
+    for k in range(1, len(order)):
+        while k > 0 and templates[order[k], 1] > templates[order[k - 1], 1]:
+            order[k], order[k - 1] = order[k - 1], order[k]
+            k -= 1
+    return order
+
+
+@kernel
+def shown(cover: Cover, templates: Array) -> Array:
+    """(K,) share of each template that none of these with a lower foot, and nothing explained, covers."""
     hidden = np.zeros(cover.shape, np.bool_)
     share = np.zeros(len(templates))
-    for k in order:
+    for k in near_first(templates):
         x, foot, h, w = templates[k]
         low, high = rows_of(foot, h, cover.shape[0])
         bare = 0

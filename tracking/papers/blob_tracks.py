@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
+from scenarios.errors import InputError
 from sim.types import Array, Bools, Context, Ints
-from tracking import kalman, lifecycle
+from tracking import assign, kalman, lifecycle
 from tracking.papers import blob_measure
 from tracking.papers.blob_config import BlobConfig
 
@@ -33,6 +34,7 @@ class Population:
         self.tentative = max(config.tentative_time, lifecycle.time_to_confirm(dynamics, config.confirm_ratio))
         self.death = self._after(config.coast_time)
         self.excused_death = max(self.death, self._after(config.merged_time))
+        self.blindest = 2 * float(np.log(max(self.excused_death, self.birth_rho)))
         self.silence = self._after(config.report_coast)
         self.excused_silence = max(self.silence, self._after(config.report_hidden))
         self.top = context.camera is not None and context.camera.kind == "top"
@@ -83,6 +85,24 @@ class Population:
             return np.full(len(place), whole)
         size = np.maximum(place[:, 2], place[:, 3]) / PERSON
         return np.asarray(np.minimum(np.maximum(size, whole / 2), whole * 2))
+
+    def check_scale(self) -> None:
+        """InputError without a scale: noises in metres would mean nothing, and nothing be tracked."""
+        scale = self.context.px_per_m
+        if not scale > 0:
+            raise InputError(
+                place="context.px_per_m",
+                got=f"{scale:g}",
+                expected="px per m at people, above 0",
+                remedy="give it, for instance the median height of boxes / 1.7 m; nan will do with a background sample",
+            )
+
+    def pairs(self, cost: Array, gate: float) -> tuple[Ints, Ints]:
+        """Tracks and measurements (K,) one to one; cost (N, M): d^2 within gates, the widest `gate`, inf elsewhere."""
+        if self.config.association == "nearest":
+            return blob_measure.best_pieces(*assign.nearest(cost), cost)
+        blind = np.minimum(2 * np.log(self.rho), self.blindest)
+        return assign.optimal(cost + blind[:, None], gate + self.blindest)
 
     def excuse(self) -> None:
         """Excuse the unseen confirmed tracks that are behind somebody: covered by a track whose feet are lower."""

@@ -224,7 +224,7 @@ def pairs(d2, rho):
     tracker.reset(CONTEXT, 0)
     tracker.people.give_birth(np.tile([100.0, 200, 68, 28], (len(d2), 1)), np.ones(len(d2)), 0.0)
     tracker.people.rho[:] = rho
-    return sorted(zip(*(k.tolist() for k in tracker.cascade._pairs(np.array(d2))), strict=True))
+    return sorted(zip(*(k.tolist() for k in tracker.people.pairs(np.array(d2), tracker.cascade.gate)), strict=True))
 
 
 def test_a_blind_track_far_away_changes_no_pair():
