@@ -237,10 +237,21 @@ class Grounded(Placed):
     plane = "ground"
 
 
+class OfGroups(Grounded):
+    """Its rows are groups, which are no upright people."""
+
+    def step(self, frame, detections):
+        made = super().step(frame, detections)
+        return made.replace(unit="group", group=made.id.copy(), groups=None, events=())
+
+
 @pytest.mark.parametrize(
     ("tracker", "seen", "expected"),
-    [(Placed, True, "none"), (Grounded, True, "projected"), (Grounded, False, "none"), ("blob", True, "measured")],
-)
+    [
+        (Placed, True, "none"), (Grounded, True, "projected"), (Grounded, False, "none"), (OfGroups, True, "none"),
+        ("blob", True, "measured"),
+    ],
+)  # fmt: skip
 def test_the_run_and_its_files_agree_on_where_boxes_come_from(tmp_path, tracker, seen, expected):
     camera = simulate(load("merge"), seed=3).camera if seen else None
     run = track(tracker, source(camera=camera))
