@@ -26,7 +26,7 @@ __all__ = [
     "History", "check_detections", "check_tracks", "checked", "choose_mode", "find", "names", "own_detector",
 ]  # fmt: skip
 
-REGISTRY = {"blob": "tracking.papers.blob:Blob"}
+REGISTRY = {"blob": "tracking.papers.blob:Blob", "group-pda": "tracking.papers.group_pda:GroupPda"}
 NEEDS = ("pixels", "stereo", "boxes", "points")
 
 

@@ -1,0 +1,131 @@
+"""`group-pda`: groups of people tracked as wholes, from points or foreground pixels.
+
+Gennari & Hager, "Probabilistic data association methods in visual tracking of groups", CVPR 2004.
+"""
+
+from __future__ import annotations
+
+from typing import ClassVar
+
+import numpy as np
+
+from scenarios.errors import InputError
+from sim.types import Array, Bools, Context, Detections, Frame, Plane, Tracks
+from tracking.papers import group_pda_changes as changes
+from tracking.papers import group_pda_kernels as kernels
+from tracking.papers.group_pda_bank import Bank
+from tracking.papers.group_pda_config import GroupPdaConfig
+from tracking.papers.group_pda_pixels import Pixels
+from tracking.papers.group_pda_report import remember, tracks
+from tracking.papers.group_pda_rules import Rules, make_rules
+
+
+class GroupPda:
+    """The tracker. State: the bank of groups, who is about to merge, the names given, what tells foreground.
+
+    innovation: of the last step (id, y (2,), S (2, 2)) of each named group's likeliest association.
+    """
+
+    needs: ClassVar[tuple[str, ...]] = ("pixels", "points")
+    config_class: ClassVar[type[GroupPdaConfig]] = GroupPdaConfig
+
+    def __init__(self, config: GroupPdaConfig | None = None) -> None:
+        self.config = config or GroupPdaConfig()
+
+    def reset(self, context: Context, seed: int) -> None:
+        """Forget everything; with a background sample pixels are tracked, else points. `seed` is unused."""
+        self.context = context
+        self.bank, self.merging, self.names = Bank.empty(), changes.Merging(), changes.Names()
+        self.pixels = None if context.background is None else Pixels(self.config, context)
+        self.rules: Rules | None = None
+        self.plane: Plane = "ground" if self.pixels is None else "image"
+        if self.pixels is not None:
+            self.rules = make_rules(self.config, context.fps, context.px_per_m, self.pixels.spread, self.pixels.step)
+        self.innovation: list[tuple[int, Array, Array]] = []
+
+    def step(self, frame: Frame, detections: Detections | None) -> Tracks:
+        """Predict; gate, associate, update, split (Fig. 1); merge; births and deaths."""
+        points, weights = self._points(frame, detections)
+        rules = self.rules or self._rules()
+        bank, t = self.bank, frame.t
+        bank.predict(rules)
+        told: list[changes.Change] = []
+        if points is not None:
+            told += self._measure(points, weights, rules, t)
+        told += self.merging.step(bank, rules, t)
+        told += changes.confirm(bank, rules, t, self.names)
+        told += changes.deaths(bank, rules, t)
+        return tracks(bank, told, rules, frame.index, t, self.plane, self.context.fps)
+
+    def _points(self, frame: Frame, detections: Detections | None) -> tuple[Array | None, Array]:
+        """The frame's points (M, 2) and the people each stands for (M,); None where the frame tells nothing."""
+        if self.pixels is not None:
+            found = None if frame.image is None else self.pixels.points(frame.image)
+            return found, np.full(0 if found is None else len(found), self.pixels.share)
+        if detections is None:
+            return None, np.zeros(0)
+        self.plane = "image" if detections.plane == "image" else "ground"
+        return np.ascontiguousarray(detections.pos[:, :2]), np.ones(len(detections.pos))
+
+    def _rules(self) -> Rules:
+        """The rules for points, whose plane is known once they come."""
+        scale = self.context.px_per_m if self.plane == "image" else 1.0
+        if not scale > 0:
+            raise InputError(
+                place="context.px_per_m", got=f"{scale:g}", expected="px per m, above 0, to track points in the image",
+                remedy="give --px-per-m",
+            )  # fmt: skip
+        self.rules = make_rules(self.config, self.context.fps, scale)
+        return self.rules
+
+    def _measure(self, points: Array, weights: Array, rules: Rules, t: float) -> list[changes.Change]:
+        """Search regions, associations, updates (4); splits and births (3.3)."""
+        bank, c = self.bank, self.config
+        lost = bank.named & (t - bank.seen > c.coast_time)
+        d2 = self._search(points, rules, lost)
+        hits = np.isfinite(d2).sum(0)
+        own = changes.attached(points, d2, rules.constraint.link) if c.attach else np.full(len(points), -1)
+        hits[own >= 0] = 1
+        before = bank.null > 0
+        state, chosen, said = kernels.associate(
+            points, weights, d2, own, hits, bank.x, bank.P, bank.extent, bank.size, before, rules.numbers
+        )
+        measured, null = state == kernels.MEASURED, state == kernels.NULL
+        bank.seen[measured | null] = t
+        bank.measured[measured] += rules.dt
+        bank.null = np.where(null, bank.null + rules.dt, np.maximum(bank.null - rules.dt * measured, 0.0))
+        self.innovation = [
+            (int(bank.id[g]), said[g, :2].copy(), said[g, [2, 3, 3, 4]].reshape(2, 2))
+            for g in np.flatnonzero(measured & bank.named).tolist()
+        ]
+        remember(bank, points, chosen, rules, t)
+        told = self._split(points, weights, d2, chosen, rules, t)
+        free = (hits == 0) & (own < 0)
+        changes.births(bank, points[free], weights[free], rules, t)
+        return told
+
+    def _search(self, points: Array, rules: Rules, lost: Bools) -> Array:
+        """d2 (G, M). Lost groups claim nothing; tentative ones what no other claims."""
+        bank = self.bank
+        wider = np.square(rules.scale * self.config.split_speed * bank.null)
+        d2 = kernels.search(points, bank.x, bank.P, bank.extent, rules.noise**2, wider, self.config.gate)
+        d2[lost] = np.inf
+        tentative = ~bank.named
+        if tentative.any():
+            claimed = np.isfinite(d2[~tentative]).any(0)
+            d2[np.ix_(tentative, claimed)] = np.inf
+        return d2
+
+    def _split(
+        self, points: Array, weights: Array, d2: Array, chosen: Bools, rules: Rules, t: float
+    ) -> list[changes.Change]:
+        """Groups that had no feasible association for split_time fall into those that their points form; shared points
+        go with the nearest group."""
+        bank, told = self.bank, []
+        due = np.flatnonzero((bank.null >= self.config.split_time - 1e-9) & (bank.null > 0))
+        nearest = d2.argmin(0) if len(d2) else np.zeros(len(points), np.int64)
+        for row in due.tolist()[::-1]:  # from behind: children stand at the end
+            mine = chosen[row] & ((nearest == row) | ~np.isfinite(d2[row]))
+            change = changes.split(bank, row, points[mine], weights[mine], rules, t, self.names)
+            told += [] if change is None else [change]
+        return told

@@ -1,0 +1,126 @@
+"""The groups that `group-pda` follows: their states as arrays, birth, merging, splitting, loss.
+
+A group is tentative until it was measured for `confirm_time`, then it has an id and is told. It coasts where it is not
+measured, is lost after `coast_time` (it then claims nothing, waiting for a newborn to take its id back), and dies after
+`recapture_time`. null: the length of its spell without a feasible association, which every good frame shortens.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, fields
+
+import numpy as np
+
+from sim.types import Array, Bools, Ints
+from tracking.papers.group_pda_rules import Rules
+
+UNNAMED = -1
+
+
+@dataclass
+class Bank:
+    """G groups: x (G, 4) xi, v; P (G, 4, 4); extent (G, 2, 2) Sigma; size (G,) N, people; id (G,), UNNAMED tentative;
+    born, seen (G,): s, first and last measurement; measured (G,): s in all; null (G,): s; trail: of each group its
+    points of the last moments, (time, points relative to xi)."""
+
+    x: Array
+    P: Array
+    extent: Array
+    size: Array
+    id: Ints
+    born: Array
+    seen: Array
+    measured: Array
+    null: Array
+    trail: list[list[tuple[float, Array]]]
+
+    @classmethod
+    def empty(cls) -> Bank:
+        """No groups."""
+        none, ids = np.zeros(0), np.zeros(0, np.int64)
+        return cls(np.zeros((0, 4)), np.zeros((0, 4, 4)), np.zeros((0, 2, 2)), none, ids, none, none, none, none, [])
+
+    def __len__(self) -> int:
+        return len(self.id)
+
+    @property
+    def named(self) -> Bools:
+        """(G,) not tentative."""
+        return np.asarray(self.id != UNNAMED)
+
+    def keep(self, kept: Bools) -> None:
+        """Drop the others."""
+        for f in fields(self):
+            value = getattr(self, f.name)
+            new = [v for v, k in zip(value, kept, strict=True) if k] if f.name == "trail" else value[kept]
+            setattr(self, f.name, new)
+
+    def add(self, other: Bank) -> None:
+        """Take in more groups, behind these."""
+        for f in fields(self):
+            a, b = getattr(self, f.name), getattr(other, f.name)
+            setattr(self, f.name, a + b if f.name == "trail" else np.concatenate([a, b]))
+
+    def predict(self, rules: Rules) -> None:
+        """x = F x, P = F P F' + Q (2.3)."""
+        self.x = self.x @ rules.F.T
+        self.P = rules.F @ self.P @ rules.F.T + rules.Q
+
+
+def newborn(points: Array, weights: Array, group: Ints, rules: Rules, t: float) -> Bank:
+    """Tentative groups out of measurements (3.3): sample mean, covariance and number of each, at rest.
+
+    group (M,): 0, 1, … or -1 for none.
+    """
+    count = int(group.max(initial=-1)) + 1
+    bank = Bank.empty()
+    if not count:
+        return bank
+    inside = group >= 0
+    g, y, w = group[inside], points[inside], weights[inside]
+    people = np.bincount(g, w, count)
+    mean = np.stack([np.bincount(g, w * y[:, a], count) for a in range(2)], 1) / people[:, None]
+    d = y - mean[g]
+    prior, strength, c = rules.constraint.prior, rules.constraint.strength, rules.config
+    square = np.stack([np.bincount(g, w * d[:, a] * d[:, b], count) for a in range(2) for b in range(2)], 1)
+    extent = (square.reshape(-1, 2, 2) + strength * prior) / (people + strength)[:, None, None]
+    P = np.zeros((count, 4, 4))
+    P[:, [0, 1], [0, 1]] = (rules.noise**2 / np.maximum(people, 1e-3))[:, None] + rules.noise**2
+    P[:, [2, 3], [2, 3]] = (rules.scale * c.speed_prior) ** 2
+    trail = [[(t, d[g == k])] for k in range(count)]
+    nil, now = np.zeros(count), np.full(count, t)
+    return Bank(
+        np.hstack([mean, np.zeros((count, 2))]), P, extent, people, np.full(count, UNNAMED),
+        now, now.copy(), nil + rules.dt, nil, trail,
+    )  # fmt: skip
+
+
+def children(parent: Bank, row: int, points: Array, weights: Array, group: Ints, rules: Rules, t: float) -> Bank:
+    """The groups into which one splits: newborn from its points; ours: with its velocity and age."""
+    c = rules.config
+    made = newborn(points, weights, group, rules, t)
+    made.born[:], made.measured[:] = parent.born[row], parent.measured[row]
+    if c.inherit_velocity:
+        made.x[:, 2:] = parent.x[row, 2:]
+        made.P[:, 2:, 2:] = parent.P[row, 2:, 2:] + (rules.scale * c.split_speed) ** 2 * np.eye(2)
+    return made
+
+
+def merged(bank: Bank, rows: Ints) -> Bank:
+    """One group out of several (3.1): means by size, extents with the spread of the centroids.
+
+    P is that of a weighted mean of independent centroids, sum w^2 P_i: their spread is the group's extent, no error.
+    """
+    size = bank.size[rows].sum()
+    w = bank.size[rows] / size
+    x = w @ bank.x[rows]
+    d = bank.x[rows, :2] - x[:2]
+    extent = np.einsum("k,kij->ij", w, bank.extent[rows] + d[:, :, None] * d[:, None, :])
+    P = np.einsum("k,kij->ij", w * w, bank.P[rows])
+    heir = rows[np.lexsort((bank.born[rows], -bank.size[rows]))[0]]  # most people, then the older
+    trail = [(t, y + bank.x[r, :2] - x[:2]) for r in rows.tolist() for t, y in bank.trail[r]]
+    one = slice(heir, heir + 1)
+    return Bank(
+        x[None], P[None], extent[None], np.array([size]), bank.id[one], bank.born[rows].min(keepdims=True),
+        bank.seen[rows].max(keepdims=True), bank.measured[rows].max(keepdims=True), np.zeros(1), [trail],
+    )  # fmt: skip

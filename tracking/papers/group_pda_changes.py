@@ -1,0 +1,175 @@
+"""What becomes of `group-pda`'s groups in a frame: points attached, splits, merging, births, loss and return.
+
+Each function takes the bank as it is and leaves it changed; what is to be told comes back as `Change`s.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+
+from sim.types import Array, Bools, Ints
+from tracking.components import linked, partition
+from tracking.ellipsoids import overlaps
+from tracking.papers.group_pda_bank import UNNAMED, Bank, children, merged, newborn
+from tracking.papers.group_pda_rules import Rules
+
+
+@dataclass(frozen=True)
+class Change:
+    """kind of GroupEvent; since, s: when it began; ids before and after; pos (2,)."""
+
+    kind: str
+    since: float
+    before: tuple[int, ...]
+    after: tuple[int, ...]
+    pos: tuple[float, float]
+
+
+def attached(points: Array, d2: Array, link: float) -> Ints:
+    """(M,) the group, a row of d2 (G, M), that each point in nobody's region belongs to as it is linked to one of its
+    points, else -1. Of several groups the one whose point is nearest."""
+    own = np.full(len(points), -1)
+    taken = np.isfinite(d2).any(0) if len(d2) else np.zeros(len(points), bool)
+    if taken.all() or not taken.any():
+        return own
+    label = linked(points, link)
+    free = np.flatnonzero(~taken & np.isin(label, label[taken]))
+    for part in np.unique(label[free]).tolist():
+        mine, theirs = free[label[free] == part], np.flatnonzero(taken & (label == part))
+        claim = d2[:, theirs].argmin(0)
+        if len(np.unique(claim)) == 1:
+            own[mine] = claim[0]
+            continue
+        apart = np.square(points[mine][:, None] - points[theirs]).sum(2)
+        own[mine] = claim[apart.argmin(1)]
+    return own
+
+
+class Names:
+    """Ids, each used once. State: the next one."""
+
+    def __init__(self) -> None:
+        self.next = 1
+
+    def new(self) -> int:
+        """A fresh id."""
+        self.next += 1
+        return self.next - 1
+
+
+def split(bank: Bank, row: int, points: Array, weights: Array, rules: Rules, t: float, names: Names) -> Change | None:
+    """Replace a group by those that its points (M, 2) form (3.3), if they are several; the largest keeps its id."""
+    group = partition(points, weights, rules.constraint)
+    if group.max(initial=-1) < 1:
+        return None
+    made = children(bank, row, points, weights, group, rules, t)
+    largest = int(made.size.argmax())
+    named = bank.id[row] != UNNAMED
+    if named:
+        made.id[:] = [bank.id[row] if k == largest else names.new() for k in range(len(made))]
+    change = Change("split", t - bank.null[row], (int(bank.id[row]),), tuple(made.id.tolist()), tuple(bank.x[row, :2]))
+    bank.keep(np.arange(len(bank)) != row)
+    bank.add(made)
+    return change if named else None
+
+
+class Merging:
+    """Merging (3.1, 3.2) on updated states. State: since when each two groups have been near and equally fast."""
+
+    def __init__(self) -> None:
+        self.since: dict[tuple[int, int], float] = {}
+
+    def step(self, bank: Bank, rules: Rules, t: float) -> Iterator[Change]:
+        """Merge groups for which that has been so for `merge_time`.
+
+        Only those do that have an id, were measured in this frame and are in no spell: the others' velocities are
+        ignorance, not likeness.
+        """
+        able = np.flatnonzero(bank.named & (bank.seen >= t) & (bank.null <= 0))
+        pairs = {p: self.since.get(p, t) for p in _alike(bank, able, rules)}
+        self.since = pairs
+        due = [p for p, since in pairs.items() if t - since >= rules.config.merge_time - 1e-9]
+        for ids in _connected(due):
+            rows = np.flatnonzero(np.isin(bank.id, ids))
+            since = min(pairs[p] for p in due if p[0] in ids)
+            one = merged(bank, rows)
+            keep = np.ones(len(bank), bool)
+            keep[rows] = False
+            bank.keep(keep)
+            bank.add(one)
+            self.since = {p: s for p, s in self.since.items() if not set(p) & set(ids)}
+            yield Change("merge", since, tuple(sorted(ids)), (int(one.id[0]),), tuple(one.x[0, :2]))
+
+
+def _alike(bank: Bank, rows: Ints, rules: Rules) -> Iterator[tuple[int, int]]:
+    """R_x: ids of each two groups whose search regions overlap and whose velocities differ by no more than allowed."""
+    near = overlaps(bank.x[rows, :2], bank.extent[rows], rules.config.gate)
+    v = bank.x[rows, 2:]
+    slow = np.hypot(*(v[:, None] - v[None]).transpose(2, 0, 1)) <= rules.scale * rules.config.merge_velocity
+    for i, j in np.argwhere(np.triu(near & slow, 1)).tolist():
+        a, b = sorted((int(bank.id[rows[i]]), int(bank.id[rows[j]])))
+        yield a, b
+
+
+def _connected(pairs: list[tuple[int, int]]) -> list[list[int]]:
+    """Connected components of a graph, G_x."""
+    parts: list[set[int]] = []
+    for pair in pairs:
+        touched = [p for p in parts if p & set(pair)]
+        parts = [p for p in parts if not p & set(pair)] + [set(pair).union(*touched)]
+    return [sorted(p) for p in parts]
+
+
+def births(bank: Bank, points: Array, weights: Array, rules: Rules, t: float) -> None:
+    """Tentative groups out of unclaimed points (3.3)."""
+    if len(points):
+        bank.add(newborn(points, weights, partition(points, weights, rules.constraint), rules, t))
+
+
+def confirm(bank: Bank, rules: Rules, t: float, names: Names) -> Iterator[Change]:
+    """Names for tentative groups that were measured for long enough: that of a lost group which should be here, with
+    its velocity, or a fresh one."""
+    c = rules.config
+    for row in np.flatnonzero(~bank.named & (bank.measured > c.confirm_time + 1e-9)).tolist():
+        lost = _lost_here(bank, row, rules, t) if c.recapture else -1
+        place = tuple(bank.x[row, :2])
+        if lost >= 0:
+            bank.id[row], bank.born[row] = bank.id[lost], bank.born[lost]
+            bank.id[lost], bank.seen[lost] = UNNAMED, -np.inf
+        else:
+            bank.id[row] = names.new()
+            yield Change("enter", float(bank.born[row]), (), (int(bank.id[row]),), place)
+
+
+def _lost_here(bank: Bank, row: int, rules: Rules, t: float) -> int:
+    """The unmeasured group in whose predicted region, position and velocity, a new one lies; -1 if there is none."""
+    old = np.flatnonzero(bank.named & (bank.seen < t))
+    if not len(old):
+        return -1
+    d = bank.x[row] - bank.x[old]
+    S = bank.P[old] + bank.P[row]
+    S[:, :2, :2] += bank.extent[old]
+    d2 = np.einsum("ki,ki->k", d, np.linalg.solve(S, d[..., None])[..., 0])
+    slow = np.hypot(d[:, 2], d[:, 3]) <= rules.scale * rules.config.merge_velocity + np.sqrt(
+        np.trace(S[:, 2:, 2:], axis1=1, axis2=2) / 2
+    )
+    good = slow & (d2 <= GATE4)
+    return int(old[np.where(good, d2, np.inf).argmin()]) if good.any() else -1
+
+
+GATE4 = 13.28
+"""99 % of chi-square with 4 degrees of freedom."""
+
+
+def deaths(bank: Bank, rules: Rules, t: float) -> Iterator[Change]:
+    """Groups that were lost for too long die, tentative ones that were missed for `confirm_time`."""
+    c = rules.config
+    patience = np.where(bank.named, max(c.coast_time, c.recapture_time if c.recapture else 0.0), c.confirm_time)
+    dead: Bools = t - bank.seen > patience + 1e-9
+    for row in np.flatnonzero(dead & bank.named).tolist():
+        yield Change("leave", float(bank.seen[row]), (int(bank.id[row]),), (), tuple(bank.x[row, :2]))
+    if dead.any():
+        bank.keep(~dead)

@@ -1,0 +1,88 @@
+"""The parameters of `group-pda`, and the numbers of its kernels that follow from them at a frame rate and a scale."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import ClassVar
+
+from tracking.config import param
+from tracking.detect.settings import BackgroundSettings
+
+
+@dataclass(frozen=True)
+class GroupPdaConfig(BackgroundSettings):
+    """Search regions, masses, group constraint, merging, splitting and output of `group-pda`. Lengths are metres."""
+
+    tracker: ClassVar[str] = "group-pda"
+
+    gate: float = param(9.21, (6.0, 20.0), "", "gamma: squared Mahalanobis radius of the search region (2.2)")
+    radius: float = param(0.75, (0.1, 2.0), "m", "r of a point's region: points closer than 2 r are linked (R_0, 3.3)")
+    person_spread: float = param(
+        0.3, (0.05, 1.0), "m", "standard deviation that the extent of few points is shrunk to (ours)", "log"
+    )
+    spread_weight: float = param(3.0, (0.1, 20.0), "people", "how many people that extent counts for (ours)", "log")
+    accel_noise: float = param(
+        0.5, (0.05, 5.0), "m/s^1.5", "white acceleration of the centroid, per root second", "log"
+    )
+    point_noise: float = param(
+        0.1, (0.005, 1.0), "m", "standard deviation of one person's measured place, sensor and gait", "log"
+    )
+    speed_prior: float = param(1.3, (0.1, 5.0), "m/s", "standard deviation of a newborn's velocity", "log")
+    extent_time: float = param(1.0, (0.05, 20.0), "s", "time constant of the extent, alpha_s of (2.4)", "log")
+    size_time: float = param(1.0, (0.05, 20.0), "s", "time constant of the number of people, alpha_N of (2.4)", "log")
+    count_noise: float = param(0.5, (0.05, 5.0), "people", "sigma_n of m_N: part that does not grow with N", "log")
+    count_share: float = param(0.15, (0.01, 1.0), "share", "sigma_n of m_N: part that grows with N (ours)", "log")
+    detect_prob: float = param(0.95, (0.3, 1.0), "probability", "that a member is measured: people there from seen")
+    miss_prob: float = param(0.02, (0.0, 0.5), "probability", "of the miss hypothesis before any measurement (ours)")
+
+    association: str = param(
+        "pda", ("pda", "none"), "", "masses of associations (4.2), or all points in the region (5.2.1)", "categorical"
+    )
+    miss: bool = param(True, (True, False), "", "an explicit hypothesis that nothing is the group's", "categorical")
+    freeze: bool = param(True, (True, False), "", "extent and size rest while points are shared (ours)", "categorical")
+    freeze_share: float = param(
+        0.1, (0.0, 1.0), "share", "of the group's size, shared points from which on they rest (ours)"
+    )
+    gate_correction: bool = param(
+        True, (True, False), "", "undo what the region's edge cuts from the extent (ours)", "categorical"
+    )
+    centroid_noise: str = param(
+        "people",
+        ("people", "redrawn"),
+        "",
+        "R of the centroid: members keep their places and some are not seen (ours), or are drawn anew each frame (2.1)",
+        "categorical",
+    )
+    attach: bool = param(
+        True, (True, False), "", "unclaimed points linked to a group's are its own (ours)", "categorical"
+    )
+
+    merge_velocity: float = param(
+        0.5, (0.05, 3.0), "m/s", "greatest difference of velocities at which groups merge (ours: SR_v made physical)"
+    )
+    merge_time: float = param(0.5, (0.0, 3.0), "s", "for so long groups must be near and equally fast to merge (ours)")
+    split_time: float = param(0.5, (0.0, 3.0), "s", "spell without a feasible association after which a group splits")
+    split_speed: float = param(
+        0.5, (0.0, 3.0), "m/s", "standard deviation of a child's velocity about its parent's (ours)"
+    )
+    inherit_velocity: bool = param(
+        True, (True, False), "", "children of a split start with their parent's velocity (ours)", "categorical"
+    )
+    confirm_time: float = param(0.3, (0.0, 3.0), "s", "a new group is told once it was measured for so long (ours)")
+    coast_time: float = param(1.5, (0.0, 10.0), "s", "a group dies after so long without measurement (ours)")
+    recapture: bool = param(
+        True, (True, False), "", "a newborn where a lost group should be takes its id back (ours)", "categorical"
+    )
+    recapture_time: float = param(3.0, (0.0, 10.0), "s", "for so long after its last measurement (ours)")
+    report_coast: float = param(0.5, (0.0, 5.0), "s", "a group is told for so long after its last measurement (ours)")
+    hull_time: float = param(0.3, (0.0, 3.0), "s", "the hull is that of the points of so long, moved along (ours)")
+
+    grid: float = param(0.1, (0.02, 1.0), "m", "from pixels: step of the grid of foreground points", "log")
+    pixel_radius: float = param(0.4, (0.05, 2.0), "m", "from pixels: r of a point's region")
+    pixel_noise: float = param(0.12, (0.005, 1.0), "m", "from pixels: jitter of one silhouette's centroid", "log")
+    least_people: float = param(
+        0.25, (0.0, 2.0), "people", "from pixels: components of less foreground are noise (bounds the work, ours)"
+    )
+    most_foreground: float = param(
+        0.6, (0.05, 1.0), "share", "from pixels: a frame with more foreground tells nothing: lights, camera (ours)"
+    )

@@ -1,0 +1,63 @@
+"""From a picture to the points of `group-pda`: foreground pixels on a grid, each a share of a person (ours)."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from sim.types import Array, Bools, Camera, Context, Image
+from tracking.detect import blobs
+from tracking.detect.background import Background
+from tracking.detect.classes import foreground
+from tracking.papers.group_pda_config import GroupPdaConfig
+
+PERSON, SLIM = 1.7, 0.3
+"""m, and width over height of a person seen from the side: where no camera tells."""
+
+
+class Pixels:
+    """State: the background model. step: grid step, px; person (2,): width and height of a person in the image, px."""
+
+    def __init__(self, config: GroupPdaConfig, context: Context) -> None:
+        assert context.background is not None
+        self.config, self.scale = config, context.px_per_m
+        self.background = Background(context.background, context.fps, config)
+        self.step = max(1, round(config.grid * self.scale))
+        self.person = _person(context.camera, self.scale)
+
+    @property
+    def share(self) -> float:
+        """How much of a person a grid point is: cell / area of an ellipse of his size."""
+        return float(self.step**2 / (np.pi / 4 * self.person.prod()))
+
+    @property
+    def spread(self) -> Array:
+        """(2, 2) covariance of one person's pixels: a filled ellipse has a quarter of its semi-axes' squares."""
+        return np.diag(np.square(self.person / 4))
+
+    def points(self, image: Image) -> Array | None:
+        """(M, 2) px centres of the grid's cells that are foreground; None where there is more than there can be."""
+        classes = self.background.classify(image)
+        mask = blobs.clean(foreground(classes), self.scale)
+        self.background.adapt(image, classes)
+        if np.count_nonzero(mask) / mask.size > self.config.most_foreground:
+            return None
+        return grid_points(mask, self.step)
+
+
+def grid_points(mask: Bools, step: int) -> Array:
+    """(M, 2) u, v of the foreground pixels in the middle of the cells of a grid."""
+    first = step // 2
+    v, u = np.nonzero(mask[first::step, first::step])
+    return np.stack([u, v], 1) * float(step) + first + 0.5
+
+
+def _person(camera: Camera | None, scale: float) -> Array:
+    if camera is None:
+        return scale * PERSON * np.array([SLIM, 1.0])
+    from sim.camera import to_ground
+    from sim.people import boxes
+
+    middle = to_ground(camera, np.array([camera.image], float) / 2)
+    turns = np.radians([0.0, 45.0, 90.0, 135.0])
+    place = np.column_stack([np.repeat(middle, len(turns), 0), np.zeros(len(turns))])
+    return np.asarray(boxes(camera, place, turns, np.full(len(turns), PERSON))[:, 2:].mean(0))

@@ -1,0 +1,65 @@
+"""The numbers of `group-pda`'s kernels in the unit of the points, from its parameters, a frame rate and a scale."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from sim.types import Array
+from tracking.components import Constraint
+from tracking.papers import group_pda_kernels as kernels
+from tracking.papers.group_pda_config import GroupPdaConfig
+
+
+@dataclass(frozen=True)
+class Rules:
+    """dt, s; scale: units of the plane per metre; constraint: of G_y; numbers: `rules` of the kernels; F, Q (4, 4) of
+    (2.3); noise: standard deviation of one person's measured place; half_cell: of the grid
+    of pixels, 0 for points; all but dt in the plane's unit."""
+
+    config: GroupPdaConfig
+    dt: float
+    scale: float
+    constraint: Constraint
+    noise: float
+    numbers: Array
+    F: Array
+    Q: Array
+    half_cell: float
+
+
+def make_rules(
+    config: GroupPdaConfig, fps: float, scale: float, person: Array | None = None, step: float = 0.0
+) -> Rules:
+    """person (2, 2): covariance of one person's pixels, px^2, and step: that of their grid, px; None: from points."""
+    c, dt, pixels = config, 1 / fps, person is not None
+    noise = scale * (c.pixel_noise if pixels else c.point_noise)
+    prior = (scale * c.person_spread) ** 2 * np.eye(2) if person is None else person
+    link = 2 * scale * (c.pixel_radius if pixels else c.radius)
+    constraint = Constraint(link, c.gate, prior, c.spread_weight, c.least_people if pixels else 0.0)
+    numbers = np.zeros(kernels.ALL + 1)
+    numbers[kernels.GATE], numbers[kernels.LINK] = c.gate, link
+    numbers[kernels.PRIOR_XX : kernels.PRIOR_YY + 1] = constraint.three
+    numbers[kernels.STRENGTH], numbers[kernels.LEAST] = c.spread_weight, constraint.least
+    numbers[kernels.NOISE], numbers[kernels.COUNT], numbers[kernels.SHARE] = noise, c.count_noise, c.count_share
+    numbers[kernels.DETECT], numbers[kernels.MISS] = 1.0 if pixels else c.detect_prob, c.miss_prob if c.miss else 0.0
+    numbers[kernels.FREEZE] = c.freeze_share if c.freeze else np.inf
+    numbers[kernels.KEEP_EXTENT], numbers[kernels.KEEP_SIZE] = np.exp(-dt / np.array([c.extent_time, c.size_time]))
+    numbers[kernels.CUT] = truncation(c.gate) if c.gate_correction else 1.0
+    numbers[kernels.REDRAWN] = c.centroid_noise == "redrawn"
+    numbers[kernels.ALL] = c.association == "none"
+    if numbers[kernels.ALL]:
+        numbers[kernels.MISS], numbers[kernels.FREEZE] = 0.0, np.inf
+    F = np.eye(4)
+    F[0, 2] = F[1, 3] = dt
+    block = np.array([[dt**4 / 4, dt**3 / 2], [dt**3 / 2, dt**2]])
+    Q = np.kron(block, np.eye(2)) * (scale * c.accel_noise) ** 2 / dt
+    return Rules(config, dt, scale, constraint, noise, numbers, F, Q, step / 2)
+
+
+def truncation(gate: float) -> float:
+    """c: the covariance of Gaussian points inside the region is c times that of all (in the plane):
+    F_chi2,4(gate) / F_chi2,2(gate)."""
+    tail = np.exp(-gate / 2)
+    return float((1 - tail * (1 + gate / 2)) / (1 - tail))
