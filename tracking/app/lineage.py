@@ -7,12 +7,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from sim.types import GroupEvent, Ints
+from sim.types import Array, GroupEvent, Ints
 
 
 @dataclass(frozen=True)
 class Bar:
-    """One unbroken life of a group id: frames (both inclusive), lane from 0, most people in it."""
+    """One unbroken life of a group id: frames (both inclusive), lane from 0, most people in it (a whole number)."""
 
     id: int
     start: int
@@ -30,20 +30,21 @@ class Link:
     b: int
 
 
-def bars(frame: Ints, group: Ints, least: int = 2, gap: int = 1) -> list[Bar]:
+def bars(frame: Ints, group: Ints, least: int = 2, gap: int = 1, people: Array | None = None) -> list[Bar]:
     """The lives of the groups that rows of (frame, group) make, -1 being nobody's; shorter gaps than `gap` are closed.
 
-    least: people from which a group counts (1 where a row is a whole group). Lanes are filled greedily: a bar takes
-    the lowest lane that is free, so that a page stays low.
+    least: people from which a group counts. people: how many each row stands for, one where nothing is said. Lanes are
+    filled greedily: a bar takes the lowest lane that is free, so that a page stays low.
     """
     rows = group >= 0
-    pairs, people = np.unique(np.stack([group[rows], frame[rows]], axis=1), axis=0, return_counts=True)
-    pairs, people = pairs[people >= least], people[people >= least]
+    pairs, place = np.unique(np.stack([group[rows], frame[rows]], axis=1), axis=0, return_inverse=True)
+    count = np.bincount(place.ravel(), None if people is None else people[rows], len(pairs))
+    pairs, count = pairs[count >= least], count[count >= least]
     if not len(pairs):
         return []
     new = np.flatnonzero((np.diff(pairs[:, 0]) != 0) | (np.diff(pairs[:, 1]) > gap)) + 1
-    lives = zip(np.split(pairs, new), np.split(people, new), strict=True)
-    found = [(int(p[0, 1]), int(p[-1, 1]), int(p[0, 0]), int(n.max())) for p, n in lives]
+    lives = zip(np.split(pairs, new), np.split(count, new), strict=True)
+    found = [(int(p[0, 1]), int(p[-1, 1]), int(p[0, 0]), round(float(n.max()))) for p, n in lives]
     return _in_lanes(sorted(found))
 
 

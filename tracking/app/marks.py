@@ -12,10 +12,13 @@ import numpy as np
 from sim.geometry import convex_hull
 from sim.io.truths import standing
 from sim.io.upright import upright_boxes
-from sim.types import Array, Bools, Camera, GroupEvent, Ints, Scene, Tracks, Truth
+from sim.types import Array, Bools, Camera, GroupEvent, Groups, Ints, Scene, Tracks, Truth
 
 SURE = math.sqrt(5.991)
 """Standard deviations that hold 95 % of a plane's normal distribution."""
+
+SEARCH = math.sqrt(9.21)
+"""The same for 99 %: d' E^-1 d <= 9.21 is where a group of extent E is looked for."""
 
 ROUND = np.stack([f(np.linspace(0, 2 * np.pi, 32, endpoint=False)) for f in (np.cos, np.sin)], axis=1)
 AROUND = 5.0
@@ -28,12 +31,30 @@ QUIET = ("enter", "leave")
 """Kinds that are told nowhere in the picture."""
 
 
+NOWHERE = np.zeros((0, 2))
+
+
+@dataclass(frozen=True, eq=False)
+class Region:
+    """A group in px: the polygon hull (V, 2), no vertex where none is known or it cannot be seen.
+
+    Of one that is tracked as a whole also search (32, 2), where its parts are with 99 %; way (2, 2), its middle and
+    where that is in 1 s; size, people, nan where unknown.
+    """
+
+    id: int
+    hull: Array
+    search: Array = field(default_factory=NOWHERE.copy)
+    way: Array = field(default_factory=NOWHERE.copy)
+    size: float = math.nan
+
+
 @dataclass(frozen=True, eq=False)
 class Marks:
     """One frame of one side, N rows: box (N, 4) ltwh and at (N, 2), where trails run, nan where unknown.
 
-    ellipse (N, 32, 2): where the position is with 95 %, nan where unknown; regions: group ids and polygons (V, 2).
-    hidden (N,): labelled, yet hardly to be seen.
+    ellipse (N, 32, 2): where the position is with 95 %, nan where unknown. hidden (N,): labelled, yet hardly to be
+    seen. wholes: the rows are the regions, no people.
     """
 
     id: Ints
@@ -41,7 +62,8 @@ class Marks:
     at: Array
     ellipse: Array
     hidden: Bools
-    regions: tuple[tuple[int, Array], ...] = ()
+    regions: tuple[Region, ...] = ()
+    wholes: bool = False
 
     @classmethod
     def none(cls) -> Marks:
@@ -102,15 +124,38 @@ def of_truth(truth: Truth) -> Side:
 
 
 def _of_answer(t: Tracks, camera: Camera | None, scene: Scene | None) -> Marks:
+    if t.unit == "group":
+        return _of_groups(t, camera, scene)
     n = len(t.id)
     box = t.box if t.box is not None else np.full((n, 4), np.nan)
-    if t.box is None and t.plane != "image" and t.unit == "person" and camera is not None:
+    if t.box is None and t.plane != "image" and camera is not None:
         box = upright_boxes(camera, standing(t.pos, scene))
     at = _feet(box)
     if t.plane == "image":
         at = np.where(np.isfinite(at), at, t.pos)
-    regions = _hulls(t, camera, scene) if t.unit == "group" else _regions(t.group, box)
-    return Marks(t.id, box, at, _ellipses(t, camera, scene), np.zeros(n, bool), regions)
+    return Marks(t.id, box, at, _ellipses(t, camera, scene), np.zeros(n, bool), _regions(t.group, box))
+
+
+def _of_groups(t: Tracks, camera: Camera | None, scene: Scene | None) -> Marks:
+    """Groups that are tracked as wholes: their regions, and trails of their middles."""
+    n, groups = len(t.id), t.groups or Groups.none()
+    rows = dict(zip(groups.id.tolist(), range(len(groups.id)), strict=True))
+
+    def seen(points: Array) -> Array:
+        return _seen(points, t.plane, camera, scene)
+
+    def region(k: int, name: int) -> Region:
+        row, way = rows.get(name), seen(np.stack([t.pos[k], t.pos[k] + t.vel[k]]))
+        if row is None:
+            return Region(name, NOWHERE, way=way)
+        hull = groups.hull[row] if groups.hull else NOWHERE
+        around = ring(t.pos[k, :2], groups.extent[row], SEARCH)
+        return Region(name, seen(hull), seen(around), way, float(groups.size[row]))
+
+    regions = tuple(region(k, name) for k, name in enumerate(t.id.tolist()))
+    at = np.array([r.way[0] if len(r.way) else [np.nan, np.nan] for r in regions]).reshape(n, 2)
+    no_box, no_ellipse = np.full((n, 4), np.nan), np.full((n, len(ROUND), 2), np.nan)
+    return Marks(t.id, no_box, at, no_ellipse, np.zeros(n, bool), regions, wholes=True)
 
 
 def _feet(box: Array) -> Array:
@@ -118,47 +163,43 @@ def _feet(box: Array) -> Array:
     return np.asarray(box[:, :2] + box[:, 2:] * np.array([0.5, 1.0]))
 
 
-def _regions(group: Ints, box: Array) -> tuple[tuple[int, Array], ...]:
+def _regions(group: Ints, box: Array) -> tuple[Region, ...]:
     """The hull of the boxes, a little wider, of each group of two or more."""
     names = np.unique(group[group >= 0])
     box = box + AROUND * np.array([-1, -1, 2, 2])
     found = [(int(g), box[(group == g) & np.isfinite(box[:, 0])]) for g in names]
-    return tuple((g, convex_hull(_corners(own))) for g, own in found if len(own) > 1)
+    return tuple(Region(g, convex_hull(_corners(own))) for g, own in found if len(own) > 1)
 
 
 def _corners(box: Array) -> Array:
     return np.concatenate([box[:, :2] + box[:, 2:] * np.array(c) for c in ((0, 0), (1, 0), (1, 1), (0, 1))])
 
 
-def _hulls(t: Tracks, camera: Camera | None, scene: Scene | None) -> tuple[tuple[int, Array], ...]:
-    """The regions of a method that knows groups only."""
-    if t.groups is None:
-        return ()
-    pairs = [(int(g), hull) for g, hull in zip(t.groups.id, t.groups.hull, strict=True) if len(hull)]
-    return tuple((g, seen) for g, hull in pairs for seen in [_seen(hull, t.plane, camera, scene)] if len(seen))
-
-
 def _seen(points: Array, plane: str, camera: Camera | None, scene: Scene | None) -> Array:
     """Points (K, 2 or 3) in a tracker's plane as px; none where they cannot all be seen."""
-    if plane == "image":
+    if plane == "image" or not len(points):
         return points
     if camera is None:
-        return np.zeros((0, 2))
+        return NOWHERE
     from sim.camera import project
 
     uv, depth = project(camera, standing(points, scene))
-    return uv if (depth > 0).all() else np.zeros((0, 2))
+    return uv if (depth > 0).all() and np.isfinite(uv).all() else NOWHERE
+
+
+def ring(at: Array, cov: Array, reach: float) -> Array:
+    """(32, 2) points so many standard deviations of cov (2, 2) round a place; none where it is unknown."""
+    if not np.isfinite(cov).all():
+        return NOWHERE
+    values, vectors = np.linalg.eigh(cov)
+    return np.asarray(at + reach * (ROUND * np.sqrt(np.maximum(values, 0.0))) @ vectors.T)
 
 
 def _ellipses(t: Tracks, camera: Camera | None, scene: Scene | None) -> Array:
     """(N, 32, 2) px, nan where the covariance or a view of the place is missing."""
     found = np.full((len(t.id), len(ROUND), 2), np.nan)
     for k, cov in enumerate(t.cov[:, :2, :2]):
-        if not np.isfinite(cov).all():
-            continue
-        values, vectors = np.linalg.eigh(cov)
-        ring = t.pos[k, :2] + SURE * (ROUND * np.sqrt(np.maximum(values, 0.0))) @ vectors.T
-        seen = _seen(ring, t.plane, camera, scene)
+        seen = _seen(ring(t.pos[k, :2], cov, SURE), t.plane, camera, scene)
         if len(seen):
             found[k] = seen
     return found

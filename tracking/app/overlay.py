@@ -6,7 +6,7 @@ import os
 from collections.abc import Callable, Iterator
 from collections.abc import Sequence as SequenceOf
 from pathlib import Path
-from typing import Any, Literal
+from typing import Literal
 
 import cv2
 import numpy as np
@@ -116,9 +116,9 @@ def _panel(picture: Image | None, sequence: Sequence, index: int, sides: list[tu
 
 def _words(sequence: Sequence, frame: Frame, layers: list[list[tuple[Side, Style]]]) -> str:
     of = "" if sequence.length is None else f" of {sequence.length}"
-    sides: dict[str, Any] = {side.name: side for sides in layers for side, _ in sides}
-    people = "".join(f"   {name} {len(side.at(frame.index).id)}" for name, side in sides.items())
-    return f"{sequence.name}   frame {frame.index}{of}   {frame.t:.2f} s{people}"
+    now = {side.name: side.at(frame.index) for sides in layers for side, _ in sides}
+    count = "".join(f"   {name} {len(marks.id)}{' groups' * marks.wholes}" for name, marks in now.items())
+    return f"{sequence.name}   frame {frame.index}{of}   {frame.t:.2f} s{count}"
 
 
 def _marks(sequence: Sequence, frame: Frame) -> list[str]:

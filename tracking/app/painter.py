@@ -8,8 +8,8 @@ import cv2
 import numpy as np
 
 from sim.types import Array, GroupEvent, Image
-from tracking.app.marks import Side
-from tracking.app.sheet_panel import FLOOR, INK, Colour, View, colour, text
+from tracking.app.marks import Region, Side
+from tracking.app.sheet_panel import FLOOR, INK, Colour, View, colour
 
 TRAIL = 3.0
 """s of the past that is shown."""
@@ -52,10 +52,8 @@ def paint(view: View, side: Side, index: int, fps: float, style: Style = Style()
     """The marks of a side in a frame, over the picture that the view's canvas holds."""
     marks = side.at(index)
     regions = () if style.plain else marks.regions
-    for group, polygon in regions:
-        ink = colour(group)
-        view.wash(view.map(polygon), ink, 0.18)
-        view.line(polygon, ink, 2, closed=True)
+    for region in regions:
+        _region(view, region, colour(region.id))
     if not style.plain:
         for name, points in side.trails(index, round(TRAIL * fps)):
             view.line(points, colour(name), 2)
@@ -69,8 +67,33 @@ def paint(view: View, side: Side, index: int, fps: float, style: Style = Style()
             view.disc(marks.at[k], 5, ink, 2)
     if not style.plain:
         _names(view, side, index)
-        for group, polygon in regions:
-            _group_name(view, f"{side.prefix}{group}", polygon, colour(group))
+        for region in regions[:MANY]:
+            _group_name(view, side.prefix, region)
+
+
+def _region(view: View, region: Region, ink: Colour) -> None:
+    """The hull filled; dots round the search region; an arrow from the middle to where that is in 1 s."""
+    if len(region.hull):
+        view.wash(view.map(region.hull), ink, 0.18)
+        view.line(region.hull, ink, 2, closed=True)
+    if len(region.search):
+        _dots(view, region.search, ink)
+    if len(region.way):
+        view.arrow(region.way, FLOOR, 4)
+        view.arrow(region.way, ink, 2)
+
+
+def _dots(view: View, ring: Array, ink: Colour) -> None:
+    """A closed line of dots some 7 px apart, each with a light rim; none where it is larger than the picture."""
+    ends = np.concatenate([ring, ring[:1]])
+    along = np.r_[0.0, np.cumsum(np.hypot(*np.diff(ends, axis=0).T))]
+    if not (np.ptp(ring, axis=0) * view.scale < view.canvas.shape[1::-1]).all():
+        return
+    places = np.linspace(0.0, along[-1], max(int(along[-1] * view.scale / 7), 8), endpoint=False)
+    dots = np.stack([np.interp(places, along, ends[:, axis]) for axis in (0, 1)], axis=1)
+    for radius, tone in ((2.4, FLOOR), (1.5, ink)):
+        for at in dots:
+            view.disc(at, radius, tone)
 
 
 def _corners(box: Array) -> Array:
@@ -106,7 +129,7 @@ def _ellipse(view: View, ring: Array, ink: Colour) -> None:
 
 def _names(view: View, side: Side, index: int) -> None:
     marks = side.at(index)
-    if len(marks.id) > MANY:
+    if len(marks.id) > MANY or marks.wholes:
         return
     top = np.where(np.isfinite(marks.box[:, :2]), marks.box[:, :2], marks.at)
     size = letter(view)
@@ -115,12 +138,15 @@ def _names(view: View, side: Side, index: int) -> None:
             chip(view.canvas, str(name), (at[0] - 1, at[1] - 1), size, colour(name))
 
 
-def _group_name(view: View, name: str, polygon: Array, ink: Colour) -> None:
-    points = view.map(polygon)
+def _group_name(view: View, prefix: str, region: Region) -> None:
+    """Its id, and its estimated size where it is tracked as a whole, under its lowest corner."""
+    points = view.map(
+        next(points for points in (region.hull, region.search, region.way, np.zeros((1, 2))) if len(points))
+    )
     x, y = points[points[:, 1].argmax()]
+    words = f"{prefix}{region.id}" + (f" ~{round(region.size, 1):g}" if np.isfinite(region.size) else "")
     size = letter(view)
-    height = view.canvas.shape[0]
-    text(view.canvas, name, (x - 14 * size, min(y + 34 * size, height - 6)), size * 1.15, ink, 2)
+    chip(view.canvas, words, (x - 14 * size, y + 38 * size), size * 1.1, colour(region.id))
 
 
 def letter(view: View) -> float:

@@ -72,6 +72,14 @@ class View:
         x, y = _whole(self.map(at))[0]
         cv2.circle(self.canvas, (int(x), int(y)), round(radius * 2**SHIFT), ink, width, cv2.LINE_AA, SHIFT)
 
+    def arrow(self, ends: Array, ink: Colour, width: int) -> None:
+        """From the first of two places to the second, with a head of 7 px at most."""
+        a, b = self.map(ends)
+        far = float(np.hypot(*(b - a)))
+        tip = min(7.0, far / 2) / far if far > 0 else 0.0
+        start, end = ((int(x), int(y)) for x, y in _whole(np.stack([a, b])))
+        cv2.arrowedLine(self.canvas, start, end, ink, width, cv2.LINE_AA, SHIFT, tip)
+
     def wash(self, polygon: Array, ink: Colour, share: float) -> None:
         """A translucent polygon given in px."""
         low = np.maximum(np.floor(polygon.min(axis=0)).astype(int) - 1, 0)

@@ -2,11 +2,12 @@
 
 const $ = id => document.getElementById(id);
 const state = { frame: 1, playing: false, speed: 1, clock: 0, then: 0 };
-const options = { truth: true, tracks: true, detections: false, hulls: true, trails: true, ids: true, near: true, beside: false, video: true, by: "person" };
+const options = { truth: true, tracks: true, detections: false, hulls: true, ellipses: true, trails: true, ids: true, near: true, beside: false, video: true, by: "person" };
 const film = makeFilm(data.video, pictured);
 const TOGGLES = [
   ["truth", "Truth", "t", truth], ["tracks", "Tracks", "k", tracks], ["beside", "Side by side", "b", truth && tracks],
-  ["detections", "Detections", "d", found], ["hulls", "Groups", "h", true], ["trails", "Trails", "l", hasPlan],
+  ["detections", "Detections", "d", found], ["hulls", "Groups", "h", true],
+  ["ellipses", "Search regions", "e", tracks && tracks.wholes], ["trails", "Trails", "l", hasPlan || (tracks && tracks.wholes)],
   ["video", "Video", "v", film], ["ids", "Ids", "i", true], ["near", "Near strangers", "s", data.near.length],
 ];
 const SPEEDS = [0.1, 0.25, 0.5, 1, 2, 4, 8];
@@ -63,12 +64,13 @@ function pictured() {
 function facts(frame) {
   const rows = [["frame", `${frame} of ${data.length}, ${seconds(frame).toFixed(2)} s`]];
   for (const side of sides) {
-    const what = side.hull ? "groups" : "people";
-    rows.push([`${WORDS[side.name]} ${what}`, side.rows(frame).length]);
-    const groups = [...groupsAt(side, frame)].map(([id, members]) =>
-      `${side.name === "tracks" ? "T" : "G"}${id}` + (side.hull ? "" : ` (${members.map(row => side.id[row]).join(", ")})`));
+    if (!side.wholes) rows.push([`${WORDS[side.name]} people`, side.rows(frame).length]);
+    const groups = side.wholes
+      ? [...side.rows(frame)].map(row => wholeWords(side, row))
+      : [...groupsAt(side, frame)].map(([id, members]) =>
+        `${side.name === "tracks" ? "T" : "G"}${id} (${members.map(row => side.id[row]).join(", ")})`);
     const none = side === truth && data.unlabelled.some(([a, b]) => a <= frame && frame <= b) ? "not labelled" : "none";
-    if (!side.hull) rows.push([`${WORDS[side.name]} groups`, groups.join(" · ") || none]);
+    rows.push([`${WORDS[side.name]} groups`, groups.join(" · ") || none]);
   }
   if (found) rows.push(["detections", found.rows(frame).length]);
   const now = events.filter(event => event.start <= frame && frame <= Math.max(event.end, event.start + data.fps / 2));
@@ -169,14 +171,20 @@ function onKey(event) {
 function buildHead() {
   const about = [`${data.length} frames, ${data.fps} per second, ${seconds(data.length).toFixed(1)} s`];
   if (truth) about.push(`${new Set(truth.id).size} true people`);
-  if (tracks) about.push(`${new Set(tracks.id).size} ${tracks.hull ? "groups" : "people"} by ${data.tracker}`);
+  if (tracks) about.push(`${new Set(tracks.id).size} ${tracks.wholes ? "groups" : "people"} by ${data.tracker}`);
   $("about").textContent = about.join(" · ");
   buildScores();
-  const note = tracks && truth ? "true: bodies, solid, ids upright · tracked: rings, dashed, ids slanted" : "";
-  $("plan-note").textContent = hasPlan ? note : "";
+  $("plan-note").textContent = hasPlan && tracks && truth ? planNote() : "";
   $("image-note").textContent = hasImage && tracks && truth ? "true: solid · tracked: dashed · detected: dotted" : "";
   $("plan-stage").hidden = !hasPlan;
   $("image-stage").hidden = !hasImage;
+}
+
+function planNote() {
+  const flat = [[truth, "true"], [tracks, "tracked"]].find(([side]) => side.plane === "image");
+  if (flat) return `${flat[1]} in the image only`;
+  return tracks.wholes ? "true: bodies, solid · tracked: dashed"
+    : "true: bodies, solid, ids upright · tracked: rings, dashed, ids slanted";
 }
 
 function buildScores() {
@@ -236,6 +244,7 @@ function layOut() {
   chooseTheme();
   line = timeline($("timeline"), Math.max($("timeline").clientWidth, 320), jump);
   legend($("legend"));
+  wholesKey($("wholes-key"));
   show();
 }
 

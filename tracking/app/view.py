@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from sim.io.atomic import write_file
-from sim.types import Sequence, Tracks, Truth
+from sim.types import Array, Sequence, Tracks, Truth
 from tracking.app import view_data
 from tracking.app.extent import MARGIN, peopled
 from tracking.app.film import Film
@@ -21,7 +21,10 @@ from tracking.app.view_data import Json, Rows
 from tracking.run import grouped
 
 HERE = Path(__file__).parent
-SCRIPTS = ("view_data.js", "view_draw.js", "view_plan.js", "view_image.js", "view_time.js", "view_film.js", "view.js")
+SCRIPTS = (
+    "view_data.js", "view_draw.js", "view_groups.js", "view_plan.js", "view_world.js", "view_image.js", "view_time.js",
+    "view_film.js", "view.js",
+)  # fmt: skip
 
 
 def view(
@@ -107,18 +110,21 @@ def _length(sequence: Sequence, sides: list[Rows], found: Json | None) -> int:
 
 
 def _image_size(sides: list[Rows]) -> list[int] | None:
-    """A picture that holds all boxes, where nothing says how large it is."""
-    corners = [rows.box[:, :2] + rows.box[:, 2:] for rows in sides if np.isfinite(rows.box).any()]
-    if not corners:
+    """A picture that holds all boxes, and all that was tracked in it, where nothing says how large it is."""
+    corners = [rows.box[:, :2] + rows.box[:, 2:] for rows in sides]
+    corners += [points for rows in sides if rows.plane == "image" for points in _places(rows)]
+    known = np.concatenate([np.zeros((0, 2)), *corners])
+    known = known[np.isfinite(known).all(axis=1)]
+    if not len(known):
         return None
-    width, height = np.nanmax(np.concatenate(corners), axis=0)
+    width, height = known.max(axis=0)
     return [max(math.ceil(width), 16), max(math.ceil(height), 16)]
 
 
 def _bounds(sequence: Sequence, sides: list[Rows]) -> list[float] | None:
     """x0, y0, x1, y1 of the plan in m: what people and things need; None without ground."""
-    points = [rows.pos for rows in sides if rows.plane == "ground" and len(rows.pos)]
-    known = np.concatenate(points) if points else np.zeros((0, 2))
+    points = [part for rows in sides if rows.plane == "ground" for part in _places(rows)]
+    known = np.concatenate([np.zeros((0, 2)), *points])
     known = known[np.isfinite(known).all(axis=1)]
     if sequence.scene is not None:
         low, high = peopled(sequence.scene, known)
@@ -127,6 +133,11 @@ def _bounds(sequence: Sequence, sides: list[Rows]) -> list[float] | None:
     else:
         return None
     return [round(float(v), 2) for v in (*low, *high)]
+
+
+def _places(rows: Rows) -> list[Array]:
+    """Where rows are, and the corners of their hulls where they are groups."""
+    return [rows.pos, *(rows.wholes.hull if rows.wholes is not None else ())]
 
 
 def _unlabelled(truth: Truth | None) -> list[list[int]]:

@@ -56,11 +56,34 @@ function decodeSide(raw, name) {
     angle: sums(raw.a, 180 / Math.PI),
     group: runs(raw.group, n),
     visible: runs(raw.vis, n),
-    hull: raw.hull.length ? raw.hull.map(flat => flat.map(v => v / raw.scale)) : null,
+    wholes: decodeWholes(raw),
     bars: raw.bars.map(([id, start, end, lane, size]) => ({ id, start, end, lane, size })),
     links: raw.links.map(([frame, a, b]) => ({ frame, a, b })),
     rows: byFrame(frame, data.length),
   };
+}
+
+// More of each row where the rows are groups: size, speed, ellipse (two standard deviations, direction), hull; or null.
+function decodeWholes({ wholes, plane, scale }) {
+  if (!wholes) return null;
+  const [long, wide, turn] = wholes.ellipse;
+  return {
+    size: sums(wholes.size, 10),
+    speed: sums(wholes.speed, plane === "image" ? 1 : 10),
+    long: sums(long, scale), wide: sums(wide, scale), turn: sums(turn, 180 / Math.PI),
+    hull: wholes.hull.map(steps => corners(steps, scale)),
+  };
+}
+
+// The first corner and the steps to the others as [[x, y], …].
+function corners(steps, scale) {
+  const list = [];
+  for (let k = 0, x = 0, y = 0; k < steps.length; k += 2) {
+    x += steps[k];
+    y += steps[k + 1];
+    list.push([x / scale, y / scale]);
+  }
+  return list;
 }
 
 function decodeDetections(raw) {
@@ -83,7 +106,7 @@ function groupsAt(side, frame) {
     if (!groups.has(side.group[row])) groups.set(side.group[row], []);
     groups.get(side.group[row]).push(row);
   }
-  if (!side.hull) for (const [id, rows] of groups) if (rows.length < 2) groups.delete(id);
+  if (!side.wholes) for (const [id, rows] of groups) if (rows.length < 2) groups.delete(id);
   return groups;
 }
 

@@ -14,16 +14,14 @@ from dataclasses import asdict, dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from sim.types import Array, Camera, GroupEvent, Groups, Ints, Scene, Sequence, Tracks, Truth
-from tracking.app.lineage import bars, links
-
-NIL = -99_999
-"""Stands for an unknown number in a column."""
+from sim.types import Array, Camera, GroupEvent, Ints, Scene, Sequence, Tracks, Truth
+from tracking.app import view_groups
+from tracking.app.lineage import Bar, bars, links
+from tracking.app.view_columns import deltas, run_lengths, stints
+from tracking.app.view_groups import Wholes
 
 SCALE = {"ground": 100, "space": 100, "image": 2}
-MAX_HULL = 24
 
 Json = dict[str, Any]
 
@@ -32,7 +30,7 @@ Json = dict[str, Any]
 class Rows:
     """One side of the page, R rows in any order: pos (R, 2), angle (R,) radians, box (R, 4) ltwh; nan where unknown.
 
-    hull: a polygon per row where a row is a whole group.
+    wholes: more of each row where the rows are groups.
     """
 
     plane: str
@@ -43,7 +41,7 @@ class Rows:
     angle: Array
     box: Array
     visibility: Array
-    hull: tuple[Array, ...] = ()
+    wholes: Wholes | None = None
 
 
 def truth_rows(truth: Truth) -> Rows:
@@ -58,36 +56,21 @@ def truth_rows(truth: Truth) -> Rows:
 
 def track_rows(tracks: SequenceOf[Tracks]) -> Rows:
     """A tracker's rows."""
-    some = [t for t in tracks if len(t.id)]
-    if not some:
-        return Rows(
-            "ground", *(np.zeros(0, np.int64),) * 3, np.zeros((0, 2)), np.zeros(0), np.zeros((0, 4)), np.zeros(0)
-        )
-    counts = [len(t.id) for t in some]
-    box = [t.box if t.box is not None else np.full((len(t.id), 4), np.nan) for t in some]
-    vel = np.concatenate([t.vel[:, :2] for t in some])
+    count = np.array([len(t.id) for t in tracks], np.int64)
+    box = [t.box if t.box is not None else np.full((len(t.id), 4), np.nan) for t in tracks]
+    vel = np.concatenate([np.zeros((0, 2)), *(t.vel[:, :2] for t in tracks)])
+    no_id = np.zeros(0, np.int64)
     return Rows(
-        "image" if some[0].plane == "image" else "ground",
-        np.repeat(np.array([t.index for t in some], np.int64), counts),
-        np.concatenate([t.id for t in some]),
-        np.concatenate([t.group for t in some]),
-        np.concatenate([t.pos[:, :2] for t in some]),
+        "image" if any(t.plane == "image" for t in tracks) else "ground",
+        np.repeat(np.array([t.index for t in tracks], np.int64), count),
+        np.concatenate([no_id, *(t.id for t in tracks)]),
+        np.concatenate([no_id, *(t.group for t in tracks)]),
+        np.concatenate([np.zeros((0, 2)), *(t.pos[:, :2] for t in tracks)]),
         _angles(vel, len(vel)),
-        np.concatenate(box),
+        np.concatenate([np.zeros((0, 4)), *box]),
         np.ones(len(vel)),
-        tuple(hull for t in some for hull in _hulls(t)) if some[0].unit == "group" else (),
+        view_groups.wholes(tracks) if any(t.unit == "group" for t in tracks) else None,
     )
-
-
-def _hulls(tracks: Tracks) -> list[Array]:
-    """The hull of each row of a tracker of groups (empty where it gives none)."""
-    groups: Groups = tracks.groups or Groups.none()
-    known = dict(zip(groups.id.tolist(), groups.hull, strict=True))
-    return [_thin(known.get(name, np.zeros((0, 2)))) for name in tracks.id.tolist()]
-
-
-def _thin(hull: Array) -> Array:
-    return hull if len(hull) <= MAX_HULL else hull[:: math.ceil(len(hull) / MAX_HULL)]
 
 
 def _centres(box: Array | None, n: int) -> Array:
@@ -109,7 +92,6 @@ def side(rows: Rows, events: Iterable[GroupEvent]) -> Json:
     frame, ids, group = rows.frame[order], rows.id[order], rows.group[order]
     scale = SCALE[rows.plane]
     pos, box = rows.pos[order] * scale, rows.box[order] * 2
-    least = 1 if rows.hull else 2
     return {
         "plane": rows.plane,
         "scale": scale,
@@ -120,37 +102,17 @@ def side(rows: Rows, events: Iterable[GroupEvent]) -> Json:
         "box": [] if np.isnan(box).all() else [deltas(box[:, k]) for k in range(4)],
         "group": run_lengths(group),
         "vis": run_lengths(np.nan_to_num(rows.visibility[order] * 10, nan=10).round().astype(np.int64)),
-        "hull": [np.rint(rows.hull[k] * scale).astype(int).ravel().tolist() for k in order] if rows.hull else [],
+        "wholes": None if rows.wholes is None else view_groups.columns(rows.wholes, order, rows.plane, scale),
         "events": [event_json(e, scale) for e in events if e.start >= 1],
-        "bars": [list(asdict(bar).values()) for bar in bars(frame, group, least)],
+        "bars": [list(asdict(bar).values()) for bar in _bars(rows)],
         "links": [list(asdict(link).values()) for link in links(events)],
     }
 
 
-def stints(ids: Ints, frame: Ints) -> list[list[int]]:
-    """[id, first frame, frames] of each stint of sorted rows."""
-    if not len(ids):
-        return []
-    first = np.flatnonzero(np.r_[True, (np.diff(ids) != 0) | (np.diff(frame) != 1)])
-    length = np.diff(np.r_[first, len(ids)])
-    table: list[list[int]] = np.stack([ids[first], frame[first], length], axis=1).tolist()
-    return table
-
-
-def deltas(column: NDArray[np.float64]) -> list[int]:
-    """A column rounded and differenced; nan becomes NIL."""
-    whole = np.where(np.isfinite(column), np.rint(column), NIL).astype(np.int64)
-    listed: list[int] = np.diff(whole, prepend=0).tolist()
-    return listed
-
-
-def run_lengths(column: Ints) -> list[int]:
-    """value, count, value, count, …"""
-    if not len(column):
-        return []
-    first = np.flatnonzero(np.r_[True, np.diff(column) != 0])
-    listed: list[int] = np.stack([column[first], np.diff(np.r_[first, len(column)])], axis=1).ravel().tolist()
-    return listed
+def _bars(rows: Rows) -> list[Bar]:
+    if rows.wholes is None:
+        return bars(rows.frame, rows.group)
+    return bars(rows.frame, rows.group, least=0, people=np.nan_to_num(rows.wholes.size))
 
 
 def event_json(event: GroupEvent, scale: int) -> list[Any]:
@@ -211,6 +173,7 @@ def camera_json(camera: Camera | None) -> Json | None:
         "C": _round(camera.position, 4),
         "R": _round(camera.rotation, 6),
         "scale": None if math.isnan(camera.px_per_m) else camera.px_per_m,
+        "k": camera.radial,
     }
 
 

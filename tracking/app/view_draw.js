@@ -74,8 +74,12 @@ function strokeLine(ctx, points) {
   ctx.stroke();
 }
 
+function font(bold, slanted) {
+  return `${slanted ? "italic " : ""}${bold ? "700 13px" : "600 11px"} system-ui, sans-serif`;
+}
+
 function label(ctx, text, x, y, colour, bold, slanted) {
-  ctx.font = `${slanted ? "italic " : ""}${bold ? "700 13px" : "600 11px"} system-ui, sans-serif`;
+  ctx.font = font(bold, slanted);
   ctx.textAlign = "center";
   ctx.lineJoin = "round";
   ctx.lineWidth = 3;
@@ -87,9 +91,9 @@ function label(ctx, text, x, y, colour, bold, slanted) {
 }
 
 // A name at whichever of some places (middles, the best first) covers the least of what is `taken` (boxes).
-function name(ctx, taken, text, spots, colour, slanted) {
-  ctx.font = `${slanted ? "italic " : ""}600 11px system-ui, sans-serif`;
-  const half = [ctx.measureText(text).width / 2 + 1, 6];
+function name(ctx, taken, text, spots, colour, slanted, bold) {
+  ctx.font = font(bold, slanted);
+  const half = [ctx.measureText(text).width / 2 + 1, bold ? 7 : 6];
   let best = null, least = Infinity;
   for (const [x, y] of spots(half)) {
     const box = [x - half[0], y - half[1], x + half[0], y + half[1]];
@@ -98,7 +102,7 @@ function name(ctx, taken, text, spots, colour, slanted) {
     if (!least) break;
   }
   taken.push(best);
-  label(ctx, text, best[0] + half[0], best[3] - 2, colour, false, slanted);
+  label(ctx, text, best[0] + half[0], best[3] - 2, colour, bold, slanted);
 }
 
 function shared(a, b) {
@@ -106,16 +110,25 @@ function shared(a, b) {
 }
 
 // Fills and outlines the current path as the region of a group; what is tracked is dashed, what is true is not.
-function region(ctx, colour, tracked) {
+function region(ctx, colour, tracked, rimmed) {
   ctx.globalAlpha = tracked ? 0.06 : 0.14;
   ctx.fillStyle = colour;
   ctx.fill();
   ctx.globalAlpha = 1;
   ctx.setLineDash(tracked ? [7, 5] : []);
   ctx.lineWidth = tracked ? 2.2 : 1.6;
+  if (rimmed) rimPath(ctx);
   ctx.strokeStyle = colour;
   ctx.stroke();
   ctx.setLineDash([]);
+}
+
+// A light edge under the current path, for colours on pictures.
+function rimPath(ctx) {
+  ctx.strokeStyle = theme.halo;
+  ctx.lineWidth += 2;
+  ctx.stroke();
+  ctx.lineWidth -= 2;
 }
 
 // Sizes the canvas to its place on the page and gives a context in CSS px.

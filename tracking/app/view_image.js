@@ -9,7 +9,7 @@ function drawImage(canvas, frame, options) {
     const title = parts.length > 1 ? shown[0].name : "";
     inPane(ctx, k * w, 0, w, height, title, () => {
       const pictured = Boolean(film) && options.video && film.draw(ctx, w, height);
-      imagePane({ ctx, scale, frame, options, pictured, taken: [] }, shown);
+      imagePane({ ctx, width: w, height, scale, frame, options, pictured, taken: [] }, shown);
     });
   });
 }
@@ -17,9 +17,23 @@ function drawImage(canvas, frame, options) {
 function imagePane(pane, shown) {
   if (data.camera && !pane.pictured) groundLines(pane);
   if (film && film.lost.has(pane.frame)) label(pane.ctx, "lost frame: no picture", 90, 22, theme.found, true);
-  if (pane.options.hulls) for (const side of shown) imageHulls(pane, side);
+  const people = shown.filter(side => !side.wholes);
+  const wholes = shown.filter(side => side.wholes).map(side => [side, toImage(side, pane.scale)]).filter(([, map]) => map);
+  if (pane.options.hulls) for (const side of people) imageHulls(pane, side);
+  for (const [side, map] of wholes) drawWholes(pane, side, map);
   if (pane.options.detections && found) imageDetections(pane);
-  for (const side of shown) imageBoxes(pane, side);
+  for (const side of people) imageBoxes(pane, side);
+  if (pane.options.ids) for (const [side, map] of wholes) nameWholes(pane, side, map);
+}
+
+// Places in a side's plane as px of the pane, where the camera tells; a place may be null, behind it.
+function toImage(side, scale) {
+  if (side.plane === "image") return (x, y) => [x * scale, y * scale];
+  if (!data.camera) return null;
+  return (x, y) => {
+    const at = project(x, y, heightAt(x, y));
+    return at && at.map(v => v * scale);
+  };
 }
 
 function boxOf(source, row, scale) {
@@ -49,7 +63,7 @@ function imageBoxes({ ctx, scale, frame, options, pictured, taken }, side) {
       const places = [0.5, 0, 1].map(share => [box[0] + share * box[2], y]);
       const spots = () => [...places, ...places.map(([x]) => [x, y + away])];
       if (ids) name(ctx, taken, side.id[row], spots, colour, tracked);
-    } else if (side.plane === "image" && !side.hull) {
+    } else if (side.plane === "image") {
       ctx.beginPath();
       ctx.arc(side.x[row] * scale, side.y[row] * scale, 6, 0, 2 * Math.PI);
       ctx.stroke();
@@ -75,7 +89,6 @@ function imageHulls({ ctx, scale, frame, options, taken }, side) {
     for (const row of rows) {
       const box = boxOf(side, row, scale);
       if (box) for (const [p, q] of [[0, 0], [1, 0], [0, 1], [1, 1]]) points.push([box[0] + p * box[2], box[1] + q * box[3]]);
-      else if (side.hull && side.plane === "image") side.hull[row].forEach((v, k, all) => k % 2 || points.push([v * scale, all[k + 1] * scale]));
       else if (side.plane === "image") points.push([side.x[row] * scale, side.y[row] * scale]);
     }
     if (!points.length) continue;
@@ -99,50 +112,4 @@ function imageDetections({ ctx, scale, frame }) {
     else if (found.plane === "image") ctx.strokeRect(found.x[row] * scale - 3, found.y[row] * scale - 3, 6, 6);
   }
   ctx.setLineDash([]);
-}
-
-// World to image as sim.camera has it; null behind the camera.
-function project(x, y, z) {
-  const { kind, f, c, C, R, scale } = data.camera;
-  const p = [x - C[0], y - C[1], z - C[2]];
-  const [a, b, d] = R.map(r => r[0] * p[0] + r[1] * p[1] + r[2] * p[2]);
-  if (kind === "top") return [a * scale + c[0], b * scale + c[1]];
-  return d < 0.05 ? null : [(f[0] * a) / d + c[0], (f[1] * b) / d + c[1]];
-}
-
-function worldLine(ctx, scale, from, to) {
-  const n = Math.max(2, Math.ceil(Math.hypot(to[0] - from[0], to[1] - from[1])));
-  let before = null;
-  for (let k = 0; k <= n; k++) {
-    const p = project(...from.map((v, i) => v + ((to[i] - v) * k) / n));
-    if (p && before) strokeLine(ctx, [before.map(v => v * scale), p.map(v => v * scale)]);
-    before = p;
-  }
-}
-
-function groundLines({ ctx, scale }) {
-  const [x0, y0, x1, y1] = data.scene ? [0, 0, ...data.scene.size] : data.bounds || [0, 0, 0, 0];
-  const step = x1 - x0 > 40 ? 5 : 1;
-  ctx.strokeStyle = theme.grid;
-  ctx.lineWidth = 1;
-  for (let x = x0; x <= x1; x += step) worldLine(ctx, scale, [x, y0, 0], [x, y1, 0]);
-  for (let y = y0; y <= y1; y += step) worldLine(ctx, scale, [x0, y, 0], [x1, y, 0]);
-  if (!data.scene) return;
-  const { walls, wallHeight, pillars, pillarHeight } = data.scene;
-  ctx.fillStyle = theme.thing;
-  ctx.globalAlpha = 0.3;
-  for (const [a, b, c, d] of walls) fillWorld(ctx, scale, [[a, b, 0], [c, d, 0], [c, d, wallHeight], [a, b, wallHeight]]);
-  ctx.globalAlpha = 0.55;
-  for (const [x, y, r] of pillars) {
-    const ringAt = z => Array.from({ length: 16 }, (_, k) => [x + r * Math.cos((k * Math.PI) / 8), y + r * Math.sin((k * Math.PI) / 8), z]);
-    fillWorld(ctx, scale, [...ringAt(0), ...ringAt(pillarHeight)]);
-  }
-  ctx.globalAlpha = 1;
-}
-
-function fillWorld(ctx, scale, corners) {
-  const points = corners.map(p => project(...p)).filter(Boolean).map(p => p.map(v => v * scale));
-  if (points.length < corners.length) return;
-  polygonPath(ctx, convex(points));
-  ctx.fill();
 }

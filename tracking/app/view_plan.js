@@ -25,14 +25,17 @@ function planPane(ctx, width, height, shown, frame, options) {
   ctx.fillRect(0, 0, width, height);
   grid(ctx, map, scale, [x0 - left / scale, y0 - top / scale, x1 + left / scale, y1 + top / scale]);
   if (data.scene) scene(ctx, map, scale);
-  const plan = { ctx, map, scale, frame, options, taken: [] };
-  for (const side of shown) if (side.plane === "ground" && options.hulls) planHulls(plan, side);
+  const plan = { ctx, map, width, height, scale, frame, options, taken: [] };
+  const grounded = shown.filter(side => side.plane === "ground");
+  const people = grounded.filter(side => !side.wholes), wholes = grounded.filter(side => side.wholes);
+  if (options.hulls) for (const side of people) planHulls(plan, side);
+  for (const side of wholes) drawWholes(plan, side, map);
   if (options.near && truth && shown.includes(truth)) nearLines(plan);
-  for (const side of shown) if (side.plane === "ground" && options.trails) planTrails(plan, side);
+  if (options.trails) for (const side of people) trails(plan, side, map);
   if (options.detections && found && found.plane !== "image") planDetections(plan);
-  const grounded = shown.filter(side => side.plane === "ground" && !(side.hull && options.hulls));
-  for (const side of grounded) planPeople(plan, side);
-  if (options.ids) planNames(plan, grounded.filter(side => side.rows(frame).length <= MANY));
+  for (const side of people) planPeople(plan, side);
+  if (options.ids) planNames(plan, people.filter(side => side.rows(frame).length <= MANY));
+  if (options.ids) for (const side of wholes) nameWholes(plan, side, map);
 }
 
 // Lines over all that the pane shows, and a scale in its corner.
@@ -103,9 +106,7 @@ function planHulls(plan, side) {
   for (const [id, rows] of groupsAt(side, plan.frame)) {
     const points = rows.map(row => place(plan, side, row)).filter(p => !Number.isNaN(p[0]));
     if (!points.length) continue;
-    const given = side.hull ? side.hull[rows[0]] : [];
-    if (given.length) polygonPath(ctx, given.reduce((list, v, k) => (k % 2 ? list : [...list, plan.map(v, given[k + 1])]), []));
-    else roundedPath(ctx, points, Math.max((tracked ? 0.4 : BODY.footprint + 0.05) * scale, 7));
+    roundedPath(ctx, points, Math.max((tracked ? 0.4 : BODY.footprint + 0.05) * scale, 7));
     region(ctx, colourOf(id), tracked);
     if (!plan.options.ids) continue;
     const mid = points.reduce((a, p) => a + p[0], 0) / points.length;
@@ -115,17 +116,18 @@ function planHulls(plan, side) {
   }
 }
 
-function planTrails(plan, side) {
-  const { ctx } = plan, reach = Math.round(3 * data.fps), tracked = side.name === "tracks";
+// Where everybody of a side was in the last seconds; map: places to px.
+function trails(pane, side, map) {
+  const { ctx } = pane, reach = Math.round(3 * data.fps), tracked = side.name === "tracks";
   ctx.lineCap = "round";
   ctx.lineWidth = tracked ? 1.4 : 2;
   ctx.setLineDash(tracked ? [3, 4] : []);
   ctx.globalAlpha = 0.6;
-  for (const row of side.rows(plan.frame)) {
+  for (const row of side.rows(pane.frame)) {
     const points = [];
-    for (let k = Math.max(side.first[row], row - reach); k <= row; k++) points.push(place(plan, side, k));
-    ctx.strokeStyle = rowColour(side, row, plan.options.by);
-    strokeLine(ctx, points);
+    for (let k = Math.max(side.first[row], row - reach); k <= row; k++) points.push(map(side.x[k], side.y[k]));
+    ctx.strokeStyle = rowColour(side, row, pane.options.by);
+    strokeLine(ctx, points.filter(Boolean));
   }
   ctx.globalAlpha = 1;
   ctx.setLineDash([]);

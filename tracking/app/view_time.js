@@ -119,10 +119,10 @@ function lineage(svg, side, x, y, seekTo) {
     const from = x(bar.start), wide = Math.max(x(bar.end + 1) - from, 3), colour = colourOf(bar.id);
     const group = element("g", { style: "cursor:pointer" }, svg);
     const tracked = side.name === "tracks";
-    element("rect", { x: from, y: middle(bar) - BAR / 2, width: wide, height: BAR, rx: 4, fill: colour, "fill-opacity": tracked ? 0.35 : 0.9, stroke: colour, "stroke-dasharray": tracked ? "4 3" : "none" }, group);
+    element("rect", { x: from, y: middle(bar) - BAR / 2, width: wide, height: BAR, rx: 4, fill: colour, "fill-opacity": tracked ? (bar.size < 2 ? 0.12 : 0.35) : 0.9, stroke: colour, "stroke-dasharray": tracked ? "4 3" : "none" }, group);
     const name = `${tracked ? "T" : "G"}${bar.id}`;
     if (wide > 8 * name.length + 6) element("text", { x: from + 5, y: middle(bar) + 4, "font-size": 11, "font-weight": 650, fill: tracked ? theme.ink : theme.halo, style: "pointer-events:none" }, group, name);
-    element("title", {}, group, `${name}: ${seconds(bar.start).toFixed(1)} to ${seconds(bar.end).toFixed(1)} s, up to ${bar.size} ${side.hull ? "regions" : "people"}`);
+    element("title", {}, group, `${name}: ${seconds(bar.start).toFixed(1)} to ${seconds(bar.end).toFixed(1)} s, up to ${side.wholes ? "≈" : ""}${bar.size} people`);
     group.addEventListener("dblclick", () => seekTo(bar.start));
   }
   return y + Math.max(...side.bars.map(bar => bar.lane + 1)) * (BAR + 5) + 8;

@@ -61,3 +61,9 @@ def test_links_join_and_fork() -> None:
         ]
     )
     assert made == [Link(10, 2, 1), Link(14, 1, 3)]
+
+
+def test_a_row_may_stand_for_many() -> None:
+    frame, group = rows((7, 1, 3, 1))
+    assert bars(frame, group, least=0, people=np.array([3.2, 4.6, 0.3])) == [Bar(7, 1, 3, 0, 5)]
+    assert bars(frame, group, least=0, people=np.zeros(3)) == [Bar(7, 1, 3, 0, 0)]

@@ -10,10 +10,13 @@ import numpy as np
 import pytest
 
 from scenarios.errors import InputError
+from sim.camera import project
+from sim.geometry import contains, convex_hull
 from sim.types import Detections, Frame, GroupEvent, Groups, Sequence, Tracks, Truth
 from tests.coded_pictures import SIZE, coded, number, sequence
+from tests.groups_as_wholes import wholes
 from tracking.app import marks
-from tracking.app.overlay import compose, overlay
+from tracking.app.overlay import _words, compose, overlay
 from tracking.app.painter import Style
 from tracking.app.sheet_panel import colour
 
@@ -136,9 +139,9 @@ def test_groups_without_people_show_their_hulls() -> None:
     one, two = np.array([4]), np.zeros((1, 2))
     groups = Groups(one, (np.zeros(0, np.int64),), two, two, np.zeros((1, 2, 2)), np.array([3.0]), (square,))
     said = Tracks(1, 0.0, "image", "group", one, one, two, two, np.full((1, 4, 4), np.nan), groups=groups)
-    ((name, polygon),) = marks.of_tracks([said], None, None).at(1).regions
-    assert name == 4
-    np.testing.assert_array_equal(polygon, square)
+    (region,) = marks.of_tracks([said], None, None).at(1).regions
+    assert (region.id, region.size) == (4, 3.0)
+    np.testing.assert_array_equal(region.hull, square)
 
 
 def test_events_stand_for_a_while_from_when_they_are_known() -> None:
@@ -148,3 +151,72 @@ def test_events_stand_for_a_while_from_when_they_are_known() -> None:
     side = marks.of_tracks(tracks, None, None)
     assert [k for k in range(1, 20) if side.told(k, 5.0)] == [6, 7, 8, 9, 10]
     assert [e.kind for e in side.told(6, 5.0)] == ["merge"]
+
+
+def coloured(picture: np.ndarray, group: int) -> np.ndarray:
+    """(V, 2) u, v of what has a group's colour, at the picture's own size."""
+    rows = np.argwhere(np.abs(picture[STRIP:].astype(int) - colour(group)).max(axis=2) < 12)
+    return rows[:, ::-1] / 2
+
+
+def a_group(place: tuple[float, float], plane: str = "image", camera_scale: float = 1.0) -> Tracks:
+    """Group 4 of three people, of 3 x 1 units (times the scale) across and moving by ten along x."""
+    at, one = np.array([place]), np.array([4])
+    square = at + camera_scale * np.array([[-3, -1], [3, -1], [3, 1], [-3, 1.0]])
+    extent = camera_scale**2 * np.diag([9.0, 1.0])[None]
+    vel = camera_scale * np.array([[10.0, 0]])
+    groups = Groups(one, (), at, vel, extent, np.array([3.04]), (square,))
+    return Tracks(1, 0.0, plane, "group", one, one, at, vel, np.tile(np.eye(4), (1, 1, 1)), groups=groups)
+
+
+def test_a_group_has_its_search_region_its_way_and_its_size() -> None:
+    """9.21 by its extent round its place; as wide in the picture."""
+    side = marks.of_tracks([a_group((40, 30))], None, None)
+    (region,) = side.at(1).regions
+    offset = region.search - [40, 30]
+    np.testing.assert_allclose((offset**2 / [9.0, 1.0]).sum(axis=1), 9.21, rtol=1e-6)
+    np.testing.assert_allclose(region.way, [[40, 30], [50, 30]])
+    assert region.size == 3.04
+    (picture,) = compose(sequence(1), [[(side, Style())]])
+    drawn = coloured(picture, 4)
+    drawn = drawn[drawn[:, 1] <= 30]  # above its name
+    reach = 3 * np.sqrt(9.21)
+    assert (drawn[:, 0].min(), drawn[:, 0].max()) == pytest.approx((40 - reach, 50), abs=1.5)
+
+
+def test_groups_on_the_ground_lie_there_in_the_picture(sequence: Sequence) -> None:
+    """Projected as people are; nothing of them where no camera is known, or all is behind it."""
+    tracks = wholes(sequence, "ground")
+    seen = marks.of_tracks(tracks, sequence.camera, sequence.scene).at(1)
+    for region, pos in zip(seen.regions, tracks[0].pos, strict=True):
+        (uv,), _ = project(sequence.camera, np.array([[*pos, 0.0]]))
+        np.testing.assert_allclose(region.way[0], uv)
+        assert contains(convex_hull(region.hull), uv[None]).all()
+        assert contains(convex_hull(region.search), region.hull).all()
+    np.testing.assert_allclose(seen.at, [region.way[0] for region in seen.regions])
+    blind = marks.of_tracks(tracks, None, None).at(1)
+    assert np.isnan(blind.at).all()
+    assert not any(len(part) for r in blind.regions for part in (r.hull, r.search, r.way))
+    behind = marks.of_tracks([a_group((8.0, -40.0), "ground")], sequence.camera, None).at(1)
+    assert not any(len(part) for r in behind.regions for part in (r.hull, r.search, r.way))
+
+
+def test_what_is_unknown_of_a_group_is_left_out() -> None:
+    plain = a_group((40, 30))
+    unknown = plain.groups.replace(hull=(), extent=np.full((1, 2, 2), np.nan), size=np.array([np.nan]))
+    for given in (plain.replace(groups=None), plain.replace(groups=unknown)):
+        side = marks.of_tracks([given], None, None)
+        (region,) = side.at(1).regions
+        assert (len(region.hull), len(region.search), np.isnan(region.size)) == (0, 0, True)
+        (picture,) = compose(sequence(1), [[(side, Style())]])
+        assert len(coloured(picture, 4)) > 20
+
+
+def test_groups_that_are_tracked_are_counted_as_such() -> None:
+    assert overlay_words([a_group((40, 30))]) == "coded   frame 1 of 1   0.00 s   tracked 1 groups"
+
+
+def overlay_words(tracks: list[Tracks]) -> str:
+    case = sequence(1)
+    side = marks.of_tracks(tracks, None, None)
+    return _words(case, next(iter(case)), [[(side, Style())]])

@@ -11,10 +11,10 @@ import pytest
 
 from scenarios.errors import InputError
 from sim.types import Groups, Sequence, Tracks, Truth
-from tracking.app import view_data
+from tracking.app import view_columns
 from tracking.app.view import payload, view
 
-NIL = view_data.NIL
+NIL = view_columns.NIL
 
 
 def page_data(page: str) -> dict:
@@ -80,8 +80,8 @@ def test_tracks_come_back(sequence: Sequence, tracks: list[Tracks]) -> None:
 
 def test_whoever_leaves_and_returns_has_two_stints() -> None:
     frame, ids = np.array([1, 2, 4, 5, 2, 3]), np.array([7, 7, 7, 7, 8, 8])
-    assert view_data.stints(ids, frame) == [[7, 1, 2], [7, 4, 2], [8, 2, 2]]
-    assert view_data.stints(ids[:0], frame[:0]) == []
+    assert view_columns.stints(ids, frame) == [[7, 1, 2], [7, 4, 2], [8, 2, 2]]
+    assert view_columns.stints(ids[:0], frame[:0]) == []
 
 
 def test_detections_come_back(sequence: Sequence) -> None:
@@ -151,19 +151,6 @@ def test_nobody_anywhere(sequence: Sequence) -> None:
     assert data["truth"]["x"] == data["tracks"]["x"] == []
     assert data["truth"]["bars"] == []
     assert payload(Sequence("bare", 10.0, None, lambda: iter(())), None)["length"] == 1
-
-
-def test_a_tracker_of_groups_shows_their_hulls(sequence: Sequence) -> None:
-    square = np.array([[0, 0], [1, 0], [1, 1], [0, 1.0]])
-    two, four, names = np.zeros((1, 2)), np.zeros((1, 4, 4)), np.array([4])
-    answers = []
-    for k in range(1, 4):
-        size = np.array([3.0])
-        groups = Groups(names, (np.zeros(0, np.int64),), two, two, np.zeros((1, 2, 2)), size, (square + k,))
-        answers.append(Tracks(k, 0.0, "ground", "group", names, names, two + k, two, four, groups=groups))
-    side = payload(sequence, answers)["tracks"]
-    assert side["hull"][1] == [200, 200, 300, 200, 300, 300, 200, 300]
-    assert side["bars"] == [[4, 1, 3, 0, 1]]
 
 
 def test_a_track_without_box_in_one_frame_stays_without(sequence: Sequence, tracks: list[Tracks]) -> None:
