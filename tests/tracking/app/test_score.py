@@ -9,7 +9,10 @@ import numpy as np
 import pytest
 
 from scenarios.loading import load
+from sim.io.tracks import write_tracks
 from sim.sequence import simulate
+from sim.types import Sequence
+from tests.groups_as_wholes import wholes
 from tracking import track
 from tracking.app.cli import run
 from tracking.scoring import evaluate
@@ -42,6 +45,28 @@ def test_files_are_memory(made: Path, capsys, by: str) -> None:
         sequence = simulate(load("merge"), seed)
         expected = evaluate(sequence.truth, track("blob", sequence, detections="file"), group_match=by)
         assert (row["name"], row["group_match"], row["surface"]) == (f"merge-s{seed:05d}", by, "ground")
+        for key, value in expected.items():
+            assert row[key] == (None if np.isnan(value) else pytest.approx(value, abs=1e-12)), key
+
+
+@pytest.fixture(scope="module")
+def scene() -> Sequence:
+    return simulate(load("merge"), 3)
+
+
+@pytest.mark.parametrize("plane", ["ground", "image"])
+def test_files_are_memory_for_groups_as_wholes(made: Path, scene: Sequence, tmp_path: Path, capsys, plane: str) -> None:
+    """Hulls, extents, sizes and events come back exactly, and with them every score; of people there is none."""
+    answers = wholes(scene, plane)
+    write_tracks(tmp_path / "t", answers, fps=scene.fps, camera=scene.camera, scene=scene.scene)
+    for by in ("hull", "members"):
+        data = made / "data" / "flockscope-train" / "merge-s00003"
+        (row,) = scored(capsys, data, tmp_path / "t", "--group-match", by)["sequences"]
+        expected = evaluate(scene.truth, answers, group_match=by)
+        assert row["surface"] == plane
+        assert expected["group_F1"] > 0.8
+        assert expected["merge_F1"] == 1
+        assert all(np.isnan(expected[key]) for key in ("HOTA", "MOTA", "IDF1", "GOSPA"))
         for key, value in expected.items():
             assert row[key] == (None if np.isnan(value) else pytest.approx(value, abs=1e-12)), key
 
