@@ -17,8 +17,8 @@ from sim.types import Array, Bools, Camera, GroupEvent, Groups, Ints, Scene, Tra
 SURE = math.sqrt(5.991)
 """Standard deviations that hold 95 % of a plane's normal distribution."""
 
-SEARCH = math.sqrt(9.21)
-"""The same for 99 %: d' E^-1 d <= 9.21 is where a group of extent E is looked for."""
+WIDE = math.sqrt(9.21)
+"""The same for 99 %: d' E^-1 d <= 9.21 round a group of extent E."""
 
 ROUND = np.stack([f(np.linspace(0, 2 * np.pi, 32, endpoint=False)) for f in (np.cos, np.sin)], axis=1)
 AROUND = 5.0
@@ -38,13 +38,13 @@ NOWHERE = np.zeros((0, 2))
 class Region:
     """A group in px: the polygon hull (V, 2), no vertex where none is known or it cannot be seen.
 
-    Of one that is tracked as a whole also search (32, 2), where its parts are with 99 %; way (2, 2), its middle and
+    Of one that is tracked as a whole also around (32, 2), where 99 % of it is by its extent; way (2, 2), its middle and
     where that is in 1 s; size, people, nan where unknown.
     """
 
     id: int
     hull: Array
-    search: Array = field(default_factory=NOWHERE.copy)
+    around: Array = field(default_factory=NOWHERE.copy)
     way: Array = field(default_factory=NOWHERE.copy)
     size: float = math.nan
 
@@ -149,7 +149,7 @@ def _of_groups(t: Tracks, camera: Camera | None, scene: Scene | None) -> Marks:
         if row is None:
             return Region(name, NOWHERE, way=way)
         hull = groups.hull[row] if groups.hull else NOWHERE
-        around = ring(t.pos[k, :2], groups.extent[row], SEARCH)
+        around = ring(t.pos[k, :2], groups.extent[row], WIDE)
         return Region(name, seen(hull), seen(around), way, float(groups.size[row]))
 
     regions = tuple(region(k, name) for k, name in enumerate(t.id.tolist()))

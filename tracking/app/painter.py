@@ -72,12 +72,12 @@ def paint(view: View, side: Side, index: int, fps: float, style: Style = Style()
 
 
 def _region(view: View, region: Region, ink: Colour) -> None:
-    """The hull filled; dots round the search region; an arrow from the middle to where that is in 1 s."""
+    """The hull filled; dots round its extent; an arrow from the middle to where that is in 1 s."""
     if len(region.hull):
         view.wash(view.map(region.hull), ink, 0.18)
         view.line(region.hull, ink, 2, closed=True)
-    if len(region.search):
-        _dots(view, region.search, ink)
+    if len(region.around):
+        _dots(view, region.around, ink)
     if len(region.way):
         view.arrow(region.way, FLOOR, 4)
         view.arrow(region.way, ink, 2)
@@ -141,7 +141,7 @@ def _names(view: View, side: Side, index: int) -> None:
 def _group_name(view: View, prefix: str, region: Region) -> None:
     """Its id, and its estimated size where it is tracked as a whole, under its lowest corner."""
     points = view.map(
-        next(points for points in (region.hull, region.search, region.way, np.zeros((1, 2))) if len(points))
+        next(points for points in (region.hull, region.around, region.way, np.zeros((1, 2))) if len(points))
     )
     x, y = points[points[:, 1].argmax()]
     words = f"{prefix}{region.id}" + (f" ~{round(region.size, 1):g}" if np.isfinite(region.size) else "")

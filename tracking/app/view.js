@@ -7,7 +7,7 @@ const film = makeFilm(data.video, pictured);
 const TOGGLES = [
   ["truth", "Truth", "t", truth], ["tracks", "Tracks", "k", tracks], ["beside", "Side by side", "b", truth && tracks],
   ["detections", "Detections", "d", found], ["hulls", "Groups", "h", true],
-  ["ellipses", "Search regions", "e", tracks && tracks.wholes], ["trails", "Trails", "l", hasPlan || (tracks && tracks.wholes)],
+  ["ellipses", "Extents", "e", tracks && tracks.wholes], ["trails", "Trails", "l", hasPlan || (tracks && tracks.wholes)],
   ["video", "Video", "v", film], ["ids", "Ids", "i", true], ["near", "Near strangers", "s", data.near.length],
 ];
 const SPEEDS = [0.1, 0.25, 0.5, 1, 2, 4, 8];

@@ -1,14 +1,14 @@
-// Groups that a tracker follows as wholes: hull, search region, velocity, trail, id and size, on the plan and in the
-// image. `map` takes places in the side's plane to px of the pane, or to null where they cannot be seen.
+// Groups that a tracker follows as wholes: hull, ellipse of its extent, velocity, trail, id and size, on the plan and in
+// the image. `map` takes places in the side's plane to px of the pane, or to null where they cannot be seen.
 
-const SEARCH = Math.sqrt(9.21); // standard deviations: d'E⁻¹d = 9.21 holds 99 % of a plane's normal distribution
+const WIDE = Math.sqrt(9.21); // standard deviations: d'E⁻¹d ≤ 9.21 holds 99 % of a plane's normal distribution
 const ROUNDS = 48;
 
 function drawWholes(pane, side, map) {
   if (pane.options.trails) trails(pane, side, map);
   for (const row of side.rows(pane.frame)) {
     const colour = colourOf(side.id[row]);
-    if (pane.options.ellipses) searchRegion(pane, side, row, map, colour);
+    if (pane.options.ellipses) extentOf(pane, side, row, map, colour);
     if (pane.options.hulls) wholeHull(pane, side, row, map, colour);
     wayOfWhole(pane, side, row, map, colour);
   }
@@ -25,19 +25,19 @@ function hullOf(side, row, map) {
 }
 
 // d'E⁻¹d = 9.21 round a group's place, as a polygon.
-function regionOf(side, row, map) {
+function ringOf(side, row, map) {
   const { long, wide, turn } = side.wholes, c = Math.cos(turn[row]), s = Math.sin(turn[row]);
   return seen(Array.from({ length: ROUNDS }, (_, k) => {
-    const t = (2 * Math.PI * k) / ROUNDS, a = SEARCH * long[row] * Math.cos(t), b = SEARCH * wide[row] * Math.sin(t);
+    const t = (2 * Math.PI * k) / ROUNDS, a = WIDE * long[row] * Math.cos(t), b = WIDE * wide[row] * Math.sin(t);
     return [side.x[row] + c * a - s * b, side.y[row] + s * a + c * b];
   }), map);
 }
 
-function searchRegion({ ctx, pictured }, side, row, map, colour) {
-  const points = regionOf(side, row, map);
+function extentOf({ ctx, pictured }, side, row, map, colour) {
+  const points = ringOf(side, row, map);
   if (!points.length) return;
   polygonPath(ctx, points);
-  searchLine(ctx);
+  extentLine(ctx);
   if (pictured) {
     ctx.lineWidth += 0.6;
     rimPath(ctx);
@@ -47,7 +47,7 @@ function searchRegion({ ctx, pictured }, side, row, map, colour) {
   ctx.setLineDash([]);
 }
 
-function searchLine(ctx) {
+function extentLine(ctx) {
   ctx.lineCap = "round";
   ctx.lineWidth = 1.8;
   ctx.setLineDash([0.1, 5]);
@@ -102,7 +102,7 @@ function nameWholes(pane, side, map) {
   const rows = side.rows(pane.frame), { hulls, ellipses } = pane.options;
   if (rows.length > MANY) return;
   for (const row of rows) {
-    const shapes = [hulls ? hullOf(side, row, map) : [], hulls || !ellipses ? [] : regionOf(side, row, map)];
+    const shapes = [hulls ? hullOf(side, row, map) : [], hulls || !ellipses ? [] : ringOf(side, row, map)];
     const at = map(side.x[row], side.y[row]);
     if (!at || Number.isNaN(at[0])) continue;
     const points = [...shapes.flat(), [at[0] - 5, at[1] - 5], [at[0] + 5, at[1] + 5]];
@@ -127,10 +127,10 @@ function wholesKey(box) {
   if (!(tracks && tracks.wholes)) return;
   const marks = [
     ["hull of what a group is made of", ctx => { polygonPath(ctx, [[3, 16], [10, 2], [36, 2], [45, 16]]); region(ctx, theme.ink, true); }],
-    ["search region (99 %: d² ≤ 9.21 by its extent)", ctx => {
+    ["where 99 % of it is, by its extent (d² ≤ 9.21)", ctx => {
       ctx.beginPath();
       ctx.ellipse(24, 9, 20, 7.5, 0, 0, 2 * Math.PI);
-      searchLine(ctx);
+      extentLine(ctx);
       ctx.stroke();
     }],
     ["middle, and where it will be in 1 s", ctx => {

@@ -169,11 +169,11 @@ def a_group(place: tuple[float, float], plane: str = "image", camera_scale: floa
     return Tracks(1, 0.0, plane, "group", one, one, at, vel, np.tile(np.eye(4), (1, 1, 1)), groups=groups)
 
 
-def test_a_group_has_its_search_region_its_way_and_its_size() -> None:
+def test_a_group_has_its_extent_its_way_and_its_size() -> None:
     """9.21 by its extent round its place; as wide in the picture."""
     side = marks.of_tracks([a_group((40, 30))], None, None)
     (region,) = side.at(1).regions
-    offset = region.search - [40, 30]
+    offset = region.around - [40, 30]
     np.testing.assert_allclose((offset**2 / [9.0, 1.0]).sum(axis=1), 9.21, rtol=1e-6)
     np.testing.assert_allclose(region.way, [[40, 30], [50, 30]])
     assert region.size == 3.04
@@ -192,13 +192,13 @@ def test_groups_on_the_ground_lie_there_in_the_picture(sequence: Sequence) -> No
         (uv,), _ = project(sequence.camera, np.array([[*pos, 0.0]]))
         np.testing.assert_allclose(region.way[0], uv)
         assert contains(convex_hull(region.hull), uv[None]).all()
-        assert contains(convex_hull(region.search), region.hull).all()
+        assert contains(convex_hull(region.around), region.hull).all()
     np.testing.assert_allclose(seen.at, [region.way[0] for region in seen.regions])
     blind = marks.of_tracks(tracks, None, None).at(1)
     assert np.isnan(blind.at).all()
-    assert not any(len(part) for r in blind.regions for part in (r.hull, r.search, r.way))
+    assert not any(len(part) for r in blind.regions for part in (r.hull, r.around, r.way))
     behind = marks.of_tracks([a_group((8.0, -40.0), "ground")], sequence.camera, None).at(1)
-    assert not any(len(part) for r in behind.regions for part in (r.hull, r.search, r.way))
+    assert not any(len(part) for r in behind.regions for part in (r.hull, r.around, r.way))
 
 
 def test_what_is_unknown_of_a_group_is_left_out() -> None:
@@ -207,7 +207,7 @@ def test_what_is_unknown_of_a_group_is_left_out() -> None:
     for given in (plain.replace(groups=None), plain.replace(groups=unknown)):
         side = marks.of_tracks([given], None, None)
         (region,) = side.at(1).regions
-        assert (len(region.hull), len(region.search), np.isnan(region.size)) == (0, 0, True)
+        assert (len(region.hull), len(region.around), np.isnan(region.size)) == (0, 0, True)
         (picture,) = compose(sequence(1), [[(side, Style())]])
         assert len(coloured(picture, 4)) > 20
 

@@ -58,10 +58,10 @@ def scene() -> Sequence:
 def test_files_are_memory_for_groups_as_wholes(made: Path, scene: Sequence, tmp_path: Path, capsys, plane: str) -> None:
     """Hulls, extents, sizes and events come back exactly, and with them every score; of people there is none."""
     answers = wholes(scene, plane)
-    folder = tmp_path / scene.name
+    data = made / "data" / "flockscope-train" / "merge-s00003"
+    folder = tmp_path / data.name
     write_tracks(folder, answers, fps=scene.fps, camera=scene.camera, scene=scene.scene)
     for by in ("hull", "members"):
-        data = made / "data" / "flockscope-train" / "merge-s00003"
         (row,) = scored(capsys, data, folder, "--group-match", by)["sequences"]
         expected = evaluate(scene.truth, answers, group_match=by)
         assert row["surface"] == plane
