@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import os
 import time
 from pathlib import Path
@@ -25,7 +26,7 @@ SEEN, SEEN_SEED = "split", range(40_000, 40_001)
 SEEN_QUICKLY = ("camera.fps=5",)
 """The scene that is drawn, and what --quick changes of it."""
 
-MODES: dict[DetectionMode, str] = {"image": "from pixels", "file": "from boxes"}
+MODES: tuple[DetectionMode, ...] = ("image", "file")
 
 
 def demo(out: Path, *, quick: bool) -> Answer:
@@ -56,32 +57,35 @@ def demo(out: Path, *, quick: bool) -> Answer:
 
 
 def _seen(sequence: Sequence, out: Path) -> Seen:
-    """One scene from its pixels and from its boxes, replays over one and the same video, and an overlay."""
+    """One scene from its pixels and from what a detector found, replays over one and the same video, and overlays."""
     from tracking.app.film import film
     from tracking.app.overlay import overlay
 
     folder = out / "pages" / "pictures"
     video = film(sequence, folder / f"{sequence.name}.html", "beside")
-    part = Part(f"{sequence.name}, from its pictures", [], [], [])
-    drawn = folder / "overlay.mp4"
-    trackers = [name for name in protocol.names() if "pixels" in protocol.find(name).needs]
-    for tracker in trackers:
-        for mode, words in MODES.items():
+    part, films = Part(f"{sequence.name}, from its pictures", [], [], []), {}
+    for tracker in [name for name in protocol.names() if "pixels" in protocol.find(name).needs]:
+        for mode in MODES:
             run = Job(tracker, detections=mode).run(sequence)
-            row = score_run(sequence, run)
+            row, name = score_run(sequence, run), f"{tracker} from {_input(tracker, mode)}"
             place = folder / f"{tracker}-{mode}.html"
-            _store(f"{tracker} {words}", sequence, run, row, out / "tracks" / f"{tracker}-{mode}", place, video)
+            _store(name, sequence, run, row, out / "tracks" / f"{tracker}-{mode}", place, video)
             part.rows.append(row)
             part.pages.append(place)
-            part.names.append(f"{tracker} {words}")
-            if tracker == trackers[0] and mode == "image":
-                overlay(sequence, run, drawn, "over")
+            part.names.append(name)
+            if mode == "image":
+                films[tracker] = overlay(sequence, run, folder / f"{tracker}.mp4", "over")
     frames = sequence.length or 0
-    return Seen(part, drawn, frames, frames / sequence.fps)
+    return Seen(part, films, frames, frames / sequence.fps)
+
+
+def _input(tracker: str, mode: DetectionMode) -> str:
+    """What it is given, in a word."""
+    return "pixels" if mode == "image" else "boxes" if "boxes" in protocol.find(tracker).needs else "points"
 
 
 def _part(tracker: str, sequences: list[Sequence], out: Path, meter: Meter) -> Part:
-    part = Part(f"{tracker}, from boxes", [], [], [])
+    part = Part(f"{tracker}, from {_input(tracker, 'file')}", [], [], [])
     for sequence in sequences:
         run = Job(tracker).run(sequence)
         row = score_run(sequence, run)
@@ -107,5 +111,5 @@ def _store(who: str, sequence: Sequence, run: Run, row: Row, tracks: Path, place
 def _line(title: str, rows: list[Row]) -> str:
     means = summary(rows)
     return f"{title}: " + ", ".join(
-        f"{key} {number(key, means[key]['mean'], mean=True)}" for key in SHOWN if key in means
+        f"{key} {number(key, means[key]['mean'], mean=True)}" for key in SHOWN if math.isfinite(means[key]["mean"])
     )

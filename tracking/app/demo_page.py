@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from html import escape
 from pathlib import Path
@@ -15,8 +16,11 @@ body { font: 16px/1.5 system-ui, sans-serif; margin: 2rem auto; max-width: 76rem
 table { border-collapse: collapse; margin: 0 0 2rem } th, td { padding: .25rem .8rem; text-align: right }
 th:first-child, td:first-child { text-align: left; white-space: nowrap }
 th[title] { text-decoration: underline dotted #8a8f98; cursor: help } thead th { border-bottom: 2px solid #1b1f24 }
-tfoot td { border-top: 1px solid #8a8f98; font-weight: 600 } small { color: #57606a; font-weight: 400 }
-video { display: block; width: 100%; max-width: 640px; border-radius: 8px; margin: 0 0 1rem }
+tfoot td { border-top: 1px solid #8a8f98; font-weight: 600 }
+small { color: #57606a; font-weight: 400; white-space: nowrap }
+.films { display: grid; grid-template-columns: repeat(auto-fit, minmax(min(100%, 24rem), 1fr)); gap: 1rem }
+.wide { overflow-x: auto } figure { margin: 0 0 1rem; max-width: 640px } figcaption { color: #57606a; font-size: .9em }
+video { display: block; width: 100%; border-radius: 8px }
 """
 INTRO = """<h1>flockscope demo</h1>
 <p>Scenes in which groups merge, split, cross and queue were simulated, tracked and scored. Each name below opens a
@@ -24,11 +28,17 @@ replay: what was tracked beside what is true, with a timeline of events. The sco
 <code>flockscope score</code>; rest on a heading to read what it means.</p>
 """
 SEEN = """<h2>One scene, from its pictures</h2>
-<p>The same {frames} frames tracked twice: from pixels, by background subtraction, and from the boxes of a simulated
-detector. The video shows what was found in the pixels: boxes, trails, groups and events, the truth as thin
-white boxes.</p>
-<video src="{film}#t={start:.1f}" controls muted loop playsinline preload="metadata"></video>
+<p>The same {frames} frames, tracked from pixels, by background subtraction, and from what a simulated detector found.
+The videos show what was found in the pixels: trails, groups, events; the truth as thin white boxes. A dash in a table:
+nothing that could be scored, as of people where only groups are followed.</p>
 """
+FILM = """<figure><video src="{film}#t={start:.1f}" controls muted loop playsinline preload="metadata"></video>
+<figcaption>{about}</figcaption></figure>"""
+OF_PEOPLE = "<code>{tracker}</code>: boxes of people with ids, hulls of their groups"
+OF_GROUPS = (
+    "<code>{tracker}</code>: groups as wholes, with hull, extent (dotted), arrow to where it is in 1 s, people (~)"
+)
+WITHOUT_PEOPLE = "<p>It follows groups as wholes: of single people it says nothing, and no score of them is known.</p>"
 
 
 @dataclass(frozen=True)
@@ -43,10 +53,10 @@ class Part:
 
 @dataclass(frozen=True)
 class Seen:
-    """A scene that was tracked from its pictures: its results, a video of them, and how many frames it has."""
+    """A scene that was tracked from its pictures: its results, a video by tracker, and how many frames it has."""
 
     part: Part
-    film: Path
+    films: dict[str, Path]
     frames: int
     seconds: float
 
@@ -54,10 +64,29 @@ class Seen:
 def page(root: Path, seen: Seen, parts: list[Part]) -> str:
     """The page as HTML; root: the folder in which it will stand."""
     head = f'<!doctype html><html lang="en"><meta charset="utf-8"><title>flockscope demo</title><style>{STYLE}</style>'
-    film = {"film": escape(_link(seen.film, root)), "start": 0.4 * seen.seconds}
-    first = SEEN.format(frames=seen.frames, **film) + _table(seen.part, root)
-    rest = "\n".join(f"<h2>{escape(part.title)}</h2>{_table(part, root)}" for part in parts)
+    first = SEEN.format(frames=seen.frames) + _films(root, seen) + _table(seen.part, root)
+    rest = "\n".join(_section(part, root) for part in parts)
     return f"{head}{INTRO}{first}{rest}</html>\n"
+
+
+def _films(root: Path, seen: Seen) -> str:
+    """The videos beside each other."""
+    with_people = {name.split()[0] for name, row in zip(seen.part.names, seen.part.rows, strict=True) if _people(row)}
+    shown = []
+    for tracker, path in seen.films.items():
+        about = (OF_PEOPLE if tracker in with_people else OF_GROUPS).format(tracker=escape(tracker))
+        shown.append(FILM.format(film=escape(_link(path, root)), start=0.4 * seen.seconds, about=about))
+    return f'<div class="films">{"".join(shown)}</div>'
+
+
+def _section(part: Part, root: Path) -> str:
+    note = "" if any(map(_people, part.rows)) else WITHOUT_PEOPLE
+    return f"<h2>{escape(part.title)}</h2>{note}{_table(part, root)}"
+
+
+def _people(row: Row) -> bool:
+    """Are people scored, not groups alone?"""
+    return math.isfinite(row.scores["HOTA"])
 
 
 def _link(path: Path, root: Path) -> str:
@@ -65,8 +94,8 @@ def _link(path: Path, root: Path) -> str:
 
 
 def _table(part: Part, root: Path) -> str:
-    """The shown scores, with their mean and interval where there are several sequences."""
-    keys = [key for key in SHOWN if key in part.rows[0].scores]
+    """The shown scores of which any is known, with their mean and interval where there are several sequences."""
+    keys = [key for key in SHOWN if any(math.isfinite(row.scores[key]) for row in part.rows)]
     rows = []
     for row, place, name in zip(part.rows, part.pages, part.names, strict=True):
         link = f'<a href="{escape(_link(place, root))}">{escape(name)}</a>'
@@ -77,7 +106,8 @@ def _table(part: Part, root: Path) -> str:
         means = summary(part.rows)
         ends = [_interval(key, means[key]) for key in keys]
         foot = f"<tfoot>{_cells('td', ['mean<br><small>95 % interval</small>', *ends])}</tfoot>"
-    return f"<table><thead>{head}</thead><tbody>{''.join(rows)}</tbody>{foot}</table>"
+    table = f"<table><thead>{head}</thead><tbody>{''.join(rows)}</tbody>{foot}</table>"
+    return f'<div class="wide">{table}</div>'
 
 
 def _heading(key: str) -> str:

@@ -29,6 +29,9 @@ TABLES = {
 }
 """What a terminal has room for; --json holds everything."""
 
+OF_GROUPS = {title: PEOPLE[:1] * (keys is GROUPS) + keys for title, keys in TABLES.items() if keys is not PEOPLE}
+"""The same for a tracker that knows groups only: the objective is theirs."""
+
 SIMILARITY = {
     "boxes": "overlap (IoU) of boxes",
     "ground": "1 - distance / 2 m on the ground",
@@ -51,14 +54,20 @@ def tables(rows: list[Row], means: Means, notes: Sequence[str] = (), total: int 
     from rich.console import Group
 
     seen = f"detections {said([rows[0].given])}"
-    known = {title: keys for title, keys in TABLES.items() if any(math.isfinite(means[k]["mean"]) for k in keys)}
+    people = _known(PEOPLE[1:], means)
+    titles = TABLES if people else OF_GROUPS
+    known = {title: keys for title, keys in titles.items() if _known(keys, means)}
     parts = [_table(title, keys, rows, means) for title, keys in known.items()]
-    lines = [seen, *_compared(rows, "groups, strict" in known)]
+    lines = [seen, *_compared(rows, people, "groups, strict" in known)]
     if len(rows) == 1 and math.isfinite(means["objective"]["low"]):
         lines.append("intervals by moving blocks of frames")
     some = len(rows) < total
     head = [f"{len(rows)} of {total} sequences, {seen}", ""] if some else []
     return Group(*head, *parts, "\n".join([*lines, *notes]), *([""] if some else []))
+
+
+def _known(keys: Sequence[str], means: Means) -> bool:
+    return any(math.isfinite(means[key]["mean"]) for key in keys)
 
 
 def said(given: Sequence[str]) -> str:
@@ -94,14 +103,14 @@ def _headed(title: str, table: Any) -> Any:
     return Group(Text(title, style="italic"), table, "")
 
 
-def _compared(rows: list[Row], groups: bool) -> list[str]:
+def _compared(rows: list[Row], people: bool, groups: bool) -> list[str]:
     def each(words: dict[str, str], name: str) -> str:
         return ", ".join(words[kind] for kind in dict.fromkeys(getattr(row.scores, name) for row in rows))
 
-    people = f"people by {each(SIMILARITY, 'similarity')}"
+    lines = [f"people by {each(SIMILARITY, 'similarity')}" if people else "people are not tracked"]
     if not groups:
-        return [people, "groups are not labelled"]
-    return [people, f"groups by {each(MATCHED, 'group_match')}, {each(SURFACE, 'surface')}"]
+        return [*lines, "groups are not labelled"]
+    return [*lines, f"groups by {each(MATCHED, 'group_match')}, {each(SURFACE, 'surface')}"]
 
 
 def differences(found: Means, sequences: int) -> Any:

@@ -126,7 +126,7 @@ function within(x, w, width) {
 function wholesKey(box) {
   if (!(tracks && tracks.wholes)) return;
   const marks = [
-    ["hull of what a group is made of", ctx => { polygonPath(ctx, [[3, 16], [10, 2], [36, 2], [45, 16]]); region(ctx, theme.ink, true); }],
+    ["hull of its points", ctx => { polygonPath(ctx, [[3, 16], [10, 2], [36, 2], [45, 16]]); region(ctx, theme.ink, true); }],
     ["where 99 % of it is, by its extent (d² ≤ 9.21)", ctx => {
       ctx.beginPath();
       ctx.ellipse(24, 9, 20, 7.5, 0, 0, 2 * Math.PI);

@@ -72,6 +72,19 @@ def test_files_are_memory_for_groups_as_wholes(made: Path, scene: Sequence, tmp_
             assert row[key] == (None if np.isnan(value) else pytest.approx(value, abs=1e-12)), key
 
 
+def test_tables_of_a_tracker_of_groups(made: Path, scene: Sequence, tmp_path: Path, capsys) -> None:
+    """No table of people; the objective stands with the groups."""
+    folder = tmp_path / "merge-s00003"
+    write_tracks(folder, wholes(scene, "ground"), fps=scene.fps)
+    capsys.readouterr()
+    assert run(["score", str(made / "data" / "flockscope-train" / "merge-s00003"), str(folder)]) == 0
+    lines = capsys.readouterr().out.splitlines()
+    assert lines[0].strip() == "groups, strict"
+    assert lines[1].split()[:3] == ["sequence", "objective", "1-FP"]
+    assert "people are not tracked" in lines
+    assert not any("DetA" in line for line in lines)
+
+
 def test_no_mean_over_what_trackers_saw_differently(made: Path, tmp_path: Path, capsys) -> None:
     """A seed tracked from its sensor's boxes, one from labels, one from noisy ones, one as a text without run.json."""
     line = ["generate", "merge", "--seeds", "3:7", "--streams", "none", "--out", str(tmp_path / "data")]
