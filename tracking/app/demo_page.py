@@ -17,7 +17,7 @@ table { border-collapse: collapse; margin: 0 0 2rem } th, td { padding: .25rem .
 th:first-child, td:first-child { text-align: left; white-space: nowrap }
 th[title] { text-decoration: underline dotted #8a8f98; cursor: help } thead th { border-bottom: 2px solid #1b1f24 }
 tfoot td { border-top: 1px solid #8a8f98; font-weight: 600 }
-small { color: #57606a; font-weight: 400; white-space: nowrap }
+small { color: #57606a; font-weight: 400 }
 .films { display: grid; grid-template-columns: repeat(auto-fit, minmax(min(100%, 24rem), 1fr)); gap: 1rem }
 .wide { overflow-x: auto } figure { margin: 0 0 1rem; max-width: 640px } figcaption { color: #57606a; font-size: .9em }
 video { display: block; width: 100%; border-radius: 8px }
