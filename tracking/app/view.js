@@ -175,7 +175,7 @@ function buildHead() {
   $("about").textContent = about.join(" · ");
   buildScores();
   $("plan-note").textContent = hasPlan && tracks && truth ? planNote() : "";
-  $("image-note").textContent = hasImage && tracks && truth ? "true: solid · tracked: dashed · detected: dotted" : "";
+  $("image-note").textContent = hasImage && tracks && truth ? "true: solid · tracked: dashed · detected: dotted boxes" : "";
   $("plan-stage").hidden = !hasPlan;
   $("image-stage").hidden = !hasImage;
 }

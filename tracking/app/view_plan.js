@@ -5,9 +5,10 @@ const MANY = 80;
 
 function drawPlan(canvas, frame, options) {
   const [x0, y0, x1, y1] = data.bounds;
-  const parts = panes(sides.filter(side => options[side.name]), options.beside);
+  const there = sides.filter(side => options[side.name]);
+  const parts = panes(there.filter(side => side.plane === "ground"), options.beside);
   const own = Math.min(Math.max((y1 - y0) / (x1 - x0), 0.35), 1.1);
-  const aspect = (hasImage ? data.image[1] / data.image[0] : own) / parts.length;
+  const aspect = (hasImage ? data.image[1] / data.image[0] : own) / panes(there, options.beside).length;
   const [ctx, width, height] = prepare(canvas, aspect);
   const w = width / parts.length;
   parts.forEach((shown, k) => {
@@ -26,8 +27,7 @@ function planPane(ctx, width, height, shown, frame, options) {
   grid(ctx, map, scale, [x0 - left / scale, y0 - top / scale, x1 + left / scale, y1 + top / scale]);
   if (data.scene) scene(ctx, map, scale);
   const plan = { ctx, map, width, height, scale, frame, options, taken: [] };
-  const grounded = shown.filter(side => side.plane === "ground");
-  const people = grounded.filter(side => !side.wholes), wholes = grounded.filter(side => side.wholes);
+  const people = shown.filter(side => !side.wholes), wholes = shown.filter(side => side.wholes);
   if (options.hulls) for (const side of people) planHulls(plan, side);
   for (const side of wholes) drawWholes(plan, side, map);
   if (options.near && truth && shown.includes(truth)) nearLines(plan);
