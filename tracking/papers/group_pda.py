@@ -14,9 +14,10 @@ from sim.types import Array, Bools, Context, Detections, Frame, Plane, Tracks
 from tracking.papers import group_pda_changes as changes
 from tracking.papers import group_pda_kernels as kernels
 from tracking.papers.group_pda_bank import Bank
+from tracking.papers.group_pda_carry import carried, remember
 from tracking.papers.group_pda_config import GroupPdaConfig
 from tracking.papers.group_pda_pixels import Pixels
-from tracking.papers.group_pda_report import remember, tracks
+from tracking.papers.group_pda_report import tracks
 from tracking.papers.group_pda_rules import Rules, make_rules
 
 
@@ -86,6 +87,15 @@ class GroupPda:
         hits = np.isfinite(d2).sum(0)
         own = changes.attached(points, d2, rules.constraint.link) if c.attach else np.full(len(points), -1)
         hits[own >= 0] = 1
+        free = hits == 0
+        unfelt = ~np.isfinite(d2).any(1) & ~np.isin(np.arange(len(bank)), own)
+        ghost, row_of, seen = carried(bank, points, rules, t)
+        felt = ~unfelt[row_of]
+        ghost, row_of, seen = ghost[felt], row_of[felt], seen[felt]
+        measured_at = np.concatenate([np.full(len(points), t), seen])
+        points, weights = np.concatenate([points, ghost]), np.concatenate([weights, np.ones(len(ghost))])
+        own, hits = np.concatenate([own, row_of]), np.concatenate([hits, np.ones(len(ghost), np.int64)])
+        d2 = np.hstack([d2, np.full((len(bank), len(ghost)), np.inf)])
         before = bank.null > 0
         state, chosen, said = kernels.associate(
             points, weights, d2, own, hits, bank.x, bank.P, bank.extent, bank.size, before, rules.numbers
@@ -98,9 +108,9 @@ class GroupPda:
             (int(bank.id[g]), said[g, :2].copy(), said[g, [2, 3, 3, 4]].reshape(2, 2))
             for g in np.flatnonzero(measured & bank.named).tolist()
         ]
-        remember(bank, points, chosen, rules, t)
+        remember(bank, points, measured_at, chosen)
         told = self._split(points, weights, d2, chosen, rules, t)
-        free = (hits == 0) & (own < 0)
+        free = np.append(free, np.zeros(len(ghost), bool))
         changes.births(bank, points[free], weights[free], rules, t)
         return told
 

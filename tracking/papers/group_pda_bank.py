@@ -20,8 +20,8 @@ UNNAMED = -1
 @dataclass
 class Bank:
     """G groups: x (G, 4) xi, v; P (G, 4, 4); extent (G, 2, 2) Sigma; size (G,) N, people; id (G,), UNNAMED tentative;
-    born, seen (G,): s, first and last measurement; measured (G,): s in all; null (G,): s; trail: of each group its
-    points of the last moments, (time, points relative to xi)."""
+    born, seen (G,): s, first and last measurement; measured (G,): s in all; null (G,): s; places: of each group its
+    points (K, 2) relative to xi and when each was measured last (K,), s."""
 
     x: Array
     P: Array
@@ -32,7 +32,7 @@ class Bank:
     seen: Array
     measured: Array
     null: Array
-    trail: list[list[tuple[float, Array]]]
+    places: list[tuple[Array, Array]]
 
     @classmethod
     def empty(cls) -> Bank:
@@ -52,14 +52,14 @@ class Bank:
         """Drop the others."""
         for f in fields(self):
             value = getattr(self, f.name)
-            new = [v for v, k in zip(value, kept, strict=True) if k] if f.name == "trail" else value[kept]
+            new = [v for v, k in zip(value, kept, strict=True) if k] if f.name == "places" else value[kept]
             setattr(self, f.name, new)
 
     def add(self, other: Bank) -> None:
         """Take in more groups, behind these."""
         for f in fields(self):
             a, b = getattr(self, f.name), getattr(other, f.name)
-            setattr(self, f.name, a + b if f.name == "trail" else np.concatenate([a, b]))
+            setattr(self, f.name, a + b if f.name == "places" else np.concatenate([a, b]))
 
     def predict(self, rules: Rules) -> None:
         """x = F x, P = F P F' + Q (2.3)."""
@@ -87,11 +87,11 @@ def newborn(points: Array, weights: Array, group: Ints, rules: Rules, t: float) 
     P = np.zeros((count, 4, 4))
     P[:, [0, 1], [0, 1]] = (rules.noise**2 / np.maximum(people, 1e-3))[:, None] + rules.noise**2
     P[:, [2, 3], [2, 3]] = (rules.scale * c.speed_prior) ** 2
-    trail = [[(t, d[g == k])] for k in range(count)]
+    places = [(d[g == k], np.full(int((g == k).sum()), t)) for k in range(count)]
     nil, now = np.zeros(count), np.full(count, t)
     return Bank(
         np.hstack([mean, np.zeros((count, 2))]), P, extent, people, np.full(count, UNNAMED),
-        now, now.copy(), nil + rules.dt, nil, trail,
+        now, now.copy(), nil + rules.dt, nil, places,
     )  # fmt: skip
 
 
@@ -118,9 +118,10 @@ def merged(bank: Bank, rows: Ints) -> Bank:
     extent = np.einsum("k,kij->ij", w, bank.extent[rows] + d[:, :, None] * d[:, None, :])
     P = np.einsum("k,kij->ij", w * w, bank.P[rows])
     heir = rows[np.lexsort((bank.born[rows], -bank.size[rows]))[0]]  # most people, then the older
-    trail = [(t, y + bank.x[r, :2] - x[:2]) for r in rows.tolist() for t, y in bank.trail[r]]
+    moved = [(y + bank.x[r, :2] - x[:2], seen) for r in rows.tolist() for y, seen in (bank.places[r],)]
+    places = (np.concatenate([y for y, _ in moved]), np.concatenate([seen for _, seen in moved]))
     one = slice(heir, heir + 1)
     return Bank(
         x[None], P[None], extent[None], np.array([size]), bank.id[one], bank.born[rows].min(keepdims=True),
-        bank.seen[rows].max(keepdims=True), bank.measured[rows].max(keepdims=True), np.zeros(1), [trail],
+        bank.seen[rows].max(keepdims=True), bank.measured[rows].max(keepdims=True), np.zeros(1), [places],
     )  # fmt: skip

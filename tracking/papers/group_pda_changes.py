@@ -76,11 +76,38 @@ def split(bank: Bank, row: int, points: Array, weights: Array, rules: Rules, t: 
     return change if named else None
 
 
+@dataclass
+class Encounter:
+    """Two groups whose regions overlap: since when they have been equally fast, too (inf: they are not), and how they
+    stood to each other, (time, difference of centroids)."""
+
+    since: float
+    path: list[tuple[float, Array]]
+
+    def onset(self, speed: float) -> float:
+        """When they became equally fast, looked at afterwards: a filter's velocity lags, a chord through what came
+        before and after does not."""
+        t = np.array([s for s, _ in self.path])
+        d = np.array([y for _, y in self.path])
+        first, last = np.searchsorted(t, t - CHORD - 1e-9), np.searchsorted(t, t + CHORD + 1e-9) - 1
+        length = np.maximum(t[last] - t[first], 1e-9)
+        fast = np.hypot(*((d[last] - d[first]) / length[:, None]).T) > speed
+        fast &= t <= self.since
+        k = int(np.flatnonzero(fast)[-1]) + 1 if fast.any() else 0
+        return float(min(t[min(k, len(t) - 1)], self.since))
+
+
+CHORD = 0.3
+"""s before and after, over which a velocity is a chord."""
+PATIENCE = 0.5
+"""s that an encounter outlasts without a look at both groups."""
+
+
 class Merging:
-    """Merging (3.1, 3.2) on updated states. State: since when each two groups have been near and equally fast."""
+    """Merging (3.1, 3.2) on updated states. State: the encounters of each two groups."""
 
     def __init__(self) -> None:
-        self.since: dict[tuple[int, int], float] = {}
+        self.met: dict[tuple[int, int], Encounter] = {}
 
     def step(self, bank: Bank, rules: Rules, t: float) -> Iterator[Change]:
         """Merge groups for which that has been so for `merge_time`.
@@ -89,29 +116,42 @@ class Merging:
         ignorance, not likeness.
         """
         able = np.flatnonzero(bank.named & (bank.seen >= t) & (bank.null <= 0))
-        pairs = {p: self.since.get(p, t) for p in _alike(bank, able, rules)}
-        self.since = pairs
-        due = [p for p, since in pairs.items() if t - since >= rules.config.merge_time - 1e-9]
+        near = {pair: self._went_on(pair, slow, d, t) for pair, slow, d in _near(bank, able, rules)}
+        unsure = {int(g) for g in bank.id[bank.named]} - set(bank.id[able].tolist())
+        kept = {p: m for p, m in self.met.items() if unsure & set(p) and t - m.path[-1][0] <= PATIENCE}
+        self.met = near | kept
+        due = [p for p, met in near.items() if t - met.since >= rules.config.merge_time - 1e-9]
         for ids in _connected(due):
             rows = np.flatnonzero(np.isin(bank.id, ids))
-            since = min(pairs[p] for p in due if p[0] in ids)
+            since = min(self.met[p].onset(rules.scale * rules.config.merge_velocity) for p in due if p[0] in ids)
             one = merged(bank, rows)
             keep = np.ones(len(bank), bool)
             keep[rows] = False
             bank.keep(keep)
             bank.add(one)
-            self.since = {p: s for p, s in self.since.items() if not set(p) & set(ids)}
+            self.met = {p: met for p, met in self.met.items() if not set(p) & set(ids)}
             yield Change("merge", since, tuple(sorted(ids)), (int(one.id[0]),), tuple(one.x[0, :2]))
 
+    def _went_on(self, pair: tuple[int, int], slow: bool, apart: Array, t: float) -> Encounter:
+        before = self.met.get(pair, Encounter(np.inf, []))
+        return Encounter(min(before.since, t) if slow else np.inf, [*before.path, (t, apart)])
 
-def _alike(bank: Bank, rows: Ints, rules: Rules) -> Iterator[tuple[int, int]]:
-    """R_x: ids of each two groups whose search regions overlap and whose velocities differ by no more than allowed."""
+
+def _near(bank: Bank, rows: Ints, rules: Rules) -> Iterator[tuple[tuple[int, int], bool, Array]]:
+    """R_x: ids of each two groups whose search regions overlap, whether their velocities differ by no more than
+    allowed, and the difference of their centroids."""
     near = overlaps(bank.x[rows, :2], bank.extent[rows], rules.config.gate)
     v = bank.x[rows, 2:]
-    slow = np.hypot(*(v[:, None] - v[None]).transpose(2, 0, 1)) <= rules.scale * rules.config.merge_velocity
-    for i, j in np.argwhere(np.triu(near & slow, 1)).tolist():
-        a, b = sorted((int(bank.id[rows[i]]), int(bank.id[rows[j]])))
-        yield a, b
+    var = np.trace(bank.P[rows, 2:, 2:], axis1=1, axis2=2) / 2
+    most = rules.scale * rules.config.merge_velocity + rules.config.merge_doubt * np.sqrt(var[:, None] + var)
+    slow = np.hypot(*(v[:, None] - v[None]).transpose(2, 0, 1)) <= most
+    for i, j in np.argwhere(np.triu(near, 1)).tolist():
+        i, j = sorted((i, j), key=lambda k: bank.id[rows[k]])
+        yield (
+            (int(bank.id[rows[i]]), int(bank.id[rows[j]])),
+            bool(slow[i, j]),
+            bank.x[rows[j], :2] - bank.x[rows[i], :2],
+        )
 
 
 def _connected(pairs: list[tuple[int, int]]) -> list[list[int]]:

@@ -25,7 +25,7 @@ class GroupPdaConfig(BackgroundSettings):
         0.5, (0.05, 5.0), "m/s^1.5", "white acceleration of the centroid, per root second", "log"
     )
     point_noise: float = param(
-        0.1, (0.005, 1.0), "m", "standard deviation of one person's measured place, sensor and gait", "log"
+        0.06, (0.005, 1.0), "m", "standard deviation of one person's measured place, sensor and gait", "log"
     )
     speed_prior: float = param(1.3, (0.1, 5.0), "m/s", "standard deviation of a newborn's velocity", "log")
     extent_time: float = param(1.0, (0.05, 20.0), "s", "time constant of the extent, alpha_s of (2.4)", "log")
@@ -60,6 +60,9 @@ class GroupPdaConfig(BackgroundSettings):
     merge_velocity: float = param(
         0.5, (0.05, 3.0), "m/s", "greatest difference of velocities at which groups merge (ours: SR_v made physical)"
     )
+    merge_doubt: float = param(
+        0.0, (0.0, 1.0), "", "standard deviations of the difference by which that is widened (ours)"
+    )
     merge_time: float = param(0.5, (0.0, 3.0), "s", "for so long groups must be near and equally fast to merge (ours)")
     split_time: float = param(0.5, (0.0, 3.0), "s", "spell without a feasible association after which a group splits")
     split_speed: float = param(
@@ -75,7 +78,12 @@ class GroupPdaConfig(BackgroundSettings):
     )
     recapture_time: float = param(3.0, (0.0, 10.0), "s", "for so long after its last measurement (ours)")
     report_coast: float = param(0.5, (0.0, 5.0), "s", "a group is told for so long after its last measurement (ours)")
-    hull_time: float = param(0.3, (0.0, 3.0), "s", "the hull is that of the points of so long, moved along (ours)")
+    carry_time: float = param(
+        0.5, (0.0, 3.0), "s", "from points: a member not measured is carried along for so long (ours)"
+    )
+    carry_reach: float = param(
+        0.4, (0.05, 2.0), "m", "from points: a member is measured if a point is so near his place (ours)"
+    )
 
     grid: float = param(0.1, (0.02, 1.0), "m", "from pixels: step of the grid of foreground points", "log")
     pixel_radius: float = param(0.4, (0.05, 2.0), "m", "from pixels: r of a point's region")

@@ -12,31 +12,12 @@ from tracking.papers.group_pda_changes import Change
 from tracking.papers.group_pda_rules import Rules
 
 
-def remember(bank: Bank, points: Array, chosen: Array, rules: Rules, t: float) -> None:
-    """Add the points that each group has in this frame to its trail, and forget the old ones."""
-    since = t - rules.config.hull_time - 1e-9
-    for row in range(len(bank)):
-        if chosen[row].any():
-            mine = points[chosen[row]]
-            kept = [(s, y) for s, y in bank.trail[row] if s > since]
-            bank.trail[row] = [*kept, (t, _outline(mine) - bank.x[row, :2])]
-
-
-def _outline(points: Array) -> Array:
-    """The points, if they are many only those on their hull."""
-    if len(points) < 20:
-        return points
-    import cv2
-
-    return np.asarray(cv2.convexHull(points.astype(np.float32)), float).reshape(-1, 2)
-
-
 def tracks(bank: Bank, changes: list[Change], rules: Rules, index: int, t: float, plane: Plane, fps: float) -> Tracks:
     """The groups that have an id and were measured lately."""
     rows = np.flatnonzero(bank.named & (t - bank.seen <= rules.config.report_coast + 1e-9))
     rows = rows[np.argsort(bank.id[rows])]
     id, x = bank.id[rows], bank.x[rows]
-    places = [np.concatenate([y for _, y in bank.trail[r]]) + bank.x[r, :2] for r in rows.tolist()]
+    places = [bank.places[r][0] + bank.x[r, :2] for r in rows.tolist()]
     groups = Groups(
         id,
         tuple(np.zeros(0, np.int64) for _ in rows),

@@ -1,0 +1,51 @@
+"""Members who were measured a moment ago are carried along (ours): a detector's misses do not move a group, or part it.
+
+A group knows the places of its points, not whose they are. From points, a place with nothing near it in this frame is
+somebody missed: he stands there as a point of this group only, for `carry_time` after he was measured last. Pixels are
+many, and what is missing of them is hidden: there only the outline is kept, to be told while a group coasts.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from sim.types import Array, Bools, Ints
+from tracking.papers.group_pda_bank import Bank
+from tracking.papers.group_pda_rules import Rules
+
+OUTLINE = 20
+"""Of so many points and more only those on their hull are kept."""
+
+
+def carried(bank: Bank, points: Array, rules: Rules, t: float) -> tuple[Array, Ints, Array]:
+    """Members who are not measured: places (K, 2), group (K,) a row of the bank, when they were measured last (K,)."""
+    c, kept = rules.config, []
+    if c.carry_time > 0 and not rules.half_cell:
+        for row, (y, seen) in enumerate(bank.places):
+            late = t - seen <= c.carry_time + 1e-9
+            if late.any():
+                kept.append((y[late] + bank.x[row, :2], np.full(int(late.sum()), row), seen[late]))
+    if not kept:
+        return np.zeros((0, 2)), np.zeros(0, np.int64), np.zeros(0)
+    place, row_of, seen = (np.concatenate(part) for part in zip(*kept, strict=True))
+    d2 = np.square(place[:, None] - points).sum(2)
+    missed = ~(d2 <= (rules.scale * c.carry_reach) ** 2).any(1)
+    return place[missed], row_of[missed], seen[missed]
+
+
+def remember(bank: Bank, points: Array, seen: Array, chosen: Bools) -> None:
+    """The places of the points chosen (G, M), measured at `seen` (M,), as those of the groups; the old ones where a
+    group has none."""
+    for row in np.flatnonzero(chosen.any(1)).tolist():
+        mine = points[chosen[row]]
+        if len(mine) < OUTLINE:
+            bank.places[row] = (mine - bank.x[row, :2], seen[chosen[row]])
+        else:
+            outline = _hull(mine)
+            bank.places[row] = (outline - bank.x[row, :2], np.full(len(outline), seen[chosen[row]].max()))
+
+
+def _hull(points: Array) -> Array:
+    import cv2
+
+    return np.asarray(cv2.convexHull(points.astype(np.float32)), float).reshape(-1, 2)
