@@ -8,9 +8,11 @@ import numpy as np
 
 from benchmarks.group_pda_runs import Row
 from sim.types import Array
-from tracking.stats import bootstrap, wilson
+from tracking.stats import DRAWS, LEVEL, bootstrap, wilson
 
 Column = Callable[[Sequence[Row]], str]
+Number = Callable[[Row], float]
+EXACT = 1e-12  # nearer to 0 than rounding can be
 HEADLINE = ("merge_TP", "merge_FN", "split_TP", "split_FN")
 
 
@@ -29,6 +31,22 @@ def filled(columns: Mapping[str, Column], rows: Mapping[str, Sequence[Row]]) -> 
 def mean_of(key: str, scale: float = 1.0) -> Column:
     """Mean over the sequences that have this score, drawn again sequence by sequence."""
     return lambda rows: interval(*(scale * float(x[0]) for x in bootstrap(values(rows, [key]))))
+
+
+def ratio(part: Number, whole: Number) -> Column:
+    """Sum of parts over sum of wholes, both of all sequences, drawn again sequence by sequence."""
+
+    def cell(rows: Sequence[Row]) -> str:
+        a, b = (np.array([of(r) for r in rows]) for of in (part, whole))
+        if not b.sum():
+            return "–"
+        n = len(rows)
+        times = np.random.default_rng(0).multinomial(n, np.full(n, 1 / n), size=DRAWS)
+        times = times[times @ b > 0]
+        ends = np.quantile(times @ a / (times @ b), ((1 - LEVEL) / 2, (1 + LEVEL) / 2)) if n > 1 else np.full(2, np.nan)
+        return interval(a.sum() / b.sum(), *ends)
+
+    return cell
 
 
 def pooled_f1(kind: str) -> Column:
@@ -93,4 +111,4 @@ def signed(mean: float, low: float, high: float) -> str:
     if not np.isfinite(mean):
         return "–"
     ends = f" [{low:+.3f}, {high:+.3f}]" if np.isfinite(low) else ""
-    return f"{mean:+.3f}{ends}" + (" *" if low > 0 or high < 0 else "")
+    return f"{mean:+.3f}{ends}" + (" *" if low > EXACT or high < -EXACT else "")
