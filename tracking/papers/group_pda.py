@@ -14,9 +14,9 @@ from sim.types import Array, Bools, Context, Detections, Frame, Plane, Tracks
 from tracking.papers import group_pda_changes as changes
 from tracking.papers import group_pda_kernels as kernels
 from tracking.papers.group_pda_bank import Bank
-from tracking.papers.group_pda_carry import carried, remember
+from tracking.papers.group_pda_carry import carried, exclusive, remember
 from tracking.papers.group_pda_config import GroupPdaConfig
-from tracking.papers.group_pda_pixels import Pixels
+from tracking.papers.group_pda_pixels import Pixels, steepness
 from tracking.papers.group_pda_report import tracks
 from tracking.papers.group_pda_rules import Rules, make_rules
 
@@ -41,7 +41,8 @@ class GroupPda:
         self.rules: Rules | None = None
         self.plane: Plane = "ground" if self.pixels is None else "image"
         if self.pixels is not None:
-            self.rules = make_rules(self.config, context.fps, context.px_per_m, self.pixels.spread, self.pixels.step)
+            p, scale = self.pixels, context.px_per_m
+            self.rules = make_rules(self.config, context.fps, scale, p.spread, p.step, steepness(context.camera))
         self.innovation: list[tuple[int, Array, Array]] = []
 
     def step(self, frame: Frame, detections: Detections | None) -> Tracks:
@@ -76,7 +77,8 @@ class GroupPda:
                 place="context.px_per_m", got=f"{scale:g}", expected="px per m, above 0, to track points in the image",
                 remedy="give --px-per-m",
             )  # fmt: skip
-        self.rules = make_rules(self.config, self.context.fps, scale)
+        steep = steepness(self.context.camera) if self.plane == "image" else 1.0
+        self.rules = make_rules(self.config, self.context.fps, scale, steep=steep)
         return self.rules
 
     def _measure(self, points: Array, weights: Array, rules: Rules, t: float) -> list[changes.Change]:
@@ -108,7 +110,7 @@ class GroupPda:
             (int(bank.id[g]), said[g, :2].copy(), said[g, [2, 3, 3, 4]].reshape(2, 2))
             for g in np.flatnonzero(measured & bank.named).tolist()
         ]
-        remember(bank, points, measured_at, chosen)
+        remember(bank, points, measured_at, chosen & exclusive(chosen, d2))
         told = self._split(points, weights, d2, chosen, rules, t)
         free = np.append(free, np.zeros(len(ghost), bool))
         changes.births(bank, points[free], weights[free], rules, t)

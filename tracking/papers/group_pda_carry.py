@@ -33,6 +33,15 @@ def carried(bank: Bank, points: Array, rules: Rules, t: float) -> tuple[Array, I
     return place[missed], row_of[missed], seen[missed]
 
 
+def exclusive(chosen: Bools, d2: Array) -> Bools:
+    """(G, M) whose each point is that several groups may have chosen: the one's to whose centroid it is nearest.
+
+    Estimates share points (4.1); a person is in one group only.
+    """
+    distance = np.where(chosen, d2, np.inf)
+    return np.asarray((distance <= distance.min(0, initial=np.inf)) | (chosen.sum(0) < 2))
+
+
 def remember(bank: Bank, points: Array, seen: Array, chosen: Bools) -> None:
     """The places of the points chosen (G, M), measured at `seen` (M,), as those of the groups; the old ones where a
     group has none."""

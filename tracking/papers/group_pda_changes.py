@@ -10,6 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from sim.geometry import hull_gap
 from sim.types import Array, Bools, Ints
 from tracking.components import linked, partition
 from tracking.ellipsoids import overlaps
@@ -123,7 +124,7 @@ class Merging:
         due = [p for p, met in near.items() if t - met.since >= rules.config.merge_time - 1e-9]
         for ids in _connected(due):
             rows = np.flatnonzero(np.isin(bank.id, ids))
-            since = min(self.met[p].onset(rules.scale * rules.config.merge_velocity) for p in due if p[0] in ids)
+            since = min(self.met[p].onset(rules.config.merge_velocity) for p in due if p[0] in ids)
             one = merged(bank, rows)
             keep = np.ones(len(bank), bool)
             keep[rows] = False
@@ -141,17 +142,34 @@ def _near(bank: Bank, rows: Ints, rules: Rules) -> Iterator[tuple[tuple[int, int
     """R_x: ids of each two groups whose search regions overlap, whether their velocities differ by no more than
     allowed, and the difference of their centroids."""
     near = overlaps(bank.x[rows, :2], bank.extent[rows], rules.config.gate)
-    v = bank.x[rows, 2:]
-    var = np.trace(bank.P[rows, 2:, 2:], axis1=1, axis2=2) / 2
-    most = rules.scale * rules.config.merge_velocity + rules.config.merge_doubt * np.sqrt(var[:, None] + var)
+    near |= _touching(bank, rows, rules)
+    v = bank.x[rows, 2:] * rules.ground
+    var = np.einsum("gaa,a->g", bank.P[rows, 2:, 2:], np.square(rules.ground)) / 2
+    most = rules.config.merge_velocity + rules.config.merge_doubt * np.sqrt(var[:, None] + var)
     slow = np.hypot(*(v[:, None] - v[None]).transpose(2, 0, 1)) <= most
     for i, j in np.argwhere(np.triu(near, 1)).tolist():
         i, j = sorted((i, j), key=lambda k: bank.id[rows[k]])
         yield (
             (int(bank.id[rows[i]]), int(bank.id[rows[j]])),
             bool(slow[i, j]),
-            bank.x[rows[j], :2] - bank.x[rows[i], :2],
+            (bank.x[rows[j], :2] - bank.x[rows[i], :2]) * rules.ground,
         )
+
+
+def _touching(bank: Bank, rows: Ints, rules: Rules) -> Bools:
+    """(K, K) which groups have points that are linked (ours: regions, whose extents rest while points are shared, may
+    be late)."""
+    found = np.eye(len(rows), dtype=bool)
+    place = [bank.places[r][0] + bank.x[r, :2] for r in rows.tolist()]
+    low, high = (np.array([f(p, axis=0) for p in place]).reshape(-1, 2) for f in (np.min, np.max))
+    gap = np.maximum(low[:, None] - high, low - high[:, None]).max(2, initial=-np.inf)
+    for i, j in np.argwhere(np.triu(gap <= rules.constraint.link, 1)).tolist():
+        if rules.half_cell:
+            d = hull_gap(place[i], place[j]) if min(len(place[i]), len(place[j])) > 2 else gap[i, j]
+        else:
+            d = np.sqrt(np.square(place[i][:, None] - place[j]).sum(2).min())
+        found[i, j] = found[j, i] = d <= rules.constraint.link
+    return found
 
 
 def _connected(pairs: list[tuple[int, int]]) -> list[list[int]]:

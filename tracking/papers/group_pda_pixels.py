@@ -12,6 +12,8 @@ from tracking.papers.group_pda_config import GroupPdaConfig
 
 PERSON, SLIM = 1.7, 0.3
 """m, and width over height of a person seen from the side: where no camera tells."""
+LEAST_STEEP = 0.2
+"""A view nearly along the ground tells next to nothing of depth."""
 
 
 class Pixels:
@@ -49,6 +51,11 @@ def grid_points(mask: Bools, step: int) -> Array:
     first = step // 2
     v, u = np.nonzero(mask[first::step, first::step])
     return np.stack([u, v], 1) * float(step) + first + 0.5
+
+
+def steepness(camera: Camera | None) -> float:
+    """Sine of the camera's tilt at the image's middle: how much of a length in depth shows; 1 without a camera."""
+    return 1.0 if camera is None else float(max(-camera.rotation[2, 2], LEAST_STEEP))
 
 
 def _person(camera: Camera | None, scale: float) -> Array:

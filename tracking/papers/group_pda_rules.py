@@ -16,7 +16,7 @@ from tracking.papers.group_pda_config import GroupPdaConfig
 class Rules:
     """dt, s; scale: units of the plane per metre; constraint: of G_y; numbers: `rules` of the kernels; F, Q (4, 4) of
     (2.3); noise: standard deviation of one person's measured place; half_cell: of the grid
-    of pixels, 0 for points; all but dt in the plane's unit."""
+    of pixels, 0 for points; all but dt in the plane's unit. ground (2,): metres on the ground per unit along x and y."""
 
     config: GroupPdaConfig
     dt: float
@@ -27,12 +27,14 @@ class Rules:
     F: Array
     Q: Array
     half_cell: float
+    ground: Array
 
 
 def make_rules(
-    config: GroupPdaConfig, fps: float, scale: float, person: Array | None = None, step: float = 0.0
+    config: GroupPdaConfig, fps: float, scale: float, person: Array | None = None, step: float = 0.0, steep: float = 1.0
 ) -> Rules:
-    """person (2, 2): covariance of one person's pixels, px^2, and step: that of their grid, px; None: from points."""
+    """person (2, 2): covariance of one person's pixels, px^2, and step: that of their grid, px; None: from points.
+    steep: sine of the camera's tilt, by which depth is foreshortened."""
     c, dt, pixels = config, 1 / fps, person is not None
     noise = scale * (c.pixel_noise if pixels else c.point_noise)
     prior = (scale * c.person_spread) ** 2 * np.eye(2) if person is None else person
@@ -55,7 +57,7 @@ def make_rules(
     F[0, 2] = F[1, 3] = dt
     block = np.array([[dt**4 / 4, dt**3 / 2], [dt**3 / 2, dt**2]])
     Q = np.kron(block, np.eye(2)) * (scale * c.accel_noise) ** 2 / dt
-    return Rules(config, dt, scale, constraint, noise, numbers, F, Q, step / 2)
+    return Rules(config, dt, scale, constraint, noise, numbers, F, Q, step / 2, np.array([1, 1 / steep]) / scale)
 
 
 def truncation(gate: float) -> float:

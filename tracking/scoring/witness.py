@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Callable, Iterable, Mapping, Sequence
 
 import numpy as np
@@ -12,6 +13,7 @@ from tracking.scoring.lives import Lives
 from tracking.scoring.pairs import Rows
 from tracking.scoring.sides import Crowd, People
 
+HULLS = 2.0  # s before and after an event in which hulls tell who is in a group: the time of the merge rule
 CHANGES = frozenset(HEADLINE) | {kind for kind, as_ in COUNTS_AS.items() if as_ in HEADLINE}
 
 
@@ -115,19 +117,37 @@ def told_without_people(
     answers: Sequence[Tracks], groups: Crowd, true: Rows, frames: Bools, fps: float, people: bool
 ) -> list[Told]:
     """The events of a method that names no members: compared by their places, their parents and children by who is in
-    the hulls. groups: with rows of `true` for members. people: whether the method does name some elsewhere."""
-    reach = round(LATE * fps)
-    lives = Lives(groups.rows)
-    order = np.argsort(groups.of, kind="stable")
-    cuts = np.searchsorted(groups.of[order], np.arange(len(groups) + 1))
-    who = true.id[groups.who[order]]
+    the hulls. groups: with rows of `true` for members. people: whether the method does name some elsewhere.
 
-    def part(row: int) -> Part:
-        return Part(frozenset(who[cuts[row] : cuts[row + 1]].tolist()) if row >= 0 else frozenset())
+    Parents are whom the hulls held in the 2 s before the event's start (before it was said, if they are younger),
+    children in the 2 s from when it was said: one picture does not tell, as hulls of people who stand behind each other
+    overlap in it. Everybody is in one group at most, in the hull that held him in most frames, and in more than half of
+    that group's own.
+    """
+    span = round(HULLS * fps)
+    frame, group = groups.rows.frame[groups.of], groups.rows.id[groups.of]
+    who = true.id[groups.who]
+
+    def held(names: Sequence[int], first: int, last: int) -> tuple[Part, ...]:
+        now = (frame >= first) & (frame <= last)
+        pairs, times = np.unique(np.stack([who[now], group[now]]), axis=1, return_counts=True)
+        best: dict[int, tuple[int, int]] = {}
+        for person, g, n in zip(*pairs.tolist(), times.tolist(), strict=True):
+            best[person] = max(best.get(person, (0, 0)), (n, -g))
+        there = (groups.rows.frame >= first) & (groups.rows.frame <= last)
+        lived = Counter(groups.rows.id[there].tolist())
+        return tuple(
+            Part(frozenset(p for p, (n, g) in best.items() if -g == name and 2 * n > lived[name])) for name in names
+        )
 
     def tell(event: GroupEvent, said: int) -> Told:
-        parents = tuple(part(lives.last(g, said - 1, reach)) for g in event.before)
-        children = tuple(part(lives.next(g, said, reach)) for g in event.after)
+        born = max(
+            (int(frames_of[0]) for g in event.before if len(frames_of := groups.rows.frame[groups.rows.id == g])),
+            default=0,
+        )
+        last = event.start - 1 if born < event.start else said - 1
+        parents = held(event.before, last - span + 1, last)
+        children = held(event.after, said, said + span - 1)
         return Told(event.kind, event.start, said, None, event.pos, parents, children)
 
     return [tell(event, said) for event, said in _said(answers, frames) if not (people and event.members)]
