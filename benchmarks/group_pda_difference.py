@@ -90,13 +90,13 @@ def one_camera(motions: Sequence[Motion]) -> CameraSpec:
 def one(job: Job) -> Answer:
     """By variant: for each difference whether both ids were kept, the two merged, they crossed, and the velocities'
     own difference, m/s."""
-    scenes = [script(job.kind, d) for d in job.differences]
-    motions = [walk(scene, job.seed) for scene in scenes]
-    camera = one_camera([walk(script(job.kind, d), job.seed) for d in DIFFERENCES])
+    scenes = {d: script(job.kind, d) for d in (*DIFFERENCES, *job.differences)}
+    motions = {d: walk(scene, job.seed) for d, scene in scenes.items()}
+    camera = one_camera([motions[d] for d in DIFFERENCES])
     found: Answer = {v.name: [] for v in job.variants}
     streams = ("left",) if job.mode == "image" else ()
-    for scene, motion in zip(scenes, motions, strict=True):
-        live = observe(scene.model_copy(update={"camera": camera}), motion, streams=streams)
+    for d in job.differences:
+        live = observe(scenes[d].model_copy(update={"camera": camera}), motions[d], streams=streams)
         sequence, truth = held(live) if streams else live, live.truth
         assert truth is not None
         two = meeting(truth, 1, 2)
@@ -162,12 +162,17 @@ def _cells(rows: Sequence[dict[str, float]], steps: int, key: str) -> list[list[
 
 
 def tell(title: str, steps: Sequence[float], found: Answer) -> None:
-    """Shares by difference: kept, merged by the tracker; and what the scenes were."""
+    """Shares by difference: kept (of true crossings, too: people may give way and not cross at all), merged by the
+    tracker; and what the scenes were."""
     some = next(iter(found.values()))
     rows = {}
     for name, answers in found.items():
-        for key in ("kept", "merged"):
-            rows[f"{key}, {name}"] = [share(int(sum(c)), len(c)) for c in _cells(answers, len(steps), key)]
+        kept, merged, crossed = (_cells(answers, len(steps), key) for key in ("kept", "merged", "crossed"))
+        rows[f"kept, {name}"] = [share(int(sum(c)), len(c)) for c in kept]
+        if any(map(any, crossed)):
+            of_crossings = [[k for k, c in zip(*both, strict=True) if c] for both in zip(kept, crossed, strict=True)]
+            rows[f"kept, {name}, of true crossings"] = [share(int(sum(c)), len(c)) for c in of_crossings]
+        rows[f"merged, {name}"] = [share(int(sum(c)), len(c)) for c in merged]
     rows["true crossings"] = [f"{np.mean(c):.2f}" for c in _cells(some, len(steps), "crossed")]
     rows["difference while near, m/s"] = [f"{np.mean(c):.2f}" for c in _cells(some, len(steps), "apart")]
     table(title, "", [f"{s:g} m/s" for s in steps], rows)

@@ -53,8 +53,8 @@ EVENT_COLUMNS: Mapping[str, tables.Column] = {
 }
 PX_PER_M = 40.0  # of friends-meet, from above
 TABLE_2 = """columns of Bazzani et al. 2012, Table 2; there, on its own 28 sequences, 1-FP 93.7 %, 1-FN 82.9 %,
-GDSR 79.7 %, MOTP 16.7 px, MOTA 57.3 %. MSE here is that of matched groups' middles, there of people (2.2 px). First all
-frames of all sequences together, then means of sequences, in which those with few true groups weigh as much as others"""
+GDSR 79.7 %, MOTP 16.7 px, MOTA 57.3 %. MSE here is that of matched groups' middles, there of people (2.2 px). First
+all frames of all sequences together, then means of sequences, where those with few true groups weigh as much as any"""
 
 
 def scenarios(given: argparse.Namespace) -> Any:
