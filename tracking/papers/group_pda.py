@@ -110,7 +110,7 @@ class GroupPda:
             (int(bank.id[g]), said[g, :2].copy(), said[g, [2, 3, 3, 4]].reshape(2, 2))
             for g in np.flatnonzero(measured & bank.named).tolist()
         ]
-        remember(bank, points, measured_at, chosen & exclusive(chosen, d2))
+        remember(bank, points, measured_at, chosen & exclusive(chosen, d2), t)
         told = self._split(points, weights, d2, chosen, rules, t)
         free = np.append(free, np.zeros(len(ghost), bool))
         changes.births(bank, points[free], weights[free], rules, t)

@@ -15,13 +15,15 @@ from sim.types import Array, Bools, Ints
 from tracking.papers.group_pda_rules import Rules
 
 UNNAMED = -1
+LISTS = ("places", "past")
 
 
 @dataclass
 class Bank:
     """G groups: x (G, 4) xi, v; P (G, 4, 4); extent (G, 2, 2) Sigma; size (G,) N, people; id (G,), UNNAMED tentative;
     born, seen (G,): s, first and last measurement; measured (G,): s in all; null (G,): s; places: of each group its
-    points (K, 2) relative to xi and when each was measured last (K,), s."""
+    points (K, 2) relative to xi and when each was measured last (K,), s; past: of each its points of the last seconds,
+    (time, points)."""
 
     x: Array
     P: Array
@@ -33,12 +35,15 @@ class Bank:
     measured: Array
     null: Array
     places: list[tuple[Array, Array]]
+    past: list[list[tuple[float, Array]]]
 
     @classmethod
     def empty(cls) -> Bank:
         """No groups."""
         none, ids = np.zeros(0), np.zeros(0, np.int64)
-        return cls(np.zeros((0, 4)), np.zeros((0, 4, 4)), np.zeros((0, 2, 2)), none, ids, none, none, none, none, [])
+        return cls(
+            np.zeros((0, 4)), np.zeros((0, 4, 4)), np.zeros((0, 2, 2)), none, ids, none, none, none, none, [], []
+        )
 
     def __len__(self) -> int:
         return len(self.id)
@@ -52,14 +57,14 @@ class Bank:
         """Drop the others."""
         for f in fields(self):
             value = getattr(self, f.name)
-            new = [v for v, k in zip(value, kept, strict=True) if k] if f.name == "places" else value[kept]
+            new = [v for v, k in zip(value, kept, strict=True) if k] if f.name in LISTS else value[kept]
             setattr(self, f.name, new)
 
     def add(self, other: Bank) -> None:
         """Take in more groups, behind these."""
         for f in fields(self):
             a, b = getattr(self, f.name), getattr(other, f.name)
-            setattr(self, f.name, a + b if f.name == "places" else np.concatenate([a, b]))
+            setattr(self, f.name, a + b if f.name in LISTS else np.concatenate([a, b]))
 
     def predict(self, rules: Rules) -> None:
         """x = F x, P = F P F' + Q (2.3)."""
@@ -91,7 +96,7 @@ def newborn(points: Array, weights: Array, group: Ints, rules: Rules, t: float) 
     nil, now = np.zeros(count), np.full(count, t)
     return Bank(
         np.hstack([mean, np.zeros((count, 2))]), P, extent, people, np.full(count, UNNAMED),
-        now, now.copy(), nil + rules.dt, nil, places,
+        now, now.copy(), nil + rules.dt, nil, places, [[] for _ in range(count)],
     )  # fmt: skip
 
 
@@ -123,5 +128,5 @@ def merged(bank: Bank, rows: Ints) -> Bank:
     one = slice(heir, heir + 1)
     return Bank(
         x[None], P[None], extent[None], np.array([size]), bank.id[one], bank.born[rows].min(keepdims=True),
-        bank.seen[rows].max(keepdims=True), bank.measured[rows].max(keepdims=True), np.zeros(1), [places],
+        bank.seen[rows].max(keepdims=True), bank.measured[rows].max(keepdims=True), np.zeros(1), [places], [[]],
     )  # fmt: skip

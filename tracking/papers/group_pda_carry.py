@@ -15,6 +15,8 @@ from tracking.papers.group_pda_rules import Rules
 
 OUTLINE = 20
 """Of so many points and more only those on their hull are kept."""
+PAST, MEMORY = 3.0, 64
+"""For so long, s, no more than so many of a group's points are kept, to look back from a split."""
 
 
 def carried(bank: Bank, points: Array, rules: Rules, t: float) -> tuple[Array, Ints, Array]:
@@ -42,11 +44,13 @@ def exclusive(chosen: Bools, d2: Array) -> Bools:
     return np.asarray((distance <= distance.min(0, initial=np.inf)) | (chosen.sum(0) < 2))
 
 
-def remember(bank: Bank, points: Array, seen: Array, chosen: Bools) -> None:
+def remember(bank: Bank, points: Array, seen: Array, chosen: Bools, t: float) -> None:
     """The places of the points chosen (G, M), measured at `seen` (M,), as those of the groups; the old ones where a
     group has none."""
     for row in np.flatnonzero(chosen.any(1)).tolist():
         mine = points[chosen[row]]
+        some = mine[:: -(-len(mine) // MEMORY)]
+        bank.past[row] = [*(p for p in bank.past[row] if p[0] > t - PAST), (t, some)]
         if len(mine) < OUTLINE:
             bank.places[row] = (mine - bank.x[row, :2], seen[chosen[row]])
         else:

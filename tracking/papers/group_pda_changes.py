@@ -15,6 +15,8 @@ from sim.types import Array, Bools, Ints
 from tracking.components import linked, partition
 from tracking.ellipsoids import overlaps
 from tracking.papers.group_pda_bank import UNNAMED, Bank, children, merged, newborn
+from tracking.papers.group_pda_carry import MEMORY
+from tracking.papers.group_pda_onset import Encounter, parting
 from tracking.papers.group_pda_rules import Rules
 
 
@@ -71,35 +73,16 @@ def split(bank: Bank, row: int, points: Array, weights: Array, rules: Rules, t: 
     named = bank.id[row] != UNNAMED
     if named:
         made.id[:] = [bank.id[row] if k == largest else names.new() for k in range(len(made))]
-    change = Change("split", t - bank.null[row], (int(bank.id[row]),), tuple(made.id.tolist()), tuple(bank.x[row, :2]))
+    other = int(np.where(np.arange(len(made)) == largest, -np.inf, made.size).argmax())
+    parts = [points[group == k] for k in (largest, other)]
+    parts = [p[:: -(-len(p) // MEMORY)] for p in parts]
+    since, place = parting(bank.past[row], parts, rules.ground, rules.body, t)
+    change = Change("split", since, (int(bank.id[row]),), tuple(made.id.tolist()), tuple(place.tolist()))
     bank.keep(np.arange(len(bank)) != row)
     bank.add(made)
     return change if named else None
 
 
-@dataclass
-class Encounter:
-    """Two groups whose regions overlap: since when they have been equally fast, too (inf: they are not), and how they
-    stood to each other, (time, difference of centroids)."""
-
-    since: float
-    path: list[tuple[float, Array]]
-
-    def onset(self, speed: float) -> float:
-        """When they became equally fast, looked at afterwards: a filter's velocity lags, a chord through what came
-        before and after does not."""
-        t = np.array([s for s, _ in self.path])
-        d = np.array([y for _, y in self.path])
-        first, last = np.searchsorted(t, t - CHORD - 1e-9), np.searchsorted(t, t + CHORD + 1e-9) - 1
-        length = np.maximum(t[last] - t[first], 1e-9)
-        fast = np.hypot(*((d[last] - d[first]) / length[:, None]).T) > speed
-        fast &= t <= self.since
-        k = int(np.flatnonzero(fast)[-1]) + 1 if fast.any() else 0
-        return float(min(t[min(k, len(t) - 1)], self.since))
-
-
-CHORD = 0.3
-"""s before and after, over which a velocity is a chord."""
 PATIENCE = 0.5
 """s that an encounter outlasts without a look at both groups."""
 
@@ -117,30 +100,32 @@ class Merging:
         ignorance, not likeness.
         """
         able = np.flatnonzero(bank.named & (bank.seen >= t) & (bank.null <= 0))
-        near = {pair: self._went_on(pair, slow, d, t) for pair, slow, d in _near(bank, able, rules)}
+        near = {pair: self._went_on(pair, slow, (t, d, m)) for pair, slow, d, m in _near(bank, able, rules)}
         unsure = {int(g) for g in bank.id[bank.named]} - set(bank.id[able].tolist())
         kept = {p: m for p, m in self.met.items() if unsure & set(p) and t - m.path[-1][0] <= PATIENCE}
         self.met = near | kept
         due = [p for p, met in near.items() if t - met.since >= rules.config.merge_time - 1e-9]
         for ids in _connected(due):
             rows = np.flatnonzero(np.isin(bank.id, ids))
-            since = min(self.met[p].onset(rules.config.merge_velocity) for p in due if p[0] in ids)
+            since, place = min(
+                (self.met[p].onset(rules.config.merge_velocity) for p in due if p[0] in ids), key=lambda found: found[0]
+            )
             one = merged(bank, rows)
             keep = np.ones(len(bank), bool)
             keep[rows] = False
             bank.keep(keep)
             bank.add(one)
             self.met = {p: met for p, met in self.met.items() if not set(p) & set(ids)}
-            yield Change("merge", since, tuple(sorted(ids)), (int(one.id[0]),), tuple(one.x[0, :2]))
+            yield Change("merge", since, tuple(sorted(ids)), (int(one.id[0]),), tuple(place.tolist()))
 
-    def _went_on(self, pair: tuple[int, int], slow: bool, apart: Array, t: float) -> Encounter:
+    def _went_on(self, pair: tuple[int, int], slow: bool, now: tuple[float, Array, Array]) -> Encounter:
         before = self.met.get(pair, Encounter(np.inf, []))
-        return Encounter(min(before.since, t) if slow else np.inf, [*before.path, (t, apart)])
+        return Encounter(min(before.since, now[0]) if slow else np.inf, [*before.path, now])
 
 
-def _near(bank: Bank, rows: Ints, rules: Rules) -> Iterator[tuple[tuple[int, int], bool, Array]]:
+def _near(bank: Bank, rows: Ints, rules: Rules) -> Iterator[tuple[tuple[int, int], bool, Array, Array]]:
     """R_x: ids of each two groups whose search regions overlap, whether their velocities differ by no more than
-    allowed, and the difference of their centroids."""
+    allowed, the difference of their centroids on the ground, and the middle between them."""
     near = overlaps(bank.x[rows, :2], bank.extent[rows], rules.config.gate)
     near |= _touching(bank, rows, rules)
     v = bank.x[rows, 2:] * rules.ground
@@ -149,11 +134,8 @@ def _near(bank: Bank, rows: Ints, rules: Rules) -> Iterator[tuple[tuple[int, int
     slow = np.hypot(*(v[:, None] - v[None]).transpose(2, 0, 1)) <= most
     for i, j in np.argwhere(np.triu(near, 1)).tolist():
         i, j = sorted((i, j), key=lambda k: bank.id[rows[k]])
-        yield (
-            (int(bank.id[rows[i]]), int(bank.id[rows[j]])),
-            bool(slow[i, j]),
-            (bank.x[rows[j], :2] - bank.x[rows[i], :2]) * rules.ground,
-        )
+        a, b = bank.x[rows[i], :2], bank.x[rows[j], :2]
+        yield (int(bank.id[rows[i]]), int(bank.id[rows[j]])), bool(slow[i, j]), (b - a) * rules.ground, (a + b) / 2
 
 
 def _touching(bank: Bank, rows: Ints, rules: Rules) -> Bools:

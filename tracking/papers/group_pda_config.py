@@ -61,7 +61,7 @@ class GroupPdaConfig(BackgroundSettings):
         0.5, (0.05, 3.0), "m/s", "greatest difference of velocities at which groups merge (ours: SR_v made physical)"
     )
     merge_doubt: float = param(
-        0.0, (0.0, 1.0), "", "standard deviations of the difference by which that is widened (ours)"
+        0.3, (0.0, 1.0), "", "standard deviations of the difference by which that is widened (ours)"
     )
     merge_time: float = param(0.5, (0.0, 3.0), "s", "for so long groups must be near and equally fast to merge (ours)")
     split_time: float = param(0.5, (0.0, 3.0), "s", "spell without a feasible association after which a group splits")
@@ -86,7 +86,7 @@ class GroupPdaConfig(BackgroundSettings):
     )
 
     grid: float = param(0.1, (0.02, 1.0), "m", "from pixels: step of the grid of foreground points", "log")
-    pixel_radius: float = param(0.4, (0.05, 2.0), "m", "from pixels: r of a point's region")
+    pixel_radius: float = param(0.55, (0.05, 2.0), "m", "from pixels: r of a point's region")
     pixel_noise: float = param(0.12, (0.005, 1.0), "m", "from pixels: jitter of one silhouette's centroid", "log")
     least_people: float = param(
         0.25, (0.0, 2.0), "people", "from pixels: components of less foreground are noise (bounds the work, ours)"

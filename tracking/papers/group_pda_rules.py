@@ -16,7 +16,8 @@ from tracking.papers.group_pda_config import GroupPdaConfig
 class Rules:
     """dt, s; scale: units of the plane per metre; constraint: of G_y; numbers: `rules` of the kernels; F, Q (4, 4) of
     (2.3); noise: standard deviation of one person's measured place; half_cell: of the grid
-    of pixels, 0 for points; all but dt in the plane's unit. ground (2,): metres on the ground per unit along x and y."""
+    of pixels, 0 for points; all but dt in the plane's unit. ground (2,):
+    metres on the ground per unit along x and y. body (2, 2): covariance of one person's points."""
 
     config: GroupPdaConfig
     dt: float
@@ -28,6 +29,7 @@ class Rules:
     Q: Array
     half_cell: float
     ground: Array
+    body: Array
 
 
 def make_rules(
@@ -57,7 +59,19 @@ def make_rules(
     F[0, 2] = F[1, 3] = dt
     block = np.array([[dt**4 / 4, dt**3 / 2], [dt**3 / 2, dt**2]])
     Q = np.kron(block, np.eye(2)) * (scale * c.accel_noise) ** 2 / dt
-    return Rules(config, dt, scale, constraint, noise, numbers, F, Q, step / 2, np.array([1, 1 / steep]) / scale)
+    return Rules(
+        config,
+        dt,
+        scale,
+        constraint,
+        noise,
+        numbers,
+        F,
+        Q,
+        step / 2,
+        np.array([1, 1 / steep]) / scale,
+        np.zeros((2, 2)) if person is None else person,
+    )
 
 
 def truncation(gate: float) -> float:
