@@ -16,7 +16,7 @@ from tracking.components import linked, partition
 from tracking.ellipsoids import overlaps
 from tracking.papers.group_pda_bank import UNNAMED, Bank, children, merged, newborn
 from tracking.papers.group_pda_carry import MEMORY
-from tracking.papers.group_pda_onset import Encounter, parting
+from tracking.papers.group_pda_onset import REACH, Encounter, parting
 from tracking.papers.group_pda_rules import Rules
 
 
@@ -100,7 +100,7 @@ class Merging:
         ignorance, not likeness.
         """
         able = np.flatnonzero(bank.named & (bank.seen >= t) & (bank.null <= 0))
-        near = {pair: self._went_on(pair, slow, (t, d, m)) for pair, slow, d, m in _near(bank, able, rules)}
+        near = {pair: self._went_on(pair, slow, (t, *now)) for pair, slow, *now in _near(bank, able, rules)}
         unsure = {int(g) for g in bank.id[bank.named]} - set(bank.id[able].tolist())
         kept = {p: m for p, m in self.met.items() if unsure & set(p) and t - m.path[-1][0] <= PATIENCE}
         self.met = near | kept
@@ -118,14 +118,14 @@ class Merging:
             self.met = {p: met for p, met in self.met.items() if not set(p) & set(ids)}
             yield Change("merge", since, tuple(sorted(ids)), (int(one.id[0]),), tuple(place.tolist()))
 
-    def _went_on(self, pair: tuple[int, int], slow: bool, now: tuple[float, Array, Array]) -> Encounter:
+    def _went_on(self, pair: tuple[int, int], slow: bool, now: tuple[float, Array, Array, float]) -> Encounter:
         before = self.met.get(pair, Encounter(np.inf, []))
         return Encounter(min(before.since, now[0]) if slow else np.inf, [*before.path, now])
 
 
-def _near(bank: Bank, rows: Ints, rules: Rules) -> Iterator[tuple[tuple[int, int], bool, Array, Array]]:
+def _near(bank: Bank, rows: Ints, rules: Rules) -> Iterator[tuple[tuple[int, int], bool, Array, Array, float]]:
     """R_x: ids of each two groups whose search regions overlap, whether their velocities differ by no more than
-    allowed, the difference of their centroids on the ground, and the middle between them."""
+    allowed, the difference of their centroids on the ground, the middle between them, how far the nearest people are."""
     near = overlaps(bank.x[rows, :2], bank.extent[rows], rules.config.gate)
     near |= _touching(bank, rows, rules)
     v = bank.x[rows, 2:] * rules.ground
@@ -135,7 +135,19 @@ def _near(bank: Bank, rows: Ints, rules: Rules) -> Iterator[tuple[tuple[int, int
     for i, j in np.argwhere(np.triu(near, 1)).tolist():
         i, j = sorted((i, j), key=lambda k: bank.id[rows[k]])
         a, b = bank.x[rows[i], :2], bank.x[rows[j], :2]
-        yield (int(bank.id[rows[i]]), int(bank.id[rows[j]])), bool(slow[i, j]), (b - a) * rules.ground, (a + b) / 2
+        d = (b - a) * rules.ground
+        reach = REACH * sum(_spread(bank, rows[k], d, rules) for k in (i, j))
+        gap = float(np.hypot(*d)) - reach
+        yield (int(bank.id[rows[i]]), int(bank.id[rows[j]])), bool(slow[i, j]), d, (a + b) / 2, gap
+
+
+def _spread(bank: Bank, row: int, way: Array, rules: Rules) -> float:
+    """Standard deviation, m, of a group's people along a way on the ground: their extent without what it was shrunk to,
+    and without that of one body."""
+    n, n0 = bank.size[row], rules.constraint.strength
+    people = ((n + n0) * bank.extent[row] - n0 * rules.constraint.prior) / n - rules.body
+    along = rules.ground * way / max(float(np.hypot(*way)), 1e-9)
+    return float(np.sqrt(max(along @ people @ along, 0.0)))
 
 
 def _touching(bank: Bank, rows: Ints, rules: Rules) -> Bools:

@@ -25,17 +25,18 @@ REACH = 1.1
 @dataclass
 class Encounter:
     """Two groups near each other: since when they have been equally fast, too (inf: they are not), and how they stood
-    to each other, (time, difference of centroids on the ground, middle between them)."""
+    to each other, (time, difference of centroids on the ground, middle between them, distance of the nearest people).
+    """
 
     since: float
-    path: list[tuple[float, Array, Array]]
+    path: list[tuple[float, Array, Array, float]]
 
     def onset(self, speed: float) -> tuple[float, Array]:
-        """When they became equally fast, and where."""
+        """When they became near and equally fast, and where."""
         t, d = np.array([p[0] for p in self.path]), np.array([p[1] for p in self.path])
         fast = (chords(t, d) > speed) & (t <= self.since)
-        k = min(int(np.flatnonzero(fast)[-1]) + 1 if fast.any() else 0, int(np.searchsorted(t, self.since - 1e-9)))
-        k = min(k, len(t) - 1)
+        fast |= np.array([p[3] for p in self.path]) > APART
+        k = min(int(np.flatnonzero(fast)[-1]) + 1 if fast.any() else 0, len(t) - 1)
         return float(t[k]), self.path[k][2]
 
 
