@@ -131,7 +131,11 @@ def _speeds(tracker: str, sequence: Sequence, mode: Any) -> tuple[float, float]:
     the background is in neither."""
     ready = prepare(tracker, sequence, detections=mode)
     given = list(ready.frames())
-    steps: list[Callable[[Frame], Any]] = [lambda f: ready.tracker.step(f, f.detections), ready.answer]
+
+    def alone(frame: Frame) -> Any:
+        return ready.tracker.step(frame, None if mode == "image" else frame.detections)
+
+    steps: tuple[Callable[[Frame], Any], ...] = alone, ready.answer
     found = []
     for step in steps:
         ready.reset(0)
