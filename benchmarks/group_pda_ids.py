@@ -75,7 +75,8 @@ def _gaps(truth: Truth, a: int, b: int) -> tuple[Ints, Array]:
     rows = np.arange(len(both))
     if not both:
         return rows, np.zeros(0)
-    return np.array(both), gap_pairs(*(pack([of[f] for f in both]) for of in hulls), rows, rows)
+    one, other = (pack([of[f] for f in both]) for of in hulls)
+    return np.array(both), gap_pairs(one, other, rows, rows)
 
 
 def _hulls(groups: Sequence[Groups], name: int) -> dict[int, Array]:

@@ -118,8 +118,9 @@ def trained_once() -> Iterator[None]:
 
 def held(sequence: Recording) -> Recording:
     """The sequence with its pictures, the background's too, in memory."""
-    frames, background = tuple(sequence.frames()), sequence.background()
-    return replace(sequence, frames=partial(_again, frames), load_background=lambda: background)
+    frames, sample = tuple(sequence.frames()), sequence.background()
+    assert sample is not None, "a sequence with pictures has a background"
+    return replace(sequence, frames=partial(_again, frames), load_background=lambda: sample)
 
 
 def _again(frames: Sequence[Frame]) -> Iterator[Frame]:
