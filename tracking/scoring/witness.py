@@ -119,38 +119,42 @@ def told_without_people(
     """The events of a method that names no members: compared by their places, their parents and children by who is in
     the hulls. groups: with rows of `true` for members. people: whether the method does name some elsewhere.
 
-    Parents are whom the hulls held in the 2 s before the event's start (before it was said, if they are younger),
-    children in the 2 s from when it was said: one picture does not tell, as hulls of people who stand behind each other
-    overlap in it. Everybody is in one group at most, in the hull that held him in most frames, and in more than half of
-    that group's own.
+    Parents are whom the hulls held in the 2 s before the event's start (before it was said, if one of them is younger),
+    children in the 2 s from when it was said.
     """
-    span = round(HULLS * fps)
-    frame, group = groups.rows.frame[groups.of], groups.rows.id[groups.of]
-    who = true.id[groups.who]
-
-    def held(names: Sequence[int], first: int, last: int) -> tuple[Part, ...]:
-        now = (frame >= first) & (frame <= last)
-        pairs, times = np.unique(np.stack([who[now], group[now]]), axis=1, return_counts=True)
-        best: dict[int, tuple[int, int]] = {}
-        for person, g, n in zip(*pairs.tolist(), times.tolist(), strict=True):
-            best[person] = max(best.get(person, (0, 0)), (n, -g))
-        there = (groups.rows.frame >= first) & (groups.rows.frame <= last)
-        lived = Counter(groups.rows.id[there].tolist())
-        return tuple(
-            Part(frozenset(p for p, (n, g) in best.items() if -g == name and 2 * n > lived[name])) for name in names
-        )
+    span, who = round(HULLS * fps), true.id[groups.who]
 
     def tell(event: GroupEvent, said: int) -> Told:
-        born = max(
-            (int(frames_of[0]) for g in event.before if len(frames_of := groups.rows.frame[groups.rows.id == g])),
-            default=0,
-        )
-        last = event.start - 1 if born < event.start else said - 1
-        parents = held(event.before, last - span + 1, last)
-        children = held(event.after, said, said + span - 1)
+        end = event.start if _youngest(groups.rows, event.before) < event.start else said
+        parents = _held(groups, who, event.before, range(end - span, end))
+        children = _held(groups, who, event.after, range(said, said + span))
         return Told(event.kind, event.start, said, None, event.pos, parents, children)
 
     return [tell(event, said) for event, said in _said(answers, frames) if not (people and event.members)]
+
+
+def _youngest(rows: Rows, ids: Sequence[int]) -> int:
+    """The first frame of the one that came last, 0 if none ever came; rows sorted by frame."""
+    frames = [rows.frame[rows.id == id] for id in ids]
+    return max((int(own[0]) for own in frames if len(own)), default=0)
+
+
+def _held(groups: Crowd, who: Ints, names: Sequence[int], span: range) -> tuple[Part, ...]:
+    """Whom each of these groups held in these frames; who (K,): the true id of each member.
+
+    One picture does not tell: hulls of people who stand behind each other overlap in it. Everybody is in one group at
+    most, the one that held him in most frames (of two the lower id), if that was in more than half of its own.
+    """
+    rows, now = groups.rows, (groups.rows.frame >= span.start) & (groups.rows.frame < span.stop)
+    told = Counter(rows.id[now].tolist())
+    held = now[groups.of]
+    pairs, times = np.unique(np.stack([who[held], rows.id[groups.of[held]]]), axis=1, return_counts=True)
+    holder: dict[int, tuple[int, int]] = {}  # of each person: in how many frames, and less its id
+    for person, group, n in zip(*pairs.tolist(), times.tolist(), strict=True):
+        holder[person] = max(holder.get(person, (0, 0)), (n, -group))
+    return tuple(
+        Part(frozenset(p for p, (n, less) in holder.items() if -less == name and 2 * n > told[name])) for name in names
+    )
 
 
 def _said(answers: Sequence[Tracks], frames: Bools) -> list[tuple[GroupEvent, int]]:
