@@ -98,9 +98,9 @@ class GroupPda:
         points, weights = np.concatenate([points, ghost]), np.concatenate([weights, np.ones(len(ghost))])
         own, hits = np.concatenate([own, row_of]), np.concatenate([hits, np.ones(len(ghost), np.int64)])
         d2 = np.hstack([d2, np.full((len(bank), len(ghost)), np.inf)])
-        before = bank.null > 0
+        before, resting = changes.standing(bank), bank.null > 0
         state, chosen, said = kernels.associate(
-            points, weights, d2, own, hits, bank.x, bank.P, bank.extent, bank.size, before, rules.numbers
+            points, weights, d2, own, hits, bank.x, bank.P, bank.extent, bank.size, resting, rules.numbers
         )
         measured, null = state == kernels.MEASURED, state == kernels.NULL
         bank.seen[measured | null] = t
@@ -113,7 +113,7 @@ class GroupPda:
         remember(bank, points, measured_at, chosen & exclusive(chosen, d2), t)
         told = self._split(points, weights, d2, chosen, rules, t)
         free = np.append(free, np.zeros(len(ghost), bool))
-        changes.births(bank, points[free], weights[free], rules, t)
+        changes.births(bank, points[free], weights[free], before, rules, t)
         return told
 
     def _search(self, points: Array, rules: Rules, lost: Bools) -> Array:

@@ -21,7 +21,8 @@ LISTS = ("places", "past")
 @dataclass
 class Bank:
     """G groups: x (G, 4) xi, v; P (G, 4, 4); extent (G, 2, 2) Sigma; size (G,) N, people; id (G,), UNNAMED tentative;
-    born, seen (G,): s, first and last measurement; measured (G,): s in all; null (G,): s; places: of each group its
+    born, seen (G,): s, first and last measurement; measured (G,): s in all; null (G,): s; parent (G,): id of the
+    group that a tentative one left, or UNNAMED, and origin (G, 2), where; places: of each group its
     points (K, 2) relative to xi and when each was measured last (K,), s; past: of each its points of the last seconds,
     (time, points)."""
 
@@ -34,6 +35,8 @@ class Bank:
     seen: Array
     measured: Array
     null: Array
+    parent: Ints
+    origin: Array
     places: list[tuple[Array, Array]]
     past: list[list[tuple[float, Array]]]
 
@@ -42,7 +45,19 @@ class Bank:
         """No groups."""
         none, ids = np.zeros(0), np.zeros(0, np.int64)
         return cls(
-            np.zeros((0, 4)), np.zeros((0, 4, 4)), np.zeros((0, 2, 2)), none, ids, none, none, none, none, [], []
+            np.zeros((0, 4)),
+            np.zeros((0, 4, 4)),
+            np.zeros((0, 2, 2)),
+            none,
+            ids,
+            none,
+            none,
+            none,
+            none,
+            ids,
+            np.zeros((0, 2)),
+            [],
+            [],
         )
 
     def __len__(self) -> int:
@@ -96,7 +111,7 @@ def newborn(points: Array, weights: Array, group: Ints, rules: Rules, t: float) 
     nil, now = np.zeros(count), np.full(count, t)
     return Bank(
         np.hstack([mean, np.zeros((count, 2))]), P, extent, people, np.full(count, UNNAMED),
-        now, now.copy(), nil + rules.dt, nil, places, [[] for _ in range(count)],
+        now, now.copy(), nil + rules.dt, nil, np.full(count, UNNAMED), mean.copy(), places, [[] for _ in range(count)],
     )  # fmt: skip
 
 
@@ -128,5 +143,5 @@ def merged(bank: Bank, rows: Ints) -> Bank:
     one = slice(heir, heir + 1)
     return Bank(
         x[None], P[None], extent[None], np.array([size]), bank.id[one], bank.born[rows].min(keepdims=True),
-        bank.seen[rows].max(keepdims=True), bank.measured[rows].max(keepdims=True), np.zeros(1), [places], [[]],
+        bank.seen[rows].max(keepdims=True), bank.measured[rows].max(keepdims=True), np.zeros(1), np.full(1, UNNAMED), x[None, :2].copy(), [places], [[]],
     )  # fmt: skip

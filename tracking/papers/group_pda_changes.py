@@ -83,6 +83,8 @@ def split(bank: Bank, row: int, points: Array, weights: Array, rules: Rules, t: 
     return change if named else None
 
 
+FASTEST = 2.0
+"""m/s: nobody walks faster away from a group than this."""
 PATIENCE = 0.5
 """s that an encounter outlasts without a look at both groups."""
 
@@ -175,10 +177,38 @@ def _connected(pairs: list[tuple[int, int]]) -> list[list[int]]:
     return [sorted(p) for p in parts]
 
 
-def births(bank: Bank, points: Array, weights: Array, rules: Rules, t: float) -> None:
-    """Tentative groups out of unclaimed points (3.3)."""
-    if len(points):
-        bank.add(newborn(points, weights, partition(points, weights, rules.constraint), rules, t))
+def standing(bank: Bank) -> tuple[Array, Ints]:
+    """Where the people of named groups should be (K, 2), and of which group, its id (K,)."""
+    rows = np.flatnonzero(bank.named & (bank.null <= 0)).tolist()
+    places = [bank.places[r][0] + bank.x[r, :2] for r in rows]
+    return np.concatenate([np.zeros((0, 2)), *places]), np.repeat(bank.id[rows], [len(p) for p in places])
+
+
+def births(bank: Bank, points: Array, weights: Array, before: tuple[Array, Ints], rules: Rules, t: float) -> None:
+    """Tentative groups out of unclaimed points (3.3). Ours: those that were a group's a moment ago are its children; before: what
+    `standing` told then."""
+    if not len(points):
+        return
+    group = partition(points, weights, rules.constraint)
+    made = newborn(points, weights, group, rules, t)
+    where, whose = before
+    reach = rules.scale * FASTEST * rules.dt + 3 * rules.noise
+    for k in range(len(made) if len(where) else 0):
+        d2 = np.square(points[group == k][:, None] - where).sum(2).min(0)
+        row = np.flatnonzero(bank.id == whose[d2.argmin()])
+        if len(row) and d2.min() <= reach**2:
+            _adopt(made, k, bank, int(row[0]), rules)
+    bank.add(made)
+
+
+def _adopt(made: Bank, k: int, bank: Bank, row: int, rules: Rules) -> None:
+    """A newborn is what left a group: its child, with its velocity."""
+    share = bank.size[row] / (bank.size[row] + made.size[k])
+    made.parent[k] = bank.id[row]
+    made.origin[k] = share * bank.x[row, :2] + (1 - share) * made.x[k, :2]
+    if rules.config.inherit_velocity:
+        made.x[k, 2:] = bank.x[row, 2:]
+        made.P[k, 2:, 2:] = bank.P[row, 2:, 2:] + (rules.scale * rules.config.split_speed) ** 2 * np.eye(2)
 
 
 def confirm(bank: Bank, rules: Rules, t: float, names: Names) -> Iterator[Change]:
@@ -193,7 +223,12 @@ def confirm(bank: Bank, rules: Rules, t: float, names: Names) -> Iterator[Change
             bank.id[lost], bank.seen[lost] = UNNAMED, -np.inf
         else:
             bank.id[row] = names.new()
-            yield Change("enter", float(bank.born[row]), (), (int(bank.id[row]),), place)
+            id, parent = int(bank.id[row]), int(bank.parent[row])
+            if parent != UNNAMED and (bank.id == parent).any():
+                place = tuple(bank.origin[row].tolist())
+                yield Change("split", float(bank.born[row]), (parent,), tuple(sorted((parent, id))), place)
+            else:
+                yield Change("enter", float(bank.born[row]), (), (id,), place)
 
 
 def _lost_here(bank: Bank, row: int, rules: Rules, t: float) -> int:
