@@ -264,4 +264,4 @@ def _whole(
     work[0] += len(tops) + count * count
     if count < 2:
         return count == 1
-    return closure(part[:count], gate, prior, strength).max() == 0
+    return bool(closure(part[:count], gate, prior, strength).max() == 0)

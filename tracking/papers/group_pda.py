@@ -37,6 +37,8 @@ class GroupPda:
         """Forget everything; with a background sample pixels are tracked, else points. `seed` is unused."""
         self.context = context
         self.bank, self.merging, self.names = Bank.empty(), changes.Merging(), changes.Names()
+        if context.background is not None:
+            _check_scale(context.px_per_m)
         self.pixels = None if context.background is None else Pixels(self.config, context)
         self.rules: Rules | None = None
         self.plane: Plane = "ground" if self.pixels is None else "image"
@@ -72,11 +74,7 @@ class GroupPda:
     def _rules(self) -> Rules:
         """The rules for points, whose plane is known once they come."""
         scale = self.context.px_per_m if self.plane == "image" else 1.0
-        if not scale > 0:
-            raise InputError(
-                place="context.px_per_m", got=f"{scale:g}", expected="px per m, above 0, to track points in the image",
-                remedy="give --px-per-m",
-            )  # fmt: skip
+        _check_scale(scale)
         steep = steepness(self.context.camera) if self.plane == "image" else 1.0
         self.rules = make_rules(self.config, self.context.fps, scale, steep=steep)
         return self.rules
@@ -141,3 +139,14 @@ class GroupPda:
             change = changes.split(bank, row, points[mine], weights[mine], rules, t, self.names)
             told += [] if change is None else [change]
         return told
+
+
+def _check_scale(px_per_m: float) -> None:
+    """InputError without a scale: all lengths of the config are metres."""
+    if not px_per_m > 0:
+        raise InputError(
+            place="context.px_per_m",
+            got=f"{px_per_m:g}",
+            expected="px per m at people, above 0, to track in the image",
+            remedy="give --px-per-m, or a camera",
+        )

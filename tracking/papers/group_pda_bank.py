@@ -98,7 +98,7 @@ def newborn(points: Array, weights: Array, group: Ints, rules: Rules, t: float) 
         return bank
     inside = group >= 0
     g, y, w = group[inside], points[inside], weights[inside]
-    people = np.bincount(g, w, count)
+    people = np.asarray(np.bincount(g, w, count), float)
     mean = np.stack([np.bincount(g, w * y[:, a], count) for a in range(2)], 1) / people[:, None]
     d = y - mean[g]
     prior, strength, c = rules.constraint.prior, rules.constraint.strength, rules.config
@@ -143,5 +143,6 @@ def merged(bank: Bank, rows: Ints) -> Bank:
     one = slice(heir, heir + 1)
     return Bank(
         x[None], P[None], extent[None], np.array([size]), bank.id[one], bank.born[rows].min(keepdims=True),
-        bank.seen[rows].max(keepdims=True), bank.measured[rows].max(keepdims=True), np.zeros(1), np.full(1, UNNAMED), x[None, :2].copy(), [places], [[]],
+        bank.seen[rows].max(keepdims=True), bank.measured[rows].max(keepdims=True), np.zeros(1),
+        np.full(1, UNNAMED), x[None, :2].copy(), [places], [[]],
     )  # fmt: skip

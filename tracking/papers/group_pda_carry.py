@@ -30,8 +30,11 @@ def carried(bank: Bank, points: Array, rules: Rules, t: float) -> tuple[Array, I
     if not kept:
         return np.zeros((0, 2)), np.zeros(0, np.int64), np.zeros(0)
     place, row_of, seen = (np.concatenate(part) for part in zip(*kept, strict=True))
-    d2 = np.square(place[:, None] - points).sum(2)
-    missed = ~(d2 <= (rules.scale * c.carry_reach) ** 2).any(1)
+    missed = np.ones(len(place), bool)
+    if len(points):
+        from scipy.spatial import cKDTree
+
+        missed = np.isinf(cKDTree(points).query(place, distance_upper_bound=rules.scale * c.carry_reach)[0])
     return place[missed], row_of[missed], seen[missed]
 
 

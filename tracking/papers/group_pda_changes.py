@@ -102,7 +102,7 @@ class Merging:
         ignorance, not likeness.
         """
         able = np.flatnonzero(bank.named & (bank.seen >= t) & (bank.null <= 0))
-        near = {pair: self._went_on(pair, slow, (t, *now)) for pair, slow, *now in _near(bank, able, rules)}
+        near = {pair: self._went_on(pair, slow, (t, d, m, gap)) for pair, slow, d, m, gap in _near(bank, able, rules)}
         unsure = {int(g) for g in bank.id[bank.named]} - set(bank.id[able].tolist())
         kept = {p: m for p, m in self.met.items() if unsure & set(p) and t - m.path[-1][0] <= PATIENCE}
         self.met = near | kept
@@ -127,7 +127,7 @@ class Merging:
 
 def _near(bank: Bank, rows: Ints, rules: Rules) -> Iterator[tuple[tuple[int, int], bool, Array, Array, float]]:
     """R_x: ids of each two groups whose search regions overlap, whether their velocities differ by no more than
-    allowed, the difference of their centroids on the ground, the middle between them, how far the nearest people are."""
+    allowed, the difference of their centroids on the ground, the middle between them, the nearest people's distance."""
     near = overlaps(bank.x[rows, :2], bank.extent[rows], rules.config.gate)
     near |= _touching(bank, rows, rules)
     v = bank.x[rows, 2:] * rules.ground
@@ -185,8 +185,10 @@ def standing(bank: Bank) -> tuple[Array, Ints]:
 
 
 def births(bank: Bank, points: Array, weights: Array, before: tuple[Array, Ints], rules: Rules, t: float) -> None:
-    """Tentative groups out of unclaimed points (3.3). Ours: those that were a group's a moment ago are its children; before: what
-    `standing` told then."""
+    """Tentative groups out of unclaimed points (3.3). Ours: those that were a group's a moment ago are its children.
+
+    before: what `standing` told then.
+    """
     if not len(points):
         return
     group = partition(points, weights, rules.constraint)

@@ -49,8 +49,9 @@ def associate(
     """Update the groups x (G, 4), P, extent (G, 2, 2), size (G,) in place by their points (4.1 to 4.3).
 
     d2 (G, M) from `search`; own (M,): the group that an unclaimed point is attached to, or -1; hits (M,): in how many
-    regions each point lies; hold (G,): whose extent and size rest. Returns (G,) NOTHING in the region, NULL (no association is feasible) or MEASURED; (G, M)
-    the points of the likeliest association; (G, 6) its innovation y and S (xx, xy, yy) and the mass of the miss.
+    regions each point lies; hold (G,): whose extent and size rest. Returns (G,) NOTHING in the region, NULL (no
+    association is feasible) or MEASURED; (G, M) the points of the likeliest association; (G, 6) its innovation y and S
+    (xx, xy, yy) and the mass of the miss.
     """
     groups, m = d2.shape
     state, chosen = np.zeros(groups, np.int64), np.zeros((groups, m), np.bool_)
@@ -147,15 +148,16 @@ def _centroid_noise(seen: float, extent: Array, size: float, rules: Array) -> tu
     """R (xx, xy, yy) of the centroid of `seen` people out of those that are there.
 
     Members who keep their places: r^2 / m + (1 - m / n) Sigma n / (n - 1) / m, drawn without replacement (ours); or
-    (2.1) read literally, drawn anew in each frame: (Sigma + r^2) / m.
+    (2.1) read literally, drawn anew in each frame: Sigma / m. Sigma is of measured places: r^2 is in it.
     """
-    noise = rules[NOISE] ** 2
+    noise = rules[NOISE] ** 2  # the extent is that of measured places, so it has this noise already
     if rules[REDRAWN] > 0:
-        return (extent[0, 0] + noise) / seen, extent[0, 1] / seen, (extent[1, 1] + noise) / seen
+        return extent[0, 0] / seen, extent[0, 1] / seen, extent[1, 1] / seen
     there = size / rules[DETECT]
     m = max(min(seen, there), min(1.0, there))
     unseen = (there - m) / max(there - 1, 1e-9) / m if there > 1 else 0.0
-    return noise / m + unseen * extent[0, 0], unseen * extent[0, 1], noise / m + unseen * extent[1, 1]
+    xx, yy = max(extent[0, 0] - noise, 0.0), max(extent[1, 1] - noise, 0.0)
+    return noise / m + unseen * xx, unseen * extent[0, 1], noise / m + unseen * yy
 
 
 @njit(cache=True)
@@ -163,7 +165,7 @@ def _log_density(dx: float, dy: float, S: Array) -> float:
     """log N((dx, dy); 0, S): m_d."""
     area = S[0] * S[2] - S[1] * S[1]
     d2 = (S[2] * dx * dx - 2 * S[1] * dx * dy + S[0] * dy * dy) / area
-    return -0.5 * (d2 + np.log(area)) - np.log(2 * np.pi)
+    return float(-0.5 * (d2 + np.log(area)) - np.log(2 * np.pi))
 
 
 @njit(cache=True)
@@ -180,7 +182,7 @@ def _log_miss(points: Array, weights: Array, start: int, extent: Array, P: Array
 
 @njit(cache=True)
 def _mix(beta: Array, miss: float, mean: Array, S: Array, x: Array, P: Array) -> None:
-    """x and P over all associations, each with its own gain: x = sum beta_j x_j, P = sum beta_j (P_j + spread) (4.3)."""
+    """x and P over all associations, each with its gain: x = sum beta_j x_j, P = sum beta_j (P_j + spread) (4.3)."""
     shift, spread, less = np.zeros(4), np.zeros((4, 4)), np.zeros((4, 4))
     step = np.empty(4)
     gain = np.empty((4, 2))

@@ -70,8 +70,8 @@ def parting(
         middle = np.array([y[side == k].mean(0) if (side == k).any() else middle[k] for k in range(2)])
         times.append(t)
         apart.append(middle[1] - middle[0])
-    t, d = np.array(times[::-1]), np.array(apart[::-1])
+    when, d = np.array(times[::-1]), np.array(apart[::-1])
     gap = np.hypot(*d.T) - reach
-    together = (gap <= APART) | ((gap <= FAR_APART) & (chords(t, d) < PARTING))
-    k = min(int(np.flatnonzero(together)[-1]) + 1 if together.any() else 0, len(t) - 1)
-    return float(t[k]), before[k][1].mean(0) / ground
+    together = (gap <= APART) | ((gap <= FAR_APART) & (chords(when, d) < PARTING))
+    k = min(int(np.flatnonzero(together)[-1]) + 1 if together.any() else 0, len(when) - 1)
+    return float(when[k]), before[k][1].mean(0) / ground

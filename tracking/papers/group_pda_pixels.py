@@ -34,7 +34,8 @@ class Pixels:
     @property
     def spread(self) -> Array:
         """(2, 2) covariance of one person's pixels: a filled ellipse has a quarter of its semi-axes' squares."""
-        return np.diag(np.square(self.person / 4))
+        spread: Array = np.diag(np.square(self.person / 4))
+        return spread
 
     def points(self, image: Image) -> Array | None:
         """(M, 2) px centres of the grid's cells that are foreground; None where there is more than there can be."""
