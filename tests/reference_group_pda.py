@@ -1,0 +1,165 @@
+"""Slow, obvious oracle of a group's associations: Gennari & Hager (2004), 4.1 to 4.3, as plain numpy with loops.
+
+A point is (place, people it stands for). Rules come by name; nothing is incremental, each association is looked at by
+itself.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.special import gammainc, logsumexp
+from scipy.stats import multivariate_normal, norm
+
+from tests import reference_components
+from tracking.components import Constraint
+
+H = np.eye(2, 4)
+
+
+@dataclass(frozen=True)
+class Rules:
+    constraint: Constraint
+    noise: float  # standard deviation of one person's measured place
+    count_noise: float
+    count_share: float
+    detect: float
+    miss: float  # probability of the miss before any measurement
+    freeze: float  # share of N from which on shared points let extent and size rest
+    keep_extent: float
+    keep_size: float
+    correct: bool  # what the gate cuts off is put back
+    redrawn: bool
+    every: bool  # no association: all points in the region
+
+    @property
+    def numbers(self):
+        """`rules` of the kernels."""
+        c, P = self.constraint, self.constraint.prior
+        cut = truncation(c.gate) if self.correct else 1.0
+        return np.array([
+            c.gate, c.link, P[0, 0], P[0, 1], P[1, 1], c.strength, c.least, self.noise, self.count_noise,
+            self.count_share, self.detect, self.miss, self.freeze, self.keep_extent, self.keep_size, cut, self.redrawn,
+            self.every,
+        ], float)  # fmt: skip
+
+
+def truncation(gate, dims=2):
+    """F_chi2,d+2(gate) / F_chi2,d(gate): how much of its covariance a Gaussian keeps inside the gate."""
+    return gammainc(dims / 2 + 1, gate / 2) / gammainc(dims / 2, gate / 2)
+
+
+def search(points, x, P, extent, noise, wider, gate):
+    """(G, M) squared Mahalanobis distances by Sigma + H P H' + (noise + wider) I, inf outside the region."""
+    d2 = np.full((len(x), len(points)), np.inf)
+    for g in range(len(x)):
+        S = extent[g] + H @ P[g] @ H.T + (noise + wider[g]) * np.eye(2)
+        for k, y in enumerate(points):
+            d = y - x[g, :2]
+            if d @ np.linalg.solve(S, d) < gate:
+                d2[g, k] = d @ np.linalg.solve(S, d)
+    return d2
+
+
+def claims(d2, own, hits, g):
+    """Unshared points of group g, and the shared ones in the order of their distance (4.1)."""
+    inside = [k for k in range(len(own)) if np.isfinite(d2[g, k]) or own[k] == g]
+    return [k for k in inside if hits[k] < 2], sorted((k for k in inside if hits[k] > 1), key=lambda k: d2[g, k])
+
+
+def centroid_noise(seen, extent, size, rules):
+    """R of the centroid of `seen` people of a group of `size`.
+
+    The extent is that of measured places. Members redrawn in each frame: as many of those, extent / m. Members who keep
+    their places: r^2 I / m and the variance of the mean of m out of n true places drawn without replacement, (n - m) /
+    (n - 1) Sigma / m, Sigma being the extent without r^2 I; at least one (or all) is seen.
+    """
+    noise = rules.noise**2 * np.eye(2)
+    if rules.redrawn:
+        return extent / seen
+    n = size / rules.detect
+    m = min(max(seen, min(1.0, n)), n)
+    true = extent - noise
+    np.fill_diagonal(true, np.maximum(np.diag(true), 0.0))
+    return noise / m + (true * (n - m) / (n - 1) / m if n > 1 else 0.0)
+
+
+def moments(points, weights):
+    n = weights.sum()
+    mean = weights @ points / n
+    return n, mean, (weights * (points - mean).T) @ (points - mean) / n
+
+
+def associations(mine, shared, points, weights, rules):
+    """The feasible sets of points, largest last; rows of `points`."""
+    if rules.every:
+        return [mine + shared]
+    sets = [mine + shared[:j] for j in range(len(shared) + 1)]
+    return [s for s in sets if reference_components.is_group(points[s], weights[s], rules.constraint)]
+
+
+def masses(sets, mine, shared, points, weights, x, P, extent, size, rules):
+    """Masses of the associations, m_d m_N (4.2), and of the miss, all normalised; each one's R.
+
+    m_N is a mass of numbers of people, which differ by those of a point. The miss has the same unit: its centroid is
+    anywhere in the region, and if there are points of no other group, their number is any up to 2 N.
+    """
+    step = weights[mine + shared].mean()
+    sigma = np.hypot(rules.count_noise, rules.count_share * size)
+    log, R = [], []
+    for s in sets:
+        n, mean, _ = moments(points[s], weights[s])
+        R.append(centroid_noise(n, extent, size, rules))
+        close = multivariate_normal(x[:2], H @ P @ H.T + R[-1]).logpdf(mean)
+        log.append(close + norm(size, sigma).logpdf(n) + np.log(step))
+    miss = -np.inf
+    if rules.miss > 0:
+        area = np.pi * rules.constraint.gate * np.sqrt(np.linalg.det(extent + H @ P @ H.T))
+        number = step / (2 * size + 1) if mine else 1.0
+        miss = np.log(rules.miss / (1 - rules.miss) / area * number)
+    total = logsumexp([*log, miss])
+    return np.exp(np.array(log) - total), np.exp(miss - total), R
+
+
+def update(g, points, weights, d2, own, hits, x, P, extent, size, hold, rules):
+    """One group after its points: state, rows chosen, innovation, its S, mass of the miss, x, P, extent, size."""
+    mine, shared = claims(d2, own, hits, g)
+    same = x, P, extent, size
+    if not mine + shared:
+        return "nothing", [], None, None, 0.0, *same
+    sets = associations(mine, shared, points, weights, rules)
+    if not sets:
+        return "null", mine + shared, None, None, 0.0, *same
+    beta, miss, R = masses(sets, mine, shared, points, weights, x, P, extent, size, rules)
+    states, covariances = [x], [P]
+    for s, r in zip(sets, R, strict=True):
+        K = P @ H.T @ np.linalg.inv(H @ P @ H.T + r)
+        states.append(x + K @ (moments(points[s], weights[s])[1] - x[:2]))
+        covariances.append(P - K @ H @ P)
+    share = np.array([miss, *beta])
+    new_x = share @ np.array(states)
+    new_P = sum(b * (C + np.outer(y - new_x, y - new_x)) for b, y, C in zip(share, states, covariances, strict=True))
+    best = int(np.argmax(beta))
+    middle = moments(points[sets[best]], weights[sets[best]])[1]
+    new_extent, new_size = extent, size
+    frozen = hold or (not rules.every and weights[shared].sum() > rules.freeze * size)
+    if not frozen:
+        new_extent, new_size = adapted(sets, share, points, weights, extent, size, rules)
+    found = beta.sum() > miss
+    return (
+        "measured" if found else "nothing", sets[best] if found else [], middle - x[:2], H @ P @ H.T + R[best], miss,
+        new_x, new_P, new_extent, new_size,
+    )  # fmt: skip
+
+
+def adapted(sets, share, points, weights, extent, size, rules):
+    """(2.4) of each association, mixed; a miss leaves extent and size."""
+    c, cut = rules.constraint, truncation(rules.constraint.gate) if rules.correct else 1.0
+    new_extent, new_size = share[0] * extent, share[0] * size
+    for b, s in zip(share[1:], sets, strict=True):
+        n, _, S = moments(points[s], weights[s])
+        shrunk = (n * S / cut + c.strength * c.prior) / (n + c.strength)
+        new_extent = new_extent + b * (rules.keep_extent * extent + (1 - rules.keep_extent) * shrunk)
+        new_size = new_size + b * (rules.keep_size * size + (1 - rules.keep_size) * n)
+    return new_extent, new_size
