@@ -172,7 +172,11 @@ def test_light_components_are_noise() -> None:
 
 
 CANCELS = pytest.param(
-    1e9, 0, marks=pytest.mark.xfail(reason="sums about a first point that is 1e9 away cancel", strict=True)
+    1e9,
+    0,
+    marks=pytest.mark.xfail(
+        reason="sums about a first point that is 1e9 away cancel", strict=True, raises=AssertionError
+    ),
 )
 
 
@@ -230,6 +234,12 @@ def two_clumps(r, n, radius, towards):
     return r.permutation(np.concatenate([round_clump(r, n // 2, radius), round_clump(r, n // 2, radius) + away]))
 
 
+def slanted_gap(r, n):
+    """Two halves of a square on either side of a diagonal strip just wider than the link."""
+    points = r.uniform(-4, 4, (3 * n, 2))
+    return points[np.abs(points.sum(axis=1)) > np.sqrt(0.5) * 1.001 * LINK][:n]
+
+
 SHAPES = {
     "constant density, outwards": lambda r, n: outwards(r.uniform(0, np.sqrt(n / 4), (n, 2))),
     "constant area, outwards": lambda r, n: outwards(r.uniform(0, 10, (n, 2))),
@@ -239,14 +249,18 @@ SHAPES = {
     "two clumps, growing": lambda r, n: two_clumps(r, n, np.sqrt(n) / 20, (1, 0)),
     "two clumps, denser": lambda r, n: two_clumps(r, n, 2.0, (1, 0)),
     "two clumps, denser, aslant": lambda r, n: two_clumps(r, n, 2.0, (np.sqrt(0.5), np.sqrt(0.5))),
+    "slanted gap, denser": slanted_gap,
 }
+QUADRATIC = pytest.mark.xfail(
+    reason="boxes of cells reach over a slanted gap: all their points are looked at", strict=True
+)
 
 
-@pytest.mark.parametrize("shape", SHAPES)
+@pytest.mark.parametrize("shape", [pytest.param(s, marks=[QUADRATIC] if "gap" in s else []) for s in SHAPES])
 def test_work_grows_with_the_number_of_points(shape: str) -> None:
     """Operations for 5000 and 10000 points, means of a few draws: doubling costs little more than twice."""
     few, many = (np.mean([work(SHAPES[shape](np.random.default_rng(k), n)) for k in range(4)]) for n in (5_000, 10_000))
-    assert few > 5_000
+    assert few > 5_000  # each point is looked at
     assert many / few <= 2.3
 
 

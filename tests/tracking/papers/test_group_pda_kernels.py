@@ -13,8 +13,9 @@ from scipy.stats import chi2
 
 from tests import reference_group_pda as reference
 from tracking.components import Constraint
+from tracking.papers import group_pda_changes as changes
 from tracking.papers import group_pda_kernels as kernels
-from tracking.papers.group_pda_bank import Bank, merged
+from tracking.papers.group_pda_bank import Bank, merged, newborn
 from tracking.papers.group_pda_config import GroupPdaConfig
 from tracking.papers.group_pda_rules import make_rules, truncation
 
@@ -187,6 +188,29 @@ def test_masses_sum_to_one(seed: int) -> None:
         np.testing.assert_allclose(b, a, rtol=1e-12, atol=1e-12)
 
 
+def occluded(miss):
+    """A group of 50 hidden behind another, of which three stray points are in its region; x, P and size after that."""
+    y = np.array([[1.2, 0.1], [1.3, -0.1], [1.25, 0.2]])
+    x, P, size = np.array([[0.0, 0, 1, 0]]), 0.02 * np.eye(4)[None], np.array([50.0])
+    case = y, np.ones(3), np.square(y).sum(1)[None] / 0.4, np.full(3, -1), np.full(3, 2), x, P, 0.36 * np.eye(2)[None]
+    state, chosen, told, x, P, _, size = kernel((*case, size, np.zeros(1, bool)), replace(PLAIN, miss=miss))
+    return state, chosen.any(), told[0, 5], x[0], P[0], size[0]
+
+
+def test_strays_do_not_drag_a_hidden_group() -> None:
+    """Without the miss hypothesis three points have all the mass, as masses sum to 1."""
+    state, chosen, miss, x, P, size = occluded(0.02)
+    assert (state, chosen) == (["nothing"], False)
+    assert miss > 0.95
+    np.testing.assert_allclose(x, [0, 0, 1, 0], atol=0.01)
+    np.testing.assert_allclose(P, 0.02 * np.eye(4), atol=0.001)
+    assert size == pytest.approx(50, abs=0.2)
+    state, chosen, miss, x, _, size = occluded(0.0)
+    assert (state, chosen, miss) == (["measured"], True, 0)
+    assert x[0] > 0.05
+    assert size < 47
+
+
 def gaussian(count):
     """Points spread evenly as a Gaussian of covariance I is."""
     k = np.arange(count)
@@ -349,3 +373,24 @@ def test_merged_groups_are_as_sure_as_they_say() -> None:
     low, high = chi2.ppf([0.005, 0.995], 4 * 500) / (4 * 500)
     assert low < np.mean(errors) / 4 < high
     assert not low < np.mean(spread) / 4 < high
+
+
+@pytest.mark.parametrize("pixels", [False, True])
+def test_what_split_does_not_merge_in_the_same_frame(pixels: bool) -> None:
+    """E5: groups made of measurements cannot be merged back (3.3), even if merging needs no time at all."""
+    splits = 0
+    for seed in range(100):
+        r = np.random.default_rng(seed)
+        person = np.diag([0.05, 0.2]) if pixels else None
+        rules = make_rules(GroupPdaConfig(merge_time=0.0), 10.0, 1.0, person, 0.1 if pixels else 0.0)
+        points = r.uniform(0, 9, (int(r.integers(2, 9)), 2))
+        if pixels:
+            points = np.concatenate([p + r.normal(0, [0.1, 0.3], (40, 2)) for p in points])
+        weights = np.full(len(points), 1 / 40 if pixels else 1.0)
+        one = newborn(points, weights, np.zeros(len(points), np.int64), rules, 1.0)
+        one.id[:], names = 0, changes.Names()
+        split = changes.split(one, 0, points, weights, rules, 1.0, names)
+        splits += split is not None
+        assert split is None or len(one) == len(split.after) > 1
+        assert not list(changes.Merging().step(one, rules, 1.0)), seed
+    assert splits > 50
