@@ -222,7 +222,7 @@ def prefixes(
 ) -> tuple[Bools, int]:
     """Which of the first `start`, start + 1, … M points are one group, |G_y| = 1 (M - start + 1,), and the work done.
 
-    Components of less weight than `least` are no parts (unless all are); none of no points.
+    Components of less weight than `least` are no parts; one point alone, or linked ones, are always a group.
     """
     m = len(points)
     one = np.zeros(m - start + 1, np.bool_)

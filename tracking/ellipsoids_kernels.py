@@ -20,8 +20,8 @@ def overlap(dx: float, dy: float, axx: float, axy: float, ayy: float, bxx: float
     """Whether {y' A^-1 y <= 1} and {(y - d)' B^-1 (y - d) <= 1} meet; A, B positive definite.
 
     They are disjoint iff f(s) = d' (A / (1 - s) + B / s)^-1 d > 1 for some s in (0, 1) (Gilitschenski & Hanebeck 2012).
-    In coordinates where B = I and A = diag(l1, l2), f(s) = sum of s (1 - s) d_i^2 / (1 + s (l_i - 1)). It is concave: its
-    tangents at both ends of the bracket bound the maximum.
+    In coordinates where B = I and A = diag(l1, l2), f(s) = sum of s (1 - s) d_i^2 / (1 + s (l_i - 1)). It is concave:
+    its tangents at both ends of the bracket bound the maximum.
     """
     l11 = sqrt(bxx)  # B = L L'
     l21 = bxy / l11

@@ -41,7 +41,8 @@ class GroupPda:
             _check_scale(context.px_per_m)
         self.pixels = None if context.background is None else Pixels(self.config, context)
         self.rules: Rules | None = None
-        self.plane: Plane = "ground" if self.pixels is None else "image"
+        flat = context.camera is None and context.px_per_m > 0
+        self.plane: Plane = "image" if flat or self.pixels is not None else "ground"
         if self.pixels is not None:
             p, scale = self.pixels, context.px_per_m
             self.rules = make_rules(self.config, context.fps, scale, p.spread, p.step, steepness(context.camera))
@@ -50,8 +51,11 @@ class GroupPda:
     def step(self, frame: Frame, detections: Detections | None) -> Tracks:
         """Predict; gate, associate, update, split (Fig. 1); merge; births and deaths."""
         points, weights = self._points(frame, detections)
+        if points is None and self.rules is None:
+            return self._silent(frame)
         rules = self.rules or self._rules()
         bank, t = self.bank, frame.t
+        self.innovation = []
         bank.predict(rules)
         told: list[changes.Change] = []
         if points is not None:
@@ -64,12 +68,22 @@ class GroupPda:
     def _points(self, frame: Frame, detections: Detections | None) -> tuple[Array | None, Array]:
         """The frame's points (M, 2) and the people each stands for (M,); None where the frame tells nothing."""
         if self.pixels is not None:
-            found = None if frame.image is None else self.pixels.points(frame.image)
+            found = None if frame.image is None else self.pixels.points(frame.image, self._outlines())
             return found, np.full(0 if found is None else len(found), self.pixels.share)
         if detections is None:
             return None, np.zeros(0)
         self.plane = "image" if detections.plane == "image" else "ground"
         return np.ascontiguousarray(detections.pos[:, :2]), np.ones(len(detections.pos))
+
+    def _outlines(self) -> list[Array]:
+        """The outlines of the groups that are told, px."""
+        bank = self.bank
+        return [bank.places[r][0] + bank.x[r, :2] for r in np.flatnonzero(bank.named).tolist()]
+
+    def _silent(self, frame: Frame) -> Tracks:
+        """Nothing was seen yet, not even what the plane is."""
+        none, ids = np.zeros((0, 2)), np.zeros(0, np.int64)
+        return Tracks(frame.index, frame.t, self.plane, "group", ids, ids, none, none, np.zeros((0, 4, 4)))
 
     def _rules(self) -> Rules:
         """The rules for points, whose plane is known once they come."""
@@ -96,7 +110,7 @@ class GroupPda:
         points, weights = np.concatenate([points, ghost]), np.concatenate([weights, np.ones(len(ghost))])
         own, hits = np.concatenate([own, row_of]), np.concatenate([hits, np.ones(len(ghost), np.int64)])
         d2 = np.hstack([d2, np.full((len(bank), len(ghost)), np.inf)])
-        before, resting = changes.standing(bank), bank.null > 0
+        before, resting = changes.standing(bank, rules, t), bank.null > 0
         state, chosen, said = kernels.associate(
             points, weights, d2, own, hits, bank.x, bank.P, bank.extent, bank.size, resting, rules.numbers
         )
@@ -108,7 +122,9 @@ class GroupPda:
             (int(bank.id[g]), said[g, :2].copy(), said[g, [2, 3, 3, 4]].reshape(2, 2))
             for g in np.flatnonzero(measured & bank.named).tolist()
         ]
-        remember(bank, points, measured_at, chosen & exclusive(chosen, d2), t)
+        mine = chosen & exclusive(chosen, d2)
+        bank.own = mine @ weights
+        remember(bank, points, measured_at, mine, rules, t)
         told = self._split(points, weights, d2, chosen, rules, t)
         free = np.append(free, np.zeros(len(ghost), bool))
         changes.births(bank, points[free], weights[free], before, rules, t)

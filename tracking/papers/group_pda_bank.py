@@ -12,6 +12,7 @@ from dataclasses import dataclass, fields
 import numpy as np
 
 from sim.types import Array, Bools, Ints
+from tracking.papers import group_pda_kernels as kernels
 from tracking.papers.group_pda_rules import Rules
 
 UNNAMED = -1
@@ -21,7 +22,8 @@ LISTS = ("places", "past")
 @dataclass
 class Bank:
     """G groups: x (G, 4) xi, v; P (G, 4, 4); extent (G, 2, 2) Sigma; size (G,) N, people; id (G,), UNNAMED tentative;
-    born, seen (G,): s, first and last measurement; measured (G,): s in all; null (G,): s; parent (G,): id of the
+    born, seen (G,): s, first and last measurement; measured (G,): s in all; null (G,): s; own (G,): people in
+    this frame who are nearer to no other group; parent (G,): id of the
     group that a tentative one left, or UNNAMED, and origin (G, 2), where; places: of each group its
     points (K, 2) relative to xi and when each was measured last (K,), s; past: of each its points of the last seconds,
     (time, points)."""
@@ -35,6 +37,7 @@ class Bank:
     seen: Array
     measured: Array
     null: Array
+    own: Array
     parent: Ints
     origin: Array
     places: list[tuple[Array, Array]]
@@ -43,21 +46,10 @@ class Bank:
     @classmethod
     def empty(cls) -> Bank:
         """No groups."""
-        none, ids = np.zeros(0), np.zeros(0, np.int64)
+        none, ids, two = np.zeros(0), np.zeros(0, np.int64), np.zeros((0, 2))
+        four = np.zeros((0, 4))
         return cls(
-            np.zeros((0, 4)),
-            np.zeros((0, 4, 4)),
-            np.zeros((0, 2, 2)),
-            none,
-            ids,
-            none,
-            none,
-            none,
-            none,
-            ids,
-            np.zeros((0, 2)),
-            [],
-            [],
+            four, np.zeros((0, 4, 4)), np.zeros((0, 2, 2)), none, ids, none, none, none, none, none, ids, two, [], []
         )
 
     def __len__(self) -> int:
@@ -104,6 +96,7 @@ def newborn(points: Array, weights: Array, group: Ints, rules: Rules, t: float) 
     prior, strength, c = rules.constraint.prior, rules.constraint.strength, rules.config
     square = np.stack([np.bincount(g, w * d[:, a] * d[:, b], count) for a in range(2) for b in range(2)], 1)
     extent = (square.reshape(-1, 2, 2) + strength * prior) / (people + strength)[:, None, None]
+    extent /= rules.numbers[kernels.CUT]
     P = np.zeros((count, 4, 4))
     P[:, [0, 1], [0, 1]] = (rules.noise**2 / np.maximum(people, 1e-3))[:, None] + rules.noise**2
     P[:, [2, 3], [2, 3]] = (rules.scale * c.speed_prior) ** 2
@@ -111,7 +104,8 @@ def newborn(points: Array, weights: Array, group: Ints, rules: Rules, t: float) 
     nil, now = np.zeros(count), np.full(count, t)
     return Bank(
         np.hstack([mean, np.zeros((count, 2))]), P, extent, people, np.full(count, UNNAMED),
-        now, now.copy(), nil + rules.dt, nil, np.full(count, UNNAMED), mean.copy(), places, [[] for _ in range(count)],
+        now, now.copy(), nil + rules.dt, nil, people.copy(), np.full(count, UNNAMED), mean.copy(), places,
+        [[] for _ in range(count)],
     )  # fmt: skip
 
 
@@ -131,7 +125,7 @@ def merged(bank: Bank, rows: Ints) -> Bank:
 
     P is that of a weighted mean of independent centroids, sum w^2 P_i: their spread is the group's extent, no error.
     """
-    size = bank.size[rows].sum()
+    size = np.asarray(bank.size[rows].sum())
     w = bank.size[rows] / size
     x = w @ bank.x[rows]
     d = bank.x[rows, :2] - x[:2]
@@ -142,7 +136,7 @@ def merged(bank: Bank, rows: Ints) -> Bank:
     places = (np.concatenate([y for y, _ in moved]), np.concatenate([seen for _, seen in moved]))
     one = slice(heir, heir + 1)
     return Bank(
-        x[None], P[None], extent[None], np.array([size]), bank.id[one], bank.born[rows].min(keepdims=True),
-        bank.seen[rows].max(keepdims=True), bank.measured[rows].max(keepdims=True), np.zeros(1),
+        x[None], P[None], extent[None], size[None].copy(), bank.id[one], bank.born[rows].min(keepdims=True),
+        bank.seen[rows].max(keepdims=True), bank.measured[rows].max(keepdims=True), np.zeros(1), size[None],
         np.full(1, UNNAMED), x[None, :2].copy(), [places], [[]],
     )  # fmt: skip

@@ -14,7 +14,7 @@ from tracking.papers.group_pda_bank import Bank
 from tracking.papers.group_pda_rules import Rules
 
 OUTLINE = 20
-"""Of so many points and more only those on their hull are kept."""
+"""Of so many pixels and more only those on their hull are kept."""
 PAST, MEMORY = 3.0, 64
 """For so long, s, no more than so many of a group's points are kept, to look back from a split."""
 
@@ -47,18 +47,25 @@ def exclusive(chosen: Bools, d2: Array) -> Bools:
     return np.asarray((distance <= distance.min(0, initial=np.inf)) | (chosen.sum(0) < 2))
 
 
-def remember(bank: Bank, points: Array, seen: Array, chosen: Bools, t: float) -> None:
+def remember(bank: Bank, points: Array, seen: Array, chosen: Bools, rules: Rules, t: float) -> None:
     """The places of the points chosen (G, M), measured at `seen` (M,), as those of the groups; the old ones where a
     group has none."""
     for row in np.flatnonzero(chosen.any(1)).tolist():
-        mine = points[chosen[row]]
-        some = mine[:: -(-len(mine) // MEMORY)]
-        bank.past[row] = [*(p for p in bank.past[row] if p[0] > t - PAST), (t, some)]
-        if len(mine) < OUTLINE:
-            bank.places[row] = (mine - bank.x[row, :2], seen[chosen[row]])
-        else:
-            outline = _hull(mine)
-            bank.places[row] = (outline - bank.x[row, :2], np.full(len(outline), seen[chosen[row]].max()))
+        mine, when = points[chosen[row]], seen[chosen[row]]
+        bank.past[row] = [*(p for p in bank.past[row] if p[0] > t - PAST), (t, thinned(mine))]
+        place = mine - bank.x[row, :2]
+        if rules.half_cell and len(place) >= OUTLINE:
+            place = _hull(place)
+            when = np.full(len(place), t)
+        bank.places[row] = (place, when)
+
+
+def thinned(points: Array) -> Array:
+    """At most MEMORY of the points (M, 2), drawn by where they are: neither their order nor a grid's shows."""
+    if len(points) <= MEMORY:
+        return points
+    scattered = np.sin(points @ np.array([12.9898, 78.233])) * 43758.5453
+    return points[np.argsort(scattered - np.floor(scattered), kind="stable")[:MEMORY]]
 
 
 def _hull(points: Array) -> Array:

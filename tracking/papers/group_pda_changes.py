@@ -15,7 +15,7 @@ from sim.types import Array, Bools, Ints
 from tracking.components import linked, partition
 from tracking.ellipsoids import overlaps
 from tracking.papers.group_pda_bank import UNNAMED, Bank, children, merged, newborn
-from tracking.papers.group_pda_carry import MEMORY
+from tracking.papers.group_pda_carry import thinned
 from tracking.papers.group_pda_onset import REACH, Encounter, parting
 from tracking.papers.group_pda_rules import Rules
 
@@ -67,17 +67,19 @@ def split(bank: Bank, row: int, points: Array, weights: Array, rules: Rules, t: 
     """Replace a group by those that its points (M, 2) form (3.3), if they are several; the largest keeps its id."""
     group = partition(points, weights, rules.constraint)
     if group.max(initial=-1) < 1:
+        bank.null[row] = 0.0
+        if group.max(initial=-1) < 0:  # nothing but noise
+            bank.seen[row] = -np.inf
         return None
     made = children(bank, row, points, weights, group, rules, t)
-    largest = int(made.size.argmax())
+    away = np.hypot(*(made.x[:, :2] - bank.x[row, :2]).T)
+    largest, other = np.lexsort((made.x[:, 1], made.x[:, 0], away, -made.size))[:2].tolist()
     named = bank.id[row] != UNNAMED
     if named:
         made.id[:] = [bank.id[row] if k == largest else names.new() for k in range(len(made))]
-    other = int(np.where(np.arange(len(made)) == largest, -np.inf, made.size).argmax())
-    parts = [points[group == k] for k in (largest, other)]
-    parts = [p[:: -(-len(p) // MEMORY)] for p in parts]
+    parts = [thinned(points[group == k]) for k in (largest, other)]
     since, place = parting(bank.past[row], parts, rules.ground, rules.body, t)
-    change = Change("split", since, (int(bank.id[row]),), tuple(made.id.tolist()), tuple(place.tolist()))
+    change = Change("split", since, (int(bank.id[row]),), tuple(sorted(made.id.tolist())), tuple(place.tolist()))
     bank.keep(np.arange(len(bank)) != row)
     bank.add(made)
     return change if named else None
@@ -85,6 +87,10 @@ def split(bank: Bank, row: int, points: Array, weights: Array, rules: Rules, t: 
 
 FASTEST = 2.0
 """m/s: nobody walks faster away from a group than this."""
+LONGEST = 5.0
+"""s that is looked back at most."""
+OWN = 0.2
+"""Share of a group that must be nearer to it than to any other for its velocity to be its own."""
 PATIENCE = 0.5
 """s that an encounter outlasts without a look at both groups."""
 
@@ -98,10 +104,10 @@ class Merging:
     def step(self, bank: Bank, rules: Rules, t: float) -> Iterator[Change]:
         """Merge groups for which that has been so for `merge_time`.
 
-        Only those do that have an id, were measured in this frame and are in no spell: the others' velocities are
-        ignorance, not likeness.
+        Only those do that have an id, were measured in this frame, some of them by points that are nearer to no other
+        group, and are in no spell: the others' velocities are ignorance, or another's.
         """
-        able = np.flatnonzero(bank.named & (bank.seen >= t) & (bank.null <= 0))
+        able = np.flatnonzero(bank.named & (bank.seen >= t) & (bank.null <= 0) & (bank.own >= OWN * bank.size))
         near = {pair: self._went_on(pair, slow, (t, d, m, gap)) for pair, slow, d, m, gap in _near(bank, able, rules)}
         unsure = {int(g) for g in bank.id[bank.named]} - set(bank.id[able].tolist())
         kept = {p: m for p, m in self.met.items() if unsure & set(p) and t - m.path[-1][0] <= PATIENCE}
@@ -122,7 +128,8 @@ class Merging:
 
     def _went_on(self, pair: tuple[int, int], slow: bool, now: tuple[float, Array, Array, float]) -> Encounter:
         before = self.met.get(pair, Encounter(np.inf, []))
-        return Encounter(min(before.since, now[0]) if slow else np.inf, [*before.path, now])
+        path = [p for p in before.path if p[0] > now[0] - LONGEST]
+        return Encounter(min(before.since, now[0]) if slow else np.inf, [*path, now])
 
 
 def _near(bank: Bank, rows: Ints, rules: Rules) -> Iterator[tuple[tuple[int, int], bool, Array, Array, float]]:
@@ -177,9 +184,10 @@ def _connected(pairs: list[tuple[int, int]]) -> list[list[int]]:
     return [sorted(p) for p in parts]
 
 
-def standing(bank: Bank) -> tuple[Array, Ints]:
-    """Where the people of named groups should be (K, 2), and of which group, its id (K,)."""
-    rows = np.flatnonzero(bank.named & (bank.null <= 0)).tolist()
+def standing(bank: Bank, rules: Rules, t: float) -> tuple[Array, Ints]:
+    """Where the people of named groups that were measured lately should be (K, 2), and of which group, its id (K,)."""
+    late = t - bank.seen <= max(rules.config.carry_time, rules.dt) + 1e-9
+    rows = np.flatnonzero(bank.named & (bank.null <= 0) & late).tolist()
     places = [bank.places[r][0] + bank.x[r, :2] for r in rows]
     return np.concatenate([np.zeros((0, 2)), *places]), np.repeat(bank.id[rows], [len(p) for p in places])
 
@@ -217,10 +225,13 @@ def confirm(bank: Bank, rules: Rules, t: float, names: Names) -> Iterator[Change
     """Names for tentative groups that were measured for long enough: that of a lost group which should be here, with
     its velocity, or a fresh one."""
     c = rules.config
-    for row in np.flatnonzero(~bank.named & (bank.measured > c.confirm_time + 1e-9)).tolist():
-        lost = _lost_here(bank, row, rules, t) if c.recapture else -1
+    new = np.flatnonzero(~bank.named & (bank.measured > c.confirm_time + 1e-9))
+    old = np.flatnonzero(bank.named & (bank.seen < t)) if c.recapture else new[:0]
+    back = dict(_returned(bank, new, old, rules)) if len(new) and len(old) else {}
+    for row in new.tolist():
         place = tuple(bank.x[row, :2])
-        if lost >= 0:
+        if row in back:
+            lost = back[row]
             bank.id[row], bank.born[row] = bank.id[lost], bank.born[lost]
             bank.id[lost], bank.seen[lost] = UNNAMED, -np.inf
         else:
@@ -233,20 +244,20 @@ def confirm(bank: Bank, rules: Rules, t: float, names: Names) -> Iterator[Change
                 yield Change("enter", float(bank.born[row]), (), (id,), place)
 
 
-def _lost_here(bank: Bank, row: int, rules: Rules, t: float) -> int:
-    """The unmeasured group in whose predicted region, position and velocity, a new one lies; -1 if there is none."""
-    old = np.flatnonzero(bank.named & (bank.seen < t))
-    if not len(old):
-        return -1
-    d = bank.x[row] - bank.x[old]
-    S = bank.P[old] + bank.P[row]
-    S[:, :2, :2] += bank.extent[old]
-    d2 = np.einsum("ki,ki->k", d, np.linalg.solve(S, d[..., None])[..., 0])
-    slow = np.hypot(d[:, 2], d[:, 3]) <= rules.scale * rules.config.merge_velocity + np.sqrt(
-        np.trace(S[:, 2:, 2:], axis1=1, axis2=2) / 2
-    )
-    good = slow & (d2 <= GATE4)
-    return int(old[np.where(good, d2, np.inf).argmin()]) if good.any() else -1
+def _returned(bank: Bank, new: Ints, old: Ints, rules: Rules) -> Iterator[tuple[int, int]]:
+    """New groups and the unmeasured ones in whose predicted region, position and velocity, they lie: rows, the likest
+    first, each once."""
+    d = bank.x[new][:, None] - bank.x[old]
+    S = bank.P[new][:, None] + bank.P[old]
+    S[..., :2, :2] += bank.extent[old]
+    d2 = np.einsum("nki,nki->nk", d, np.linalg.solve(S, d[..., None])[..., 0])
+    doubt = np.sqrt(np.einsum("nkaa,a->nk", S[..., 2:, 2:], np.square(rules.ground)) / 2)
+    slow = np.hypot(*np.moveaxis(d[..., 2:] * rules.ground, 2, 0)) <= rules.config.merge_velocity + doubt
+    d2 = np.where(slow & (d2 <= GATE4), d2, np.inf)
+    while np.isfinite(d2).any():
+        i, j = np.unravel_index(int(d2.argmin()), d2.shape)
+        yield int(new[i]), int(old[j])
+        d2[i], d2[:, j] = np.inf, np.inf
 
 
 GATE4 = 13.28
@@ -259,6 +270,8 @@ def deaths(bank: Bank, rules: Rules, t: float) -> Iterator[Change]:
     patience = np.where(bank.named, max(c.coast_time, c.recapture_time if c.recapture else 0.0), c.confirm_time)
     dead: Bools = t - bank.seen > patience + 1e-9
     for row in np.flatnonzero(dead & bank.named).tolist():
-        yield Change("leave", float(bank.seen[row]), (int(bank.id[row]),), (), tuple(bank.x[row, :2]))
+        unseen = min(t - bank.seen[row], patience[row])
+        place = bank.x[row, :2] - unseen * bank.x[row, 2:]  # where it was measured last
+        yield Change("leave", float(t - unseen), (int(bank.id[row]),), (), tuple(place.tolist()))
     if dead.any():
         bank.keep(~dead)

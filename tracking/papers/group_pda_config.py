@@ -61,7 +61,7 @@ class GroupPdaConfig(BackgroundSettings):
         0.5, (0.05, 3.0), "m/s", "greatest difference of velocities at which groups merge (ours: SR_v made physical)"
     )
     merge_doubt: float = param(
-        0.3, (0.0, 1.0), "", "standard deviations of the difference by which that is widened (ours)"
+        0.0, (0.0, 1.0), "", "standard deviations of the difference by which that is widened (ours)"
     )
     merge_time: float = param(0.5, (0.0, 3.0), "s", "for so long groups must be near and equally fast to merge (ours)")
     split_time: float = param(0.5, (0.0, 3.0), "s", "spell without a feasible association after which a group splits")

@@ -17,6 +17,8 @@ NOTHING, NULL, MEASURED = range(3)
 (GATE, LINK, PRIOR_XX, PRIOR_XY, PRIOR_YY, STRENGTH, LEAST, NOISE, COUNT, SHARE, DETECT, MISS, FREEZE, KEEP_EXTENT,
  KEEP_SIZE, CUT, REDRAWN, ALL) = range(18)  # fmt: skip
 """Rows of `rules`: see tracking.papers.group_pda_rules."""
+NEWCOMERS = 0.02
+"""Probability that the number of people has nothing to do with what it was."""
 
 
 @njit(cache=True)
@@ -100,15 +102,14 @@ def _estimate(
     people, mean, cov = _running(points, weights, x[0], x[1], start)
     S = np.empty((len(people), 3))
     log_mass = np.full(len(people), -np.inf)
+    unit = weights.mean()  # people that one point stands for: makes m_N a mass of numbers of points
     width = rules[COUNT] ** 2 + (rules[SHARE] * size[0]) ** 2  # sigma_n^2
     for j in range(len(people)):
         if feasible[j] and people[j] > 0:
-            R = _centroid_noise(people[j], extent, size[0], rules)
+            R = _centroid_noise(people[j], cov[j], extent, size[0], rules)
             S[j, 0], S[j, 1], S[j, 2] = P[0, 0] + R[0], P[0, 1] + R[1], P[1, 1] + R[2]
-            log_mass[j] = _log_density(mean[j, 0], mean[j, 1], S[j]) - 0.5 * (people[j] - size[0]) ** 2 / width
-    unit = weights.mean() / np.sqrt(2 * np.pi * width)  # makes m_N a mass of numbers of points
-    if rules[ALL] == 0:
-        log_mass += np.log(unit)
+            m_d = _log_density(mean[j, 0], mean[j, 1], S[j])
+            log_mass[j] = m_d + _log_count(people[j], size[0], width) + np.log(unit)  # (4.2), m_g being 1
     log_miss = _log_miss(points, weights, start, extent, P, size[0], rules)
     top = max(log_mass.max(), log_miss)
     beta, miss = np.exp(log_mass - top), np.exp(log_miss - top)
@@ -144,17 +145,30 @@ def _running(points: Array, weights: Array, x: float, y: float, start: int) -> t
 
 
 @njit(cache=True)
-def _centroid_noise(seen: float, extent: Array, size: float, rules: Array) -> tuple[float, float, float]:
+def _log_count(people: float, size: float, width: float) -> float:
+    """log m_N, per person: Gaussian about N with the variance `width`; ours: with tails, as people who are linked to a
+    group come all at once."""
+    gauss = np.exp(-0.5 * (people - size) ** 2 / width) / np.sqrt(2 * np.pi * width)
+    return float(np.log((1 - NEWCOMERS) * gauss + NEWCOMERS / (size + people + 1)))
+
+
+@njit(cache=True)
+def _centroid_noise(seen: float, cov: Array, extent: Array, size: float, rules: Array) -> tuple[float, float, float]:
     """R (xx, xy, yy) of the centroid of `seen` people out of those that are there.
 
-    Members who keep their places: r^2 / m + (1 - m / n) Sigma n / (n - 1) / m, drawn without replacement (ours); or
+    Members who keep their places: r^2 / m + (1 - m / n) Sigma n / (n - 1) / m, drawn without replacement (ours); if
+    more are seen than there are, the other way round, with the covariance cov (3,) of those who are seen; or
     (2.1) read literally, drawn anew in each frame: Sigma / m. Sigma is of measured places: r^2 is in it.
     """
     noise = rules[NOISE] ** 2  # the extent is that of measured places, so it has this noise already
     if rules[REDRAWN] > 0:
         return extent[0, 0] / seen, extent[0, 1] / seen, extent[1, 1] / seen
     there = size / rules[DETECT]
-    m = max(min(seen, there), min(1.0, there))
+    if seen > there:  # some are strangers: the group is drawn out of them
+        strange = (seen - there) / max(seen - 1, 1.0) / max(there, 1.0)
+        own = noise / max(there, 1.0)
+        return own + strange * cov[0], strange * cov[1], own + strange * cov[2]
+    m = max(seen, min(1.0, there))
     unseen = (there - m) / max(there - 1, 1e-9) / m if there > 1 else 0.0
     xx, yy = max(extent[0, 0] - noise, 0.0), max(extent[1, 1] - noise, 0.0)
     return noise / m + unseen * xx, unseen * extent[0, 1], noise / m + unseen * yy
@@ -218,8 +232,8 @@ def _adapt(beta: Array, people: Array, cov: Array, extent: Array, size: Array, r
         if beta[j] > 0:
             n, share = people[j], beta[j]
             for a in range(3):
-                whole = n * cov[j, a] / rules[CUT] + rules[STRENGTH] * rules[PRIOR_XX + a]
-                move[a] += share * whole / (n + rules[STRENGTH])
+                whole = n * cov[j, a] + rules[STRENGTH] * rules[PRIOR_XX + a]
+                move[a] += share * whole / (n + rules[STRENGTH]) / rules[CUT]
             count += share * n
     keep = rules[KEEP_EXTENT] + (1 - rules[KEEP_EXTENT]) * (1 - total)  # a miss leaves them as they are
     extent[0, 0] = keep * extent[0, 0] + (1 - rules[KEEP_EXTENT]) * move[0]

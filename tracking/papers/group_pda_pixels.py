@@ -34,14 +34,21 @@ class Pixels:
     @property
     def spread(self) -> Array:
         """(2, 2) covariance of one person's pixels: a filled ellipse has a quarter of its semi-axes' squares."""
-        spread: Array = np.diag(np.square(self.person / 4))
-        return spread
+        return np.asarray(np.eye(2) * np.square(self.person / 4), np.float64)
 
-    def points(self, image: Image) -> Array | None:
-        """(M, 2) px centres of the grid's cells that are foreground; None where there is more than there can be."""
+    def points(self, image: Image, outlines: list[Array]) -> Array | None:
+        """(M, 2) px centres of the grid's cells that are foreground; None where there is more than there can be.
+
+        What lies in the groups' outlines (V, 2) stays out of the background, however long they stand.
+        """
+        import cv2
+
         classes = self.background.classify(image)
         mask = blobs.clean(foreground(classes), self.scale)
-        self.background.adapt(image, classes)
+        protected = np.zeros(mask.shape, np.uint8)
+        for outline in outlines:
+            cv2.fillConvexPoly(protected, cv2.convexHull(np.rint(outline).astype(np.int32)), 1)
+        self.background.adapt(image, classes, protected.astype(bool))
         if np.count_nonzero(mask) / mask.size > self.config.most_foreground:
             return None
         return grid_points(mask, self.step)
@@ -67,5 +74,7 @@ def _person(camera: Camera | None, scale: float) -> Array:
 
     middle = to_ground(camera, np.array([camera.image], float) / 2)
     turns = np.radians([0.0, 45.0, 90.0, 135.0])
+    if not np.isfinite(middle).all():  # above the horizon
+        return _person(None, scale)
     place = np.column_stack([np.repeat(middle, len(turns), 0), np.zeros(len(turns))])
     return np.asarray(boxes(camera, place, turns, np.full(len(turns), PERSON))[:, 2:].mean(0))

@@ -41,16 +41,22 @@ def make_rules(
     noise = scale * (c.pixel_noise if pixels else c.point_noise)
     prior = (scale * c.person_spread) ** 2 * np.eye(2) if person is None else person
     link = 2 * scale * (c.pixel_radius if pixels else c.radius)
-    constraint = Constraint(link, c.gate, prior, c.spread_weight, c.least_people if pixels else 0.0)
+    cut = truncation(c.gate) if c.gate_correction else 1.0
+    # Every extent is sample covariance / cut, shrunk towards `prior`: in G_y, too, or what it parts would be merged.
+    least = c.least_people if pixels else 0.0
+    constraint = Constraint(link, c.gate / cut, cut * prior, c.spread_weight, least)
     numbers = np.zeros(kernels.ALL + 1)
-    numbers[kernels.GATE], numbers[kernels.LINK] = c.gate, link
+    numbers[kernels.GATE], numbers[kernels.LINK] = constraint.gate, link
     numbers[kernels.PRIOR_XX : kernels.PRIOR_YY + 1] = constraint.three
     numbers[kernels.STRENGTH], numbers[kernels.LEAST] = c.spread_weight, constraint.least
     numbers[kernels.NOISE], numbers[kernels.COUNT], numbers[kernels.SHARE] = noise, c.count_noise, c.count_share
-    numbers[kernels.DETECT], numbers[kernels.MISS] = 1.0 if pixels else c.detect_prob, c.miss_prob if c.miss else 0.0
+    numbers[kernels.DETECT], numbers[kernels.MISS] = (
+        1.0 if pixels or c.carry_time > 0 else c.detect_prob,
+        c.miss_prob if c.miss else 0.0,
+    )
     numbers[kernels.FREEZE] = c.freeze_share if c.freeze else np.inf
     numbers[kernels.KEEP_EXTENT], numbers[kernels.KEEP_SIZE] = np.exp(-dt / np.array([c.extent_time, c.size_time]))
-    numbers[kernels.CUT] = truncation(c.gate) if c.gate_correction else 1.0
+    numbers[kernels.CUT] = cut
     numbers[kernels.REDRAWN] = c.centroid_noise == "redrawn"
     numbers[kernels.ALL] = c.association == "none"
     if numbers[kernels.ALL]:
