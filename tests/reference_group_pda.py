@@ -16,6 +16,7 @@ from tests import reference_components
 from tracking.components import Constraint
 
 H = np.eye(2, 4)
+NEWCOMERS = 0.02  # probability that the number of people is any
 
 
 @dataclass(frozen=True)
@@ -68,18 +69,21 @@ def claims(d2, own, hits, g):
     return [k for k in inside if hits[k] < 2], sorted((k for k in inside if hits[k] > 1), key=lambda k: d2[g, k])
 
 
-def centroid_noise(seen, extent, size, rules):
-    """R of the centroid of `seen` people of a group of `size`.
+def centroid_noise(seen, cov, extent, size, rules):
+    """R of the centroid of `seen` people of a group of `size`; cov: their own covariance.
 
     The extent is that of measured places. Members redrawn in each frame: as many of those, extent / m. Members who keep
     their places: r^2 I / m and the variance of the mean of m out of n true places drawn without replacement, (n - m) /
-    (n - 1) Sigma / m, Sigma being the extent without r^2 I; at least one (or all) is seen.
+    (n - 1) Sigma / m, Sigma being the extent without r^2 I; at least one (or all) is seen. If more are seen than there
+    are, the n members are drawn out of the m seen.
     """
     noise = rules.noise**2 * np.eye(2)
     if rules.redrawn:
         return extent / seen
     n = size / rules.detect
-    m = min(max(seen, min(1.0, n)), n)
+    if seen > n:
+        return noise / max(n, 1.0) + cov * (seen - n) / max(seen - 1, 1.0) / max(n, 1.0)
+    m = max(seen, min(1.0, n))
     true = extent - noise
     np.fill_diagonal(true, np.maximum(np.diag(true), 0.0))
     return noise / m + (true * (n - m) / (n - 1) / m if n > 1 else 0.0)
@@ -102,17 +106,19 @@ def associations(mine, shared, points, weights, rules):
 def masses(sets, mine, shared, points, weights, x, P, extent, size, rules):
     """Masses of the associations, m_d m_N (4.2), and of the miss, all normalised; each one's R.
 
-    m_N is a mass of numbers of people, which differ by those of a point. The miss has the same unit: its centroid is
-    anywhere in the region, and if there are points of no other group, their number is any up to 2 N.
+    m_N is a mass of numbers of people, which differ by those of a point: Gaussian, with tails. The miss has the same
+    unit: its centroid is anywhere in the region, and if there are points of no other group, their number is any up to
+    2 N.
     """
     step = weights[mine + shared].mean()
     sigma = np.hypot(rules.count_noise, rules.count_share * size)
     log, R = [], []
     for s in sets:
-        n, mean, _ = moments(points[s], weights[s])
-        R.append(centroid_noise(n, extent, size, rules))
+        n, mean, cov = moments(points[s], weights[s])
+        R.append(centroid_noise(n, cov, extent, size, rules))
         close = multivariate_normal(x[:2], H @ P @ H.T + R[-1]).logpdf(mean)
-        log.append(close + norm(size, sigma).logpdf(n) + np.log(step))
+        many = (1 - NEWCOMERS) * norm(size, sigma).pdf(n) + NEWCOMERS / (size + n + 1)
+        log.append(close + np.log(step * many))
     miss = -np.inf
     if rules.miss > 0:
         area = np.pi * rules.constraint.gate * np.sqrt(np.linalg.det(extent + H @ P @ H.T))
@@ -159,7 +165,7 @@ def adapted(sets, share, points, weights, extent, size, rules):
     new_extent, new_size = share[0] * extent, share[0] * size
     for b, s in zip(share[1:], sets, strict=True):
         n, _, S = moments(points[s], weights[s])
-        shrunk = (n * S / cut + c.strength * c.prior) / (n + c.strength)
+        shrunk = (n * S + c.strength * c.prior) / (n + c.strength) / cut
         new_extent = new_extent + b * (rules.keep_extent * extent + (1 - rules.keep_extent) * shrunk)
         new_size = new_size + b * (rules.keep_size * size + (1 - rules.keep_size) * n)
     return new_extent, new_size
