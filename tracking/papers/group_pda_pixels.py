@@ -58,7 +58,7 @@ def grid_points(mask: Bools, step: int) -> Array:
     """(M, 2) u, v of the foreground pixels in the middle of the cells of a grid."""
     first = step // 2
     v, u = np.nonzero(mask[first::step, first::step])
-    return np.stack([u, v], 1) * float(step) + first + 0.5
+    return np.asarray(np.stack([u, v], 1) * float(step) + (first + 0.5), np.float64)
 
 
 def steepness(camera: Camera | None) -> float:
