@@ -11,8 +11,8 @@ pixel is); components of less than a least weight are noise.
 
 `prefixes` answers the group constraint for all associations of a group at once: the sets Y_ns + the first j of the
 shared points grow by a point each, and so does G_0, with running sums of each component. A point costs the 20 cells
-around it and the overlaps of the M components that there are, O(M^2) of them in the worst case, at most M a pass in
-the usual one; M is bounded by the least weight. n points and M components: O(n log n + n M^2).
+around it, and where there are M > 1 components the overlaps of all with all: n points cost O(n log n + n M^2), M being
+bounded by the least weight.
 """
 
 from __future__ import annotations

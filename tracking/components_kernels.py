@@ -2,8 +2,8 @@
 
 The grid's cells have the diagonal `link`, so that points of one cell are linked; others can only be linked with the 20
 cells around. A new point is compared with the points of those neighbours that are not of its component yet and whose
-bounding box is near enough; at the first one found the components are joined and their sums added.
-Rows of sums: weight, count, and the weighted sums of x, y, xx, xy, yy about the first point.
+bounding box is near enough; at the first one found the components are joined, and so are their moments.
+Rows of sums: weight N, mean x, y, and N times the covariance xx, xy, yy; joined without raw sums, which would cancel.
 Slow twins: tests/reference_components.py.
 """
 
@@ -16,7 +16,7 @@ from sim.types import Array, Bools, Ints
 from tracking.ellipsoids_kernels import overlap
 
 AROUND = 20
-WEIGHT, COUNT, X, Y, XX, XY, YY = range(7)
+WEIGHT, X, Y, XX, XY, YY = range(6)
 FAR = 2.0**40  # cells from the first point: the grid's numbers stay whole numbers
 
 
@@ -90,14 +90,13 @@ def insert(
     """Add point k to the components: G_0(Y + {y}) from G_0(Y) (4.2.1).
 
     parent (M,): trees of points; head (C,), after (M,): the points of each cell as a list; box (C, 4): their bounds;
-    sums (M, 7): of each component, at its root; work (2,): cells and points looked at, components.
+    sums (M, 6): of each component, at its root; work (2,): cells and points looked at, components.
     """
     c = cell[k]
     x, y = points[k, 0], points[k, 1]
-    dx, dy = x - points[0, 0], y - points[0, 1]
     parent[k] = k
-    sums[k, WEIGHT], sums[k, COUNT], sums[k, X], sums[k, Y] = weight, 1.0, weight * dx, weight * dy
-    sums[k, XX], sums[k, XY], sums[k, YY] = weight * dx * dx, weight * dx * dy, weight * dy * dy
+    sums[k, WEIGHT], sums[k, X], sums[k, Y] = weight, x, y
+    sums[k, XX], sums[k, XY], sums[k, YY] = 0.0, 0.0, 0.0
     work[1] += 1
     if head[c] >= 0:
         _join(parent, sums, k, head[c], work)
@@ -134,16 +133,30 @@ def _join(parent: Ints, sums: Array, a: int, b: int, work: Ints) -> None:
         return
     low, high = min(a, b), max(a, b)
     parent[high] = low
-    for n in range(7):
-        sums[low, n] += sums[high, n]
+    pool(sums[low], sums[high])
     work[1] -= 1
 
 
 @njit(cache=True)
+def pool(into: Array, other: Array) -> None:
+    """The moments (6,) of two sets of points as those of their union, in place: (3.1), the N / N form of it."""
+    n = into[WEIGHT] + other[WEIGHT]
+    share = other[WEIGHT] / n
+    dx, dy = other[X] - into[X], other[Y] - into[Y]
+    w = into[WEIGHT] * share
+    into[WEIGHT] = n
+    into[X] += share * dx
+    into[Y] += share * dy
+    into[XX] += other[XX] + w * dx * dx
+    into[XY] += other[XY] + w * dx * dy
+    into[YY] += other[YY] + w * dy * dy
+
+
+@njit(cache=True)
 def components(points: Array, weights: Array, link: float) -> tuple[Ints, Array]:
-    """G_0 (3.3): (M,) the component of each point, in the order of their first points, and their sums (K, 7)."""
+    """G_0 (3.3): (M,) the component of each point, in the order of their first points, and their sums (K, 6)."""
     m = len(points)
-    parent, sums = np.empty(m, np.int64), np.empty((m, 7))
+    parent, sums = np.empty(m, np.int64), np.empty((m, 6))
     label, count = np.empty(m, np.int64), 0
     if m == 0:
         return label, sums
@@ -165,7 +178,7 @@ def components(points: Array, weights: Array, link: float) -> tuple[Ints, Array]
 
 @njit(cache=True)
 def closure(sums: Array, gate: float, prior: Array, strength: float) -> Ints:
-    """(K,) which of K components with `sums` (K, 7) are one by G_x (3.1), in the order of their first ones.
+    """(K,) which of K components with `sums` (K, 6) are one by G_x (3.1), in the order of their first ones.
 
     Components whose regions overlap, also through others, are joined, then the joined ones, until no two overlap:
     one pass is not closed, as a joined region may reach one that none of its parts did. prior (3,), strength: of `fit`.
@@ -196,7 +209,7 @@ def closure(sums: Array, gate: float, prior: Array, strength: float) -> Ints:
         for i in range(k):
             top = root(tree, i)
             if alive[i] and top != i:
-                pooled[top] += pooled[i]
+                pool(pooled[top], pooled[i])
                 alive[i], fresh[top], changed = False, True, True
         for i in range(k):
             label[i] = root(tree, label[i])
@@ -205,15 +218,13 @@ def closure(sums: Array, gate: float, prior: Array, strength: float) -> Ints:
 
 @njit(cache=True)
 def fit(sums: Array, gate: float, prior: Array, strength: float, shape: Array) -> None:
-    """shape (5,): mean x, y about the first point, and gate times the covariance xx, xy, yy shrunk towards `prior`:
+    """shape (5,): mean x, y, and gate times the covariance xx, xy, yy shrunk towards `prior`:
     (N S + n0 S0) / (N + n0), S the 1/N covariance, N the weight."""
-    n = sums[WEIGHT]
-    x, y = sums[X] / n, sums[Y] / n
-    shape[0], shape[1] = x, y
-    scale = gate / (n + strength)
-    shape[2] = scale * (max(sums[XX] - n * x * x, 0.0) + strength * prior[0])
-    shape[3] = scale * (sums[XY] - n * x * y + strength * prior[1])
-    shape[4] = scale * (max(sums[YY] - n * y * y, 0.0) + strength * prior[2])
+    shape[0], shape[1] = sums[X], sums[Y]
+    scale = gate / (sums[WEIGHT] + strength)
+    shape[2] = scale * (sums[XX] + strength * prior[0])
+    shape[3] = scale * (sums[XY] + strength * prior[1])
+    shape[4] = scale * (sums[YY] + strength * prior[2])
 
 
 @njit(cache=True)
@@ -229,11 +240,11 @@ def prefixes(
     if m == 0:
         return one, 0
     cell, around = cells(points, link)
-    parent, sums = np.empty(m, np.int64), np.empty((m, 7))
+    parent, sums = np.empty(m, np.int64), np.empty((m, 6))
     head, after, box = np.full(len(around), -1), np.full(m, -1), np.empty((len(around), 4))
     work = np.zeros(2, np.int64)
     tops, some = np.empty(m, np.int64), 0  # the roots of components so far
-    part = np.empty((m, 7))
+    part = np.empty((m, 6))
     for k in range(m):
         insert(k, points, weights[k], link, cell, around, parent, head, after, box, sums, work)
         tops[some] = k

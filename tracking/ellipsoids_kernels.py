@@ -33,7 +33,9 @@ def overlap(dx: float, dy: float, axx: float, axy: float, ayy: float, bxx: float
     cyy = (ayy - 2 * l21 * (axy / l11) + l21 * l21 * cxx) / (l22 * l22)
     half, differ = (cxx + cyy) / 2, (cxx - cyy) / 2
     root = sqrt(differ * differ + cxy * cxy)
-    p, q = half + root - 1, half - root - 1  # eigenvalues less 1
+    large = half + root
+    small = (axx * ayy - axy * axy) / (bxx * byy - bxy * bxy) / large  # half - root would cancel
+    p, q = large - 1, small - 1
     # Direction of the first eigenvector: (cxy, l1 - cxx) or (l1 - cyy, cxy), whichever is the longer.
     ex, ey = (root + differ, cxy) if differ >= 0 else (cxy, root - differ)
     length = sqrt(ex * ex + ey * ey)

@@ -171,16 +171,7 @@ def test_light_components_are_noise() -> None:
     assert prefixes(points, weights, 1, rule).tolist() == [True, False, False, True, False, False]
 
 
-CANCELS = pytest.param(
-    1e9,
-    0,
-    marks=pytest.mark.xfail(
-        reason="sums about a first point that is 1e9 away cancel", strict=True, raises=AssertionError
-    ),
-)
-
-
-@pytest.mark.parametrize(("far", "where"), [(1e3, 0), (1e3, 3), (1e6, 0), (1e6, 3), CANCELS, (1e9, 3)])
+@pytest.mark.parametrize(("far", "where"), [(1e3, 0), (1e3, 3), (1e6, 0), (1e6, 3), (1e9, 0), (1e9, 3)])
 def test_one_far_away(far: float, where: int) -> None:
     """However far and whenever he comes: the others are as without him."""
     r = np.random.default_rng(1)

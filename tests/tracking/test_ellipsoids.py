@@ -60,15 +60,7 @@ def test_concentric_ones_overlap(minor: float, angle: float) -> None:
     assert one([1, 1], turned(angle, 1, minor), [1, 1], turned(angle, 1, minor))
 
 
-CANCELS = pytest.param(
-    1e-6,
-    marks=pytest.mark.xfail(
-        reason="the eigenvalue of 1e-12 is lost beside 1e12", strict=True, raises=ZeroDivisionError
-    ),
-)
-
-
-@pytest.mark.parametrize("minor", [1e-2, 1e-3, CANCELS])
+@pytest.mark.parametrize("minor", [1e-2, 1e-3, 1e-6])
 def test_needles_that_cross(minor: float) -> None:
     along, across = np.diag([1, minor**2]), np.diag([minor**2, 1])
     assert one([0, 0], along, [0.9, 0.9], across)

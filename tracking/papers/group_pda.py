@@ -1,6 +1,35 @@
 """`group-pda`: groups of people tracked as wholes, from points or foreground pixels.
 
-Gennari & Hager, "Probabilistic data association methods in visual tracking of groups", CVPR 2004.
+Gennari & Hager, "Probabilistic data association methods in visual tracking of groups", CVPR 2004. A group is
+(xi, v, Sigma, N): centroid and velocity x with covariance P, extent of its members, how many people they are. Each
+frame (Fig. 1):
+
+    predict    x = F x, P = F P F' + Q                                                  (2.3; bank)
+    gate       {y : (y - xi)' S^-1 (y - xi) < gamma}                                    (2.2; kernels.search)
+    associate  Y_ns + the first j of the shared points, by distance, for all j          (4.1; kernels._claims)
+    masses     m_d m_N m_g: centroid, number, group constraint |G_y| = 1                (4.2; kernels._estimate)
+    update     x, P, Sigma, N as means over the associations                            (2.4, 4.3; kernels._mix, _adapt)
+    split      after a spell in which no association has a mass                         (3.3, 4.2; changes.split)
+    merge      groups near each other with like velocities, on updated states           (3.1; changes.Merging)
+    birth      unclaimed points, grouped by G_y                                         (3.3; changes.births)
+
+Departures, all ours:
+- The search region has the centroid's and the points' uncertainty beside Sigma; it widens while no association is
+  feasible. What its edge cuts from Sigma is put back, extents of few people are shrunk to a prior one, the same ones in
+  splitting and merging, so that what is split is not merged.
+- R of the centroid: members keep their places and are drawn without replacement out of those there (of those seen, if
+  they are more). m_N grows with N and has tails; a further association is that nothing is the group's (the miss).
+- Sigma and N rest while points are shared, and in spells. A shared point is told as the nearer group's.
+- From points, members who are not measured are carried along for a while as points of their group (carry); points that
+  are linked to a group's, but in no region, are its own (attach).
+- P of merged groups is that of a weighted mean. SR_v is a physical difference of velocities, and must last. Groups that
+  are tentative, coasting, in a spell, or without points of their own do not merge; linked points are near, whatever the
+  regions. A spell is shortened by good frames rather than ended.
+- Children of a split have their parent's velocity; so has who walks out of its region. The largest keeps the id.
+- Groups are tentative at first, coast, are lost, and take their id back from a newborn that fits.
+- Onsets of merges and splits are looked at afterwards (onset). In an image seen at an angle, velocities and distances
+  in depth count for more px than they show.
+- association="none", the paper's 5.2.1, takes all points in the region: no masses, no miss, no spell, so no split.
 """
 
 from __future__ import annotations
@@ -43,17 +72,14 @@ class GroupPda:
         self.rules: Rules | None = None
         flat = context.camera is None and context.px_per_m > 0
         self.plane: Plane = "image" if flat or self.pixels is not None else "ground"
-        if self.pixels is not None:
-            p, scale = self.pixels, context.px_per_m
-            self.rules = make_rules(self.config, context.fps, scale, p.spread, p.step, steepness(context.camera))
         self.innovation: list[tuple[int, Array, Array]] = []
 
     def step(self, frame: Frame, detections: Detections | None) -> Tracks:
         """Predict; gate, associate, update, split (Fig. 1); merge; births and deaths."""
         points, weights = self._points(frame, detections)
-        if points is None and self.rules is None:
+        if points is None and self.rules is None and self.pixels is None:
             return self._silent(frame)
-        rules = self.rules or self._rules()
+        rules = self._rules()
         bank, t = self.bank, frame.t
         self.innovation = []
         bank.predict(rules)
@@ -86,7 +112,14 @@ class GroupPda:
         return Tracks(frame.index, frame.t, self.plane, "group", ids, ids, none, none, np.zeros((0, 4, 4)))
 
     def _rules(self) -> Rules:
-        """The rules for points, whose plane is known once they come."""
+        """The rules by the present config; those for points only once it is known what plane they lie in."""
+        if self.rules is not None and self.rules.config is self.config:
+            return self.rules
+        if self.pixels is not None:
+            p, scale = self.pixels, self.context.px_per_m
+            steep = steepness(self.context.camera)
+            self.rules = make_rules(self.config, self.context.fps, scale, p.spread, p.step, steep)
+            return self.rules
         scale = self.context.px_per_m if self.plane == "image" else 1.0
         _check_scale(scale)
         steep = steepness(self.context.camera) if self.plane == "image" else 1.0
@@ -99,7 +132,7 @@ class GroupPda:
         lost = bank.named & (t - bank.seen > c.coast_time)
         d2 = self._search(points, rules, lost)
         hits = np.isfinite(d2).sum(0)
-        own = changes.attached(points, d2, rules.constraint.link) if c.attach else np.full(len(points), -1)
+        own = changes.attached(points, d2, bank, rules) if c.attach else np.full(len(points), -1)
         hits[own >= 0] = 1
         free = hits == 0
         unfelt = ~np.isfinite(d2).any(1) & ~np.isin(np.arange(len(bank)), own)

@@ -21,12 +21,14 @@ LISTS = ("places", "past")
 
 @dataclass
 class Bank:
-    """G groups: x (G, 4) xi, v; P (G, 4, 4); extent (G, 2, 2) Sigma; size (G,) N, people; id (G,), UNNAMED tentative;
-    born, seen (G,): s, first and last measurement; measured (G,): s in all; null (G,): s; own (G,): people in
-    this frame who are nearer to no other group; parent (G,): id of the
-    group that a tentative one left, or UNNAMED, and origin (G, 2), where; places: of each group its
-    points (K, 2) relative to xi and when each was measured last (K,), s; past: of each its points of the last seconds,
-    (time, points)."""
+    """G groups. State of each:
+
+    x (G, 4) xi, v; P (G, 4, 4); extent (G, 2, 2) Sigma; size (G,) N, people. id (G,), UNNAMED tentative. born, seen
+    (G,): s, first and last measurement; measured (G,): s in all; null (G,): s without a feasible association. own (G,):
+    people in this frame who are nearer to no other group. parent (G,): id of the group that a tentative one left, or
+    UNNAMED, and origin (G, 2), where. places: of each its points (K, 2) relative to xi, when each was measured last
+    (K,), s, and whether it was there before, too (K,). past: of each its points of the last seconds, (time, points).
+    """
 
     x: Array
     P: Array
@@ -40,7 +42,7 @@ class Bank:
     own: Array
     parent: Ints
     origin: Array
-    places: list[tuple[Array, Array]]
+    places: list[tuple[Array, Array, Bools]]
     past: list[list[tuple[float, Array]]]
 
     @classmethod
@@ -100,7 +102,8 @@ def newborn(points: Array, weights: Array, group: Ints, rules: Rules, t: float) 
     P = np.zeros((count, 4, 4))
     P[:, [0, 1], [0, 1]] = (rules.noise**2 / np.maximum(people, 1e-3))[:, None] + rules.noise**2
     P[:, [2, 3], [2, 3]] = (rules.scale * c.speed_prior) ** 2
-    places = [(d[g == k], np.full(int((g == k).sum()), t)) for k in range(count)]
+    many = np.bincount(g, minlength=count).tolist()
+    places = [(d[g == k], np.full(n, t), np.zeros(n, bool)) for k, n in enumerate(many)]
     nil, now = np.zeros(count), np.full(count, t)
     return Bank(
         np.hstack([mean, np.zeros((count, 2))]), P, extent, people, np.full(count, UNNAMED),
@@ -132,8 +135,9 @@ def merged(bank: Bank, rows: Ints) -> Bank:
     extent = np.einsum("k,kij->ij", w, bank.extent[rows] + d[:, :, None] * d[:, None, :])
     P = np.einsum("k,kij->ij", w * w, bank.P[rows])
     heir = rows[np.lexsort((bank.born[rows], -bank.size[rows]))[0]]  # most people, then the older
-    moved = [(y + bank.x[r, :2] - x[:2], seen) for r in rows.tolist() for y, seen in (bank.places[r],)]
-    places = (np.concatenate([y for y, _ in moved]), np.concatenate([seen for _, seen in moved]))
+    moved = [(y + bank.x[r, :2] - x[:2], seen, known) for r in rows.tolist() for y, seen, known in (bank.places[r],)]
+    y, seen, known = zip(*moved, strict=True)
+    places = (np.concatenate(y), np.concatenate(seen), np.concatenate(known))
     one = slice(heir, heir + 1)
     return Bank(
         x[None], P[None], extent[None], size[None].copy(), bank.id[one], bank.born[rows].min(keepdims=True),

@@ -15,6 +15,8 @@ from tracking.papers.group_pda_rules import Rules
 
 OUTLINE = 20
 """Of so many pixels and more only those on their hull are kept."""
+SMALL = 4096
+"""Pairs of points up to which all with all is quicker than a tree."""
 PAST, MEMORY = 3.0, 64
 """For so long, s, no more than so many of a group's points are kept, to look back from a split."""
 
@@ -23,19 +25,24 @@ def carried(bank: Bank, points: Array, rules: Rules, t: float) -> tuple[Array, I
     """Members who are not measured: places (K, 2), group (K,) a row of the bank, when they were measured last (K,)."""
     c, kept = rules.config, []
     if c.carry_time > 0 and not rules.half_cell:
-        for row, (y, seen) in enumerate(bank.places):
-            late = t - seen <= c.carry_time + 1e-9
+        for row, (y, seen, known) in enumerate(bank.places):
+            late = known & (t - seen <= c.carry_time + 1e-9)
             if late.any():
                 kept.append((y[late] + bank.x[row, :2], np.full(int(late.sum()), row), seen[late]))
     if not kept:
         return np.zeros((0, 2)), np.zeros(0, np.int64), np.zeros(0)
     place, row_of, seen = (np.concatenate(part) for part in zip(*kept, strict=True))
-    missed = np.ones(len(place), bool)
-    if len(points):
-        from scipy.spatial import cKDTree
-
-        missed = np.isinf(cKDTree(points).query(place, distance_upper_bound=rules.scale * c.carry_reach)[0])
+    missed = ~_near(place, points, rules.scale * c.carry_reach)
     return place[missed], row_of[missed], seen[missed]
+
+
+def _near(place: Array, points: Array, reach: float) -> Bools:
+    """(K,) whether one of the points (M, 2) is no further than reach from each place (K, 2)."""
+    if len(place) * len(points) < SMALL:
+        return np.asarray((np.square(place[:, None] - points).sum(2) <= reach**2).any(1))
+    from scipy.spatial import cKDTree
+
+    return np.asarray(np.isfinite(cKDTree(points).query(place, distance_upper_bound=reach)[0]))
 
 
 def exclusive(chosen: Bools, d2: Array) -> Bools:
@@ -54,10 +61,11 @@ def remember(bank: Bank, points: Array, seen: Array, chosen: Bools, rules: Rules
         mine, when = points[chosen[row]], seen[chosen[row]]
         bank.past[row] = [*(p for p in bank.past[row] if p[0] > t - PAST), (t, thinned(mine))]
         place = mine - bank.x[row, :2]
-        if rules.half_cell and len(place) >= OUTLINE:
-            place = _hull(place)
-            when = np.full(len(place), t)
-        bank.places[row] = (place, when)
+        if not rules.half_cell:
+            bank.places[row] = (place, when, _near(place, bank.places[row][0], rules.scale * rules.config.carry_reach))
+            continue
+        place = _hull(place) if len(place) >= OUTLINE else place
+        bank.places[row] = (place, np.full(len(place), t), np.ones(len(place), bool))
 
 
 def thinned(points: Array) -> Array:

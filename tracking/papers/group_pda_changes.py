@@ -31,10 +31,13 @@ class Change:
     pos: tuple[float, float]
 
 
-def attached(points: Array, d2: Array, link: float) -> Ints:
+def attached(points: Array, d2: Array, bank: Bank, rules: Rules) -> Ints:
     """(M,) the group, a row of d2 (G, M), that each point in nobody's region belongs to as it is linked to one of its
-    points, else -1. Of several groups the one whose point is nearest."""
-    own = np.full(len(points), -1)
+    points, else -1. Of several groups the one whose point is nearest.
+
+    From points only who was a member a moment ago: others are newcomers or false alarms, and groups of their own first.
+    """
+    link, own = rules.constraint.link, np.full(len(points), -1)
     taken = np.isfinite(d2).any(0) if len(d2) else np.zeros(len(points), bool)
     if taken.all() or not taken.any():
         return own
@@ -48,7 +51,17 @@ def attached(points: Array, d2: Array, link: float) -> Ints:
             continue
         apart = np.square(points[mine][:, None] - points[theirs]).sum(2)
         own[mine] = claim[apart.argmin(1)]
+    if not rules.half_cell:
+        for k in np.flatnonzero(own >= 0).tolist():
+            place = bank.places[own[k]][0] + bank.x[own[k], :2]
+            if np.square(place - points[k]).sum(1).min() > _reach(rules) ** 2:
+                own[k] = -1
     return own
+
+
+def _reach(rules: Rules) -> float:
+    """How far somebody may get away from where his group takes him, until the next frame."""
+    return rules.scale * FASTEST * rules.dt + 3 * rules.noise
 
 
 class Names:
@@ -202,7 +215,7 @@ def births(bank: Bank, points: Array, weights: Array, before: tuple[Array, Ints]
     group = partition(points, weights, rules.constraint)
     made = newborn(points, weights, group, rules, t)
     where, whose = before
-    reach = rules.scale * FASTEST * rules.dt + 3 * rules.noise
+    reach = _reach(rules)
     for k in range(len(made) if len(where) else 0):
         d2 = np.square(points[group == k][:, None] - where).sum(2).min(0)
         row = np.flatnonzero(bank.id == whose[d2.argmin()])

@@ -16,23 +16,35 @@ class GroupPdaConfig(BackgroundSettings):
     tracker: ClassVar[str] = "group-pda"
 
     gate: float = param(9.21, (6.0, 20.0), "", "gamma: squared Mahalanobis radius of the search region (2.2)")
-    radius: float = param(0.75, (0.1, 2.0), "m", "r of a point's region: points closer than 2 r are linked (R_0, 3.3)")
+    radius: float = param(
+        0.75, (0.1, 2.0), "m", "from points: r of a point's region, those within 2 r are linked (R_0, 3.3)"
+    )
     person_spread: float = param(
-        0.3, (0.05, 1.0), "m", "standard deviation that the extent of few points is shrunk to (ours)", "log"
+        0.3,
+        (0.05, 1.0),
+        "m",
+        "from points: standard deviation that the extent of few people is shrunk to (ours)",
+        "log",
     )
     spread_weight: float = param(3.0, (0.1, 20.0), "people", "how many people that extent counts for (ours)", "log")
     accel_noise: float = param(
         0.5, (0.05, 5.0), "m/s^1.5", "white acceleration of the centroid, per root second", "log"
     )
     point_noise: float = param(
-        0.06, (0.005, 1.0), "m", "standard deviation of one person's measured place, sensor and gait", "log"
+        0.06,
+        (0.005, 1.0),
+        "m",
+        "from points: standard deviation of one person's measured place, sensor and gait",
+        "log",
     )
     speed_prior: float = param(1.3, (0.1, 5.0), "m/s", "standard deviation of a newborn's velocity", "log")
     extent_time: float = param(1.0, (0.05, 20.0), "s", "time constant of the extent, alpha_s of (2.4)", "log")
     size_time: float = param(1.0, (0.05, 20.0), "s", "time constant of the number of people, alpha_N of (2.4)", "log")
     count_noise: float = param(0.5, (0.05, 5.0), "people", "sigma_n of m_N: part that does not grow with N", "log")
     count_share: float = param(0.15, (0.01, 1.0), "share", "sigma_n of m_N: part that grows with N (ours)", "log")
-    detect_prob: float = param(0.95, (0.3, 1.0), "probability", "that a member is measured: people there from seen")
+    detect_prob: float = param(
+        0.95, (0.3, 1.0), "probability", "from points, if none are carried: that a member is measured"
+    )
     miss_prob: float = param(0.02, (0.0, 0.5), "probability", "of the miss hypothesis before any measurement (ours)")
 
     association: str = param(
@@ -54,35 +66,56 @@ class GroupPdaConfig(BackgroundSettings):
         "categorical",
     )
     attach: bool = param(
-        True, (True, False), "", "unclaimed points linked to a group's are its own (ours)", "categorical"
+        True,
+        (True, False),
+        "",
+        "points in no region, but linked to a group's points, are its own (ours)",
+        "categorical",
     )
 
     merge_velocity: float = param(
         0.5, (0.05, 3.0), "m/s", "greatest difference of velocities at which groups merge (ours: SR_v made physical)"
     )
     merge_doubt: float = param(
-        0.0, (0.0, 1.0), "", "standard deviations of the difference by which that is widened (ours)"
+        0.0, (0.0, 1.0), "", "standard deviations of the difference by which that is widened (ours)", before=0.0
     )
     merge_time: float = param(0.5, (0.0, 3.0), "s", "for so long groups must be near and equally fast to merge (ours)")
-    split_time: float = param(0.5, (0.0, 3.0), "s", "spell without a feasible association after which a group splits")
+    split_time: float = param(
+        0.5,
+        (0.0, 3.0),
+        "s",
+        "spell without a feasible association, less the good frames in it, after which a group splits",
+    )
     split_speed: float = param(
-        0.5, (0.0, 3.0), "m/s", "standard deviation of a child's velocity about its parent's (ours)"
+        0.5,
+        (0.0, 3.0),
+        "m/s",
+        "standard deviation of a child's velocity about its parent's; the region widens so fast in a spell (ours)",
     )
     inherit_velocity: bool = param(
         True, (True, False), "", "children of a split start with their parent's velocity (ours)", "categorical"
     )
-    confirm_time: float = param(0.3, (0.0, 3.0), "s", "a new group is told once it was measured for so long (ours)")
-    coast_time: float = param(1.5, (0.0, 10.0), "s", "a group dies after so long without measurement (ours)")
+    confirm_time: float = param(
+        0.3,
+        (0.0, 3.0),
+        "s",
+        "a new group is told once it was measured for so long, and dies if it is not for so long (ours)",
+    )
+    coast_time: float = param(
+        1.5, (0.0, 10.0), "s", "after so long without measurement a group claims nothing any more (ours)"
+    )
     recapture: bool = param(
         True, (True, False), "", "a newborn where a lost group should be takes its id back (ours)", "categorical"
     )
-    recapture_time: float = param(3.0, (0.0, 10.0), "s", "for so long after its last measurement (ours)")
-    report_coast: float = param(0.5, (0.0, 5.0), "s", "a group is told for so long after its last measurement (ours)")
+    recapture_time: float = param(
+        3.0, (0.0, 10.0), "s", "for so long after its last measurement a lost group waits (ours)"
+    )
+    report_coast: float = param(0.5, (0.0, 5.0), "s", "for so long after its last measurement a group is told (ours)")
     carry_time: float = param(
-        0.5, (0.0, 3.0), "s", "from points: a member not measured is carried along for so long (ours)"
+        0.5, (0.0, 3.0), "s", "from points: a member not measured is carried along for so long (ours)", before=0.0
     )
     carry_reach: float = param(
-        0.4, (0.05, 2.0), "m", "from points: a member is measured if a point is so near his place (ours)"
+        0.4, (0.05, 2.0), "m", "from points: a member is measured if a point is so near his place (ours)", before=0.4
     )
 
     grid: float = param(0.1, (0.02, 1.0), "m", "from pixels: step of the grid of foreground points", "log")
