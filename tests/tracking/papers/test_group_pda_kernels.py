@@ -318,7 +318,9 @@ def bank(**given):
         none = getattr(made, f.name)
         nil = [[] for _ in range(n)] if isinstance(none, list) else np.zeros((n, *none.shape[1:]), none.dtype)
         setattr(made, f.name, given.get(f.name, nil))
-    return replace(made, id=np.arange(n), places=given.get("places", [(np.zeros((1, 2)), np.zeros(1))] * n))
+    return replace(
+        made, id=np.arange(n), places=given.get("places", [(np.zeros((1, 2)), np.zeros(1), np.ones(1, bool))] * n)
+    )
 
 
 def samples(r, count):
@@ -328,7 +330,10 @@ def samples(r, count):
     x = np.hstack([mean, r.normal(size=(count, 2))])
     extent = np.array([np.cov(y.T, bias=True).reshape(2, 2) for y in points])
     P = np.array([positive(r, 4) for _ in range(count)])
-    places = [(y - m, np.full(len(y), float(k))) for k, (y, m) in enumerate(zip(points, mean, strict=True))]
+    places = [
+        (y - m, np.full(len(y), float(k)), np.ones(len(y), bool))
+        for k, (y, m) in enumerate(zip(points, mean, strict=True))
+    ]
     size = np.array([float(len(y)) for y in points])
     born = r.permutation(count).astype(float)
     return points, bank(x=x, P=P, extent=extent, size=size, born=born, places=places)
@@ -344,7 +349,7 @@ def test_merging_pools_moments(seed: int) -> None:
     np.testing.assert_allclose(one.x[0, 2:], np.average(groups.x[:, 2:], axis=0, weights=groups.size), atol=1e-12)
     np.testing.assert_allclose(one.extent[0], np.cov(union.T, bias=True), rtol=1e-12, atol=1e-12)
     assert one.size[0] == len(union)
-    place, seen = one.places[0]
+    place, seen, _ = one.places[0]
     np.testing.assert_allclose(place + one.x[0, :2], union, atol=1e-12)
     assert np.array_equal(seen, np.repeat(np.arange(4.0), [len(y) for y in points]))
 
