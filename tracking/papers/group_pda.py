@@ -44,6 +44,7 @@ from tracking.papers import group_pda_changes as changes
 from tracking.papers import group_pda_kernels as kernels
 from tracking.papers.group_pda_bank import Bank
 from tracking.papers.group_pda_carry import carried, exclusive, remember
+from tracking.papers.group_pda_colour import colours, learn, speaks
 from tracking.papers.group_pda_config import GroupPdaConfig
 from tracking.papers.group_pda_pixels import Pixels, steepness
 from tracking.papers.group_pda_report import tracks
@@ -73,6 +74,7 @@ class GroupPda:
         flat = context.camera is None and context.px_per_m > 0
         self.plane: Plane = "image" if flat or self.pixels is not None else "ground"
         self.innovation: list[tuple[int, Array, Array]] = []
+        self.colour = np.zeros(0, np.int64)
 
     def step(self, frame: Frame, detections: Detections | None) -> Tracks:
         """Predict; gate, associate, update, split (Fig. 1); merge; births and deaths."""
@@ -81,6 +83,8 @@ class GroupPda:
             return self._silent(frame)
         rules = self._rules()
         bank, t = self.bank, frame.t
+        if bank.look.shape[1] != rules.colours:
+            bank.look = np.zeros((len(bank), rules.colours))
         self.innovation = []
         bank.predict(rules)
         told: list[changes.Change] = []
@@ -95,6 +99,8 @@ class GroupPda:
         """The frame's points (M, 2) and the people each stands for (M,); None where the frame tells nothing."""
         if self.pixels is not None:
             found = None if frame.image is None else self.pixels.points(frame.image, self._outlines())
+            if found is not None and frame.image is not None and self.config.appearance > 0:
+                self.colour = colours(frame.image, found)
             return found, np.full(0 if found is None else len(found), self.pixels.share)
         if detections is None:
             return None, np.zeros(0)
@@ -143,9 +149,10 @@ class GroupPda:
         points, weights = np.concatenate([points, ghost]), np.concatenate([weights, np.ones(len(ghost))])
         own, hits = np.concatenate([own, row_of]), np.concatenate([hits, np.ones(len(ghost), np.int64)])
         d2 = np.hstack([d2, np.full((len(bank), len(ghost)), np.inf)])
+        looks = c.appearance * speaks(bank, d2, self.colour) if rules.colours else np.zeros((len(bank), 0))
         before, resting = changes.standing(bank, rules, t), bank.null > 0
         state, chosen, said = kernels.associate(
-            points, weights, d2, own, hits, bank.x, bank.P, bank.extent, bank.size, resting, rules.numbers
+            points, weights, d2, looks, own, hits, bank.x, bank.P, bank.extent, bank.size, resting, rules.numbers
         )
         measured, null = state == kernels.MEASURED, state == kernels.NULL
         bank.seen[measured | null] = t
@@ -158,6 +165,8 @@ class GroupPda:
         mine = chosen & exclusive(chosen, d2)
         bank.own = mine @ weights
         remember(bank, points, measured_at, mine, rules, t)
+        if rules.colours:
+            learn(bank, mine, hits, self.colour, weights, rules)
         told = self._split(points, weights, d2, chosen, rules, t)
         free = np.append(free, np.zeros(len(ghost), bool))
         changes.births(bank, points[free], weights[free], before, rules, t)

@@ -26,8 +26,9 @@ class Bank:
     x (G, 4) xi, v; P (G, 4, 4); extent (G, 2, 2) Sigma; size (G,) N, people. id (G,), UNNAMED tentative. born, seen
     (G,): s, first and last measurement; measured (G,): s in all; null (G,): s without a feasible association. own (G,):
     people in this frame who are nearer to no other group. parent (G,): id of the group that a tentative one left, or
-    UNNAMED, and origin (G, 2), where. places: of each its points (K, 2) relative to xi, when each was measured last
-    (K,), s, and whether it was there before, too (K,). past: of each its points of the last seconds, (time, points).
+    UNNAMED, and origin (G, 2), where. look (G, C): people by colour, C = 0 where none are looked at. places: of each
+    its points (K, 2) relative to xi, when each was measured last (K,), s, and whether it was there before, too (K,).
+    past: of each its points of the last seconds, (time, points).
     """
 
     x: Array
@@ -42,17 +43,19 @@ class Bank:
     own: Array
     parent: Ints
     origin: Array
+    look: Array
     places: list[tuple[Array, Array, Bools]]
     past: list[list[tuple[float, Array]]]
 
     @classmethod
-    def empty(cls) -> Bank:
-        """No groups."""
+    def empty(cls, colours: int = 0) -> Bank:
+        """No groups, of so many colours."""
         none, ids, two = np.zeros(0), np.zeros(0, np.int64), np.zeros((0, 2))
         four = np.zeros((0, 4))
         return cls(
-            four, np.zeros((0, 4, 4)), np.zeros((0, 2, 2)), none, ids, none, none, none, none, none, ids, two, [], []
-        )
+            four, np.zeros((0, 4, 4)), np.zeros((0, 2, 2)), none, ids, none, none, none, none, none, ids, two,
+            np.zeros((0, colours)), [], [],
+        )  # fmt: skip
 
     def __len__(self) -> int:
         return len(self.id)
@@ -87,9 +90,8 @@ def newborn(points: Array, weights: Array, group: Ints, rules: Rules, t: float) 
     group (M,): 0, 1, … or -1 for none.
     """
     count = int(group.max(initial=-1)) + 1
-    bank = Bank.empty()
     if not count:
-        return bank
+        return Bank.empty(rules.colours)
     inside = group >= 0
     g, y, w = group[inside], points[inside], weights[inside]
     people = np.asarray(np.bincount(g, w, count), float)
@@ -107,8 +109,8 @@ def newborn(points: Array, weights: Array, group: Ints, rules: Rules, t: float) 
     nil, now = np.zeros(count), np.full(count, t)
     return Bank(
         np.hstack([mean, np.zeros((count, 2))]), P, extent, people, np.full(count, UNNAMED),
-        now, now.copy(), nil + rules.dt, nil, people.copy(), np.full(count, UNNAMED), mean.copy(), places,
-        [[] for _ in range(count)],
+        now, now.copy(), nil + rules.dt, nil, people.copy(), np.full(count, UNNAMED), mean.copy(),
+        np.zeros((count, rules.colours)), places, [[] for _ in range(count)],
     )  # fmt: skip
 
 
@@ -117,6 +119,7 @@ def children(parent: Bank, row: int, points: Array, weights: Array, group: Ints,
     c = rules.config
     made = newborn(points, weights, group, rules, t)
     made.born[:], made.measured[:] = parent.born[row], parent.measured[row]
+    made.look[:] = parent.look[row]
     if c.inherit_velocity:
         made.x[:, 2:] = parent.x[row, 2:]
         made.P[:, 2:, 2:] = parent.P[row, 2:, 2:] + (rules.scale * c.split_speed) ** 2 * np.eye(2)
@@ -142,5 +145,5 @@ def merged(bank: Bank, rows: Ints) -> Bank:
     return Bank(
         x[None], P[None], extent[None], size[None].copy(), bank.id[one], bank.born[rows].min(keepdims=True),
         bank.seen[rows].max(keepdims=True), bank.measured[rows].max(keepdims=True), np.zeros(1), size[None],
-        np.full(1, UNNAMED), x[None, :2].copy(), [places], [[]],
+        np.full(1, UNNAMED), x[None, :2].copy(), bank.look[rows].sum(0, keepdims=True), [places], [[]],
     )  # fmt: skip

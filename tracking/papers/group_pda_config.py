@@ -73,6 +73,10 @@ class GroupPdaConfig(BackgroundSettings):
         "categorical",
     )
 
+    appearance: float = param(
+        0.0, (0.0, 5.0), "", "from pixels: weight of colours among the masses (6, future work; ours)", before=0.0
+    )
+
     merge_velocity: float = param(
         0.5, (0.05, 3.0), "m/s", "greatest difference of velocities at which groups merge (ours: SR_v made physical)"
     )

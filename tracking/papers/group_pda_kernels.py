@@ -45,13 +45,14 @@ def search(points: Array, x: Array, P: Array, extent: Array, noise: float, wider
 
 @njit(cache=True)
 def associate(
-    points: Array, weights: Array, d2: Array, own: Ints, hits: Ints,
+    points: Array, weights: Array, d2: Array, looks: Array, own: Ints, hits: Ints,
     x: Array, P: Array, extent: Array, size: Array, hold: Bools, rules: Array,
 ) -> tuple[Ints, Bools, Array]:  # fmt: skip
     """Update the groups x (G, 4), P, extent (G, 2, 2), size (G,) in place by their points (4.1 to 4.3).
 
     d2 (G, M) from `search`; own (M,): the group that an unclaimed point is attached to, or -1; hits (M,): in how many
-    regions each point lies; hold (G,): whose extent and size rest. Returns (G,) NOTHING in the region, NULL (no
+    regions each point lies; looks (G, M): what a point's colour adds to the log mass of an association, per person, or
+    (G, 0) without colours; hold (G,): whose extent and size rest. Returns (G,) NOTHING in the region, NULL (no
     association is feasible) or MEASURED; (G, M) the points of the likeliest association; (G, 6) its innovation y and S
     (xx, xy, yy) and the mass of the miss.
     """
@@ -59,7 +60,7 @@ def associate(
     state, chosen = np.zeros(groups, np.int64), np.zeros((groups, m), np.bool_)
     told = np.zeros((groups, 6))
     for g in range(groups):
-        order, start = _claims(d2[g], own, hits, g)
+        order, start = _claims(d2[g], looks[g], own, hits, g)
         if len(order) == 0:
             continue
         some, people = points[order], weights[order]
@@ -72,7 +73,10 @@ def associate(
         if not feasible.any():
             state[g], chosen[g, order] = NULL, True
             continue
-        best = _estimate(some, people, start, feasible, x[g], P[g], extent[g], size[g : g + 1], hold[g], rules, told[g])
+        look = looks[g][order] * people if looks.shape[1] else np.zeros(len(order))
+        best = _estimate(
+            some, people, look, start, feasible, x[g], P[g], extent[g], size[g : g + 1], hold[g], rules, told[g]
+        )
         state[g] = MEASURED if best >= 0 else NOTHING
         if best >= 0:
             chosen[g, order[: start + best]] = True
@@ -80,21 +84,22 @@ def associate(
 
 
 @njit(cache=True)
-def _claims(d2: Array, own: Ints, hits: Ints, g: int) -> tuple[Ints, int]:
-    """The points in a group's region: unshared ones, then the shared ones by their distance (4.1); how many are
-    unshared."""
+def _claims(d2: Array, look: Array, own: Ints, hits: Ints, g: int) -> tuple[Ints, int]:
+    """The points in a group's region: unshared ones, then the shared ones by their distance (4.1), in colours as well;
+    how many are unshared."""
     inside = np.flatnonzero((d2 < np.inf) | (own == g))
     shared = hits[inside] > 1
     mine, others = inside[~shared], inside[shared]
     order = np.empty(len(inside), np.int64)
     order[: len(mine)] = mine
-    order[len(mine) :] = others[np.argsort(d2[others], kind="mergesort")]
+    far = d2[others] - 2 * look[others] if len(look) else d2[others]
+    order[len(mine) :] = others[np.argsort(far, kind="mergesort")]
     return order, len(mine)
 
 
 @njit(cache=True)
 def _estimate(
-    points: Array, weights: Array, start: int, feasible: Bools,
+    points: Array, weights: Array, look: Array, start: int, feasible: Bools,
     x: Array, P: Array, extent: Array, size: Array, hold: bool, rules: Array, told: Array,
 ) -> int:  # fmt: skip
     """Update one group in place by its associations, the first start, start + 1, … points; the likeliest one's number
@@ -103,13 +108,14 @@ def _estimate(
     S = np.empty((len(people), 3))
     log_mass = np.full(len(people), -np.inf)
     unit = weights.mean()  # people that one point stands for: makes m_N a mass of numbers of points
+    alike = np.concatenate((np.zeros(1), np.cumsum(look[start:])))
     width = rules[COUNT] ** 2 + (rules[SHARE] * size[0]) ** 2  # sigma_n^2
     for j in range(len(people)):
         if feasible[j] and people[j] > 0:
             R = _centroid_noise(people[j], cov[j], extent, size[0], rules)
             S[j, 0], S[j, 1], S[j, 2] = P[0, 0] + R[0], P[0, 1] + R[1], P[1, 1] + R[2]
             m_d = _log_density(mean[j, 0], mean[j, 1], S[j])
-            log_mass[j] = m_d + _log_count(people[j], size[0], width) + np.log(unit)  # (4.2), m_g being 1
+            log_mass[j] = m_d + _log_count(people[j], size[0], width) + np.log(unit) + alike[j]  # (4.2), m_g = 1
     log_miss = _log_miss(points, weights, start, extent, P, size[0], rules)
     top = max(log_mass.max(), log_miss)
     beta, miss = np.exp(log_mass - top), np.exp(log_miss - top)

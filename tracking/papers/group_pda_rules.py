@@ -11,13 +11,16 @@ from tracking.components import Constraint
 from tracking.papers import group_pda_kernels as kernels
 from tracking.papers.group_pda_config import GroupPdaConfig
 
+COLOURS = 64
+"""Of a group's look (tracking.papers.group_pda_colour)."""
+
 
 @dataclass(frozen=True)
 class Rules:
     """dt, s; scale: units of the plane per metre; constraint: of G_y; numbers: `rules` of the kernels; F, Q (4, 4) of
-    (2.3); noise: standard deviation of one person's measured place; half_cell: of the grid
-    of pixels, 0 for points; all but dt in the plane's unit. ground (2,):
-    metres on the ground per unit along x and y. body (2, 2): covariance of one person's points."""
+    (2.3); noise: standard deviation of one person's measured place; half_cell: of the grid of pixels, 0 for points;
+    body (2, 2): covariance of one person's points; all but dt in the plane's unit. ground (2,): metres on the ground
+    per unit along x and y. colours: that groups are told apart by, 0 if they are not."""
 
     config: GroupPdaConfig
     dt: float
@@ -30,6 +33,7 @@ class Rules:
     half_cell: float
     ground: Array
     body: Array
+    colours: int
 
 
 def make_rules(
@@ -77,6 +81,7 @@ def make_rules(
         step / 2,
         np.array([1, 1 / steep]) / scale,
         np.zeros((2, 2)) if person is None else person,
+        COLOURS if pixels and c.appearance > 0 else 0,
     )
 
 

@@ -71,7 +71,7 @@ def kernel(case, rules):
     """A copy of the case after the kernel: states, rows chosen, what is told, x, P, extent, size."""
     points, weights, d2, own, hits, x, P, extent, size, hold = case
     after = [a.copy() for a in (x, P, extent, size)]
-    found = kernels.associate(points, weights, d2, own, hits, *after, hold, rules.numbers)
+    found = kernels.associate(points, weights, d2, d2[:, :0], own, hits, *after, hold, rules.numbers)
     return [STATES[s] for s in found[0].tolist()], *found[1:], *after
 
 
