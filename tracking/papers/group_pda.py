@@ -39,6 +39,7 @@ from typing import ClassVar
 import numpy as np
 
 from scenarios.errors import InputError
+from sim.footprints import Q
 from sim.types import Array, Bools, Context, Detections, Frame, Plane, Tracks
 from tracking.papers import group_pda_changes as changes
 from tracking.papers import group_pda_kernels as kernels
@@ -49,6 +50,8 @@ from tracking.papers.group_pda_config import GroupPdaConfig
 from tracking.papers.group_pda_pixels import Pixels, steepness
 from tracking.papers.group_pda_report import tracks
 from tracking.papers.group_pda_rules import Rules, make_rules
+
+SQUARE = np.array([[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]])
 
 
 class GroupPda:
@@ -75,6 +78,7 @@ class GroupPda:
         self.plane: Plane = "image" if flat or self.pixels is not None else "ground"
         self.innovation: list[tuple[int, Array, Array]] = []
         self.colour = np.zeros(0, np.int64)
+        self.box: Array | None = None
 
     def step(self, frame: Frame, detections: Detections | None) -> Tracks:
         """Predict; gate, associate, update, split (Fig. 1); merge; births and deaths."""
@@ -93,7 +97,7 @@ class GroupPda:
         told += self.merging.step(bank, rules, t)
         told += changes.confirm(bank, rules, t, self.names)
         told += changes.deaths(bank, rules, t)
-        return tracks(bank, told, rules, frame.index, t, self.plane, self.context.fps)
+        return tracks(bank, told, rules, frame.index, t, self.plane, self.context.fps, self._outline(detections))
 
     def _points(self, frame: Frame, detections: Detections | None) -> tuple[Array | None, Array]:
         """The frame's points (M, 2) and the people each stands for (M,); None where the frame tells nothing."""
@@ -106,6 +110,16 @@ class GroupPda:
             return None, np.zeros(0)
         self.plane = "image" if detections.plane == "image" else "ground"
         return np.ascontiguousarray(detections.pos[:, :2]), np.ones(len(detections.pos))
+
+    def _outline(self, detections: Detections | None) -> Array:
+        """(V, 2) what stands round a place: a cell of the grid, a footprint, in the image a person's usual box."""
+        if self.pixels is not None:
+            return SQUARE * self.pixels.step / 2
+        if self.plane == "ground":
+            return Q
+        if detections is not None and detections.box is not None and len(detections.box):
+            self.box = np.median(detections.box[:, 2:], 0)
+        return Q * self.context.px_per_m if self.box is None else SQUARE * self.box / 2
 
     def _outlines(self) -> list[Array]:
         """The outlines of the groups that are told, px."""

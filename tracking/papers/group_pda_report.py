@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from sim.footprints import footprint_hulls
+from sim.hull_kernels import chains
 from sim.types import Array, GroupEvent, Groups, Plane, Tracks
 from tracking.papers import group_pda_kernels as kernels
 from tracking.papers.group_pda_bank import Bank
@@ -12,8 +12,10 @@ from tracking.papers.group_pda_changes import Change
 from tracking.papers.group_pda_rules import Rules
 
 
-def tracks(bank: Bank, changes: list[Change], rules: Rules, index: int, t: float, plane: Plane, fps: float) -> Tracks:
-    """The groups that have an id and were measured lately."""
+def tracks(
+    bank: Bank, changes: list[Change], rules: Rules, index: int, t: float, plane: Plane, fps: float, outline: Array
+) -> Tracks:
+    """The groups that have an id and were measured lately; outline (V, 2): of what stands at a place."""
     rows = np.flatnonzero(bank.named & (t - bank.seen <= rules.config.report_coast + 1e-9))
     rows = rows[np.argsort(bank.id[rows])]
     id, x = bank.id[rows], bank.x[rows]
@@ -25,7 +27,7 @@ def tracks(bank: Bank, changes: list[Change], rules: Rules, index: int, t: float
         x[:, 2:],
         bank.extent[rows],
         bank.size[rows] / rules.numbers[kernels.DETECT],
-        _hulls(places, rules, plane),
+        _hulls(places, outline),
     )
     return Tracks(
         index, t, plane, "group", id, id.copy(), x[:, :2].copy(), x[:, 2:].copy(), bank.P[rows],
@@ -33,23 +35,16 @@ def tracks(bank: Bank, changes: list[Change], rules: Rules, index: int, t: float
     )  # fmt: skip
 
 
-def _hulls(places: list[Array], rules: Rules, plane: Plane) -> tuple[Array, ...]:
-    """Hulls of people's footprints on the ground, of squares of foreground in the image."""
-    if not places:
-        return ()
-    if plane == "image":
-        half = max(rules.half_cell, 0.25 * rules.scale * (rules.half_cell == 0)) * np.array(
-            [[-1, -1], [1, -1], [1, 1], [-1, 1]]
-        )
-        return tuple(_hull((p[:, None] + half).reshape(-1, 2)) for p in places)
-    return tuple(footprint_hulls(np.concatenate(places), np.array([len(p) for p in places])))
-
-
-def _hull(points: Array) -> Array:
-    import cv2
-
-    found = cv2.convexHull(points.astype(np.float32), clockwise=False)
-    return np.asarray(found, float).reshape(-1, 2)
+def _hulls(places: list[Array], outline: Array) -> tuple[Array, ...]:
+    """Convex hulls of an outline (V, 2) round each group's places (K, 2)."""
+    count = np.array([len(p) for p in places], np.int64)
+    if not count.any():
+        return tuple(np.zeros((0, 2)) for _ in places)
+    corner = (np.concatenate(places)[:, None] + outline).reshape(-1, 2)
+    group = np.repeat(np.arange(len(places)), count * len(outline))
+    order = np.lexsort((corner[:, 1], corner[:, 0], group))
+    vertices, ends = chains(corner[order], np.concatenate([[0], np.cumsum(count * len(outline))]))
+    return tuple(np.split(vertices, ends[:-1]))
 
 
 def _event(change: Change, index: int, fps: float) -> GroupEvent:
