@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
-from sim.types import Array, Tracks
-from tests.tracking.papers.test_group_pda import FPS, block, changes, events, ids, noisy, track
+from sim.types import Array, Context, Frame, Tracks
+from tests.tracking.papers.test_group_pda import FPS, block, changes, events, ids, noisy, sizes, track
 from tracking.papers.group_pda import GroupPda
 from tracking.papers.group_pda_config import GroupPdaConfig
 
@@ -81,3 +82,144 @@ def test_a_changed_config_holds_from_the_next_frame_on() -> None:
 
     made = track(walk((1.0, 0.3), range(40, 50)), watch=forget)
     assert [len(t.id) for t in made[40:51]] == [1, 1, 1, 0, 0, 0, 0, 0, 0, 0, 1]
+
+
+def joining(seed: int, ranks: tuple[int, int]) -> list[Array]:
+    """A group comes to another's side, 1 m between the nearest from frame 31 on, and walks with it."""
+    r, made = np.random.default_rng(seed), []
+    for k in range(90):
+        s = k / FPS
+        aside = (sum(ranks) - 2) * 0.3 + 1.0 + max(3 - s, 0)
+        made.append(noisy([block(2, ranks[0], (s, 0)), block(2, ranks[1], (s, aside))], r))
+    return made
+
+
+@pytest.mark.parametrize(("ranks", "stays"), [((3, 2), 1), ((2, 3), 2)])
+def test_equally_fast_groups_within_reach_merge_once(ranks: tuple[int, int], stays: int) -> None:
+    for seed in range(3):
+        made = track(joining(seed, ranks))
+        assert made[20].id.tolist() == [1, 2]
+        ((kind, start, before, after),) = changes(made)
+        assert (kind, before, after) == ("merge", (1, 2), (stays,))
+        assert start == pytest.approx(31, abs=5)
+        assert made[-1].id.tolist() == [stays]
+        assert sizes(made[-1]) == pytest.approx([10], abs=0.5)
+
+
+def parting(seed: int, along: float, apart: float, ranks: int = 1, who: int = 2) -> tuple[list[Array], int]:
+    """Of four abreast, so many ranks deep, the right `who` leave from frame 41 on; the first frame in which the nearest
+    are 1.5 m apart."""
+    r, made = np.random.default_rng(seed), []
+    for k in range(100):
+        group = block(4, ranks, (0.0, along * k / FPS))
+        group[group[:, 0] > 0.3 + 0.6 * (1 - who), 0] += apart * max(k - 40, 0) / FPS
+        made.append(noisy([group], r))
+    return made, 41 + int(np.ceil(0.9 / apart * FPS))
+
+
+@pytest.mark.parametrize("seed", range(3))
+@pytest.mark.parametrize(("along", "apart"), [(0.0, 0.5), (1.0, 0.5), (1.0, 1.2)])
+@pytest.mark.parametrize("who", [1, 2])
+def test_a_group_that_falls_into_two_splits_once(seed: int, along: float, apart: float, who: int) -> None:
+    frames, due = parting(seed, along, apart, who=who)
+    made = track(frames)
+    ((kind, start, before, after),) = changes(made)
+    assert (kind, before, after) == ("split", (1,), (1, 2))
+    assert start == pytest.approx(due, abs=FPS)
+    left, right = made[-1].pos[np.argsort(made[-1].pos[:, 0])], sizes(made[-1])
+    assert left[:, 0] == pytest.approx([-0.9 + 0.3 * (3 - who), 0.9 - 0.3 * (who - 1) + 5.9 * apart], abs=0.1)
+    assert sorted(right) == pytest.approx(sorted([4 - who, who]), abs=0.2)
+    if who == 1:
+        assert sizes(made[-1])[0] == pytest.approx(3, abs=0.2)  # who stay are most, and keep the id
+
+
+def test_the_larger_part_keeps_the_id() -> None:
+    frames, _ = parting(0, 1.0, 0.8, ranks=2, who=1)
+    for turned, x in ((frames, -0.3), ([-p for p in frames], 0.3)):
+        last = track(turned)[-1]
+        assert last.id.tolist() == [1, 2]
+        assert last.pos[0, 0] == pytest.approx(x, abs=0.1)
+        assert sizes(last) == pytest.approx([6, 2], abs=0.3)
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_children_have_their_parents_velocity(seed: int) -> None:
+    frames, _ = parting(seed, 1.0, 0.5)
+    for config, kept in ((GroupPdaConfig(), 1.0), (GroupPdaConfig(inherit_velocity=False), 0.0)):
+        made = track(frames, config)
+        (k,) = (k for k, t in enumerate(made) if any(e.kind == "split" for e in t.events))
+        assert made[k].vel == pytest.approx(np.repeat(kept * made[k - 1].vel, 2, 0), abs=1e-9)
+        assert np.hypot(*made[k - 1].vel[0]) > 0.8
+
+
+@pytest.mark.parametrize("gap", [2.0, 2.2])
+def test_two_that_stand_beside_each_other_do_not_join_and_part(gap: float) -> None:
+    """Twice 16 people; gap: between the nearest, m."""
+    for seed in range(2):
+        r = np.random.default_rng(seed)
+        made = track([noisy([block(4, 4), block(4, 4, (1.8 + gap, 0))], r) for _ in range(200)])
+        assert not events(made, "split")
+        assert len(events(made, "merge")) <= 1
+
+
+HIGH, WIDE, PX = 120, 160, 20.0
+COLOURS = ((30, 20, 190), (190, 30, 20), (20, 170, 40))
+People = Sequence[tuple[float, float]]
+"""Their middles, px."""
+
+
+def picture(people: People, r: np.random.Generator) -> np.ndarray:
+    """(H, W, 3) ellipses of a person's size on a mottled ground, with noise."""
+    image = np.kron(np.random.default_rng(0).uniform(90, 170, (HIGH // 8, WIDE // 8, 3)), np.ones((8, 8, 1)))
+    v, u = np.arange(HIGH)[:, None] + 0.5, np.arange(WIDE) + 0.5
+    for (x, y), colour in zip(people, COLOURS, strict=False):
+        image[((u - x) / 5) ** 2 + ((v - y) / 17) ** 2 <= 1] = colour
+    return np.clip(image + 2 * r.standard_normal(image.shape), 0, 255).astype(np.uint8)
+
+
+def watched(frames: Sequence[People | None], config: GroupPdaConfig | None = None) -> list[Tracks]:
+    """Answers to pictures of these people; None is a lost one."""
+    r, tracker = np.random.default_rng(0), GroupPda(config)
+    empty = np.stack([picture([], r) for _ in range(20)])
+    tracker.reset(Context(FPS, PX, image_size=(WIDE, HIGH), background=empty), 0)
+    shown = [None if people is None else picture(people, r) for people in frames]
+    return [tracker.step(Frame(k + 1, k / FPS, image), None) for k, image in enumerate(shown)]
+
+
+def test_pixels_of_two_who_walk_abreast_are_one_group_of_two() -> None:
+    frames: list[People | None] = [[(20 + 1.5 * k, 60), (32 + 1.5 * k, 60)] for k in range(80)]
+    frames[0] = frames[40] = frames[41] = None
+    made = watched(frames)
+    assert ids(made) == {1}
+    assert not changes(made)
+    for k in range(10, 80):
+        assert made[k].plane == "image"
+        assert made[k].pos[0] == pytest.approx([26 + 1.5 * k, 60], abs=1.5)
+        assert sizes(made[k]) == pytest.approx([2], abs=0.3)
+    assert made[-1].vel[0] == pytest.approx([15, 0], abs=1)
+
+
+def test_pixels_of_two_who_part_split() -> None:
+    frames = [[(60 - 1.2 * max(k - 30, 0), 60.0), (72 + 1.2 * max(k - 30, 0), 60.0)] for k in range(70)]
+    made = watched(frames)
+    ((kind, start, before, after),) = changes(made)
+    assert (kind, before, after) == ("split", (1,), (1, 2))
+    assert start == pytest.approx(41, abs=FPS)  # the ellipses are 1.5 m apart
+    assert sizes(made[-1]) == pytest.approx([1, 1], abs=0.2)
+    assert np.sort(made[-1].pos[:, 0]) == pytest.approx([60 - 46.8, 72 + 46.8], abs=2)
+
+
+def test_pixels_of_pairs_that_pass_each_other_keep_their_ids() -> None:
+    """On their own ways, one behind the other."""
+    frames = [[(10 + 2.0 * k, 40.0), (20 + 2.0 * k, 40.0), (150 - 2.0 * k, 88.0)] for k in range(70)]
+    made = watched(frames)
+    assert made[10].id.tolist() == made[-1].id.tolist() == [1, 2]
+    assert not changes(made)
+    assert sizes(made[-1]) == pytest.approx(sizes(made[10]), rel=0.2)
+    assert np.sign(made[-1].vel[:, 0]).tolist() == np.sign(made[10].vel[:, 0]).tolist()
+
+
+def test_who_stands_for_long_does_not_become_background() -> None:
+    """Unprotected he would be within two time constants."""
+    made = watched([[(80.0, 60.0)]] * 60, GroupPdaConfig(background_time=1.0, foreground_time=1.0))
+    assert all(t.id.tolist() == [1] for t in made[5:])
