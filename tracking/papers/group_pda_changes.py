@@ -35,7 +35,8 @@ def attached(points: Array, d2: Array, bank: Bank, rules: Rules) -> Ints:
     """(M,) the group, a row of d2 (G, M), that each point in nobody's region belongs to as it is linked to one of its
     points, else -1. Of several groups the one whose point is nearest.
 
-    From points only who was a member a moment ago: others are newcomers or false alarms, and groups of their own first.
+    From points a group that has an id takes only who was its member a moment ago: others are newcomers or false alarms,
+    and groups of their own first.
     """
     link, own = rules.constraint.link, np.full(len(points), -1)
     taken = np.isfinite(d2).any(0) if len(d2) else np.zeros(len(points), bool)
@@ -52,7 +53,7 @@ def attached(points: Array, d2: Array, bank: Bank, rules: Rules) -> Ints:
         apart = np.square(points[mine][:, None] - points[theirs]).sum(2)
         own[mine] = claim[apart.argmin(1)]
     if not rules.half_cell:
-        for k in np.flatnonzero(own >= 0).tolist():
+        for k in np.flatnonzero((own >= 0) & bank.named[own]).tolist():
             place = bank.places[own[k]][0] + bank.x[own[k], :2]
             if np.square(place - points[k]).sum(1).min() > _reach(rules) ** 2:
                 own[k] = -1
@@ -98,6 +99,8 @@ def split(bank: Bank, row: int, points: Array, weights: Array, rules: Rules, t: 
     return change if named else None
 
 
+ARRIVAL = 1.0
+"""s: a group that another joins so soon after it came has arrived, as in tracking.links."""
 FASTEST = 2.0
 """m/s: nobody walks faster away from a group than this."""
 LONGEST = 5.0
@@ -115,7 +118,7 @@ class Merging:
         self.met: dict[tuple[int, int], Encounter] = {}
 
     def step(self, bank: Bank, rules: Rules, t: float) -> Iterator[Change]:
-        """Merge groups for which that has been so for `merge_time`.
+        """Merge groups for which that has been so for `merge_time`; one that joins soon after it came has entered.
 
         Only those do that have an id, were measured in this frame, some of them by points that are nearer to no other
         group, and are in no spell: the others' velocities are ignorance, or another's.
@@ -132,12 +135,14 @@ class Merging:
                 (self.met[p].onset(rules.config.merge_velocity) for p in due if p[0] in ids), key=lambda found: found[0]
             )
             one = merged(bank, rows)
+            here = bank.id[rows][(since - bank.born[rows] > ARRIVAL) | (bank.parent[rows] != UNNAMED)]
             keep = np.ones(len(bank), bool)
             keep[rows] = False
             bank.keep(keep)
             bank.add(one)
             self.met = {p: met for p, met in self.met.items() if not set(p) & set(ids)}
-            yield Change("merge", since, tuple(sorted(ids)), (int(one.id[0]),), tuple(place.tolist()))
+            kind = "merge" if len(here) > 1 else "enter"
+            yield Change(kind, since, tuple(sorted(ids)), (int(one.id[0]),), tuple(place.tolist()))
 
     def _went_on(self, pair: tuple[int, int], slow: bool, now: tuple[float, Array, Array, float]) -> Encounter:
         before = self.met.get(pair, Encounter(np.inf, []))
