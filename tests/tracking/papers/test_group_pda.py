@@ -212,22 +212,24 @@ def holds(hull: Array, point: Array) -> bool:
 
 
 @pytest.mark.parametrize("angle", [0.0, 0.8, 1.6])
-def test_a_false_alarm_beside_a_group_is_no_member(angle: float) -> None:
-    frames, middle = missed(0, 0.5, share=1.0)
-    at, false = 60, middle[60] + (0.3 * np.sqrt(2) + 1.0) * np.array([np.cos(angle), np.sin(angle)])
-    struck = [np.vstack([p, false]) if k == at else p for k, p in enumerate(frames)]
+@pytest.mark.parametrize(("ranks", "gap"), [(2, 0.45), (2, 1.0), (3, 1.0)])
+def test_a_false_alarm_beside_a_group_is_no_member(angle: float, ranks: int, gap: float) -> None:
+    """In one frame, so far from the circle that holds the group; 0.45 m is in its region."""
+    r, at = np.random.default_rng(0), 60
+    away = (0.3 * (ranks - 1) * np.sqrt(2) + gap) * np.array([np.cos(angle), np.sin(angle)])
+    middle = np.array([[0.05 * k, 0.0] for k in range(100)])
+    frames = [noisy([block(ranks, ranks) + m], r) for m in middle]
+    struck = [np.vstack([p, middle[at] + away]) if k == at else p for k, p in enumerate(frames)]
     plain, made = track(frames), track(struck)
     assert ids(made) == {1}
     assert not changes(made)
     for k in range(at + 2, len(frames)):
-        groups = made[k].groups
-        assert groups is not None
-        assert not holds(groups.hull[0], false + middle[k] - middle[at])  # nor does he walk along
-        assert abs(sizes(made[k])[0] - sizes(plain[k])[0]) <= 1 / 5
         own, other = made[k].groups, plain[k].groups
         assert own is not None
         assert other is not None
+        assert not holds(own.hull[0], middle[k] + away)  # nor does he walk along
         assert own.hull[0] - own.pos[0] == pytest.approx(other.hull[0] - other.pos[0], abs=0.1)
+        assert abs(own.size[0] - other.size[0]) <= 1 / ranks**2
 
 
 def test_frames_that_tell_nothing() -> None:
@@ -243,6 +245,17 @@ def test_frames_that_tell_nothing() -> None:
         assert made[k].id.tolist() == [1, 2]
         assert made[k].pos == pytest.approx(made[k - 1].pos + made[k].vel / FPS)
     assert not changes(made)
+
+
+@pytest.mark.parametrize("plane", ["ground", "image"])
+def test_a_lost_first_frame_does_not_decide_on_the_plane(plane: str) -> None:
+    context, unit = Context(FPS, 40.0), 40.0 if plane == "image" else 1.0
+    frames = [unit * p for p in head_on(0, 2.4)]
+    plain, late = track(frames, plane=plane, context=context), track([None, *frames], plane=plane, context=context)
+    for x, y in zip(plain, late[1:], strict=True):
+        assert y.plane == plane
+        np.testing.assert_allclose(y.pos, x.pos, atol=1e-6)
+        np.testing.assert_allclose(y.cov, x.cov, atol=1e-6)
 
 
 @pytest.mark.parametrize(("plane", "context"), [("ground", GROUND), ("image", Context(FPS, 40.0))])

@@ -40,11 +40,11 @@ def test_a_hidden_group_goes_straight_on_ever_less_surely() -> None:
 
 
 def test_a_hidden_group_merges_with_nobody() -> None:
-    """Another walks beside it, equally fast, while it is hidden: the regions overlap for more than merge_time."""
+    """Another walks beside it, equally fast, while it is hidden: for longer than merge_time near enough to merge."""
     r, made = np.random.default_rng(0), []
     for k in range(90):
-        way, aside = np.array([0.1 * k, 0.0]), 2.2 + 0.04 * abs(k - 45)
-        made.append(noisy([block(2, 2, (0, aside)) + way, *([] if 40 <= k < 50 else [block(2, 2) + way])], r))
+        way, aside = np.array([0.1 * k, 0.0]), 1.95 + 0.03 * abs(k - 45)
+        made.append(noisy([block(2, 2, (0, aside)) + way, *([] if 38 <= k < 52 else [block(2, 2) + way])], r))
     said = track(made)
     assert said[30].id.tolist() == said[-1].id.tolist() == [1, 2]
     assert not changes(said)
@@ -131,6 +131,23 @@ def test_a_group_that_falls_into_two_splits_once(seed: int, along: float, apart:
     assert sorted(right) == pytest.approx(sorted([4 - who, who]), abs=0.2)
     if who == 1:
         assert sizes(made[-1])[0] == pytest.approx(3, abs=0.2)  # who stay are most, and keep the id
+
+
+@pytest.mark.parametrize("ranks", [2, 3])
+@pytest.mark.parametrize("seed", range(3))
+def test_one_who_walks_fast_out_of_the_region_is_split_off(ranks: int, seed: int) -> None:
+    """He is a newborn at the region's edge before the group is seen to be two."""
+    r, made = np.random.default_rng(seed), []
+    for k in range(80):
+        made.append(noisy([block(2, ranks), np.array([[0.9 + 1.6 * max(k - 40, 0) / FPS, 0.0]])], r))
+    spells: list[float] = []
+    told = track(made, watch=lambda t, _: spells.append(float(t.bank.null.max(initial=0))))
+    assert max(spells) < GroupPdaConfig().split_time
+    ((kind, start, before, after),) = changes(told)
+    assert (kind, before, after) == ("split", (1,), (1, 2))
+    assert start == pytest.approx(41 + 7.5, abs=FPS)  # 1.5 m from the nearest
+    assert told[-1].vel[1] == pytest.approx([1.6, 0], abs=0.3)
+    assert sizes(told[-1]) == pytest.approx([2 * ranks, 1], abs=0.2)
 
 
 def test_the_larger_part_keeps_the_id() -> None:
