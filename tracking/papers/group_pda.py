@@ -10,7 +10,7 @@ frame (Fig. 1):
     masses     m_d m_N m_g: centroid, number, group constraint |G_y| = 1                (4.2; kernels._estimate)
     update     x, P, Sigma, N as means over the associations                            (2.4, 4.3; kernels._mix, _adapt)
     split      after a spell in which no association has a mass                         (3.3, 4.2; changes.split)
-    merge      groups near each other with like velocities, on updated states           (3.1; changes.Merging)
+    merge      groups near each other with like velocities, on updated states           (3.1; merging.Merging)
     birth      unclaimed points, grouped by G_y                                         (3.3; changes.births)
 
 Departures, all ours:
@@ -44,9 +44,10 @@ from sim.types import Array, Bools, Context, Detections, Frame, Plane, Tracks
 from tracking.papers import group_pda_changes as changes
 from tracking.papers import group_pda_kernels as kernels
 from tracking.papers.group_pda_bank import Bank
-from tracking.papers.group_pda_carry import carried, exclusive, remember
+from tracking.papers.group_pda_carry import Claims, claimed, exclusive, remember, with_carried
 from tracking.papers.group_pda_colour import colours, learn, speaks
 from tracking.papers.group_pda_config import GroupPdaConfig
+from tracking.papers.group_pda_merging import Change, Merging
 from tracking.papers.group_pda_pixels import Pixels, steepness
 from tracking.papers.group_pda_report import tracks
 from tracking.papers.group_pda_rules import Rules, make_rules
@@ -69,7 +70,7 @@ class GroupPda:
     def reset(self, context: Context, seed: int) -> None:
         """Forget everything; with a background sample pixels are tracked, else points. `seed` is unused."""
         self.context = context
-        self.bank, self.merging, self.names = Bank.empty(), changes.Merging(), changes.Names()
+        self.bank, self.merging, self.names = Bank.empty(), Merging(), changes.Names()
         if context.background is not None:
             _check_scale(context.px_per_m)
         self.pixels = None if context.background is None else Pixels(self.config, context)
@@ -91,7 +92,7 @@ class GroupPda:
             bank.look = np.zeros((len(bank), rules.colours))
         self.innovation = []
         bank.predict(rules)
-        told: list[changes.Change] = []
+        told: list[Change] = []
         if points is not None:
             told += self._measure(points, weights, rules, t)
         told += self.merging.step(bank, rules, t)
@@ -146,28 +147,29 @@ class GroupPda:
         self.rules = make_rules(self.config, self.context.fps, scale, steep=steep)
         return self.rules
 
-    def _measure(self, points: Array, weights: Array, rules: Rules, t: float) -> list[changes.Change]:
+    def _measure(self, points: Array, weights: Array, rules: Rules, t: float) -> list[Change]:
         """Search regions, associations, updates (4); splits and births (3.3)."""
-        bank, c = self.bank, self.config
-        lost = bank.named & (t - bank.seen > c.coast_time)
-        d2 = self._search(points, rules, lost)
-        hits = np.isfinite(d2).sum(0)
-        own = changes.attached(points, d2, bank, rules) if c.attach else np.full(len(points), -1)
-        hits[own >= 0] = 1
-        free = hits == 0
-        unfelt = ~np.isfinite(d2).any(1) & ~np.isin(np.arange(len(bank)), own)
-        ghost, row_of, seen = carried(bank, points, rules, t)
-        felt = ~unfelt[row_of]
-        ghost, row_of, seen = ghost[felt], row_of[felt], seen[felt]
-        measured_at = np.concatenate([np.full(len(points), t), seen])
-        points, weights = np.concatenate([points, ghost]), np.concatenate([weights, np.ones(len(ghost))])
-        own, hits = np.concatenate([own, row_of]), np.concatenate([hits, np.ones(len(ghost), np.int64)])
-        d2 = np.hstack([d2, np.full((len(bank), len(ghost)), np.inf)])
-        looks = c.appearance * speaks(bank, d2, self.colour) if rules.colours else np.zeros((len(bank), 0))
-        before, resting = changes.standing(bank, rules, t), bank.null > 0
+        bank = self.bank
+        d2 = self._search(points, rules, t)
+        own = changes.attached(points, d2, bank, rules) if self.config.attach else np.full(len(points), -1)
+        claims = with_carried(claimed(points, weights, d2, own, t), bank, rules, t)
+        before = changes.standing(bank, rules, t)
+        chosen = self._associate(claims, rules, t)
+        told = self._split(claims, chosen, rules, t)
+        free = claims.hits[: len(points)] == 0
+        changes.births(bank, points[free], weights[free], before, rules, t)
+        return told
+
+    def _associate(self, claims: Claims, rules: Rules, t: float) -> Bools:
+        """Update the groups by their associations; (G, M) the points of each group's likeliest one."""
+        bank = self.bank
+        looks = np.zeros((len(bank), 0))
+        if rules.colours:
+            looks = self.config.appearance * speaks(bank, claims.d2, self.colour)
         state, chosen, said = kernels.associate(
-            points, weights, d2, looks, own, hits, bank.x, bank.P, bank.extent, bank.size, resting, rules.numbers
-        )
+            claims.points, claims.weights, claims.d2, looks, claims.own, claims.hits,
+            bank.x, bank.P, bank.extent, bank.size, bank.null > 0, rules.numbers,
+        )  # fmt: skip
         measured, null = state == kernels.MEASURED, state == kernels.NULL
         bank.seen[measured | null] = t
         bank.measured[measured] += rules.dt
@@ -176,19 +178,17 @@ class GroupPda:
             (int(bank.id[g]), said[g, :2].copy(), said[g, [2, 3, 3, 4]].reshape(2, 2))
             for g in np.flatnonzero(measured & bank.named).tolist()
         ]
-        mine = chosen & exclusive(chosen, d2)
-        bank.own = mine @ weights
-        remember(bank, points, measured_at, mine, rules, t)
+        mine = chosen & exclusive(chosen, claims.d2)
+        bank.own = mine @ claims.weights
+        remember(bank, claims, mine, rules, t)
         if rules.colours:
-            learn(bank, mine, hits, self.colour, weights, rules)
-        told = self._split(points, weights, d2, chosen, rules, t)
-        free = np.append(free, np.zeros(len(ghost), bool))
-        changes.births(bank, points[free], weights[free], before, rules, t)
-        return told
+            learn(bank, mine, claims.hits, self.colour, claims.weights, rules)
+        return chosen
 
-    def _search(self, points: Array, rules: Rules, lost: Bools) -> Array:
+    def _search(self, points: Array, rules: Rules, t: float) -> Array:
         """d2 (G, M). Lost groups claim nothing; tentative ones what no other claims."""
         bank = self.bank
+        lost = bank.named & (t - bank.seen > self.config.coast_time + 1e-9)
         wider = np.square(rules.scale * self.config.split_speed * bank.null)
         d2 = kernels.search(points, bank.x, bank.P, bank.extent, rules.noise**2, wider, self.config.gate)
         d2[lost] = np.inf
@@ -198,17 +198,15 @@ class GroupPda:
             d2[np.ix_(tentative, claimed)] = np.inf
         return d2
 
-    def _split(
-        self, points: Array, weights: Array, d2: Array, chosen: Bools, rules: Rules, t: float
-    ) -> list[changes.Change]:
+    def _split(self, claims: Claims, chosen: Bools, rules: Rules, t: float) -> list[Change]:
         """Groups that had no feasible association for split_time fall into those that their points form; shared points
         go with the nearest group."""
         bank, told = self.bank, []
         due = np.flatnonzero((bank.null >= self.config.split_time - 1e-9) & (bank.null > 0))
-        nearest = d2.argmin(0) if len(d2) else np.zeros(len(points), np.int64)
+        mine = chosen & exclusive(np.isfinite(claims.d2), claims.d2)
         for row in due.tolist()[::-1]:  # from behind: children stand at the end
-            mine = chosen[row] & ((nearest == row) | ~np.isfinite(d2[row]))
-            change = changes.split(bank, row, points[mine], weights[mine], rules, t, self.names)
+            points, weights = claims.points[mine[row]], claims.weights[mine[row]]
+            change = changes.split(bank, row, points, weights, rules, t, self.names)
             told += [] if change is None else [change]
         return told
 

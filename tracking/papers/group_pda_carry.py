@@ -7,6 +7,8 @@ many, and what is missing of them is hidden: there only the outline is kept, to 
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 
 from sim.types import Array, Bools, Ints
@@ -19,6 +21,43 @@ SMALL = 4096
 """Pairs of points up to which all with all is quicker than a tree."""
 PAST, MEMORY = 3.0, 64
 """For so long, s, no more than so many of a group's points are kept, to look back from a split."""
+
+
+@dataclass(frozen=True)
+class Claims:
+    """Who may have which points (M, 2): weights (M,) people that each stands for; seen (M,) s, when it was measured; d2
+    (G, M) inf outside the regions; own (M,) the one group, a row of the bank, that has it anyway, or -1; hits (M,) how
+    many groups may have it."""
+
+    points: Array
+    weights: Array
+    seen: Array
+    d2: Array
+    own: Ints
+    hits: Ints
+
+
+def claimed(points: Array, weights: Array, d2: Array, own: Ints, t: float) -> Claims:
+    """The claims on the points of a frame; own: from `attached`."""
+    hits = np.where(own >= 0, 1, np.isfinite(d2).sum(0))
+    return Claims(points, weights, np.full(len(points), t), d2, own, hits)
+
+
+def with_carried(claims: Claims, bank: Bank, rules: Rules, t: float) -> Claims:
+    """Members who are not measured, too, of groups that have any points; behind the others, each its group's own."""
+    felt: Bools = np.isfinite(claims.d2).any(axis=1)
+    felt[claims.own[claims.own >= 0]] = True
+    place, row, seen = carried(bank, claims.points, rules, t)
+    kept = felt[row]
+    place, row, seen = place[kept], row[kept], seen[kept]
+    return Claims(
+        np.concatenate([claims.points, place]),
+        np.concatenate([claims.weights, np.ones(len(place))]),
+        np.concatenate([claims.seen, seen]),
+        np.hstack([claims.d2, np.full((len(bank), len(place)), np.inf)]),
+        np.concatenate([claims.own, row]),
+        np.concatenate([claims.hits, np.ones(len(place), np.int64)]),
+    )
 
 
 def carried(bank: Bank, points: Array, rules: Rules, t: float) -> tuple[Array, Ints, Array]:
@@ -54,11 +93,10 @@ def exclusive(chosen: Bools, d2: Array) -> Bools:
     return np.asarray((distance <= distance.min(0, initial=np.inf)) | (chosen.sum(0) < 2))
 
 
-def remember(bank: Bank, points: Array, seen: Array, chosen: Bools, rules: Rules, t: float) -> None:
-    """The places of the points chosen (G, M), measured at `seen` (M,), as those of the groups; the old ones where a
-    group has none."""
+def remember(bank: Bank, claims: Claims, chosen: Bools, rules: Rules, t: float) -> None:
+    """The places of the points chosen (G, M) as those of the groups; the old ones where a group has none."""
     for row in np.flatnonzero(chosen.any(1)).tolist():
-        mine, when = points[chosen[row]], seen[chosen[row]]
+        mine, when = claims.points[chosen[row]], claims.seen[chosen[row]]
         bank.past[row] = [*(p for p in bank.past[row] if p[0] > t - PAST), (t, thinned(mine))]
         place = mine - bank.x[row, :2]
         if not rules.half_cell:

@@ -8,7 +8,7 @@ from sim.hull_kernels import chains
 from sim.types import Array, GroupEvent, Groups, Plane, Tracks
 from tracking.papers import group_pda_kernels as kernels
 from tracking.papers.group_pda_bank import Bank
-from tracking.papers.group_pda_changes import Change
+from tracking.papers.group_pda_merging import Change
 from tracking.papers.group_pda_rules import Rules
 
 
