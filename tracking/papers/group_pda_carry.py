@@ -45,7 +45,7 @@ def claimed(points: Array, weights: Array, d2: Array, own: Ints, t: float) -> Cl
 
 def with_carried(claims: Claims, bank: Bank, rules: Rules, t: float) -> Claims:
     """Members who are not measured, too, of groups that have any points; behind the others, each its group's own."""
-    felt: Bools = np.isfinite(claims.d2).any(axis=1)
+    felt = np.asarray(np.isfinite(claims.d2).any(axis=1))
     felt[claims.own[claims.own >= 0]] = True
     place, row, seen = carried(bank, claims.points, rules, t)
     kept = felt[row]
