@@ -123,9 +123,10 @@ class GroupPda:
         return Q * self.context.px_per_m if self.box is None else SQUARE * self.box / 2
 
     def _outlines(self) -> list[Array]:
-        """The outlines of the groups that are told, px."""
-        bank = self.bank
-        return [bank.places[r][0] + bank.x[r, :2] for r in np.flatnonzero(bank.named).tolist()]
+        """The outlines of the groups that are told, px, the whole cells of the grid."""
+        bank, cell = self.bank, self._outline(None)
+        rows = np.flatnonzero(bank.named).tolist()
+        return [((bank.places[r][0] + bank.x[r, :2])[:, None] + cell).reshape(-1, 2) for r in rows]
 
     def _silent(self, frame: Frame) -> Tracks:
         """Nothing was seen yet, not even what the plane is."""

@@ -70,13 +70,17 @@ class Names:
 
 
 def split(bank: Bank, row: int, points: Array, weights: Array, rules: Rules, t: float, names: Names) -> Change | None:
-    """Replace a group by those that its points (M, 2) form (3.3), if they are several; the largest keeps its id."""
+    """Replace a group by those that its points (M, 2) form (3.3), if several; the largest keeps its id. If they
+    form none it has left."""
     group = partition(points, weights, rules.constraint)
     if group.max(initial=-1) < 1:
         bank.null[row] = 0.0
-        if group.max(initial=-1) < 0:  # nothing but noise
-            bank.seen[row] = -np.inf
-        return None
+        if group.max(initial=-1) == 0:
+            return None
+        left = Change("leave", t, (int(bank.id[row]),), (), tuple(bank.x[row, :2].tolist()))  # nothing but noise
+        named = bank.id[row] != UNNAMED
+        bank.keep(np.arange(len(bank)) != row)
+        return left if named else None
     made = children(bank, row, points, weights, group, rules, t)
     away = np.hypot(*(made.x[:, :2] - bank.x[row, :2]).T)
     largest, other = np.lexsort((made.x[:, 1], made.x[:, 0], away, -made.size))[:2].tolist()
@@ -94,7 +98,7 @@ def split(bank: Bank, row: int, points: Array, weights: Array, rules: Rules, t: 
 def standing(bank: Bank, rules: Rules, t: float) -> tuple[Array, Ints]:
     """Where the people of named groups that were measured lately should be (K, 2), and of which group, its id (K,)."""
     late = t - bank.seen <= max(rules.config.carry_time, rules.dt) + 1e-9
-    rows = np.flatnonzero(bank.named & (bank.null <= 0) & late).tolist()
+    rows = np.flatnonzero(bank.named & late).tolist()
     places = [bank.places[r][0] + bank.x[r, :2] for r in rows]
     return np.concatenate([np.zeros((0, 2)), *places]), np.repeat(bank.id[rows], [len(p) for p in places])
 
@@ -136,7 +140,7 @@ def confirm(bank: Bank, rules: Rules, t: float, names: Names) -> Iterator[Change
     old = np.flatnonzero(bank.named & (bank.seen < t)) if c.recapture else new[:0]
     back = dict(_returned(bank, new, old, rules)) if len(new) and len(old) else {}
     for row in new.tolist():
-        place = tuple(bank.x[row, :2])
+        place = tuple(bank.x[row, :2].tolist())
         if row in back:
             lost = back[row]
             bank.id[row], bank.born[row] = bank.id[lost], bank.born[lost]
@@ -173,8 +177,8 @@ def deaths(bank: Bank, rules: Rules, t: float) -> Iterator[Change]:
     patience = np.where(bank.named, max(c.coast_time, c.recapture_time if c.recapture else 0.0), c.confirm_time)
     dead: Bools = t - bank.seen > patience + 1e-9
     for row in np.flatnonzero(dead & bank.named).tolist():
-        unseen = min(t - bank.seen[row], patience[row])
-        place = bank.x[row, :2] - unseen * bank.x[row, 2:]  # where it was measured last
-        yield Change("leave", float(t - unseen), (int(bank.id[row]),), (), tuple(place.tolist()))
+        seen = float(bank.seen[row])
+        place = bank.x[row, :2] - (t - seen) * bank.x[row, 2:]  # where it was measured last
+        yield Change("leave", seen, (int(bank.id[row]),), (), tuple(place.tolist()))
     if dead.any():
         bank.keep(~dead)

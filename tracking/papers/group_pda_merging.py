@@ -21,6 +21,10 @@ ARRIVAL = 1.0
 """s: a group that another joins so soon after it came has arrived, as in tracking.links."""
 LONGEST = 5.0
 """s that is looked back at most."""
+MARGIN = 0.9
+"""Of gamma: groups merge a little nearer than they split, as their extents are noisy."""
+DOUBLE = 0.55
+"""Share of two groups that must be measured: else they may be one and the same, a hidden one on another's points."""
 OWN = 0.2
 """Share of a group that must be nearer to it than to any other for its velocity to be its own."""
 PATIENCE = 0.5
@@ -80,13 +84,15 @@ class Merging:
 def _near(bank: Bank, rows: Ints, rules: Rules) -> Iterator[tuple[tuple[int, int], bool, Array, Array, float]]:
     """R_x: ids of each two groups whose search regions overlap, whether their velocities differ by no more than
     allowed, the difference of their centroids on the ground, the middle between them, the nearest people's distance."""
-    near = overlaps(bank.x[rows, :2], bank.extent[rows], rules.config.gate)
+    near = overlaps(bank.x[rows, :2], bank.extent[rows], MARGIN * rules.config.gate)
     near |= _touching(bank, rows, rules)
     v = bank.x[rows, 2:] * rules.ground
     var = np.einsum("gaa,a->g", bank.P[rows, 2:, 2:], np.square(rules.ground)) / 2
     most = rules.config.merge_velocity + rules.config.merge_doubt * np.sqrt(var[:, None] + var)
     slow = np.hypot(*(v[:, None] - v[None]).transpose(2, 0, 1)) <= most
     for i, j in np.argwhere(np.triu(near, 1)).tolist():
+        if DOUBLE * (bank.size[rows[i]] + bank.size[rows[j]]) > bank.own[rows[i]] + bank.own[rows[j]]:
+            continue
         i, j = sorted((i, j), key=lambda k: bank.id[rows[k]])
         a, b = bank.x[rows[i], :2], bank.x[rows[j], :2]
         d = (b - a) * rules.ground
