@@ -42,8 +42,8 @@ def overlap(dx: float, dy: float, axx: float, axy: float, ayy: float, bxx: float
     if length == 0:
         ex, ey, length = 1.0, 0.0, 1.0
     a = (u * ex + v * ey) / length
-    a2 = a * a
-    b2 = max(u * u + v * v - a2, 0.0)
+    b = (v * ex - u * ey) / length
+    a2, b2 = a * a, b * b
     low, high = 0.0, 1.0
     value_low, slope_low, value_high, slope_high = 0.0, a2 + b2, 0.0, -(a2 / (1 + p) + b2 / (1 + q))
     for _ in range(STEPS):

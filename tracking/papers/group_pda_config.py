@@ -43,7 +43,7 @@ class GroupPdaConfig(BackgroundSettings):
     count_noise: float = param(0.5, (0.05, 5.0), "people", "sigma_n of m_N: part that does not grow with N", "log")
     count_share: float = param(0.15, (0.01, 1.0), "share", "sigma_n of m_N: part that grows with N (ours)", "log")
     detect_prob: float = param(
-        0.95, (0.3, 1.0), "probability", "from points, if none are carried: that a member is measured"
+        0.95, (0.3, 1.0), "probability", "from points: that a member is measured; he is carried after that"
     )
     miss_prob: float = param(0.02, (0.0, 0.5), "probability", "of the miss hypothesis before any measurement (ours)")
 

@@ -54,10 +54,9 @@ def make_rules(
     numbers[kernels.PRIOR_XX : kernels.PRIOR_YY + 1] = constraint.three
     numbers[kernels.STRENGTH], numbers[kernels.LEAST] = c.spread_weight, constraint.least
     numbers[kernels.NOISE], numbers[kernels.COUNT], numbers[kernels.SHARE] = noise, c.count_noise, c.count_share
-    numbers[kernels.DETECT], numbers[kernels.MISS] = (
-        1.0 if pixels or c.carry_time > 0 else c.detect_prob,
-        c.miss_prob if c.miss else 0.0,
-    )
+    looks = 1 + c.carry_time * fps  # frames in one of which a member must be measured to be there
+    numbers[kernels.DETECT] = 1.0 if pixels else 1 - (1 - c.detect_prob) ** looks
+    numbers[kernels.MISS] = c.miss_prob if c.miss else 0.0
     numbers[kernels.FREEZE] = c.freeze_share if c.freeze else np.inf
     numbers[kernels.KEEP_EXTENT], numbers[kernels.KEEP_SIZE] = np.exp(-dt / np.array([c.extent_time, c.size_time]))
     numbers[kernels.CUT] = cut

@@ -17,6 +17,7 @@ from tracking.papers import group_pda_changes as changes
 from tracking.papers import group_pda_kernels as kernels
 from tracking.papers.group_pda_bank import Bank, merged, newborn
 from tracking.papers.group_pda_config import GroupPdaConfig
+from tracking.papers.group_pda_merging import Merging
 from tracking.papers.group_pda_rules import make_rules, truncation
 
 STATES = ["nothing", "null", "measured"]
@@ -408,5 +409,5 @@ def test_what_split_does_not_merge_in_the_same_frame(pixels: bool) -> None:
         split = changes.split(one, 0, points, weights, rules, 1.0, names)
         splits += split is not None
         assert split is None or len(one) == len(split.after) > 1
-        assert not list(changes.Merging().step(one, rules, 1.0)), seed
+        assert not list(Merging().step(one, rules, 1.0)), seed
     assert splits > 50
