@@ -8,16 +8,9 @@ from numba import njit
 from sim.paint_kernels import span
 from sim.plate_kernels import at
 from sim.static_kernels import nearest
+from sim.trees_kernels import root
 
 SAME = 1e-3  # m: what lies nearer by less is taken for the same point
-
-
-@njit(cache=True, error_model="numpy")
-def _root(parent, i):  # type: ignore[no-untyped-def]
-    while parent[i] != i:
-        parent[i] = parent[parent[i]]
-        i = parent[i]
-    return i
 
 
 @njit(cache=True, error_model="numpy")
@@ -40,14 +33,14 @@ def tally(ids, boxes, id, row_of, count, edges, blob):  # type: ignore[no-untype
                 for k in range(4):  # right, and the three below: each pair of neighbours once
                     y, x = v + (k > 0), u + (1 if k == 0 else k - 2)
                     if y < height and 0 <= x < width and ids[y, x] > 0 and ids[y, x] != id[i]:
-                        a, b = _root(parent, i), _root(parent, row_of[ids[y, x]])
+                        a, b = root(parent, i), root(parent, row_of[ids[y, x]])
                         parent[max(a, b)] = min(a, b)
     number = 0
     for i in range(len(id)):
         blob[i] = -1
     for i in range(len(id)):
         if count[i] > 0:
-            r = _root(parent, i)
+            r = root(parent, i)
             if r == i:
                 blob[r] = number
                 number += 1

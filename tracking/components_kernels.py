@@ -12,6 +12,7 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
+from sim.trees_kernels import root
 from sim.types import Array, Bools, Ints
 from tracking.ellipsoids_kernels import overlap
 
@@ -71,15 +72,6 @@ def _find(place: Ints, first: Ints, count: int, x: int, y: int) -> int:
     if low < count and place[first[low], 0] == x and place[first[low], 1] == y:
         return low
     return -1
-
-
-@njit(cache=True)
-def root(parent: Ints, k: int) -> int:
-    """The first point of k's component; halves the way there."""
-    while parent[k] != k:
-        parent[k] = parent[parent[k]]
-        k = parent[k]
-    return k
 
 
 @njit(cache=True)

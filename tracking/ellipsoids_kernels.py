@@ -26,7 +26,7 @@ def overlap(dx: float, dy: float, axx: float, axy: float, ayy: float, bxx: float
     l11 = sqrt(bxx)  # B = L L'
     l21 = bxy / l11
     l22 = sqrt(byy - l21 * l21)
-    u, v = dx / l11, 0.0
+    u = dx / l11
     v = (dy - l21 * u) / l22
     cxx = axx / (l11 * l11)  # C = L^-1 A L^-T
     cxy = (axy / l11 - l21 * cxx) / l22

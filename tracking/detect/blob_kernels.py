@@ -10,6 +10,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from sim.trees_kernels import root
 from sim.types import Array, Bools, Ints
 
 Labels = NDArray[np.int32]
@@ -37,15 +38,6 @@ def runs(mask: Bools) -> Labels:
                 found[n, 0], found[n, 1], found[n, 2] = row, first - row * wide, at - row * wide
                 n += 1
     return found[:n].copy()
-
-
-@njit(cache=True)
-def root(parent: Ints, k: int) -> int:
-    """The first run of k's region as far as it is known; halves the way there."""
-    while parent[k] != k:
-        parent[k] = parent[parent[k]]
-        k = parent[k]
-    return k
 
 
 @njit(cache=True)
