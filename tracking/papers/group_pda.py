@@ -140,7 +140,7 @@ class GroupPda:
         if self.pixels is not None:
             p, scale = self.pixels, self.context.px_per_m
             steep = steepness(self.context.camera)
-            self.rules = make_rules(self.config, self.context.fps, scale, p.spread, p.step, steep)
+            self.rules = make_rules(self.config, self.context.fps, scale, p.spread, steep)
             return self.rules
         scale = self.context.px_per_m if self.plane == "image" else 1.0
         _check_scale(scale)

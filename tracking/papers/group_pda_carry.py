@@ -63,7 +63,7 @@ def with_carried(claims: Claims, bank: Bank, rules: Rules, t: float) -> Claims:
 def carried(bank: Bank, points: Array, rules: Rules, t: float) -> tuple[Array, Ints, Array]:
     """Members who are not measured: places (K, 2), group (K,) a row of the bank, when they were measured last (K,)."""
     c, kept = rules.config, []
-    if c.carry_time > 0 and not rules.half_cell:
+    if c.carry_time > 0 and not rules.pixels:
         for row, (y, seen, known) in enumerate(bank.places):
             late = known & (t - seen <= c.carry_time + 1e-9)
             if late.any():
@@ -71,11 +71,11 @@ def carried(bank: Bank, points: Array, rules: Rules, t: float) -> tuple[Array, I
     if not kept:
         return np.zeros((0, 2)), np.zeros(0, np.int64), np.zeros(0)
     place, row_of, seen = (np.concatenate(part) for part in zip(*kept, strict=True))
-    missed = ~_near(place, points, rules.scale * c.carry_reach)
+    missed = ~near(place, points, rules.scale * c.carry_reach)
     return place[missed], row_of[missed], seen[missed]
 
 
-def _near(place: Array, points: Array, reach: float) -> Bools:
+def near(place: Array, points: Array, reach: float) -> Bools:
     """(K,) whether one of the points (M, 2) is no further than reach from each place (K, 2)."""
     if len(place) * len(points) < SMALL:
         return np.asarray((np.square(place[:, None] - points).sum(2) <= reach**2).any(1))
@@ -99,8 +99,8 @@ def remember(bank: Bank, claims: Claims, chosen: Bools, rules: Rules, t: float) 
         mine, when = claims.points[chosen[row]], claims.seen[chosen[row]]
         bank.past[row] = [*(p for p in bank.past[row] if p[0] > t - PAST), (t, thinned(mine))]
         place = mine - bank.x[row, :2]
-        if not rules.half_cell:
-            bank.places[row] = (place, when, _near(place, bank.places[row][0], rules.scale * rules.config.carry_reach))
+        if not rules.pixels:
+            bank.places[row] = (place, when, near(place, bank.places[row][0], rules.scale * rules.config.carry_reach))
             continue
         place = _hull(place) if len(place) >= OUTLINE else place
         bank.places[row] = (place, np.full(len(place), t), np.ones(len(place), bool))

@@ -12,7 +12,7 @@ import numpy as np
 from sim.types import Array, Bools, Ints
 from tracking.components import linked, partition
 from tracking.papers.group_pda_bank import UNNAMED, Bank, children, newborn
-from tracking.papers.group_pda_carry import thinned
+from tracking.papers.group_pda_carry import near, thinned
 from tracking.papers.group_pda_merging import Change
 from tracking.papers.group_pda_onset import parting
 from tracking.papers.group_pda_rules import Rules
@@ -44,11 +44,12 @@ def attached(points: Array, d2: Array, bank: Bank, rules: Rules) -> Ints:
             continue
         apart = np.square(points[mine][:, None] - points[theirs]).sum(2)
         own[mine] = claim[apart.argmin(1)]
-    if not rules.half_cell:
-        for k in np.flatnonzero((own >= 0) & bank.named[own]).tolist():
-            place = bank.places[own[k]][0] + bank.x[own[k], :2]
-            if np.square(place - points[k]).sum(1).min() > _reach(rules) ** 2:
-                own[k] = -1
+    if not rules.pixels:
+        for row in np.unique(own[own >= 0]).tolist():
+            mine = np.flatnonzero(own == row)
+            if bank.named[row]:
+                place = bank.places[row][0] + bank.x[row, :2]
+                own[mine[~near(points[mine], place, _reach(rules))]] = -1
     return own
 
 

@@ -14,6 +14,7 @@ from sim.geometry import hull_gap
 from sim.types import Array, Bools, Ints
 from tracking.ellipsoids import overlaps
 from tracking.papers.group_pda_bank import UNNAMED, Bank, merged
+from tracking.papers.group_pda_carry import near
 from tracking.papers.group_pda_onset import REACH, Encounter
 from tracking.papers.group_pda_rules import Rules
 
@@ -84,13 +85,13 @@ class Merging:
 def _near(bank: Bank, rows: Ints, rules: Rules) -> Iterator[tuple[tuple[int, int], bool, Array, Array, float]]:
     """R_x: ids of each two groups whose search regions overlap, whether their velocities differ by no more than
     allowed, the difference of their centroids on the ground, the middle between them, the nearest people's distance."""
-    near = overlaps(bank.x[rows, :2], bank.extent[rows], MARGIN * rules.config.gate)
-    near |= _touching(bank, rows, rules)
+    close = overlaps(bank.x[rows, :2], bank.extent[rows], MARGIN * rules.config.gate)
+    close |= _touching(bank, rows, rules)
     v = bank.x[rows, 2:] * rules.ground
     var = np.einsum("gaa,a->g", bank.P[rows, 2:, 2:], np.square(rules.ground)) / 2
     most = rules.config.merge_velocity + rules.config.merge_doubt * np.sqrt(var[:, None] + var)
     slow = np.hypot(*(v[:, None] - v[None]).transpose(2, 0, 1)) <= most
-    for i, j in np.argwhere(np.triu(near, 1)).tolist():
+    for i, j in np.argwhere(np.triu(close, 1)).tolist():
         if DOUBLE * (bank.size[rows[i]] + bank.size[rows[j]]) > bank.own[rows[i]] + bank.own[rows[j]]:
             continue
         i, j = sorted((i, j), key=lambda k: bank.id[rows[k]])
@@ -118,11 +119,11 @@ def _touching(bank: Bank, rows: Ints, rules: Rules) -> Bools:
     low, high = (np.array([f(p, axis=0) for p in place]).reshape(-1, 2) for f in (np.min, np.max))
     gap = np.maximum(low[:, None] - high, low - high[:, None]).max(2, initial=-np.inf)
     for i, j in np.argwhere(np.triu(gap <= rules.constraint.link, 1)).tolist():
-        if rules.half_cell:
+        if rules.pixels:
             d = hull_gap(place[i], place[j]) if min(len(place[i]), len(place[j])) > 2 else gap[i, j]
+            found[i, j] = found[j, i] = d <= rules.constraint.link
         else:
-            d = np.sqrt(np.square(place[i][:, None] - place[j]).sum(2).min())
-        found[i, j] = found[j, i] = d <= rules.constraint.link
+            found[i, j] = found[j, i] = near(place[i], place[j], rules.constraint.link).any()
     return found
 
 

@@ -18,7 +18,7 @@ COLOURS = 64
 @dataclass(frozen=True)
 class Rules:
     """dt, s; scale: units of the plane per metre; constraint: of G_y; numbers: `rules` of the kernels; F, Q (4, 4) of
-    (2.3); noise: standard deviation of one person's measured place; half_cell: of the grid of pixels, 0 for points;
+    (2.3); noise: standard deviation of one person's measured place; pixels: are the points foreground's, not people;
     body (2, 2): covariance of one person's points; all but dt in the plane's unit. ground (2,): metres on the ground
     per unit along x and y. colours: that groups are told apart by, 0 if they are not."""
 
@@ -30,16 +30,16 @@ class Rules:
     numbers: Array
     F: Array
     Q: Array
-    half_cell: float
+    pixels: bool
     ground: Array
     body: Array
     colours: int
 
 
 def make_rules(
-    config: GroupPdaConfig, fps: float, scale: float, person: Array | None = None, step: float = 0.0, steep: float = 1.0
+    config: GroupPdaConfig, fps: float, scale: float, person: Array | None = None, steep: float = 1.0
 ) -> Rules:
-    """person (2, 2): covariance of one person's pixels, px^2, and step: that of their grid, px; None: from points.
+    """person (2, 2): covariance of one person's pixels, px^2; None: from points.
     steep: sine of the camera's tilt, by which depth is foreshortened."""
     c, dt, pixels = config, 1 / fps, person is not None
     noise = scale * (c.pixel_noise if pixels else c.point_noise)
@@ -77,7 +77,7 @@ def make_rules(
         numbers,
         F,
         Q,
-        step / 2,
+        pixels,
         np.array([1, 1 / steep]) / scale,
         np.zeros((2, 2)) if person is None else person,
         COLOURS if pixels and c.appearance > 0 else 0,

@@ -399,7 +399,7 @@ def test_what_split_does_not_merge_in_the_same_frame(pixels: bool) -> None:
     for seed in range(100):
         r = np.random.default_rng(seed)
         person = np.diag([0.05, 0.2]) if pixels else None
-        rules = make_rules(GroupPdaConfig(merge_time=0.0), 10.0, 1.0, person, 0.1 if pixels else 0.0)
+        rules = make_rules(GroupPdaConfig(merge_time=0.0), 10.0, 1.0, person)
         points = r.uniform(0, 9, (int(r.integers(2, 9)), 2))
         if pixels:
             points = np.concatenate([p + r.normal(0, [0.1, 0.3], (40, 2)) for p in points])
