@@ -26,9 +26,9 @@ from sim.sequence import simulate
 from sim.types import Frame, Sequence
 from tracking.detect import blobs
 from tracking.detect.background import Background
+from tracking.detect.person_size import PersonSize
 from tracking.papers import blob_entry
 from tracking.papers.blob_pixels import Pixels
-from tracking.papers.blob_size import PersonSize
 from tracking.protocol import History
 from tracking.run import Prepared, prepare
 

@@ -16,11 +16,9 @@ import numpy as np
 
 from scenarios.errors import FlockscopeError, InputError, WorkError
 from sim.types import Context, DetectionMode, Detections, Frame, Sequence, Tracker, Tracks
-from tracking import protocol
+from tracking import protocol, scale
 from tracking.config import Config
 from tracking.provenance import Speed, describe
-
-PERSON_HEIGHT = 1.7  # m, what the median box of an uncalibrated source stands for
 
 Params = Config | Mapping[str, Any] | str | Path | None
 
@@ -126,7 +124,7 @@ def track(
         if progress is not None:
             progress(frame.index)
     whole = time.perf_counter() - begun
-    px_per_m = _scale(ready.context, made)
+    px_per_m = scale.of_answers(ready.context.px_per_m, getattr(ready.tracker, "px_per_m", None), made)
     answers = with_groups(made, ready.context.fps, px_per_m)
     speed = Speed(len(made) / spent, len(made) / whole) if made else Speed()
     return Run(answers, describe(ready, answers, seed, sensor or {}, px_per_m, speed))
@@ -219,20 +217,12 @@ def _feed(
     return tuple(Frame(k, (k - 1) / sequence.fps, detections=d) for k, d in enumerate(found, 1))
 
 
-def _scale(context: Context, answers: SequenceOf[Tracks]) -> float:
-    """px per metre; where nothing said it before, by the median height of the boxes that were answered."""
-    heights = [t.box[:, 3] for t in answers if t.box is not None and len(t.box)]
-    if np.isfinite(context.px_per_m) or not heights:
-        return context.px_per_m
-    return float(np.nanmedian(np.concatenate(heights))) / PERSON_HEIGHT
-
-
 def grouped(tracks: SequenceOf[Tracks], sequence: Sequence) -> tuple[Tracks, ...]:
     """Stored or a stranger's tracks of a sequence, with groups and events where the tracker left them empty."""
     from tracking.grouping import with_groups
 
-    scale, truth = sequence.px_per_m, None if np.isfinite(sequence.px_per_m) else sequence.truth
-    return with_groups(tracks, sequence.fps, scale if truth is None else truth.px_per_m)
+    truth = None if np.isfinite(sequence.px_per_m) else sequence.truth
+    return with_groups(tracks, sequence.fps, sequence.px_per_m if truth is None else truth.px_per_m)
 
 
 def _px_per_m(sequence: Sequence, mode: DetectionMode, feed: tuple[Frame, ...] | None) -> float:
@@ -243,6 +233,4 @@ def _px_per_m(sequence: Sequence, mode: DetectionMode, feed: tuple[Frame, ...] |
         return float(px_per_m_at_centre(sequence.camera))
     if np.isfinite(sequence.px_per_m) or mode == "image":
         return sequence.px_per_m
-    found = [f.detections for f in (sequence.without_pictures() if feed is None else feed)]
-    heights = [d.box[:, 3] for d in found if d is not None and d.box is not None and len(d.box)]
-    return float(np.median(np.concatenate(heights))) / PERSON_HEIGHT if heights else float("nan")
+    return scale.of_boxes(f.detections for f in (sequence.without_pictures() if feed is None else feed))

@@ -8,7 +8,7 @@ from __future__ import annotations
 import numpy as np
 
 from sim.types import Array, Bools, Detections, Frame, Ints
-from tracking import kalman
+from tracking import kalman, scale
 from tracking.papers import blob_measure
 from tracking.papers.blob_config import BlobConfig
 from tracking.papers.blob_tracks import Population
@@ -32,7 +32,7 @@ class Boxes:
         z, score = self._measurements(detections)
         people = self.people
         if len(z):
-            people.check_scale()
+            scale.needed(people.context.px_per_m)
         people.predict()
         people.look(z)
         rows, columns, free, d2 = self._associate(z, score)

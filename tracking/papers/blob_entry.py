@@ -12,8 +12,8 @@ import numpy as np
 
 from sim.types import Array, Ints
 from tracking.detect import blobs as detect
+from tracking.detect.person_size import SLIM, SMALLEST, PersonSize
 from tracking.papers import blob_entry_kernels as kernels
-from tracking.papers.blob_size import SLIM, SMALLEST, PersonSize
 from tracking.papers.blob_template import ELLIPSE, Mask
 
 LEAST = 0.3  # of a person's area: a smaller region is nobody

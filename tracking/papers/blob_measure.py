@@ -25,14 +25,6 @@ def to_boxes(place: Array) -> Array:
     return box
 
 
-def upright(place: Array, angle: Array) -> Array:
-    """(N, 4) box x, y, h, w round ellipses of centre and axes `place` (N, 4), the first at `angle` (N,) rad."""
-    box, c, s = place.copy(), np.square(np.cos(angle)), np.square(np.sin(angle))
-    first, second = np.square(place[:, 2]), np.square(place[:, 3])
-    box[:, 2], box[:, 3] = np.sqrt(first * s + second * c), np.sqrt(first * c + second * s)
-    return box
-
-
 def lying(box: Array) -> Array:
     """(N, 5) ellipses x, y, h, w, theta inscribed in boxes (N, 4) x, y, h, w: h the longer axis."""
     tall = box[:, 2] >= box[:, 3]

@@ -12,7 +12,7 @@ import numpy as np
 
 from sim.types import Array, Context, Ints
 from tracking import kalman, lifecycle
-from tracking.papers import blob_measure
+from tracking.detect.person_size import upright
 from tracking.papers.blob_config import BlobConfig
 from tracking.papers.blob_tracks import Population
 
@@ -41,7 +41,7 @@ class People(Population):
 
     def uprights(self) -> Array:
         """(N, 4) boxes x, y, h, w round the predicted ellipses."""
-        return blob_measure.upright(self.bank[kalman.PLACE], self.angle[0])
+        return upright(self.bank[kalman.PLACE], self.angle[0])
 
     def keep(self, rows: Ints) -> None:
         """Forget all other tracks."""

@@ -18,22 +18,20 @@ from __future__ import annotations
 import numpy as np
 
 from sim.types import Array, Bools, Context, Detections, Frame, Image, Ints
-from tracking import kalman
+from tracking import kalman, scale
 from tracking.detect import blobs as detect
+from tracking.detect import lone
 from tracking.detect.background import Background
 from tracking.detect.classes import foreground
 from tracking.detect.mog2 import Mog2, Mog2Settings
+from tracking.detect.person_size import PersonSize
 from tracking.papers import blob_entry, blob_measure
 from tracking.papers.blob_config import BlobConfig
 from tracking.papers.blob_people import People
-from tracking.papers.blob_size import PersonSize
 from tracking.papers.blob_template import Mask, painted
 
 SHARED = 0.35  # share of a predicted box in a blob's from which on the blob may be this track's
-LEAST_AREA, LEAST_PIXELS = 0.0125, 12.0  # m^2 at the scale, px^2: smaller blobs are noise
-COARSE = 18.0  # m that an image is high, while no scale is known
 UPRIGHT = 25.0  # deg, standard deviation of the direction of somebody measured by a template, which stands upright
-LOOKED = 25  # frames of the background sample in which lone blobs are looked for
 EXTENT = 0.75, 1.3  # of the expected size, what a template may have
 BLIND = 25.0  # variance of a template's height and width relative to a lone blob's: they are predicted, not seen
 LEAST_SHOWN = 0.2  # a person of whom less shows is measured as if so much did
@@ -47,7 +45,7 @@ class Pixels:
 
         assert context.background is not None
         if not np.isnan(context.px_per_m):
-            people.check_scale()
+            scale.needed(context.px_per_m)
         self.config, self.people, self.context = config, people, context
         self.size = PersonSize(context)
         self.background: Background | Mog2
@@ -57,19 +55,13 @@ class Pixels:
         else:
             self.background = Background(context.background, context.fps, config)
         self.scale = context.px_per_m
-        self._look_at_sample(context.background)
+        lone.learn(self.size, self.background, context.background, self.scale)
+        self._take_scale()
         # d^2 of 4 and 5 degrees of freedom, without and with a direction, at these shares (eq. 10)
         self.gates = chdtri(np.array([4, 5]), 1 - config.gate)
         self.confirm_gates = chdtri(np.array([4, 5]), 1 - config.confirm_gate)
         self.angle_noise = np.radians(config.angle_noise) ** 2
         self.upright = np.inf if self.size.above else np.radians(UPRIGHT) ** 2
-
-    def _look_at_sample(self, sample: Image) -> None:
-        """Learn sizes and scale from the lone blobs of the background sample."""
-        for image in sample[:: max(len(sample) // LOOKED, 1)]:
-            found = self._find(self._foreground(image)[1])
-            self.size.learn(found.box, found.ellipse, ~self._cut(found.box))
-        self._take_scale()
 
     def _take_scale(self) -> None:
         """The learned px per m, where the context has none."""
@@ -82,19 +74,9 @@ class Pixels:
         classes = self.background.classify(image)
         return classes, detect.clean(foreground(classes), self._known_scale())
 
-    def _find(self, mask: Bools) -> detect.Blobs:
-        """The blobs that are no noise (3.3)."""
-        return detect.find(mask, max(LEAST_AREA * self._known_scale() ** 2, LEAST_PIXELS))
-
     def _known_scale(self) -> float:
         """px per m; a guess as long as nobody was seen."""
-        return self.scale if self.scale > 0 else self.background.valid.shape[0] / COARSE
-
-    def _cut(self, box: Array) -> Bools:
-        """Does the image's edge cut these blobs (M, 4)?"""
-        high, wide = self.background.valid.shape
-        right, bottom = box[:, 0] + box[:, 2], box[:, 1] + box[:, 3]
-        return np.asarray((box[:, 0] <= 1) | (box[:, 1] <= 1) | (right >= wide - 1) | (bottom >= high - 1))
+        return lone.or_guess(self.scale, self.background.valid.shape[0])
 
     def step(self, frame: Frame, detections: Detections | None) -> None:
         """Predict; measure by the picture, if it is there and no more of it than possible is foreground; manage."""
@@ -107,13 +89,13 @@ class Pixels:
         if np.count_nonzero(mask) / mask.size > self.config.most_foreground:
             self.background.adapt(frame.image, classes, self._protected())
             return self._unseen(frame.t)
-        found = self._find(mask)
+        found = lone.people(mask, self._known_scale())
         self._measure(frame.t, mask, found)
         self.background.adapt(frame.image, classes, self._protected())
         if len(found):
             places = self.people.uprights()
             alone = self._lone(found, places) if self.size.reliable else ~self._several(found.box, places)
-            alone &= ~self._cut(found.box)
+            alone &= ~lone.cut(found.box, self.background.valid.shape)
             self.size.learn(found.box, found.ellipse, alone)
             self._take_scale()
         return None
@@ -176,7 +158,8 @@ class Pixels:
     def _lone(self, found: detect.Blobs, expected: Array) -> Bools:
         """(M,) blobs of one person's size, whole, in which at most one confirmed track is expected."""
         box = found.box
-        return np.asarray(self.size.one(box, found.ellipse) & ~self._cut(box) & ~self._several(box, expected))
+        whole = ~lone.cut(box, self.background.valid.shape)
+        return np.asarray(self.size.one(box, found.ellipse) & whole & ~self._several(box, expected))
 
     def _boxes(self, upright: Array) -> Array:
         """(N, 4) x, y, h, w: boxes of people whose ellipses have these upright boxes (N, 4)."""

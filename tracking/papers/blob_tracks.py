@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import numpy as np
 
-from scenarios.errors import InputError
 from sim.types import Array, Bools, Context, Ints
 from tracking import assign, kalman, lifecycle
 from tracking.papers import blob_measure
@@ -85,17 +84,6 @@ class Population:
             return np.full(len(place), whole)
         size = np.maximum(place[:, 2], place[:, 3]) / PERSON
         return np.asarray(np.minimum(np.maximum(size, whole / 2), whole * 2))
-
-    def check_scale(self) -> None:
-        """InputError without a scale: noises in metres would mean nothing, and nothing be tracked."""
-        scale = self.context.px_per_m
-        if not scale > 0:
-            raise InputError(
-                place="context.px_per_m",
-                got=f"{scale:g}",
-                expected="px per m at people, above 0",
-                remedy="give it, for instance the median height of boxes / 1.7 m; nan will do with a background sample",
-            )
 
     def pairs(self, cost: Array, gate: float) -> tuple[Ints, Ints]:
         """Tracks and measurements (K,) one to one; cost (N, M): d^2 within gates, the widest `gate`, inf elsewhere."""

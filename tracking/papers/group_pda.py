@@ -38,7 +38,6 @@ from typing import ClassVar
 
 import numpy as np
 
-from scenarios.errors import InputError
 from sim.footprints import Q
 from sim.types import Array, Bools, Context, Detections, Frame, Plane, Tracks
 from tracking.papers import group_pda_changes as changes
@@ -51,6 +50,7 @@ from tracking.papers.group_pda_merging import Change, Merging
 from tracking.papers.group_pda_pixels import Pixels, steepness
 from tracking.papers.group_pda_report import tracks
 from tracking.papers.group_pda_rules import Rules, make_rules
+from tracking.scale import needed
 
 SQUARE = np.array([[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]])
 
@@ -71,15 +71,20 @@ class GroupPda:
         """Forget everything; with a background sample pixels are tracked, else points. `seed` is unused."""
         self.context = context
         self.bank, self.merging, self.names = Bank.empty(), Merging(), changes.Names()
-        if context.background is not None:
-            _check_scale(context.px_per_m)
         self.pixels = None if context.background is None else Pixels(self.config, context)
+        if self.pixels is not None:
+            self.context = context.replace(px_per_m=self.pixels.scale)
         self.rules: Rules | None = None
         flat = context.camera is None and context.px_per_m > 0
         self.plane: Plane = "image" if flat or self.pixels is not None else "ground"
         self.innovation: list[tuple[int, Array, Array]] = []
         self.colour = np.zeros(0, np.int64)
         self.box: Array | None = None
+
+    @property
+    def px_per_m(self) -> float:
+        """Of the image: the context's, or learned from its background sample."""
+        return self.context.px_per_m
 
     def step(self, frame: Frame, detections: Detections | None) -> Tracks:
         """Predict; gate, associate, update, split (Fig. 1); merge; births and deaths."""
@@ -142,8 +147,7 @@ class GroupPda:
             steep = steepness(self.context.camera)
             self.rules = make_rules(self.config, self.context.fps, scale, p.spread, steep)
             return self.rules
-        scale = self.context.px_per_m if self.plane == "image" else 1.0
-        _check_scale(scale)
+        scale = needed(self.context.px_per_m) if self.plane == "image" else 1.0
         steep = steepness(self.context.camera) if self.plane == "image" else 1.0
         self.rules = make_rules(self.config, self.context.fps, scale, steep=steep)
         return self.rules
@@ -210,14 +214,3 @@ class GroupPda:
             change = changes.split(bank, row, points, weights, rules, t, self.names)
             told += [] if change is None else [change]
         return told
-
-
-def _check_scale(px_per_m: float) -> None:
-    """InputError without a scale: all lengths of the config are metres."""
-    if not px_per_m > 0:
-        raise InputError(
-            place="context.px_per_m",
-            got=f"{px_per_m:g}",
-            expected="px per m at people, above 0, to track in the image",
-            remedy="give --px-per-m, or a camera",
-        )

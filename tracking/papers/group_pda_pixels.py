@@ -5,10 +5,12 @@ from __future__ import annotations
 import numpy as np
 
 from sim.types import Array, Bools, Camera, Context, Image
-from tracking.detect import blobs
+from tracking.detect import blobs, lone
 from tracking.detect.background import Background
 from tracking.detect.classes import foreground
+from tracking.detect.person_size import PersonSize
 from tracking.papers.group_pda_config import GroupPdaConfig
+from tracking.scale import needed
 
 PERSON, SLIM = 1.7, 0.3
 """m, and width over height of a person seen from the side: where no camera tells."""
@@ -17,12 +19,14 @@ LEAST_STEEP = 0.2
 
 
 class Pixels:
-    """State: the background model. step: grid step, px; person (2,): width and height of a person in the image, px."""
+    """State: the background model. scale: px per m, the context's or learned from lone blobs of its background sample;
+    step: grid step, px; person (2,): width and height of a person in the image, px."""
 
     def __init__(self, config: GroupPdaConfig, context: Context) -> None:
         assert context.background is not None
-        self.config, self.scale = config, context.px_per_m
+        self.config = config
         self.background = Background(context.background, context.fps, config)
+        self.scale = needed(_learned(self.background, context) if np.isnan(context.px_per_m) else context.px_per_m)
         self.step = max(1, round(config.grid * self.scale))
         self.person = _person(context.camera, self.scale)
 
@@ -64,6 +68,14 @@ def grid_points(mask: Bools, step: int) -> Array:
 def steepness(camera: Camera | None) -> float:
     """Sine of the camera's tilt at the image's middle: how much of a length in depth shows; 1 without a camera."""
     return 1.0 if camera is None else float(max(-camera.rotation[2, 2], LEAST_STEEP))
+
+
+def _learned(background: Background, context: Context) -> float:
+    """px per m by the lone blobs of the background sample; nan where nobody was alone in it."""
+    assert context.background is not None
+    size = PersonSize(context)
+    lone.learn(size, background, context.background, context.px_per_m)
+    return size.px_per_m
 
 
 def _person(camera: Camera | None, scale: float) -> Array:

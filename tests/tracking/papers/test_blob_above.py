@@ -9,8 +9,8 @@ from sim.camera import looking
 from sim.types import Camera, Context, Frame
 from tests import painted
 from tests.painted import overlap
+from tracking.detect.person_size import PersonSize
 from tracking.papers.blob import Blob
-from tracking.papers.blob_size import PersonSize
 
 HIGH, WIDE, FPS = 120, 160, 10.0
 COLOURS = (30, 20, 190), (190, 30, 20), (20, 170, 40)

@@ -276,12 +276,6 @@ def test_the_image_needs_a_scale(first: list[Points]) -> None:
     assert told.value.place == "context.px_per_m"
 
 
-def test_pixels_need_a_scale() -> None:
-    with pytest.raises(InputError) as told:
-        GroupPda().reset(replace(GROUND, background=np.zeros((5, 12, 16, 3), np.uint8)), 0)
-    assert told.value.place == "context.px_per_m"
-
-
 def test_reset_is_a_fresh_start_and_the_input_stays_as_it_is() -> None:
     frames = busy(0)
     kept = [p.copy() for p in frames]

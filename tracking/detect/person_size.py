@@ -1,11 +1,10 @@
-"""How large a person is where: box height and width at every foot point of the image, for `blob` from pixels (ours).
+"""How large a person is where: box height and width at every foot point of the image (ours).
 
 With a camera: the box of an upright person of mean build (1.7 m) standing there, turned either way. Without: learned
 from lone blobs, h = a + b v over the row v of their lower edge, as a pinhole without roll has it: of many lines the one
 on which most heights agree, then least squares of relative errors among those within WIDTH of it (a blob of several
 people, or of a part, is an outlier); widths are a share of it. Votes prefer the slope SLOPE, since blobs of one row say
-nothing about it. A learned size is `reliable` once enough lone blobs
-agree; before that nothing is split and every blob counts as one person, as in the paper.
+nothing about it. A learned size is `reliable` once enough lone blobs agree.
 From straight above everybody is the same ellipse, turned as he walks: measured are a blob's axes, not its box's sides.
 """
 
@@ -14,8 +13,7 @@ from __future__ import annotations
 import numpy as np
 
 from sim.types import Array, Bools, Camera, Context
-from tracking.papers import blob_measure
-from tracking.papers import blob_size_kernels as kernels
+from tracking.detect import person_size_kernels as kernels
 
 PERSON = 1.7  # m
 SLIM = 0.36  # width over height of a walking person's box, the prior of what is learned
@@ -129,7 +127,7 @@ class PersonSize:
         size, foot = size[good], foot[good]
         if not self.above:
             size = size + np.array([EATEN, 0.0])
-            round_ellipse = blob_measure.upright(ellipse[good, :4], ellipse[good, 4])[:, 2:]
+            round_ellipse = upright(ellipse[good, :4], ellipse[good, 4])[:, 2:]
             self.excess = np.concatenate([self.excess, size / round_ellipse])[-KEPT:]
             self.loose = np.median(np.concatenate([self.excess, np.tile(LOOSE, (ENOUGH, 1))]), 0)
         new = np.concatenate([foot, size], 1)
@@ -159,6 +157,14 @@ class PersonSize:
         tall, agreed = _densest(ratio[:, 0], count)
         wide, _ = _densest(ratio[agreed, 1], count[agreed], NARROW)
         self.agreed, self.factor = int(agreed.sum()), np.clip([tall, wide], *FACTORS)
+
+
+def upright(place: Array, angle: Array) -> Array:
+    """(N, 4) box x, y, h, w round ellipses of centre and axes `place` (N, 4), the first at `angle` (N,) rad."""
+    box, c, s = place.copy(), np.square(np.cos(angle)), np.square(np.sin(angle))
+    first, second = np.square(place[:, 2]), np.square(place[:, 3])
+    box[:, 2], box[:, 3] = np.sqrt(first * s + second * c), np.sqrt(first * c + second * s)
+    return box
 
 
 def _feet(box: Array) -> Array:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from tracking.papers.blob_size_kernels import look_up
+from tracking.detect.person_size_kernels import look_up
 
 
 def slow(table, at):

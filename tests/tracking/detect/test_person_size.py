@@ -7,7 +7,7 @@ import pytest
 
 from sim.camera import looking, project
 from sim.types import Camera, Context
-from tracking.papers.blob_size import ENOUGH, SMALLEST, PersonSize
+from tracking.detect.person_size import ENOUGH, SMALLEST, PersonSize
 
 BARE = Context(10.0, float("nan"), image_size=(480, 360))
 

@@ -1,4 +1,4 @@
-"""Kernel of tracking.papers.blob_size: values of a table between its nodes."""
+"""Kernel of tracking.detect.person_size: values of a table between its nodes."""
 
 from __future__ import annotations
 
