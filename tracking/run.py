@@ -58,6 +58,10 @@ class Prepared:
         """The frames as the tracker gets them."""
         return iter(self.sequence) if self.feed is None else iter(self.feed)
 
+    def px_per_m(self, answers: SequenceOf[Tracks]) -> float:
+        """The scale by which groups are derived: what was given, learned, or follows from the boxes answered."""
+        return scale.of_answers(self.context.px_per_m, getattr(self.tracker, "px_per_m", None), answers)
+
     def reset(self, seed: int) -> None:
         """Reset the tracker for this sequence."""
         self.history.forget()
@@ -124,7 +128,7 @@ def track(
         if progress is not None:
             progress(frame.index)
     whole = time.perf_counter() - begun
-    px_per_m = scale.of_answers(ready.context.px_per_m, getattr(ready.tracker, "px_per_m", None), made)
+    px_per_m = ready.px_per_m(made)
     answers = with_groups(made, ready.context.fps, px_per_m)
     speed = Speed(len(made) / spent, len(made) / whole) if made else Speed()
     return Run(answers, describe(ready, answers, seed, sensor or {}, px_per_m, speed))
