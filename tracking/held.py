@@ -1,0 +1,139 @@
+"""What is kept between episodes on the same sources: motions, truths, detections; bounded by bytes."""
+
+from __future__ import annotations
+
+from collections import OrderedDict
+from collections.abc import Iterator
+from dataclasses import fields, is_dataclass, replace
+from functools import cached_property
+from types import FunctionType, MethodType
+from typing import Any
+
+import numpy as np
+
+from scenarios.errors import InputError
+from sim.types import Frame, Image, Truth
+from tracking.source import Source
+
+LIMIT = 256 * 2**20
+
+
+class Held:
+    """A source that was opened. State: its sequence, detections in memory; truth and background once asked for."""
+
+    def __init__(self, source: Source, streams: tuple[str, ...] = ()) -> None:
+        self.source = source
+        opened = source.open(streams)
+        self._bare: tuple[Frame, ...] | None = None
+        self._opened = opened
+        self.sequence = replace(opened, bare=self._without_pictures)
+        if not opened.has_images and not opened.has_right:
+            self.sequence = replace(self.sequence, frames=self._without_pictures)
+        if opened.load_background is not None:
+            self.sequence = replace(self.sequence, load_background=self._background)
+
+    def _without_pictures(self) -> Iterator[Frame]:
+        if self._bare is None:
+            self._bare = tuple(self._opened.without_pictures())
+        return iter(self._bare)
+
+    @cached_property
+    def _sample(self) -> Image | None:
+        return self._opened.background()
+
+    def _background(self) -> Image:
+        found = self._sample
+        assert found is not None, "the sequence has a background"
+        return found
+
+    @cached_property
+    def truth(self) -> Truth:
+        """What is true; InputError where nothing is labelled."""
+        truth = self._opened.truth
+        if truth is None:
+            remedy = "give a sequence with labels: there is nothing to score by"
+            raise InputError(file=self.source.name, got="no labels", expected="a truth", remedy=remedy)
+        return truth
+
+
+class Cache:
+    """Opened sources, the least recently used dropped first. State: those held, and their bytes.
+
+    limit: bytes of arrays that all together may hold; the one in use is held whatever its size. Bytes are counted when
+    another source is asked for: by then it is known what the last one came to hold.
+    """
+
+    def __init__(self, limit: int = LIMIT) -> None:
+        if limit < 0:
+            raise InputError(place="cache", got=limit, expected="bytes, 0 or more", remedy="correct it")
+        self.limit = limit
+        self._held: OrderedDict[tuple[object, ...], Held] = OrderedDict()
+        self._bytes: dict[tuple[object, ...], int] = {}
+
+    def __len__(self) -> int:
+        return len(self._held)
+
+    @property
+    def bytes(self) -> int:
+        """Bytes of the arrays held."""
+        self._count_last()
+        return sum(self._bytes.values())
+
+    def hold(self, source: Source, streams: tuple[str, ...] = ()) -> Held:
+        """The source, opened now or before with these pictures."""
+        key = (*source.key, streams)
+        if self._held and next(reversed(self._held)) == key:
+            return self._held[key]
+        self._count_last()
+        if key in self._held:
+            self._held.move_to_end(key)
+            return self._held[key]
+        self._make_room()
+        self._held[key] = Held(source, streams)
+        return self._held[key]
+
+    def _count_last(self) -> None:
+        if self._held:
+            key = next(reversed(self._held))
+            self._bytes[key] = array_bytes(self._held[key])
+
+    def _make_room(self) -> None:
+        while self._held and sum(self._bytes.values()) > self.limit:
+            key, _ = self._held.popitem(last=False)
+            self._bytes.pop(key, None)
+
+
+def array_bytes(thing: object) -> int:
+    """Bytes of all arrays that can be reached from here, each counted once."""
+    arrays: dict[int, int] = {}
+    seen: set[int] = set()
+    waiting: list[Any] = [thing]
+    while waiting:
+        one = waiting.pop()
+        if id(one) in seen:
+            continue
+        seen.add(id(one))
+        if isinstance(one, np.ndarray):
+            while isinstance(one.base, np.ndarray):
+                one = one.base
+            arrays[id(one)] = one.nbytes
+        else:
+            waiting.extend(_parts(one))
+    return sum(arrays.values())
+
+
+def _parts(one: Any) -> list[Any]:
+    """What a container, one of our objects, or a function with what it closes over, leads to."""
+    if isinstance(one, tuple | list):
+        return list(one)
+    if isinstance(one, dict):
+        return list(one.values())
+    if isinstance(one, MethodType):
+        return [one.__self__]
+    if isinstance(one, FunctionType) or hasattr(one, "__wrapped__"):
+        cells = getattr(one, "__closure__", None) or ()
+        return [*(c.cell_contents for c in cells), getattr(one, "__wrapped__", None)]
+    if type(one).__module__.split(".")[0] not in ("sim", "tracking"):
+        return []
+    named = [getattr(one, f.name) for f in fields(one)] if is_dataclass(one) and not isinstance(one, type) else []
+    return [*named, *getattr(one, "__dict__", {}).values()]
