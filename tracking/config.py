@@ -28,6 +28,8 @@ class Param:
     """One declared parameter: default, unit, meaning, and low..high or choices.
 
     before: of a parameter younger than the frozen first defaults, the value that leaves a tracker as it was without it.
+    sees: "pixels" or "points" of one that says something only where the tracker is given these; a search over other
+    detections leaves it alone.
     """
 
     name: str
@@ -41,6 +43,7 @@ class Param:
     online: bool = True
     tunable: bool = True
     before: Value | None = None
+    sees: str = ""
 
     @property
     def expected(self) -> str:
@@ -84,11 +87,12 @@ def param(
     online: bool = True,
     tunable: bool = True,
     before: Value | None = None,
+    sees: Literal["", "pixels", "points"] = "",
 ) -> Any:
     """A dataclass field that is a parameter; `values` is (low, high), or the choices of a categorical one."""
     ends = {"choices": values} if scale == "categorical" else {"low": values[0], "high": values[1]}
     spec = {"default": default, "unit": unit, "meaning": meaning, "scale": scale, **ends}
-    spec |= {"online": online, "tunable": tunable, "before": before}
+    spec |= {"online": online, "tunable": tunable, "before": before, "sees": sees}
     return dataclasses.field(default=default, metadata={"param": spec})
 
 

@@ -16,18 +16,37 @@ class BackgroundSettings(Config):
     tracker: ClassVar[str] = "background"
 
     detection_rate: float = param(
-        0.9995, (0.9, 0.999999), "probability", "share of background pixels inside each threshold, by training", "log"
+        0.9995,
+        (0.9, 0.999999),
+        "probability",
+        "share of background pixels inside each threshold, by training",
+        "log",
+        sees="pixels",
     )
-    dark: float = param(0.5, (0.0, 1.0), "", "brightness, relative, below which a pixel is dark foreground, no shadow")
+    dark: float = param(
+        0.5, (0.0, 1.0), "", "brightness, relative, below which a pixel is dark foreground, no shadow", sees="pixels"
+    )
     bright: float = param(
-        1.3, (1.0, 100.0), "", "brightness, relative, above which a pixel is foreground, no highlight (ours)", "log"
+        1.3,
+        (1.0, 100.0),
+        "",
+        "brightness, relative, above which a pixel is foreground, no highlight (ours)",
+        "log",
+        sees="pixels",
     )
-    background_time: float = param(20.0, (1.0, 1e6), "s", "time constant of adaptation where background is seen", "log")
+    background_time: float = param(
+        20.0, (1.0, 1e6), "s", "time constant of adaptation where background is seen", "log", sees="pixels"
+    )
     foreground_time: float = param(
-        200.0, (1.0, 1e9), "s", "the same where it is not, outside protected places (ours)", "log"
+        200.0, (1.0, 1e9), "s", "the same where it is not, outside protected places (ours)", "log", sees="pixels"
     )
     gain: str = param(
-        "global", ("global", "none"), "", "follow the brightness of the whole frame per channel (ours)", "categorical"
+        "global",
+        ("global", "none"),
+        "",
+        "follow the brightness of the whole frame per channel (ours)",
+        "categorical",
+        sees="pixels",
     )
 
     def check(self) -> None:

@@ -74,6 +74,7 @@ class BlobConfig(BackgroundSettings):
         "categorical",
         online=False,
         before="horprasert",
+        sees="pixels",
     )
     split: bool = param(
         True,
@@ -82,6 +83,7 @@ class BlobConfig(BackgroundSettings):
         "from pixels: people who share a blob are told apart (ours)",
         "categorical",
         before=True,
+        sees="pixels",
     )
     evidence: float = param(
         10.0,
@@ -90,12 +92,18 @@ class BlobConfig(BackgroundSettings):
         "what a wholly seen template is worth beside its distance (ours)",
         "log",
         before=10.0,
+        sees="pixels",
     )
     track_support: float = param(
-        0.3, (0.02, 0.8), "share", "foreground in what no other covers of a confirmed track measured (ours)", before=0.3
+        0.3,
+        (0.02, 0.8),
+        "share",
+        "foreground in what no other covers of a confirmed track measured (ours)",
+        before=0.3,
+        sees="pixels",
     )
     entry_support: float = param(
-        0.5, (0.1, 0.9), "share", "support from which on a template is somebody new (ours)", before=0.5
+        0.5, (0.1, 0.9), "share", "support from which on a template is somebody new (ours)", before=0.5, sees="pixels"
     )
     person_noise: float = param(
         0.15,
@@ -104,6 +112,7 @@ class BlobConfig(BackgroundSettings):
         "how far people's axes are from those expected at their place (ours)",
         "log",
         before=0.15,
+        sees="pixels",
     )
     angle_noise: float = param(
         8.0,
@@ -112,12 +121,24 @@ class BlobConfig(BackgroundSettings):
         "standard deviation of a measured direction, beside the moments' own",
         "log",
         before=8.0,
+        sees="pixels",
     )
     angle_rate: float = param(
-        15.0, (0.5, 180.0), "deg/s^0.5", "random walk of the direction, per root second", "log", before=15.0
+        15.0,
+        (0.5, 180.0),
+        "deg/s^0.5",
+        "random walk of the direction, per root second",
+        "log",
+        before=15.0,
+        sees="pixels",
     )
     most_foreground: float = param(
-        0.6, (0.05, 1.0), "share", "a frame with more foreground tells nothing: lights, camera (ours)", before=0.6
+        0.6,
+        (0.05, 1.0),
+        "share",
+        "a frame with more foreground tells nothing: lights, camera (ours)",
+        before=0.6,
+        sees="pixels",
     )
 
     def dynamics(self, fps: float) -> Dynamics:

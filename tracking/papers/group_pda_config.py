@@ -17,7 +17,11 @@ class GroupPdaConfig(BackgroundSettings):
 
     gate: float = param(9.21, (6.0, 20.0), "", "gamma: squared Mahalanobis radius of the search region (2.2)")
     radius: float = param(
-        0.75, (0.1, 2.0), "m", "from points: r of a point's region, those within 2 r are linked (R_0, 3.3)"
+        0.75,
+        (0.1, 2.0),
+        "m",
+        "from points: r of a point's region, those within 2 r are linked (R_0, 3.3)",
+        sees="points",
     )
     person_spread: float = param(
         0.3,
@@ -25,6 +29,7 @@ class GroupPdaConfig(BackgroundSettings):
         "m",
         "from points: standard deviation that the extent of few people is shrunk to (ours)",
         "log",
+        sees="points",
     )
     spread_weight: float = param(3.0, (0.1, 20.0), "people", "how many people that extent counts for (ours)", "log")
     accel_noise: float = param(
@@ -36,6 +41,7 @@ class GroupPdaConfig(BackgroundSettings):
         "m",
         "from points: standard deviation of one person's measured place, sensor and gait",
         "log",
+        sees="points",
     )
     speed_prior: float = param(1.3, (0.1, 5.0), "m/s", "standard deviation of a newborn's velocity", "log")
     extent_time: float = param(1.0, (0.05, 20.0), "s", "time constant of the extent, alpha_s of (2.4)", "log")
@@ -43,7 +49,11 @@ class GroupPdaConfig(BackgroundSettings):
     count_noise: float = param(0.5, (0.05, 5.0), "people", "sigma_n of m_N: part that does not grow with N", "log")
     count_share: float = param(0.15, (0.01, 1.0), "share", "sigma_n of m_N: part that grows with N (ours)", "log")
     detect_prob: float = param(
-        0.95, (0.3, 1.0), "probability", "from points: that a member is measured; he is carried after that"
+        0.95,
+        (0.3, 1.0),
+        "probability",
+        "from points: that a member is measured; he is carried after that",
+        sees="points",
     )
     miss_prob: float = param(0.02, (0.0, 0.5), "probability", "of the miss hypothesis before any measurement (ours)")
 
@@ -74,7 +84,12 @@ class GroupPdaConfig(BackgroundSettings):
     )
 
     appearance: float = param(
-        0.0, (0.0, 5.0), "", "from pixels: weight of colours among the masses (6, future work; ours)", before=0.0
+        0.0,
+        (0.0, 5.0),
+        "",
+        "from pixels: weight of colours among the masses (6, future work; ours)",
+        before=0.0,
+        sees="pixels",
     )
 
     merge_velocity: float = param(
@@ -116,18 +131,40 @@ class GroupPdaConfig(BackgroundSettings):
     )
     report_coast: float = param(0.5, (0.0, 5.0), "s", "for so long after its last measurement a group is told (ours)")
     carry_time: float = param(
-        0.5, (0.0, 3.0), "s", "from points: a member not measured is carried along for so long (ours)", before=0.0
+        0.5,
+        (0.0, 3.0),
+        "s",
+        "from points: a member not measured is carried along for so long (ours)",
+        before=0.0,
+        sees="points",
     )
     carry_reach: float = param(
-        0.4, (0.05, 2.0), "m", "from points: a member is measured if a point is so near his place (ours)", before=0.4
+        0.4,
+        (0.05, 2.0),
+        "m",
+        "from points: a member is measured if a point is so near his place (ours)",
+        before=0.4,
+        sees="points",
     )
 
-    grid: float = param(0.1, (0.02, 1.0), "m", "from pixels: step of the grid of foreground points", "log")
-    pixel_radius: float = param(0.55, (0.05, 2.0), "m", "from pixels: r of a point's region")
-    pixel_noise: float = param(0.12, (0.005, 1.0), "m", "from pixels: jitter of one silhouette's centroid", "log")
+    grid: float = param(
+        0.1, (0.02, 1.0), "m", "from pixels: step of the grid of foreground points", "log", sees="pixels"
+    )
+    pixel_radius: float = param(0.55, (0.05, 2.0), "m", "from pixels: r of a point's region", sees="pixels")
+    pixel_noise: float = param(
+        0.12, (0.005, 1.0), "m", "from pixels: jitter of one silhouette's centroid", "log", sees="pixels"
+    )
     least_people: float = param(
-        0.25, (0.0, 2.0), "people", "from pixels: components of less foreground are noise (bounds the work, ours)"
+        0.25,
+        (0.0, 2.0),
+        "people",
+        "from pixels: components of less foreground are noise (bounds the work, ours)",
+        sees="pixels",
     )
     most_foreground: float = param(
-        0.6, (0.05, 1.0), "share", "from pixels: a frame with more foreground tells nothing: lights, camera (ours)"
+        0.6,
+        (0.05, 1.0),
+        "share",
+        "from pixels: a frame with more foreground tells nothing: lights, camera (ours)",
+        sees="pixels",
     )
