@@ -1,73 +1,147 @@
-"""Processes of one thread each that begin fresh, obey Ctrl-C through their parent, and end when it does."""
+"""Who does the work: this process, spawned processes of one thread each, or the workers of a cluster; one call for all.
+
+The work of a worker that dies is done again, so a function should find what it has done before, or do it anew.
+"""
 
 from __future__ import annotations
 
 import os
-import signal
-import threading
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
-from typing import Any, TypeVar
+from collections.abc import Callable, Iterable, Iterator
+from contextlib import AbstractContextManager, contextmanager
+from dataclasses import dataclass
+from typing import Any, Generic, Protocol, TypeVar
 
-from scenarios.errors import WorkError
+from scenarios.errors import InputError, WorkError
+from sim.hand import Hand
 
 THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS", "OPENCV_FOR_THREADS_NUM")
+TRIES = 3  # workers that an item may cost
 T = TypeVar("T")
 R = TypeVar("R")
-Run = Callable[[Callable[[T], R], list[T]], Iterator[tuple[T, R]]]
+
+
+class Run(Protocol):
+    """Pairs (item, result) as they come, in any order.
+
+    Items are taken from their iterable when there is somebody to do them, and `ahead` more where that helps: a
+    generator of items sees the results so far. The function is pickled by its name; an exception of it ends all and is
+    raised here. An item that costs TRIES workers their life is a WorkError, or has the result that lost(item, error)
+    gives.
+    """
+
+    def __call__(
+        self,
+        function: Callable[[T], R],
+        items: Iterable[T],
+        *,
+        ahead: int = 0,
+        lost: Callable[[T, WorkError], R] | None = None,
+    ) -> Iterator[tuple[T, R]]:
+        """Do function(item) of all items."""
+
+
+def crew(workers: int = 1, cluster: str | None = None) -> AbstractContextManager[Run]:
+    """The run of this process (one worker), of so many processes, or of the cluster whose scheduler has that address.
+
+    On a cluster as many items are under way as it has workers, `workers` at least.
+    """
+    if workers < 1:
+        raise InputError(place="workers", got=workers, expected="1 or more", remedy="correct --workers")
+    if cluster is not None:
+        from sim.cluster import connected
+
+        return connected(cluster, workers)
+    return pool(workers) if workers > 1 else alone()
 
 
 @contextmanager
-def pool(workers: int) -> Iterator[Run[Any, Any]]:
-    """run(function, items): pairs (item, result) as they come, by spawned processes; an error ends all at once."""
-    from concurrent.futures import ProcessPoolExecutor, as_completed
-    from concurrent.futures.process import BrokenProcessPool
-    from multiprocessing import get_context
+def alone() -> Iterator[Run]:
+    """The run of this process."""
 
-    executor = ProcessPoolExecutor(workers, get_context("spawn"), _start)
+    def run(
+        function: Callable[[T], R], items: Iterable[T], *, ahead: int = 0, lost: Any = None
+    ) -> Iterator[tuple[T, R]]:
+        for item in items:
+            yield item, function(item)
+
+    yield run
+
+
+@contextmanager
+def pool(workers: int) -> Iterator[Run]:
+    """The run of so many spawned processes, which end with the block, whatever they are at."""
     before = {name: os.environ.get(name) for name in THREADS}
     os.environ.update(dict.fromkeys(THREADS, "1"))
+    hands = [Hand() for _ in range(workers)]
 
-    def run(function: Callable[[Any], Any], items: list[Any]) -> Iterator[tuple[Any, Any]]:
-        futures = {executor.submit(function, item): item for item in items}
-        for future in as_completed(futures):
-            try:
-                yield futures[future], future.result()
-            except BrokenProcessPool:
-                raise WorkError(
-                    got="a worker that died",
-                    expected="workers that finish",
-                    remedy="run again, perhaps with fewer workers",
-                ) from None
+    def run(
+        function: Callable[[T], R],
+        items: Iterable[T],
+        *,
+        ahead: int = 0,
+        lost: Callable[[T, WorkError], R] | None = None,
+    ) -> Iterator[tuple[T, R]]:
+        return _shared_out(hands, function, items, lost)
 
     try:
         yield run
-    except BaseException:
-        _end(executor)
-        raise
     finally:
-        executor.shutdown(wait=True, cancel_futures=True)
+        for hand in hands:
+            hand.end()
+        for hand in hands:
+            hand.join()
         for name, value in before.items():
             os.environ.pop(name, None) if value is None else os.environ.update({name: value})
 
 
-def _end(executor: Any) -> None:
-    """Do not wait for work nobody wants any more."""
-    for process in list((executor._processes or {}).values()):
-        process.terminate()
+@dataclass
+class _Task(Generic[T]):
+    """An item and how many workers it has cost."""
+
+    item: T
+    deaths: int = 0
 
 
-def _start() -> None:
-    """In each worker: leave Ctrl-C to the parent, and do not outlive it."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
-    threading.Thread(target=_follow_parent, daemon=True).start()
-
-
-def _follow_parent() -> None:
-    from multiprocessing import parent_process
+def _shared_out(
+    hands: list[Hand], function: Callable[[T], R], items: Iterable[T], lost: Callable[[T, WorkError], R] | None
+) -> Iterator[tuple[T, R]]:
+    """One item at a time to each hand, so that a death is about that item alone."""
     from multiprocessing.connection import wait
 
-    parent = parent_process()
-    if parent is not None:
-        wait([parent.sentinel])
-        os._exit(1)
+    coming, again, idle = map(_Task, items), list[_Task[T]](), list(hands)
+    busy: dict[Any, tuple[Hand, _Task[T]]] = {}
+    since = 0  # deaths since a hand has answered
+    try:
+        while True:
+            while idle and (task := again.pop() if again else next(coming, None)) is not None:
+                hand = idle.pop()
+                busy[hand.begin(function, task.item)] = hand, task
+            if not busy:
+                return
+            hand, task = busy.pop(wait(list(busy))[0])
+            idle.append(hand)
+            answer = hand.answer()
+            if answer is not None:
+                since = 0
+                yield task.item, answer.result()
+                continue
+            task.deaths, since = task.deaths + 1, since + 1
+            if task.deaths < TRIES:
+                again.append(task)
+            elif lost is None or since > TRIES * (len(hands) + 1):
+                raise died(TRIES, hand.ended)
+            else:
+                yield task.item, lost(task.item, died(TRIES, hand.ended))
+    finally:
+        for hand, _ in busy.values():
+            hand.end()
+            hand.join()
+
+
+def died(workers: int, how: str) -> WorkError:
+    """The error of an item that has cost so many workers."""
+    return WorkError(
+        got=f"{workers} workers that died at it, the last by {how}",
+        expected="workers that finish",
+        remedy="run again, with fewer workers if memory is short",
+    )

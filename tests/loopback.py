@@ -1,0 +1,72 @@
+"""A dask cluster of separate processes on loopback: a scheduler, and workers that can be killed one by one."""
+
+from __future__ import annotations
+
+import os
+import socket
+import subprocess
+import sys
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+ROOT = Path(__file__).resolve().parents[1]
+PATIENCE = 60.0  # s until a process must listen
+
+
+class Loopback:
+    """State: the processes; `workers` in the order of their start."""
+
+    def __init__(self, folder: Path) -> None:
+        self._folder = folder
+        self.workers: list[subprocess.Popen[bytes]] = []
+        with socket.socket() as free:
+            free.bind(("127.0.0.1", 0))
+            port = free.getsockname()[1]
+        self.address = f"tcp://127.0.0.1:{port}"
+        words = ["--host", "127.0.0.1", "--port", str(port), "--no-dashboard"]
+        self.scheduler = self._start("scheduler", words)
+        self._wait(port)
+
+    def add_worker(self, *words: str, path: str = str(ROOT), **env: str) -> subprocess.Popen[bytes]:
+        """One more worker, of one thread, which nobody starts again; path: where it finds our packages."""
+        name = f"worker-{len(self.workers)}"
+        words = (self.address, "--name", name, "--nthreads", "1", "--no-nanny", "--no-dashboard", *words)
+        self.workers.append(self._start("worker", ["--host", "127.0.0.1", *words], PYTHONPATH=path, **env))
+        return self.workers[-1]
+
+    def end(self) -> None:
+        """End all processes."""
+        for process in [*self.workers, self.scheduler]:
+            process.kill()
+            process.wait()
+
+    def _start(self, what: str, words: list[str], **env: str) -> subprocess.Popen[bytes]:
+        threads = dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS"), "1")
+        with (self._folder / f"{what}-{len(self.workers)}.log").open("wb") as log:
+            return subprocess.Popen(
+                [sys.executable, "-m", f"distributed.cli.dask_{what}", *words],
+                env={**os.environ, **threads, **env}, stdout=log, stderr=log, cwd=self._folder,
+            )  # fmt: skip
+
+    def _wait(self, port: int) -> None:
+        end = time.monotonic() + PATIENCE
+        while time.monotonic() < end and self.scheduler.poll() is None:
+            with socket.socket() as probe:
+                if probe.connect_ex(("127.0.0.1", port)) == 0:
+                    return
+            time.sleep(0.05)
+        raise RuntimeError(f"no scheduler: see {self._folder}")
+
+
+@contextmanager
+def loopback(folder: Path, workers: int = 2) -> Iterator[Loopback]:
+    """A cluster with so many workers, ended with the block; logs in the folder."""
+    cluster = Loopback(folder)
+    try:
+        for _ in range(workers):
+            cluster.add_worker()
+        yield cluster
+    finally:
+        cluster.end()
