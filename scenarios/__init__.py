@@ -1,6 +1,7 @@
 """The scripts: scenario files, their strict form, the catalogue and the suites. Imports nothing of ours.
 
-`scenarios.load("cross")` is the whole of it; nothing heavy is imported before it is asked for.
+`scenarios.load("cross")` is the whole of it; nothing heavy is imported before it is asked for. A detector's profile
+goes with it as `scenarios.load("cross", set=scenarios.sensor_settings("mine.toml"))`.
 """
 
 from __future__ import annotations
@@ -9,13 +10,16 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from scenarios.loading import load
+    from scenarios.sensor_file import sensor_settings
 
-__all__ = ["load"]
+__all__ = ["load", "sensor_settings"]
+
+_HOME = {"load": "scenarios.loading", "sensor_settings": "scenarios.sensor_file"}
 
 
 def __getattr__(name: str) -> Any:
-    if name not in __all__:
+    if name not in _HOME:
         raise AttributeError(f"module 'scenarios' has no attribute {name!r}")
-    from scenarios import loading
+    from importlib import import_module
 
-    return getattr(loading, name)
+    return getattr(import_module(_HOME[name]), name)

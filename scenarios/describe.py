@@ -104,12 +104,17 @@ def order(event: Event) -> str:
 def sensor(scenario: Scenario) -> list[str]:
     """The point and box sensor."""
     s = scenario.sensor
+    edges = f"{s.noise_px:g} px on the edges of boxes" if s.box_noise is None else "in proportion to boxes"
+    points = "points under their feet" if s.points == "foot" else f"{s.noise_m:g} m on points"
+    chance = f"visibility^{s.occlusion_power:g}" if s.by_visibility is None else "a curve of visibility"
+    lasting = s.persistence or s.miss_memory
     lines = [
-        f"detects {s.detect_prob:.0%} of fully visible people, {s.clutter_rate:g} false alarms per frame",
-        f"noise {s.noise_px:g} px on the edges of boxes ({s.box}), {s.noise_m:g} m on points",
-        f"nobody less visible than {s.min_visibility:.0%}; chance × visibility^{s.occlusion_power:g}"
+        f"detects {s.detect_prob:.0%} of fully visible people, {s.clutter_rate:g} false alarms per frame"
+        + (f", each for {s.false_alarms.life:g} s" if s.false_alarms is not None and s.false_alarms.life else ""),
+        f"noise {edges} ({s.box}), {points}",
+        f"nobody less visible than {s.min_visibility:.0%}; chance × {chance}"
         + (f"; half at a height of {s.small_px:g} px" if s.small_px else "")
-        + (f"; misses persist ({s.persistence:g})" if s.persistence else ""),
+        + (f"; misses persist{f' ({s.persistence:g})' if s.persistence else ''}" if lasting else ""),
     ]
     lines += [f"hides {h.group or 'everybody'} from {h.start:g} to {h.end:g} s" for h in s.hide]
     return lines

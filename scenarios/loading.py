@@ -85,6 +85,6 @@ def _load_line(line: suite.Line, path: Path, settings: tuple[str, ...]) -> Scena
 
 def _build(path: Path, settings: tuple[str, ...]) -> Scenario:
     table, places = override.apply(document.read(path), settings, path)
-    scenario = validate(table, path, places)
+    scenario = validate(table, path, places, model=Scenario)
     check(scenario, path)
     return scenario

@@ -8,26 +8,16 @@ from __future__ import annotations
 
 from typing import Annotated, Literal, Self
 
-from pydantic import BaseModel, ConfigDict, Field, model_validator
+from pydantic import Field, model_validator
 
 from scenarios.distribution import Distribution, Point, Value
-
-Positive = Annotated[float, Field(gt=0)]
-NonNegative = Annotated[float, Field(ge=0)]
-Share = Annotated[float, Field(ge=0, le=1)]
-Name = Annotated[str, Field(pattern=r"^[A-Za-z][A-Za-z0-9_.-]*$")]
-Pattern = Annotated[str, Field(pattern=r"^[A-Za-z][A-Za-z0-9_.-]*\*?$")]
-Fixed = tuple[float, float]
+from scenarios.model import Fixed, Model, Name, NonNegative, Pattern, Positive, Share
+from scenarios.sensor import Hide as Hide
+from scenarios.sensor import Sensor as Sensor
 
 FREE_SPEED = Distribution(normal=(1.34, 0.26), clip=(0.5, 2.2))
 GROUP_SIZE = Distribution(poisson=1.1, clip=(1, 12))
 SPACING = Distribution(normal=(0.75, 0.12), clip=(0.5, 1.2))
-
-
-class Model(BaseModel):
-    """Frozen, strict about keys, no infinities."""
-
-    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False, populate_by_name=True)
 
 
 class Door(Model):
@@ -80,29 +70,6 @@ class CameraSpec(Model):
     height: Positive | None = Field(None, description="height above the ground, m; solved where absent")
     position: Fixed | None = Field(None, description="x, y, m; solved where absent")
     crop: bool = Field(False, description="accept people who walk out of view")
-
-
-class Hide(Model):
-    """Artificial occlusion: nothing is detected of these people in this window."""
-
-    start: NonNegative = Field(description="s")
-    end: NonNegative = Field(description="s")
-    group: Name | None = Field(None, description="people of this script group; everybody where absent")
-
-
-class Sensor(Model):
-    """The point and box sensor behind det/det.txt."""
-
-    detect_prob: Share = Field(0.95, description="chance that a fully visible person of usual size is detected")
-    clutter_rate: NonNegative = Field(0.3, description="false alarms per frame, Poisson")
-    noise_px: NonNegative = Field(1.5, description="sd of each edge of a box, px")
-    noise_m: NonNegative = Field(0.05, description="sd of points on the ground, per axis, m")
-    box: Literal["visible", "amodal"] = Field("visible", description="visible: occlusion moves foot points")
-    occlusion_power: NonNegative = Field(1.0, description="detection chance times visibility to this power")
-    min_visibility: Share = Field(0.2, description="less visible people are never detected")
-    small_px: NonNegative = Field(12.0, description="box height at which detection is half as likely; 0 = no effect")
-    persistence: Share = Field(0.0, description="correlation of misses from frame to frame")
-    hide: tuple[Hide, ...] = Field((), description="artificial occlusions")
 
 
 class Switch(Model):

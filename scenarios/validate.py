@@ -17,12 +17,18 @@ NUMBER = "a number, or a distribution such as { normal = [1.3, 0.2] }"
 NAME = "a name: a letter, then letters, digits, '_', '.' or '-'"
 
 
-def validate(table: Table, file: object = "", places: dict[Path, str] | None = None) -> Scenario:
-    """The Scenario of a table; InputError with file, key and expectation otherwise. places: see override.apply."""
+M = typing.TypeVar("M", bound=BaseModel)
+
+
+def validate(table: Table, file: object = "", places: dict[Path, str] | None = None, *, model: type[M]) -> M:
+    """The model (a Scenario, or a table of one) that a table is; InputError with file, key and expectation otherwise.
+
+    places: see override.apply.
+    """
     try:
-        return Scenario.model_validate(_tuples(table), strict=True)
+        return model.model_validate(_tuples(table), strict=True)
     except ValidationError as error:
-        raise translate(error, table, file, places or {}) from None
+        raise translate(error, table, file, places or {}, model) from None
 
 
 def _tuples(value: Any) -> Any:
@@ -32,12 +38,14 @@ def _tuples(value: Any) -> Any:
     return tuple(_tuples(v) for v in value) if isinstance(value, list) else value
 
 
-def translate(error: ValidationError, table: Table, file: object, places: dict[Path, str]) -> InputError:
+def translate(
+    error: ValidationError, table: Table, file: object, places: dict[Path, str], model: type[BaseModel] = Scenario
+) -> InputError:
     """The error of the first problem; unknown keys come first, since they explain missing ones."""
     found = [e for e in error.errors() if _branch_fits(e["loc"], table)] or list(error.errors())
     first = min(found, key=lambda e: (e["type"] != "extra_forbidden", e["type"] == "too_short" and len(found) > 1))
     path = strip(first["loc"], table) + (("type",) if first["type"].startswith("union_tag") else ())
-    got, expected, remedy = _words(first, path, table)
+    got, expected, remedy = _words(first, path, table, model)
     more = f" ({len(found) - 1} more problem{'s' * (len(found) > 2)})" if len(found) > 1 else ""
     return InputError(file=file, place=_place(path, table, places), got=got, expected=expected, remedy=remedy + more)
 
@@ -85,11 +93,11 @@ def _branch_fits(loc: tuple[int | str, ...], table: Table) -> bool:
     return True
 
 
-def _words(error: Any, path: Path, table: Table) -> tuple[str, str, str]:
+def _words(error: Any, path: Path, table: Table, model: type[BaseModel]) -> tuple[str, str, str]:
     """got, expected, remedy of one pydantic error."""
     kind, message = error["type"], str(error["msg"])
     if kind == "extra_forbidden":
-        known = known_keys(path[:-1], table)
+        known = known_keys(path[:-1], table, model)
         return f"unknown key {str(path[-1])!r}", "a known key", nearest(str(path[-1]), known)
     got = _show(error["input"])
     if kind == "missing" and isinstance(path[-1], int):
@@ -157,9 +165,9 @@ def spell(path: Path, table: Table) -> str:
     return ".".join(steps)
 
 
-def known_keys(path: Path, table: Table) -> list[str]:
+def known_keys(path: Path, table: Table, form: type[BaseModel] = Scenario) -> list[str]:
     """The keys that the strict form knows at a place."""
-    model: type[BaseModel] | None = Scenario
+    model: type[BaseModel] | None = form
     here: Any = table
     for step in path:
         here = here[step]

@@ -30,16 +30,17 @@ def _is_rows(value: Any) -> bool:
 
 
 def _lines(table: dict[str, Any]) -> str:
-    return "".join(f"{key} = {_value(v)}\n" for key, v in table.items())
+    return "".join(f"{key} = {value(v)}\n" for key, v in table.items())
 
 
-def _value(value: Any) -> str:
-    if isinstance(value, bool):
-        return str(value).lower()
-    if isinstance(value, str):
-        return json.dumps(value, ensure_ascii=False).replace("\x7f", "\\u007f")
-    if isinstance(value, dict):
-        return "{ " + ", ".join(f"{key} = {_value(v)}" for key, v in value.items()) + " }"
-    if isinstance(value, tuple):
-        return "[" + ", ".join(map(_value, value)) + "]"
-    return repr(value)
+def value(v: Any) -> str:
+    """A value as TOML, on one line."""
+    if isinstance(v, bool):
+        return str(v).lower()
+    if isinstance(v, str):
+        return json.dumps(v, ensure_ascii=False).replace("\x7f", "\\u007f")
+    if isinstance(v, dict):
+        return "{ " + ", ".join(f"{key} = {value(inner)}" for key, inner in v.items()) + " }"
+    if isinstance(v, tuple | list):
+        return "[" + ", ".join(map(value, v)) + "]"
+    return repr(v)

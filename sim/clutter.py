@@ -13,11 +13,11 @@ import numpy as np
 from sim.camera import project, to_ground
 from sim.people import boxes
 from sim.rng import rng
-from sim.sensors import Readings, uniforms
+from sim.sensors import Readings, quantiles, uniforms
 from sim.types import Array, Camera, Ints, Truth
 
 if TYPE_CHECKING:
-    from scenarios.schema import Sensor
+    from scenarios.sensor import Sensor
 
 ACROSS, DOWN, HEIGHT, HEADING, SCORE, PLACE, DRAWS = 0, 1, 2, 3, 4, 5, 6
 SMALLEST = 0.25  # of the height of a person at the image's middle: no false alarm is further away
@@ -37,6 +37,11 @@ def false_alarms(
     With a camera: spread evenly over the part of the image that shows ground, sized as a person standing there.
     Without: boxes of the sizes of the labelled ones, evenly over the image; points evenly over the labelled area.
     """
+    if sensor.false_alarms is not None and (len(truth.id) or camera is not None):
+        from sim.ghosts import ghosts
+
+        size = camera.image if camera is not None else image_size
+        return ghosts(truth, sensor, seed, camera, None if size is None else np.array(size, dtype=float), repeat)
     count = counts(sensor.clutter_rate, truth.length, seed, repeat)
     slots = [
         (np.flatnonzero(count > k) + 1, uniforms(rng(seed, "clutter", 1 + k, repeat=repeat), 1, truth.length, DRAWS))
@@ -52,7 +57,9 @@ def false_alarms(
         box = clipped(box, size)
     if truth.pos is None and box is not None:
         pos = box[:, :2] + box[:, 2:] / 2
-    return Readings(frame, pos, None if truth.box is None else box, FALSE_SCORE * u[:, SCORE] ** 2, u[:, PLACE])
+    curve = sensor.false_scores
+    score = FALSE_SCORE * u[:, SCORE] ** 2 if curve is None else quantiles(curve, u[:, SCORE])
+    return Readings(frame, pos, None if truth.box is None else box, score, u[:, PLACE])
 
 
 def counts(rate: float, length: int, seed: int, repeat: int = 0) -> Ints:
@@ -107,6 +114,73 @@ def _like(truth: Truth, image_size: tuple[int, int] | None, u: Array) -> tuple[A
     centre = truth.box[:, :2] + truth.box[:, 2:] / 2
     low, high = (centre.min(axis=0), centre.max(axis=0)) if image_size is None else (np.zeros(2), np.array(image_size))
     return pos, np.concatenate([low + spread * (high - low) - size / 2, size], axis=1)
+
+
+class Ground:
+    """Where false alarms can stand, and how large a person would be there: by the camera, else by the labels.
+
+    Without a camera a person's height is linear in the row of the feet, as on flat ground, between the labelled
+    extremes.
+    """
+
+    def __init__(self, truth: Truth, camera: Camera | None, size: Array | None) -> None:
+        self.truth, self.camera = truth, camera
+        self.low, self.high = _stretch(truth, camera, size)
+        self.line = np.zeros(2)
+        if camera is None and truth.box is not None and len(truth.box):
+            foot, tall = truth.box[:, 1] + truth.box[:, 3], truth.box[:, 3]
+            self.line = height_line(foot, tall)
+            self.extremes = float(tall.min()), float(tall.max())
+
+    def place(self, x: float, y: float) -> tuple[float, float]:
+        """The image point at shares x of the width and y of the rows that show ground."""
+        u, v = self.low + np.array([x, y]) * (self.high - self.low)
+        return float(u), float(v)
+
+    def usual_height(self, u: float, v: float) -> float:
+        """Height of a person's box whose feet are at (u, v), px."""
+        if self.camera is None:
+            return float(np.clip(self.line @ [1.0, v], *self.extremes)) if self.line.any() else 0.0
+        pos = to_ground(self.camera, np.array([[u, v]]))
+        tall = boxes(self.camera, np.column_stack([pos, [0.0]]), np.zeros(1), np.full(1, 1.7))[0, 3]
+        if not np.isfinite(tall):  # right under the camera
+            tall = 1.7 * self.camera.focal_px[1] / max(float(self.camera.position[2]), 1.0)
+        return float(tall)
+
+    def points(self, u: Array, v: Array, otherwise: Array) -> Array:
+        """(L, 2) m: the ground behind image points; `otherwise` where none is seen or no camera is known."""
+        if self.camera is None:
+            return otherwise
+        top = self.low[1]
+        pos = to_ground(self.camera, np.stack([u, np.maximum(v, top)], axis=1))
+        return np.where(np.isfinite(pos), pos, otherwise)
+
+    def anywhere(self, x: float, y: float) -> Array:
+        """(2,) m: a place of the labelled area."""
+        pos = self.truth.pos
+        if pos is None or not len(pos):
+            return np.zeros(2)
+        low, high = pos.min(axis=0), pos.max(axis=0)
+        return np.asarray(low + np.array([x, y]) * (high - low))
+
+
+def _stretch(truth: Truth, camera: Camera | None, size: Array | None) -> tuple[Array, Array]:
+    """The part of the image where feet can be: low (2,), high (2,)."""
+    if camera is not None:
+        top = 0.0 if camera.kind == "top" else _furthest_row(camera)
+        return np.array([0.0, top]), np.array(camera.image, dtype=float)
+    if truth.box is None or not len(truth.box):
+        return np.zeros(2), np.zeros(2)
+    foot = truth.box[:, :2] + truth.box[:, 2:] * [0.5, 1.0]
+    low, high = foot.min(axis=0), foot.max(axis=0)
+    return (low, high) if size is None else (np.array([0.0, low[1]]), np.array([size[0], size[1]]))
+
+
+def height_line(foot: Array, tall: Array) -> Array:
+    """(2,) a, b of the least-squares line height = a + b foot; b = 0 where all feet are in one row."""
+    spread = foot - foot.mean()
+    b = float(spread @ tall / (spread @ spread)) if spread @ spread > 1e-9 * len(foot) else 0.0
+    return np.array([tall.mean() - b * foot.mean(), b])
 
 
 def clipped(box: Array, image_size: tuple[int, int]) -> Array:

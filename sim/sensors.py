@@ -4,6 +4,8 @@ Who is detected: u < p with p = detect_prob · visibility^occlusion_power · min
 min_visibility and while hidden. Each person has one stream, each place of a false alarm another, all read at the
 frame's own offset: a person or a frame more moves nobody else, and a setting changed leaves all other draws as they
 were, so that sweeps are paired. Everything is drawn as uniforms; normals are their quantiles.
+A measured profile (`flockscope fit sensor`) puts a curve in the place of visibility^occlusion_power, makes luck and
+noise last (sim.lasting) and noise grow with the box (sim.box_noise).
 """
 
 from __future__ import annotations
@@ -21,7 +23,7 @@ from sim.rng import rng
 from sim.types import Array, Bools, Camera, Detections, Ints, Plane, Truth
 
 if TYPE_CHECKING:
-    from scenarios.schema import Sensor
+    from scenarios.sensor import Sensor
 
 KEEP, DETECT, EDGES, POINT, SCORE, PLACE, DRAWS = 0, 1, slice(2, 6), slice(6, 8), 8, 9, 10  # a person's frame's draws
 
@@ -84,16 +86,18 @@ def _found(
     truth: Truth, sensor: Sensor, seed: int, repeat: int, people: Mapping[str, tuple[int, ...]], camera: Camera | None
 ) -> Readings:
     """The true detections."""
-    u = person_draws(truth, seed, repeat, sensor.persistence)
+    u = person_draws(truth, seed, repeat, sensor)
     hidden = _hidden(truth, sensor, people)
     seen = (u[:, DETECT] < detection_probability(truth, sensor, camera)) & ~hidden
     base = _boxes(truth, sensor)
     if base is not None:
         seen &= np.isfinite(base).all(axis=1)
     u = u[seen]
-    box = None if base is None else _noisy_boxes(base[seen], sensor.noise_px, u[:, EDGES])
+    box = None if base is None else _boxed(base[seen], truth.visibility[seen], sensor, u[:, EDGES])
     if truth.pos is not None:
         pos = truth.pos[seen] + sensor.noise_m * _normal(u[:, POINT]) if sensor.noise_m else truth.pos[seen]
+        if sensor.points == "foot" and box is not None and camera is not None:
+            pos = _standing(box, truth, seen, camera, pos)
     else:
         assert box is not None, "labels have positions or boxes"
         pos = box[:, :2] + box[:, 2:] / 2
@@ -101,30 +105,62 @@ def _found(
     return Readings(truth.frame[seen], pos, box, score, u[:, PLACE])
 
 
-def person_draws(truth: Truth, seed: int, repeat: int, persistence: float = 0.0) -> Array:
+def _standing(box: Array, truth: Truth, seen: Bools, camera: Camera, otherwise: Array) -> Array:
+    """The ground under the boxes' feet; the point sensor's where a box shows none."""
+    from sim.box_noise import feet
+
+    z = np.zeros(len(box)) if truth.z is None else truth.z[seen]
+    pos = feet(box, z, camera)
+    return np.where(np.isfinite(pos), pos, otherwise)
+
+
+def _boxed(box: Array, visibility: Array, sensor: Sensor, u: Array) -> Array:
+    if sensor.box_noise is None:
+        return _noisy_boxes(box, sensor.noise_px, u)
+    from sim.box_noise import erring
+
+    return erring(box, visibility, sensor.box_noise, _normal(u))
+
+
+def person_draws(truth: Truth, seed: int, repeat: int, sensor: Sensor) -> Array:
     """Uniforms in (0, 1) for each row of the truth, (R, DRAWS), keyed by the person and the frame.
 
     persistence ρ: a person's DETECT is the previous frame's again with chance ρ; it stays uniform, and misses of
-    neighbouring frames are correlated by exactly ρ where the detection probability does not change.
+    neighbouring frames are correlated by exactly ρ where the detection probability does not change. Memories make
+    the normal quantiles of DETECT or EDGES last instead.
     """
     u = np.empty((len(truth.id), DRAWS))
     by_person = np.argsort(truth.id, kind="stable")
     cuts = np.flatnonzero(np.diff(truth.id[by_person])) + 1
     for rows in np.split(by_person, cuts):
         if len(rows):
-            u[rows] = _one_person(int(truth.id[rows[0]]), truth.frame[rows], seed, repeat, persistence)
+            u[rows] = _one_person(int(truth.id[rows[0]]), truth.frame[rows], seed, repeat, sensor, truth.fps)
     return u
 
 
-def _one_person(id: int, frame: Ints, seed: int, repeat: int, persistence: float) -> Array:
+def _one_person(id: int, frame: Ints, seed: int, repeat: int, sensor: Sensor, fps: float) -> Array:
     first = int(frame[0])
     u = uniforms(rng(seed, "detect", id, repeat=repeat), first, int(frame[-1]) - first + 1, DRAWS)
-    if persistence:
-        fresh = u[:, KEEP] >= persistence
+    _make_last(u, first, sensor, fps, seed, id, repeat)
+    if sensor.persistence:
+        fresh = u[:, KEEP] >= sensor.persistence
         fresh[0] = True
         source = np.maximum.accumulate(np.where(fresh, np.arange(len(u)), 0))
         u[:, DETECT] = u[source, DETECT]
     return u[frame - first]
+
+
+def _make_last(u: Array, first: int, sensor: Sensor, fps: float, seed: int, id: int, repeat: int) -> None:
+    """Misses and errors of boxes that last, in the place of new ones; u (F, DRAWS) of frames `first` … is changed."""
+    of_boxes = None if sensor.box_noise is None else sensor.box_noise.memory
+    parts = ((0, slice(DETECT, DETECT + 1), sensor.miss_memory), (1, EDGES, of_boxes))
+    for key, columns, memory in parts:
+        if memory:
+            from scipy.special import ndtr
+
+            from sim.lasting import lasting
+
+            u[:, columns] = ndtr(lasting(_normal(u[:, columns]), memory, first, fps, seed, id, key, repeat=repeat))
 
 
 def uniforms(generator: np.random.Generator, first: int, frames: int, per_frame: int) -> Array:
@@ -136,13 +172,20 @@ def uniforms(generator: np.random.Generator, first: int, frames: int, per_frame:
 def detection_probability(truth: Truth, sensor: Sensor, camera: Camera | None = None) -> Array:
     """The chance of each row to be detected, (R,), hiding apart."""
     visible = truth.visibility
-    p = sensor.detect_prob * visible**sensor.occlusion_power
+    p = sensor.detect_prob * _in_sight(visible, sensor)
     if sensor.small_px and truth.box is not None:
         from_above = camera is not None and camera.kind == "top"
         # Seen from above a person is as large as one of this shoulder width is high when seen from the side.
         size = truth.box[:, 2:].max(axis=1) / SHOULDERS if from_above else truth.box[:, 3]
         p = p * np.minimum(1.0, np.nan_to_num(size) / (2 * sensor.small_px))
     return np.asarray(np.where(visible >= sensor.min_visibility, p, 0.0))
+
+
+def _in_sight(visible: Array, sensor: Sensor) -> Array:
+    """What occlusion leaves of the chance to be detected."""
+    if sensor.by_visibility is None:
+        return np.asarray(visible**sensor.occlusion_power)
+    return np.interp(visible, np.linspace(0.0, 1.0, len(sensor.by_visibility)), sensor.by_visibility)
 
 
 def _hidden(truth: Truth, sensor: Sensor, people: Mapping[str, tuple[int, ...]]) -> Bools:
@@ -177,6 +220,11 @@ def _noisy_boxes(box: Array, noise: float, u: Array) -> Array:
     return np.concatenate([edges[:, :2], size], axis=1)
 
 
+def quantiles(curve: tuple[float, ...], u: Array) -> Array:
+    """The quantile function through evenly spaced quantiles, at u."""
+    return np.interp(u, np.linspace(0.0, 1.0, len(curve)), curve)
+
+
 def _normal(u: Array) -> Array:
     from scipy.special import ndtri
 
@@ -184,7 +232,12 @@ def _normal(u: Array) -> Array:
 
 
 def true_scores(u: Array, visibility: Array, sensor: Sensor) -> Array:
-    """Confidence of true detections: mean 0.8 in full view, half of that when hardly visible; 1 if it never errs."""
+    """Confidence of true detections: mean 0.8 in full view, half of that when hardly visible; 1 if it never errs.
+
+    Where the detector's own scores are known, their quantiles.
+    """
+    if sensor.true_scores is not None:
+        return quantiles(sensor.true_scores, u)
     if sensor.detect_prob == 1.0 and sensor.clutter_rate == 0.0:
         return np.ones(len(u))
     return np.asarray((0.4 + 0.6 * np.sqrt(u)) * (0.5 + 0.5 * visibility))

@@ -36,6 +36,7 @@ def _sensed(truth: Truth, sequence: Sequence, sensor: Mapping[str, Any], seed: i
     from pydantic import ValidationError
 
     from scenarios.schema import Sensor
+    from sim.box_visibility import with_visibility
     from sim.sensors import sense
 
     try:
@@ -45,6 +46,8 @@ def _sensed(truth: Truth, sequence: Sequence, sensor: Mapping[str, Any], seed: i
         place = ".".join(["sensor", *map(str, first["loc"])])
         expected = first["msg"]
         raise InputError(place=place, got=first["input"], expected=expected, remedy="see docs/formats.md") from None
+    if spec.box == "visible" or spec.by_visibility or spec.occlusion_power or spec.min_visibility:
+        truth = with_visibility(truth, sequence.image_size)
     by_name, cast = any(hide.group is not None for hide in spec.hide), sequence.load_people
     people = cast() if by_name and cast is not None else {}
     return iter(sense(truth, spec, seed, sequence.camera, sequence.image_size, people=people))

@@ -148,7 +148,7 @@ def prepare(
     mode = protocol.choose_mode(instance.needs, sequence, detections)
     if sensor and mode != "truth":
         remedy = "add --detections truth, or leave the sensor as it is"
-        raise InputError(place="--set sensor", got=f"--detections {mode}", expected="--detections truth", remedy=remedy)
+        raise InputError(place="--sensor, --set sensor", got=f"--detections {mode}", expected="--detections truth", remedy=remedy)
     feed = _feed(instance.needs, mode, sequence, sensor or {}, seed)
     context = Context(
         fps=sequence.fps,

@@ -34,6 +34,9 @@ Scale = Annotated[float | None, typer.Option("--px-per-m", help="Pixels per metr
 Calibration = Annotated[
     Path | None, typer.Option("--camera", metavar="FILE", help="A recording's calibration: camera.json or Tsai's XML.")
 ]
+Detector = Annotated[
+    Path | None, typer.Option("--sensor", metavar="FILE.toml", help="A detector's profile, by `fit sensor`.")
+]
 Tracked = Annotated[Path | None, typer.Argument(metavar="TRACKS", help="What `track` wrote, or MOT text.")]
 
 
@@ -94,6 +97,7 @@ def generate(
     seeds: Annotated[str, typer.Option("--seeds", metavar="A:B", help="Seeds from A to B - 1, or one.")],
     out: Out,
     settings: Set = [],  # noqa: B006
+    sensor: Detector = None,
     streams: Annotated[
         str,
         typer.Option("--streams", metavar="A,B,…", help="Pictures: left, right, disparity, ids, background; or none."),
@@ -105,9 +109,11 @@ def generate(
     json: Json = False,
 ) -> Answer:
     """Simulate scenarios and store them as a dataset."""
+    from tracking.app import options
     from tracking.app.dataset_commands import generate
 
-    return generate(names, seeds, out, settings, workers, streams, images)
+    texts = [*options.sensor(sensor), *settings]
+    return generate(names, seeds, out, texts, workers, streams, images)
 
 
 @app.command()
@@ -118,6 +124,7 @@ def track(
     params: Annotated[Path | None, typer.Option("--params", metavar="FILE.toml", help="Its parameters.")] = None,
     settings: Set = [],  # noqa: B006
     detections: Annotated[Literal["image", "truth", "file"] | None, typer.Option(help="What it is given.")] = None,
+    sensor: Detector = None,
     seed: Annotated[int, typer.Option("--seed", min=0, help="The tracker's seed.")] = 0,
     fps: Fps = None,
     px_per_m: Scale = None,
@@ -131,7 +138,7 @@ def track(
     """Run a tracker and store what it says."""
     from tracking.app import track_command
 
-    job = track_command.job(tracker, params, settings, detections, seed)
+    job = track_command.job(tracker, params, settings, detections, seed, sensor)
     return track_command.track(job, source, out, fps=fps, px_per_m=px_per_m, camera=camera, background=background)
 
 

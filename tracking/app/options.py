@@ -56,6 +56,15 @@ def scenario_settings(texts: Iterable[str]) -> list[str]:
     return [f"sensor.{text}" if subject == "sensor" else text for subject, text in found]
 
 
+def sensor(file: Path | None) -> tuple[str, ...]:
+    """`--sensor FILE.toml` as `--set` would say it: `sensor.key=value`; what `--set` says itself comes after it."""
+    if file is None:
+        return ()
+    from scenarios import sensor_settings
+
+    return sensor_settings(file)
+
+
 def streams(text: str) -> tuple[str, ...]:
     """Words between commas; () for none."""
     return () if text.strip() == "none" else tuple(word.strip() for word in text.split(",") if word.strip())

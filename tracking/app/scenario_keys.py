@@ -24,7 +24,7 @@ def keys() -> Answer:
 def _keys(table: Node, known: Node, prefix: str) -> Iterator[dict[str, str]]:
     required = table.get("required", [])
     for name, node in table["properties"].items():
-        many = "[]" if "items" in node else ""
+        many = "[]" if any("items" in each for each in (node, *node.get("anyOf", ()))) else ""
         tables = list(_tables(node, known))
         for inner in tables:
             which = f"({inner['properties']['type']['const']})" if len(tables) > 1 else ""

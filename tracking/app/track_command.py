@@ -37,9 +37,16 @@ class Job:
         )  # fmt: skip
 
 
-def job(tracker: str, params: Path | None, settings: Iterable[str], detections: DetectionMode | None, seed: int) -> Job:
+def job(
+    tracker: str,
+    params: Path | None,
+    settings: Iterable[str],
+    detections: DetectionMode | None,
+    seed: int,
+    detector: Path | None = None,
+) -> Job:
     """The options of the command as a Job; InputError for settings that the tracker does not know."""
-    found = options.settings(settings, "tracker", ("tracker", "sensor"))
+    found = options.settings([*options.sensor(detector), *settings], "tracker", ("tracker", "sensor"))
     own = [text for subject, text in found if subject == "tracker"]
     sensor = options.values(text for subject, text in found if subject == "sensor")
     return Job(tracker, _config(tracker, params, own), detections, sensor, seed)
