@@ -1,0 +1,202 @@
+"""What a search is about, checked before anything is played: tracker, space, scenes, goals.
+
+Training scenes guide the search, validation scenes choose among its best, test scenes (and a suite that was not used)
+say what was gained.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+from scenarios.errors import InputError
+from sim.types import DetectionMode, Tracker
+from tracking import tuning_scenes
+from tracking.config import Config, Param, Value
+from tracking.episodes import Source
+from tracking.tuning_goals import ALWAYS, SPEED, Goal, goals
+from tracking.tuning_subject import Subject, subject_of
+
+Scenes = str | Path | Sequence[str | Path]
+
+
+@dataclass(frozen=True)
+class Plan:
+    """A search. base: the defaults, and what was set; space: what is searched; check: a suite that was not used."""
+
+    subject: Subject
+    base: Config
+    space: tuple[Param, ...]
+    suite: tuple[str, ...]
+    check: str | None
+    seeds: range
+    validation: range
+    test: range
+    check_test: range
+    goals: tuple[Goal, ...]
+    detections: DetectionMode
+    settings: tuple[str, ...]
+    trials: int
+    prune: float
+    finalists: int
+    seed: int
+
+    @property
+    def defaults(self) -> dict[str, Value]:
+        """The first trial."""
+        return {p.name: getattr(self.base, p.name) for p in self.space}
+
+    def config(self, values: dict[str, Any]) -> Config:
+        """The config of a trial; InputError where its own check refuses these values together."""
+        return type(self.base).from_dict({**self.base.as_dict(), **values})
+
+    @cached_property
+    def training(self) -> tuple[Source, ...]:
+        """Episodes of a trial."""
+        return tuning_scenes.of(self.suite, self.seeds, self.settings)
+
+    @cached_property
+    def validating(self) -> tuple[Source, ...]:
+        """Episodes by which the best are judged once more."""
+        return tuning_scenes.of(self.suite, self.validation, self.settings)
+
+    @cached_property
+    def testing(self) -> dict[str, tuple[Source, ...]]:
+        """Episodes by which the winner is judged, by what they are called."""
+        found = {", ".join(self.suite): tuning_scenes.of(self.suite, self.test, self.settings)}
+        if self.check is not None:
+            found[self.check] = tuning_scenes.of((self.check,), self.check_test, ())
+        return found
+
+    def identity(self) -> dict[str, Any]:
+        """What makes a trial's value what it is: a study goes on under the same only."""
+        return {
+            "tracker": self.subject.name,
+            "code": _code(self.subject.name),
+            "suite": ", ".join(self.suite),
+            "seeds": text(self.seeds),
+            "scenes": _digest(source.key for source in self.training),
+            "detections": self.detections,
+            "objective": ", ".join(goal.key for goal in self.goals),
+            "searched": ", ".join(p.name for p in self.space),
+            "ranges": _digest(repr(p) for p in self.space),
+            "fixed": _digest(self.base.as_dict().items()),
+            "prune": self.prune,
+            "seed": self.seed,
+        }
+
+
+def plan(
+    tracker: str | type[Tracker],
+    suite: Scenes,
+    trials: int,
+    *,
+    seeds: range | None = None,
+    validation: range | None = None,
+    test: range | None = None,
+    check: str | None = "",
+    objective: str | Iterable[str] = "objective",
+    detections: DetectionMode | None = None,
+    only: Iterable[str] = (),
+    set: Iterable[str] = (),
+    prune: float = 0.1,
+    finalists: int = 5,
+    seed: int = 0,
+) -> Plan:
+    """The plan of these wishes (`tracking.tune` explains them), the rest by default; InputError where one cannot be."""
+    _positive(trials, prune, finalists, seed)
+    subject = subject_of(tracker)
+    own, settings = _sorted_settings(set)
+    names = (str(suite),) if isinstance(suite, str | Path) else tuple(map(str, suite))
+    count = tuning_scenes.scenes(names, settings, "--suite")
+    other = tuning_scenes.unused(names) if check == "" else check
+    several = _check_suite(names, other)
+    base, mode = subject.config_class().with_set(*own), detections or subject.detections
+    made = Plan(
+        subject, base, _space(base, own, tuple(only), mode), names, other,
+        tuning_scenes.chosen_seeds(seeds, "train", count), tuning_scenes.chosen_seeds(validation, "val", count),
+        tuning_scenes.chosen_seeds(test, "test", count), tuning_scenes.chosen_seeds(test, "test", several),
+        goals([objective] if isinstance(objective, str) else objective),
+        mode, settings, trials, prune, finalists, seed,
+    )  # fmt: skip
+    subject.accept(made.training[0], made.detections)
+    return made
+
+
+def every_score(plan: Plan) -> bool:
+    """Must the whole catalogue be computed to know what the goals are about?"""
+    return any(goal.key not in (*ALWAYS, SPEED) for goal in plan.goals)
+
+
+def text(seeds: range) -> str:
+    """Seeds as `--seeds` takes them."""
+    return f"{seeds.start}:{seeds.stop}"
+
+
+def _positive(trials: int, prune: float, finalists: int, seed: int) -> None:
+    for place, value, good, expected in (
+        ("--trials", trials, trials >= 1, "1 or more"),
+        ("--prune", prune, 0 <= prune < 1, "a probability, 0 (never) or more and under 1"),
+        ("--finalists", finalists, finalists >= 1, "1 or more"),
+        ("--seed", seed, seed >= 0, "0 or more"),
+    ):
+        if not good:
+            raise InputError(place=place, got=value, expected=expected, remedy="correct it")
+
+
+def _sorted_settings(settings: Iterable[str]) -> tuple[list[str], tuple[str, ...]]:
+    """Settings of the tracker, and of the scenes (`scenario.` taken away, `sensor.` being a part of them)."""
+    own, scenes = [], []
+    for setting in settings:
+        key, _, value = setting.partition("=")
+        if key.strip().startswith(("scenario.", "sensor.")):
+            scenes.append(f"{key.strip().removeprefix('scenario.')}={value}")
+        else:
+            own.append(setting.strip())
+    return own, tuple(scenes)
+
+
+def _check_suite(names: Sequence[str], other: str | None) -> int:
+    """How many scenes the suite to check on has; InputError where it shares some with what is tuned on."""
+    if other is None:
+        return 1
+    count = tuning_scenes.scenes((other,), (), "--check")
+    common = tuning_scenes.shared(names, (other,))
+    if common:
+        got = f"{other}, which has {', '.join(common)} of {', '.join(names)}"
+        remedy = "choose another suite, or --check none"
+        raise InputError(place="--check", got=got, expected="scenes that are not tuned on", remedy=remedy)
+    return count
+
+
+def _space(base: Config, fixed: Sequence[str], only: tuple[str, ...], mode: DetectionMode) -> tuple[Param, ...]:
+    """The tunable parameters that were not set and say something about such detections, or those of `only`."""
+    held = {setting.removeprefix("tracker.").partition("=")[0].strip() for setting in fixed}
+    idle = "points" if mode == "image" else "pixels"
+    for name in only:
+        param = base.known(name, "--only")
+        reason = "set" if name in held else "not tunable" if not param.tunable else ""
+        reason = reason or (f"about {idle} alone" if param.sees == idle else "")
+        if reason:
+            got, remedy = f"{name}, which is {reason}", "leave it out"
+            raise InputError(place="--only", got=got, expected="parameters to search", remedy=remedy)
+    found = tuple(p for p in base.space() if p.name in only or not (only or p.name in held or p.sees == idle))
+    if not found:
+        got = "all of them set" if held else f"{type(base).__name__}, which declares none"
+        raise InputError(place="tracker", got=got, expected="parameters to search", remedy="leave one free")
+    return found
+
+
+def _code(tracker: str) -> str:
+    """What a tracker's own file holds, so that another version of it begins anew; "" where it is not a file."""
+    file = Path(tracker.rpartition(":")[0])
+    return _digest([file.read_bytes()]) if file.suffix == ".py" and file.is_file() else ""
+
+
+def _digest(parts: Iterable[object]) -> str:
+    return hashlib.sha256(json.dumps([str(part) for part in parts]).encode()).hexdigest()[:12]

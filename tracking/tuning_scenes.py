@@ -1,0 +1,88 @@
+"""Which scenes a search may use for what: seeds from ranges that never meet, suites that share nothing, no recordings."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+
+from scenarios import document, suite
+from scenarios.errors import InputError
+from sim.splits import SPLITS, split_of
+from tracking.episodes import Source, sources
+
+EPISODES = {"train": 16, "val": 32, "test": 100}
+"""How many episodes default seeds make, at least."""
+
+LEAST = 2
+"""Seeds of each scene, at least, where nothing is said."""
+
+OPTION = {"train": "--seeds", "val": "--validation", "test": "--test"}
+WORD = {"train": "training", "val": "validation", "test": "test"}
+UNUSED = ("friends-meet", "crossing")
+"""Suites to check on: the first that shares no scenario with what was tuned on."""
+
+
+def chosen_seeds(seeds: range | None, split: str, scenes: int) -> range:
+    """The seeds, if all are of the split; where nothing is said the split's first, enough for EPISODES."""
+    low, high = next((low, high) for name, low, high in SPLITS if name == split)
+    if seeds is None:
+        return range(low, low + max(LEAST, -(-EPISODES[split] // scenes)))
+    try:
+        good = split_of(seeds) == split
+    except InputError:
+        good = False
+    if not good:
+        raise InputError(
+            place=OPTION[split], got=f"{seeds.start}:{seeds.stop}",
+            expected=f"{WORD[split]} seeds, out of {low}:{high}",
+            remedy=f"write for example {low}:{low + 4}: training, validation and test are kept apart",
+        )  # fmt: skip
+    return seeds
+
+
+def scenes(names: Sequence[str], settings: Sequence[str], option: str) -> int:
+    """How many scenes these suites, scenarios or files make; InputError for a recording, and where there is nothing."""
+    for name in names:
+        if not name.endswith(".toml") and not _known(name) and Path(name).exists():
+            raise InputError(
+                file=name, place=option, got="a recording or stored data",
+                expected="scenes to simulate: nothing is tuned on what was recorded",
+                remedy="give a suite or scenario; `flockscope fit sensor` lets it err like a recording's detector",
+            )  # fmt: skip
+    try:
+        return len(sources(list(names), (0,), tuple(settings)))
+    except InputError as error:
+        raise error if error.place else InputError(**{**error.as_dict(), "place": option}) from None
+
+
+def of(names: Sequence[str], seeds: range, settings: Sequence[str]) -> tuple[Source, ...]:
+    """Every scene with every seed."""
+    return sources(list(names), seeds, tuple(settings))
+
+
+def unused(names: Sequence[str]) -> str | None:
+    """A suite that shares no scenario with these, None if there is none."""
+    return next((suite for suite in UNUSED if not shared(names, (suite,))), None)
+
+
+def shared(names: Sequence[str], others: Sequence[str]) -> list[str]:
+    """Scenarios that both are made of, sorted."""
+    common = {file for name in names for file in _files(name)} & {file for name in others for file in _files(name)}
+    return sorted(Path(file).stem for file in common)
+
+
+def _files(name: str) -> list[str]:
+    """The files of the scenarios that a scenario's, a suite's or a file's name stands for."""
+    bare = name.removeprefix("suite:")
+    if bare != name or (bare in document.suite_names() and bare not in document.names()) or _is_suite(bare):
+        path = suite.find_suite(bare)
+        return [str(document.find(line.scenario, beside=path.parent).resolve()) for line in suite.lines(path)]
+    return [str(document.find(bare).resolve())]
+
+
+def _is_suite(name: str) -> bool:
+    return name.endswith(".toml") and "entry" in document.parse(document.find(name))
+
+
+def _known(name: str) -> bool:
+    return name.startswith("suite:") or name in (*document.names(), *document.suite_names())

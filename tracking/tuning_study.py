@@ -1,0 +1,262 @@
+"""The study: Optuna's search over a plan's space, resumable, shared by processes, and told what to try by seed alone.
+
+What trial n tries follows from the seed, n and the finished trials before it: the sampler is made anew for each trial,
+so that a study that was killed and goes on finds what it would have found without.
+"""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager, nullcontext
+from pathlib import Path
+from typing import Any
+from urllib.parse import urlparse
+
+import numpy as np
+import optuna
+from optuna.distributions import BaseDistribution, CategoricalDistribution, FloatDistribution, IntDistribution
+from optuna.samplers import BaseSampler, TPESampler
+from optuna.storages import BaseStorage
+from optuna.trial import FrozenTrial, TrialState
+
+from scenarios.errors import InputError
+from tracking.config import Param, Value
+from tracking.tuning_journal import LOCKS, Journal, Locks
+from tracking.tuning_plan import Plan
+from tracking.tuning_result import Trial
+
+SETTINGS, AGAIN, PRUNED, ERROR = "settings", "again", "pruned after", "error"
+"""Attributes: of a study, what it is about; of a trial, which it replaces, after how many episodes it was given up, and
+what went wrong."""
+
+DONE = (TrialState.COMPLETE, TrialState.PRUNED)
+STARTUP = 10  # trials near the defaults before the search proper
+CHANGED = 0.25  # share of parameters that such a trial changes
+
+
+def distribution(p: Param) -> BaseDistribution:
+    """A parameter as Optuna's, in its own unit."""
+    if p.scale == "categorical":
+        return CategoricalDistribution(p.choices)
+    if p.scale == "int":
+        return IntDistribution(int(np.ceil(p.low)), int(np.floor(p.high)))
+    return FloatDistribution(p.low, p.high, log=p.scale == "log")
+
+
+def slot(trials: Sequence[FrozenTrial], trial: FrozenTrial) -> int:
+    """The trial's place in the search: how many new ones were begun before it, or before the one that it replaces."""
+    number = trial.user_attrs.get(AGAIN, trial.number)
+    return sum(t.number < number and AGAIN not in t.user_attrs for t in trials)
+
+
+class Sampler(BaseSampler):
+    """TPE after some trials near the defaults, its generator made from seed and slot. State: that of this trial."""
+
+    def __init__(self, seed: int, defaults: dict[str, Value]) -> None:
+        self._seed, self._defaults = seed, defaults
+        self._tpe, self._rng = TPESampler(seed=seed), np.random.default_rng(seed)
+
+    def before_trial(self, study: optuna.Study, trial: FrozenTrial) -> None:
+        """Begin anew."""
+        state = np.random.SeedSequence([self._seed, slot(study.get_trials(deepcopy=False), trial)])
+        self._tpe = TPESampler(seed=int(state.generate_state(1)[0]), n_startup_trials=STARTUP)
+        self._rng = np.random.default_rng(state)
+
+    def infer_relative_search_space(self, study: optuna.Study, trial: FrozenTrial) -> dict[str, BaseDistribution]:
+        """As TPE."""
+        return self._tpe.infer_relative_search_space(study, trial)
+
+    def sample_relative(
+        self, study: optuna.Study, trial: FrozenTrial, search_space: dict[str, BaseDistribution]
+    ) -> dict[str, Any]:
+        """As TPE."""
+        return self._tpe.sample_relative(study, trial, search_space)
+
+    def sample_independent(
+        self, study: optuna.Study, trial: FrozenTrial, param_name: str, param_distribution: BaseDistribution
+    ) -> Any:
+        """In the first trials mostly the default, else anything; as TPE later."""
+        begun = sum(t.state in DONE for t in study.get_trials(deepcopy=False)) < STARTUP
+        if begun and self._rng.random() >= CHANGED:
+            return self._defaults[param_name]
+        return self._tpe.sample_independent(study, trial, param_name, param_distribution)
+
+
+class Study:
+    """A study that is open. State: Optuna's study, and the locks by which processes share its journal, if it has one."""
+
+    def __init__(self, plan: Plan, study: optuna.Study, locks: Locks | None) -> None:
+        self.plan, self.optuna, self._locks = plan, study, locks
+        self._space = {p.name: distribution(p) for p in plan.space}
+        with self._taking():
+            if SETTINGS not in study.user_attrs:
+                study.set_user_attr(SETTINGS, plan.identity())
+            if not study.get_trials(deepcopy=False):
+                study.enqueue_trial(dict(plan.defaults))
+
+    def trials(self) -> list[FrozenTrial]:
+        """All trials, those given up on in the middle too."""
+        return self.optuna.get_trials(deepcopy=False)
+
+    def finished(self) -> list[FrozenTrial]:
+        """Those that were played to their end, or pruned."""
+        return [t for t in self.trials() if t.state in DONE]
+
+    def ask(self, desperate: bool = False) -> optuna.Trial | None:
+        """The next trial to play, None where as many are finished or being played as are wanted.
+
+        Trials whose process has died come first. Where that cannot be known (no journal), all that are not finished
+        count as being played by others, or, `desperate`, as left.
+        """
+        with self._taking():
+            for t in self.trials():
+                if t.state == TrialState.RUNNING and (desperate if self._locks is None else self._locks.left(t.number)):
+                    self._again(t)
+            taken = [t for t in self.trials() if t.state in (*DONE, TrialState.RUNNING)]
+            if len(taken) >= self.plan.trials:
+                return None
+            asked = self.optuna.ask(self._space)
+            if self._locks is not None:
+                self._locks.play(asked.number)
+            return asked
+
+    def tell(self, asked: optuna.Trial, values: Sequence[float] | None) -> None:
+        """What came of it; None: these parameters cannot be."""
+        state = TrialState.PRUNED if values is None else TrialState.COMPLETE
+        self.optuna.tell(asked, values, state, skip_if_finished=True)
+        if self._locks is not None:
+            self._locks.leave(asked.number)
+
+    def slot(self, asked: optuna.Trial) -> int:
+        """Its place in the search; 0: the defaults."""
+        trials = self.trials()
+        return slot(trials, trials[asked.number])
+
+    def told(self) -> list[Trial]:
+        """The finished trials."""
+        many = len(self.plan.training)
+        return [
+            Trial(
+                t.number, tuple(t.values or ()) if ERROR not in t.user_attrs else (), dict(t.params),
+                t.user_attrs.get(PRUNED, many), PRUNED in t.user_attrs, t.user_attrs.get(ERROR, ""),
+            )
+            for t in self.finished()
+        ]  # fmt: skip
+
+    def importance(self) -> dict[str, float]:
+        """How much each parameter decided about the first goal in training (PED-ANOVA), shares, greatest first."""
+        from optuna.importance import get_param_importances
+
+        names = [p.name for p in self.plan.space]
+        known = [t.values[0] for t in self.told() if t.values]
+        if len(known) < 2 or min(known) == max(known):
+            return dict.fromkeys(names, 0.0)
+        target = (lambda t: t.values[0]) if len(self.plan.goals) > 1 else None
+        return dict(get_param_importances(self.optuna, params=names, target=target))
+
+    @property
+    def shared(self) -> bool:
+        """Can it be known whether others are still at work?"""
+        return self._locks is not None
+
+    def _taking(self) -> Any:
+        return nullcontext() if self._locks is None else self._locks.taking()
+
+    def _again(self, left: FrozenTrial) -> None:
+        """Put a trial that was left back in the queue, in the place that it had."""
+        number = left.user_attrs.get(AGAIN, left.number)
+        waiting = [t for t in self.trials() if t.user_attrs.get(AGAIN) == number and t.number > left.number]
+        if not waiting:
+            values = {**left.system_attrs.get("fixed_params", {}), **left.params}
+            self.optuna.enqueue_trial(values, user_attrs={AGAIN: number})
+        self.optuna.tell(left.number, state=TrialState.FAIL, skip_if_finished=True)
+
+
+@contextmanager
+def opened(plan: Plan, storage: str | Path | None, name: str) -> Iterator[Study]:
+    """The study of that name: in a journal file, at the URL of another of Optuna's storages, or (None) in memory.
+
+    InputError where the storage cannot be used, or holds a study of this name that is about something else.
+    """
+    with _quiet():
+        place = storage if storage is None or "://" in str(storage) else Path(storage)
+        locks = _locks(place) if isinstance(place, Path) else None
+        try:
+            store = _store(place, locks)
+            found = optuna.create_study(
+                storage=store, study_name=name, load_if_exists=True, sampler=Sampler(plan.seed, plan.defaults),
+                pruner=_pruner(plan), directions=[goal.direction for goal in plan.goals],
+            )  # fmt: skip
+            _same(plan, found, storage, name)
+            yield Study(plan, found, locks)
+        finally:
+            if locks is not None:
+                locks.close()
+
+
+def _pruner(plan: Plan) -> optuna.pruners.BasePruner:
+    if plan.prune == 0 or len(plan.goals) > 1:
+        return optuna.pruners.NopPruner()
+    return optuna.pruners.WilcoxonPruner(p_threshold=plan.prune)
+
+
+def _same(plan: Plan, found: optuna.Study, storage: object, name: str) -> None:
+    """InputError where the study is about something else."""
+    mine, its = plan.identity(), found.user_attrs.get(SETTINGS)
+    if its is None and not found.get_trials(deepcopy=False):
+        return
+    its = its or {}
+    different = [key for key in mine if its.get(key) != mine[key]]
+    if different:
+        key = different[0]
+        raise InputError(
+            file=storage, place=f"study {name}", got=f"another search: {', '.join(different)} differ",
+            expected=f"{key} {its.get(key)}, not {mine[key]}",
+            remedy="choose another --out or --study, or repeat the command that began it",
+        )  # fmt: skip
+
+
+def _locks(path: Path) -> Locks | None:
+    """The locks of a journal, None where the system has no such thing."""
+    try:
+        import fcntl  # noqa: F401
+    except ImportError:
+        return None
+    path.parent.mkdir(parents=True, exist_ok=True)
+    return Locks(path.with_name(path.name + LOCKS))
+
+
+def _store(place: str | Path | None, locks: Locks | None) -> BaseStorage | str | None:
+    from optuna.storages import GrpcStorageProxy, JournalStorage
+    from optuna.storages.journal import JournalFileBackend, JournalFileOpenLock, JournalRedisBackend
+
+    try:
+        if isinstance(place, Path):
+            lock = JournalFileOpenLock(str(place))
+            return JournalStorage(Journal(place, locks) if locks else JournalFileBackend(str(place), lock_obj=lock))
+        if place is not None and place.startswith("redis"):
+            return JournalStorage(JournalRedisBackend(place))
+        if place is not None and place.startswith("grpc://"):
+            url = urlparse(place)
+            return GrpcStorageProxy(host=url.hostname or "localhost", port=url.port or 13000)
+        return None if place is None else optuna.storages.RDBStorage(place)
+    except OSError:
+        raise
+    except Exception as error:
+        got = f"{type(error).__name__}: {error}".partition("\n")[0]
+        expected = "a journal file, or the URL of a storage that Optuna knows, its driver installed"
+        raise InputError(file=place, place="--storage", got=got, expected=expected, remedy="check it") from error
+
+
+@contextmanager
+def _quiet() -> Iterator[None]:
+    """Optuna's own messages and its warnings of what is experimental."""
+    level = optuna.logging.get_verbosity()
+    optuna.logging.set_verbosity(optuna.logging.ERROR)
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", optuna.exceptions.ExperimentalWarning)
+            yield
+    finally:
+        optuna.logging.set_verbosity(level)

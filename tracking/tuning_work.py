@@ -1,0 +1,99 @@
+"""Episodes of a search, played here, by other processes or elsewhere; answers come in the order in which they were asked.
+
+Workers play episodes, not trials: what is asked next depends on answers alone, never on who was quick, so that a
+search finds the same with any number of them.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Generator, Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass
+from functools import cache
+from typing import Any
+
+from scenarios.errors import FlockscopeError, InputError
+from sim.types import DetectionMode, Tracker
+from tracking.episodes import Cache, Episode, Source
+from tracking.tuning_subject import Subject, subject_of
+
+HELD = 512 * 2**20
+"""Bytes of sequences that each process holds."""
+
+
+@dataclass(frozen=True)
+class Job:
+    """One episode to play, and its place in the order."""
+
+    place: int
+    tracker: str | type[Tracker]
+    source: Source
+    values: dict[str, Any]
+    detections: DetectionMode
+    every_score: bool
+
+
+Answer = Episode | FlockscopeError
+Play = Callable[[Sequence[Source], dict[str, Any], bool], Generator[Answer, None, None]]
+
+
+@contextmanager
+def players(
+    subject: Subject, detections: DetectionMode, workers: int = 1, cluster: str | None = None
+) -> Iterator[Play]:
+    """play(sources, values, every_score): an answer for each source in turn, an error where there is no episode.
+
+    Once its taker stops nothing more is begun.
+    """
+    from sim.workers import crew
+
+    if isinstance(subject.tracker, type) and (workers > 1 or cluster):
+        remedy = "give file.py:Class or module:Class, or one worker"
+        raise InputError(place="--workers", got="a class", expected="a name that workers can look up", remedy=remedy)
+    with crew(workers, cluster) as run:
+        alone, held = workers == 1 and cluster is None, Cache(HELD)
+
+        def play(
+            sources: Sequence[Source], values: dict[str, Any], every: bool = False
+        ) -> Generator[Answer, None, None]:
+            jobs = [Job(k, subject.tracker, s, values, detections, every) for k, s in enumerate(sources)]
+            if alone:
+                yield from (_attempt(job, subject, held) for job in jobs)
+            else:
+                yield from _in_order(run, jobs)
+
+        yield play
+
+
+def _in_order(run: Any, jobs: list[Job]) -> Generator[Answer, None, None]:
+    """The answers in order; those under way when the taker stops are waited for, so that no worker is lost."""
+    wanted = True
+    found: dict[int, Answer] = {}
+    coming = run(play_job, (job for job in jobs if wanted))
+    try:
+        for k in range(len(jobs)):
+            while k not in found:
+                job, answer = next(coming)
+                found[job.place] = answer
+            yield found.pop(k)
+    finally:
+        wanted = False
+        for _ in coming:
+            pass
+
+
+def play_job(job: Job) -> Answer:
+    """Play an episode in a worker, which keeps what it opened."""
+    return _attempt(job, *_kept(job.tracker))
+
+
+@cache
+def _kept(tracker: str | type[Tracker]) -> tuple[Subject, Cache]:
+    return subject_of(tracker), Cache(HELD)
+
+
+def _attempt(job: Job, subject: Subject, held: Cache) -> Answer:
+    try:
+        return subject.play(job.source, job.values, job.detections, held, job.every_score)
+    except FlockscopeError as error:
+        return error
