@@ -23,11 +23,6 @@ class Goal:
     key: str
     higher: bool = True
 
-    @property
-    def direction(self) -> str:
-        """Optuna's word for it."""
-        return "maximize" if self.higher else "minimize"
-
     def of(self, episode: Episode) -> float:
         """What one episode reached; nan where it is not known (nothing to divide by)."""
         if self.key == SPEED:

@@ -1,4 +1,4 @@
-"""Which scenes a search may use for what: seeds from ranges that never meet, suites that share nothing, no recordings."""
+"""Which scenes a search may use for what: seeds of ranges that never meet, suites that share nothing, no recordings."""
 
 from __future__ import annotations
 

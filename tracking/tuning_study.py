@@ -22,6 +22,7 @@ from optuna.trial import FrozenTrial, TrialState
 
 from scenarios.errors import InputError
 from tracking.config import Param, Value
+from tracking.tuning_goals import Goal
 from tracking.tuning_journal import LOCKS, Journal, Locks
 from tracking.tuning_plan import Plan
 from tracking.tuning_result import Trial
@@ -84,7 +85,7 @@ class Sampler(BaseSampler):
 
 
 class Study:
-    """A study that is open. State: Optuna's study, and the locks by which processes share its journal, if it has one."""
+    """A study that is open. State: Optuna's study; the locks by which processes share its journal, if it has one."""
 
     def __init__(self, plan: Plan, study: optuna.Study, locks: Locks | None) -> None:
         self.plan, self.optuna, self._locks = plan, study, locks
@@ -186,13 +187,17 @@ def opened(plan: Plan, storage: str | Path | None, name: str) -> Iterator[Study]
             store = _store(place, locks)
             found = optuna.create_study(
                 storage=store, study_name=name, load_if_exists=True, sampler=Sampler(plan.seed, plan.defaults),
-                pruner=_pruner(plan), directions=[goal.direction for goal in plan.goals],
+                pruner=_pruner(plan), directions=[_direction(goal) for goal in plan.goals],
             )  # fmt: skip
             _same(plan, found, storage, name)
             yield Study(plan, found, locks)
         finally:
             if locks is not None:
                 locks.close()
+
+
+def _direction(goal: Goal) -> optuna.study.StudyDirection:
+    return optuna.study.StudyDirection.MAXIMIZE if goal.higher else optuna.study.StudyDirection.MINIMIZE
 
 
 def _pruner(plan: Plan) -> optuna.pruners.BasePruner:

@@ -1,4 +1,4 @@
-"""Episodes of a search, played here, by other processes or elsewhere; answers come in the order in which they were asked.
+"""Episodes of a search, played here, by other processes or elsewhere; answers come in the order of the questions.
 
 Workers play episodes, not trials: what is asked next depends on answers alone, never on who was quick, so that a
 search finds the same with any number of them.
@@ -53,9 +53,7 @@ def players(
     with crew(workers, cluster) as run:
         alone, held = workers == 1 and cluster is None, Cache(HELD)
 
-        def play(
-            sources: Sequence[Source], values: dict[str, Any], every: bool = False
-        ) -> Generator[Answer, None, None]:
+        def play(sources: Sequence[Source], values: dict[str, Any], every: bool) -> Generator[Answer, None, None]:
             jobs = [Job(k, subject.tracker, s, values, detections, every) for k, s in enumerate(sources)]
             if alone:
                 yield from (_attempt(job, subject, held) for job in jobs)
