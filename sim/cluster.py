@@ -59,7 +59,7 @@ def connected(address: str, workers: int = 1) -> Iterator[Run]:
             if not under_way:
                 return
             ready = [under_way.pop(key) for key in _drained(done)]
-            for (item, future), fetch in zip(ready, _fetched(client, [f for _, f in ready]), strict=True):
+            for (item, _), fetch in zip(ready, _fetched(client, [f for _, f in ready]), strict=True):
                 yield item, _result(fetch, item, address, lost)
 
     try:

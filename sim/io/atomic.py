@@ -5,10 +5,11 @@ from __future__ import annotations
 import errno
 import os
 import shutil
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager, suppress
 from pathlib import Path
+from uuid import uuid4
 
 from scenarios.errors import FlockscopeError, InputError, WorkError
 
@@ -29,8 +30,11 @@ def refusal(path: Path, error: OSError) -> FlockscopeError:
 
 @contextmanager
 def writing(target: Path) -> Iterator[Path]:
-    """A partial path beside the target to write to; gone afterwards, and so are folders made for nothing."""
-    partial = target.parent / f"{PARTIAL}{target.name}-{os.getpid()}"
+    """A partial path beside the target to write to; gone afterwards, and so are folders made for nothing.
+
+    No other writer has it: processes of two machines may have one number.
+    """
+    partial = target.parent / f"{PARTIAL}{target.name}-{uuid4().hex[:12]}"
     made = [p for p in (target.parent, *target.parent.parents) if not p.exists()]
     try:
         target.parent.mkdir(parents=True, exist_ok=True)
@@ -53,15 +57,24 @@ def write_file(target: Path, content: bytes) -> None:
 
 
 @contextmanager
-def new_folder(target: Path) -> Iterator[Path]:
-    """An empty folder beside the target to fill, which takes its place when left well; one that stood there goes."""
+def new_folder(target: Path, keep: Callable[[], bool] = lambda: False) -> Iterator[Path]:
+    """An empty folder beside the target to fill, which takes its place when left well; one that stood there goes.
+
+    keep: whether one that has come to stand there meanwhile shall stay instead.
+    """
     with writing(target) as partial:
         partial.mkdir()
         yield partial
         _flush_all(partial)
         if target.exists():
+            if keep():
+                return
             _remove(target)
-        os.rename(partial, target)
+        try:
+            os.rename(partial, target)
+        except OSError:
+            if not keep():
+                raise
         _flush_folder(target.parent)
 
 

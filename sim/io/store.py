@@ -32,14 +32,15 @@ def write_sequence(
     repeat: int = 0,
     streams: Iterable[str] = (),
     images: str = "jpg",
+    keep: Callable[[], bool] = lambda: False,
 ) -> Path:
     """Store a sequence as `folder`, whole or not at all; `scenario` is the resolved scenario's TOML.
 
     streams: those of its pictures to store (sim.io.streams.STREAMS), images: as jpg, png or mp4. One picture at a time
-    is in memory.
+    is in memory. keep: whether what another has written there meanwhile shall stay.
     """
     wanted = chosen(streams, images)
-    with atomic.new_folder(folder) as partial:
+    with atomic.new_folder(folder, keep) as partial:
         truth = sequence.truth  # a script that fails does so before a picture is drawn
         assert truth is None or truth.length == sequence.length
         pictures = write_pictures(partial, sequence, wanted, images)
