@@ -118,7 +118,7 @@ def _unseen(job: Job) -> WorkError:
 
 
 def write_seqmap(root: Path, split: str) -> set[str]:
-    """seqmaps/flockscope-<split>.txt: each complete sequence of the split, sorted, as TrackEval has it. Their names."""
+    """seqmaps/flockscope-<split>.txt: every complete sequence of the split, sorted, for TrackEval. Their names."""
     folder = root / f"flockscope-{split}"
     complete = sorted(p.parent.name for p in folder.glob(f"*/{MANIFEST}") if not p.parent.name.startswith("."))
     if complete:

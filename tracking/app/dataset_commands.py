@@ -12,7 +12,15 @@ from tracking.app.meter import Meter
 
 
 def generate(
-    names: Iterable[str], seeds: str, out: Path, settings: Iterable[str], workers: int, streams: str, images: str | None
+    names: Iterable[str],
+    seeds: str,
+    out: Path,
+    settings: Iterable[str],
+    streams: str,
+    images: str | None,
+    *,
+    workers: int,
+    cluster: str | None,
 ) -> Answer:
     """Every named scenario or suite with every seed, as a dataset."""
     from sim.generate import generate as make
@@ -26,7 +34,7 @@ def generate(
         raise InputError(place="--images", got=got, expected="left, right or background", remedy=remedy)
     with Meter("generate") as meter:
         folders = make(
-            names, chosen, out, set=texts, workers=workers, progress=meter.update,
+            names, chosen, out, set=texts, workers=workers, cluster=cluster, progress=meter.update,
             streams=wanted, images=images or "jpg",
         )  # fmt: skip
     text = f"{len(folders)} sequences in {folders[0].parent}"
