@@ -2,8 +2,10 @@
 
 Points in the image, 40 px per m, in clumps like people. parted: two groups of 10 people far from each other. shared:
 they cross, and half of each stands among the other's people. crowd: groups of 5 people 8 m apart, as many as there are
-points at 50 a person, so that density stays what it is. The tracker gets to know them for two seconds, and is then
-copied: the same few steps are timed from there on, all sizes in turn, round after round; the least time counts.
+points at 50 a person, so that density stays what it is. pictures: the same crowd as black ellipses on grey, so that
+about as many grid points are foreground, with and without the time that the detector takes. The tracker gets to know
+them for two seconds, and is then copied: the same few steps are timed from there on, all sizes in turn, round after
+round; the least time counts.
 """
 
 from __future__ import annotations
@@ -26,7 +28,7 @@ from tracking import protocol
 from tracking.run import prepare
 
 COUNTS = (100, 200, 500, 1000, 2000, 5000, 10_000, 20_000)
-KINDS = ("parted", "shared", "crowd")
+KINDS = ("parted", "shared", "crowd", "pictures")
 FPS, SCALE = 10.0, 40.0
 ROUNDS, WARM, STEPS = 5, 20, 4
 BODY = np.array([0.12, 0.4])  # m, standard deviations of a person's points
@@ -63,17 +65,33 @@ def frames(kind: str, count: int) -> list[Frame]:
     return made
 
 
+def pictures(count: int) -> tuple[Array, list[Frame]]:
+    """Background sample (10, H, W, 3) and the same picture again and again, about so many of its grid points black."""
+    r = np.random.default_rng(count)
+    place = SCALE * (people_of("crowd", count, r)[0] + APART / 2)
+    side = int(SCALE * APART * np.ceil(np.sqrt(max(1, count // FIVE))))
+    empty = r.integers(120, 130, (10, side, side, 3), np.uint8)
+    image = empty[0].copy()
+    for x, y in place:
+        rows, columns = np.ogrid[int(y) - 29 : int(y) + 30, int(x) - 10 : int(x) + 11]
+        inside = np.square((columns - x) / 9) + np.square((rows - y) / 28) <= 1
+        image[rows[0, 0] : rows[-1, 0] + 1, columns[0, 0] : columns[0, -1] + 1][inside] = 0
+    steps = range(1, WARM + STEPS + 1)
+    return empty, [Frame(k, (k - 1) / FPS, image=image) for k in steps]
+
+
 class Stepper:
-    """A tracker that knows its groups. State: its copy to begin with, and the least time of a step so far, s."""
+    """A tracker that knows its groups. State: its copy to begin with, and the least times of a step and, of pictures,
+    of the detector so far, s; how many groups it told."""
 
     def __init__(self, tracker: str, kind: str, count: int) -> None:
         made: Any = protocol.find(tracker)
         self.tracker = made(made.config_class())
-        self.tracker.reset(Context(FPS, SCALE), 0)
-        first = frames(kind, count)
+        sample, first = pictures(count) if kind == "pictures" else (None, frames(kind, count))
+        self.tracker.reset(Context(FPS, SCALE, background=sample), 0)
         for frame in first[:WARM]:
             self.tracker.step(frame, frame.detections)
-        self.frames, self.best, self.told = first[WARM:], float("inf"), 0
+        self.frames, self.best, self.detector, self.told = first[WARM:], float("inf"), float("inf"), 0
 
     def round(self) -> None:
         """The steps once more."""
@@ -83,6 +101,11 @@ class Stepper:
             said = tracker.step(frame, frame.detections)
         self.best = min(self.best, (time.process_time() - begun) / len(self.frames))
         self.told = len(said.id)
+        if tracker.pixels is not None:
+            begun = time.process_time()
+            for frame in self.frames:
+                tracker.pixels.points(frame.image, tracker.outlines())
+            self.detector = min(self.detector, (time.process_time() - begun) / len(self.frames))
 
 
 def exponent(counts: Array, seconds: Array) -> float:
@@ -101,11 +124,14 @@ def cost(given: argparse.Namespace) -> Any:
             stepper.round()
     rows, found = {}, {}
     for kind in kinds:
-        seconds = np.array([steppers[kind, n].best for n in COUNTS])
+        row = [steppers[kind, n] for n in COUNTS]
+        seconds = np.array([s.best - (s.detector if kind == "pictures" else 0.0) for s in row])
         found[kind] = {"seconds": seconds.tolist(), "exponent": exponent(np.array(COUNTS), seconds)}
         rows[f"{kind}, ms"] = [*(f"{1e3 * s:.2f}" for s in seconds), f"{found[kind]['exponent']:.2f}"]
         rows[f"{kind}, frames/s"] = [*(f"{1 / s:.0f}" for s in seconds), ""]
-        rows[f"{kind}, groups told"] = [*(str(steppers[kind, n].told) for n in COUNTS), ""]
+        if kind == "pictures":
+            rows["pictures, frames/s with the detector"] = [*(f"{1 / s.best:.0f}" for s in row), ""]
+        rows[f"{kind}, groups told"] = [*(str(s.told) for s in row), ""]
     title = f"a step against the number of measurements; exponent of n, from {LEAST} on"
     table(title, "measurements", [*(f"{n:,}" for n in COUNTS), "exponent"], rows)
     speeds = whole(given.tracker)

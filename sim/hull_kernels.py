@@ -2,8 +2,23 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 from numba import njit
+
+from sim.types import Array
+
+
+def hulls(sets: Sequence[Array]) -> tuple[Array, ...]:
+    """(V, 2) convex hull of each set of points (K, 2), as sim.geometry.convex_hull has it; (0, 2) of one with a nan."""
+    count = np.array([len(points) for points in sets], np.int64)
+    if not count.any():
+        return tuple(np.zeros((0, 2)) for _ in sets)
+    points, of = np.concatenate(sets), np.repeat(np.arange(len(sets)), count)
+    order = np.lexsort((points[:, 1], points[:, 0], of))
+    vertices, ends = chains(points[order], np.concatenate([[0], np.cumsum(count)]))
+    return tuple(np.split(vertices, ends[:-1]))
 
 
 @njit(cache=True)
@@ -35,6 +50,6 @@ def chains(points, cuts):  # type: ignore[no-untyped-def]
                     n -= 1
                 out[n] = points[i]
                 n += 1
-            n -= 1  # the last is the first again
+            n -= last > first + 1  # the last is the first again
         ends[g] = n
     return out[:n].copy(), ends

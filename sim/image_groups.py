@@ -58,15 +58,11 @@ def _means(values: Array, cuts: Ints) -> Array:
 
 def hulls(ellipses: Outlines, cuts: Ints) -> list[Array]:
     """Hulls (V, 2) of groups of silhouettes, counter-clockwise in (u, v); (0, 2) where a silhouette is nan."""
-    from sim.hull_kernels import chains
+    from sim import hull_kernels
 
     edge = contour(ellipses, POINTS)[: cuts[-1]]
-    each = edge.shape[1]
-    group = np.repeat(np.arange(len(cuts) - 1), np.diff(cuts) * each)
-    points = edge.reshape(-1, 2)
-    order = np.lexsort((points[:, 1], points[:, 0], group))
-    vertices, ends = chains(points[order], cuts * each)
-    return np.split(vertices, ends)[: len(ends)]
+    sets = np.split(edge.reshape(-1, 2), edge.shape[1] * cuts[1:])
+    return list(hull_kernels.hulls(sets[:-1]))
 
 
 def image_velocities(camera: Camera, middle: Array, vel: Array) -> Array:

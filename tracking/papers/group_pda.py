@@ -108,7 +108,7 @@ class GroupPda:
     def _points(self, frame: Frame, detections: Detections | None) -> tuple[Array | None, Array]:
         """The frame's points (M, 2) and the people each stands for (M,); None where the frame tells nothing."""
         if self.pixels is not None:
-            found = None if frame.image is None else self.pixels.points(frame.image, self._outlines())
+            found = None if frame.image is None else self.pixels.points(frame.image, self.outlines())
             if found is not None and frame.image is not None and self.config.appearance > 0:
                 self.colour = colours(frame.image, found)
             return found, np.full(0 if found is None else len(found), self.pixels.share)
@@ -127,7 +127,7 @@ class GroupPda:
             self.box = np.median(detections.box[:, 2:], 0)
         return Q * self.context.px_per_m if self.box is None else SQUARE * self.box / 2
 
-    def _outlines(self) -> list[Array]:
+    def outlines(self) -> list[Array]:
         """The outlines of the groups that are told, px, the whole cells of the grid."""
         bank, cell = self.bank, self._outline(None)
         rows = np.flatnonzero(bank.named).tolist()

@@ -11,14 +11,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from sim.hull_kernels import hulls
 from sim.types import Array, Bools, Ints
 from tracking.papers.group_pda_bank import Bank
+from tracking.papers.group_pda_kernels import near
 from tracking.papers.group_pda_rules import Rules
 
-OUTLINE = 20
-"""Of so many pixels and more only those on their hull are kept."""
-SMALL = 4096
-"""Pairs of points up to which all with all is quicker than a tree."""
 PAST, MEMORY = 3.0, 64
 """For so long, s, no more than so many of a group's points are kept, to look back from a split."""
 
@@ -75,15 +73,6 @@ def carried(bank: Bank, points: Array, rules: Rules, t: float) -> tuple[Array, I
     return place[missed], row_of[missed], seen[missed]
 
 
-def near(place: Array, points: Array, reach: float) -> Bools:
-    """(K,) whether one of the points (M, 2) is no further than reach from each place (K, 2)."""
-    if len(place) * len(points) < SMALL:
-        return np.asarray((np.square(place[:, None] - points).sum(2) <= reach**2).any(1))
-    from scipy.spatial import cKDTree
-
-    return np.asarray(np.isfinite(cKDTree(points).query(place, distance_upper_bound=reach)[0]))
-
-
 def exclusive(chosen: Bools, d2: Array) -> Bools:
     """(G, M) whose each point is that several groups may have chosen: the one's to whose centroid it is nearest.
 
@@ -102,7 +91,7 @@ def remember(bank: Bank, claims: Claims, chosen: Bools, rules: Rules, t: float) 
         if not rules.pixels:
             bank.places[row] = (place, when, near(place, bank.places[row][0], rules.scale * rules.config.carry_reach))
             continue
-        place = _hull(place) if len(place) >= OUTLINE else place
+        (place,) = hulls([place])
         bank.places[row] = (place, np.full(len(place), t), np.ones(len(place), bool))
 
 
@@ -112,9 +101,3 @@ def thinned(points: Array) -> Array:
         return points
     scattered = np.sin(points @ np.array([12.9898, 78.233])) * 43758.5453
     return points[np.argsort(scattered - np.floor(scattered), kind="stable")[:MEMORY]]
-
-
-def _hull(points: Array) -> Array:
-    import cv2
-
-    return np.asarray(cv2.convexHull(points.astype(np.float32)), float).reshape(-1, 2)

@@ -12,7 +12,8 @@ import numpy as np
 from sim.types import Array, Bools, Ints
 from tracking.components import linked, partition
 from tracking.papers.group_pda_bank import UNNAMED, Bank, children, newborn
-from tracking.papers.group_pda_carry import near, thinned
+from tracking.papers.group_pda_carry import thinned
+from tracking.papers.group_pda_kernels import near
 from tracking.papers.group_pda_merging import Change
 from tracking.papers.group_pda_onset import parting
 from tracking.papers.group_pda_rules import Rules

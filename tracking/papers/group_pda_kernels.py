@@ -44,6 +44,30 @@ def search(points: Array, x: Array, P: Array, extent: Array, noise: float, wider
 
 
 @njit(cache=True)
+def near(place: Array, points: Array, reach: float) -> Bools:
+    """(K,) whether one of the points (M, 2) is no further than reach from each place (K, 2); outwards along x."""
+    order = np.argsort(points[:, 0])
+    x = points[order, 0]
+    found, most = np.zeros(len(place), np.bool_), reach * reach
+    for k in range(len(place)):
+        up = np.searchsorted(x, place[k, 0])
+        down = up - 1
+        while not found[k] and (up < len(x) or down >= 0):
+            right = x[up] - place[k, 0] if up < len(x) else np.inf
+            left = place[k, 0] - x[down] if down >= 0 else np.inf
+            if min(left, right) > reach:
+                break
+            at = order[up] if right <= left else order[down]
+            dx, dy = points[at, 0] - place[k, 0], points[at, 1] - place[k, 1]
+            found[k] = dx * dx + dy * dy <= most
+            if right <= left:
+                up += 1
+            else:
+                down -= 1
+    return found
+
+
+@njit(cache=True)
 def associate(
     points: Array, weights: Array, d2: Array, looks: Array, own: Ints, hits: Ints,
     x: Array, P: Array, extent: Array, size: Array, hold: Bools, rules: Array,

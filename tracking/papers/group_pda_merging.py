@@ -14,7 +14,7 @@ from sim.geometry import hull_gap
 from sim.types import Array, Bools, Ints
 from tracking.ellipsoids import overlaps
 from tracking.papers.group_pda_bank import UNNAMED, Bank, merged
-from tracking.papers.group_pda_carry import near
+from tracking.papers.group_pda_kernels import near
 from tracking.papers.group_pda_onset import REACH, Encounter
 from tracking.papers.group_pda_rules import Rules
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from sim.hull_kernels import chains
+from sim.hull_kernels import hulls
 from sim.types import Array, GroupEvent, Groups, Plane, Tracks
 from tracking.papers import group_pda_kernels as kernels
 from tracking.papers.group_pda_bank import Bank
@@ -36,15 +36,8 @@ def tracks(
 
 
 def _hulls(places: list[Array], outline: Array) -> tuple[Array, ...]:
-    """Convex hulls of an outline (V, 2) round each group's places (K, 2)."""
-    count = np.array([len(p) for p in places], np.int64)
-    if not count.any():
-        return tuple(np.zeros((0, 2)) for _ in places)
-    corner = (np.concatenate(places)[:, None] + outline).reshape(-1, 2)
-    group = np.repeat(np.arange(len(places)), count * len(outline))
-    order = np.lexsort((corner[:, 1], corner[:, 0], group))
-    vertices, ends = chains(corner[order], np.concatenate([[0], np.cumsum(count * len(outline))]))
-    return tuple(np.split(vertices, ends[:-1]))
+    """Convex hulls of an outline (V, 2) round each group's places (K, 2): round those on their own hull."""
+    return hulls([(corner[:, None] + outline).reshape(-1, 2) for corner in hulls(places)])
 
 
 def _event(change: Change, index: int, fps: float) -> GroupEvent:

@@ -17,6 +17,7 @@ from tracking.papers import group_pda_changes as changes
 from tracking.papers import group_pda_kernels as kernels
 from tracking.papers.group_pda_bank import Bank, merged, newborn
 from tracking.papers.group_pda_config import GroupPdaConfig
+from tracking.papers.group_pda_kernels import near
 from tracking.papers.group_pda_merging import Merging
 from tracking.papers.group_pda_rules import make_rules, truncation
 
@@ -411,3 +412,12 @@ def test_what_split_does_not_merge_in_the_same_frame(pixels: bool) -> None:
         assert split is None or len(one) == len(split.after) > 1
         assert not list(Merging().step(one, rules, 1.0)), seed
     assert splits > 50
+
+
+@pytest.mark.parametrize("seed", range(30))
+def test_near_is_that_of_all_pairs(seed: int) -> None:
+    r = np.random.default_rng(seed)
+    place, points = (np.round(r.uniform(0, 5, (int(r.integers(0, 20)), 2)), 1) for _ in range(2))
+    reach = float(r.choice([0.05, 0.5, 2.0]))
+    squared = np.square(place[:, None] - points).sum(2) <= reach**2
+    np.testing.assert_array_equal(near(place, points, reach), squared.any(1))
