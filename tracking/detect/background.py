@@ -29,7 +29,7 @@ from tracking.detect.classes import SHADOW as SHADOW
 from tracking.detect.classes import Floats
 from tracking.detect.classes import foreground as foreground
 from tracking.detect.settings import BackgroundSettings
-from tracking.detect.training import FLOOR, check_frame, train
+from tracking.detect.training import FLOOR, check_frame, thresholds, train
 
 INTERLEAVE = 4
 """One row in so many is adapted per frame, by as many frames' worth."""
@@ -53,13 +53,19 @@ class Background:
         self.var: Floats = np.ascontiguousarray(np.moveaxis(np.square(trained.sigma), -1, 0))
         self.valid = trained.valid
         self.s, self.b = (np.where(self.valid, n, np.float32(np.inf)) for n in (trained.s, trained.b))
-        self.thresholds = trained.thresholds
+        self._counts = trained.counts
         self.gain: Floats = np.ones(3, np.float32)
         self._grid = gains.grid(*self.valid.shape)
         self._calm = self.valid[self._grid]
         self._turn = 0
-        grey = bool((sample[..., :1] == sample).all())
-        self.bounds = (1.0, 1.0) if grey else (self.settings.dark, self.settings.bright)
+        self._grey = bool((sample[..., :1] == sample).all())
+        self.follow(self.settings)
+
+    def follow(self, settings: BackgroundSettings) -> None:
+        """Take on thresholds, bounds and times; what was learned stays."""
+        self.settings = settings
+        self.thresholds = thresholds(self._counts, settings.detection_rate)
+        self.bounds = (1.0, 1.0) if self._grey else (settings.dark, settings.bright)
 
     def classify(self, image: Image) -> Image:
         """(H, W) uint8 classes of a frame (H, W, 3) BGR uint8."""

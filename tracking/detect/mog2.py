@@ -38,14 +38,21 @@ class Mog2:
         import cv2
 
         check(sample)
-        self.settings = settings or Mog2Settings()
+        settings = settings or Mog2Settings()
+        self.fps = fps
         self.valid = np.ones(sample.shape[1:3], bool)
-        self._rate = 1 - math.exp(-1 / (fps * self.settings.background_time))
-        self._model = cv2.createBackgroundSubtractorMOG2(len(sample), self.settings.variance, True)
-        self._model.setShadowThreshold(self.settings.shadow)
+        self._model = cv2.createBackgroundSubtractorMOG2(len(sample), settings.variance, True)
         self._model.setShadowValue(SHADOW_VALUE)
+        self.follow(settings)
         for frame in sample:
             self._model.apply(frame)
+
+    def follow(self, settings: Mog2Settings) -> None:
+        """Take on thresholds and the time; what was learned stays."""
+        self.settings = settings
+        self._rate = 1 - math.exp(-1 / (self.fps * settings.background_time))
+        self._model.setVarThreshold(settings.variance)
+        self._model.setShadowThreshold(settings.shadow)
 
     def classify(self, image: Image) -> Image:
         """(H, W) uint8 classes of a frame (H, W, 3) BGR uint8."""

@@ -47,6 +47,7 @@ class BackgroundSettings(Config):
         "follow the brightness of the whole frame per channel (ours)",
         "categorical",
         sees="pixels",
+        online=False,
     )
 
     def check(self) -> None:

@@ -47,7 +47,7 @@ BINS, SPAN = 4000, 20.0
 @dataclass(frozen=True)
 class Trained:
     """E, sigma (H, W, 3), grey levels; s, b (H, W), no unit; valid (H, W); thresholds of CD / b, of (alpha - 1) / a
-    the lower and the upper one."""
+    the lower and the upper one; counts (2, BINS): the histograms that these are read off."""
 
     mean: Floats
     sigma: Floats
@@ -55,6 +55,7 @@ class Trained:
     b: Floats
     valid: Bools
     thresholds: tuple[float, float, float]
+    counts: Ints
 
 
 def train(sample: Image, rate: float, follow_gain: bool) -> Trained:
@@ -78,7 +79,8 @@ def train(sample: Image, rate: float, follow_gain: bool) -> Trained:
             remedy="give a sample of the empty scene, or detections instead of pixels",
         )
     enough = counts[1, 1].sum() >= 0.05 * counts[0, 1].sum()
-    return Trained(mean, sigma, s, b, valid, thresholds(counts[1 if enough else 0], rate))
+    counts = counts[1 if enough else 0].copy()
+    return Trained(mean, sigma, s, b, valid, thresholds(counts, rate), counts)
 
 
 def check(sample: Image) -> None:

@@ -77,7 +77,15 @@ class Blob:
             self.people, self.cascade = people, Pixels(c, people, context)
 
     def step(self, frame: Frame, detections: Detections | None) -> Tracks:
-        """Predict, gate, associate, update, manage; a picture or boxes in, boxes out."""
+        """Predict, gate, associate, update, manage; a picture or boxes in, boxes out.
+
+        `config` may have been replaced since the last frame: the tracks go on with the new one. InputError, and all is
+        as it was, where it cannot be.
+        """
+        if self.config is not self.people.config:
+            dynamics = self.config.dynamics(self.context.fps)
+            self.people.follow(self.config, dynamics)
+            self.cascade.follow(self.config)
         self.cascade.step(frame, detections)
         return self._report(frame)
 

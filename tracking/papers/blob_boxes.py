@@ -20,10 +20,15 @@ class Boxes:
     """From the boxes of each frame to the population's next state; holds the constants of its gates."""
 
     def __init__(self, config: BlobConfig, people: Population) -> None:
+        self.people = people
+        self.follow(config)
+
+    def follow(self, config: BlobConfig) -> None:
+        """Take on a config, which the population has taken on before."""
         from scipy.special import chdtri
 
-        self.config, self.people = config, people
-        self.noise, self.asymptote = people.noise, people.asymptote
+        self.config = config
+        self.noise, self.asymptote = self.people.noise, self.people.asymptote
         shares = 1 - np.array([config.gate, config.orphan_gate, config.confirm_gate])
         self.gate, self.orphan_gate, self.confirm_gate = chdtri(4, shares)  # d^2 at these shares (eq. 10)
 

@@ -26,6 +26,10 @@ class People(Population):
     def __init__(self, config: BlobConfig, dynamics: lifecycle.Dynamics, context: Context) -> None:
         self.angle, self.nominal = np.zeros((2, 0)), np.zeros((5, 0, 4))
         super().__init__(config, dynamics, context)
+
+    def follow(self, config: BlobConfig, dynamics: lifecycle.Dynamics) -> None:
+        """Take on a config and the nominal filter that follows from it; the tracks stay as they are."""
+        super().follow(config, dynamics)
         rate = config.angle_rate * (HEADING if self.top else 1.0)
         self.turn = np.radians(rate) ** 2 * dynamics.dt
 

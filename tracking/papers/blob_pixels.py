@@ -41,27 +41,35 @@ class Pixels:
     """From the picture of each frame to the population's next state. State: background and person size."""
 
     def __init__(self, config: BlobConfig, people: People, context: Context) -> None:
-        from scipy.special import chdtri
-
         assert context.background is not None
         if not np.isnan(context.px_per_m):
             scale.needed(context.px_per_m)
-        self.config, self.people, self.context = config, people, context
+        self.people, self.context = people, context
         self.size = PersonSize(context)
         self.background: Background | Mog2
         if config.segmentation == "mog2":
-            mog2 = Mog2Settings(shadow=config.dark, background_time=config.background_time)
-            self.background = Mog2(context.background, context.fps, mog2)
+            self.background = Mog2(context.background, context.fps, _mog2(config))
         else:
             self.background = Background(context.background, context.fps, config)
         self.scale = context.px_per_m
         lone.learn(self.size, self.background, context.background, self.scale)
         self._take_scale()
+        self.upright = np.inf if self.size.above else np.radians(UPRIGHT) ** 2
+        self._set(config)
+
+    def follow(self, config: BlobConfig) -> None:
+        """Take on a config, which the population has taken on before; background and person size stay as learned."""
+        self.background.follow(_mog2(config) if isinstance(self.background, Mog2) else config)  # type: ignore[arg-type]
+        self._set(config)
+
+    def _set(self, config: BlobConfig) -> None:
+        from scipy.special import chdtri
+
+        self.config = config
         # d^2 of 4 and 5 degrees of freedom, without and with a direction, at these shares (eq. 10)
         self.gates = chdtri(np.array([4, 5]), 1 - config.gate)
         self.confirm_gates = chdtri(np.array([4, 5]), 1 - config.confirm_gate)
         self.angle_noise = np.radians(config.angle_noise) ** 2
-        self.upright = np.inf if self.size.above else np.radians(UPRIGHT) ** 2
 
     def _take_scale(self) -> None:
         """The learned px per m, where the context has none."""
@@ -212,6 +220,10 @@ class Pixels:
         noise = people.noise / np.maximum(shown, LEAST_SHOWN)[:, None] ** 2
         noise[:, 2:] *= BLIND
         return open_rows[keep], self._ellipses(_places(at)), noise, np.clip(worth, 0.0, 1.0)
+
+
+def _mog2(config: BlobConfig) -> Mog2Settings:
+    return Mog2Settings(shadow=config.dark, background_time=config.background_time)
 
 
 def _templates(place: Array) -> Array:

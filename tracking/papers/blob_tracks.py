@@ -27,7 +27,16 @@ class Population:
     """
 
     def __init__(self, config: BlobConfig, dynamics: lifecycle.Dynamics, context: Context) -> None:
-        self.config, self.dynamics, self.context = config, dynamics, context
+        self.context = context
+        self.top = context.camera is not None and context.camera.kind == "top"
+        self.low, self.high = np.full(2, np.inf), np.full(2, -np.inf)
+        self.bank, self.id, self.next_id = np.zeros((5, 0, 4)), np.zeros(0, np.int64), 1
+        self._bind(np.zeros((6, 0)), np.zeros((3, 0), bool))
+        self.follow(config, dynamics)
+
+    def follow(self, config: BlobConfig, dynamics: lifecycle.Dynamics) -> None:
+        """Take on a config and the nominal filter that follows from it; the tracks stay as they are."""
+        self.config, self.dynamics = config, dynamics
         self.q, self.noise, self.asymptote = dynamics.q, dynamics.noise, dynamics.asymptote
         self.birth_rho = lifecycle.at_birth(dynamics)
         self.tentative = max(config.tentative_time, lifecycle.time_to_confirm(dynamics, config.confirm_ratio))
@@ -36,10 +45,6 @@ class Population:
         self.blindest = 2 * float(np.log(max(self.excused_death, self.birth_rho)))
         self.silence = self._after(config.report_coast)
         self.excused_silence = max(self.silence, self._after(config.report_hidden))
-        self.top = context.camera is not None and context.camera.kind == "top"
-        self.low, self.high = np.full(2, np.inf), np.full(2, -np.inf)
-        self.bank, self.id, self.next_id = np.zeros((5, 0, 4)), np.zeros(0, np.int64), 1
-        self._bind(np.zeros((6, 0)), np.zeros((3, 0), bool))
 
     def _bind(self, book: Array, flags: Bools) -> None:
         """Name the rows of the two tables; whoever changes one writes in place."""

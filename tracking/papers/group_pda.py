@@ -87,7 +87,12 @@ class GroupPda:
         return self.context.px_per_m
 
     def step(self, frame: Frame, detections: Detections | None) -> Tracks:
-        """Predict; gate, associate, update, split (Fig. 1); merge; births and deaths."""
+        """Predict; gate, associate, update, split (Fig. 1); merge; births and deaths.
+
+        `config` may have been replaced since the last frame: the groups go on with the new one.
+        """
+        if self.pixels is not None and self.pixels.config is not self.config:
+            self.pixels.follow(self.config)
         points, weights = self._points(frame, detections)
         if points is None and self.rules is None and self.pixels is None:
             return self._silent(frame)

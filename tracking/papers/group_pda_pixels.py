@@ -30,6 +30,12 @@ class Pixels:
         self.step = max(1, round(config.grid * self.scale))
         self.person = _person(context.camera, self.scale)
 
+    def follow(self, config: GroupPdaConfig) -> None:
+        """Take on a config; background and scale stay as learned."""
+        self.config = config
+        self.background.follow(config)
+        self.step = max(1, round(config.grid * self.scale))
+
     @property
     def share(self) -> float:
         """How much of a person a grid point is: cell / area of an ellipse of his size."""

@@ -1,0 +1,152 @@
+"""Trackers whose parameters change between frames: what they do is what a tracker reset with the new ones does."""
+
+from __future__ import annotations
+
+import dataclasses
+
+import numpy as np
+import pytest
+
+from scenarios.errors import InputError
+from scenarios.loading import load
+from sim.sequence import simulate
+from sim.types import Context
+from tracking.protocol import find, names
+from tracking.run import prepare
+from tracking.search import decode
+
+POINTS = ["camera.fps=5", "duration=4", "sensor.detect_prob=0.9", "sensor.clutter_rate=1"]
+PIXELS = ["camera.fps=5", "duration=2", "camera.image=[160,120]"]
+TRAINED = ("detection_rate", "dark", "bright")
+"""By these the background sample was looked through already."""
+
+
+@pytest.fixture(scope="module")
+def points():
+    return simulate(load("cross", POINTS), 3, 0, ())
+
+
+@pytest.fixture(scope="module")
+def pixels():
+    return simulate(load("cross", PIXELS), 3, 0, ("left", "background"))
+
+
+def answers(name, sequence, mode, configs):
+    """Answers with the config that `configs` holds from each frame on."""
+    ready = prepare(name, sequence, params=configs.get(0), detections=mode)
+    ready.reset(0)
+    made = []
+    for frame in ready.frames():
+        ready.tracker.config = configs.get(frame.index, ready.tracker.config)
+        made.append(ready.answer(frame))
+    return made
+
+
+def same(a, b):
+    assert len(a) == len(b)
+    for s, t in zip(a, b, strict=True):
+        assert np.array_equal(s.id, t.id)
+        assert np.array_equal(s.pos, t.pos)
+        assert np.array_equal(s.cov, t.cov)
+        assert [e.kind for e in s.events] == [e.kind for e in t.events]
+
+
+def differ(a, b):
+    return any(s.pos.shape != t.pos.shape or not np.array_equal(s.pos, t.pos) for s, t in zip(a, b, strict=True))
+
+
+def other(p, value):
+    """Another value of a parameter, far from this one."""
+    if p.scale == "categorical":
+        return next(c for c in p.choices if c != value)
+    return p.low + 0.03 * (p.high - p.low) if value > (p.low + p.high) / 2 else p.high - 0.03 * (p.high - p.low)
+
+
+def changed(config, p):
+    """The config with another value of this parameter alone, if it can be had."""
+    try:
+        return dataclasses.replace(config, **{p.name: other(p, getattr(config, p.name))})
+    except InputError:
+        return None
+
+
+@pytest.mark.parametrize("name", names())
+def test_an_equal_config_changes_nothing(name, points):
+    config = find(name).config_class()
+    plain = answers(name, points, "file", {})
+    same(plain, answers(name, points, "file", {k: dataclasses.replace(config) for k in (1, 7, 10)}))
+
+
+@pytest.mark.parametrize("name", names())
+def test_each_parameter_changed_after_the_reset_is_as_if_reset_with(name, points):
+    kind = find(name).config_class
+    counted, plain = 0, answers(name, points, "file", {})
+    for p in (p for p in kind.space(online=True) if p.sees != "pixels"):
+        config = changed(kind(), p)
+        if config is None:
+            continue
+        try:
+            reset = answers(name, points, "file", {0: config})
+        except InputError:
+            with pytest.raises(InputError):
+                answers(name, points, "file", {1: config})
+            continue
+        same(reset, answers(name, points, "file", {1: config}))
+        counted += differ(reset, plain)
+    assert counted >= 10
+
+
+@pytest.mark.parametrize("name", names())
+def test_from_pixels_too(name, pixels):
+    kind, rng = find(name).config_class, np.random.default_rng(5)
+    space = tuple(p for p in kind.space(online=True) if p.name not in TRAINED)
+    plain = answers(name, pixels, "image", {})
+    for _ in range(4):
+        action = rng.uniform(-0.5, 0.5, len(space))
+        config = decode(space, action, kind(), lambda c: find(name)(c).reset(Context(5.0, 40.0), 0))
+        reset = answers(name, pixels, "image", {0: config})
+        same(reset, answers(name, pixels, "image", {1: config}))
+        assert differ(plain, reset)
+
+
+@pytest.mark.parametrize("name", names())
+def test_a_change_half_way_is_seen_from_there_on_and_not_before(name, points):
+    kind = find(name).config_class
+    config = decode(kind.space(online=True), np.full(len(kind.space(online=True)), -0.3), kind())
+    plain, late = answers(name, points, "file", {}), answers(name, points, "file", {12: config})
+    same(plain[:11], late[:11])
+    assert differ(plain[11:], late[11:])
+
+
+@pytest.mark.parametrize(("sequence", "mode"), [("points", "file"), ("pixels", "image")])
+@pytest.mark.parametrize("name", names())
+def test_any_change_between_any_frames(name, sequence, mode, request):
+    """Random parameters in every other frame: those that cannot be are refused before anything is changed."""
+    kind, rng = find(name).config_class, np.random.default_rng(5)
+    space = kind.space(online=True)
+    ready = prepare(name, request.getfixturevalue(sequence), detections=mode)
+    ready.reset(0)
+    for frame in ready.frames():
+        before = ready.tracker.config
+        ready.tracker.config = decode(space, rng.uniform(-1, 1, len(space)), kind())
+        try:
+            ready.answer(frame)
+        except InputError:
+            ready.tracker.config = before
+            ready.answer(frame)
+
+
+def test_a_refused_change_leaves_blob_as_it_was(points):
+    """Newborn tracks that would be confirmed at once."""
+    wrong = dataclasses.replace(find("blob").config_class(), confirm_ratio=2.0, speed_prior=0.1, size_rate_prior=0.01)
+    ready, plain = prepare("blob", points), answers("blob", points, "file", {})
+    ready.reset(0)
+    good, made = ready.tracker.config, []
+    for frame in ready.frames():
+        ready.tracker.config = wrong
+        with pytest.raises(InputError, match="confirm_ratio"):
+            ready.answer(frame)
+        ready.tracker.config = good
+        made.append(ready.answer(frame))
+    assert len(made) == 20
+    same(plain, made)
