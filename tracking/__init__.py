@@ -1,7 +1,7 @@
 """From frames to scores: detectors, trackers, grouping, scoring, the commands.
 
-`tracking.track(tracker, sequence)` and `tracking.evaluate(truth, tracks)` are the whole of it; nothing heavy is
-imported before it is asked for.
+`tracking.track(tracker, sequence)` and `tracking.evaluate(truth, tracks)` are the whole of it, `tracking.tune(tracker,
+suite)` a search around them; nothing heavy is imported before it is asked for.
 """
 
 from __future__ import annotations
@@ -11,10 +11,11 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from tracking.run import track
     from tracking.scoring import evaluate
+    from tracking.tuning import tune
 
-__all__ = ["evaluate", "track"]
+__all__ = ["evaluate", "track", "tune"]
 
-_HOME = {"evaluate": "tracking.scoring", "track": "tracking.run"}
+_HOME = {"evaluate": "tracking.scoring", "track": "tracking.run", "tune": "tracking.tuning"}
 
 
 def __getattr__(name: str) -> Any:

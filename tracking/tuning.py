@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING
 
 from scenarios.errors import InputError
 from sim.types import DetectionMode, Tracker
+from tracking.tuning_goals import Goal
 from tracking.tuning_judge import Candidate, Judge, front
 from tracking.tuning_plan import Plan, Scenes, plan
 from tracking.tuning_result import Trial, Tuned
@@ -47,6 +48,7 @@ def tune(
     storage: str | Path | None = None,
     study: str | None = None,
     workers: int = 1,
+    cluster: str | None = None,
     prune: float = 0.1,
     finalists: int = 5,
     seed: int = 0,
@@ -60,9 +62,10 @@ def tune(
     docs/metrics.md or "frames/s"; of several, a Pareto front. set: "gate=0.99" holds a parameter, "scenario.…" and
     "sensor.…" are of the scenes. only: the parameters to search. out: where to write the result; beside it lies the
     study, by which the same call goes on, unless `storage` names another journal file or an Optuna storage's URL
-    (without either it is in memory). study: its name there. workers: processes that play episodes; the result does not
-    depend on them. prune: p below which a trial that loses on the same scenes is given up, 0 for never. finalists: how
-    many of the best are judged on validation scenes. progress(done, all, what) is called as it goes.
+    (without either it is in memory). study: its name there. workers: processes that play episodes, or cluster: a
+    scheduler's address; the result does not depend on them. prune: p below which a trial that loses on the same scenes
+    is given up, 0 for never. finalists: how many of the best are judged on validation scenes. progress(done, all, what)
+    is called as it goes.
 
     InputError for wishes that cannot be, before anything is played; errors of the defaults themselves are raised.
     """
@@ -78,7 +81,7 @@ def tune(
     target = None if out is None else _target(Path(out))
     place = storage if storage is not None or target is None else target.with_suffix(JOURNAL)
     name = study or (target.stem if target is not None else "flockscope")
-    with opened(made, place, name) as own, players(made.subject, made.detections, workers) as play:
+    with opened(made, place, name) as own, players(made.subject, made.detections, workers, cluster) as play:
         search(own, play, tell)
         found = _judged(made, own, play, lambda what: tell(made.trials, made.trials, what))
     if target is not None:
@@ -110,19 +113,30 @@ def _judged(made: Plan, study: Study, play: Play, tell: Callable[[str], None]) -
     default, several = candidates[0], len(made.goals) > 1
     kept = front(candidates, made.goals) if several else []
     goal = made.goals[0]
-    best = kept[0] if several else max(candidates, key=lambda c: goal.gain(0.0, c.validation[0]))
+    sure = [c for c in candidates if c.gain is not None and c.gain.verdict == "better"]
+    best = kept[0] if several else max([default, *sure], key=lambda c: goal.gain(0.0, c.validation[0]))
     config, reached = best.config, best.validation
-    if not several:
+    if not several and best is not default:
         order = sorted(importance, key=lambda name: importance[name])
         config, value = judge.simplified(best.config, best.validation[0], order)
         reached = (value,)
     before = made.base.as_dict()
     back = [n for n, v in best.config.as_dict().items() if v != before[n] and config.as_dict()[n] == before[n]]
-    comparisons, notes = judge.compared(config) if config != made.base else ([], [])
+    comparisons, notes = judge.compared(config) if config != made.base else ([], _why_none(candidates, goal))
     return Tuned(
         made, config, tuple(kept), tuple(candidates), tuple(study.told()), importance, tuple(comparisons), tuple(back),
         (default.validation, reached), tuple(notes), study.optuna.study_name,
     )  # fmt: skip
+
+
+def _why_none(candidates: list[Candidate], goal: Goal) -> list[str]:
+    """Why the defaults stay."""
+    others = [c.gain for c in candidates[1:] if c.gain is not None]
+    if not others:
+        return ["the defaults stay: no trial was better in training"]
+    best = max(others, key=lambda c: goal.gain(c.before, c.after))
+    ends = f"{best.difference:+.4f} [{best.low:+.4f}, {best.high:+.4f}], {best.sequences} sequences"
+    return [f"the defaults stay: nothing is surely better on the validation scenes; at best {goal.key} {ends}"]
 
 
 def _candidates(made: Plan, study: Study) -> list[Candidate]:

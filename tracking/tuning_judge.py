@@ -28,16 +28,6 @@ Tell = Callable[[str], None]
 
 
 @dataclass(frozen=True)
-class Candidate:
-    """A config that was good in training: its trial, its value there, and what it reached on the validation scenes."""
-
-    trial: int
-    config: Config
-    training: tuple[float, ...]
-    validation: tuple[float, ...] = ()
-
-
-@dataclass(frozen=True)
 class Comparison:
     """A score before and after, means over the sequences where both are known, and the 95 % interval of the difference.
 
@@ -69,6 +59,18 @@ class Comparison:
 
 
 @dataclass(frozen=True)
+class Candidate:
+    """A config that was good in training: its trial, its value there, what it reached on the validation scenes, and
+    how that is beside the defaults by the first goal."""
+
+    trial: int
+    config: Config
+    training: tuple[float, ...]
+    validation: tuple[float, ...] = ()
+    gain: Comparison | None = None
+
+
+@dataclass(frozen=True)
 class Judge:
     """Plays and compares. tell: is told what is being done."""
 
@@ -79,16 +81,19 @@ class Judge:
     def validated(self, candidates: Sequence[Candidate]) -> list[Candidate]:
         """The candidates with what they reach on the validation scenes, the first being the defaults; others that
         cannot be played there are left out."""
-        found = []
+        found, goals = list[Candidate](), self.plan.goals
+        first: Episodes = ()
         for k, one in enumerate(candidates):
             self.tell(f"validation, {k + 1} of {len(candidates)}")
             try:
-                reached = self._reached(one.config)
+                episodes = self._all(self.plan.validating, one.config, every_score(self.plan))
             except FlockscopeError:
                 if k == 0:
                     raise
                 continue
-            found.append(replace(one, validation=reached))
+            first = first or episodes
+            reached = tuple(goal.mean(episodes) for goal in goals)
+            found.append(replace(one, validation=reached, gain=comparison("validation", goals[0], first, episodes)))
         return found
 
     def simplified(self, config: Config, value: float, order: Sequence[str]) -> tuple[Config, float]:
@@ -100,7 +105,7 @@ class Judge:
             self.tell(f"taking back what brings nothing, {k + 1} of {len(changed)}")
             try:
                 simpler = type(config).from_dict({**config.as_dict(), name: self.plan.defaults[name]})
-                reached = self._reached(simpler)[0]
+                reached = goal.mean(self._all(self.plan.validating, simpler, every_score(self.plan)))
             except FlockscopeError:
                 continue
             if goal.gain(value, reached) >= 0:
@@ -125,11 +130,6 @@ class Judge:
     def _shown(self) -> list[Goal]:
         keys = [goal.key for goal in self.plan.goals]
         return [*self.plan.goals, *(Goal(key) for key in SHOWN if key not in keys)]
-
-    def _reached(self, config: Config) -> tuple[float, ...]:
-        """By each goal, on the validation scenes."""
-        episodes = self._all(self.plan.validating, config, every_score(self.plan))
-        return tuple(goal.mean(episodes) for goal in self.plan.goals)
 
     def _all(self, sources: Sequence[Source], config: Config, every: bool) -> list[Episode]:
         found = []

@@ -47,6 +47,16 @@ class Plan:
     seed: int
 
     @property
+    def tracker(self) -> str:
+        """What the tracker is called, without the folder it lies in."""
+        return self.subject.name.rpartition("/")[2]
+
+    @property
+    def scenes(self) -> str:
+        """What the scenes are called, likewise."""
+        return ", ".join(map(_bare, self.suite))
+
+    @property
     def defaults(self) -> dict[str, Value]:
         """The first trial."""
         return {p.name: getattr(self.base, p.name) for p in self.space}
@@ -68,19 +78,20 @@ class Plan:
     @cached_property
     def testing(self) -> dict[str, tuple[Source, ...]]:
         """Episodes by which the winner is judged, by what they are called."""
-        found = {", ".join(self.suite): tuning_scenes.of(self.suite, self.test, self.settings)}
+        found = {self.scenes: tuning_scenes.of(self.suite, self.test, self.settings)}
         if self.check is not None:
-            found[self.check] = tuning_scenes.of((self.check,), self.check_test, ())
+            sensor = [text for text in self.settings if text.startswith("sensor.")]
+            found[_bare(self.check)] = tuning_scenes.of((self.check,), self.check_test, sensor)
         return found
 
     def identity(self) -> dict[str, Any]:
         """What makes a trial's value what it is: a study goes on under the same only."""
         return {
-            "tracker": self.subject.name,
+            "tracker": self.tracker,
             "code": _code(self.subject.name),
-            "suite": ", ".join(self.suite),
+            "suite": self.scenes,
             "seeds": text(self.seeds),
-            "scenes": _digest(source.key for source in self.training),
+            "motions": _digest(source.key for source in self.training),
             "detections": self.detections,
             "objective": ", ".join(goal.key for goal in self.goals),
             "searched": ", ".join(p.name for p in self.space),
@@ -190,6 +201,10 @@ def _space(base: Config, fixed: Sequence[str], only: tuple[str, ...], mode: Dete
         got = "all of them set" if held else f"{type(base).__name__}, which declares none"
         raise InputError(place="tracker", got=got, expected="parameters to search", remedy="leave one free")
     return found
+
+
+def _bare(name: str) -> str:
+    return Path(name).name if name.endswith(".toml") else name
 
 
 def _code(tracker: str) -> str:

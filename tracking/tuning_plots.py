@@ -16,7 +16,8 @@ if TYPE_CHECKING:
     from tracking.tuning_result import Tuned
 
 WIDTH, HEIGHT = 760, 400
-LEFT, RIGHT, TOP, BOTTOM = 70, 20, 56, 48
+LEFT, RIGHT, TOP, BOTTOM = 70, 20, 78, 48
+BARS = 56  # where bars begin
 INK, PALE, GRID = "#1b1f24", "#57606a", "#dcdfe4"
 BLUE, ORANGE, RED = "#0b6bcb", "#d4600a", "#b42318"
 ROW = 24  # height of a bar's row
@@ -92,7 +93,7 @@ def importance(found: Tuned) -> str:
     most, body = max(found.importance.values()), []
     left, wide = 190, WIDTH - 190 - 250
     for k, (name, share) in enumerate(ranked):
-        y, bar = TOP + 8 + k * ROW, wide * share / most
+        y, bar = BARS + k * ROW, wide * share / most
         old, new = getattr(found.default, name), getattr(found.config, name)
         moved = old != new
         body += [f'<rect x="{left}" y="{y}" width="{bar:.1f}" height="16" fill="{ORANGE if moved else BLUE}"/>']
@@ -102,7 +103,7 @@ def importance(found: Tuned) -> str:
         body += [_text(WIDTH - 12, y + 13, f"{change} {unit}".rstrip(), "end", INK if moved else PALE)]
     title = f"{_named(found)}: what decided about {found.plan.goals[0].key} in training (PED-ANOVA)"
     key = [(ORANGE, "changed by the winner"), (BLUE, "left at its default")]
-    return _page(title, body, key, TOP + 8 + ROW * len(ranked) + 16)
+    return _page(title, body, key, BARS + ROW * len(ranked) + 16)
 
 
 def pareto(found: Tuned) -> str:
@@ -124,7 +125,7 @@ def pareto(found: Tuned) -> str:
 def ticks(low: float, high: float) -> list[float]:
     """Five or so round numbers in a range."""
     raw = (high - low) / 5
-    step = 10.0 ** math.floor(math.log10(raw))
+    step: float = 10.0 ** math.floor(math.log10(raw))
     step *= next(m for m in (1, 2, 5, 10) if m * step >= raw * (1 - 1e-9))
     first, last = math.ceil(low / step - 1e-9), math.floor(high / step + 1e-9)
     return [round(k * step, 10) for k in range(first, last + 1)]
@@ -143,7 +144,7 @@ def _range(values: Sequence[float], pad: float) -> tuple[float, float]:
 
 
 def _named(found: Tuned) -> str:
-    return f"{found.plan.subject.name.rpartition('/')[2]} on {', '.join(found.plan.suite)}"
+    return f"{found.plan.tracker} on {found.plan.scenes}"
 
 
 def _short(value: object) -> str:

@@ -84,7 +84,7 @@ class Tuned:
         names = ", ".join(goal.key for goal in plan.goals)
         given_up = f"{self.pruned} given up early, {self.impossible} impossible"
         told = [
-            f"{plan.subject.name} tuned on {', '.join(plan.suite)}, detections {plan.detections}, for {names}",
+            f"{plan.tracker} tuned on {plan.scenes}, detections {plan.detections}, for {names}",
             f"{len(self.trials)} trials of up to {len(plan.training)} episodes, {given_up}; "
             f"training seeds {text(plan.seeds)}, validation {text(plan.validation)}, test {text(plan.test)}",
         ]
@@ -94,8 +94,6 @@ class Tuned:
         for goal, a, b in zip(plan.goals, before, after, strict=True):
             told.append(f"validation: {goal.key} {a:.4f} → {b:.4f} (chosen by it: no result)")
         told += [c.line() for c in self.comparisons]
-        if not self.changed:
-            told.append("the defaults are the best that was found")
         return [*told, *self.notes]
 
     def to_toml(self, config: Config | None = None) -> str:
@@ -117,7 +115,8 @@ class Tuned:
             "settings": plan.identity()
             | {
                 "trials": plan.trials, "validation": text(plan.validation), "test": text(plan.test),
-                "check": plan.check, "check_test": text(plan.check_test), "set": list(plan.settings),
+                "check": list(plan.testing)[1] if plan.check else None, "check_test": text(plan.check_test),
+                "set": list(plan.settings),
             },
             "counts": {"trials": len(self.trials), "pruned": self.pruned, "impossible": self.impossible},
             "params": self.config.as_dict(),

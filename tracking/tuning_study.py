@@ -52,17 +52,20 @@ def slot(trials: Sequence[FrozenTrial], trial: FrozenTrial) -> int:
 
 
 class Sampler(BaseSampler):
-    """TPE after some trials near the defaults, its generator made from seed and slot. State: that of this trial."""
+    """TPE after some trials near the defaults. State: what is drawn for this trial, from seed and slot."""
 
     def __init__(self, seed: int, defaults: dict[str, Value]) -> None:
         self._seed, self._defaults = seed, defaults
-        self._tpe, self._rng = TPESampler(seed=seed), np.random.default_rng(seed)
+        self._tpe, self._changed = TPESampler(seed=seed), set[str]()
 
     def before_trial(self, study: optuna.Study, trial: FrozenTrial) -> None:
         """Begin anew."""
         state = np.random.SeedSequence([self._seed, slot(study.get_trials(deepcopy=False), trial)])
         self._tpe = TPESampler(seed=int(state.generate_state(1)[0]), n_startup_trials=STARTUP)
-        self._rng = np.random.default_rng(state)
+        rng, names = np.random.default_rng(state), list(self._defaults)
+        changed = rng.random(len(names)) < CHANGED
+        changed[rng.integers(len(names))] = True
+        self._changed = {name for name, here in zip(names, changed, strict=True) if here}
 
     def infer_relative_search_space(self, study: optuna.Study, trial: FrozenTrial) -> dict[str, BaseDistribution]:
         """As TPE."""
@@ -77,9 +80,9 @@ class Sampler(BaseSampler):
     def sample_independent(
         self, study: optuna.Study, trial: FrozenTrial, param_name: str, param_distribution: BaseDistribution
     ) -> Any:
-        """In the first trials mostly the default, else anything; as TPE later."""
+        """In the first trials mostly the default, a few parameters anything; as TPE later."""
         begun = sum(t.state in DONE for t in study.get_trials(deepcopy=False)) < STARTUP
-        if begun and self._rng.random() >= CHANGED:
+        if begun and param_name not in self._changed:
             return self._defaults[param_name]
         return self._tpe.sample_independent(study, trial, param_name, param_distribution)
 

@@ -12,12 +12,12 @@ from scenarios.errors import InputError
 SUBJECTS = ("tracker", "sensor", "scenario")
 
 
-def seeds(text: str) -> range:
+def seeds(text: str, option: str = "--seeds") -> range:
     """`a:b`, half-open, or one seed."""
     found = re.fullmatch(r"(\d{1,18})(?::(\d{1,18}))?", text.strip())
     if found is None:
         raise InputError(
-            place="--seeds", got=repr(text), expected="a:b (from a to b - 1) or one seed", remedy="write 0:10 or 7"
+            place=option, got=repr(text), expected="a:b (from a to b - 1) or one seed", remedy="write 0:10 or 7"
         )
     first = int(found[1])
     return range(first, first + 1 if found[2] is None else int(found[2]))

@@ -1,0 +1,59 @@
+"""Nearest neighbours with parameters that a search can find: what is worst about the defaults is known."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import ClassVar
+
+import numpy as np
+
+from scenarios.errors import InputError
+from sim.types import Context, Detections, Frame, Tracks
+from tracking.config import Config, param
+
+
+@dataclass(frozen=True)
+class ToyConfig(Config):
+    """`reach` is far too short: everybody is somebody new in every frame."""
+
+    tracker: ClassVar[str] = "toy"
+
+    reach: float = param(0.1, (0.05, 5.0), "m", "nobody goes further in a frame", "log")
+    skip: int = param(0, (0, 4), "people", "so many are left out", "int")
+    colour: str = param("red", ("red", "green"), "", "nothing depends on it", "categorical")
+    forbidden: float = param(0.0, (0.0, 1.0), "", "must stay under a half")
+    steps: float = param(1.0, (0.0, 2.0), "", "of a detector in pictures", sees="pixels")
+
+    def check(self) -> None:
+        """Not everything is allowed."""
+        if self.forbidden > 0.5:
+            raise InputError(place="forbidden", got=self.forbidden, expected="under 0.5", remedy="take less")
+
+
+class Toy:
+    """State: the last place and id of everybody seen in the frame before, and the next free id."""
+
+    needs = ("points", "boxes")
+    config_class = ToyConfig
+
+    def __init__(self, config: ToyConfig) -> None:
+        self.config = config
+
+    def reset(self, context: Context, seed: int) -> None:
+        self.fps = context.fps
+        self.pos, self.id, self.next = np.zeros((0, 2)), np.zeros(0, np.int64), 0
+
+    def step(self, frame: Frame, detections: Detections | None) -> Tracks:
+        assert detections is not None
+        pos = detections.pos[self.config.skip :]
+        n, id, vel = len(pos), np.full(len(pos), -1), np.zeros((len(pos), 2))
+        apart = np.linalg.norm(pos[:, None] - self.pos[None], axis=2)
+        while apart.size and apart.min() < self.config.reach:
+            row, before = np.unravel_index(apart.argmin(), apart.shape)
+            id[row], vel[row] = self.id[before], (pos[row] - self.pos[before]) * self.fps
+            apart[row], apart[:, before] = np.inf, np.inf
+        born = id < 0
+        id[born] = self.next + np.arange(born.sum())
+        self.pos, self.id, self.next = pos, id, self.next + int(born.sum())
+        cov = np.tile(np.eye(4), (n, 1, 1))
+        return Tracks(frame.index, frame.t, detections.plane, "person", id, np.full(n, -1), pos, vel, cov)
