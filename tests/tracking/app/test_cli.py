@@ -23,6 +23,8 @@ from tracking.app.cli import run
 ROOT = Path(__file__).resolve().parents[3]
 OURS = tuple(str(ROOT / name) + os.sep for name in ("scenarios", "sim", "tracking"))
 FAKE = f"{ROOT / 'tests' / 'fake_tracker.py'}:Nearest"
+TOY = f"{ROOT / 'tests' / 'toy_tracker.py'}:Toy"
+TUNE = f"tune {TOY} --suite {{scene}} --check none --validation 10000 --test 20000 --out {{out}}/toy.toml"
 SCENE = """
 schema = 1
 about = "three people, nothing happens"
@@ -115,6 +117,7 @@ COMMANDS = {
     ),
     "view truth": ("view {one} --out {out}/page.html", "view {scene} --out {out}/page.html"),
     "sheet": ("sheet {one} --out {out}/sheet.png", "sheet {out}/nothing --out {out}/sheet.png"),
+    "tune": (TUNE + " --trials 2 --seeds 0", TUNE + " --trials 2 --seeds 0:20000"),
     "validate": ("validate {data}", "validate {out}/nothing"),
     "export coco": ("export coco {data} --out {out}/coco.json", "export coco {out}/nothing --out {out}/coco.json"),
     "demo": ("demo --quick --out {out}", "demo --quick --out {scene}/x"),
@@ -203,7 +206,12 @@ def test_command(name, state, as_json, place, capsys):
 
 
 def is_whole(name: str, out: Path) -> bool:
-    """Whether the files of an interrupted command are of finished parts only: datasets that are valid, whole pages."""
+    """Whether the files of an interrupted command are of finished parts only: datasets that are valid, whole pages; of
+    a search its study too, by which it goes on."""
+    if name == "tune":
+        return all(json.loads(p.read_text()) for p in out.rglob("*.json")) and all(
+            p.read_text().endswith("</svg>\n") for p in out.rglob("*.svg")
+        )
     if name not in ("generate", "generate pictures", "demo", "track", "view all"):
         return False
     sequences = [p.parent for p in out.rglob("scenario.toml")]
@@ -240,7 +248,8 @@ def test_interrupted_and_full_disk_while_writing(name, error, code, as_json, pla
     assert run(words(COMMANDS[name][0], place) + ["--json"] * as_json) == code
     monkeypatch.undo()
     said(capsys, code, as_json)
-    assert not place.out.exists(), list(place.out.rglob("*"))
+    left = [] if name != "tune" else ["toy.journal", "toy.journal.locks"]
+    assert sorted(p.name for p in place.out.rglob("*")) == left
 
 
 def _raise(error: BaseException):
