@@ -15,11 +15,11 @@ from scenarios.errors import InputError
 from sim.io.atomic import writing
 from sim.io.encode import movie
 from sim.types import Frame, Image, Sequence, Tracks
-from tracking.app import marks, painter
 from tracking.app.film import even, refuse_source
-from tracking.app.marks import Side
-from tracking.app.painter import Style
-from tracking.app.sheet_panel import View
+from tracking.drawing import marks, painter
+from tracking.drawing.marks import Side
+from tracking.drawing.painter import Style
+from tracking.drawing.panel import View
 from tracking.run import grouped
 
 HowTrue = Literal["beside", "over", "only"]

@@ -11,11 +11,11 @@ import numpy as np
 from scenarios.errors import InputError
 from sim.io.atomic import write_file
 from sim.types import Array, GroupEvent, Image, Ints, Sequence, Truth
-from tracking.app import sheet_panel
 from tracking.app.extent import MARGIN, peopled
-from tracking.app.painter import KIND_COLOUR, event_words, kind_colour
-from tracking.app.sheet_panel import INK, QUIET, THING, View, colour, text
 from tracking.app.sheet_pictures import Pictures
+from tracking.drawing import panel
+from tracking.drawing.painter import KIND_COLOUR, event_words, kind_colour
+from tracking.drawing.panel import INK, QUIET, THING, View, colour, text
 
 # Merges and splits are what a scenario is about; entering and leaving come last.
 RANK = {"merge": 0, "split": 0, "cross": 1, "queue": 1, "form": 2, "dissolve": 2}
@@ -74,21 +74,21 @@ def compose(sequence: Sequence, truth: Truth, frames: int = 8) -> Image:
     pictures = Pictures(sequence, truth, chosen)
     low, high = _bounds(sequence, truth)
     plan = round(WIDTH * float(np.clip((high - low)[1] / (high - low)[0], 0.4, 1.2)))
-    panel = Panel(*pictures.heights(WIDTH), plan if truth.pos is not None or not pictures.frames else 0)
+    part = Panel(*pictures.heights(WIDTH), plan if truth.pos is not None or not pictures.frames else 0)
     columns = min(4, len(chosen))
     rows = -(-len(chosen) // columns)
-    total = (HEAD + rows * (panel.height + GAP) + FOOT, GAP + columns * (WIDTH + GAP))
+    total = (HEAD + rows * (part.height + GAP) + FOOT, GAP + columns * (WIDTH + GAP))
     canvas = np.full((*total, 3), 255, np.uint8)
     for k, index in enumerate(chosen):
-        top, left = HEAD + k // columns * (panel.height + GAP), GAP + k % columns * (WIDTH + GAP)
-        area = canvas[top : top + panel.height, left : left + WIDTH]
-        y = TITLE + panel.picture
-        if panel.picture:
+        top, left = HEAD + k // columns * (part.height + GAP), GAP + k % columns * (WIDTH + GAP)
+        area = canvas[top : top + part.height, left : left + WIDTH]
+        y = TITLE + part.picture
+        if part.picture:
             pictures.large(area[TITLE:y], index)
-        if panel.small:
-            pictures.small(area[y : y + panel.small], index)
-        if panel.plan:
-            _plan(area[y + panel.small :], sequence, truth, index, low, high)
+        if part.small:
+            pictures.small(area[y : y + part.small], index)
+        if part.plan:
+            _plan(area[y + part.small :], sequence, truth, index, low, high)
         _title(area, truth, index)
     _head(canvas, sequence, truth)
     _foot(canvas[-FOOT:], truth, chosen)
@@ -169,13 +169,13 @@ def _plan(area: Image, sequence: Sequence, truth: Truth, index: int, low: Array,
     plan = truth.pos is not None
     view = View.fit(area, low, high, upwards=plan)
     places, boxes = _places(truth), None if plan else truth.box
-    view.canvas[:] = sheet_panel.FLOOR
+    view.canvas[:] = panel.FLOOR
     if plan:
-        sheet_panel.ground(view, sequence.scene)
-    sheet_panel.trails(view, truth, index, places)
-    sheet_panel.hulls(view, truth, index, places, boxes)
+        panel.ground(view, sequence.scene)
+    panel.trails(view, truth, index, places)
+    panel.hulls(view, truth, index, places, boxes)
     rows = truth.rows(index)
-    sheet_panel.people(view, truth, index, places, boxes, names=rows.stop - rows.start <= MANY)
+    panel.people(view, truth, index, places, boxes, names=rows.stop - rows.start <= MANY)
     for event in _now(truth, index) if plan else []:
         at, radius = _around(event, truth.id[rows], places[rows])
         view.disc(at, radius * view.scale, kind_colour(event.kind), 3)
@@ -214,7 +214,7 @@ def _head(canvas: Image, sequence: Sequence, truth: Truth) -> None:
         low, high = np.zeros(2), sequence.scene.size
     people = f"{len(np.unique(truth.id))} people, " if len(truth.id) else ""
     facts = f"{people}{truth.length} frames, {truth.fps:g}/s, "
-    facts += f"{high[0] - low[0]:.4g} x {high[1] - low[1]:.4g} {unit}; trails {sheet_panel.TRAIL:g} s"
+    facts += f"{high[0] - low[0]:.4g} x {high[1] - low[1]:.4g} {unit}; trails {panel.TRAIL:g} s"
     text(canvas, facts, (GAP + width + 30, 46), 0.75, QUIET)
 
 

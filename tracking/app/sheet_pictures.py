@@ -8,10 +8,10 @@ import cv2
 import numpy as np
 
 from sim.types import Array, Frame, Image, Ints, PixelTruth, Sequence, Truth
-from tracking.app import marks, painter
-from tracking.app.marks import Side
-from tracking.app.painter import Style
-from tracking.app.sheet_panel import FLOOR, GRID, INK, View, colour
+from tracking.drawing import marks, painter
+from tracking.drawing.marks import Side
+from tracking.drawing.painter import Style
+from tracking.drawing.panel import FLOOR, GRID, INK, View, colour
 
 STANDING = (150, 140, 132)
 GREY = 128

@@ -15,10 +15,10 @@ from sim.geometry import contains, convex_hull
 from sim.types import Detections, Frame, GroupEvent, Groups, Sequence, Tracks, Truth
 from tests.coded_pictures import SIZE, coded, number, sequence
 from tests.groups_as_wholes import wholes
-from tracking.app import marks
 from tracking.app.overlay import _words, compose, overlay
-from tracking.app.painter import Style
-from tracking.app.sheet_panel import colour
+from tracking.drawing import marks
+from tracking.drawing.painter import Style
+from tracking.drawing.panel import colour
 
 STRIP = 32
 

@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 from scenarios.errors import InputError
 from sim.types import GroupEvent, Sequence, Truth
 from tracking.app.sheet import choose, sheet
-from tracking.app.sheet_panel import FLOOR, View, _names, colour
+from tracking.drawing.panel import FLOOR, View, _names, colour
 
 
 def bare(length: int, starts: dict[int, str]) -> Truth:

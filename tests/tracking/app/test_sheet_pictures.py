@@ -13,8 +13,8 @@ from scenarios.errors import InputError
 from sim.types import PixelTruth, Sequence, Truth
 from tests.coded_pictures import SIZE, number, sequence
 from tracking.app.sheet import HEAD, TITLE, WIDTH, _nobody, choose, compose, sheet
-from tracking.app.sheet_panel import FLOOR, GRID, colour
 from tracking.app.sheet_pictures import STANDING, Pictures, coloured_disparity, coloured_ids
+from tracking.drawing.panel import FLOOR, GRID, colour
 
 
 def pixels(index: int) -> PixelTruth:

@@ -15,9 +15,9 @@ from sim.camera import looking, project
 from sim.io.truths import standing
 from sim.types import Camera, Scene, Sequence, Stairs
 from tests.groups_as_wholes import wholes
-from tracking.app.marks import WIDE, ring
 from tracking.app.view import payload
 from tracking.app.view_data import camera_json, scene_json
+from tracking.drawing.marks import WIDE, ring
 
 NODE = shutil.which("node")
 HERE = Path(tracking.app.__file__).parent

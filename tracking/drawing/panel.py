@@ -1,6 +1,6 @@
-"""One small picture of a contact sheet: people, trails, groups and what stands still, drawn with cv2.
+"""A picture of the ground or of the image plane: people, trails, groups and what stands still, drawn with cv2.
 
-Everything is drawn with four bits of sub-pixel; the sheet draws at twice its size and shrinks it.
+Everything is drawn with four bits of sub-pixel; the contact sheet draws at twice its size and shrinks it.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""Drawing over pictures: boxes with ids, trails, ellipses and groups, captions of events; the sheet and the overlay."""
+"""Drawing over pictures: boxes with ids, trails, ellipses and groups, captions of events."""
 
 from __future__ import annotations
 
@@ -8,8 +8,8 @@ import cv2
 import numpy as np
 
 from sim.types import Array, GroupEvent, Image
-from tracking.app.marks import Region, Side
-from tracking.app.sheet_panel import FLOOR, INK, Colour, View, colour
+from tracking.drawing.marks import Region, Side
+from tracking.drawing.panel import FLOOR, INK, Colour, View, colour
 
 TRAIL = 3.0
 """s of the past that is shown."""

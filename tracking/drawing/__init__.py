@@ -1,0 +1,1 @@
+"""Drawing what is tracked and what is true, on plain ground or over pictures."""
