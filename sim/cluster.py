@@ -168,12 +168,13 @@ def about() -> dict[str, str]:
     from sim.hashing import cpu_level
     from sim.io.manifest import versions
 
-    return {**versions(drawn=True), "sources": _sources(), "cpu": cpu_level()}
+    root = Path(__file__).resolve().parents[1]
+    return {**versions(drawn=True), "sources": sources(root), "cpu": cpu_level()}
 
 
-def _sources() -> str:
-    """A short hash over our own sources."""
-    root, h = Path(__file__).resolve().parents[1], hashlib.sha256()
+def sources(root: Path) -> str:
+    """A short hash over our packages in a folder."""
+    h = hashlib.sha256()
     for package in PACKAGES:
         for path in sorted((root / package).rglob("*")):
             if path.suffix in (".py", ".toml"):

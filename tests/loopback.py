@@ -18,7 +18,7 @@ PATIENCE = 60.0  # s until a process must listen
 class Loopback:
     """State: the processes; `workers` in the order of their start."""
 
-    def __init__(self, folder: Path) -> None:
+    def __init__(self, folder: Path, **env: str) -> None:
         self._folder = folder
         self.workers: list[subprocess.Popen[bytes]] = []
         with socket.socket() as free:
@@ -26,14 +26,13 @@ class Loopback:
             port = free.getsockname()[1]
         self.address = f"tcp://127.0.0.1:{port}"
         words = ["--host", "127.0.0.1", "--port", str(port), "--no-dashboard"]
-        self.scheduler = self._start("scheduler", words)
+        self.scheduler = self._start("scheduler", words, **env)
         self._wait(port)
 
-    def add_worker(self, *words: str, path: str = str(ROOT), **env: str) -> subprocess.Popen[bytes]:
-        """One more worker, of one thread, which nobody starts again; path: where it finds our packages."""
-        name = f"worker-{len(self.workers)}"
-        words = (self.address, "--name", name, "--nthreads", "1", "--no-nanny", "--no-dashboard", *words)
-        self.workers.append(self._start("worker", ["--host", "127.0.0.1", *words], PYTHONPATH=path, **env))
+    def add_worker(self, *words: str, threads: int = 1, path: Path = ROOT) -> subprocess.Popen[bytes]:
+        """One more worker, which nobody starts again when it dies; path: where it finds our packages."""
+        more = ["--nthreads", str(threads), "--no-nanny", "--no-dashboard", *words]
+        self.workers.append(self._start("worker", [self.address, "--host", "127.0.0.1", *more], PYTHONPATH=str(path)))
         return self.workers[-1]
 
     def end(self) -> None:
@@ -61,12 +60,12 @@ class Loopback:
 
 
 @contextmanager
-def loopback(folder: Path, workers: int = 2) -> Iterator[Loopback]:
-    """A cluster with so many workers, ended with the block; logs in the folder."""
-    cluster = Loopback(folder)
+def loopback(folder: Path, workers: int = 2, *words: str, **env: str) -> Iterator[Loopback]:
+    """A cluster of so many workers, given the words, ended with the block; logs in the folder; env: the scheduler's."""
+    cluster = Loopback(folder, **env)
     try:
         for _ in range(workers):
-            cluster.add_worker()
+            cluster.add_worker(*words)
         yield cluster
     finally:
         cluster.end()
