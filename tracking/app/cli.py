@@ -12,6 +12,20 @@ import typer
 
 from scenarios.errors import InputError
 from tracking.app.answer import INTERRUPTED, Answer
+from tracking.app.arguments import (
+    Calibration,
+    Cluster,
+    Detector,
+    Fps,
+    Json,
+    Out,
+    Scale,
+    Set,
+    Source,
+    Tracked,
+    Workers,
+)
+from tracking.app.tune_options import tune
 
 app = typer.Typer(
     add_completion=False,
@@ -22,26 +36,7 @@ app = typer.Typer(
 )
 export = typer.Typer(rich_markup_mode=None, help="Turn a dataset into another form.")
 app.add_typer(export, name="export")
-
-Json = Annotated[bool, typer.Option("--json", help="Print one JSON object instead of text.")]
-Set = Annotated[list[str], typer.Option("--set", metavar="K=V", help="Set a value; may be given often.")]
-Out = Annotated[Path, typer.Option("--out", metavar="DIR", help="Folder to write to.")]
-Source = Annotated[
-    Path, typer.Argument(metavar="SOURCE", help="Sequence or dataset: generated, MOT, video, BIWI, CAVIAR.")
-]
-Fps = Annotated[float | None, typer.Option("--fps", help="Frames per second, where the recording does not say.")]
-Scale = Annotated[float | None, typer.Option("--px-per-m", help="Pixels per metre, where there is no camera.")]
-Calibration = Annotated[
-    Path | None, typer.Option("--camera", metavar="FILE", help="A recording's calibration: camera.json or Tsai's XML.")
-]
-Detector = Annotated[
-    Path | None, typer.Option("--sensor", metavar="FILE.toml", help="A detector's profile, by `fit sensor`.")
-]
-Workers = Annotated[int, typer.Option("--workers", min=1, help="Processes; on a cluster, so many at once at least.")]
-Cluster = Annotated[
-    str | None, typer.Option("--cluster", metavar="tcp://HOST:PORT", help="Scheduler of a dask cluster that works.")
-]
-Tracked = Annotated[Path | None, typer.Argument(metavar="TRACKS", help="What `track` wrote, or MOT text.")]
+app.command()(tune)
 
 
 def _version(asked: bool) -> None:
@@ -180,52 +175,6 @@ def score(
         fps=fps,
         px_per_m=px_per_m,
     )
-
-
-@app.command()
-def tune(
-    tracker: Annotated[str, typer.Argument(metavar="TRACKER", help="Its name, file.py:Class or module:Class.")],
-    suite: Annotated[
-        list[str], typer.Option("--suite", metavar="NAME", help="Suite, scenario or *.toml file; may be given often.")
-    ],
-    out: Annotated[Path, typer.Option("--out", metavar="FILE.toml", help="Parameters to write; the rest beside it.")],
-    trials: Annotated[int, typer.Option("--trials", metavar="N", help="How many to finish, the defaults included.")],
-    seeds: Annotated[str | None, typer.Option("--seeds", metavar="A:B", help="Training seeds, of 0:10000.")] = None,
-    validation: Annotated[
-        str | None, typer.Option("--validation", metavar="A:B", help="Seeds that choose, of 10000:20000.")
-    ] = None,
-    test: Annotated[str | None, typer.Option("--test", metavar="A:B", help="Seeds that judge, of 20000:30000.")] = None,
-    check: Annotated[
-        str | None, typer.Option("--check", metavar="SUITE", help="A suite not used, to judge on too; or none.")
-    ] = None,
-    objective: Annotated[
-        list[str], typer.Option("--objective", metavar="KEY", help="A score, or frames/s; several: a Pareto front.")
-    ] = ["objective"],  # noqa: B006
-    detections: Annotated[Literal["image", "truth", "file"] | None, typer.Option(help="What it is given.")] = None,
-    settings: Set = [],  # noqa: B006
-    sensor: Detector = None,
-    only: Annotated[str | None, typer.Option("--only", metavar="A,B,…", help="Parameters to search.")] = None,
-    storage: Annotated[
-        str | None, typer.Option("--storage", metavar="FILE|URL", help="Optuna's storage; a journal beside --out.")
-    ] = None,
-    study: Annotated[str | None, typer.Option("--study", metavar="NAME", help="Its name there; that of --out.")] = None,
-    workers: Workers = 1,
-    cluster: Cluster = None,
-    prune: Annotated[float, typer.Option("--prune", metavar="P", help="Give up below this p; 0: never.")] = 0.1,
-    finalists: Annotated[int, typer.Option("--finalists", metavar="N", help="How many are validated.")] = 5,
-    seed: Annotated[int, typer.Option("--seed", help="The search's seed.")] = 0,
-    json: Json = False,
-) -> Answer:
-    """Search a tracker's parameters on simulated scenes; judge them on others."""
-    from tracking.app import tune_command
-
-    wishes = tune_command.Wishes(
-        tracker, suite, trials, out, seeds, validation, test, check, objective, detections, settings, only, sensor,
-    )  # fmt: skip
-    return tune_command.tune(
-        wishes, storage=storage, study=study, workers=workers, cluster=cluster, prune=prune, finalists=finalists,
-        seed=seed,
-    )  # fmt: skip
 
 
 @app.command()
