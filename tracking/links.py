@@ -6,35 +6,58 @@ link breaks once they have been far apart for long enough. All pairs of a sequen
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterator
 from dataclasses import dataclass
+from typing import ClassVar
 
 import numpy as np
 
 from sim.near import close_pairs
 from sim.rules import APART, HOLD, SAME_WAY, TOGETHER, frames_of
 from sim.types import Array, Bools, Ints
+from tracking.config import Config, param
 
 CELLS = 4_000_000  # frames times pairs held at once
+NEVER = 10.0  # m/s: velocities of people never differ by more
 
 
 @dataclass(frozen=True)
-class Grouping:
-    """Parameters of the baseline rule; lengths in metres, multiplied by px_per_m in the image."""
+class Grouping(Config):
+    """Parameters of the baseline rule; lengths in metres, multiplied by px_per_m in the image. Declared like a
+    tracker's, so that they are searched, stored and read in the same way."""
 
-    near: float = TOGETHER  # m: nearer is together
-    alike: float = SAME_WAY  # m/s: velocities that differ by less are alike
-    share: float = 0.8  # of the frames of the last `window` in which both were seen
-    window: float = HOLD  # s
-    acquaintance: float = 1.0  # s of the window in which both must have been seen: who has just come is judged sooner
-    apart: float = APART  # m: further is apart
-    patience: float = HOLD  # s apart, until the link breaks
-    idle: float = 0.0  # m/s: standing side by side (both slower) links nobody; 0 = it does, as in a conversation
-    diverge: float = math.inf  # m/s: beyond `near`, and velocities differing by more, is apart, too
-    smooth: float = 0.0  # s: velocities are chords of positions over so long; 0 = the tracker's own
-    memory: float = 1.0  # s that a group waits for a member who is not seen
-    arrival: float = 1.0  # s: a link that began so soon after a track did is an arrival, not a merge
+    tracker: ClassVar[str] = "grouping"
+
+    near: float = param(TOGETHER, (0.5, 3.0), "m", "nearer is together")
+    alike: float = param(SAME_WAY, (0.1, 2.0), "m/s", "velocities that differ by less are alike")
+    share: float = param(0.8, (0.3, 1.0), "share", "of the frames of the last `window` in which both were seen")
+    window: float = param(HOLD, (0.2, 6.0), "s", "how far back it looks")
+    acquaintance: float = param(
+        1.0,
+        (0.0, 6.0),
+        "s",
+        "of the window in which both must have been seen: who has just come is judged sooner",
+    )
+    apart: float = param(APART, (0.5, 5.0), "m", "further is apart")
+    patience: float = param(HOLD, (0.1, 6.0), "s", "apart for so long, and the link breaks")
+    idle: float = param(
+        0.0,
+        (0.0, 1.0),
+        "m/s",
+        "standing side by side, both slower, links nobody; 0: it does, as in a conversation",
+        before=0.0,
+    )
+    diverge: float = param(
+        NEVER,
+        (0.2, NEVER),
+        "m/s",
+        "beyond `near`, and velocities differing by more, is apart too; 10: never",
+        "log",
+        before=NEVER,
+    )
+    smooth: float = param(0.0, (0.0, 3.0), "s", "velocities are chords of positions over so long; 0: the tracker's own")
+    memory: float = param(1.0, (0.0, 5.0), "s", "a group waits so long for a member who is not seen")
+    arrival: float = param(1.0, (0.0, 5.0), "s", "a link that began so soon after a track did is an arrival, no merge")
 
 
 @dataclass(frozen=True, slots=True, eq=False)

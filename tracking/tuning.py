@@ -40,7 +40,7 @@ def tune(
     validation: range | None = None,
     test: range | None = None,
     check: str | None = "",
-    objective: str | Iterable[str] = "objective",
+    objective: str | Iterable[str] = (),
     detections: DetectionMode | None = None,
     set: Iterable[str] = (),
     only: Iterable[str] = (),
@@ -56,16 +56,16 @@ def tune(
 ) -> Tuned:
     """Search the tunable parameters of a tracker over whole episodes of simulated scenes.
 
-    tracker: a name, "file.py:Class", "module:Class" or (one worker) a class. suite: a suite, scenario, TOML file, or a
-    list of these. seeds, validation, test: of 0:10000, 10000:20000 and 20000:30000; by default as many as make 16, 32
-    and 100 episodes. check: a suite that was not used, "" for a usual one, None for none. objective: score keys of
-    docs/metrics.md or "frames/s"; of several, a Pareto front. set: "gate=0.99" holds a parameter, "scenario.…" and
-    "sensor.…" are of the scenes. only: the parameters to search. out: where to write the result; beside it lies the
-    study, by which the same call goes on, unless `storage` names another journal file or an Optuna storage's URL
-    (without either it is in memory). study: its name there. workers: processes that play episodes, or cluster: a
-    scheduler's address; the result does not depend on them. prune: p below which a trial that loses on the same scenes
-    is given up, 0 for never. finalists: how many of the best are judged on validation scenes. progress(done, all, what)
-    is called as it goes.
+    tracker: a name ("grouping" is the baseline rule of groups), "file.py:Class", "module:Class" or (one worker) a
+    class. suite: a suite, scenario, TOML file, or a list of these. seeds, validation, test: of 0:10000, 10000:20000
+    and 20000:30000; by default as many as make 16, 32 and 100 episodes. check: a suite that was not used, "" for a
+    usual one, None for none. objective: score keys of docs/metrics.md or "frames/s"; of several, a Pareto front; by
+    default "objective". set: "gate=0.99" holds a parameter, "scenario.…" and "sensor.…" are of the scenes. only:
+    the parameters to search. out: where to write the result; beside it lies the study, by which the same call goes
+    on, unless `storage` names another journal file or an Optuna storage's URL (without either it is in memory).
+    study: its name there. workers: processes that play episodes, or cluster: a scheduler's address; the result does
+    not depend on them. prune: p below which a trial that loses on the same scenes is given up, 0 for never.
+    finalists: how many of the best are judged on validation scenes. progress(done, all, what) is called as it goes.
 
     InputError for wishes that cannot be, before anything is played; errors of the defaults themselves are raised.
     """

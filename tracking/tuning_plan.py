@@ -111,7 +111,7 @@ def plan(
     validation: range | None = None,
     test: range | None = None,
     check: str | None = "",
-    objective: str | Iterable[str] = "objective",
+    objective: str | Iterable[str] = (),
     detections: DetectionMode | None = None,
     only: Iterable[str] = (),
     set: Iterable[str] = (),
@@ -132,7 +132,7 @@ def plan(
         subject, base, _space(base, own, tuple(only), mode), names, other,
         tuning_scenes.chosen_seeds(seeds, "train", count), tuning_scenes.chosen_seeds(validation, "val", count),
         tuning_scenes.chosen_seeds(test, "test", count), tuning_scenes.chosen_seeds(test, "test", several),
-        goals([objective] if isinstance(objective, str) else objective),
+        goals([objective] if isinstance(objective, str) else tuple(objective) or (subject.objective,)),
         mode, settings, trials, prune, finalists, seed,
     )  # fmt: skip
     subject.accept(made.training[0], made.detections)

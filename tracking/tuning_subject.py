@@ -1,4 +1,4 @@
-"""What is tuned: a tracker, by name, file or class."""
+"""What is tuned: a tracker, by name, file or class; or the baseline rule of groups, by the name `grouping`."""
 
 from __future__ import annotations
 
@@ -9,6 +9,9 @@ from scenarios.errors import InputError
 from sim.types import DetectionMode, Tracker
 from tracking.config import Config
 from tracking.episodes import Cache, Episode, Source, play, streams_for
+from tracking.links import Grouping
+
+RULE = Grouping.tracker
 
 
 @dataclass(frozen=True)
@@ -21,20 +24,37 @@ class Subject:
     needs: tuple[str, ...]
 
     @property
+    def objective(self) -> str:
+        """What it is tuned for where nothing is said."""
+        return "pairwise_F1" if self.name == RULE else "objective"
+
+    @property
     def detections(self) -> DetectionMode:
-        """What it is given where nothing is said: no pictures unless it takes nothing else, as they cost most."""
+        """What it is given where nothing is said: no pictures unless it takes nothing else, as they cost most; the
+        rule of groups people who are who they are."""
+        if self.name == RULE:
+            return "truth"
         return "file" if {"boxes", "points"} & {*self.needs} else "image"
 
     def accept(self, source: Source, detections: DetectionMode) -> None:
         """InputError where it cannot work on such a source."""
         from tracking.protocol import choose_mode
 
+        if self.name == RULE:
+            if detections != "truth":
+                remedy = "leave the option out: the rule is tuned on people whose identity is known"
+                raise InputError(place="--detections", got=detections, expected="truth", remedy=remedy)
+            return
         choose_mode(self.needs, source.open(streams_for(self.tracker, detections)), detections)
 
     def play(
         self, source: Source, values: dict[str, Any], detections: DetectionMode, cache: Cache, every_score: bool
     ) -> Episode:
         """One episode with these parameters."""
+        if self.name == RULE:
+            from tracking.tuning_rule import play_rule
+
+            return play_rule(source, Grouping.from_dict(values), cache)
         return play(
             self.tracker, source, values, detections=detections, cache=cache, every_score=every_score,
         )  # fmt: skip
@@ -44,6 +64,8 @@ def subject_of(tracker: str | type[Tracker]) -> Subject:
     """The subject of this name, file or class; InputError where it is no tracker or has no parameters."""
     from tracking.protocol import checked, find
 
+    if tracker == RULE:
+        return Subject(RULE, RULE, Grouping, ("points", "boxes"))
     named = tracker if isinstance(tracker, str) else getattr(tracker, "__name__", str(tracker))
     found: Any = find(tracker) if isinstance(tracker, str) else checked(tracker, named)
     kind = getattr(found, "config_class", None)

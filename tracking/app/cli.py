@@ -36,7 +36,6 @@ app = typer.Typer(
 )
 export = typer.Typer(rich_markup_mode=None, help="Turn a dataset into another form.")
 app.add_typer(export, name="export")
-app.command()(tune)
 
 
 def _version(asked: bool) -> None:
@@ -175,6 +174,9 @@ def score(
         fps=fps,
         px_per_m=px_per_m,
     )
+
+
+app.command()(tune)
 
 
 @app.command()

@@ -28,7 +28,7 @@ def tune(
     ] = None,
     objective: Annotated[
         list[str], typer.Option("--objective", metavar="KEY", help="A score, or frames/s; several: a Pareto front.")
-    ] = ["objective"],  # noqa: B006
+    ] = [],  # noqa: B006
     detections: Annotated[Literal["image", "truth", "file"] | None, typer.Option(help="What it is given.")] = None,
     settings: Set = [],  # noqa: B006
     sensor: Detector = None,
