@@ -43,6 +43,9 @@ class BoxNoise(Model):
     top: Spread = Field((0.0, 0.0), description="of the upper edge, downwards: mean, sd; box heights")
     width: Spread = Field((0.0, 0.0), description="of the width's logarithm: mean, sd")
     occluded: NonNegative = Field(0.0, description="each sd times 1 + this times the hidden share")
+    tails: Annotated[float, Field(ge=0, le=30)] = Field(
+        0.0, description="excess kurtosis: Student's t of 4 + 6 / this degrees of freedom; 0 = normal"
+    )
     memory: Memories | None = Field(
         None, description="parts of these errors that stay alike; the rest is new each frame"
     )

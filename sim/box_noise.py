@@ -18,6 +18,7 @@ def erring(box: Array, visibility: Array, noise: BoxNoise, n: Array) -> Array:
     With h the box's height: middle += h e0, foot += h e1, top += h e2, log width += e3. At least 1 px (or what there
     was) remains of width and height.
     """
+    n = heavier(n, noise.tails)
     means, sds = np.array([noise.across, noise.foot, noise.top, noise.width]).T
     e = means + sds * (1.0 + noise.occluded * (1.0 - visibility))[:, None] * n
     left, top, w, h = box.T
@@ -26,6 +27,16 @@ def erring(box: Array, visibility: Array, noise: BoxNoise, n: Array) -> Array:
     width, height = w * np.exp(e[:, 3]), foot - top
     width, height = np.maximum(width, np.minimum(w, 1.0)), np.maximum(height, np.minimum(h, 1.0))
     return np.stack([middle - width / 2, foot - height, width, height], axis=1)
+
+
+def heavier(n: Array, tails: float) -> Array:
+    """Standard normals made Student's t of unit variance and excess kurtosis `tails`, each at its quantile."""
+    if not tails:
+        return n
+    from scipy.special import ndtr, stdtrit
+
+    freedom = 4.0 + 6.0 / tails
+    return np.asarray(stdtrit(freedom, ndtr(n)) * np.sqrt((freedom - 2.0) / freedom))
 
 
 def box_errors(box: Array, true: Array) -> Array:

@@ -119,18 +119,24 @@ def _like(truth: Truth, image_size: tuple[int, int] | None, u: Array) -> tuple[A
 class Ground:
     """Where false alarms can stand, and how large a person would be there: by the camera, else by the labels.
 
-    Without a camera a person's height is linear in the row of the feet, as on flat ground, between the labelled
-    extremes.
+    Without a camera a person's height is linear in the row of the feet, as on flat ground, and not far beyond the
+    labelled extremes. Ground ends, either way, where people would be SMALLEST of one at the image's middle.
     """
 
     def __init__(self, truth: Truth, camera: Camera | None, size: Array | None) -> None:
         self.truth, self.camera = truth, camera
-        self.low, self.high = _stretch(truth, camera, size)
-        self.line = np.zeros(2)
-        if camera is None and truth.box is not None and len(truth.box):
-            foot, tall = truth.box[:, 1] + truth.box[:, 3], truth.box[:, 3]
-            self.line = height_line(foot, tall)
-            self.extremes = float(tall.min()), float(tall.max())
+        self.low, self.high = np.zeros(2), np.zeros(2)
+        self.line, self.extremes = np.array([1.0, 0.0]), (1.0, 1.0)
+        if camera is not None:
+            self.high = np.array(camera.image, dtype=float)
+            self.low[1] = 0.0 if camera.kind == "top" else _furthest_row(camera)
+        elif truth.box is not None and len(truth.box):
+            foot = truth.box[:, :2] + truth.box[:, 2:] * [0.5, 1.0]
+            self.line = height_line(foot[:, 1], truth.box[:, 3])
+            self.extremes = 0.5 * float(truth.box[:, 3].min()), 1.5 * float(truth.box[:, 3].max())
+            self.low, self.high = foot.min(axis=0), foot.max(axis=0)
+            if size is not None:
+                self.low, self.high = np.array([0.0, _far_row(self.line, float(size[1]))]), np.array(size)
 
     def place(self, x: float, y: float) -> tuple[float, float]:
         """The image point at shares x of the width and y of the rows that show ground."""
@@ -140,7 +146,7 @@ class Ground:
     def usual_height(self, u: float, v: float) -> float:
         """Height of a person's box whose feet are at (u, v), px."""
         if self.camera is None:
-            return float(np.clip(self.line @ [1.0, v], *self.extremes)) if self.line.any() else 0.0
+            return float(np.clip(self.line @ [1.0, v], *self.extremes))
         pos = to_ground(self.camera, np.array([[u, v]]))
         tall = boxes(self.camera, np.column_stack([pos, [0.0]]), np.zeros(1), np.full(1, 1.7))[0, 3]
         if not np.isfinite(tall):  # right under the camera
@@ -164,16 +170,10 @@ class Ground:
         return np.asarray(low + np.array([x, y]) * (high - low))
 
 
-def _stretch(truth: Truth, camera: Camera | None, size: Array | None) -> tuple[Array, Array]:
-    """The part of the image where feet can be: low (2,), high (2,)."""
-    if camera is not None:
-        top = 0.0 if camera.kind == "top" else _furthest_row(camera)
-        return np.array([0.0, top]), np.array(camera.image, dtype=float)
-    if truth.box is None or not len(truth.box):
-        return np.zeros(2), np.zeros(2)
-    foot = truth.box[:, :2] + truth.box[:, 2:] * [0.5, 1.0]
-    low, high = foot.min(axis=0), foot.max(axis=0)
-    return (low, high) if size is None else (np.array([0.0, low[1]]), np.array([size[0], size[1]]))
+def _far_row(line: Array, rows: float) -> float:
+    """The row at which people on that line are SMALLEST of one at the middle; 0 where they do not grow downwards."""
+    a, b = line
+    return float(np.clip((SMALLEST * (a + b * rows / 2) - a) / b, 0.0, rows / 2)) if b > 1e-6 else 0.0
 
 
 def height_line(foot: Array, tall: Array) -> Array:

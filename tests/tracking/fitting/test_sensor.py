@@ -1,0 +1,211 @@
+"""Round trip: detections of a known profile, fitted, give the profile back within statistical error."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import cache
+from typing import Any
+
+import numpy as np
+import pytest
+
+from scenarios.errors import InputError
+from scenarios.loading import load
+from scenarios.sensor import BoxNoise, FalseAlarms, Memory, Sensor
+from sim.sensors import sense
+from sim.sequence import simulate
+from sim.types import Frame, Sequence, Truth
+from tracking.fitting.alarms import fit_alarms
+from tracking.fitting.matched import Matched, match, match_sequence
+from tracking.fitting.sensor import fit, fit_sensor
+from tracking.fitting.statistics import again, statistics
+
+KNOWN = Sensor(
+    detect_prob=0.85,
+    clutter_rate=1.2,
+    noise_m=0.2,
+    box="amodal",
+    min_visibility=0.0,
+    small_px=0.0,
+    by_visibility=(0.05, 0.3, 0.6, 0.9, 1.0),
+    miss_memory=(Memory(share=0.7, time=0.6),),
+    box_noise=BoxNoise(
+        across=(0.01, 0.03), foot=(-0.02, 0.05), top=(0.03, 0.04), width=(0.1, 0.12), occluded=1.0,
+        memory=(Memory(share=0.6, time=1.0),),
+    ),
+    points="foot",
+    false_alarms=FalseAlarms(
+        life=1.5, seen=0.8, near=0.4, across=(0.1, 0.08), foot=(-0.3, 0.05), near_height=(-1.1, 0.1), height=(0.2, 0.1),
+        aspect=(-0.8, 0.1), drift=0.1, jitter=0.02,
+    ),
+    true_scores=(0.3, 0.8, 1.0),
+    false_scores=(0.2, 0.3, 0.6),
+)  # fmt: skip
+
+
+@cache
+def scenes() -> tuple[tuple[Truth, Any], ...]:
+    """Three streets before a level camera; read-only, whatever a test makes of them."""
+    made = []
+    for seed in range(30_000, 30_003):
+        scenario = load("street", set=["camera.tilt_deg=15", "camera.image=[1280, 720]", "duration=25.0"])
+        sequence = simulate(scenario, seed, streams=())
+        assert sequence.truth is not None
+        made.append((sequence.truth, sequence.camera))
+    return tuple(made)
+
+
+def seen(sensor: Sensor, seed: int = 0) -> list[Matched]:
+    return [
+        match(truth, sense(truth, sensor, seed + k, camera, camera.image), camera.image, camera)
+        for k, (truth, camera) in enumerate(scenes())
+    ]
+
+
+@cache
+def fitted() -> Sensor:
+    return fit(seen(KNOWN))
+
+
+def near(found: Any, wanted: Any, absolute: float) -> None:
+    assert np.array(found) == pytest.approx(np.array(wanted), abs=absolute)
+
+
+def test_misses_come_back() -> None:
+    found = fitted()
+    near(found.detect_prob, KNOWN.detect_prob, 0.03)
+    assert found.by_visibility is not None
+    near(found.by_visibility, KNOWN.by_visibility, 0.12)
+    assert found.small_px == 0.0
+    assert found.miss_memory is not None
+    for lag in (0.1, 0.5, 1.5):
+        near(correlation(found.miss_memory, lag), 0.7 * np.exp(-lag / 0.6), 0.1)
+
+
+def correlation(memory: tuple[Memory, ...], lag: float) -> float:
+    return sum(part.share * float(np.exp(-lag / part.time)) for part in memory)
+
+
+def test_noise_comes_back() -> None:
+    found, known = fitted().box_noise, KNOWN.box_noise
+    assert found is not None
+    assert known is not None
+    for name, absolute in (("across", 0.004), ("foot", 0.006), ("top", 0.006), ("width", 0.02)):
+        near(getattr(found, name), getattr(known, name), absolute)
+    near(found.occluded, 1.0, 0.25)
+    assert found.tails <= 0.5
+    assert found.memory is not None
+    for lag in (0.1, 1.0, 3.0):
+        near(correlation(found.memory, lag), 0.6 * np.exp(-lag / 1.0), 0.07)
+    assert fitted().box == "amodal"
+
+
+def test_false_alarms_come_back() -> None:
+    busy = KNOWN.model_copy(update={"clutter_rate": 4.0})
+    rate, found = fit_alarms(seen(busy, seed=50))
+    alone = seen(busy.model_copy(update={"detect_prob": 0.0}), seed=50)  # the same alarms, nobody detected
+    known = KNOWN.false_alarms
+    assert found is not None
+    assert known is not None
+    near(rate, sum(len(m.box) for m in alone) / sum(m.truth.length for m in alone), 0.2)
+    near(found.life, 1.5, 0.35)
+    near(found.seen, 0.8, 0.08)
+    near(found.near, 0.4, 0.15)  # of some 150 alarms, each seen for 0 to 60 frames; some end as their person leaves
+    for name, absolute in (("across", 0.04), ("foot", 0.04), ("near_height", 0.06), ("aspect", 0.04)):
+        near(getattr(found, name), getattr(known, name), absolute)
+    near(found.height, known.height, 0.08)
+    near(found.drift, 0.1, 0.04)
+    near(found.jitter, 0.02, 0.006)
+
+
+def test_places_of_false_alarms_come_back() -> None:
+    left = KNOWN.false_alarms.model_copy(update={"near": 0.0, "at": ((0.2, 0.3), (0.3, 0.7)), "drift": 0.0})
+    found = fit_alarms(seen(KNOWN.model_copy(update={"false_alarms": left})))[1]
+    assert found is not None
+    assert found.at is not None
+    near(np.mean([x for x, _ in found.at]), 0.25, 0.04)
+    near(np.mean([y for _, y in found.at]), 0.5, 0.12)
+    assert found.near < 0.15
+
+
+def test_scores_come_back() -> None:
+    found = fitted()
+    assert found.true_scores is not None
+    assert found.false_scores is not None
+    near(np.array(found.true_scores)[[1, 5, 9]], (0.4, 0.8, 0.96), 0.03)
+    near(np.array(found.false_scores)[[1, 5, 9]], (0.22, 0.3, 0.54), 0.06)
+
+
+def test_small_people_and_tails_and_visible_parts_are_told() -> None:
+    truth = scenes()[0][0]
+    assert truth.box is not None
+    small = float(np.quantile(truth.box[:, 3], 0.5)) / 2 * 1.3
+    noise = BoxNoise(foot=(0.0, 0.05), top=(0.0, 0.05), across=(0.0, 0.03), width=(0.0, 0.1), tails=6.0)
+    other = Sensor(detect_prob=0.95, clutter_rate=0.0, box="visible", small_px=small, min_visibility=0.0,
+                   by_visibility=(0.3, 0.5, 0.7, 0.9, 1.0), box_noise=noise)  # fmt: skip
+    found = fit(seen(other))
+    assert found.small_px == pytest.approx(small, rel=0.25)
+    assert found.box == "visible"
+    assert found.box_noise is not None
+    assert 3.0 <= found.box_noise.tails <= 14.0
+    assert found.miss_memory is None or correlation(found.miss_memory, 0.3) < 0.1
+    assert found.false_alarms is None or found.clutter_rate < 0.1
+
+
+def test_who_never_errs_has_a_clean_profile() -> None:
+    perfect = Sensor(detect_prob=1.0, clutter_rate=0.0, noise_px=0.0, noise_m=0.0, box="amodal", occlusion_power=0.0,
+                     min_visibility=0.0, small_px=0.0)  # fmt: skip
+    found = fit(seen(perfect))
+    assert found.detect_prob > 0.999
+    assert min(found.by_visibility or (0.0,)) > 0.97
+    assert found.clutter_rate == 0.0
+    assert found.false_alarms is None
+    assert found.miss_memory is None
+    assert found.box_noise is not None
+    assert max(abs(x) for name in ("across", "foot", "top", "width") for x in getattr(found.box_noise, name)) < 1e-6
+    assert found.noise_m == 0.0
+    assert found.points == "own"
+
+
+def test_synthetic_errors_look_like_those_they_were_fitted_to() -> None:
+    """Statistics of new draws of the fitted sensor lie among those of new draws of the true one."""
+    first = seen(KNOWN)[:2]
+    real = [statistics([again(m, KNOWN, 100 * k) for m in first]) for k in range(1, 4)]
+    made = [statistics([again(m, fitted(), 100 * k) for m in first]) for k in range(1, 4)]
+    for name in ("missed", "misses: mean run, s", "overlap, 50% quantile", "overlap, 10% quantile",
+                 "false alarms per frame", "false alarms: at people", "error foot: sd"):  # fmt: skip
+        a, b = np.array([r[name] for r in real]), np.array([m[name] for m in made])
+        assert abs(a.mean() - b.mean()) < 3.5 * max(a.std(), b.std(), 0.02 * abs(a.mean())), name
+
+
+def as_sequence(truth: Truth, camera: Any, sensor: Sensor, **changes: Any) -> Sequence:
+    found = sense(truth, sensor, 0, camera, camera.image)
+    frames = lambda: iter([Frame(d.index, d.t, detections=d) for d in found])  # noqa: E731
+    made = Sequence("made", truth.fps, truth.length, frames, lambda: truth, camera.image, camera, has_detections=True)
+    return replace(made, **changes)
+
+
+def test_sequences_are_taken_one_or_many() -> None:
+    truth, camera = scenes()[0]
+    one = as_sequence(truth, camera, KNOWN)
+    assert fit_sensor(one) == fit_sensor([one])
+    near(fit_sensor([one, one]).detect_prob, fit_sensor(one).detect_prob, 0.01)
+
+
+def test_what_cannot_be_fitted_is_refused() -> None:
+    truth, camera = scenes()[0]
+    nothing = KNOWN.model_copy(update={"detect_prob": 0.0, "clutter_rate": 0.0})
+    bad = {
+        "no labelled people": as_sequence(truth, camera, KNOWN, load_truth=None),
+        "no detections": as_sequence(truth, camera, KNOWN, has_detections=False),
+        "labels without boxes": as_sequence(truth, camera, KNOWN, load_truth=lambda: truth.replace(box=None)),
+        "no detection in any frame": as_sequence(truth, camera, nothing),
+    }
+    for words, sequence in bad.items():
+        with pytest.raises(InputError, match=words):
+            match_sequence(sequence)
+    few = truth.frame <= 1
+    fields = ("frame", "id", "group", "pos", "vel", "box", "visibility", "visible_box", "z")
+    short = truth.replace(length=1, **{f: getattr(truth, f)[few] for f in fields})
+    with pytest.raises(InputError, match="labelled people"):
+        fit_sensor([as_sequence(short, camera, KNOWN)])

@@ -1,0 +1,110 @@
+"""A detector's errors in numbers, to lay synthetic ones beside real ones: misses, runs, false alarms, overlaps."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from scenarios.sensor import Sensor
+from sim.box_noise import box_errors
+from sim.sensors import sense
+from sim.types import Array, Ints
+from tracking.fitting.alarms import linked
+from tracking.fitting.matched import Matched, match
+from tracking.fitting.memory import pairs_at
+
+VISIBILITIES = (0.0, 0.25, 0.5, 0.75, 0.95)
+LAGS = (0.2, 1.0)  # s
+
+
+def again(m: Matched, sensor: Sensor, seed: int) -> Matched:
+    """The same people, seen by a sensor instead of the recording's detector."""
+    found = sense(m.truth, sensor, seed, m.camera, m.size)
+    return match(m.truth, found, m.size, m.camera)
+
+
+def statistics(recordings: Sequence[Matched]) -> dict[str, float]:
+    """Errors by name; shares of 1, nan where nothing of the kind was seen."""
+    hit = np.concatenate([m.hit for m in recordings])
+    visibility = np.concatenate([m.truth.visibility for m in recordings])
+    found: dict[str, float] = {"missed": 1.0 - float(hit.mean())}
+    for low, high in zip(VISIBILITIES, (*VISIBILITIES[1:], 1.01), strict=True):
+        here = (visibility >= low) & (visibility < high)
+        found[f"missed, visibility {low:g}-{min(high, 1):g}"] = _mean(~hit[here])
+    runs = np.concatenate([miss_runs(m) / m.truth.fps for m in recordings])
+    found["misses: mean run, s"] = _mean(runs)
+    found["misses in runs over 1 s"] = float(runs[runs > 1.0].sum() / runs.sum()) if len(runs) else float("nan")
+    frames = sum(m.truth.length for m in recordings)
+    chains = [c for m in recordings for c in linked(m)]
+    seen = np.array([len(c.rows) for c in chains], dtype=float)
+    found["false alarms per frame"] = float(seen.sum()) / frames
+    found["false alarms: at people"] = _weighted(np.array([c.person >= 0 for c in chains]), seen)
+    found["false alarms: mean stay, s"] = _mean(np.array([np.ptp(c.frame) + 1 for c in chains]) / _fps(chains))
+    overlap, errors = zip(*(_of_boxes(m) for m in recordings), strict=True)
+    for q in (0.1, 0.5, 0.9):
+        found[f"overlap, {q:.0%} quantile"] = _quantile(np.concatenate(overlap), q)
+    e = np.concatenate(errors)
+    for k, name in enumerate(("across", "foot", "top", "log width")):
+        found[f"error {name}: mean"], found[f"error {name}: sd"] = _mean(e[:, k]), _sd(e[:, k])
+    for lag in LAGS:
+        found[f"error correlation after {lag:g} s"] = _correlation(recordings, e, lag)
+    found["score of true, median"] = _quantile(np.concatenate([m.score[m.match[m.hit]] for m in recordings]), 0.5)
+    found["score of false, median"] = _quantile(np.concatenate([m.score[m.false] for m in recordings]), 0.5)
+    return found
+
+
+def miss_runs(m: Matched) -> Ints:
+    """Lengths of stretches in which a person who is there is missed, frames."""
+    lengths = []
+    for id in np.unique(m.truth.id):
+        rows = np.flatnonzero(m.truth.id == id)
+        start = np.concatenate([[True], np.diff(m.truth.frame[rows]) > 1])
+        lost = ~m.hit[rows]
+        begins = lost & (start | np.concatenate([[True], ~lost[:-1]]))
+        lengths.append(np.bincount(np.cumsum(begins)[lost] - 1) if lost.any() else np.zeros(0, np.int64))
+    return np.concatenate([np.zeros(0, np.int64), *lengths])
+
+
+def _of_boxes(m: Matched) -> tuple[Array, Array]:
+    """Overlaps (H,) and errors (H, 4) of detected people, against their whole boxes."""
+    assert m.truth.box is not None
+    true, box = m.truth.box[m.hit], m.box[m.match[m.hit]]
+    low, high = np.maximum(true[:, :2], box[:, :2]), np.minimum(true[:, :2] + true[:, 2:], box[:, :2] + box[:, 2:])
+    inner = np.prod(np.clip(high - low, 0.0, None), axis=1)
+    area = true[:, 2] * true[:, 3] + box[:, 2] * box[:, 3]
+    return inner / (area - inner), box_errors(box, true)
+
+
+def _correlation(recordings: Sequence[Matched], e: Array, lag: float) -> float:
+    """Of the errors of one person so far apart, all four pooled."""
+    total, count, first = 0.0, 0, 0
+    mean, sd = e.mean(axis=0), np.maximum(e.std(axis=0), 1e-9)
+    for m in recordings:
+        z = np.full((len(m.truth.id), 4), np.nan)
+        z[m.hit] = (e[first : first + int(m.hit.sum())] - mean) / sd
+        first += int(m.hit.sum())
+        near = [(i, j) for there, i, j in pairs_at(m.truth, m.hit) if abs(there - lag) <= 0.5 * lag]
+        total += sum(float((z[i] * z[j]).sum()) for i, j in near)
+        count += sum(4 * len(i) for i, _ in near)
+    return total / count if count else float("nan")
+
+
+def _fps(chains: Sequence[object]) -> Array:
+    return np.array([c.m.truth.fps for c in chains])  # type: ignore[attr-defined]
+
+
+def _mean(a: Array) -> float:
+    return float(np.mean(a)) if len(a) else float("nan")
+
+
+def _sd(a: Array) -> float:
+    return float(np.std(a)) if len(a) else float("nan")
+
+
+def _quantile(a: Array, q: float) -> float:
+    return float(np.quantile(a, q)) if len(a) else float("nan")
+
+
+def _weighted(a: Array, w: Array) -> float:
+    return float(a @ w / w.sum()) if w.sum() else float("nan")
