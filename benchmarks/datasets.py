@@ -27,11 +27,18 @@ NONE = Pictures()
 
 
 def start(
-    entries: Sequence[str], seeds: str, out: Path, workers: int, pictures: Pictures = NONE, **env: str
+    entries: Sequence[str],
+    seeds: str,
+    out: Path,
+    workers: int,
+    pictures: Pictures = NONE,
+    more: Sequence[str] = (),
+    **env: str,
 ) -> subprocess.Popen[str]:
-    """`flockscope generate` as a process of its own, in a session of its own; env: variables that differ from ours."""
-    words = ["generate", *entries, "--seeds", seeds, "--out", str(out), "--workers", str(workers), "--json"]
-    words += ["--streams", pictures.streams, "--images", pictures.images]
+    """`flockscope generate` as a process of its own, of its own session; more: further words; env: what differs."""
+    words = ["generate", *entries, *more, "--seeds", seeds, "--out", str(out), "--workers", str(workers), "--json"]
+    words += ["--streams", pictures.streams]
+    words += [] if pictures == NONE else ["--images", pictures.images]
     variables = {**os.environ, "PYTHONPATH": str(ROOT), **env}
     return subprocess.Popen(
         [sys.executable, "-m", "tracking.app.cli", *words],
@@ -40,11 +47,17 @@ def start(
 
 
 def whole_run(
-    entries: Sequence[str], seeds: str, out: Path, workers: int, pictures: Pictures = NONE, **env: str
+    entries: Sequence[str],
+    seeds: str,
+    out: Path,
+    workers: int,
+    pictures: Pictures = NONE,
+    more: Sequence[str] = (),
+    **env: str,
 ) -> float:
     """Wall seconds of a run that must end well."""
     begin = time.perf_counter()
-    process = start(entries, seeds, out, workers, pictures, **env)
+    process = start(entries, seeds, out, workers, pictures, more, **env)
     answer = process.communicate()[0]
     if process.returncode != 0:
         raise SystemExit(f"{' '.join(map(str, process.args))}: exit code {process.returncode}: {answer[:600]}")
