@@ -6,16 +6,15 @@ another; what is stored depends on scenario, seed and versions alone, never on w
 
 from __future__ import annotations
 
-import os
-from collections.abc import Callable, Iterable, Iterator
-from contextlib import contextmanager, suppress
+from collections.abc import Callable, Iterable
 from dataclasses import replace
 from pathlib import Path
 from uuid import uuid4
 
 from scenarios.errors import FlockscopeError, InputError, WorkError
 from scenarios.loading import Entry
-from sim.io.atomic import PARTIAL, refusal, sweep, write_file
+from sim.io.atomic import PARTIAL, sweep, write_file
+from sim.io.lock import alone
 from sim.io.manifest import MANIFEST
 from sim.io.streams import chosen
 from sim.job import Job, attempt, begun, given_up, plan
@@ -52,7 +51,7 @@ def generate(
     folder = root / f"flockscope-{split}"
     pictures = chosen(streams, images)
     jobs = [replace(job, streams=pictures, images=images) for job in plan(_resolved(entries, set), seeds, folder)]
-    with _alone(root):
+    with alone(root):
         sweep(root, folder, root / "seqmaps")
         for job in jobs:
             begun(job)
@@ -137,44 +136,3 @@ def _summary(errors: dict[str, FlockscopeError], total: int) -> FlockscopeError:
         file=first.file, place=first.place, got=f"{first.got} (and {len(errors) - 1} more of {total}: {others})",
         expected=first.expected, remedy=first.remedy + ("" if len(errors) == total else "; the others are kept"),
     )  # fmt: skip
-
-
-@contextmanager
-def _alone(root: Path) -> Iterator[None]:
-    """One run at a time in a folder, where the system can tell; a folder made for nothing goes away again."""
-    made = [p for p in (root, *root.parents) if not p.exists()]
-    try:
-        root.mkdir(parents=True, exist_ok=True)
-        with _lock(root):
-            yield
-    except OSError as error:
-        raise refusal(root, error) from error
-    finally:
-        with suppress(OSError):
-            for folder in made:
-                folder.rmdir()
-
-
-@contextmanager
-def _lock(root: Path) -> Iterator[None]:
-    try:
-        import fcntl
-    except ImportError:
-        yield
-        return
-    descriptor = os.open(root, os.O_RDONLY)
-    try:
-        try:
-            fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        except BlockingIOError:
-            raise InputError(
-                file=root,
-                got="another run at work here",
-                expected="one at a time",
-                remedy="wait, or choose another --out",
-            ) from None
-        except OSError:  # a file system that many machines share may lock no folders: NFS does not
-            pass
-        yield
-    finally:
-        os.close(descriptor)

@@ -48,6 +48,11 @@ def content_hash(truth: str, detections: Any, pixels: Mapping[str, str] | None =
     return canonical_hash(("content", truth, detections, dict(pixels) if pixels else ()))
 
 
+def dataset_hash(contents: Mapping[str, str]) -> str:
+    """Hash of a dataset: of the content hashes by name of sequence, <split>/<name>."""
+    return canonical_hash(("dataset", dict(contents)))
+
+
 class PixelHash:
     """Hash of a stream of pictures as they are added, by their shapes, types and raw bytes; `count` of them so far."""
 

@@ -57,6 +57,16 @@ def write_file(target: Path, content: bytes) -> None:
 
 
 @contextmanager
+def new_file(target: Path) -> Iterator[Path]:
+    """A path beside the target to write a file to, which takes its place when left well."""
+    with writing(target) as partial:
+        yield partial
+        _flush(partial)
+        os.replace(partial, target)
+        _flush_folder(target.parent)
+
+
+@contextmanager
 def new_folder(target: Path, keep: Callable[[], bool] = lambda: False) -> Iterator[Path]:
     """An empty folder beside the target to fill, which takes its place when left well; one that stood there goes.
 

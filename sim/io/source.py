@@ -49,6 +49,17 @@ def open_source(
     return [_open_folder(p, options) for p in found]
 
 
+def folders(path: Path, kind: str) -> list[Path]:
+    """The folders of sequences of a dataset or of one, all of a kind; InputError where there are none, or others."""
+    found = _find(path, DEPTH) if path.is_dir() else []
+    other = next((p for p in found if p.is_file() or _kind(p) != kind), None)
+    if not found or other is not None:
+        got = "nothing of ours" if other is None else f"a recording, {other.name}"
+        expected = f"a {kind} sequence or dataset"
+        raise InputError(file=path, got=got, expected=expected, remedy="give what `flockscope generate` made")
+    return found
+
+
 @dataclass(frozen=True)
 class Options:
     """What a user says about a recording; None: nothing."""

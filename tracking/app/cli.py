@@ -257,6 +257,24 @@ def coco(
     return export_coco(folder, out)
 
 
+@export.command()
+def webdataset(
+    folder: Annotated[Path, typer.Argument(metavar="DIR", help="A generated sequence or dataset.")],
+    out: Out,
+    shard_size: Annotated[
+        str, typer.Option("--shard-size", metavar="SIZE", help="What a shard may hold: 500MB, 2GB.")
+    ] = "1GB",
+    samples: Annotated[
+        Literal["sequence", "frame"], typer.Option(help="A sample: a sequence with all its files, or a labelled frame.")
+    ] = "sequence",
+    json: Json = False,
+) -> Answer:
+    """Tar shards to stream from, as the library webdataset reads them."""
+    from tracking.app.dataset_commands import export_webdataset
+
+    return export_webdataset(folder, out, shard_size, samples)
+
+
 def run(arguments: Sequence[str]) -> int:
     """Run the command; everything it says is printed; its exit code."""
     from tracking.app.running import carry_out

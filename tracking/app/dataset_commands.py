@@ -59,3 +59,17 @@ def export_coco(source: Path, out: Path) -> Answer:
 
     path = coco(source, out)
     return Answer({"file": path}, str(path))
+
+
+def export_webdataset(source: Path, out: Path, shard_size: str, samples: str) -> Answer:
+    """Tar shards of every sequence."""
+    from sim.io.webdataset import size_of, webdataset
+
+    options.folder(out)
+    with Meter("export") as meter:
+        index = webdataset(source, out, shard_size=size_of(shard_size), samples=samples, progress=meter.update)
+    shards = index["shards"]
+    count, size = sum(len(s["sequences"]) for s in shards), sum(s["bytes"] for s in shards)
+    text = f"{count} sequences in {len(shards)} shards, {size / 1e6:.1f} MB; content {index['content_hash'][:16]}"
+    files = [out / s["name"] for s in shards]
+    return Answer({"shards": files, "bytes": size, "content_hash": index["content_hash"]}, text)
