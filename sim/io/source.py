@@ -60,6 +60,11 @@ def folders(path: Path, kind: str) -> list[Path]:
     return found
 
 
+def named(folder: Path) -> str:
+    """<split>/<name> of a stored sequence, by which datasets call it."""
+    return "/".join(folder.absolute().parts[-2:])
+
+
 @dataclass(frozen=True)
 class Options:
     """What a user says about a recording; None: nothing."""

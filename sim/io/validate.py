@@ -16,6 +16,7 @@ from sim.io.cameras import read_scene
 from sim.io.mot_folder import read_seqinfo
 from sim.io.picture_reader import Stored
 from sim.io.sample import FRAMES
+from sim.io.source import folders, named
 from sim.io.streams import file_name, is_picture, suffix
 from sim.types import Detections, Groups, Truth
 
@@ -34,6 +35,12 @@ def validate(folder: str | Path) -> list[FlockscopeError]:
     if not sequences and not found:
         raise InputError(file=folder, got="no sequences", expected="a dataset of ours", remedy="check the path")
     return found + [problem for p in sequences for problem in _sequence(p)]
+
+
+def content_hash(folder: str | Path) -> str:
+    """The hash of all content hashes of a dataset of ours, or of a sequence: what every export of it has too."""
+    found = {named(p): manifests.read_manifest(p)["content_hash"] for p in folders(Path(folder), "generated")}
+    return hashing.dataset_hash(found)
 
 
 def _problem(path: Path, got: object, expected: object, place: str = "", remedy: str = manifests.REDO) -> InputError:

@@ -26,7 +26,7 @@ from sim.io.frame_labels import labels
 from sim.io.lock import alone
 from sim.io.manifest import MANIFEST, read_manifest
 from sim.io.picture_reader import Stored
-from sim.io.source import folders
+from sim.io.source import folders, named
 from sim.io.streams import file_name
 
 SAMPLES = ("sequence", "frame")
@@ -53,7 +53,7 @@ class Item:
     @property
     def name(self) -> str:
         """<split>/<name>."""
-        return f"{self.folder.parent.name}/{self.folder.name}"
+        return named(self.folder)
 
     @property
     def key(self) -> str:

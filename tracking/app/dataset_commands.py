@@ -43,11 +43,13 @@ def generate(
 
 def validate(folder: Path) -> Answer:
     """Whether a sequence or dataset is whole and unaltered; code 1 where it is not."""
+    from sim.io.validate import content_hash
     from sim.io.validate import validate as check
 
     problems = check(folder)
     if not problems:
-        return Answer({"problems": []}, f"{folder}: nothing wrong")
+        content = content_hash(folder)
+        return Answer({"problems": [], "content_hash": content}, f"{folder}: nothing wrong; content {content[:16]}")
     lines = [problem.line() for problem in problems]
     found = [problem.as_dict() for problem in problems]
     return Answer({"problems": found, "error": found[0]}, "\n".join(lines), code=1)

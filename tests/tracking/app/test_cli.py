@@ -120,6 +120,10 @@ COMMANDS = {
     "tune": (TUNE + " --trials 2 --seeds 0", TUNE + " --trials 2 --seeds 0:20000"),
     "validate": ("validate {data}", "validate {out}/nothing"),
     "export coco": ("export coco {data} --out {out}/coco.json", "export coco {out}/nothing --out {out}/coco.json"),
+    "export webdataset": (
+        "export webdataset {data} --out {out}",
+        "export webdataset {data} --out {out} --shard-size 0",
+    ),
     "demo": ("demo --quick --out {out}", "demo --quick --out {scene}/x"),
 }
 WRITING = [name for name, (good, _) in COMMANDS.items() if "--out {out}" in good]

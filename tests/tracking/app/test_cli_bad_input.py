@@ -297,9 +297,9 @@ def test_a_dataset_with_a_file_missing(name, made, tmp_path, capsys):
     shutil.copytree(made / "data", data)
     (path,) = data.rglob(name)
     path.unlink()
-    lines = {"track": ["blob", str(data)], "view": [str(data)], "sheet": [str(data)], "export": ["coco", str(data)]}
-    for command, words in lines.items():
-        assert str(path) in refused([command, *words, "--out", str(out / "x")], capsys), command
+    lines = (["track", "blob"], ["view"], ["sheet"], ["export", "coco"], ["export", "webdataset"])
+    for words in lines:
+        assert str(path) in refused([*words, str(data), "--out", str(out / "x")], capsys), words
     assert run(["validate", str(data)]) == 1
     assert str(path) in capsys.readouterr().out
     assert not out.exists()
@@ -315,6 +315,7 @@ def writers(made: Path, out: Path) -> list[list[str]]:
         ["sheet", str(data), "--out", str(out / "sheet.png")],
         ["overlay", str(data), "--out", str(out / "film.mp4")],
         ["export", "coco", str(data), "--out", str(out / "coco.json")],
+        ["export", "webdataset", str(data), "--out", str(out)],
         ["scenarios", str(made / "scene.toml"), "--out", str(out / "plan.svg")],
         ["demo", "--quick", "--out", str(out)],
     ]

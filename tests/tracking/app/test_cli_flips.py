@@ -450,10 +450,23 @@ OPTIONS = {
     ("sheet", "frames"): (BASE["sheet"], BASE["sheet"] + " --frames 4"),
     ("sheet", "fps"): ("sheet {0}/mot --out {1}/sheet.png", "sheet {0}/mot --fps 5 --out {1}/sheet.png"),
     ("validate", "folder"): ("validate {0}/data", "validate {0}/tracks"),
+    ("webdataset", "folder"): (
+        "export webdataset {0}/data --out {1}",
+        "export webdataset {0}/data/flockscope-demo/scene-s40000 --out {1}",
+    ),
+    ("webdataset", "shard_size"): (
+        "export webdataset {0}/data --out {1}",
+        "export webdataset {0}/data --shard-size 1kB --out {1}",
+    ),
+    ("webdataset", "samples"): (
+        "export webdataset {0}/data --out {1}",
+        "export webdataset {0}/data --samples frame --out {1}",
+    ),
     ("coco", "folder"): ("export coco {0}/data --out {1}/c.json", "export coco {0}/mot --out {1}/c.json"),
 }
 ELSEWHERE = {
     ("generate", "workers"),  # the same bytes for any number: tests/sim/test_generate.py
+    ("generate", "cluster"),  # and on a cluster: tests/sim/test_generate_cluster.py
     ("demo", "quick"),  # the long one is for `make demo`
 }
 
