@@ -8,12 +8,16 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
+from tracking.registration import announce
+
 if TYPE_CHECKING:
     from tracking.run import track
     from tracking.scoring import evaluate
     from tracking.tuning import tune
 
 __all__ = ["evaluate", "track", "tune"]
+
+announce()
 
 _HOME = {"evaluate": "tracking.scoring", "track": "tracking.run", "tune": "tracking.tuning"}
 

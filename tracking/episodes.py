@@ -59,7 +59,7 @@ def play(
 
 
 class Rollout:
-    """An episode frame by frame. State: the tracker, its answers so far, the seconds spent."""
+    """An episode frame by frame. State: the tracker, its answers so far, the last frame, the seconds spent."""
 
     def __init__(
         self,
@@ -82,6 +82,8 @@ class Rollout:
         self.ready.reset(tracker_seed)
         self.seconds_tracking += time.perf_counter() - begun
         self._frames = self.ready.frames()
+        self._next: Frame | None = None
+        self.last: Frame | None = None
 
     @property
     def sequence(self) -> Sequence:
@@ -94,16 +96,20 @@ class Rollout:
         return self.truth.length
 
     def advance(self, upto: int | None = None) -> Iterator[tuple[Frame, Tracks]]:
-        """Play on, to the frame `upto` or to the last: each frame as the tracker was given it, and its answer."""
+        """Play on, to the frame `upto` or to the last: each frame as the tracker was given it, and its answer.
+
+        After an error of the tracker's the same frame comes again.
+        """
         last = self.length if upto is None else min(upto, self.length)
         while len(self.answers) < last:
-            frame = next(self._frames, None)
+            self._next = frame = self._next or next(self._frames, None)
             if frame is None:
                 return
             begun = time.perf_counter()
             answer = self.ready.answer(frame)
             self.seconds_tracking += time.perf_counter() - begun
             self.answers.append(answer)
+            self._next, self.last = None, frame
             yield frame, answer
 
     def episode(self, every_score: bool = False) -> Episode:

@@ -176,7 +176,7 @@ def _make(tracker: str | type[Tracker] | Tracker, params: Params) -> tuple[str, 
             remedy = "leave the parameters out, or give the class a config_class (docs/trackers.md)"
             raise InputError(place="params", got=name, expected="a tracker with parameters", remedy=remedy)
         return name, _instance(name, made), None
-    config = _config(kind, params)
+    config = config_of(kind, params)
     return name, _instance(name, made, config), config
 
 
@@ -189,7 +189,8 @@ def _instance(name: str, made: Any, *arguments: Any) -> Tracker:
         raise _raised(name, "__init__", "before the first frame", error) from error
 
 
-def _config(kind: type[Config], params: Params) -> Config:
+def config_of(kind: type[Config], params: Params) -> Config:
+    """The config that was given as itself, by values or as a TOML file; the default where nothing was."""
     if params is None:
         return kind()
     if isinstance(params, str | Path):

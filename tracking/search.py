@@ -18,12 +18,19 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from scenarios.errors import InputError
-from sim.types import Array
+from sim.types import Array, DetectionMode
 from tracking.config import Config, Param, Value
 
 Space = tuple[Param, ...]
 HALVINGS = 6
 """How often the way back to an allowed config is halved."""
+
+
+def space_of(kind: type[Config], mode: DetectionMode | None = None, *, online: bool = False) -> Space:
+    """The parameters of a config to search where a tracker is given pictures ("image") or detections (others): without
+    those that say nothing of these. online: those only that may change between frames."""
+    blind = {"image": "points", None: None}.get(mode, "pixels")
+    return tuple(p for p in kind.space(online=online) if p.sees == "" or p.sees != blind)
 
 
 def encode(space: Space, config: Config) -> Array:

@@ -110,6 +110,12 @@ def of_tracks(tracks: SequenceOf[Tracks], camera: Camera | None, scene: Scene | 
     return Side("tracked", "T", frames, tuple(events))
 
 
+def on_plan(tracks: SequenceOf[Tracks]) -> Side:
+    """Answers on the ground as marks in metres, for a view of the ground."""
+    events = [(e.start if e.emitted is None else e.emitted, e) for t in tracks for e in t.events]
+    return Side("tracked", "T", {t.index: _flat(t) for t in tracks}, tuple(events))
+
+
 def of_truth(truth: Truth) -> Side:
     """What is true; frames without a person have no marks."""
     frames = {}
@@ -134,6 +140,28 @@ def _of_answer(t: Tracks, camera: Camera | None, scene: Scene | None) -> Marks:
     if t.plane == "image":
         at = np.where(np.isfinite(at), at, t.pos)
     return Marks(t.id, box, at, _ellipses(t, camera, scene), np.zeros(n, bool), _regions(t.group, box))
+
+
+def _flat(t: Tracks) -> Marks:
+    """One answer on the ground: places, and hulls of groups in metres."""
+    n, groups, at = len(t.id), t.groups or Groups.none(), t.pos[:, :2]
+    hulls = groups.hull or tuple(NOWHERE for _ in groups.id)
+    regions = tuple(Region(g, hull) for g, hull in zip(groups.id.tolist(), hulls, strict=True))
+    if t.unit == "group":
+        own = dict(zip(groups.id.tolist(), range(len(groups.id)), strict=True))
+        regions = tuple(_whole(t, k, groups, own.get(name), hulls) for k, name in enumerate(t.id.tolist()))
+    rings = [ring(p, cov, SURE) for p, cov in zip(at, t.cov[:, :2, :2], strict=True)]
+    ellipse = np.array([r if len(r) else np.full((len(ROUND), 2), np.nan) for r in rings]).reshape(n, len(ROUND), 2)
+    return Marks(t.id, np.full((n, 4), np.nan), at, ellipse, np.zeros(n, bool), regions, t.unit == "group")
+
+
+def _whole(t: Tracks, k: int, groups: Groups, row: int | None, hulls: tuple[Array, ...]) -> Region:
+    """Row k of groups that are tracked as wholes, on the ground."""
+    name, at = int(t.id[k]), t.pos[k, :2]
+    way = np.stack([at, at + t.vel[k, :2]])
+    if row is None:
+        return Region(name, NOWHERE, way=way)
+    return Region(name, hulls[row], ring(at, groups.extent[row], WIDE), way, float(groups.size[row]))
 
 
 def _of_groups(t: Tracks, camera: Camera | None, scene: Scene | None) -> Marks:
