@@ -74,8 +74,13 @@ def given(info: Mapping[str, Any]) -> str:
     """What a tracker was given, in words, by its run.json; "" where that does not say."""
     mode, background, sensor = (info.get(key) for key in ("detections", "background", "sensor"))
     more = [f"background: {background}"] if background else []
-    more += [f"{key} = {value}" for key, value in (sensor or {}).items()]
+    more += [f"{key} = {_short(value)}" for key, value in (sensor or {}).items()]
     return f"{mode} ({', '.join(more)})" if more else str(mode or "")
+
+
+def _short(value: object) -> object:
+    """Numbers and words as they are; of tables and lists that they are there."""
+    return "…" if isinstance(value, Mapping | list | tuple) else value
 
 
 def _versions() -> dict[str, str]:

@@ -36,6 +36,8 @@ app = typer.Typer(
 )
 export = typer.Typer(rich_markup_mode=None, help="Turn a dataset into another form.")
 app.add_typer(export, name="export")
+fit = typer.Typer(rich_markup_mode=None, help="Learn a table from recordings.")
+app.add_typer(fit, name="fit")
 
 
 def _version(asked: bool) -> None:
@@ -273,6 +275,19 @@ def webdataset(
     from tracking.app.dataset_commands import export_webdataset
 
     return export_webdataset(folder, out, shard_size, samples)
+
+
+@fit.command("sensor")
+def fit_sensor(
+    sources: Annotated[list[Path], typer.Argument(metavar="SOURCE…", help="Recordings with gt and det; pooled.")],
+    out: Annotated[Path, typer.Option("--out", metavar="FILE.toml", help="File to write: a [sensor] table.")],
+    fps: Fps = None,
+    json: Json = False,
+) -> Answer:
+    """How a detector errs, for synthetic detections that err alike."""
+    from tracking.app.fit_command import sensor
+
+    return sensor(sources, out, fps)
 
 
 def run(arguments: Sequence[str]) -> int:

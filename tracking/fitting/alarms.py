@@ -150,15 +150,14 @@ def _aspect(chains: Sequence[Chain]) -> tuple[float, float]:
 
 
 def _jitter(chains: Sequence[Chain]) -> float:
-    """sd of edges about the straight way of their chain, in heights; chains of 4 and more tell."""
-    squares, freedom = 0.0, 0
+    """sd of edges in heights: of x_(t-1) - 2 x_t + x_(t+1), which knows no steady way, over sqrt 6; by its median."""
+    bends = [np.zeros((0, 4))]
     for c in chains:
-        if len(c.rows) >= 4:
-            edges = np.concatenate([c.box[:, :2], c.box[:, :2] + c.box[:, 2:]], axis=1) / c.box[:, 3].mean()
-            basis = np.stack([np.ones(len(c.rows)), c.frame - c.frame.mean()], axis=1)
-            rest = edges - basis @ np.linalg.lstsq(basis, edges, rcond=None)[0]
-            squares, freedom = squares + float((rest**2).sum()), freedom + 4 * (len(c.rows) - 2)
-    return round(float(np.sqrt(squares / freedom)), 4) if freedom else 0.0
+        edges = np.concatenate([c.box[:, :2], c.box[:, :2] + c.box[:, 2:]], axis=1) / c.box[:, 3].mean()
+        steady = (np.diff(c.frame)[1:] == 1) & (np.diff(c.frame)[:-1] == 1)
+        bends.append(np.diff(edges, n=2, axis=0)[steady])
+    size = np.abs(np.concatenate(bends))
+    return round(float(1.4826 * np.median(size) / np.sqrt(6.0)), 4) if len(size) else 0.0
 
 
 def _beside(chains: Sequence[Chain]) -> dict[str, tuple[float, float]]:

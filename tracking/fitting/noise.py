@@ -14,9 +14,10 @@ from sim.types import Array
 from tracking.fitting.matched import Matched
 from tracking.fitting.memory import correlations, memory
 
-GROWTH = np.concatenate([[0.0], np.geomspace(0.1, 6.0, 24)])  # values of `occluded` that are tried
+GROWTH = np.concatenate([[0.0], np.geomspace(0.1, 6.0, 40)])  # values of `occluded` that are tried
 TAILS = (0.0, 0.25, 0.5, 1.0, 1.5, 2.0, 3.0, 4.0, 6.0, 9.0, 14.0, 20.0)
 HALF = (0.3, 0.9)  # visibilities between which a row tells the visible part from the whole
+BARELY = 0.25  # visibility: of who shows less the nearest box is often another's, and no error of his own
 FEW = 20  # rows half hidden: with fewer, boxes are taken for those of the whole, and errors for alike
 
 
@@ -96,9 +97,11 @@ def _true(m: Matched, kind: str) -> Array:
 def _spread(recordings: Sequence[Matched], kind: str) -> Spread:
     e = np.concatenate([_errors(m, kind) for m in recordings])
     hidden = np.concatenate([1.0 - m.truth.visibility[m.hit] for m in recordings])
+    clear = hidden <= 1.0 - BARELY
+    e, hidden = e[clear], hidden[clear]
     if not len(e):
         return Spread(np.zeros(4), np.zeros(4), 0.0, 0.0)
-    tried = GROWTH if (hidden > 1 - HALF[1]).sum() >= FEW else GROWTH[:1]
+    tried = GROWTH if (hidden > 1.0 - HALF[1]).sum() >= FEW else GROWTH[:1]
     return max((_of_growth(e, hidden, float(k)) for k in tried), key=lambda s: s.likelihood)
 
 

@@ -1,0 +1,109 @@
+"""Synthetic errors beside real ones: a detector's profile fitted on one half of a recording, judged on the other.
+
+    PYTHONPATH=. python benchmarks/fit_sensor.py [--data FOLDER] [--draws 20] [--json FILE]    or $FLOCKSCOPE_DATA
+
+For each recording with gt and det (PETS09-S2L1-first200, TUD-Campus): `measured` is the real detector on the second
+half; `drawn` is the fitted sensor on the same people there, mean and 5 to 95 % of the draws, with the profile of the
+first half (`held out`), of the whole (`same`), of the other recording (`other`), and without any profile (`default`,
+[sensor] as it is). `outside` counts the rows whose measured value lies outside those 5 to 95 %.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import os
+import warnings
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+
+from scenarios.sensor import Sensor
+from sim.io.source import open_source
+from sim.types import Detections, Truth
+from sim.types import Sequence as Recording
+from tracking.fitting.matched import Matched, match, match_sequence
+from tracking.fitting.sensor import fit
+from tracking.fitting.statistics import again, statistics
+
+RECORDINGS = ("mot/PETS09-S2L1-first200", "mot/TUD-Campus")
+SEED = 30_000
+LOW, HIGH = 0.05, 0.95
+
+
+def part(recording: Recording, first: int, last: int, size: tuple[int, int]) -> Matched:
+    """Frames first … last of a recording, as one of its own."""
+    truth = recording.truth
+    assert truth is not None
+    rows = (truth.frame >= first) & (truth.frame <= last)
+    names = ("frame", "id", "group", "pos", "vel", "box", "visibility", "z")
+    cut = {name: getattr(truth, name)[rows] for name in names if getattr(truth, name) is not None}
+    cut["frame"] = cut["frame"] - (first - 1)
+    short: Truth = truth.replace(length=last - first + 1, labelled=None, **cut)
+    found: list[Detections] = []
+    for frame in recording.without_pictures():
+        if first <= frame.index <= last and frame.detections is not None:
+            found.append(frame.detections.replace(index=frame.index - first + 1))
+    return match(short, found, size, recording.camera)
+
+
+def table(second: Matched, profiles: dict[str, Sensor], draws: int) -> dict[str, dict[str, object]]:
+    """Each statistic: `measured`, and by profile the mean and the limits of its draws."""
+    rows: dict[str, dict[str, object]] = {name: {"measured": v} for name, v in statistics([second]).items()}
+    for profile, sensor in profiles.items():
+        made = [statistics([again(second, sensor, SEED + k)]) for k in range(draws)]
+        for name, row in rows.items():
+            v = np.array([m[name] for m in made])
+            v = v[np.isfinite(v)]
+            row[profile] = (float(v.mean()), *np.quantile(v, (LOW, HIGH)).tolist()) if len(v) else (np.nan,) * 3
+    return rows
+
+
+def show(name: str, rows: dict[str, dict[str, object]], profiles: Sequence[str]) -> None:
+    wide = max(map(len, rows))
+    print(f"\n{name}\n{'':<{wide}}  measured" + "".join(f"  {p:>22}" for p in profiles))
+    outside = dict.fromkeys(profiles, 0)
+    for key, row in rows.items():
+        measured = row["measured"]
+        words = ""
+        for p in profiles:
+            mean, low, high = row[p]  # type: ignore[misc]
+            words += f"  {mean:6.3f} ({low:6.3f} to {high:6.3f})"
+            outside[p] += bool(np.isfinite([measured, mean]).all() and not low <= measured <= high)
+        print(f"{key:<{wide}}  {measured:8.3f}{words}")
+    print(f"{f'outside, of {len(rows)}':<{wide}}  {'':8}" + "".join(f"  {outside[p]:>22}" for p in profiles))
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    default = Path(__file__).resolve().parents[2] / "shared" / "data"
+    parser.add_argument("--data", type=Path, default=Path(os.environ.get("FLOCKSCOPE_DATA", default)))
+    parser.add_argument("--draws", type=int, default=20)
+    parser.add_argument("--json", type=Path)
+    args = parser.parse_args()
+    warnings.simplefilter("ignore")  # the frame rate of TUD-Campus, which says none
+    recordings = {Path(name).name: open_source(args.data / name, images=False)[0] for name in RECORDINGS}
+    whole = {name: match_sequence(r) for name, r in recordings.items()}
+    fitted = {name: fit([m]) for name, m in whole.items()}
+    result = {}
+    for name, recording in recordings.items():
+        length, size = recording.length, whole[name].size
+        assert length is not None
+        middle = length // 2
+        other = next(sensor for key, sensor in fitted.items() if key != name)
+        profiles = {
+            "held out": fit([part(recording, 1, middle, size)]),
+            "same": fitted[name],
+            "other": other,
+            "default": Sensor(),
+        }
+        rows = table(part(recording, middle + 1, length, size), profiles, args.draws)
+        show(f"{name}: frames {middle + 1} to {length}", rows, list(profiles))
+        result[name] = rows
+    if args.json:
+        args.json.write_text(json.dumps(result, indent=1), encoding="utf-8")
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,86 @@
+"""`flockscope fit sensor` as a user calls it, and `--sensor` with what it wrote."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pytest
+
+from scenarios import load, sensor_settings
+from tracking.app.cli import run
+
+
+def answer(capsys: pytest.CaptureFixture[str], *words: str | Path) -> dict[str, object]:
+    capsys.readouterr()
+    code = run([*map(str, words), "--json"])
+    return {"code": code, **json.loads(capsys.readouterr().out)}
+
+
+@pytest.fixture(scope="module")
+def made(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A generated sequence: a recording with gt and det like any other."""
+    out = tmp_path_factory.mktemp("fit") / "data"
+    words = ["generate", "street", "--seeds", "30000", "--streams", "none", "--set", "duration=12.0", "--out", str(out)]
+    assert run(words) == 0
+    return out
+
+
+def test_fit_generate_and_track_with_it(made: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    profile = tmp_path / "mine.toml"
+    said = answer(capsys, "fit", "sensor", made, made, "--out", profile)
+    assert said["code"] == 0
+    assert said["measured"]["missed"] == pytest.approx(said["drawn"]["missed"], abs=0.05)  # type: ignore[index]
+    assert load("merge", set=sensor_settings(profile)).sensor.detect_prob == said["sensor"]["detect_prob"]  # type: ignore[index]
+    out = tmp_path / "data"
+    words = ["generate", "merge", "--seeds", "0", "--streams", "none", "--sensor", profile, "--out", out]
+    assert answer(capsys, *words, "--set", "sensor.clutter_rate=0.0")["code"] == 0
+    stored = load(out / "flockscope-train" / "merge-s00000" / "scenario.toml").sensor
+    assert stored.box_noise is not None
+    assert stored.clutter_rate == 0.0
+    tracked = answer(
+        capsys, "track", "blob", made, "--detections", "truth", "--sensor", profile, "--out", tmp_path / "t"
+    )
+    assert tracked["code"] == 0
+    refused = answer(
+        capsys, "track", "blob", made, "--detections", "file", "--sensor", profile, "--out", tmp_path / "t"
+    )
+    assert refused["code"] == 2
+    assert "--sensor" in refused["error"]["place"]  # type: ignore[index]
+
+
+def test_real_detectors(shared_data: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """Boxes of PETS that are a third too wide, false alarms that stay; several recordings pooled."""
+    profile = tmp_path / "pets.toml"
+    folder = shared_data / "mot" / "PETS09-S2L1-first200"
+    said = answer(capsys, "fit", "sensor", folder, "--out", profile)
+    assert said["sensor"]["box_noise"]["width"][0] == pytest.approx(0.27, abs=0.05)  # type: ignore[index]
+    assert said["sensor"]["false_alarms"]["life"] > 0.5  # type: ignore[index]
+    # Eight people whose luck lasts for seconds: the share that a draw misses spreads by 0.08.
+    for name, error in (("missed", 0.09), ("overlap, 50% quantile", 0.03), ("error foot: sd", 0.01)):
+        assert said["measured"][name] == pytest.approx(said["drawn"][name], abs=error)  # type: ignore[index]
+    both = answer(capsys, "fit", "sensor", folder, shared_data / "mot/TUD-Campus", "--fps", "25", "--out", profile)
+    assert both["code"] == 0
+    tracked = answer(
+        capsys, "track", "blob", folder, "--detections", "truth", "--sensor", profile, "--out", tmp_path / "t"
+    )
+    assert tracked["code"] == 0
+
+
+@pytest.mark.parametrize(
+    ("words", "place", "got"),
+    [
+        (["fit", "sensor", "DATA", "--out", "x.txt"], "--out", "x.txt"),
+        (["fit", "sensor", "NOWHERE", "--out", "x.toml"], "", "nothing there"),
+        (["generate", "merge", "--seeds", "0", "--sensor", "none.toml", "--out", "o"], "", "no such file"),
+    ],
+)
+def test_wrong_input_is_one_line(
+    made: Path, words: list[str], place: str, got: str, capsys: pytest.CaptureFixture[str],
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch,
+) -> None:  # fmt: skip
+    monkeypatch.chdir(tmp_path)
+    said = answer(capsys, *[str(made) if word == "DATA" else word for word in words])
+    assert said["code"] == 2
+    assert place in said["error"]["place"]  # type: ignore[index]
+    assert got in said["error"]["got"]  # type: ignore[index]
