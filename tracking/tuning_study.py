@@ -156,8 +156,10 @@ class Study:
         known = [t.values[0] for t in self.told() if t.values]
         if len(known) < 2 or min(known) == max(known):
             return dict.fromkeys(names, 0.0)
-        target = (lambda t: t.values[0]) if len(self.plan.goals) > 1 else None
-        return dict(get_param_importances(self.optuna, params=names, target=target))
+        sign = -1 if self.plan.goals[0].higher else 1  # it asks what makes a target low, and warns of that
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", UserWarning)
+            return dict(get_param_importances(self.optuna, params=names, target=lambda t: sign * t.values[0]))
 
     @property
     def shared(self) -> bool:

@@ -1,0 +1,198 @@
+"""Tuning by search: what it gains on scenes that were not searched, and on recordings that nothing was tuned on.
+
+    PYTHONPATH=. python benchmarks/tuning.py search [blob] [group-pda] [grouping] --out FOLDER [--trials N]
+    PYTHONPATH=. python benchmarks/tuning.py real --out FOLDER [--data FOLDER]       after `search`
+    PYTHONPATH=. python benchmarks/tuning.py pruning|workers|overhead
+
+search: on the suites of benchmarks/tuning_suites, training seeds; default → tuned on test seeds, and on friends-meet or
+crossing, which share no scenario with them. A search that was interrupted goes on.
+real: first defaults (tracking/frozen), present defaults and what `search` found, on recordings: `blob` on PETS09-S2L1
+(200 frames) and TUD-Campus from their det/det.txt, HOTA; `group-pda` on seq_hotel from labelled places, group scores;
+the rule of groups on seq_hotel and CAVIAR Meet_WalkTogether1 from labelled people, pairwise F1. Intervals by moving
+blocks, of the value and of the difference to the present defaults.
+pruning: the same search with and without giving up early: episodes played, and what is found. workers: seconds of one
+search by 1 and 2 processes. overhead: a trial's time beside that of its episodes.
+"""
+
+from __future__ import annotations
+
+import argparse
+import os
+import tempfile
+import time
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from sim.io.source import open_source
+from sim.types import Ints, Sequence, Tracks
+from tracking.config import Config
+from tracking.grouping import derive
+from tracking.links import Grouping
+from tracking.protocol import find
+from tracking.run import track
+from tracking.scoring.catalogue import CATALOGUE
+from tracking.scoring.resample import scorer
+from tracking.stats import moving_blocks
+from tracking.tuning import tune
+from tracking.tuning_rule import people_as_tracks
+
+SUITES = Path(__file__).parent / "tuning_suites"
+DRAWS = 200
+
+
+@dataclass(frozen=True)
+class Search:
+    """What is searched where, and by what it is tuned."""
+
+    tracker: str
+    suite: str
+    objective: str
+    detections: str
+    trials: int
+    more: dict[str, Any] = field(default_factory=dict)
+
+
+SEARCHES = {
+    s.tracker: s
+    for s in (
+        Search("blob", "boxes.toml", "HOTA", "file", 120),
+        Search("group-pda", "points.toml", "objective", "file", 120),
+        Search("grouping", "points.toml", "pairwise_F1", "truth", 120),
+    )
+}
+RECORDINGS = {
+    "blob": (("mot/PETS09-S2L1-first200", "file"), ("mot/TUD-Campus", "file")),
+    "group-pda": (("biwi/seq_hotel", "truth"),),
+    "grouping": (("biwi/seq_hotel", "truth"), ("caviar/mwt1gt.xml", "truth")),
+}
+KEYS = {
+    "blob": ("HOTA", "MOTA", "IDF1"),
+    "group-pda": ("group_F1_hull", "group_1-FP", "group_1-FN", "group_GDSR", "group_MOTP"),
+    "grouping": ("pairwise_F1", "pairwise_precision", "pairwise_recall"),
+}
+
+
+def search(given: argparse.Namespace) -> None:
+    for name in given.names or SEARCHES:
+        wanted = SEARCHES[name]
+        begun = time.perf_counter()
+        found = tune(
+            wanted.tracker, SUITES / wanted.suite, given.trials or wanted.trials, objective=wanted.objective,
+            detections=wanted.detections, out=given.out / f"{name}.toml", seeds=range(3),
+            validation=range(10_000, 10_005), test=range(20_000, 20_013), progress=said(), **wanted.more,
+        )  # fmt: skip
+        print(found)
+        for key, (old, new) in found.changed.items():
+            print(f"  {key}: {old} → {new}")
+        print(f"  {time.perf_counter() - begun:.0f} s\n", flush=True)
+
+
+def said() -> Callable[[int, int | None, str], None]:
+    """Progress, at most once in 30 s."""
+    last = [0.0]
+
+    def tell(done: int, total: int | None, what: str) -> None:
+        if time.monotonic() - last[0] > 30:
+            last[0] = time.monotonic()
+            print(f"  … {done} of {total} {what}", flush=True)
+
+    return tell
+
+
+def real(given: argparse.Namespace) -> None:
+    for name in given.names or RECORDINGS:
+        for path, mode in RECORDINGS[name]:
+            (sequence,) = open_source(given.data / path, images=False)
+            compared(name, sequence, mode, configs(name, given.out))
+
+
+def configs(name: str, folder: Path) -> dict[str, Config]:
+    """First defaults, present ones, what the search found."""
+    kind = Grouping if name == "grouping" else find(name).config_class
+    return {"first": kind.frozen(), "present": kind(), "tuned": kind.from_toml(folder / f"{name}.toml")}
+
+
+def compared(name: str, sequence: Sequence, mode: str, chosen: dict[str, Config]) -> None:
+    """A table of the recording: values with intervals, and differences to the present defaults."""
+    truth = sequence.truth
+    assert truth is not None
+    every = list(CATALOGUE)
+    at = [every.index(key) for key in KEYS[name]]
+    draws = {who: scorer(truth, answers(name, sequence, mode, c), None, "hull") for who, c in chosen.items()}
+
+    def score(places: Ints) -> np.ndarray:
+        values = {who: np.asarray(draw(places))[at] for who, draw in draws.items()}
+        return np.concatenate([*values.values(), *(values[who] - values["present"] for who in values)])
+
+    whole, low, high = moving_blocks(score, truth.length, truth.fps, DRAWS)
+    size, count = len(at), len(chosen)
+    print(f"{name} on {sequence.name}, {truth.length / truth.fps:.0f} s, {mode}; less the present defaults'")
+    for k, who in enumerate(chosen):
+        cells = []
+        for j, key in enumerate(KEYS[name]):
+            v, d = k * size + j, (count + k) * size + j
+            less = "" if who == "present" else f" ({whole[d]:+.3f} [{low[d]:+.3f}, {high[d]:+.3f}])"
+            cells.append(f"{key} {whole[v]:.3f}{less}")
+        print(f"  {who:8} " + "   ".join(cells), flush=True)
+
+
+def answers(name: str, sequence: Sequence, mode: str, config: Config) -> list[Tracks]:
+    truth = sequence.truth
+    assert truth is not None
+    if isinstance(config, Grouping):
+        return derive(people_as_tracks(truth), truth.fps, truth.px_per_m, config)
+    return list(track(name, sequence, params=config, detections=mode))
+
+
+def pruning(given: argparse.Namespace) -> None:
+    """Episodes that are played, and what is found, by p below which a trial is given up."""
+    for p in (0.0, 0.05, 0.1, 0.2):
+        begun = time.process_time()
+        found = tune(
+            "blob", "crossing", given.trials or 60, seeds=range(4), validation=range(10_000, 10_004),
+            test=range(20_000, 20_008), check=None, prune=p, objective="HOTA",
+        )  # fmt: skip
+        played = sum(t.episodes for t in found.trials if not t.error)
+        best = max(c.validation[0] for c in found.candidates)
+        gain = next((c for c in found.comparisons if c.key == "HOTA"), None)
+        told = gain.line() if gain else found.notes
+        print(
+            f"p {p}: {found.pruned} of {len(found.trials)} given up, {played} episodes, best on validation {best:.4f}"
+        )
+        print(f"  {told}; {time.process_time() - begun:.0f} s", flush=True)
+
+
+def workers(given: argparse.Namespace) -> None:
+    """Seconds of one search by one process and by two, taken in turns; the same is found."""
+    best: dict[int, float] = {}
+    for _ in range(2):
+        for count in (1, 2):
+            with tempfile.TemporaryDirectory() as folder:
+                out, begun = Path(folder) / "blob.toml", time.perf_counter()
+                tune(
+                    "blob", "crossing", given.trials or 20, seeds=range(4), validation=range(10_000, 10_004),
+                    test=range(20_000, 20_004), check=None, workers=count, out=out,
+                )  # fmt: skip
+                best[count] = min(best.get(count, np.inf), time.perf_counter() - begun)
+                print(f"{count} workers: {best[count]:.1f} s, {hash(out.read_bytes())}", flush=True)
+    print(f"two are {best[1] / best[2]:.2f} times as fast as one")
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    beside = Path(__file__).resolve().parents[2] / "shared" / "data"
+    parser.add_argument("mode", choices=["search", "real", "pruning", "workers"])
+    parser.add_argument("names", nargs="*", choices=[*SEARCHES, []])
+    parser.add_argument("--out", type=Path, default=Path("tuned"))
+    parser.add_argument("--trials", type=int)
+    parser.add_argument("--data", type=Path, default=Path(os.environ.get("FLOCKSCOPE_DATA", beside)))
+    given = parser.parse_args()
+    {"search": search, "real": real, "pruning": pruning, "workers": workers}[given.mode](given)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,33 @@
+"""Two scenes of a few people and a search on them that takes a second, for tests of tuning."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+TOY = f"{Path(__file__).parent / 'toy_tracker.py'}:Toy"
+SCENE = """
+schema = 1
+about = "three people, nothing happens"
+duration = 4.0
+warmup = 1.0
+camera = { kind = "top", fps = 5 }
+group = [
+  { id = "a", size = 2, start = [4, 4], goal = [12, 4] },
+  { id = "b", size = 1, start = [12, 7], goal = [4, %s] },
+]
+"""
+
+
+def write_scenes(folder: Path) -> tuple[str, str]:
+    """One to tune on, and one that is not used."""
+    for name, goal in (("one", "7"), ("two", "6")):
+        (folder / f"{name}.toml").write_text(SCENE % goal)
+    return str(folder / "one.toml"), str(folder / "two.toml")
+
+
+def wishes(folder: Path, **more: Any) -> dict[str, Any]:
+    """Arguments of `tune` for a small search on scenes in `folder`."""
+    one, two = write_scenes(folder)
+    seeds = {"seeds": range(5), "validation": range(10_000, 10_004), "test": range(20_000, 20_006)}
+    return {"tracker": TOY, "suite": one, "check": two, "trials": 12, "objective": "HOTA", **seeds, **more}
