@@ -28,7 +28,16 @@ import importlib.util, os, signal, sys, types
 spec = importlib.util.spec_from_file_location("fakes", {str(FAKES)!r})
 fakes = importlib.util.module_from_spec(spec)
 spec.loader.exec_module(fakes)
-simulate = lambda scenario, seed, repeat, streams=(): fakes.sequence(seed + 100 * repeat)
+
+def simulate(scenario, seed, repeat, streams=()):
+    deaths = {{-2: 1, -3: 99}}.get(int(sys.argv[3]), 0)
+    if seed == 1 and repeat == 0 and deaths:
+        with open(sys.argv[1] + "-deaths", "a") as told:
+            print(os.getpid(), file=told)
+        if sum(1 for _ in open(sys.argv[1] + "-deaths")) <= deaths:
+            os.kill(os.getpid(), signal.SIGKILL)
+    return fakes.sequence(seed + 100 * repeat)
+
 sys.modules["sim.sequence"] = types.SimpleNamespace(simulate=simulate)
 from scenarios.loading import Entry
 from scenarios.schema import Scenario
@@ -253,6 +262,22 @@ def test_workers_do_not_outlive_a_killed_parent(tmp_path):
     done = run_program(tmp_path, tmp_path / "out", 2, kill_after=-1)
     assert done.returncode == -signal.SIGKILL
     assert run_program(tmp_path, tmp_path / "out", 2).returncode == 0
+    assert validate(tmp_path / "out") == []
+
+
+def test_the_work_of_a_killed_worker_is_done_by_another(tmp_path, whole):
+    done = run_program(tmp_path, tmp_path / "out", 2, kill_after=-2)
+    assert done.returncode == 0, done.stderr.decode()
+    assert len((tmp_path / "out-deaths").read_text().split()) == 2
+    assert content(tmp_path / "out") == whole
+
+
+def test_a_sequence_that_kills_its_workers_fails_alone(tmp_path, whole):
+    done = run_program(tmp_path, tmp_path / "out", 2, kill_after=-3)
+    assert done.returncode == 1
+    assert b"x-s00001: got 3 workers that died at it, the last by signal 9 (SIGKILL)" in done.stderr.splitlines()[-1]
+    others = {name: body for name, body in whole.items() if "x-s00001" not in name and "seqmaps" not in name}
+    assert {k: v for k, v in content(tmp_path / "out").items() if "seqmaps" not in k} == others
     assert validate(tmp_path / "out") == []
 
 
