@@ -144,7 +144,7 @@ def _candidates(made: Plan, study: Study) -> list[Candidate]:
     whole = [t for t in study.told() if not t.pruned and not t.error]
     first, goal = next(t for t in whole if t.params == made.defaults), made.goals[0]
     if len(made.goals) > 1:
-        best = {t.number for t in study.optuna.best_trials}
+        best = study.best()
         whole = [t for t in whole if t.number in best]
     ranked = sorted(whole, key=lambda t: goal.gain(t.values[0], 0.0))
     ranked = _spread(ranked, made.finalists) if len(made.goals) > 1 else ranked

@@ -138,15 +138,21 @@ class Study:
         return slot(trials, trials[asked.number])
 
     def told(self) -> list[Trial]:
-        """The finished trials."""
-        many = len(self.plan.training)
-        return [
+        """The finished trials, by their places in the search, which a trial that was done again keeps."""
+        many, every = len(self.plan.training), self.trials()
+        found = [
             Trial(
-                t.number, tuple(t.values or ()) if ERROR not in t.user_attrs else (), dict(t.params),
+                slot(every, t), tuple(t.values or ()) if ERROR not in t.user_attrs else (), dict(t.params),
                 t.user_attrs.get(PRUNED, many), PRUNED in t.user_attrs, t.user_attrs.get(ERROR, ""),
             )
             for t in self.finished()
         ]  # fmt: skip
+        return sorted(found, key=lambda t: t.number)
+
+    def best(self) -> set[int]:
+        """The places of those trials that no other one beats by all goals."""
+        every = self.trials()
+        return {slot(every, t) for t in self.optuna.best_trials}
 
     def importance(self) -> dict[str, float]:
         """How much each parameter decided about the first goal in training (PED-ANOVA), shares, greatest first."""
