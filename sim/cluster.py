@@ -13,6 +13,8 @@ import os
 import pickle
 import queue
 import re
+import sys
+import threading
 import time
 import uuid
 import warnings
@@ -33,6 +35,7 @@ PATIENCE = 10.0  # s to reach a scheduler
 COUNT = 1.0  # s between counts of its workers
 SILENCE = 20.0  # s without any worker until the user is told
 REMEDY = "run the same command again: what is complete is kept"
+SOUND = (3, 11, 9)  # Python before may stand still for ever where sys._current_frames meets garbage (its issue 106883)
 PACKAGES = ("scenarios", "sim", "tracking")
 
 
@@ -140,6 +143,8 @@ def carry_out(work: bytes, like: tuple[tuple[str, str], ...]) -> bytes:
     for name in THREADS:
         os.environ.setdefault(name, "1")
     worker = get_worker()
+    if sys.version_info < SOUND:
+        _stop_profile(worker)
     if worker.state.nthreads != 1:
         raise WorkError(
             file=worker.address, got=f"a worker of {worker.state.nthreads} threads", expected="one thread per worker",
@@ -154,6 +159,16 @@ def carry_out(work: bytes, like: tuple[tuple[str, str], ...]) -> bytes:
             expected=", ".join(f"{k} {wanted[k]}" for k in other) + " as here", remedy=_remedy(other),
         )  # fmt: skip
     return answered(work)
+
+
+def _stop_profile(worker: Any) -> None:
+    """Dask's profile asks a hundred times a second what each thread is at."""
+    profile = worker.periodic_callbacks.get("profile")
+    if profile is not None and profile.is_running():
+        worker.loop.add_callback(profile.stop)
+        stopped = threading.Event()
+        worker.loop.add_callback(stopped.set)
+        stopped.wait(PATIENCE)
 
 
 def _remedy(other: list[str]) -> str:

@@ -16,7 +16,7 @@ import pytest
 from scenarios.errors import InputError, WorkError
 from sim import cluster
 from sim.workers import crew
-from tests.errands import complain, fall, process, refuse, root_of, tell_and_wait
+from tests.errands import complain, fall, process, profiled, refuse, root_of, tell_and_wait
 from tests.loopback import Loopback, loopback
 
 pytest.importorskip("distributed", reason="the extra [cluster] is not installed")
@@ -148,6 +148,12 @@ def test_sources_are_told_apart_by_every_byte_and_name(tmp_path: Path) -> None:
     assert len(set(found)) == 4
     (tmp_path / "sim" / "a.pyc").write_text("")
     assert cluster.sources(tmp_path) == found[-1]
+
+
+@pytest.mark.skipif(sys.version_info >= cluster.SOUND, reason="this Python does not stand still")
+def test_workers_do_without_the_profile_that_may_stop_them(two: Loopback) -> None:
+    with crew(1, two.address) as run:
+        assert set(dict(run(profiled, range(8), ahead=8)).values()) == {False}
 
 
 def test_a_scheduler_that_goes_away(tmp_path: Path) -> None:
