@@ -58,7 +58,7 @@ def tune(
 
     tracker: a name ("grouping" is the baseline rule of groups), "file.py:Class", "module:Class" or (one worker) a
     class. suite: a suite, scenario, TOML file, or a list of these. seeds, validation, test: of 0:10000, 10000:20000
-    and 20000:30000; by default as many as make 16, 32 and 100 episodes. check: a suite that was not used, "" for a
+    and 20000:30000; by default as many as make 16, 48 and 100 episodes. check: a suite that was not used, "" for a
     usual one, None for none. objective: score keys of docs/metrics.md or "frames/s"; of several, a Pareto front; by
     default "objective". set: "gate=0.99" holds a parameter, "scenario.…" and "sensor.…" are of the scenes. only:
     the parameters to search. out: where to write the result; beside it lies the study, by which the same call goes

@@ -10,7 +10,7 @@ from scenarios.errors import InputError
 from sim.splits import SPLITS, split_of
 from tracking.episodes import Source, sources
 
-EPISODES = {"train": 16, "val": 32, "test": 100}
+EPISODES = {"train": 16, "val": 48, "test": 100}
 """How many episodes default seeds make, at least."""
 
 LEAST = 2

@@ -1,0 +1,116 @@
+"""The judgement: paired differences, the front, and what is taken back."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+
+import pytest
+
+from scenarios.errors import WorkError
+from tests.toy_tracker import ToyConfig
+from tests.tuning_toys import wishes
+from tracking.episodes import Episode
+from tracking.tuning_goals import Goal
+from tracking.tuning_judge import Candidate, Judge, comparison, front
+from tracking.tuning_plan import Plan, plan
+
+
+def episodes(values, key: str = "HOTA") -> list[Episode]:
+    return [Episode("x", k, math.nan, {key: v} if v == v else {}, 10, 1.0, 0.0) for k, v in enumerate(values)]
+
+
+def test_differences_are_paired():
+    """The same gain on scenes that differ much more than it: sure."""
+    before = [0.1, 0.5, 0.9, 0.3, 0.7]
+    found = comparison("s", Goal("HOTA"), episodes(before), episodes([v + 0.01 for v in before]))
+    assert (found.before, found.after) == (pytest.approx(0.5), pytest.approx(0.51))
+    assert found.low == pytest.approx(0.01)
+    assert found.verdict == "better"
+    assert (
+        comparison("s", Goal("HOTA", False), episodes(before), episodes([v + 0.01 for v in before])).verdict == "worse"
+    )
+
+
+def test_a_difference_of_either_sign_is_not_sure():
+    found = comparison("s", Goal("HOTA"), episodes([0.5] * 4), episodes([0.4, 0.6, 0.45, 0.6]))
+    assert found.verdict == "no sure difference"
+    assert found.low < 0 < found.high
+
+
+def test_pairs_that_are_not_known_are_left_out():
+    found = comparison("s", Goal("HOTA"), episodes([0.5, math.nan, 0.5]), episodes([0.6, 0.9, math.nan]))
+    assert (found.sequences, found.before, found.after) == (1, 0.5, 0.6)
+    assert comparison("s", Goal("HOTA"), episodes([math.nan]), episodes([0.6])) is None
+
+
+def test_front_of_two_goals():
+    """One is best in each, one lies between, one is beaten; of equals both stay."""
+    goals = (Goal("HOTA"), Goal("GOSPA", False))
+    points = [(0.9, 5.0), (0.5, 1.0), (0.7, 3.0), (0.6, 4.0), (0.7, 3.0)]
+    kept = front([Candidate(k, ToyConfig(), (), p) for k, p in enumerate(points)], goals)
+    assert [c.trial for c in kept] == [0, 2, 4, 1]
+
+
+@dataclass
+class Game:
+    """Plays by a formula: what each parameter is worth, and what is refused. `seen`: configs that were played."""
+
+    worth: dict
+    refused: dict = field(default_factory=dict)
+    seen: list = field(default_factory=list)
+
+    def __call__(self, sources, values, every):
+        self.seen.append(dict(values))
+        for source in sources:
+            if any(values[name] == bad for name, bad in self.refused.items()):
+                yield WorkError(got="it", expected="another", remedy="no")
+                return
+            value = sum(self.worth.get((name, v), 0.0) for name, v in values.items())
+            yield Episode(source.name, source.seed, value, {"HOTA": value + 0.01 * (source.seed % 3)}, 10, 1.0, 0.0)
+
+
+@pytest.fixture
+def made(tmp_path) -> Plan:
+    return plan(**wishes(tmp_path))
+
+
+def test_what_brings_nothing_is_taken_back(made):
+    """`skip` costs, `colour` brings nothing, `reach` brings all."""
+    game = Game({("reach", 1.0): 0.5, ("skip", 3): -0.1})
+    winner = ToyConfig(reach=1.0, skip=3, colour="green")
+    kept, value = Judge(made, game).simplified(winner, 0.4 + 0.01, ["colour", "skip", "reach", "forbidden"])
+    assert kept == ToyConfig(reach=1.0)
+    assert value == pytest.approx(0.5 + 0.01 * (1 + 2 + 0 + 1) / 4)
+    assert len(game.seen) == 3, "what is at its default is not tried"
+
+
+def test_a_default_that_is_refused_beside_the_rest_stays_away(made):
+    game = Game({}, refused={"skip": 0})
+    kept, value = Judge(made, game).simplified(ToyConfig(skip=3), 0.2, ["skip"])
+    assert (kept, value) == (ToyConfig(skip=3), 0.2)
+
+
+def test_validation_is_beside_the_defaults(made):
+    game = Game({("reach", 1.0): 0.5})
+    candidates = [Candidate(0, ToyConfig(), (0.1,)), Candidate(4, ToyConfig(reach=1.0), (0.9,))]
+    first, second = Judge(made, game).validated(candidates)
+    assert first.gain.difference == 0.0
+    assert second.gain.difference == pytest.approx(0.5)
+    assert second.gain.verdict == "better"
+    assert second.training == (0.9,)
+
+
+def test_who_cannot_be_played_on_validation_scenes_is_out(made):
+    game = Game({}, refused={"skip": 3})
+    candidates = [Candidate(0, ToyConfig(), (0.1,)), Candidate(4, ToyConfig(skip=3), (0.9,))]
+    assert [c.trial for c in Judge(made, game).validated(candidates)] == [0]
+    with pytest.raises(WorkError):
+        Judge(made, game).validated(candidates[::-1])
+
+
+def test_a_winner_that_fails_on_test_scenes_is_told(made):
+    game = Game({}, refused={"skip": 3})
+    found, notes = Judge(made, game).compared(ToyConfig(skip=3))
+    assert found == []
+    assert [note.partition(":")[0] for note in notes] == ["one.toml", "two.toml"]

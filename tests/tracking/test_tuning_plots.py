@@ -1,0 +1,99 @@
+"""Pictures of a search: well-formed, every trial where it belongs, round numbers beside them."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from xml.etree import ElementTree
+
+import pytest
+
+from tests.toy_tracker import ToyConfig
+from tests.tuning_toys import wishes
+from tracking.tuning_goals import Goal
+from tracking.tuning_judge import Candidate
+from tracking.tuning_plan import plan
+from tracking.tuning_plots import BLUE, ORANGE, Axes, plots, ticks
+from tracking.tuning_result import Trial, Tuned
+
+SVG = "{http://www.w3.org/2000/svg}"
+DEFAULTS = {"reach": 0.1, "skip": 0, "colour": "red", "forbidden": 0.0}
+
+
+@pytest.fixture
+def found(tmp_path) -> Tuned:
+    made = plan(**wishes(tmp_path))
+    values = [0.5, 0.4, 0.6, -9.0, 0.55, 0.7]
+    trials = [Trial(k, (v,), DEFAULTS if k == 0 else {"reach": v}, 5, pruned=v < 0) for k, v in enumerate(values)]
+    trials.append(Trial(6, (), {"reach": 1.0}, 0, error="no"))
+    importance = {"reach": 0.7, "skip": 0.3, "colour": 0.0, "forbidden": 0.0}
+    candidate = Candidate(5, ToyConfig(reach=1.0), (0.7,), (0.65,))
+    return Tuned(made, ToyConfig(reach=1.0), (), (candidate,), tuple(trials), importance, validation=((0.5,), (0.65,)))
+
+
+def dots(text: str, radius: str = "3.5") -> list[tuple[float, float, str]]:
+    """Of the picture itself: those of the key stand above it."""
+    found = [c.attrib for c in ElementTree.fromstring(text).iter(f"{SVG}circle") if c.attrib["r"] == radius]
+    return [(float(a["cx"]), float(a["cy"]), a["fill"]) for a in found if float(a["cy"]) > 50]
+
+
+def test_history_shows_what_was_played(found):
+    """Six trials; one far below is named and not drawn, as it would flatten the rest."""
+    text = plots(found)[".history.svg"]
+    shown = dots(text)
+    assert len(shown) == 5
+    assert "1 far below not shown" in text
+    heights = [y for _, y, _ in shown]
+    assert sorted(range(5), key=lambda k: -heights[k]) == [1, 0, 3, 2, 4], "higher is further up"
+    assert [x for x, _, _ in shown] == sorted(x for x, _, _ in shown)
+    steps = ElementTree.fromstring(text).find(f"{SVG}polyline").attrib["points"].split()
+    assert [float(p.split(",")[1]) for p in steps][-1] == min(heights)
+
+
+def test_trials_given_up_are_hollow(found):
+    near = tuple(replace(t, values=(0.45,)) if t.pruned else t for t in found.trials)
+    shown = dots(plots(replace(found, trials=near))[".history.svg"])
+    assert [fill for _, _, fill in shown].count("#fff") == 1
+
+
+def test_importance_has_a_bar_for_each_parameter(found):
+    bars = [r.attrib for r in ElementTree.fromstring(plots(found)[".importance.svg"]).iter(f"{SVG}rect")][1:]
+    assert [b["fill"] for b in bars] == [ORANGE, BLUE, BLUE, BLUE]
+    assert float(bars[0]["width"]) / float(bars[1]["width"]) == pytest.approx(7 / 3, rel=1e-3)
+    assert "0.1 → 1 m" in plots(found)[".importance.svg"]
+
+
+def test_nothing_to_show_is_not_drawn(found):
+    assert set(plots(replace(found, importance=dict.fromkeys(DEFAULTS, 0.0)))) == {".history.svg"}
+    one = replace(found, trials=found.trials[:1])
+    assert len(dots(plots(one)[".history.svg"])) == 1
+
+
+def test_front_is_drawn_for_two_goals(found):
+    made = replace(found.plan, goals=(Goal("HOTA"), Goal("GOSPA", False)))
+    configs = [found.default, ToyConfig(skip=1), ToyConfig(skip=2)]
+    points = [(0.5, 2.0), (0.7, 3.0), (0.4, 4.0)]
+    three = [Candidate(k, config, (), p) for k, (config, p) in enumerate(zip(configs, points, strict=True))]
+    two = replace(found, plan=made, candidates=tuple(three), front=tuple(three[:2]))
+    text = plots(two)[".front.svg"]
+    assert [fill for _, _, fill in dots(text)] == [ORANGE, ORANGE, BLUE]
+    assert "defaults" in text
+
+
+@pytest.mark.parametrize(("low", "high"), [(0, 1), (0.7, 0.7001), (-3e4, 5e6), (0.123, 0.987)])
+def test_ticks_are_round_and_inside(low, high):
+    found = ticks(low, high)
+    assert 2 <= len(found) <= 11
+    assert all(low - 1e-9 <= v <= high * (1 + 1e-9) for v in found)
+    step = found[1] - found[0]
+    assert step / 10 ** math.floor(math.log10(step) + 1e-9) == pytest.approx(
+        round(step / 10 ** math.floor(math.log10(step) + 1e-9))
+    )
+
+
+def test_axes_put_the_corners_where_they_belong():
+    axes = Axes((0.0, 2.0), (1.0, 3.0))
+    (u0, v0), (u1, v1) = axes.at(0.0, 1.0), axes.at(2.0, 3.0)
+    assert u0 < u1
+    assert v0 > v1
+    assert axes.at(1.0, 2.0) == ((u0 + u1) / 2, (v0 + v1) / 2)

@@ -1,0 +1,58 @@
+"""The rule of groups as something to tune: true people, grouped by it, and nothing of their true groups seen."""
+
+from __future__ import annotations
+
+import pytest
+
+from tests.tuning_toys import write_scenes
+from tracking.episodes import Cache, sources
+from tracking.grouping import derive
+from tracking.links import Grouping
+from tracking.scoring import evaluate
+from tracking.tuning import tune
+from tracking.tuning_rule import people_as_tracks, play_rule
+
+
+@pytest.fixture
+def source(tmp_path):
+    return sources(write_scenes(tmp_path)[0], (3,))[0]
+
+
+def test_the_people_are_perfect_and_their_groups_unknown(source):
+    truth = source.open().truth
+    answers = people_as_tracks(truth)
+    assert len(answers) == truth.length
+    assert all((t.group == -1).all() and t.groups is None and t.events == () for t in answers)
+    assert evaluate(truth, answers)["HOTA"] == 1.0
+
+
+def test_an_episode_is_what_evaluate_says(source):
+    truth, rule = source.open().truth, Grouping(near=1.0)
+    found = play_rule(source, rule, Cache())
+    scores = evaluate(truth, derive(people_as_tracks(truth), truth.fps, truth.px_per_m, rule))
+    assert found.objective == scores["objective"]
+    assert found.scores == {key: value for key, value in scores.items() if value == value}
+    assert found.frames == truth.length
+
+
+def test_a_rule_that_links_nobody_scores_nothing(source):
+    """The pair walks 0.75 m apart: at half a metre nobody is together."""
+    assert play_rule(source, Grouping(), Cache()).scores["pairwise_F1"] > 0.5
+    assert play_rule(source, Grouping(near=0.5), Cache()).scores["pairwise_F1"] == 0.0
+
+
+def test_the_rule_is_tuned_like_a_tracker(tmp_path):
+    """From a rule that asks for too much at the start."""
+    one, _ = write_scenes(tmp_path)
+    found = tune(
+        "grouping", one, 10, seeds=range(4), validation=range(10_000, 10_004), test=range(20_000, 20_004), check=None,
+        set=["near=0.5"], out=tmp_path / "rule.toml",
+    )  # fmt: skip
+    assert found.plan.goals[0].key == "pairwise_F1"
+    assert "near" not in found.trials[0].params
+    assert Grouping.from_toml(tmp_path / "rule.toml") == found.config
+
+
+def test_first_rule_is_frozen():
+    first = Grouping.frozen()
+    assert (first.near, first.acquaintance, first.idle, first.diverge) == (1.5, 2.0, 0.0, 10.0)

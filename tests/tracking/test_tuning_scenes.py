@@ -1,0 +1,139 @@
+"""What may be used for what: seeds kept apart, no recordings, suites that share nothing."""
+
+from __future__ import annotations
+
+import pytest
+
+from scenarios.errors import InputError
+from tests.tuning_toys import wishes, write_scenes
+from tracking import tuning_scenes
+from tracking.tuning_plan import plan
+
+
+@pytest.mark.parametrize(
+    ("split", "scenes", "expected"),
+    [
+        ("train", 1, range(16)),
+        ("train", 4, range(4)),
+        ("train", 32, range(2)),
+        ("val", 4, range(10_000, 10_012)),
+        ("test", 4, range(20_000, 20_025)),
+        ("test", 28, range(20_000, 20_004)),
+    ],
+)
+def test_default_seeds_make_enough_episodes(split, scenes, expected):
+    assert tuning_scenes.chosen_seeds(None, split, scenes) == expected
+
+
+@pytest.mark.parametrize(
+    ("option", "seeds"),
+    [
+        ("seeds", range(9_998, 10_002)),
+        ("seeds", range(20_000, 20_002)),
+        ("seeds", range(0)),
+        ("validation", range(5)),
+        ("validation", range(20_000, 20_005)),
+        ("test", range(5)),
+        ("test", range(29_999, 30_001)),
+    ],
+)
+def test_seeds_of_another_range_are_refused(tmp_path, option, seeds):
+    with pytest.raises(InputError, match=f"--{option}.*kept apart") as caught:
+        plan(**wishes(tmp_path, **{option: seeds}))
+    assert "\n" not in str(caught.value)
+
+
+def test_the_three_sets_share_no_source(tmp_path):
+    made = plan(**wishes(tmp_path))
+    sets = [made.training, made.validating, *made.testing.values()]
+    keys = [source.key for sources in sets for source in sources]
+    assert len(set(keys)) == len(keys) == 5 + 4 + 6 + 6
+
+
+def test_a_recording_is_never_tuned_on(tmp_path):
+    folder = tmp_path / "recording"
+    (folder / "gt").mkdir(parents=True)
+    (folder / "gt" / "gt.txt").write_text("1,1,0,0,5,5,1,1,1\n")
+    for option in ("suite", "check"):
+        with pytest.raises(InputError, match="nothing is tuned on what was recorded") as caught:
+            plan(**wishes(tmp_path, **{option: str(folder)}))
+        assert f"--{option}" in str(caught.value)
+
+
+def test_real_recordings_are_never_tuned_on(tmp_path, shared_data):
+    for name in ("mot/TUD-Campus", "biwi/seq_hotel", "caviar/mwt1gt.xml"):
+        with pytest.raises(InputError, match="nothing is tuned on what was recorded"):
+            plan(**wishes(tmp_path, suite=str(shared_data / name)))
+
+
+def test_unknown_scenes_are_named(tmp_path):
+    with pytest.raises(InputError, match="crossing") as caught:
+        plan(**wishes(tmp_path, suite="crosing"))
+    assert "--suite" in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    ("names", "expected"),
+    [
+        (["crossing"], "friends-meet"),
+        (["standard"], "friends-meet"),
+        (["friends-meet"], "crossing"),
+        (["suite:friends-meet", "cross"], None),
+    ],
+)
+def test_the_usual_check_shares_nothing(names, expected):
+    assert tuning_scenes.unused(names) == expected
+
+
+def test_a_check_that_shares_a_scenario_is_refused(tmp_path):
+    assert tuning_scenes.shared(["standard"], ["crossing"]) == ["cross", "cross-same-speed", "pass-by", "side-by-side"]
+    one, _ = write_scenes(tmp_path)
+    (tmp_path / "all.toml").write_text('about = "all"\nentry = [{ scenario = "one.toml" }, { scenario = "two.toml" }]')
+    with pytest.raises(InputError, match=r"all\.toml, which has one of"):
+        plan(**wishes(tmp_path, check=str(tmp_path / "all.toml")))
+    assert plan(**wishes(tmp_path, check=None)).check is None
+    assert tuning_scenes.shared([one], [one]) == ["one"]
+
+
+def test_settings_reach_the_scenes(tmp_path):
+    made = plan(**wishes(tmp_path, set=["scenario.duration=5", "sensor.detect_prob=0.5", "tracker.skip=2"]))
+    assert {s.entry.scenario.duration for s in (*made.training, *made.validating)} == {5.0}
+    unused = made.testing["two.toml"][0].entry.scenario
+    assert (unused.duration, unused.sensor.detect_prob) == (4.0, 0.5), "the detector is the same everywhere"
+    assert made.base.skip == 2
+    assert "skip" not in made.defaults
+
+
+def test_scene_with_a_wrong_setting(tmp_path):
+    with pytest.raises(InputError, match="duratoin"):
+        plan(**wishes(tmp_path, set=["scenario.duratoin=5"]))
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        ({"trials": 0}, "--trials: got 0"),
+        ({"prune": 1.0}, "--prune: got 1.0"),
+        ({"finalists": 0}, "--finalists"),
+        ({"seed": -1}, "--seed"),
+        ({"only": ["reech"]}, "did you mean reach"),
+        ({"only": ["reach"], "set": ["reach=1"]}, "reach, which is set"),
+        ({"only": ["steps"]}, "about pixels alone"),
+        ({"set": ["reach=99"]}, "from 0.05 to 5"),
+        ({"detections": "image"}, "--detections"),
+        ({"tracker": "tests/fake_tracker.py:Nearest"}, "a tracker with parameters"),
+        ({"tracker": "blobb"}, "did you mean blob"),
+        ({"tracker": "grouping", "detections": "file"}, "whose identity is known"),
+        ({"set": [f"{name}=0.1" for name in ("reach", "skip", "colour", "forbidden")]}, "skip|colour"),
+    ],
+)
+def test_wrong_wishes_are_one_line(tmp_path, change, words):
+    with pytest.raises(InputError, match=words) as caught:
+        plan(**wishes(tmp_path, **change))
+    assert "\n" not in str(caught.value)
+
+
+def test_everything_set_leaves_nothing_to_search(tmp_path):
+    fixed = ["reach=1", "skip=0", "colour=red", "forbidden=0"]
+    with pytest.raises(InputError, match="all of them set"):
+        plan(**wishes(tmp_path, set=fixed))

@@ -1,0 +1,167 @@
+"""The study: parameters in their own units, what is tried by seed alone, a journal that survives anything."""
+
+from __future__ import annotations
+
+import math
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import optuna
+import pytest
+from optuna.distributions import CategoricalDistribution, FloatDistribution, IntDistribution
+from optuna.trial import TrialState
+
+from tests.tuning_toys import wishes
+from tracking.links import Grouping
+from tracking.papers.blob_config import BlobConfig
+from tracking.papers.group_pda_config import GroupPdaConfig
+from tracking.tuning_journal import Journal, Locks
+from tracking.tuning_plan import plan
+from tracking.tuning_study import DONE, distribution, opened, slot
+
+
+def test_distributions_are_the_declarations(tmp_path):
+    space = {p.name: distribution(p) for p in plan(**wishes(tmp_path)).space}
+    assert space == {
+        "reach": FloatDistribution(0.05, 5.0, log=True),
+        "skip": IntDistribution(0, 4),
+        "colour": CategoricalDistribution(("red", "green")),
+        "forbidden": FloatDistribution(0.0, 1.0),
+    }
+
+
+@pytest.mark.parametrize("kind", [BlobConfig, GroupPdaConfig, Grouping])
+def test_every_default_can_be_tried(kind):
+    """And both ends, unless the config refuses them together with the other defaults."""
+    for p in kind.space():
+        made = distribution(p)
+        assert made._contains(made.to_internal_repr(getattr(kind(), p.name))), p.name
+        if p.scale == "log":
+            assert p.low > 0
+        if p.scale != "categorical":
+            assert math.isfinite(p.low)
+            assert math.isfinite(p.high)
+
+
+def tried(folder, count: int, **more) -> list[dict]:
+    with opened(plan(**wishes(folder, trials=count, **more)), None, "x") as study:
+        while (asked := study.ask()) is not None:
+            study.tell(asked, [asked.params["reach"] - asked.params["skip"]])
+        return [t.params for t in study.finished()]
+
+
+def test_what_is_tried_follows_from_the_seed(tmp_path):
+    assert tried(tmp_path, 14) == tried(tmp_path, 14)
+    assert tried(tmp_path, 14)[1:] != tried(tmp_path, 14, seed=5)[1:]
+
+
+def test_first_trials_stay_near_the_defaults(tmp_path):
+    """The defaults, then a few parameters changed at a time, never none."""
+    first = tried(tmp_path, 8)
+    changed = [sum(params[name] != first[0][name] for name in params) for params in first]
+    assert changed[0] == 0
+    assert all(1 <= n <= 4 for n in changed[1:])
+    assert sum(changed) < 2 * 8
+
+
+def test_the_search_learns(tmp_path):
+    """Later trials are better than the first ones on a simple slope."""
+    values = [params["reach"] - params["skip"] for params in tried(tmp_path, 40)]
+    assert sum(values[30:]) / 10 > sum(values[:10]) / 10 + 0.5
+
+
+def test_no_more_than_wanted(tmp_path):
+    with opened(plan(**wishes(tmp_path, trials=2)), None, "x") as study:
+        assert [study.ask() is not None for _ in range(3)] == [True, True, False]
+        study.tell(study.optuna.trials[0].number, None)
+        assert [t.state for t in study.finished()] == [TrialState.PRUNED]
+
+
+def test_a_trial_done_again_keeps_its_place(tmp_path):
+    made = plan(**wishes(tmp_path, trials=3))
+    with opened(made, tmp_path / "j", "x") as study:
+        study.tell(study.ask(), [0.1])
+        left = study.ask()
+    with opened(made, tmp_path / "j", "x") as study:
+        again = study.ask()
+        assert again.params == left.params
+        assert study.slot(again) == 1
+        study.tell(again, [0.2])
+        fresh = study.ask()
+        assert (fresh.number, study.slot(fresh)) == (3, 2)
+        study.tell(fresh, [0.3])
+        assert study.ask() is None
+        assert [t.number for t in study.told()] == [0, 1, 2]
+        assert [t.state.name for t in study.trials()] == ["COMPLETE", "FAIL", "COMPLETE", "COMPLETE"]
+        assert [slot(study.trials(), t) for t in study.trials()] == [0, 1, 1, 2]
+
+
+def test_killed_between_two_lines(tmp_path):
+    """However much of the journal was written: the study opens, and ends with as many trials as are wanted."""
+    made = plan(**wishes(tmp_path, trials=2))
+    with opened(made, tmp_path / "whole", "x") as study:
+        while (asked := study.ask()) is not None:
+            study.tell(asked, [0.5])
+    text = (tmp_path / "whole").read_bytes()
+    for k in range(0, len(text), 97):
+        path = tmp_path / f"cut-{k}"
+        path.write_bytes(text[:k])
+        with opened(made, path, "x") as study:
+            while (asked := study.ask()) is not None:
+                study.tell(asked, [0.5])
+            told = study.told()
+            assert len(told) == 2, k
+            assert told[0].params == made.defaults
+            assert sum(t.state in DONE for t in study.trials()) == 2
+
+
+def test_a_half_line_is_cut_off(tmp_path):
+    path, locks = tmp_path / "j", Locks(tmp_path / "j.locks")
+    Journal(path, locks).append_logs([{"a": 1}])
+    with path.open("ab") as file:
+        file.write(b'{"b"')
+    journal = Journal(path, locks)
+    journal.append_logs([{"c": 2}])
+    assert list(journal.read_logs(0)) == [{"a": 1}, {"c": 2}]
+    path.write_bytes(b'{"b"')
+    assert list(Journal(path, locks).read_logs(0)) == []
+    locks.close()
+
+
+def test_a_lock_lives_as_long_as_its_process(tmp_path):
+    path = tmp_path / "locks"
+    hold = (
+        "import sys; from pathlib import Path; from tracking.tuning_journal import Locks\n"
+        "locks = Locks(Path(sys.argv[1])); locks.play(7); print('held', flush=True); sys.stdin.read()"
+    )
+    other = subprocess.Popen(
+        [sys.executable, "-c", hold, str(path)], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True,
+        env={**os.environ, "PYTHONPATH": str(Path(__file__).resolve().parents[2])},
+    )  # fmt: skip
+    assert other.stdout.readline() == "held\n"
+    locks = Locks(path)
+    assert not locks.left(7)
+    assert locks.left(8)
+    other.kill()
+    other.communicate()
+    assert locks.left(7)
+    locks.close()
+
+
+def test_optuna_is_as_loud_as_before(tmp_path):
+    before = optuna.logging.get_verbosity()
+    with opened(plan(**wishes(tmp_path)), None, "x"):
+        pass
+    assert optuna.logging.get_verbosity() == before
+
+
+def test_importance_finds_what_matters(tmp_path):
+    with opened(plan(**wishes(tmp_path, trials=40, objective="GOSPA")), None, "x") as study:
+        assert set(study.importance().values()) == {0.0}
+        while (asked := study.ask()) is not None:
+            study.tell(asked, [asked.params["skip"]])
+        found = study.importance()
+    assert next(iter(found)) == "skip"
+    assert sum(found.values()) == pytest.approx(1.0)
