@@ -7,7 +7,7 @@ cheap. `Rollout` is an episode frame by frame.
 from __future__ import annotations
 
 import time
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 
 from sim.types import DetectionMode, Frame, Sequence, Tracker, Tracks, Truth
@@ -126,16 +126,19 @@ class Rollout:
         )
 
     def scores(self, every: bool = False) -> dict[str, float]:
-        """The known scores of the frames so far, by key."""
+        """The known scores of the frames so far, by key: the objective and what it is the mean of, or all."""
+        begun = time.perf_counter()
+        px_per_m = self.ready.px_per_m(self.answers)
+        found = self._every_score(px_per_m) if every else self.held.judge.scores(self.answers, px_per_m)
+        self.seconds_scoring += time.perf_counter() - begun
+        return {key: value for key, value in found.items() if value == value}
+
+    def _every_score(self, px_per_m: float) -> Mapping[str, float]:
         from tracking.grouping import with_groups
         from tracking.scoring.evaluation import evaluate
 
-        begun = time.perf_counter()
-        answers = with_groups(self.answers, self.ready.context.fps, self.ready.px_per_m(self.answers))
-        found = evaluate(self.truth, answers, frames=len(self.answers))
-        kept = found if every else {key: found[key] for key in ("objective", "HOTA", "group_F1_hull")}
-        self.seconds_scoring += time.perf_counter() - begun
-        return {key: value for key, value in kept.items() if value == value}
+        answers = with_groups(self.answers, self.ready.context.fps, px_per_m) if self.answers else ()
+        return evaluate(self.truth, answers, frames=len(self.answers))
 
 
 def streams_for(tracker: AnyTracker, detections: DetectionMode | None) -> tuple[str, ...]:

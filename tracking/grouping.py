@@ -33,7 +33,7 @@ HALF = 0.5  # s: chord that stands for the velocities of a tracker that knows no
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class _Rows:
+class Table:
     """All tracks of a sequence as rows sorted by frame (from 0) and id; metres; group -1 alone."""
 
     frame: Ints
@@ -85,7 +85,7 @@ def derive(tracks: Iterable[Tracks], fps: float, px_per_m: float = 1.0, rule: Gr
     if not given or any(t.unit == "group" for t in given):
         return given
     rule = rule or Grouping()
-    rows = _rows(given, fps, px_per_m, rule)
+    rows = tabled(given, fps, px_per_m, rule)
     named = bool((rows.group >= 0).any()) or any(t.groups is not None for t in given)
     said = {e.kind for t in given for e in t.events}
     events: list[GroupEvent] = []
@@ -95,7 +95,7 @@ def derive(tracks: Iterable[Tracks], fps: float, px_per_m: float = 1.0, rule: Gr
     return _filled(given, rows, events + [e for e in _encounters(rows, fps) if e.kind not in said])
 
 
-def _membership(rows: _Rows, named: bool, fps: float, rule: Grouping) -> tuple[_Rows, list[GroupEvent]]:
+def _membership(rows: Table, named: bool, fps: float, rule: Grouping) -> tuple[Table, list[GroupEvent]]:
     """The rows with their groups, and what happened to these.
 
     Groups that the tracker named are kept. Where they are those of the baseline rule (it may have been applied before),
@@ -122,7 +122,8 @@ def _labels(given: Sequence[Tracks]) -> list[Ints]:
     return found
 
 
-def _rows(given: Sequence[Tracks], fps: float, px_per_m: float, rule: Grouping) -> _Rows:
+def tabled(given: Sequence[Tracks], fps: float, px_per_m: float, rule: Grouping) -> Table:
+    """All tracks of a sequence as the rule sees them."""
     scale = px_per_m if given[0].plane == "image" else 1.0
     if not math.isfinite(scale) or scale <= 0:
         raise InputError(
@@ -140,7 +141,7 @@ def _rows(given: Sequence[Tracks], fps: float, px_per_m: float, rule: Grouping) 
     if rule.smooth > 0 or unknown.any():
         chords = backward_velocity(frame, column, pos, fps, rule.smooth or HALF)
         vel = chords if rule.smooth > 0 else np.where(unknown[:, None], chords, vel)
-    return _Rows(frame, id, column, ids, pos, vel, group, length, scale)
+    return Table(frame, id, column, ids, pos, vel, group, length, scale)
 
 
 def backward_velocity(frame: Ints, column: Ints, pos: Array, fps: float, window: float) -> Array:
@@ -157,7 +158,7 @@ def backward_velocity(frame: Ints, column: Ints, pos: Array, fps: float, window:
     return out
 
 
-def _encounters(rows: _Rows, fps: float) -> list[GroupEvent]:
+def _encounters(rows: Table, fps: float) -> list[GroupEvent]:
     """Crossings and queues, and when they are known."""
     pos, vel, label = rows.places(), rows.velocities(), rows.labels()
     present: Bools = np.isfinite(pos[..., 0])
@@ -169,7 +170,7 @@ def _encounters(rows: _Rows, fps: float) -> list[GroupEvent]:
     ]
 
 
-def _filled(given: Sequence[Tracks], rows: _Rows, events: Sequence[GroupEvent]) -> list[Tracks]:
+def _filled(given: Sequence[Tracks], rows: Table, events: Sequence[GroupEvent]) -> list[Tracks]:
     """The tracks with these events (people being columns + 1, metres), labels, and groups in their own unit."""
     shapes = _shapes(given, rows)
     cuts = np.searchsorted(rows.frame, np.arange(rows.length + 1))
@@ -186,18 +187,23 @@ def _filled(given: Sequence[Tracks], rows: _Rows, events: Sequence[GroupEvent]) 
     return out
 
 
-def _named(event: GroupEvent, rows: _Rows) -> GroupEvent:
+def _named(event: GroupEvent, rows: Table) -> GroupEvent:
     """An event with the tracks' own ids and unit."""
     x, y = (v * rows.scale for v in event.pos)
     return replace(event, members=tuple(int(rows.ids[p - 1]) for p in event.members), pos=(x, y))
 
 
-def _shapes(given: Sequence[Tracks], rows: _Rows) -> list[Groups]:
+def _shapes(given: Sequence[Tracks], rows: Table) -> list[Groups]:
     """Groups of every frame: hulls of footprints on the ground, of boxes in the image where there are any."""
-    pos, vel = rows.pos * rows.scale, rows.vel * rows.scale
-    if given[0].plane == "image" and all(t.box is not None for t in given if len(t.id)):
-        boxes = [t.box[np.argsort(t.id)] for t in given if t.box is not None and len(t.id)]
-        if boxes:
-            box = np.concatenate(boxes)
-            return box_groups(rows.frame, rows.id, rows.group, pos, vel, box, 0, rows.length)
+    pos, vel, box = rows.pos * rows.scale, rows.vel * rows.scale, outlined_boxes(given)
+    if box is not None:
+        return box_groups(rows.frame, rows.id, rows.group, pos, vel, box, 0, rows.length)
     return groups_over_time(rows.frame, rows.id, rows.group, pos, vel, 0, rows.length, rows.scale)
+
+
+def outlined_boxes(given: Sequence[Tracks]) -> Array | None:
+    """The boxes of the rows where groups are drawn round boxes: in the image, where everybody has one."""
+    if given[0].plane != "image" or any(t.box is None for t in given if len(t.id)):
+        return None
+    found = [t.box[np.argsort(t.id)] for t in given if t.box is not None and len(t.id)]
+    return np.concatenate(found) if found else None

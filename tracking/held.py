@@ -7,13 +7,16 @@ from collections.abc import Iterator
 from dataclasses import fields, is_dataclass, replace
 from functools import cached_property
 from types import FunctionType, MethodType
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from scenarios.errors import InputError
 from sim.types import Frame, Image, Truth
 from tracking.source import Source
+
+if TYPE_CHECKING:
+    from tracking.objective import Judge
 
 LIMIT = 256 * 2**20
 
@@ -54,6 +57,13 @@ class Held:
             remedy = "give a sequence with labels: there is nothing to score by"
             raise InputError(file=self.source.name, got="no labels", expected="a truth", remedy=remedy)
         return truth
+
+    @cached_property
+    def judge(self) -> Judge:
+        """The truth, ready to score answers by."""
+        from tracking.objective import Judge
+
+        return Judge(self.truth)
 
 
 class Cache:

@@ -86,7 +86,7 @@ def evaluate(
         found |= place_scores(true, est, case.stands_for, case.surface, plane, case.scale, int(inside.sum()))
     if told.any():
         found |= social_scores(case, group_match)
-    found["objective"] = _objective(found)
+    found["objective"] = objective_of(found)
     return Scores(found, chosen, case.surface, group_match)
 
 
@@ -149,7 +149,7 @@ def _places(people: People, surface: Surface, plane: str) -> Array:
     return np.zeros((0, 2)) if places is None else places
 
 
-def _objective(found: Mapping[str, float]) -> float:
+def objective_of(found: Mapping[str, float]) -> float:
     """Mean of HOTA and the groups' F1 by hulls, or the one that there is."""
     known = [v for v in (found["HOTA"], found["group_F1_hull"]) if v == v]
     return sum(known) / len(known) if known else float("nan")
