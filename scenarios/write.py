@@ -5,11 +5,11 @@ from __future__ import annotations
 import json
 from typing import Any
 
-from scenarios.schema import Scenario
+from pydantic import BaseModel
 
 
-def dump(scenario: Scenario) -> str:
-    """The scenario as TOML text."""
+def dump(scenario: BaseModel) -> str:
+    """The scenario, or another form of such tables, as TOML text."""
     table = scenario.model_dump(mode="python", by_alias=True, exclude_none=True)
     flat = [(k, v) for k, v in table.items() if not _is_table(v) and not _is_rows(v)]
     blocks = [_lines(dict(flat))]

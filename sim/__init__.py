@@ -1,6 +1,7 @@
 """The world: crowds, cameras, sensors, truth, and how sequences are stored and read.
 
-`sim.simulate(scenario, seed)` is the whole of it; nothing heavy is imported before it is asked for.
+`sim.simulate(scenario, seed)` is the whole of it, and `sim.replay(recording, camera)` for people who were filmed;
+nothing heavy is imported before it is asked for.
 """
 
 from __future__ import annotations
@@ -8,14 +9,17 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from sim.real_motion import replay
     from sim.sequence import simulate
 
-__all__ = ["simulate"]
+__all__ = ["replay", "simulate"]
+
+_HOME = {"replay": "sim.real_motion", "simulate": "sim.sequence"}
 
 
 def __getattr__(name: str) -> Any:
-    if name not in __all__:
+    if name not in _HOME:
         raise AttributeError(f"module 'sim' has no attribute {name!r}")
-    from sim import sequence
+    from importlib import import_module
 
-    return getattr(sequence, name)
+    return getattr(import_module(_HOME[name]), name)

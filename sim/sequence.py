@@ -18,6 +18,7 @@ from sim.types import BACKGROUNDS, Camera, Detections, Frame, Image, Motion, Ord
 
 if TYPE_CHECKING:
     from scenarios.schema import Scenario
+    from scenarios.view import View
 
 STREAMS = frozenset({"left", "right", "disparity", "ids", "background"})
 
@@ -35,7 +36,7 @@ def simulate(scenario: Scenario, seed: int, repeat: int = 0, streams: Iterable[s
 
 
 def observe(
-    scenario: Scenario,
+    scenario: Scenario | View,
     motion: Motion,
     *,
     people: Mapping[str, tuple[int, ...]] | None = None,
@@ -57,6 +58,9 @@ def observe(
     def named() -> Mapping[str, tuple[int, ...]]:
         if people is not None:
             return people
+        from scenarios import schema
+
+        assert isinstance(scenario, schema.Scenario), "a view knows no groups: give people"
         return named_people(scenario, motion.scene, motion.seed, motion.repeat, motion.orders)
 
     @cache
@@ -136,7 +140,7 @@ class _Pictures:
         return np.stack([self.stage.background(k) for k in range(BACKGROUNDS)])
 
 
-def _pictures(streams: Iterable[str], scenario: Scenario, motion: Motion, camera: Camera) -> _Pictures | None:
+def _pictures(streams: Iterable[str], scenario: Scenario | View, motion: Motion, camera: Camera) -> _Pictures | None:
     wanted = frozenset(streams)
     if not wanted <= STREAMS:
         raise InputError(

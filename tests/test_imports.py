@@ -67,7 +67,11 @@ def test_data_types_need_numpy_only():
 
 @pytest.mark.parametrize(
     ("package", "names"),
-    [("sim", ["simulate"]), ("scenarios", ["load", "sensor_settings"]), ("tracking", ["evaluate", "track", "tune"])],
+    [
+        ("sim", ["replay", "simulate"]),
+        ("scenarios", ["load", "sensor_settings"]),
+        ("tracking", ["evaluate", "track", "tune"]),
+    ],
 )
 def test_lazy_names(package, names):
     module = __import__(package)

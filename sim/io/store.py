@@ -77,8 +77,10 @@ def _manifest(
     sequence: Sequence, found: list[Detections], length: int, scenario: str, seed: int, repeat: int, pictures: Pictures
 ) -> dict[str, Any]:
     truth = hashing.truth_hash(scenario, seed, repeat, sequence.truth)
+    origin = {"origin": sequence.source["origin"]} if "origin" in sequence.source else {}
     return {
         **identity(scenario, seed, repeat, pictures.streams, pictures.images or "jpg"),
+        **origin,
         "pixels": pictures.pixels,
         "truth_hash": truth,
         "content_hash": hashing.content_hash(truth, found, pictures.pixels),
@@ -121,6 +123,7 @@ def open_sequence(folder: Path, *, background: Choice | None = None) -> Sequence
     size, length, fps = about["image_size"], about["length"], about["fps"]
     left, right = "left" in pictures.streams, "right" in pictures.streams
     load_background, words = _background(pictures, background, length)
+    origin = {"origin": manifest["origin"]} if "origin" in manifest else {}
 
     @lru_cache(maxsize=1)
     def detections() -> list[Detections]:
@@ -145,11 +148,11 @@ def open_sequence(folder: Path, *, background: Choice | None = None) -> Sequence
         scene=read_scene(folder / "scene.json") if "scene.json" in has else None,
         px_per_m=tables.number(about["px_per_m"]),
         has_images=left, has_right=right, has_detections="det/det.parquet" in has, load_background=load_background,
-        load_people=(lambda: _people(folder, manifest)) if "gt/script.json" in has else None,
+        load_people=(lambda: _people(folder, manifest)) if "gt/script.json" in has and not origin else None,
         source={
             "kind": "generated", "path": str(folder), "seed": manifest["seed"], "repeat": manifest["repeat"],
             "truth_hash": manifest["truth_hash"], "streams": list(pictures.streams), "images": manifest.get("images"),
-            **words,
+            **words, **origin,
         },
         bare=bare if left or right else None,
         load_pixels=pictures.pixel_loader() if {"ids"} <= set(pictures.streams) else None,

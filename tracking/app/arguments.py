@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Literal
 
 import typer
 
@@ -24,5 +24,11 @@ Detector = Annotated[
 Workers = Annotated[int, typer.Option("--workers", min=1, help="Processes; on a cluster, so many at once at least.")]
 Cluster = Annotated[
     str | None, typer.Option("--cluster", metavar="tcp://HOST:PORT", help="Scheduler of a dask cluster that works.")
+]
+Streams = Annotated[
+    str, typer.Option("--streams", metavar="A,B,…", help="Pictures: left, right, disparity, ids, background; or none.")
+]
+Images = Annotated[
+    Literal["jpg", "png", "mp4"] | None, typer.Option(help="How pictures are stored; jpg if nothing is said.")
 ]
 Tracked = Annotated[Path | None, typer.Argument(metavar="TRACKS", help="What `track` wrote, or MOT text.")]

@@ -17,14 +17,17 @@ from tracking.app.arguments import (
     Cluster,
     Detector,
     Fps,
+    Images,
     Json,
     Out,
     Scale,
     Set,
     Source,
+    Streams,
     Tracked,
     Workers,
 )
+from tracking.app.recorded_options import fit_sensor, replay
 from tracking.app.tune_options import tune
 
 app = typer.Typer(
@@ -98,13 +101,8 @@ def generate(
     out: Out,
     settings: Set = [],  # noqa: B006
     sensor: Detector = None,
-    streams: Annotated[
-        str,
-        typer.Option("--streams", metavar="A,B,…", help="Pictures: left, right, disparity, ids, background; or none."),
-    ] = "left",
-    images: Annotated[
-        Literal["jpg", "png", "mp4"] | None, typer.Option(help="How pictures are stored; jpg if nothing is said.")
-    ] = None,
+    streams: Streams = "left",
+    images: Images = None,
     workers: Workers = 1,
     cluster: Cluster = None,
     json: Json = False,
@@ -179,6 +177,8 @@ def score(
 
 
 app.command()(tune)
+app.command()(replay)
+fit.command("sensor")(fit_sensor)
 
 
 @app.command()
@@ -275,19 +275,6 @@ def webdataset(
     from tracking.app.dataset_commands import export_webdataset
 
     return export_webdataset(folder, out, shard_size, samples)
-
-
-@fit.command("sensor")
-def fit_sensor(
-    sources: Annotated[list[Path], typer.Argument(metavar="SOURCE…", help="Recordings with gt and det; pooled.")],
-    out: Annotated[Path, typer.Option("--out", metavar="FILE.toml", help="File to write: a [sensor] table.")],
-    fps: Fps = None,
-    json: Json = False,
-) -> Answer:
-    """How a detector errs, for synthetic detections that err alike."""
-    from tracking.app.fit_command import sensor
-
-    return sensor(sources, out, fps)
 
 
 def run(arguments: Sequence[str]) -> int:

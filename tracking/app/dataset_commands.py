@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Iterable
 from pathlib import Path
 
-from scenarios.errors import InputError
 from tracking.app import options
 from tracking.app.answer import Answer
 from tracking.app.meter import Meter
@@ -24,18 +23,14 @@ def generate(
 ) -> Answer:
     """Every named scenario or suite with every seed, as a dataset."""
     from sim.generate import generate as make
-    from sim.io.streams import coding
 
     options.folder(out)
-    chosen = options.seeds(seeds)
-    texts, wanted = options.scenario_settings(settings), options.streams(streams)
-    if images is not None and coding(wanted, images) is None:
-        got, remedy = f"{images} with --streams {streams}", "leave --images out: ids and disparity are always png"
-        raise InputError(place="--images", got=got, expected="left, right or background", remedy=remedy)
+    chosen, texts = options.seeds(seeds), options.scenario_settings(settings)
+    wanted, kind = options.pictures(streams, images)
     with Meter("generate") as meter:
         folders = make(
             names, chosen, out, set=texts, workers=workers, cluster=cluster, progress=meter.update,
-            streams=wanted, images=images or "jpg",
+            streams=wanted, images=kind,
         )  # fmt: skip
     text = f"{len(folders)} sequences in {folders[0].parent}"
     return Answer({"sequences": folders, "folder": folders[0].parent}, text)

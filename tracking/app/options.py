@@ -70,6 +70,17 @@ def streams(text: str) -> tuple[str, ...]:
     return () if text.strip() == "none" else tuple(word.strip() for word in text.split(",") if word.strip())
 
 
+def pictures(text: str, images: str | None) -> tuple[tuple[str, ...], str]:
+    """`--streams` and `--images`; InputError for images of streams that have no choice."""
+    from sim.io.streams import coding
+
+    wanted = streams(text)
+    if images is not None and coding(wanted, images) is None:
+        got, remedy = f"{images} with --streams {text}", "leave --images out: ids and disparity are always png"
+        raise InputError(place="--images", got=got, expected="left, right or background", remedy=remedy)
+    return wanted, images or "jpg"
+
+
 def values(texts: Iterable[str]) -> dict[str, Any]:
     """key=value texts as TOML values by key."""
     from scenarios.override import parse
