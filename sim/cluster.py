@@ -30,7 +30,7 @@ from scenarios.errors import InputError, WorkError
 from sim.hand import Answer, answered
 from sim.workers import THREADS, R, Run, T, died
 
-ADDRESS = r"[a-z]+://[^\s/:]+:\d+/?"
+ADDRESS = r"[a-z]+://([^\s/:\[\]]+|\[[0-9a-fA-F:.]+\]):\d+/?"
 PATIENCE = 10.0  # s to reach a scheduler
 COUNT = 1.0  # s between counts of its workers
 SILENCE = 20.0  # s without any worker until the user is told

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import re
 import signal
 import sys
 import threading
@@ -182,10 +183,17 @@ def test_a_scheduler_without_workers_is_told_once(strict: Loopback, monkeypatch:
     assert ["has no workers: waiting" in str(w.message) for w in told] == [True]
 
 
-@pytest.mark.parametrize("address", ["", "127.0.0.1:8786", "tcp://host", "tcp://:1", "host", "tcp://a b:1"])
+@pytest.mark.parametrize(
+    "address", ["", "127.0.0.1:8786", "tcp://host", "tcp://:1", "host", "tcp://a b:1", "tcp://::1:8786"]
+)
 def test_what_is_no_address(address: str) -> None:
     with pytest.raises(InputError, match=r"--cluster: got .*; expected tcp://HOST:PORT"), crew(1, address):
         pass
+
+
+@pytest.mark.parametrize("address", ["tcp://host:8786", "tls://10.0.0.7:1", "tcp://[::1]:8786", "tcp://a.b-c.de:80/"])
+def test_what_is_an_address(address: str) -> None:
+    assert re.fullmatch(cluster.ADDRESS, address)
 
 
 def test_without_the_extra(monkeypatch: pytest.MonkeyPatch) -> None:
