@@ -78,7 +78,8 @@ def cpu_level() -> str:
     has = importlib.import_module("numpy._core._multiarray_umath").__cpu_features__
     machine = platform.machine().lower()
     if machine in ("x86_64", "amd64"):
-        level = 4 if has.get("AVX512_SKX") else 3 if has.get("AVX2") and has.get("FMA3") else 2
+        third = has.get("X86_V3", has.get("AVX2") and has.get("FMA3"))  # as older numpy says it
+        level = 4 if has.get("X86_V4", has.get("AVX512_SKX")) else 3 if third else 2
         return f"x86-64-v{level}"
     return "+".join([machine, *sorted(name for name in ("ASIMD", "SVE", "VSX", "VX") if has.get(name))])
 
