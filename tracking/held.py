@@ -2,52 +2,43 @@
 
 from __future__ import annotations
 
-from collections import OrderedDict
-from collections.abc import Iterator
+from collections import Counter, OrderedDict
+from collections.abc import Callable, Iterator
 from dataclasses import fields, is_dataclass, replace
 from functools import cached_property
 from types import FunctionType, MethodType
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
 
 from scenarios.errors import InputError
-from sim.types import Frame, Image, Truth
+from sim.types import Frame, Truth
 from tracking.source import Source
 
 if TYPE_CHECKING:
     from tracking.objective import Judge
 
+T = TypeVar("T")
 LIMIT = 256 * 2**20
+COUNTS = 2
+"""Times that a source's bytes are counted; after that it holds what it will hold."""
 
 
 class Held:
     """A source that was opened. State: its sequence, detections in memory; truth and background once asked for."""
 
     def __init__(self, source: Source, streams: tuple[str, ...] = ()) -> None:
-        self.source = source
-        opened = source.open(streams)
-        self._bare: tuple[Frame, ...] | None = None
-        self._opened = opened
-        self.sequence = replace(opened, bare=self._without_pictures)
-        if not opened.has_images and not opened.has_right:
-            self.sequence = replace(self.sequence, frames=self._without_pictures)
+        self.source, self._opened = source, source.open(streams)
+        opened = self._opened
+        made = _remembered(lambda: tuple(opened.without_pictures()))
+
+        def bare() -> Iterator[Frame]:
+            return iter(made())
+
+        pictures = opened.has_images or opened.has_right
+        self.sequence = replace(opened, bare=bare, frames=opened.frames if pictures else bare)
         if opened.load_background is not None:
-            self.sequence = replace(self.sequence, load_background=self._background)
-
-    def _without_pictures(self) -> Iterator[Frame]:
-        if self._bare is None:
-            self._bare = tuple(self._opened.without_pictures())
-        return iter(self._bare)
-
-    @cached_property
-    def _sample(self) -> Image | None:
-        return self._opened.background()
-
-    def _background(self) -> Image:
-        found = self._sample
-        assert found is not None, "the sequence has a background"
-        return found
+            self.sequence = replace(self.sequence, load_background=_remembered(opened.load_background))
 
     @cached_property
     def truth(self) -> Truth:
@@ -66,11 +57,23 @@ class Held:
         return Judge(self.truth)
 
 
+def _remembered(make: Callable[[], T]) -> Callable[[], T]:
+    """What `make` makes, made once and kept where `array_bytes` finds it."""
+    kept: list[T] = []
+
+    def again() -> T:
+        if not kept:
+            kept.append(make())
+        return kept[0]
+
+    return again
+
+
 class Cache:
     """Opened sources, the least recently used dropped first. State: those held, and their bytes.
 
     limit: bytes of arrays that all together may hold; the one in use is held whatever its size. Bytes are counted when
-    another source is asked for: by then it is known what the last one came to hold.
+    another source is asked for, the first times: by then it is known what the last one came to hold.
     """
 
     def __init__(self, limit: int = LIMIT) -> None:
@@ -79,6 +82,7 @@ class Cache:
         self.limit = limit
         self._held: OrderedDict[tuple[object, ...], Held] = OrderedDict()
         self._bytes: dict[tuple[object, ...], int] = {}
+        self._counted: Counter[tuple[object, ...]] = Counter()
 
     def __len__(self) -> int:
         return len(self._held)
@@ -86,6 +90,7 @@ class Cache:
     @property
     def bytes(self) -> int:
         """Bytes of the arrays held."""
+        self._counted.clear()
         self._count_last()
         return sum(self._bytes.values())
 
@@ -103,14 +108,15 @@ class Cache:
         return self._held[key]
 
     def _count_last(self) -> None:
-        if self._held:
-            key = next(reversed(self._held))
+        key = next(reversed(self._held), None)
+        if key is not None and self._counted[key] < COUNTS:
+            self._counted[key] += 1
             self._bytes[key] = array_bytes(self._held[key])
 
     def _make_room(self) -> None:
         while self._held and sum(self._bytes.values()) > self.limit:
             key, _ = self._held.popitem(last=False)
-            self._bytes.pop(key, None)
+            del self._bytes[key], self._counted[key]
 
 
 def array_bytes(thing: object) -> int:

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import gc
+import weakref
+
 import numpy as np
 import pytest
 
@@ -62,3 +65,25 @@ def test_bytes_of_a_held_source_are_those_of_motion_truth_and_detections():
     before = cache.bytes
     play("blob", SOURCES[0], cache=cache)
     assert motion < before < cache.bytes < 2_000_000
+
+
+def test_the_sample_of_the_background_counts():
+    small = sources("cross", [1], ["camera.fps=5", "duration=1", "camera.image=[80,60]"])[0]
+    cache = Cache()
+    play("group-pda", small, detections="image", cache=cache)
+    assert cache.bytes > 50 * 80 * 60 * 3
+    before = cache.hold(small, ("left", "background")).sequence.background()
+    assert before is cache.hold(small, ("left", "background")).sequence.background()
+
+
+def test_what_is_dropped_is_gone():
+
+    cache = Cache(0)
+    gc.disable()
+    try:
+        first = weakref.ref(cache.hold(SOURCES[0]))
+        play("blob", SOURCES[0], cache=cache)
+        play("blob", SOURCES[1], cache=cache)
+        assert first() is None
+    finally:
+        gc.enable()

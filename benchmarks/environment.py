@@ -1,0 +1,204 @@
+"""What an episode costs beside its tracking, and how fast the environment steps.
+
+    PYTHONPATH=. OMP_NUM_THREADS=1 python benchmarks/environment.py [trial] [steps] [memory] [--rounds 5]
+
+trial: a tuning trial, 4 sequences of 200 frames and 20 people on average (the crowd, boxes), played with what was kept
+of the trial before; for every registered tracker, and by part. Limits (design): `blob` 0.5 s, and any tracker 1.15
+times its tracking time; exit code 1 beyond. steps: steps and episodes per second on `crossing`, one action for a whole
+episode or every 10 frames, in one environment, and in vectors of two, in this process and in two. memory: what the
+cache holds, and the process, while many sequences are played under a small limit. CPU time of the process, but for
+vectors, whose wall time depends on the machine's load, which is printed; the best of several rounds.
+"""
+
+from __future__ import annotations
+
+import argparse
+import os
+import resource
+import time
+from collections.abc import Callable
+from functools import partial
+from typing import Any
+from unittest import mock
+
+import gymnasium
+import numpy as np
+
+import tracking
+from tracking.episodes import Cache, Rollout, Source, play, sources
+from tracking.held import Held
+from tracking.observation import Observer
+from tracking.protocol import names
+
+MUST, AIM, SHARE = 0.5, 0.2, 1.15
+PEOPLE = ["group.passers.repeat=2", "group.stop.repeat=3"]
+EVERY = (None, 10)
+ID = "flockscope/Tuning-v0"
+
+
+def best(run: Callable[[], Any], rounds: int, clock: Callable[[], float] = time.process_time) -> float:
+    """Seconds of the quickest of several runs, after one that is not counted."""
+    run()
+    found = []
+    for _ in range(rounds):
+        begun = clock()
+        run()
+        found.append(clock() - begun)
+    return min(found)
+
+
+def track_alone(tracker: str, held: list[Held]) -> None:
+    """The tracker on the same detections, and nothing else."""
+    from tracking.run import prepare
+
+    for one in held:
+        ready = prepare(tracker, one.sequence)
+        ready.reset(0)
+        for frame in ready.frames():
+            ready.answer(frame)
+
+
+def trial(rounds: int) -> bool:
+    """Print the figures of a trial; are they within the limits?"""
+    chosen, cache = sources("crowd", range(4), PEOPLE), Cache()
+    held = [cache.hold(source) for source in chosen]
+    people = np.mean([len(one.truth.frame) / one.truth.length for one in held])
+    print(f"\ntrial: {len(chosen)} x {held[0].truth.length} frames, {people:.1f} people on average; seconds")
+    print("| tracker | tracking | trial | ratio | scoring |\n|---|---|---|---|---|")
+    good = True
+    for name in names():
+        alone, whole, scoring = [], [], []
+        for _ in range(rounds):  # in turn: others share the machine
+            alone.append(best(partial(track_alone, name, held), 1))
+            episodes: list[Any] = []
+            whole.append(best(partial(played, name, chosen, cache, episodes), 1))
+            scoring.append(sum(e.seconds_scoring for e in episodes[-4:]))
+        ratio = min(w / a for w, a in zip(whole, alone, strict=True))
+        print(f"| {name} | {min(alone):.3f} | {min(whole):.3f} | {ratio:.2f} | {min(scoring):.3f} |", flush=True)
+        good &= ratio <= SHARE and (name != "blob" or min(whole) <= MUST)
+    print(f"must: blob {MUST} s (aim {AIM}), ratio {SHARE}")
+    return good
+
+
+def played(name: str, chosen: tuple[Source, ...], cache: Cache, episodes: list[Any]) -> None:
+    episodes += [play(name, source, cache=cache) for source in chosen]
+
+
+def made(tracker: str, every: int | None, **options: Any) -> dict[str, Any]:
+    return {"tracker": tracker, "suite": "crossing", "seeds": range(2), "decision_every": every, **options}
+
+
+def episode(env: gymnasium.Env[Any, Any]) -> int:
+    """Play an episode with the middle of the space; its steps."""
+    env.reset()
+    action, steps, done = np.zeros(env.action_space.shape or (), np.float32), 0, False
+    while not done:
+        *_, done, _, _ = env.step(action)
+        steps += 1
+    return steps
+
+
+def steps(rounds: int) -> None:
+    """Print steps and episodes per second, and where an environment's time goes."""
+    print("\nsteps: `crossing`, 160 frames, 5 to 7 people; share of an environment's CPU time")
+    print("| tracker | action every | steps/s | episodes/s | tracking | scoring | observing |")
+    print("|---|---|---|---|---|---|---|")
+    for name in names():
+        for every in EVERY:
+            env = gymnasium.make(ID, **made(name, every))
+            env.reset(seed=0)
+            for _ in range(8):
+                episode(env)  # all sequences are opened
+            spent, count, parts = measured(env, rounds)
+            tracked, scored, observed = (100 * part / spent for part in parts)
+            rates = f"{count / spent:.1f} | {8 * rounds / spent:.1f}"
+            print(f"| {name} | {every} | {rates} | {tracked:.0f} % | {scored:.0f} % | {observed:.0f} % |", flush=True)
+    print("\nvectors of 2, wall time\n| tracker | action every | sync steps/s | async steps/s |\n|---|---|---|---|")
+    for name in names():
+        for every in EVERY:
+            found = [vector(name, every, mode, rounds) for mode in ("sync", "async")]
+            print(f"| {name} | {every} | {found[0]:.1f} | {found[1]:.1f} |", flush=True)
+
+
+def measured(env: gymnasium.Env[Any, Any], rounds: int) -> tuple[float, int, list[float]]:
+    """CPU seconds and steps of 8 episodes a round, and the seconds in tracking, scoring and observing."""
+    parts = [0.0, 0.0, 0.0]
+
+    def timed(k: int, call: Callable[..., Any]) -> Callable[..., Any]:
+        def inner(*given: Any) -> Any:
+            begun = time.process_time()
+            try:
+                return call(*given)
+            finally:
+                parts[k] += time.process_time() - begun
+
+        return inner
+
+    from tracking.run import Prepared
+
+    with (
+        mock.patch.object(Prepared, "answer", timed(0, Prepared.answer)),
+        mock.patch.object(Rollout, "scores", timed(1, Rollout.scores)),
+        mock.patch.object(Observer, "see", timed(2, Observer.see)),
+        mock.patch.object(Observer, "look", timed(2, Observer.look)),
+    ):
+        begun = time.process_time()
+        count = sum(episode(env) for _ in range(8 * rounds))
+        return time.process_time() - begun, count, parts
+
+
+def vector(name: str, every: int | None, mode: str, rounds: int) -> float:
+    """Steps per second of both environments together."""
+    envs = gymnasium.make_vec(ID, 2, vectorization_mode=mode, **made(name, every))
+    try:
+        envs.reset(seed=0)
+        zero = np.zeros(envs.action_space.shape or (), np.float32)
+        some = 8 if every is None else 40
+
+        def run() -> None:
+            for _ in range(some):
+                envs.step(zero)
+
+        run()
+        return 2 * some / best(run, rounds, time.perf_counter)
+    finally:
+        envs.close()
+
+
+def memory() -> bool:
+    """Print what is held while 60 sequences are played under a small limit; does it stay there?"""
+    limit = 4 * 2**20
+    cache, found = Cache(limit), []
+    for k, source in enumerate(sources("crowd", range(60), PEOPLE), 1):
+        play("blob", source, cache=cache)
+        if k in (1, 10, 20, 40, 60):
+            rss = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
+            found.append((k, len(cache), cache.bytes / 2**20, rss))
+    print(f"\nmemory: cache of {limit / 2**20:.0f} MiB\n| played | held | MiB held | MB of the process, at most |")
+    print("|---|---|---|---|")
+    for k, held, size, rss in found:
+        print(f"| {k} | {held} | {size:.1f} | {rss:.0f} |")
+    one = found[0][2]
+    return all(size <= limit / 2**20 + one * 2 for _, _, size, _ in found)
+
+
+def main() -> int:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("what", nargs="*", choices=["trial", "steps", "memory", []], default=[])
+    parser.add_argument("--rounds", type=int, default=5)
+    options = parser.parse_args()
+    assert tracking is not None
+    what = options.what or ["trial", "steps", "memory"]
+    print(f"load {os.getloadavg()[0]:.1f} on {os.cpu_count()} cores")
+    good = True
+    if "trial" in what:
+        good &= trial(options.rounds)
+    if "steps" in what:
+        steps(options.rounds)
+    if "memory" in what:
+        good &= memory()
+    return 0 if good else 1
+
+
+if __name__ == "__main__":
+    raise SystemExit(main())
