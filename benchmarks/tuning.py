@@ -21,9 +21,8 @@ import os
 import tempfile
 import time
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
@@ -52,16 +51,15 @@ class Search:
     suite: str
     objective: str
     detections: str
-    trials: int
-    more: dict[str, Any] = field(default_factory=dict)
+    validation: int  # seeds of each scene
 
 
 SEARCHES = {
     s.tracker: s
     for s in (
-        Search("blob", "boxes.toml", "HOTA", "file", 120),
-        Search("group-pda", "points.toml", "objective", "file", 120),
-        Search("grouping", "points.toml", "pairwise_F1", "truth", 120),
+        Search("blob", "boxes.toml", "HOTA", "file", 5),
+        Search("group-pda", "points.toml", "objective", "file", 5),
+        Search("grouping", "points.toml", "pairwise_F1", "truth", 15),
     )
 }
 RECORDINGS = {
@@ -81,9 +79,9 @@ def search(given: argparse.Namespace) -> None:
         wanted = SEARCHES[name]
         begun = time.perf_counter()
         found = tune(
-            wanted.tracker, SUITES / wanted.suite, given.trials or wanted.trials, objective=wanted.objective,
+            wanted.tracker, SUITES / wanted.suite, given.trials or 60, objective=wanted.objective,
             detections=wanted.detections, out=given.out / f"{name}.toml", seeds=range(3),
-            validation=range(10_000, 10_005), test=range(20_000, 20_013), progress=said(), **wanted.more,
+            validation=range(10_000, 10_000 + wanted.validation), test=range(20_000, 20_013), progress=said(),
         )  # fmt: skip
         print(found)
         for key, (old, new) in found.changed.items():

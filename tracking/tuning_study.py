@@ -1,8 +1,4 @@
-"""The study: Optuna's search over a plan's space, resumable, shared by processes, and told what to try by seed alone.
-
-What trial n tries follows from the seed, n and the finished trials before it: the sampler is made anew for each trial,
-so that a study that was killed and goes on finds what it would have found without.
-"""
+"""The study: Optuna's search over a plan's space, in a storage of its own, resumable, shared by processes."""
 
 from __future__ import annotations
 
@@ -13,78 +9,22 @@ from pathlib import Path
 from typing import Any
 from urllib.parse import urlparse
 
-import numpy as np
 import optuna
-from optuna.distributions import BaseDistribution, CategoricalDistribution, FloatDistribution, IntDistribution
-from optuna.samplers import BaseSampler, TPESampler
 from optuna.storages import BaseStorage
 from optuna.trial import FrozenTrial, TrialState
 
 from scenarios.errors import InputError
-from tracking.config import Param, Value
 from tracking.tuning_goals import Goal
 from tracking.tuning_journal import LOCKS, Journal, Locks
 from tracking.tuning_plan import Plan
+from tracking.tuning_pruner import SignedRank
 from tracking.tuning_result import Trial
+from tracking.tuning_sampler import AGAIN, ERROR, PRUNED, Sampler, distribution, slot
 
-SETTINGS, AGAIN, PRUNED, ERROR = "settings", "again", "pruned after", "error"
-"""Attributes: of a study, what it is about; of a trial, which it replaces, after how many episodes it was given up, and
-what went wrong."""
+SETTINGS = "settings"
+"""The attribute of a study that says what it is about."""
 
 DONE = (TrialState.COMPLETE, TrialState.PRUNED)
-STARTUP = 10  # trials near the defaults before the search proper
-CHANGED = 0.25  # share of parameters that such a trial changes
-
-
-def distribution(p: Param) -> BaseDistribution:
-    """A parameter as Optuna's, in its own unit."""
-    if p.scale == "categorical":
-        return CategoricalDistribution(p.choices)
-    if p.scale == "int":
-        return IntDistribution(int(np.ceil(p.low)), int(np.floor(p.high)))
-    return FloatDistribution(p.low, p.high, log=p.scale == "log")
-
-
-def slot(trials: Sequence[FrozenTrial], trial: FrozenTrial) -> int:
-    """The trial's place in the search: how many new ones were begun before it, or before the one that it replaces."""
-    number = trial.user_attrs.get(AGAIN, trial.number)
-    return sum(t.number < number and AGAIN not in t.user_attrs for t in trials)
-
-
-class Sampler(BaseSampler):
-    """TPE after some trials near the defaults. State: what is drawn for this trial, from seed and slot."""
-
-    def __init__(self, seed: int, defaults: dict[str, Value]) -> None:
-        self._seed, self._defaults = seed, defaults
-        self._tpe, self._changed = TPESampler(seed=seed), set[str]()
-
-    def before_trial(self, study: optuna.Study, trial: FrozenTrial) -> None:
-        """Begin anew."""
-        state = np.random.SeedSequence([self._seed, slot(study.get_trials(deepcopy=False), trial)])
-        self._tpe = TPESampler(seed=int(state.generate_state(1)[0]), n_startup_trials=STARTUP)
-        rng, names = np.random.default_rng(state), list(self._defaults)
-        changed = rng.random(len(names)) < CHANGED
-        changed[rng.integers(len(names))] = True
-        self._changed = {name for name, here in zip(names, changed, strict=True) if here}
-
-    def infer_relative_search_space(self, study: optuna.Study, trial: FrozenTrial) -> dict[str, BaseDistribution]:
-        """As TPE."""
-        return self._tpe.infer_relative_search_space(study, trial)
-
-    def sample_relative(
-        self, study: optuna.Study, trial: FrozenTrial, search_space: dict[str, BaseDistribution]
-    ) -> dict[str, Any]:
-        """As TPE."""
-        return self._tpe.sample_relative(study, trial, search_space)
-
-    def sample_independent(
-        self, study: optuna.Study, trial: FrozenTrial, param_name: str, param_distribution: BaseDistribution
-    ) -> Any:
-        """In the first trials mostly the default, a few parameters anything; as TPE later."""
-        begun = sum(t.state in DONE for t in study.get_trials(deepcopy=False)) < STARTUP
-        if begun and param_name not in self._changed:
-            return self._defaults[param_name]
-        return self._tpe.sample_independent(study, trial, param_name, param_distribution)
 
 
 class Study:
@@ -197,7 +137,7 @@ def opened(plan: Plan, storage: str | Path | None, name: str) -> Iterator[Study]
         try:
             store = _store(place, locks)
             found = optuna.create_study(
-                storage=store, study_name=name, load_if_exists=True, sampler=Sampler(plan.seed, plan.defaults),
+                storage=store, study_name=name, load_if_exists=True, sampler=Sampler(plan),
                 pruner=_pruner(plan), directions=[_direction(goal) for goal in plan.goals],
             )  # fmt: skip
             _same(plan, found, storage, name)
@@ -214,7 +154,7 @@ def _direction(goal: Goal) -> optuna.study.StudyDirection:
 def _pruner(plan: Plan) -> optuna.pruners.BasePruner:
     if plan.prune == 0 or len(plan.goals) > 1:
         return optuna.pruners.NopPruner()
-    return optuna.pruners.WilcoxonPruner(p_threshold=plan.prune)
+    return SignedRank(plan.prune)
 
 
 def _same(plan: Plan, found: optuna.Study, storage: object, name: str) -> None:

@@ -13,7 +13,8 @@ from scenarios.errors import FlockscopeError, InputError
 from tracking.episodes import Episode
 from tracking.tuning_goals import Goal, mean
 from tracking.tuning_plan import Plan, every_score
-from tracking.tuning_study import ERROR, PRUNED, Study
+from tracking.tuning_sampler import ERROR, PRUNED
+from tracking.tuning_study import Study
 from tracking.tuning_work import Play
 
 PAUSE = 0.5  # s between looks at whether others have finished

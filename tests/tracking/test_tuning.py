@@ -17,7 +17,8 @@ from tests.toy_tracker import Toy, ToyConfig
 from tests.tuning_toys import TOY, wishes, write_scenes
 from tracking.tuning import tune
 from tracking.tuning_plan import plan
-from tracking.tuning_study import AGAIN, DONE, opened
+from tracking.tuning_sampler import AGAIN
+from tracking.tuning_study import DONE, opened
 from tracking.tuning_trials import search
 from tracking.tuning_work import players
 
@@ -85,24 +86,6 @@ def test_what_changes_nothing_is_left_as_it_was(found):
     assert found[0].config.colour == "red"
     assert found[0].config.steps == 1.0
     assert "steps" not in found[0].trials[0].params
-
-
-def test_losing_trials_are_given_up(found):
-    result = found[0]
-    given_up = [t for t in result.trials if t.pruned]
-    assert given_up
-    assert all(2 <= t.episodes < 5 for t in given_up)
-    best = max(t.values[0] for t in result.trials if t.values and not t.pruned)
-    assert all(t.values[0] < best for t in given_up)
-    everything = tune(**wishes(found[1], prune=0.0, trials=4, check=None))
-    assert everything.pruned == 0
-    assert {t.episodes for t in everything.trials if not t.error} == {5}
-
-
-def test_what_the_tracker_refuses_is_no_error(found):
-    assert found[0].impossible > 0
-    assert all("forbidden" in t.error for t in found[0].trials if t.error)
-    assert len(found[0].trials) == 12
 
 
 def test_the_file_is_read_by_track(found):

@@ -1,0 +1,103 @@
+"""One trial after another: when one is given up, what it is then worth, what is no trial at all."""
+
+from __future__ import annotations
+
+import pytest
+
+from scenarios.errors import InputError
+from tests.tuning_toys import wishes
+from tracking.episodes import Episode
+from tracking.tuning_plan import plan
+from tracking.tuning_study import opened
+from tracking.tuning_trials import search
+
+
+class Game:
+    """Plays by a formula: scenes differ much, and skipping people costs a little in each. `played`: how many."""
+
+    def __init__(self, refused: int = 99) -> None:
+        self.refused, self.played = refused, 0
+
+    def __call__(self, sources, values, every):
+        for source in sources:
+            if values["skip"] == self.refused:
+                yield InputError(place="skip", got=values["skip"], expected="another", remedy="none")
+                return
+            self.played += 1
+            value = 0.5 + 0.04 * (source.seed % 10) - 0.02 * values["skip"]
+            yield Episode(source.name, source.seed, value, {"HOTA": value, "GOSPA": 1 - value}, 10, 1.0, 0.0)
+
+
+def played(tmp_path, game=None, **more):
+    given = wishes(tmp_path, **{"seeds": range(12), "trials": 12, "only": ["skip"], **more})
+    told = []
+    with opened(plan(**given), None, "x") as study:
+        search(study, game or Game(), lambda *now: told.append(now))
+        return study.told(), told
+
+
+@pytest.mark.parametrize(("objective", "better"), [("HOTA", max), ("GOSPA", min)])
+def test_a_trial_that_loses_everywhere_is_given_up(tmp_path, objective, better):
+    """Four losses in a row are surer than p = 0.1 (1 / 16), three are not; either way up."""
+    trials, _ = played(tmp_path, objective=objective)
+    losing = [t for t in trials if t.params["skip"] > 0]
+    assert losing
+    assert {(t.pruned, t.episodes) for t in losing} == {(True, 4)}
+    assert {(t.pruned, t.episodes) for t in trials if t.params["skip"] == 0} == {(False, 12)}
+    assert better(t.values[0] for t in trials) == trials[0].values[0]
+
+
+def test_what_was_given_up_is_worth_what_it_lost(tmp_path):
+    """0.02 for each one left out, whichever four of the very different scenes it was played on."""
+    trials, _ = played(tmp_path)
+    for t in trials:
+        assert t.values[0] == pytest.approx(trials[0].values[0] - 0.02 * t.params["skip"])
+
+
+def test_with_p_zero_everything_is_played(tmp_path):
+    game = Game()
+    trials, _ = played(tmp_path, game, prune=0.0)
+    assert not any(t.pruned for t in trials)
+    assert game.played == 12 * 12
+
+
+def test_scenes_come_in_another_order_in_each_trial(tmp_path):
+    orders = []
+
+    def game(sources, values, every):
+        orders.append([s.seed for s in sources])
+        yield from Game()(sources, values, every)
+
+    played(tmp_path, game, trials=4)
+    assert len({tuple(order) for order in orders}) == 4
+    assert all(sorted(order) == list(range(12)) for order in orders)
+
+
+def test_parameters_that_cannot_be_played_are_a_trial_without_value(tmp_path):
+    trials, _ = played(tmp_path, Game(refused=1))
+    refused = [t for t in trials if t.params["skip"] == 1]
+    assert refused
+    assert all(t.values == () and "expected another" in t.error and not t.pruned for t in refused)
+    assert len(trials) == 12
+
+
+def test_defaults_that_cannot_be_played_are_an_error(tmp_path):
+    with pytest.raises(InputError, match="expected another"):
+        played(tmp_path, Game(refused=0))
+
+
+def test_a_score_that_no_scene_has_is_an_error(tmp_path):
+    with pytest.raises(InputError, match="queue_F1 unknown in every training scene"):
+        played(tmp_path, objective="queue_F1")
+
+
+def test_several_goals_are_played_to_the_end(tmp_path):
+    trials, _ = played(tmp_path, objective=["HOTA", "frames/s"], trials=3)
+    assert {t.episodes for t in trials} == {12}
+    assert all(t.values[1] == 10.0 for t in trials)
+
+
+def test_progress_is_told(tmp_path):
+    _, told = played(tmp_path, trials=3)
+    assert [(done, total) for done, total, _ in told] == [(0, 3), (1, 3), (2, 3), (3, 3)]
+    assert "best in training 0.6533" in told[-1][2]
