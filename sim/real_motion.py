@@ -108,6 +108,11 @@ def _labels(source: Sequence) -> Truth:
 def on_ground(truth: Truth, source: Sequence, calibration: Camera | None = None) -> Array:
     """(R, 2) m: where the rows of a truth are on the ground, nan where unknown; InputError where nothing says so."""
     if truth.pos is not None:
+        if calibration is not None:
+            raise InputError(
+                file=source.source.get("path", source.name), place="--calibration", got="a calibration",
+                expected="none for labels that are on the ground already", remedy="leave it out",
+            )  # fmt: skip
         return truth.pos
     assert truth.box is not None, "labels have positions or boxes"
     camera = calibration or source.camera

@@ -59,7 +59,7 @@ def test_real_detectors(shared_data: Path, tmp_path: Path, capsys: pytest.Captur
     # Eight people whose luck lasts for seconds: the share that a draw misses spreads by 0.08.
     for name, error in (("missed", 0.09), ("overlap, 50% quantile", 0.03), ("error foot: sd", 0.01)):
         assert said["measured"][name] == pytest.approx(said["drawn"][name], abs=error)  # type: ignore[index]
-    both = answer(capsys, "fit", "sensor", folder, shared_data / "mot/TUD-Campus", "--fps", "25", "--out", profile)
+    both = answer(capsys, "fit", "sensor", folder, shared_data / "mot/TUD-Campus", "--out", profile)
     assert both["code"] == 0
     tracked = answer(
         capsys, "track", "blob", folder, "--detections", "truth", "--sensor", profile, "--out", tmp_path / "t"
