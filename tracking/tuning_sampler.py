@@ -2,7 +2,7 @@
 
 Declared ranges are wide and defaults are good, so that a point drawn anywhere, or by a density over many parameters,
 is nearly always worse. A trial therefore begins as one of the best so far (the first time, the defaults), and some of
-its parameters, three on the mean, are moved: a step of any size from a hundredth to a half of the range, in the
+its parameters, three on the mean, are moved: steps of any size from a fortieth to a half of the range, in the
 logarithm where the parameter is declared so. Every fourth trial is TPE's, which sees what hill climbing does not.
 
 What trial n tries follows from the seed, n and the finished trials before it, through a generator of its own: a study
@@ -28,7 +28,7 @@ AGAIN, PRUNED, ERROR = "again", "pruned after", "error"
 """Attributes of a trial: which it replaces, after how many episodes it was given up, what went wrong."""
 
 MOVED = 3  # parameters on the mean
-STEPS = (0.02, 1.0)  # standard deviation of a step in [-1, 1], the ends of a range between which it is drawn
+STEPS = (0.05, 1.0)  # standard deviation of a step in [-1, 1], the ends of a range between which it is drawn
 PARENTS = 3  # so many of the best may be a trial's parent
 EVERY = 4  # the how-manieth trial is TPE's
 STARTUP = 10  # … once so many are finished
