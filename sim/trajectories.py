@@ -17,7 +17,6 @@ from sim.types import Array, Bools, Ints
 TIMES = (0.05, 0.1, 0.15, 0.2, 0.3, 0.4, 0.6, 0.8, 1.0)  # s
 LIMIT = 2.5  # m/s²
 GAP = 2.0  # s: who is not labelled for longer was away
-SPLINE = 5  # places, at the least, of a smoothing spline; fewer are interpolated
 
 
 @dataclass(frozen=True)
@@ -61,6 +60,8 @@ def _inside(times: Array, t: Array) -> Bools:
 
 def _stretches(frame: Ints, id: Ints, pos: Array, one: int, rate: float, tau: float) -> list[Stretch]:
     """A person's stretches without a gap: id, times, and place and velocity as functions of time."""
+    from scipy.interpolate import CubicSpline
+
     rows = np.flatnonzero(id == one)
     rows = rows[np.argsort(frame[rows])]
     cuts = np.flatnonzero(np.diff(frame[rows]) > GAP * rate) + 1
@@ -68,20 +69,34 @@ def _stretches(frame: Ints, id: Ints, pos: Array, one: int, rate: float, tau: fl
     for part in np.split(rows, cuts):
         if len(part) >= 2:
             times = (frame[part] - 1) / rate
-            made.append((one, times, *_spline(times, pos[part], tau**4 * rate)))
+            f = CubicSpline(times, smoothed(times, pos[part], tau**4 * rate), bc_type="natural")
+            made.append((one, times, f, f.derivative()))
     return made
 
 
-def _spline(t: Array, y: Array, weight: float) -> tuple[Curve, Curve]:
-    """Places (N, 2) as a function of time, and its derivative."""
-    from scipy.interpolate import BSpline, make_interp_spline, make_smoothing_spline
+def smoothed(t: Array, y: Array, weight: float) -> Array:
+    """Places (N, 2) of the natural cubic spline f at its knots t: the least Σ |y - f|² + weight ∫ |f''|².
 
-    if len(t) < SPLINE:
-        f = make_interp_spline(t, y, k=min(3, len(t) - 1))
-    else:
-        parts = [make_smoothing_spline(t, y[:, k], lam=weight) for k in (0, 1)]
-        f = BSpline(parts[0].t, np.stack([p.c for p in parts], axis=1), parts[0].k)
-    return f, f.derivative()
+    Reinsch (1967): f = y - weight Q γ with (R + weight Qᵀ Q) γ = Qᵀ y, γ being f'' at the inner knots.
+    """
+    from scipy.linalg import solveh_banded
+
+    if len(t) < 3:
+        return y
+    h = np.diff(t)
+    a, c = 1.0 / h[:-1], 1.0 / h[1:]
+    b = -a - c  # column j of Q: a_j, b_j, c_j in rows j, j + 1, j + 2
+    bands = np.zeros((3, len(t) - 2))
+    bands[0] = (h[:-1] + h[1:]) / 3.0 + weight * (a**2 + b**2 + c**2)
+    bands[1, :-1] = h[1:-1] / 6.0 + weight * (b[:-1] * a[1:] + c[:-1] * b[1:])
+    bands[2, :-2] = weight * c[:-2] * a[2:]
+    bend = a[:, None] * y[:-2] + b[:, None] * y[1:-1] + c[:, None] * y[2:]
+    gamma = weight * solveh_banded(bands, bend, lower=True)
+    f = np.array(y, dtype=float)
+    f[:-2] -= a[:, None] * gamma
+    f[1:-1] -= b[:, None] * gamma
+    f[2:] -= c[:, None] * gamma
+    return f
 
 
 def _acceleration(stretches: list[Stretch], fps: float) -> float:

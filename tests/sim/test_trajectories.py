@@ -1,7 +1,8 @@
 import numpy as np
 import pytest
+from scipy.interpolate import make_smoothing_spline
 
-from sim.trajectories import GAP, LIMIT, nearest_row, resample
+from sim.trajectories import GAP, LIMIT, nearest_row, resample, smoothed
 
 RATE = 2.5
 
@@ -69,6 +70,18 @@ def test_a_part_is_the_part_of_the_whole() -> None:
     whole = resample(*labels, RATE, 10.0, 0.0, 39 / RATE)
     part = resample(*labels, RATE, 10.0, 4.0, 8.0)
     assert np.array_equal(part.pos, whole.pos[40:81], equal_nan=True)
+
+
+@pytest.mark.parametrize("weight", [1e-6, 0.01, 100.0])
+def test_smoothing_is_that_of_scipy(weight: float) -> None:
+    r = np.random.default_rng(3)
+    t, y = np.cumsum(r.uniform(0.2, 0.8, 40)), r.normal(0, 1, (40, 2))
+    for k in (0, 1):
+        wanted = make_smoothing_spline(t, y[:, k], lam=weight)(t)
+        assert smoothed(t, y, weight)[:, k] == pytest.approx(wanted, abs=1e-7)
+    assert np.array_equal(smoothed(t[:2], y[:2], weight), y[:2])
+    line = np.stack([t, 2.0 - t], axis=1)
+    assert smoothed(t, line, weight) == pytest.approx(line)
 
 
 def test_nearest_rows() -> None:
