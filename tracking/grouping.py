@@ -66,12 +66,14 @@ class Table:
         return out
 
 
-def with_groups(tracks: Sequence[Tracks], fps: float, px_per_m: float) -> tuple[Tracks, ...]:
+def with_groups(
+    tracks: Sequence[Tracks], fps: float, px_per_m: float, rule: Grouping | None = None
+) -> tuple[Tracks, ...]:
     """The tracks `derive`d; px_per_m is needed for tracks in the image, which stay as they are without it (not one box
     was given: nobody can be grouped). Tracks that are marked as derived stay what they are."""
     if all(t.derived for t in tracks) or (tracks[0].plane == "image" and not math.isfinite(px_per_m)):
         return tuple(tracks)
-    return tuple(derive(tracks, fps, px_per_m))
+    return tuple(derive(tracks, fps, px_per_m, rule))
 
 
 def derive(tracks: Iterable[Tracks], fps: float, px_per_m: float = 1.0, rule: Grouping | None = None) -> list[Tracks]:

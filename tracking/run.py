@@ -18,6 +18,7 @@ from scenarios.errors import FlockscopeError, InputError, WorkError
 from sim.types import Context, DetectionMode, Detections, Frame, Sequence, Tracker, Tracks
 from tracking import protocol, scale
 from tracking.config import Config
+from tracking.links import Grouping
 from tracking.provenance import Speed, describe
 
 Params = Config | Mapping[str, Any] | str | Path | None
@@ -107,17 +108,20 @@ def track(
     detections: DetectionMode | None = None,
     sensor: Mapping[str, Any] | None = None,
     seed: int = 0,
+    grouping: Grouping | str | Path | None = None,
     progress: Callable[[int], None] | None = None,
 ) -> Run:
     """Track a sequence with a registered tracker, "file.py:Class", "module:Class", a class or an instance.
 
     params: its config, values by name or a TOML file. detections: "image", "file" or "truth"; by default the first that
-    can work. sensor: overrides that degrade "truth" (misses, clutter, noise, hiding). progress: called with the number
-    of each frame that is done. InputError where tracker and source do not fit, before a frame is read; WorkError where
+    can work. sensor: overrides that degrade "truth" (misses, clutter, noise, hiding). grouping: the rule by which
+    people get groups where the tracker names none, or its TOML file. progress: called with the number of each frame
+    that is done. InputError where tracker and source do not fit, before a frame is read; WorkError where
     the tracker's answer is no Tracks.
     """
     from tracking.grouping import with_groups
 
+    rule = Grouping.from_toml(grouping) if isinstance(grouping, str | Path) else grouping
     ready = prepare(tracker, sequence, params=params, detections=detections, sensor=sensor, seed=seed)
     ready.reset(seed)
     made, spent, begun = [], 0.0, time.perf_counter()
@@ -129,9 +133,10 @@ def track(
             progress(frame.index)
     whole = time.perf_counter() - begun
     px_per_m = ready.px_per_m(made)
-    answers = with_groups(made, ready.context.fps, px_per_m)
+    answers = with_groups(made, ready.context.fps, px_per_m, rule)
     speed = Speed(len(made) / spent, len(made) / whole) if made else Speed()
-    return Run(answers, describe(ready, answers, seed, sensor or {}, px_per_m, speed))
+    info = describe(ready, answers, seed, sensor or {}, px_per_m, speed)
+    return Run(answers, info if rule is None else {**info, "grouping": rule.as_dict()})
 
 
 def prepare(
@@ -148,7 +153,9 @@ def prepare(
     mode = protocol.choose_mode(instance.needs, sequence, detections)
     if sensor and mode != "truth":
         remedy = "add --detections truth, or leave the sensor as it is"
-        raise InputError(place="--sensor, --set sensor", got=f"--detections {mode}", expected="--detections truth", remedy=remedy)
+        raise InputError(
+            place="--sensor, --set sensor", got=f"--detections {mode}", expected="--detections truth", remedy=remedy
+        )
     feed = _feed(instance.needs, mode, sequence, sensor or {}, seed)
     context = Context(
         fps=sequence.fps,

@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+import json
+
 import pytest
 
 from tests.tuning_toys import write_scenes
+from tracking.app.cli import run
 from tracking.episodes import Cache, sources
 from tracking.grouping import derive
 from tracking.links import Grouping
+from tracking.run import track
 from tracking.scoring import evaluate
 from tracking.tuning import tune
 from tracking.tuning_rule import people_as_tracks, play_rule
@@ -56,3 +60,28 @@ def test_the_rule_is_tuned_like_a_tracker(tmp_path):
 def test_first_rule_is_frozen():
     first = Grouping.frozen()
     assert (first.near, first.acquaintance, first.idle, first.diverge) == (1.5, 2.0, 0.0, 10.0)
+
+
+def test_a_rule_of_ones_own_groups_what_is_tracked(source, tmp_path):
+    """From Python, from a file; run.json says which; who says nothing gets the usual one."""
+    rule = Grouping(near=0.5)
+    (tmp_path / "rule.toml").write_text(rule.to_toml())
+    sequence = source.open()
+    usual, own, read = (track("blob", sequence, grouping=g) for g in (None, rule, str(tmp_path / "rule.toml")))
+    assert any((t.group >= 0).any() for t in usual)
+    assert not any((t.group >= 0).any() for t in own)
+    assert own.info["grouping"] == read.info["grouping"] == rule.as_dict()
+    assert "grouping" not in usual.info
+
+
+def test_a_rule_on_the_command_line(source, tmp_path, capsys):
+    (tmp_path / "rule.toml").write_text("[params]\nnear = 0.5\n")
+    (tmp_path / "wrong.toml").write_text("[params]\nnaer = 0.5\n")
+    where = str(tmp_path / "data")
+    assert run(["generate", str(tmp_path / "one.toml"), "--seeds", "3", "--streams", "none", "--out", where]) == 0
+    line = ["track", "blob", where, "--out", str(tmp_path / "tracks"), "--grouping"]
+    assert run([*line, str(tmp_path / "rule.toml")]) == 0
+    (info,) = (tmp_path / "tracks").rglob("run.json")
+    assert json.loads(info.read_text())["grouping"]["near"] == 0.5
+    assert run([*line, str(tmp_path / "wrong.toml")]) == 2
+    assert "did you mean near?" in capsys.readouterr().err

@@ -31,4 +31,7 @@ Streams = Annotated[
 Images = Annotated[
     Literal["jpg", "png", "mp4"] | None, typer.Option(help="How pictures are stored; jpg if nothing is said.")
 ]
+Rule = Annotated[
+    Path | None, typer.Option("--grouping", metavar="FILE.toml", help="The rule of groups, by `tune grouping`.")
+]
 Tracked = Annotated[Path | None, typer.Argument(metavar="TRACKS", help="What `track` wrote, or MOT text.")]

@@ -20,6 +20,7 @@ from tracking.app.arguments import (
     Images,
     Json,
     Out,
+    Rule,
     Scale,
     Set,
     Source,
@@ -124,6 +125,7 @@ def track(
     settings: Set = [],  # noqa: B006
     detections: Annotated[Literal["image", "truth", "file"] | None, typer.Option(help="What it is given.")] = None,
     sensor: Detector = None,
+    grouping: Rule = None,
     seed: Annotated[int, typer.Option("--seed", min=0, help="The tracker's seed.")] = 0,
     fps: Fps = None,
     px_per_m: Scale = None,
@@ -137,7 +139,7 @@ def track(
     """Run a tracker and store what it says."""
     from tracking.app import track_command
 
-    job = track_command.job(tracker, params, settings, detections, seed, sensor)
+    job = track_command.job(tracker, params, settings, detections, seed, sensor, grouping)
     return track_command.track(job, source, out, fps=fps, px_per_m=px_per_m, camera=camera, background=background)
 
 

@@ -13,6 +13,7 @@ from tracking.app import options
 from tracking.app.answer import Answer
 from tracking.app.meter import Meter
 from tracking.config import Config
+from tracking.links import Grouping
 from tracking.provenance import given
 from tracking.run import Run
 
@@ -26,6 +27,7 @@ class Job:
     detections: DetectionMode | None = None
     sensor: Mapping[str, Any] = field(default_factory=dict)
     seed: int = 0
+    grouping: Grouping | None = None
 
     def run(self, sequence: Sequence, progress: Callable[[int], None] | None = None) -> Run:
         """The tracker's answers."""
@@ -33,7 +35,7 @@ class Job:
 
         return track(
             self.tracker, sequence, params=self.config, detections=self.detections, sensor=self.sensor, seed=self.seed,
-            progress=progress,
+            grouping=self.grouping, progress=progress,
         )  # fmt: skip
 
 
@@ -44,12 +46,14 @@ def job(
     detections: DetectionMode | None,
     seed: int,
     detector: Path | None = None,
+    grouping: Path | None = None,
 ) -> Job:
     """The options of the command as a Job; InputError for settings that the tracker does not know."""
     found = options.settings([*options.sensor(detector), *settings], "tracker", ("tracker", "sensor"))
     own = [text for subject, text in found if subject == "tracker"]
     sensor = options.values(text for subject, text in found if subject == "sensor")
-    return Job(tracker, _config(tracker, params, own), detections, sensor, seed)
+    rule = None if grouping is None else Grouping.from_toml(grouping)
+    return Job(tracker, _config(tracker, params, own), detections, sensor, seed, rule)
 
 
 def _config(tracker: str, params: Path | None, settings: list[str]) -> Config | None:
