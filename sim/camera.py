@@ -56,8 +56,8 @@ def rays(camera: Camera, uv: Array) -> tuple[Array, Array]:
         across = (uv - camera.centre_px) / camera.px_per_m
         origin = camera.position + across @ camera.rotation[:2]
         return origin, np.broadcast_to(camera.rotation[2], origin.shape)
-    ideal = lens.straight((uv - camera.centre_px) / camera.focal_px, camera.radial)
-    x = np.column_stack([ideal, np.ones(len(uv))])
+    x = np.ones((len(uv), 3))
+    x[:, :2] = lens.straight((uv - camera.centre_px) / camera.focal_px, camera.radial)
     return np.broadcast_to(camera.position, x.shape), x @ camera.rotation
 
 
@@ -79,7 +79,9 @@ def ground_jacobian(camera: Camera, uv: Array, z: float = 0.0) -> Array:
     if camera.kind == "top":
         return np.broadcast_to(camera.rotation[:2, :2].T / camera.px_per_m, (len(origin), 2, 2))
     focal = np.array(camera.focal_px)
-    bend = lens.slope((np.asarray(uv, dtype=float) - camera.centre_px) / focal, camera.radial)
+    bend = np.eye(2)[None]
+    if camera.radial:
+        bend = lens.slope((np.asarray(uv, dtype=float) - camera.centre_px) / focal, camera.radial)
     step = np.swapaxes(bend / focal, 1, 2) @ camera.rotation[:2]  # dD/du, dD/dv as rows
     s = (z - origin[:, 2]) / direction[:, 2]
     slope = direction[:, :2] / direction[:, 2:]

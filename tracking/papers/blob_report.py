@@ -28,12 +28,13 @@ def on_ground(camera: Camera, state: Array, scale: Array) -> tuple[Array, Array,
     foot, rate, cov = _foot(camera, state, scale)
     ground = to_ground(camera, foot)
     seen = np.asarray(np.isfinite(ground).all(1))
-    foot, rate, cov = foot[seen], rate[seen], cov[seen]
+    if not seen.all():
+        ground, foot, rate, cov = ground[seen], foot[seen], rate[seen], cov[seen]
     jacobian = ground_jacobian(camera, foot)
     turn = np.zeros((len(foot), 4, 4))
     turn[:, :2, :2] = turn[:, 2:, 2:] = jacobian
     out = turn @ cov @ turn.transpose(0, 2, 1)
-    return ground[seen], np.einsum("nij,nj->ni", jacobian, rate), (out + out.transpose(0, 2, 1)) / 2, seen
+    return ground, np.einsum("nij,nj->ni", jacobian, rate), (out + out.transpose(0, 2, 1)) / 2, seen
 
 
 def _foot(camera: Camera, state: Array, scale: Array) -> tuple[Array, Array, Array]:
