@@ -29,10 +29,10 @@ class Loopback:
         self.scheduler = self._start("scheduler", words, **env)
         self._wait(port)
 
-    def add_worker(self, *words: str, threads: int = 1, path: Path = ROOT) -> subprocess.Popen[bytes]:
-        """One more worker, which nobody starts again when it dies; path: where it finds our packages."""
+    def add_worker(self, *words: str, threads: int = 1) -> subprocess.Popen[bytes]:
+        """One more worker, given more words, which nobody starts again when it dies."""
         more = ["--nthreads", str(threads), "--no-nanny", "--no-dashboard", *words]
-        self.workers.append(self._start("worker", [self.address, "--host", "127.0.0.1", *more], PYTHONPATH=str(path)))
+        self.workers.append(self._start("worker", [self.address, "--host", "127.0.0.1", *more], PYTHONPATH=str(ROOT)))
         return self.workers[-1]
 
     def end(self) -> None:

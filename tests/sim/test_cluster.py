@@ -116,9 +116,8 @@ def test_an_item_that_kills_its_workers_is_one_clear_error_or_has_a_result(stric
      (True, "got a worker that cannot begin .*No module named 'sim.cluster'")],
 )  # fmt: skip
 def test_a_worker_that_cannot_take_part(empty: bool, message: str, strict: Loopback, tmp_path: Path) -> None:
-    (tmp_path / "sim").mkdir()
-    (tmp_path / "sim" / "__init__.py").write_text("")
-    worker = strict.add_worker(path=tmp_path) if empty else strict.add_worker(threads=2)
+    (tmp_path / "empty.py").write_text("import sys, types\nsys.modules['sim'] = types.ModuleType('sim')\n")
+    worker = strict.add_worker("--preload", str(tmp_path / "empty.py")) if empty else strict.add_worker(threads=2)
     try:
         with pytest.raises(WorkError, match=message), crew(1, strict.address) as run:
             list(run(root_of, [4.0]))
