@@ -84,6 +84,23 @@ def test_who_stays_stands_drifts_or_shakes() -> None:
     assert places(drift=0.1) == places(jitter=0.1) == 60 * still
 
 
+def test_drift_has_the_sd_asked_for_along_both_axes() -> None:
+    truth, ways = people(11), []
+    for seed in range(150):
+        found = alarms(truth, 0.7, seed, life=1e6, drift=0.4)
+        first, last = found[0].box, found[-1].box
+        if first is not None and last is not None and len(first) == len(last) == 1:
+            way = (
+                last[0]
+                + last[0, [2, 3, 2, 3]] * [0.5, 1.0, 0, 0]
+                - first[0]
+                - first[0, [2, 3, 2, 3]] * [0.5, 1.0, 0, 0]
+            )
+            ways.append(way[:2] / first[0, 3])  # in 1 s
+    assert len(ways) > 30
+    assert np.std(ways, axis=0) == pytest.approx([0.4, 0.4], rel=0.3)
+
+
 def test_a_higher_rate_keeps_those_that_were_there() -> None:
     few, many = (alarms(people(80), rate, life=0.5, near=0.5) for rate in (1.0, 3.0))
     for a, b in zip(few, many, strict=True):
