@@ -1,4 +1,4 @@
-"""What README.md says can be typed as it stands; only seeds and frames per second are fewer."""
+"""What README.md says can be typed as it stands; only seeds, trials and frames per second are fewer."""
 
 from __future__ import annotations
 
@@ -15,6 +15,9 @@ from tracking.app.cli import run
 README = (Path(__file__).resolve().parents[3] / "README.md").read_text(encoding="utf-8")
 
 
+FEW = shlex.split("--seeds 0 --validation 10000 --test 20000 --check none --set scenario.camera.fps=5 --only gate")
+
+
 def blocks(language: str) -> list[str]:
     """The fenced blocks of a language ("" for none)."""
     found = re.findall(r"^```(\w*)\n(.*?)^```$", README, re.DOTALL | re.MULTILINE)
@@ -29,8 +32,11 @@ def test_commands(tmp_path, monkeypatch, capsys):
     assert len(lines) >= 6
     for line in lines:
         words = shlex.split(line, comments=True)[1:]
-        words += ["--set", "camera.fps=5"] if words[0] == "generate" else []
-        assert run([word.replace("0:10", "0:1") for word in words]) == 0, (line, capsys.readouterr().err)
+        words += {"generate": ["--set", "camera.fps=5"], "tune": FEW}.get(words[0], [])
+        assert run([{"0:10": "0:1", "100": "2"}.get(word, word) for word in words]) == 0, (
+            line,
+            capsys.readouterr().err,
+        )
     assert (tmp_path / "plan.svg").is_file()
     for made in ("replay.html", "replay.mp4", "street-tracked.mp4"):
         assert (tmp_path / made).is_file()
