@@ -20,7 +20,7 @@ REACH = 10.0  # s
 LAGS = 14
 TIMES = np.geomspace(0.05, 2 * REACH, 26)  # s, of the exponentials tried, up to twice the longest lag
 LEAST = 0.03  # of the variance: smaller parts are left out
-PAIRS = 4000  # of a lag that are looked at
+PAIRS = 12000  # of a lag that are looked at
 FEW = 20  # pairs: a lag with fewer tells nothing
 
 

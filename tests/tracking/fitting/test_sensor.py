@@ -35,8 +35,8 @@ KNOWN = Sensor(
     ),
     points="foot",
     false_alarms=FalseAlarms(
-        life=1.5, seen=0.8, near=0.4, across=(0.02, 0.04), foot=(-0.3, 0.05), near_height=(-1.1, 0.1), height=(0.2, 0.1),
-        aspect=(-0.8, 0.1), drift=0.1, jitter=0.02,
+        life=1.5, seen=0.8, near=0.4, across=(0.02, 0.04), foot=(-0.3, 0.05), near_height=(-1.1, 0.1),
+        height=(0.2, 0.1), aspect=(-0.8, 0.1), drift=0.1, jitter=0.02,
     ),
     true_scores=(0.3, 0.8, 1.0),
     false_scores=(0.2, 0.3, 0.6),
