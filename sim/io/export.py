@@ -14,6 +14,7 @@ from sim.io.atomic import write_file
 from sim.io.source import open_source
 from sim.io.streams import file_name
 from sim.io.tables import json_text
+from sim.io.validate import content_hash
 from sim.types import Sequence, Truth
 
 PERSON = {"id": 1, "name": "person", "supercategory": "person"}
@@ -23,8 +24,8 @@ def coco(source: str | Path, out: str | Path) -> Path:
     """A COCO file of every sequence of a dataset with labelled boxes: one image per frame, one video per sequence.
 
     bbox is amodal and unclipped, [left, top, width, height] px; track_id and group_id (-1 alone) are those of the
-    truth, visibility its share. file_name is the frame's picture, or the video that holds it. The same dataset gives
-    the same bytes.
+    truth, visibility its share. file_name is the frame's picture, or the video that holds it. info has the content hash
+    of a dataset of ours. The same dataset gives the same bytes.
     """
     sequences = [s for s in open_source(source, images=False) if s.truth is not None and s.truth.box is not None]
     if not sequences:
@@ -36,8 +37,10 @@ def coco(source: str | Path, out: str | Path) -> Path:
     images = chain.from_iterable(_images(k, s, starts[k - 1]) for k, s in enumerate(sequences, 1))
     rows = chain.from_iterable(_annotations(k, s, starts[k - 1]) for k, s in enumerate(sequences, 1))
     numbered = ({"id": k, **row} for k, row in enumerate(rows, 1))
+    ours = all(s.source.get("kind") == "generated" for s in sequences)
+    info = {"description": "flockscope", "version": "1"} | ({"content_hash": content_hash(source)} if ours else {})
     blocks = (
-        '"info": {"description": "flockscope", "version": "1"}, "licenses": []',
+        f'"info": {json_text(info)}, "licenses": []',
         f'"categories": [{json_text(PERSON)}]',
         _block("videos", videos),
         _block("images", images),

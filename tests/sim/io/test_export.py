@@ -5,6 +5,7 @@ import pytest
 from scenarios.errors import InputError
 from sim.io import store
 from sim.io.export import coco
+from sim.io.validate import content_hash
 
 
 def test_coco_has_every_box(tmp_path, make_sequence):
@@ -18,6 +19,7 @@ def test_coco_has_every_box(tmp_path, make_sequence):
     found = json.loads(first)
     truths = [make_sequence(k).truth for k in (0, 1)]
     assert [c["name"] for c in found["categories"]] == ["person"]
+    assert found["info"]["content_hash"] == content_hash(tmp_path / "data")
     assert [i["id"] for i in found["images"]] == list(range(1, 25))
     assert [a["id"] for a in found["annotations"]] == list(range(1, sum(len(t.id) for t in truths) + 1))
     assert [a["track_id"] for a in found["annotations"]] == [i for t in truths for i in t.id.tolist()]
