@@ -2,7 +2,7 @@
 
     PYTHONPATH=. python benchmarks/tuning.py search [blob] [group-pda] [grouping] --out FOLDER [--trials N]
     PYTHONPATH=. python benchmarks/tuning.py real --out FOLDER [--data FOLDER]       after `search`
-    PYTHONPATH=. python benchmarks/tuning.py pruning|workers|overhead
+    PYTHONPATH=. python benchmarks/tuning.py workers|overhead
 
 search: on the suites of benchmarks/tuning_suites, training seeds; default → tuned on test seeds, and on friends-meet or
 crossing, which share no scenario with them. A search that was interrupted goes on.
@@ -10,8 +10,7 @@ real: first defaults (tracking/frozen), present defaults and what `search` found
 (200 frames) and TUD-Campus from their det/det.txt, HOTA; `group-pda` on seq_hotel from labelled places, group scores;
 the rule of groups on seq_hotel and CAVIAR Meet_WalkTogether1 from labelled people, pairwise F1. Intervals by moving
 blocks, of the value and of the difference to the present defaults.
-pruning: the same search with and without giving up early: episodes played, and what is found. workers: seconds of one
-search by 1 and 2 processes. overhead: a trial's time beside that of its episodes.
+workers: seconds of one search by 1 and 2 processes. overhead: what a trial costs beside its episodes.
 """
 
 from __future__ import annotations
@@ -20,15 +19,17 @@ import argparse
 import os
 import tempfile
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 from sim.io.source import open_source
 from sim.types import Ints, Sequence, Tracks
 from tracking.config import Config
+from tracking.episodes import Episode, Source
 from tracking.grouping import derive
 from tracking.links import Grouping
 from tracking.protocol import find
@@ -37,7 +38,10 @@ from tracking.scoring.catalogue import CATALOGUE
 from tracking.scoring.resample import scorer
 from tracking.stats import moving_blocks
 from tracking.tuning import tune
+from tracking.tuning_plan import plan
 from tracking.tuning_rule import people_as_tracks
+from tracking.tuning_study import opened
+from tracking.tuning_trials import search as search_trials
 
 SUITES = Path(__file__).parent / "tuning_suites"
 DRAWS = 200
@@ -146,22 +150,22 @@ def answers(name: str, sequence: Sequence, mode: str, config: Config) -> list[Tr
     return list(track(name, sequence, params=config, detections=mode))
 
 
-def pruning(given: argparse.Namespace) -> None:
-    """Episodes that are played, and what is found, by p below which a trial is given up."""
-    for p in (0.0, 0.05, 0.1, 0.2):
-        begun = time.process_time()
-        found = tune(
-            "blob", "crossing", given.trials or 60, seeds=range(4), validation=range(10_000, 10_004),
-            test=range(20_000, 20_008), check=None, prune=p, objective="HOTA",
-        )  # fmt: skip
-        played = sum(t.episodes for t in found.trials if not t.error)
-        best = max(c.validation[0] for c in found.candidates)
-        gain = next((c for c in found.comparisons if c.key == "HOTA"), None)
-        told = gain.line() if gain else found.notes
-        print(
-            f"p {p}: {found.pruned} of {len(found.trials)} given up, {played} episodes, best on validation {best:.4f}"
-        )
-        print(f"  {told}; {time.process_time() - begun:.0f} s", flush=True)
+def overhead(given: argparse.Namespace) -> None:
+    """CPU milliseconds of a trial of 16 episodes that cost nothing: asking, testing, storing."""
+    made = plan("blob", "crossing", given.trials or 200, check=None)
+    r = np.random.default_rng(0)
+
+    def play(sources: list[Source], values: dict[str, Any], every: bool) -> Iterator[Episode]:
+        for s in sources:
+            value = 0.5 + 0.04 * (s.seed % 10) - 0.1 * r.random()
+            yield Episode(s.name, s.seed, value, {"objective": value}, 1, 1.0, 0.0)
+
+    for kind in ("memory", "journal"):
+        with tempfile.TemporaryDirectory() as folder:
+            begun = time.process_time()
+            with opened(made, None if kind == "memory" else Path(folder) / "journal", "x") as study:
+                search_trials(study, play, lambda done, total, what: None)
+            print(f"{kind}: {1000 * (time.process_time() - begun) / made.trials:.1f} ms")
 
 
 def workers(given: argparse.Namespace) -> None:
@@ -183,13 +187,13 @@ def workers(given: argparse.Namespace) -> None:
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     beside = Path(__file__).resolve().parents[2] / "shared" / "data"
-    parser.add_argument("mode", choices=["search", "real", "pruning", "workers"])
+    parser.add_argument("mode", choices=["search", "real", "workers", "overhead"])
     parser.add_argument("names", nargs="*", choices=[*SEARCHES, []])
     parser.add_argument("--out", type=Path, default=Path("tuned"))
     parser.add_argument("--trials", type=int)
     parser.add_argument("--data", type=Path, default=Path(os.environ.get("FLOCKSCOPE_DATA", beside)))
     given = parser.parse_args()
-    {"search": search, "real": real, "pruning": pruning, "workers": workers}[given.mode](given)
+    {"search": search, "real": real, "workers": workers, "overhead": overhead}[given.mode](given)
 
 
 if __name__ == "__main__":

@@ -70,6 +70,11 @@ class Tuned:
         return sum(trial.pruned for trial in self.trials)
 
     @property
+    def episodes(self) -> int:
+        """Training episodes that were played, in trials that had a value."""
+        return sum(trial.episodes for trial in self.trials)
+
+    @property
     def impossible(self) -> int:
         """Trials whose parameters the tracker refused."""
         return sum(bool(trial.error) for trial in self.trials)
@@ -82,10 +87,11 @@ class Tuned:
         """What was done and what came of it; training scores are not among it."""
         plan = self.plan
         names = ", ".join(goal.key for goal in plan.goals)
+        every = len(self.trials) * len(plan.training)
         given_up = f"{self.pruned} given up early, {self.impossible} impossible"
         told = [
             f"{plan.tracker} tuned on {plan.scenes}, detections {plan.detections}, for {names}",
-            f"{len(self.trials)} trials of up to {len(plan.training)} episodes, {given_up}; "
+            f"{len(self.trials)} trials, {self.episodes} of {every} episodes played, {given_up}; "
             f"training seeds {text(plan.seeds)}, validation {text(plan.validation)}, test {text(plan.test)}",
         ]
         if plan.settings:
@@ -118,7 +124,10 @@ class Tuned:
                 "check": list(plan.testing)[1] if plan.check else None, "check_test": text(plan.check_test),
                 "set": list(plan.settings),
             },
-            "counts": {"trials": len(self.trials), "pruned": self.pruned, "impossible": self.impossible},
+            "counts": {
+                "trials": len(self.trials), "episodes": self.episodes, "pruned": self.pruned,
+                "impossible": self.impossible,
+            },
             "params": self.config.as_dict(),
             "changed": {name: {"default": a, "tuned": b} for name, (a, b) in self.changed.items()},
             "taken_back": list(self.taken_back),

@@ -79,15 +79,15 @@ class Study:
 
     def told(self) -> list[Trial]:
         """The finished trials, by their places in the search, which a trial that was done again keeps."""
-        many, every = len(self.plan.training), self.trials()
-        found = [
-            Trial(
-                slot(every, t), tuple(t.values or ()) if ERROR not in t.user_attrs else (), dict(t.params),
-                t.user_attrs.get(PRUNED, many), PRUNED in t.user_attrs, t.user_attrs.get(ERROR, ""),
-            )
-            for t in self.finished()
-        ]  # fmt: skip
-        return sorted(found, key=lambda t: t.number)
+        every = self.trials()
+        return sorted((self._told(t, slot(every, t)) for t in self.finished()), key=lambda t: t.number)
+
+    def _told(self, t: FrozenTrial, place: int) -> Trial:
+        said = t.user_attrs
+        if ERROR in said:
+            return Trial(place, (), dict(t.params), 0, error=said[ERROR])
+        episodes = said.get(PRUNED, len(self.plan.training))
+        return Trial(place, tuple(t.values or ()), dict(t.params), episodes, PRUNED in said)
 
     def best(self) -> set[int]:
         """The places of those trials that no other one beats by all goals."""

@@ -109,7 +109,9 @@ def test_files_hold_no_place_and_no_training_score(found):
 
 def test_all_figures_are_stored(found):
     stored = json.loads((found[1] / "toy.json").read_text())
-    assert stored["counts"] == {"trials": 12, "pruned": found[0].pruned, "impossible": found[0].impossible}
+    played = sum(t.episodes for t in found[0].trials)
+    counts = {"trials": 12, "episodes": played, "pruned": found[0].pruned, "impossible": found[0].impossible}
+    assert stored["counts"] == counts
     assert stored["comparisons"][0]["low"] == found[0].comparisons[0].low
     assert stored["settings"]["seeds"] == "0:5"
     assert stored["changed"]["reach"] == {"default": 0.1, "tuned": found[0].config.reach}
