@@ -154,11 +154,11 @@ def comparison(scenes: str, goal: Goal, before: Episodes, after: Episodes) -> Co
 
 
 def front(candidates: Sequence[Candidate], goals: Sequence[Goal]) -> list[Candidate]:
-    """Those of several goals that no other one beats in all, best of the first goal first."""
+    """Those that no other one beats by all goals, of equals the first; best of the first goal first."""
 
     def beats(one: Candidate, other: Candidate) -> bool:
         gains = [g.gain(b, a) for g, a, b in zip(goals, one.validation, other.validation, strict=True)]
         return min(gains) >= 0 and max(gains) > 0
 
-    kept = [c for c in candidates if not any(beats(other, c) for other in candidates)]
-    return sorted(kept, key=lambda c: goals[0].gain(c.validation[0], 0.0))
+    kept = {c.validation: c for c in reversed(candidates) if not any(beats(other, c) for other in candidates)}
+    return sorted(kept.values(), key=lambda c: goals[0].gain(c.validation[0], 0.0))

@@ -117,7 +117,8 @@ def pareto(found: Tuned) -> str:
     for c in found.candidates:
         u, v = axes.at(*c.validation[:2])
         body += [_dot(u, v, ORANGE if c in found.front else BLUE)]
-        body += [_text(u + 8, v - 6, "defaults" if c.config == found.default else f"trial {c.trial}", fill=PALE)]
+        name = "defaults" if c.config == found.default else f"trial {c.trial}"
+        body += [_text(u - 8, v - 6, name, "end", PALE) if u > WIDTH / 2 else _text(u + 8, v - 6, name, fill=PALE)]
     key = [(ORANGE, "front: no other is better in all"), (BLUE, "beaten")]
     return _page(f"{_named(found)}: {one.key} and {two.key}", body, key)
 
