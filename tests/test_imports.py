@@ -22,6 +22,7 @@ HEAVY = {
     "av",
     "rich",
     "matplotlib",
+    "optuna",
 }
 LIST = "print(*sorted({name.partition('.')[0] for name in sys.modules}))"
 

@@ -128,6 +128,9 @@ def plan(
     other = tuning_scenes.unused(names) if check == "" else check
     several = _check_suite(names, other)
     base, mode = subject.config_class().with_set(*own), detections or subject.detections
+    if mode != "file" and any(setting.startswith("sensor.") for setting in settings):
+        remedy = "leave the sensor out, or add --detections file"
+        raise InputError(place="--sensor, --set sensor", got=f"--detections {mode}", expected="file", remedy=remedy)
     made = Plan(
         subject, base, _space(base, own, tuple(only), mode), names, other,
         tuning_scenes.chosen_seeds(seeds, "train", count), tuning_scenes.chosen_seeds(validation, "val", count),

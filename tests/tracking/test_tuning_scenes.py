@@ -123,6 +123,7 @@ def test_scene_with_a_wrong_setting(tmp_path):
         ({"detections": "image"}, "--detections"),
         ({"tracker": "tests/fake_tracker.py:Nearest"}, "a tracker with parameters"),
         ({"tracker": "blobb"}, "did you mean blob"),
+        ({"set": ["sensor.detect_prob=0.5"], "detections": "truth"}, "leave the sensor out"),
         ({"tracker": "grouping", "detections": "file"}, "whose identity is known"),
         ({"set": [f"{name}=0.1" for name in ("reach", "skip", "colour", "forbidden")]}, "skip|colour"),
     ],
