@@ -135,6 +135,8 @@ def _why_none(candidates: list[Candidate], goal: Goal) -> list[str]:
     if not others:
         return ["the defaults stay: no trial was better in training"]
     best = max(others, key=lambda c: goal.gain(c.before, c.after))
+    if best.sequences < 2:
+        return ["the defaults stay: one validation scene says nothing of others; give more --validation seeds"]
     ends = f"{best.difference:+.4f} [{best.low:+.4f}, {best.high:+.4f}], {best.sequences} sequences"
     return [f"the defaults stay: nothing is surely better on the validation scenes; at best {goal.key} {ends}"]
 

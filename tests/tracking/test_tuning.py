@@ -13,6 +13,7 @@ from pathlib import Path
 import pytest
 
 from scenarios.errors import FlockscopeError, InputError
+from tests.loopback import loopback
 from tests.toy_tracker import Toy, ToyConfig
 from tests.tuning_toys import TOY, wishes, write_scenes
 from tracking.tuning import tune
@@ -126,6 +127,18 @@ def test_the_same_again_and_with_two_workers(found, tmp_path):
         assert contents(out) == contents(found[1])
     tune(**wishes(tmp_path)).write(tmp_path / "toy.toml")
     assert contents(tmp_path) == contents(found[1])
+
+
+def test_the_same_on_a_cluster(tmp_path):
+    """Two workers elsewhere: the same bytes as here."""
+    small = {"trials": 4, "check": None, "only": ["reach"]}
+    tune(**wishes(tmp_path, **small), out=tmp_path / "toy.toml")
+    here = contents(tmp_path)
+    for path in tmp_path.glob("toy.*"):
+        path.unlink()
+    with loopback(tmp_path) as cluster:
+        tune(**wishes(tmp_path, cluster=cluster.address, **small), out=tmp_path / "toy.toml")
+    assert contents(tmp_path) == here
 
 
 def test_another_seed_searches_elsewhere(found, tmp_path):
