@@ -14,6 +14,8 @@ from sim.types import Sequence, Tracks
 if TYPE_CHECKING:
     from tracking.run import Prepared
 
+SAID = 6  # settings of a sensor that are said in words: of a whole profile the rest is in run.json
+
 
 @dataclass(frozen=True)
 class Speed:
@@ -74,13 +76,9 @@ def given(info: Mapping[str, Any]) -> str:
     """What a tracker was given, in words, by its run.json; "" where that does not say."""
     mode, background, sensor = (info.get(key) for key in ("detections", "background", "sensor"))
     more = [f"background: {background}"] if background else []
-    more += [f"{key} = {_short(value)}" for key, value in (sensor or {}).items()]
+    more += [f"{key} = {value}" for key, value in list((sensor or {}).items())[:SAID]]
+    more += [f"{len(sensor) - SAID} more"] if sensor and len(sensor) > SAID else []
     return f"{mode} ({', '.join(more)})" if more else str(mode or "")
-
-
-def _short(value: object) -> object:
-    """Numbers and words as they are; of tables and lists that they are there."""
-    return "…" if isinstance(value, Mapping | list | tuple) else value
 
 
 def _versions() -> dict[str, str]:
