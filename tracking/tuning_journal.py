@@ -20,6 +20,7 @@ from optuna.storages.journal import JournalFileBackend
 
 LOCKS = ".locks"
 TAKING, WRITING, FIRST = 0, 1, 2
+HEAD = b'{"op_code":'
 
 
 class Locks:
@@ -80,6 +81,7 @@ class Journal(JournalFileBackend):
         self._path, self._locks = path, locks
         super().__init__(str(path))
         with locks.holding(WRITING):
+            self._check()
             self._whole()
 
     def append_logs(self, logs: list[dict[str, Any]]) -> None:
@@ -89,6 +91,13 @@ class Journal(JournalFileBackend):
             self._whole()
             with open(self._path, "ab") as file:
                 file.write(text.encode())
+
+    def _check(self) -> None:
+        """ValueError where the file is something else, of which nothing may be cut off."""
+        with open(self._path, "rb") as file:
+            head = file.read(len(HEAD))
+        if not HEAD.startswith(head):
+            raise ValueError("no journal of Optuna")
 
     def _whole(self) -> None:
         """Cut off a line that has no end."""

@@ -13,6 +13,7 @@ import pytest
 from optuna.distributions import CategoricalDistribution, FloatDistribution, IntDistribution
 from optuna.trial import TrialState
 
+from scenarios.errors import InputError
 from tests.tuning_toys import wishes
 from tracking.links import Grouping
 from tracking.papers.blob_config import BlobConfig
@@ -125,15 +126,25 @@ def test_killed_between_two_lines(tmp_path):
 
 def test_a_half_line_is_cut_off(tmp_path):
     path, locks = tmp_path / "j", Locks(tmp_path / "j.locks")
-    Journal(path, locks).append_logs([{"a": 1}])
+    Journal(path, locks).append_logs([{"op_code": 1}])
     with path.open("ab") as file:
         file.write(b'{"b"')
     journal = Journal(path, locks)
-    journal.append_logs([{"c": 2}])
-    assert list(journal.read_logs(0)) == [{"a": 1}, {"c": 2}]
-    path.write_bytes(b'{"b"')
+    journal.append_logs([{"op_code": 2}])
+    assert list(journal.read_logs(0)) == [{"op_code": 1}, {"op_code": 2}]
+    path.write_bytes(b'{"op_c')
     assert list(Journal(path, locks).read_logs(0)) == []
     locks.close()
+
+
+@pytest.mark.parametrize("content", [b"tracker = 'blob'", b'{"seed": 1}', b"\x00\x01"])
+def test_another_file_is_left_as_it_is(tmp_path, content):
+    path = tmp_path / "precious"
+    path.write_bytes(content)
+    with pytest.raises(InputError, match="no journal") as caught, opened(plan(**wishes(tmp_path)), path, "x"):
+        pass
+    assert "--storage" in str(caught.value)
+    assert path.read_bytes() == content
 
 
 def test_a_lock_lives_as_long_as_its_process(tmp_path):
