@@ -101,11 +101,8 @@ def partition(points, weights, rule: Constraint, label=None):
 
 
 def is_group(points, weights, rule: Constraint):
-    """|G_y| = 1, or all linked however light; nobody is no group."""
-    if len(points) == 0:
-        return False
-    label = linked(points, rule.link)
-    return label.max() == 0 or partition(points, weights, rule, label).max() == 0
+    """|G_y| = 1; nobody, or noise alone, is no group."""
+    return len(points) > 0 and partition(points, weights, rule, linked(points, rule.link)).max() == 0
 
 
 def prefixes(points, weights, start, rule: Constraint):

@@ -86,7 +86,7 @@ def centroid_noise(seen, cov, extent, size, rules):
     m = max(seen, min(1.0, n))
     true = extent - noise
     np.fill_diagonal(true, np.maximum(np.diag(true), 0.0))
-    return noise / m + (true * (n - m) / (n - 1) / m if n > 1 else 0.0)
+    return noise / m + (true * (n - m) / max(n - 1, 1.0) / m if n > 1 else 0.0)
 
 
 def moments(points, weights):
@@ -136,7 +136,10 @@ def update(g, points, weights, d2, own, hits, x, P, extent, size, hold, rules):
         return "nothing", [], None, None, 0.0, *same
     sets = associations(mine, shared, points, weights, rules)
     if not sets:
-        return "null", mine + shared, None, None, 0.0, *same
+        some = mine + shared
+        if reference_components.partition(points[some], weights[some], rules.constraint).max() < 0:
+            return "nothing", [], None, None, 0.0, *same  # noise
+        return "null", some, None, None, 0.0, *same
     beta, miss, R = masses(sets, mine, shared, points, weights, x, P, extent, size, rules)
     states, covariances = [x], [P]
     for s, r in zip(sets, R, strict=True):

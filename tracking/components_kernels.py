@@ -225,7 +225,7 @@ def prefixes(
 ) -> tuple[Bools, int]:
     """Which of the first `start`, start + 1, … M points are one group, |G_y| = 1 (M - start + 1,), and the work done.
 
-    Components of less weight than `least` are no parts; one point alone, or linked ones, are always a group.
+    Components of less weight than `least` are no parts, and of such alone there is no group.
     """
     m = len(points)
     one = np.zeros(m - start + 1, np.bool_)
@@ -250,7 +250,7 @@ def prefixes(
             work[0] += some
             some = kept
         if k + 1 >= start:
-            one[k + 1 - start] = some == 1 or _whole(sums, tops[:some], part, gate, prior, strength, least, work)
+            one[k + 1 - start] = _whole(sums, tops[:some], part, gate, prior, strength, least, work)
     return one, work[0]
 
 
@@ -259,6 +259,8 @@ def _whole(
     sums: Array, tops: Ints, part: Array, gate: float, prior: Array, strength: float, least: float, work: Ints
 ) -> bool:
     """Are the components with these roots one group?"""
+    if len(tops) == 1:
+        return bool(sums[tops[0], WEIGHT] >= least)
     count = 0
     for n in range(len(tops)):
         if sums[tops[n], WEIGHT] >= least:

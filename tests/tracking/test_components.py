@@ -165,10 +165,10 @@ def test_light_components_are_noise() -> None:
     assert partition(points, np.ones(6), rule).tolist() == [0, 1, 0, 0, 1, 1]
     assert partition(points[:5], np.ones(5), rule).tolist() == [0, -1, 0, 0, -1]
     assert partition(points[:3], np.ones(3), rule).tolist() == [-1, -1, -1]
-    #             one   two light   light  heavy and light  both heavy
-    assert prefixes(points, np.ones(6), 1, rule).tolist() == [True, False, False, True, True, False]
+    #                                              light ones alone     heavy and light  both heavy
+    assert prefixes(points, np.ones(6), 1, rule).tolist() == [False, False, False, True, True, False]
     weights = np.array([1.0, 2, 1, 1, 1, 1])  # the second is heavy by himself, from the fifth on
-    assert prefixes(points, weights, 1, rule).tolist() == [True, False, False, True, False, False]
+    assert prefixes(points, weights, 1, rule).tolist() == [False, False, False, True, False, False]
 
 
 @pytest.mark.parametrize(("far", "where"), [(1e3, 0), (1e3, 3), (1e6, 0), (1e6, 3), (1e9, 0), (1e9, 3)])

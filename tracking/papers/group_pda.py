@@ -46,6 +46,7 @@ from tracking.papers.group_pda_bank import Bank
 from tracking.papers.group_pda_carry import Claims, claimed, exclusive, remember, with_carried
 from tracking.papers.group_pda_colour import colours, learn, speaks
 from tracking.papers.group_pda_config import GroupPdaConfig
+from tracking.papers.group_pda_doubles import Doubles
 from tracking.papers.group_pda_merging import Change, Merging
 from tracking.papers.group_pda_pixels import Pixels, steepness
 from tracking.papers.group_pda_report import tracks
@@ -70,7 +71,8 @@ class GroupPda:
     def reset(self, context: Context, seed: int) -> None:
         """Forget everything; with a background sample pixels are tracked, else points. `seed` is unused."""
         self.context = context
-        self.bank, self.merging, self.names = Bank.empty(), Merging(), changes.Names()
+        self.bank, self.names = Bank.empty(), changes.Names()
+        self.merging, self.doubles = Merging(), Doubles()
         self.pixels = None if context.background is None else Pixels(self.config, context)
         if self.pixels is not None:
             self.context = context.replace(px_per_m=self.pixels.scale)
@@ -105,6 +107,7 @@ class GroupPda:
         told: list[Change] = []
         if points is not None:
             told += self._measure(points, weights, rules, t)
+        self.doubles.step(bank, rules, t)
         told += self.merging.step(bank, rules, t)
         told += changes.confirm(bank, rules, t, self.names)
         told += changes.deaths(bank, rules, t)
@@ -133,7 +136,7 @@ class GroupPda:
         return Q * self.context.px_per_m if self.box is None else SQUARE * self.box / 2
 
     def outlines(self) -> list[Array]:
-        """The outlines of the groups that are told, px, the whole cells of the grid."""
+        """The outlines of the groups that have an id, px, the whole cells of the grid."""
         bank, cell = self.bank, self._outline(None)
         rows = np.flatnonzero(bank.named).tolist()
         return [((bank.places[r][0] + bank.x[r, :2])[:, None] + cell).reshape(-1, 2) for r in rows]
@@ -180,7 +183,8 @@ class GroupPda:
             claims.points, claims.weights, claims.d2, looks, claims.own, claims.hits,
             bank.x, bank.P, bank.extent, bank.size, bank.null > 0, rules.numbers,
         )  # fmt: skip
-        measured, null = state == kernels.MEASURED, state == kernels.NULL
+        fresh = (chosen & (claims.seen >= t)).any(1)  # more than members carried along
+        measured, null = (state == kernels.MEASURED) & fresh, state == kernels.NULL
         bank.seen[measured | null] = t
         bank.measured[measured] += rules.dt
         bank.null = np.where(null, bank.null + rules.dt, np.maximum(bank.null - rules.dt * measured, 0.0))
@@ -198,7 +202,7 @@ class GroupPda:
     def _search(self, points: Array, rules: Rules, t: float) -> Array:
         """d2 (G, M). Lost groups claim nothing; tentative ones what no other claims."""
         bank = self.bank
-        lost = bank.named & (t - bank.seen > self.config.coast_time + 1e-9)
+        lost = bank.named & (t - bank.seen > max(self.config.coast_time, rules.dt) + 1e-9)
         wider = np.square(rules.scale * self.config.split_speed * bank.null)
         d2 = kernels.search(points, bank.x, bank.P, bank.extent, rules.noise**2, wider, self.config.gate)
         d2[lost] = np.inf

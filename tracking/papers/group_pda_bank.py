@@ -120,6 +120,8 @@ def children(parent: Bank, row: int, points: Array, weights: Array, group: Ints,
     made = newborn(points, weights, group, rules, t)
     made.born[:], made.measured[:] = parent.born[row], parent.measured[row]
     made.look[:] = parent.look[row]
+    if parent.id[row] == UNNAMED:
+        made.parent[:], made.origin[:] = parent.parent[row], parent.origin[row]
     if c.inherit_velocity:
         made.x[:, 2:] = parent.x[row, 2:]
         made.P[:, 2:, 2:] = parent.P[row, 2:, 2:] + (rules.scale * c.split_speed) ** 2 * np.eye(2)

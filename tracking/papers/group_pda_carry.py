@@ -78,8 +78,10 @@ def exclusive(chosen: Bools, d2: Array) -> Bools:
 
     Estimates share points (4.1); a person is in one group only.
     """
-    distance = np.where(chosen, d2, np.inf)
-    return np.asarray((distance <= distance.min(0, initial=np.inf)) | (chosen.sum(0) < 2))
+    if not len(chosen):
+        return chosen
+    nearest = np.where(chosen, d2, np.inf).argmin(0)
+    return np.asarray(chosen & ((np.arange(len(chosen))[:, None] == nearest) | (chosen.sum(0) < 2)))
 
 
 def remember(bank: Bank, claims: Claims, chosen: Bools, rules: Rules, t: float) -> None:

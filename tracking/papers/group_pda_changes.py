@@ -166,7 +166,8 @@ def _returned(bank: Bank, new: Ints, old: Ints, rules: Rules) -> Iterator[tuple[
     d2 = np.einsum("nki,nki->nk", d, np.linalg.solve(S, d[..., None])[..., 0])
     doubt = np.sqrt(np.einsum("nkaa,a->nk", S[..., 2:, 2:], np.square(rules.ground)) / 2)
     slow = np.hypot(*np.moveaxis(d[..., 2:] * rules.ground, 2, 0)) <= rules.config.merge_velocity + doubt
-    d2 = np.where(slow & (d2 <= GATE4), d2, np.inf)
+    gone = bank.seen[old] < bank.born[new][:, None]  # not somebody else who is missed for a frame
+    d2 = np.where(slow & gone & (d2 <= GATE4), d2, np.inf)
     while np.isfinite(d2).any():
         i, j = np.unravel_index(int(d2.argmin()), d2.shape)
         yield int(new[i]), int(old[j])

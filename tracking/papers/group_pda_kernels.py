@@ -11,7 +11,7 @@ import numpy as np
 from numba import njit
 
 from sim.types import Array, Bools, Ints
-from tracking.components_kernels import prefixes
+from tracking.components_kernels import WEIGHT, components, prefixes
 
 NOTHING, NULL, MEASURED = range(3)
 (GATE, LINK, PRIOR_XX, PRIOR_XY, PRIOR_YY, STRENGTH, LEAST, NOISE, COUNT, SHARE, DETECT, MISS, FREEZE, KEEP_EXTENT,
@@ -76,9 +76,9 @@ def associate(
 
     d2 (G, M) from `search`; own (M,): the group that an unclaimed point is attached to, or -1; hits (M,): in how many
     regions each point lies; looks (G, M): what a point's colour adds to the log mass of an association, per person, or
-    (G, 0) without colours; hold (G,): whose extent and size rest. Returns (G,) NOTHING in the region, NULL (no
-    association is feasible) or MEASURED; (G, M) the points of the likeliest association; (G, 6) its innovation y and S
-    (xx, xy, yy) and the mass of the miss.
+    (G, 0) without colours; hold (G,): whose extent and size rest. Returns (G,) NOTHING in the region but noise, or
+    nothing that is the group's; NULL (no association is feasible) or MEASURED; (G, M) the points of the likeliest
+    association; (G, 6) its innovation y and S (xx, xy, yy) and the mass of the miss.
     """
     groups, m = d2.shape
     state, chosen = np.zeros(groups, np.int64), np.zeros((groups, m), np.bool_)
@@ -95,7 +95,8 @@ def associate(
             prior = rules[PRIOR_XX : PRIOR_YY + 1]
             feasible = prefixes(some, people, start, rules[LINK], rules[GATE], prior, rules[STRENGTH], rules[LEAST])[0]
         if not feasible.any():
-            state[g], chosen[g, order] = NULL, True
+            if components(some, people, rules[LINK])[1][:, WEIGHT].max() >= rules[LEAST]:
+                state[g], chosen[g, order] = NULL, True
             continue
         look = looks[g][order] * people if looks.shape[1] else np.zeros(len(order))
         best = _estimate(
@@ -187,7 +188,8 @@ def _centroid_noise(seen: float, cov: Array, extent: Array, size: float, rules: 
     """R (xx, xy, yy) of the centroid of `seen` people out of those that are there.
 
     Members who keep their places: r^2 / m + (1 - m / n) Sigma n / (n - 1) / m, drawn without replacement (ours); if
-    more are seen than there are, the other way round, with the covariance cov (3,) of those who are seen; or
+    more are seen than there are, the other way round, with the covariance cov (3,) of those who are seen; n - 1 is 1
+    at least, as a size between one and two is a doubt about which; or
     (2.1) read literally, drawn anew in each frame: Sigma / m. Sigma is of measured places: r^2 is in it.
     """
     noise = rules[NOISE] ** 2  # the extent is that of measured places, so it has this noise already
@@ -199,7 +201,7 @@ def _centroid_noise(seen: float, cov: Array, extent: Array, size: float, rules: 
         own = noise / max(there, 1.0)
         return own + strange * cov[0], strange * cov[1], own + strange * cov[2]
     m = max(seen, min(1.0, there))
-    unseen = (there - m) / max(there - 1, 1e-9) / m if there > 1 else 0.0
+    unseen = (there - m) / max(there - 1, 1.0) / m if there > 1 else 0.0
     xx, yy = max(extent[0, 0] - noise, 0.0), max(extent[1, 1] - noise, 0.0)
     return noise / m + unseen * xx, unseen * extent[0, 1], noise / m + unseen * yy
 

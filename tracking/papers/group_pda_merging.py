@@ -14,7 +14,8 @@ from sim.geometry import hull_gap
 from sim.types import Array, Bools, Ints
 from tracking.ellipsoids import overlaps
 from tracking.papers.group_pda_bank import UNNAMED, Bank, merged
-from tracking.papers.group_pda_kernels import near
+from tracking.papers.group_pda_doubles import doubtful
+from tracking.papers.group_pda_kernels import CUT, near
 from tracking.papers.group_pda_onset import REACH, Encounter
 from tracking.papers.group_pda_rules import Rules
 
@@ -24,11 +25,9 @@ LONGEST = 5.0
 """s that is looked back at most."""
 MARGIN = 0.9
 """Of gamma: groups merge a little nearer than they split, as their extents are noisy."""
-DOUBLE = 0.55
-"""Share of two groups that must be measured: else they may be one and the same, a hidden one on another's points."""
 OWN = 0.2
 """Share of a group that must be nearer to it than to any other for its velocity to be its own."""
-PATIENCE = 0.5
+PATIENCE = 1.5
 """s that an encounter outlasts without a look at both groups."""
 
 
@@ -72,6 +71,7 @@ class Merging:
             keep[rows] = False
             bank.keep(keep)
             bank.add(one)
+            bank.parent[np.isin(bank.parent, ids)] = one.id[0]
             self.met = {p: met for p, met in self.met.items() if not set(p) & set(ids)}
             kind = "merge" if len(here) > 1 else "enter"
             yield Change(kind, since, tuple(sorted(ids)), (int(one.id[0]),), tuple(place.tolist()))
@@ -92,7 +92,7 @@ def _near(bank: Bank, rows: Ints, rules: Rules) -> Iterator[tuple[tuple[int, int
     most = rules.config.merge_velocity + rules.config.merge_doubt * np.sqrt(var[:, None] + var)
     slow = np.hypot(*(v[:, None] - v[None]).transpose(2, 0, 1)) <= most
     for i, j in np.argwhere(np.triu(close, 1)).tolist():
-        if DOUBLE * (bank.size[rows[i]] + bank.size[rows[j]]) > bank.own[rows[i]] + bank.own[rows[j]]:
+        if doubtful(bank, rows[i], rows[j]):
             continue
         i, j = sorted((i, j), key=lambda k: bank.id[rows[k]])
         a, b = bank.x[rows[i], :2], bank.x[rows[j], :2]
@@ -106,7 +106,7 @@ def _spread(bank: Bank, row: int, way: Array, rules: Rules) -> float:
     """Standard deviation, m, of a group's people along a way on the ground: their extent without what it was shrunk to,
     and without that of one body."""
     n, n0 = bank.size[row], rules.constraint.strength
-    people = ((n + n0) * bank.extent[row] - n0 * rules.constraint.prior) / n - rules.body
+    people = ((n + n0) * rules.numbers[CUT] * bank.extent[row] - n0 * rules.constraint.prior) / n - rules.body
     along = rules.ground * way / max(float(np.hypot(*way)), 1e-9)
     return float(np.sqrt(max(along @ people @ along, 0.0)))
 

@@ -13,7 +13,7 @@ import numpy as np
 
 from sim.types import Array
 
-CHORD = 0.3
+CHORD = 0.4
 """s before and after, over which a velocity is a chord."""
 APART, FAR_APART, PARTING = 1.5, 2.5, 0.7
 """m between the nearest, with and without velocities that differ by so many m/s, from which on parts of a group count
@@ -41,8 +41,10 @@ class Encounter:
 
 
 def chords(t: Array, d: Array) -> Array:
-    """(K,) speeds over CHORD before and after each of the times t (K,), of places d (K, 2)."""
-    first, last = np.searchsorted(t, t - CHORD - 1e-9), np.searchsorted(t, t + CHORD + 1e-9) - 1
+    """(K,) speeds over CHORD before and after each of the times t (K,), one frame at least, of places d (K, 2)."""
+    k = np.arange(len(t))
+    first = np.minimum(np.searchsorted(t, t - CHORD - 1e-9), np.maximum(k - 1, 0))
+    last = np.maximum(np.searchsorted(t, t + CHORD + 1e-9) - 1, np.minimum(k + 1, len(t) - 1))
     return np.asarray(np.hypot(*(d[last] - d[first]).T) / np.maximum(t[last] - t[first], 1e-9))
 
 

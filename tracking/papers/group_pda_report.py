@@ -31,7 +31,7 @@ def tracks(
     )
     return Tracks(
         index, t, plane, "group", id, id.copy(), x[:, :2].copy(), x[:, 2:].copy(), bank.P[rows],
-        None, np.ones(len(rows)), groups, tuple(_event(c, index, fps) for c in changes),
+        None, np.ones(len(rows)), groups, tuple(_event(c, index, t, fps) for c in changes),
     )  # fmt: skip
 
 
@@ -40,6 +40,6 @@ def _hulls(places: list[Array], outline: Array) -> tuple[Array, ...]:
     return hulls([(corner[:, None] + outline).reshape(-1, 2) for corner in hulls(places)])
 
 
-def _event(change: Change, index: int, fps: float) -> GroupEvent:
-    start = min(max(round(change.since * fps) + 1, 1), index)
+def _event(change: Change, index: int, t: float, fps: float) -> GroupEvent:
+    start = min(max(index - round((t - change.since) * fps), 1), index)
     return GroupEvent(change.kind, start, index, index, change.before, change.after, (), change.pos)
