@@ -19,7 +19,8 @@ Departures, all ours:
   splitting and merging, so that what is split is not merged.
 - R of the centroid: members keep their places and are drawn without replacement out of those there (of those seen, if
   they are more). m_N grows with N and has tails; a further association is that nothing is the group's (the miss).
-- Sigma and N rest while points are shared, and in spells. A shared point is told as the nearer group's.
+- Sigma and N rest while points are shared, and in spells. A shared point is told as the nearer group's. Of two groups
+  that lie on the points of one for too long one is lost (doubles).
 - From points, members who are not measured are carried along for a while as points of their group (carry); points that
   are linked to a group's, but in no region, are its own (attach).
 - P of merged groups is that of a weighted mean. SR_v is a physical difference of velocities, and must last. Groups that
@@ -29,7 +30,8 @@ Departures, all ours:
 - Groups are tentative at first, coast, are lost, and take their id back from a newborn that fits.
 - Onsets of merges and splits are looked at afterwards (onset). In an image seen at an angle, velocities and distances
   in depth count for more px than they show.
-- association="none", the paper's 5.2.1, takes all points in the region: no masses, no miss, no spell, so no split.
+- association="none", the paper's 5.2.1, takes all points in the region, attached and carried ones, too: no masses, no
+  miss, no spell, so no split but by walking out.
 """
 
 from __future__ import annotations
