@@ -51,11 +51,17 @@ def find(spec: str) -> type[Tracker]:
 
 
 def _from_file(path: Path) -> Any:
-    """Load a file under a private name, so that it shadows nothing and two of the same stem can live together."""
+    """Load a file under a private name, so that it shadows nothing and two of the same stem can live together.
+
+    Loaded once as long as it is what it was: its classes stay the same ones, so that a config fits its tracker.
+    """
     if not path.is_file():
         raise InputError(file=path, got="no such file", expected="a Python file", remedy="check the path")
     resolved = path.resolve()
-    name = f"_flockscope_{resolved.stem}_{hashlib.sha256(str(resolved).encode()).hexdigest()[:12]}"
+    content = hashlib.sha256(str(resolved).encode() + b"\0" + resolved.read_bytes())
+    name = f"_flockscope_{resolved.stem}_{content.hexdigest()[:12]}"
+    if name in sys.modules:
+        return sys.modules[name]
     spec = importlib.util.spec_from_file_location(name, resolved)
     assert spec is not None
     assert spec.loader is not None

@@ -79,6 +79,16 @@ def test_registered_and_by_module():
     assert protocol.find("blob") is protocol.find("tracking.papers.blob:Blob")
 
 
+def test_a_file_is_loaded_anew_where_it_has_changed(tmp_path):
+    path = tmp_path / "mine.py"
+    text = "class Mine:\n  needs = ('points',)\n  def reset(self, c, s): pass\n  def step(self, f, d): pass\n"
+    path.write_text(text)
+    first = protocol.find(f"{path}:Mine")
+    assert protocol.find(f"{path}:Mine") is first
+    path.write_text(text.replace("points", "boxes"))
+    assert protocol.find(f"{path}:Mine").needs == ("boxes",)
+
+
 def test_from_file_under_a_private_name(tmp_path):
     path = tmp_path / "numpy.py"
     path.write_text(STRANGER)
