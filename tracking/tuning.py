@@ -70,6 +70,7 @@ def tune(
     InputError for wishes that cannot be, before anything is played; errors of the defaults themselves are raised.
     """
     _optuna()
+    from tracking.tuning_memory import remembering
     from tracking.tuning_study import opened
     from tracking.tuning_trials import search
 
@@ -83,7 +84,7 @@ def tune(
     name = study or (target.stem if target is not None else "flockscope")
     with opened(made, place, name) as own, players(made.subject, made.detections, workers, cluster) as play:
         search(own, play, tell)
-        found = _judged(made, own, play, lambda what: tell(made.trials, made.trials, what))
+        found = _judged(made, own, remembering(own, play), lambda what: tell(made.trials, made.trials, what))
     if target is not None:
         found.write(target)
     return found
