@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
+import json
 import os
-import socket
 import subprocess
 import sys
 import time
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -19,15 +19,12 @@ class Loopback:
     """State: the processes; `workers` in the order of their start."""
 
     def __init__(self, folder: Path, **env: str) -> None:
-        self._folder = folder
+        self.folder = folder
         self.workers: list[subprocess.Popen[bytes]] = []
-        with socket.socket() as free:
-            free.bind(("127.0.0.1", 0))
-            port = free.getsockname()[1]
-        self.address = f"tcp://127.0.0.1:{port}"
-        words = ["--host", "127.0.0.1", "--port", str(port), "--no-dashboard"]
+        told = folder / "scheduler.json"
+        words = ["--host", "127.0.0.1", "--port", "0", "--no-dashboard", "--scheduler-file", str(told)]
         self.scheduler = self._start("scheduler", words, **env)
-        self._wait(port)
+        self.address = self._told(told)
 
     def add_worker(self, *words: str, threads: int = 1) -> subprocess.Popen[bytes]:
         """One more worker, given more words, which nobody starts again when it dies."""
@@ -43,20 +40,21 @@ class Loopback:
 
     def _start(self, what: str, words: list[str], **env: str) -> subprocess.Popen[bytes]:
         threads = dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS"), "1")
-        with (self._folder / f"{what}-{len(self.workers)}.log").open("wb") as log:
+        with (self.folder / f"{what}-{len(self.workers)}.log").open("wb") as log:
             return subprocess.Popen(
                 [sys.executable, "-m", f"distributed.cli.dask_{what}", *words],
-                env={**os.environ, **threads, **env}, stdout=log, stderr=log, cwd=self._folder,
+                env={**os.environ, **threads, **env}, stdout=log, stderr=log, cwd=self.folder,
             )  # fmt: skip
 
-    def _wait(self, port: int) -> None:
+    def _told(self, file: Path) -> str:
+        """The address that the scheduler writes once it listens."""
         end = time.monotonic() + PATIENCE
         while time.monotonic() < end and self.scheduler.poll() is None:
-            with socket.socket() as probe:
-                if probe.connect_ex(("127.0.0.1", port)) == 0:
-                    return
+            with suppress(FileNotFoundError, json.JSONDecodeError):
+                return str(json.loads(file.read_text())["address"])
             time.sleep(0.05)
-        raise RuntimeError(f"no scheduler: see {self._folder}")
+        self.scheduler.kill()
+        raise RuntimeError(f"no scheduler: see {self.folder}")
 
 
 @contextmanager

@@ -66,7 +66,6 @@ def cluster(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Loopback]:
     folder = tmp_path_factory.mktemp("cluster")
     (folder / "preload.py").write_text(PRELOAD.replace('FOLDER")', f'{folder}")'))
     with loopback(folder, 4, "--preload", str(folder / "preload.py")) as cluster:
-        cluster.folder = folder
         yield cluster
 
 
