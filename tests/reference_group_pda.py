@@ -33,6 +33,7 @@ class Rules:
     correct: bool  # what the gate cuts off is put back
     redrawn: bool
     every: bool  # no association: all points in the region
+    others: float = 1.0  # people beside one, of those who are there, at least
 
     @property
     def numbers(self):
@@ -42,7 +43,7 @@ class Rules:
         return np.array([
             c.gate, c.link, P[0, 0], P[0, 1], P[1, 1], c.strength, c.least, self.noise, self.count_noise,
             self.count_share, self.detect, self.miss, self.freeze, self.keep_extent, self.keep_size, cut, self.redrawn,
-            self.every,
+            self.every, self.others,
         ], float)  # fmt: skip
 
 
@@ -86,7 +87,7 @@ def centroid_noise(seen, cov, extent, size, rules):
     m = max(seen, min(1.0, n))
     true = extent - noise
     np.fill_diagonal(true, np.maximum(np.diag(true), 0.0))
-    return noise / m + (true * (n - m) / max(n - 1, 1.0) / m if n > 1 else 0.0)
+    return noise / m + (true * (n - m) / max(n - 1, rules.others) / m if n > 1 else 0.0)
 
 
 def moments(points, weights):

@@ -15,7 +15,7 @@ from tracking.components_kernels import WEIGHT, components, prefixes
 
 NOTHING, NULL, MEASURED = range(3)
 (GATE, LINK, PRIOR_XX, PRIOR_XY, PRIOR_YY, STRENGTH, LEAST, NOISE, COUNT, SHARE, DETECT, MISS, FREEZE, KEEP_EXTENT,
- KEEP_SIZE, CUT, REDRAWN, ALL) = range(18)  # fmt: skip
+ KEEP_SIZE, CUT, REDRAWN, ALL, OTHERS) = range(19)  # fmt: skip
 """Rows of `rules`: see tracking.papers.group_pda_rules."""
 NEWCOMERS = 0.02
 """Probability that the number of people has nothing to do with what it was."""
@@ -189,7 +189,7 @@ def _centroid_noise(seen: float, cov: Array, extent: Array, size: float, rules: 
 
     Members who keep their places: r^2 / m + (1 - m / n) Sigma n / (n - 1) / m, drawn without replacement (ours); if
     more are seen than there are, the other way round, with the covariance cov (3,) of those who are seen; n - 1 is 1
-    at least, as a size between one and two is a doubt about which; or
+    at least from points, as a size between one and two is a doubt about which, and from pixels what it is; or
     (2.1) read literally, drawn anew in each frame: Sigma / m. Sigma is of measured places: r^2 is in it.
     """
     noise = rules[NOISE] ** 2  # the extent is that of measured places, so it has this noise already
@@ -201,7 +201,7 @@ def _centroid_noise(seen: float, cov: Array, extent: Array, size: float, rules: 
         own = noise / max(there, 1.0)
         return own + strange * cov[0], strange * cov[1], own + strange * cov[2]
     m = max(seen, min(1.0, there))
-    unseen = (there - m) / max(there - 1, 1.0) / m if there > 1 else 0.0
+    unseen = (there - m) / max(there - 1, rules[OTHERS]) / m if there > 1 else 0.0
     xx, yy = max(extent[0, 0] - noise, 0.0), max(extent[1, 1] - noise, 0.0)
     return noise / m + unseen * xx, unseen * extent[0, 1], noise / m + unseen * yy
 

@@ -49,7 +49,7 @@ def make_rules(
     # Every extent is sample covariance / cut, shrunk towards `prior`: in G_y, too, or what it parts would be merged.
     least = c.least_people if pixels else 0.0
     constraint = Constraint(link, c.gate / cut, cut * prior, c.spread_weight, least)
-    numbers = np.zeros(kernels.ALL + 1)
+    numbers = np.zeros(kernels.OTHERS + 1)
     numbers[kernels.GATE], numbers[kernels.LINK] = constraint.gate, link
     numbers[kernels.PRIOR_XX : kernels.PRIOR_YY + 1] = constraint.three
     numbers[kernels.STRENGTH], numbers[kernels.LEAST] = c.spread_weight, constraint.least
@@ -62,6 +62,7 @@ def make_rules(
     numbers[kernels.CUT] = cut
     numbers[kernels.REDRAWN] = c.centroid_noise == "redrawn"
     numbers[kernels.ALL] = c.association == "none"
+    numbers[kernels.OTHERS] = 1e-9 if pixels else 1.0
     if numbers[kernels.ALL]:
         numbers[kernels.MISS], numbers[kernels.FREEZE] = 0.0, np.inf
     F = np.eye(4)

@@ -41,7 +41,7 @@ def random_rules(r):
     return reference.Rules(
         constraint, r.uniform(0.02, 0.3), r.uniform(0.2, 2), r.uniform(0.05, 0.4), r.uniform(0.6, 1),
         r.uniform(0.01, 0.5) if miss and not every else 0.0, r.uniform(0, 0.8) if freeze and not every else np.inf,
-        r.uniform(0.1, 0.99), r.uniform(0.1, 0.99), correct, redrawn, every,
+        r.uniform(0.1, 0.99), r.uniform(0.1, 0.99), correct, redrawn, every, float(r.choice([1e-9, 1.0])),
     )  # fmt: skip
 
 
