@@ -97,6 +97,8 @@ COMMANDS = {
         "generate {scene} --seeds 5 --set camera.image=[128,96] --out {out}",
         "generate {scene} --seeds 5 --streams left,centre --out {out}",
     ),
+    "replay": ("replay {one} --out {out}", "replay {out}/nothing --out {out}/x"),
+    "fit sensor": ("fit sensor {data} --out {out}/mine.toml", "fit sensor {out}/nothing --out {out}/mine.toml"),
     "track": ("track " + FAKE + " {data} --out {out}", "track " + FAKE + " {out}/nothing --out {out}/x"),
     "track blob": ("track blob {one} --out {out}", "track blobb {one} --out {out}"),
     "score": ("score {data} {tracks}", "score {data} {out}/nothing"),
@@ -344,9 +346,9 @@ def test_one_warning_for_many_recordings(tmp_path, capsys):
 def test_visible_boxes_of_a_recording_without_any(tmp_path, capsys):
     (tmp_path / "gt.txt").write_text("1,1,0,0,5,5,1,1,1\n2,1,0,0,5,5,1,1,1\n")
     line = ["track", "blob", str(tmp_path / "gt.txt"), "--fps", "10", "--detections", "truth", "--out"]
-    assert run([*line, str(tmp_path / "a"), "--set", "sensor.box=visible"]) == 2
-    assert "sensor.box: got visible" in capsys.readouterr().err
-    assert run([*line, str(tmp_path / "a"), "--set", "sensor.box=amodal"]) == 0
+    for box in ("visible", "amodal"):
+        assert run([*line, str(tmp_path / box), "--set", f"sensor.box={box}"]) == 0
+    assert not capsys.readouterr().err
 
 
 def test_a_tracker_on_the_ground_is_scored_there_from_text_alone(place, tmp_path, capsys):
