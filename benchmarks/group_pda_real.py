@@ -18,7 +18,6 @@ import numpy as np
 
 from benchmarks.group_pda_runs import Variant
 from benchmarks.group_pda_tables import interval, table
-from benchmarks.real_groups import as_tracks
 from sim.geometry import contains
 from sim.io.source import open_source
 from sim.types import Array, Ints, Tracks, Truth
@@ -30,6 +29,7 @@ from tracking.scoring.catalogue import CATALOGUE
 from tracking.scoring.resample import scorer
 from tracking.scoring.sides import INSIDE
 from tracking.stats import moving_blocks
+from tracking.tuning_rule import people_as_tracks
 
 DRAWS = 200
 KEYS = ("group_1-FP", "group_1-FN", "group_GDSR", "group_MOTP", "group_MOTA", "group_GDSR2", "group_F1", "group_IDSW")
@@ -69,7 +69,7 @@ def labelled(given: argparse.Namespace, path: str, note: str) -> Any:
     said: dict[str, Sequence[Tracks]] = {
         v.name: track(v.tracker, sequence, params=v.params or None, detections="truth") for v in variants
     }
-    said["baseline rule, told who is who"] = with_groups(as_tracks(truth), truth.fps, truth.px_per_m)
+    said["baseline rule, told who is who"] = with_groups(people_as_tracks(truth), truth.fps, truth.px_per_m)
     keys = [*KEYS, "pairwise_F1", "pairwise_precision", "pairwise_recall"]
     found = {name: blocks(truth, answers, keys) for name, answers in said.items()}
     rows = {name: [interval(*ends) for ends in row] for name, row in found.items()}

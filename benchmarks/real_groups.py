@@ -31,8 +31,9 @@ from sim.io.velocity import differentiate
 from sim.lines import WAITING
 from sim.rules import SAME_WAY, TOGETHER
 from sim.sequence import simulate
-from sim.types import Tracks, Truth
+from sim.types import Truth
 from tracking.grouping import Grouping, derive
+from tracking.tuning_rule import people_as_tracks
 
 CHOSEN = Grouping(near=1.0, idle=0.4)  # by --choose 0:4
 RULES = {
@@ -44,22 +45,6 @@ RULES = {
 }
 GRID = [Grouping(near=near, idle=idle) for near in (1.0, 1.2, 1.5) for idle in (0.0, 0.4)]
 NINE = [(d, v) for d in (0.9, 1.2, 1.5) for v in (0.3, 0.5, 0.7)]
-
-
-def as_tracks(truth: Truth) -> list[Tracks]:
-    """The true people as somebody's tracks, without groups; velocities only where the recording has them."""
-    made = []
-    plane = "image" if truth.pos is None else "ground"
-    for index in range(1, truth.length + 1):
-        here = truth.at(index)
-        n = len(here.id)
-        pos = here.pos if here.pos is not None else here.box[:, :2] + here.box[:, 2:] / 2
-        vel = here.vel if here.vel is not None else np.full((n, 2), np.nan)
-        alone = np.full(n, -1)
-        made.append(
-            Tracks(index, here.t, plane, "person", here.id, alone, pos, vel, np.zeros((n, 4, 4)), here.box, np.ones(n))
-        )
-    return made
 
 
 def pairs(truth: Truth) -> tuple[np.ndarray, ...]:
@@ -84,7 +69,7 @@ def scores(true: np.ndarray, said: np.ndarray) -> str:
 
 def grouped(truth: Truth, rule: Grouping, i: np.ndarray, j: np.ndarray) -> tuple[np.ndarray, dict[str, int]]:
     """Which pairs of rows the rule takes for one group, and how many events of each kind it tells."""
-    made = derive(as_tracks(truth), truth.fps, rule=rule)
+    made = derive(people_as_tracks(truth), truth.fps, rule=rule)
     group = np.concatenate([t.group for t in made])
     return (group[i] >= 0) & (group[i] == group[j]), Counter(e.kind for t in made for e in t.events)
 
@@ -164,7 +149,7 @@ def caviar(root: Path) -> None:
     for name, rule in (("default", Grouping()), ("velocities over 1 s", Grouping(smooth=1.0))):
         told = [
             (e.kind, e.start, e.emitted, e.members)
-            for t in derive(as_tracks(truth), truth.fps, truth.px_per_m, rule)
+            for t in derive(people_as_tracks(truth), truth.fps, truth.px_per_m, rule)
             for e in t.events
         ]
         print(f"  baseline rule, {name}: (kind, start, told, members) {told}")
@@ -172,7 +157,7 @@ def caviar(root: Path) -> None:
 
 def pets(root: Path) -> None:
     truth = open_source(root / "mot" / "PETS09-S2L1-first200", images=False)[0].truth
-    made = derive(as_tracks(truth), truth.fps, truth.px_per_m)
+    made = derive(people_as_tracks(truth), truth.fps, truth.px_per_m)
     both = [t for t in made if {11, 12} <= set(t.id.tolist())]
     one = [t.index for t in both if t.group[t.id == 11] >= 0 and t.group[t.id == 11] == t.group[t.id == 12]]
     seen = f"11 and 12 are seen together in {len(both)} frames"

@@ -25,12 +25,13 @@ import numpy as np
 
 from scenarios.errors import InputError
 from sim import workers
-from sim.types import Array, DetectionMode, Frame, Tracks, Truth
+from sim.types import Array, DetectionMode, Frame, Tracks
 from sim.workers import THREADS
 from tracking.answers import History
 from tracking.config import Config
 from tracking.episodes import streams_for
 from tracking.held import Held
+from tracking.objective import Judge
 from tracking.protocol import find
 from tracking.run import Prepared, prepare
 from tracking.search import decode, encode, space_of
@@ -92,7 +93,7 @@ def change(base: Config, config: Config) -> str:
     return ", ".join(f"{name}={b:.3g}" if isinstance(b, float) else f"{name}={b}" for (name, a), b in rows if a != b)
 
 
-def go(state: State, config: Config, frames: Sequence[Frame], ready: Prepared, truth: Truth) -> State | None:
+def go(state: State, config: Config, frames: Sequence[Frame], ready: Prepared, judge: Judge) -> State | None:
     """The state after these frames with this config; None where the tracker refuses it there."""
     shared: list[Any] = [ready.context, ready.context.background, ready.context.camera]
     tracker = copy.deepcopy(state.tracker, {id(one): one for one in shared if one is not None})
@@ -102,17 +103,13 @@ def go(state: State, config: Config, frames: Sequence[Frame], ready: Prepared, t
         answers = [*state.answers, *(there.answer(frame) for frame in frames)]
     except InputError:
         return None
-    return State(tracker, there.history, answers, objective(there, truth, answers))
+    return State(tracker, there.history, answers, objective(there, judge, answers))
 
 
-def objective(ready: Prepared, truth: Truth, answers: list[Tracks]) -> float:
+def objective(ready: Prepared, judge: Judge, answers: list[Tracks]) -> float:
     """Of the frames so far; 0 where they hold nothing to score."""
-    from tracking.grouping import with_groups
-    from tracking.scoring.evaluation import evaluate
-
-    told = with_groups(answers, ready.context.fps, ready.px_per_m(answers))
-    found = evaluate(truth, told, frames=len(answers))["objective"]
-    return float(found) if np.isfinite(found) else 0.0
+    found = judge.scores(answers, ready.px_per_m(answers))["objective"]
+    return found if np.isfinite(found) else 0.0
 
 
 def play(job: Job) -> Found:
@@ -126,10 +123,10 @@ def play(job: Job) -> Found:
     for config in job.candidates:  # a new tracker: some parameters are taken on at reset
         alone = prepare(job.tracker, held.sequence, params=config, detections=job.mode)
         alone.reset(0)
-        fixed.append(objective(alone, held.truth, [alone.answer(frame) for frame in frames]))
+        fixed.append(objective(alone, held.judge, [alone.answer(frame) for frame in frames]))
     state, chosen, long = first, [], max(1, round(job.every * held.sequence.fps))
     for begin in range(0, len(frames), long):
-        tried = [go(state, c, frames[begin : begin + long], ready, held.truth) for c in job.candidates]
+        tried = [go(state, c, frames[begin : begin + long], ready, held.judge) for c in job.candidates]
         best = max((k for k, t in enumerate(tried) if t is not None), key=lambda k: tried[k].score)  # type: ignore[union-attr]
         state = tried[best] or state
         chosen.append(best)

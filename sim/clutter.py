@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from sim.camera import project, to_ground
+from sim.camera import PERSON, project, to_ground
 from sim.people import boxes
 from sim.rng import rng
 from sim.sensors import Readings, quantiles, uniforms
@@ -57,9 +57,13 @@ def false_alarms(
         box = clipped(box, size)
     if truth.pos is None and box is not None:
         pos = box[:, :2] + box[:, 2:] / 2
+    return Readings(frame, pos, None if truth.box is None else box, false_scores(sensor, u[:, SCORE]), u[:, PLACE])
+
+
+def false_scores(sensor: Sensor, u: Array) -> Array:
+    """Scores of false alarms by uniforms u: those measured, else FALSE_SCORE u^2."""
     curve = sensor.false_scores
-    score = FALSE_SCORE * u[:, SCORE] ** 2 if curve is None else quantiles(curve, u[:, SCORE])
-    return Readings(frame, pos, None if truth.box is None else box, score, u[:, PLACE])
+    return FALSE_SCORE * u**2 if curve is None else quantiles(curve, u)
 
 
 def counts(rate: float, length: int, seed: int, repeat: int = 0) -> Ints:
@@ -92,7 +96,7 @@ def _furthest_row(camera: Camera) -> float:
     v = np.linspace(0.0, camera.image[1], 241)
     ground = to_ground(camera, np.column_stack([np.full_like(v, camera.centre_px[0]), v]))
     foot = np.column_stack([ground, np.zeros(len(v))])
-    tall = foot + np.array([0.0, 0.0, 1.7])
+    tall = foot + np.array([0.0, 0.0, PERSON])
     size = np.linalg.norm(project(camera, tall)[0] - project(camera, foot)[0], axis=1)
     at_middle = size[len(v) // 2] if np.isfinite(size[len(v) // 2]) else np.nanmax(size, initial=0.0)
     enough = np.flatnonzero(np.nan_to_num(size) >= SMALLEST * at_middle)
@@ -148,9 +152,9 @@ class Ground:
         if self.camera is None:
             return float(np.clip(self.line @ [1.0, v], *self.extremes))
         pos = to_ground(self.camera, np.array([[u, v]]))
-        tall = boxes(self.camera, np.column_stack([pos, [0.0]]), np.zeros(1), np.full(1, 1.7))[0, 3]
+        tall = boxes(self.camera, np.column_stack([pos, [0.0]]), np.zeros(1), np.full(1, PERSON))[0, 3]
         if not np.isfinite(tall):  # right under the camera
-            tall = 1.7 * self.camera.focal_px[1] / max(float(self.camera.position[2]), 1.0)
+            tall = PERSON * self.camera.focal_px[1] / max(float(self.camera.position[2]), 1.0)
         return float(tall)
 
     def points(self, u: Array, v: Array, otherwise: Array) -> Array:

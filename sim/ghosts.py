@@ -13,9 +13,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from sim.clutter import FALSE_SCORE, Ground, clipped
+from sim.camera import PERSON
+from sim.clutter import Ground, clipped, false_scores
 from sim.rng import rng
-from sim.sensors import Readings, quantiles, uniforms
+from sim.sensors import Readings, normals, uniforms
 from sim.types import Array, Bools, Camera, Ints, Truth
 
 if TYPE_CHECKING:
@@ -24,7 +25,6 @@ if TYPE_CHECKING:
 LIFE, NEAR, WHICH, X, Y, TALL, ASPECT, VX, VY, ONCE = range(10)  # an alarm's draws at birth
 SHOW, EDGES, SCORE, PLACE, EACH = 0, slice(1, 5), 5, 6, 7  # its draws of each frame
 KERNEL = 0.03  # sd of places round those of `at`, in shares
-BODY = 1.7  # m, where points without boxes stand for a person's height
 
 
 @dataclass(frozen=True)
@@ -55,9 +55,7 @@ def ghosts(truth: Truth, sensor: Sensor, seed: int, camera: Camera | None, size:
     frame, box, pos, u = frame[keep], box[keep], pos[keep], u[keep]
     if truth.pos is None:
         pos = box[:, :2] + box[:, 2:] / 2
-    curve = sensor.false_scores
-    score = FALSE_SCORE * u[:, SCORE] ** 2 if curve is None else quantiles(curve, u[:, SCORE])
-    return Readings(frame, pos, None if truth.box is None else box, score, u[:, PLACE])
+    return Readings(frame, pos, None if truth.box is None else box, false_scores(sensor, u[:, SCORE]), u[:, PLACE])
 
 
 def _births(model: FalseAlarms, rate: float, truth: Truth, seed: int, repeat: int) -> Born:
@@ -86,7 +84,7 @@ def _one(model: FalseAlarms, ground: Ground, born: Born, k: int, seed: int, repe
     """One alarm: its frames (L,), box and ground point (L, 6), draws (L, EACH)."""
     start, once, each = int(born.frame[k]), born.once[k], born.each[k]
     frame = start + np.arange(len(each))
-    n = _normal(once)
+    n = normals(once)
     here = ground.truth.rows(start)
     if once[NEAR] < model.near and here.stop > here.start:
         nth = int(k - np.searchsorted(born.frame, start))
@@ -97,7 +95,7 @@ def _one(model: FalseAlarms, ground: Ground, born: Born, k: int, seed: int, repe
     else:
         box, pos = _apart(model, ground, len(each), once, n)
     if model.jitter:
-        box = _jittered(box, model.jitter, _normal(each[:, EDGES]))
+        box = _jittered(box, model.jitter, normals(each[:, EDGES]))
     return frame, np.concatenate([box, pos], axis=1), each
 
 
@@ -119,7 +117,7 @@ def _beside(model: FalseAlarms, ground: Ground, row: Ints, n: Array) -> tuple[Ar
     """Boxes (L, 4) and points (L, 2) that go with a person in these rows of the truth."""
     truth = ground.truth
     across, down = (mean + sd * n[c] for (mean, sd), c in ((model.across, X), (model.foot, Y)))
-    pos = np.zeros((len(row), 2)) if truth.pos is None else truth.pos[row] + BODY * across * np.array([1.0, 0.0])
+    pos = np.zeros((len(row), 2)) if truth.pos is None else truth.pos[row] + PERSON * across * np.array([1.0, 0.0])
     if truth.box is None:
         return np.zeros((len(row), 4)), pos
     left, top, w, h = truth.box[row].T
@@ -151,9 +149,3 @@ def _jittered(box: Array, jitter: float, n: Array) -> Array:
     edges = np.concatenate([box[:, :2], box[:, :2] + box[:, 2:]], axis=1) + jitter * box[:, 3:] * n
     size = np.maximum(edges[:, 2:] - edges[:, :2], np.minimum(box[:, 2:], 1.0))
     return np.concatenate([edges[:, :2], size], axis=1)
-
-
-def _normal(u: Array) -> Array:
-    from scipy.special import ndtri
-
-    return np.asarray(ndtri(np.minimum(u, 1.0 - 2.0**-53)))

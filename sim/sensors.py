@@ -95,7 +95,7 @@ def _found(
     u = u[seen]
     box = None if base is None else _boxed(base[seen], truth.visibility[seen], sensor, u[:, EDGES])
     if truth.pos is not None:
-        pos = truth.pos[seen] + sensor.noise_m * _normal(u[:, POINT]) if sensor.noise_m else truth.pos[seen]
+        pos = truth.pos[seen] + sensor.noise_m * normals(u[:, POINT]) if sensor.noise_m else truth.pos[seen]
         if sensor.points == "foot" and box is not None and camera is not None:
             pos = _standing(box, truth, seen, camera, pos)
     else:
@@ -119,7 +119,7 @@ def _boxed(box: Array, visibility: Array, sensor: Sensor, u: Array) -> Array:
         return _noisy_boxes(box, sensor.noise_px, u)
     from sim.box_noise import erring
 
-    return erring(box, visibility, sensor.box_noise, _normal(u))
+    return erring(box, visibility, sensor.box_noise, normals(u))
 
 
 def person_draws(truth: Truth, seed: int, repeat: int, sensor: Sensor) -> Array:
@@ -160,7 +160,7 @@ def _make_last(u: Array, first: int, sensor: Sensor, fps: float, seed: int, id: 
 
             from sim.lasting import lasting
 
-            u[:, columns] = ndtr(lasting(_normal(u[:, columns]), memory, first, fps, seed, id, key, repeat=repeat))
+            u[:, columns] = ndtr(lasting(normals(u[:, columns]), memory, first, fps, seed, id, key, repeat=repeat))
 
 
 def uniforms(generator: np.random.Generator, first: int, frames: int, per_frame: int) -> Array:
@@ -214,7 +214,7 @@ def _noisy_boxes(box: Array, noise: float, u: Array) -> Array:
     """Each edge moved by noise · N(0, 1); at least 1 px (or what there was) remains of width and height."""
     if not noise:
         return box
-    move = noise * _normal(u)
+    move = noise * normals(u)
     edges = np.concatenate([box[:, :2], box[:, :2] + box[:, 2:]], axis=1) + move
     size = np.maximum(edges[:, 2:] - edges[:, :2], np.minimum(box[:, 2:], 1.0))
     return np.concatenate([edges[:, :2], size], axis=1)
@@ -225,10 +225,11 @@ def quantiles(curve: tuple[float, ...], u: Array) -> Array:
     return np.interp(u, np.linspace(0.0, 1.0, len(curve)), curve)
 
 
-def _normal(u: Array) -> Array:
+def normals(u: Array) -> Array:
+    """Standard normals at these uniforms; one that was rounded to 1 is taken for the number below."""
     from scipy.special import ndtri
 
-    return np.asarray(ndtri(u))
+    return np.asarray(ndtri(np.minimum(u, 1.0 - 2.0**-53)))
 
 
 def true_scores(u: Array, visibility: Array, sensor: Sensor) -> Array:

@@ -8,9 +8,8 @@ from collections.abc import Sequence as SequenceOf
 import numpy as np
 
 from scenarios.errors import InputError
+from sim.camera import PERSON
 from sim.types import Detections, Tracks
-
-PERSON_HEIGHT = 1.7  # m, what the median box of an uncalibrated source stands for
 
 
 def needed(px_per_m: float) -> float:
@@ -28,7 +27,7 @@ def needed(px_per_m: float) -> float:
 def of_boxes(found: Iterable[Detections | Tracks | None]) -> float:
     """The median height of all boxes / 1.7 m; nan without any."""
     heights = [d.box[:, 3] for d in found if d is not None and d.box is not None and len(d.box)]
-    return float(np.nanmedian(np.concatenate(heights))) / PERSON_HEIGHT if heights else float("nan")
+    return float(np.nanmedian(np.concatenate(heights))) / PERSON if heights else float("nan")
 
 
 def of_answers(given: float, learned: object, answers: SequenceOf[Tracks]) -> float:

@@ -15,6 +15,7 @@ from pathlib import Path
 import numpy as np
 
 from scenarios.errors import InputError
+from sim.camera import PERSON
 from sim.groups import box_groups
 from sim.io.labels import label_truth
 from sim.io.velocity import differentiate
@@ -22,7 +23,6 @@ from sim.types import Array, Frame, Ints, Sequence, Truth
 
 FPS = 25.0
 IMAGE_SIZE = (384, 288)
-PERSON_HEIGHT = 1.7  # m
 CHORD = 1.0  # s, for velocities: labels stand still for frames and then jump by pixels; shorter chords see the jumps
 
 
@@ -42,7 +42,7 @@ class Recording:
     @property
     def px_per_m(self) -> float:
         """Median of the longer sides / 1.7 m; nan without boxes."""
-        return float(np.median(self.size.max(axis=1))) / PERSON_HEIGHT if len(self.size) else float("nan")
+        return float(np.median(self.size.max(axis=1))) / PERSON if len(self.size) else float("nan")
 
 
 def read_xml(path: Path) -> Recording:

@@ -12,11 +12,11 @@ from pathlib import Path
 
 import numpy as np
 
+from sim.camera import PERSON
 from sim.io.numbers import Rows, read_rows
 from sim.io.velocity import differentiate
 from sim.types import Array, Bools, Detections, Ints, Plane, Truth
 
-PERSON_HEIGHT = 1.7  # m
 PEDESTRIAN = 1
 MAX_FRAME = 10_000_000
 
@@ -135,7 +135,7 @@ def read_truth(path: Path, name: str, fps: float, length: int | None = None, px_
     ground = table.ground()
     place = None if ground is None else ground[order]
     if not np.isfinite(px_per_m) and len(box):
-        px_per_m = float(np.median(box[:, 3])) / PERSON_HEIGHT
+        px_per_m = float(np.median(box[:, 3])) / PERSON
     frames = length if length is not None else int(frame.max(initial=0))
     return Truth(
         name=name, fps=fps, length=frames, px_per_m=px_per_m, frame=frame, id=id,

@@ -12,10 +12,10 @@ from __future__ import annotations
 
 import numpy as np
 
+from sim.camera import PERSON
 from sim.types import Array, Bools, Camera, Context
 from tracking.detect import person_size_kernels as kernels
 
-PERSON = 1.7  # m
 SLIM = 0.36  # width over height of a walking person's box, the prior of what is learned
 STOUT = 2.0  # by how much the width over height of a blob that may be somebody alone differs at most
 UNLIKE = 1.4  # by how much his height differs at most from what a camera leads to expect

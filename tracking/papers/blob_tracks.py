@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 
+from sim.camera import PERSON
 from sim.types import Array, Bools, Context, Ints
 from tracking import assign, kalman, lifecycle
 from tracking.papers import blob_measure
 from tracking.papers.blob_config import BlobConfig
 
-PERSON = 1.7  # m, what the longer side of a person's box stands for
 HIDDEN = 0.4  # share of a predicted box behind somebody else from which on a miss is explained
 SAME = 0.5  # IoU of a box with the hull of several predicted ones from which on it is taken for them all
 # Relative, of rho at death (earlier) and silence (later): filters near their steady state count as in it. With the

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from sim.camera import PERSON
 from sim.types import Array, Bools, Camera, Context, Image
 from tracking.detect import blobs, lone
 from tracking.detect.background import Background
@@ -12,8 +13,8 @@ from tracking.detect.person_size import PersonSize
 from tracking.papers.group_pda_config import GroupPdaConfig
 from tracking.scale import needed
 
-PERSON, SLIM = 1.7, 0.3
-"""m, and width over height of a person seen from the side: where no camera tells."""
+SLIM = 0.3
+"""Width over height of a person seen from the side: where no camera tells."""
 LEAST_STEEP = 0.2
 """A view nearly along the ground tells next to nothing of depth."""
 
