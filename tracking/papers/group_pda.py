@@ -169,20 +169,18 @@ class GroupPda:
         own = changes.attached(points, d2, bank, rules) if self.config.attach else np.full(len(points), -1)
         claims = with_carried(claimed(points, weights, d2, own, t), bank, rules, t)
         before = changes.standing(bank, rules, t)
-        chosen = self._associate(claims, rules, t)
-        told = self._split(claims, chosen, rules, t)
+        looks = speaks(bank, claims.d2, self.colour) if rules.colours else np.zeros((len(bank), 0))
+        chosen = self._associate(claims, looks, rules, t)
+        told = self._split(claims, chosen, looks, rules, t)
         free = claims.hits[: len(points)] == 0
         changes.births(bank, points[free], weights[free], before, rules, t)
         return told
 
-    def _associate(self, claims: Claims, rules: Rules, t: float) -> Bools:
+    def _associate(self, claims: Claims, looks: Array, rules: Rules, t: float) -> Bools:
         """Update the groups by their associations; (G, M) the points of each group's likeliest one."""
         bank = self.bank
-        looks = np.zeros((len(bank), 0))
-        if rules.colours:
-            looks = self.config.appearance * speaks(bank, claims.d2, self.colour)
         state, chosen, said = kernels.associate(
-            claims.points, claims.weights, claims.d2, looks, claims.own, claims.hits,
+            claims.points, claims.weights, claims.d2, self.config.appearance * looks, claims.own, claims.hits,
             bank.x, bank.P, bank.extent, bank.size, bank.null > 0, rules.numbers,
         )  # fmt: skip
         fresh = (chosen & (claims.seen >= t)).any(1)  # more than members carried along
@@ -194,7 +192,7 @@ class GroupPda:
             (int(bank.id[g]), said[g, :2].copy(), said[g, [2, 3, 3, 4]].reshape(2, 2))
             for g in np.flatnonzero(measured & bank.named).tolist()
         ]
-        mine = chosen & exclusive(chosen, claims.d2)
+        mine = chosen & exclusive(chosen, claims.d2, looks)
         bank.own = mine @ claims.weights
         remember(bank, claims, mine, rules, t)
         if rules.colours:
@@ -214,12 +212,12 @@ class GroupPda:
             d2[np.ix_(tentative, claimed)] = np.inf
         return d2
 
-    def _split(self, claims: Claims, chosen: Bools, rules: Rules, t: float) -> list[Change]:
+    def _split(self, claims: Claims, chosen: Bools, looks: Array, rules: Rules, t: float) -> list[Change]:
         """Groups that had no feasible association for split_time fall into those that their points form; shared points
-        go with the nearest group."""
+        go with the likeliest group."""
         bank, told = self.bank, []
         due = np.flatnonzero((bank.null >= self.config.split_time - 1e-9) & (bank.null > 0))
-        mine = chosen & exclusive(np.isfinite(claims.d2), claims.d2)
+        mine = chosen & exclusive(np.isfinite(claims.d2), claims.d2, looks)
         for row in due.tolist()[::-1]:  # from behind: children stand at the end
             points, weights = claims.points[mine[row]], claims.weights[mine[row]]
             change = changes.split(bank, row, points, weights, rules, t, self.names)

@@ -73,14 +73,16 @@ def carried(bank: Bank, points: Array, rules: Rules, t: float) -> tuple[Array, I
     return place[missed], row_of[missed], seen[missed]
 
 
-def exclusive(chosen: Bools, d2: Array) -> Bools:
-    """(G, M) whose each point is that several groups may have chosen: the one's to whose centroid it is nearest.
+def exclusive(chosen: Bools, d2: Array, looks: Array) -> Bools:
+    """(G, M) whose each point is that several groups may have chosen: the likeliest one's, to whose centroid it is
+    nearest, given looks (G, M) (tracking.papers.group_pda_colour) or (G, 0).
 
     Estimates share points (4.1); a person is in one group only.
     """
     if not len(chosen):
         return chosen
-    nearest = np.where(chosen, d2, np.inf).argmin(0)
+    far = d2 - 2 * looks if looks.shape[1] else d2
+    nearest = np.where(chosen, far, np.inf).argmin(0)
     return np.asarray(chosen & ((np.arange(len(chosen))[:, None] == nearest) | (chosen.sum(0) < 2)))
 
 

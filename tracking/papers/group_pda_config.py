@@ -84,7 +84,7 @@ class GroupPdaConfig(BackgroundSettings):
     )
 
     appearance: float = param(
-        0.0,
+        0.5,
         (0.0, 5.0),
         "",
         "from pixels: weight of colours among the masses (6, future work; ours)",

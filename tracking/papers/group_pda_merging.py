@@ -16,7 +16,7 @@ from tracking.ellipsoids import overlaps
 from tracking.papers.group_pda_bank import UNNAMED, Bank, merged
 from tracking.papers.group_pda_doubles import doubtful
 from tracking.papers.group_pda_kernels import CUT, near
-from tracking.papers.group_pda_onset import REACH, Encounter
+from tracking.papers.group_pda_onset import FAR_APART, REACH, Encounter
 from tracking.papers.group_pda_rules import Rules
 
 ARRIVAL = 1.0
@@ -84,7 +84,8 @@ class Merging:
 
 def _near(bank: Bank, rows: Ints, rules: Rules) -> Iterator[tuple[tuple[int, int], bool, Array, Array, float]]:
     """R_x: ids of each two groups whose search regions overlap, whether their velocities differ by no more than
-    allowed, the difference of their centroids on the ground, the middle between them, the nearest people's distance."""
+    allowed (from pixels: and they are not far apart on the ground), the difference of their centroids on the ground,
+    the middle between them, the nearest people's distance."""
     close = overlaps(bank.x[rows, :2], bank.extent[rows], MARGIN * rules.config.gate)
     close |= _touching(bank, rows, rules)
     v = bank.x[rows, 2:] * rules.ground
@@ -92,14 +93,15 @@ def _near(bank: Bank, rows: Ints, rules: Rules) -> Iterator[tuple[tuple[int, int
     most = rules.config.merge_velocity + rules.config.merge_doubt * np.sqrt(var[:, None] + var)
     slow = np.hypot(*(v[:, None] - v[None]).transpose(2, 0, 1)) <= most
     for i, j in np.argwhere(np.triu(close, 1)).tolist():
-        if doubtful(bank, rows[i], rows[j]):
+        if doubtful(bank, rows[i], rows[j]) and not rules.pixels:  # bodies hide each other in an image
             continue
         i, j = sorted((i, j), key=lambda k: bank.id[rows[k]])
         a, b = bank.x[rows[i], :2], bank.x[rows[j], :2]
         d = (b - a) * rules.ground
         reach = REACH * sum(_spread(bank, rows[k], d, rules) for k in (i, j))
         gap = float(np.hypot(*d)) - reach
-        yield (int(bank.id[rows[i]]), int(bank.id[rows[j]])), bool(slow[i, j]), d, (a + b) / 2, gap
+        together = bool(slow[i, j]) and not (rules.pixels and gap > FAR_APART)  # bodies cover the ground behind them
+        yield (int(bank.id[rows[i]]), int(bank.id[rows[j]])), together, d, (a + b) / 2, gap
 
 
 def _spread(bank: Bank, row: int, way: Array, rules: Rules) -> float:
