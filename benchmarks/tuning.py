@@ -1,11 +1,12 @@
 """Tuning by search: what it gains on scenes that were not searched, and on recordings that nothing was tuned on.
 
-    PYTHONPATH=. python benchmarks/tuning.py search [blob] [group-pda] [grouping] --out FOLDER [--trials N]
+    PYTHONPATH=. python benchmarks/tuning.py search [blob] [group-pda] [grouping] --out FOLDER [--trials N] [--sensor F]
     PYTHONPATH=. python benchmarks/tuning.py real --out FOLDER [--data FOLDER]       after `search`
     PYTHONPATH=. python benchmarks/tuning.py workers|overhead
 
 search: on the suites of benchmarks/tuning_suites, training seeds; default → tuned on test seeds, and on friends-meet or
-crossing, which share no scenario with them. A search that was interrupted goes on.
+crossing, which share no scenario with them. A search that was interrupted goes on. --sensor: detections err as this
+profile says (`flockscope fit sensor`), for trackers of boxes.
 real: first defaults (tracking/frozen), present defaults and what `search` found, on recordings: `blob` on PETS09-S2L1
 (200 frames) and TUD-Campus from their det/det.txt, HOTA; `group-pda` on seq_hotel from labelled places, group scores;
 the rule of groups on seq_hotel and CAVIAR Meet_WalkTogether1 from labelled people, pairwise F1. Intervals by moving
@@ -26,6 +27,7 @@ from typing import Any
 
 import numpy as np
 
+from scenarios import sensor_settings
 from sim.io.source import open_source
 from sim.types import Ints, Sequence, Tracks
 from tracking.config import Config
@@ -86,6 +88,7 @@ def search(given: argparse.Namespace) -> None:
             wanted.tracker, SUITES / wanted.suite, given.trials or 60, objective=wanted.objective,
             detections=wanted.detections, out=given.out / f"{name}.toml", seeds=range(3),
             validation=range(10_000, 10_000 + wanted.validation), test=range(20_000, 20_013), progress=said(),
+            set=sensor_settings(given.sensor) if given.sensor else (),
         )  # fmt: skip
         print(found)
         for key, (old, new) in found.changed.items():
@@ -191,6 +194,7 @@ def main() -> None:
     parser.add_argument("names", nargs="*", choices=[*SEARCHES, []])
     parser.add_argument("--out", type=Path, default=Path("tuned"))
     parser.add_argument("--trials", type=int)
+    parser.add_argument("--sensor", type=Path)
     parser.add_argument("--data", type=Path, default=Path(os.environ.get("FLOCKSCOPE_DATA", beside)))
     given = parser.parse_args()
     {"search": search, "real": real, "workers": workers, "overhead": overhead}[given.mode](given)

@@ -1,0 +1,82 @@
+"""What an agent gains that changes a tracker's parameters as it goes, beside the best fixed ones by the same search.
+
+    PYTHONPATH=. python benchmarks/agent.py --case blob:clutter:file --parameters gate,coast_time [--statistics …]
+
+Both are found by CMA-ES (tracking.agent_search) on training seeds, with and without statistics; on test seeds are
+compared: the defaults, the fixed parameters, the agent. Differences are paired, 95 % (bootstrap over sequences), in
+points: hundredths of the objective. What an oracle would gain: benchmarks/switching.py.
+"""
+
+from __future__ import annotations
+
+import argparse
+import os
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+
+from sim.workers import THREADS, crew
+from tracking.agent_search import learn, played
+from tracking.episodes import sources
+from tracking.stats import bootstrap, paired
+
+STATISTICS = "births,flicker,weak,surplus,orphans,missed,innovation"
+
+
+def said(word: str) -> Callable[[int, int, float], None]:
+    """Progress, a line for every fifth generation."""
+
+    def tell(done: int, total: int, gain: float) -> None:
+        if done % 5 == 0 or done == total:
+            print(f"  {word}: {done} of {total} generations, mean gain {100 * gain:+.2f} points", flush=True)
+
+    return tell
+
+
+def main() -> None:
+    made = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    made.add_argument("--case", default="blob:clutter:file", help="tracker:scenario:detections")
+    made.add_argument("--parameters", required=True, help="those that change, separated by commas")
+    made.add_argument("--statistics", default=STATISTICS)
+    made.add_argument("--every", type=float, default=2.5, help="s between decisions")
+    made.add_argument("--generations", type=int, default=20)
+    made.add_argument("--seeds", default="20000:20040", help="test seeds a:b")
+    made.add_argument("--workers", type=int, default=2)
+    made.add_argument("--out", type=Path, help="the agent found, *.json")
+    given = made.parse_args()
+    for name in THREADS:
+        os.environ.setdefault(name, "1")
+    tracker, scenario, mode = given.case.split(":")
+    names, seen = given.parameters.split(","), given.statistics.split(",")
+    found = {
+        word: learn(
+            tracker, scenario, names, some, every=given.every, generations=given.generations, detections=mode,
+            workers=given.workers, progress=said(word),
+        )
+        for word, some in (("fixed", []), ("agent", seen))
+    }  # fmt: skip
+    for word, one in found.items():
+        gain = "{:+.2f} [{:+.2f}, {:+.2f}]".format(*(100 * g for g in one.gain))
+        print(f"  {word}: in validation {gain}, {'believed' if one.policy is one.tried else 'not believed'}")
+    test = sources(scenario, range(*map(int, given.seeds.split(":"))))
+    best = found["fixed"].tried
+    none = replace(best, offset=np.zeros(len(names)))
+    with crew(given.workers) as run:
+        rows = np.stack([played(run, p, test, mode) for p in (none, best, found["agent"].tried)], axis=1)
+    mean, low, high = bootstrap(100 * rows)
+    print(f"\n{given.case}, seeds {given.seeds}, {', '.join(names)} every {given.every:g} s by {', '.join(seen)}\n")
+    print("| | objective, points | less the defaults | less the fixed ones |\n|---|---|---|---|")
+    for k, word in enumerate(("defaults", "fixed ones, found", "agent")):
+        less = [
+            "{:+.2f} [{:+.2f}, {:+.2f}]".format(*(float(v[k]) for v in paired(100 * rows[:, [j] * 3], 100 * rows)))
+            for j in (0, 1)
+        ]
+        print(f"| {word} | {mean[k]:.2f} [{low[k]:.2f}, {high[k]:.2f}] | {less[0] if k else '–'} | {less[1]} |")
+    if given.out is not None:
+        given.out.write_text(found["agent"].tried.to_json(), encoding="utf-8")
+
+
+if __name__ == "__main__":
+    main()
