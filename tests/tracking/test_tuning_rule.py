@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 
+import numpy as np
 import pytest
 
 from tests.tuning_toys import write_scenes
@@ -14,7 +15,7 @@ from tracking.links import Grouping
 from tracking.run import track
 from tracking.scoring import evaluate
 from tracking.tuning import tune
-from tracking.tuning_rule import people_as_tracks, play_rule
+from tracking.tuning_rule import FILMED, SURVEYED, Labels, as_labelled, people_as_tracks, play_rule
 
 
 @pytest.fixture
@@ -30,13 +31,32 @@ def test_the_people_are_perfect_and_their_groups_unknown(source):
     assert evaluate(truth, answers)["HOTA"] == 1.0
 
 
-def test_an_episode_is_what_evaluate_says(source):
+@pytest.mark.parametrize("seed", [3, 4])
+def test_an_episode_is_what_evaluate_says(tmp_path, seed):
+    (source,) = sources(write_scenes(tmp_path)[0], (seed,))
     truth, rule = source.open().truth, Grouping(near=1.0)
     found = play_rule(source, rule, Cache())
-    scores = evaluate(truth, derive(people_as_tracks(truth), truth.fps, truth.px_per_m, rule))
+    people = people_as_tracks(as_labelled(truth, FILMED if seed % 2 else SURVEYED, seed))
+    scores = evaluate(truth, derive(people, truth.fps, truth.px_per_m, rule))
     assert found.objective == scores["objective"]
     assert found.scores == {key: value for key, value in scores.items() if value == value}
     assert found.frames == truth.length
+
+
+def test_labels_err_for_a_while_and_do_not_change_who_is_there():
+    (source,) = sources("crossing", (0,))[:1]
+    truth = source.open().truth
+    for labels in (Labels(0.06, 0.3, told=False), SURVEYED):
+        found = as_labelled(truth, labels, 7)
+        assert (found.vel is not None) == labels.told
+        assert found.frame.tobytes() + found.id.tobytes() == truth.frame.tobytes() + truth.id.tobytes()
+        error = found.pos - truth.pos
+        assert error.std(axis=0) == pytest.approx([labels.sd] * 2, rel=0.1)
+        own = error[truth.id == truth.id[0]]
+        stay = np.exp(-1 / (truth.fps * labels.time))
+        assert np.corrcoef(own[1:, 0], own[:-1, 0])[0, 1] == pytest.approx(stay, abs=0.2)
+        assert as_labelled(truth, labels, 7).pos.tobytes() == found.pos.tobytes()
+        assert as_labelled(truth, labels, 8).pos.tobytes() != found.pos.tobytes()
 
 
 def test_a_rule_that_links_nobody_scores_nothing(source):
