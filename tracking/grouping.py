@@ -76,6 +76,11 @@ def with_groups(
     return tuple(derive(tracks, fps, px_per_m, rule))
 
 
+def names_groups(tracks: Sequence[Tracks]) -> bool:
+    """Does the tracker tell groups itself, of people or as wholes?"""
+    return any(t.unit == "group" or t.groups is not None or bool((t.group >= 0).any()) for t in tracks)
+
+
 def derive(tracks: Iterable[Tracks], fps: float, px_per_m: float = 1.0, rule: Grouping | None = None) -> list[Tracks]:
     """The tracks with `group`, `groups` and `events` filled in where a tracker left them empty, marked as derived.
 

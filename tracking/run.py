@@ -6,6 +6,7 @@
 from __future__ import annotations
 
 import time
+import warnings
 from collections.abc import Callable, Iterator, Mapping
 from collections.abc import Sequence as SequenceOf
 from dataclasses import dataclass, field
@@ -119,7 +120,7 @@ def track(
     that is done. InputError where tracker and source do not fit, before a frame is read; WorkError where
     the tracker's answer is no Tracks.
     """
-    from tracking.grouping import with_groups
+    from tracking.grouping import names_groups, with_groups
 
     rule = Grouping.from_toml(grouping) if isinstance(grouping, str | Path) else grouping
     ready = prepare(tracker, sequence, params=params, detections=detections, sensor=sensor, seed=seed)
@@ -134,6 +135,8 @@ def track(
     whole = time.perf_counter() - begun
     px_per_m = ready.px_per_m(made)
     answers = with_groups(made, ready.context.fps, px_per_m, rule)
+    if rule is not None and names_groups(made):
+        warnings.warn(f"{ready.name} names groups itself: --grouping has no effect", UserWarning, stacklevel=2)
     speed = Speed(len(made) / spent, len(made) / whole) if made else Speed()
     info = describe(ready, answers, seed, sensor or {}, px_per_m, speed)
     return Run(answers, info if rule is None else {**info, "grouping": rule.as_dict()})

@@ -1,7 +1,7 @@
 """Episodes of the baseline rule of groups: people who are known, as labels tell them, grouped by it and scored.
 
-Simulated people are exact, labels are not: a rule tuned on exact places asks for velocities that no label has. So places
-get a labeller's errors, and with odd seeds, as in most labelled videos, no velocities.
+Simulated people are exact, labels are not: a rule tuned on exact places asks for velocities that no label has. So
+places get a labeller's errors, and with odd seeds, as in most labelled videos, no velocities.
 """
 
 from __future__ import annotations

@@ -12,6 +12,7 @@ from scenarios.loading import load
 from sim.io.tracks import write_tracks
 from sim.sequence import simulate
 from sim.types import Context, Detections, Frame, Groups, Sequence, Tracks, Truth
+from tracking.links import Grouping
 from tracking.papers.blob import Blob
 from tracking.papers.blob_config import BlobConfig
 from tracking.run import Run, prepare, track
@@ -274,3 +275,11 @@ def test_one_plane_in_a_run_and_again_in_the_next():
         ready.reset(0)
         ready.tracker.turn = turn
         ready.answer(next(ready.frames()))
+
+
+def test_a_rule_of_groups_that_has_no_effect_is_said_to_have_none(recwarn):
+    made = simulate(load("merge", ["duration=4"]), 0, streams=())
+    track("blob", made, detections="file", grouping=Grouping(near=1.0))
+    assert not [w for w in recwarn if "--grouping" in str(w.message)]
+    with pytest.warns(UserWarning, match="group-pda names groups itself: --grouping has no effect"):
+        track("group-pda", made, detections="file", grouping=Grouping(near=1.0))
