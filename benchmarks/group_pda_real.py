@@ -29,7 +29,7 @@ from tracking.scoring.catalogue import CATALOGUE
 from tracking.scoring.resample import scorer
 from tracking.scoring.sides import INSIDE
 from tracking.stats import moving_blocks
-from tracking.tuning_rule import people_as_tracks
+from tracking.tuning.rule import people_as_tracks
 
 DRAWS = 200
 KEYS = ("group_1-FP", "group_1-FN", "group_GDSR", "group_MOTP", "group_MOTA", "group_GDSR2", "group_F1", "group_IDSW")

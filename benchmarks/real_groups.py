@@ -33,7 +33,7 @@ from sim.rules import SAME_WAY, TOGETHER
 from sim.sequence import simulate
 from sim.types import Truth
 from tracking.grouping import Grouping, derive
-from tracking.tuning_rule import people_as_tracks
+from tracking.tuning.rule import people_as_tracks
 
 CHOSEN = Grouping(near=1.0, idle=0.4)  # by --choose 0:4
 RULES = {

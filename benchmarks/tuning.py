@@ -40,10 +40,10 @@ from tracking.scoring.catalogue import CATALOGUE
 from tracking.scoring.resample import scorer
 from tracking.stats import moving_blocks
 from tracking.tuning import tune
-from tracking.tuning_plan import plan
-from tracking.tuning_rule import people_as_tracks
-from tracking.tuning_study import opened
-from tracking.tuning_trials import search as search_trials
+from tracking.tuning.plan import plan
+from tracking.tuning.rule import people_as_tracks
+from tracking.tuning.study import opened
+from tracking.tuning.trials import search as search_trials
 
 SUITES = Path(__file__).parent / "tuning_suites"
 DRAWS = 200

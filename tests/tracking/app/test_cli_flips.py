@@ -476,7 +476,7 @@ ELSEWHERE = {
     ("demo", "quick"),  # the long one is for `make demo`
     ("generate", "sensor"),  # tests/tracking/app/test_fit.py
     ("track", "sensor"),
-    ("track", "grouping"),  # tests/tracking/test_tuning_rule.py
+    ("track", "grouping"),  # tests/tracking/tuning/test_rule.py
 }
 OWN = ("replay", "sensor", "tune")
 """Commands whose options are tested one by one in files of their own: test_replay.py, test_fit.py, test_tune.py."""

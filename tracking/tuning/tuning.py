@@ -16,14 +16,14 @@ from typing import TYPE_CHECKING
 
 from scenarios.errors import InputError
 from sim.types import DetectionMode, Tracker
-from tracking.tuning_goals import Goal
-from tracking.tuning_judge import Candidate, Judge, front
-from tracking.tuning_plan import Plan, Scenes, plan
-from tracking.tuning_result import Trial, Tuned
-from tracking.tuning_work import Play, players
+from tracking.tuning.goals import Goal
+from tracking.tuning.judge import Candidate, Judge, front
+from tracking.tuning.plan import Plan, Scenes, plan
+from tracking.tuning.result import Trial, Tuned
+from tracking.tuning.work import Play, players
 
 if TYPE_CHECKING:
-    from tracking.tuning_study import Study
+    from tracking.tuning.study import Study
 
 __all__ = ["Tuned", "tune"]
 
@@ -70,9 +70,9 @@ def tune(
     InputError for wishes that cannot be, before anything is played; errors of the defaults themselves are raised.
     """
     _optuna()
-    from tracking.tuning_memory import remembering
-    from tracking.tuning_study import opened
-    from tracking.tuning_trials import search
+    from tracking.tuning.memory import remembering
+    from tracking.tuning.study import opened
+    from tracking.tuning.trials import search
 
     made = plan(
         tracker, suite, trials, seeds=seeds, validation=validation, test=test, check=check, objective=objective,

@@ -22,7 +22,7 @@ from optuna.trial import FrozenTrial, TrialState
 
 from tracking.config import Param
 from tracking.search import decode, encode
-from tracking.tuning_plan import Plan
+from tracking.tuning.plan import Plan
 
 AGAIN, PRUNED, ERROR = "again", "pruned after", "error"
 """Attributes of a trial: which it replaces, after how many episodes it was given up, what went wrong."""

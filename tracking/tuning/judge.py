@@ -16,9 +16,9 @@ from scenarios.errors import FlockscopeError
 from tracking.config import Config
 from tracking.episodes import Episode, Source
 from tracking.stats import paired
-from tracking.tuning_goals import Goal
-from tracking.tuning_plan import Plan, every_score
-from tracking.tuning_work import Play
+from tracking.tuning.goals import Goal
+from tracking.tuning.plan import Plan, every_score
+from tracking.tuning.work import Play
 
 SHOWN = ("objective", "HOTA", "group_F1_hull", "pairwise_F1", "event_F1")
 """Scores that are compared beside the goals."""

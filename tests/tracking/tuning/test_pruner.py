@@ -9,7 +9,7 @@ import optuna
 import pytest
 from scipy.stats import rankdata, wilcoxon
 
-from tracking.tuning_pruner import SignedRank, chance
+from tracking.tuning.pruner import SignedRank, chance
 
 
 @pytest.mark.parametrize("seed", range(8))

@@ -15,7 +15,7 @@ from tracking.links import Grouping
 from tracking.run import track
 from tracking.scoring import evaluate
 from tracking.tuning import tune
-from tracking.tuning_rule import FILMED, SURVEYED, Labels, as_labelled, people_as_tracks, play_rule
+from tracking.tuning.rule import FILMED, SURVEYED, Labels, as_labelled, people_as_tracks, play_rule
 
 
 @pytest.fixture

@@ -7,9 +7,9 @@ import pytest
 from scenarios.errors import InputError
 from tests.tuning_toys import wishes
 from tracking.episodes import Episode
-from tracking.tuning_plan import plan
-from tracking.tuning_study import opened
-from tracking.tuning_trials import search
+from tracking.tuning.plan import plan
+from tracking.tuning.study import opened
+from tracking.tuning.trials import search
 
 
 class Game:

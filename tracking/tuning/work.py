@@ -15,7 +15,7 @@ from typing import Any
 from scenarios.errors import FlockscopeError, InputError
 from sim.types import DetectionMode, Tracker
 from tracking.episodes import Cache, Episode, Source
-from tracking.tuning_subject import Subject, subject_of
+from tracking.tuning.subject import Subject, subject_of
 
 HELD = 512 * 2**20
 """Bytes of sequences that each process holds."""

@@ -6,12 +6,12 @@ import pytest
 
 from scenarios.errors import InputError
 from tests.tuning_toys import wishes, write_scenes
-from tracking import tuning_scenes
-from tracking.tuning_plan import plan
+from tracking.tuning import scenes
+from tracking.tuning.plan import plan
 
 
 @pytest.mark.parametrize(
-    ("split", "scenes", "expected"),
+    ("split", "count", "expected"),
     [
         ("train", 1, range(16)),
         ("train", 4, range(4)),
@@ -21,8 +21,8 @@ from tracking.tuning_plan import plan
         ("test", 28, range(20_000, 20_004)),
     ],
 )
-def test_default_seeds_make_enough_episodes(split, scenes, expected):
-    assert tuning_scenes.chosen_seeds(None, split, scenes) == expected
+def test_default_seeds_make_enough_episodes(split, count, expected):
+    assert scenes.chosen_seeds(None, split, count) == expected
 
 
 @pytest.mark.parametrize(
@@ -82,17 +82,17 @@ def test_unknown_scenes_are_named(tmp_path):
     ],
 )
 def test_the_usual_check_shares_nothing(names, expected):
-    assert tuning_scenes.unused(names) == expected
+    assert scenes.unused(names) == expected
 
 
 def test_a_check_that_shares_a_scenario_is_refused(tmp_path):
-    assert tuning_scenes.shared(["standard"], ["crossing"]) == ["cross", "cross-same-speed", "pass-by", "side-by-side"]
+    assert scenes.shared(["standard"], ["crossing"]) == ["cross", "cross-same-speed", "pass-by", "side-by-side"]
     one, _ = write_scenes(tmp_path)
     (tmp_path / "all.toml").write_text('about = "all"\nentry = [{ scenario = "one.toml" }, { scenario = "two.toml" }]')
     with pytest.raises(InputError, match=r"all\.toml, which has one of"):
         plan(**wishes(tmp_path, check=str(tmp_path / "all.toml")))
     assert plan(**wishes(tmp_path, check=None)).check is None
-    assert tuning_scenes.shared([one], [one]) == ["one"]
+    assert scenes.shared([one], [one]) == ["one"]
 
 
 def test_settings_reach_the_scenes(tmp_path):

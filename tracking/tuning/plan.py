@@ -16,11 +16,11 @@ from typing import Any
 
 from scenarios.errors import InputError
 from sim.types import DetectionMode, Tracker
-from tracking import tuning_scenes
 from tracking.config import Config, Param, Value
 from tracking.episodes import Source
-from tracking.tuning_goals import ALWAYS, SPEED, Goal, goals
-from tracking.tuning_subject import Subject, subject_of
+from tracking.tuning import scenes
+from tracking.tuning.goals import ALWAYS, SPEED, Goal, goals
+from tracking.tuning.subject import Subject, subject_of
 
 Scenes = str | Path | Sequence[str | Path]
 
@@ -68,20 +68,20 @@ class Plan:
     @cached_property
     def training(self) -> tuple[Source, ...]:
         """Episodes of a trial."""
-        return tuning_scenes.of(self.suite, self.seeds, self.settings)
+        return scenes.of(self.suite, self.seeds, self.settings)
 
     @cached_property
     def validating(self) -> tuple[Source, ...]:
         """Episodes by which the best are judged once more."""
-        return tuning_scenes.of(self.suite, self.validation, self.settings)
+        return scenes.of(self.suite, self.validation, self.settings)
 
     @cached_property
     def testing(self) -> dict[str, tuple[Source, ...]]:
         """Episodes by which the winner is judged, by what they are called."""
-        found = {self.scenes: tuning_scenes.of(self.suite, self.test, self.settings)}
+        found = {self.scenes: scenes.of(self.suite, self.test, self.settings)}
         if self.check is not None:
             sensor = [text for text in self.settings if text.startswith("sensor.")]
-            found[_bare(self.check)] = tuning_scenes.of((self.check,), self.check_test, sensor)
+            found[_bare(self.check)] = scenes.of((self.check,), self.check_test, sensor)
         return found
 
     def identity(self) -> dict[str, Any]:
@@ -124,8 +124,8 @@ def plan(
     subject = subject_of(tracker)
     own, settings = _sorted_settings(set)
     names = (str(suite),) if isinstance(suite, str | Path) else tuple(map(str, suite))
-    count = tuning_scenes.scenes(names, settings, "--suite")
-    other = tuning_scenes.unused(names) if check == "" else check
+    count = scenes.scenes(names, settings, "--suite")
+    other = scenes.unused(names) if check == "" else check
     several = _check_suite(names, other)
     base, mode = subject.config_class().with_set(*own), detections or subject.detections
     if mode != "file" and any(setting.startswith("sensor.") for setting in settings):
@@ -133,8 +133,8 @@ def plan(
         raise InputError(place="--sensor, --set sensor", got=f"--detections {mode}", expected="file", remedy=remedy)
     made = Plan(
         subject, base, _space(base, own, tuple(only), mode), names, other,
-        tuning_scenes.chosen_seeds(seeds, "train", count), tuning_scenes.chosen_seeds(validation, "val", count),
-        tuning_scenes.chosen_seeds(test, "test", count), tuning_scenes.chosen_seeds(test, "test", several),
+        scenes.chosen_seeds(seeds, "train", count), scenes.chosen_seeds(validation, "val", count),
+        scenes.chosen_seeds(test, "test", count), scenes.chosen_seeds(test, "test", several),
         goals([objective] if isinstance(objective, str) else tuple(objective) or (subject.objective,)),
         mode, settings, trials, prune, finalists, seed,
     )  # fmt: skip
@@ -179,8 +179,8 @@ def _check_suite(names: Sequence[str], other: str | None) -> int:
     """How many scenes the suite to check on has; InputError where it shares some with what is tuned on."""
     if other is None:
         return 1
-    count = tuning_scenes.scenes((other,), (), "--check")
-    common = tuning_scenes.shared(names, (other,))
+    count = scenes.scenes((other,), (), "--check")
+    common = scenes.shared(names, (other,))
     if common:
         got = f"{other}, which has {', '.join(common)} of {', '.join(names)}"
         remedy = "choose another suite, or --check none"

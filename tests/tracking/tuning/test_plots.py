@@ -10,11 +10,11 @@ import pytest
 
 from tests.toy_tracker import ToyConfig
 from tests.tuning_toys import wishes
-from tracking.tuning_goals import Goal
-from tracking.tuning_judge import Candidate
-from tracking.tuning_plan import plan
-from tracking.tuning_plots import BLUE, ORANGE, Axes, plots, ticks
-from tracking.tuning_result import Trial, Tuned
+from tracking.tuning.goals import Goal
+from tracking.tuning.judge import Candidate
+from tracking.tuning.plan import plan
+from tracking.tuning.plots import BLUE, ORANGE, Axes, plots, ticks
+from tracking.tuning.result import Trial, Tuned
 
 SVG = "{http://www.w3.org/2000/svg}"
 DEFAULTS = {"reach": 0.1, "skip": 0, "colour": "red", "forbidden": 0.0}

@@ -13,9 +13,9 @@ from typing import Any
 
 from scenarios.errors import FlockscopeError
 from tracking.episodes import Episode, Source
-from tracking.tuning_judge import SHOWN
-from tracking.tuning_study import Study
-from tracking.tuning_work import Answer, Play
+from tracking.tuning.judge import SHOWN
+from tracking.tuning.study import Study
+from tracking.tuning.work import Answer, Play
 
 JUDGED = "judged "
 """Begins the attributes of a study in which this is kept."""

@@ -14,12 +14,12 @@ from optuna.storages import BaseStorage
 from optuna.trial import FrozenTrial, TrialState
 
 from scenarios.errors import InputError
-from tracking.tuning_goals import Goal
-from tracking.tuning_journal import LOCKS, Journal, Locks
-from tracking.tuning_plan import Plan
-from tracking.tuning_pruner import SignedRank
-from tracking.tuning_result import Trial
-from tracking.tuning_sampler import AGAIN, ERROR, PRUNED, Sampler, distribution, slot
+from tracking.tuning.goals import Goal
+from tracking.tuning.journal import LOCKS, Journal, Locks
+from tracking.tuning.plan import Plan
+from tracking.tuning.pruner import SignedRank
+from tracking.tuning.result import Trial
+from tracking.tuning.sampler import AGAIN, ERROR, PRUNED, Sampler, distribution, slot
 
 SETTINGS = "settings"
 """The attribute of a study that says what it is about."""

@@ -17,17 +17,17 @@ from tests.loopback import loopback
 from tests.toy_tracker import Toy, ToyConfig
 from tests.tuning_toys import TOY, wishes, write_scenes
 from tracking.tuning import tune
-from tracking.tuning_plan import plan
-from tracking.tuning_sampler import AGAIN
-from tracking.tuning_study import DONE, opened
-from tracking.tuning_trials import search
-from tracking.tuning_work import players
+from tracking.tuning.plan import plan
+from tracking.tuning.sampler import AGAIN
+from tracking.tuning.study import DONE, opened
+from tracking.tuning.trials import search
+from tracking.tuning.work import players
 
-ROOT = Path(__file__).resolve().parents[2]
+ROOT = Path(__file__).resolve().parents[3]
 KILLED_AT = """
 import os, signal, sys
 from pathlib import Path
-import tracking.tuning_work as work
+import tracking.tuning.work as work
 from tests.tuning_toys import wishes
 from tracking.tuning import tune
 played, attempt = 0, work._attempt

@@ -13,8 +13,8 @@ from pathlib import Path
 from typing import Any
 
 from tracking.config import Config
-from tracking.tuning_judge import Candidate, Comparison
-from tracking.tuning_plan import Plan, text
+from tracking.tuning.judge import Candidate, Comparison
+from tracking.tuning.plan import Plan, text
 
 VERSIONS = ("flockscope", "optuna", "numpy", "scipy", "numba")
 
@@ -147,7 +147,7 @@ class Tuned:
         """The parameters to `path`, and beside it all figures (.json) and the plots (.history.svg, .importance.svg);
         of several goals each of the front (.front-1.toml …) and .front.svg. What was written."""
         from sim.io.atomic import write_file
-        from tracking.tuning_plots import plots
+        from tracking.tuning.plots import plots
 
         target = Path(path)
         files = {".json": json.dumps(_plain(self.as_dict()), indent=1, allow_nan=False) + "\n", **plots(self)}

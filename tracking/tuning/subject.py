@@ -52,7 +52,7 @@ class Subject:
     ) -> Episode:
         """One episode with these parameters."""
         if self.name == RULE:
-            from tracking.tuning_rule import play_rule
+            from tracking.tuning.rule import play_rule
 
             return play_rule(source, Grouping.from_dict(values), cache)
         return play(

@@ -8,7 +8,7 @@ import pytest
 
 from scenarios.errors import InputError
 from tracking.episodes import Episode
-from tracking.tuning_goals import SPEED, Goal, goals, mean
+from tracking.tuning.goals import SPEED, Goal, goals, mean
 
 
 def episode(seconds: float = 1.0, frames: int = 10, **scores: float) -> Episode:

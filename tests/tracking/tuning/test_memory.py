@@ -8,9 +8,9 @@ from scenarios.errors import WorkError
 from tests.tuning_toys import wishes
 from tracking.episodes import Episode
 from tracking.tuning import tune
-from tracking.tuning_memory import remembering
-from tracking.tuning_plan import plan
-from tracking.tuning_study import opened
+from tracking.tuning.memory import remembering
+from tracking.tuning.plan import plan
+from tracking.tuning.study import opened
 
 
 class Game:
@@ -71,6 +71,6 @@ def test_the_same_command_again_plays_nothing(tmp_path, monkeypatch):
     def never(*_):
         raise AssertionError("an episode was played")
 
-    monkeypatch.setattr("tracking.tuning_work._attempt", never)
+    monkeypatch.setattr("tracking.tuning.work._attempt", never)
     assert str(tune(**given, out=tmp_path / "toy.toml")) == str(first)
     assert (tmp_path / "toy.json").read_bytes() == content

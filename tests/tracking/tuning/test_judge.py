@@ -11,9 +11,9 @@ from scenarios.errors import WorkError
 from tests.toy_tracker import ToyConfig
 from tests.tuning_toys import wishes
 from tracking.episodes import Episode
-from tracking.tuning_goals import Goal
-from tracking.tuning_judge import Candidate, Judge, comparison, front
-from tracking.tuning_plan import Plan, plan
+from tracking.tuning.goals import Goal
+from tracking.tuning.judge import Candidate, Judge, comparison, front
+from tracking.tuning.plan import Plan, plan
 
 
 def episodes(values, key: str = "HOTA") -> list[Episode]:

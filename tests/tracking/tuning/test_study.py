@@ -18,10 +18,10 @@ from tests.tuning_toys import wishes
 from tracking.links import Grouping
 from tracking.papers.blob_config import BlobConfig
 from tracking.papers.group_pda_config import GroupPdaConfig
-from tracking.tuning_journal import Journal, Locks
-from tracking.tuning_plan import plan
-from tracking.tuning_sampler import distribution, slot
-from tracking.tuning_study import DONE, opened
+from tracking.tuning.journal import Journal, Locks
+from tracking.tuning.plan import plan
+from tracking.tuning.sampler import distribution, slot
+from tracking.tuning.study import DONE, opened
 
 
 def test_distributions_are_the_declarations(tmp_path):
@@ -150,12 +150,12 @@ def test_another_file_is_left_as_it_is(tmp_path, content):
 def test_a_lock_lives_as_long_as_its_process(tmp_path):
     path = tmp_path / "locks"
     hold = (
-        "import sys; from pathlib import Path; from tracking.tuning_journal import Locks\n"
+        "import sys; from pathlib import Path; from tracking.tuning.journal import Locks\n"
         "locks = Locks(Path(sys.argv[1])); locks.play(7); print('held', flush=True); sys.stdin.read()"
     )
     other = subprocess.Popen(
         [sys.executable, "-c", hold, str(path)], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True,
-        env={**os.environ, "PYTHONPATH": str(Path(__file__).resolve().parents[2])},
+        env={**os.environ, "PYTHONPATH": str(Path(__file__).resolve().parents[3])},
     )  # fmt: skip
     assert other.stdout.readline() == "held\n"
     locks = Locks(path)
