@@ -1,24 +1,30 @@
 """What an episode costs beside its tracking, and how fast the environment steps.
 
-    PYTHONPATH=. OMP_NUM_THREADS=1 python benchmarks/environment.py [trial] [steps] [memory] [--rounds 5]
+    PYTHONPATH=. OMP_NUM_THREADS=1 python benchmarks/environment.py [trial] [steps] [memory] [--rounds 5] [--peer P]
 
 trial: a tuning trial, 4 sequences of 200 frames and 20 people on average (the crowd, boxes), played with what was kept
 of the trial before, for every registered tracker, and its tracking alone. Limits (design): `blob` 0.5 s, and any
-tracker 1.15 times its tracking time; exit code 1 beyond. steps: steps and episodes per second on `crossing`, one action
-for a whole episode or every 10 frames, in one environment, and in vectors of two, in this process and in two. memory:
-what the cache holds, and the process, while many sequences are played under a small limit. CPU time of the process, but
-for vectors, whose wall time depends on the machine's load, which is printed; the best of several rounds.
+tracker 1.15 times its tracking time; exit code 1 beyond. --peer: the Python of an environment for
+benchmarks/peers/tune_roboflow.py, which plays a trial of roboflow's tuner (SORT, HOTA) on the same boxes. steps: steps
+and episodes per second on `crossing`, one action for a whole episode or every 10 frames, in one environment, and in
+vectors of two, in this process and in two. memory: what the cache holds, and the process, while many sequences are
+played under a small limit. CPU time of the process, but for vectors, whose wall time depends on the machine's load,
+which is printed; the best of several rounds.
 """
 
 from __future__ import annotations
 
 import argparse
 import dataclasses
+import json
 import os
 import resource
+import subprocess
+import tempfile
 import time
 from collections.abc import Callable
 from functools import partial
+from pathlib import Path
 from typing import Any
 from unittest import mock
 
@@ -26,6 +32,7 @@ import gymnasium
 import numpy as np
 
 import tracking  # noqa: F401  (registers the environment)
+from benchmarks.blob_vs_peers import write_mot
 from tracking.episodes import Cache, Rollout, Source, play, sources
 from tracking.held import Held
 from tracking.observation import Observer
@@ -36,6 +43,7 @@ MUST, AIM, SHARE = 0.5, 0.2, 1.15
 PEOPLE = ["group.passers.repeat=2", "group.stop.repeat=3"]
 EVERY = (None, 10)
 ID = "flockscope/Tuning-v0"
+PEER = Path(__file__).parent / "peers" / "tune_roboflow.py"
 
 
 def best(run: Callable[[], Any], rounds: int, clock: Callable[[], float] = time.process_time) -> float:
@@ -62,7 +70,26 @@ def boxes_alone(source: Source) -> Source:
     return sources(dataclasses.replace(source.open(), camera=None))[0]
 
 
-def trial(rounds: int) -> bool:
+def peer_trial(python: str, flat: tuple[Source, ...], rounds: int) -> None:
+    """Print what a trial of roboflow's tuner costs on the same boxes."""
+    with tempfile.TemporaryDirectory() as place:
+        for name in ("gt", "det"):
+            (Path(place) / name).mkdir()
+        for k, source in enumerate(flat):
+            sequence = source.open()
+            write_mot(sequence, Path(place) / "det" / f"{k}.txt")
+            truth = sequence.truth
+            assert truth is not None
+            assert truth.box is not None
+            rows = zip(truth.frame.tolist(), truth.id.tolist(), truth.box.tolist(), strict=True)
+            lines = [f"{f},{i},{b[0]:.4f},{b[1]:.4f},{b[2]:.4f},{b[3]:.4f},1,1,1\n" for f, i, b in rows]
+            (Path(place) / "gt" / f"{k}.txt").write_text("".join(lines))
+        call = [python, str(PEER), place, "sort", str(rounds)]
+        found = json.loads(subprocess.run(call, capture_output=True, text=True, check=True).stdout.splitlines()[-1])
+    print(f"| roboflow's tuner, SORT | – | {found['seconds']:.3f} | – |  (HOTA {found['best']:.3f} at best)")
+
+
+def trial(rounds: int, peer: str | None) -> bool:
     """Print the figures of a trial; are they within the limits?"""
     chosen, cache = sources("crowd", range(4), PEOPLE), Cache()
     truths = [cache.hold(source).truth for source in chosen]
@@ -84,6 +111,8 @@ def trial(rounds: int) -> bool:
         ratio = whole / alone
         print(f"| {title} | {alone:.3f} | {whole:.3f} | {ratio:.2f} |", flush=True)
         good &= ratio <= SHARE and (tracker != "blob" or whole <= MUST)
+    if peer is not None:
+        peer_trial(peer, flat, rounds)
     print(f"must: blob {MUST} s (aim {AIM}), ratio {SHARE}")
     return good
 
@@ -188,12 +217,13 @@ def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("what", nargs="*", choices=["trial", "steps", "memory", []], default=[])
     parser.add_argument("--rounds", type=int, default=5)
+    parser.add_argument("--peer", metavar="PYTHON", help="of the environment that roboflow trackers and optuna are in")
     options = parser.parse_args()
     what = options.what or ["trial", "steps", "memory"]
     print(f"load {os.getloadavg()[0]:.1f} on {os.cpu_count()} cores")
     good = True
     if "trial" in what:
-        good &= trial(options.rounds)
+        good &= trial(options.rounds, options.peer)
     if "steps" in what:
         steps(options.rounds)
     if "memory" in what:
