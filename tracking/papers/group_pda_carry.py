@@ -79,11 +79,12 @@ def exclusive(chosen: Bools, d2: Array, looks: Array) -> Bools:
 
     Estimates share points (4.1); a person is in one group only.
     """
-    if not len(chosen):
-        return chosen
-    far = d2 - 2 * looks if looks.shape[1] else d2
-    nearest = np.where(chosen, far, np.inf).argmin(0)
-    return np.asarray(chosen & ((np.arange(len(chosen))[:, None] == nearest) | (chosen.sum(0) < 2)))
+    mine, shared = chosen.copy(), np.flatnonzero(chosen.sum(0) > 1)
+    if len(shared):
+        far = d2[:, shared] - 2 * looks[:, shared] if looks.shape[1] else d2[:, shared]
+        nearest = np.where(chosen[:, shared], far, np.inf).argmin(0)
+        mine[:, shared] = np.arange(len(chosen))[:, None] == nearest
+    return mine
 
 
 def remember(bank: Bank, claims: Claims, chosen: Bools, rules: Rules, t: float) -> None:

@@ -28,13 +28,17 @@ def colours(image: Image, points: Array) -> Ints:
 
 def speaks(bank: Bank, d2: Array, colour: Ints) -> Array:
     """(G, M) how much a shared point's colour speaks for each group that may have it; 0 elsewhere."""
-    may = np.isfinite(d2)
-    p = (bank.look + SMOOTH / COLOURS) / (bank.look.sum(1, keepdims=True) + SMOOTH)
-    p = np.where(may, p[:, colour], 0.0)
+    spoken, may = np.zeros(d2.shape), np.isfinite(d2)
     count = may.sum(0)
-    others = (p.sum(0) - p) / np.maximum(count - 1, 1)
-    shared = may & (count > 1)
-    return np.log(np.where(shared, p, 1.0)) - np.log(np.where(shared, others, 1.0))
+    shared = np.flatnonzero(count > 1)
+    if not len(shared):
+        return spoken
+    look = (bank.look + SMOOTH / COLOURS) / (bank.look.sum(1, keepdims=True) + SMOOTH)
+    may = may[:, shared]
+    p = np.where(may, look[:, colour[shared]], 0.0)
+    others = np.where(may, (p.sum(0) - p) / (count[shared] - 1), 1.0)
+    spoken[:, shared] = np.log(np.where(may, p, 1.0)) - np.log(others)
+    return spoken
 
 
 def learn(bank: Bank, chosen: Bools, hits: Ints, colour: Ints, weights: Array, rules: Rules) -> None:
