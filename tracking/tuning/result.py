@@ -19,6 +19,10 @@ from tracking.tuning.plan import Plan, text
 VERSIONS = ("flockscope", "optuna", "numpy", "scipy", "numba")
 
 
+LONG = 40
+"""Characters of a setting that are told."""
+
+
 @dataclass(frozen=True)
 class Trial:
     """A trial as plots and tables show it: its values by goal (of one that was given up, an estimate), its parameters,
@@ -95,7 +99,7 @@ class Tuned:
             f"training seeds {text(plan.seeds)}, validation {text(plan.validation)}, test {text(plan.test)}",
         ]
         if plan.settings:
-            told.append("scenes with " + ", ".join(plan.settings))
+            told.append("scenes with " + ", ".join(_short(setting) for setting in plan.settings))
         before, after = self.validation
         for goal, a, b in zip(plan.goals, before, after, strict=True):
             told.append(f"validation: {goal.key} {a:.4f} → {b:.4f} (chosen by it: no result)")
@@ -186,3 +190,8 @@ def _plain(value: Any) -> Any:
     if isinstance(value, list | tuple):
         return [_plain(v) for v in value]
     return None if isinstance(value, float) and not math.isfinite(value) else value
+
+
+def _short(setting: str) -> str:
+    """A setting as it is told: long values, as of a detector's profile, stand in the JSON file."""
+    return setting if len(setting) <= LONG else setting[: LONG - 2] + " …"

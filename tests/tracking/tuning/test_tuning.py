@@ -273,6 +273,16 @@ def test_where_nothing_is_better_the_defaults_stay(tmp_path):
     assert "the defaults stay" in str(found)
 
 
+def test_long_settings_are_told_short_and_stored_whole(tmp_path):
+    long = "sensor.by_visibility=[0.1, 0.2, 0.3, 0.4, 0.5, 0.6]"
+    given = wishes(tmp_path, trials=1, set=[long, "scenario.duration=2"], out=tmp_path / "found.toml")
+    (told,) = (line for line in str(tune(**given)).splitlines() if line.startswith("scenes with"))
+    assert "duration=2" in told
+    assert "sensor.by_visibility=[" in told
+    assert "0.6]" not in told
+    assert "0.6]" in (tmp_path / "found.json").read_text()
+
+
 def test_an_error_of_the_defaults_is_raised(tmp_path):
     broken = tmp_path / "broken.py"
     broken.write_text(
