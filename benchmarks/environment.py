@@ -33,6 +33,7 @@ import numpy as np
 
 import tracking  # noqa: F401  (registers the environment)
 from benchmarks.blob_vs_peers import write_mot
+from sim.io.truths import truth_files
 from tracking.episodes import Cache, Rollout, Source, play, sources
 from tracking.held import Held
 from tracking.observation import Observer
@@ -78,12 +79,8 @@ def peer_trial(python: str, flat: tuple[Source, ...], rounds: int) -> None:
         for k, source in enumerate(flat):
             sequence = source.open()
             write_mot(sequence, Path(place) / "det" / f"{k}.txt")
-            truth = sequence.truth
-            assert truth is not None
-            assert truth.box is not None
-            rows = zip(truth.frame.tolist(), truth.id.tolist(), truth.box.tolist(), strict=True)
-            lines = [f"{f},{i},{b[0]:.4f},{b[1]:.4f},{b[2]:.4f},{b[3]:.4f},1,1,1\n" for f, i, b in rows]
-            (Path(place) / "gt" / f"{k}.txt").write_text("".join(lines))
+            assert sequence.truth is not None
+            (Path(place) / "gt" / f"{k}.txt").write_bytes(truth_files(sequence.truth)["gt/gt.txt"])
         call = [python, str(PEER), place, "sort", str(rounds)]
         found = json.loads(subprocess.run(call, capture_output=True, text=True, check=True).stdout.splitlines()[-1])
     print(f"| roboflow's tuner, SORT | – | {found['seconds']:.3f} | – |  (HOTA {found['best']:.3f} at best)")

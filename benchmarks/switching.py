@@ -136,12 +136,10 @@ def play(job: Job) -> Found:
 def played(jobs: list[Job], count: int) -> Iterator[Found]:
     """All jobs, in their order."""
     with workers.crew(count) as run:
-        done = {}
-        for job, found in run(play, jobs):
-            done[job.source.seed] = found
-            print(f"\r{len(done)}/{len(jobs)} sequences", end="", file=sys.stderr, flush=True)
+        for done, found in enumerate(workers.in_order(run, play, jobs), 1):
+            print(f"\r{done}/{len(jobs)} sequences", end="", file=sys.stderr, flush=True)
+            yield found
     print(file=sys.stderr)
-    return (done[job.source.seed] for job in jobs)
 
 
 def case(name: str, given: argparse.Namespace) -> None:

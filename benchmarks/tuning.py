@@ -1,6 +1,6 @@
 """Tuning by search: what it gains on scenes that were not searched, and on recordings that nothing was tuned on.
 
-    PYTHONPATH=. python benchmarks/tuning.py search [blob] [group-pda] [grouping] --out FOLDER [--trials N] [--sensor F]
+    PYTHONPATH=. python benchmarks/tuning.py search [blob] [group-pda] [grouping] --out FOLDER [--trials N] …
     PYTHONPATH=. python benchmarks/tuning.py real --out FOLDER [--data FOLDER]       after `search`
     PYTHONPATH=. python benchmarks/tuning.py workers|overhead
 
@@ -86,7 +86,7 @@ def search(given: argparse.Namespace) -> None:
         begun = time.perf_counter()
         found = tune(
             wanted.tracker, SUITES / wanted.suite, given.trials or 60, objective=wanted.objective,
-            detections=wanted.detections, out=given.out / f"{name}.toml", seeds=range(3),
+            detections=wanted.detections, workers=given.workers, out=given.out / f"{name}.toml", seeds=range(3),
             validation=range(10_000, 10_000 + wanted.validation), test=range(20_000, 20_013), progress=said(),
             set=sensor_settings(given.sensor) if given.sensor else (),
         )  # fmt: skip
@@ -195,6 +195,7 @@ def main() -> None:
     parser.add_argument("--out", type=Path, default=Path("tuned"))
     parser.add_argument("--trials", type=int)
     parser.add_argument("--sensor", type=Path)
+    parser.add_argument("--workers", type=int, default=1, help="search: processes, which change nothing that is found")
     parser.add_argument("--data", type=Path, default=Path(os.environ.get("FLOCKSCOPE_DATA", beside)))
     given = parser.parse_args()
     {"search": search, "real": real, "workers": workers, "overhead": overhead}[given.mode](given)

@@ -6,7 +6,7 @@ The work of a worker that dies is done again, so a function should find what it 
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Generator, Iterable, Iterator, Sequence
 from contextlib import AbstractContextManager, contextmanager
 from dataclasses import dataclass
 from typing import Any, Generic, Protocol, TypeVar
@@ -52,6 +52,25 @@ def crew(workers: int = 1, cluster: str | None = None) -> AbstractContextManager
 
         return connected(cluster, workers)
     return pool(workers) if workers > 1 else alone()
+
+
+def in_order(run: Run, function: Callable[[T], R], items: Sequence[T]) -> Generator[R, None, None]:
+    """The results in the order of the items, no two of which are the same object.
+
+    Once the taker stops nothing more is begun; what is under way is waited for, so that no worker is lost.
+    """
+    wanted, found = True, dict[int, R]()
+    coming = run(function, (item for item in items if wanted))
+    try:
+        for item in items:
+            while id(item) not in found:
+                done, result = next(coming)
+                found[id(done)] = result
+            yield found.pop(id(item))
+    finally:
+        wanted = False
+        for _ in coming:
+            pass
 
 
 @contextmanager

@@ -73,3 +73,12 @@ def tell_and_wait(marker: Path) -> str:
     while not marker.with_suffix(".go").exists():
         time.sleep(0.01)
     return marker.name
+
+
+def told(item: tuple[Path, float]) -> str:
+    """Says that it has begun, takes its time, says that it is done."""
+    marker, seconds = item
+    marker.write_text("begun")
+    time.sleep(seconds)
+    marker.write_text("done")
+    return marker.name

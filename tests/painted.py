@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import functools
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 
 import numpy as np
 
-from sim.types import Context, Frame, Tracks
+from sim.types import Context, Frame, Tracker, Tracks
 from tracking.papers.blob import Blob
 from tracking.papers.blob_config import BlobConfig
 
@@ -42,6 +42,14 @@ def box(person: Person) -> np.ndarray:
     """ltwh of body and head."""
     x, foot, h = person
     return np.array([x - 0.15 * h, foot - h, 0.3 * h, h])
+
+
+def watched(tracker: Tracker, frames: Iterable[Sequence[Person]], scale: float, sample: np.ndarray) -> list[Tracks]:
+    """What a tracker says of pictures of these people; scale: px per m, as it is told."""
+    r = np.random.default_rng(1)
+    tracker.reset(Context(FPS, scale, image_size=(WIDE, HIGH), background=sample), 0)
+    pictures = (picture(people, r) for people in frames)
+    return [tracker.step(Frame(k + 1, k / FPS, image=image), None) for k, image in enumerate(pictures)]
 
 
 COLOURS = ((30, 20, 190), (190, 30, 20), (20, 170, 40), (20, 20, 25))

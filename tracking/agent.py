@@ -13,6 +13,7 @@ from __future__ import annotations
 import json
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from functools import cached_property
 from pathlib import Path
 from typing import Any, ClassVar, cast
 
@@ -24,7 +25,7 @@ from sim.types import Array, Context, Detections, Frame, Tracker, Tracks
 from tracking import scale
 from tracking.config import Config, Value
 from tracking.observation import NAMES, Observer
-from tracking.protocol import find
+from tracking.protocol import config_class, find
 from tracking.search import Space, decode, encode
 
 OWN = ("grouped", "group_size", "merges", "splits")
@@ -48,7 +49,7 @@ class Policy:
 
     def __post_init__(self) -> None:
         p, f = len(self.parameters), len(self.statistics)
-        known = {q.name for q in _config_class(self.tracker).space(online=True)}
+        known = {q.name for q in config_class(find(self.tracker)).space(online=True)}
         for place, names, allowed in (
             ("parameters", self.parameters, known),
             ("statistics", self.statistics, set(NAMES) - set(OWN)),
@@ -66,16 +67,19 @@ class Policy:
                 raise InputError(place=name, got=f"shape {value.shape}", expected=expected, remedy="correct it")
             object.__setattr__(self, name, value)
 
-    @property
+    @cached_property
     def base(self) -> Config:
         """The config that it moves."""
-        return _config_class(self.tracker).from_dict(self.params)
+        return config_class(find(self.tracker)).from_dict(self.params)
 
-    @property
+    @cached_property
     def space(self) -> Space:
         """The parameters (P,) that it moves, in their order."""
-        kind = _config_class(self.tracker)
-        return tuple(kind.known(name) for name in self.parameters)
+        return tuple(self.base.known(name) for name in self.parameters)
+
+    def frames(self, fps: float) -> int:
+        """From one decision to the next."""
+        return max(round(self.every * fps), 1)
 
     def config(self, observed: ArrayLike | None) -> Config:
         """The parameters for the next frames, by the statistics (K,) of the last ones; None before the first frame."""
@@ -120,7 +124,7 @@ class Adaptive:
     def reset(self, context: Context, seed: int) -> None:
         """Begin anew, with the policy's parameters of a run in which nothing was seen yet."""
         self.context = context
-        self.long = max(round(self.policy.every * context.fps), 1)
+        self.long = self.policy.frames(context.fps)
         self.inner: Any = cast(Any, find(self.policy.tracker))(self.policy.config(None))
         self.inner.reset(context, seed)
         self.observer, self.answers = Observer(context.fps), list[Tracks]()
@@ -146,11 +150,3 @@ class Adaptive:
         self.observer.see(frame, answer)
         self.answers.append(answer)
         return answer
-
-
-def _config_class(tracker: str) -> type[Config]:
-    kind: type[Config] | None = getattr(find(tracker), "config_class", None)
-    if kind is None:
-        remedy = "give the class a config_class (docs/trackers.md)"
-        raise InputError(place="tracker", got=tracker, expected="a tracker with parameters", remedy=remedy)
-    return kind

@@ -15,9 +15,9 @@ import numpy as np
 
 from scenarios.errors import InputError
 from sim.types import Array, DetectionMode
-from sim.workers import Run, crew
-from tracking.agent import OWN, Policy
-from tracking.episodes import Cache, Rollout
+from sim.workers import Run, crew, in_order
+from tracking.agent import Policy
+from tracking.episodes import Cache, Rollout, play
 from tracking.observation import NAMES, Observer
 from tracking.source import Source, What, sources
 from tracking.stats import paired
@@ -74,15 +74,16 @@ def learn(
     """
     settings = tuple(set)
     train, check = sources(suite, seeds, settings), sources(suite, validation, settings)
-    usual, spread = usual_statistics(tracker, train[:BATCH], statistics, every, detections)
-    p, f = len(parameters), len(statistics)
-    zero = Policy(tracker, every, tuple(parameters), tuple(statistics), np.zeros(p), np.zeros((p, f)), usual, spread)
+    p, f = np.zeros(len(parameters)), np.zeros(len(statistics))
+    zero = Policy(tracker, every, tuple(parameters), tuple(statistics), p, np.outer(p, f), f, f + 1)
+    usual, spread = usual_statistics(zero, train[:BATCH], detections)
+    zero = replace(zero, usual=usual, spread=spread)
     with crew(workers) as run:
         base = dict(zip(train, played(run, zero, train, detections), strict=True))
 
         def gains(policies: list[Policy], part: Sequence[Source]) -> Array:
             jobs = [Job(policy, s, detections) for policy in policies for s in part]
-            value = np.reshape(_values(run, jobs), (len(policies), len(part)))
+            value = np.reshape(list(in_order(run, objective, jobs)), (len(policies), len(part)))
             return np.asarray(value - np.array([base[s] for s in part]))
 
         best, history = _evolved(zero, train, gains, generations, seed, progress)
@@ -128,44 +129,27 @@ def moved(policy: Policy, point: Array) -> Policy:
 
 def played(run: Run, policy: Policy, among: Sequence[Source], mode: DetectionMode) -> Array:
     """The objective (S,) of a policy on each of the sources."""
-    return _values(run, [Job(policy, s, mode) for s in among])
+    return np.array(list(in_order(run, objective, [Job(policy, s, mode) for s in among])))
 
 
-def usual_statistics(
-    tracker: str, among: Sequence[Source], statistics: Sequence[str], every: float, mode: DetectionMode
-) -> tuple[Array, Array]:
-    """Mean and standard deviation (F,) of the statistics, as the tracker sees them with its defaults."""
-    for name in statistics:
-        if name not in NAMES or name in OWN:
-            expected = "some of " + ", ".join(n for n in NAMES if n not in OWN)
-            raise InputError(place="statistics", got=name, expected=expected, remedy="correct the name")
+def usual_statistics(policy: Policy, among: Sequence[Source], mode: DetectionMode) -> tuple[Array, Array]:
+    """Mean and standard deviation (F,) of its statistics, as the tracker sees them with the config that it moves."""
     seen = []
     for source in among:
-        rollout = Rollout(tracker, source, detections=mode, cache=_memory())
-        observer, long = Observer(rollout.sequence.fps), max(round(every * rollout.sequence.fps), 1)
+        rollout = Rollout(policy.tracker, source, policy.base, detections=mode, cache=_memory())
+        observer, long = Observer(rollout.sequence.fps), policy.frames(rollout.sequence.fps)
         for k, (frame, answer) in enumerate(rollout.advance(), 1):
             observer.see(frame, answer)
             if k % long == 0:
                 seen.append(observer.look(rollout.ready.px_per_m(rollout.answers)))
-    found = np.array(seen, float)[:, [NAMES.index(s) for s in statistics]]
+    found = np.array(seen, float)[:, [NAMES.index(s) for s in policy.statistics]]
     return found.mean(0), np.maximum(found.std(0), LEAST)
-
-
-def _values(run: Run, jobs: list[Job]) -> Array:
-    """The objectives of the jobs, in their order."""
-    place = {id(job): k for k, job in enumerate(jobs)}
-    value = np.zeros(len(jobs))
-    for job, found in run(objective, jobs):
-        value[place[id(job)]] = found
-    return value
 
 
 def objective(job: Job) -> float:
     """Of an episode; 0 where it has nothing to score."""
-    rollout = Rollout(job.policy.tracked(), job.source, detections=job.mode, cache=_memory())
-    for _ in rollout.advance():
-        pass
-    return rollout.scores().get("objective", 0.0)
+    found = play(job.policy.tracked(), job.source, detections=job.mode, cache=_memory()).objective
+    return 0.0 if np.isnan(found) else found
 
 
 @functools.cache

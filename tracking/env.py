@@ -23,7 +23,7 @@ from tracking.config import Config
 from tracking.episodes import AnyTracker, Rollout, streams_for
 from tracking.held import LIMIT, Cache
 from tracking.observation import NAMES, Observer
-from tracking.protocol import checked, choose_mode, find
+from tracking.protocol import checked, choose_mode, config_class, find
 from tracking.run import Params, config_of
 from tracking.search import Space, decode, encode, space_of
 from tracking.source import Source, What, sources
@@ -68,7 +68,7 @@ class TuningEnv(gymnasium.Env[Floats, Floats]):
         _one_of("observation", observation, SEEN)
         _one_of("render_mode", render_mode, (None, *METADATA["render_modes"]))
         self.render_mode, self.observation = render_mode, observation
-        self.kind = _config_class(self.tracker)
+        self.kind = config_class(self.tracker)
         self.defaults = config_of(self.kind, params)
         self.sources = sources(suite, seeds, set)
         self.mode = _mode(self.tracker, self.sources[0], detections)
@@ -221,14 +221,6 @@ class TuningEnv(gymnasium.Env[Floats, Floats]):
             "params": self.config.as_dict(),
             "refused": self.refused,
         }
-
-
-def _config_class(tracker: type[Tracker]) -> type[Config]:
-    kind: type[Config] | None = getattr(tracker, "config_class", None)
-    if kind is None:
-        remedy = "give the class a config_class (docs/trackers.md)"
-        raise InputError(place="tracker", got=tracker.__name__, expected="a tracker with parameters", remedy=remedy)
-    return kind
 
 
 def _mode(tracker: type[Tracker], first: Source, asked: DetectionMode | None) -> DetectionMode:

@@ -93,7 +93,7 @@ def derive(tracks: Iterable[Tracks], fps: float, px_per_m: float = 1.0, rule: Gr
         return given
     rule = rule or Grouping()
     rows = tabled(given, fps, px_per_m, rule)
-    named = bool((rows.group >= 0).any()) or any(t.groups is not None for t in given)
+    named = names_groups(given)
     said = {e.kind for t in given for e in t.events}
     events: list[GroupEvent] = []
     if not named or not said & MEMBERSHIP:

@@ -13,7 +13,7 @@ import importlib.util
 import inspect
 import sys
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 
@@ -23,7 +23,8 @@ from tracking.answers import History, check_tracks, finite
 from tracking.config import Config
 
 __all__ = [
-    "History", "check_detections", "check_tracks", "checked", "choose_mode", "find", "names", "own_detector",
+    "History", "check_detections", "check_tracks", "checked", "choose_mode", "config_class", "find", "names",
+    "own_detector",
 ]  # fmt: skip
 
 REGISTRY = {"blob": "tracking.papers.blob:Blob", "group-pda": "tracking.papers.group_pda:GroupPda"}
@@ -94,6 +95,15 @@ def checked(found: Any, spec: str) -> type[Tracker]:
         expected = f"a class with reset(context, seed), step(frame, detections) and needs, a tuple out of {NEEDS}"
         raise InputError(file=spec, got=fault, expected=expected, remedy="see docs/trackers.md")
     return found  # type: ignore[no-any-return]
+
+
+def config_class(tracker: type[Tracker]) -> type[Config]:
+    """The config's class; InputError where the tracker has no parameters."""
+    kind = getattr(tracker, "config_class", None)
+    if kind is None:
+        remedy = "give the class a config_class that declares them (docs/trackers.md)"
+        raise InputError(place="tracker", got=tracker.__name__, expected="a tracker with parameters", remedy=remedy)
+    return cast("type[Config]", kind)
 
 
 def _class_fault(found: Any) -> str | None:

@@ -12,8 +12,8 @@ import pytest
 
 from scenarios.errors import InputError, WorkError
 from sim.hand import Elsewhere
-from sim.workers import THREADS, TRIES, crew, pool
-from tests.errands import complain, fall, fall_at_first, hide, process, refuse, root_of
+from sim.workers import THREADS, TRIES, crew, in_order, pool
+from tests.errands import complain, fall, fall_at_first, hide, process, refuse, root_of, told
 
 
 @pytest.mark.parametrize("workers", [1, 2])
@@ -106,6 +106,25 @@ def test_who_stops_looking_can_run_again() -> None:
         for _ in run(time.sleep, [0.0, 1800.0]):
             break
         assert sorted(run(refuse, range(3))) == [(0, 0), (1, 1), (2, 2)]
+
+
+@pytest.mark.parametrize("workers", [1, 3])
+def test_results_in_the_order_of_the_items_whoever_was_first(workers: int, tmp_path: Path) -> None:
+    items = [(tmp_path / str(k), seconds) for k, seconds in enumerate((0.5, 0.0, 0.2, 0.0))]
+    with crew(workers) as run:
+        assert list(in_order(run, told, items)) == ["0", "1", "2", "3"]
+        assert list(in_order(run, told, [])) == []
+
+
+def test_once_the_taker_stops_what_is_under_way_ends_and_nothing_more_begins(tmp_path: Path) -> None:
+    items = [(tmp_path / str(k), 0.3) for k in range(20)]
+    with pool(2) as run:
+        coming = in_order(run, told, items)
+        next(coming)
+        coming.close()
+        found = [marker.read_text() for marker, _ in items if marker.exists()]
+    assert 2 <= len(found) <= 4
+    assert set(found) == {"done"}
 
 
 def test_what_cannot_be_sent_back_is_an_error_not_a_death() -> None:

@@ -19,13 +19,14 @@ Departures, all ours:
   splitting and merging, so that what is split is not merged.
 - R of the centroid: members keep their places and are drawn without replacement out of those there (of those seen, if
   they are more). m_N grows with N and has tails; a further association is that nothing is the group's (the miss).
-- Sigma and N rest while points are shared, and in spells. A shared point is told as the nearer group's. Of two groups
+- Sigma and N rest while points are shared, and in spells. A shared point is told as the likelier group's. Of two groups
   that lie on the points of one for too long one is lost (doubles).
 - From points, members who are not measured are carried along for a while as points of their group (carry); points that
   are linked to a group's, but in no region, are its own (attach).
 - P of merged groups is that of a weighted mean. SR_v is a physical difference of velocities, and must last. Groups that
   are tentative, coasting, in a spell, or without points of their own do not merge; linked points are near, whatever the
-  regions. A spell is shortened by good frames rather than ended.
+  regions. From pixels who is far behind is not near, and groups on the same points may merge. A spell is
+  shortened by good frames rather than ended.
 - Children of a split have their parent's velocity; so has who walks out of its region. The largest keeps the id.
 - Groups are tentative at first, coast, are lost, and take their id back from a newborn that fits.
 - Onsets of merges and splits are looked at afterwards (onset). In an image seen at an angle, velocities and distances

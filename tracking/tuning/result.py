@@ -17,8 +17,6 @@ from tracking.tuning.judge import Candidate, Comparison
 from tracking.tuning.plan import Plan, text
 
 VERSIONS = ("flockscope", "optuna", "numpy", "scipy", "numba")
-
-
 LONG = 40
 """Characters of a setting that are told."""
 

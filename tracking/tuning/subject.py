@@ -62,14 +62,10 @@ class Subject:
 
 def subject_of(tracker: str | type[Tracker]) -> Subject:
     """The subject of this name, file or class; InputError where it is no tracker or has no parameters."""
-    from tracking.protocol import checked, find
+    from tracking.protocol import checked, config_class, find
 
     if tracker == RULE:
         return Subject(RULE, RULE, Grouping, ("points", "boxes"))
     named = tracker if isinstance(tracker, str) else getattr(tracker, "__name__", str(tracker))
     found: Any = find(tracker) if isinstance(tracker, str) else checked(tracker, named)
-    kind = getattr(found, "config_class", None)
-    if kind is None:
-        remedy = "give the class a config_class that declares them (docs/trackers.md)"
-        raise InputError(place="tracker", got=named, expected="a tracker with parameters", remedy=remedy)
-    return Subject(tracker, named, kind, tuple(found.needs))
+    return Subject(tracker, named, config_class(found), tuple(found.needs))

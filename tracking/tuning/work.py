@@ -23,9 +23,8 @@ HELD = 512 * 2**20
 
 @dataclass(frozen=True)
 class Job:
-    """One episode to play, and its place in the order."""
+    """One episode to play."""
 
-    place: int
     tracker: str | type[Tracker]
     source: Source
     values: dict[str, Any]
@@ -45,7 +44,7 @@ def players(
 
     Once its taker stops nothing more is begun.
     """
-    from sim.workers import crew
+    from sim.workers import crew, in_order
 
     if isinstance(subject.tracker, type) and (workers > 1 or cluster):
         remedy = "give file.py:Class or module:Class, or one worker"
@@ -54,30 +53,13 @@ def players(
         alone, held = workers == 1 and cluster is None, Cache(HELD)
 
         def play(sources: Sequence[Source], values: dict[str, Any], every: bool) -> Generator[Answer, None, None]:
-            jobs = [Job(k, subject.tracker, s, values, detections, every) for k, s in enumerate(sources)]
+            jobs = [Job(subject.tracker, s, values, detections, every) for s in sources]
             if alone:
                 yield from (_attempt(job, subject, held) for job in jobs)
             else:
-                yield from _in_order(run, jobs)
+                yield from in_order(run, play_job, jobs)
 
         yield play
-
-
-def _in_order(run: Any, jobs: list[Job]) -> Generator[Answer, None, None]:
-    """The answers in order; those under way when the taker stops are waited for, so that no worker is lost."""
-    wanted = True
-    found: dict[int, Answer] = {}
-    coming = run(play_job, (job for job in jobs if wanted))
-    try:
-        for k in range(len(jobs)):
-            while k not in found:
-                job, answer = next(coming)
-                found[job.place] = answer
-            yield found.pop(k)
-    finally:
-        wanted = False
-        for _ in coming:
-            pass
 
 
 def play_job(job: Job) -> Answer:

@@ -8,18 +8,16 @@ import numpy as np
 import pytest
 
 from scenarios.errors import InputError
-from sim.types import Context, Frame, Tracks
+from sim.types import Tracks
 from tests import painted
 from tracking.papers.group_pda import GroupPda
 
 
 def watch(scale: float, sample: np.ndarray) -> tuple[GroupPda, list[Tracks]]:
     """Two people abreast walk through the picture; scale: px per m, as it is told."""
-    tracker, r = GroupPda(), np.random.default_rng(1)
-    tracker.reset(Context(painted.FPS, scale, image_size=(painted.WIDE, painted.HIGH), background=sample), 0)
+    tracker = GroupPda()
     frames = [[(40.0 + 4 * k, 200.0, painted.TALL), (64.0 + 4 * k, 200.0, painted.TALL)] for k in range(40)]
-    pictures = [painted.picture(people, r) for people in frames]
-    return tracker, [tracker.step(Frame(k + 1, k / painted.FPS, image=image), None) for k, image in enumerate(pictures)]
+    return tracker, painted.watched(tracker, frames, scale, sample)
 
 
 def test_lone_people_in_the_sample_tell_the_scale() -> None:

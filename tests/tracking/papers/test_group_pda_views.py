@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from sim.types import Context, Frame, Tracks
+from sim.types import Tracks
 from tests import painted
 from tests.painted import TALL, Person
 from tracking.papers.group_pda import GroupPda
@@ -16,11 +16,7 @@ SCALE = TALL / 1.7
 
 def watch(frames: list[list[Person]]) -> list[Tracks]:
     """Groups in pictures of these people."""
-    tracker, r = GroupPda(), np.random.default_rng(1)
-    sample = painted.sample(np.random.default_rng(0), 28)
-    tracker.reset(Context(painted.FPS, SCALE, image_size=(painted.WIDE, painted.HIGH), background=sample), 0)
-    pictures = (painted.picture(people, r) for people in frames)
-    return [tracker.step(Frame(k + 1, k / painted.FPS, image=image), None) for k, image in enumerate(pictures)]
+    return painted.watched(GroupPda(), frames, SCALE, painted.sample(np.random.default_rng(0), 28))
 
 
 def merges(made: list[Tracks]) -> int:

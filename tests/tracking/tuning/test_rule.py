@@ -44,7 +44,7 @@ def test_an_episode_is_what_evaluate_says(tmp_path, seed):
 
 
 def test_labels_err_for_a_while_and_do_not_change_who_is_there():
-    (source,) = sources("crossing", (0,))[:1]
+    source = sources("crossing", (0,))[0]
     truth = source.open().truth
     for labels in (Labels(0.06, 0.3, told=False), SURVEYED):
         found = as_labelled(truth, labels, 7)
