@@ -57,15 +57,16 @@ class Search:
     suite: str
     objective: str
     detections: str
-    validation: int  # seeds of each scene
+    seeds: int  # of each scene in training
+    validation: int
 
 
 SEARCHES = {
     s.tracker: s
     for s in (
-        Search("blob", "boxes.toml", "HOTA", "file", 5),
-        Search("group-pda", "points.toml", "objective", "file", 5),
-        Search("grouping", "points.toml", "pairwise_F1", "truth", 15),
+        Search("blob", "boxes.toml", "HOTA", "file", 3, 5),
+        Search("group-pda", "points.toml", "objective", "file", 3, 5),
+        Search("grouping", "points.toml", "pairwise_F1", "truth", 8, 16),
     )
 }
 RECORDINGS = {
@@ -86,8 +87,9 @@ def search(given: argparse.Namespace) -> None:
         begun = time.perf_counter()
         found = tune(
             wanted.tracker, SUITES / wanted.suite, given.trials or 60, objective=wanted.objective,
-            detections=wanted.detections, workers=given.workers, out=given.out / f"{name}.toml", seeds=range(3),
-            validation=range(10_000, 10_000 + wanted.validation), test=range(20_000, 20_013), progress=said(),
+            detections=wanted.detections, workers=given.workers, out=given.out / f"{name}.toml",
+            seeds=range(wanted.seeds), validation=range(10_000, 10_000 + wanted.validation),
+            test=range(20_000, 20_013), progress=said(),
             set=sensor_settings(given.sensor) if given.sensor else (),
         )  # fmt: skip
         print(found)

@@ -13,8 +13,11 @@ import numpy as np
 
 from sim.types import Array
 
-CHORD = 0.4
-"""s before and after, over which a velocity is a chord."""
+MEETING, LEAVING = 0.7, 0.4
+"""s before and after, over which a velocity is a chord: whole groups turn slowly, and bodies hide each other as they
+meet; a part leaves at once."""
+ALIKE = 1.2
+"""Of the velocities that may differ: chords across a meeting are still those of before in part."""
 APART, FAR_APART, PARTING = 1.5, 2.5, 0.7
 """m between the nearest, with and without velocities that differ by so many m/s, from which on parts of a group count
 as apart (docs/formats.md, split)."""
@@ -32,19 +35,19 @@ class Encounter:
     path: list[tuple[float, Array, Array, float]]
 
     def onset(self, speed: float) -> tuple[float, Array]:
-        """When they became near and equally fast, and where."""
+        """When they became near and equally fast, and where; speed: by which groups that merge may differ."""
         t, d = np.array([p[0] for p in self.path]), np.array([p[1] for p in self.path])
-        fast = (chords(t, d) > speed) & (t <= self.since)
+        fast = (chords(t, d, MEETING) > ALIKE * speed) & (t <= self.since)
         fast |= np.array([p[3] for p in self.path]) > APART
         k = min(int(np.flatnonzero(fast)[-1]) + 1 if fast.any() else 0, len(t) - 1)
         return float(t[k]), self.path[k][2]
 
 
-def chords(t: Array, d: Array) -> Array:
-    """(K,) speeds over CHORD before and after each of the times t (K,), one frame at least, of places d (K, 2)."""
+def chords(t: Array, d: Array, half: float) -> Array:
+    """(K,) speeds over `half` s before and after each of the times t (K,), one frame at least, of places d (K, 2)."""
     k = np.arange(len(t))
-    first = np.minimum(np.searchsorted(t, t - CHORD - 1e-9), np.maximum(k - 1, 0))
-    last = np.maximum(np.searchsorted(t, t + CHORD + 1e-9) - 1, np.minimum(k + 1, len(t) - 1))
+    first = np.minimum(np.searchsorted(t, t - half - 1e-9), np.maximum(k - 1, 0))
+    last = np.maximum(np.searchsorted(t, t + half + 1e-9) - 1, np.minimum(k + 1, len(t) - 1))
     return np.asarray(np.hypot(*(d[last] - d[first]).T) / np.maximum(t[last] - t[first], 1e-9))
 
 
@@ -74,6 +77,6 @@ def parting(
         apart.append(middle[1] - middle[0])
     when, d = np.array(times[::-1]), np.array(apart[::-1])
     gap = np.hypot(*d.T) - reach
-    together = (gap <= APART) | ((gap <= FAR_APART) & (chords(when, d) < PARTING))
+    together = (gap <= APART) | ((gap <= FAR_APART) & (chords(when, d, LEAVING) < PARTING))
     k = min(int(np.flatnonzero(together)[-1]) + 1 if together.any() else 0, len(when) - 1)
     return float(when[k]), before[k][1].mean(0) / ground

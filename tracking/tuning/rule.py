@@ -1,7 +1,8 @@
 """Episodes of the baseline rule of groups: people who are known, as labels tell them, grouped by it and scored.
 
-Simulated people are exact, labels are not: a rule tuned on exact places asks for velocities that no label has. So
-places get a labeller's errors, and with odd seeds, as in most labelled videos, no velocities.
+A rule tuned on simulated people's exact places on the ground asks for distances and velocities that no label has. So
+they get a labeller's errors, and with odd seeds, as in most labelled videos, they are boxes in the camera's image,
+whose distances shrink with depth, at one scale for the whole image, and without velocities.
 """
 
 from __future__ import annotations
@@ -20,14 +21,14 @@ from tracking.links import Grouping
 
 @dataclass(frozen=True)
 class Labels:
-    """sd, m, of a place, each way; time, s, for which its error lasts; told: are velocities known?"""
+    """sd, m, of a place, each way; time, s, for which its error lasts; filmed: boxes in the image, no velocities."""
 
     sd: float
     time: float
-    told: bool
+    filmed: bool
 
 
-SURVEYED, FILMED = Labels(0.02, 0.1, told=True), Labels(0.06, 0.1, told=False)
+SURVEYED, FILMED = Labels(0.02, 0.1, filmed=False), Labels(0.06, 0.1, filmed=True)
 """As people's places in BIWI's seq_hotel, and boxes in CAVIAR's Meet_WalkTogether1, leave a smooth way: by 0.02 m and
 0.055 m, the latter jumping by 0.05 m from frame to frame at 25 fps."""
 
@@ -51,15 +52,20 @@ def play_rule(source: Source, rule: Grouping, cache: Cache) -> Episode:
 
 
 def as_labelled(truth: Truth, labels: Labels, seed: int) -> Truth:
-    """The truth with people's places on the ground as such labels have them, errors a first-order process."""
+    """The truth as such labels have it, errors of places a first-order process."""
     assert truth.pos is not None, "simulated people have places"
+    assert truth.box is not None, "scenes have cameras"
     r, stay = np.random.default_rng(seed), float(np.exp(-1 / (truth.fps * labels.time)))
     error = np.sqrt(1 - stay**2) * r.standard_normal(truth.pos.shape)
     for id in np.unique(truth.id).tolist():
         own = np.flatnonzero(truth.id == id)
         error[own[0]] /= np.sqrt(1 - stay**2)
         error[own] = lfilter([1.0], [1.0, -stay], error[own], axis=0)
-    return truth.replace(pos=truth.pos + labels.sd * error, vel=truth.vel if labels.told else None)
+    error *= labels.sd
+    if not labels.filmed:
+        return truth.replace(pos=truth.pos + error)
+    moved = np.concatenate([truth.px_per_m * error, np.zeros_like(error)], axis=1)
+    return truth.replace(pos=None, vel=None, box=truth.box + moved)
 
 
 def people_as_tracks(truth: Truth) -> list[Tracks]:

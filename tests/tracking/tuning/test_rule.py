@@ -20,7 +20,7 @@ from tracking.tuning.rule import FILMED, SURVEYED, Labels, as_labelled, people_a
 
 @pytest.fixture
 def source(tmp_path):
-    return sources(write_scenes(tmp_path)[0], (3,))[0]
+    return sources(write_scenes(tmp_path)[0], (4,))[0]
 
 
 def test_the_people_are_perfect_and_their_groups_unknown(source):
@@ -46,17 +46,32 @@ def test_an_episode_is_what_evaluate_says(tmp_path, seed):
 def test_labels_err_for_a_while_and_do_not_change_who_is_there():
     source = sources("crossing", (0,))[0]
     truth = source.open().truth
-    for labels in (Labels(0.06, 0.3, told=False), SURVEYED):
+    for labels in (Labels(0.06, 0.3, filmed=True), SURVEYED):
         found = as_labelled(truth, labels, 7)
-        assert (found.vel is not None) == labels.told
+        assert (found.vel is None) == (found.pos is None) == labels.filmed
         assert found.frame.tobytes() + found.id.tobytes() == truth.frame.tobytes() + truth.id.tobytes()
-        error = found.pos - truth.pos
+        error = (found.box - truth.box)[:, :2] / truth.px_per_m if labels.filmed else found.pos - truth.pos
+        assert found.box[:, 2:].tobytes() == truth.box[:, 2:].tobytes()
         assert error.std(axis=0) == pytest.approx([labels.sd] * 2, rel=0.1)
         own = error[truth.id == truth.id[0]]
         stay = np.exp(-1 / (truth.fps * labels.time))
         assert np.corrcoef(own[1:, 0], own[:-1, 0])[0, 1] == pytest.approx(stay, abs=0.2)
-        assert as_labelled(truth, labels, 7).pos.tobytes() == found.pos.tobytes()
-        assert as_labelled(truth, labels, 8).pos.tobytes() != found.pos.tobytes()
+        same, other = (as_labelled(truth, labels, seed) for seed in (7, 8))
+        assert (same.box if labels.filmed else same.pos).tobytes() == (
+            found.box if labels.filmed else found.pos
+        ).tobytes()
+        assert (other.box if labels.filmed else other.pos).tobytes() != (
+            found.box if labels.filmed else found.pos
+        ).tobytes()
+
+
+def test_filmed_people_are_grouped_in_the_image():
+    """Boxes alone, at one scale: those who walk behind each other look nearer than they are."""
+    truth = sources("crossing", (0,))[0].open().truth
+    answers = people_as_tracks(as_labelled(truth, FILMED, 1))
+    assert {t.plane for t in answers} == {"image"}
+    assert all(np.isnan(t.vel).all() for t in answers)
+    assert evaluate(truth, derive(answers, truth.fps, truth.px_per_m)).surface == "image"
 
 
 def test_a_rule_that_links_nobody_scores_nothing(source):
@@ -98,7 +113,7 @@ def test_a_rule_on_the_command_line(source, tmp_path, capsys):
     (tmp_path / "rule.toml").write_text("[params]\nnear = 0.5\n")
     (tmp_path / "wrong.toml").write_text("[params]\nnaer = 0.5\n")
     where = str(tmp_path / "data")
-    assert run(["generate", str(tmp_path / "one.toml"), "--seeds", "3", "--streams", "none", "--out", where]) == 0
+    assert run(["generate", str(tmp_path / "one.toml"), "--seeds", "4", "--streams", "none", "--out", where]) == 0
     line = ["track", "blob", where, "--out", str(tmp_path / "tracks"), "--grouping"]
     assert run([*line, str(tmp_path / "rule.toml")]) == 0
     (info,) = (tmp_path / "tracks").rglob("run.json")

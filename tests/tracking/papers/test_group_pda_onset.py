@@ -1,0 +1,35 @@
+"""Onsets, looked at afterwards: when groups that have merged became as fast as each other."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from sim.rules import SAME_WAY
+from tracking.papers.group_pda_onset import APART, Encounter
+
+FPS, SLOWS, LASTS = 10.0, 2.0, 1.0
+"""Frames per second; when the difference of the velocities begins to fall from 2 m/s to nothing, and for how long."""
+
+
+def encounter(noise: float, seed: int, gap: float = 0.5) -> Encounter:
+    """Two groups that turn into one direction 3 m from each other's middles, seen with so much noise, m."""
+    t = np.arange(50) / FPS
+    speed = 2 * np.clip((SLOWS + LASTS - t) / LASTS, 0, 1)
+    d = np.stack([3.0 + np.cumsum(speed[::-1])[::-1] / FPS, np.zeros(50)], axis=1)
+    d += np.random.default_rng(seed).normal(0, noise, d.shape)
+    return Encounter(3.5, [(time, place, place / 2, gap) for time, place in zip(t.tolist(), d, strict=True)])
+
+
+@pytest.mark.parametrize("noise", [0.0, 0.05, 0.1])
+def test_it_is_when_they_had_become_equally_fast(noise: float) -> None:
+    due = SLOWS + LASTS * (1 - SAME_WAY / 2)
+    found = np.array([encounter(noise, seed).onset(SAME_WAY)[0] for seed in range(40)])
+    assert abs(found - due).max() <= 0.5
+    assert found.mean() == pytest.approx(due, abs=0.25)
+
+
+def test_before_that_they_must_be_near() -> None:
+    met = encounter(0.0, 0)
+    far = [(t, d, m, APART + 0.1 if t < 4.2 else gap) for t, d, m, gap in met.path]
+    assert Encounter(4.4, far).onset(SAME_WAY)[0] == pytest.approx(4.2)
