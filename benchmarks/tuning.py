@@ -65,7 +65,7 @@ SEARCHES = {
     s.tracker: s
     for s in (
         Search("blob", "boxes.toml", "HOTA", "file", 3, 5),
-        Search("group-pda", "points.toml", "objective", "file", 3, 5),
+        Search("group-pda", "groups.toml", "objective", "file", 3, 5),
         Search("grouping", "points.toml", "pairwise_F1", "truth", 8, 16),
     )
 }
