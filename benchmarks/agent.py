@@ -2,7 +2,7 @@
 
     PYTHONPATH=. python benchmarks/agent.py --case blob:clutter:file --parameters gate,coast_time [--statistics …]
 
-Both are found by CMA-ES (tracking.agent_search) on training seeds, with and without statistics; on test seeds are
+Both are found by CMA-ES (tracking.agent_search) on training seeds, the agent from the fixed ones on; on test seeds are
 compared: the defaults, the fixed parameters, the agent. Differences are paired, 95 % (bootstrap over sequences), in
 points: hundredths of the objective. What an oracle would gain: benchmarks/switching.py.
 """
@@ -11,7 +11,6 @@ from __future__ import annotations
 
 import argparse
 import os
-from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
@@ -25,14 +24,10 @@ from tracking.stats import bootstrap, paired
 STATISTICS = "births,flicker,weak,surplus,orphans,missed,innovation"
 
 
-def said(word: str) -> Callable[[int, int, float], None]:
+def said(done: int, total: int, gain: float) -> None:
     """Progress, a line for every fifth generation."""
-
-    def tell(done: int, total: int, gain: float) -> None:
-        if done % 5 == 0 or done == total:
-            print(f"  {word}: {done} of {total} generations, mean gain {100 * gain:+.2f} points", flush=True)
-
-    return tell
+    if done % 5 == 0 or done == total:
+        print(f"  {done} of {total} generations, mean gain {100 * gain:+.2f} points", flush=True)
 
 
 def main() -> None:
@@ -50,21 +45,16 @@ def main() -> None:
         os.environ.setdefault(name, "1")
     tracker, scenario, mode = given.case.split(":")
     names, seen = given.parameters.split(","), given.statistics.split(",")
-    found = {
-        word: learn(
-            tracker, scenario, names, some, every=given.every, generations=given.generations, detections=mode,
-            workers=given.workers, progress=said(word),
-        )
-        for word, some in (("fixed", []), ("agent", seen))
-    }  # fmt: skip
-    for word, one in found.items():
-        gain = "{:+.2f} [{:+.2f}, {:+.2f}]".format(*(100 * g for g in one.gain))
-        print(f"  {word}: in validation {gain}, {'believed' if one.policy is one.tried else 'not believed'}")
+    found = learn(
+        tracker, scenario, names, seen, every=given.every, generations=given.generations, detections=mode,
+        workers=given.workers, progress=said,
+    )  # fmt: skip
+    for word, gain in (("fixed ones less the defaults", found.gain), ("agent less the fixed ones", found.more)):
+        print("  in validation {}: {:+.2f} [{:+.2f}, {:+.2f}]".format(word, *(100 * g for g in gain)))
     test = sources(scenario, range(*map(int, given.seeds.split(":"))))
-    best = found["fixed"].tried
-    none = replace(best, offset=np.zeros(len(names)))
+    none = replace(found.fixed, offset=np.zeros(len(names)))
     with crew(given.workers) as run:
-        rows = np.stack([played(run, p, test, mode) for p in (none, best, found["agent"].tried)], axis=1)
+        rows = np.stack([played(run, p, test, mode) for p in (none, found.fixed, found.agent)], axis=1)
     mean, low, high = bootstrap(100 * rows)
     print(f"\n{given.case}, seeds {given.seeds}, {', '.join(names)} every {given.every:g} s by {', '.join(seen)}\n")
     print("| | objective, points | less the defaults | less the fixed ones |\n|---|---|---|---|")
@@ -75,7 +65,7 @@ def main() -> None:
         ]
         print(f"| {word} | {mean[k]:.2f} [{low[k]:.2f}, {high[k]:.2f}] | {less[0] if k else '–'} | {less[1]} |")
     if given.out is not None:
-        given.out.write_text(found["agent"].tried.to_json(), encoding="utf-8")
+        given.out.write_text(found.agent.to_json(), encoding="utf-8")
 
 
 if __name__ == "__main__":

@@ -1,8 +1,9 @@
 """The search for an agent: CMA-ES over the offset and weights of a linear policy (tracking.agent), on whole episodes.
 
-All policies of a generation are played on the same training sequences, and what counts is the gain over the defaults on
-each of them: scenes differ by more than policies do. The centre of the last generations is the agent; it is believed
-where its gain on validation sequences is sure, else the defaults stay. Hansen & Ostermeier 2001; needs `cmaes`.
+First the offset alone is searched, the best fixed parameters; from there offset and weights together. All policies of a
+generation are played on the same training sequences, and what counts is the gain over the defaults on each of them:
+scenes differ by more than policies do. The centre of the last generations is what was found; it is believed where its
+gain on validation sequences is sure. Hansen & Ostermeier 2001; needs `cmaes`.
 """
 
 from __future__ import annotations
@@ -14,7 +15,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from scenarios.errors import InputError
-from sim.types import Array, DetectionMode
+from sim.types import Array, DetectionMode, Ints
 from sim.workers import Run, crew, in_order
 from tracking.agent import Policy
 from tracking.episodes import Cache, Rollout, play
@@ -23,7 +24,8 @@ from tracking.source import Source, What, sources
 from tracking.stats import paired
 
 SIGMA = 0.08
-"""First step of the search, in the cube: of an offset, and of a weight per standard deviation of a statistic."""
+"""First step of the search for fixed parameters, in the cube; half of it for the agent's offset, and for what all its
+weights together make of statistics one standard deviation from usual."""
 LEAST = 0.02
 """A statistic's standard deviation is taken to be no less."""
 BATCH = 8
@@ -32,13 +34,18 @@ BATCH = 8
 
 @dataclass(frozen=True)
 class Learned:
-    """policy: the agent, or the defaults (no weights, no offset) where it was not surely better in validation; tried:
-    the agent in any case; gain: its mean gain there, and the ends of the 95 % interval; history: mean gains in training
-    of each generation's policies."""
+    """policy: the agent where it is surely better than the fixed parameters in validation, else these where they are
+    surely better than the defaults, else the defaults (no weights, no offset).
+
+    agent, fixed: what was found in any case; gain: the fixed ones' over the defaults, more: the agent's over the fixed
+    ones, mean and the ends of the 95 % interval; history: mean gains in training of each generation's policies.
+    """
 
     policy: Policy
-    tried: Policy
+    agent: Policy
+    fixed: Policy
     gain: tuple[float, float, float]
+    more: tuple[float, float, float]
     history: tuple[float, ...]
 
 
@@ -69,8 +76,9 @@ def learn(
 ) -> Learned:
     """An agent that moves these parameters by these statistics, every so many seconds.
 
-    No statistics: the best fixed parameters that the same search finds. progress: called with the generations done, how
-    many there will be, and the mean gain. InputError where names are unknown.
+    generations: of the search for fixed parameters, and, where there are statistics, again of that for the agent.
+    progress: called with the generations done, how many there will be, and the mean gain. InputError where names are
+    unknown.
     """
     settings = tuple(set)
     train, check = sources(suite, seeds, settings), sources(suite, validation, settings)
@@ -86,44 +94,64 @@ def learn(
             value = np.reshape(list(in_order(run, objective, jobs)), (len(policies), len(part)))
             return np.asarray(value - np.array([base[s] for s in part]))
 
-        best, history = _evolved(zero, train, gains, generations, seed, progress)
-        new, old = (played(run, one, check, detections) for one in (best, zero))
-    gain, low, high = (float(v[0]) for v in paired(old[:, None], new[:, None]))
-    return Learned(best if low > 0 else zero, best, (gain, low, high), history)
+        history: list[float] = []
+
+        def tell(mean: float) -> None:
+            history.append(mean)
+            if progress is not None:
+                progress(len(history), generations * (2 if len(f) else 1), mean)
+
+        steps = SIGMA * np.r_[np.ones(len(p)), np.zeros(p.size * f.size)]
+        fixed = agent = _evolved(zero, steps, train, gains, generations, seed, tell)
+        if len(f):
+            steps = SIGMA / 2 * np.r_[np.ones(len(p)), np.full(p.size * f.size, f.size**-0.5)]
+            agent = _evolved(fixed, steps, train, gains, generations, seed, tell)
+        values = [played(run, one, check, detections) for one in (zero, fixed, agent)]
+    gain, more = _gain(values[0], values[1]), _gain(values[1], values[2])
+    policy = agent if more[1] > 0 else fixed if gain[1] > 0 else zero
+    return Learned(policy, agent, fixed, gain, more, tuple(history))
+
+
+def _gain(before: Array, after: Array) -> tuple[float, float, float]:
+    """Mean difference of scores (S,) of the same sequences, and the ends of its interval."""
+    mean, low, high = paired(before[:, None], after[:, None])
+    return float(mean[0]), float(low[0]), float(high[0])
 
 
 def _evolved(
-    zero: Policy,
+    start: Policy,
+    steps: Array,
     train: Sequence[Source],
     gains: Callable[[list[Policy], Sequence[Source]], Array],
     generations: int,
     seed: int,
-    progress: Callable[[int, int, float], None] | None,
-) -> tuple[Policy, tuple[float, ...]]:
-    """The mean of the centres of the last quarter of the generations, and the mean gain of each generation."""
+    tell: Callable[[float], None],
+) -> Policy:
+    """The mean of the centres of the last quarter of the generations; steps (P + P F,): the first ones of each number,
+    0: it stays. tell: called with each generation's mean gain."""
     try:
         from cmaes import CMA
     except ImportError as error:
         remedy = 'install the extra: pip install "flockscope[tune]"'
         raise InputError(place="agent_search", got="no cmaes", expected="the package cmaes", remedy=remedy) from error
-    p, f = zero.weights.shape
-    search = CMA(mean=np.zeros(p * (1 + f)), sigma=SIGMA, seed=seed)
-    r, history, centres = np.random.default_rng(seed), [], []
-    for k in range(generations):
+    free = np.flatnonzero(steps)
+    search = CMA(mean=np.zeros(len(free)), sigma=1.0, seed=seed)
+    r, centres = np.random.default_rng(seed), []
+    for _ in range(generations):
         part = [train[i] for i in sorted(r.permutation(len(train))[:BATCH])]
         points = [search.ask() for _ in range(search.population_size)]
-        found = gains([moved(zero, point) for point in points], part).mean(1)
+        found = gains([moved(start, free, steps[free] * point) for point in points], part).mean(1)
         search.tell([(point, -float(value)) for point, value in zip(points, found, strict=True)])
-        history.append(float(found.mean()))
         centres.append(search.mean.copy())
-        if progress is not None:
-            progress(k + 1, generations, history[-1])
-    return moved(zero, np.mean(centres[-max(generations // 4, 1) :], axis=0)), tuple(history)
+        tell(float(found.mean()))
+    return moved(start, free, steps[free] * np.mean(centres[-max(generations // 4, 1) :], axis=0))
 
 
-def moved(policy: Policy, point: Array) -> Policy:
-    """The policy with the offset and weights of a point (P + P F,)."""
+def moved(policy: Policy, which: Ints, by: Array) -> Policy:
+    """The policy with some of the numbers of its offset and weights, one after the other, moved by so much."""
     p, f = policy.weights.shape
+    point = np.r_[policy.offset, policy.weights.ravel()]
+    point[which] += by
     return replace(policy, offset=point[:p], weights=point[p:].reshape(p, f))
 
 

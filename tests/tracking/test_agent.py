@@ -116,10 +116,12 @@ def test_the_search_finds_what_the_defaults_lack(tmp_path: Path) -> None:
         TOY, scene, ("reach",), ("tracks",), every=0.6, generations=8, seeds=range(4),
         validation=range(10_000, 10_006), progress=lambda done, total, gain: told.append(done),
     )  # fmt: skip
-    assert told == list(range(1, 9))
-    assert len(found.history) == 8
+    assert told == list(range(1, 17))
+    assert len(found.history) == 16
     assert found.gain[1] > 0.1  # reach is far too short by default
-    assert found.policy is found.tried
+    assert found.policy in (found.fixed, found.agent)
+    assert not found.fixed.weights.any()
+    assert found.agent.weights.any()
     assert found.policy.config(None).as_dict()["reach"] > 0.3
     again = agent_search.learn(
         TOY, scene, ("reach",), ("tracks",), every=0.6, generations=8, seeds=range(4), validation=range(10_000, 10_006)
@@ -133,9 +135,10 @@ def test_a_gain_that_is_not_sure_is_not_believed(tmp_path: Path) -> None:
         f"{FILE}:Indifferent", scene, ("reach",), (), every=0.6, generations=2, seeds=range(3),
         validation=range(10_000, 10_004),
     )  # fmt: skip
-    assert found.gain == (0.0, 0.0, 0.0)
+    assert found.gain == found.more == (0.0, 0.0, 0.0)
     assert not found.policy.offset.any()
-    assert found.tried.offset.any()
+    assert found.fixed.offset.any()
+    assert found.agent is found.fixed
 
 
 def test_without_cmaes_it_says_what_to_install(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
