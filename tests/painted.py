@@ -44,14 +44,6 @@ def box(person: Person) -> np.ndarray:
     return np.array([x - 0.15 * h, foot - h, 0.3 * h, h])
 
 
-def watched(tracker: Tracker, frames: Iterable[Sequence[Person]], scale: float, sample: np.ndarray) -> list[Tracks]:
-    """What a tracker says of pictures of these people; scale: px per m, as it is told."""
-    r = np.random.default_rng(1)
-    tracker.reset(Context(FPS, scale, image_size=(WIDE, HIGH), background=sample), 0)
-    pictures = (picture(people, r) for people in frames)
-    return [tracker.step(Frame(k + 1, k / FPS, image=image), None) for k, image in enumerate(pictures)]
-
-
 COLOURS = ((30, 20, 190), (190, 30, 20), (20, 170, 40), (20, 20, 25))
 
 
@@ -78,6 +70,14 @@ def sample(r: np.random.Generator, frames: int = 20, people: Sequence[Person] = 
 def spread(height: float = TALL) -> list[Person]:
     """People all over the picture, one at a time, for a sample that shows how high they are."""
     return [(30.0 + 20 * k, 100.0 + 6 * k, height) for k in range(14)]
+
+
+def watched(tracker: Tracker, frames: Iterable[Sequence[Person]], scale: float, sample: np.ndarray) -> list[Tracks]:
+    """What a tracker says of pictures of these people; scale: px per m, as it is told."""
+    r = np.random.default_rng(1)
+    tracker.reset(Context(FPS, scale, image_size=(WIDE, HIGH), background=sample), 0)
+    pictures = (picture(people, r) for people in frames)
+    return [tracker.step(Frame(k + 1, k / FPS, image=image), None) for k, image in enumerate(pictures)]
 
 
 def track(

@@ -49,7 +49,7 @@ class Policy:
 
     def __post_init__(self) -> None:
         p, f = len(self.parameters), len(self.statistics)
-        known = {q.name for q in config_class(find(self.tracker)).space(online=True)}
+        known = {q.name for q in config_class(find(self.tracker), self.tracker).space(online=True)}
         for place, names, allowed in (
             ("parameters", self.parameters, known),
             ("statistics", self.statistics, set(NAMES) - set(OWN)),
@@ -70,7 +70,7 @@ class Policy:
     @cached_property
     def base(self) -> Config:
         """The config that it moves."""
-        return config_class(find(self.tracker)).from_dict(self.params)
+        return config_class(find(self.tracker), self.tracker).from_dict(self.params)
 
     @cached_property
     def space(self) -> Space:

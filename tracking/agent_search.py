@@ -106,8 +106,9 @@ def learn(
         if len(f):
             steps = SIGMA / 2 * np.r_[np.ones(len(p)), np.full(p.size * f.size, f.size**-0.5)]
             agent = _evolved(fixed, steps, train, gains, generations, seed, tell)
-        values = [played(run, one, check, detections) for one in (zero, fixed, agent)]
-    gain, more = _gain(values[0], values[1]), _gain(values[1], values[2])
+        old, new = (played(run, one, check, detections) for one in (zero, fixed))
+        newest = new if agent is fixed else played(run, agent, check, detections)
+    gain, more = _gain(old, new), _gain(new, newest)
     policy = agent if more[1] > 0 else fixed if gain[1] > 0 else zero
     return Learned(policy, agent, fixed, gain, more, tuple(history))
 

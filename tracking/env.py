@@ -68,7 +68,7 @@ class TuningEnv(gymnasium.Env[Floats, Floats]):
         _one_of("observation", observation, SEEN)
         _one_of("render_mode", render_mode, (None, *METADATA["render_modes"]))
         self.render_mode, self.observation = render_mode, observation
-        self.kind = config_class(self.tracker)
+        self.kind = config_class(self.tracker, self.tracker.__name__)
         self.defaults = config_of(self.kind, params)
         self.sources = sources(suite, seeds, set)
         self.mode = _mode(self.tracker, self.sources[0], detections)

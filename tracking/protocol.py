@@ -97,12 +97,12 @@ def checked(found: Any, spec: str) -> type[Tracker]:
     return found  # type: ignore[no-any-return]
 
 
-def config_class(tracker: type[Tracker]) -> type[Config]:
-    """The config's class; InputError where the tracker has no parameters."""
+def config_class(tracker: type[Tracker], spec: str) -> type[Config]:
+    """The config's class; InputError where the tracker, which was given as `spec`, has no parameters."""
     kind = getattr(tracker, "config_class", None)
     if kind is None:
         remedy = "give the class a config_class that declares them (docs/trackers.md)"
-        raise InputError(place="tracker", got=tracker.__name__, expected="a tracker with parameters", remedy=remedy)
+        raise InputError(place="tracker", got=spec, expected="a tracker with parameters", remedy=remedy)
     return cast("type[Config]", kind)
 
 

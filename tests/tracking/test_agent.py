@@ -109,6 +109,12 @@ def test_wrong_policies_are_named(wrong: dict[str, object], place: str) -> None:
         policy(**wrong)
 
 
+def test_a_tracker_without_parameters_is_told_as_it_was_given() -> None:
+    with pytest.raises(InputError, match="a tracker with parameters") as error:
+        policy(tracker="tests/fake_tracker.py:Nearest")
+    assert error.value.got == "tests/fake_tracker.py:Nearest"
+
+
 def test_the_search_finds_what_the_defaults_lack(tmp_path: Path) -> None:
     scene, _ = write_scenes(tmp_path)
     told: list[int] = []
@@ -119,7 +125,7 @@ def test_the_search_finds_what_the_defaults_lack(tmp_path: Path) -> None:
     assert told == list(range(1, 17))
     assert len(found.history) == 16
     assert found.gain[1] > 0.1  # reach is far too short by default
-    assert found.policy in (found.fixed, found.agent)
+    assert found.policy is (found.agent if found.more[1] > 0 else found.fixed)
     assert not found.fixed.weights.any()
     assert found.agent.weights.any()
     assert found.policy.config(None).as_dict()["reach"] > 0.3

@@ -68,4 +68,4 @@ def subject_of(tracker: str | type[Tracker]) -> Subject:
         return Subject(RULE, RULE, Grouping, ("points", "boxes"))
     named = tracker if isinstance(tracker, str) else getattr(tracker, "__name__", str(tracker))
     found: Any = find(tracker) if isinstance(tracker, str) else checked(tracker, named)
-    return Subject(tracker, named, config_class(found), tuple(found.needs))
+    return Subject(tracker, named, config_class(found, named), tuple(found.needs))

@@ -56,13 +56,11 @@ def test_labels_err_for_a_while_and_do_not_change_who_is_there():
         own = error[truth.id == truth.id[0]]
         stay = np.exp(-1 / (truth.fps * labels.time))
         assert np.corrcoef(own[1:, 0], own[:-1, 0])[0, 1] == pytest.approx(stay, abs=0.2)
-        same, other = (as_labelled(truth, labels, seed) for seed in (7, 8))
-        assert (same.box if labels.filmed else same.pos).tobytes() == (
-            found.box if labels.filmed else found.pos
-        ).tobytes()
-        assert (other.box if labels.filmed else other.pos).tobytes() != (
-            found.box if labels.filmed else found.pos
-        ).tobytes()
+        again = [as_labelled(truth, labels, seed) for seed in (7, 8)]
+        same, other = (told.box if labels.filmed else told.pos for told in again)
+        here = found.box if labels.filmed else found.pos
+        assert same.tobytes() == here.tobytes()
+        assert other.tobytes() != here.tobytes()
 
 
 def test_filmed_people_are_grouped_in_the_image():
