@@ -38,6 +38,7 @@ def main() -> None:
     made.add_argument("--every", type=float, default=2.5, help="s between decisions")
     made.add_argument("--generations", type=int, default=20)
     made.add_argument("--seeds", default="20000:20040", help="test seeds a:b")
+    made.add_argument("--set", nargs="*", default=[], help="of the scenes, key=value: smaller pictures cost less")
     made.add_argument("--workers", type=int, default=2)
     made.add_argument("--out", type=Path, help="the agent found, *.json")
     given = made.parse_args()
@@ -47,11 +48,11 @@ def main() -> None:
     names, seen = given.parameters.split(","), given.statistics.split(",")
     found = learn(
         tracker, scenario, names, seen, every=given.every, generations=given.generations, detections=mode,
-        workers=given.workers, progress=said,
+        set=given.set, workers=given.workers, progress=said,
     )  # fmt: skip
     for word, gain in (("fixed ones less the defaults", found.gain), ("agent less the fixed ones", found.more)):
         print("  in validation {}: {:+.2f} [{:+.2f}, {:+.2f}]".format(word, *(100 * g for g in gain)))
-    test = sources(scenario, range(*map(int, given.seeds.split(":"))))
+    test = sources(scenario, range(*map(int, given.seeds.split(":"))), given.set)
     none = replace(found.fixed, offset=np.zeros(len(names)))
     with crew(given.workers) as run:
         rows = np.stack([played(run, p, test, mode) for p in (none, found.fixed, found.agent)], axis=1)

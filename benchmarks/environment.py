@@ -177,7 +177,8 @@ def measured(env: gymnasium.Env[Any, Any], rounds: int) -> tuple[float, int, lis
 
 def vector(name: str, every: int | None, mode: str, rounds: int) -> float:
     """Steps per second of both environments together."""
-    envs = gymnasium.make_vec(ID, 2, vectorization_mode=mode, **made(name, every))
+    at_once = {"autoreset_mode": gymnasium.vector.AutoresetMode.SAME_STEP}  # else the step after an end plays nothing
+    envs = gymnasium.make_vec(ID, 2, vectorization_mode=mode, vector_kwargs=at_once, **made(name, every))
     try:
         envs.reset(seed=0)
         zero = np.zeros(envs.action_space.shape or (), np.float32)

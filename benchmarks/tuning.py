@@ -4,9 +4,9 @@
     PYTHONPATH=. python benchmarks/tuning.py real --out FOLDER [--data FOLDER]       after `search`
     PYTHONPATH=. python benchmarks/tuning.py workers|overhead
 
-search: on the suites of benchmarks/tuning_suites, training seeds; default → tuned on test seeds, and on friends-meet or
-crossing, which share no scenario with them. A search that was interrupted goes on. --sensor: detections err as this
-profile says (`flockscope fit sensor`), for trackers of boxes.
+search: on the suites of benchmarks/tuning_suites (or --suite), training seeds; default → tuned on test seeds, and on
+friends-meet or crossing, which share no scenario with them. A search that was interrupted goes on. --sensor: detections
+err as this profile says (`flockscope fit sensor`), with --half in every second scene, for trackers of boxes.
 real: first defaults (tracking/frozen), present defaults and what `search` found, on recordings: `blob` on PETS09-S2L1
 (200 frames) and TUD-Campus from their det/det.txt, HOTA; `group-pda` on seq_hotel from labelled places, group scores;
 the rule of groups on seq_hotel and CAVIAR Meet_WalkTogether1 from labelled people, pairwise F1. Intervals by moving
@@ -17,6 +17,7 @@ workers: seconds of one search by 1 and 2 processes. overhead: what a trial cost
 from __future__ import annotations
 
 import argparse
+import json
 import os
 import tempfile
 import time
@@ -28,6 +29,7 @@ from typing import Any
 import numpy as np
 
 from scenarios import sensor_settings
+from scenarios.suite import lines
 from sim.io.source import open_source
 from sim.types import Ints, Sequence, Tracks
 from tracking.config import Config
@@ -64,9 +66,9 @@ class Search:
 SEARCHES = {
     s.tracker: s
     for s in (
-        Search("blob", "boxes.toml", "HOTA", "file", 3, 5),
+        Search("blob", "detectors.toml", "HOTA", "file", 3, 5),
         Search("group-pda", "groups.toml", "objective", "file", 3, 5),
-        Search("grouping", "points.toml", "pairwise_F1", "truth", 8, 16),
+        Search("grouping", "groups.toml", "pairwise_F1", "truth", 8, 16),
     )
 }
 RECORDINGS = {
@@ -84,18 +86,32 @@ KEYS = {
 def search(given: argparse.Namespace) -> None:
     for name in given.names or SEARCHES:
         wanted = SEARCHES[name]
-        begun = time.perf_counter()
+        begun, suite = time.perf_counter(), given.suite or SUITES / wanted.suite
+        if given.half:
+            suite = half_sensed(suite, given.sensor, given.out)
         found = tune(
-            wanted.tracker, SUITES / wanted.suite, given.trials or 60, objective=wanted.objective,
+            wanted.tracker, suite, given.trials or 60, objective=wanted.objective,
             detections=wanted.detections, workers=given.workers, out=given.out / f"{name}.toml",
-            seeds=range(wanted.seeds), validation=range(10_000, 10_000 + wanted.validation),
+            seeds=range(wanted.seeds), validation=range(10_000, 10_000 + (given.validation or wanted.validation)),
             test=range(20_000, 20_013), progress=said(),
-            set=sensor_settings(given.sensor) if given.sensor else (),
+            set=sensor_settings(given.sensor) if given.sensor and not given.half else (),
         )  # fmt: skip
         print(found)
         for key, (old, new) in found.changed.items():
             print(f"  {key}: {old} → {new}")
         print(f"  {time.perf_counter() - begun:.0f} s\n", flush=True)
+
+
+def half_sensed(suite: Path, sensor: Path, out: Path) -> Path:
+    """The suite with this detector in every second scene, the first one included."""
+    rows = []
+    for k, line in enumerate(lines(suite)):
+        settings = (*line.settings, *(sensor_settings(sensor) if k % 2 == 0 else ()))
+        name, scenario, set = map(json.dumps, (line.name, line.scenario, settings))
+        rows.append(f"  {{ name = {name}, scenario = {scenario}, set = {set} }},")
+    path = out / f"{suite.stem}-half-{sensor.stem}.toml"
+    path.write_text("\n".join(["entry = [", *rows, "]", ""]))
+    return path
 
 
 def said() -> Callable[[int, int | None, str], None]:
@@ -196,10 +212,15 @@ def main() -> None:
     parser.add_argument("names", nargs="*", choices=[*SEARCHES, []])
     parser.add_argument("--out", type=Path, default=Path("tuned"))
     parser.add_argument("--trials", type=int)
+    parser.add_argument("--validation", type=int, help="seeds of each scene")
+    parser.add_argument("--suite", type=Path, help="search: another one than the tracker's own")
     parser.add_argument("--sensor", type=Path)
+    parser.add_argument("--half", action="store_true", help="--sensor in every second scene only")
     parser.add_argument("--workers", type=int, default=1, help="search: processes, which change nothing that is found")
     parser.add_argument("--data", type=Path, default=Path(os.environ.get("FLOCKSCOPE_DATA", beside)))
     given = parser.parse_args()
+    if given.half and given.sensor is None:
+        parser.error("--half needs --sensor")
     {"search": search, "real": real, "workers": workers, "overhead": overhead}[given.mode](given)
 
 

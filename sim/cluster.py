@@ -105,7 +105,9 @@ class _Staff:
         """How many items can be done at a time, at least as many as the user says."""
         now = time.monotonic()
         if now - self._counted >= COUNT:
-            with suppress(OSError):  # a lost scheduler shows in its futures
+            if self._client.status not in ("running", "connecting"):
+                raise lost_connection(self._address)
+            with suppress(OSError):  # a scheduler that is lost just now shows in its futures
                 self._here, self._counted = sum(self._client.nthreads().values()), now
             self._mind(now)
         return max(self._least, self._here)
@@ -116,6 +118,12 @@ class _Staff:
         elif self._alone_since is not None and now - self._alone_since >= SILENCE:
             self._alone_since = None
             warnings.warn(f"{self._address} has no workers: waiting for some to come", stacklevel=2)
+
+
+def lost_connection(address: str) -> WorkError:
+    """The error of a scheduler that went away."""
+    got = f"a lost connection to {address}"
+    return WorkError(place="--cluster", got=got, expected="a scheduler that stays", remedy=REMEDY)
 
 
 def _submitted(client: Any, function: Callable[[Any], Any], item: Any) -> Any:
@@ -224,9 +232,7 @@ def _result(fetch: Callable[[], bytes], item: T, address: str, lost: Callable[[T
             raise told from None
         return lost(item, told)
     except (CancelledError, OSError) as error:
-        raise WorkError(
-            place="--cluster", got=f"a lost connection to {address}", expected="a scheduler that stays", remedy=REMEDY
-        ) from error
+        raise lost_connection(address) from error
     except (ImportError, AttributeError) as error:
         raise WorkError(
             place="--cluster", got=f"a worker that cannot begin ({error})", expected="flockscope as it is here",

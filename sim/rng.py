@@ -20,6 +20,7 @@ ROLE = {
     "tracker": 11,
     "camera": 12,
     "wind": 13,
+    "label": 14,
 }
 
 

@@ -11,7 +11,7 @@ before the first frame s = 0. Without weights it is a fixed set of parameters. F
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
@@ -81,13 +81,16 @@ class Policy:
         """From one decision to the next."""
         return max(round(self.every * fps), 1)
 
-    def config(self, observed: ArrayLike | None) -> Config:
-        """The parameters for the next frames, by the statistics (K,) of the last ones; None before the first frame."""
+    def config(self, observed: ArrayLike | None, allowed: Callable[[Config], object] = lambda config: None) -> Config:
+        """The parameters for the next frames, by the statistics (K,) of the last ones; None before the first frame.
+
+        Drawn back to the base where they are no config, or `allowed` raises InputError (tracking.search.decode).
+        """
         seen = np.zeros(len(self.statistics))
         if observed is not None:
             seen = (np.asarray(observed, float)[[NAMES.index(s) for s in self.statistics]] - self.usual) / self.spread
         base, space = self.base, self.space
-        return decode(space, encode(space, base) + self.offset + self.weights @ seen, base)
+        return decode(space, encode(space, base) + self.offset + self.weights @ seen, base, allowed)
 
     def to_json(self) -> str:
         """Itself as text."""
@@ -122,11 +125,21 @@ class Adaptive:
     needs: ClassVar[tuple[str, ...]]
 
     def reset(self, context: Context, seed: int) -> None:
-        """Begin anew, with the policy's parameters of a run in which nothing was seen yet."""
+        """Begin anew, with the policy's parameters of a run in which nothing was seen yet, as far as the tracker takes
+        them for this sequence."""
         self.context = context
         self.long = self.policy.frames(context.fps)
-        self.inner: Any = cast(Any, find(self.policy.tracker))(self.policy.config(None))
-        self.inner.reset(context, seed)
+        kind, begun = cast(Any, find(self.policy.tracker)), dict[Config, Any]()
+
+        def begin(config: Config) -> None:
+            tracker = kind(config)
+            tracker.reset(context, seed)
+            begun[config] = tracker
+
+        config = self.policy.config(None, begin)
+        if config not in begun:
+            begin(config)
+        self.inner: Any = begun[config]
         self.observer, self.answers = Observer(context.fps), list[Tracks]()
 
     @property

@@ -11,6 +11,7 @@ from __future__ import annotations
 import functools
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
+from pathlib import Path
 
 import numpy as np
 
@@ -20,8 +21,10 @@ from sim.workers import Run, crew, in_order
 from tracking.agent import Policy
 from tracking.episodes import Cache, Rollout, play
 from tracking.observation import NAMES, Observer
-from tracking.source import Source, What, sources
+from tracking.source import Source
 from tracking.stats import paired
+from tracking.tuning import scenes
+from tracking.tuning.plan import Scenes
 
 SIGMA = 0.08
 """First step of the search for fixed parameters, in the cube; half of it for the agent's offset, and for what all its
@@ -34,11 +37,12 @@ BATCH = 8
 
 @dataclass(frozen=True)
 class Learned:
-    """policy: the agent where it is surely better than the fixed parameters in validation, else these where they are
-    surely better than the defaults, else the defaults (no weights, no offset).
+    """policy: the agent where it is surely better in validation than the fixed parameters and the defaults, else the
+    former where they are surely better than the latter, else the defaults (no weights, no offset).
 
     agent, fixed: what was found in any case; gain: the fixed ones' over the defaults, more: the agent's over the fixed
-    ones, mean and the ends of the 95 % interval; history: mean gains in training of each generation's policies.
+    ones, total: the agent's over the defaults, mean and the ends of the 95 % interval; history: mean gains in training
+    of each generation's policies.
     """
 
     policy: Policy
@@ -46,6 +50,7 @@ class Learned:
     fixed: Policy
     gain: tuple[float, float, float]
     more: tuple[float, float, float]
+    total: tuple[float, float, float]
     history: tuple[float, ...]
 
 
@@ -60,14 +65,14 @@ class Job:
 
 def learn(
     tracker: str,
-    suite: What,
+    suite: Scenes,
     parameters: Sequence[str],
     statistics: Sequence[str],
     *,
     every: float = 1.0,
     generations: int = 20,
-    seeds: Iterable[int] = range(24),
-    validation: Iterable[int] = range(10_000, 10_024),
+    seeds: range = range(24),
+    validation: range = range(10_000, 10_024),
     set: Iterable[str] = (),
     detections: DetectionMode = "file",
     workers: int = 1,
@@ -78,10 +83,18 @@ def learn(
 
     generations: of the search for fixed parameters, and, where there are statistics, again of that for the agent.
     progress: called with the generations done, how many there will be, and the mean gain. InputError where names are
-    unknown.
+    unknown, and where scenes are recordings, or seeds of another split: as in `tracking.tune`.
     """
-    settings = tuple(set)
-    train, check = sources(suite, seeds, settings), sources(suite, validation, settings)
+    _needed()
+    if not parameters or generations < 1:
+        place, got = ("generations", generations) if parameters else ("parameters", "none")
+        raise InputError(place=place, got=got, expected="at least one", remedy="give more")
+    names, settings = (str(suite),) if isinstance(suite, str | Path) else tuple(map(str, suite)), tuple(set)
+    count = scenes.scenes(names, settings, "suite")
+    train, check = (
+        scenes.of(names, scenes.chosen_seeds(some, split, count), settings)
+        for some, split in ((seeds, "train"), (validation, "val"))
+    )
     p, f = np.zeros(len(parameters)), np.zeros(len(statistics))
     zero = Policy(tracker, every, tuple(parameters), tuple(statistics), p, np.outer(p, f), f, f + 1)
     usual, spread = usual_statistics(zero, train[:BATCH], detections)
@@ -108,9 +121,18 @@ def learn(
             agent = _evolved(fixed, steps, train, gains, generations, seed, tell)
         old, new = (played(run, one, check, detections) for one in (zero, fixed))
         newest = new if agent is fixed else played(run, agent, check, detections)
-    gain, more = _gain(old, new), _gain(new, newest)
-    policy = agent if more[1] > 0 else fixed if gain[1] > 0 else zero
-    return Learned(policy, agent, fixed, gain, more, tuple(history))
+    gain, more, total = _gain(old, new), _gain(new, newest), _gain(old, newest)
+    policy = agent if min(more[1], total[1]) > 0 else fixed if gain[1] > 0 else zero
+    return Learned(policy, agent, fixed, gain, more, total, tuple(history))
+
+
+def _needed() -> None:
+    """InputError where the search's package is missing."""
+    try:
+        import cmaes  # noqa: F401
+    except ImportError as error:
+        remedy = 'install the extra: pip install "flockscope[tune]"'
+        raise InputError(place="agent_search", got="no cmaes", expected="the package cmaes", remedy=remedy) from error
 
 
 def _gain(before: Array, after: Array) -> tuple[float, float, float]:
@@ -130,11 +152,8 @@ def _evolved(
 ) -> Policy:
     """The mean of the centres of the last quarter of the generations; steps (P + P F,): the first ones of each number,
     0: it stays. tell: called with each generation's mean gain."""
-    try:
-        from cmaes import CMA
-    except ImportError as error:
-        remedy = 'install the extra: pip install "flockscope[tune]"'
-        raise InputError(place="agent_search", got="no cmaes", expected="the package cmaes", remedy=remedy) from error
+    from cmaes import CMA
+
     free = np.flatnonzero(steps)
     search = CMA(mean=np.zeros(len(free)), sigma=1.0, seed=seed)
     r, centres = np.random.default_rng(seed), []
@@ -165,7 +184,9 @@ def usual_statistics(policy: Policy, among: Sequence[Source], mode: DetectionMod
     """Mean and standard deviation (F,) of its statistics, as the tracker sees them with the config that it moves."""
     seen = []
     for source in among:
-        rollout = Rollout(policy.tracker, source, policy.base, detections=mode, cache=_memory())
+        rollout = Rollout(
+            policy.tracker, source, policy.base, detections=mode, tracker_seed=source.seed, cache=_memory()
+        )
         observer, long = Observer(rollout.sequence.fps), policy.frames(rollout.sequence.fps)
         for k, (frame, answer) in enumerate(rollout.advance(), 1):
             observer.see(frame, answer)
@@ -177,7 +198,9 @@ def usual_statistics(policy: Policy, among: Sequence[Source], mode: DetectionMod
 
 def objective(job: Job) -> float:
     """Of an episode; 0 where it has nothing to score."""
-    found = play(job.policy.tracked(), job.source, detections=job.mode, cache=_memory()).objective
+    found = play(
+        job.policy.tracked(), job.source, detections=job.mode, tracker_seed=job.source.seed, cache=_memory()
+    ).objective
     return 0.0 if np.isnan(found) else found
 
 

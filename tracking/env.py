@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import difflib
 from collections.abc import Iterable, Mapping
-from typing import Any, Literal, cast
+from typing import Any, Literal, cast, get_args
 
 import gymnasium
 import numpy as np
@@ -66,12 +66,13 @@ class TuningEnv(gymnasium.Env[Floats, Floats]):
         self.tracker: type[Tracker] = find(tracker) if isinstance(tracker, str) else checked(tracker, str(tracker))
         self.tracker_seed, self.decision_every = tracker_seed, decision_every
         _one_of("observation", observation, SEEN)
+        _one_of("detections", detections, (None, *get_args(DetectionMode)))
         _one_of("render_mode", render_mode, (None, *METADATA["render_modes"]))
         self.render_mode, self.observation = render_mode, observation
         self.kind = config_class(self.tracker, self.tracker.__name__)
         self.defaults = config_of(self.kind, params)
         self.sources = sources(suite, seeds, set)
-        self.mode = _mode(self.tracker, self.sources[0], detections)
+        self.mode = _mode(self.tracker, self.sources, detections)
         self.space: Space = _space(self.kind, self.mode, decision_every)
         self.cache = Cache(cache)
         count, low = len(NAMES), np.r_[np.zeros(len(NAMES)), -np.ones(len(self.space))].astype(np.float32)
@@ -79,6 +80,7 @@ class TuningEnv(gymnasium.Env[Floats, Floats]):
         self.observation_space = Box(low[:size], np.ones(size, np.float32))
         self.action_space = Box(-1.0, 1.0, (len(self.space),), np.float32)
         self.source, self.base = self.sources[0], self.defaults
+        self.metadata = self._metadata(self.source.fps)
         self._forget()
 
     @property
@@ -92,9 +94,14 @@ class TuningEnv(gymnasium.Env[Floats, Floats]):
         names = {"statistics": NAMES, "parameters": (*NAMES, *self.parameter_names), "none": ("nothing",)}
         return names[self.observation]
 
+    def _metadata(self, fps: float) -> dict[str, Any]:
+        """A video of pictures, one per action, takes as long as what it shows."""
+        return {**METADATA, "render_fps": max(round(fps / (self.decision_every or 1)), 1)}
+
     def _forget(self) -> None:
         """No episode."""
         self.rollout: Rollout | None = None
+        self._observer: Observer | None = None
         self.config, self.score, self.scores, self.refused = self.base, 0.0, dict[str, float](), ""
 
     def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> tuple[Floats, dict[str, Any]]:
@@ -108,18 +115,18 @@ class TuningEnv(gymnasium.Env[Floats, Floats]):
         options = options or {}
         for name in options:
             _one_of("options", name, OPTIONS)
-        self.source = self._drawn(options)
-        self.base = self.defaults if options.get("params") is None else config_of(self.kind, options["params"])
-        self._forget()
-        held = self.cache.hold(self.source, streams_for(self.tracker, self.mode))
+        base = self.defaults if options.get("params") is None else config_of(self.kind, options["params"])
+        source = self._drawn(options)
+        held = self.cache.hold(source, streams_for(self.tracker, self.mode))
         assert held.truth is not None
-        self._observer = Observer(held.sequence.fps)
-        if self.decision_every is not None:
-            self.rollout = self._begun(self.base)
-            if not hasattr(self.rollout.ready.tracker, "config"):
-                expected, remedy = "a tracker that keeps its config as `config`", "see docs/tuning.md, Environment"
-                raise InputError(place="decision_every", got=self.tracker.__name__, expected=expected, remedy=remedy)
-        self.metadata = {**METADATA, "render_fps": max(round(held.sequence.fps / (self.decision_every or 1)), 1)}
+        rollout = None if self.decision_every is None else self._begun(base, source)
+        if rollout is not None and not hasattr(rollout.ready.tracker, "config"):
+            expected, remedy = "a tracker that keeps its config as `config`", "see docs/tuning.md, Environment"
+            raise InputError(place="decision_every", got=self.tracker.__name__, expected=expected, remedy=remedy)
+        self.source, self.base = source, base
+        self._forget()
+        self.rollout, self._observer = rollout, Observer(held.sequence.fps)
+        self.metadata = self._metadata(held.sequence.fps)
         return self._observed(), self._info()
 
     def step(self, action: Any) -> tuple[Floats, float, bool, bool, dict[str, Any]]:
@@ -128,19 +135,21 @@ class TuningEnv(gymnasium.Env[Floats, Floats]):
         Parameters that are no config are drawn back towards those that the episode began with (tracking.search.decode);
         those that the tracker refuses between frames leave it with the ones before, and `info["refused"]` says why.
         """
+        if self._observer is None:
+            raise InputError(place="step", got="no episode", expected="one that was begun", remedy="call reset() first")
         if self.decision_every is None:
             self.rollout = self._begun_by(action)
             whole = self._track(None)
         else:
-            assert self.rollout is not None, "reset comes before step"
+            assert self.rollout is not None
             whole = self._track_on(decode(self.space, action, self.base))
         self.scores = self.rollout.scores() if self.rollout.answers else {}
         before, self.score = self.score, self.scores.get("objective", 0.0)
         return self._observed(), self.score - before, whole, False, self._info()
 
-    def _begun(self, config: Config) -> Rollout:
+    def _begun(self, config: Config, source: Source) -> Rollout:
         return Rollout(
-            self.tracker, self.source, config, detections=self.mode, tracker_seed=self.tracker_seed, cache=self.cache
+            self.tracker, source, config, detections=self.mode, tracker_seed=self.tracker_seed, cache=self.cache
         )
 
     def _begun_by(self, action: Any) -> Rollout:
@@ -148,16 +157,17 @@ class TuningEnv(gymnasium.Env[Floats, Floats]):
         begun: dict[Config, Rollout] = {}
 
         def begin(config: Config) -> None:
-            begun[config] = self._begun(config)
+            begun[config] = self._begun(config, self.source)
 
         self.config = decode(self.space, action, self.base, begin)
-        return begun.get(self.config) or self._begun(self.config)
+        return begun.get(self.config) or self._begun(self.config, self.source)
 
     def _track(self, upto: int | None) -> bool:
         """Track on; is this the end?"""
         assert self.rollout is not None
         for frame, answer in self.rollout.advance(upto):
             if self.observation != "none":
+                assert self._observer is not None
                 self._observer.see(frame, answer)
         done = len(self.rollout.answers)
         return done == self.rollout.length or upto is None or done < upto
@@ -204,6 +214,7 @@ class TuningEnv(gymnasium.Env[Floats, Floats]):
     def _observed(self) -> Floats:
         if self.observation == "none":
             return np.zeros(1, np.float32)
+        assert self._observer is not None
         scale = float("nan") if self.rollout is None else self.rollout.ready.px_per_m(self.rollout.answers)
         seen = self._observer.look(scale)
         if self.observation == "statistics":
@@ -223,11 +234,17 @@ class TuningEnv(gymnasium.Env[Floats, Floats]):
         }
 
 
-def _mode(tracker: type[Tracker], first: Source, asked: DetectionMode | None) -> DetectionMode:
-    """The detections of all episodes: so that all have the same parameters."""
-    if first.simulated:
-        return asked or ("image" if streams_for(tracker, None) else "file")
-    return choose_mode(tracker.needs, first.open(("left",)), asked)
+def _mode(tracker: type[Tracker], among: Iterable[Source], asked: DetectionMode | None) -> DetectionMode:
+    """The detections of all episodes, so that all have the same parameters: those of the first that is not simulated;
+    InputError where another one has none of the kind."""
+    among = tuple(among)
+    for source in among:
+        if not source.simulated:
+            asked = choose_mode(tracker.needs, source.open(("left",)), asked)
+    if any(source.simulated for source in among):
+        asked = asked or ("image" if streams_for(tracker, None) else "file")
+    assert asked is not None
+    return asked
 
 
 def _space(kind: type[Config], mode: DetectionMode, every: int | None) -> Space:

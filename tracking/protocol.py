@@ -12,6 +12,7 @@ import importlib
 import importlib.util
 import inspect
 import sys
+from functools import cache
 from pathlib import Path
 from typing import Any, cast
 
@@ -23,7 +24,7 @@ from tracking.answers import History, check_tracks, finite
 from tracking.config import Config
 
 __all__ = [
-    "History", "check_detections", "check_tracks", "checked", "choose_mode", "config_class", "find", "names",
+    "History", "check_detections", "check_tracks", "checked", "choose_mode", "code", "config_class", "find", "names",
     "own_detector",
 ]  # fmt: skip
 
@@ -104,6 +105,13 @@ def config_class(tracker: type[Tracker], spec: str) -> type[Config]:
         remedy = "give the class a config_class that declares them (docs/trackers.md)"
         raise InputError(place="tracker", got=spec, expected="a tracker with parameters", remedy=remedy)
     return cast("type[Config]", kind)
+
+
+@cache
+def code(tracker: type[Tracker]) -> str:
+    """A short hash of the file that the class is from, as it was when first asked for; "" where there is none."""
+    file = Path(getattr(sys.modules.get(tracker.__module__), "__file__", None) or "")
+    return hashlib.sha256(file.read_bytes()).hexdigest()[:12] if file.is_file() else ""
 
 
 def _class_fault(found: Any) -> str | None:

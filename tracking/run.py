@@ -9,7 +9,7 @@ import time
 import warnings
 from collections.abc import Callable, Iterator, Mapping
 from collections.abc import Sequence as SequenceOf
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, cast, overload
 
@@ -57,8 +57,8 @@ class Prepared:
     history: protocol.History = field(default_factory=protocol.History)
 
     def frames(self) -> Iterator[Frame]:
-        """The frames as the tracker gets them."""
-        return iter(self.sequence) if self.feed is None else iter(self.feed)
+        """The frames as the tracker gets them: from pixels without the detections that came with them."""
+        return iter(self.feed) if self.feed is not None else (replace(f, detections=None) for f in self.sequence)
 
     def px_per_m(self, answers: SequenceOf[Tracks]) -> float:
         """The scale by which groups are derived: what was given, learned, or follows from the boxes answered."""
@@ -76,7 +76,7 @@ class Prepared:
 
     def answer(self, frame: Frame) -> Tracks:
         """One step, its input and output checked."""
-        detections = None if self.mode == "image" else frame.detections
+        detections = frame.detections
         if detections is not None:
             protocol.check_detections(detections, self.tracker.needs)
         try:
@@ -152,6 +152,9 @@ def prepare(
     seed: int = 0,
 ) -> Prepared:
     """Everything up to the tracker's reset; arguments as in `track`."""
+    if not isinstance(sequence, Sequence):
+        remedy = "open it: sim.io.source.open_source(path), or sim.simulate(scenario, seed)"
+        raise InputError(place="sequence", got=type(sequence).__name__, expected="a Sequence", remedy=remedy)
     name, instance, config = _make(tracker, params)
     mode = protocol.choose_mode(instance.needs, sequence, detections)
     if sensor and mode != "truth":

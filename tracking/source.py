@@ -41,6 +41,12 @@ class Source:
         """Is it made from a scenario?"""
         return self.entry is not None
 
+    @property
+    def fps(self) -> float:
+        """Frames per second."""
+        camera = self.entry.scenario.camera if self.entry is not None else None
+        return self.open().fps if camera is None else camera.fps
+
     def open(self, streams: Iterable[str] = ()) -> Sequence:
         """The sequence; streams: of the pictures that are drawn where it is simulated, of others "left" lets them be
         read."""
@@ -64,6 +70,11 @@ def sources(what: What | Source, seeds: Iterable[int] = range(10), set: Iterable
     """
     if isinstance(what, str | Path | Sequence | Source):
         what = (what,)
+    if not isinstance(seeds, Iterable):
+        remedy = f"write for example range({seeds})"
+        raise InputError(place="seeds", got=repr(seeds), expected="a range or a list of numbers", remedy=remedy)
+    if isinstance(set, str):
+        raise InputError(place="set", got=repr(set), expected='a list of "key=value"', remedy=f"write [{set!r}]")
     numbers, settings = tuple(seeds), tuple(set)
     found = tuple(source for one in what for source in _of(one, numbers, settings))
     if not found:

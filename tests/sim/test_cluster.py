@@ -161,8 +161,10 @@ def test_a_scheduler_that_goes_away(tmp_path: Path) -> None:
         pairs = run(process, range(1000))
         next(pairs)
         here.scheduler.kill()
-        with pytest.raises(WorkError, match=f"lost connection to {here.address}.*is kept"):
-            list(pairs)
+        for some in (pairs, run(process, range(3)), run(process, range(3))):  # lost, and known to be lost
+            with pytest.raises(WorkError, match=f"lost connection to {here.address}.*is kept"):
+                list(some)
+            time.sleep(1.0)
 
 
 def test_nobody_there(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -40,6 +40,20 @@ def test_it_says_what_its_formula_says() -> None:
     assert made.config(100 * seen) == dataclasses.replace(made.base, reach=5.0)
 
 
+def test_what_the_tracker_refuses_for_a_sequence_is_drawn_back(tmp_path: Path) -> None:
+    """At any frame rate newborn tracks of blob must start above confirm_ratio; what is possible depends on the rate."""
+    (source,) = sources(write_scenes(tmp_path)[0], [3])
+    names, none = ("confirm_ratio", "speed_prior", "size_rate_prior"), np.zeros((3, 0))
+    made = policy("blob", parameters=names, statistics=(), offset=[0.5, -1.0, -1.0], weights=none, usual=[], spread=[])
+    with pytest.raises(InputError, match="confirm_ratio"):
+        play("blob", source, made.config(None), detections="file")
+    rollout = Rollout(made.tracked(), source, detections="file")
+    assert rollout.episode().frames == 0
+    used = rollout.ready.tracker.inner.config
+    assert used.confirm_ratio > made.base.confirm_ratio
+    assert used.speed_prior < made.base.speed_prior
+
+
 def places(answers: Iterable[Tracks]) -> np.ndarray:
     """Where everybody was said to be, frame by frame."""
     return np.concatenate([t.pos for t in answers])
@@ -135,6 +149,38 @@ def test_the_search_finds_what_the_defaults_lack(tmp_path: Path) -> None:
     assert again.policy.to_json() == found.policy.to_json()
 
 
+@pytest.mark.parametrize(
+    ("fixed", "agent", "chosen"),
+    [(0.1, 0.2, "agent"), (0.1, 0.05, "fixed"), (-0.2, -0.1, "defaults"), (-0.1, 0.1, "agent")],
+)
+def test_an_agent_is_to_beat_the_defaults_too(
+    fixed: float, agent: float, chosen: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Better than fixed parameters that are worse than the defaults is not good enough."""
+
+    def said(run: object, policy: Policy, among: list[object], mode: str) -> np.ndarray:
+        gain = agent if policy.weights.any() else fixed if policy.offset.any() else 0.0
+        return np.linspace(0.2, 0.8, len(among)) + gain
+
+    monkeypatch.setattr(agent_search, "played", said)
+    seeds = {"seeds": range(3), "validation": range(10_000, 10_004)}
+    found = agent_search.learn(TOY, write_scenes(tmp_path)[0], ("reach",), ("tracks",), generations=1, **seeds)
+    assert (found.gain[0], found.total[0]) == pytest.approx((fixed, agent))
+    kind = "agent" if found.policy is found.agent else "fixed" if found.policy is found.fixed else "defaults"
+    assert kind == chosen
+    assert (kind == "defaults") == (not found.policy.offset.any())
+
+
+def test_nothing_is_learned_on_what_judges(tmp_path: Path) -> None:
+    scene, _ = write_scenes(tmp_path)
+    with pytest.raises(InputError, match="validation seeds, out of 10000:20000"):
+        agent_search.learn(TOY, scene, ("reach",), (), seeds=range(4), validation=range(4))
+    with pytest.raises(InputError, match="training seeds"):
+        agent_search.learn(TOY, scene, ("reach",), (), seeds=range(20_000, 20_004))
+    with pytest.raises(InputError, match="nothing is tuned on what was recorded"):
+        agent_search.learn(TOY, tmp_path, ("reach",), ())
+
+
 def test_a_gain_that_is_not_sure_is_not_believed(tmp_path: Path) -> None:
     scene, _ = write_scenes(tmp_path)
     found = agent_search.learn(
@@ -145,6 +191,13 @@ def test_a_gain_that_is_not_sure_is_not_believed(tmp_path: Path) -> None:
     assert not found.policy.offset.any()
     assert found.fixed.offset.any()
     assert found.agent is found.fixed
+
+
+@pytest.mark.parametrize(("wrong", "place"), [({"generations": 0}, "generations"), ({"parameters": ()}, "parameters")])
+def test_a_search_needs_something_to_do(wrong: dict[str, object], place: str, tmp_path: Path) -> None:
+    given = {"parameters": ("reach",), "statistics": (), **wrong}
+    with pytest.raises(InputError, match=f"{place}: .* at least one"):
+        agent_search.learn(TOY, write_scenes(tmp_path)[0], **given)
 
 
 def test_without_cmaes_it_says_what_to_install(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

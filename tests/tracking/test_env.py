@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import gymnasium
@@ -21,6 +22,7 @@ from sim.types import Truth
 from tests.toy_tracker import Toy
 from tracking.config import Config, param
 from tracking.env import SEEN, TuningEnv
+from tracking.observation import NAMES
 from tracking.protocol import names
 from tracking.search import decode, encode
 
@@ -100,6 +102,29 @@ def test_a_seed_repeats_everything(tracker, every):
         assert run[2] == first[2]
 
 
+def test_a_refused_reset_leaves_the_episode_as_it_was():
+    env = make(decision_every=5)
+    env.reset(seed=0, options={"scenario": "cross"})
+    by_tracker = {"confirm_ratio": 2.0, "speed_prior": 0.1, "size_rate_prior": 0.01}
+    for wrong in (
+        {"scenario": "pass-by", "params": {"gate": 7}},
+        {"scenario": "pass-by", "params": by_tracker},
+        {"scenario": "cros"},
+    ):
+        with pytest.raises(InputError):
+            env.reset(options=wrong)
+        *_, info = env.step(np.zeros(env.action_space.shape, np.float32))
+        assert info["scenario"] == env.unwrapped.rollout.source.name == "cross"
+    assert info["frame"] == 15
+
+
+def test_a_step_needs_an_episode():
+    for every in (None, 5):
+        env = make(decision_every=every).unwrapped
+        with pytest.raises(InputError, match=r"call reset\(\) first"):
+            env.step(np.zeros(env.action_space.shape, np.float32))
+
+
 def test_options_choose_the_source_and_the_parameters():
     env = make()
     options = {"scenario": "pass-by", "seed": 1, "params": {"report_delay": 3.0, "association": "nearest"}}
@@ -171,6 +196,19 @@ def test_stored_sequences_and_lists(tmp_path):
     assert {s.name for s in mixed.unwrapped.sources} == {"cross-s00007", "cross-s00008", "pass-by", "split"}
 
 
+def test_all_episodes_have_detections_of_one_kind():
+    """That which the recorded ones have; where they have none in common, it is said at once."""
+    whole = simulate(load("pass-by", SHORT), 1, 0, ())
+    bare, boxed = replace(whole, name="bare", has_detections=False), replace(whole, name="boxed", load_truth=None)
+    for mixed in (["cross", bare], [bare, "cross"]):
+        env = make("group-pda", mixed).unwrapped
+        assert env.mode == "truth"
+        for seed in range(6):
+            played(env, seed=seed)
+    with pytest.raises(InputError, match="bare with truth"):
+        make("group-pda", ["cross", boxed, bare])
+
+
 def test_from_pixels():
     tiny = ["camera.fps=5", "duration=2", "camera.image=[160,120]"]
     env = make("group-pda", "cross", set=tiny, detections="image", decision_every=5, render_mode="rgb_array")
@@ -182,6 +220,18 @@ def test_from_pixels():
     assert "grid" in info["names"]
     assert "radius" not in info["names"]
     assert env.render().shape == (152, 160, 3)
+
+
+def test_from_pixels_detections_that_came_with_the_pictures_are_not_there():
+    """Neither for the tracker nor in what is observed: blob's tracks and a camera's sensor are both on the ground."""
+    tiny = ["camera.fps=5", "duration=2", "camera.image=[320,240]"]
+    env = make("blob", "cross", set=tiny, detections="image", decision_every=5)
+    held = env.unwrapped.cache.hold(env.unwrapped.sources[0], ("left",))
+    assert any(len(frame.detections.pos) for frame in held.sequence)
+    seen, _, _ = played(env, seed=1)
+    assert env.unwrapped.rollout.last.detections is None
+    named = dict(zip(env.unwrapped.observation_names, seen[-1], strict=True))
+    assert {named[key] for key in NAMES[NAMES.index("seen") : NAMES.index("brightness")]} == {0.0}
 
 
 def test_which_parameters_an_action_sets():
@@ -256,6 +306,9 @@ class StillToy(Toy):
         ("blob", {"params": {"gaet": 0.5}}, "did you mean gate"),
         ("blob", {"suite": "nothing at all"}, "a scenario, a suite"),
         ("blob", {"render_mode": "human"}, "rgb_array"),
+        ("blob", {"detections": "boxes"}, "one of None, image, truth, file"),
+        ("blob", {"seeds": 5}, r"write for example range\(5\)"),
+        ("blob", {"set": "camera.fps=5"}, r"write \['camera.fps=5'\]"),
         (StillToy, {"decision_every": 5}, "may change between frames"),
     ],
 )
@@ -311,6 +364,15 @@ def test_vectorised(mode):
         assert played(make(suite="cross", seeds=range(3), decision_every=15), seed=seed)[1] == pytest.approx(
             rewards[:, k]
         )
+
+
+@pytest.mark.parametrize(("every", "rate"), [(None, 5), (2, 2), (10, 1)])
+def test_a_video_takes_as_long_as_what_it_shows(every, rate):
+    """RecordVideo asks before the first reset."""
+    env = make(decision_every=every, render_mode="rgb_array")
+    assert env.metadata["render_fps"] == rate
+    env.reset(seed=1)
+    assert env.metadata["render_fps"] == rate
 
 
 def test_video(tmp_path):

@@ -148,6 +148,12 @@ def test_image_mode_hides_the_files_detections():
     assert run.info["detections"] == "image"
 
 
+@pytest.mark.parametrize("wrong", ["data", load("cross")])
+def test_what_is_no_sequence_is_told_how_to_open_one(wrong):
+    with pytest.raises(InputError, match="expected a Sequence; open it"):
+        track("blob", wrong)
+
+
 def test_params_by_config_values_and_file(tmp_path):
     path = tmp_path / "p.toml"
     path.write_text("[params]\ngate = 0.95\n")

@@ -7,8 +7,8 @@ from pathlib import Path
 
 import numpy as np
 
-from scenarios.errors import InputError
 from sim.types import Sequence as Recording
+from tracking.app import options
 from tracking.app.answer import Answer
 
 SEEDS = range(30_000, 30_008)  # of the draws that are laid beside the real errors
@@ -26,9 +26,7 @@ def sensor(sources: Sequence[Path], out: Path, fps: float | None) -> Answer:
     from tracking.fitting.sensor import fit
     from tracking.fitting.statistics import again, statistics
 
-    if out.suffix != ".toml":
-        expected = "a file that ends in .toml"
-        raise InputError(place="--out", got=str(out), expected=expected, remedy="name it so: it is read by --sensor")
+    options.named(out, ".toml")
     recordings = _open(sources, fps)
     matched = [match_sequence(recording) for recording in recordings]
     found = fit(matched)

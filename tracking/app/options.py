@@ -88,6 +88,15 @@ def values(texts: Iterable[str]) -> dict[str, Any]:
     return {".".join(steps): value for steps, value in map(parse, texts)}
 
 
+def named(out: Path, suffix: str) -> Path:
+    """A file to write whose name says what it is; InputError where it says something else."""
+    if out.suffix.lower() != suffix or out.is_dir():
+        got = f"{out}, a folder" if out.is_dir() else str(out)
+        remedy = f"write {out / 'page' if out.is_dir() else out.with_suffix('')}{suffix}"
+        raise InputError(place="--out", got=got, expected=f"a file that ends in {suffix}", remedy=remedy)
+    return out
+
+
 def folder(out: Path) -> Path:
     """A folder to write to, there or to be made; InputError before any work where it cannot be one."""
     there = next(p for p in (out, *out.parents) if p.exists())

@@ -10,7 +10,7 @@ from scenarios import document, suite
 from scenarios.errors import InputError
 from scenarios.loading import Entry, dump, load, names, resolve, suite_names
 from tracking.app.answer import Answer
-from tracking.app.options import scenario_settings
+from tracking.app.options import named, scenario_settings
 
 if TYPE_CHECKING:
     from scenarios.schema import Scenario
@@ -51,7 +51,7 @@ def _one(scenario: Scenario, drawing: Path | None) -> Answer:
         return Answer(data, words)
     from sim.io.atomic import write_file
 
-    write_file(drawing, draw.svg(scenario).encode())
+    write_file(named(drawing, ".svg"), draw.svg(scenario).encode())
     return Answer({**data, "drawing": drawing}, f"{words}\n{drawing}")
 
 

@@ -49,9 +49,18 @@ def tune(wishes: Wishes, **search_options: Any) -> Answer:
             seeds=_seeds("--seeds", wishes.seeds), validation=_seeds("--validation", wishes.validation),
             test=_seeds("--test", wishes.test), **search_options,
         )  # fmt: skip
-    changed = [f"{name}: {old} → {new}" for name, (old, new) in result.changed.items()]
+    params = type(result.config).params()
+    changed = [
+        f"{name}: {_shown(old)} → {_shown(new)} {params[name].unit}".rstrip()
+        for name, (old, new) in result.changed.items()
+    ]
     told = "\n".join([*result.lines(), *changed, f"{wishes.out}, all figures and plots beside it"])
     return Answer({**result.as_dict(), "file": wishes.out}, told)
+
+
+def _shown(value: Any) -> str:
+    """A value in four figures; the file has all."""
+    return f"{value:.4g}" if isinstance(value, float) else str(value)
 
 
 def _seeds(option: str, text: str | None) -> range | None:

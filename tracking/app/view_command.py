@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 from scenarios.errors import InputError
 from sim.io.source import open_source
 from sim.types import Sequence
+from tracking.app import options
 from tracking.app.answer import Answer
 from tracking.app.meter import Meter
 from tracking.app.paired import pair, results
@@ -109,11 +110,7 @@ def _each(what: str, sequences: list[Sequence], out: Path, suffix: str, draw: Dr
 
 def _files(sequences: list[Sequence], out: Path, suffix: str) -> list[Path]:
     if len(sequences) == 1:
-        if out.is_dir():
-            raise InputError(
-                file=out, place="--out", got="a folder", expected=f"a {suffix} file", remedy=f"write {out}/page{suffix}"
-            )
-        return [out]
+        return [options.named(out, suffix)]
     if out.suffix.lower() == suffix:
         raise InputError(
             file=out, place="--out", got=f"one file for {len(sequences)} sequences", expected="a folder",

@@ -218,7 +218,8 @@ class GroupPda:
         go with the likeliest group."""
         bank, told = self.bank, []
         due = np.flatnonzero((bank.null >= self.config.split_time - 1e-9) & (bank.null > 0))
-        mine = chosen & exclusive(np.isfinite(claims.d2), claims.d2, looks)
+        shared = exclusive(np.isfinite(claims.d2), claims.d2, looks)
+        mine = chosen & (shared | (claims.own == np.arange(len(bank))[:, None]))  # attached and carried ones, too
         for row in due.tolist()[::-1]:  # from behind: children stand at the end
             points, weights = claims.points[mine[row]], claims.weights[mine[row]]
             change = changes.split(bank, row, points, weights, rules, t, self.names)

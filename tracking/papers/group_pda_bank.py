@@ -139,7 +139,7 @@ def merged(bank: Bank, rows: Ints) -> Bank:
     d = bank.x[rows, :2] - x[:2]
     extent = np.einsum("k,kij->ij", w, bank.extent[rows] + d[:, :, None] * d[:, None, :])
     P = np.einsum("k,kij->ij", w * w, bank.P[rows])
-    heir = rows[np.lexsort((bank.born[rows], -bank.size[rows]))[0]]  # most people, then the older
+    heir = rows[np.lexsort((bank.id[rows], bank.born[rows], -np.rint(bank.size[rows])))[0]]  # most people, the older
     moved = [(y + bank.x[r, :2] - x[:2], seen, known) for r in rows.tolist() for y, seen, known in (bank.places[r],)]
     y, seen, known = zip(*moved, strict=True)
     places = (np.concatenate(y), np.concatenate(seen), np.concatenate(known))

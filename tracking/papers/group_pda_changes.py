@@ -50,13 +50,13 @@ def attached(points: Array, d2: Array, bank: Bank, rules: Rules) -> Ints:
             mine = np.flatnonzero(own == row)
             if bank.named[row]:
                 place = bank.places[row][0] + bank.x[row, :2]
-                own[mine[~near(points[mine], place, _reach(rules))]] = -1
+                own[mine[~near(points[mine], place, float(_reach(rules, np.array(rules.dt))))]] = -1
     return own
 
 
-def _reach(rules: Rules) -> float:
-    """How far somebody may get away from where his group takes him, until the next frame."""
-    return rules.scale * FASTEST * rules.dt + 3 * rules.noise
+def _reach(rules: Rules, since: Array) -> Array:
+    """How far people may get away from where their group takes them in so many s (K,), a frame at least."""
+    return np.asarray(rules.scale * FASTEST * np.maximum(since, rules.dt) + 3 * rules.noise)
 
 
 class Names:
@@ -97,15 +97,20 @@ def split(bank: Bank, row: int, points: Array, weights: Array, rules: Rules, t: 
     return change if named else None
 
 
-def standing(bank: Bank, rules: Rules, t: float) -> tuple[Array, Ints]:
-    """Where the people of named groups that were measured lately should be (K, 2), and of which group, its id (K,)."""
+def standing(bank: Bank, rules: Rules, t: float) -> tuple[Array, Array, Ints]:
+    """Where the people of named groups that were measured lately should be (K, 2), how far each may be from there (K,),
+    and of which group he is, its id (K,)."""
     late = t - bank.seen <= max(rules.config.carry_time, rules.dt) + 1e-9
     rows = np.flatnonzero(bank.named & late).tolist()
     places = [bank.places[r][0] + bank.x[r, :2] for r in rows]
-    return np.concatenate([np.zeros((0, 2)), *places]), np.repeat(bank.id[rows], [len(p) for p in places])
+    seen = np.concatenate([np.zeros(0), *(bank.places[r][1] for r in rows)])
+    whose = np.repeat(bank.id[rows], [len(p) for p in places])
+    return np.concatenate([np.zeros((0, 2)), *places]), _reach(rules, t - seen), whose
 
 
-def births(bank: Bank, points: Array, weights: Array, before: tuple[Array, Ints], rules: Rules, t: float) -> None:
+def births(
+    bank: Bank, points: Array, weights: Array, before: tuple[Array, Array, Ints], rules: Rules, t: float
+) -> None:
     """Tentative groups out of unclaimed points (3.3). Ours: those that were a group's a moment ago are its children.
 
     before: what `standing` told then.
@@ -114,12 +119,12 @@ def births(bank: Bank, points: Array, weights: Array, before: tuple[Array, Ints]
         return
     group = partition(points, weights, rules.constraint)
     made = newborn(points, weights, group, rules, t)
-    where, whose = before
-    reach = _reach(rules)
+    where, reach, whose = before
     for k in range(len(made) if len(where) else 0):
         d2 = np.square(points[group == k][:, None] - where).sum(2).min(0)
+        d2[d2 > reach**2] = np.inf
         row = np.flatnonzero(bank.id == whose[d2.argmin()])
-        if len(row) and d2.min() <= reach**2:
+        if len(row) and np.isfinite(d2.min()):
             _adopt(made, k, bank, int(row[0]), rules)
     bank.add(made)
 

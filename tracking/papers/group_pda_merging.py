@@ -72,9 +72,25 @@ class Merging:
             bank.keep(keep)
             bank.add(one)
             bank.parent[np.isin(bank.parent, ids)] = one.id[0]
-            self.met = {p: met for p, met in self.met.items() if not set(p) & set(ids)}
+            self._hand_on(ids, int(one.id[0]), bank, rules)
             kind = "merge" if len(here) > 1 else "enter"
             yield Change(kind, since, tuple(sorted(ids)), (int(one.id[0]),), tuple(place.tolist()))
+
+    def _hand_on(self, ids: list[int], heir: int, bank: Bank, rules: Rules) -> None:
+        """What those that merged had with others is the heir's, ways shifted so that they do not jump."""
+        met = {p: one for p, one in self.met.items() if not set(p) & set(ids)}
+        for p, one in self.met.items():
+            others = set(p) - set(ids)
+            if len(others) != 1:
+                continue
+            pair = (min(heir, *others), max(heir, *others))
+            a, b = (bank.x[np.flatnonzero(bank.id == id)[0], :2] for id in pair)
+            turn = 1 if (p[0] in others) == (pair[0] in others) else -1
+            shift = (b - a) * rules.ground - turn * one.path[-1][1]
+            path = [(t, turn * d + shift, place, gap) for t, d, place, gap in one.path]
+            if pair not in met or one.since < met[pair].since:
+                met[pair] = Encounter(one.since, path)
+        self.met = met
 
     def _went_on(self, pair: tuple[int, int], slow: bool, now: tuple[float, Array, Array, float]) -> Encounter:
         before = self.met.get(pair, Encounter(np.inf, []))
@@ -98,10 +114,18 @@ def _near(bank: Bank, rows: Ints, rules: Rules) -> Iterator[tuple[tuple[int, int
         i, j = sorted((i, j), key=lambda k: bank.id[rows[k]])
         a, b = bank.x[rows[i], :2], bank.x[rows[j], :2]
         d = (b - a) * rules.ground
-        reach = REACH * sum(_spread(bank, rows[k], d, rules) for k in (i, j))
-        gap = float(np.hypot(*d)) - reach
+        gap = _gap(bank, rows[i], rows[j], d, rules)
         together = bool(slow[i, j]) and not (rules.pixels and gap > FAR_APART)  # bodies cover the ground behind them
         yield (int(bank.id[rows[i]]), int(bank.id[rows[j]])), together, d, (a + b) / 2, gap
+
+
+def _gap(bank: Bank, a: int, b: int, d: Array, rules: Rules) -> float:
+    """Distance of the nearest people of two groups, m: of the nearest points, or, as pixels are parts of bodies, of the
+    centroids, d apart, less how far people are about them."""
+    if not rules.pixels:
+        here, there = (bank.places[k][0] + bank.x[k, :2] for k in (a, b))
+        return float(np.hypot(*((here[:, None] - there) * rules.ground).T).min())
+    return float(np.hypot(*d)) - REACH * sum(_spread(bank, k, d, rules) for k in (a, b))
 
 
 def _spread(bank: Bank, row: int, way: Array, rules: Rules) -> float:

@@ -43,11 +43,16 @@ class Encounter:
         return float(t[k]), self.path[k][2]
 
 
-def chords(t: Array, d: Array, half: float) -> Array:
-    """(K,) speeds over `half` s before and after each of the times t (K,), one frame at least, of places d (K, 2)."""
-    k = np.arange(len(t))
-    first = np.minimum(np.searchsorted(t, t - half - 1e-9), np.maximum(k - 1, 0))
-    last = np.maximum(np.searchsorted(t, t + half + 1e-9) - 1, np.minimum(k + 1, len(t) - 1))
+def chords(t: Array, d: Array, half: float, *, whole: bool = False) -> Array:
+    """(K,) speeds over `half` s before and after each of the times t (K,), one frame at least, of places d (K, 2).
+
+    At the ends chords are shorter, and so noisier; whole: they are as long as elsewhere, but not about their times.
+    """
+    k, middle = np.arange(len(t)), t
+    if whole:
+        middle = np.clip(t, min(t[0] + half, t[-1]), max(t[-1] - half, t[0]))
+    first = np.minimum(np.searchsorted(t, middle - half - 1e-9), np.maximum(k - 1, 0))
+    last = np.maximum(np.searchsorted(t, middle + half + 1e-9) - 1, np.minimum(k + 1, len(t) - 1))
     return np.asarray(np.hypot(*(d[last] - d[first]).T) / np.maximum(t[last] - t[first], 1e-9))
 
 
@@ -77,6 +82,6 @@ def parting(
         apart.append(middle[1] - middle[0])
     when, d = np.array(times[::-1]), np.array(apart[::-1])
     gap = np.hypot(*d.T) - reach
-    together = (gap <= APART) | ((gap <= FAR_APART) & (chords(when, d, LEAVING) < PARTING))
+    together = (gap <= APART) | ((gap <= FAR_APART) & (chords(when, d, LEAVING, whole=True) < PARTING))
     k = min(int(np.flatnonzero(together)[-1]) + 1 if together.any() else 0, len(when) - 1)
     return float(when[k]), before[k][1].mean(0) / ground

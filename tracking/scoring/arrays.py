@@ -63,7 +63,7 @@ def _table(columns: Mapping[str, ArrayLike], side: str) -> Table:
         if values is not None and len(values) != len(frame):
             raise ValueError(f"{side}: got {len(values)} rows of {name}, expected {len(frame)}, as of frame")
     if len(frame) and frame.min() < 1:
-        raise ValueError(f"{side}: got frame {frame.min()}, expected frames from 1 on")
+        raise ValueError(f"{side}: got frame {frame.min()}, expected frames from 1 on: add to all of them")
     order = np.lexsort((id, frame))
     return {name: None if values is None else values[order] for name, values in table.items()}
 

@@ -55,7 +55,7 @@ def goals(keys: Iterable[str]) -> tuple[Goal, ...]:
     able = [SPEED, *(key for key, score in CATALOGUE.items() if score.better != "neither")]
     for key in keys:
         if key not in able:
-            near = difflib.get_close_matches(key, able, 1, 0.0)[0]
+            near = next((k for k in able if k.lower() == key.lower()), difflib.get_close_matches(key, able, 1, 0.0)[0])
             remedy = f"did you mean {near}? docs/metrics.md lists them"
             raise InputError(
                 place="--objective", got=key, expected=f"a score with a better side, or {SPEED}", remedy=remedy

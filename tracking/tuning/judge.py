@@ -85,11 +85,10 @@ class Judge:
         first: Episodes = ()
         for k, one in enumerate(candidates):
             self.tell(f"validation, {k + 1} of {len(candidates)}")
-            try:
-                episodes = self._all(self.plan.validating, one.config, every_score(self.plan))
-            except FlockscopeError:
+            episodes = self._all(self.plan.validating, one.config, every_score(self.plan))
+            if isinstance(episodes, FlockscopeError):
                 if k == 0:
-                    raise
+                    raise episodes
                 continue
             first = first or episodes
             reached = tuple(goal.mean(episodes) for goal in goals)
@@ -105,9 +104,12 @@ class Judge:
             self.tell(f"taking back what brings nothing, {k + 1} of {len(changed)}")
             try:
                 simpler = type(config).from_dict({**config.as_dict(), name: self.plan.defaults[name]})
-                reached = goal.mean(self._all(self.plan.validating, simpler, every_score(self.plan)))
             except FlockscopeError:
                 continue
+            episodes = self._all(self.plan.validating, simpler, every_score(self.plan))
+            if isinstance(episodes, FlockscopeError):
+                continue
+            reached = goal.mean(episodes)
             if goal.gain(value, reached) >= 0:
                 config, value = simpler, reached
         return config, value
@@ -119,10 +121,11 @@ class Judge:
         for name, sources in self.plan.testing.items():
             self.tell(f"test on {name}")
             before = self._all(sources, self.plan.base, every=True)
-            try:
-                after = self._all(sources, config, every=True)
-            except FlockscopeError as error:
-                notes.append(f"{name}: cannot be played with the new parameters: {error.line()}")
+            if isinstance(before, FlockscopeError):
+                raise before
+            after = self._all(sources, config, every=True)
+            if isinstance(after, FlockscopeError):
+                notes.append(f"{name}: cannot be played with the new parameters: {after.line()}")
                 continue
             found += [c for goal in self._shown() if (c := comparison(name, goal, before, after)) is not None]
         return found, notes
@@ -131,11 +134,12 @@ class Judge:
         keys = [goal.key for goal in self.plan.goals]
         return [*self.plan.goals, *(Goal(key) for key in SHOWN if key not in keys)]
 
-    def _all(self, sources: Sequence[Source], config: Config, every: bool) -> list[Episode]:
+    def _all(self, sources: Sequence[Source], config: Config, every: bool) -> list[Episode] | FlockscopeError:
+        """All episodes, or the error by which there is one that cannot be played so; errors of who plays are raised."""
         found = []
         for answer in self.play(sources, config.as_dict(), every):
             if isinstance(answer, FlockscopeError):
-                raise answer
+                return answer
             found.append(answer)
         return found
 

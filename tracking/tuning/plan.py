@@ -15,6 +15,7 @@ from pathlib import Path
 from typing import Any
 
 from scenarios.errors import InputError
+from sim.cluster import about
 from sim.types import DetectionMode, Tracker
 from tracking.config import Config, Param, Value
 from tracking.episodes import Source
@@ -88,7 +89,8 @@ class Plan:
         """What makes a trial's value what it is: a study goes on under the same only."""
         return {
             "tracker": self.tracker,
-            "code": _code(self.subject.name),
+            "code": self.subject.code,
+            "versions": _digest(version for name, version in about().items() if name != "cpu"),
             "suite": self.scenes,
             "seeds": text(self.seeds),
             "motions": _digest(source.key for source in self.training),
@@ -208,12 +210,6 @@ def _space(base: Config, fixed: Sequence[str], only: tuple[str, ...], mode: Dete
 
 def _bare(name: str) -> str:
     return Path(name).name if name.endswith(".toml") else name
-
-
-def _code(tracker: str) -> str:
-    """What a tracker's own file holds, so that another version of it begins anew; "" where it is not a file."""
-    file = Path(tracker.rpartition(":")[0])
-    return _digest([file.read_bytes()]) if file.suffix == ".py" and file.is_file() else ""
 
 
 def _digest(parts: Iterable[object]) -> str:

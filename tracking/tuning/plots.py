@@ -71,6 +71,7 @@ def history(found: Tuned) -> str:
         steps += [] if best != best else [(t.number, best)]
         best = t.values[0] if better else best
         steps += [(t.number, best)]
+    steps += [(trials[-1].number, best)] if steps else []
     shown = [t.values[0] for t in trials]
     axes = Axes(_range([0, *(t.number for t in trials)], 0.02), _clear(shown, [t.values[0] for t in whole]))
     inside = [t for t in trials if axes.y[0] <= t.values[0] <= axes.y[1]]
@@ -80,10 +81,15 @@ def history(found: Tuned) -> str:
         body += [f'<path d="M{u0:.1f} {v:.1f}H{u1:.1f}" stroke="{PALE}" stroke-dasharray="5 4"/>']
     body += [_line((axes.at(x, y) for x, y in steps), ORANGE)]
     body += [_dot(*axes.at(t.number, t.values[0]), BLUE, hollow=t.pruned) for t in inside]
+    edge = axes.y[0] if goal.higher else axes.y[1]
+    for t in trials:
+        if t not in inside:
+            u, v = axes.at(t.number, edge)
+            body += [f'<path d="M{u:.1f} {v - 4:.1f}v8" stroke="{BLUE}"/>']
     outside = len(trials) - len(inside)
     key = [(BLUE, "played to the end"), ("hollow", "given up early, estimated"), (ORANGE, "best so far")]
     key += [("dashes", "defaults")] if first is not None else []
-    note = f"; {outside} far below not shown" if goal.higher else f"; {outside} far above not shown"
+    note = f"; {outside} far below: ticks" if goal.higher else f"; {outside} far above: ticks"
     return _page(f"{_named(found)}: {len(found.trials)} trials" + (note if outside else ""), body, key)
 
 

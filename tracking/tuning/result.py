@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any
@@ -19,6 +19,8 @@ from tracking.tuning.plan import Plan, text
 VERSIONS = ("flockscope", "optuna", "numpy", "scipy", "numba")
 LONG = 40
 """Characters of a setting that are told."""
+MANY = 4
+"""Settings of a sensor that are told one by one."""
 
 
 @dataclass(frozen=True)
@@ -85,8 +87,8 @@ class Tuned:
         """What was gained, in lines."""
         return "\n".join(self.lines())
 
-    def lines(self) -> list[str]:
-        """What was done and what came of it; training scores are not among it."""
+    def lines(self, one: Candidate | None = None) -> list[str]:
+        """What was done and what came of it, or of one of a front; training scores are not among it."""
         plan = self.plan
         names = ", ".join(goal.key for goal in plan.goals)
         every = len(self.trials) * len(plan.training)
@@ -97,23 +99,25 @@ class Tuned:
             f"training seeds {text(plan.seeds)}, validation {text(plan.validation)}, test {text(plan.test)}",
         ]
         if plan.settings:
-            told.append("scenes with " + ", ".join(_short(setting) for setting in plan.settings))
-        before, after = self.validation
+            told.append("scenes with " + ", ".join(_told(plan.settings)))
+        before, after = self.validation if one is None else (self.validation[0], one.validation)
         for goal, a, b in zip(plan.goals, before, after, strict=True):
             told.append(f"validation: {goal.key} {a:.4f} → {b:.4f} (chosen by it: no result)")
+        if one is not None:
+            return [*told, f"one of {len(self.front)} that no other trial beats by all goals"]
         told += [c.line() for c in self.comparisons]
         return [*told, *self.notes]
 
-    def to_toml(self, config: Config | None = None) -> str:
-        """A file that `flockscope track --params` reads."""
-        chosen = self.config if config is None else config
+    def to_toml(self, one: Candidate | None = None) -> str:
+        """A file that `flockscope track --params` reads: the winner's, or one's of a front."""
+        chosen = self.config if one is None else one.config
         old = self.default.as_dict()
         lines = []
         for line in chosen.to_toml().splitlines():
             name = line.partition(" = ")[0]
             moved = name in old and chosen.as_dict().get(name) != old[name]
             lines.append(f"{line}  # default {old[name]}" if moved else line)
-        about = [*self.lines(), "versions: " + ", ".join(f"{name} {of}" for name, of in versions().items())]
+        about = [*self.lines(one), "versions: " + ", ".join(f"{name} {of}" for name, of in versions().items())]
         return "\n".join([*(f"# {line}" for line in about), *lines, ""])
 
     def as_dict(self) -> dict[str, Any]:
@@ -154,7 +158,7 @@ class Tuned:
         target = Path(path)
         files = {".json": json.dumps(_plain(self.as_dict()), indent=1, allow_nan=False) + "\n", **plots(self)}
         if len(self.plan.goals) > 1:
-            files |= {f".front-{k}.toml": self.to_toml(c.config) for k, c in enumerate(self.front, 1)}
+            files |= {f".front-{k}.toml": self.to_toml(c) for k, c in enumerate(self.front, 1)}
         for suffix, content in files.items():
             write_file(target.with_suffix(suffix), content.encode())
         write_file(target, self.to_toml().encode())
@@ -190,6 +194,12 @@ def _plain(value: Any) -> Any:
     return None if isinstance(value, float) and not math.isfinite(value) else value
 
 
-def _short(setting: str) -> str:
-    """A setting as it is told: long values, as of a detector's profile, stand in the JSON file."""
-    return setting if len(setting) <= LONG else setting[: LONG - 2] + " …"
+def _told(settings: Sequence[str]) -> Iterator[str]:
+    """Settings in words: long values, and a detector's profile, stand in the JSON file."""
+    sensor = [setting for setting in settings if setting.startswith("sensor.")]
+    profile = len(sensor) > MANY
+    if profile:
+        yield f"a detector of {len(sensor)} settings"
+    for setting in settings:
+        if not (profile and setting in sensor):
+            yield setting if len(setting) <= LONG else setting[: LONG - 2] + " …"

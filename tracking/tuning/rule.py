@@ -2,7 +2,8 @@
 
 A rule tuned on simulated people's exact places on the ground asks for distances and velocities that no label has. So
 they get a labeller's errors, and with odd seeds, as in most labelled videos, they are boxes in the camera's image,
-whose distances shrink with depth, at one scale for the whole image, and without velocities.
+whose distances shrink with depth, at one scale for the whole image, which may be wrong where they are, and without
+velocities.
 """
 
 from __future__ import annotations
@@ -13,6 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.signal import lfilter
 
+from sim.rng import rng
 from sim.types import Array, FrameTruth, Plane, Tracks, Truth
 from tracking.episodes import Cache, Episode, Source
 from tracking.grouping import derive
@@ -21,16 +23,19 @@ from tracking.links import Grouping
 
 @dataclass(frozen=True)
 class Labels:
-    """sd, m, of a place, each way; time, s, for which its error lasts; filmed: boxes in the image, no velocities."""
+    """sd, m, of a place, each way; time, s, for which its error lasts; filmed: boxes in the image, no velocities;
+    scale: px per m are known up to this factor, either way."""
 
     sd: float
     time: float
     filmed: bool
+    scale: float = 1.0
 
 
-SURVEYED, FILMED = Labels(0.02, 0.1, filmed=False), Labels(0.06, 0.1, filmed=True)
+SURVEYED, FILMED = Labels(0.02, 0.1, filmed=False), Labels(0.06, 0.1, filmed=True, scale=1.5)
 """As people's places in BIWI's seq_hotel, and boxes in CAVIAR's Meet_WalkTogether1, leave a smooth way: by 0.02 m and
-0.055 m, the latter jumping by 0.05 m from frame to frame at 25 fps."""
+0.055 m, the latter jumping by 0.05 m from frame to frame at 25 fps. A scale is the median person's: in a view along a
+corridor those in front are half as large again, those at its end half as large."""
 
 
 def play_rule(source: Source, rule: Grouping, cache: Cache) -> Episode:
@@ -40,8 +45,12 @@ def play_rule(source: Source, rule: Grouping, cache: Cache) -> Episode:
 
     truth = cache.hold(source).truth
     begun = time.perf_counter()
-    known = as_labelled(truth, (SURVEYED, FILMED)[source.seed % 2], source.seed) if source.simulated else truth
-    answers = derive(people_as_tracks(known), truth.fps, truth.px_per_m, rule)
+    known, px_per_m = truth, truth.px_per_m
+    if source.entry is not None:
+        labels, repeat = (SURVEYED, FILMED)[source.seed % 2], source.entry.repeat
+        known = as_labelled(truth, labels, source.seed, repeat)
+        px_per_m *= labels.scale ** rng(source.seed, "label", repeat=repeat).uniform(-1, 1)
+    answers = derive(people_as_tracks(known), truth.fps, px_per_m, rule)
     grouped = time.perf_counter()
     found = evaluate(truth, answers)
     scored = time.perf_counter()
@@ -51,17 +60,16 @@ def play_rule(source: Source, rule: Grouping, cache: Cache) -> Episode:
     )
 
 
-def as_labelled(truth: Truth, labels: Labels, seed: int) -> Truth:
-    """The truth as such labels have it, errors of places a first-order process."""
+def as_labelled(truth: Truth, labels: Labels, seed: int, repeat: int = 0) -> Truth:
+    """The truth as such labels have it, errors of places a first-order process, each person's drawn alone."""
     assert truth.pos is not None, "simulated people have places"
     assert truth.box is not None, "scenes have cameras"
-    r, stay = np.random.default_rng(seed), float(np.exp(-1 / (truth.fps * labels.time)))
-    error = np.sqrt(1 - stay**2) * r.standard_normal(truth.pos.shape)
+    stay, error = float(np.exp(-1 / (truth.fps * labels.time))), np.empty_like(truth.pos)
     for id in np.unique(truth.id).tolist():
         own = np.flatnonzero(truth.id == id)
-        error[own[0]] /= np.sqrt(1 - stay**2)
-        error[own] = lfilter([1.0], [1.0, -stay], error[own], axis=0)
-    error *= labels.sd
+        new = np.sqrt(1 - stay**2) * rng(seed, "label", id, repeat=repeat).standard_normal((len(own), 2))
+        new[0] /= np.sqrt(1 - stay**2)
+        error[own] = labels.sd * lfilter([1.0], [1.0, -stay], new, axis=0)
     if not labels.filmed:
         return truth.replace(pos=truth.pos + error)
     moved = np.concatenate([truth.px_per_m * error, np.zeros_like(error)], axis=1)

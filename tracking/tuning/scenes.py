@@ -27,6 +27,9 @@ def chosen_seeds(seeds: range | None, split: str, scenes: int) -> range:
     low, high = next((low, high) for name, low, high in SPLITS if name == split)
     if seeds is None:
         return range(low, low + max(LEAST, -(-EPISODES[split] // scenes)))
+    if not isinstance(seeds, range):
+        got, remedy = repr(seeds), f"write for example range({low}, {low + 4})"
+        raise InputError(place=OPTION[split], got=got, expected="a range of seeds", remedy=remedy)
     try:
         good = split_of(seeds) == split
     except InputError:

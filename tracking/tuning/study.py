@@ -30,10 +30,11 @@ DONE = (TrialState.COMPLETE, TrialState.PRUNED)
 class Study:
     """A study that is open. State: Optuna's study; the locks by which processes share its journal, if it has one."""
 
-    def __init__(self, plan: Plan, study: optuna.Study, locks: Locks | None) -> None:
+    def __init__(self, plan: Plan, study: optuna.Study, locks: Locks | None, place: object = None) -> None:
         self.plan, self.optuna, self._locks = plan, study, locks
         self._space = {p.name: distribution(p) for p in plan.space}
         with self._taking():
+            _same(plan, study, place)
             if SETTINGS not in study.user_attrs:
                 study.set_user_attr(SETTINGS, plan.identity())
             if not study.get_trials(deepcopy=False):
@@ -140,8 +141,7 @@ def opened(plan: Plan, storage: str | Path | None, name: str) -> Iterator[Study]
                 storage=store, study_name=name, load_if_exists=True, sampler=Sampler(plan),
                 pruner=_pruner(plan), directions=[_direction(goal) for goal in plan.goals],
             )  # fmt: skip
-            _same(plan, found, storage, name)
-            yield Study(plan, found, locks)
+            yield Study(plan, found, locks, storage)
         finally:
             if locks is not None:
                 locks.close()
@@ -157,7 +157,7 @@ def _pruner(plan: Plan) -> optuna.pruners.BasePruner:
     return SignedRank(plan.prune)
 
 
-def _same(plan: Plan, found: optuna.Study, storage: object, name: str) -> None:
+def _same(plan: Plan, found: optuna.Study, storage: object) -> None:
     """InputError where the study is about something else."""
     mine, its = plan.identity(), found.user_attrs.get(SETTINGS)
     if its is None and not found.get_trials(deepcopy=False):
@@ -167,7 +167,7 @@ def _same(plan: Plan, found: optuna.Study, storage: object, name: str) -> None:
     if different:
         key = different[0]
         raise InputError(
-            file=storage, place=f"study {name}", got=f"another search: {', '.join(different)} differ",
+            file=storage, place=f"study {found.study_name}", got=f"another search: {', '.join(different)} differ",
             expected=f"{key} {its.get(key)}, not {mine[key]}",
             remedy="choose another --out or --study, or repeat the command that began it",
         )  # fmt: skip

@@ -16,12 +16,14 @@ RULE = Grouping.tracker
 
 @dataclass(frozen=True)
 class Subject:
-    """A tracker with parameters: as `tracking.track` takes it, what it is called, its config's class, what it needs."""
+    """A tracker with parameters: as `tracking.track` takes it, what it is called, its config's class, what it needs, a
+    hash of the file that it is from."""
 
     tracker: str | type[Tracker]
     name: str
     config_class: type[Config]
     needs: tuple[str, ...]
+    code: str = ""
 
     @property
     def objective(self) -> str:
@@ -50,22 +52,23 @@ class Subject:
     def play(
         self, source: Source, values: dict[str, Any], detections: DetectionMode, cache: Cache, every_score: bool
     ) -> Episode:
-        """One episode with these parameters."""
+        """One episode with these parameters; a tracker that draws does so by the source's seed."""
         if self.name == RULE:
             from tracking.tuning.rule import play_rule
 
             return play_rule(source, Grouping.from_dict(values), cache)
         return play(
-            self.tracker, source, values, detections=detections, cache=cache, every_score=every_score,
+            self.tracker, source, values, detections=detections, tracker_seed=source.seed, cache=cache,
+            every_score=every_score,
         )  # fmt: skip
 
 
 def subject_of(tracker: str | type[Tracker]) -> Subject:
     """The subject of this name, file or class; InputError where it is no tracker or has no parameters."""
-    from tracking.protocol import checked, config_class, find
+    from tracking.protocol import checked, code, config_class, find
 
     if tracker == RULE:
         return Subject(RULE, RULE, Grouping, ("points", "boxes"))
     named = tracker if isinstance(tracker, str) else getattr(tracker, "__name__", str(tracker))
     found: Any = find(tracker) if isinstance(tracker, str) else checked(tracker, named)
-    return Subject(tracker, named, config_class(found, named), tuple(found.needs))
+    return Subject(tracker, named, config_class(found, named), tuple(found.needs), code(found))

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
-from contextlib import closing
+from contextlib import closing, suppress
 
 import numpy as np
 import optuna
+from optuna.exceptions import UpdateFinishedTrialError
 
 from scenarios.errors import FlockscopeError, InputError
 from tracking.episodes import Episode
@@ -46,27 +47,34 @@ def _so_far(study: Study) -> str:
 
 
 def _play(study: Study, asked: optuna.Trial, play: Play) -> None:
-    """One trial; an error of the defaults is raised, any other one means that these parameters cannot be."""
-    try:
-        values = _values(study, asked, play)
-    except FlockscopeError as error:
-        if study.slot(asked) == 0:
-            raise
-        asked.set_user_attr(ERROR, error.line())
-        values = None
-    study.tell(asked, values)
+    """One trial; an error of the defaults is raised, an error of other ones means that these parameters cannot be.
+
+    Errors of who plays end the search: the trial stays as it is, to be played again by whoever goes on. Where others
+    took it as left, it is theirs.
+    """
+    with suppress(UpdateFinishedTrialError):
+        found = _values(study, asked, play)
+        if isinstance(found, FlockscopeError):
+            if study.slot(asked) == 0:
+                raise found
+            asked.set_user_attr(ERROR, found.line())
+        study.tell(asked, None if isinstance(found, FlockscopeError) else found)
 
 
-def _values(study: Study, asked: optuna.Trial, play: Play) -> list[float]:
-    """What the trial reached by each goal; where it was given up, what it would probably have reached."""
+def _values(study: Study, asked: optuna.Trial, play: Play) -> list[float] | FlockscopeError:
+    """What the trial reached by each goal; where it was given up, what it would probably have reached; or the error by
+    which these parameters cannot be."""
     plan, played = study.plan, dict[int, Episode]()
-    config = plan.config(asked.params).as_dict()
+    try:
+        config = plan.config(asked.params).as_dict()
+    except FlockscopeError as error:
+        return error
     # In an order of its own, so that trials are not given up by the same few scenes.
     order = np.random.default_rng([plan.seed, study.slot(asked)]).permutation(len(plan.training)).tolist()
     with closing(play([plan.training[k] for k in order], config, every_score(plan))) as answers:
         for at, answer in zip(order, answers, strict=True):
             if isinstance(answer, FlockscopeError):
-                raise answer
+                return answer
             played[at] = answer
             if _hopeless(asked, at, answer, plan) and len(played) < len(order):
                 asked.set_user_attr(PRUNED, len(played))
@@ -75,7 +83,7 @@ def _values(study: Study, asked: optuna.Trial, play: Play) -> list[float]:
     unknown = [goal.key for goal, value in zip(plan.goals, found, strict=True) if value != value]
     if unknown:
         got, remedy = f"{unknown[0]} unknown in every training scene", "choose another score, suite or tracker"
-        raise InputError(place="--objective", got=got, expected="scenes that it is about", remedy=remedy)
+        return InputError(place="--objective", got=got, expected="scenes that it is about", remedy=remedy)
     return found
 
 

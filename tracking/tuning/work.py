@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from functools import cache
 from typing import Any
 
-from scenarios.errors import FlockscopeError, InputError
+from scenarios.errors import FlockscopeError, InputError, WorkError
 from sim.types import DetectionMode, Tracker
 from tracking.episodes import Cache, Episode, Source
 from tracking.tuning.subject import Subject, subject_of
@@ -30,6 +30,7 @@ class Job:
     values: dict[str, Any]
     detections: DetectionMode
     every_score: bool
+    code: str
 
 
 Answer = Episode | FlockscopeError
@@ -53,7 +54,7 @@ def players(
         alone, held = workers == 1 and cluster is None, Cache(HELD)
 
         def play(sources: Sequence[Source], values: dict[str, Any], every: bool) -> Generator[Answer, None, None]:
-            jobs = [Job(subject.tracker, s, values, detections, every) for s in sources]
+            jobs = [Job(subject.tracker, s, values, detections, every, subject.code) for s in sources]
             if alone:
                 yield from (_attempt(job, subject, held) for job in jobs)
             else:
@@ -63,13 +64,19 @@ def players(
 
 
 def play_job(job: Job) -> Answer:
-    """Play an episode in a worker, which keeps what it opened."""
-    return _attempt(job, *_kept(job.tracker))
+    """Play an episode in a worker, which keeps what it opened; WorkError where its tracker is another one."""
+    return _attempt(job, *_kept(job.tracker, job.code))
 
 
 @cache
-def _kept(tracker: str | type[Tracker]) -> tuple[Subject, Cache]:
-    return subject_of(tracker), Cache(HELD)
+def _kept(tracker: str | type[Tracker], code: str) -> tuple[Subject, Cache]:
+    subject = subject_of(tracker)
+    if subject.code != code:
+        raise WorkError(
+            place="tracker", got=f"another {subject.name} in a worker", expected="the file as it is here",
+            remedy="put the same file there, and start the workers anew",
+        )  # fmt: skip
+    return subject, Cache(HELD)
 
 
 def _attempt(job: Job, subject: Subject, held: Cache) -> Answer:

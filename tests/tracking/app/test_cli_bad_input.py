@@ -170,6 +170,20 @@ def test_wrong_trackers(name, made, tmp_path, capsys):
     assert not out.exists()
 
 
+@pytest.mark.parametrize(
+    ("line", "suffix"),
+    [
+        ("scenarios merge --out {0}/plan.pdf", "svg"), ("sheet {1} --out {0}/sheet.jpg", "png"),
+        ("overlay {1} --out {0}/film.avi", "mp4"), ("view {1} --out {0}/page", "html"),
+        ("fit sensor {1} --out {0}/mine.txt", "toml"),
+    ],
+)  # fmt: skip
+def test_a_file_is_what_its_name_says(line, suffix, made, tmp_path, capsys):
+    words = line.format(tmp_path, made / "data" / "flockscope-demo" / "scene-s40000").split()
+    assert f"expected a file that ends in .{suffix}; write {tmp_path}/" in refused(words, capsys)
+    assert not list(tmp_path.iterdir())
+
+
 PARAMS = {
     "no TOML": ("gate = [", ["TOML"]),
     "unknown": ("[params]\ngaet = 0.9", ["gaet", "gate"]),
@@ -398,7 +412,7 @@ def test_nothing_labelled(tmp_path, capsys):
     (tmp_path / "tracks.txt").write_text("1,1,10,10,20,50,0.9\n")
     for line in (
         ["score", str(tmp_path / "seq"), str(tmp_path / "tracks.txt")],
-        ["sheet", str(tmp_path / "seq"), "--out", "x"],
+        ["sheet", str(tmp_path / "seq"), "--out", "x.png"],
     ):
         assert "label" in refused(line, capsys)
 

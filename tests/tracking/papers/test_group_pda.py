@@ -34,8 +34,8 @@ def track(
     for k, points in enumerate(frames):
         found = None
         if points is not None:
-            found = Detections(k + 1, k / FPS, plane, points, score=np.ones(len(points)))  # type: ignore[arg-type]
-        made.append(tracker.step(Frame(k + 1, k / FPS, detections=found), found))
+            found = Detections(k + 1, k / context.fps, plane, points, score=np.ones(len(points)))  # type: ignore[arg-type]
+        made.append(tracker.step(Frame(k + 1, k / context.fps, detections=found), found))
         if watch is not None:
             watch(tracker, made[-1])
     return made

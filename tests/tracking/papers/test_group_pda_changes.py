@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from sim.types import Array, Context, Frame, Tracks
-from tests.tracking.papers.test_group_pda import FPS, block, changes, events, ids, noisy, sizes, track
+from tests.tracking.papers.test_group_pda import FPS, GROUND, block, changes, events, ids, noisy, sizes, track
 from tracking.papers.group_pda import GroupPda
 from tracking.papers.group_pda_config import GroupPdaConfig
 
@@ -106,6 +106,48 @@ def test_equally_fast_groups_within_reach_merge_once(ranks: tuple[int, int], sta
         assert sizes(made[-1]) == pytest.approx([10], abs=0.5)
 
 
+@pytest.mark.parametrize("seed", range(3))
+def test_a_merge_begins_when_it_does_though_one_of_them_merges_with_a_third(seed: int) -> None:
+    """A second group comes to the first one's right until frame 21, and they are one before the third on its left,
+    there from frame 27 on, is known to stay."""
+    starts = []
+    for others in ((2.6,), (2.0, 2.6)):
+        r, frames = np.random.default_rng(seed), []
+        for k in range(90):
+            s = k / FPS
+            sides = [y * (1.6 + max(until - s, 0)) for y, until in zip((-1, 1), others[::-1], strict=False)]
+            frames.append(noisy([block(2, 2, (s, y)) for y in (0.0, *sides)], r))
+        found = changes(track(frames))
+        assert [kind for kind, *_ in found] == ["merge"] * len(others)
+        starts.append(found[-1][1])
+    assert starts[1] == pytest.approx(starts[0], abs=2)
+
+
+@pytest.mark.parametrize("seed", range(3))
+@pytest.mark.parametrize("length", [2, 5, 8])
+def test_files_that_join_end_to_end_do_so_when_they_are_near(length: int, seed: int) -> None:
+    """The last of one and the first of the other are 1.2 m apart from frame 41 on, however far their middles are."""
+    r, frames = np.random.default_rng(seed), []
+    for k in range(100):
+        s, file = k / FPS, np.column_stack([0.7 * np.arange(length), np.zeros(length)])
+        behind = file - [0.7 * (length - 1) + 1.2 + 0.9 * max(4.0 - s, 0), 0]
+        frames.append(noisy([file + np.array([s, 0]), behind + np.array([s, 0])], r))
+    ((kind, start, before, _),) = changes(track(frames))
+    assert (kind, before) == ("merge", (1, 2))
+    assert start == pytest.approx(41, abs=4)
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_who_was_missed_before_he_left_has_split_off(seed: int) -> None:
+    """At 2.5 frames/s, with the next sight of him 0.8 s later, 1.3 m on."""
+    r, frames = np.random.default_rng(seed), []
+    for k in range(40):
+        away = np.array([[0.9 + 1.6 * max(k - 20, 0) / 2.5, 0.0]])
+        frames.append(noisy([block(2, 2), *([] if k == 21 else [away])], r))
+    ((kind, _, before, after),) = changes(track(frames, context=replace(GROUND, fps=2.5)))
+    assert (kind, before, after) == ("split", (1,), (1, 2))
+
+
 def parting(seed: int, along: float, apart: float, ranks: int = 1, who: int = 2) -> tuple[list[Array], int]:
     """Of four abreast, so many ranks deep, the right `who` leave from frame 41 on; the first frame in which the nearest
     are 1.5 m apart."""
@@ -131,6 +173,24 @@ def test_a_group_that_falls_into_two_splits_once(seed: int, along: float, apart:
     assert sorted(right) == pytest.approx(sorted([4 - who, who]), abs=0.2)
     if who == 1:
         assert sizes(made[-1])[0] == pytest.approx(3, abs=0.2)  # who stay are most, and keep the id
+
+
+@pytest.mark.parametrize("missed", range(5))
+@pytest.mark.parametrize("seed", range(3))
+def test_who_is_not_detected_when_his_group_splits_is_in_his_part_all_the_same(seed: int, missed: int) -> None:
+    """Five in a line, 0.8 m apart: without the second one they would fall into three."""
+    r, frames = np.random.default_rng(seed), []
+    for k in range(100):
+        x = 0.8 * np.arange(5)
+        x[3:] += 0.5 * max(k - 40, 0) / FPS
+        frames.append(noisy([np.column_stack([x, np.zeros(5)])], r))
+    (whole,) = [e for t in track(frames) for e in t.events if e.kind == "split"]
+    frames[whole.emitted - 1] = np.delete(frames[whole.emitted - 1], missed, axis=0)
+    made = track(frames)
+    (split,) = [e for t in made for e in t.events if e.kind != "enter" or e.emitted > 20]
+    assert (split.kind, split.before, split.emitted) == ("split", whole.before, whole.emitted)
+    assert len(split.after) == 2
+    assert sorted(sizes(made[-1])) == pytest.approx([2, 3], abs=0.2)
 
 
 @pytest.mark.parametrize("ranks", [2, 3])

@@ -40,6 +40,7 @@ def test_speed_is_frames_over_seconds_of_all():
     ("keys", "words"),
     [
         (["HOTTA"], "did you mean HOTA"),
+        (["hota"], "did you mean HOTA"),
         (["HOTA", "HOTA"], "HOTA twice"),
         ([], "got none"),
         (["fps"], "docs/metrics.md"),

@@ -109,6 +109,24 @@ def test_who_cannot_be_played_on_validation_scenes_is_out(made):
         Judge(made, game).validated(candidates[::-1])
 
 
+def test_errors_of_who_plays_say_nothing_of_the_parameters(made):
+    """They end the judgement; nobody is out, kept or noted for them."""
+
+    def lost(sources, values, every):
+        if values["skip"] == 3:
+            raise WorkError(got="a lost connection", expected="a scheduler that stays", remedy="run again")
+        yield from Game({})(sources, values, every)
+
+    judge, winner = Judge(made, lost), ToyConfig(skip=3, colour="green")
+    for judged in (
+        lambda: judge.validated([Candidate(0, ToyConfig(), (0.1,)), Candidate(4, winner, (0.9,))]),
+        lambda: judge.simplified(winner, 0.2, ["colour"]),
+        lambda: judge.compared(winner),
+    ):
+        with pytest.raises(WorkError, match="a lost connection"):
+            judged()
+
+
 def test_a_winner_that_fails_on_test_scenes_is_told(made):
     game = Game({}, refused={"skip": 3})
     found, notes = Judge(made, game).compared(ToyConfig(skip=3))

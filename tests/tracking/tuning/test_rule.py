@@ -7,6 +7,7 @@ import json
 import numpy as np
 import pytest
 
+from sim.rng import rng
 from tests.tuning_toys import write_scenes
 from tracking.app.cli import run
 from tracking.episodes import Cache, sources
@@ -36,8 +37,11 @@ def test_an_episode_is_what_evaluate_says(tmp_path, seed):
     (source,) = sources(write_scenes(tmp_path)[0], (seed,))
     truth, rule = source.open().truth, Grouping(near=1.0)
     found = play_rule(source, rule, Cache())
-    people = people_as_tracks(as_labelled(truth, FILMED if seed % 2 else SURVEYED, seed))
-    scores = evaluate(truth, derive(people, truth.fps, truth.px_per_m, rule))
+    labels = FILMED if seed % 2 else SURVEYED
+    people = people_as_tracks(as_labelled(truth, labels, seed))
+    factor = labels.scale ** rng(seed, "label").uniform(-1, 1)
+    assert (factor == 1) == (seed == 4)
+    scores = evaluate(truth, derive(people, truth.fps, truth.px_per_m * factor, rule))
     assert found.objective == scores["objective"]
     assert found.scores == {key: value for key, value in scores.items() if value == value}
     assert found.frames == truth.length
@@ -61,6 +65,29 @@ def test_labels_err_for_a_while_and_do_not_change_who_is_there():
         here = found.box if labels.filmed else found.pos
         assert same.tobytes() == here.tobytes()
         assert other.tobytes() != here.tobytes()
+
+
+def test_one_person_more_moves_nobody_elses_errors():
+    truth = sources("crossing", (0,))[0].open().truth
+    others = truth.id != truth.id[0]
+    rows = (
+        "frame",
+        "id",
+        "group",
+        "pos",
+        "vel",
+        "box",
+        "visibility",
+        "z",
+        "heading",
+        "height",
+        "truncation",
+        "visible_box",
+    )
+    fewer = truth.replace(**{name: a[others] for name in rows if (a := getattr(truth, name)) is not None})
+    every, rest = (as_labelled(t, SURVEYED, 7).pos for t in (truth, fewer))
+    assert every[others].tobytes() == rest.tobytes()
+    assert as_labelled(truth, SURVEYED, 7, repeat=2).pos.tobytes() != every.tobytes()
 
 
 def test_filmed_people_are_grouped_in_the_image():

@@ -43,6 +43,11 @@ def test_seeds_of_another_range_are_refused(tmp_path, option, seeds):
     assert "\n" not in str(caught.value)
 
 
+def test_one_number_is_no_range(tmp_path):
+    with pytest.raises(InputError, match=r"--seeds: got 5; expected a range of seeds; .* range\(0, 4\)"):
+        plan(**wishes(tmp_path, seeds=5))
+
+
 def test_the_three_sets_share_no_source(tmp_path):
     made = plan(**wishes(tmp_path))
     sets = [made.training, made.validating, *made.testing.values()]

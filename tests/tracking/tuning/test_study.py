@@ -14,6 +14,7 @@ from optuna.distributions import CategoricalDistribution, FloatDistribution, Int
 from optuna.trial import TrialState
 
 from scenarios.errors import InputError
+from sim.cluster import about
 from tests.tuning_toys import wishes
 from tracking.links import Grouping
 from tracking.papers.blob_config import BlobConfig
@@ -182,3 +183,34 @@ def test_importance_finds_what_matters(tmp_path):
         found = study.importance()
     assert next(iter(found)) == "skip"
     assert sum(found.values()) == pytest.approx(1.0)
+
+
+def test_settings_are_compared_when_they_are_stored(tmp_path, monkeypatch):
+    """Of two commands with different settings that begin at once the later one is told so."""
+    mine, theirs = (plan(**wishes(tmp_path, objective=key)) for key in ("MOTA", "HOTA"))
+    others = []
+
+    def meanwhile(param):
+        if not others:
+            others.append(1)
+            with opened(theirs, tmp_path / "j", "x"):
+                pass
+        return distribution(param)
+
+    monkeypatch.setattr("tracking.tuning.study.distribution", meanwhile)
+    with pytest.raises(InputError, match="another search: objective differ"), opened(mine, tmp_path / "j", "x"):
+        pass
+
+
+@pytest.mark.parametrize("what", ["sources", "numpy"])
+def test_a_study_is_of_one_version(tmp_path, monkeypatch, what):
+    made = plan(**wishes(tmp_path))
+    with opened(made, tmp_path / "j", "x") as study:
+        study.tell(study.ask(), [0.1])
+    other = {**about(), "cpu": "another"}
+    monkeypatch.setattr("tracking.tuning.plan.about", lambda: other)
+    with opened(made, tmp_path / "j", "x") as study:
+        assert len(study.finished()) == 1, "what workers of a cluster may not differ in, going on may"
+    other[what] = "another"
+    with pytest.raises(InputError, match="another search: versions differ"), opened(made, tmp_path / "j", "x"):
+        pass

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from scenarios.errors import InputError
+from scenarios.errors import InputError, WorkError
 from tests.tuning_toys import wishes
 from tracking.episodes import Episode
 from tracking.tuning.plan import plan
@@ -15,14 +15,16 @@ from tracking.tuning.trials import search
 class Game:
     """Plays by a formula: scenes differ much, and skipping people costs a little in each. `played`: how many."""
 
-    def __init__(self, refused: int = 99) -> None:
-        self.refused, self.played = refused, 0
+    def __init__(self, refused: int = 99, dies: int = -1) -> None:
+        self.refused, self.dies, self.played = refused, dies, 0
 
     def __call__(self, sources, values, every):
         for source in sources:
             if values["skip"] == self.refused:
                 yield InputError(place="skip", got=values["skip"], expected="another", remedy="none")
                 return
+            if self.played == self.dies:
+                raise WorkError(got="a worker that died", expected="workers that finish", remedy="run again")
             self.played += 1
             value = 0.5 + 0.04 * (source.seed % 10) - 0.02 * values["skip"]
             yield Episode(source.name, source.seed, value, {"HOTA": value, "GOSPA": 1 - value}, 10, 1.0, 0.0)
@@ -101,3 +103,38 @@ def test_progress_is_told(tmp_path):
     _, told = played(tmp_path, trials=3)
     assert [(done, total) for done, total, _ in told] == [(0, 3), (1, 3), (2, 3), (3, 3)]
     assert "best in training 0.6533" in told[-1][2]
+
+
+def test_errors_of_who_plays_say_nothing_of_the_parameters(tmp_path):
+    """The search ends; going on plays the trial that was interrupted again, and finds what it would have found."""
+    made = plan(**wishes(tmp_path, seeds=range(12), trials=6, only=["skip"]))
+    with opened(made, tmp_path / "j", "x") as study, pytest.raises(WorkError, match="a worker that died"):
+        search(study, Game(dies=20), lambda *now: None)
+    with opened(made, tmp_path / "j", "x") as study:
+        begun = study.trials()
+        assert [t.state.name for t in begun][-1] == "RUNNING"
+        assert 0 < len(study.told()) < len(begun)
+        search(study, Game(), lambda *now: None)
+        found = study.told()
+    undisturbed, _ = played(tmp_path, trials=6)
+    assert found == undisturbed
+    assert not any(t.error for t in found)
+
+
+def test_a_trial_that_others_took_as_left_is_theirs(tmp_path):
+    """Without a journal nobody knows who is at work: of two processes one may play what the other is at, too."""
+    made, url = plan(**wishes(tmp_path, seeds=range(12), trials=2, only=["skip"])), f"sqlite:///{tmp_path}/s.db"
+
+    def interrupted(sources, values, every):
+        for k, answer in enumerate(Game()(sources, values, every)):
+            if k == 5 and not others:
+                with opened(made, url, "x") as other:
+                    others.append(other.ask(desperate=True))
+                    search(other, Game(), lambda *now: None)
+            yield answer
+
+    others = []
+    with opened(made, url, "x") as study:
+        search(study, interrupted, lambda *now: None)
+        assert len(study.told()) >= 2
+        assert not any(t.error for t in study.told())

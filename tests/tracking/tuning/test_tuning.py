@@ -248,6 +248,11 @@ def test_several_goals_give_a_front(tmp_path):
     assert (tmp_path / "toy.front.svg").is_file()
     assert found.config == found.front[0].config
     assert ToyConfig.from_toml(tmp_path / "toy.front-1.toml").as_dict() == found.config.as_dict()
+    for k, one in enumerate(found.front, 1):
+        file = tmp_path / f"toy.front-{k}.toml"
+        assert ToyConfig.from_toml(file).as_dict() == one.config.as_dict()
+        for goal, before, after in zip(found.plan.goals, found.validation[0], one.validation, strict=True):
+            assert f"# validation: {goal.key} {before:.4f} → {after:.4f} " in file.read_text()
     first = [c.validation[0] for c in found.front]
     assert first == sorted(first, reverse=True)
 
@@ -255,7 +260,6 @@ def test_several_goals_give_a_front(tmp_path):
 def test_speed_is_a_goal(tmp_path):
     found = tune(**wishes(tmp_path, objective=("HOTA", "frames/s"), trials=3, check=None))
     assert all(t.values[1] > 1 for t in found.trials if not t.error)
-    assert {c.key for c in found.comparisons} >= {"HOTA", "frames/s"} or not found.changed
 
 
 def test_a_class_and_its_own_parameters(tmp_path):
@@ -275,6 +279,9 @@ def test_where_nothing_is_better_the_defaults_stay(tmp_path):
 
 def test_long_settings_are_told_short_and_stored_whole(tmp_path):
     long = "sensor.by_visibility=[0.1, 0.2, 0.3, 0.4, 0.5, 0.6]"
+    many = ["sensor.detect_prob=0.9", "sensor.noise_m=0.1", "sensor.noise_px=2.0", "sensor.persistence=0.1", long]
+    profile = str(tune(**wishes(tmp_path, trials=1, set=["scenario.duration=2", *many])))
+    assert "\nscenes with a detector of 5 settings, duration=2\n" in profile
     given = wishes(tmp_path, trials=1, set=[long, "scenario.duration=2"], out=tmp_path / "found.toml")
     (told,) = (line for line in str(tune(**given)).splitlines() if line.startswith("scenes with"))
     assert "duration=2" in told
