@@ -30,6 +30,7 @@ import numpy as np
 
 from scenarios import sensor_settings
 from scenarios.suite import lines
+from sim.io.atomic import write_file
 from sim.io.source import open_source
 from sim.types import Ints, Sequence, Tracks
 from tracking.config import Config
@@ -107,10 +108,10 @@ def half_sensed(suite: Path, sensor: Path, out: Path) -> Path:
     rows = []
     for k, line in enumerate(lines(suite)):
         settings = (*line.settings, *(sensor_settings(sensor) if k % 2 == 0 else ()))
-        name, scenario, set = map(json.dumps, (line.name, line.scenario, settings))
-        rows.append(f"  {{ name = {name}, scenario = {scenario}, set = {set} }},")
+        name, scenario, more = map(json.dumps, (line.name, line.scenario, settings))
+        rows.append(f"  {{ name = {name}, scenario = {scenario}, set = {more} }},")
     path = out / f"{suite.stem}-half-{sensor.stem}.toml"
-    path.write_text("\n".join(["entry = [", *rows, "]", ""]))
+    write_file(path, "\n".join(["entry = [", *rows, "]", ""]).encode())
     return path
 
 

@@ -12,6 +12,7 @@ from __future__ import annotations
 
 import difflib
 import tomllib
+from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
 
@@ -40,6 +41,12 @@ def nearest(word: str, known: list[str]) -> str:
     if close:
         return "did you mean " + " or ".join(repr(name) for name in close) + "?"
     return "choose one of " + ", ".join(known) if known else "there is none to choose from"
+
+
+def closest(word: str, known: Iterable[str]) -> str:
+    """The known name that is most like a word, whatever their cases; "" where nothing is known."""
+    names = {name.casefold(): name for name in known}
+    return names[difflib.get_close_matches(word.casefold(), names, 1, 0.0)[0]] if names else ""
 
 
 def find(name: str | Path, beside: Path | None = None) -> Path:

@@ -11,7 +11,7 @@ before the first frame s = 0. Without weights it is a fixed set of parameters. F
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
@@ -26,7 +26,7 @@ from tracking import scale
 from tracking.config import Config, Value
 from tracking.observation import NAMES, Observer
 from tracking.protocol import config_class, find
-from tracking.search import Space, decode, encode
+from tracking.search import Space, begun, decode, encode
 
 OWN = ("grouped", "group_size", "merges", "splits")
 """Statistics of groups that the tracker names itself: no part of a policy, which is to serve any tracker."""
@@ -81,16 +81,17 @@ class Policy:
         """From one decision to the next."""
         return max(round(self.every * fps), 1)
 
-    def config(self, observed: ArrayLike | None, allowed: Callable[[Config], object] = lambda config: None) -> Config:
-        """The parameters for the next frames, by the statistics (K,) of the last ones; None before the first frame.
-
-        Drawn back to the base where they are no config, or `allowed` raises InputError (tracking.search.decode).
-        """
+    def point(self, observed: ArrayLike | None) -> Array:
+        """Where the parameters (P,) for the next frames are in the cube, by the statistics (K,) of the last ones; None
+        before the first frame."""
         seen = np.zeros(len(self.statistics))
         if observed is not None:
             seen = (np.asarray(observed, float)[[NAMES.index(s) for s in self.statistics]] - self.usual) / self.spread
-        base, space = self.base, self.space
-        return decode(space, encode(space, base) + self.offset + self.weights @ seen, base, allowed)
+        return np.asarray(encode(self.space, self.base) + self.offset + self.weights @ seen)
+
+    def config(self, observed: ArrayLike | None) -> Config:
+        """The parameters at this point."""
+        return decode(self.space, self.point(observed), self.base)
 
     def to_json(self) -> str:
         """Itself as text."""
@@ -129,17 +130,15 @@ class Adaptive:
         them for this sequence."""
         self.context = context
         self.long = self.policy.frames(context.fps)
-        kind, begun = cast(Any, find(self.policy.tracker)), dict[Config, Any]()
+        policy = self.policy
 
-        def begin(config: Config) -> None:
-            tracker = kind(config)
+        def begin(config: Config) -> Any:
+            tracker = cast(Any, find(policy.tracker))(config)
             tracker.reset(context, seed)
-            begun[config] = tracker
+            return tracker
 
-        config = self.policy.config(None, begin)
-        if config not in begun:
-            begin(config)
-        self.inner: Any = begun[config]
+        self.inner: Any
+        _, self.inner = begun(policy.space, policy.point(None), policy.base, begin)
         self.observer, self.answers = Observer(context.fps), list[Tracks]()
 
     @property

@@ -11,7 +11,6 @@ from __future__ import annotations
 import functools
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
-from pathlib import Path
 
 import numpy as np
 
@@ -24,7 +23,6 @@ from tracking.observation import NAMES, Observer
 from tracking.source import Source
 from tracking.stats import paired
 from tracking.tuning import scenes
-from tracking.tuning.plan import Scenes
 
 SIGMA = 0.08
 """First step of the search for fixed parameters, in the cube; half of it for the agent's offset, and for what all its
@@ -65,7 +63,7 @@ class Job:
 
 def learn(
     tracker: str,
-    suite: Scenes,
+    suite: scenes.Scenes,
     parameters: Sequence[str],
     statistics: Sequence[str],
     *,
@@ -89,7 +87,7 @@ def learn(
     if not parameters or generations < 1:
         place, got = ("generations", generations) if parameters else ("parameters", "none")
         raise InputError(place=place, got=got, expected="at least one", remedy="give more")
-    names, settings = (str(suite),) if isinstance(suite, str | Path) else tuple(map(str, suite)), tuple(set)
+    names, settings = scenes.named(suite), tuple(set)
     count = scenes.scenes(names, settings, "suite")
     train, check = (
         scenes.of(names, scenes.chosen_seeds(some, split, count), settings)

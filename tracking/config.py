@@ -8,7 +8,6 @@ that are `online`: they may change between two frames) and the table in the docs
 from __future__ import annotations
 
 import dataclasses
-import difflib
 import inspect
 import tomllib
 from collections.abc import Mapping
@@ -16,6 +15,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, ClassVar, Literal, Self
 
+from scenarios.document import closest
 from scenarios.errors import InputError
 
 Scale = Literal["linear", "log", "int", "categorical"]
@@ -127,8 +127,7 @@ class Config:
         declared = cls.params()
         if name in declared:
             return declared[name]
-        near = difflib.get_close_matches(name, declared, 1, 0.0)[:1]
-        remedy = f"did you mean {near[0]}?" if near else "it has no parameters"
+        remedy = f"did you mean {closest(name, declared)}?" if declared else "it has no parameters"
         raise InputError(file=file, place=name, got=name, expected=f"a parameter of {cls.tracker}", remedy=remedy)
 
     @classmethod

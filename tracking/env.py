@@ -8,7 +8,6 @@ objective of `tracking.evaluate` and 0 for no frames: rewards sum to the objecti
 
 from __future__ import annotations
 
-import difflib
 from collections.abc import Iterable, Mapping
 from typing import Any, Literal, cast, get_args
 
@@ -17,6 +16,7 @@ import numpy as np
 from gymnasium.spaces import Box
 from numpy.typing import NDArray
 
+from scenarios.document import closest
 from scenarios.errors import InputError
 from sim.types import DetectionMode, Image, Tracker
 from tracking.config import Config
@@ -25,7 +25,7 @@ from tracking.held import LIMIT, Cache
 from tracking.observation import NAMES, Observer
 from tracking.protocol import checked, choose_mode, config_class, find
 from tracking.run import Params, config_of
-from tracking.search import Space, decode, encode, space_of
+from tracking.search import Space, begun, decode, encode, space_of
 from tracking.source import Source, What, sources
 
 METADATA: dict[str, Any] = {"render_modes": ["rgb_array"], "render_fps": 10}
@@ -138,7 +138,8 @@ class TuningEnv(gymnasium.Env[Floats, Floats]):
         if self._observer is None:
             raise InputError(place="step", got="no episode", expected="one that was begun", remedy="call reset() first")
         if self.decision_every is None:
-            self.rollout = self._begun_by(action)
+            self.config, rollout = begun(self.space, action, self.base, lambda c: self._begun(c, self.source))
+            self.rollout = rollout
             whole = self._track(None)
         else:
             assert self.rollout is not None
@@ -151,16 +152,6 @@ class TuningEnv(gymnasium.Env[Floats, Floats]):
         return Rollout(
             self.tracker, source, config, detections=self.mode, tracker_seed=self.tracker_seed, cache=self.cache
         )
-
-    def _begun_by(self, action: Any) -> Rollout:
-        """The whole episode's rollout, with the nearest parameters on the way to the action's that can be had."""
-        begun: dict[Config, Rollout] = {}
-
-        def begin(config: Config) -> None:
-            begun[config] = self._begun(config, self.source)
-
-        self.config = decode(self.space, action, self.base, begin)
-        return begun.get(self.config) or self._begun(self.config, self.source)
 
     def _track(self, upto: int | None) -> bool:
         """Track on; is this the end?"""
@@ -262,6 +253,5 @@ def _space(kind: type[Config], mode: DetectionMode, every: int | None) -> Space:
 def _one_of(place: str, got: object, known: Iterable[object]) -> None:
     known = tuple(known)
     if got not in known:
-        near = difflib.get_close_matches(str(got), [str(k) for k in known], 1, 0.0)
-        remedy = f"did you mean {near[0]}?" if near else "leave it out"
+        remedy = f"did you mean {closest(str(got), map(str, known))}?" if known else "leave it out"
         raise InputError(place=place, got=repr(got), expected=f"one of {', '.join(map(str, known))}", remedy=remedy)

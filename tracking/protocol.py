@@ -6,7 +6,6 @@ the string, never a pickle.
 
 from __future__ import annotations
 
-import difflib
 import hashlib
 import importlib
 import importlib.util
@@ -18,6 +17,7 @@ from typing import Any, cast
 
 import numpy as np
 
+from scenarios.document import closest
 from scenarios.errors import InputError
 from sim.types import DetectionMode, Detections, Sequence, Tracker
 from tracking.answers import History, check_tracks, finite
@@ -42,8 +42,7 @@ def find(spec: str) -> type[Tracker]:
     target = REGISTRY.get(spec, spec)
     where, colon, class_name = target.rpartition(":")
     if not colon:
-        near = difflib.get_close_matches(spec, REGISTRY, 1, 0.0)[0]
-        remedy = f"did you mean {near}? Your own: file.py:Class or package.module:Class"
+        remedy = f"did you mean {closest(spec, REGISTRY)}? Your own: file.py:Class or package.module:Class"
         raise InputError(place="tracker", got=spec, expected="one of " + ", ".join(REGISTRY), remedy=remedy)
     module = _from_file(Path(where)) if where.endswith(".py") else _from_module(where)
     found = getattr(module, class_name, None)

@@ -13,6 +13,7 @@ from __future__ import annotations
 import dataclasses
 import math
 from collections.abc import Callable
+from typing import TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -21,6 +22,7 @@ from scenarios.errors import InputError
 from sim.types import Array, DetectionMode
 from tracking.config import Config, Param, Value
 
+T = TypeVar("T")
 Space = tuple[Param, ...]
 HALVINGS = 6
 """How often the way back to an allowed config is halved."""
@@ -57,6 +59,19 @@ def decode(
         found = _attempt(space, origin + share * (point - origin), base, allowed)
         near, far, best = (near, share, best) if found is None else (share, far, found)
     return best
+
+
+def begun(space: Space, action: ArrayLike, base: Config, begin: Callable[[Config], T]) -> tuple[Config, T]:
+    """The config at a point (P,), drawn back where `begin` refuses it too, and what `begin` made of it."""
+    made: dict[Config, T] = {}
+
+    def attempt(config: Config) -> None:
+        made[config] = begin(config)
+
+    config = decode(space, action, base, attempt)
+    if config not in made:
+        attempt(config)
+    return config, made[config]
 
 
 def _attempt(space: Space, point: Array, base: Config, allowed: Callable[[Config], object]) -> Config | None:

@@ -90,9 +90,10 @@ def values(texts: Iterable[str]) -> dict[str, Any]:
 
 def named(out: Path, suffix: str) -> Path:
     """A file to write whose name says what it is; InputError where it says something else."""
-    if out.suffix.lower() != suffix or out.is_dir():
-        got = f"{out}, a folder" if out.is_dir() else str(out)
-        remedy = f"write {out / 'page' if out.is_dir() else out.with_suffix('')}{suffix}"
+    there = out.is_dir()
+    if there or out.suffix.lower() != suffix:
+        got, better = (f"{out}, a folder", out / "page") if there else (str(out), out.with_suffix(""))
+        remedy = f"write {better}{suffix}"
         raise InputError(place="--out", got=got, expected=f"a file that ends in {suffix}", remedy=remedy)
     return out
 

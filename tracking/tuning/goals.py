@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-import difflib
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
+from scenarios.document import closest
 from scenarios.errors import InputError
 from tracking.episodes import Episode
 
@@ -55,8 +55,7 @@ def goals(keys: Iterable[str]) -> tuple[Goal, ...]:
     able = [SPEED, *(key for key, score in CATALOGUE.items() if score.better != "neither")]
     for key in keys:
         if key not in able:
-            near = next((k for k in able if k.lower() == key.lower()), difflib.get_close_matches(key, able, 1, 0.0)[0])
-            remedy = f"did you mean {near}? docs/metrics.md lists them"
+            remedy = f"did you mean {closest(key, able)}? docs/metrics.md lists them"
             raise InputError(
                 place="--objective", got=key, expected=f"a score with a better side, or {SPEED}", remedy=remedy
             )

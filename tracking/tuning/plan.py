@@ -23,8 +23,6 @@ from tracking.tuning import scenes
 from tracking.tuning.goals import ALWAYS, SPEED, Goal, goals
 from tracking.tuning.subject import Subject, subject_of
 
-Scenes = str | Path | Sequence[str | Path]
-
 
 @dataclass(frozen=True)
 class Plan:
@@ -106,7 +104,7 @@ class Plan:
 
 def plan(
     tracker: str | type[Tracker],
-    suite: Scenes,
+    suite: scenes.Scenes,
     trials: int,
     *,
     seeds: range | None = None,
@@ -125,7 +123,7 @@ def plan(
     _positive(trials, prune, finalists, seed)
     subject = subject_of(tracker)
     own, settings = _sorted_settings(set)
-    names = (str(suite),) if isinstance(suite, str | Path) else tuple(map(str, suite))
+    names = scenes.named(suite)
     count = scenes.scenes(names, settings, "--suite")
     other = scenes.unused(names) if check == "" else check
     several = _check_suite(names, other)

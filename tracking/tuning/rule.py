@@ -34,8 +34,8 @@ class Labels:
 
 SURVEYED, FILMED = Labels(0.02, 0.1, filmed=False), Labels(0.06, 0.1, filmed=True, scale=1.5)
 """As people's places in BIWI's seq_hotel, and boxes in CAVIAR's Meet_WalkTogether1, leave a smooth way: by 0.02 m and
-0.055 m, the latter jumping by 0.05 m from frame to frame at 25 fps. A scale is the median person's: in a view along a
-corridor those in front are half as large again, those at its end half as large."""
+0.055 m, the latter jumping by 0.05 m from frame to frame at 25 fps. A scale is the median person's: those in front are
+larger, those far behind smaller; 1.5 is a guess, fitted to nothing."""
 
 
 def play_rule(source: Source, rule: Grouping, cache: Cache) -> Episode:

@@ -10,6 +10,9 @@ from scenarios.errors import InputError
 from sim.splits import SPLITS, split_of
 from tracking.episodes import Source, sources
 
+Scenes = str | Path | Sequence[str | Path]
+"""A suite, a scenario, a TOML file, or a list of these."""
+
 EPISODES = {"train": 16, "val": 48, "test": 100}
 """How many episodes default seeds make, at least."""
 
@@ -20,6 +23,11 @@ OPTION = {"train": "--seeds", "val": "--validation", "test": "--test"}
 WORD = {"train": "training", "val": "validation", "test": "test"}
 UNUSED = ("friends-meet", "crossing")
 """Suites to check on: the first that shares no scenario with what was tuned on."""
+
+
+def named(suite: Scenes) -> tuple[str, ...]:
+    """One name or several as several."""
+    return (str(suite),) if isinstance(suite, str | Path) else tuple(map(str, suite))
 
 
 def chosen_seeds(seeds: range | None, split: str, scenes: int) -> range:

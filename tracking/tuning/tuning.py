@@ -16,9 +16,10 @@ from typing import TYPE_CHECKING
 
 from scenarios.errors import InputError
 from sim.types import DetectionMode, Tracker
+from tracking.tuning import scenes
 from tracking.tuning.goals import Goal
 from tracking.tuning.judge import Candidate, Judge, front
-from tracking.tuning.plan import Plan, Scenes, plan
+from tracking.tuning.plan import Plan, plan
 from tracking.tuning.result import Trial, Tuned
 from tracking.tuning.work import Play, players
 
@@ -33,7 +34,7 @@ Progress = Callable[[int, int | None, str], None]
 
 def tune(
     tracker: str | type[Tracker],
-    suite: Scenes,
+    suite: scenes.Scenes,
     trials: int = 100,
     *,
     seeds: range | None = None,

@@ -260,6 +260,7 @@ def test_several_goals_give_a_front(tmp_path):
 def test_speed_is_a_goal(tmp_path):
     found = tune(**wishes(tmp_path, objective=("HOTA", "frames/s"), trials=3, check=None))
     assert all(t.values[1] > 1 for t in found.trials if not t.error)
+    assert {c.key for c in found.comparisons} >= {"HOTA", "frames/s"} or not found.changed
 
 
 def test_a_class_and_its_own_parameters(tmp_path):
