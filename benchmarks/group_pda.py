@@ -52,6 +52,7 @@ def parser() -> argparse.ArgumentParser:
     made.add_argument("--detections", choices=("file", "truth", "image"), default="file")
     made.add_argument("--only", help="scenes, suites, parts or differences, separated by commas")
     made.add_argument("--each", action="store_true", help="decisions: scene by scene, too")
+    made.add_argument("--alone", action="store_true", help="scenarios, events: without those it is compared with")
     made.add_argument("--workers", type=int, default=2)
     made.add_argument("--tracker", default="group-pda", help="another tracker with the same parameters")
     made.add_argument("--data", type=Path, default=os.environ.get("FLOCKSCOPE_DATA", beside()))

@@ -61,7 +61,7 @@ def scenarios(given: argparse.Namespace) -> Any:
     """Must-show 1: scene by scene, the tracker beside its ablation and the baseline."""
     names = given.only.split(",") if given.only else SCENES
     entries = [entry for name in names for entry in resolve(name)]
-    found = gathered(entries, given, trackers(given.tracker, given.detections))
+    found = gathered(entries, given, compared(given))
     for scene, rows in found.items():
         title = f"{scene}: {heading(given, rows)}"
         tables.table(title, "tracker", list(SCENE_COLUMNS), tables.filled(SCENE_COLUMNS, rows))
@@ -94,7 +94,7 @@ def events(given: argparse.Namespace) -> Any:
     """Must-show 3: events on suites; on friends-meet the columns of Bazzani et al. 2012, Table 2."""
     found = {}
     for suite in given.only.split(",") if given.only else SUITES:
-        by_scene = gathered(resolve(f"suite:{suite}"), given, trackers(given.tracker, given.detections))
+        by_scene = gathered(resolve(f"suite:{suite}"), given, compared(given))
         rows = {name: [r for scene in by_scene.values() for r in scene.get(name, ())] for name in _names(by_scene)}
         tables.table(
             f"{suite}: {heading(given, rows)}", "tracker", list(EVENT_COLUMNS), tables.filled(EVENT_COLUMNS, rows)
@@ -109,6 +109,12 @@ def events(given: argparse.Namespace) -> Any:
                 tables.table(f"{suite}, {part}: {TABLE_2}", "tracker", list(_means(end, 1.0)), told)
         found[suite] = by_scene
     return found
+
+
+def compared(given: argparse.Namespace) -> tuple[Variant, ...]:
+    """The tracker and, unless it is wanted alone, those it is compared with."""
+    found = trackers(given.tracker, given.detections)
+    return found[:1] if given.alone else found
 
 
 def _means(end: str, scale: float) -> dict[str, tables.Column]:

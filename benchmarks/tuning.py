@@ -68,13 +68,13 @@ SEARCHES = {
     s.tracker: s
     for s in (
         Search("blob", "detectors.toml", "HOTA", "file", 3, 5),
-        Search("group-pda", "groups.toml", "objective", "file", 3, 5),
+        Search("group-pda", "labelled.toml", "objective", "file", 3, 5),
         Search("grouping", "groups.toml", "pairwise_F1", "truth", 8, 16),
     )
 }
 RECORDINGS = {
     "blob": (("mot/PETS09-S2L1-first200", "file"), ("mot/TUD-Campus", "file")),
-    "group-pda": (("biwi/seq_hotel", "truth"),),
+    "group-pda": (("biwi/seq_hotel", "truth"), ("caviar/mwt1gt.xml", "truth")),
     "grouping": (("biwi/seq_hotel", "truth"), ("caviar/mwt1gt.xml", "truth")),
 }
 KEYS = {
@@ -91,8 +91,9 @@ def search(given: argparse.Namespace) -> None:
         if given.half:
             suite = half_sensed(suite, given.sensor, given.out)
         found = tune(
-            wanted.tracker, suite, given.trials or 60, objective=wanted.objective,
-            detections=wanted.detections, workers=given.workers, out=given.out / f"{name}.toml",
+            wanted.tracker, suite, given.trials or 60, objective=given.objective or wanted.objective,
+            detections=wanted.detections, workers=given.workers, out=given.out / f"{name}.toml", only=given.only,
+            finalists=given.finalists,
             seeds=range(wanted.seeds), validation=range(10_000, 10_000 + (given.validation or wanted.validation)),
             test=range(20_000, 20_013), progress=said(),
             set=sensor_settings(given.sensor) if given.sensor and not given.half else (),
@@ -135,9 +136,12 @@ def real(given: argparse.Namespace) -> None:
 
 
 def configs(name: str, folder: Path) -> dict[str, Config]:
-    """First defaults, present ones, what the search found."""
+    """First defaults, present ones, what the search found: of several goals the whole front."""
     kind = Grouping if name == "grouping" else find(name).config_class
-    return {"first": kind.frozen(), "present": kind(), "tuned": kind.from_toml(folder / f"{name}.toml")}
+    files = sorted(folder.glob(f"{name}.front-*.toml"), key=lambda path: (len(path.name), path))
+    files = files or [folder / f"{name}.toml"]
+    found = {path.stem.rpartition(".")[2] if len(files) > 1 else "tuned": kind.from_toml(path) for path in files}
+    return {"first": kind.frozen(), "present": kind(), **found}
 
 
 def compared(name: str, sequence: Sequence, mode: str, chosen: dict[str, Config]) -> None:
@@ -215,6 +219,9 @@ def main() -> None:
     parser.add_argument("--trials", type=int)
     parser.add_argument("--validation", type=int, help="seeds of each scene")
     parser.add_argument("--suite", type=Path, help="search: another one than the tracker's own")
+    parser.add_argument("--objective", action="append", help="search: another goal than the tracker's own, or several")
+    parser.add_argument("--only", action="append", default=[], help="search: this parameter and others so named, alone")
+    parser.add_argument("--finalists", type=int, default=5, help="search: how many are judged on validation scenes")
     parser.add_argument("--sensor", type=Path)
     parser.add_argument("--half", action="store_true", help="--sensor in every second scene only")
     parser.add_argument("--workers", type=int, default=1, help="search: processes, which change nothing that is found")

@@ -17,14 +17,14 @@ class GroupPdaConfig(BackgroundSettings):
 
     gate: float = param(9.21, (6.0, 20.0), "", "gamma: squared Mahalanobis radius of the search region (2.2)")
     radius: float = param(
-        0.75,
+        0.52,
         (0.1, 2.0),
         "m",
         "from points: r of a point's region, those within 2 r are linked (R_0, 3.3)",
         sees="points",
     )
     person_spread: float = param(
-        0.3,
+        0.25,
         (0.05, 1.0),
         "m",
         "from points: standard deviation that the extent of few people is shrunk to (ours)",
@@ -131,7 +131,7 @@ class GroupPdaConfig(BackgroundSettings):
     )
     report_coast: float = param(0.5, (0.0, 5.0), "s", "for so long after its last measurement a group is told (ours)")
     carry_time: float = param(
-        0.5,
+        0.9,
         (0.0, 3.0),
         "s",
         "from points: a member not measured is carried along for so long (ours)",
@@ -139,7 +139,7 @@ class GroupPdaConfig(BackgroundSettings):
         sees="points",
     )
     carry_reach: float = param(
-        0.4,
+        0.37,
         (0.05, 2.0),
         "m",
         "from points: a member is measured if a point is so near his place (ours)",

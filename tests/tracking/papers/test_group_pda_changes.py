@@ -126,13 +126,14 @@ def test_a_merge_begins_when_it_does_though_one_of_them_merges_with_a_third(seed
 @pytest.mark.parametrize("seed", range(3))
 @pytest.mark.parametrize("length", [2, 5, 8])
 def test_files_that_join_end_to_end_do_so_when_they_are_near(length: int, seed: int) -> None:
-    """The last of one and the first of the other are 1.2 m apart from frame 41 on, however far their middles are."""
+    """The last of one and the first of the other are 1.2 m apart from frame 41 on, within 2 r, however far their
+    middles are."""
     r, frames = np.random.default_rng(seed), []
     for k in range(100):
         s, file = k / FPS, np.column_stack([0.7 * np.arange(length), np.zeros(length)])
         behind = file - [0.7 * (length - 1) + 1.2 + 0.9 * max(4.0 - s, 0), 0]
         frames.append(noisy([file + np.array([s, 0]), behind + np.array([s, 0])], r))
-    ((kind, start, before, _),) = changes(track(frames))
+    ((kind, start, before, _),) = changes(track(frames, GroupPdaConfig(radius=0.75)))
     assert (kind, before) == ("merge", (1, 2))
     assert start == pytest.approx(41, abs=4)
 
