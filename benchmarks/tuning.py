@@ -8,9 +8,9 @@ search: on the suites of benchmarks/tuning_suites (or --suite), training seeds; 
 friends-meet or crossing, which share no scenario with them. A search that was interrupted goes on. --sensor: detections
 err as this profile says (`flockscope fit sensor`), with --half in every second scene, for trackers of boxes.
 real: first defaults (tracking/frozen), present defaults and what `search` found, on recordings: `blob` on PETS09-S2L1
-(200 frames) and TUD-Campus from their det/det.txt, HOTA; `group-pda` on seq_hotel from labelled places, group scores;
-the rule of groups on seq_hotel and CAVIAR Meet_WalkTogether1 from labelled people, pairwise F1. Intervals by moving
-blocks, of the value and of the difference to the present defaults.
+(200 frames) and TUD-Campus from their det/det.txt, HOTA; on seq_hotel and CAVIAR Meet_WalkTogether1, from labelled
+people, `group-pda` by group scores and the rule of groups by pairwise F1; of several goals the whole front. Intervals
+by moving blocks, of the value and of the difference to the present defaults.
 workers: seconds of one search by 1 and 2 processes. overhead: what a trial costs beside its episodes.
 """
 
