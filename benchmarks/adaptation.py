@@ -23,7 +23,7 @@ from benchmarks.chart import Panel, lines
 from scenarios import load
 from sim import simulate
 from tracking.detect.background import BACKGROUND, Background, foreground
-from tracking.detect.settings import BackgroundSettings
+from tracking.detect.background_settings import BackgroundSettings
 
 SECONDS, CHANGE, SHOWN = 900, 60, 6
 """How long, when it changes, and how many seconds lie between points that are drawn."""

@@ -16,9 +16,9 @@ from pathlib import Path
 
 import numpy as np
 
-from sim.workers import THREADS, crew
+from sim.workers.pool import THREADS, crew
 from tracking.agent_search import learn, played
-from tracking.episodes import sources
+from tracking.environment.episodes import sources
 from tracking.stats import bootstrap, paired
 
 STATISTICS = "births,flicker,weak,surplus,orphans,missed,innovation"

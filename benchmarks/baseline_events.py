@@ -15,7 +15,7 @@ import argparse
 import numpy as np
 
 from scenarios.errors import FlockscopeError
-from scenarios.loading import Entry, names, resolve
+from scenarios.loading.resolve import Entry, names, resolve
 from sim.sequence import simulate
 from sim.types import Tracks, Truth
 from tracking.scoring import evaluate

@@ -17,8 +17,8 @@ import numpy as np
 from blob_vs_peers import Scene, generated, one_thread, ours, walks
 from peers.scores import iou, mot_scores
 
-from tracking.papers import blob_measure
-from tracking.papers.blob_config import BlobConfig
+from tracking.papers.blob import measurements
+from tracking.papers.blob.config import BlobConfig
 from tracking.run import prepare
 from tracking.stats import bootstrap
 
@@ -70,7 +70,7 @@ def coasted(scene: Scene) -> np.ndarray:
         lost = told[~people.hit[told]]
         if not len(lost) or not len(truth):
             continue
-        box = blob_measure.to_boxes(people.bank[0])
+        box = measurements.to_boxes(people.bank[0])
         overlap = iou(box, truth)
         free = np.ones(len(truth), bool)
         claims = overlap[people.hit]

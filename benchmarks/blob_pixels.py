@@ -20,7 +20,7 @@ from pathlib import Path
 import numpy as np
 
 import tracking
-from scenarios.loading import load
+from scenarios.loading.resolve import load
 from sim.io.source import open_source
 from sim.sequence import simulate
 from sim.types import Frame, Sequence

@@ -31,7 +31,7 @@ from scenarios import load
 from sim.io.source import open_source
 from sim.sequence import simulate
 from sim.types import Detections, Frame, Sequence
-from tracking.papers.blob_config import BlobConfig
+from tracking.papers.blob.config import BlobConfig
 from tracking.run import prepare
 from tracking.stats import bootstrap as over_sequences
 

@@ -22,7 +22,7 @@ from pathlib import Path
 import psutil
 from datasets import NONE, complete, file_bytes_hash, start, whole_run
 
-from sim.io.validate import validate
+from sim.io.store.validate import validate
 from tests.loopback import Loopback, loopback
 
 

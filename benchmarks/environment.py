@@ -33,12 +33,12 @@ import numpy as np
 
 import tracking  # noqa: F401  (registers the environment)
 from benchmarks.blob_vs_peers import write_mot
-from sim.io.truths import truth_files
-from tracking.episodes import Cache, Rollout, Source, play, sources
-from tracking.held import Held
-from tracking.observation import Observer
-from tracking.protocol import names
+from sim.io.store.truth_files import truth_files
+from tracking.environment.episode_cache import Held
+from tracking.environment.episodes import Cache, Rollout, Source, play, sources
+from tracking.environment.observation import Observer
 from tracking.run import Prepared, prepare
+from tracking.tracker_registry import names
 
 MUST, AIM, SHARE = 0.5, 0.2, 1.15
 PEOPLE = ["group.passers.repeat=2", "group.stop.repeat=3"]

@@ -20,13 +20,13 @@ from pathlib import Path
 
 import numpy as np
 
-from scenarios.loading import load
-from scenarios.sensor import Sensor
+from scenarios.loading.resolve import load
+from scenarios.schema.sensor import Sensor
 from sim.io.source import open_source
 from sim.sequence import simulate
 from sim.types import Detections, Truth
 from sim.types import Sequence as Recording
-from tracking.fitting.matched import Matched, match, match_sequence
+from tracking.fitting.matching import Matched, match, match_sequence
 from tracking.fitting.sensor import fit
 from tracking.fitting.statistics import again, statistics
 

@@ -10,10 +10,10 @@ import sys
 import cv2
 import numpy as np
 
-from scenarios.loading import load
-from sim.camera import solve
-from sim.render import Stage, stage
-from sim.world import run
+from scenarios.loading.resolve import load
+from sim.crowd.world import run
+from sim.render.renderer import Stage, stage
+from sim.scene.camera import solve
 
 SHOWN = (
     ("crowd", 60),

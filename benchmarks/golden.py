@@ -18,7 +18,7 @@ from importlib import metadata
 from pathlib import Path
 from typing import Any
 
-from scenarios.loading import dump, load, names
+from scenarios.loading.resolve import dump, load, names
 from sim.hashing import ENGINE, cpu_level, scenario_hash, truth_hash
 from sim.sequence import simulate
 

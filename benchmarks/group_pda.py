@@ -31,7 +31,7 @@ from benchmarks import (
     group_pda_real,
     group_pda_scenes,
 )
-from sim.workers import THREADS
+from sim.workers.pool import THREADS
 
 MODES: dict[str, Callable[[argparse.Namespace], Any]] = {
     "scenarios": group_pda_scenes.scenarios,

@@ -20,7 +20,7 @@ import numpy as np
 
 from benchmarks.group_pda_tables import table
 from sim.types import Array, Context, Detections, Frame
-from tracking import protocol
+from tracking import tracker_registry
 from tracking.scoring.consistency import LAGS, mean_band, normalised, normalised_square, whiteness, whiteness_band
 
 FPS = 10.0
@@ -83,7 +83,7 @@ class Record:
 
 def record(tracker: str, members: str, params: Mapping[str, object], runs: int) -> Record:
     """Track `runs` runs; those in which there was ever more or less than one group are dropped, and counted."""
-    kind: Any = protocol.find(tracker)
+    kind: Any = tracker_registry.find(tracker)
     config = kind.config_class.from_dict(params)
     rows = []
     for seed in range(runs):

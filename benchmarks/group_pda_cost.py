@@ -21,10 +21,10 @@ import numpy as np
 
 from benchmarks.group_pda_runs import held
 from benchmarks.group_pda_tables import table
-from scenarios.loading import load
+from scenarios.loading.resolve import load
 from sim.sequence import simulate
 from sim.types import Array, Context, Detections, Frame, Sequence
-from tracking import protocol
+from tracking import tracker_registry
 from tracking.run import prepare
 
 COUNTS = (100, 200, 500, 1000, 2000, 5000, 10_000, 20_000)
@@ -85,7 +85,7 @@ class Stepper:
     of the detector so far, s; how many groups it told."""
 
     def __init__(self, tracker: str, kind: str, count: int) -> None:
-        made: Any = protocol.find(tracker)
+        made: Any = tracker_registry.find(tracker)
         self.tracker = made(made.config_class())
         sample, first = pictures(count) if kind == "pictures" else (None, frames(kind, count))
         self.tracker.reset(Context(FPS, SCALE, background=sample), 0)

@@ -23,13 +23,13 @@ from benchmarks.chart import Panel, lines
 from benchmarks.group_pda_ids import Encounter, Match, meeting
 from benchmarks.group_pda_runs import Variant, held, seeds_of, tracked, trained_once
 from benchmarks.group_pda_tables import share, table
-from scenarios.schema import CameraSpec, Scenario
-from sim import workers
-from sim.camera import solve
+from scenarios.schema.scenario import CameraSpec, Scenario
+from sim.crowd.world import run as walk
+from sim.scene.camera import solve
 from sim.sequence import observe
 from sim.types import DetectionMode, Motion, Truth
-from sim.world import run as walk
-from tracking import protocol
+from sim.workers import pool
+from tracking import tracker_registry
 from tracking.stats import wilson
 
 DIFFERENCES = (0.0, 0.2, 0.4, 0.6, 0.8, 1.0, 1.2, 1.6, 2.0)  # m/s
@@ -130,7 +130,7 @@ def difference(given: argparse.Namespace) -> Any:
         "points": ("file", given.seeds),
         "pixels": ("image", given.image_seeds),
     }
-    kind = protocol.find(ours)
+    kind = tracker_registry.find(ours)
     threshold = float(kind.config_class().merge_velocity)  # type: ignore[attr-defined]
     panels, everything = [], {}
     for name in SECONDS:
@@ -149,7 +149,7 @@ def difference(given: argparse.Namespace) -> Any:
 def collected(jobs: Sequence[Job], processes: int) -> Answer:
     """By variant, the answers of all seeds, difference after difference within a seed."""
     made = {}
-    with workers.pool(processes) as run:
+    with pool.pool(processes) as run:
         for job, answer in run(one, list(jobs)):
             made[job.seed] = answer
             print(f"\r{job.kind}: {len(made)}/{len(jobs)} seeds", end="", file=sys.stderr, flush=True)

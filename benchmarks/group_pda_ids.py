@@ -18,12 +18,12 @@ from itertools import combinations
 
 import numpy as np
 
-from sim.encounters import CROSS_GAP
-from sim.geometry import gap_pairs, pack
+from sim.geometry.polygons import gap_pairs, pack
+from sim.truth.encounters import CROSS_GAP
 from sim.types import Array, Groups, Ints, Tracks, Truth
 from tracking.scoring.evaluation import labelled_frames, plane_of
 from tracking.scoring.groups import hull_pairs, matched, shared_members
-from tracking.scoring.sides import crowd, people_inside, true_people
+from tracking.scoring.rows import crowd, people_inside, true_people
 
 SECOND = 1.0
 NEVER = (2**31, 0)

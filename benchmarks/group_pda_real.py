@@ -18,18 +18,18 @@ import numpy as np
 
 from benchmarks.group_pda_runs import Variant
 from benchmarks.group_pda_tables import interval, table
-from sim.geometry import contains
+from sim.geometry.polygons import contains
 from sim.io.source import open_source
 from sim.types import Array, Ints, Tracks, Truth
-from tracking.app.overlay import overlay
-from tracking.grouping import with_groups
+from tracking.app.pictures.overlay import overlay
+from tracking.grouping.derive import with_groups
 from tracking.run import track
 from tracking.scoring import evaluate
+from tracking.scoring.block_resampling import scorer
 from tracking.scoring.catalogue import CATALOGUE
-from tracking.scoring.resample import scorer
-from tracking.scoring.sides import INSIDE
+from tracking.scoring.rows import INSIDE
 from tracking.stats import moving_blocks
-from tracking.tuning.rule import people_as_tracks
+from tracking.tuning.grouping_episodes import people_as_tracks
 
 DRAWS = 200
 KEYS = ("group_1-FP", "group_1-FN", "group_GDSR", "group_MOTP", "group_MOTA", "group_GDSR2", "group_F1", "group_IDSW")

@@ -17,12 +17,12 @@ import numpy as np
 
 from benchmarks.group_pda_ids import fates
 from scenarios.errors import FlockscopeError, InputError
-from scenarios.loading import Entry
-from sim import workers
-from sim.groups import box_groups
+from scenarios.loading.resolve import Entry
 from sim.sequence import simulate
+from sim.truth.groups import box_groups
 from sim.types import DetectionMode, Frame, Image, Tracks, Truth
 from sim.types import Sequence as Recording
+from sim.workers import pool
 from tracking.detect import background
 from tracking.detect.training import Trained, train
 from tracking.run import Run, track
@@ -63,7 +63,7 @@ def trackers(name: str, mode: DetectionMode) -> tuple[Variant, ...]:
 def measure(jobs: Iterable[Job], processes: int) -> Iterator[tuple[Job, dict[str, Row]]]:
     """Rows by variant of each job as they come; a seed that cannot be is said and left out."""
     todo = list(jobs)
-    with workers.pool(processes) as run:
+    with pool.pool(processes) as run:
         for done, (job, found) in enumerate(run(one, todo), 1):
             print(f"\r{done}/{len(todo)} sequences", end="", file=sys.stderr, flush=True)
             if isinstance(found, str):

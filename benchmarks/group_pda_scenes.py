@@ -8,7 +8,7 @@ from typing import Any
 
 from benchmarks import group_pda_tables as tables
 from benchmarks.group_pda_runs import Job, Row, Variant, measure, seeds_of, trackers
-from scenarios.loading import Entry, resolve
+from scenarios.loading.resolve import Entry, resolve
 from tracking.stats import paired
 
 SCENES = ("merge", "split", "cross", "queue", "side-by-side")

@@ -14,9 +14,9 @@ from collections.abc import Callable
 
 import numpy as np
 
-from sim.groups import groups_over_time
+from sim.truth.groups import groups_over_time
 from sim.types import Groups, Tracks, Truth
-from tracking.grouping import with_groups
+from tracking.grouping.derive import with_groups
 from tracking.scoring import evaluate
 
 RUNS = 5

@@ -14,10 +14,10 @@ from collections.abc import Callable
 
 import numpy as np
 
-from sim.events import crossings, queues
-from sim.groups import groups_over_time, memberships
-from tracking.crowd import label_people
-from tracking.links import Grouping, find_links
+from sim.truth.cross_queue_events import crossings, queues
+from sim.truth.groups import groups_over_time, memberships
+from tracking.grouping.group_labels import label_people
+from tracking.grouping.link_rule import Grouping, find_links
 
 FPS = 10.0
 SIDE = 60.0  # m

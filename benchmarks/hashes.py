@@ -16,7 +16,7 @@ from pathlib import Path
 
 from datasets import NONE, Pictures, content_hashes, file_bytes_hash, manifest_values, whole_run
 
-from sim.generate import generate
+from sim.dataset.generate import generate
 
 ENTRIES = ("merge", "split", "cross", "queue", "pillar", "door", "stairs", "party", "clutter", "side-by-side")
 

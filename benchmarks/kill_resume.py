@@ -26,7 +26,7 @@ from pathlib import Path
 import numpy as np
 from datasets import Pictures, complete, content_hashes, file_bytes_hash, sequences, start, whole_run
 
-from sim.io.validate import validate
+from sim.io.store.validate import validate
 
 Wait = Callable[[subprocess.Popen[str], Path], str]
 

@@ -15,9 +15,9 @@ from dataclasses import replace
 import numpy as np
 
 from sim.types import Context, Detections, Frame
-from tracking import lifecycle
-from tracking.papers.blob import Blob
-from tracking.papers.blob_config import BlobConfig
+from tracking.filters import lifecycle
+from tracking.papers.blob.config import BlobConfig
+from tracking.papers.blob.tracker import Blob
 
 FPS = 10.0
 WIDTH, HEIGHT = 28.0, 68.0  # px, a person at 40 px per m

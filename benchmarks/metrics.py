@@ -19,12 +19,12 @@ from pathlib import Path
 
 import numpy as np
 
-from sim.io.mot import read_table
+from sim.io.formats.mot_text import read_table
 from tracking.scoring.clear import clear
 from tracking.scoring.hota import hota
 from tracking.scoring.identity import identity
 from tracking.scoring.individuals import scores
-from tracking.scoring.pairs import Pairs, Rows, box_pairs, point_pairs
+from tracking.scoring.similarity import Pairs, Rows, box_pairs, point_pairs
 
 REACH = 2.0  # m
 TOLERANCE = 1e-6

@@ -17,12 +17,12 @@ import argparse
 
 import numpy as np
 
-from scenarios.loading import load, names
-from sim.camera import solve
-from sim.render import Stage, stage
-from sim.truth import bodies
+from scenarios.loading.resolve import load, names
+from sim.crowd.world import run
+from sim.render.renderer import Stage, stage
+from sim.scene.camera import solve
+from sim.truth.label import bodies
 from sim.types import Camera, Motion
-from sim.world import run
 from tests import reference_render as slow
 
 

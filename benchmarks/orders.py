@@ -16,13 +16,13 @@ from collections import defaultdict
 import numpy as np
 
 from scenarios.errors import FlockscopeError
-from scenarios.loading import Entry, names, resolve
-from scenarios.schema import Scenario
-from sim.cast import cast, walking_speed
-from sim.orders import PATIENCE
+from scenarios.loading.resolve import Entry, names, resolve
+from scenarios.schema.scenario import Scenario
+from sim.crowd.population import cast, walking_speed
+from sim.crowd.world import run
 from sim.sequence import observe
+from sim.truth.order_fulfilment import PATIENCE
 from sim.types import Array, Motion, Truth
-from sim.world import run
 from tracking.stats import wilson
 
 WINDOW = 0.8  # s

@@ -19,9 +19,9 @@ import numpy as np
 from benchmarks.chart import Panel, lines
 from scenarios import load
 from scenarios.errors import InputError
+from sim.crowd.world import run as walk
 from sim.sequence import observe
 from sim.types import Motion
-from sim.world import run as walk
 from tracking import evaluate, track
 from tracking.stats import bootstrap
 

@@ -5,7 +5,8 @@
 
 seq_hotel: pairwise membership F1 (pairs of labelled people of a frame, pooled over frames), baseline rule against rules
 that judge each frame alone, the best of nine settings being chosen on this very recording. Ours are not chosen on it:
-the baseline rule stands in tracking/links.py, CHOSEN is the best of six on simulated crowds (training seeds; which two
+the baseline rule stands in tracking/grouping/link_rule.py, CHOSEN is the best of six on simulated crowds (training
+seeds; which two
 parameters the six vary was decided knowing what goes wrong here; who stands and talks pays for it, see party). Whom the
 baseline rule takes for groups wrongly are mostly people who stand about waiting: by place and velocity alone they are
 as near and as alike as people who talk, and only the label knows that they do not.
@@ -22,18 +23,18 @@ from pathlib import Path
 
 import numpy as np
 
-from scenarios.loading import load, names
-from sim.groups import memberships
-from sim.io.caviar import CHORD
-from sim.io.labels import dense
+from scenarios.loading.resolve import load, names
+from sim.io.formats.caviar import CHORD
+from sim.io.formats.group_labels import dense
+from sim.io.formats.velocity import differentiate
 from sim.io.source import open_source
-from sim.io.velocity import differentiate
-from sim.lines import WAITING
-from sim.rules import SAME_WAY, TOGETHER
 from sim.sequence import simulate
+from sim.truth.groups import memberships
+from sim.truth.merge_split_rules import SAME_WAY, TOGETHER
+from sim.truth.queue_detection import WAITING
 from sim.types import Truth
-from tracking.grouping import Grouping, derive
-from tracking.tuning.rule import people_as_tracks
+from tracking.grouping.derive import Grouping, derive
+from tracking.tuning.grouping_episodes import people_as_tracks
 
 CHOSEN = Grouping(near=1.0, idle=0.4)  # by --choose 0:4
 RULES = {

@@ -15,11 +15,11 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.stats import wasserstein_distance
 
-from scenarios.loading import load, names
-from scenarios.schema import Scenario
+from scenarios.loading.resolve import load, names
+from scenarios.schema.scenario import Scenario
+from sim.crowd.world import run
 from sim.io.source import open_source
 from sim.types import Array, Bools, Ints, Motion
-from sim.world import run
 
 STEP = 0.4  # s
 WALKING = 0.3  # m/s

@@ -23,11 +23,11 @@ from pathlib import Path
 import numpy as np
 from scipy.stats import wasserstein_distance
 
-from scenarios.schema import Light, Picture, Scenario
-from sim.camera import solve
-from sim.render import stage
-from sim.truth import bodies
-from sim.world import run
+from scenarios.schema.scenario import Light, Picture, Scenario
+from sim.crowd.world import run
+from sim.render.renderer import stage
+from sim.scene.camera import solve
+from sim.truth.label import bodies
 
 PETS = "mot/PETS09-S2L1-first200"
 CAMERA = {"image": [480, 360], "focal_px": 560, "tilt_deg": 15, "height": 6.5, "crop": True, "fps": 7}

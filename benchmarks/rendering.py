@@ -16,11 +16,11 @@ from collections.abc import Callable
 
 import numpy as np
 
-from scenarios.schema import Scenario
-from sim import paint_kernels, render
-from sim.camera import solve
-from sim.render import Stage, stage
-from sim.world import run
+from scenarios.schema.scenario import Scenario
+from sim.crowd.world import run
+from sim.render import people_shadow_kernels, renderer
+from sim.render.renderer import Stage, stage
+from sim.scene.camera import solve
 
 STRETCH = 10
 
@@ -56,12 +56,12 @@ ASKED: dict[str, Callable[[Stage], Callable[[int], object]]] = {
     "empty": lambda s: lambda i: s.background(i % 50),
 }
 PARTS = (
-    ("places, outlines", render.Stretch, ("__init__", "crowd", "sight")),
-    ("shadows", paint_kernels, ("shadows",)),
-    ("people", paint_kernels, ("people",)),
-    ("blur, light, noise", render.Stage, ("_finish",)),
-    ("truth of pixels", render, ("pixel_truth",)),
-    ("disparity", render.Stage, ("_disparities",)),
+    ("places, outlines", renderer.Stretch, ("__init__", "crowd", "sight")),
+    ("shadows", people_shadow_kernels, ("shadows",)),
+    ("people", people_shadow_kernels, ("people",)),
+    ("blur, light, noise", renderer.Stage, ("_finish",)),
+    ("truth of pixels", renderer, ("pixel_truth",)),
+    ("disparity", renderer.Stage, ("_disparities",)),
 )
 
 

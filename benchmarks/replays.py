@@ -17,9 +17,9 @@ from pathlib import Path
 
 import numpy as np
 
-from scenarios.view import View
+from scenarios.schema.observation import View
+from sim.dataset.replay import on_ground, replay
 from sim.io.source import open_source
-from sim.real_motion import on_ground, replay
 from sim.types import Array, Sequence, Truth
 
 RECORDINGS = ("biwi/seq_hotel", "caviar/mwt1gt.xml", "mot/PETS09-S2L1-first200")

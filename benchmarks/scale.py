@@ -20,9 +20,9 @@ from dataclasses import dataclass
 from itertools import pairwise
 from pathlib import Path
 
-from sim.generate import generate
-from sim.io.webdataset import webdataset
-from sim.workers import crew
+from sim.dataset.generate import generate
+from sim.io.export.webdataset import webdataset
+from sim.workers.pool import crew
 from tests.errands import process
 from tests.loopback import loopback
 

@@ -23,8 +23,8 @@ from sim import simulate
 from sim.types import Sequence
 from tracking.detect import blobs
 from tracking.detect.background import Background, foreground
+from tracking.detect.background_settings import BackgroundSettings
 from tracking.detect.mog2 import Mog2
-from tracking.detect.settings import BackgroundSettings
 
 SCALE = 20.0
 COLOURS = np.array([[0, 0, 0], [255, 255, 255], [0, 255, 255], [0, 160, 0], [0, 0, 255]], np.uint8)

@@ -22,9 +22,9 @@ import numpy as np
 import pymunk
 import pymunk.batch
 
-from scenarios.schema import Scenario
-from sim.steering import Steering
-from sim.world import WRITE, World
+from scenarios.schema.scenario import Scenario
+from sim.crowd.steering import Steering
+from sim.crowd.world import WRITE, World
 
 RUNNER = Path(__file__).parent / "peers" / "run_jupedsim.py"
 DENSITY = 0.2  # people per m²

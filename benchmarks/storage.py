@@ -13,7 +13,7 @@ import tempfile
 import time
 from pathlib import Path
 
-from sim.generate import generate
+from sim.dataset.generate import generate
 from sim.io.source import open_source
 
 KINDS = (

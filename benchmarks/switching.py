@@ -24,19 +24,19 @@ from typing import Any
 import numpy as np
 
 from scenarios.errors import InputError
-from sim import workers
 from sim.types import Array, DetectionMode, Frame, Tracks
-from sim.workers import THREADS
+from sim.workers import pool
+from sim.workers.pool import THREADS
 from tracking.answers import History
 from tracking.config import Config
-from tracking.episodes import streams_for
-from tracking.held import Held
+from tracking.environment.episode_cache import Held
+from tracking.environment.episodes import streams_for
 from tracking.objective import Judge
-from tracking.protocol import find
+from tracking.parameter_space import decode, encode, space_of
 from tracking.run import Prepared, prepare
-from tracking.search import decode, encode, space_of
 from tracking.source import Source, sources
 from tracking.stats import bootstrap, paired
+from tracking.tracker_registry import find
 
 CASES = ("blob:clutter:file", "group-pda:clutter:file", "blob:lights:image", "group-pda:lights:image")
 STEP = 0.5
@@ -135,8 +135,8 @@ def play(job: Job) -> Found:
 
 def played(jobs: list[Job], count: int) -> Iterator[Found]:
     """All jobs, in their order."""
-    with workers.crew(count) as run:
-        for done, found in enumerate(workers.in_order(run, play, jobs), 1):
+    with pool.crew(count) as run:
+        for done, found in enumerate(pool.in_order(run, play, jobs), 1):
             print(f"\r{done}/{len(jobs)} sequences", end="", file=sys.stderr, flush=True)
             yield found
     print(file=sys.stderr)

@@ -20,17 +20,17 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from unittest import mock
 
-from scenarios.schema import Scenario
+from scenarios.schema.scenario import Scenario
 from sim.io.source import open_source
 from sim.sequence import simulate
 from sim.types import Frame, Sequence
 from tracking.detect import blobs
 from tracking.detect.background import Background
 from tracking.detect.person_size import PersonSize
-from tracking.papers import blob_entry
-from tracking.papers.blob_pixels import Pixels
-from tracking.protocol import History
+from tracking.papers.blob import newcomers
+from tracking.papers.blob.from_pixels import Pixels
 from tracking.run import Prepared, prepare
+from tracking.tracker_registry import History
 
 SIZES = (640, 480), (1280, 720)
 RUNS = 3
@@ -39,7 +39,7 @@ PARTS: dict[str, tuple[tuple[object, str], ...]] = {
     "clean, find": ((blobs, "clean"), (Pixels, "_find")),
     "associate": ((Pixels, "_associate"),),
     "split": ((Pixels, "_split"),),
-    "newcomers": ((blob_entry, "newcomers"),),
+    "newcomers": ((newcomers, "newcomers"),),
     "person size": ((PersonSize, "learn"), (Pixels, "_lone"), (Pixels, "_settle_sizes")),
     "adapt": ((Background, "adapt"), (Pixels, "_protected")),
 }

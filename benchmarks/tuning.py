@@ -29,22 +29,22 @@ from typing import Any
 import numpy as np
 
 from scenarios import sensor_settings
-from scenarios.suite import lines
-from sim.io.atomic import write_file
+from scenarios.loading.suites import lines
+from sim.io.files.atomic import write_file
 from sim.io.source import open_source
 from sim.types import Ints, Sequence, Tracks
 from tracking.config import Config
-from tracking.episodes import Episode, Source
-from tracking.grouping import derive
-from tracking.links import Grouping
-from tracking.protocol import find
+from tracking.environment.episodes import Episode, Source
+from tracking.grouping.derive import derive
+from tracking.grouping.link_rule import Grouping
 from tracking.run import track
+from tracking.scoring.block_resampling import scorer
 from tracking.scoring.catalogue import CATALOGUE
-from tracking.scoring.resample import scorer
 from tracking.stats import moving_blocks
+from tracking.tracker_registry import find
 from tracking.tuning import tune
-from tracking.tuning.plan import plan
-from tracking.tuning.rule import people_as_tracks
+from tracking.tuning.grouping_episodes import people_as_tracks
+from tracking.tuning.search_plan import plan
 from tracking.tuning.study import opened
 from tracking.tuning.trials import search as search_trials
 

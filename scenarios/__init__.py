@@ -9,12 +9,12 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from scenarios.loading import load
-    from scenarios.sensor_file import sensor_settings
+    from scenarios.loading.resolve import load
+    from scenarios.loading.sensor_profiles import sensor_settings
 
 __all__ = ["load", "sensor_settings"]
 
-_HOME = {"load": "scenarios.loading", "sensor_settings": "scenarios.sensor_file"}
+_HOME = {"load": "scenarios.loading.resolve", "sensor_settings": "scenarios.loading.sensor_profiles"}
 
 
 def __getattr__(name: str) -> Any:

@@ -9,12 +9,12 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from sim.real_motion import replay
+    from sim.dataset.replay import replay
     from sim.sequence import simulate
 
 __all__ = ["replay", "simulate"]
 
-_HOME = {"replay": "sim.real_motion", "simulate": "sim.sequence"}
+_HOME = {"replay": "sim.dataset.replay", "simulate": "sim.sequence"}
 
 
 def __getattr__(name: str) -> Any:

@@ -33,7 +33,7 @@ def file_hash(content: bytes) -> str:
 
 
 def scenario_hash(text: str) -> str:
-    """Hash of a resolved scenario, given as the text of scenarios.loading.dump."""
+    """Hash of a resolved scenario, given as the text of scenarios.loading.resolve.dump."""
     return canonical_hash(("scenario", text))
 
 

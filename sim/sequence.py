@@ -9,16 +9,16 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from scenarios.errors import InputError
-from sim.camera import px_per_m_at_centre, solve
-from sim.io.sample import OWN
-from sim.orders import check_orders
-from sim.render import Rendered, Stage, stage
-from sim.truth import bodies, label
+from sim.io.store.background_sample import OWN
+from sim.render.renderer import Rendered, Stage, stage
+from sim.scene.camera import px_per_m_at_centre, solve
+from sim.truth.label import bodies, label
+from sim.truth.order_fulfilment import check_orders
 from sim.types import BACKGROUNDS, Camera, Detections, Frame, Image, Motion, Order, PixelTruth, Scene, Sequence, Truth
 
 if TYPE_CHECKING:
-    from scenarios.schema import Scenario
-    from scenarios.view import View
+    from scenarios.schema.observation import View
+    from scenarios.schema.scenario import Scenario
 
 STREAMS = frozenset({"left", "right", "disparity", "ids", "background"})
 
@@ -30,7 +30,7 @@ def simulate(scenario: Scenario, seed: int, repeat: int = 0, streams: Iterable[s
     is known of pixels (`ids`, `disparity`); () none. InputError where the scenario cannot be (no room, people out of
     view, a right view without a baseline).
     """
-    from sim.world import run
+    from sim.crowd.world import run
 
     return observe(scenario, run(scenario, seed, repeat), streams=streams)
 
@@ -58,14 +58,14 @@ def observe(
     def named() -> Mapping[str, tuple[int, ...]]:
         if people is not None:
             return people
-        from scenarios import schema
+        from scenarios.schema import scenario as schema
 
         assert isinstance(scenario, schema.Scenario), "a view knows no groups: give people"
         return named_people(scenario, motion.scene, motion.seed, motion.repeat, motion.orders)
 
     @cache
     def detections() -> list[Detections]:
-        from sim.sensors import sense
+        from sim.detector.sense import sense
 
         hidden = named() if any(hide.group is not None for hide in scenario.sensor.hide) else {}
         seen = bodies(motion, camera)
@@ -159,7 +159,7 @@ def named_people(
     scenario: Scenario, scene: Scene, seed: int, repeat: int, orders: Iterable[Order]
 ) -> dict[str, tuple[int, ...]]:
     """Ids of the people of each group that the script names: those it starts with, and those its orders made."""
-    from sim.cast import cast
+    from sim.crowd.population import cast
 
     parties = cast(scenario, scene, seed, repeat)
     names = {party.name: tuple(m.column + 1 for m in party.members) for party in parties}

@@ -103,7 +103,8 @@ class Tracks(Frozen):
 
     unit "person": group is the id of the person's group, -1 alone. unit "group": id == group.
     cov (N, 2D, 2D) ordered x, y, (z), vx, vy, (vz). box (N, 4) ltwh px or None. groups and events may be left empty:
-    they are then derived by the baseline rule (tracking.grouping). derived: this has been done, nothing is left to do.
+    they are then derived by the baseline rule (tracking.grouping.derive). derived: this has been done, nothing is left
+    to do.
     """
 
     index: int
@@ -152,7 +153,7 @@ class Scene(Frozen):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Camera(Frozen):
-    """A camera; see sim.camera for what it sees.
+    """A camera; see sim.scene.camera for what it sees.
 
     kind "pinhole": x_cam = rotation (X - position), u = fx x/z + cx, v = fy y/z + cy, (cx, cy) the image's middle
     unless given. kind "top": orthographic, px_per_m, looking straight down on `position`.

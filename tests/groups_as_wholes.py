@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from sim.footprints import footprint_hull
-from sim.geometry import convex_hull
+from sim.geometry.footprints import footprint_hull
+from sim.geometry.polygons import convex_hull
 from sim.types import Array, FrameTruth, GroupEvent, Groups, Sequence, Tracks
 
 LATE = 4

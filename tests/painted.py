@@ -8,8 +8,8 @@ from collections.abc import Iterable, Sequence
 import numpy as np
 
 from sim.types import Context, Frame, Tracker, Tracks
-from tracking.papers.blob import Blob
-from tracking.papers.blob_config import BlobConfig
+from tracking.papers.blob.config import BlobConfig
+from tracking.papers.blob.tracker import Blob
 
 HIGH, WIDE, FPS, TALL = 240, 320, 10.0, 68.0
 """px, frames per second, and how high a person is."""

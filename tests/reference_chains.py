@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from sim.chains import FURTHEST, NEAREST, OFF, SHARE, STRAIGHT
+from sim.truth.queue_shapes import FURTHEST, NEAREST, OFF, SHARE, STRAIGHT
 
 
 def chain(pos):

@@ -11,7 +11,7 @@ import numpy as np
 from scipy.sparse.csgraph import connected_components
 from scipy.spatial.distance import cdist
 
-from tracking.components import Constraint
+from tracking.filters.components import Constraint
 
 ANGLES = np.linspace(0, 2 * np.pi, 120, endpoint=False)
 

@@ -13,7 +13,7 @@ from scipy.special import gammainc, logsumexp
 from scipy.stats import multivariate_normal, norm
 
 from tests import reference_components
-from tracking.components import Constraint
+from tracking.filters.components import Constraint
 
 H = np.eye(2, 4)
 NEWCOMERS = 0.02  # probability that the number of people is any

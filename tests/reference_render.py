@@ -6,8 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from sim.people import ellipsoids
-from sim.terrain import height_at
+from sim.scene.body import ellipsoids
+from sim.scene.terrain import height_at
 from sim.types import Array, Bools, Camera, Ints, Motion, Scene
 
 NEVER = np.inf

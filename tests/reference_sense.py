@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from sim.camera import looking
-from sim.people import DEPTH, SHOULDERS, ellipsoids
+from sim.scene.body import DEPTH, SHOULDERS, ellipsoids
+from sim.scene.camera import looking
 from sim.types import Array, Camera, Motion, Order, Scene
 
 
@@ -112,8 +112,8 @@ def wall_hit(origin: Array, direction: Array, wall: Array, tall: float, far: flo
 
 def raster_visibility(camera: Camera, scene: Scene, pos3: Array, heading: Array, height: Array, n: int = 60) -> Array:
     """Share of each person's silhouette that is visible, (N,): n × n rays over the amodal box, nearest surface wins."""
-    from sim.camera import rays
-    from sim.people import boxes
+    from sim.scene.body import boxes
+    from sim.scene.camera import rays
 
     shapes = ellipsoids(pos3, heading, height)
     out = np.zeros(len(pos3))

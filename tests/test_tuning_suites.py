@@ -6,8 +6,8 @@ from pathlib import Path
 
 import pytest
 
-from scenarios.loading import resolve
-from scenarios.suite import lines
+from scenarios.loading.resolve import resolve
+from scenarios.loading.suites import lines
 
 SUITES = Path(__file__).resolve().parents[1] / "benchmarks" / "tuning_suites"
 

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from tracking.registration import announce
+from tracking.gymnasium_registration import announce
 
 if TYPE_CHECKING:
     from tracking.run import track

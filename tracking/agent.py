@@ -1,10 +1,12 @@
 """An agent that changes a tracker's parameters while it runs: a linear policy on what a tracker in use can see.
 
-Every `every` seconds, the first time before the first frame, the parameters are moved in the cube of tracking.search:
+Every `every` seconds, the first time before the first frame, the parameters are moved in the cube of
+tracking.parameter_space:
 
     a = a0 + offset + weights s,    s = (o - usual) / spread,
 
-a0 the point of the policy's own config, o the statistics (tracking.observation) of the frames since the last decision;
+a0 the point of the policy's own config, o the statistics (tracking.environment.observation) of the frames since the
+last decision;
 before the first frame s = 0. Without weights it is a fixed set of parameters. Found by tracking.agent_search.
 """
 
@@ -24,9 +26,9 @@ from scenarios.errors import InputError
 from sim.types import Array, Context, Detections, Frame, Tracker, Tracks
 from tracking import scale
 from tracking.config import Config, Value
-from tracking.observation import NAMES, Observer
-from tracking.protocol import config_class, find
-from tracking.search import Space, begun, decode, encode
+from tracking.environment.observation import NAMES, Observer
+from tracking.parameter_space import Space, begun, decode, encode
+from tracking.tracker_registry import config_class, find
 
 OWN = ("grouped", "group_size", "merges", "splits")
 """Statistics of groups that the tracker names itself: no part of a policy, which is to serve any tracker."""

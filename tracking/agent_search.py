@@ -16,10 +16,10 @@ import numpy as np
 
 from scenarios.errors import InputError
 from sim.types import Array, DetectionMode, Ints
-from sim.workers import Run, crew, in_order
+from sim.workers.pool import Run, crew, in_order
 from tracking.agent import Policy
-from tracking.episodes import Cache, Rollout, play
-from tracking.observation import NAMES, Observer
+from tracking.environment.episodes import Cache, Rollout, play
+from tracking.environment.observation import NAMES, Observer
 from tracking.source import Source
 from tracking.stats import paired
 from tracking.tuning import scenes

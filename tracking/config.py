@@ -15,8 +15,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, ClassVar, Literal, Self
 
-from scenarios.document import closest
 from scenarios.errors import InputError
+from scenarios.loading.toml_files import closest
 
 Scale = Literal["linear", "log", "int", "categorical"]
 Value = float | int | str | bool

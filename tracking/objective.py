@@ -14,12 +14,12 @@ from functools import cached_property
 
 import numpy as np
 
-from sim.footprints import Q
-from sim.geometry import iou_pairs, pack
-from sim.rules import frames_of
+from sim.geometry.footprints import Q
+from sim.geometry.polygons import iou_pairs, pack
+from sim.truth.merge_split_rules import frames_of
 from sim.types import Array, Bools, Ints, Tracks, Truth
-from tracking.grouping import outlined_boxes, tabled, with_groups
-from tracking.links import Grouping, find_links
+from tracking.grouping.derive import outlined_boxes, tabled, with_groups
+from tracking.grouping.link_rule import Grouping, find_links
 from tracking.scoring.evaluation import (
     chosen_frames,
     labelled_frames,
@@ -28,11 +28,11 @@ from tracking.scoring.evaluation import (
     plane_of,
     usual_similarity,
 )  # fmt: skip
+from tracking.scoring.group_and_event_scores import Labelled, told_groups, true_groups
 from tracking.scoring.groups import FOUND, matched
 from tracking.scoring.hota import hota
-from tracking.scoring.pairs import Pairs, Rows
-from tracking.scoring.sides import INSIDE, Crowd, People, Surface, people_inside, tracked_people, true_people
-from tracking.scoring.social import Labelled, told_groups, true_groups
+from tracking.scoring.rows import INSIDE, Crowd, People, Surface, people_inside, tracked_people, true_people
+from tracking.scoring.similarity import Pairs, Rows
 
 NEAR = 1e-6
 """An overlap so near 0.5 is looked at more closely."""

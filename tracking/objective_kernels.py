@@ -1,4 +1,5 @@
-"""Compiled shapes of groups and their overlaps; the twins are sim.geometry, sim.footprints and tracking.crowd.
+"""Compiled shapes of groups and their overlaps; the twins are sim.geometry.polygons, sim.geometry.footprints and
+tracking.grouping.group_labels.
 
 Polygons stand one after the other in vertex (V, 2), counter-clockwise; polygon g is vertex[ends[g - 1] : ends[g]].
 """
@@ -11,7 +12,8 @@ from numba import njit
 
 @njit(cache=True)
 def partition(frame, column, length, people, memory, when, a, b, on):  # type: ignore[no-untyped-def]
-    """(R,) of each row the least column of those it is grouped with in its frame, -1 alone: tracking.crowd.label_people
+    """(R,) of each row the least column of those it is grouped with in its frame, -1 alone:
+    tracking.grouping.group_labels.label_people
     without names. Rows sorted by frame (from 0); links: when, a, b, on (L,) sorted by `when`."""
     linked = np.zeros((people, people), np.bool_)
     seen = np.full(people, -memory - 2)

@@ -34,7 +34,7 @@ def describe(
     speed: Speed,
 ) -> dict[str, Any]:
     """What run.json holds; px_per_m: by which groups were derived. Only the speeds differ between two equal runs."""
-    from sim.io.box_source import box_source
+    from sim.io.store.box_source import box_source
 
     sample = ready.context.background
     begins = 1 if sample is None else causal_from(ready.sequence)
@@ -64,7 +64,7 @@ def causal_from(sequence: Sequence) -> int | None:
 
     What was learned from the first N frames has seen ahead for whoever answers one of those before N.
     """
-    from sim.io.sample import Sample
+    from sim.io.store.background_sample import Sample
 
     sample = sequence.load_background
     if not isinstance(sample, Sample):

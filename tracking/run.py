@@ -17,9 +17,9 @@ import numpy as np
 
 from scenarios.errors import FlockscopeError, InputError, WorkError
 from sim.types import Context, DetectionMode, Detections, Frame, Sequence, Tracker, Tracks
-from tracking import protocol, scale
+from tracking import scale, tracker_registry
 from tracking.config import Config
-from tracking.links import Grouping
+from tracking.grouping.link_rule import Grouping
 from tracking.provenance import Speed, describe
 
 Params = Config | Mapping[str, Any] | str | Path | None
@@ -54,7 +54,7 @@ class Prepared:
     mode: DetectionMode
     sequence: Sequence
     feed: tuple[Frame, ...] | None
-    history: protocol.History = field(default_factory=protocol.History)
+    history: tracker_registry.History = field(default_factory=tracker_registry.History)
 
     def frames(self) -> Iterator[Frame]:
         """The frames as the tracker gets them: from pixels without the detections that came with them."""
@@ -78,14 +78,14 @@ class Prepared:
         """One step, its input and output checked."""
         detections = frame.detections
         if detections is not None:
-            protocol.check_detections(detections, self.tracker.needs)
+            tracker_registry.check_detections(detections, self.tracker.needs)
         try:
             said = self.tracker.step(frame, detections)
         except FlockscopeError as error:
             raise _named(error, self.sequence) from error.__cause__
         except Exception as error:
             raise _raised(self.name, "step", f"{self.sequence.name}, frame {frame.index}", error) from error
-        return protocol.check_tracks(said, frame.index, self.name, self.history)
+        return tracker_registry.check_tracks(said, frame.index, self.name, self.history)
 
 
 def _named(error: FlockscopeError, sequence: Sequence) -> FlockscopeError:
@@ -120,7 +120,7 @@ def track(
     that is done. InputError where tracker and source do not fit, before a frame is read; WorkError where
     the tracker's answer is no Tracks.
     """
-    from tracking.grouping import names_groups, with_groups
+    from tracking.grouping.derive import names_groups, with_groups
 
     rule = Grouping.from_toml(grouping) if isinstance(grouping, str | Path) else grouping
     ready = prepare(tracker, sequence, params=params, detections=detections, sensor=sensor, seed=seed)
@@ -156,7 +156,7 @@ def prepare(
         remedy = "open it: sim.io.source.open_source(path), or sim.simulate(scenario, seed)"
         raise InputError(place="sequence", got=type(sequence).__name__, expected="a Sequence", remedy=remedy)
     name, instance, config = _make(tracker, params)
-    mode = protocol.choose_mode(instance.needs, sequence, detections)
+    mode = tracker_registry.choose_mode(instance.needs, sequence, detections)
     if sensor and mode != "truth":
         remedy = "add --detections truth, or leave the sensor as it is"
         raise InputError(
@@ -182,7 +182,9 @@ def _make(tracker: str | type[Tracker] | Tracker, params: Params) -> tuple[str, 
             raise InputError(place="params", got=got, expected="a class or a name", remedy="configure the instance")
         return type(tracker).__name__, tracker, getattr(tracker, "config", None)
     name = tracker if isinstance(tracker, str) else tracker.__name__
-    made = cast(Any, protocol.find(tracker) if isinstance(tracker, str) else protocol.checked(tracker, name))
+    made = cast(
+        Any, tracker_registry.find(tracker) if isinstance(tracker, str) else tracker_registry.checked(tracker, name)
+    )
     kind: type[Config] | None = getattr(made, "config_class", None)
     if kind is None:
         if params is not None:
@@ -225,7 +227,7 @@ def _feed(
     if mode == "file":
         found: list[Detections | None] = [f.detections for f in sequence.without_pictures()]
     else:
-        from tracking.labelled import from_truth
+        from tracking.truth_detections import from_truth
 
         found = list(from_truth(sequence, sensor, seed))
     given = [d for d in found if d is not None and len(d.pos)]
@@ -237,7 +239,7 @@ def _feed(
 
 def grouped(tracks: SequenceOf[Tracks], sequence: Sequence) -> tuple[Tracks, ...]:
     """Stored or a stranger's tracks of a sequence, with groups and events where the tracker left them empty."""
-    from tracking.grouping import with_groups
+    from tracking.grouping.derive import with_groups
 
     truth = None if np.isfinite(sequence.px_per_m) else sequence.truth
     return with_groups(tracks, sequence.fps, sequence.px_per_m if truth is None else truth.px_per_m)
@@ -246,7 +248,7 @@ def grouped(tracks: SequenceOf[Tracks], sequence: Sequence) -> tuple[Tracks, ...
 def _px_per_m(sequence: Sequence, mode: DetectionMode, feed: tuple[Frame, ...] | None) -> float:
     """px per metre: the camera's, the source's own, else the median height of the boxes given / 1.7; nan if none."""
     if sequence.camera is not None:
-        from sim.camera import px_per_m_at_centre
+        from sim.scene.camera import px_per_m_at_centre
 
         return float(px_per_m_at_centre(sequence.camera))
     if np.isfinite(sequence.px_per_m) or mode == "image":

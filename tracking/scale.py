@@ -8,7 +8,7 @@ from collections.abc import Sequence as SequenceOf
 import numpy as np
 
 from scenarios.errors import InputError
-from sim.camera import PERSON
+from sim.scene.camera import PERSON
 from sim.types import Detections, Tracks
 
 

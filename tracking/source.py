@@ -13,7 +13,7 @@ from scenarios.errors import InputError
 from sim.types import Sequence
 
 if TYPE_CHECKING:
-    from scenarios.loading import Entry
+    from scenarios.loading.resolve import Entry
 
 What = str | Path | Sequence | Iterable["str | Path | Sequence | Source"]
 
@@ -90,7 +90,7 @@ def _of(what: str | Path | Sequence | Source, seeds: tuple[int, ...], settings: 
         return [what]
     if isinstance(what, Sequence):
         return [Source(what.name, int(what.source.get("seed", 0)), sequence=what)]
-    from scenarios.loading import names, resolve, suite_names
+    from scenarios.loading.resolve import names, resolve, suite_names
 
     text = str(what)
     known = text.endswith(".toml") or text.startswith("suite:") or text in (*names(), *suite_names())

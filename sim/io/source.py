@@ -6,10 +6,11 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from scenarios.errors import InputError
-from sim.io import biwi, caviar, mot_folder, store, video
-from sim.io.cameras import read_calibration
-from sim.io.manifest import is_sequence
-from sim.io.sample import Choice, read_choice
+from sim.io.formats import biwi, caviar, mot_folder, video
+from sim.io.store import sequence_folder
+from sim.io.store.background_sample import Choice, read_choice
+from sim.io.store.camera_files import read_calibration
+from sim.io.store.manifest import is_sequence
 from sim.types import Camera, Sequence
 
 KINDS = "a generated sequence or dataset, a MOTChallenge folder or text, a BIWI folder, a CAVIAR XML, a video"
@@ -132,7 +133,7 @@ def _open_folder(path: Path, options: Options) -> Sequence:
     match _kind(path):
         case "generated":
             o.refuse(path, "a generated sequence", "it knows its own", "fps", "px_per_m", "camera")
-            return store.open_sequence(path, background=o.background)
+            return sequence_folder.open_sequence(path, background=o.background)
         case "biwi":
             o.refuse(path, "a BIWI recording", "it is in metres, without pictures", "px_per_m", "camera", "background")
             return biwi.open_folder(path, fps=o.fps)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from benchmarks import golden
-from scenarios.loading import names
+from scenarios.loading.resolve import names
 from sim.hashing import ENGINE
 
 

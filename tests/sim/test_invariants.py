@@ -5,8 +5,8 @@ import numpy as np
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from sim.events import crossings, queues
-from sim.groups import memberships
+from sim.truth.cross_queue_events import crossings, queues
+from sim.truth.groups import memberships
 from tests.plots import DURATION, crosses, look, merges, scenes, splits
 
 FPS = 10.0

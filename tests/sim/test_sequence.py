@@ -6,10 +6,10 @@ import pytest
 
 import sim.sequence
 from scenarios.errors import InputError, WorkError
-from scenarios.schema import Scenario
+from scenarios.schema.scenario import Scenario
 from sim.hashing import canonical_hash, truth_hash
 from sim.sequence import observe
-from sim.truth import bodies
+from sim.truth.label import bodies
 from sim.types import Order
 from tests.reference_sense import crowd, walkers
 
@@ -94,7 +94,7 @@ def test_truth_of_a_script_that_did_not_come_true_is_refused(monkeypatch: pytest
 
 
 def test_simulation_is_repeatable_and_hides_by_name() -> None:
-    pytest.importorskip("sim.world", exc_type=ImportError)
+    pytest.importorskip("sim.crowd.world", exc_type=ImportError)
     hide = {"hide": [{"start": 0.5, "end": 1.5, "group": "b"}]}
     a, b = (sim.sequence.simulate(scenario(duration=2.0, sensor=hide), 3) for _ in range(2))
     for x, y in zip(a, b, strict=True):

@@ -15,10 +15,10 @@ from sim.types import Tracks
 from tests.tuning_toys import write_scenes
 from tracking import agent_search
 from tracking.agent import Policy
-from tracking.env import TuningEnv
-from tracking.episodes import Rollout, play, sources
-from tracking.observation import NAMES
-from tracking.search import encode
+from tracking.environment.env import TuningEnv
+from tracking.environment.episodes import Rollout, play, sources
+from tracking.environment.observation import NAMES
+from tracking.parameter_space import encode
 
 FILE = f"{Path(__file__).parents[1] / 'adaptive_toy.py'}"
 TOY = f"{FILE}:Changing"

@@ -7,7 +7,7 @@ import pytest
 
 from scenarios.errors import WorkError
 from sim.types import GroupEvent, Groups, Tracks
-from tracking.protocol import History, check_tracks
+from tracking.tracker_registry import History, check_tracks
 
 SQUARE = np.array([[0.0, 0], [1, 0], [1, 1]])
 

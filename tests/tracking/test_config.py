@@ -8,7 +8,7 @@ import pytest
 
 from scenarios.errors import InputError
 from tracking.config import Config, param
-from tracking.papers.blob_config import BlobConfig
+from tracking.papers.blob.config import BlobConfig
 
 
 @dataclasses.dataclass(frozen=True)

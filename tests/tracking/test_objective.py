@@ -10,15 +10,15 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from scenarios.loading import load
-from sim.footprints import footprint_hulls
-from sim.geometry import convex_hull, iou_matrix
+from scenarios.loading.resolve import load
+from sim.geometry.footprints import footprint_hulls
+from sim.geometry.polygons import convex_hull, iou_matrix
 from sim.sequence import simulate
 from sim.types import Groups
 from tracking import objective_kernels as kernels
-from tracking.crowd import label_people
-from tracking.grouping import with_groups
-from tracking.links import Grouping, find_links
+from tracking.grouping.derive import with_groups
+from tracking.grouping.group_labels import label_people
+from tracking.grouping.link_rule import Grouping, find_links
 from tracking.objective import DISC, FLAT, Judge, Shapes, f1
 from tracking.scoring import evaluate
 

@@ -8,13 +8,13 @@ import numpy as np
 import pytest
 
 from scenarios.errors import InputError, WorkError
-from scenarios.loading import load
-from sim.io.tracks import write_tracks
+from scenarios.loading.resolve import load
+from sim.io.store.track_files import write_tracks
 from sim.sequence import simulate
 from sim.types import Context, Detections, Frame, Groups, Sequence, Tracks, Truth
-from tracking.links import Grouping
-from tracking.papers.blob import Blob
-from tracking.papers.blob_config import BlobConfig
+from tracking.grouping.link_rule import Grouping
+from tracking.papers.blob.config import BlobConfig
+from tracking.papers.blob.tracker import Blob
 from tracking.run import Run, prepare, track
 
 FPS, LENGTH = 10.0, 30
@@ -104,8 +104,8 @@ def test_hiding_a_group_by_its_name(tmp_path):
     """Simulated and stored alike: the script's own groups, and those that its orders made."""
     import sim
     from scenarios import load
-    from scenarios.write import dump
-    from sim.io.store import open_sequence, write_sequence
+    from scenarios.loading.toml_writing import dump
+    from sim.io.store.sequence_folder import open_sequence, write_sequence
 
     scenario = load("merge")
     live = sim.simulate(scenario, seed=3, streams=())

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from scenarios.errors import InputError
-from scenarios.loading import load
-from sim.generate import generate
+from scenarios.loading.resolve import load
+from sim.dataset.generate import generate
 from sim.sequence import simulate
 from tracking.source import Source, sources
 

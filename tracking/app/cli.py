@@ -11,8 +11,9 @@ from typing import Annotated, Literal
 import typer
 
 from scenarios.errors import InputError
-from tracking.app.answer import INTERRUPTED, Answer
-from tracking.app.arguments import (
+from tracking.app.output import INTERRUPTED, Answer
+from tracking.app.recording_options import fit_sensor, replay
+from tracking.app.shared_options import (
     Calibration,
     Cluster,
     Detector,
@@ -28,7 +29,6 @@ from tracking.app.arguments import (
     Tracked,
     Workers,
 )
-from tracking.app.recorded_options import fit_sensor, replay
 from tracking.app.tune_options import tune
 
 app = typer.Typer(
@@ -69,7 +69,7 @@ def demo(
     json: Json = False,
 ) -> Answer:
     """From scenes to a page with scores, start to finish."""
-    from tracking.app.demo import demo
+    from tracking.app.commands.demo import demo
 
     return demo(out, quick=quick)
 
@@ -83,16 +83,16 @@ def scenarios(
     json: Json = False,
 ) -> Answer:
     """List them, or explain one with a drawing."""
-    from tracking.app import scenario_keys, scenarios_command
+    from tracking.app.commands import scenario_keys, scenarios
 
     if name is not None and not schema:
-        return scenarios_command.explain(name, settings, out)
+        return scenarios.explain(name, settings, out)
     unused = {"NAME": name, "--out": out, "--set": settings}
     for option, value in unused.items():
         if value:
             got, remedy = f"{option} with nothing to explain", "name a scenario, without --schema"
             raise InputError(place=option, got=got, expected="NAME", remedy=remedy)
-    return scenario_keys.keys() if schema else scenarios_command.catalogue()
+    return scenario_keys.keys() if schema else scenarios.catalogue()
 
 
 @app.command()
@@ -109,10 +109,10 @@ def generate(
     json: Json = False,
 ) -> Answer:
     """Simulate scenarios and store them as a dataset."""
-    from tracking.app import options
-    from tracking.app.dataset_commands import generate
+    from tracking.app import option_values
+    from tracking.app.commands.datasets import generate
 
-    texts = [*options.sensor(sensor), *settings]
+    texts = [*option_values.sensor(sensor), *settings]
     return generate(names, seeds, out, texts, streams, images, workers=workers, cluster=cluster)
 
 
@@ -137,10 +137,10 @@ def track(
     json: Json = False,
 ) -> Answer:
     """Run a tracker and store what it says."""
-    from tracking.app import track_command
+    from tracking.app.commands import track
 
-    job = track_command.job(tracker, params, settings, detections, seed, sensor, grouping)
-    return track_command.track(job, source, out, fps=fps, px_per_m=px_per_m, camera=camera, background=background)
+    job = track.job(tracker, params, settings, detections, seed, sensor, grouping)
+    return track.track(job, source, out, fps=fps, px_per_m=px_per_m, camera=camera, background=background)
 
 
 @app.command()
@@ -164,7 +164,7 @@ def score(
     json: Json = False,
 ) -> Answer:
     """Score tracks against truth."""
-    from tracking.app.score_command import score
+    from tracking.app.commands.score import score
 
     return score(
         truth,
@@ -199,7 +199,7 @@ def view(
     json: Json = False,
 ) -> Answer:
     """A replay in the browser, tracks beside truth, over the pictures where there are any."""
-    from tracking.app.view_command import Recording, view
+    from tracking.app.commands.view import Recording, view
 
     return view(Recording(source, fps, px_per_m, camera), tracks, out, video)
 
@@ -213,7 +213,7 @@ def sheet(
     json: Json = False,
 ) -> Answer:
     """A contact sheet of a sequence: its pictures, its truth."""
-    from tracking.app.view_command import Recording, sheet
+    from tracking.app.commands.view import Recording, sheet
 
     return sheet(Recording(source, fps), out, frames)
 
@@ -234,7 +234,7 @@ def overlay(
     json: Json = False,
 ) -> Answer:
     """A video with boxes, ids, trails, groups and events drawn over the pictures."""
-    from tracking.app.view_command import Recording, overlay
+    from tracking.app.commands.view import Recording, overlay
 
     return overlay(Recording(source, fps, px_per_m, camera), tracks, out, truth)
 
@@ -244,7 +244,7 @@ def validate(
     folder: Annotated[Path, typer.Argument(metavar="DIR", help="A generated sequence or dataset.")], json: Json = False
 ) -> Answer:
     """Check that a dataset is whole, unaltered and consistent."""
-    from tracking.app.dataset_commands import validate
+    from tracking.app.commands.datasets import validate
 
     return validate(folder)
 
@@ -256,7 +256,7 @@ def coco(
     json: Json = False,
 ) -> Answer:
     """One COCO file with track and group ids."""
-    from tracking.app.dataset_commands import export_coco
+    from tracking.app.commands.datasets import export_coco
 
     return export_coco(folder, out)
 
@@ -274,14 +274,14 @@ def webdataset(
     json: Json = False,
 ) -> Answer:
     """Tar shards to stream from, as the library webdataset reads them."""
-    from tracking.app.dataset_commands import export_webdataset
+    from tracking.app.commands.datasets import export_webdataset
 
     return export_webdataset(folder, out, shard_size, samples)
 
 
 def run(arguments: Sequence[str]) -> int:
     """Run the command; everything it says is printed; its exit code."""
-    from tracking.app.running import carry_out
+    from tracking.app.exit_codes import carry_out
 
     return carry_out(app, list(arguments) or ["--help"])
 

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 from html import escape
 from pathlib import Path
 
-from tracking.app.score_command import Row, summary
-from tracking.app.score_tables import SHOWN, number
+from tracking.app.commands.score import Row, summary
+from tracking.app.commands.score_tables import SHOWN, number
 from tracking.scoring.catalogue import CATALOGUE
 
 STYLE = """

@@ -7,8 +7,8 @@ from typing import Annotated, Literal
 
 import typer
 
-from tracking.app.answer import Answer
-from tracking.app.arguments import Cluster, Detector, Json, Set, Workers
+from tracking.app.output import Answer
+from tracking.app.shared_options import Cluster, Detector, Json, Set, Workers
 
 
 def tune(
@@ -45,12 +45,12 @@ def tune(
     json: Json = False,
 ) -> Answer:
     """Search a tracker's parameters on simulated scenes; judge them on others."""
-    from tracking.app import tune_command
+    from tracking.app.commands import tune
 
-    wishes = tune_command.Wishes(
+    wishes = tune.Wishes(
         tracker, suite, trials, out, seeds, validation, test, check, objective, detections, settings, only, sensor,
     )  # fmt: skip
-    return tune_command.tune(
+    return tune.tune(
         wishes, storage=storage, study=study, workers=workers, cluster=cluster, prune=prune, finalists=finalists,
         seed=seed,
     )  # fmt: skip

@@ -21,14 +21,14 @@ import numpy as np
 
 from sim.types import Bools, Image
 from tracking.detect import gain as gains
-from tracking.detect.classes import BACKGROUND as BACKGROUND
-from tracking.detect.classes import DARK as DARK
-from tracking.detect.classes import FOREGROUND as FOREGROUND
-from tracking.detect.classes import HIGHLIGHT as HIGHLIGHT
-from tracking.detect.classes import SHADOW as SHADOW
-from tracking.detect.classes import Floats
-from tracking.detect.classes import foreground as foreground
-from tracking.detect.settings import BackgroundSettings
+from tracking.detect.background_settings import BackgroundSettings
+from tracking.detect.pixel_classes import BACKGROUND as BACKGROUND
+from tracking.detect.pixel_classes import DARK as DARK
+from tracking.detect.pixel_classes import FOREGROUND as FOREGROUND
+from tracking.detect.pixel_classes import HIGHLIGHT as HIGHLIGHT
+from tracking.detect.pixel_classes import SHADOW as SHADOW
+from tracking.detect.pixel_classes import Floats
+from tracking.detect.pixel_classes import foreground as foreground
 from tracking.detect.training import FLOOR, check_frame, thresholds, train
 
 INTERLEAVE = 4

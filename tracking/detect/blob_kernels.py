@@ -10,7 +10,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from sim.trees_kernels import root
+from sim.geometry.union_find_kernels import root
 from sim.types import Array, Bools, Ints
 
 Labels = NDArray[np.int32]

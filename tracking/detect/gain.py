@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from sim.types import Bools, Image
-from tracking.detect.classes import Floats
+from tracking.detect.pixel_classes import Floats
 
 POINTS = 6000
 """Pixels of the grid on which a gain is estimated."""

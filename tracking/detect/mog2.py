@@ -10,7 +10,7 @@ import numpy as np
 
 from sim.types import Bools, Image
 from tracking.config import Config, param
-from tracking.detect.classes import BACKGROUND, FOREGROUND, SHADOW
+from tracking.detect.pixel_classes import BACKGROUND, FOREGROUND, SHADOW
 from tracking.detect.training import check, check_frame
 
 SHADOW_VALUE = 127

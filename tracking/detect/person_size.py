@@ -12,7 +12,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from sim.camera import PERSON
+from sim.scene.camera import PERSON
 from sim.types import Array, Bools, Camera, Context
 from tracking.detect import person_size_kernels as kernels
 
@@ -212,8 +212,8 @@ def _crowding(place: Array) -> Array:
 
 def _table(camera: Camera, low: Array) -> Array:
     """(2, V, U) height and width at nodes STEP px apart from `low` on; nan where nobody can stand."""
-    from sim.camera import to_ground
-    from sim.people import boxes
+    from sim.scene.body import boxes
+    from sim.scene.camera import to_ground
 
     size = (np.array(camera.image) * (1 + 2 * MARGIN) / STEP).astype(int) + 2
     u, v = np.meshgrid(low[0] + STEP * np.arange(size[0]), low[1] + STEP * np.arange(size[1]))
@@ -234,7 +234,7 @@ def _table(camera: Camera, low: Array) -> Array:
 
 def _from_above(camera: Camera) -> Array:
     """(2,) longer and shorter axis of a person, px."""
-    from sim.people import boxes
+    from sim.scene.body import boxes
 
     return np.sort(boxes(camera, np.zeros((1, 3)), np.zeros(1), np.array([PERSON]))[0, 2:])[::-1]
 

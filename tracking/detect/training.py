@@ -20,8 +20,8 @@ import numpy as np
 
 from scenarios.errors import InputError
 from sim.types import Bools, Image, Ints
-from tracking.detect.classes import Floats
 from tracking.detect.gain import frame_gains
+from tracking.detect.pixel_classes import Floats
 
 LEAST_FRAMES = 10
 """With fewer, SHARE of them are too few values to tell a spread by."""

@@ -6,7 +6,7 @@ import numpy as np
 from numba import njit
 
 from sim.types import Array, Bools, Image, Ints
-from tracking.detect.classes import Floats
+from tracking.detect.pixel_classes import Floats
 
 
 @njit(cache=True, error_model="numpy")

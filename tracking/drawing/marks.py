@@ -9,9 +9,9 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from sim.geometry import convex_hull
-from sim.io.truths import standing
-from sim.io.upright import upright_boxes
+from sim.geometry.polygons import convex_hull
+from sim.io.store.truth_files import standing
+from sim.io.store.upright_boxes import upright_boxes
 from sim.types import Array, Bools, Camera, GroupEvent, Groups, Ints, Scene, Tracks, Truth
 
 SURE = math.sqrt(5.991)
@@ -209,7 +209,7 @@ def _seen(points: Array, plane: str, camera: Camera | None, scene: Scene | None)
         return points
     if camera is None:
         return NOWHERE
-    from sim.camera import project
+    from sim.scene.camera import project
 
     uv, depth = project(camera, standing(points, scene))
     return uv if (depth > 0).all() and np.isfinite(uv).all() else NOWHERE

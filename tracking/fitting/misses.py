@@ -12,10 +12,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from scenarios.sensor import Memory
+from scenarios.schema.sensor import Memory
 from sim.types import Array, Bools
-from tracking.fitting.matched import Matched
-from tracking.fitting.memory import correlations, hidden_correlations, memory
+from tracking.fitting.error_correlation import correlations, hidden_correlations, memory
+from tracking.fitting.matching import Matched
 
 NODES = 5
 SIZES = 16  # of `small` that are tried
@@ -59,9 +59,9 @@ def fit_misses(recordings: Sequence[Matched]) -> tuple[Chance, tuple[Memory, ...
 
 
 def _heights(m: Matched) -> Array:
-    """What decides on size: the boxes' heights, from above what sim.sensors takes for them."""
+    """What decides on size: the boxes' heights, from above what sim.detector.sense takes for them."""
     assert m.truth.box is not None
-    from sim.people import SHOULDERS
+    from sim.scene.body import SHOULDERS
 
     if m.camera is not None and m.camera.kind == "top":
         return np.asarray(m.truth.box[:, 2:].max(axis=1) / SHOULDERS)

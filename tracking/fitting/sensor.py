@@ -7,13 +7,13 @@ from collections.abc import Iterable, Sequence
 import numpy as np
 
 from scenarios.errors import InputError
-from scenarios.sensor import Sensor
+from scenarios.schema.sensor import Sensor
 from sim.types import Array
 from sim.types import Sequence as Recording
-from tracking.fitting.alarms import fit_alarms
-from tracking.fitting.matched import Matched, match_sequence
+from tracking.fitting.box_noise import fit_noise, point_noise
+from tracking.fitting.false_alarms import fit_alarms
+from tracking.fitting.matching import Matched, match_sequence
 from tracking.fitting.misses import fit_misses
-from tracking.fitting.noise import fit_noise, point_noise
 
 SCORES = 11  # quantiles
 LEAST = 50  # labelled people (rows): fewer are no profile

@@ -6,13 +6,13 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from scenarios.sensor import Sensor
-from sim.box_noise import box_errors
-from sim.sensors import sense
+from scenarios.schema.sensor import Sensor
+from sim.detector.box_noise import box_errors
+from sim.detector.sense import sense
 from sim.types import Array, Ints
-from tracking.fitting.alarms import linked
-from tracking.fitting.matched import Matched, match
-from tracking.fitting.memory import pairs_at
+from tracking.fitting.error_correlation import pairs_at
+from tracking.fitting.false_alarms import linked
+from tracking.fitting.matching import Matched, match
 
 VISIBILITIES = (0.0, 0.25, 0.5, 0.75, 0.95)
 LAGS = (0.2, 1.0)  # s

@@ -15,7 +15,7 @@ import numpy as np
 
 from sim.types import Bools, Ints
 from tracking.scoring.matching import solve_frame
-from tracking.scoring.pairs import EPS, Pairs
+from tracking.scoring.similarity import EPS, Pairs
 
 THRESHOLD = 0.5
 BONUS = 1000.0  # of a pair that was matched in the frame before

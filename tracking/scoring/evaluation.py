@@ -10,15 +10,15 @@ from typing import Literal
 import numpy as np
 
 from sim.types import Array, Bools, Tracks, Truth
-from tracking.grouping import with_groups
+from tracking.grouping.derive import with_groups
 from tracking.scoring.catalogue import CATALOGUE
+from tracking.scoring.group_and_event_scores import Labelled, social_scores
 from tracking.scoring.groups import GroupMatch
 from tracking.scoring.individuals import scores as individual_scores
 from tracking.scoring.mapping import mapped
-from tracking.scoring.pairs import Pairs, box_pairs, point_pairs
-from tracking.scoring.places import REACH, place_scores
-from tracking.scoring.sides import People, Surface, tracked_people, true_people
-from tracking.scoring.social import Labelled, social_scores
+from tracking.scoring.position_errors import REACH, place_scores
+from tracking.scoring.rows import People, Surface, tracked_people, true_people
+from tracking.scoring.similarity import Pairs, box_pairs, point_pairs
 
 Similarity = Literal["boxes", "ground", "image"]
 

@@ -16,7 +16,7 @@ import numpy as np
 
 from sim.types import Array
 from tracking.scoring.matching import match
-from tracking.scoring.pairs import Pairs
+from tracking.scoring.similarity import Pairs
 
 POWER = 2.0
 

@@ -11,13 +11,13 @@ from typing import Literal
 
 import numpy as np
 
-from sim.geometry import iou_pairs, pack
+from sim.geometry.polygons import iou_pairs, pack
 from sim.types import Array, Bools, Ints
 from tracking.scoring.errors import gaussian_wasserstein
 from tracking.scoring.hota import hota
 from tracking.scoring.matching import match
-from tracking.scoring.pairs import EPS, Pairs, compare
-from tracking.scoring.sides import Crowd
+from tracking.scoring.rows import Crowd
+from tracking.scoring.similarity import EPS, Pairs, compare
 
 GroupMatch = Literal["hull", "members"]
 CORRECT = (3, 5)  # share of members (of either side) that makes a group a right one: 60 %, without rounding

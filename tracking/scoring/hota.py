@@ -12,7 +12,7 @@ import numpy as np
 
 from sim.types import Array, Ints
 from tracking.scoring.matching import match_as_table
-from tracking.scoring.pairs import EPS, Pairs
+from tracking.scoring.similarity import EPS, Pairs
 
 ALPHAS = np.arange(0.05, 0.99, 0.05)
 

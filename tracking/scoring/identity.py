@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from tracking.scoring.matching import match
-from tracking.scoring.pairs import Pairs
+from tracking.scoring.similarity import Pairs
 
 THRESHOLD = 0.5
 

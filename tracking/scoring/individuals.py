@@ -7,7 +7,7 @@ from collections.abc import Iterable, Iterator
 from tracking.scoring.clear import clear
 from tracking.scoring.hota import hota
 from tracking.scoring.identity import identity
-from tracking.scoring.pairs import Pairs
+from tracking.scoring.similarity import Pairs
 
 
 def scores(pairs: Pairs) -> dict[str, float]:

@@ -6,7 +6,7 @@ import numpy as np
 
 from sim.types import Ints
 from tracking.scoring.matching import match
-from tracking.scoring.pairs import EPS, Pairs
+from tracking.scoring.similarity import EPS, Pairs
 
 LEAST = 0.5
 """Similarity from which somebody counts as found: 1 m apart on the ground, half the union of two boxes."""

@@ -15,7 +15,7 @@ from __future__ import annotations
 import numpy as np
 
 from sim.types import Array, Bools, Ints
-from tracking.scoring.pairs import Pairs
+from tracking.scoring.similarity import Pairs
 
 CLEARLY = 1 + 1e-9  # times as much is more, whatever the rounding
 WORTH = 0.2  # share of pairs that a pass must take off for another one: below, the solver is quicker

@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
-from scenarios.document import closest
 from scenarios.errors import InputError
-from tracking.episodes import Episode
+from scenarios.loading.toml_files import closest
+from tracking.environment.episodes import Episode
 
 SPEED = "frames/s"
 """Frames per second in the tracker; the one goal that is not the same every time."""

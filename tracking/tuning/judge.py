@@ -14,11 +14,11 @@ import numpy as np
 
 from scenarios.errors import FlockscopeError
 from tracking.config import Config
-from tracking.episodes import Episode, Source
+from tracking.environment.episodes import Episode, Source
 from tracking.stats import paired
 from tracking.tuning.goals import Goal
-from tracking.tuning.plan import Plan, every_score
-from tracking.tuning.work import Play
+from tracking.tuning.parallel_episodes import Play
+from tracking.tuning.search_plan import Plan, every_score
 
 SHOWN = ("objective", "HOTA", "group_F1_hull", "pairwise_F1", "event_F1")
 """Scores that are compared beside the goals."""

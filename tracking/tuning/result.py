@@ -14,7 +14,7 @@ from typing import Any
 
 from tracking.config import Config
 from tracking.tuning.judge import Candidate, Comparison
-from tracking.tuning.plan import Plan, text
+from tracking.tuning.search_plan import Plan, text
 
 VERSIONS = ("flockscope", "optuna", "numpy", "scipy", "numba")
 LONG = 40
@@ -152,7 +152,7 @@ class Tuned:
     def write(self, path: str | Path) -> list[Path]:
         """The parameters to `path`, and beside it all figures (.json) and the plots (.history.svg, .importance.svg);
         of several goals each of the front (.front-1.toml …) and .front.svg. What was written."""
-        from sim.io.atomic import write_file
+        from sim.io.files.atomic import write_file
         from tracking.tuning.plots import plots
 
         target = Path(path)

@@ -21,8 +21,8 @@ from optuna.samplers import BaseSampler, TPESampler
 from optuna.trial import FrozenTrial, TrialState
 
 from tracking.config import Param
-from tracking.search import decode, encode
-from tracking.tuning.plan import Plan
+from tracking.parameter_space import decode, encode
+from tracking.tuning.search_plan import Plan
 
 AGAIN, PRUNED, ERROR = "again", "pruned after", "error"
 """Attributes of a trial: which it replaces, after how many episodes it was given up, what went wrong."""

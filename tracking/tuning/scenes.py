@@ -5,10 +5,11 @@ from __future__ import annotations
 from collections.abc import Sequence
 from pathlib import Path
 
-from scenarios import document, suite
 from scenarios.errors import InputError
-from sim.splits import SPLITS, split_of
-from tracking.episodes import Source, sources
+from scenarios.loading import suites as suite
+from scenarios.loading import toml_files
+from sim.dataset.seed_ranges import SPLITS, split_of
+from tracking.environment.episodes import Source, sources
 
 Scenes = str | Path | Sequence[str | Path]
 """A suite, a scenario, a TOML file, or a list of these."""
@@ -85,15 +86,15 @@ def shared(names: Sequence[str], others: Sequence[str]) -> list[str]:
 def _files(name: str) -> list[str]:
     """The files of the scenarios that a scenario's, a suite's or a file's name stands for."""
     bare = name.removeprefix("suite:")
-    if bare != name or (bare in document.suite_names() and bare not in document.names()) or _is_suite(bare):
+    if bare != name or (bare in toml_files.suite_names() and bare not in toml_files.names()) or _is_suite(bare):
         path = suite.find_suite(bare)
-        return [str(document.find(line.scenario, beside=path.parent).resolve()) for line in suite.lines(path)]
-    return [str(document.find(bare).resolve())]
+        return [str(toml_files.find(line.scenario, beside=path.parent).resolve()) for line in suite.lines(path)]
+    return [str(toml_files.find(bare).resolve())]
 
 
 def _is_suite(name: str) -> bool:
-    return name.endswith(".toml") and "entry" in document.parse(document.find(name))
+    return name.endswith(".toml") and "entry" in toml_files.parse(toml_files.find(name))
 
 
 def _known(name: str) -> bool:
-    return name.startswith("suite:") or name in (*document.names(), *document.suite_names())
+    return name.startswith("suite:") or name in (*toml_files.names(), *toml_files.suite_names())

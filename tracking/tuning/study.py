@@ -16,10 +16,10 @@ from optuna.trial import FrozenTrial, TrialState
 from scenarios.errors import InputError
 from tracking.tuning.goals import Goal
 from tracking.tuning.journal import LOCKS, Journal, Locks
-from tracking.tuning.plan import Plan
 from tracking.tuning.pruner import SignedRank
 from tracking.tuning.result import Trial
 from tracking.tuning.sampler import AGAIN, ERROR, PRUNED, Sampler, distribution, slot
+from tracking.tuning.search_plan import Plan
 
 SETTINGS = "settings"
 """The attribute of a study that says what it is about."""

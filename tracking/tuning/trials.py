@@ -11,12 +11,12 @@ import optuna
 from optuna.exceptions import UpdateFinishedTrialError
 
 from scenarios.errors import FlockscopeError, InputError
-from tracking.episodes import Episode
+from tracking.environment.episodes import Episode
 from tracking.tuning.goals import Goal, mean
-from tracking.tuning.plan import Plan, every_score
+from tracking.tuning.parallel_episodes import Play
 from tracking.tuning.sampler import ERROR, PRUNED
+from tracking.tuning.search_plan import Plan, every_score
 from tracking.tuning.study import Study
-from tracking.tuning.work import Play
 
 PAUSE = 0.5  # s between looks at whether others have finished
 TINY = 1e-12  # by so much at least is a trial that was given up behind the best

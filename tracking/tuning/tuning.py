@@ -19,9 +19,9 @@ from sim.types import DetectionMode, Tracker
 from tracking.tuning import scenes
 from tracking.tuning.goals import Goal
 from tracking.tuning.judge import Candidate, Judge, front
-from tracking.tuning.plan import Plan, plan
+from tracking.tuning.parallel_episodes import Play, players
 from tracking.tuning.result import Trial, Tuned
-from tracking.tuning.work import Play, players
+from tracking.tuning.search_plan import Plan, plan
 
 if TYPE_CHECKING:
     from tracking.tuning.study import Study
@@ -71,7 +71,7 @@ def tune(
     InputError for wishes that cannot be, before anything is played; errors of the defaults themselves are raised.
     """
     _optuna()
-    from tracking.tuning.memory import remembering
+    from tracking.tuning.judgement_memory import remembering
     from tracking.tuning.study import opened
     from tracking.tuning.trials import search
 

@@ -24,7 +24,7 @@ SCENE = Scene(
 @pytest.fixture(autouse=True)
 def _no_progress(monkeypatch):
     """However slow the machine: stderr is for what goes wrong."""
-    monkeypatch.setattr("tracking.app.meter.PATIENCE", 1e6)
+    monkeypatch.setattr("tracking.app.progress.PATIENCE", 1e6)
 
 
 def look_at() -> Camera:

@@ -73,7 +73,7 @@ def _ctrl_c():
 @pytest.fixture(autouse=True)
 def _small_pictures(monkeypatch):
     """The demo's one drawn scene is quickly tracked."""
-    monkeypatch.setattr("tracking.app.demo.SEEN_QUICKLY", ("camera.fps=5", "camera.image=[160,120]"))
+    monkeypatch.setattr("tracking.app.commands.demo.SEEN_QUICKLY", ("camera.fps=5", "camera.image=[160,120]"))
 
 
 @pytest.fixture
@@ -354,7 +354,7 @@ def test_visible_boxes_of_a_recording_without_any(tmp_path, capsys):
 def test_a_tracker_on_the_ground_is_scored_there_from_text_alone(place, tmp_path, capsys):
     """The truth as tracks without boxes: projected ones in the text are no measurement."""
     from sim.io.source import open_source
-    from sim.io.tracks import write_tracks
+    from sim.io.store.track_files import write_tracks
     from sim.types import Tracks
 
     (sequence,) = open_source(place.one)
@@ -390,13 +390,13 @@ def test_ctrl_c_that_became_another_error(place, capsys, monkeypatch):
         except KeyboardInterrupt:
             raise ImportError("a library failed to import")  # noqa: B904
 
-    monkeypatch.setattr("sim.io.export.coco", load)
+    monkeypatch.setattr("sim.io.export.coco.coco", load)
     assert run(words(COMMANDS["export coco"][0], place)) == 130
     said(capsys, 130, as_json=False)
 
 
 def test_a_bug_is_one_line_and_shown_whole_when_asked_for(place, capsys, monkeypatch):
-    monkeypatch.setattr("sim.io.export.coco", _raise(KeyError("lost")))
+    monkeypatch.setattr("sim.io.export.coco.coco", _raise(KeyError("lost")))
     line = words(COMMANDS["export coco"][0], place)
     assert run(line) == 1
     printed = capsys.readouterr().err

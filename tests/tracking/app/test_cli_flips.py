@@ -11,14 +11,14 @@ import pytest
 import typer
 
 from scenarios.errors import InputError
-from scenarios.override import apply
-from scenarios.schema import Scenario
-from scenarios.validate import validate
-from sim.io.store import sequence_files
-from sim.io.tracks import tracks_files
-from tracking import protocol, track
+from scenarios.loading.overrides import apply
+from scenarios.loading.validation import validate
+from scenarios.schema.scenario import Scenario
+from sim.io.store.sequence_folder import sequence_files
+from sim.io.store.track_files import tracks_files
+from tracking import track, tracker_registry
 from tracking.app.cli import app, run
-from tracking.app.scenario_keys import keys
+from tracking.app.commands.scenario_keys import keys
 
 ROOT = Path(__file__).resolve().parents[3]
 FAKE = f"{ROOT / 'tests' / 'fake_tracker.py'}:Nearest"
@@ -201,8 +201,8 @@ def output(settings: str, seed: int) -> dict[str, bytes] | str:
     import tomllib
 
     from scenarios.errors import FlockscopeError
+    from sim.crowd.world import run as simulate
     from sim.sequence import observe
-    from sim.world import run as simulate
 
     table, places = apply({"name": "flip", **tomllib.loads(SCENE)}, settings.split(";") if settings else [])
     try:
@@ -240,8 +240,8 @@ def test_a_key_changes_what_is_made(key):
 @cache
 def three_people():
     """Two seconds of three people, and their camera."""
-    from sim.camera import solve
-    from sim.world import run as simulate
+    from sim.crowd.world import run as simulate
+    from sim.scene.camera import solve
 
     scenario = picture_scenario("")
     motion = simulate(scenario, 3)
@@ -260,7 +260,7 @@ def picture_scenario(settings: str):
 
 @pytest.mark.parametrize("key", PICTURES)
 def test_a_key_changes_pictures_and_only_those(key):
-    from sim.render import stage
+    from sim.render.renderer import stage
 
     before, after = (picture_scenario(settings) for settings in PICTURES[key])
     assert before.model_dump(exclude={"light", "picture"}) == after.model_dump(exclude={"light", "picture"})
@@ -279,16 +279,16 @@ def test_after_waits_for_another_order():
 
 
 def trackers() -> list[tuple[str, str]]:
-    kinds = [(name, getattr(protocol.find(name), "config_class", None)) for name in protocol.names()]
+    kinds = [(name, getattr(tracker_registry.find(name), "config_class", None)) for name in tracker_registry.names()]
     return [(name, parameter) for name, kind in kinds if kind is not None for parameter in kind.params()]
 
 
 @cache
 def hard_scene():
     """Boxes of a tangle seen from low: misses, false alarms, occlusion, people in and out of view."""
-    from scenarios.loading import load
+    from scenarios.loading.resolve import load
+    from sim.crowd.world import run as simulate
     from sim.sequence import observe
-    from sim.world import run as simulate
 
     scene = load("cross", ["group.passers.repeat=6", "camera.tilt_deg=15", "duration=12"])
     sensor = scene.sensor.model_copy(update={"detect_prob": 0.75, "clutter_rate": 2.0, "persistence": 0.6})
@@ -300,9 +300,9 @@ def hard_scene():
 @cache
 def seen_scene():
     """A few seconds of it as pictures: people share blobs, shadows fall, the light jumps, a hand is before the lens."""
-    from scenarios.loading import load
+    from scenarios.loading.resolve import load
+    from sim.crowd.world import run as simulate
     from sim.sequence import observe
-    from sim.world import run as simulate
 
     size = ["camera.image=[320,240]", "camera.tilt_deg=25", "duration=10", "camera.fps=8"]
     light = [
@@ -332,7 +332,7 @@ def answers(name: str, pictures: bool = False, **values: object) -> dict[str, by
 def accepted(name: str, **values: object) -> bool:
     """Whether a value goes with the defaults of all others."""
     try:
-        protocol.find(name).config_class.from_dict(values)
+        tracker_registry.find(name).config_class.from_dict(values)
     except InputError:
         return False
     return True
@@ -340,7 +340,7 @@ def accepted(name: str, **values: object) -> bool:
 
 @pytest.mark.parametrize(("name", "parameter"), trackers())
 def test_a_parameter_changes_what_a_tracker_says(name, parameter):
-    spec = protocol.find(name).config_class.params()[parameter]
+    spec = tracker_registry.find(name).config_class.params()[parameter]
     ends = spec.choices or (spec.low, spec.high)
     others = [value for value in ends if value != spec.default and accepted(name, **{parameter: value})]
     assert any(

@@ -5,8 +5,8 @@ from __future__ import annotations
 import re
 from pathlib import Path
 
-from scenarios.loading import load, names, suite_names
-from tracking.app.scenario_keys import keys
+from scenarios.loading.resolve import load, names, suite_names
+from tracking.app.commands.scenario_keys import keys
 
 DOC = (Path(__file__).resolve().parents[3] / "docs" / "scenarios.md").read_text(encoding="utf-8")
 

@@ -8,8 +8,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from scenarios.loading import load
-from sim.io.tracks import write_tracks
+from scenarios.loading.resolve import load
+from sim.io.store.track_files import write_tracks
 from sim.sequence import simulate
 from sim.types import Sequence
 from tests.groups_as_wholes import wholes
@@ -176,7 +176,7 @@ def test_a_short_recording_is_an_indication_only(made: Path, capsys, monkeypatch
     assert run(["score", *map(str, one), "--blocks", "2"]) == 0
     assert "indicative under 60 s" in " ".join(capsys.readouterr().out.split())
     assert scored(capsys, *one)["notes"] == []
-    monkeypatch.setattr("tracking.app.score_command.SURE", 5.0)
+    monkeypatch.setattr("tracking.app.commands.score.SURE", 5.0)
     assert scored(capsys, *one, "--blocks", "2")["notes"] == []
     assert run(["score", *map(str, one), "--blocks", "2"]) == 0
     assert "indicative" not in capsys.readouterr().out

@@ -16,8 +16,8 @@ from tracking.detect.background import (
     Background,
     foreground,
 )
+from tracking.detect.background_settings import BackgroundSettings
 from tracking.detect.mog2 import Mog2
-from tracking.detect.settings import BackgroundSettings
 from tracking.detect.training import FLOOR, train
 
 SIGMA = np.array([3.0, 2.0, 4.0])

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from sim.camera import looking, project
+from sim.scene.camera import looking, project
 from sim.types import Camera, Context
 from tracking.detect.person_size import ENOUGH, SMALLEST, PersonSize
 

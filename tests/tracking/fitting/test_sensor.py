@@ -10,13 +10,13 @@ import numpy as np
 import pytest
 
 from scenarios.errors import InputError
-from scenarios.loading import load
-from scenarios.sensor import BoxNoise, FalseAlarms, Memory, Sensor
-from sim.sensors import sense
+from scenarios.loading.resolve import load
+from scenarios.schema.sensor import BoxNoise, FalseAlarms, Memory, Sensor
+from sim.detector.sense import sense
 from sim.sequence import simulate
 from sim.types import Frame, Sequence, Truth
-from tracking.fitting.alarms import fit_alarms
-from tracking.fitting.matched import Matched, match, match_sequence
+from tracking.fitting.false_alarms import fit_alarms
+from tracking.fitting.matching import Matched, match, match_sequence
 from tracking.fitting.sensor import fit, fit_sensor
 from tracking.fitting.statistics import again, statistics
 

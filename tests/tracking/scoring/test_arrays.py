@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from scenarios.loading import load
+from scenarios.loading.resolve import load
 from sim.sequence import simulate
 from sim.types import Truth
 from tracking import track

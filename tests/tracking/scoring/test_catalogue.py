@@ -45,6 +45,6 @@ def test_keys_are_unique_and_said_in_full() -> None:
 
 
 def test_the_command_shows_scores_that_there_are() -> None:
-    from tracking.app.score_tables import SHOWN, TABLES
+    from tracking.app.commands.score_tables import SHOWN, TABLES
 
     assert {*SHOWN, *(key for keys in TABLES.values() for key in keys)} <= set(CATALOGUE)

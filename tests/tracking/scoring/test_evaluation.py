@@ -9,10 +9,10 @@ import numpy as np
 import pytest
 
 import scenarios
-from scenarios.loading import load
+from scenarios.loading.resolve import load
 from sim.io.source import open_source
-from sim.io.store import write_sequence
-from sim.io.tracks import read_tracks, write_tracks
+from sim.io.store.sequence_folder import write_sequence
+from sim.io.store.track_files import read_tracks, write_tracks
 from sim.sequence import simulate
 from sim.types import Tracks, Truth
 from tests.hand_made import Scene, event, tracks, truth

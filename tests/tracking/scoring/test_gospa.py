@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from tracking.scoring.gospa import gospa, gospa_parts
-from tracking.scoring.pairs import Pairs, Rows, point_pairs
+from tracking.scoring.similarity import Pairs, Rows, point_pairs
 
 
 def rows(*counts: int) -> Rows:

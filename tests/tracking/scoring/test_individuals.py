@@ -5,14 +5,14 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from scenarios.loading import load
-from sim.io.mot import read_table
+from scenarios.loading.resolve import load
+from sim.io.formats.mot_text import read_table
 from sim.sequence import simulate
 from sim.types import Tracks
 from tests.reference_trackeval import box_similarity, trackeval_scores
 from tracking.scoring import evaluate
 from tracking.scoring.individuals import scores, scores_until
-from tracking.scoring.pairs import Rows, box_pairs, matrix_pairs, point_pairs
+from tracking.scoring.similarity import Rows, box_pairs, matrix_pairs, point_pairs
 from tracking.stats import draw_blocks, moving_blocks
 
 SEEDS = range(60)

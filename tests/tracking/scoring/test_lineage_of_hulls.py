@@ -10,7 +10,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from scenarios.loading import load
+from scenarios.loading.resolve import load
 from sim.sequence import simulate
 from sim.types import GroupEvent, Tracks, Truth
 from sim.types import Sequence as Recording

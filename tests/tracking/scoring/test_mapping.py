@@ -7,7 +7,7 @@ import pytest
 from scipy.optimize import linear_sum_assignment
 
 from tracking.scoring.mapping import mapped
-from tracking.scoring.pairs import Rows, matrix_pairs, point_pairs
+from tracking.scoring.similarity import Rows, matrix_pairs, point_pairs
 
 
 def test_the_total_counts_and_not_the_nearest_first() -> None:

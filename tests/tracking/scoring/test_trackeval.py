@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from sim.io.source import open_source
-from sim.io.tracks import read_tracks
+from sim.io.store.track_files import read_tracks
 from tests.reference_trackeval import CLEAR, HOTA, IDENTITY, KEYS
 from tracking.app.cli import run
 from tracking.scoring import evaluate

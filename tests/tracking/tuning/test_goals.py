@@ -7,7 +7,7 @@ import math
 import pytest
 
 from scenarios.errors import InputError
-from tracking.episodes import Episode
+from tracking.environment.episodes import Episode
 from tracking.tuning.goals import SPEED, Goal, goals, mean
 
 

@@ -10,10 +10,10 @@ import pytest
 from scenarios.errors import WorkError
 from tests.toy_tracker import ToyConfig
 from tests.tuning_toys import wishes
-from tracking.episodes import Episode
+from tracking.environment.episodes import Episode
 from tracking.tuning.goals import Goal
 from tracking.tuning.judge import Candidate, Judge, comparison, front
-from tracking.tuning.plan import Plan, plan
+from tracking.tuning.search_plan import Plan, plan
 
 
 def episodes(values, key: str = "HOTA") -> list[Episode]:

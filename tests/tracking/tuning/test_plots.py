@@ -12,9 +12,9 @@ from tests.toy_tracker import ToyConfig
 from tests.tuning_toys import wishes
 from tracking.tuning.goals import Goal
 from tracking.tuning.judge import Candidate
-from tracking.tuning.plan import plan
 from tracking.tuning.plots import BLUE, ORANGE, Axes, plots, ticks
 from tracking.tuning.result import Trial, Tuned
+from tracking.tuning.search_plan import plan
 
 SVG = "{http://www.w3.org/2000/svg}"
 DEFAULTS = {"reach": 0.1, "skip": 0, "colour": "red", "forbidden": 0.0}

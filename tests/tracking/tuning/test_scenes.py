@@ -7,7 +7,7 @@ import pytest
 from scenarios.errors import InputError
 from tests.tuning_toys import wishes, write_scenes
 from tracking.tuning import scenes
-from tracking.tuning.plan import plan
+from tracking.tuning.search_plan import plan
 
 
 @pytest.mark.parametrize(

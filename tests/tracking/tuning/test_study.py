@@ -14,14 +14,14 @@ from optuna.distributions import CategoricalDistribution, FloatDistribution, Int
 from optuna.trial import TrialState
 
 from scenarios.errors import InputError
-from sim.cluster import about
+from sim.workers.cluster import about
 from tests.tuning_toys import wishes
-from tracking.links import Grouping
-from tracking.papers.blob_config import BlobConfig
-from tracking.papers.group_pda_config import GroupPdaConfig
+from tracking.grouping.link_rule import Grouping
+from tracking.papers.blob.config import BlobConfig
+from tracking.papers.group_pda.config import GroupPdaConfig
 from tracking.tuning.journal import Journal, Locks
-from tracking.tuning.plan import plan
 from tracking.tuning.sampler import distribution, slot
+from tracking.tuning.search_plan import plan
 from tracking.tuning.study import DONE, opened
 
 
@@ -208,7 +208,7 @@ def test_a_study_is_of_one_version(tmp_path, monkeypatch, what):
     with opened(made, tmp_path / "j", "x") as study:
         study.tell(study.ask(), [0.1])
     other = {**about(), "cpu": "another"}
-    monkeypatch.setattr("tracking.tuning.plan.about", lambda: other)
+    monkeypatch.setattr("tracking.tuning.search_plan.about", lambda: other)
     with opened(made, tmp_path / "j", "x") as study:
         assert len(study.finished()) == 1, "what workers of a cluster may not differ in, going on may"
     other[what] = "another"

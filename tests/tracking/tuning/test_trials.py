@@ -6,8 +6,8 @@ import pytest
 
 from scenarios.errors import InputError, WorkError
 from tests.tuning_toys import wishes
-from tracking.episodes import Episode
-from tracking.tuning.plan import plan
+from tracking.environment.episodes import Episode
+from tracking.tuning.search_plan import plan
 from tracking.tuning.study import opened
 from tracking.tuning.trials import search
 

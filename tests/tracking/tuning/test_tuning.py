@@ -17,17 +17,17 @@ from tests.loopback import loopback
 from tests.toy_tracker import Toy, ToyConfig
 from tests.tuning_toys import TOY, wishes, write_scenes
 from tracking.tuning import tune
-from tracking.tuning.plan import plan
+from tracking.tuning.parallel_episodes import players
 from tracking.tuning.sampler import AGAIN
+from tracking.tuning.search_plan import plan
 from tracking.tuning.study import DONE, opened
 from tracking.tuning.trials import search
-from tracking.tuning.work import players
 
 ROOT = Path(__file__).resolve().parents[3]
 KILLED_AT = """
 import os, signal, sys
 from pathlib import Path
-import tracking.tuning.work as work
+import tracking.tuning.parallel_episodes as work
 from tests.tuning_toys import wishes
 from tracking.tuning import tune
 played, attempt = 0, work._attempt

@@ -1,0 +1,74 @@
+"""The geometry of a plan: walls less their doors, distances to them, and the bounds of what a value may draw."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+
+from scenarios.schema.distribution import Distribution, Point, Value
+from scenarios.schema.scenario import Door, World
+
+Segment = tuple[float, float, float, float]
+DOOR_TOLERANCE = 0.05
+
+
+def bounds(value: Value) -> tuple[float, float]:
+    """The least and greatest number that a value can draw; infinite where nothing bounds it."""
+    if not isinstance(value, Distribution):
+        return float(value), float(value)
+    if value.uniform is not None:
+        low, high = value.uniform
+    elif value.choice is not None:
+        low, high = min(value.choice), max(value.choice)
+    else:
+        low, high = (-math.inf if value.normal is not None else 0.0), math.inf
+    return (low, high) if value.clip is None else (max(low, value.clip[0]), min(high, value.clip[1]))
+
+
+def fixed(point: Point) -> tuple[float, float] | None:
+    """The point where it is two numbers, None where anything is drawn."""
+    x, y = point
+    return None if isinstance(x, Distribution) or isinstance(y, Distribution) else (float(x), float(y))
+
+
+def along(wall: Segment, point: tuple[float, float]) -> tuple[float, float]:
+    """Where a point is beside a wall: metres along it from its first end, and metres off its line."""
+    x, y = point[0] - wall[0], point[1] - wall[1]
+    length = math.dist(wall[:2], wall[2:])
+    if length == 0:
+        return 0.0, math.hypot(x, y)
+    ex, ey = (wall[2] - wall[0]) / length, (wall[3] - wall[1]) / length
+    return x * ex + y * ey, abs(x * ey - y * ex)
+
+
+def fits(door: Door, wall: Segment) -> bool:
+    """Whether the whole opening lies on this wall."""
+    s, off = along(wall, door.at)
+    length = math.dist(wall[:2], wall[2:])
+    return off <= DOOR_TOLERANCE and door.width / 2 <= s + 1e-9 and s + door.width / 2 <= length + 1e-9
+
+
+def solid(world: World) -> Iterator[Segment]:
+    """The walls without their doors."""
+    for wall in world.walls:
+        length = math.dist(wall[:2], wall[2:])
+        ex, ey = ((wall[2] - wall[0]) / length, (wall[3] - wall[1]) / length) if length else (0.0, 0.0)
+        start = 0.0
+        openings = sorted((along(wall, d.at)[0], d.width / 2) for d in world.doors if fits(d, wall))
+        for s, half in [*openings, (length, 0.0)]:
+            if s - half > start or not openings:
+                end = s - half
+                yield wall[0] + start * ex, wall[1] + start * ey, wall[0] + end * ex, wall[1] + end * ey
+            start = s + half
+
+
+def clearance(point: tuple[float, float], world: World) -> tuple[float, str]:
+    """Metres from a point to the nearest wall or pillar (negative inside a pillar), and what that is."""
+    best = (math.inf, "nothing")
+    for wall in solid(world):
+        s, off = along(wall, point)
+        beyond = max(-s, s - math.dist(wall[:2], wall[2:]), 0.0)
+        best = min(best, (math.hypot(off, beyond), f"the wall {[round(v, 2) for v in wall]}"))
+    for x, y, radius in world.pillars:
+        best = min(best, (math.dist(point, (x, y)) - radius, f"the pillar {[x, y, radius]}"))
+    return best

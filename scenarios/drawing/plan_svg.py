@@ -1,0 +1,170 @@
+"""The plan of a scenario as SVG elements: ground, what stands on it, ways, starts, orders."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable
+from html import escape
+
+from scenarios.drawing.plan_geometry import solid
+from scenarios.drawing.routes import XY, Course, Mark
+from scenarios.schema.scenario import StairsSpec, World
+
+WIDTH, MARGIN = 900.0, 26.0
+STYLE = """
+text { font: 13px system-ui, sans-serif; fill: #1b1f24 } .small { font-size: 11.5px; fill: #57606a }
+.halo { paint-order: stroke; stroke: #fff; stroke-width: 3.5px; stroke-linejoin: round; font-weight: 600 }
+.wall { stroke: #24292f; stroke-width: 5; stroke-linecap: butt } .door { stroke: #24292f; stroke-dasharray: 2 4 }
+.way { fill: none; stroke-width: 1.8; opacity: .75 } .order { stroke-width: 2.6; stroke-dasharray: 7 4; opacity: .9 }
+"""
+
+
+class Plan:
+    """World metres to picture px (y up to y down); state: scale and offsets only."""
+
+    def __init__(self, world: World) -> None:
+        self.world = world
+        self.scale = min((WIDTH - 2 * MARGIN) / world.size[0], 620 / world.size[1])
+        self.left = (WIDTH - world.size[0] * self.scale) / 2
+        self.top = 56.0
+        self.bottom = self.top + world.size[1] * self.scale + 20
+
+    def __call__(self, at: XY) -> XY:
+        """A point of the picture, px."""
+        return self.left + at[0] * self.scale, self.top + (self.world.size[1] - at[1]) * self.scale
+
+    def path(self, points: Iterable[XY], attributes: str) -> str:
+        """A line through points in m."""
+        through = " ".join(f"{x:.1f},{y:.1f}" for x, y in map(self, points))
+        return f'<polyline points="{through}" {attributes}/>'
+
+    def label(self, at: XY, words: str, dx: float = 0, dy: float = 0, attributes: str = "") -> str:
+        """Words beside a point in m."""
+        x, y = self(at)
+        return f'<text x="{x + dx:.1f}" y="{y + dy:.1f}" {attributes}>{escape(words)}</text>'
+
+    def floor(self) -> list[str]:
+        """The ground with a line each metre (or each 5 m where it is large) and a scale."""
+        width, depth = self.world.size
+        (x0, y1), (x1, y0) = self((0, 0)), self((width, depth))
+        step = 1.0 if width <= 40 else 5.0
+        lines = [self.path([(k * step, 0), (k * step, depth)], "") for k in range(1, math.ceil(width / step))]
+        lines += [self.path([(0, k * step), (width, k * step)], "") for k in range(1, math.ceil(depth / step))]
+        frame = f'<rect x="{x0:.1f}" y="{y0:.1f}" width="{x1 - x0:.1f}" height="{y1 - y0:.1f}"'
+        note = f"{width:g} × {depth:g} m, a line each {'metre' if step == 1 else f'{step:g} m'}"
+        return [
+            f'{frame} fill="#f6f8fa"/>',
+            f'<g stroke="#e3e7ec" stroke-width="1">{"".join(lines)}</g>',
+            f'{frame} fill="none" stroke="#8c959f"/>',
+            self.label((0, 0), note, 0, 15, 'class="small"'),
+        ]
+
+    def stands(self) -> list[str]:
+        """Stairs, walls, doors, pillars, service points."""
+        parts = [part for stairs in self.world.stairs for part in self._stairs(stairs)]
+        parts += [self.path([wall[:2], wall[2:]], 'class="wall"') for wall in solid(self.world)]
+        parts += [self.label(door.at, "door", 0, -8, 'class="small" text-anchor="middle"') for door in self.world.doors]
+        for x, y, radius in self.world.pillars:
+            u, v = self((x, y))
+            parts.append(f'<circle cx="{u:.1f}" cy="{v:.1f}" r="{radius * self.scale:.1f}" fill="#57606a"/>')
+        for at in self.world.service:
+            u, v = self(at)
+            parts.append(f'<rect x="{u - 6:.1f}" y="{v - 6:.1f}" width="12" height="12" fill="#fff" stroke="#24292f"/>')
+            parts.append(self.label(at, "service", 0, -10, 'class="small" text-anchor="middle"'))
+        return parts
+
+    def _stairs(self, stairs: StairsSpec) -> list[str]:
+        (fx, fy), (hx, hy) = stairs.foot, stairs.head
+        length = math.dist(stairs.foot, stairs.head)
+        ex, ey = (hx - fx) / length, (hy - fy) / length
+        nx, ny = -ey * stairs.width / 2, ex * stairs.width / 2
+        end = (hx + ex * stairs.landing, hy + ey * stairs.landing)
+        corners = [(fx - nx, fy - ny), (fx + nx, fy + ny), (end[0] + nx, end[1] + ny), (end[0] - nx, end[1] - ny)]
+        steps = [
+            (fx + (hx - fx) * k / stairs.steps, fy + (hy - fy) * k / stairs.steps) for k in range(stairs.steps + 1)
+        ]
+        lines = [self.path([(x - nx, y - ny), (x + nx, y + ny)], 'stroke="#8c959f"') for x, y in steps]
+        words = f"stairs, {stairs.rise:+g} m"
+        return [
+            self.path([*corners, corners[0]], 'fill="#eaeef2" stroke="#8c959f"'),
+            *lines,
+            self.label(stairs.head, words, 0, 4, 'class="small halo" text-anchor="middle"'),
+        ]
+
+    def course(self, course: Course, colour: str) -> list[str]:
+        """The way of a group, and the goal."""
+        end = course.points[-1]
+        u, v = self(end)
+        return [
+            *self._spread(end, course.spread[-1], colour),
+            self.path(course.points, f'class="way" stroke="{colour}" marker-end="url(#{colour[1:]})"'),
+            f'<circle cx="{u:.1f}" cy="{v:.1f}" r="7" fill="none" stroke="{colour}" stroke-width="1.6"/>',
+        ]
+
+    def _spread(self, at: XY, half: XY, colour: str) -> list[str]:
+        if half == (0, 0):
+            return []
+        u, v = self(at)
+        rx, ry = (max(h * self.scale, 3) for h in half)
+        return [
+            f'<rect x="{u - rx:.1f}" y="{v - ry:.1f}" width="{2 * rx:.1f}" height="{2 * ry:.1f}" rx="3" '
+            f'fill="{colour}" opacity=".15"/>'
+        ]
+
+    def start(self, course: Course, colour: str, lift: int = 0) -> list[str]:
+        """Bodies at the start, at most a dozen, with the group's name and size, `lift` lines further up."""
+        at, parts = course.points[0], self._spread(course.points[0], course.spread[0], colour)
+        n = min(max(round(course.people), 1), 12)
+        reach = 0.0 if n == 1 else 0.75 / (2 * math.sin(math.pi / n))
+        for k in range(n):
+            u, v = self(
+                (at[0] + reach * math.cos(2.4 + k * math.tau / n), at[1] + reach * math.sin(2.4 + k * math.tau / n))
+            )
+            r = max(0.22 * self.scale, 3)
+            parts.append(f'<circle cx="{u:.1f}" cy="{v:.1f}" r="{r:.1f}" fill="{colour}" stroke="#fff"/>')
+        words = course.id + (f" ×{course.repeat}" if course.repeat > 1 else "") + f" ({course.people:.2g})"
+        dy = -(reach + 0.22) * self.scale - 6 - 15 * lift
+        parts.append(self.label(at, words, 0, dy, f'class="halo" text-anchor="middle" style="fill:{colour}"'))
+        return parts
+
+    def mark(self, mark: Mark, colour: dict[str, str]) -> list[str]:
+        """What an order opens: dashed ways, the slots of a queue."""
+        parts = []
+        for arrow in mark.arrows:
+            c = colour.get(arrow.id, colour[mark.before[0]])
+            style = f'class="way order" stroke="{c}" marker-end="url(#{c[1:]})"'
+            parts.append(self.path(arrow.points, style))
+            if arrow.id != "served":
+                end = f'class="halo" text-anchor="middle" style="fill:{c}"'
+                parts.append(self.label(arrow.points[-1], arrow.id, 0, -11, end))
+        for slot in mark.slots:
+            u, v = self(slot)
+            r = max(0.25 * self.scale, 3)
+            parts.append(f'<circle cx="{u:.1f}" cy="{v:.1f}" r="{r:.1f}" fill="none" stroke="#57606a" class="door"/>')
+        return parts
+
+    def numbers(self, orders: list[Mark]) -> list[str]:
+        """The orders' numbers where they happen; those at one place stand side by side."""
+        parts, used = [], dict[tuple[int, int], int]()
+        for mark in orders:
+            u, v = self(mark.at)
+            cell = (round(u / 24), round(v / 24))
+            used[cell] = used.get(cell, 0) + 1
+            parts.append(badge(u + 22 * (used[cell] - 1), v, mark.number))
+        return parts
+
+
+def badge(x: float, y: float, number: int) -> str:
+    """An order's number in a black disc at a point of the picture."""
+    return (
+        f'<circle cx="{x:.1f}" cy="{y:.1f}" r="10" fill="#1b1f24" stroke="#fff" stroke-width="1.5"/>'
+        f'<text x="{x:.1f}" y="{y + 4.3:.1f}" text-anchor="middle" style="fill:#fff;font-weight:700">{number}</text>'
+    )
+
+
+def marker(colour: str) -> str:
+    """The arrow head of a colour."""
+    return (
+        f'<marker id="{colour[1:]}" viewBox="0 0 8 8" refX="7" refY="4" markerWidth="9" markerHeight="9" '
+        f'markerUnits="userSpaceOnUse" orient="auto"><path d="M0,0.5 L8,4 L0,7.5 z" fill="{colour}"/></marker>'
+    )

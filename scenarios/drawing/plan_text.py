@@ -1,0 +1,105 @@
+"""A plan in characters: two columns stand for one row, so that it looks right in a terminal."""
+
+from __future__ import annotations
+
+import math
+
+from scenarios.drawing.plan_geometry import solid
+from scenarios.drawing.routes import XY, courses, marks
+from scenarios.schema.scenario import Scenario
+
+NUMBERS = "①②③④⑤⑥⑦⑧⑨⑩⑪⑫⑬⑭⑮⑯⑰⑱⑲⑳"
+LEGEND = "A start of a   ◎ goal   · way   ① order   ○ queue   █ wall   ● pillar   ≡ stairs   ▣ service point"
+
+
+class Sketch:
+    """A grid of characters over the world; state: the characters. The y axis points up."""
+
+    def __init__(self, size: XY, columns: int) -> None:
+        self.scale = columns / size[0]
+        self.columns, self.rows = columns, max(round(size[1] * self.scale / 2), 4)
+        self.size = size
+        self.cells = [[" "] * columns for _ in range(self.rows)]
+
+    def put(self, at: XY, text: str, over: str = "") -> None:
+        """Text from a point rightwards; where `over` is given, only upon these characters."""
+        column = min(max(int(at[0] * self.scale), 0), self.columns - len(text))
+        row = min(max(int((self.size[1] - at[1]) / self.size[1] * self.rows), 0), self.rows - 1)
+        for k, character in enumerate(text):
+            if not over or self.cells[row][column + k] in over:
+                self.cells[row][column + k] = character
+
+    def name(self, at: XY, text: str) -> None:
+        """A name at a point, in the nearest row where it covers nothing but ways."""
+        column = min(max(int(at[0] * self.scale), 0), self.columns - len(text))
+        step = self.size[1] / self.rows
+        for shift in (0, -1, 1, -2, 2):
+            y = at[1] + shift * step
+            row = min(max(int((self.size[1] - y) / step), 0), self.rows - 1)
+            if set(self.cells[row][column : column + len(text)]) <= {" ", "·"}:
+                break
+        else:
+            y = at[1]
+        self.put((at[0], y), text)
+
+    def line(self, a: XY, b: XY, character: str, over: str = "", gap: float = 0.5) -> None:
+        """Characters along a segment, `gap` columns apart."""
+        steps = max(int(math.dist(a, b) * self.scale / gap), 1)
+        for k in range(steps + 1):
+            self.put((a[0] + (b[0] - a[0]) * k / steps, a[1] + (b[1] - a[1]) * k / steps), character, over)
+
+    def text(self) -> str:
+        """The framed drawing."""
+        rows = ["│" + "".join(row) + "│" for row in self.cells]
+        return "\n".join(["┌" + "─" * self.columns + "┐", *rows, "└" + "─" * self.columns + "┘"])
+
+
+def sketch(scenario: Scenario, columns: int = 64) -> str:
+    """The plan of a scenario and its legend."""
+    world = scenario.world
+    plan = Sketch(world.size, columns)
+    _stairs(plan, scenario)
+    ways = courses(scenario)
+    for course in ways:
+        for a, b in zip(course.points, course.points[1:], strict=False):
+            plan.line(a, b, "·", over=" ", gap=2)
+    orders = marks(scenario)
+    for mark in orders:
+        for arrow in mark.arrows:
+            for a, b in zip(arrow.points, arrow.points[1:], strict=False):
+                plan.line(a, b, "·", over=" ", gap=2)
+            plan.put(arrow.points[-1], "◎")
+        for slot in mark.slots:
+            plan.put(slot, "○")
+    for wall in solid(world):
+        plan.line(wall[:2], wall[2:], "█")
+    for x, y, radius in world.pillars:
+        _disc(plan, (x, y), radius)
+    for service in world.service:
+        plan.put(service, "▣")
+    for course in ways:
+        plan.put(course.points[-1], "◎")
+    for course in ways:
+        plan.name(course.points[0], course.id.upper()[:8])
+    for mark in orders:
+        plan.put(mark.at, NUMBERS[(mark.number - 1) % len(NUMBERS)])
+    return plan.text() + f"\n {world.size[0]:g} × {world.size[1]:g} m\n {LEGEND}"
+
+
+def _stairs(plan: Sketch, scenario: Scenario) -> None:
+    for stairs in scenario.world.stairs:
+        (fx, fy), (hx, hy) = stairs.foot, stairs.head
+        length = math.dist(stairs.foot, stairs.head)
+        nx, ny = -(hy - fy) / length * stairs.width / 2, (hx - fx) / length * stairs.width / 2
+        for k in range(stairs.steps + 1):
+            x, y = fx + (hx - fx) * k / stairs.steps, fy + (hy - fy) * k / stairs.steps
+            plan.line((x - nx, y - ny), (x + nx, y + ny), "≡")
+
+
+def _disc(plan: Sketch, centre: XY, radius: float) -> None:
+    step = 0.5 / plan.scale
+    n = int(radius / step)
+    for i in range(-n, n + 1):
+        for j in range(-n, n + 1):
+            if math.hypot(i, j) * step <= radius:
+                plan.put((centre[0] + i * step, centre[1] + j * step), "●")

@@ -1,0 +1,147 @@
+"""Where a script takes its people, as far as it can be known before it is simulated: what a drawing needs.
+
+Drawn values stand at their middle, with how far they may spread. Where nothing says where people meet, half-way is
+taken.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+from scenarios.drawing.plan_geometry import bounds
+from scenarios.schema.distribution import Distribution, Point, Value
+from scenarios.schema.scenario import Event, Merge, Queue, Scenario, Split, expand, group_names
+
+XY = tuple[float, float]
+SLOTS = 6
+"""Places of a queue that are drawn."""
+
+
+@dataclass(frozen=True)
+class Course:
+    """The way of one group (a `repeat` is one): start, via, goal in m, and the half spread of each in x and y."""
+
+    id: str
+    points: tuple[XY, ...]
+    spread: tuple[XY, ...]
+    people: float
+    repeat: int
+
+
+@dataclass(frozen=True)
+class Arrow:
+    """A way that an order opens: whose, and its points in m."""
+
+    id: str
+    points: tuple[XY, ...]
+
+
+@dataclass(frozen=True)
+class Mark:
+    """An order on the plan: its number from 1, where it happens, the ways it opens, and the slots of a queue."""
+
+    number: int
+    event: Event
+    at: XY
+    before: tuple[str, ...]
+    after: tuple[str, ...]
+    arrows: tuple[Arrow, ...]
+    slots: tuple[XY, ...] = ()
+
+
+def middle(value: Value) -> float:
+    """The mean of a value, clip ignored unless it excludes the mean."""
+    if not isinstance(value, Distribution):
+        return float(value)
+    if value.normal is not None:
+        mean = value.normal[0]
+    elif value.uniform is not None:
+        mean = (value.uniform[0] + value.uniform[1]) / 2
+    elif value.choice is not None:
+        mean = sum(value.choice) / len(value.choice)
+    else:
+        mean = value.exponential if value.exponential is not None else value.poisson or 0.0
+    low, high = bounds(value)
+    return min(max(mean, low), high)
+
+
+def spread(value: Value) -> float:
+    """Half of the range in which nearly all draws lie: the bounds where there are any, else two standard deviations."""
+    if not isinstance(value, Distribution):
+        return 0.0
+    low, high = bounds(value)
+    wide = (high - low) / 2
+    if value.normal is not None:
+        return min(wide, 2 * value.normal[1])
+    return wide if math.isfinite(wide) else 2 * middle(value)
+
+
+def courses(scenario: Scenario) -> list[Course]:
+    """The ways of the groups of the first frame."""
+    made = []
+    for group in scenario.group:
+        points = (group.start, *group.via, group.goal)
+        spreads = tuple((spread(x), spread(y)) for x, y in points)
+        made.append(Course(group.id, tuple(map(_at, points)), spreads, middle(group.size), group.repeat))
+    return made
+
+
+def marks(scenario: Scenario) -> list[Mark]:
+    """The orders, in the order of the file."""
+    places = {}
+    for group in scenario.group:
+        start, goal = _at(group.start), _at(group.goal)
+        places.update(dict.fromkeys(group_names(group), (start, goal)))
+    return [_mark(k + 1, event, places, scenario.world.size) for k, event in enumerate(scenario.event)]
+
+
+def _at(point: Point) -> XY:
+    return middle(point[0]), middle(point[1])
+
+
+def _mean(points: list[XY]) -> XY:
+    return sum(x for x, _ in points) / len(points), sum(y for _, y in points) / len(points)
+
+
+def _mark(number: int, event: Event, places: dict[str, tuple[XY, XY]], world: XY) -> Mark:
+    """One order; places (where from, where to of every group) move on with it."""
+    if isinstance(event, Merge):
+        return _merge(number, event, places)
+    if isinstance(event, Split):
+        return _split(number, event, places)
+    names = tuple(dict.fromkeys(name for pattern in event.groups for name in expand(pattern, list(places))))
+    inside = tuple((x, y) for x, y in slots(event, SLOTS) if 0 <= x <= world[0] and 0 <= y <= world[1])
+    return Mark(number, event, event.at, names, names, _served(event, names, places), inside)
+
+
+def _merge(number: int, event: Merge, places: dict[str, tuple[XY, XY]]) -> Mark:
+    ways = [places.pop(name) for name in event.groups]
+    meeting = _mean([_mean([start, goal]) for start, goal in ways])
+    goal = meeting if isinstance(event.goal, str) else _at(event.goal)
+    places[event.into] = (meeting, goal)
+    arrow = Arrow(event.into, (meeting, *map(_at, event.via), goal))
+    return Mark(number, event, meeting, event.groups, (event.into,), () if goal == meeting else (arrow,))
+
+
+def _split(number: int, event: Split, places: dict[str, tuple[XY, XY]]) -> Mark:
+    start, goal = places.pop(event.group)
+    at = _mean([start, goal])
+    arrows = [Arrow(part.id, (at, *map(_at, part.via), _at(part.goal))) for part in event.parts]
+    places.update({arrow.id: (at, arrow.points[-1]) for arrow in arrows})
+    return Mark(number, event, at, (event.group,), tuple(part.id for part in event.parts), tuple(arrows))
+
+
+def _served(event: Queue, names: tuple[str, ...], places: dict[str, tuple[XY, XY]]) -> tuple[Arrow, ...]:
+    if event.goal is None:
+        return ()
+    goal = _at(event.goal)
+    places.update(dict.fromkeys(names, (event.at, goal)))
+    return (Arrow("served", (event.at, goal)),)
+
+
+def slots(event: Queue, count: int) -> tuple[XY, ...]:
+    """The first places of a queue, head first."""
+    angle = math.radians(event.direction_deg)
+    (x, y), step = event.at, event.spacing
+    return tuple((x + k * step * math.cos(angle), y + k * step * math.sin(angle)) for k in range(count))

@@ -1,0 +1,120 @@
+"""A scenario in words: values, people, orders with their triggers, camera and sensor."""
+
+from __future__ import annotations
+
+from scenarios.schema.distribution import Distribution, Point, Value
+from scenarios.schema.scenario import Event, Group, Merge, Scenario, Split, When
+
+AT_GOAL = {"stand": "stand there", "leave": "leave", "walk": "walk on"}
+
+
+def number(value: Value, unit: str = "") -> str:
+    """A value as one would say it: `1.2 ± 0.1`, `0 to 5`, `3 on average`."""
+    tail = f" {unit}" if unit else ""
+    if not isinstance(value, Distribution):
+        return f"{value:g}{tail}"
+    clip = "" if value.clip is None else f" ({value.clip[0]:g} to {value.clip[1]:g})"
+    if value.normal is not None:
+        return f"{value.normal[0]:g} ± {value.normal[1]:g}{tail}{clip}"
+    if value.uniform is not None:
+        return f"{value.uniform[0]:g} to {value.uniform[1]:g}{tail}"
+    if value.choice is not None:
+        return _choice(value.choice) + tail
+    mean = value.exponential if value.exponential is not None else value.poisson
+    return f"about {mean:g}{tail}{clip}"
+
+
+def _choice(values: tuple[float, ...]) -> str:
+    """`1 or 2`; with their shares where some are likelier: `1 (67 %) or 2 (33 %)`."""
+    times = {v: values.count(v) for v in values}
+    if len(set(times.values())) == 1:
+        return " or ".join(f"{v:g}" for v in times)
+    return " or ".join(f"{v:g} ({n / len(values):.0%})".replace("%", " %") for v, n in times.items())
+
+
+def place(point: Point) -> str:
+    """A point: `(5, 3 to 4)`."""
+    return f"({number(point[0])}, {number(point[1])})"
+
+
+def count(n: Value, one: str, many: str) -> str:
+    """`1 person`, `3 people`."""
+    return f"{number(n)} {one if n == 1 else many}"
+
+
+def setting(scenario: Scenario) -> list[str]:
+    """Duration, world and camera."""
+    world, camera = scenario.world, scenario.camera
+    things = {"wall": world.walls, "door": world.doors, "pillar": world.pillars, "flight of stairs": world.stairs}
+    things["service point"] = world.service
+    held = [f"{len(rows)} {name}{'s' * (len(rows) > 1)}" for name, rows in things.items() if rows]
+    turned = [] if scenario.turn_deg == 0.0 else [f"turned by {number(scenario.turn_deg)}°"]
+    turned += ["mirrored by a coin"] * scenario.mirror
+    turned += [] if scenario.lead == 0.0 else [f"{number(scenario.lead, 's')} further on than it says"]
+    view = "from above" if camera.kind == "top" else f"looking down {camera.tilt_deg:g}°"
+    solved = "" if camera.height is not None or camera.px_per_m is not None else ", placed to see everybody"
+    return [
+        f"{scenario.duration:g} s after {scenario.warmup:g} s of warm-up; the script is {', '.join(turned)}"
+        if turned
+        else f"{scenario.duration:g} s after {scenario.warmup:g} s of warm-up",
+        f"world {world.size[0]:g} × {world.size[1]:g} m" + (": " + ", ".join(held) if held else ", empty"),
+        f"camera {view}, {camera.image[0]} × {camera.image[1]} px, {camera.fps:g} frames/s{solved}",
+    ]
+
+
+def people(group: Group) -> str:
+    """One group: who, from where to where, how fast."""
+    words = [count(group.size, "person", "people")]
+    words[0] = f"{group.repeat} groups of {words[0]}" if group.repeat > 1 else words[0]
+    words.append(f"from {place(group.start)}")
+    words += [f"past {', '.join(map(place, group.via))}"] if group.via else []
+    words.append(f"to {place(group.goal)}")
+    text = " ".join(words)
+    text += f", at {number(group.speed, 'm/s')}" if group.speed is not None else ""
+    text += f", entering at {number(group.enter, 's')}" if group.enter != 0.0 else ""
+    return f"{text}; then they {AT_GOAL[group.at_goal]}"
+
+
+def trigger(when: When) -> str:
+    """When an order fires."""
+    if when.time is not None:
+        text = f"at {number(when.time, 's')}"
+    elif when.reach is not None:
+        goal = "its goal" if when.reach.at is None else place(when.reach.at)
+        text = f"when {when.reach.group} comes within {when.reach.radius:g} m of {goal}"
+    elif when.after is not None:
+        text = f"after {when.after}"
+    else:
+        text = f"when they are closer than {when.distance_lt:g} m"
+    return text if when.delay == 0.0 else f"{text}, {number(when.delay, 's')} later"
+
+
+def order(event: Event) -> str:
+    """What an order does."""
+    if isinstance(event, Merge):
+        goal = "to meet and stand" if isinstance(event.goal, str) else f"to {place(event.goal)}"
+        return f"merge {' + '.join(event.groups)} → {event.into}, {goal}"
+    if isinstance(event, Split):
+        parts = [f"{p.id} ({p.size or 'rest'}) to {place(p.goal)}" for p in event.parts]
+        return f"split {event.group} → {', '.join(parts)}"
+    served = "" if event.goal is None else f", then to {place(event.goal)}"
+    return f"queue {', '.join(event.groups)} at {place(event.at)}, served {number(event.service, 's')} each{served}"
+
+
+def sensor(scenario: Scenario) -> list[str]:
+    """The point and box sensor."""
+    s = scenario.sensor
+    edges = f"{s.noise_px:g} px on the edges of boxes" if s.box_noise is None else "in proportion to boxes"
+    points = "points under their feet" if s.points == "foot" else f"{s.noise_m:g} m on points"
+    chance = f"visibility^{s.occlusion_power:g}" if s.by_visibility is None else "a curve of visibility"
+    lasting = s.persistence or s.miss_memory
+    lines = [
+        f"detects {s.detect_prob:.0%} of fully visible people, {s.clutter_rate:g} false alarms per frame"
+        + (f", each for {s.false_alarms.life:g} s" if s.false_alarms is not None and s.false_alarms.life else ""),
+        f"noise {edges} ({s.box}), {points}",
+        f"nobody less visible than {s.min_visibility:.0%}; chance × {chance}"
+        + (f"; half at a height of {s.small_px:g} px" if s.small_px else "")
+        + (f"; misses persist{f' ({s.persistence:g})' if s.persistence else ''}" if lasting else ""),
+    ]
+    lines += [f"hides {h.group or 'everybody'} from {h.start:g} to {h.end:g} s" for h in s.hide]
+    return lines

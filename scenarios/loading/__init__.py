@@ -1,0 +1,1 @@
+"""From files and names to checked scenarios: TOML, `extends`, `--set`, suites, error messages."""

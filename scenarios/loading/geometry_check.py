@@ -1,0 +1,124 @@
+"""What can be seen to be wrong in a scenario before anything is simulated: geometry, names, lifetimes, sizes, times."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from pathlib import Path
+
+from scenarios.drawing.plan_geometry import bounds, clearance, fits, fixed
+from scenarios.drawing.routes import slots
+from scenarios.errors import InputError
+from scenarios.loading.script_check import QUEUE_PEOPLE, check_script, fail
+from scenarios.loading.toml_files import nearest
+from scenarios.schema.distribution import Point
+from scenarios.schema.scenario import Merge, Queue, Scenario, Split, group_names
+
+BODY = 0.2
+"""m: nobody's middle can be closer to a wall or pillar (the physics radius)."""
+
+
+def check(scenario: Scenario, file: str | Path = "") -> None:
+    """InputError for the first thing that cannot work."""
+    try:
+        _check_world(scenario)
+        _check_groups(scenario)
+        _check_sensor(scenario)
+        _check_points(scenario)
+        check_script(scenario)
+    except InputError as error:
+        raise InputError(**{**error.as_dict(), "file": str(file)}) from None
+
+
+def _check_world(scenario: Scenario) -> None:
+    world = scenario.world
+    for k, wall in enumerate(world.walls):
+        if wall[:2] == wall[2:]:
+            fail(f"world.walls.{k}", "a wall of no length", "two different ends", "move one end")
+    for k, door in enumerate(world.doors):
+        if not any(fits(door, wall) for wall in world.walls):
+            got = f"a door {door.width:g} m wide at {list(door.at)}, where no wall holds it"
+            fail(
+                f"world.doors.{k}", got, "an opening that lies on one wall", "move it onto a wall, or make it narrower"
+            )
+    for k, stairs in enumerate(world.stairs):
+        if stairs.foot == stairs.head:
+            fail(f"world.stairs.{k}", "foot and head at one place", "a way up", "move one of them")
+
+
+def _check_groups(scenario: Scenario) -> None:
+    seen: set[str] = set()
+    for group in scenario.group:
+        for name in group_names(group):
+            if name in seen:
+                fail(f"group.{group.id}", f"a second group named {name!r}", "unique ids", "rename one")
+            seen.add(name)
+        low = bounds(group.size)[0]
+        if low < 0.5:
+            got = f"a size that can be {'any number' if math.isinf(low) else f'{low:g}'}"
+            fail(f"group.{group.id}.size", got, "at least 1 person", "raise it, or add clip = [1, 6]")
+        if group.speed is not None and bounds(group.speed)[1] <= 0:
+            fail(f"group.{group.id}.speed", f"{bounds(group.speed)[1]:g} m/s at most", "more than 0", "raise it")
+        if bounds(group.enter)[0] >= scenario.duration:
+            got = f"{bounds(group.enter)[0]:g} s at the earliest"
+            fail(f"group.{group.id}.enter", got, f"before the end, {scenario.duration:g} s", "enter earlier")
+
+
+def _check_sensor(scenario: Scenario) -> None:
+    known = [name for group in scenario.group for name in group_names(group)] + [
+        name
+        for event in scenario.event
+        for name in ((event.into,) if isinstance(event, Merge) else ())
+        + (tuple(part.id for part in event.parts) if isinstance(event, Split) else ())
+    ]
+    for k, hide in enumerate(scenario.sensor.hide):
+        if hide.group is not None and hide.group not in known:
+            fail(f"sensor.hide.{k}.group", repr(hide.group), "a group of the script", nearest(hide.group, known))
+        if hide.end <= hide.start:
+            fail(f"sensor.hide.{k}", f"{hide.start:g} to {hide.end:g} s", "an end after its start", "swap them")
+
+
+def _check_points(scenario: Scenario) -> None:
+    """Places inside the world, and, where they are fixed, not in a wall or pillar.
+
+    A script that is turned is only checked where it is not (its places depend on the draw); a mirrored one is checked
+    on both sides.
+    """
+    if bounds(scenario.turn_deg) != (0.0, 0.0):
+        return
+    width, depth = scenario.world.size
+    for place, point in points(scenario):
+        for axis, value, size in zip("xy", point, (width, depth), strict=True):
+            low, high = bounds(value)
+            if (math.isfinite(low) and low < 0) or (math.isfinite(high) and high > size):
+                got = f"{axis} = {low:g}" if low == high else f"{axis} from {low:g} to {high:g}"
+                fail(place, got, f"inside the world, {axis} from 0 to {size:g} m", "move it, or enlarge world.size")
+        at = fixed(point)
+        for x, y in [] if at is None else [at, (width - at[0], at[1])][: 1 + scenario.mirror]:
+            gap, what = clearance((x, y), scenario.world)
+            if gap < BODY:
+                got = f"[{x:.4g}, {y:.4g}], {max(gap, 0):.2f} m from {what}"
+                fail(place, got, f"{BODY} m of room for a body", "move it away")
+
+
+def points(scenario: Scenario) -> Iterator[tuple[str, Point]]:
+    """Every place that people are sent to or start from, with its key; a queue's least slots each under its `at`."""
+    for group in scenario.group:
+        yield f"group.{group.id}.start", group.start
+        yield f"group.{group.id}.goal", group.goal
+        yield from ((f"group.{group.id}.via.{k}", point) for k, point in enumerate(group.via))
+    for event in scenario.event:
+        key = f"event.{event.id}"
+        if event.when.reach is not None and event.when.reach.at is not None:
+            yield f"{key}.when.reach.at", event.when.reach.at
+        if isinstance(event, Split):
+            for part in event.parts:
+                yield f"{key}.parts.{part.id}.goal", part.goal
+                yield from ((f"{key}.parts.{part.id}.via.{k}", point) for k, point in enumerate(part.via))
+            continue
+        if isinstance(event, Queue):
+            yield from ((f"{key}.at", slot) for slot in slots(event, QUEUE_PEOPLE))
+        else:
+            yield from ((f"{key}.via.{k}", point) for k, point in enumerate(event.via))
+        if event.goal is not None and not isinstance(event.goal, str):
+            yield f"{key}.goal", event.goal

@@ -1,0 +1,111 @@
+"""`--set key=value` on a scenario's table: `camera.fps=25`, `group.a.size=3`, `group.0.size`, `world.size.0=20`.
+
+A step into an array is an index or an `id`. Values are TOML (`3`, `[8, 5]`, `{ uniform = [0, 5] }`, `"top"`); a bare
+word is taken as a string. A whole table set on a new id of an array (`group.x={ size = 2, … }`) is appended.
+"""
+
+from __future__ import annotations
+
+import copy
+import re
+import tomllib
+from collections.abc import Iterable
+from typing import Any
+
+from scenarios.errors import InputError
+from scenarios.loading.toml_files import Table, nearest
+
+Path = tuple[str | int, ...]
+
+
+def apply(table: Table, settings: Iterable[str], file: object = "") -> tuple[Table, dict[Path, str]]:
+    """The table with every `key=value` set in turn, and what was set where (for error messages)."""
+    table = copy.deepcopy(table)
+    places: dict[Path, str] = {}
+    for text in settings:
+        key, value = parse(text)
+        places[_put(table, key, value, text, file)] = text
+    return table, places
+
+
+def parse(text: str) -> tuple[list[str], Any]:
+    """`a.b=value` as its steps and its value."""
+    key, equals, value = text.partition("=")
+    steps = key.strip().split(".")
+    if not equals or not all(steps):
+        raise InputError(
+            place=f"--set {text}", got=repr(text), expected="key=value", remedy="write for example --set group.a.size=3"
+        )
+    return steps, parse_value(value.strip(), text)
+
+
+def parse_value(value: str, text: str) -> Any:
+    """A TOML value; a bare word is a string."""
+    try:
+        table = tomllib.loads(f"value = {value}")
+    except tomllib.TOMLDecodeError:
+        if re.fullmatch(r"[A-Za-z][\w.*:-]*", value):
+            return value
+        table = {}
+    if list(table) != ["value"]:
+        raise InputError(
+            place=f"--set {text}", got=repr(value), expected="a TOML value", remedy="quote strings, put lists in [ ]"
+        )
+    return table["value"]
+
+
+def _put(table: Table, steps: list[str], value: Any, text: str, file: object) -> Path:
+    """Walks to the last step and sets it there; returns the path with array steps as indices."""
+    here: Any = table
+    path: list[str | int] = []
+    while True:
+        if isinstance(here, dict):
+            step, steps = steps[0], steps[1:]
+            path.append(step)
+            if not steps:
+                here[step] = value
+                return tuple(path)
+            here = here.setdefault(step, {})
+        elif isinstance(here, list):
+            index, steps = _index(here, steps, value, text, file)
+            path.append(index)
+            if not steps:
+                here[index : index + 1] = [_with_id(here, index, value)]
+                return tuple(path)
+            here = here[index]
+        else:
+            raise InputError(
+                file=file,
+                place=f"--set {text}",
+                got=f"{'.'.join(map(str, path))} = {here!r}, which has no {steps[0]!r}",
+                expected="a key that exists",
+                remedy=f"set {'.'.join(map(str, path))} itself",
+            )
+
+
+def _index(rows: list[Any], steps: list[str], value: Any, text: str, file: object) -> tuple[int, list[str]]:
+    """The index that the next steps mean, and the steps after it; ids may hold dots, the longest that fits is meant."""
+    if steps[0].isdigit() and int(steps[0]) < len(rows):
+        return int(steps[0]), steps[1:]
+    ids = [str(row["id"]) for row in rows if isinstance(row, dict) and "id" in row]
+    for n in range(len(steps), 0, -1):
+        name = ".".join(steps[:n])
+        if name in ids:
+            return next(k for k, row in enumerate(rows) if row.get("id") == name), steps[n:]
+    if isinstance(value, dict) and len(steps) == 1 and ids and not steps[0].isdigit():
+        value.setdefault("id", steps[0])
+        return len(rows), []
+    raise InputError(
+        file=file,
+        place=f"--set {text}",
+        got=f"{steps[0]!r} in an array of {len(rows)}",
+        expected="an index from 0 or an id" if ids else "an index from 0",
+        remedy=nearest(steps[0], ids or [str(k) for k in range(len(rows))]),
+    )
+
+
+def _with_id(rows: list[Any], index: int, value: Any) -> Any:
+    """A table that replaces a row keeps the row's id unless it brings its own."""
+    if index < len(rows) and isinstance(value, dict) and isinstance(rows[index], dict) and "id" in rows[index]:
+        return {"id": rows[index]["id"], **value}
+    return value

@@ -1,0 +1,117 @@
+"""The script of a scenario as it unfolds: which groups exist at each order, how large they are, when orders fire."""
+
+from __future__ import annotations
+
+from typing import NoReturn
+
+from scenarios.drawing.plan_geometry import bounds
+from scenarios.errors import InputError
+from scenarios.loading.toml_files import nearest
+from scenarios.schema.scenario import Event, Merge, Queue, Scenario, Split, expand, group_names
+
+Size = tuple[float, float]
+QUEUE_PEOPLE = 3
+"""Fewer people in line are not measured as a queue."""
+
+
+def fail(place: str, got: str, expected: str, remedy: str) -> NoReturn:
+    """Raises the InputError of a check; the file is added where it is known."""
+    raise InputError(place=place, got=got, expected=expected, remedy=remedy)
+
+
+def check_script(scenario: Scenario) -> None:
+    """Orders in the order of the file: they concern groups that then exist, in sizes that fit, within the duration."""
+    alive = {name: _people(bounds(group.size)) for group in scenario.group for name in group_names(group)}
+    gone: dict[str, str] = {}
+    orders: list[str] = []
+    for event in scenario.event:
+        key = f"event.{event.id}"
+        if event.id in orders:
+            fail(key, f"a second order named {event.id!r}", "unique ids", "rename one")
+        _check_when(event, key, orders, alive, gone, scenario.duration)
+        _apply(event, key, alive, gone)
+        orders.append(event.id)
+
+
+def _people(size: Size) -> Size:
+    return max(1.0, float(round(size[0]))), size[1]
+
+
+def _check_when(
+    event: Event, key: str, orders: list[str], alive: dict[str, Size], gone: dict[str, str], duration: float
+) -> None:
+    when = event.when
+    if when.after is not None and when.after not in orders:
+        fail(f"{key}.when.after", repr(when.after), "an order that stands before this one", nearest(when.after, orders))
+    if when.reach is not None:
+        _exists(when.reach.group, f"{key}.when.reach.group", alive, gone)
+    delay = bounds(when.delay)[0]
+    first = delay + (0.0 if when.time is None else bounds(when.time)[0])
+    if delay < 0 or first < 0:
+        fail(f"{key}.when", f"{min(delay, first):g} s", "a time from 0 on", "raise it, or add a clip")
+    if first >= duration:
+        fail(f"{key}.when", f"{first:g} s at the earliest", f"before the end, {duration:g} s", "fire it earlier")
+
+
+def _exists(name: str, place: str, alive: dict[str, Size], gone: dict[str, str]) -> None:
+    if name in gone:
+        expected = "a group that still exists: " + ", ".join(alive)
+        fail(place, f"{name!r}, which ended with {gone[name]!r}", expected, "name another, or move the order up")
+    if name not in alive:
+        fail(place, repr(name), "a group that exists at this point of the script", nearest(name, list(alive)))
+
+
+def _born(name: str, size: Size, place: str, alive: dict[str, Size], gone: dict[str, str]) -> None:
+    if name in alive or name in gone:
+        fail(place, f"{name!r}, which is another group's name", "a new name", "rename it")
+    alive[name] = size
+
+
+def _apply(event: Event, key: str, alive: dict[str, Size], gone: dict[str, str]) -> None:
+    if isinstance(event, Merge):
+        _merge(event, key, alive, gone)
+    elif isinstance(event, Split):
+        _split(event, key, alive, gone)
+    else:
+        _queue(event, key, alive, gone)
+
+
+def _merge(event: Merge, key: str, alive: dict[str, Size], gone: dict[str, str]) -> None:
+    for k, name in enumerate(event.groups):
+        _exists(name, f"{key}.groups.{k}", alive, gone)
+        if name in event.groups[:k]:
+            fail(f"{key}.groups.{k}", f"{name!r} twice", "different groups", "take one out")
+    sizes = [alive.pop(name) for name in event.groups]
+    gone.update(dict.fromkeys(event.groups, event.id))
+    _born(event.into, (sum(low for low, _ in sizes), sum(high for _, high in sizes)), f"{key}.into", alive, gone)
+
+
+def _split(event: Split, key: str, alive: dict[str, Size], gone: dict[str, str]) -> None:
+    _exists(event.group, f"{key}.group", alive, gone)
+    low, high = alive.pop(event.group)
+    gone[event.group] = event.id
+    given = [part.size for part in event.parts if part.size is not None]
+    open_parts = len(event.parts) - len(given)
+    has = f"{low:g} people" if low == high else f"{low:g} to {high:g} people"
+    if sum(given) + open_parts > low or (not open_parts and not low == high == sum(given)):
+        got = f"parts of {' + '.join(map(str, given + ['1 or more'] * open_parts))}"
+        fail(f"{key}.parts", got, f"parts of {event.group!r}, which has {has}", "leave a size out, or change one")
+    rest = max(high - sum(given) - open_parts + 1, 1)
+    for part in event.parts:
+        size = (1.0, rest) if part.size is None else (float(part.size), float(part.size))
+        _born(part.id, size, f"{key}.parts.{part.id}", alive, gone)
+
+
+def _queue(event: Queue, key: str, alive: dict[str, Size], gone: dict[str, str]) -> None:
+    queued: list[str] = []
+    for k, pattern in enumerate(event.groups):
+        found = expand(pattern, list(alive))
+        if not found:
+            fail(f"{key}.groups.{k}", repr(pattern), "a pattern that fits a group", "groups: " + ", ".join(alive))
+        for name in found:
+            _exists(name, f"{key}.groups.{k}", alive, gone)
+        queued += [name for name in found if name not in queued]
+    people = sum(alive[name][1] for name in queued)
+    if people < QUEUE_PEOPLE:
+        got = f"{people:g} people in {', '.join(queued)}"
+        fail(f"{key}.groups", got, f"at least {QUEUE_PEOPLE} in a queue", "queue more groups, or larger ones")

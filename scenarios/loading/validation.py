@@ -1,0 +1,201 @@
+"""A plain table as a Scenario; what pydantic finds wrong becomes one clear line about the first problem."""
+
+from __future__ import annotations
+
+import re
+import typing
+from typing import Any
+
+from pydantic import BaseModel, ValidationError
+
+from scenarios.errors import InputError
+from scenarios.loading.overrides import Path
+from scenarios.loading.toml_files import Table, nearest
+from scenarios.schema.scenario import Scenario
+
+NUMBER = "a number, or a distribution such as { normal = [1.3, 0.2] }"
+NAME = "a name: a letter, then letters, digits, '_', '.' or '-'"
+
+
+M = typing.TypeVar("M", bound=BaseModel)
+
+
+def validate(table: Table, file: object = "", places: dict[Path, str] | None = None, *, model: type[M]) -> M:
+    """The model (a Scenario, or a table of one) that a table is; InputError with file, key and expectation otherwise.
+
+    places: see override.apply.
+    """
+    try:
+        return model.model_validate(_tuples(table), strict=True)
+    except ValidationError as error:
+        raise translate(error, table, file, places or {}, model) from None
+
+
+def _tuples(value: Any) -> Any:
+    """Arrays as tuples, which is what the strict form wants."""
+    if isinstance(value, dict):
+        return {key: _tuples(v) for key, v in value.items()}
+    return tuple(_tuples(v) for v in value) if isinstance(value, list) else value
+
+
+def translate(
+    error: ValidationError, table: Table, file: object, places: dict[Path, str], model: type[BaseModel] = Scenario
+) -> InputError:
+    """The error of the first problem; unknown keys come first, since they explain missing ones."""
+    found = [e for e in error.errors() if _branch_fits(e["loc"], table)] or list(error.errors())
+    first = min(found, key=lambda e: (e["type"] != "extra_forbidden", e["type"] == "too_short" and len(found) > 1))
+    path = strip(first["loc"], table) + (("type",) if first["type"].startswith("union_tag") else ())
+    got, expected, remedy = _words(first, path, table, model)
+    more = f" ({len(found) - 1} more problem{'s' * (len(found) > 2)})" if len(found) > 1 else ""
+    return InputError(file=file, place=_place(path, table, places), got=got, expected=expected, remedy=remedy + more)
+
+
+def strip(loc: tuple[int | str, ...], table: Table) -> Path:
+    """A pydantic location without the names of union branches, so that it is a path into the table."""
+    return tuple(step for step, _, is_tag in _walk(loc, table) if not is_tag)
+
+
+def _walk(loc: tuple[int | str, ...], table: Any) -> typing.Iterator[tuple[int | str, Any, bool]]:
+    """Every step of a location, the value it starts from, and whether it merely names a branch."""
+    here = table
+    for k, step in enumerate(loc):
+        last = k == len(loc) - 1
+        if isinstance(here, dict) and (step in here or (last and not _is_branch(step))):
+            yield step, here, False
+            here = here.get(step)
+        elif isinstance(here, list) and isinstance(step, int):
+            yield step, here, False
+            here = here[step] if step < len(here) else None
+        else:
+            yield step, here, True
+
+
+def _is_branch(step: int | str) -> bool:
+    return isinstance(step, str) and (step == "float" or "[" in step or step == "Distribution")
+
+
+def _branch_fits(loc: tuple[int | str, ...], table: Table) -> bool:
+    """Whether the branch of a union that complains is the one that was meant."""
+    for step, value, is_tag in _walk(loc, table):
+        if not is_tag or not isinstance(step, str):
+            continue
+        kind = (
+            dict
+            if "Distribution" in step and not step.startswith("tuple")
+            else list
+            if step.startswith("tuple")
+            else None
+        )
+        if kind is not None and not isinstance(value, kind):
+            return False
+        if (step == "float" and isinstance(value, dict)) or (step.startswith("literal") and isinstance(value, list)):
+            return False
+    return True
+
+
+def _words(error: Any, path: Path, table: Table, model: type[BaseModel]) -> tuple[str, str, str]:
+    """got, expected, remedy of one pydantic error."""
+    kind, message = error["type"], str(error["msg"])
+    if kind == "extra_forbidden":
+        known = known_keys(path[:-1], table, model)
+        return f"unknown key {str(path[-1])!r}", "a known key", nearest(str(path[-1]), known)
+    got = _show(error["input"])
+    if kind == "missing" and isinstance(path[-1], int):
+        return got, f"at least {path[-1] + 1} numbers", "correct the list"
+    if kind == "missing":
+        return "nothing", f"the key {str(path[-1])!r}", "add it"
+    if kind == "union_tag_not_found":
+        return "an event without `type`", "one of 'merge', 'split', 'queue'", "add `type`"
+    if kind == "union_tag_invalid":
+        return repr(error["ctx"]["tag"]), f"one of {error['ctx']['expected_tags']}", "correct `type`"
+    if kind == "float_type" and "float" in error["loc"]:
+        return got, NUMBER, "correct the value"
+    if kind == "string_pattern_mismatch":
+        return got, NAME, "rename it"
+    if kind in ("too_short", "too_long"):
+        limit = error["ctx"].get("min_length", error["ctx"].get("max_length"))
+        return got, f"at {'least' if kind == 'too_short' else 'most'} {limit} items", "correct the list"
+    if any(str(step).startswith("literal") for step in error["loc"]):
+        return got, "a point [x, y] in metres, or " + message.removeprefix("Input should be "), "correct the value"
+    return got, _expectation(message), "correct the value"
+
+
+def _expectation(message: str) -> str:
+    for start in ("Input should be ", "Value error, "):
+        message = message.removeprefix(start)
+    message = re.sub(r"^.* exactly one of (.*), not \[.*\]$", r"exactly one of \1", message)
+    return message.replace("a valid tuple", "a list").replace("a valid dictionary or instance of", "a table for")
+
+
+def _show(value: Any) -> str:
+    """The value as a user wrote it, cut to a line."""
+    if isinstance(value, tuple):
+        return "[" + ", ".join(map(_show, value)) + "]"
+    if isinstance(value, dict):
+        value = {key: v for key, v in value.items() if v is not None}
+        return _cut("{ " + ", ".join(f"{key} = {_show(v)}" for key, v in value.items()) + " }")
+    return _cut(
+        repr(value) if isinstance(value, str) else str(value).lower() if isinstance(value, bool) else str(value)
+    )
+
+
+def _cut(text: str) -> str:
+    return text if len(text) <= 80 else text[:77] + "…"
+
+
+def _place(path: Path, table: Table, places: dict[Path, str]) -> str:
+    for n in range(len(path), 0, -1):
+        if path[:n] in places:
+            return f"--set {places[path[:n]]}"
+    return spell(path, table)
+
+
+def spell(path: Path, table: Table) -> str:
+    """A path as `--set` takes it: rows of arrays by their id where they have one."""
+    here: Any = table
+    steps = []
+    for step in path:
+        here = (
+            here[step]
+            if isinstance(here, list) and isinstance(step, int) and step < len(here)
+            else (here.get(step) if isinstance(here, dict) else None)
+        )
+        named = isinstance(step, int) and isinstance(here, dict) and isinstance(here.get("id"), str)
+        steps.append(here["id"] if named else str(step))
+    return ".".join(steps)
+
+
+def known_keys(path: Path, table: Table, form: type[BaseModel] = Scenario) -> list[str]:
+    """The keys that the strict form knows at a place."""
+    model: type[BaseModel] | None = form
+    here: Any = table
+    for step in path:
+        here = here[step]
+        if isinstance(step, int) or model is None:
+            continue
+        field = next((f for n, f in model.model_fields.items() if step in (n, f.alias)), None)
+        models = [] if field is None else _models(field.annotation)
+        model = models[0] if len(models) == 1 else None
+        if len(models) > 1:
+            return _event_keys(models, path, table)
+    return [] if model is None else [f.alias or n for n, f in model.model_fields.items()]
+
+
+def _event_keys(models: list[type[BaseModel]], path: Path, table: Table) -> list[str]:
+    """Inside `event`, whose rows are one of several models by their `type`."""
+    row = table["event"][path[1]]
+    kind = next((m for m in models if row.get("type") in typing.get_args(m.model_fields["type"].annotation)), models[0])
+    keys = kind
+    for step in path[2:]:
+        inner = _models(keys.model_fields[step].annotation) if isinstance(step, str) else [keys]
+        if not inner:
+            return []
+        keys = inner[0]
+    return list(keys.model_fields)
+
+
+def _models(annotation: Any) -> list[type[BaseModel]]:
+    """All models named inside a type annotation."""
+    if isinstance(annotation, type) and issubclass(annotation, BaseModel):
+        return [annotation]
+    return [model for inner in typing.get_args(annotation) for model in _models(inner)]

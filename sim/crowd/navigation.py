@@ -1,0 +1,148 @@
+"""Ways round walls and through doors: the shortest path over wall ends and door middles."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from scenarios.schema.scenario import World
+from sim.types import Array, Bools, Scene, Stairs
+
+BEHIND = 0.7  # m behind a door, where nobody touches the wall any more
+CLEARANCE = 0.6  # m kept from a wall's end on the way round it
+
+
+def cut_walls(walls: Array, doors: list[tuple[Array, float]]) -> tuple[Array, Array]:
+    """Walls (W, 2, 2) with the doors' openings taken out, and the openings (D, 2, 2)."""
+    pieces = [np.asarray(w, dtype=float) for w in walls]
+    openings = []
+    for at, width in doors:
+        k = int(np.argmin([_distance(at, w) for w in pieces]))
+        wall = pieces.pop(k)
+        length = float(np.linalg.norm(wall[1] - wall[0]))
+        along = (wall[1] - wall[0]) / length
+        s = float(along @ (at - wall[0]))
+        low, high = max(0.0, s - width / 2), min(length, s + width / 2)
+        openings.append(np.stack([wall[0] + low * along, wall[0] + high * along]))
+        pieces += [
+            np.stack([wall[0] + a * along, wall[0] + b * along])
+            for a, b in ((0.0, low), (high, length))
+            if b - a > 1e-9
+        ]
+    return np.array(pieces).reshape(-1, 2, 2), np.array(openings).reshape(-1, 2, 2)
+
+
+def scene_of(world: World) -> Scene:
+    """The scenario's world as arrays."""
+    walls = np.array(world.walls, dtype=float).reshape(-1, 2, 2)
+    doors = [(np.array(d.at, dtype=float), d.width) for d in world.doors]
+    pieces, openings = cut_walls(walls, doors)
+    return Scene(
+        size=np.array(world.size, dtype=float),
+        walls=pieces,
+        pillars=np.array(world.pillars, dtype=float).reshape(-1, 3),
+        doors=openings,
+        service=np.array(world.service, dtype=float).reshape(-1, 2),
+        stairs=tuple(
+            Stairs(np.array(s.foot, float), np.array(s.head, float), s.width, s.rise, s.steps, s.landing)
+            for s in world.stairs
+        ),
+        wall_height=world.wall_height,
+        pillar_height=world.pillar_height,
+    )
+
+
+def _distance(point: Array, wall: Array) -> float:
+    along = wall[1] - wall[0]
+    s = np.clip((point - wall[0]) @ along / max(along @ along, 1e-12), 0, 1)
+    return float(np.linalg.norm(point - wall[0] - s * along))
+
+
+def blocked(a: Array, b: Array, walls: Array) -> Bools:
+    """Whether the segments a-b, both (..., 2), cross any of the walls (W, 2, 2)."""
+    if not len(walls):
+        return np.zeros(a.shape[:-1], dtype=np.bool_)
+    p, q = walls[:, 0], walls[:, 1]
+
+    def side(o: Array, u: Array, v: Array) -> Array:
+        return np.asarray(
+            (u[..., 0] - o[..., 0]) * (v[..., 1] - o[..., 1]) - (u[..., 1] - o[..., 1]) * (v[..., 0] - o[..., 0])
+        )
+
+    a, b = a[..., None, :], b[..., None, :]
+    crosses = (side(a, b, p) * side(a, b, q) < 0) & (side(p, q, a) * side(p, q, b) < 0)
+    return np.asarray(crosses.any(axis=-1))
+
+
+class Navigator:
+    """Shortest ways in one scene. State: nodes (wall ends with clearance, door middles) and their distances.
+
+    `closed` is walls and doors alike: whoever goes through a door goes by its middle.
+    """
+
+    def __init__(self, scene: Scene) -> None:
+        self.size, self.walls = scene.size, np.asarray(scene.walls)
+        self.doors = np.asarray(scene.doors).reshape(-1, 2, 2)
+        self.closed = np.concatenate([self.walls.reshape(-1, 2, 2), self.doors])
+        ends = self._wall_ends() if len(self.walls) else np.zeros((0, 2))
+        self.nodes = np.concatenate([self.doors.mean(axis=1), ends])
+        self.edges = self._lengths(self.nodes, self.nodes)
+
+    def _wall_ends(self) -> Array:
+        along = self.walls[:, 1] - self.walls[:, 0]
+        along = along / np.linalg.norm(along, axis=1, keepdims=True)
+        ends = np.concatenate([self.walls[:, 0] - CLEARANCE * along, self.walls[:, 1] + CLEARANCE * along])
+        free = [min(_distance(e, w) for w in self.closed) > 0.9 * CLEARANCE for e in ends]
+        inside = ((ends >= 0) & (ends <= self.size)).all(axis=1)
+        return np.asarray(ends[inside & np.array(free, dtype=bool)])
+
+    def _lengths(self, a: Array, b: Array) -> Array:
+        d = np.linalg.norm(a[:, None] - b[None], axis=2)
+        hidden = blocked(np.repeat(a[:, None], len(b), 1), np.repeat(b[None], len(a), 0), self.closed)
+        return np.asarray(np.where(hidden, np.inf, d))
+
+    def way(self, start: Array, goal: Array) -> tuple[Array, Bools] | None:
+        """Points to walk to, goal included, and which of them are doors; None where no way exists."""
+        ends = np.stack([start, goal])
+        if not blocked(ends[:1], ends[1:], self.closed)[0]:
+            return ends[1:], np.zeros(1, dtype=np.bool_)
+        points = np.concatenate([self.nodes, ends])
+        n = len(points)
+        lengths = np.full((n, n), np.inf)
+        lengths[: n - 2, : n - 2] = self.edges
+        lengths[: n - 2, n - 2 :] = self._lengths(self.nodes, ends)
+        lengths[n - 2 :, : n - 2] = lengths[: n - 2, n - 2 :].T
+        path = _dijkstra(lengths, n - 2, n - 1)
+        if path is None:
+            return None
+        way, narrow, here = [], [], start
+        for k in path:
+            way.append(points[k])
+            narrow.append(k < len(self.doors))
+            if narrow[-1]:
+                way.append(points[k] + self._out(k, points[k] - here))
+                narrow.append(True)
+            here = points[k]
+        return np.array(way), np.array(narrow)
+
+    def _out(self, door: int, way: Array) -> Array:
+        """From the middle of a door to a place behind it, for those who come this way: straight through the wall."""
+        along = self.doors[door, 1] - self.doors[door, 0]
+        across = np.array([-along[1], along[0]]) / np.linalg.norm(along)
+        return np.asarray(BEHIND * across * (1.0 if across @ way > 0 else -1.0))
+
+
+def _dijkstra(lengths: Array, start: int, goal: int) -> list[int] | None:
+    n = len(lengths)
+    far, before, done = np.full(n, np.inf), np.full(n, -1), np.zeros(n, dtype=bool)
+    far[start] = 0.0
+    for _ in range(n):
+        k = int(np.argmin(np.where(done, np.inf, far)))
+        done[k] = True
+        better = far[k] + lengths[k] < far
+        before[better], far[better] = k, (far[k] + lengths[k])[better]
+    if not np.isfinite(far[goal]):
+        return None
+    path = [goal]
+    while before[path[-1]] != start:
+        path.append(int(before[path[-1]]))
+    return path[::-1]

@@ -1,0 +1,238 @@
+"""Real trajectories as the motion of a scene of ours: real motion, perfect labels.
+
+`replay(source, view, seed)` takes the places that a recording's labels say, smooths and resamples them to the camera's
+rate (sim.dataset.trajectories), gives everybody a body drawn from the seed, and looks at them with the view's camera
+and
+sensor. Groups are those that the recording labels, as intent; when they come together and part is measured from the
+motion, as for simulated crowds. Of walls and obstacles nothing is known: there are none, unless the source is ours.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+
+from scenarios.errors import InputError
+from scenarios.schema.observation import Origin, Replayed, View, load_view
+from sim.crowd.heading import headings
+from sim.dataset.trajectories import Trajectories, nearest_row, resample
+from sim.hashing import canonical_hash
+from sim.io.formats.real_or_simulated import is_real
+from sim.rng import rng
+from sim.scene.body import DEPTH, SHOULDERS
+from sim.sequence import observe
+from sim.types import Array, Camera, Ints, Motion, Scene, Sequence, Truth
+
+MARGIN = 1.0  # m of ground round everybody
+LONGEST = 3600.0  # s, as of a scenario
+FLAT = ("caviar",)  # recordings whose image, divided by its scale, stands for the ground
+
+
+@dataclass(frozen=True)
+class Cut:
+    """Which part of a recording: from `start` s on for `duration` s (None: to its end)."""
+
+    start: float = 0.0
+    duration: float | None = None
+
+
+WHOLE = Cut()
+
+
+def replay(
+    source: str | Path | Sequence,
+    camera: str | Path | View | None = None,
+    seed: int = 20_000,
+    *,
+    cut: Cut = WHOLE,
+    calibration: Camera | str | Path | None = None,
+    streams: Iterable[str] = ("left",),
+) -> Sequence:
+    """A recording's people before our camera: a labelled sequence like any other.
+
+    camera: a View, or a file of one (scenarios.schema.observation), None for the usual one. calibration: of a
+    recording that has
+    boxes only, to put their feet on the ground. streams: as for `simulate`. `sequence.source["origin"]` says whose
+    motion it is. InputError where a source has no places on the ground, several sequences, or nobody in the cut, and
+    where somebody is out of view.
+    """
+    from sim.io.source import open_source
+
+    if not isinstance(source, Sequence):
+        found = open_source(source, images=False)
+        if len(found) != 1:
+            raise InputError(
+                file=source, got=f"{len(found)} sequences", expected="one", remedy="give the path of one of them"
+            )
+        source = found[0]
+    view = camera if isinstance(camera, View) else load_view(camera)
+    return resolved(source, view, seed, cut=cut, calibration=calibration, streams=streams)[0]
+
+
+def resolved(
+    source: Sequence,
+    view: View,
+    seed: int,
+    *,
+    cut: Cut = WHOLE,
+    calibration: Camera | str | Path | None = None,
+    streams: Iterable[str] = (),
+) -> tuple[Sequence, Replayed]:
+    """A replay and its resolved form, which stands for the scenario."""
+    truth = _labels(source)
+    places = on_ground(truth, source, _calibrated(calibration, source))
+    moving = _moving(places, truth, source, view.camera.fps, cut)
+    low, whole = np.nanmin(moving.pos, axis=(0, 1)), source.scene if not is_real(source) else None
+    shift = np.zeros(2) if whole is not None else MARGIN - low
+    origin = _origin(source, truth, places, moving, cut, view.camera.fps, shift)
+    motion = _motion(moving, truth, _name(source.name, cut), view.camera.fps, cut, seed, shift)
+    made = observe(view, motion if whole is None else motion.replace(scene=whole), people={}, streams=streams)
+    if truth.labelled is None or not truth.labelled.any():
+        made = replace(made, load_truth=_without_groups(made))
+    told = {**made.source, "kind": "replayed", "origin": origin.model_dump()}
+    form = Replayed(name=motion.name, replay=origin, **{name: getattr(view, name) for name in View.model_fields})
+    return replace(made, source=told), form
+
+
+def _labels(source: Sequence) -> Truth:
+    truth = source.truth
+    if truth is None or not len(truth.id):
+        raise InputError(
+            file=source.source.get("path", source.name), got="no labelled people", expected="trajectories",
+            remedy="give a BIWI folder, a CAVIAR file, a MOTChallenge folder with gt, or a sequence of ours",
+        )  # fmt: skip
+    return truth
+
+
+def on_ground(truth: Truth, source: Sequence, calibration: Camera | None = None) -> Array:
+    """(R, 2) m: where the rows of a truth are on the ground, nan where unknown; InputError where nothing says so."""
+    if truth.pos is not None:
+        if calibration is not None:
+            raise InputError(
+                file=source.source.get("path", source.name), place="--calibration", got="a calibration",
+                expected="none for labels that are on the ground already", remedy="leave it out",
+            )  # fmt: skip
+        return truth.pos
+    assert truth.box is not None, "labels have positions or boxes"
+    camera = calibration or source.camera
+    if camera is not None:
+        from sim.detector.box_noise import feet
+
+        return feet(truth.box, np.zeros(len(truth.box)), camera)
+    if source.source.get("kind") in FLAT:
+        centre = truth.box[:, :2] + truth.box[:, 2:] / 2
+        return np.asarray(np.stack([centre[:, 0], -centre[:, 1]], axis=1) / truth.px_per_m)
+    raise InputError(
+        file=source.source.get("path", source.name), got="labels in the image alone",
+        expected="places on the ground", remedy="give its calibration: --calibration FILE",
+    )  # fmt: skip
+
+
+def _calibrated(calibration: Camera | str | Path | None, source: Sequence) -> Camera | None:
+    from sim.io.store.camera_files import fitted, read_calibration
+
+    if calibration is None or isinstance(calibration, Camera):
+        return calibration
+    return fitted(read_calibration(Path(calibration)), source.image_size, Path(str(source.source.get("path", ""))))
+
+
+def _moving(places: Array, truth: Truth, source: Sequence, fps: float, cut: Cut) -> Trajectories:
+    """The cut's trajectories."""
+    file, whole = source.source.get("path", source.name), (truth.length - 1) / truth.fps
+    last = whole if cut.duration is None else min(whole, cut.start + cut.duration - 1 / fps)
+    if not 0 <= cut.start <= last <= cut.start + LONGEST:
+        part = "the rest" if cut.duration is None else f"{cut.duration:g} s"
+        raise InputError(
+            file=file, place="--start, --duration", got=f"{cut.start:g} s, {part}",
+            expected=f"a part of its {whole:.1f} s, of an hour at most", remedy="correct --start or --duration",
+        )  # fmt: skip
+    known = np.isfinite(places).all(axis=1)
+    moving = resample(truth.frame[known], truth.id[known], places[known], truth.fps, fps, cut.start, last)
+    if not len(moving.id):
+        got = f"nobody from {cut.start:g} to {last:g} s"
+        raise InputError(
+            file=file, place="--start, --duration", got=got, expected="people", remedy="choose another part"
+        )
+    return moving
+
+
+def _origin(
+    source: Sequence, truth: Truth, places: Array, moving: Trajectories, cut: Cut, fps: float, shift: Array
+) -> Origin:
+    labels = {"frame": truth.frame, "id": truth.id, "group": truth.group, "places": places, "fps": truth.fps}
+    first = source.source.get("origin") or {}  # of a replay of a replay
+    return Origin(
+        kind=str(first.get("kind", source.source.get("kind", "unknown"))),
+        name=str(first.get("name", source.name)),
+        real=is_real(source),
+        people=tuple(int(one) for one in moving.id),
+        start=cut.start,
+        duration=round(len(moving.present) / fps, 6),
+        smoothing=moving.smoothing,
+        shift=(float(shift[0]), float(shift[1])),
+        motion=canonical_hash(labels),
+    )
+
+
+def _motion(moving: Trajectories, truth: Truth, name: str, fps: float, cut: Cut, seed: int, shift: Array) -> Motion:
+    intent = _intent(moving, truth, fps, cut)
+    pos = moving.pos + shift
+    height = _heights(moving.id, truth, seed)
+    return Motion(
+        name=name,
+        seed=seed,
+        repeat=0,
+        fps=fps,
+        pos=pos,
+        vel=moving.vel,
+        heading=headings(pos, moving.vel, moving.present, intent, fps),
+        present=moving.present,
+        intent=intent,
+        height=height,
+        width=SHOULDERS * height,
+        depth=DEPTH * height,
+        free_speed=np.nanmedian(np.linalg.norm(moving.vel, axis=2), axis=0),
+        scene=Scene(np.nanmax(pos, axis=(0, 1)) + MARGIN),
+    )
+
+
+def _intent(moving: Trajectories, truth: Truth, fps: float, cut: Cut) -> Ints:
+    """(T, P): the label nearest in time; who is alone has a number of his own; -1 absent."""
+    t = cut.start + np.arange(len(moving.present)) / fps
+    label = truth.group[nearest_row(truth.frame, truth.id, moving.id, truth.fps, t)]
+    alone = int(truth.group.max(initial=0)) + 1 + np.arange(len(moving.id))
+    return np.where(moving.present, np.where(label >= 0, label, alone), -1).astype(np.int64)
+
+
+def _heights(people: Ints, truth: Truth, seed: int) -> Array:
+    """(P,) m: as labelled, else drawn as for simulated crowds, keyed by the person."""
+    from scenarios.schema.distribution import draw
+    from scenarios.schema.scenario import Crowd
+
+    drawn = [draw(Crowd().height, rng(seed, "person", int(one))) for one in people]
+    if truth.height is None:
+        return np.array(drawn)
+    first = [int(np.argmax(truth.id == one)) for one in people]
+    return np.where(np.isfinite(truth.height[first]), truth.height[first], drawn)
+
+
+def _name(name: str, cut: Cut) -> str:
+    """A scenario's kind of name: of the recording, and where in it the replay begins."""
+    clean = "".join(c if c.isalnum() or c in "_.-" else "-" for c in name)
+    clean = clean if clean[:1].isalpha() else f"replay-{clean}"
+    return f"{clean}-t{cut.start:g}" if cut.start else clean
+
+
+def _without_groups(sequence: Sequence) -> Callable[[], Truth]:
+    """Its truth where nobody has labelled groups: not labelled, which is another thing than none."""
+
+    def truth() -> Truth:
+        assert sequence.load_truth is not None
+        found = sequence.load_truth()
+        alone, nowhere = np.full(len(found.id), -1, np.int64), np.zeros(found.length, bool)
+        return found.replace(group=alone, groups=None, groups_px=None, events=None, near=None, labelled=nowhere)
+
+    return truth

@@ -1,0 +1,1 @@
+"""Plane geometry: polygons, convex hulls, footprints, and joining numbers into sets."""

@@ -1,0 +1,57 @@
+"""Compiled convex hulls of many point sets at once; the one-at-a-time twin is sim.geometry.polygons.convex_hull."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numba import njit
+
+from sim.types import Array
+
+
+def hulls(sets: Sequence[Array]) -> tuple[Array, ...]:
+    """(V, 2) convex hull of each set of points (K, 2), as sim.geometry.polygons.convex_hull has it; (0, 2) of one
+    with a nan.
+    """
+    count = np.array([len(points) for points in sets], np.int64)
+    if not count.any():
+        return tuple(np.zeros((0, 2)) for _ in sets)
+    points, of = np.concatenate(sets), np.repeat(np.arange(len(sets)), count)
+    order = np.lexsort((points[:, 1], points[:, 0], of))
+    vertices, ends = chains(points[order], np.concatenate([[0], np.cumsum(count)]))
+    return tuple(np.split(vertices, ends[:-1]))
+
+
+@njit(cache=True)
+def _turns_left(a, b, c):  # type: ignore[no-untyped-def]
+    return (b[0] - a[0]) * (c[1] - a[1]) > (b[1] - a[1]) * (c[0] - a[0])
+
+
+@njit(cache=True)
+def chains(points, cuts):  # type: ignore[no-untyped-def]
+    """Hulls of points[cuts[g]:cuts[g + 1]], each sorted by x, then y: Andrew's monotone chain, counter-clockwise.
+
+    Returns the vertices of all one after the other (V, 2) and where each hull ends (G,); a set with a nan has none.
+    """
+    out = np.empty((2 * len(points) + 2, 2))
+    ends = np.empty(len(cuts) - 1, np.int64)
+    n = 0
+    for g in range(len(cuts) - 1):
+        first, last = cuts[g], cuts[g + 1]
+        if not np.isnan(points[first:last]).any():
+            start = n
+            for i in range(first, last):
+                while n - start > 1 and not _turns_left(out[n - 2], out[n - 1], points[i]):
+                    n -= 1
+                out[n] = points[i]
+                n += 1
+            start = n - 1
+            for i in range(last - 2, first - 1, -1):
+                while n - start > 1 and not _turns_left(out[n - 2], out[n - 1], points[i]):
+                    n -= 1
+                out[n] = points[i]
+                n += 1
+            n -= last > first + 1  # the last is the first again
+        ends[g] = n
+    return out[:n].copy(), ends

@@ -1,0 +1,1 @@
+"""Stored datasets in other forms: COCO, WebDataset."""

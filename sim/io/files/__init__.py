@@ -1,0 +1,1 @@
+"""Files in general: atomic writing, locks, numeric text, Parquet and JSON."""

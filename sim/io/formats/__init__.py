@@ -1,0 +1,1 @@
+"""Files of others, read as sequences: MOTChallenge, BIWI, CAVIAR, Tsai calibrations, videos."""

@@ -1,0 +1,176 @@
+"""CAVIAR ground truth (CVML): an XML file of 25 fps, 384x288, frames numbered from 0.
+
+A box is stored as centre and size, mostly wider than tall although people stand: rely on centres. The scale is the
+median of the longer sides / 1.7 m. Groups are labelled frame by frame, with their members.
+"""
+
+from __future__ import annotations
+
+import warnings
+import xml.etree.ElementTree as ET
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from scenarios.errors import InputError
+from sim.io.formats.group_labels import label_truth
+from sim.io.formats.velocity import differentiate
+from sim.scene.camera import PERSON
+from sim.truth.groups import box_groups
+from sim.types import Array, Frame, Ints, Sequence, Truth
+
+FPS = 25.0
+IMAGE_SIZE = (384, 288)
+CHORD = 1.0  # s, for velocities: labels stand still for frames and then jump by pixels; shorter chords see the jumps
+
+
+@dataclass(frozen=True)
+class Recording:
+    """Rows sorted by (frame, id): centre (R, 2) and size (R, 2) in px, label -1 alone; labelled: has group lists."""
+
+    name: str
+    length: int
+    frame: Ints
+    id: Ints
+    label: Ints
+    centre: Array
+    size: Array
+    labelled: bool
+
+    @property
+    def px_per_m(self) -> float:
+        """Median of the longer sides / 1.7 m; nan without boxes."""
+        return float(np.median(self.size.max(axis=1))) / PERSON if len(self.size) else float("nan")
+
+
+def read_xml(path: Path) -> Recording:
+    """The people and groups of a CAVIAR file; InputError with the frame of what cannot be read."""
+    root = _root(path)
+    rows: list[tuple[float, ...]] = []
+    last, labelled = 0, False
+    for element in root.iter("frame"):
+        index = int(_number(path, "frame", element, "number")) + 1
+        last, labelled = max(last, index), labelled or element.find("grouplist") is not None
+        label = _labels(path, index, element)
+        for person in element.iterfind("objectlist/object"):
+            rows.append(_row(path, index, person, label))
+    table = np.array(sorted(rows), np.float64).reshape(-1, 7)
+    frame, id, label_ = (table[:, k].astype(np.int64) for k in range(3))
+    twice = (np.diff(frame) == 0) & (np.diff(id) == 0)
+    if twice.any():
+        k = int(np.argmax(twice))
+        raise InputError(
+            file=path, place=f"frame {frame[k] - 1}", got=f"object {id[k]} twice", expected="each id once in a frame",
+            remedy="remove one of the two",
+        )  # fmt: skip
+    name = root.get("name", path.stem)
+    return Recording(name, last, frame, id, label_, table[:, 3:5], table[:, 5:7], labelled)
+
+
+def _root(path: Path) -> ET.Element:
+    try:
+        root = ET.parse(path).getroot()
+    except ET.ParseError as error:
+        raise InputError(
+            file=path, place=f"line {error.position[0]}", got="broken XML", expected="a CAVIAR file (CVML)",
+            remedy="fetch the file again",
+        ) from None  # fmt: skip
+    except OSError as error:
+        raise InputError(
+            file=path, got=error.strerror or "no access", expected="a readable file", remedy="check the path"
+        ) from None
+    if root.tag != "dataset":
+        raise InputError(file=path, got=f"<{root.tag}>", expected="<dataset> (CAVIAR)", remedy="give another file")
+    return root
+
+
+def _number(path: Path, place: str, element: ET.Element, key: str) -> float:
+    text = element.get(key)
+    try:
+        value = float(text or "")
+    except ValueError:
+        value = float("nan")
+    if not np.isfinite(value):
+        raise InputError(
+            file=path, place=f"{place}: {element.tag} {key}", got=repr(text), expected="a number", remedy="correct it"
+        )
+    return value
+
+
+def _labels(path: Path, index: int, element: ET.Element) -> dict[int, int]:
+    """Person → group of one frame; groups of one are none, the first of two groups holds."""
+    label: dict[int, int] = {}
+    for group in element.iterfind("grouplist/group"):
+        words = (group.findtext("members") or "").replace(",", " ").split()
+        if not all(w.isdigit() for w in words):
+            raise InputError(
+                file=path, place=f"frame {index - 1}: members", got=" ".join(words), expected="ids of people",
+                remedy="correct the list",
+            )  # fmt: skip
+        members = {int(w) for w in words}
+        if len(members) < 2:
+            continue
+        if members & label.keys():
+            warnings.warn(f"{path}: frame {index - 1}: a person in two groups; the first holds", stacklevel=3)
+        number = int(_number(path, f"frame {index - 1}", group, "id"))
+        label.update({m: number for m in sorted(members) if m not in label})
+    return label
+
+
+def _row(path: Path, index: int, person: ET.Element, label: dict[int, int]) -> tuple[float, ...]:
+    """frame, id, label, centre, size of one object."""
+    place = f"frame {index - 1}"
+    id, box = int(_number(path, place, person, "id")), person.find("box")
+    if box is None:
+        raise InputError(file=path, place=place, got="an object without box", expected="a box", remedy="add it")
+    x, y, w, h = (_number(path, place, box, key) for key in ("xc", "yc", "w", "h"))
+    if w <= 0 or h <= 0:
+        raise InputError(
+            file=path, place=f"{place}: object {id}", got=f"size {w:g}x{h:g}", expected="a size above 0",
+            remedy="correct or remove the box",
+        )  # fmt: skip
+    return (index, id, label.get(id, -1), x, y, w, h)
+
+
+def read_truth(path: Path, fps: float = FPS, px_per_m: float | None = None) -> Truth:
+    """The recording as truth in the image; hulls are of boxes, as those of anybody who tracks boxes there."""
+    found = read_xml(path)
+    scale = found.px_per_m if px_per_m is None else px_per_m
+    box = np.concatenate([found.centre - found.size / 2, found.size], axis=1)
+    truth = Truth(
+        name=found.name, fps=fps, length=found.length, px_per_m=scale, frame=found.frame, id=found.id,
+        group=found.label, pos=None, vel=None, box=box, visibility=np.ones(len(box)),
+        labelled=np.zeros(found.length, bool),
+    )  # fmt: skip
+    if not found.labelled or not len(box):
+        return truth
+    vel = differentiate(found.frame, found.id, found.centre, fps, CHORD)
+    known = label_truth(
+        found.frame, found.id, found.label, found.centre, vel, fps=fps, length=found.length, px_per_m=scale
+    )
+    del known["groups"]  # of footprints: in the image nobody sees any
+    shapes = box_groups(found.frame, found.id, found.label, found.centre, vel, box, 1, found.length)
+    return truth.replace(groups_px=tuple(shapes), **known)
+
+
+def open_file(path: Path, *, fps: float | None = None, px_per_m: float | None = None) -> Sequence:
+    """A CAVIAR file as Sequence: boxes in the image, no pixels."""
+    rate, found = FPS if fps is None else fps, read_xml(path)
+    scale = found.px_per_m if px_per_m is None else px_per_m
+
+    def frames() -> Iterator[Frame]:
+        return (Frame(index, (index - 1) / rate) for index in range(1, found.length + 1))
+
+    return Sequence(
+        name=found.name, fps=rate, length=found.length, frames=frames,
+        load_truth=lambda: read_truth(path, rate, px_per_m), image_size=IMAGE_SIZE, px_per_m=scale,
+        source={"kind": "caviar", "path": str(path)},
+    )  # fmt: skip
+
+
+def is_caviar(path: Path) -> bool:
+    """Whether an XML file begins like CAVIAR's."""
+    with path.open("rb") as file:
+        return b"<dataset" in file.read(1000)

@@ -1,0 +1,81 @@
+"""Truth of recordings whose groups somebody labelled: hulls and events beside the labels as they were given.
+
+The label says who belongs together (intent); when groups come true is measured from the motion by the same function
+as for simulated crowds (sim.truth.groups). Work is done in metres; a recording in px is scaled by its px_per_m.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from sim.types import Array, GroupEvent, Groups, Ints
+
+
+def dense(frame: Ints, id: Ints, values: Array, length: int) -> Array:
+    """(T, P, ...) of rows, nan where absent; columns in the order of ids."""
+    out = np.full((length, len(np.unique(id)), *values.shape[1:]), np.nan)
+    out[frame - 1, np.searchsorted(np.unique(id), id)] = values
+    return out
+
+
+def label_truth(
+    frame: Ints, id: Ints, label: Ints, pos: Array, vel: Array, *, fps: float, length: int, px_per_m: float = 1.0
+) -> dict[str, Any]:
+    """The fields groups, events and near of a Truth, for rows sorted by (frame, id); label -1: alone.
+
+    Event ids are labels: each measured group bears the label of its members. Crossings are of the groups as labelled.
+    """
+    from sim.truth.cross_queue_events import crossings, queues
+    from sim.truth.groups import groups_over_time, memberships
+
+    metres, speed = pos / px_per_m, vel / px_per_m
+    people = np.unique(id)
+    column = np.searchsorted(people, id)
+    intent = np.full((length, len(people)), -1, np.int64)
+    alone = label.max(initial=0) + 1 + column
+    intent[frame - 1, column] = np.where(label >= 0, label, alone)
+    present = intent >= 0
+    places, velocities = dense(frame, id, metres, length), dense(frame, id, speed, length)
+    measured = memberships(places, velocities, present, intent, fps)
+    names = _names(measured.group[frame - 1, column], label)
+    found = [_named(e, names, people, px_per_m) for e in measured.events]
+    given = np.full((length, len(people)), -1, np.int64)
+    given[frame - 1, column] = label
+    met = crossings(places, velocities, present, given, fps) + queues(places, velocities, present, given, fps)
+    found += [_named(e, {}, people, px_per_m) for e in met]
+    events = tuple(sorted(found, key=lambda e: (e.start, e.end, e.kind, e.members, e.after)))
+    near = replace(measured.near, a=people[measured.near.a - 1], b=people[measured.near.b - 1])
+    groups = tuple(scaled(g, px_per_m) for g in groups_over_time(frame, id, label, metres, speed, 1, length))
+    return {"groups": groups, "events": events, "near": near, "labelled": np.ones(length, bool)}
+
+
+def _names(measured: Ints, label: Ints) -> dict[int, int]:
+    """The label of each measured group, from its first row."""
+    found, first = np.unique(measured, return_index=True)
+    return {int(g): int(label[k]) for g, k in zip(found, first, strict=True) if g >= 0}
+
+
+def _named(event: GroupEvent, names: dict[int, int], people: Ints, px_per_m: float) -> GroupEvent:
+    """An event in the recording's own ids and unit."""
+    return replace(
+        event,
+        before=tuple(sorted(names.get(g, g) for g in event.before)),
+        after=tuple(sorted(names.get(g, g) for g in event.after)),
+        members=tuple(int(people[m - 1]) for m in event.members),
+        pos=(event.pos[0] * px_per_m, event.pos[1] * px_per_m),
+    )
+
+
+def scaled(groups: Groups, factor: float) -> Groups:
+    """Groups with every length multiplied by `factor`."""
+    if factor == 1.0:
+        return groups
+    return groups.replace(
+        pos=groups.pos * factor,
+        vel=groups.vel * factor,
+        extent=groups.extent * factor**2,
+        hull=tuple(h * factor for h in groups.hull),
+    )

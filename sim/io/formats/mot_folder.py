@@ -1,0 +1,164 @@
+"""MOTChallenge folders and bare text files as Sequences."""
+
+from __future__ import annotations
+
+import configparser
+import warnings
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+from scenarios.errors import InputError
+from sim.io.files.numeric_text import read_text
+from sim.io.formats import mot_text
+from sim.io.pictures.picture_folder import filled, picture_folder
+from sim.io.store.background_sample import Choice, Sample
+from sim.io.store.camera_files import fitted
+from sim.types import Camera, Frame, Image, Sequence
+
+DEFAULT_FPS = 25.0
+
+
+@dataclass(frozen=True)
+class SeqInfo:
+    """seqinfo.ini, None where it does not say."""
+
+    name: str
+    fps: float | None
+    length: int | None
+    image_size: tuple[int, int] | None
+    image_dir: str = "img1"
+
+
+def read_seqinfo(path: Path) -> SeqInfo:
+    """seqinfo.ini; InputError where a value makes no sense."""
+    parser = configparser.ConfigParser(interpolation=None)
+    try:
+        parser.read_string(read_text(path))
+    except configparser.Error as error:
+        reason = error.message.splitlines()[0]
+        raise InputError(file=path, got=reason, expected="key=value lines", remedy="correct the file") from None
+    section = dict(parser["Sequence"]) if parser.has_section("Sequence") else {}
+
+    def number(key: str) -> float | None:
+        text = section.get(key.lower())
+        try:
+            value = None if text is None else float(text)
+        except ValueError:
+            value = float("nan")
+        if value is not None and not 0 < value < mot_text.MAX_FRAME:
+            raise InputError(file=path, place=key, got=repr(text), expected="a positive number", remedy="correct it")
+        return value
+
+    length, w, h = number("seqLength"), number("imWidth"), number("imHeight")
+    return SeqInfo(
+        section.get("name", path.parent.name),
+        number("frameRate"),
+        None if length is None else int(length),
+        None if w is None or h is None else (int(w), int(h)),
+        section.get("imdir", "img1"),
+    )
+
+
+def frame_rate(given: float | None, found: float | None) -> float:
+    """--fps, else what the recording says, else 25 with a warning."""
+    if given is not None:
+        if not given > 0:
+            raise InputError(place="fps", got=given, expected="a number above 0", remedy="correct --fps")
+        return given
+    if found is None:
+        # Names no path: of a dataset's many recordings a command says it once.
+        text = f"MOTChallenge data without a frame rate is taken at {DEFAULT_FPS:g} fps (--fps says otherwise)"
+        warnings.warn(text, stacklevel=3)
+        return DEFAULT_FPS
+    return found
+
+
+def open_folder(
+    path: Path,
+    *,
+    fps: float | None = None,
+    px_per_m: float | None = None,
+    camera: Camera | None = None,
+    images: bool = True,
+    background: Choice | None = None,
+) -> Sequence:
+    """A MOTChallenge folder as Sequence; its pictures, decoded one by one, are left out where not `images`."""
+    ini = path / "seqinfo.ini"
+    info = read_seqinfo(ini) if ini.is_file() else SeqInfo(path.name, None, None, None)
+    rate = frame_rate(fps, info.fps)
+    scale = float("nan") if px_per_m is None else px_per_m
+    gt, det = path / "gt" / "gt.txt", path / "det" / "det.txt"
+    found = mot_text.read_detections(det, info.length) if det.is_file() else None
+    pictures = picture_folder(path / info.image_dir, info.length, gt.is_file() or found is not None)
+    length = info.length or max(_labelled(found, gt), pictures.last)
+    if not length:
+        expected = "a row in gt.txt or det.txt, a picture, or seqLength in seqinfo.ini"
+        raise InputError(file=path, got="nothing that says how long it is", expected=expected, remedy="complete it")
+    seen = pictures.first_size() if images else None
+    size = _agreed(ini, info.image_size, seen)
+    if background is not None and not pictures.files:
+        got, remedy = "--background", "leave it out: it has none"
+        raise InputError(file=path, got=got, expected="none for a recording without pictures", remedy=remedy)
+    choice = (background or Choice()).of(length, path) if pictures.files else None
+
+    def bare() -> Iterator[Frame]:
+        for index in range(1, length + 1):
+            yield Frame(index, (index - 1) / rate, detections=None if found is None else found.at(index, rate))
+
+    def frames() -> Iterator[Frame]:
+        shown = pictures.some(range(1, length + 1), seen)
+        for frame, picture in zip(bare(), filled(shown, length, path.name), strict=True):
+            yield frame.replace(image=picture)
+
+    def sample(wanted: list[int]) -> Iterator[tuple[int, Image]]:
+        return pictures.some(wanted, seen if images else pictures.first_size())
+
+    return Sequence(
+        name=info.name, fps=rate, length=length, frames=frames if images and pictures.files else bare, bare=bare,
+        load_truth=(lambda: mot_text.read_truth(gt, info.name, rate, length, scale)) if gt.is_file() else None,
+        image_size=size, camera=None if camera is None else fitted(camera, size, path),
+        px_per_m=scale, has_images=images and bool(pictures.files), has_detections=found is not None,
+        load_background=None if choice is None else Sample(choice, length, path, sample),
+        source={"kind": "mot", "path": str(path), **({} if choice is None else {"background": str(choice)})},
+    )  # fmt: skip
+
+
+def _agreed(ini: Path, said: tuple[int, int] | None, seen: tuple[int, int] | None) -> tuple[int, int] | None:
+    """The size that seqinfo.ini and the pictures agree on."""
+    if said is not None and seen is not None and said != seen:
+        raise InputError(
+            file=ini, place="imWidth, imHeight", got="{} × {}".format(*said),
+            expected="{} × {}, the size of the pictures".format(*seen), remedy="correct it, or restore the pictures",
+        )  # fmt: skip
+    return said or seen
+
+
+def open_text(
+    path: Path, *, fps: float | None = None, px_per_m: float | None = None, camera: Camera | None = None
+) -> Sequence:
+    """A bare MOT text file as Sequence: detections where every id is -1, else truth."""
+    rate = frame_rate(fps, None)
+    scale = float("nan") if px_per_m is None else px_per_m
+    found = mot_text.read_detections(path, None)
+    if not len(found.frame):
+        raise InputError(file=path, got="no row", expected="people or detections", remedy="check the file")
+    length = int(found.frame.max(initial=0))
+    nobody = bool((found.id == -1).all())
+
+    def frames() -> Iterator[Frame]:
+        for index in range(1, length + 1):
+            here = found.at(index, rate) if nobody else None
+            yield Frame(index, (index - 1) / rate, detections=here)
+
+    return Sequence(
+        name=path.stem, fps=rate, length=length, frames=frames,
+        load_truth=None if nobody else lambda: mot_text.read_truth(path, path.stem, rate, length, scale),
+        camera=camera, px_per_m=scale, has_detections=nobody, source={"kind": "mot text", "path": str(path)},
+    )  # fmt: skip
+
+
+def _labelled(found: mot_text.DetectionTable | None, gt: Path) -> int:
+    """The last frame that texts speak of."""
+    last = 0 if found is None else int(found.frame.max(initial=0))
+    return max(last, int(mot_text.read_table(gt).frame.max(initial=0))) if gt.is_file() else last

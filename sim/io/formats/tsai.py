@@ -1,0 +1,74 @@
+"""Tsai's camera calibration as XML (the form of PETS 2009): Geometry, Intrinsic, Extrinsic.
+
+x_cam = R X + T in mm with R = Rz Ry Rx; ideal sensor mm f x/z; distorted Xd (1 + kappa1 r_d²) = ideal;
+px Xf = sx Xd/dpx + cx, Yf = Yd/dpy + cy. Tsai's px count from the middle of the first pixel, ours from its corner.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+from xml.etree import ElementTree
+
+import numpy as np
+
+from scenarios.errors import InputError
+from sim.io.files.numeric_text import read_text
+from sim.types import Array, Camera
+
+MM = 1000.0  # per m
+PARTS = {
+    "Geometry": ("width", "height", "dpx", "dpy"),
+    "Intrinsic": ("focal", "kappa1", "cx", "cy", "sx"),
+    "Extrinsic": ("tx", "ty", "tz", "rx", "ry", "rz"),
+}
+POSITIVE = ("width", "height", "dpx", "dpy", "focal", "sx")
+
+
+def read_tsai(path: Path) -> Camera:
+    """The calibrated camera, world in metres; InputError where the file is none or lacks a number."""
+    v = _values(path)
+    rotation = _rotation(v["rx"], v["ry"], v["rz"])
+    shift = np.array([v["tx"], v["ty"], v["tz"]]) / MM
+    return Camera(
+        kind="pinhole",
+        image=(round(v["width"]), round(v["height"])),
+        focal_px=(v["sx"] * v["focal"] / v["dpx"], v["focal"] / v["dpy"]),
+        centre_px=(v["cx"] + 0.5, v["cy"] + 0.5),
+        position=-rotation.T @ shift,
+        rotation=rotation,
+        radial=v["kappa1"] * v["focal"] ** 2,
+    )
+
+
+def _values(path: Path) -> dict[str, float]:
+    try:
+        root = ElementTree.fromstring(read_text(path))
+    except ElementTree.ParseError as error:
+        expected = "Tsai's calibration as XML, or a camera.json"
+        raise InputError(file=path, got=f"no XML ({error})", expected=expected, remedy="check --camera") from None
+    found = {}
+    for part, names in PARTS.items():
+        element = root.find(part)
+        for name in names:
+            text = None if element is None else element.get(name)
+            try:
+                value = float(text if text is not None else "nan")
+            except ValueError:
+                value = float("nan")
+            if not np.isfinite(value) or (name in POSITIVE and value <= 0):
+                kind = "a number above 0" if name in POSITIVE else "a number"
+                raise InputError(
+                    file=path, place=f"{part} {name}", got="nothing" if text is None else repr(text), expected=kind,
+                    remedy="complete the calibration",
+                )  # fmt: skip
+            found[name] = value
+    return found
+
+
+def _rotation(rx: float, ry: float, rz: float) -> Array:
+    """Rz Ry Rx, radians."""
+    (a, b, c), (sa, sb, sc) = np.cos([rx, ry, rz]), np.sin([rx, ry, rz])
+    x = np.array([[1, 0, 0], [0, a, -sa], [0, sa, a]])
+    y = np.array([[b, 0, sb], [0, 1, 0], [-sb, 0, b]])
+    z = np.array([[c, -sc, 0], [sc, c, 0], [0, 0, 1]])
+    return np.asarray(z @ y @ x)

@@ -1,0 +1,121 @@
+"""Video files as Sequences, through PyAV: pictures only, sound is left alone.
+
+A frame is a slot: what cannot be decoded is a frame without a picture. Containers lie about their frame rate: it is
+believed where the time stamps agree.
+"""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+
+from scenarios.errors import InputError
+from sim.io.pictures import video_decoding
+from sim.io.pictures.picture_folder import checked, filled, size_of
+from sim.io.store.background_sample import Choice, Sample
+from sim.io.store.camera_files import fitted
+from sim.types import Camera, Frame, Image, Sequence
+
+SUFFIXES = (
+    ".mp4", ".m4v", ".mov", ".3gp", ".mkv", ".webm", ".avi", ".wmv", ".flv", ".ogv", ".mpg", ".mpeg",
+    ".ts", ".mts", ".m2ts", ".h264", ".h265", ".hevc", ".y4m",
+)  # fmt: skip
+RATES = (0.1, 300.0)  # frames/s that make sense
+AGREE = 0.02  # by which the container's rate may differ from that of the time stamps
+GAP, GAPS = 1.0, 5.0  # s, and times the usual step: time without a frame that is told
+DEFAULT_FPS = 25.0
+ANY = Choice()
+
+
+def open_video(
+    path: Path,
+    *,
+    fps: float | None = None,
+    px_per_m: float | None = None,
+    camera: Camera | None = None,
+    background: Choice = ANY,
+) -> Sequence:
+    """A video file as Sequence; InputError where no picture can be decoded."""
+    index = video_decoding.packets(path)
+    length = len(index.stamps)
+    first = next((picture for _, picture in video_decoding.pictures(path, index)), None)
+    if first is None:
+        got = f"{length} frames, none of which can be decoded" if length else "no frame"
+        raise InputError(file=path, got=got, expected="a video with pictures", remedy=video_decoding.REMEDY)
+    for words in missing(index):
+        warnings.warn(f"{path.name}: {words}", stacklevel=2)
+    size, known = size_of(first), None if index.codec in video_decoding.HIDDEN else length
+    rate, words = frame_rate(path.name, fps, index)
+    choice = background.of(length, path)
+
+    def frames() -> Iterator[Frame]:
+        for k, picture in enumerate(filled(_pictures(path, index, size), known, path.name), 1):
+            yield Frame(k, (k - 1) / rate, picture)
+
+    return Sequence(
+        name=path.stem, fps=rate, length=known, frames=frames,
+        image_size=size, camera=None if camera is None else fitted(camera, size, path),
+        px_per_m=float("nan") if px_per_m is None else px_per_m, has_images=True,
+        load_background=Sample(choice, length, path, lambda wanted: _pictures(path, index, size, wanted)),
+        source={"kind": "video", "path": str(path), "fps": words, "background": str(choice)},
+        bare=None if known is None else lambda: (Frame(k, (k - 1) / rate) for k in range(1, known + 1)),
+    )  # fmt: skip
+
+
+def missing(index: video_decoding.Packets) -> Iterator[str]:
+    """In words, what of a video is not there: its end, by its own header, and times at which it shows nothing."""
+    times, length = index.times(), len(index.stamps)
+    step = np.diff(times)
+    usual = float(np.median(step)) if len(step) else 0.0
+    shown = float(times[-1]) + usual if len(times) else index.seconds
+    if index.broken:
+        yield f"breaks off after {length} frames ({index.broken})"
+    elif length < index.promised:
+        yield f"ends after {length} of the {index.promised} frames it promises"
+    elif not index.promised and index.seconds - shown > max(GAP, GAPS * usual):
+        yield f"ends after {shown:.1f} of the {index.seconds:.1f} s it promises"
+    gaps = np.flatnonzero(step > max(GAP, GAPS * usual)) + 1
+    if len(gaps):
+        more = f" ({len(gaps) - 1} more such)" if len(gaps) > 1 else ""
+        yield f"nothing for {step[gaps[0] - 1]:.1f} s after frame {gaps[0]}{more}; frames are numbered without the gap"
+
+
+def frame_rate(name: str, given: float | None, index: video_decoding.Packets) -> tuple[float, str]:
+    """Frames per second and where they come from: --fps, the container, its time stamps, else 25 with a warning."""
+    if given is not None:
+        return given, f"{given:g}, as given"
+    said, timed = index.rate, stamped_rate(index)
+    if _sensible(said) and (not _sensible(timed) or abs(said / timed - 1) <= AGREE):
+        return said, f"{said:g}, as the container says"
+    if _sensible(timed):
+        text = f"{timed:g} by its time stamps (the container says {said:g})"
+        rate = timed
+    else:
+        text = f"{DEFAULT_FPS:g} (the container says {said:g}, its time stamps {timed:g})"
+        rate = DEFAULT_FPS
+    warnings.warn(f"{name}: frames per second taken as {text}; --fps says otherwise", stacklevel=3)
+    return rate, text
+
+
+def _sensible(rate: float) -> bool:
+    return RATES[0] <= rate <= RATES[1]
+
+
+def stamped_rate(index: video_decoding.Packets) -> float:
+    """Frames per second by the time stamps, to 1e-3, gaps left out; 0 where stamps do not tell."""
+    step = np.diff(index.times())
+    if not len(step):
+        return 0.0
+    usual = np.abs(step - np.median(step)) <= np.median(step) / 2
+    return round(1.0 / float(step[usual].mean()), 3)
+
+
+def _pictures(
+    path: Path, index: video_decoding.Packets, size: tuple[int, int], wanted: list[int] | None = None
+) -> Iterator[tuple[int, Image]]:
+    return (
+        (k, checked(picture, size, path, f"frame {k}")) for k, picture in video_decoding.pictures(path, index, wanted)
+    )

@@ -1,0 +1,161 @@
+"""A sequence's pictures on their way to the disk, one by one: drawn, hashed as they are, encoded, written."""
+
+from __future__ import annotations
+
+import hashlib
+from contextlib import AbstractContextManager, ExitStack, nullcontext
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from scenarios.errors import InputError
+from sim import hashing
+from sim.io.files import atomic
+from sim.io.files.tables import Column, table_bytes
+from sim.io.pictures.video_encoding import Movie, movie
+from sim.io.store import streams
+from sim.types import Frame, Image, PixelTruth, Sequence, Truth
+
+JPG_QUALITY = 95
+TABLE = "gt/pixels.parquet"
+BOX = ("modal_left", "modal_top", "modal_width", "modal_height")
+
+Facts = dict[str, dict[str, Any]]
+
+
+@dataclass(frozen=True)
+class Pictures:
+    """What has been written: which streams, as what, the hash of each one's raw pixels, and its files' hashes."""
+
+    streams: tuple[str, ...] = ()
+    images: str | None = None
+    pixels: dict[str, str] = field(default_factory=dict)
+    files: Facts = field(default_factory=dict)
+
+
+NONE = Pictures()
+
+
+class Output:
+    """One stream: takes a picture at a time; `files` holds size and hash of what has been written."""
+
+    def __init__(self, folder: Path, stream: str, images: str, size: tuple[int, int], fps: float):
+        self.stream, self.images, self.folder = stream, images, folder
+        self.pixels, self.files = hashing.PixelHash(), Facts()
+        self._open: AbstractContextManager[Movie | None] = nullcontext()
+        if streams.suffix(stream, images) == "mp4":
+            self._open = movie(folder / streams.file_name(stream, images, 1), size, fps)
+
+    def add(self, picture: NDArray[Any]) -> None:
+        """The next picture: (H, W, 3) uint8, or (H, W) uint16 of an exact stream."""
+        self.pixels.add(picture)
+        if self._movie is not None:
+            self._movie.add(picture)
+            return
+        name = streams.file_name(self.stream, self.images, self.pixels.count)
+        body = encoded(picture, streams.suffix(self.stream, self.images))
+        atomic.put(self.folder / name, body)
+        self.files[name] = {"sha256": hashing.file_hash(body), "bytes": len(body)}
+
+    def __enter__(self) -> Output:
+        self._movie = self._open.__enter__()
+        return self
+
+    def __exit__(self, *error: Any) -> None:
+        self._open.__exit__(*error)
+        if self._movie is not None and error[0] is None:
+            name = streams.file_name(self.stream, self.images, 1)
+            with (self.folder / name).open("rb") as file:
+                digest = hashlib.file_digest(file, "sha256").hexdigest()
+            self.files[name] = {"sha256": digest, "bytes": (self.folder / name).stat().st_size}
+
+
+def encoded(picture: NDArray[Any], kind: str) -> bytes:
+    """A picture as the bytes of a jpg or png."""
+    import cv2
+
+    options = [cv2.IMWRITE_JPEG_QUALITY, JPG_QUALITY] if kind == "jpg" else []
+    done, body = cv2.imencode(f".{kind}", picture, options)
+    assert done
+    return body.tobytes()
+
+
+def write_pictures(folder: Path, sequence: Sequence, wanted: tuple[str, ...], images: str) -> Pictures:
+    """Draw a sequence's streams into a folder; with them, where its pixels are known, who shows where (TABLE)."""
+    if not wanted:
+        return NONE
+    assert sequence.image_size is not None, "pictures have a size"
+    known: list[PixelTruth] = []
+    with ExitStack() as stack:
+        form = (images, sequence.image_size, sequence.fps)
+        outputs = {name: stack.enter_context(Output(folder, name, *form)) for name in wanted}
+        if "background" in outputs:
+            for picture in _background(sequence):
+                outputs["background"].add(picture)
+        seen = not outputs.keys().isdisjoint({"left", "right"})
+        for frame in sequence if seen else sequence.without_pictures():
+            _add(outputs, sequence, frame, known)
+    files = {name: facts for output in outputs.values() for name, facts in output.files.items()}
+    if known and sequence.truth is not None:
+        body = pixel_table(sequence.truth, known)
+        atomic.put(folder / TABLE, body)
+        files[TABLE] = {"sha256": hashing.file_hash(body), "bytes": len(body)}
+    pixels = {name: output.pixels.hex() for name, output in outputs.items()}
+    return Pictures(wanted, streams.coding(wanted, images), pixels, files)
+
+
+def _background(sequence: Sequence) -> Image:
+    found = sequence.background()
+    if found is None:
+        raise _missing(sequence, "background")
+    return found
+
+
+def _add(outputs: dict[str, Output], sequence: Sequence, frame: Frame, known: list[PixelTruth]) -> None:
+    """One frame to each stream."""
+    for name, picture in (("left", frame.image), ("right", frame.right)):
+        if name in outputs:
+            if picture is None:
+                raise _missing(sequence, name)
+            outputs[name].add(picture)
+    if sequence.load_pixels is None:
+        if not outputs.keys().isdisjoint(streams.EXACT):
+            raise _missing(sequence, "ids and disparity")
+        return
+    pixels = sequence.load_pixels(frame.index)
+    if "ids" in outputs:
+        outputs["ids"].add(streams.coded_ids(pixels.ids))
+    if "disparity" in outputs:
+        if pixels.disparity is None:
+            raise _missing(sequence, "disparity")
+        outputs["disparity"].add(streams.coded_disparity(pixels.disparity))
+    known.append(pixels.replace(ids=np.zeros((0, 0), np.int64), disparity=None))
+
+
+def _missing(sequence: Sequence, stream: str) -> InputError:
+    return InputError(
+        file=sequence.name, place=f"--streams {stream}", got="a sequence without it", expected="one that has it",
+        remedy="leave the stream out, or give its camera a baseline",
+    )  # fmt: skip
+
+
+def pixel_table(truth: Truth, known: list[PixelTruth]) -> bytes:
+    """Who shows how much, where, and in which blob: one row per person and frame, in the order of truth.parquet."""
+
+    def joined(name: str) -> NDArray[Any]:
+        return np.concatenate([getattr(pixels, name) for pixels in known])
+
+    box = np.concatenate([pixels.box.reshape(-1, 4) for pixels in known])
+    columns = [
+        Column("frame", truth.frame),
+        Column("id", truth.id),
+        Column("visible_px", joined("visible_px"), "px²"),
+        Column("amodal_px", joined("amodal_px"), "px²"),
+        Column("visibility_px", joined("visibility")),
+        *(Column(name, box[:, k], "px") for k, name in enumerate(BOX)),
+        Column("blob", joined("blob")),
+    ]
+    return table_bytes(columns, {"frames": len(known)})

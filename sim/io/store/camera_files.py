@@ -1,0 +1,145 @@
+"""Camera and scene as JSON, exact to the last bit, and whatever a user gives as calibration of a recording."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from scenarios.errors import InputError
+from sim.io.files import tables
+from sim.types import Array, Camera, Scene, Stairs
+
+SHAPE = 0.01  # by which the ratio of width to height may differ between a calibration and a recording
+
+
+def camera_document(camera: Camera) -> dict[str, Any]:
+    """camera.json: kind, image [width, height] px, focal_px, centre_px, position (3) m, rotation 3x3 (world to
+    camera), baseline m, px_per_m (null for a pinhole), radial where the lens distorts."""
+    bend = {"radial": camera.radial} if camera.radial else {}
+    return {
+        "format": tables.FORMAT,
+        "kind": camera.kind,
+        "image": list(camera.image),
+        "focal_px": list(camera.focal_px),
+        "centre_px": list(camera.centre_px),
+        "position": camera.position.tolist(),
+        "rotation": camera.rotation.tolist(),
+        "baseline": camera.baseline,
+        "px_per_m": tables.finite(camera.px_per_m),
+        **bend,
+    }
+
+
+def read_calibration(path: Path) -> Camera:
+    """A camera.json of ours or, ending in .xml, Tsai's calibration."""
+    if not path.is_file():
+        expected = "a camera.json, or Tsai's calibration as .xml"
+        raise InputError(file=path, got="no file", expected=expected, remedy="check --camera")
+    from sim.io.formats.tsai import read_tsai
+
+    return read_tsai(path) if path.suffix.lower() == ".xml" else read_camera(path)
+
+
+def fitted(camera: Camera, image: tuple[int, int] | None, path: Path) -> Camera:
+    """The camera of a recording of that size: scaled where it was calibrated at another. None: taken as it is.
+
+    InputError where the two have different shapes: then the calibration is of another recording.
+    """
+    if image is None or image == camera.image:
+        return camera
+    x, y = image[0] / camera.image[0], image[1] / camera.image[1]
+    if abs(x / y - 1) > SHAPE:
+        raise InputError(
+            file=path, place="--camera", got="a calibration for {}×{} px".format(*camera.image),
+            expected="one for {}×{} px, or of that shape".format(*image), remedy="give this recording's calibration",
+        )  # fmt: skip
+    (fx, fy), (cx, cy) = camera.focal_px, camera.centre_px
+    return camera.replace(
+        image=image,
+        focal_px=(fx * x, fy * y),
+        centre_px=(cx * x, cy * y),
+        px_per_m=float(camera.px_per_m * np.sqrt(x * y)),
+    )
+
+
+def read_camera(path: Path) -> Camera:
+    """A camera.json; InputError where a key is missing or of the wrong shape."""
+    d = tables.read_json(path)
+    kind = _key(path, d, "kind")
+    if kind not in ("pinhole", "top"):
+        raise InputError(file=path, place="kind", got=repr(kind), expected='"pinhole" or "top"', remedy="correct it")
+    width, height = _numbers(path, d, "image", (2,))
+    fx, fy = _numbers(path, d, "focal_px", (2,))
+    cx, cy = _numbers(path, d, "centre_px", (2,))
+    scale = d.get("px_per_m")
+    if scale is None and kind == "top":
+        raise InputError(file=path, place="px_per_m", got="null", expected="a scale for kind top", remedy="add it")
+    return Camera(
+        kind=kind, image=(int(width), int(height)), focal_px=(float(fx), float(fy)), centre_px=(float(cx), float(cy)),
+        position=_numbers(path, d, "position", (3,)), rotation=_numbers(path, d, "rotation", (3, 3)),
+        baseline=float(_numbers(path, {"baseline": d.get("baseline", 0.0)}, "baseline", ())),
+        px_per_m=float("nan") if scale is None else float(_numbers(path, d, "px_per_m", ())),
+        radial=float(_numbers(path, {"radial": d.get("radial", 0.0)}, "radial", ())),
+    )  # fmt: skip
+
+
+def scene_document(scene: Scene) -> dict[str, Any]:
+    """scene.json: size, walls [[x1, y1], [x2, y2]], pillars [x, y, radius], doors, service, stairs; all in m."""
+    stairs = [
+        {"foot": s.foot.tolist(), "head": s.head.tolist(), "width": s.width, "rise": s.rise, "steps": s.steps,
+         "landing": s.landing}
+        for s in scene.stairs
+    ]  # fmt: skip
+    arrays = {name: getattr(scene, name).tolist() for name in ("size", "walls", "pillars", "doors", "service")}
+    heights = {"wall_height": scene.wall_height, "pillar_height": scene.pillar_height}
+    return {"format": tables.FORMAT, **arrays, "stairs": stairs, **heights}
+
+
+def read_scene(path: Path) -> Scene:
+    """A scene.json; InputError where a key is missing or of the wrong shape."""
+    d = tables.read_json(path)
+
+    def flight(k: int, s: dict[str, Any]) -> Stairs:
+        place = f"stairs[{k}]."
+        one = {f"{place}{name}": value for name, value in s.items()}
+        width, rise, steps, landing = (
+            float(_numbers(path, one, place + name, ())) for name in ("width", "rise", "steps", "landing")
+        )
+        foot, head = (_numbers(path, one, place + name, None) for name in ("foot", "head"))
+        return Stairs(foot, head, width, rise, int(steps), landing)
+
+    return Scene(
+        size=_numbers(path, d, "size", (2,)),
+        walls=_numbers(path, d, "walls", (-1, 2, 2)),
+        pillars=_numbers(path, d, "pillars", (-1, 3)),
+        doors=_numbers(path, d, "doors", (-1, 2, 2)),
+        service=_numbers(path, d, "service", (-1, 2)),
+        stairs=tuple(flight(k, s) for k, s in enumerate(_key(path, d, "stairs"))),
+        wall_height=float(_numbers(path, d, "wall_height", ())),
+        pillar_height=float(_numbers(path, d, "pillar_height", ())),
+    )
+
+
+def _key(path: Path, d: dict[str, Any], key: str) -> Any:
+    if key not in d:
+        raise InputError(file=path, place=key, got="nothing", expected="a value", remedy="add the key")
+    return d[key]
+
+
+def _numbers(path: Path, d: dict[str, Any], key: str, shape: tuple[int, ...] | None) -> Array:
+    """The finite numbers under a key; shape -1 for any length, None for any shape."""
+    value = _key(path, d, key)
+    try:
+        a = np.asarray(value, np.float64)
+    except (TypeError, ValueError):
+        a = np.array(np.nan)
+    free = shape is not None and shape[:1] == (-1,)
+    if shape is not None and free and a.size == 0:
+        a = a.reshape(0, *shape[1:])
+    fits = shape is None or a.shape == shape or (free and a.ndim == len(shape) and a.shape[1:] == shape[1:])
+    if not fits or not np.isfinite(a).all():
+        wanted = "finite numbers" if shape is None else f"finite numbers of shape {shape}"
+        raise InputError(file=path, place=key, got=str(value)[:80], expected=wanted, remedy="correct it")
+    return a

@@ -1,0 +1,122 @@
+"""events.json, near.csv and script.json."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from scenarios.errors import InputError
+from sim.io.files.numeric_text import read_text
+from sim.io.files.tables import finite, listing, number, read_document
+from sim.types import EVENT_KINDS, GroupEvent, Near, Order
+
+NEAR_COLUMNS = "start,end,a,b"
+
+
+def event_dict(event: GroupEvent) -> dict[str, Any]:
+    """An event for JSON; an unknown place is null."""
+    return {
+        "kind": event.kind, "start": int(event.start), "end": int(event.end),
+        "emitted": None if event.emitted is None else int(event.emitted),
+        "before": [int(g) for g in event.before], "after": [int(g) for g in event.after],
+        "members": [int(m) for m in event.members], "pos": [finite(float(v)) for v in event.pos],
+    }  # fmt: skip
+
+
+def events_bytes(events: Iterable[GroupEvent]) -> bytes:
+    """events.json of a truth."""
+    return listing("events", map(event_dict, events))
+
+
+def read_events(path: Path) -> list[tuple[GroupEvent, int | None]]:
+    """events.json: each event, and the frame of the tracker's answer that held it, if stored."""
+    found = read_document(path).get("events")
+    if not isinstance(found, list):
+        raise InputError(file=path, place="events", got=type(found).__name__, expected="a list", remedy="correct it")
+    return [(_event(path, k, e), _frame(path, k, e)) for k, e in enumerate(found)]
+
+
+def _frame(path: Path, k: int, e: dict[str, Any]) -> int | None:
+    try:
+        return None if e.get("frame") is None else _whole(e["frame"])
+    except TypeError as error:
+        raise _bad(path, k, f"frame {error}", "the frame of an answer, or none") from None
+
+
+def _event(path: Path, k: int, e: Any) -> GroupEvent:
+    try:
+        event = GroupEvent(
+            str(e["kind"]), _whole(e["start"]), _whole(e["end"]),
+            None if e["emitted"] is None else _whole(e["emitted"]),
+            tuple(map(_whole, e["before"])), tuple(map(_whole, e["after"])), tuple(map(_whole, e["members"])),
+            (number(e["pos"][0]), number(e["pos"][1])),
+        )  # fmt: skip
+    except (KeyError, TypeError, ValueError, IndexError) as error:
+        raise _bad(path, k, f"{type(error).__name__} {error}", "an event with all its keys") from None
+    if event.kind not in EVENT_KINDS:
+        raise _bad(path, k, repr(event.kind), f"a kind out of {', '.join(EVENT_KINDS)}")
+    if not 1 <= event.start <= event.end:
+        raise _bad(path, k, f"frames {event.start} to {event.end}", "frames from 1, start not after end")
+    return event
+
+
+def _whole(value: Any) -> int:
+    if isinstance(value, bool) or not isinstance(value, int):
+        raise TypeError(f"{value!r} is no whole number")
+    return value
+
+
+def _bad(path: Path, k: int, got: str, expected: str) -> InputError:
+    return InputError(file=path, place=f"events[{k}]", got=got, expected=expected, remedy="correct the event")
+
+
+def near_bytes(near: Near) -> bytes:
+    """near.csv: start,end,a,b."""
+    rows = zip(near.start, near.end, near.a, near.b, strict=True)
+    return "".join([NEAR_COLUMNS + "\n", *(f"{s},{e},{a},{b}\n" for s, e, a, b in rows)]).encode()
+
+
+def read_near(path: Path) -> Near:
+    """near.csv back."""
+    lines = read_text(path).splitlines()
+    if lines[:1] != [NEAR_COLUMNS]:
+        raise InputError(
+            file=path, place="line 1", got="".join(lines[:1])[:80], expected=NEAR_COLUMNS, remedy="restore the header"
+        )
+    if len(lines) == 1:
+        return Near.none()
+    try:
+        table = np.array([[int(c) for c in line.split(",")] for line in lines[1:]], np.int64).reshape(-1, 4)
+    except ValueError as error:
+        raise InputError(file=path, got=str(error), expected="four whole numbers", remedy="restore it") from None
+    return Near(*(table[:, k].copy() for k in range(4)))
+
+
+def script_bytes(orders: Iterable[Order], fulfilled: Iterable[int | None]) -> bytes:
+    """script.json: the orders, and for each the position in events.json of the event that fulfilled it, or None."""
+    rows = (
+        {"id": o.id, "kind": o.kind, "fired": o.fired, "before": o.before, "after": o.after, "event": event}
+        for o, event in zip(orders, fulfilled, strict=True)
+    )
+    return listing("orders", rows)
+
+
+def read_script(path: Path) -> tuple[Order, ...]:
+    """The orders of script.json."""
+    found = read_document(path).get("orders")
+    try:
+        return tuple(
+            Order(str(o["id"]), str(o["kind"]), o["fired"], _people(o["before"]), _people(o["after"]))
+            for o in found or ()
+        )
+    except (KeyError, TypeError) as error:
+        raise InputError(
+            file=path, got=f"{type(error).__name__} {error}", expected="orders with all their keys", remedy="restore it"
+        ) from None
+
+
+def _people(groups: Any) -> tuple[tuple[int, ...], ...]:
+    return tuple(tuple(_whole(p) for p in group) for group in groups)

@@ -1,0 +1,170 @@
+"""Groups per frame: exact as Parquet, for reading as groups.csv with hulls as WKT."""
+
+from __future__ import annotations
+
+import csv
+import io
+from collections.abc import Sequence as Series
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from scenarios.errors import InputError
+from sim.io.files.numeric_text import read_text
+from sim.io.files.tables import Column, Table, table_bytes
+from sim.types import Array, Groups, Ints
+
+CSV_COLUMNS = ("frame", "group", "members", "x", "y", "hull", "size")
+EXTENT = ("extent_xx", "extent_xy", "extent_yx", "extent_yy")
+AXES = ("x", "y", "z")
+
+
+def groups_bytes(frames: Series[Groups | None], first: int, unit: str) -> bytes:
+    """groups.parquet of consecutive frames from `first`; unit "m" or "px". A frame of None is kept apart from one
+    without groups."""
+    known = [g for g in frames if g is not None]
+    axes = AXES[: known[0].pos.shape[1]] if known else AXES[:2]
+    counts = [0 if g is None else len(g.id) for g in frames]
+    ids = [g.id for g in known]
+    pos, vel = _stack([g.pos for g in known], len(axes)), _stack([g.vel for g in known], len(axes))
+    extent = _stack([g.extent.reshape(-1, 4) for g in known], 4)
+    columns = [
+        Column("frame", np.repeat(np.arange(first, first + len(frames), dtype=np.int64), counts)),
+        Column("group", np.concatenate([np.zeros(0, np.int64), *ids])),
+        Column("members", _lists([g.members for g in known], ids, np.zeros(0, np.int64)), "1", np.int64),
+        *(Column(a, pos[:, k], unit) for k, a in enumerate(axes)),
+        *(Column(f"v{a}", vel[:, k], f"{unit}/s") for k, a in enumerate(axes)),
+        *(Column(name, extent[:, k], f"{unit}^2") for k, name in enumerate(EXTENT)),
+        Column("size", np.concatenate([np.zeros(0), *(g.size for g in known)]), "people"),
+        Column("hull", _lists([g.hull for g in known], ids, np.zeros(0)), f"{unit}: x1, y1, x2, …"),
+    ]
+    missing = [first + k for k, g in enumerate(frames) if g is None]
+    memberless = [first + k for k, g in enumerate(frames) if g is not None and len(g.members) < len(g.id)]
+    facts = {"first": first, "frames": len(frames), "missing": missing, "memberless": memberless}
+    return table_bytes(columns, facts)
+
+
+def _lists(rows: list[tuple[Any, ...]], ids: list[Ints], empty: NDArray[Any]) -> list[NDArray[Any]]:
+    """The lists of all groups, flattened; where a frame has none at all (unknown), an empty one for each group."""
+    every = [item for row, id in zip(rows, ids, strict=True) for item in (row or (empty,) * len(id))]
+    return [np.asarray(item, empty.dtype).ravel() for item in every]
+
+
+def _stack(parts: list[Array], width: int) -> Array:
+    return np.concatenate([np.zeros((0, width)), *parts])
+
+
+def read_groups(table: Table) -> list[Groups | None]:
+    """The groups of each frame, from groups.parquet."""
+    first, count = int(table.fact("first")), int(table.fact("frames"))
+    missing, memberless = set(table.fact("missing")), set(table.fact("memberless"))
+    axes = [a for a in AXES if table.has(a)]
+    id, size = table.ints("group"), table.floats("size")
+    pos, vel = table.floats(*axes), table.floats(*(f"v{a}" for a in axes))
+    extent = table.floats(*EXTENT).reshape(-1, 2, 2)
+    members, hulls = table.lists("members", np.int64), [h.reshape(-1, 2) for h in table.lists("hull", np.float64)]
+    cuts = np.searchsorted(table.ints("frame"), np.arange(first, first + count + 1))
+    found: list[Groups | None] = []
+    for k in range(count):
+        r = slice(int(cuts[k]), int(cuts[k + 1]))
+        who = () if first + k in memberless else tuple(members[r])
+        some = Groups(id[r], who, pos[r], vel[r], extent[r], size[r], tuple(hulls[r]))
+        found.append(None if first + k in missing else some)
+    return found
+
+
+def wkt(hull: Array, digits: int) -> str:
+    """A closed ring as WKT."""
+    points = [f"{x:.{digits}f} {y:.{digits}f}" for x, y in hull]
+    return f"POLYGON (({', '.join([*points, points[0]])}))" if points else "POLYGON EMPTY"
+
+
+def parse_wkt(text: str) -> Array:
+    """(V, 2) vertices of a POLYGON without holes; ValueError for anything else."""
+    body = text.strip().removeprefix("POLYGON").strip()
+    if body == "EMPTY":
+        return np.zeros((0, 2))
+    if not (text.strip().startswith("POLYGON") and body.startswith("((") and body.endswith("))")):
+        raise ValueError("no POLYGON ((…))")
+    ring = np.array([[float(v) for v in point.split()] for point in body[2:-2].split(",")])
+    if ring.ndim != 2 or ring.shape[1] != 2 or not np.isfinite(ring).all():
+        raise ValueError("points are pairs of finite numbers")
+    return ring[:-1] if len(ring) > 1 and np.array_equal(ring[0], ring[-1]) else ring
+
+
+def groups_csv(ground: Series[Groups | None] | None, image: Series[Groups | None] | None, first: int = 1) -> bytes:
+    """groups.csv; x, y, hull in the plane of `ground` (3 digits), hull_px from `image` where given (2 digits)."""
+    text = io.StringIO()
+    writer = csv.writer(text, lineterminator="\n")
+    writer.writerow([*CSV_COLUMNS, *(["hull_px"] if image is not None else [])])
+    for k in range(len(ground if ground is not None else image or ())):
+        here = None if ground is None else ground[k]
+        px = None if image is None else image[k]
+        pictured = {} if px is None else {int(g): wkt(h, 2) for g, h in zip(px.id, px.hull, strict=False)}
+        for row in _csv_rows(here if here is not None else Groups.none() if px is None else _placeless(px)):
+            writer.writerow([first + k, *row, *([pictured.get(row[0], "")] if image is not None else [])])
+    return text.getvalue().encode()
+
+
+def _placeless(groups: Groups) -> Groups:
+    return groups.replace(pos=np.full_like(groups.pos, np.nan), hull=())
+
+
+def _csv_rows(groups: Groups) -> list[tuple[int, str, str, str, str, str]]:
+    rows = []
+    for k, id in enumerate(groups.id):
+        members = " ".join(map(str, groups.members[k])) if len(groups.members) else ""
+        hull = wkt(groups.hull[k], 3) if len(groups.hull) else ""
+        x, y, size = (_cell(v) for v in (groups.pos[k, 0], groups.pos[k, 1], groups.size[k]))
+        rows.append((int(id), members, x, y, hull, size))
+    return rows
+
+
+def _cell(value: float) -> str:
+    return "" if value != value else f"{value:.3f}".rstrip("0").rstrip(".")
+
+
+def read_groups_csv(path: Path, length: int) -> list[Groups]:
+    """groups.csv, anybody's, as the groups of frames 1 … length; velocity 0, extent unknown."""
+    reader = csv.DictReader(io.StringIO(read_text(path)))
+    wanted = [c for c in CSV_COLUMNS[:6] if c not in (reader.fieldnames or [])]
+    if wanted:
+        raise _bad(path, 1, f"no column {', '.join(wanted)}", ",".join(CSV_COLUMNS))
+    frames: list[list[tuple[int, Ints, Array, float, Array]]] = [[] for _ in range(length)]
+    for row in reader:
+        line = reader.line_num
+        try:
+            frame, id, members = int(row["frame"]), int(row["group"]), [int(m) for m in row["members"].split()]
+            pos = np.array([float(row["x"] or "nan"), float(row["y"] or "nan")])
+            size = float(row.get("size") or "nan")
+            hull = parse_wkt(row["hull"]) if row["hull"] else np.zeros((0, 2))
+        except (ValueError, TypeError, AttributeError) as error:
+            raise _bad(path, line, str(error), "frame,group,members,x,y,hull (WKT)") from None
+        if not 1 <= frame <= length or id < 0:
+            raise _bad(path, line, f"frame {frame}, group {id}", f"frames from 1 to {length}, groups from 0")
+        if any(id == other[0] for other in frames[frame - 1]):
+            raise _bad(path, line, f"group {id} twice in frame {frame}", "each group once in a frame")
+        frames[frame - 1].append((id, np.array(sorted(set(members)), np.int64), pos, size, hull))
+    return [_from_rows(sorted(rows, key=lambda r: r[0])) for rows in frames]
+
+
+def _from_rows(rows: list[tuple[int, Ints, Array, float, Array]]) -> Groups:
+    if not rows:
+        return Groups.none()
+    id, members, pos, size, hull = zip(*rows, strict=True)
+    n = len(rows)
+    return Groups(
+        np.array(id, np.int64),
+        members,
+        np.array(pos),
+        np.zeros((n, 2)),
+        np.full((n, 2, 2), np.nan),
+        np.array(size),
+        hull,
+    )
+
+
+def _bad(path: Path, line: int, got: str, expected: str) -> InputError:
+    return InputError(file=path, place=f"line {line}", got=got, expected=expected, remedy="correct the line")

@@ -1,0 +1,187 @@
+"""Our own store: one folder per sequence, complete when its manifest.json is there, read back equal to the last bit."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Iterator
+from functools import lru_cache
+from itertools import repeat
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from scenarios.errors import InputError
+from sim import hashing
+from sim.io.files import atomic, tables
+from sim.io.pictures.picture_writer import NONE, Pictures, write_pictures
+from sim.io.pictures.stored_pictures import Stored
+from sim.io.store import background_sample, truth_files
+from sim.io.store.background_sample import Choice, Sample
+from sim.io.store.camera_files import camera_document, read_camera, read_scene, scene_document
+from sim.io.store.event_files import read_script
+from sim.io.store.manifest import MANIFEST, altered, identity, read_manifest, sealed, versions
+from sim.io.store.streams import chosen, file_name
+from sim.types import Detections, Frame, Image, Sequence
+
+
+def write_sequence(
+    folder: Path,
+    sequence: Sequence,
+    *,
+    scenario: str,
+    seed: int,
+    repeat: int = 0,
+    streams: Iterable[str] = (),
+    images: str = "jpg",
+    keep: Callable[[], bool] = lambda: False,
+) -> Path:
+    """Store a sequence as `folder`, whole or not at all; `scenario` is the resolved scenario's TOML.
+
+    streams: those of its pictures to store (sim.io.store.streams.STREAMS), images: as jpg, png or mp4. One picture at
+    a time
+    is in memory. keep: whether what another has written there meanwhile shall stay.
+    """
+    wanted = chosen(streams, images)
+    with atomic.new_folder(folder, keep) as partial:
+        truth = sequence.truth  # a script that fails does so before a picture is drawn
+        assert truth is None or truth.length == sequence.length
+        pictures = write_pictures(partial, sequence, wanted, images)
+        files = sequence_files(sequence, scenario=scenario, seed=seed, repeat=repeat, pictures=pictures)
+        for name, body in files.items():
+            atomic.put(partial / name, body)
+    return folder
+
+
+def sequence_files(
+    sequence: Sequence, *, scenario: str, seed: int, repeat: int = 0, pictures: Pictures = NONE
+) -> dict[str, bytes]:
+    """All files of a sequence by name but its pictures, the manifest last."""
+    frames = list(sequence.without_pictures())
+    found = [f.detections for f in frames if f.detections is not None]
+    assert len(found) in (0, len(frames)), "a sensor answers every frame or none"
+    files = {"scenario.toml": scenario.encode(), "seqinfo.ini": _seqinfo(sequence, len(frames), pictures)}
+    if sequence.camera is not None:
+        files["camera.json"] = tables.document(camera_document(sequence.camera))
+    if sequence.scene is not None:
+        files["scene.json"] = tables.document(scene_document(sequence.scene))
+    if sequence.truth is not None:
+        files |= truth_files.truth_files(sequence.truth)
+    if found:
+        files |= truth_files.detection_files(found, sequence.fps, sequence.scene)
+    files = dict(sorted(files.items()))
+    manifest = _manifest(sequence, found, len(frames), scenario, seed, repeat, pictures)
+    listed = {name: {"sha256": hashing.file_hash(body), "bytes": len(body)} for name, body in files.items()}
+    listed = dict(sorted((listed | pictures.files).items()))
+    return {**files, MANIFEST: tables.document(sealed({**manifest, "files": listed}))}
+
+
+def _manifest(
+    sequence: Sequence, found: list[Detections], length: int, scenario: str, seed: int, repeat: int, pictures: Pictures
+) -> dict[str, Any]:
+    truth = hashing.truth_hash(scenario, seed, repeat, sequence.truth)
+    origin = {"origin": sequence.source["origin"]} if "origin" in sequence.source else {}
+    return {
+        **identity(scenario, seed, repeat, pictures.streams, pictures.images or "jpg"),
+        **origin,
+        "pixels": pictures.pixels,
+        "truth_hash": truth,
+        "content_hash": hashing.content_hash(truth, found, pictures.pixels),
+        "sequence": {
+            "name": sequence.name,
+            "fps": sequence.fps,
+            "length": length,
+            "image_size": None if sequence.image_size is None else list(sequence.image_size),
+            "px_per_m": tables.finite(sequence.px_per_m),
+        },
+        "cpu": hashing.cpu_level(),
+        "versions": versions(bool(pictures.streams)),
+    }
+
+
+def _seqinfo(sequence: Sequence, length: int, pictures: Pictures) -> bytes:
+    """Without pictures of its own a sequence says what MOTChallenge's would be, so that their tools read it."""
+    width, height = sequence.image_size or (0, 0)
+    folder, _, name = file_name("left", "png" if pictures.images == "png" else "jpg", 1).partition("/")
+    lines = [
+        f"name={sequence.name}",
+        f"imDir={folder}",
+        f"frameRate={str(sequence.fps).removesuffix('.0')}",
+        f"seqLength={length}",
+    ]
+    if sequence.image_size is not None:
+        lines += [f"imWidth={width}", f"imHeight={height}", f"imExt={Path(name).suffix}"]
+    return "\n".join(["[Sequence]", *lines, ""]).encode()
+
+
+def open_sequence(folder: Path, *, background: Choice | None = None) -> Sequence:
+    """A stored sequence, equal to the one written; InputError about the first file that is missing or altered.
+
+    Its pictures are checked when they are read. background: a sample of its frames instead of its own background.
+    """
+    manifest = read_manifest(folder)
+    for error in altered(folder, manifest, pictures=False):
+        raise error
+    about, has, pictures = manifest["sequence"], manifest["files"].keys(), Stored(folder, manifest)
+    size, length, fps = about["image_size"], about["length"], about["fps"]
+    left, right = "left" in pictures.streams, "right" in pictures.streams
+    load_background, words = _background(pictures, background, length)
+    origin = {"origin": manifest["origin"]} if "origin" in manifest else {}
+
+    @lru_cache(maxsize=1)
+    def detections() -> list[Detections]:
+        return truth_files.read_detections(folder / "det" / "det.parquet")
+
+    def bare() -> Iterator[Frame]:
+        for index in range(1, length + 1):
+            here = detections()[index - 1] if "det/det.parquet" in has else None
+            yield Frame(index, (index - 1) / fps, detections=here)
+
+    def frames() -> Iterator[Frame]:
+        nothing = repeat(None, length)
+        both = [pictures.all(name, length) if there else nothing for name, there in (("left", left), ("right", right))]
+        for frame, image, other in zip(bare(), *both, strict=True):
+            yield frame.replace(image=image, right=other)
+
+    return Sequence(
+        name=about["name"], fps=fps, length=length, frames=frames if left or right else bare,
+        load_truth=(lambda: truth_files.read_truth(folder)) if "gt/truth.parquet" in has else None,
+        image_size=None if size is None else (size[0], size[1]),
+        camera=read_camera(folder / "camera.json") if "camera.json" in has else None,
+        scene=read_scene(folder / "scene.json") if "scene.json" in has else None,
+        px_per_m=tables.number(about["px_per_m"]),
+        has_images=left, has_right=right, has_detections="det/det.parquet" in has, load_background=load_background,
+        load_people=(lambda: _people(folder, manifest)) if "gt/script.json" in has and not origin else None,
+        source={
+            "kind": "generated", "path": str(folder), "seed": manifest["seed"], "repeat": manifest["repeat"],
+            "truth_hash": manifest["truth_hash"], "streams": list(pictures.streams), "images": manifest.get("images"),
+            **words, **origin,
+        },
+        bare=bare if left or right else None,
+        load_pixels=pictures.pixel_loader() if {"ids"} <= set(pictures.streams) else None,
+    )  # fmt: skip
+
+
+def _background(
+    pictures: Stored, choice: Choice | None, length: int
+) -> tuple[Callable[[], Image] | None, dict[str, str]]:
+    """How to load the sample that was asked for, else the sequence's own, and what it is in words."""
+    if choice is not None:
+        if "left" not in pictures.streams:
+            got, remedy = "--background", "leave it out: it has none"
+            raise InputError(file=pictures.folder, got=got, expected="none for one without pictures", remedy=remedy)
+        fits = choice.of(length, pictures.folder)
+        return Sample(fits, length, pictures.folder, pictures.sample), {"background": str(fits)}
+    if "background" not in pictures.streams:
+        return None, {}
+    return (lambda: np.stack(list(pictures.all("background", background_sample.FRAMES)))), {
+        "background": background_sample.OWN
+    }
+
+
+def _people(folder: Path, manifest: dict[str, Any]) -> dict[str, tuple[int, ...]]:
+    """Ids of the people of each group of the script, cast anew from the stored scenario and seed."""
+    from scenarios import load
+    from sim.sequence import named_people
+
+    scene, orders = read_scene(folder / "scene.json"), read_script(folder / "gt" / "script.json")
+    return named_people(load(folder / "scenario.toml"), scene, manifest["seed"], manifest["repeat"], orders)

@@ -1,0 +1,244 @@
+"""A tracker's answer as files: tracks.parquet (exact), tracks.txt and tracks.mot.txt (MOTChallenge), groups, events.
+
+tracks.txt has 10 columns `frame,id,left,top,width,height,conf,x,y,z`: no box is -1,-1,-1,-1; the ground position is
+unknown iff z = -1. tracks.mot.txt is its first 7 columns: TrackEval takes column 8 for a class.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from scenarios.errors import InputError
+from sim.io.files import tables
+from sim.io.files.atomic import write_into
+from sim.io.files.tables import Column, Table, table_bytes
+from sim.io.formats.mot_text import place_text
+from sim.io.store.box_source import box_source
+from sim.io.store.event_files import event_dict, read_events
+from sim.io.store.group_files import AXES, groups_bytes, groups_csv, read_groups
+from sim.io.store.track_text import from_text, with_groups
+from sim.io.store.truth_files import BOX, scores, standing
+from sim.io.store.upright_boxes import upright_boxes
+from sim.types import Array, Bools, Camera, GroupEvent, Scene, Tracks
+
+NAMES = ("tracks.txt", "tracks.mot.txt", "tracks.parquet", "groups.csv", "groups.parquet", "events.json", "run.json")
+
+
+def write_tracks(
+    folder: str | Path,
+    tracks: Iterable[Tracks],
+    *,
+    fps: float,
+    camera: Camera | None = None,
+    scene: Scene | None = None,
+    info: dict[str, Any] | None = None,
+) -> Path:
+    """Store the answers of consecutive frames in `folder`, run.json last; what an earlier run left is replaced.
+
+    A tracker on the ground without boxes gets, with a camera, those of upright people (run.json: boxes). scene: where
+    the ground's height stands, on which they do.
+    """
+    folder = Path(folder)
+    write_into(folder, tracks_files(tracks, fps=fps, camera=camera, scene=scene, info=info), stale=NAMES)
+    return folder
+
+
+def tracks_files(
+    tracks: Iterable[Tracks],
+    *,
+    fps: float,
+    camera: Camera | None = None,
+    scene: Scene | None = None,
+    info: dict[str, Any] | None = None,
+) -> dict[str, bytes]:
+    """The files of `write_tracks` by name."""
+    every = list(tracks)
+    rows, boxes = _flatten(every, fps), box_source(every, camera)
+    text_box, place = rows.box, None if rows.plane == "image" else standing(rows.pos, scene)
+    if boxes == "projected" and camera is not None and place is not None:
+        text_box = upright_boxes(camera, place)
+    files = {
+        "tracks.parquet": _table(rows, every, fps),
+        "tracks.txt": _text(rows, text_box, place, full=True),
+        "tracks.mot.txt": _text(rows, text_box, place, full=False),
+    }
+    first = every[0].index if every else 1
+    groups = [t.groups for t in every]
+    if any(g is not None for g in groups):
+        files["groups.parquet"] = groups_bytes(groups, first, "px" if rows.plane == "image" else "m")
+        files["groups.csv"] = groups_csv(groups, None, first)
+    events = [{**event_dict(e), "frame": t.index} for t in every for e in t.events]
+    files["events.json"] = tables.listing("events", events)
+    files["run.json"] = tables.document({"format": tables.FORMAT, **(info or {}), "boxes": boxes})
+    return files
+
+
+@dataclass(frozen=True)
+class _Rows:
+    """All rows of all frames: box nan and boxless True where a frame has none."""
+
+    plane: str
+    unit: str
+    frame: Any
+    id: Any
+    group: Any
+    pos: Array
+    vel: Array
+    cov: Array
+    box: Array
+    boxless: Any
+    score: Array
+
+
+def _flatten(every: list[Tracks], fps: float) -> _Rows:
+    kinds = {(t.plane, t.unit) for t in every}
+    assert len(kinds) <= 1, f"a tracker stays in one plane and unit: {sorted(kinds)}"
+    plane, unit = next(iter(kinds), ("ground", "person"))
+    d = 3 if plane == "space" else 2
+    counts = [len(t.id) for t in every]
+
+    def join(parts: list[Any], empty: Any) -> Any:
+        return np.concatenate([empty, *parts])
+
+    ids = np.zeros(0, np.int64)
+    no_box = [np.full((len(t.id), 4), np.nan) if t.box is None else t.box for t in every]
+    return _Rows(
+        plane, unit, np.repeat(np.array([t.index for t in every], np.int64), counts),
+        join([t.id for t in every], ids), join([t.group for t in every], ids),
+        join([t.pos for t in every], np.zeros((0, d))), join([t.vel for t in every], np.zeros((0, d))),
+        join([t.cov for t in every], np.zeros((0, 2 * d, 2 * d))), join(no_box, np.zeros((0, 4))),
+        np.repeat(np.array([t.box is None for t in every], bool), counts),
+        join([scores(t.score, len(t.id)) for t in every], np.zeros(0)),
+    )  # fmt: skip
+
+
+def _state(plane: str) -> list[str]:
+    axes = AXES[:3] if plane == "space" else AXES[:2]
+    return [*axes, *(f"v{a}" for a in axes)]
+
+
+def _table(rows: _Rows, every: list[Tracks], fps: float) -> bytes:
+    unit, state = "px" if rows.plane == "image" else "m", _state(rows.plane)
+    values = np.concatenate([rows.pos, rows.vel], axis=1)
+    units = [f"{unit}/s" if name.startswith("v") else unit for name in state]
+    columns = [
+        Column("frame", rows.frame),
+        Column("id", rows.id),
+        Column("group", rows.group),
+        *(Column(name, values[:, k], u) for k, (name, u) in enumerate(zip(state, units, strict=True))),
+        *(Column(name, rows.box[:, k], "px") for k, name in enumerate(BOX)),
+        Column("score", rows.score),
+        *(
+            Column(f"cov_{a}_{b}", rows.cov[:, i, j], f"{units[i]} {units[j]}")
+            for i, a in enumerate(state)
+            for j, b in enumerate(state)
+        ),
+    ]
+    facts = {
+        "plane": rows.plane, "unit": rows.unit, "fps": fps, "first": every[0].index if every else 1,
+        "frames": len(every), "boxless": [t.index for t in every if t.box is None],
+        "derived": bool(every) and all(t.derived for t in every),
+    }  # fmt: skip
+    return table_bytes(columns, facts)
+
+
+def _text(rows: _Rows, box: Array, place: Array | None, *, full: bool) -> bytes:
+    boxed: Bools = np.asarray(np.isfinite(box).all(axis=1) & (box[:, 2:] > 0).all(axis=1))
+    places = [[np.nan] * 3] * len(rows.id) if place is None else place.tolist()
+    placed: Bools = np.asarray(np.isfinite(np.reshape(places, (-1, 3))).all(axis=1))
+    lines = []
+    for k, (frame, id, score) in enumerate(
+        zip(rows.frame.tolist(), rows.id.tolist(), rows.score.tolist(), strict=True)
+    ):
+        left, top, width, height = box[k].tolist()
+        corner = f"{left:.2f},{top:.2f},{max(width, 0.01):.2f},{max(height, 0.01):.2f}" if boxed[k] else "-1,-1,-1,-1"
+        where = place_text(places[k]) if placed[k] else "-1,-1,-1"
+        lines.append(f"{frame},{id},{corner},{score:.4f}" + (f",{where}\n" if full else "\n"))
+    return "".join(lines).encode()
+
+
+def read_tracks(path: str | Path, *, fps: float | None = None, length: int | None = None) -> list[Tracks]:
+    """The tracks of a folder (or of one of its files), of anybody's MOTChallenge text, or of a Parquet table.
+
+    From text alone velocities are the chord over 0.5 s, covariances nan, and events and groups those of files beside
+    it; boxes that run.json says are projected are left out. fps is then needed (25 if absent), and `length` adds
+    empty frames at the end.
+    """
+    path = Path(path)
+    folder = path if path.is_dir() else path.parent
+    exact = path if path.suffix == ".parquet" else folder / "tracks.parquet"
+    ours = path.is_dir() or path.name in ("tracks.txt", "tracks.parquet")
+    if ours and exact.is_file():
+        return _with_events(_exact(exact, folder), folder)
+    text = folder / "tracks.txt" if path.is_dir() else path
+    if not text.is_file():
+        raise InputError(
+            file=path, got="no tracks", expected="tracks.parquet, tracks.txt or a MOTChallenge text",
+            remedy="give the folder that `flockscope track` made",
+        )  # fmt: skip
+    projected = ours and (folder / "run.json").is_file() and _boxes(folder / "run.json") == "projected"
+    found = from_text(text, 25.0 if fps is None else fps, length, projected=projected)
+    if not ours:
+        return found
+    groups = folder / "groups.csv"
+    return _with_events(with_groups(found, groups) if groups.is_file() else found, folder)
+
+
+def _boxes(path: Path) -> Any:
+    """Where the boxes of a tracks.txt come from, by the run.json beside it."""
+    return tables.read_document(path).get("boxes")
+
+
+def _exact(path: Path, folder: Path) -> list[Tracks]:
+    table, groups_path = tables.read_table(path), folder / "groups.parquet"
+    derived = bool(table.facts.get("derived", False)) and (folder / "events.json").is_file()
+    plane, fps = table.fact("plane"), float(table.fact("fps"))
+    first, count, boxless = int(table.fact("first")), int(table.fact("frames")), set(table.fact("boxless"))
+    state = _state(plane)
+    d = len(state) // 2
+    values, cov = table.floats(*state), table.floats(*(f"cov_{a}_{b}" for a in state for b in state))
+    cov, box, score = cov.reshape(-1, 2 * d, 2 * d), table.floats(*BOX), table.floats("score")
+    id, group = table.ints("id"), table.ints("group")
+    groups = read_groups(tables.read_table(groups_path)) if groups_path.is_file() else [None] * count
+    cuts = _cuts(table, first, count)
+    found = []
+    for k in range(count):
+        index, r = first + k, slice(int(cuts[k]), int(cuts[k + 1]))
+        found.append(
+            Tracks(
+                index, (index - 1) / fps, plane, table.fact("unit"), id[r], group[r], values[r, :d], values[r, d:],
+                cov[r], None if index in boxless else box[r], score[r], groups[k],
+                derived=derived,
+            )
+        )  # fmt: skip
+    return found
+
+
+def _cuts(table: Table, first: int, count: int) -> Any:
+    frame = table.ints("frame")
+    if len(frame) and (frame.min() < first or frame.max() >= first + count or (np.diff(frame) < 0).any()):
+        wanted = f"frames {first} to {first + count - 1}, in order"
+        raise InputError(file=table.file, place="frame", got="other frames", expected=wanted, remedy=tables.REDO)
+    return np.searchsorted(frame, np.arange(first, first + count + 1))
+
+
+def _with_events(found: list[Tracks], folder: Path) -> list[Tracks]:
+    path = folder / "events.json"
+    if not path.is_file():
+        return found
+    first, last = (found[0].index, found[-1].index) if found else (1, 0)
+    held: dict[int, list[GroupEvent]] = {}
+    for k, (event, frame) in enumerate(read_events(path)):
+        at = next(index for index in (frame, event.emitted, event.end) if index is not None)
+        if not first <= at <= last:
+            raise InputError(
+                file=path, place=f"events[{k}]", got=f"an event said in frame {at}",
+                expected=f"a frame from {first} to {last}, as the tracks have", remedy="correct the event",
+            )  # fmt: skip
+        held.setdefault(at, []).append(event)
+    return [t.replace(events=tuple(held[t.index])) if t.index in held else t for t in found]

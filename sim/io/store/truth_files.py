@@ -1,0 +1,209 @@
+"""A sequence's truth and detections as files: exact in Parquet, rounded in MOTChallenge text."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from scenarios.errors import InputError
+from sim.io.files.tables import REDO, Column, Table, finite, number, read_table, table_bytes
+from sim.io.formats.mot_text import place_text
+from sim.io.store.event_files import events_bytes, near_bytes, read_events, read_near, read_script, script_bytes
+from sim.io.store.group_files import groups_bytes, groups_csv, read_groups
+from sim.scene.terrain import height_at
+from sim.types import Array, Bools, Detections, Groups, Scene, Truth
+
+BOX = ("box_left", "box_top", "box_width", "box_height")
+VISIBLE = ("visible_left", "visible_top", "visible_width", "visible_height")
+SINGLE = (("z", "m"), ("heading", "rad"), ("height", "m"), ("truncation", "1"))
+
+
+def truth_files(truth: Truth) -> dict[str, bytes]:
+    """Everything under gt/: truth.parquet, groups, events, near, script and MOTChallenge's gt.txt."""
+    files = {"gt/truth.parquet": _table(truth), "gt/script.json": script_bytes(truth.orders, _fulfilled(truth))}
+    if truth.box is not None:
+        files["gt/gt.txt"] = _mot_text(truth, truth.box)
+    if truth.groups is not None:
+        files["gt/groups.parquet"] = groups_bytes(truth.groups, 1, "m")
+    if truth.groups_px is not None:
+        files["gt/groups_px.parquet"] = groups_bytes(truth.groups_px, 1, "px")
+    if truth.groups is not None or truth.groups_px is not None:
+        files["gt/groups.csv"] = groups_csv(truth.groups, truth.groups_px)
+    if truth.events is not None:
+        files["gt/events.json"] = events_bytes(truth.events)
+    if truth.near is not None:
+        files["gt/near.csv"] = near_bytes(truth.near)
+    return files
+
+
+def _fulfilled(truth: Truth) -> list[int | None]:
+    """For each order the position of the event that fulfils it."""
+    if not truth.orders:
+        return []
+    from sim.truth.order_fulfilment import dense_groups, fulfilment
+
+    people = max([int(truth.id.max(initial=0)), *(p for o in truth.orders for part in o.after for p in part)])
+    group = dense_groups(truth, (truth.length, people))
+    return [fulfilment(order, truth, group) for order in truth.orders]
+
+
+def _table(truth: Truth) -> bytes:
+    columns = [Column("frame", truth.frame), Column("id", truth.id), Column("group", truth.group)]
+    for array, names, unit in (
+        (truth.pos, ("x", "y"), "m"),
+        (truth.vel, ("vx", "vy"), "m/s"),
+        (truth.box, BOX, "px"),
+        (truth.visible_box, VISIBLE, "px"),
+    ):
+        if array is not None:
+            columns += [Column(name, array[:, k], unit) for k, name in enumerate(names)]
+    columns.append(Column("visibility", truth.visibility))
+    singles = ((name, unit, getattr(truth, name)) for name, unit in SINGLE)
+    columns += [Column(name, array, unit) for name, unit, array in singles if array is not None]
+    facts = {
+        "name": truth.name, "fps": truth.fps, "length": truth.length, "px_per_m": finite(truth.px_per_m),
+        "labelled": None if truth.labelled is None else _spans(truth.labelled),
+    }  # fmt: skip
+    return table_bytes(columns, facts)
+
+
+def _spans(flags: Bools) -> list[list[int]]:
+    """First and last frame of each stretch of True."""
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], flags, [False]]).astype(np.int8)))
+    return [[int(a) + 1, int(b)] for a, b in edges.reshape(-1, 2)]
+
+
+def _flags(spans: list[list[int]], length: int) -> Bools:
+    flags = np.zeros(length, bool)
+    for first, last in spans:
+        flags[first - 1 : last] = True
+    return flags
+
+
+def _mot_text(truth: Truth, box: Array) -> bytes:
+    """gt.txt, 9 columns; people without a finite box (behind the camera) have no row."""
+    lines = []
+    rows = zip(truth.frame.tolist(), truth.id.tolist(), box.tolist(), truth.visibility.tolist(), strict=True)
+    for frame, id, (left, top, width, height), visibility in rows:
+        if np.isfinite([left, top, width, height]).all() and width > 0 and height > 0:
+            size = f"{max(width, 0.01):.2f},{max(height, 0.01):.2f}"
+            lines.append(f"{frame},{id},{left:.2f},{top:.2f},{size},1,1,{visibility:.3f}\n")
+    return "".join(lines).encode()
+
+
+def read_truth(folder: Path) -> Truth:
+    """The truth of a stored sequence, equal to the one written."""
+    gt = folder / "gt"
+    table = read_table(gt / "truth.parquet")
+    length, labelled = int(table.fact("length")), table.fact("labelled")
+
+    def several(*names: str) -> Array | None:
+        return table.floats(*names) if table.has(names[0]) else None
+
+    frame, id = table.ints("frame"), table.ints("id")
+    _check_rows(table, length)
+    return Truth(
+        name=table.fact("name"), fps=float(table.fact("fps")), length=length, px_per_m=number(table.fact("px_per_m")),
+        frame=frame, id=id, group=table.ints("group"),
+        pos=several("x", "y"), vel=several("vx", "vy"), box=several(*BOX), visible_box=several(*VISIBLE),
+        visibility=table.floats("visibility"),
+        **{name: several(name) for name, _ in SINGLE},
+        groups=_groups(gt / "groups.parquet"), groups_px=_groups(gt / "groups_px.parquet"),
+        labelled=None if labelled is None else _flags(labelled, length),
+        events=tuple(e for e, _ in read_events(gt / "events.json")) if (gt / "events.json").is_file() else None,
+        near=read_near(gt / "near.csv") if (gt / "near.csv").is_file() else None,
+        orders=read_script(gt / "script.json"),
+    )  # fmt: skip
+
+
+def _check_rows(table: Table, length: int) -> None:
+    frame, id = table.ints("frame"), table.ints("id")
+    step = np.diff(frame)
+    wrong = (step < 0) | ((step == 0) & (np.diff(id) <= 0))
+    outside = len(frame) > 0 and (frame.min() < 1 or frame.max() > length)
+    if wrong.any() or outside:
+        place = f"row {int(np.argmax(wrong)) + 1}" if wrong.any() else "frame"
+        got = f"rows out of order, twice, or outside frames 1 to {length}"
+        raise InputError(file=table.file, place=place, got=got, expected="rows sorted by (frame, id)", remedy=REDO)
+
+
+def _groups(path: Path) -> tuple[Groups, ...] | None:
+    if not path.is_file():
+        return None
+    return tuple(g if g is not None else Groups.none() for g in read_groups(read_table(path)))
+
+
+def detection_files(detections: list[Detections], fps: float, scene: Scene | None = None) -> dict[str, bytes]:
+    """det/det.parquet (exact) and det/det.txt (10 columns) of the detections of frames 1, 2, …
+
+    scene: where the ground's height stands that det.txt gives points on the ground as z; flat without one.
+    """
+    plane, boxed, moving = _form(detections)
+    axes = ("x", "y", "z")[: detections[0].pos.shape[1]] if detections else ("x", "y")
+    unit = "px" if plane == "image" else "m"
+    counts = [len(d.pos) for d in detections]
+    pos = np.concatenate([np.zeros((0, len(axes))), *(d.pos for d in detections)])
+    score = np.concatenate([np.zeros(0), *(scores(d.score, len(d.pos)) for d in detections)])
+    columns = [
+        Column("frame", np.repeat(np.arange(1, len(detections) + 1, dtype=np.int64), counts)),
+        *(Column(a, pos[:, k], unit) for k, a in enumerate(axes)),
+        Column("score", score),
+    ]
+    if moving:
+        vel = np.concatenate([d.vel for d in detections if d.vel is not None])
+        columns += [Column(f"v{a}", vel[:, k], f"{unit}/s") for k, a in enumerate(axes)]
+    box = np.concatenate([d.box for d in detections if d.box is not None]) if boxed else None
+    if box is not None:
+        columns += [Column(name, box[:, k], "px") for k, name in enumerate(BOX)]
+    facts = {"plane": plane, "frames": len(detections), "fps": fps}
+    text = _det_text(columns[0].values, box, score, None if plane == "image" else standing(pos, scene))
+    return {"det/det.parquet": table_bytes(columns, facts), "det/det.txt": text}
+
+
+def _form(detections: list[Detections]) -> tuple[str, bool, bool]:
+    """Plane, and whether boxes and velocities are there: the same in every frame of a sensor."""
+    forms = {(d.plane, d.box is not None, d.vel is not None) for d in detections}
+    assert len(forms) <= 1, f"detections of one sequence differ in kind: {sorted(forms)}"
+    return next(iter(forms), ("image", True, False))
+
+
+def scores(score: Array, rows: int) -> Array:
+    """The scores, 1 each where a detector or tracker gives none."""
+    return score if len(score) == rows else np.ones(rows)
+
+
+def standing(pos: Array, scene: Scene | None) -> Array:
+    """(N, 3) m of places (N, 2 or 3): those on the ground with the height it has there, 0 without a scene."""
+    if pos.shape[1] == 3:
+        return pos
+    z = np.zeros(len(pos)) if scene is None else height_at(scene, pos)
+    return np.concatenate([pos, z[:, None]], axis=1)
+
+
+def _det_text(frame: Any, box: Array | None, score: Array, ground: Array | None) -> bytes:
+    boxes = np.full((len(score), 4), -1.0) if box is None else np.c_[box[:, :2], np.maximum(box[:, 2:], 0.01)]
+    lines = []
+    for k, f in enumerate(frame):
+        corner = "-1,-1,-1,-1" if box is None else ",".join(f"{v:.2f}" for v in boxes[k])
+        place = "-1,-1,-1" if ground is None else place_text(ground[k])
+        lines.append(f"{f},-1,{corner},{score[k]:.4f},{place}\n")
+    return "".join(lines).encode()
+
+
+def read_detections(path: Path) -> list[Detections]:
+    """det.parquet back: one Detections per frame."""
+    table = read_table(path)
+    axes = [a for a in ("x", "y", "z") if table.has(a)]
+    pos, score, fps = table.floats(*axes), table.floats("score"), float(table.fact("fps"))
+    vel = table.floats(*(f"v{a}" for a in axes)) if table.has("vx") else None
+    box = table.floats(*BOX) if table.has(BOX[0]) else None
+    count = int(table.fact("frames"))
+    cuts = np.searchsorted(table.ints("frame"), np.arange(1, count + 2))
+    found = []
+    for k in range(count):
+        r = slice(int(cuts[k]), int(cuts[k + 1]))
+        cut = (pos[r], None if vel is None else vel[r], None if box is None else box[r], score[r])
+        found.append(Detections(k + 1, k / fps, table.fact("plane"), *cut))
+    return found

@@ -1,0 +1,71 @@
+"""Groups of people in the image: hulls of their silhouettes, all frames at once.
+
+Each silhouette is taken as two POINTS-gons inscribed in the ellipses of body and head; their hulls are exact.
+"""
+
+from __future__ import annotations
+
+from itertools import pairwise
+
+import numpy as np
+
+from sim.scene.body import Ellipsoids, Outlines, contour, outlines
+from sim.scene.camera import project
+from sim.types import Array, Camera, Groups, Ints, Truth
+
+POINTS = 24
+INSTANT = 0.02  # s: half the step that turns ground velocities into image velocities
+
+
+def image_groups(truth: Truth, ground: tuple[Groups, ...], camera: Camera, shapes: Ellipsoids) -> tuple[Groups, ...]:
+    """The groups on the ground, frame by frame, as the camera sees them; shapes: of the truth's rows.
+
+    pos, extent: mean and covariance of the middles of the members' boxes, px; vel: of their middles, px/s. A group of
+    which somebody is behind the camera has nan and an empty hull.
+    """
+    assert truth.box is not None
+    assert truth.vel is not None
+    rows, cuts = _members(truth, ground)
+    centre = (truth.box[:, :2] + truth.box[:, 2:] / 2)[rows]
+    vel = image_velocities(camera, shapes.centre[rows, 0], truth.vel[rows])
+    pos, speed = _means(centre, cuts), _means(vel, cuts)
+    off = centre - np.repeat(pos, np.diff(cuts), axis=0)
+    extent = _means(off[:, :, None] * off[:, None, :], cuts)
+    hull = hulls(outlines(camera, Ellipsoids(shapes.centre[rows], shapes.shape[rows])), cuts)
+    ends = np.cumsum([0, *(len(groups.id) for groups in ground)])
+    return tuple(
+        groups.replace(pos=pos[a:b], vel=speed[a:b], extent=extent[a:b], hull=tuple(hull[a:b]))
+        for groups, (a, b) in zip(ground, pairwise(ends), strict=True)
+    )
+
+
+def _members(truth: Truth, ground: tuple[Groups, ...]) -> tuple[Ints, Ints]:
+    """Rows of the members of all groups, one group after the other, and where each group begins (and the end)."""
+    starts = np.searchsorted(truth.frame, np.arange(1, len(ground) + 1))
+    rows, sizes = [np.zeros(0, np.int64)], [0]
+    for index, (start, groups) in enumerate(zip(starts, ground, strict=True), start=1):
+        if len(groups.id):
+            sizes += [len(members) for members in groups.members]
+            rows.append(start + np.searchsorted(truth.id[truth.rows(index)], np.concatenate(groups.members)))
+    return np.concatenate(rows), np.cumsum(sizes)
+
+
+def _means(values: Array, cuts: Ints) -> Array:
+    """Mean of each group's rows, (G, ...)."""
+    count = np.diff(cuts).reshape(-1, *[1] * (values.ndim - 1))
+    return np.asarray(np.add.reduceat(values, cuts[:-1], axis=0) / count) if len(count) else values[:0]
+
+
+def hulls(ellipses: Outlines, cuts: Ints) -> list[Array]:
+    """Hulls (V, 2) of groups of silhouettes, counter-clockwise in (u, v); (0, 2) where a silhouette is nan."""
+    from sim.geometry import hull_kernels
+
+    edge = contour(ellipses, POINTS)[: cuts[-1]]
+    sets = np.split(edge.reshape(-1, 2), edge.shape[1] * cuts[1:])
+    return list(hull_kernels.hulls(sets[:-1]))
+
+
+def image_velocities(camera: Camera, middle: Array, vel: Array) -> Array:
+    """px/s (N, 2) of points (N, 3) that move at vel (N, 2) m/s over level ground."""
+    step = INSTANT * np.column_stack([vel, np.zeros(len(vel))])
+    return np.asarray((project(camera, middle + step)[0] - project(camera, middle - step)[0]) / (2 * INSTANT))

@@ -1,0 +1,88 @@
+"""What is true of a simulated crowd: bodies as the camera sees them, groups and events as they are measured.
+
+`bodies` is the part that sensors need; `label` adds groups, events and hard negatives. Nothing here knows when an
+order was given; whether orders came true is asked afterwards, by sim.truth.order_fulfilment.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from sim.scene.camera import px_per_m_at_centre
+from sim.scene.viewpoint import Bodies, recorded
+from sim.scene.visibility import look
+from sim.truth.image_groups import image_groups
+from sim.truth.order_fulfilment import check_orders
+from sim.types import Camera, GroupEvent, Groups, Ints, Motion, Truth
+
+__all__ = ["bodies", "check_orders", "label"]
+
+
+def bodies(motion: Motion, camera: Camera | None) -> Truth:
+    """Places, boxes, visibility of everybody in every frame; no groups and no events (group is -1 throughout)."""
+    return _bodies(motion, camera, recorded(motion))
+
+
+def _bodies(motion: Motion, camera: Camera | None, people: Bodies) -> Truth:
+    t, p = people.frame - 1, people.id - 1
+    seen = None if camera is None else look(
+        camera, motion.scene, people.frame, people.pos3, motion.height[p], people.shapes
+    )  # fmt: skip
+    return Truth(
+        name=motion.name,
+        fps=motion.fps,
+        length=len(motion.present),
+        px_per_m=float("nan") if camera is None else px_per_m_at_centre(camera),
+        frame=people.frame,
+        id=people.id,
+        group=np.full(len(p), -1, np.int64),
+        pos=motion.pos[t, p],
+        vel=motion.vel[t, p],
+        box=None if seen is None else seen.box,
+        visibility=np.ones(len(p)) if seen is None else seen.visibility,
+        z=people.pos3[:, 2],
+        heading=motion.heading[t, p],
+        height=motion.height[p],
+        truncation=None if seen is None else seen.truncation,
+        visible_box=None if seen is None else seen.visible_box,
+        orders=motion.orders,
+    )
+
+
+def label(motion: Motion, camera: Camera | None) -> Truth:
+    """All that is true: `bodies`, and groups, events and hard negatives measured from motion and intent."""
+    from sim.truth.groups import memberships
+
+    people = recorded(motion)
+    truth = _bodies(motion, camera, people)
+    found = memberships(motion.pos, motion.vel, motion.present, motion.intent, motion.fps)
+    truth = truth.replace(group=found.group[people.frame - 1, people.id - 1])
+    ground = tuple(_ground_groups(truth))
+    return truth.replace(
+        groups=ground,
+        groups_px=None if camera is None else image_groups(truth, ground, camera, people.shapes),
+        labelled=np.ones(truth.length, dtype=np.bool_),
+        events=_events(motion, found.group, found.events),
+        near=found.near,
+    )
+
+
+def _events(motion: Motion, group: Ints, changes: tuple[GroupEvent, ...]) -> tuple[GroupEvent, ...]:
+    from sim.truth.cross_queue_events import crossings, queues
+
+    crossed = crossings(motion.pos, motion.vel, motion.present, group, motion.fps)
+    queued = queues(motion.pos, motion.vel, motion.present, group, motion.fps)
+    every = [*changes, *crossed, *queued]
+    return tuple(sorted(every, key=lambda e: (e.start, e.end, e.kind, e.members, e.after)))
+
+
+def _ground_groups(truth: Truth) -> Iterator[Groups]:
+    from sim.truth.groups import frame_groups
+
+    assert truth.pos is not None
+    assert truth.vel is not None
+    for index in range(1, truth.length + 1):
+        r = truth.rows(index)
+        yield frame_groups(truth.id[r], truth.group[r], truth.pos[r], truth.vel[r])

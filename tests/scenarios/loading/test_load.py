@@ -1,0 +1,226 @@
+"""Files, `extends`, `--set`, strictness and the resolved form."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+from hypothesis import HealthCheck, example, given, settings
+from hypothesis import strategies as st
+
+from scenarios.errors import InputError
+from scenarios.loading.resolve import dump, load, names, resolve
+from scenarios.loading.toml_files import merge
+from scenarios.schema.scenario import Merge, Queue, Scenario, Split
+
+
+def write(path: Path, text: str) -> Path:
+    path.write_text(text)
+    return path
+
+
+def error_of(path: Path, *settings: str) -> InputError:
+    with pytest.raises(InputError) as caught:
+        load(path, settings)
+    assert "\n" not in str(caught.value)
+    return caught.value
+
+
+def test_reads_a_file(path: Path) -> None:
+    scenario = load(path)
+    assert (scenario.name, scenario.duration, scenario.camera.fps) == ("tour", 30.0, 10.0)
+    assert [type(e) for e in scenario.event] == [Merge, Split, Queue]
+    assert load(str(path)) == scenario
+
+
+def test_dump_loads_back_equal_and_twice_the_same(path: Path) -> None:
+    scenario = load(path)
+    again = load(write(path.with_name("other.toml"), dump(scenario)))
+    assert again == scenario
+    assert dump(again) == dump(scenario)
+    assert again.name == "tour"
+
+
+@settings(suppress_health_check=[HealthCheck.function_scoped_fixture], max_examples=50, deadline=None)
+@example(about='\x7f\x00\t"\\ü€\u2028', turn=1e-300, size=1)
+@given(about=st.text(), turn=st.floats(allow_nan=False, allow_infinity=False), size=st.integers(1, 10**6))
+def test_dump_holds_any_text_and_number(path: Path, about: str, turn: float, size: int) -> None:
+    group = load(path).group[0].model_copy(update={"size": float(size)})
+    scenario = load(path).model_copy(update={"about": about, "turn_deg": turn, "group": (group,), "event": ()})
+    assert load(write(path.with_name("any.toml"), dump(scenario))) == scenario
+
+
+def test_every_catalogue_scenario_loads_and_dumps(tmp_path: Path) -> None:
+    for name in names():
+        scenario = load(name)
+        assert scenario.about, name
+        assert load(write(tmp_path / "again.toml", dump(scenario))) == scenario
+
+
+def test_extends_merges_tables_and_rows_by_id(path: Path) -> None:
+    child = write(
+        path.with_name("child.toml"),
+        """
+        extends = "tour.toml"
+        camera = { fps = 25 }
+        world = { pillars = [] }
+        group = [{ id = "b", start = [11, { choice = [3, 4] }] }, { id = "e", size = 2, start = [1, 7], goal = [3, 7] }]
+        event = [{ id = "q1", when = { after = "s1" } }]
+        """,
+    )
+    base, scenario = load(path), load(child)
+    assert scenario.name == "child"
+    assert (scenario.camera.fps, scenario.camera.tilt_deg) == (25, base.camera.tilt_deg)
+    assert scenario.world.pillars == ()
+    assert scenario.world.walls == base.world.walls
+    assert [g.id for g in scenario.group] == ["a", "b", "w", "e"]
+    assert scenario.group[1].goal == base.group[1].goal
+    assert scenario.group[0] == base.group[0]
+    assert scenario.event[2].when.time is None
+    assert scenario.event[2].when.after == "s1"
+
+
+def test_a_distribution_replaces_whole() -> None:
+    below = {"speed": {"normal": [1, 2], "clip": [0, 3]}, "camera": {"fps": 10, "kind": "top"}}
+    assert merge(below, {"speed": {"uniform": [1, 2]}})["speed"] == {"uniform": [1, 2]}
+    assert merge(below, {"camera": {"fps": 5}})["camera"] == {"fps": 5, "kind": "top"}
+
+
+def test_merge_changes_neither_side() -> None:
+    below, above = {"group": [{"id": "a", "x": 1}]}, {"group": [{"id": "a", "x": 2}, {"id": "b"}]}
+    assert merge(below, above) == {"group": [{"id": "a", "x": 2}, {"id": "b"}]}
+    assert below == {"group": [{"id": "a", "x": 1}]}
+
+
+def test_extends_chain_and_circle(path: Path) -> None:
+    folder = path.parent
+    write(folder / "one.toml", 'extends = "tour.toml"\nduration = 40.0')
+    write(folder / "two.toml", 'extends = "one.toml"\nwarmup = 1.0')
+    assert (load(folder / "two.toml").duration, load(folder / "two.toml").warmup) == (40, 1)
+    write(folder / "x.toml", 'extends = "y.toml"')
+    write(folder / "y.toml", 'extends = "x.toml"')
+    error = error_of(folder / "x.toml")
+    assert error.place == "extends"
+    assert "x.toml → y.toml → x.toml" in error.got
+    write(folder / "z.toml", 'extends = "nowhere.toml"')
+    assert "nowhere.toml" in error_of(folder / "z.toml").got
+
+
+@pytest.mark.parametrize(
+    ("setting", "value"),
+    [
+        ("duration=25", lambda s: s.duration == 25.0),
+        ("camera.kind=top", lambda s: s.camera.kind == "top"),
+        ("group.a.size=5", lambda s: s.group[0].size == 5),
+        ("group.0.size=5", lambda s: s.group[0].size == 5),
+        ("group.w.repeat=4", lambda s: s.group[2].repeat == 4),
+        ("group.b.start.1=3.5", lambda s: s.group[1].start == (11, 3.5)),
+        ("group.a.size={ uniform = [3, 3] }", lambda s: s.group[0].size.uniform == (3, 3)),
+        ("event.s1.parts.d.goal=[7, 8]", lambda s: s.event[1].parts[1].goal == (7, 8)),
+        ("event.m1.when.delay=1", lambda s: s.event[0].when.delay == 1),
+        ("sensor.box=amodal", lambda s: s.sensor.box == "amodal"),
+        ("warmup=0", lambda s: s.warmup == 0),
+        ("group.e={ size = 2, start = [1, 7], goal = [3, 7] }", lambda s: s.group[3].id == "e"),
+        ("world.pillars=[]", lambda s: s.world.pillars == ()),
+        ("about=a word", None),
+        ("group.z.size=3", None),
+        ("group.7.size=3", None),
+        ("duration.x=3", None),
+        ("duration", None),
+        ("=3", None),
+        ("a..b=3", None),
+        ("duration=3\nwarmup=2", None),
+    ],
+)
+def test_set(path: Path, setting: str, value) -> None:  # type: ignore[no-untyped-def]
+    if value is None:
+        settings = [setting, "event=[]"] if "duration" not in setting else [setting]
+        assert "--set" in error_of(path, *settings).place
+        return
+    settings = [setting, "event.s1.parts=[{ id = 'c', goal = [14, 5] }, { id = 'd', goal = [8, 8] }]"]
+    if setting.startswith("event.s1"):
+        settings.pop()
+    assert value(load(path, settings))
+
+
+def test_later_settings_win_and_the_file_stays(path: Path) -> None:
+    assert load(path, ["duration=25", "duration=26"]).duration == 26
+    assert load(path).duration == 30
+
+
+def test_an_id_with_a_dot_can_be_set(path: Path) -> None:
+    path.write_text(path.read_text().replace('id = "w"', 'id = "w.x"').replace("w-*", "w.x-*"))
+    assert load(path, ["group.w.x.repeat=4"]).group[2].repeat == 4
+
+
+@pytest.mark.parametrize(
+    ("setting", "place", "got", "expected", "remedy"),
+    [
+        ("sensor.detect_probb=1", "sensor.detect_probb", "unknown key", "known key", "'detect_prob'"),
+        ("group.a.sped=2", "group.a.sped", "unknown key 'sped'", "", "'speed'"),
+        ("group.a.size={norml=[1,2]}", "group.a.size", "'norml'", "", "'normal'"),
+        ("event.s1.parts.c.sze=2", "parts.c.sze", "'sze'", "", "'size'"),
+        ("event.m1.when.reach={gruop='a'}", "when.reach", "'gruop'", "", "'group'"),
+        ("group.a.size=big", "", "'big'", "a number, or a distribution", ""),
+        ("group.a.size=true", "", "true", "a number, or a distribution", ""),
+        ("group.a.start=[1, 'x']", "", "'x'", "a number, or a distribution", ""),
+        ("group.a.start=[1]", "", "[1]", "at least 2", ""),
+        ("group.a.start=5", "", "5", "a list", ""),
+        ("group.a.size={normal=[1,2], uniform=[1,2]}", "", "uniform", "exactly one of normal", ""),
+        ("duration='20'", "", "'20'", "number", ""),
+        ("duration=nan", "", "nan", "finite", ""),
+        ("duration=2020-01-01", "", "2020-01-01", "number", ""),
+        ("camera.fps=-1", "", "-1", "greater than 0", ""),
+        ("event.m1.type=mrge", "", "'mrge'", "'merge'", ""),
+        ("event.m1.goal=mete", "", "'mete'", "'meet'", ""),
+        ("event.m1.when={time=1, after='x'}", "", "after", "exactly one of time", ""),
+        ("event.m1.groups=['a']", "", "['a']", "at least 2", ""),
+        ("group.a.id='1 2'", "", "'1 2'", "a name", ""),
+        ("schema=2", "", "2", "1", ""),
+    ],
+)
+def test_strict(path: Path, setting: str, place: str, got: str, expected: str, remedy: str) -> None:
+    error = error_of(path, setting)
+    assert error.file == str(path)
+    assert place in error.place
+    assert got in error.got
+    assert expected in error.expected
+    assert remedy in error.remedy
+
+
+def test_the_place_is_the_key_where_the_file_is_wrong(path: Path) -> None:
+    path.write_text(path.read_text().replace("size = 3,", "siz = 3,", 1))
+    error = error_of(path)
+    assert error.place == "group.a.siz"
+    assert "'size'" in error.remedy
+
+
+def test_every_key_of_the_form_is_known_to_itself(path: Path) -> None:
+    """An unknown key beside any table names that table's keys."""
+    table = load(path).model_dump(by_alias=True, exclude_none=True)
+    assert set(table) <= {f.alias or n for n, f in Scenario.model_fields.items()}
+    for key in ("world", "camera", "sensor", "crowd"):
+        known = next(iter(table[key]))
+        assert repr(known) in error_of(path, f"{key}.{known}x=1").remedy
+
+
+def test_syntax_error_has_its_line(tmp_path: Path) -> None:
+    error = error_of(write(tmp_path / "bad.toml", "schema = 1\nduration = = 3\n"))
+    assert "line 2" in error.place
+    (tmp_path / "bytes.toml").write_bytes(b"about = '\xff'")
+    assert "UTF-8" in error_of(tmp_path / "bytes.toml").got
+    assert "no such file" in error_of(tmp_path / "none.toml").got
+    (tmp_path / "folder.toml").mkdir()
+    error_of(tmp_path / "folder.toml")
+
+
+def test_the_files_name_must_serve_as_a_name(path: Path) -> None:
+    error = error_of(path.rename(path.with_name("2 tours.toml")))
+    assert error.place == "name"
+
+
+def test_unknown_names_are_answered_with_near_ones() -> None:
+    with pytest.raises(InputError, match="expected a scenario"):
+        resolve("nothing-like-this")
+    with pytest.raises(InputError, match="expected a suite"):
+        resolve("suite:nothing-like-this")

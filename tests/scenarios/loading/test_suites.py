@@ -1,0 +1,87 @@
+"""Suites: order, names, settings, repeats, and what is wrong in them."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from scenarios.errors import InputError
+from scenarios.loading.resolve import Entry, load, names, resolve, suite_names
+
+
+def suite(path: Path, text: str) -> str:
+    file = path.with_name("mine.toml")
+    file.write_text(text)
+    return str(file)
+
+
+def test_entries_expand_in_order(path: Path) -> None:
+    file = suite(
+        path,
+        """
+        about = "two"
+        entry = [
+          { name = "long", scenario = "tour.toml", set = ["duration=60"] },
+          { name = "many", scenario = "tour.toml", repeat = 3 },
+        ]
+        """,
+    )
+    entries = resolve(file)
+    assert [(e.name, e.repeat) for e in entries] == [("long", 0), ("many-1", 1), ("many-2", 2), ("many-3", 3)]
+    assert [e.scenario.name for e in entries] == [e.name for e in entries]
+    assert [e.scenario.duration for e in entries] == [60, 30, 30, 30]
+    assert [e.scenario.duration for e in resolve(file, ["duration=70"])] == [70] * 4
+    assert resolve(f"suite:{file}") == entries
+
+
+def test_a_scenario_file_is_one_entry(path: Path) -> None:
+    assert resolve(str(path), ["warmup=1"]) == [Entry("tour", load(path, ["warmup=1"]))]
+
+
+@pytest.mark.parametrize(
+    ("text", "place", "got"),
+    [
+        ("entry = []", "entry", "no entry"),
+        ("entrys = []", "entrys", "unknown key"),
+        ("entry = [{ name = 'a' }]", "entry.0", "no scenario"),
+        ("entry = [{ scenario = 'tour.toml', repet = 2 }]", "entry.0.repet", "unknown key"),
+        ("entry = [{ scenario = 'tour.toml', repeat = 0 }]", "entry.0.repeat", "0"),
+        ("entry = [{ scenario = 'tour.toml', repeat = true }]", "entry.0.repeat", "True"),
+        ("entry = [{ scenario = 'tour.toml', set = [3] }]", "entry.0.set", "[3]"),
+        ("entry = [{ scenario = 'tour.toml' }, { scenario = 'tour.toml' }]", "entry", "two entries"),
+        ("entry = [3]", "entry.0", "3"),
+        ("entry = [{ scenario = 'tour.toml', name = 'a b' }]", "entry.0.name", "'a b'"),
+    ],
+)
+def test_wrong(path: Path, text: str, place: str, got: str) -> None:
+    file = suite(path, text)
+    with pytest.raises(InputError) as caught:
+        resolve(f"suite:{file}")
+    assert (caught.value.file, caught.value.place) == (file, place)
+    assert got in caught.value.got
+
+
+def test_an_error_inside_an_entry_names_suite_and_entry(path: Path) -> None:
+    file = suite(path, "entry = [{ scenario = 'tour.toml', name = 'x', set = ['duratoin=3'] }]")
+    with pytest.raises(InputError, match="duration") as caught:
+        resolve(file)
+    assert file in caught.value.file
+    assert "entry x" in caught.value.file
+
+
+@pytest.mark.parametrize("name", suite_names())
+def test_the_catalogues_suites_resolve(name: str) -> None:
+    if not names():
+        pytest.skip("no catalogue")
+    entries = resolve(f"suite:{name}")
+    assert len({e.name for e in entries}) == len(entries) > 0
+
+
+def test_standard_has_every_scenario_at_two_densities() -> None:
+    if not names():
+        pytest.skip("no catalogue")
+    entries = resolve("suite:standard")
+    for name in names():
+        mine = [e for e in entries if e.name in (name, f"{name}-dense")]
+        assert len(mine) == 2, name

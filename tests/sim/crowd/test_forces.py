@@ -1,0 +1,149 @@
+"""The kernels of forces against their slow twins, and what forces may not depend on."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+
+from sim.crowd.avoidance_kernels import _avoid_groups, _pairs, _walls
+from sim.crowd.forces import accelerate
+from sim.crowd.steering import END, GATHER, Groups, Obstacles, People, Steering
+from tests.reference_steering import between_groups, between_people, from_things
+
+NOTHING = Obstacles(np.zeros((0, 4)), np.zeros((0, 3)), np.zeros((0, 8)))
+
+
+def crowd(n: int, seed: int, side: float = 6.0) -> tuple[np.ndarray, People, Groups]:
+    r = np.random.default_rng(seed)
+    state = np.concatenate([r.uniform(0, side, (n, 2)), r.normal(0, 1, (n, 2))], axis=1)
+    people = People.empty(n)
+    people.tag[:, 0] = np.arange(n) // 3
+    people.tag[:, 1] = 0
+    people.tag[:, 2] = np.where(r.random(n) < 0.2, 0, -1)
+    people.tag[:, 3] = 0
+    people.place[:] = r.normal(0, 0.7, (n, 2))
+    groups = Groups.empty(int(people.tag[:, 0].max()) + 1, 4)
+    groups.route[:, 0] = r.uniform(0, side, groups.route[:, 0].shape)
+    groups.kind[:, 0] = r.choice([END, GATHER], len(groups.speed))
+    groups.length[:] = 1
+    groups.speed[:] = r.uniform(0.8, 1.6, len(groups.speed))
+    angle = r.uniform(-3, 3, len(groups.speed))
+    groups.heading[:] = np.stack([np.cos(angle), np.sin(angle)], 1)
+    return state, people, groups
+
+
+def forces(state: np.ndarray, people: People, groups: Groups, obstacles: Obstacles = NOTHING) -> np.ndarray:
+    out = np.zeros((len(state), 2))
+    push = np.zeros((len(groups.speed), 2))
+    assert accelerate(state, people, groups, obstacles, 0.02, Steering().array(), push, out)
+    return out
+
+
+def scattered(state: np.ndarray) -> None:
+    """As drawn."""
+
+
+def standing(state: np.ndarray) -> None:
+    state[:, 2:] = 0.0
+
+
+def half_standing(state: np.ndarray) -> None:
+    state[::2, 2:] = 0.0
+
+
+def in_a_row(state: np.ndarray) -> None:
+    state[:, 1] = 3.0
+
+
+def head_on(state: np.ndarray) -> None:
+    state[:, 1], state[:, 3] = 3.0, 0.0
+
+
+def touching(state: np.ndarray) -> None:
+    """On a lattice as wide as the distance strangers keep, some on one place."""
+    state[:, :2] = np.round(state[:, :2] / 0.58) * 0.58
+
+
+def at_the_edge_of_reach(state: np.ndarray) -> None:
+    state[:, :2] = np.round(state[:, :2] / 3.5) * 3.5
+
+
+PLACES = (scattered, standing, half_standing, in_a_row, head_on, touching, at_the_edge_of_reach)
+
+
+@pytest.mark.parametrize("n", [2, 12, 48, 49, 150])
+@pytest.mark.parametrize("arrange", PLACES)
+def test_pairs_equal_the_slow_twin(arrange: Callable[[np.ndarray], None], n: int) -> None:
+    state, people, _ = crowd(n, n, side=4 + n / 10)
+    arrange(state)
+    out = np.zeros((n, 2))
+    _pairs(state, people.tag, Steering().array(), out)
+    np.testing.assert_allclose(out, between_people(state, people.tag, Steering()), atol=1e-9)
+
+
+def test_very_many_equal_the_slow_twin() -> None:
+    state, people, _ = crowd(400, 0, side=32.0)
+    out = np.zeros((400, 2))
+    _pairs(state, people.tag, Steering().array(), out)
+    np.testing.assert_allclose(out, between_people(state, people.tag, Steering()), atol=1e-9)
+
+
+@pytest.mark.parametrize("seed", range(8))
+def test_groups_equal_the_slow_twin(seed: int) -> None:
+    r = np.random.default_rng(seed)
+    count = r.integers(0, 4, 40).astype(float)
+    now = np.concatenate([count[:, None], r.uniform(0, 25, (40, 2)), r.normal(size=(40, 2)), r.random((40, 5))], axis=1)
+    now[:, 9] = (count > 0) & (r.random(40) < 0.9)
+    now[seed, 3:5] = 0.0
+    push = np.ones((40, 2))
+    _avoid_groups(now, Steering().array(), push)
+    np.testing.assert_allclose(push, between_groups(now, Steering()), atol=1e-9)
+    assert np.abs(push).max() > 0.1
+
+
+def test_walls_and_pillars_equal_the_slow_twin() -> None:
+    state, _, _ = crowd(100, 4)
+    r = np.random.default_rng(4)
+    walls, pillars = r.uniform(0, 6, (5, 4)), r.uniform(0.1, 6, (3, 3)) * [1, 1, 0.1]
+    walls[0, 2:] = walls[0, :2]
+    out = np.zeros((100, 2))
+    _walls(state, walls, pillars, Steering().array(), out)
+    np.testing.assert_allclose(out, from_things(state, walls, pillars, Steering()), atol=1e-9)
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_turning_and_moving_the_scene_turns_the_forces(seed: int) -> None:
+    state, people, groups = crowd(60, seed)
+    walls = np.array([[0.0, -1.0, 6.0, -1.0]])
+    pillars = np.array([[3.0, 3.0, 0.3]])
+    a = forces(state, people, groups, Obstacles(walls, pillars, np.zeros((0, 8))))
+    c, s = np.cos(0.7), np.sin(0.7)
+    turn, shift = np.array([[c, -s], [s, c]]), np.array([13.0, -4.0])
+    state, people, groups = crowd(60, seed)
+    turned = np.concatenate([state[:, :2] @ turn.T + shift, state[:, 2:] @ turn.T], axis=1)
+    groups.route[:] = groups.route @ turn.T + shift
+    groups.heading[:] = groups.heading @ turn.T
+    walls = (walls.reshape(-1, 2) @ turn.T + shift).reshape(-1, 4)
+    pillars = np.concatenate([pillars[:, :2] @ turn.T + shift, pillars[:, 2:]], axis=1)
+    b = forces(turned, people, groups, Obstacles(walls, pillars, np.zeros((0, 8))))
+    np.testing.assert_allclose(b, a @ turn.T, atol=1e-9)
+
+
+def test_the_order_of_people_does_not_matter() -> None:
+    state, people, groups = crowd(60, 3)
+    a = forces(state, people, groups)
+    state, people, groups = crowd(60, 3)
+    order = np.random.default_rng(0).permutation(60)
+    shuffled = People(*[np.ascontiguousarray(x[order]) for x in people])
+    b = forces(np.ascontiguousarray(state[order]), shuffled, groups)
+    np.testing.assert_allclose(b, a[order], atol=1e-9)
+
+
+def test_forces_are_capped_and_states_that_are_not_finite_are_noticed() -> None:
+    state, people, groups = crowd(100, 1, side=3.0)
+    assert np.linalg.norm(forces(state, people, groups), axis=1).max() <= Steering().max_acceleration + 1e-12
+    state[5, 0] = np.nan
+    out, push = np.zeros((100, 2)), np.zeros((len(groups.speed), 2))
+    assert not accelerate(state, people, groups, NOTHING, 0.02, Steering().array(), push, out)

@@ -1,0 +1,361 @@
+import errno
+import importlib.util
+import os
+import signal
+import subprocess
+import sys
+import types
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from scenarios.errors import InputError, WorkError
+from scenarios.loading.resolve import Entry
+from scenarios.schema.scenario import Scenario
+from sim.dataset.generate import generate
+from sim.dataset.seed_ranges import split_of
+from sim.io.files import atomic
+from sim.io.source import open_source
+from sim.io.store.validate import validate
+
+FAKES = Path(__file__).resolve().parents[1] / "io" / "conftest.py"
+ROOT = Path(__file__).resolve().parents[3]
+
+# A program of its own: simulate is a fake, in its workers too; argument 1 the folder, 2 workers, 3 what goes wrong.
+PROGRAM = f"""
+import importlib.util, os, signal, sys, types
+spec = importlib.util.spec_from_file_location("fakes", {str(FAKES)!r})
+fakes = importlib.util.module_from_spec(spec)
+spec.loader.exec_module(fakes)
+
+def simulate(scenario, seed, repeat, streams=()):
+    deaths = {{-2: 1, -3: 99}}.get(int(sys.argv[3]), 0)
+    if seed == 1 and repeat == 0 and deaths:
+        with open(sys.argv[1] + "-deaths", "a") as told:
+            print(os.getpid(), file=told)
+        if sum(1 for _ in open(sys.argv[1] + "-deaths")) <= deaths:
+            os.kill(os.getpid(), signal.SIGKILL)
+    return fakes.sequence(seed + 100 * repeat)
+
+sys.modules["sim.sequence"] = types.SimpleNamespace(simulate=simulate)
+from scenarios.loading.resolve import Entry
+from scenarios.schema.scenario import Scenario
+from sim.dataset.generate import generate
+from sim.io import atomic
+
+if __name__ == "__main__":
+    out, workers, kill_after = sys.argv[1], int(sys.argv[2]), int(sys.argv[3])
+    count = 0
+    fsync = os.fsync
+
+    def die(descriptor):
+        global count
+        count += 1
+        if count == kill_after:
+            os.kill(os.getpid(), signal.SIGKILL)
+        fsync(descriptor)
+
+    def parent_dies(done, total, name):
+        if kill_after == -1:
+            os.kill(os.getpid(), signal.SIGKILL)
+
+    atomic.os.fsync = die
+    scenario = Scenario.model_validate({{"schema": 1, "group": [{{"id": "a", "start": [1, 1], "goal": [2, 2]}}]}})
+    entries = [Entry("x", scenario, 0), Entry("y-1", scenario, 1)]
+    generate(entries, range(3), out, workers=workers, progress=parent_dies, streams=())
+"""
+
+
+def scenario(**more) -> Scenario:
+    return Scenario.model_validate({"schema": 1, "group": [{"id": "a", "start": [1, 1], "goal": [2, 2]}], **more})
+
+
+@pytest.fixture
+def simulate(monkeypatch):
+    """A fake simulator; `wrong` maps seeds to what is raised."""
+    spec = importlib.util.spec_from_file_location("fakes", FAKES)
+    fakes = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(fakes)
+    module = types.SimpleNamespace(made=[], wrong={})
+
+    def run(scenario, seed, repeat, streams=()):
+        module.made.append(seed)
+        if seed in module.wrong:
+            raise module.wrong[seed]
+        return fakes.pictured(seed + 100 * repeat, streams) if streams else fakes.sequence(seed + 100 * repeat)
+
+    module.simulate = run
+    monkeypatch.setitem(sys.modules, "sim.sequence", module)
+    return module
+
+
+def content(folder: Path) -> dict[str, bytes]:
+    return {str(p.relative_to(folder)): p.read_bytes() for p in sorted(folder.rglob("*")) if p.is_file()}
+
+
+def run_program(tmp_path, out, workers, kill_after=0):
+    program = tmp_path / "program.py"
+    program.write_text(PROGRAM)
+    return subprocess.run(
+        [sys.executable, str(program), str(out), str(workers), str(kill_after)],
+        env={**os.environ, "PYTHONPATH": str(ROOT)}, capture_output=True, timeout=120, check=False,
+    )  # fmt: skip
+
+
+def test_layout_seqmap_and_reading(tmp_path, simulate):
+    seen = []
+    entries = [Entry("b", scenario()), Entry("a-2", scenario(), 2)]
+    made = generate(entries, range(20_000, 20_002), tmp_path, progress=lambda *a: seen.append(a))
+    names = ["b-s20000", "b-s20001", "a-2-s20000", "a-2-s20001"]
+    assert [p.name for p in made] == names
+    assert {p.parent for p in made} == {tmp_path / "flockscope-test"}
+    assert (tmp_path / "seqmaps/flockscope-test.txt").read_text().split() == ["name", *sorted(names)]
+    assert [(done, total) for done, total, _ in seen] == [(1, 4), (2, 4), (3, 4), (4, 4)]
+    assert [s.name for s in open_source(tmp_path)] == sorted(names)
+    assert [s.name for s in open_source(tmp_path / "flockscope-test")] == sorted(names)
+    assert open_source(made[2])[0].source["repeat"] == 2
+    assert validate(tmp_path) == validate(tmp_path / "flockscope-test") == validate(made[0]) == []
+
+
+def test_complete_sequences_are_kept_and_others_redone(tmp_path, simulate):
+    made = generate([Entry("x", scenario())], range(3), tmp_path)
+    before = content(tmp_path)
+    (made[0] / "gt/gt.txt").write_text("1,1,0,0,1,1,1,1,1\n")
+    (made[1] / "manifest.json").unlink()
+    (tmp_path / "flockscope-train" / f".partial-x-s00001-{os.getpid()}").mkdir()
+    (tmp_path / "flockscope-train" / ".partial-x-s00002-99").mkdir()
+    (tmp_path / "seqmaps" / ".partial-flockscope-train.txt-99").write_text("name")
+    simulate.made.clear()
+    generate([Entry("x", scenario())], range(3), tmp_path)
+    assert simulate.made == [0, 1]
+    assert content(tmp_path) == before
+
+
+def test_another_scenario_is_not_overwritten(tmp_path, simulate):
+    generate([Entry("x", scenario())], range(1), tmp_path)
+    before = content(tmp_path)
+    with pytest.raises(InputError, match="scenario_hash"):
+        generate([Entry("x", scenario(duration=3.0))], range(2), tmp_path)
+    with pytest.raises(InputError, match="repeat"):
+        generate([Entry("x", scenario(), 1)], range(2), tmp_path)
+    assert content(tmp_path) == before
+
+
+@pytest.mark.parametrize(
+    ("seeds", "split"),
+    [((0, 10_000), "train"), ((10_000, 10_001), "val"), ((29_999, 30_000), "test"), ((30_000, 40_000), "fit"),
+     ((40_000, 99_999), "demo")],
+)  # fmt: skip
+def test_splits(seeds, split):
+    assert split_of(range(*seeds)) == split
+
+
+@pytest.mark.parametrize("seeds", [(9_999, 10_001), (0, 30_000), (5, 5), (7, 3), (-1, 2), (39_999, 40_001)])
+def test_ranges_that_cross_or_are_empty(tmp_path, simulate, seeds):
+    with pytest.raises(InputError, match="seeds"):
+        generate([Entry("x", scenario())], range(*seeds), tmp_path / "new")
+    assert not (tmp_path / "new").exists()
+
+
+def test_wrong_requests_make_nothing(tmp_path, simulate):
+    x = Entry("x", scenario())
+    for entries, more, word in (
+        ([x, x], {}, "twice"),
+        ([x], {"workers": 0}, "workers"),
+    ):
+        with pytest.raises(InputError, match=word):
+            generate(entries, range(2), tmp_path / "new", **more)
+    (tmp_path / "file").write_text("x")
+    with pytest.raises(InputError, match="--out"):
+        generate([x], range(2), tmp_path / "file" / "new")
+    assert [p.name for p in tmp_path.iterdir()] == ["file"]
+
+
+@pytest.mark.parametrize(
+    "error", [WorkError(got="m1 at 3.0 m", expected="1.5 m", remedy="bring them nearer"), KeyError("k")]
+)
+def test_one_failure_is_named_and_the_others_kept(tmp_path, simulate, error):
+    simulate.wrong = {1: error}
+    with pytest.raises(WorkError) as caught:
+        generate([Entry("x", scenario())], range(3), tmp_path)
+    assert caught.value.file == "x-s00001"
+    assert "\n" not in str(caught.value)
+    assert sorted(p.name for p in (tmp_path / "flockscope-train").iterdir()) == ["x-s00000", "x-s00002"]
+    assert validate(tmp_path) == []
+    simulate.wrong = {0: error, 1: error, 2: error}
+    with pytest.raises(WorkError, match="2 more of 3"):
+        generate([Entry("z", scenario())], range(3), tmp_path / "new")
+    assert not (tmp_path / "new").exists()
+
+
+def test_ctrl_c_leaves_whole_sequences_only(tmp_path, simulate):
+    simulate.wrong = {1: KeyboardInterrupt()}
+    with pytest.raises(KeyboardInterrupt):
+        generate([Entry("x", scenario())], range(3), tmp_path)
+    assert [p.name for p in (tmp_path / "flockscope-train").iterdir()] == ["x-s00000"]
+    simulate.wrong = {}
+    generate([Entry("x", scenario())], range(3), tmp_path)
+    assert validate(tmp_path) == []
+
+
+@pytest.mark.parametrize("number", [errno.ENOSPC, errno.EDQUOT, errno.EACCES])
+def test_a_disk_that_takes_no_more_ends_all_at_once(tmp_path, simulate, monkeypatch, number):
+    """The first sequence fits, the second in part; nobody tries the third. With room again, all is as ever."""
+    generate([Entry("x", scenario())], range(3), tmp_path / "right")
+    room = 1.5 * sum(len(body) for name, body in content(tmp_path / "right").items() if "x-s00000" in name)
+    write = atomic.put
+    simulate.made.clear()
+
+    def write_while_there_is_room(path, body):
+        nonlocal room
+        room -= len(body)
+        if room < 0:
+            write(path, body[: len(body) // 2])
+            raise OSError(number, os.strerror(number))
+        write(path, body)
+
+    monkeypatch.setattr(atomic, "put", write_while_there_is_room)
+    with pytest.raises(InputError if number == errno.EACCES else WorkError) as caught:
+        generate([Entry("x", scenario())], range(3), tmp_path / "out")
+    assert os.strerror(number) in str(caught.value)
+    assert caught.value.file.endswith("x-s00001")
+    assert simulate.made == [0, 1]
+    assert {str(p.parent.name) for p in (tmp_path / "out").rglob("manifest.json")} == {"x-s00000"}
+    assert list((tmp_path / "out").rglob(f"{atomic.PARTIAL}*")) == []
+    room = 1e9
+    generate([Entry("x", scenario())], range(3), tmp_path / "out")
+    assert content(tmp_path / "out") == content(tmp_path / "right")
+
+
+def test_one_run_at_a_time(tmp_path, simulate):
+    pytest.importorskip("fcntl")
+    found = []
+
+    def second(*_):
+        with pytest.raises(InputError, match="another run") as error:
+            generate([Entry("x", scenario())], range(1), tmp_path)
+        found.append(error)
+
+    generate([Entry("x", scenario())], range(1), tmp_path, progress=second)
+    assert len(found) == 1
+
+
+@pytest.fixture(scope="module")
+def whole(tmp_path_factory):
+    """What the program makes when nobody disturbs it."""
+    folder = tmp_path_factory.mktemp("whole")
+    done = run_program(folder, folder / "out", 1)
+    assert done.returncode == 0, done.stderr.decode()
+    return content(folder / "out")
+
+
+def test_two_workers_make_the_same_bytes(tmp_path, whole):
+    done = run_program(tmp_path, tmp_path / "out", 2)
+    assert done.returncode == 0, done.stderr.decode()
+    assert content(tmp_path / "out") == whole
+    assert validate(tmp_path / "out") == []
+
+
+def test_workers_do_not_outlive_a_killed_parent(tmp_path):
+    """Reading the pipes ends only when the last process that holds them is gone."""
+    done = run_program(tmp_path, tmp_path / "out", 2, kill_after=-1)
+    assert done.returncode == -signal.SIGKILL
+    assert run_program(tmp_path, tmp_path / "out", 2).returncode == 0
+    assert validate(tmp_path / "out") == []
+
+
+def test_the_work_of_a_killed_worker_is_done_by_another(tmp_path, whole):
+    done = run_program(tmp_path, tmp_path / "out", 2, kill_after=-2)
+    assert done.returncode == 0, done.stderr.decode()
+    assert len((tmp_path / "out-deaths").read_text().split()) == 2
+    assert content(tmp_path / "out") == whole
+
+
+def test_a_sequence_that_kills_its_workers_fails_alone(tmp_path, whole):
+    done = run_program(tmp_path, tmp_path / "out", 2, kill_after=-3)
+    assert done.returncode == 1
+    assert b"x-s00001: got 3 workers that died at it, the last by signal 9 (SIGKILL)" in done.stderr.splitlines()[-1]
+    others = {name: body for name, body in whole.items() if "x-s00001" not in name and "seqmaps" not in name}
+    assert {k: v for k, v in content(tmp_path / "out").items() if "seqmaps" not in k} == others
+    assert validate(tmp_path / "out") == []
+
+
+@pytest.mark.parametrize("kill_after", [1, 14, 20, 33])
+def test_killed_in_the_middle_and_resumed(tmp_path, whole, kill_after):
+    assert run_program(tmp_path, tmp_path / "out", 1, kill_after).returncode == -signal.SIGKILL
+    assert [p for p in open_all(tmp_path / "out") if not (p / "manifest.json").is_file()] == []
+    assert run_program(tmp_path, tmp_path / "out", 1).returncode == 0
+    assert content(tmp_path / "out") == whole
+
+
+@pytest.fixture
+def small_disk(tmp_path):
+    """A file system of 64 kB; may(size) makes it so large."""
+    folder = tmp_path / "disk"
+    folder.mkdir()
+
+    def may(size, *more):
+        return subprocess.run(["mount", "-t", "tmpfs", "-o", f"size={size}{''.join(more)}", "tmpfs", folder],
+                              capture_output=True, check=False).returncode == 0  # fmt: skip
+
+    if not may("64k"):
+        pytest.skip("no right to mount a file system")
+    yield folder, may
+    subprocess.run(["umount", folder], check=True)
+
+
+def test_a_disk_fills_up_under_two_workers(tmp_path, whole, small_disk):
+    folder, may = small_disk
+    done = run_program(tmp_path, folder / "out", 2)
+    assert done.returncode == 1
+    assert b"No space left" in done.stderr.splitlines()[-1]
+    there = open_all(folder / "out")
+    assert len(there) < 6
+    assert all(validate(p) == [] for p in there)
+    assert list(folder.rglob(f"{atomic.PARTIAL}*")) == []
+    assert may("10m", ",remount")
+    assert run_program(tmp_path, folder / "out", 2).returncode == 0
+    assert content(folder / "out") == whole
+
+
+def open_all(out: Path) -> list[Path]:
+    return [p for p in out.glob("flockscope-train/*/") if not p.name.startswith(".")]
+
+
+def test_trackeval_reads_a_dataset_as_it_is(tmp_path, simulate):
+    trackeval = pytest.importorskip("trackeval", reason="trackeval is not installed")
+    from sim.io.store.track_files import write_tracks
+    from sim.types import Tracks
+
+    entries = [Entry("x", scenario()), Entry("y", scenario())]
+    made = generate(entries, range(2), tmp_path / "data")
+    data = tmp_path / "trackers" / "flockscope-train" / "perfect" / "data"
+    data.mkdir(parents=True)
+    for folder in made:
+        (s,) = open_source(folder)
+        some = [truth_as_tracks(s.truth, index, Tracks) for index in range(1, s.length + 1)]
+        write_tracks(tmp_path / "t", some, fps=s.fps)
+        (tmp_path / "t" / "tracks.mot.txt").rename(data / f"{folder.name}.txt")
+    quiet = {"PRINT_CONFIG": False}
+    dataset = trackeval.datasets.MotChallenge2DBox(
+        {"GT_FOLDER": str(tmp_path / "data"), "TRACKERS_FOLDER": str(tmp_path / "trackers"), "BENCHMARK": "flockscope",
+         **quiet}
+    )  # fmt: skip
+    assert dataset.seq_list == sorted(p.name for p in made)
+    for name in dataset.seq_list:
+        raw = dataset.get_raw_seq_data("perfect", name)
+        ready = dataset.get_preprocessed_seq_data(raw, "pedestrian")
+        truth = open_source(tmp_path / "data/flockscope-train" / name)[0].truth
+        assert ready["num_gt_dets"] == len(truth.frame)
+        assert ready["num_timesteps"] == truth.length
+        assert trackeval.metrics.HOTA().eval_sequence(ready)["HOTA"].min() == pytest.approx(1.0)
+        assert trackeval.metrics.CLEAR({"THRESHOLD": 0.5, **quiet}).eval_sequence(ready)["MOTA"] == 1.0
+
+
+def truth_as_tracks(truth, index, kind):
+    f = truth.at(index)
+    n = len(f.id)
+    return kind(
+        index, f.t, "ground", "person", f.id, f.group, f.pos, f.vel, np.zeros((n, 4, 4)), f.box, np.ones(n), f.groups
+    )

@@ -1,0 +1,183 @@
+"""Replays: whose motion they show, what is true of them, what is refused."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import sim
+from scenarios.errors import InputError
+from scenarios.loading.resolve import load
+from scenarios.schema.observation import View, load_view
+from sim.dataset.replay import Cut, replay
+from sim.io.formats.biwi import open_folder
+from sim.io.formats.real_or_simulated import is_real
+from sim.sequence import simulate
+from sim.types import Sequence
+
+
+@pytest.fixture
+def walk(tmp_path: Path) -> Sequence:
+    """Two friends who come together at 2 s and a stranger who passes, as BIWI has it."""
+    lines, step = [], 10
+    for k in range(40):
+        t = k * 0.4
+        apart = max(0.7, 4.0 - 1.6 * t)
+        for id, x, y in ((3, 1.2 * t, 0.0), (5, 1.2 * t, apart), (9, 16.0 - 1.3 * t, -3.0)):
+            if id != 5 or k >= 2:  # who enters together is together from then on, by the rule
+                lines.append(f"{780 + step * k} {id} {x:.6f} 0 {y:.6f} 0 0 0")
+    (tmp_path / "walk").mkdir()
+    (tmp_path / "walk" / "obsmat.txt").write_text("\n".join(lines))
+    (tmp_path / "walk" / "groups.txt").write_text("3 5\n")
+    return open_folder(tmp_path / "walk")
+
+
+def test_real_motion_with_perfect_labels(walk: Sequence) -> None:
+    made = sim.replay(walk, View(), 20_001, streams=())
+    truth, labels = made.truth, walk.truth
+    assert truth is not None
+    assert labels is not None
+    assert labels.pos is not None
+    assert truth.pos is not None
+    assert made.fps == 10.0
+    assert made.length == 157
+    origin = made.source["origin"]
+    assert origin["people"] == (3, 5, 9)
+    at = truth.rows(41)  # 4 s: frame 11 of the recording
+    assert truth.pos[at] - origin["shift"] == pytest.approx(labels.pos[labels.rows(11)], abs=0.05)
+    assert truth.pos.min() == pytest.approx(1.0)
+    forms = [e for e in truth.events or () if e.kind == "form"]
+    assert [e.members for e in forms] == [(1, 2)]
+    assert forms[0].start / 10 == pytest.approx(2.0, abs=0.6)
+    assert set(truth.group[truth.id == 3].tolist()) == {-1}
+    heading = np.array(truth.heading)[truth.id == 3]
+    assert np.cos(heading[20:]) == pytest.approx(-1.0, abs=0.01)
+    assert truth.box is not None
+    assert (truth.box[:, 0] > 0).all()
+    assert sum(len(f.detections.pos) for f in made if f.detections is not None) > 300
+
+
+def test_bodies_come_from_the_seed_and_nothing_else(walk: Sequence) -> None:
+    one, same, other = (replay(walk, View(), seed, streams=()).truth for seed in (20_001, 20_001, 20_002))
+    assert one is not None
+    assert same is not None
+    assert other is not None
+    assert np.array_equal(one.pos, same.pos)  # type: ignore[arg-type]
+    assert np.array_equal(one.box, same.box)  # type: ignore[arg-type]
+    assert np.array_equal(one.pos, other.pos)  # type: ignore[arg-type]
+    assert not np.array_equal(one.height, other.height)  # type: ignore[arg-type]
+    part = replay(walk, View(), 20_001, cut=Cut(4.0, 5.0), streams=()).truth
+    assert part is not None
+    assert part.length == 50
+    assert set(np.unique(part.height)) == set(np.unique(one.height))  # type: ignore[arg-type]
+
+
+def test_groups_that_nobody_labelled_are_not_labelled(walk: Sequence, tmp_path: Path) -> None:
+    (tmp_path / "walk" / "groups.txt").unlink()
+    truth = replay(open_folder(tmp_path / "walk"), View(), streams=()).truth
+    assert truth is not None
+    assert truth.groups is None
+    assert truth.events is None
+    assert truth.labelled is not None
+    assert not truth.labelled.any()
+    assert (truth.group == -1).all()
+
+
+def test_our_own_motion_keeps_its_world_and_bodies() -> None:
+    own = simulate(load("merge"), 3, streams=())
+    made = replay(own, load_view(set=["camera.kind=top", "camera.fps=20"]), 4, streams=())
+    assert own.truth is not None
+    assert made.truth is not None
+    assert made.scene == own.scene or made.scene.size.tolist() == own.scene.size.tolist()  # type: ignore[union-attr]
+    assert made.truth.pos[made.truth.rows(101)] == pytest.approx(own.truth.pos[own.truth.rows(51)], abs=0.01)  # type: ignore[index]
+    assert np.unique(made.truth.height).tolist() == np.unique(own.truth.height).tolist()  # type: ignore[arg-type]
+    kinds = [[(e.kind, e.members, round(e.start / t.fps)) for e in t.events or ()] for t in (made.truth, own.truth)]
+    assert kinds[0] == kinds[1]
+
+
+def test_what_is_real_is_told_from_what_is_not(walk: Sequence) -> None:
+    own = simulate(load("merge"), 3, streams=())
+    assert is_real(walk)
+    assert not is_real(own)
+    assert is_real(replay(walk, View(), streams=()))
+    assert not is_real(replay(own, View(), streams=()))
+    assert is_real(replay(replay(walk, View(), streams=()), View(), streams=()))
+
+
+def test_pictures_show_them(walk: Sequence) -> None:
+    made = replay(walk, load_view(set=["camera.image=[160, 120]"]), 20_001, cut=Cut(0.0, 1.0))
+    frame = next(iter(made))
+    empty = made.background()
+    assert frame.image is not None
+    assert empty is not None
+    pixels = made.frame_truth(1)
+    assert pixels is not None
+    assert pixels.pixels is not None
+    people = pixels.pixels.ids > 0
+    change = np.abs(frame.image.astype(float) - np.median(empty, axis=0)).max(axis=2)
+    assert change[people].mean() > 3 * change[~people].mean()
+
+
+@pytest.mark.parametrize(
+    ("changes", "cut", "words"),
+    [
+        (["camera.height=1.0"], Cut(), "out of view"),
+        ([], Cut(99.0), "--start"),
+        ([], Cut(0.0, 0.01), "--start"),
+        (["sensor.hide=[{ start = 0.0, end = 1.0, group = 'a' }]"], Cut(), "sensor.hide.0.group"),
+    ],
+)
+def test_what_cannot_be_is_refused(walk: Sequence, changes: list[str], cut: Cut, words: str) -> None:
+    with pytest.raises(InputError) as error:
+        list(replay(walk, load_view(set=changes), cut=cut, streams=()))
+    assert words in str(error.value)
+
+
+def test_boxes_alone_want_a_calibration(tmp_path: Path) -> None:
+    own = simulate(load("merge"), 3, streams=())
+    truth = own.truth
+    assert truth is not None
+    assert truth.box is not None
+    (tmp_path / "gt").mkdir()
+    lines = [
+        f"{f},{i},{x},{y},{w},{h},1,1,1" for f, i, (x, y, w, h) in zip(truth.frame, truth.id, truth.box, strict=True)
+    ]
+    (tmp_path / "gt" / "gt.txt").write_text("\n".join(lines))
+    (tmp_path / "seqinfo.ini").write_text("[Sequence]\nname=boxes\nframeRate=10\nimWidth=640\nimHeight=480\n")
+    with pytest.raises(InputError, match="--calibration"):
+        replay(tmp_path, View(), streams=())
+    made = replay(tmp_path, View(), calibration=own.camera, streams=())
+    assert made.truth is not None
+    shift = np.array(made.source["origin"]["shift"])
+    away = made.truth.pos[made.truth.rows(51)] - shift - truth.pos[truth.rows(51)]  # type: ignore[index]
+    assert np.abs(away).max() < 0.3  # a box's lower edge is the near side of the feet
+
+
+def test_a_calibration_of_no_use_is_refused(walk: Sequence) -> None:
+    with pytest.raises(InputError, match="--calibration"):
+        replay(walk, View(), calibration=simulate(load("merge"), 3, streams=()).camera)
+
+
+def test_a_folder_of_many_and_nobody_labelled_are_refused(tmp_path: Path, walk: Sequence) -> None:
+    with pytest.raises(InputError, match="no labelled people"):
+        replay(Sequence("empty", 10.0, 5, lambda: iter(())), View())
+    with pytest.raises(InputError, match="nothing there"):
+        replay(tmp_path / "nowhere", View())
+    with pytest.raises(InputError, match="no such file"):
+        replay(walk, tmp_path / "none.toml")
+
+
+@pytest.mark.parametrize("name", ["biwi/seq_hotel", "caviar/mwt1gt.xml", "mot/PETS09-S2L1-first200"])
+def test_real_recordings(shared_data: Path, name: str) -> None:
+    made = replay(shared_data / name, View(), cut=Cut(5.0, 20.0), streams=())
+    truth = made.truth
+    assert truth is not None
+    assert truth.vel is not None
+    assert made.length == 200
+    assert (truth.visibility > 0).mean() > 0.95
+    speed = np.linalg.norm(truth.vel, axis=1)
+    assert 0.2 < np.median(speed) < 1.8
+    assert (truth.groups is None) == name.startswith("mot")
+    assert is_real(made)

@@ -1,0 +1,86 @@
+"""Replays as a dataset: whole, the same bytes again, on the splits that nothing is tuned on."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pytest
+
+from scenarios.errors import InputError
+from scenarios.loading.resolve import load
+from scenarios.schema.observation import load_view
+from sim.dataset.replay import Cut
+from sim.dataset.replay_dataset import How, store_replays
+from sim.io.formats.biwi import open_folder
+from sim.io.formats.real_or_simulated import is_real
+from sim.io.source import open_source
+from sim.io.store.validate import validate
+from sim.sequence import simulate
+from sim.types import Sequence
+
+SMALL = load_view(set=["camera.image=[160, 120]", "camera.fps=5"])
+
+
+@pytest.fixture
+def walk(tmp_path: Path) -> Sequence:
+    lines = [f"{10 * k} {id} {0.5 * k} 0 {id}.0 0 0 0" for k in range(20) for id in (1, 2)]
+    (tmp_path / "walk").mkdir()
+    (tmp_path / "walk" / "obsmat.txt").write_text("\n".join(lines))
+    (tmp_path / "walk" / "groups.txt").write_text("1 2\n")
+    return open_folder(tmp_path / "walk")
+
+
+def content(folder: Path) -> dict[str, bytes]:
+    return {str(p.relative_to(folder)): p.read_bytes() for p in sorted(folder.rglob("*")) if p.is_file()}
+
+
+def test_a_dataset_like_any_other(walk: Sequence, tmp_path: Path) -> None:
+    how, told = How(SMALL, Cut(1.0, 2.0)), []
+    made = store_replays([walk], how, range(20_000, 20_002), tmp_path / "a", lambda *words: told.append(words))
+    assert [p.name for p in made] == ["walk-t1-s20000", "walk-t1-s20001"]
+    assert told[-1] == (2, 2, "walk-t1-s20001")
+    assert validate(tmp_path / "a") == []
+    manifest = json.loads((made[0] / "manifest.json").read_text())
+    assert manifest["origin"]["real"] is True
+    assert manifest["origin"]["name"] == "walk"
+    assert str(tmp_path) not in (made[0] / "manifest.json").read_text() + (made[0] / "scenario.toml").read_text()
+    stored = open_source(tmp_path / "a")[0]
+    assert is_real(stored)
+    assert stored.truth is not None
+    assert stored.truth.labelled is not None
+    assert stored.truth.labelled.all()
+    assert next(iter(stored)).image is not None
+    assert stored.load_people is None
+
+
+def test_same_bytes_again_and_what_is_there_is_kept(walk: Sequence, tmp_path: Path) -> None:
+    how = How(SMALL, Cut(0.0, 1.0), streams=("left", "ids"))
+    (first,) = store_replays([walk], how, range(20_000, 20_001), tmp_path / "a")
+    (second,) = store_replays([walk], how, range(20_000, 20_001), tmp_path / "b")
+    assert content(first) == content(second)
+    stamp = (first / "manifest.json").stat().st_mtime_ns
+    store_replays([walk], how, range(20_000, 20_001), tmp_path / "a")
+    assert (first / "manifest.json").stat().st_mtime_ns == stamp
+    (first / "gt" / "gt.txt").write_text("")
+    store_replays([walk], how, range(20_000, 20_001), tmp_path / "a")
+    assert content(first) == content(second)
+
+
+def test_another_replay_in_its_place_is_refused(walk: Sequence, tmp_path: Path) -> None:
+    store_replays([walk], How(SMALL, streams=()), range(20_000, 20_001), tmp_path)
+    other = How(load_view(set=["camera.image=[160, 120]", "camera.fps=5", "sensor.detect_prob=0.5"]), streams=())
+    with pytest.raises(InputError, match="another sequence"):
+        store_replays([walk], other, range(20_000, 20_001), tmp_path)
+
+
+def test_real_motion_stays_out_of_what_is_tuned_on(walk: Sequence, tmp_path: Path) -> None:
+    for first in (0, 10_000):
+        with pytest.raises(InputError, match="20000"):
+            store_replays([walk], How(SMALL, streams=()), range(first, first + 1), tmp_path)
+    own = simulate(load("merge", set=["duration=2.0", "event=[]"]), 3, streams=())
+    (made,) = store_replays([own], How(SMALL, streams=()), range(1), tmp_path)
+    assert made.parent.name == "flockscope-train"
+    assert not is_real(open_source(made)[0])
+    with pytest.raises(InputError, match="two recordings"):
+        store_replays([walk, walk], How(SMALL, streams=()), range(20_000, 20_001), tmp_path)

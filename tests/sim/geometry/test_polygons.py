@@ -1,0 +1,182 @@
+import numpy as np
+import pytest
+
+from sim.geometry.footprints import Q, footprint_hull, footprint_hulls
+from sim.geometry.polygons import (
+    area,
+    contains,
+    convex_hull,
+    edge_distance_pairs,
+    gap_pairs,
+    hull_gap,
+    intersection_pairs,
+    iou_matrix,
+    iou_pairs,
+    pack,
+)
+
+SQUARE = np.array([[0.0, 0], [1, 0], [1, 1], [0, 1]])
+
+
+def polygons(seed, n, spread=3.0):
+    r = np.random.default_rng(seed)
+    return [convex_hull(r.uniform(0, spread, (r.integers(3, 20), 2)) + r.uniform(-1, 1, 2)) for _ in range(n)]
+
+
+def raster_iou(a, b, step=0.01):
+    x = np.arange(-1.5, 4.5, step) + step / 2
+    grid = np.stack(np.meshgrid(x, x), -1).reshape(-1, 2)
+    inside = [np.ones(len(grid), bool) for _ in (a, b)]
+    for mask, hull in zip(inside, (a, b), strict=True):
+        for p, q in zip(hull, np.roll(hull, -1, axis=0), strict=True):
+            mask &= (q - p)[0] * (grid - p)[:, 1] - (q - p)[1] * (grid - p)[:, 0] >= 0
+    return (inside[0] & inside[1]).sum() / (inside[0] | inside[1]).sum()
+
+
+def test_overlap_is_that_of_a_dense_raster():
+    some = polygons(1, 24)
+    got = iou_matrix(some[:12], some[12:])
+    for k in range(12):
+        assert got[k, k] == pytest.approx(raster_iou(some[k], some[12 + k]), abs=5e-3)
+    assert (got > 0.05).sum() > 20
+
+
+@pytest.mark.parametrize(
+    ("moved", "common"),
+    [
+        ((0.5, 0), 0.5),
+        ((0.5, 0.5), 0.25),
+        ((0, 0), 1),
+        ((1, 0), 0),
+        ((0, -1), 0),
+        ((1, 1), 0),
+        ((3, 0), 0),
+        ((1e-12, 0), 1),
+    ],
+)
+def test_squares(moved, common):
+    zero = np.zeros(1, np.int64)
+    a, b = pack([SQUARE]), pack([SQUARE + np.array(moved)])
+    assert intersection_pairs(a, b, zero, zero)[0] == pytest.approx(common, abs=1e-9)
+    assert iou_pairs(a, b, zero, zero)[0] == pytest.approx(common / (2 - common), abs=1e-9)
+
+
+def test_contained_turned_and_far_from_the_origin():
+    diamond = np.array([[0.5, 0], [1, 0.5], [0.5, 1], [0, 0.5]])
+    assert iou_matrix([SQUARE], [diamond])[0, 0] == pytest.approx(0.5)
+    assert iou_matrix([SQUARE + 1e6], [diamond + 1e6])[0, 0] == pytest.approx(0.5, abs=1e-9)
+    assert iou_matrix([SQUARE * 1e-3], [diamond * 1e-3])[0, 0] == pytest.approx(0.5)
+
+
+def test_same_hull_is_exactly_one_and_order_of_sides_is_nothing():
+    some = polygons(2, 30)
+    got = iou_matrix(some, some)
+    assert (np.diag(got) == 1.0).all()
+    np.testing.assert_allclose(got, got.T, atol=1e-14)
+    assert ((got >= 0) & (got <= 1)).all()
+
+
+def test_shared_edges_of_footprints():
+    """Hulls of {a, b, c} and {a, b}: their common part is the smaller."""
+    r = np.random.default_rng(3)
+    for _ in range(50):
+        places = r.uniform(0, 2, (3, 2))
+        whole, part = footprint_hull(places), footprint_hull(places[:2])
+        assert iou_matrix([whole], [part])[0, 0] == pytest.approx(area(part) / area(whole), abs=1e-9)
+        assert iou_matrix([part], [whole])[0, 0] == pytest.approx(area(part) / area(whole), abs=1e-9)
+    line = np.array([[0.0, 0], [0.7, 0.7], [1.4, 1.4]])
+    assert iou_matrix([footprint_hull(line)], [footprint_hull(line[:2])])[0, 0] == pytest.approx(
+        area(footprint_hull(line[:2])) / area(footprint_hull(line)), abs=1e-9
+    )
+
+
+def test_no_area_no_overlap():
+    none = np.zeros((0, 2))
+    assert iou_matrix([none, SQUARE[:1], SQUARE[:2]], [SQUARE, none]).tolist() == [[0, 0]] * 3
+    assert iou_matrix([], [SQUARE]).shape == (0, 1)
+    assert np.isnan(gap_pairs(pack([none]), pack([SQUARE]), *np.zeros((2, 1), np.int64)))
+
+
+def test_hull_of_points():
+    scipy_hull = pytest.importorskip("scipy.spatial").ConvexHull
+    for seed in range(50):
+        points = np.random.default_rng(seed).normal(size=(12, 2))
+        hull = convex_hull(points)
+        assert area(hull) == pytest.approx(scipy_hull(points).volume)
+        assert len(hull) == len(scipy_hull(points).vertices)
+    assert convex_hull(np.array([[0, 0], [1, 1], [2, 2], [1, 1.0]])).tolist() == [[0, 0], [2, 2]]
+    assert convex_hull(np.zeros((3, 2))).tolist() == [[0, 0]]
+    assert convex_hull(np.zeros((0, 2))).shape == (0, 2)
+
+
+def places_of(kind, r):
+    places = r.uniform(0, 2, (r.integers(1, 7), 2))
+    if kind == "grid":
+        return np.round(2 * places) / 2
+    if kind == "row":
+        return places * [1, 0]
+    if kind == "along an edge":
+        return np.outer(places[:, 0], Q[4] - Q[3]) / 0.1
+    if kind == "one place":
+        return np.repeat(places[:1], len(places), axis=0)
+    return places
+
+
+@pytest.mark.parametrize("kind", ["anywhere", "grid", "row", "along an edge", "one place"])
+def test_footprint_hull_is_the_hull_of_all_footprints(kind):
+    r = np.random.default_rng(4)
+    for _ in range(200):
+        places = places_of(kind, r)
+        hull, slow = footprint_hull(places), convex_hull((places[:, None] + Q).reshape(-1, 2))
+        assert area(hull) == pytest.approx(area(slow), abs=1e-9)
+        edge = np.roll(hull, -1, axis=0) - hull
+        after = np.roll(edge, -1, axis=0)
+        assert (edge[:, 0] * after[:, 1] - edge[:, 1] * after[:, 0] > 0).all(), "strictly convex, counter-clockwise"
+        assert contains(hull, places).all()
+
+
+def test_one_person_is_the_16_gon():
+    hull = footprint_hull(np.array([[3.0, 4]]))
+    assert len(hull) == 16
+    np.testing.assert_allclose(np.hypot(*(hull - [3, 4]).T), 0.25)
+
+
+def test_footprints_of_many_groups_at_once():
+    r = np.random.default_rng(5)
+    count = np.array([2, 1, 3, 2, 5])
+    places = r.uniform(0, 4, (count.sum(), 2))
+    for hull, own in zip(footprint_hulls(places, count), np.split(places, np.cumsum(count)[:-1]), strict=True):
+        np.testing.assert_array_equal(hull, footprint_hull(own))
+
+
+@pytest.mark.parametrize(
+    ("moved", "gap"), [((3, 0), 2), ((2, 2), 2**0.5), ((0.5, 0.5), 0), ((0.2, 0), 0), ((0, 1.25), 0.25)]
+)
+def test_gap(moved, gap):
+    assert hull_gap(SQUARE, SQUARE + np.array(moved)) == pytest.approx(gap, abs=1e-12)
+
+
+def test_gap_of_one_inside_another_and_against_samples():
+    assert hull_gap(SQUARE, SQUARE * 0.2 + 0.4) == 0
+    some = polygons(6, 20, spread=1.0)
+    shifted = [h + np.random.default_rng(k).uniform(-3, 3, 2) for k, h in enumerate(some)]
+    for a, b in zip(some, reversed(shifted), strict=True):
+        s = np.linspace(0, 1, 200)[:, None]
+        rims = [np.concatenate([p + s * (q - p) for p, q in zip(h, np.roll(h, -1, 0), strict=True)]) for h in (a, b)]
+        sampled = np.hypot(*np.moveaxis(rims[0][:, None] - rims[1], -1, 0)).min()
+        overlap = iou_matrix([a], [b])[0, 0] > 0
+        assert hull_gap(a, b) == pytest.approx(0 if overlap else sampled, abs=0.01)
+
+
+def test_edge_distance_of_lines_in_a_row():
+    a, b = np.array([[0.0, 0], [1, 0]]), np.array([[3.0, 0], [4, 0]])
+    assert edge_distance_pairs(pack([a]), pack([b]), *np.zeros((2, 1), np.int64))[0] == pytest.approx(2)
+
+
+def test_points_in_a_dilated_hull():
+    points = np.array([[0.5, 0.5], [1, 0.5], [1.2, 0.5], [1.25, 1.25], [-0.31, 0.5]])
+    assert contains(SQUARE, points).tolist() == [True, True, False, False, False]
+    assert contains(SQUARE, points, 0.3).tolist() == [True, True, True, False, False]
+    assert contains(SQUARE, points, 0.36).tolist() == [True] * 5
+    assert contains(np.zeros((0, 2)), points, 1).tolist() == [False] * 5
+    assert contains(SQUARE[:2], points, 0.5).tolist() == [True, True, False, False, False]

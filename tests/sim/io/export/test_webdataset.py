@@ -1,0 +1,224 @@
+"""Tar shards: the same bytes each time, read as samples, turned back into the dataset with the same content hash."""
+
+from __future__ import annotations
+
+import io
+import json
+import re
+import tarfile
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import cv2
+import numpy as np
+import pytest
+
+from scenarios.errors import InputError
+from sim.io.export.webdataset import size_of, webdataset
+from sim.io.files import atomic
+from sim.io.source import open_source
+from sim.io.store import sequence_folder
+from sim.io.store.validate import content_hash, validate
+
+Sample = dict[str, bytes]
+
+
+@pytest.fixture
+def data(tmp_path: Path, make_pictured: Callable[..., Any]) -> Path:
+    """Three sequences with pictures, one of them with a dot in its name."""
+    for k, name in enumerate(("b-s00000", "a.2-s00000", "c-s00000")):
+        live = make_pictured(k, ("left", "ids", "background"))
+        folder = tmp_path / "data" / "flockscope-train" / name
+        sequence_folder.write_sequence(
+            folder, live, scenario="schema = 1\n", seed=k, streams=("left", "ids", "background"), images="png"
+        )
+    return tmp_path / "data"
+
+
+def members(path: Path) -> list[tuple[tarfile.TarInfo, bytes]]:
+    with tarfile.open(path) as tar:
+        return [(info, tar.extractfile(info).read()) for info in tar]
+
+
+def samples(*paths: Path) -> dict[str, Sample]:
+    """As webdataset groups them: consecutive files whose names are the same up to the first dot of the last part."""
+    found: dict[str, Sample] = {}
+    last = None
+    for path in paths:
+        for info, body in members(path):
+            key, kind = re.fullmatch(r"((?:.*/|)[^.]+)[.]([^/]*)", info.name).groups()
+            assert key == last or key not in found, "a sample's files stand together"
+            assert kind not in found.setdefault(key, {})
+            found[key][kind] = body
+            last = key
+    return found
+
+
+def content(folder: Path) -> dict[str, bytes]:
+    return {p.relative_to(folder).as_posix(): p.read_bytes() for p in sorted(folder.rglob("*")) if p.is_file()}
+
+
+def test_a_sequence_is_a_sample_and_can_be_unpacked(data: Path, tmp_path: Path) -> None:
+    index = webdataset(data, tmp_path / "out")
+    (shard,) = index["shards"]
+    found = samples(tmp_path / "out" / shard["name"])
+    assert list(found) == [f"flockscope-train/{name}" for name in ("a%2E2-s00000", "b-s00000", "c-s00000")]
+    for key, sample in found.items():
+        files = {name: sample.pop(name.replace("/", ".")) for name in json.loads(sample["manifest.json"])["files"]}
+        files["manifest.json"] = sample.pop("manifest.json")
+        assert not sample
+        atomic.write_folder(tmp_path / "back" / key.replace("%2E", "."), files)
+    assert content(tmp_path / "back") == content(data)
+    assert index["content_hash"] == content_hash(data) == content_hash(tmp_path / "back")
+    assert [p for s in (tmp_path / "back").glob("*/*") for p in validate(s)] == []
+
+
+def test_a_frame_is_a_sample_with_its_labels(data: Path, tmp_path: Path) -> None:
+    index = webdataset(data, tmp_path / "out", samples="frame")
+    assert index["content_hash"] == content_hash(data)
+    found = samples(tmp_path / "out" / "shard-000000.tar")
+    assert len(found) == sum(s.length or 0 for s in open_source(data))
+    for folder in sorted((data / "flockscope-train").iterdir()):
+        (sequence,) = open_source(folder)
+        for frame in sequence:
+            sample = found[f"flockscope-train/{folder.name.replace('.', '%2E')}/{frame.index:06d}"]
+            assert set(sample) == {"json", "left.png", "ids.png"}
+            picture = cv2.imdecode(np.frombuffer(sample["left.png"], np.uint8), cv2.IMREAD_COLOR)
+            assert np.array_equal(picture, frame.image)
+            agrees(json.loads(sample["json"]), sequence.truth.at(frame.index), frame.detections)
+
+
+def agrees(labels: dict[str, Any], truth: Any, detections: Any) -> None:
+    """The labels of a frame say all that is true of its people and groups, and what the sensor saw."""
+    people = labels["people"]
+    assert labels["frame"] == truth.index
+    assert [p["id"] for p in people] == truth.id.tolist()
+    assert [p["group"] for p in people] == truth.group.tolist()
+    boxes = np.array([p["box"] for p in people], float).reshape(-1, 4)
+    places = np.array([[p[k] for k in ("x", "y", "vx", "vy")] for p in people], float).reshape(-1, 4)
+    np.testing.assert_array_equal(boxes, truth.box)
+    np.testing.assert_array_equal(places, np.hstack([truth.pos, truth.vel]))
+    assert [p["visibility"] for p in people] == truth.visibility.tolist()
+    if truth.groups is None:
+        assert labels["groups"] is None
+    else:
+        assert [g["members"] for g in labels["groups"]] == [m.tolist() for m in truth.groups.members]
+        assert [g["hull"] for g in labels["groups"]] == [h.tolist() for h in truth.groups.hull]
+    assert [d["score"] for d in labels["detections"]] == detections.score.tolist()
+    assert [[d[k] for k in "xy"] for d in labels["detections"]] == detections.pos[:, :2].tolist()
+
+
+def test_the_same_bytes_from_anywhere_and_nothing_of_the_machine(
+    data: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    webdataset(data, tmp_path / "one", shard_size=1)
+    for path in data.rglob("*"):
+        path.touch()
+    monkeypatch.chdir(data / "flockscope-train")
+    webdataset(".", tmp_path / "two", shard_size=1)
+    assert content(tmp_path / "one") == content(tmp_path / "two")
+    assert len(list((tmp_path / "one").glob("*.tar"))) == 3
+    for info, _ in members(tmp_path / "one" / "shard-000001.tar"):
+        assert (info.mtime, info.uid, info.gid, info.uname, info.gname, info.mode) == (0, 0, 0, "", "", 0o644)
+
+
+def test_shards_hold_whole_sequences_up_to_their_size(data: Path, tmp_path: Path) -> None:
+    whole = webdataset(data, tmp_path / "whole", shard_size=1)["shards"]
+    largest = max(shard["bytes"] for shard in whole)
+    some = webdataset(data, tmp_path / "some", shard_size=int(2.5 * largest))["shards"]
+    assert [len(shard["sequences"]) for shard in some] == [2, 1]
+    assert all(shard["bytes"] <= 2.5 * largest for shard in some)
+    paths = [tmp_path / "some" / shard["name"] for shard in some]
+    assert samples(*paths) == samples(*[tmp_path / "whole" / shard["name"] for shard in whole])
+
+
+def test_what_is_whole_is_kept_and_the_rest_made_anew(data: Path, tmp_path: Path) -> None:
+    out = tmp_path / "out"
+    webdataset(data, out, shard_size=1)
+    before = content(out)
+    (out / "index.json").unlink()
+    (out / "shard-000001.json").unlink()
+    shard = out / "shard-000002.tar"
+    shard.write_bytes(shard.read_bytes()[:-1])
+    (out / f"{atomic.PARTIAL}x").write_text("")
+    kept = (out / "shard-000000.tar").stat().st_ino
+    seen = []
+    webdataset(data, out, shard_size=1, progress=lambda *a: seen.append(a))
+    assert content(out) == before
+    assert (out / "shard-000000.tar").stat().st_ino == kept
+    assert seen == [(k, 3, f"shard-{k - 1:06d}.tar") for k in (1, 2, 3)]
+
+
+@pytest.mark.parametrize(("part", "more"), [("", {"shard_size": 1}), ("", {"samples": "frame"}), ("b-s00000", {})])
+def test_another_export_is_not_overwritten(data: Path, tmp_path: Path, part: str, more: dict[str, Any]) -> None:
+    source = data / "flockscope-train" / part
+    for first, second in (((data, {}), (source, more)), ((source, more), (data, {}))):
+        out = tmp_path / f"out{len(list(tmp_path.iterdir()))}"
+        webdataset(first[0], out, **first[1])
+        before = content(out)
+        with pytest.raises(InputError, match=r"shard-00000\d.tar: got a shard of another export"):
+            webdataset(second[0], out, **second[1])
+        assert content(out) == before
+
+
+@pytest.mark.parametrize("name", ["gt/truth.parquet", "img1/000003.png", "manifest.json"])
+def test_an_altered_file_is_named_and_its_shard_not_written(data: Path, tmp_path: Path, name: str) -> None:
+    path = data / "flockscope-train" / "b-s00000" / name
+    path.write_bytes(path.read_bytes().replace(b"1", b"2", 1) + b" ")
+    with pytest.raises(InputError, match=re.escape(str(path))):
+        webdataset(data, tmp_path / "out", shard_size=1)
+    assert not (tmp_path / "out" / "shard-000001.tar").exists()
+    assert not (tmp_path / "out" / "index.json").exists()
+
+
+def test_frames_of_videos_are_refused(tmp_path: Path, make_pictured: Callable[..., Any]) -> None:
+    folder = tmp_path / "x-s00000"
+    sequence_folder.write_sequence(
+        folder, make_pictured(1, ("left",)), scenario="schema = 1\n", seed=1, streams=("left",), images="mp4"
+    )
+    with pytest.raises(InputError, match=r"--samples frame: got videos; .*--images jpg or png"):
+        webdataset(folder, tmp_path / "out", samples="frame")
+    assert not (tmp_path / "out").exists()
+    webdataset(folder, tmp_path / "out")
+    (sample,) = samples(tmp_path / "out" / "shard-000000.tar").values()
+    assert sample["left.mp4"] == (folder / "left.mp4").read_bytes()
+
+
+def test_what_is_not_ours_is_refused(tmp_path: Path) -> None:
+    (tmp_path / "mot" / "det").mkdir(parents=True)
+    (tmp_path / "mot" / "det" / "det.txt").write_text("1,-1,0,0,4,6,1,-1,-1,-1\n")
+    for source, word in ((tmp_path / "mot", "a recording, mot"), (tmp_path / "no", "nothing of ours")):
+        with pytest.raises(InputError, match=f"{word}.*flockscope generate"):
+            webdataset(source, tmp_path / "out")
+    assert not (tmp_path / "out").exists()
+
+
+def test_two_of_one_name_are_refused(data: Path, tmp_path: Path) -> None:
+    both = tmp_path / "both"
+    for part in ("one", "two"):
+        (both / part).mkdir(parents=True)
+        (both / part / "flockscope-train").symlink_to(data / "flockscope-train")
+    with pytest.raises(InputError, match=r"two sequences flockscope-train/a\.2-s00000"):
+        webdataset(both, tmp_path / "out")
+
+
+@pytest.mark.parametrize(
+    ("text", "size"), [("1", 1), ("500MB", 500_000_000), ("1.5 GB", 1_500_000_000), ("20 kB", 20_000), ("7B", 7)]
+)
+def test_sizes(text: str, size: int) -> None:
+    assert size_of(text) == size
+
+
+@pytest.mark.parametrize("text", ["", "0", "-1", "1TB", "GB", "1e9", "nan", "0.1B", "1 2", "1M"])
+def test_no_sizes(text: str) -> None:
+    with pytest.raises(InputError, match="--shard-size: got"):
+        size_of(text)
+
+
+def test_a_stream_of_a_shard_needs_no_seeking(data: Path, tmp_path: Path) -> None:
+    """As object stores give it."""
+    webdataset(data, tmp_path / "out")
+    body = (tmp_path / "out" / "shard-000000.tar").read_bytes()
+    with tarfile.open(fileobj=io.BytesIO(body), mode="r|") as tar:
+        assert sum(1 for _ in tar) == len(members(tmp_path / "out" / "shard-000000.tar"))

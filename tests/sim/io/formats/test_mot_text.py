@@ -1,0 +1,172 @@
+import numpy as np
+import pytest
+
+from scenarios.errors import InputError
+from sim.io.formats import mot_text
+from sim.io.formats.velocity import differentiate
+from sim.io.source import open_source
+
+
+def folder(tmp_path, gt=None, det=None, ini="name=x\nframeRate=10\nseqLength=3\nimWidth=64\nimHeight=48\n"):
+    for name, text in (("gt/gt.txt", gt), ("det/det.txt", det)):
+        if text is not None:
+            (tmp_path / name).parent.mkdir(exist_ok=True)
+            (tmp_path / name).write_text(text)
+    if ini is not None:
+        (tmp_path / "seqinfo.ini").write_text("[Sequence]\n" + ini)
+    return tmp_path
+
+
+def test_pets_is_read_with_its_ground_positions(shared_data):
+    (s,) = open_source(shared_data / "mot" / "PETS09-S2L1-first200")
+    assert (s.name, s.fps, s.length, s.image_size) == ("PETS09-S2L1-first200", 7.0, 200, (480, 360))
+    assert s.has_images
+    assert s.has_detections
+    frames = list(s.without_pictures())
+    assert [f.index for f in frames] == list(range(1, 201))
+    assert all(f.image is None for f in frames)
+    assert sum(len(f.detections.box) for f in frames) == 1132
+    assert frames[0].detections.box[0].tolist() == [405.90, 144.69, 27.76, 53.83]
+    assert frames[7].t == 1.0
+    t = s.truth
+    assert t.pos[0].tolist() == [-4.1554, -7.3591]
+    assert len(t.frame) == 1122, "101 of 1223 rows have flag 0"
+    assert t.groups is None
+    assert not t.labelled.any()
+    speed = np.linalg.norm(t.vel, axis=1)
+    assert 0.8 < np.median(speed) < 1.6, "people walk"
+
+
+def test_images_are_decoded_when_wanted(shared_data):
+    (s,) = open_source(shared_data / "mot" / "PETS09-S2L1-first200", images=True)
+    assert next(iter(s)).image.shape == (360, 480, 3)
+
+
+def test_tud_without_seqinfo_is_taken_at_25_fps_with_one_warning(shared_data):
+    with pytest.warns(UserWarning, match="25 fps") as seen:
+        (s,) = open_source(shared_data / "mot" / "TUD-Campus")
+    frames = list(s)
+    assert len(seen) == 1
+    assert (s.fps, s.length, s.image_size) == (25.0, 71, None)
+    assert s.truth.pos is None
+    assert len(s.truth.frame) == 359
+    assert frames[0].detections.plane == "image"
+    (again,) = open_source(shared_data / "mot" / "TUD-Campus", fps=30)
+    assert again.fps == 30
+
+
+def test_a_folder_of_folders_is_a_dataset(shared_data):
+    assert [s.name for s in open_source(shared_data / "mot", fps=10)] == ["PETS09-S2L1-first200", "TUD-Campus"]
+
+
+def test_nine_columns_are_flag_class_visibility(tmp_path):
+    rows = "1,1,0,0,5,5,1,1,0.25\n1,2,0,0,5,5,0,1,1\n1,3,0,0,5,5,1,7,1\n2,1,1,0,5,5,1,1,-1\n"
+    (s,) = open_source(folder(tmp_path, rows))
+    assert s.truth.id.tolist() == [1, 1]
+    assert s.truth.visibility.tolist() == [0.25, 1.0]
+    assert s.truth.pos is None
+    assert s.truth.length == 3
+
+
+def test_ten_columns_are_confidence_and_ground(tmp_path):
+    (s,) = open_source(folder(tmp_path, "1,1,0,0,5,5,1,2.5,3.5,0\n2,1,0,0,5,5,1,-1,-1,-1\n"))
+    assert s.truth.pos[0].tolist() == [2.5, 3.5]
+    assert np.isnan(s.truth.pos[1]).all()
+
+
+def test_detections_with_points_are_on_the_ground(tmp_path):
+    (s,) = open_source(folder(tmp_path, det="1,-1,0,0,4,6,0.5,2,3,0\n3,-1,0,0,4,6,0.7,2,4,0\n"))
+    first, empty, last = (f.detections for f in s)
+    assert first.plane == last.plane == "ground"
+    assert last.pos.tolist() == [[2, 4]]
+    assert len(empty.pos) == 0
+    assert s.truth is None
+
+
+def test_scores_of_any_range_come_into_0_to_1():
+    assert mot_text.unit_scores(np.array([0.2, 1.0])).tolist() == [0.2, 1.0]
+    assert mot_text.unit_scores(np.array([-1.0, -1.0])).tolist() == [1.0, 1.0]
+    assert mot_text.unit_scores(np.array([-2.0, 0.0, 2.0])).tolist() == [0.0, 0.5, 1.0]
+
+
+GOOD = "1,1,0,0,5,5,1,1,1\n"
+
+
+@pytest.mark.parametrize(
+    ("gt", "line", "word"),
+    [
+        (GOOD + "2,1,0,0,nan,5,1,1,1\n", 2, "finite"),
+        (GOOD + "\n2,1,0,0,5,0,1,1,1\n", 3, "above 0"),
+        (GOOD + "1,1,0,0,5,5,1,1,1\n", 2, "once"),
+        (GOOD + "4,1,0,0,5,5,1,1,1\n", 2, "1 to 3"),
+        (GOOD + "0,1,0,0,5,5,1,1,1\n", 2, "1 to 3"),
+        (GOOD + "1.5,1,0,0,5,5,1,1,1\n", 2, "whole"),
+        (GOOD + "2,1,0,0,5,x,1,1,1\n", 2, "'x'"),
+        (GOOD + "2,1,0,0,5\n", 2, "9 columns"),
+        (GOOD + "2,1,0,0,5,5,1,1,1.5\n", 2, "visibility"),
+        ("1,2,3\n", 1, "columns"),
+    ],
+)
+def test_bad_rows_are_one_line(tmp_path, gt, line, word):
+    with pytest.raises(InputError, match=word) as error:
+        open_source(folder(tmp_path, gt))[0].truth  # noqa: B018
+    assert error.value.place == f"line {line}"
+    assert error.value.file.endswith("gt.txt")
+    assert error.value.exit_code == 2
+    assert "\n" not in str(error.value)
+
+
+@pytest.mark.parametrize("ini", ["frameRate=fast\n", "frameRate=0\n", "seqLength=-3\n", "frameRate=nan\n", "nothing\n"])
+def test_bad_seqinfo_is_one_line(tmp_path, ini):
+    with pytest.raises(InputError) as error:
+        open_source(folder(tmp_path, GOOD, ini=ini))
+    assert error.value.file.endswith("seqinfo.ini")
+    assert "\n" not in str(error.value)
+
+
+def test_binary_text_and_wrong_paths(tmp_path):
+    (tmp_path / "gt.txt").write_bytes(b"\xff\xfe\x00")
+    (tmp_path / "clip.mp4").write_bytes(b"")
+    (tmp_path / "empty").mkdir()
+    for name, word in (("gt.txt", "UTF-8"), ("clip.mp4", "video"), ("empty", "without"), ("nowhere", "nothing there")):
+        with pytest.raises(InputError, match=word):
+            open_source(tmp_path / name, fps=10)
+    with pytest.raises(InputError, match="fps"):
+        open_source(tmp_path, fps=-1)
+
+
+def test_a_bare_text_is_truth_or_detections(tmp_path):
+    (tmp_path / "a.txt").write_text("1,3,0,0,4,6,1,-1,-1,-1\n")
+    (tmp_path / "b.txt").write_text("1,-1,0,0,4,6,1,-1,-1,-1\n")
+    (a,), (b,) = open_source(tmp_path / "a.txt", fps=10), open_source(tmp_path / "b.txt", fps=10)
+    assert a.truth.id.tolist() == [3]
+    assert not a.has_detections
+    assert b.truth is None
+    assert next(iter(b)).detections.box.tolist() == [[0, 0, 4, 6]]
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_velocity_of_straight_walks_is_exact_in_any_row_order(seed):
+    r = np.random.default_rng(seed)
+    frame = np.concatenate([np.flatnonzero(r.random(30) < 0.7) + 1 for _ in range(4)])
+    id = np.repeat(np.arange(4), [len(frame) // 4 + (k < len(frame) % 4) for k in range(4)])
+    frame, id = np.unique(np.stack([frame, id]), axis=1)
+    start, v = r.normal(size=(4, 2)), r.normal(size=(4, 2))
+    pos = start[id] + v[id] * frame[:, None] / 10
+    mixed = r.permutation(len(frame))
+    vel = differentiate(frame[mixed], id[mixed], pos[mixed], 10.0)
+    alone = (vel == 0).all(axis=1)
+    np.testing.assert_allclose(vel[~alone], v[id[mixed]][~alone], atol=1e-9)
+    near = np.array([((np.abs(frame - f) <= 2) & (id == i)).sum() > 1 for f, i in zip(frame, id, strict=True)])[mixed]
+    assert np.array_equal(alone, ~near)
+    assert differentiate(frame[:0], id[:0], pos[:0], 10.0).shape == (0, 2)
+
+
+def test_nothing_says_how_long_it_is(tmp_path):
+    (tmp_path / "x.txt").write_text("\n")
+    with pytest.raises(InputError, match="no row"):
+        open_source(tmp_path / "x.txt", fps=10)
+    with pytest.raises(InputError, match="how long"):
+        open_source(folder(tmp_path, det="", ini="frameRate=10\n"))
+    (s,) = open_source(folder(tmp_path, det="", ini="frameRate=10\nseqLength=3\n"))
+    assert [len(f.detections.pos) for f in s] == [0, 0, 0]

@@ -1,0 +1,169 @@
+import numpy as np
+import pytest
+
+from scenarios.errors import InputError
+from sim.io.formats import biwi, caviar
+from sim.io.source import open_source
+
+ROW = "{} {} {} 0 {} 1.0 0 0.0\n"
+
+
+def biwi_folder(tmp_path, groups="", rows=None):
+    rows = rows or [(f, i, f / 10, i) for f in (1, 11, 21, 81) for i in (1, 2, 3)]
+    (tmp_path / "obsmat.txt").write_text("".join(ROW.format(*row) for row in rows))
+    (tmp_path / "groups.txt").write_text(groups)
+    return tmp_path
+
+
+def test_seq_hotel_slots_and_columns(shared_data):
+    (s,) = open_source(shared_data / "biwi" / "seq_hotel")
+    assert (s.name, s.fps, s.length) == ("seq_hotel", 2.5, 1807)
+    assert not s.has_detections
+    assert sum(1 for _ in s) == 1807
+    frame = biwi._table(shared_data / "biwi" / "seq_hotel")[1]
+    assert len(np.unique(frame)) == 1168
+    assert (np.diff(np.unique(frame)) > 1).sum() == 26, "gaps"
+
+
+def test_seq_hotel_truth(shared_data):
+    pytest.importorskip("sim.truth.groups")
+    (s,) = open_source(shared_data / "biwi" / "seq_hotel")
+    t = s.truth
+    assert (len(t.frame), len(np.unique(t.id))) == (6544, 390)
+    assert t.pos[0].tolist() == [1.3983781, -5.7433032]
+    assert t.vel[0].tolist() == [-0.32708274, -1.6802858]
+    assert len(np.unique(t.group[t.group >= 0])) == 41
+    assert len(t.groups) == 1807
+    assert t.labelled.all()
+    assert np.unique(t.group[t.id == 14]) == np.unique(t.group[t.id == 15])
+    assert all(set(e.members) <= set(t.id.tolist()) for e in t.events)
+    labels = set(t.group.tolist())
+    assert all(set(e.before) | set(e.after) <= labels for e in t.events)
+    check_groups(t, t.groups)
+
+
+def check_groups(truth, groups):
+    """Each frame's groups are the labels of at least two people there, and hulls hold their members."""
+    for index, some in enumerate(groups, 1):
+        here = truth.rows(index)
+        names, counts = np.unique(truth.group[here][truth.group[here] >= 0], return_counts=True)
+        assert some.id.tolist() == names[counts > 1].tolist()
+        for g, members in zip(some.id, some.members, strict=True):
+            assert members.tolist() == truth.id[here][truth.group[here] == g].tolist()
+
+
+def test_biwi_groups_survive_their_traps(tmp_path):
+    folder = biwi_folder(tmp_path, "1 1 2\n3 3\n\n7 8\n")
+    assert biwi.read_groups(folder / "groups.txt") == {1: 1, 2: 1, 7: 2, 8: 2}
+    folder = biwi_folder(tmp_path, "1 2\n2 3\n")
+    with pytest.warns(UserWarning, match="one group"):
+        assert biwi.read_groups(folder / "groups.txt") == {1: 1, 2: 1, 3: 1}
+
+
+def test_biwi_slots_take_the_most_frequent_step():
+    assert biwi.slots(np.array([1, 11, 21, 81, 81])).tolist() == [1, 2, 3, 9, 9]
+    assert biwi.slots(np.array([780, 786, 792, 799])).tolist() == [1, 2, 3, 4]
+    assert biwi.slots(np.array([5, 5])).tolist() == [1, 1]
+
+
+def test_biwi_without_groups_is_not_labelled(tmp_path):
+    folder = biwi_folder(tmp_path)
+    (folder / "groups.txt").unlink()
+    (s,) = open_source(folder)
+    assert s.length == 9
+    assert s.truth.pos[4].tolist() == [1.1, 2]
+    assert s.truth.vel[4].tolist() == [1, 0]
+    assert not s.truth.labelled.any()
+    assert s.truth.groups is None
+    assert (s.truth.group == -1).all()
+
+
+@pytest.mark.parametrize(
+    ("groups", "rows", "word"),
+    [
+        ("1 x\n", None, "ids of people"),
+        ("", [(1, 1, 0, 0), (1, 1, 0, 0)], "once"),
+        ("", [(1, 1, "nan", 0)], "finite"),
+        ("", [(1, 1.5, 0, 0)], "whole"),
+    ],
+)
+def test_bad_biwi_is_one_line(tmp_path, groups, rows, word):
+    with pytest.raises(InputError, match=word) as error:
+        open_source(biwi_folder(tmp_path, groups, rows))[0].truth  # noqa: B018
+    assert error.value.place.startswith("line ")
+    assert "\n" not in str(error.value)
+
+
+OBJECT = '<object id="{}"><box h="8" w="16" xc="{}" yc="20"/></object>'
+GROUP = '<group id="{}"><members>{}</members></group>'
+
+
+def xml(tmp_path, *frames, tag="dataset"):
+    body = "".join(
+        f'<frame number="{k}"><objectlist>{"".join(o)}</objectlist><grouplist>{"".join(g)}</grouplist></frame>'
+        for k, (o, g) in enumerate(frames)
+    )
+    path = tmp_path / "clip.xml"
+    path.write_text(f'<?xml version="1.0" encoding="UTF-8"?><{tag} name="clip">{body}</{tag}>')
+    return path
+
+
+def test_meet_walk_together(shared_data):
+    (s,) = open_source(shared_data / "caviar" / "mwt1gt.xml")
+    assert (s.name, s.fps, s.length, s.image_size) == ("Meet_WalkTogether1", 25.0, 707, (384, 288))
+    assert s.px_per_m == 32 / 1.7
+    found = caviar.read_xml(shared_data / "caviar" / "mwt1gt.xml")
+    assert len(np.unique(found.id)) == 6
+    assert found.centre[0].tolist() == [25, 209]
+    assert np.unique(found.label).tolist() == [-1, 0, 2, 3]
+
+
+def test_meet_walk_together_truth(shared_data):
+    pytest.importorskip("sim.truth.groups")
+    t = open_source(shared_data / "caviar" / "mwt1gt.xml")[0].truth
+    assert (t.pos, t.groups, len(t.groups_px)) == (None, None, 707)
+    assert t.box[0].tolist() == [18, 205, 14, 8]
+    assert sum(len(g.id) for g in t.groups_px) == 182 + 82 + 10
+    check_groups(t, t.groups_px)
+    told = [(e.kind, e.start, e.end, e.before, e.after, e.members) for e in t.events]
+    assert told == [("form", 339, 388, (-1, -1), (0,), (1, 2)), ("leave", 493, 493, (0,), (-1,), (1, 2))], (
+        "two people alone form a group, 27 frames after they are labelled as one and 10 after they are within 1.5 m"
+    )
+    some = next(g for g in t.groups_px if len(g.id))
+    assert some.pos[0, 0] > 20, "px"
+
+
+def test_caviar_traps(tmp_path):
+    objects = [OBJECT.format(k, 10 * k) for k in (1, 2, 3)]
+    path = xml(tmp_path, (objects, [GROUP.format(4, "1,2"), GROUP.format(5, "3")]), (objects, []))
+    found = caviar.read_xml(path)
+    assert found.frame.tolist() == [1, 1, 1, 2, 2, 2]
+    assert found.label.tolist() == [4, 4, -1, -1, -1, -1]
+    with pytest.warns(UserWarning, match="two groups"):
+        found = caviar.read_xml(xml(tmp_path, (objects, [GROUP.format(4, "1,2"), GROUP.format(5, "2,3")])))
+    assert found.label.tolist() == [4, 4, 5]
+
+
+def test_a_caviar_of_nobody(tmp_path):
+    (s,) = open_source(xml(tmp_path, ([], []), ([], [])))
+    assert s.length == 2
+    assert len(s.truth.frame) == 0
+
+
+@pytest.mark.parametrize(
+    ("frames", "tag", "word"),
+    [
+        ((([OBJECT.format(1, "nan")], []),), "dataset", "a number"),
+        ((([OBJECT.format("a", 1)], []),), "dataset", "a number"),
+        ((([OBJECT.format(1, 1).replace('"8"', '"0"')], []),), "dataset", "above 0"),
+        ((([OBJECT.format(1, 1)] * 2, []),), "dataset", "once"),
+        ((([], [GROUP.format(1, "a,b")]),), "dataset", "ids of people"),
+        (((['<object id="1"/>'], []),), "dataset", "without box"),
+        (((["<object>"], []),), "dataset", "broken XML"),
+        ((([], []),), "Camera", "<dataset>"),
+    ],
+)
+def test_bad_caviar_is_one_line(tmp_path, frames, tag, word):
+    with pytest.raises(InputError, match=word) as error:
+        open_source(xml(tmp_path, *frames, tag=tag))
+    assert "\n" not in str(error.value)

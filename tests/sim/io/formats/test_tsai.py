@@ -1,0 +1,102 @@
+import json
+
+import numpy as np
+import pytest
+
+from scenarios.errors import InputError
+from sim.io.formats.tsai import read_tsai
+from sim.io.source import open_source
+from sim.io.store.camera_files import camera_document, fitted, read_camera
+from sim.scene.camera import project, to_ground
+
+XML = """<?xml version="1.0" encoding="UTF-8"?>
+<Camera name="c">
+  <Geometry width="768" height="576" ncx="795" nfx="752" dx="4.85e-03" dy="4.65e-03" dpx="5.0e-03" dpy="4.0e-03"/>
+  <Intrinsic focal="5.5" kappa1="5.1e-03" cx="324.0" cy="282.0" sx="1.1"/>
+  <Extrinsic tx="800" ty="-3000" tz="35000" rx="2.04" ry="-0.89" rz="-0.43"/>
+</Camera>
+"""
+
+
+def by_the_book(x, y, z):
+    """Tsai's model as Willson writes it, mm in, px out (counted from the middle of the first pixel)."""
+    rx, ry, rz = 2.04, -0.89, -0.43
+    sa, ca, sb, cb, sg, cg = np.sin(rx), np.cos(rx), np.sin(ry), np.cos(ry), np.sin(rz), np.cos(rz)
+    xc = cb * cg * x + (cg * sa * sb - ca * sg) * y + (sa * sg + ca * cg * sb) * z + 800
+    yc = cb * sg * x + (sa * sb * sg + ca * cg) * y + (ca * sb * sg - cg * sa) * z - 3000
+    zc = -sb * x + cb * sa * y + ca * cb * z + 35000
+    xu, yu = 5.5 * xc / zc, 5.5 * yc / zc
+    xd, yd = xu, yu
+    for _ in range(200):
+        bend = 1 + 5.1e-3 * (xd**2 + yd**2)
+        xd, yd = xu / bend, yu / bend
+    return 1.1 * xd / 5.0e-3 + 324, yd / 4.0e-3 + 282
+
+
+def test_tsai_by_the_book(tmp_path):
+    (tmp_path / "c.xml").write_text(XML)
+    camera = read_tsai(tmp_path / "c.xml")
+    assert camera.image == (768, 576)
+    for xyz in np.random.default_rng(0).uniform(-8, 8, (50, 3)):
+        uv, _ = project(camera, xyz[None])
+        assert uv[0] - 0.5 == pytest.approx(by_the_book(*(1000 * xyz)), abs=1e-6)
+
+
+def test_a_bent_camera_comes_back_and_a_straight_one_says_nothing_of_it(tmp_path, same):
+    (tmp_path / "c.xml").write_text(XML)
+    bent = read_tsai(tmp_path / "c.xml")
+    for camera in (bent, bent.replace(radial=0.0)):
+        document = camera_document(camera)
+        assert ("radial" in document) == (camera.radial != 0)
+        (tmp_path / "camera.json").write_text(json.dumps(document))
+        same(camera, read_camera(tmp_path / "camera.json"))
+
+
+def test_a_calibration_is_scaled_to_the_recording(tmp_path):
+    (tmp_path / "c.xml").write_text(XML)
+    camera = read_tsai(tmp_path / "c.xml")
+    half = fitted(camera, (384, 288), tmp_path)
+    xyz = np.random.default_rng(0).uniform(-8, 8, (50, 3))
+    assert project(half, xyz)[0] == pytest.approx(project(camera, xyz)[0] / 2)
+    assert half.image == (384, 288)
+    assert fitted(camera, None, tmp_path) is camera
+    with pytest.raises(InputError, match="768×576"):
+        fitted(camera, (640, 360), tmp_path)
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "place"),
+    [
+        ("<Camera", "Camera", "no XML"),
+        ("Geometry", "Geometrie", "Geometry width"),
+        ('kappa1="5.1e-03"', "", "Intrinsic kappa1"),
+        ('focal="5.5"', 'focal="0"', "Intrinsic focal"),
+        ('rx="2.04"', 'rx="nan"', "Extrinsic rx"),
+        ('rx="2.04"', 'rx="two"', "Extrinsic rx"),
+    ],
+)
+def test_a_broken_calibration_is_one_line(tmp_path, old, new, place):
+    (tmp_path / "c.xml").write_text(XML.replace(old, new))
+    with pytest.raises(InputError, match=place) as error:
+        open_source(tmp_path, camera=tmp_path / "c.xml")
+    assert "\n" not in str(error.value)
+    with pytest.raises(InputError, match="no file"):
+        open_source(tmp_path, camera=tmp_path / "none.xml")
+
+
+def test_pets_ground_truth_is_in_the_calibrations_world(shared_data):
+    """Columns 8 to 10 of gt.txt project to the boxes' feet, all but a shift of 1 px of the original that MOTChallenge's
+    counting from (1, 1) makes (0.63 px here), and whole px in the original."""
+    folder = shared_data / "mot" / "PETS09-S2L1-first200"
+    (sequence,) = open_source(folder, camera=folder / "View_001.xml")
+    truth, camera = sequence.truth, sequence.camera
+    assert camera.image == sequence.image_size == (480, 360)
+    feet = truth.box[:, :2] + truth.box[:, 2:] * (0.5, 1.0)
+    uv, _ = project(camera, np.c_[truth.pos, np.zeros(len(truth.pos))])
+    off = feet - uv
+    assert np.median(off, axis=0) == pytest.approx([0.62, 0.62], abs=0.05)
+    assert np.percentile(np.linalg.norm(off - np.median(off, axis=0), axis=1), 95) < 0.5
+    away = np.linalg.norm(to_ground(camera, feet) - truth.pos, axis=1)
+    assert np.median(away) < 0.10
+    assert away.max() < 0.25
+    assert np.median(np.linalg.norm(to_ground(camera, feet - 0.625) - truth.pos, axis=1)) < 0.03

@@ -1,0 +1,264 @@
+import warnings
+
+import numpy as np
+import pytest
+
+from scenarios.errors import InputError
+from sim.io.pictures import video_decoding
+from sim.io.source import open_source
+from tests.small_videos import SIZE, cut, damage, disc, picture, write_jpegs, write_video
+
+KINDS = {
+    "x264.mp4": {},
+    "long-groups.mp4": {"options": {"g": "250", "bf": "3"}},
+    "h264.mkv": {},
+    "h264-in.avi": {},
+    "mpeg4.avi": {"codec": "mpeg4"},
+    "jpegs.avi": {"codec": "mjpeg", "pix_fmt": "yuvj420p"},
+    "mpeg2.mpg": {"codec": "mpeg2video", "rate": 25},
+    "transport.ts": {"rate": 25},
+    "bare.h264": {"rate": 25},
+    "bare.y4m": {"codec": "wrapped_avframe"},
+    "phone.3gp": {"codec": "mpeg4"},
+    "media.wmv": {"codec": "wmv2"},
+    "vp9.webm": {"codec": "libvpx-vp9"},
+    "vp8.webm": {"codec": "libvpx"},
+    "quick.mov": {"audio": True},
+    "grey.mkv": {"codec": "ffv1", "pix_fmt": "gray"},
+    "16-bit.mkv": {"codec": "ffv1", "pix_fmt": "gray16le"},
+    "10-bit.mkv": {"codec": "ffv1", "pix_fmt": "yuv420p10le"},
+}
+
+
+def one(path, **options):
+    (sequence,) = open_source(path, **options)
+    return sequence
+
+
+@pytest.mark.parametrize("name", KINDS)
+def test_every_frame_in_its_place(tmp_path, name):
+    more = dict(KINDS[name])
+    sequence = one(write_video(tmp_path / name, [picture(k) for k in range(2, 22)], **more))
+    assert (sequence.image_size, sequence.fps) == (SIZE, more.get("rate", 10))
+    assert sequence.length in (20, None)
+    for _ in range(2):
+        frames = list(sequence)
+        assert [f.index for f in frames] == list(range(1, 21))
+        assert [f.t for f in frames] == pytest.approx([k / sequence.fps for k in range(20)])
+        assert all(f.image.shape == (SIZE[1], SIZE[0], 3) and f.image.dtype == np.uint8 for f in frames)
+        assert [disc(f.image) for f in frames] == pytest.approx([disc(picture(k)) for k in range(2, 22)], abs=1.0)
+        assert np.abs(frames[9].image.astype(int) - picture(11)).mean() < 8
+    assert sequence.has_images
+    assert not sequence.has_right
+    assert sequence.truth is None
+    if sequence.length:
+        assert [(f.index, f.image) for f in sequence.without_pictures()] == [(k, None) for k in range(1, 21)]
+
+
+def test_rotation_is_undone(tmp_path):
+    cv2 = pytest.importorskip("cv2")
+    for degrees in (90, 180):
+        path = write_video(tmp_path / f"{degrees}.mp4", [picture(k) for k in range(3)], rotation=degrees)
+        sequence = one(path)
+        assert sequence.image_size == (SIZE if degrees == 180 else SIZE[::-1])
+        other = cv2.VideoCapture(str(path)).read()[1]
+        off = np.abs(next(iter(sequence)).image.astype(int) - other).mean()
+        assert off < 2, "OpenCV's reader is a grey level darker"
+        assert np.abs(next(iter(sequence)).image[::-1, ::-1].astype(int) - other).mean() > 5
+
+
+@pytest.mark.parametrize(
+    ("name", "more", "rate", "said"),
+    [
+        ("a.mkv", {"stamps": [100 * k for k in range(20)], "rate": 1000}, 10.0, "10 by its time stamps"),
+        ("b.mp4", {"stamps": [40 * k for k in range(20)], "rate": 1000}, 25.0, "25 by its time stamps"),
+        ("c.mkv", {"stamps": [round(k * 1000 / 29.97) for k in range(20)], "rate": 90}, 29.97, "by its time stamps"),
+        ("d.avi", {"codec": "mjpeg", "pix_fmt": "yuvj420p", "rate": 1000}, 25.0, "25 .the container says 1000"),
+    ],
+)
+def test_a_container_that_lies_about_its_rate(tmp_path, name, more, rate, said):
+    path = write_video(tmp_path / name, [picture(k) for k in range(20)], **more)
+    with pytest.warns(UserWarning, match=said):
+        sequence = one(path)
+    assert sequence.fps == pytest.approx(rate, abs=0.06)
+    given = one(path, fps=12.5)
+    assert (given.fps, given.source["fps"]) == (12.5, "12.5, as given")
+    assert next(f for f in given if f.index == 3).t == pytest.approx(2 / 12.5)
+
+
+def test_what_cannot_be_decoded_is_a_lost_frame(tmp_path):
+    path = write_video(tmp_path / "a.mp4", [picture(k) for k in range(40)], options={"g": "10", "bf": "0"})
+    whole = list(one(path))
+    damage(path, 0.5)
+    sequence = one(path)
+    assert sequence.length == 40
+    with pytest.warns(UserWarning, match="no readable picture") as told:
+        frames = list(sequence)
+    assert len(told) == 1
+    lost = [f.index for f in frames if f.image is None]
+    assert lost
+    assert [f.index for f in frames] == list(range(1, 41))
+    for frame, right in zip(frames, whole, strict=True):
+        if frame.index < lost[0] or frame.index > lost[-1] + 10:
+            assert np.array_equal(frame.image, right.image)
+
+
+def test_a_video_cut_off_ends_there_with_a_warning(tmp_path):
+    path = cut(write_video(tmp_path / "a.mp4", [picture(k) for k in range(40)], options={"g": "10", "bf": "0"}), 0.7)
+    with pytest.warns(UserWarning, match="of the 40 frames it promises"):
+        sequence = one(path)
+    assert 5 < sequence.length < 40
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        assert len(list(sequence)) == sequence.length
+
+
+def test_a_matroska_that_breaks_off_is_told(tmp_path):
+    """Its header says how many seconds, not how many frames."""
+    whole = write_video(tmp_path / "a.mkv", [picture(k) for k in range(40)], options={"g": "10", "bf": "0"})
+    one(whole)  # warnings are errors
+    with pytest.warns(UserWarning, match=r"a.mkv: ends after 2\.\d of the 4\.0 s it promises"):
+        sequence = one(cut(whole, 0.7))
+    assert 20 <= sequence.length < 30
+
+
+def test_a_container_that_breaks_within_is_told(tmp_path):
+    path = write_video(tmp_path / "a.y4m", [picture(k) for k in range(20)], codec="wrapped_avframe")
+    with pytest.warns(UserWarning, match=r"a\.y4m: breaks off after \d+ frames \(Invalid data"):
+        sequence = one(damage(path, 0.5, 9000))
+    assert 5 < sequence.length < 15
+    assert [disc(frame.image) for frame in sequence][:5] == pytest.approx([4.0 * k for k in range(5)], abs=5)
+
+
+@pytest.mark.parametrize("name", ["a.mkv", "a.mp4"])
+def test_times_without_frames_are_told(tmp_path, name):
+    """Two gaps; a pause of half a second, as phones make them, is none."""
+    stamps = [40 * k + 3000 * (k > 9) + 2000 * (k > 14) + 500 * (k > 17) for k in range(20)]
+    path = write_video(tmp_path / name, [picture(k) for k in range(20)], rate=1000, stamps=stamps)
+    with pytest.warns(UserWarning, match="without the gap") as told:
+        sequence = one(path, fps=25)
+    (words,) = (str(warning.message) for warning in told)
+    assert words == f"{name}: nothing for 3.0 s after frame 10 (1 more such); frames are numbered without the gap"
+    assert [frame.index for frame in sequence] == list(range(1, 21))
+
+
+def empty(path):
+    path.write_bytes(b"")
+
+
+def text(path):
+    path.write_text("no video\n" * 100)
+
+
+def sound_alone(path):
+    import av
+
+    with av.open(str(path), "w") as container:
+        stream = container.add_stream("aac", rate=8000, layout="mono")
+        frame = av.AudioFrame.from_ndarray(np.zeros((1, 8000), np.float32), format="fltp", layout="mono")
+        frame.sample_rate = 8000
+        container.mux(stream.encode(frame))
+        container.mux(stream.encode(None))
+
+
+def without_index(path):
+    write_video(path.with_suffix(".mov"), [picture(k) for k in range(9)])
+    whole = path.with_suffix(".mov").read_bytes()
+    path.write_bytes(whole[whole.index(b"mdat") - 4 :])
+
+
+@pytest.mark.parametrize(
+    ("make", "got"),
+    [
+        (empty, "an empty file"),
+        (text, "no readable video"),
+        (sound_alone, "no video stream"),
+        (without_index, "no readable video"),
+    ],
+)
+def test_no_video_is_one_line(tmp_path, make, got):
+    path = tmp_path / "a.mp4"
+    make(path)
+    with pytest.raises(InputError, match=got) as error:
+        open_source(path)
+    assert error.value.file == str(path)
+    assert "\n" not in str(error.value)
+    with pytest.raises(InputError, match="nothing there"):
+        open_source(tmp_path / "none.mp4")
+
+
+def test_pictures_of_another_size_are_one_line(tmp_path):
+    path = write_jpegs(tmp_path / "a.avi", [picture(0), picture(1), picture(2, (48, 32)), picture(3)])
+    sequence = one(path)
+    with pytest.raises(InputError, match=r"frame 3: got 48×32 px; expected 96×64 px") as error:
+        list(sequence)
+    assert "\n" not in str(error.value)
+
+
+@pytest.mark.parametrize("name", ["x264.mp4", "long-groups.mp4", "h264-in.avi", "mpeg2.mpg", "vp8.webm"])
+@pytest.mark.parametrize(
+    ("asked", "wanted", "words"),
+    [
+        (None, [int((k + 0.5) * 60 / 50) + 1 for k in range(50)], "50 frames spread over the recording (not causal)"),
+        ("spread:3", [11, 31, 51], "3 frames spread over the recording (not causal)"),
+        ("first:4", [1, 2, 3, 4], "first 4 frames (causal from frame 4)"),
+    ],
+)
+def test_the_background_sample(tmp_path, name, asked, wanted, words):
+    path = write_video(tmp_path / name, [picture(k) for k in range(60)], **KINDS[name])
+    sequence = one(path, background=asked)
+    frames = [f.image for f in sequence]
+    assert sequence.source["background"] == words
+    assert np.array_equal(sequence.background(), np.stack([frames[k - 1] for k in wanted]))
+
+
+def test_the_sample_decodes_the_groups_it_needs(tmp_path, monkeypatch):
+    path = write_video(tmp_path / "a.mp4", [picture(k) for k in range(60)], options={"g": "5", "bf": "2"})
+    some, count = video_decoding._some, 0
+
+    def counted(stream, packet):
+        nonlocal count
+        found = some(stream, packet)
+        count += len(found)
+        return found
+
+    sequence = one(path, background="spread:2")
+    monkeypatch.setattr(video_decoding, "_some", counted)
+    assert len(sequence.background()) == 2
+    assert count < 20
+
+
+@pytest.mark.parametrize("wanted", [[5, 30, 45], [1, 60], [10, 11], [4, 5, 6], [60], [1]])
+def test_any_frames_of_any_groups(tmp_path, wanted):
+    """Also those that the decoder still holds when the next group is left out."""
+    path = write_video(tmp_path / "a.mp4", [picture(k) for k in range(60)], options={"g": "5", "bf": "3"})
+    index = video_decoding.packets(path)
+    assert sum(index.keys) >= 12
+    every = dict(video_decoding.pictures(path, index))
+    found = dict(video_decoding.pictures(path, index, wanted))
+    assert list(found) == wanted
+    assert all(np.array_equal(found[k], every[k]) for k in wanted)
+
+
+def test_a_sample_longer_than_the_video(tmp_path):
+    path = write_video(tmp_path / "a.mp4", [picture(k) for k in range(12)])
+    with pytest.raises(InputError, match="--background: got a recording of 12 frames; expected 30 or more"):
+        open_source(path, background="first:30")
+    sequence = one(path)
+    with pytest.warns(UserWarning, match="all 12 are taken"):
+        assert len(sequence.background()) == 12
+    assert sequence.source["background"].startswith("12 frames")
+
+
+@pytest.mark.parametrize("text", ["first", "first:0", "last:3", "spread:-1", "50", "first:3.5", ""])
+def test_no_background(tmp_path, text):
+    path = write_video(tmp_path / "a.mp4", [picture(k) for k in range(12)])
+    with pytest.raises(InputError, match="--background"):
+        open_source(path, background=text)
+
+
+def test_a_folder_of_videos(tmp_path):
+    for name in ("b.mp4", "a.avi"):
+        write_video(tmp_path / name, [picture(k) for k in range(3)])
+    (tmp_path / "notes.md").write_text("…")
+    assert [s.name for s in open_source(tmp_path)] == ["a", "b"]

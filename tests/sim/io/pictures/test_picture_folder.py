@@ -1,0 +1,184 @@
+import warnings
+
+import cv2
+import numpy as np
+import pytest
+
+from scenarios.errors import InputError
+from sim.io.pictures import picture_folder as pictures
+from sim.io.pictures.picture_folder import read_picture
+from sim.io.source import open_source
+from tests.small_videos import SIZE, picture
+
+ROWS = "1,1,10,10,8,16,1,-1,-1,-1\n9,1,10,10,8,16,1,-1,-1,-1\n"
+
+
+def folder(tmp_path, names, *, gt="", det="", ini="", size=SIZE):
+    """A MOTChallenge folder whose k-th picture shows disc k."""
+    (tmp_path / "img1").mkdir(parents=True)
+    for k, name in enumerate(names):
+        cv2.imwrite(str(tmp_path / "img1" / name), picture(k, size))
+    for part, text in (("gt", gt), ("det", det)):
+        if text:
+            (tmp_path / part).mkdir()
+            (tmp_path / part / f"{part}.txt").write_text(text)
+    (tmp_path / "seqinfo.ini").write_text(f"[Sequence]\nframeRate=10\n{ini}")
+    return tmp_path
+
+
+def shown(path, **options):
+    """Number of the picture that each frame shows, None for lost ones."""
+    (sequence,) = open_source(path, images=True, **options)
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        frames = list(sequence)
+    assert [f.index for f in frames] == list(range(1, sequence.length + 1))
+    every = {k: picture(k) for k in range(30)}
+    pictures = [f.image for f in frames]
+    return [None if p is None else min(every, key=lambda k: np.abs(every[k].astype(int) - p).mean()) for p in pictures]
+
+
+@pytest.mark.parametrize(
+    ("names", "more", "right"),
+    [
+        (["000001.jpg", "000002.jpg", "000003.jpg"], {}, [0, 1, 2]),
+        (["000001.png", "000002.jpg", "000004.png"], {"gt": ROWS}, [0, 1, None, 2, None, None, None, None, None]),
+        (["000001.jpg", "000003.jpg"], {"ini": "seqLength=4\n"}, [0, None, 1, None]),
+        (["000000.jpg", "000001.jpg", "000003.jpg"], {}, [0, 1, None, 2]),
+        (["000000.jpg", "000001.jpg", "000002.jpg"], {"ini": "seqLength=3\n"}, [0, 1, 2]),
+        (["in000470.jpg", "in000471.jpg", "in000473.jpg"], {}, [0, 1, None, 2]),
+        (["000500.jpg", "000501.jpg", "000502.jpg"], {"ini": "seqLength=3\n"}, [0, 1, 2]),
+        (["000003.jpg", "000004.jpg"], {"det": ROWS.replace(",1,", ",-1,", 1)}, [None, None, 0, 1, *[None] * 5]),
+        (["9.jpg", "10.jpg", "11.jpg"], {}, [0, 1, 2]),
+        (["a.jpg", "b.jpg", "c.jpg"], {}, [0, 1, 2]),
+        (["a1.jpg", "b1.jpg", "c7.jpg"], {}, [0, 1, 2]),
+        (["1600000000100.jpg", "1600000000200.jpg", "1600000000900.jpg"], {}, [0, 1, 2]),
+    ],
+)
+def test_pictures_are_frames_by_their_numbers(tmp_path, names, more, right):
+    assert shown(folder(tmp_path / "a", names, **more)) == right
+
+
+def test_two_pictures_of_a_frame_are_refused(tmp_path):
+    with pytest.raises(InputError, match=r"000001.jpg and 000001.png"):
+        open_source(folder(tmp_path / "a", ["000001.jpg", "000001.png"]))
+
+
+@pytest.mark.parametrize("suffix", [".jpg", ".png"])
+def test_a_lost_picture_is_told_once(tmp_path, capfd, suffix):
+    """By us alone: libraries do not grumble on stderr."""
+    path = folder(tmp_path / "a", [f"{k:06d}{suffix}" for k in range(1, 9)])
+    (path / f"img1/000003{suffix}").unlink()
+    (path / f"img1/000005{suffix}").write_bytes((path / f"img1/000005{suffix}").read_bytes()[:400])
+    (path / f"img1/000006{suffix}").write_bytes(b"no picture")
+    (path / f"img1/000008{suffix}").write_bytes(b"")
+    (sequence,) = open_source(path, images=True)
+    with pytest.warns(UserWarning, match="frame 3 has no readable picture") as told:
+        frames = list(sequence)
+    assert len(told) == 1
+    assert [f.index for f in frames if f.image is None] == [3, 5, 6, 8]
+    assert capfd.readouterr().err == ""
+
+
+@pytest.mark.parametrize("kind", [".jpg", ".png"])
+def test_a_picture_cut_off_anywhere_is_none(kind):
+    """Seen without decoding: OpenCV 4 makes half a picture of it."""
+    body = cv2.imencode(kind, picture(3))[1].tobytes()
+    assert pictures.ends(body)
+    assert not any(pictures.ends(body[:n]) for n in range(8, len(body) - 8, 7))
+
+
+def test_pictures_cost_nothing_where_nobody_asks(tmp_path, monkeypatch):
+    path = folder(tmp_path / "a", ["000001.jpg", "000002.jpg"])
+    monkeypatch.setattr(pictures, "read_picture", None)
+    (sequence,) = open_source(path, images=False)
+    assert not sequence.has_images
+    assert [f.image for f in sequence] == [None, None]
+    assert sequence.image_size is None
+
+
+@pytest.mark.parametrize("suffix", [".jpg", ".png", ".bmp", ".tif"])
+def test_grey_16_bit_and_transparent_pictures(tmp_path, suffix):
+    image = picture(3)
+    grey = cv2.cvtColor(image, cv2.COLOR_BGR2GRAY)
+    kinds = [grey]
+    if suffix in (".png", ".tif"):
+        kinds += [grey.astype(np.uint16) * 257, image.astype(np.uint16) * 257]
+    if suffix == ".png":
+        kinds.append(np.dstack([image, np.full(grey.shape, 9, np.uint8)]))
+    for kind in kinds:
+        path = tmp_path / f"a{suffix}"
+        cv2.imwrite(str(path), kind)
+        read = read_picture(path)
+        assert (read.shape, read.dtype) == ((SIZE[1], SIZE[0], 3), np.uint8)
+        right = np.dstack([grey] * 3) if kind.ndim == 2 else image
+        assert np.abs(read.astype(int) - right).mean() <= (1 if suffix == ".jpg" else 0)
+
+
+def test_16_bits_are_the_full_range(tmp_path):
+    cv2.imwrite(str(tmp_path / "a.png"), np.array([[0, 255, 256, 32768, 65535]], np.uint16))
+    assert read_picture(tmp_path / "a.png")[0, :, 0].tolist() == [0, 0, 1, 128, 255]
+
+
+def test_another_size_is_one_line(tmp_path):
+    path = folder(tmp_path / "a", [f"{k:06d}.jpg" for k in range(1, 5)])
+    cv2.imwrite(str(path / "img1/000003.jpg"), picture(0, (48, 32)))
+    (sequence,) = open_source(path, images=True)
+    with pytest.raises(InputError, match=r"000003.jpg: got 48×32 px; expected 96×64 px"):
+        list(sequence)
+    (path / "seqinfo.ini").write_text("[Sequence]\nframeRate=10\nimWidth=960\nimHeight=640\n")
+    with pytest.raises(InputError, match=r"seqinfo.ini: imWidth, imHeight: got 960 × 640"):
+        open_source(path, images=True)
+    assert open_source(path, images=False)[0].image_size == (960, 640)
+
+
+def test_no_picture_that_can_be_read_is_one_line(tmp_path):
+    path = folder(tmp_path / "a", ["000001.jpg", "000002.jpg"])
+    for name in ("000001.jpg", "000002.jpg"):
+        (path / "img1" / name).write_text("version https://git-lfs.github.com/spec/v1\n")
+    (sequence,) = open_source(path, images=True)
+    for reading in (lambda: list(sequence), sequence.background):
+        with pytest.raises(InputError, match=r"2 pictures, none of which can be read") as error:
+            reading()
+        assert "\n" not in str(error.value)
+    assert len(list(sequence.without_pictures())) == 2
+
+
+def test_a_folder_without_pictures(tmp_path):
+    path = folder(tmp_path / "a", [], gt=ROWS)
+    (sequence,) = open_source(path, images=True)
+    assert not sequence.has_images
+    assert sequence.background() is None
+    assert [f.image for f in sequence] == [None] * 9
+    with pytest.raises(InputError, match="without pictures"):
+        open_source(path, images=True, background="first:3")
+    for text in ("a.txt",):
+        (tmp_path / text).write_text(ROWS)
+        with pytest.raises(InputError, match="--background"):
+            open_source(tmp_path / text, background="first:3")
+
+
+def test_the_sample_of_a_folder(tmp_path):
+    path = folder(tmp_path / "a", [f"{k:06d}.png" for k in range(1, 13)])
+    (path / "img1/000002.png").unlink()
+    (sequence,) = open_source(path, images=True, background="first:3")
+    assert sequence.source["background"] == "first 3 frames (causal from frame 3)"
+    assert np.array_equal(sequence.background(), np.stack([picture(0), picture(2)]))
+    (sequence,) = open_source(path, background="spread:3")
+    assert np.array_equal(sequence.background(), np.stack([picture(k) for k in (2, 6, 10)]))
+    (sequence,) = open_source(path, images=True)
+    with pytest.warns(UserWarning, match="all 12 are taken"):
+        assert len(sequence.background()) == 11
+    with pytest.raises(InputError, match="recording of 12 frames"):
+        open_source(path, images=True, background="spread:13")
+
+
+def test_pets_has_its_pictures(shared_data):
+    path = shared_data / "mot" / "PETS09-S2L1-first200"
+    (sequence,) = open_source(path, images=True)
+    assert sequence.image_size == (480, 360)
+    first = next(iter(sequence))
+    assert first.image.shape == (360, 480, 3)
+    assert len(first.detections.pos) > 0
+    assert sequence.source["background"] == "50 frames spread over the recording (not causal)"
+    assert sequence.background().shape == (50, 360, 480, 3)

@@ -1,0 +1,330 @@
+import json
+from dataclasses import replace
+
+import cv2
+import numpy as np
+import pytest
+
+from scenarios.errors import InputError, WorkError
+from sim.hashing import file_hash
+from sim.io.files import atomic
+from sim.io.files.tables import read_table
+from sim.io.source import open_source
+from sim.io.store import sequence_folder, streams
+from sim.io.store.manifest import sealed
+from sim.io.store.validate import validate
+from sim.types import PixelTruth
+
+SCENARIO = 'schema = 1\nname = "fake"\n'
+ALL = ("left", "right", "disparity", "ids", "background")
+
+
+def stored(folder, sequence, wanted=ALL, images="jpg"):
+    sequence_folder.write_sequence(folder, sequence, scenario=SCENARIO, seed=3, streams=wanted, images=images)
+    return open_source(folder)[0]
+
+
+def manifest(folder):
+    return json.loads((folder / "manifest.json").read_text())
+
+
+def names(folder):
+    return sorted(p.relative_to(folder).as_posix() for p in folder.rglob("*") if p.is_file())
+
+
+def test_png_comes_back_exactly(tmp_path, make_pictured, same):
+    live = make_pictured(3, ALL)
+    read = stored(tmp_path / "a", live, images="png")
+    same(live, read)
+    same(list(live), list(read))
+    same(list(read), list(read))
+    same(live.background(), read.background())
+    for index in range(1, live.length + 1):
+        same(live.load_pixels(index), read.load_pixels(index))
+        same(live.frame_truth(index), read.frame_truth(index))
+    assert [f.image for f in read.without_pictures()] == [None] * 12
+    assert (read.has_images, read.has_right) == (True, True)
+    assert validate(tmp_path / "a") == []
+
+
+@pytest.mark.parametrize(("images", "off"), [("jpg", 4.0), ("mp4", 12.0)])
+def test_jpg_and_mp4_come_back_nearly(tmp_path, make_pictured, same, images, off):
+    live = make_pictured(3, ALL)
+    read = stored(tmp_path / "a", live, images=images)
+    for a, b in zip(live, read, strict=True):
+        assert np.abs(a.image.astype(int) - b.image).mean() < off
+        assert np.abs(a.right.astype(int) - b.right).mean() < off
+        same(a.detections, b.detections)
+    assert np.abs(live.background().astype(int) - read.background()).mean() < off
+    assert read.background().shape == (50, 48, 64, 3)
+    same(live.load_pixels(7), read.load_pixels(7))
+    assert validate(tmp_path / "a") == []
+
+
+def test_where_pictures_lie(tmp_path, make_pictured):
+    live = make_pictured(3, ALL)
+    stored(tmp_path / "jpg", live)
+    found = names(tmp_path / "jpg")
+    for folder, kind, count in (
+        ("img1", "jpg", 12), ("img1_right", "jpg", 12), ("disparity", "png", 12), ("ids", "png", 12),
+        ("background", "jpg", 50),
+    ):  # fmt: skip
+        assert [n for n in found if n.startswith(f"{folder}/")] == [
+            f"{folder}/{k:06d}.{kind}" for k in range(1, count + 1)
+        ]
+    assert "imExt=.jpg" in (tmp_path / "jpg/seqinfo.ini").read_text()
+    stored(tmp_path / "png", live, ("left",), "png")
+    assert "imExt=.png" in (tmp_path / "png/seqinfo.ini").read_text()
+    stored(tmp_path / "mp4", live, images="mp4")
+    assert [n for n in names(tmp_path / "mp4") if n.endswith(".mp4")] == ["background.mp4", "left.mp4", "right.mp4"]
+    assert manifest(tmp_path / "mp4")["images"] == "mp4"
+    assert manifest(tmp_path / "png")["streams"] == ["left", "background"]
+
+
+def test_what_the_exact_streams_hold(tmp_path, make_pictured):
+    live = make_pictured(3, ALL)
+    stored(tmp_path / "a", live)
+    codes = cv2.imread(str(tmp_path / "a/ids/000005.png"), cv2.IMREAD_UNCHANGED)
+    assert codes.dtype == np.uint16
+    assert set(np.unique(codes)) == {0, 2001, 2002, 2999, 3000}
+    steps = cv2.imread(str(tmp_path / "a/disparity/000005.png"), cv2.IMREAD_UNCHANGED)
+    known = live.load_pixels(5).disparity
+    assert np.array_equal(steps == 0, np.isnan(known))
+    assert steps[steps > 0] / 64 == pytest.approx(known[steps > 0])
+
+
+def test_codes_there_and_back():
+    ids = np.array([[0, 1, 999], [-2, 2, 0]])
+    assert np.array_equal(streams.decoded_ids(streams.coded_ids(ids)), ids)
+    with pytest.raises(WorkError, match="person 1000"):
+        streams.coded_ids(np.array([[1000]]))
+    d = np.array([[np.nan, 1e-6, 0.5, 100.01, 2000.0]])
+    assert streams.decoded_disparity(streams.coded_disparity(d))[0] == pytest.approx(
+        [np.nan, 1 / 64, 0.5, 100.015625, 65535 / 64], nan_ok=True
+    )
+
+
+def test_one_content_however_it_is_stored(tmp_path, make_pictured):
+    """The content hash and the pixels' hashes are of what was drawn; truth_hash does not know of pictures."""
+    seen = {}
+    for images in ("jpg", "png", "mp4"):
+        stored(tmp_path / images, make_pictured(3, ALL), images=images)
+        seen[images] = manifest(tmp_path / images)
+    for key in ("truth_hash", "content_hash", "pixels"):
+        assert seen["jpg"][key] == seen["png"][key] == seen["mp4"][key]
+    assert list(seen["jpg"]["pixels"]) == list(ALL)
+    stored(tmp_path / "none", make_pictured(3, ()), ())
+    bare = manifest(tmp_path / "none")
+    assert (bare["streams"], bare["images"], bare["pixels"]) == ([], None, {})
+    assert bare["truth_hash"] == seen["jpg"]["truth_hash"]
+    assert bare["content_hash"] != seen["jpg"]["content_hash"]
+    other = make_pictured(3, ALL)
+    dark = replace(other, frames=lambda: (f.replace(image=f.image // 2) for f in make_pictured(3, ALL)))
+    stored(tmp_path / "dark", dark)
+    assert manifest(tmp_path / "dark")["content_hash"] != seen["jpg"]["content_hash"]
+    assert manifest(tmp_path / "dark")["pixels"]["right"] == seen["jpg"]["pixels"]["right"]
+
+
+@pytest.mark.parametrize("images", ["jpg", "png", "mp4"])
+def test_same_pictures_same_bytes(tmp_path, make_pictured, images):
+    for name in ("a", "b"):
+        stored(tmp_path / name, make_pictured(3, ALL), images=images)
+    assert names(tmp_path / "a") == names(tmp_path / "b")
+    for name in names(tmp_path / "a"):
+        assert (tmp_path / "a" / name).read_bytes() == (tmp_path / "b" / name).read_bytes(), name
+
+
+def test_who_shows_where(tmp_path, make_pictured):
+    live = make_pictured(3, ("left",))
+    stored(tmp_path / "a", live, ("left",))
+    table = read_table(tmp_path / "a/gt/pixels.parquet")
+    truth = live.truth
+    assert np.array_equal(table.ints("frame"), truth.frame)
+    assert np.array_equal(table.ints("id"), truth.id)
+    right = live.load_pixels(5)
+    rows = truth.rows(5)
+    assert np.array_equal(table.floats("visible_px")[rows], right.visible_px)
+    assert np.array_equal(table.floats("visibility_px")[rows], right.visibility)
+    assert np.array_equal(table.ints("blob")[rows], right.blob)
+    assert np.array_equal(table.floats("modal_left")[rows], right.box[:, 0], equal_nan=True)
+
+
+def test_one_picture_at_a_time(tmp_path, make_pictured):
+    """Each picture is on the disk before the next but one is asked for."""
+    live = make_pictured(3, ("left",))
+
+    def watched():
+        for frame in live:
+            written = list(tmp_path.rglob("img1/*.jpg"))
+            assert len(written) >= frame.index - 2
+            yield frame
+
+    stored(tmp_path / "a", replace(live, frames=watched), ("left",))
+    assert len(list((tmp_path / "a/img1").iterdir())) == 12
+
+
+@pytest.mark.parametrize("images", ["jpg", "png", "mp4"])
+def test_pictures_are_checked_when_they_are_read(tmp_path, make_pictured, images):
+    stored(tmp_path / "a", make_pictured(3, ALL), images=images)
+    every = names(tmp_path / "a")
+    for name in [n for n in every if n.endswith(("left.mp4", "img1/000005.jpg", "img1/000005.png"))]:
+        path = tmp_path / "a" / name
+        whole = path.read_bytes()
+        path.write_bytes(whole[:-9] + bytes(9))
+        (sequence,) = open_source(tmp_path / "a")
+        with pytest.raises(InputError, match="altered") as error:
+            list(sequence)
+        assert error.value.file == str(path)
+        assert [p.file for p in validate(tmp_path / "a")] == [str(path)]
+        for body in (whole[:-9], None):
+            path.write_bytes(body) if body else path.unlink()
+            with pytest.raises(InputError, match="truncated" if body else "missing"):
+                open_source(tmp_path / "a")
+        path.write_bytes(whole)
+    assert validate(tmp_path / "a") == []
+
+
+@pytest.mark.parametrize("wanted", [("right",), ("disparity",), ("ids",), ("left", "ids"), ("background",), ()])
+def test_any_streams(tmp_path, make_pictured, same, wanted):
+    live = make_pictured(3, tuple(wanted))
+    read = stored(tmp_path / "a", live, wanted)
+    assert (read.has_images, read.has_right) == ("left" in wanted, "right" in wanted)
+    assert all((f.image is not None) == ("left" in wanted) for f in read)
+    assert (read.load_pixels is not None) == ("ids" in wanted)
+    assert (read.background() is not None) == (not {"left", "right", "background"}.isdisjoint(wanted))
+    assert validate(tmp_path / "a") == []
+    if wanted in (("disparity",), ("ids",), ()):
+        assert manifest(tmp_path / "a")["images"] is None
+
+
+def test_streams_that_are_not_there(tmp_path, make_pictured):
+    for wanted, images in ((("right",), "jpg"), (("right",), "mp4"), (("disparity",), "jpg")):
+        with pytest.raises(InputError, match=wanted[0]):
+            stored(tmp_path / "a", make_pictured(3, ("left",)), wanted, images)
+        assert list(tmp_path.iterdir()) == []
+    empty = replace(make_pictured(3, ALL), load_background=None)
+    with pytest.raises(InputError, match="background"):
+        stored(tmp_path / "a", empty, ("left",), "mp4")
+    assert list(tmp_path.iterdir()) == []
+    for more, place in (({"wanted": ("top",)}, "--streams"), ({"images": "gif"}, "--images")):
+        with pytest.raises(InputError, match=place):
+            stored(tmp_path / "a", make_pictured(3, ALL), **more)
+    odd = replace(make_pictured(3, ALL), image_size=(65, 48))
+    with pytest.raises(InputError, match="even width"):
+        stored(tmp_path / "a", odd, ("left",), "mp4")
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize("images", ["jpg", "mp4"])
+def test_a_renderer_that_fails_leaves_nothing(tmp_path, make_pictured, images):
+    live = make_pictured(3, ALL)
+
+    def failing():
+        for frame in live:
+            if frame.index == 7:
+                raise RuntimeError("no paint")
+            yield frame
+
+    with pytest.raises(RuntimeError, match="no paint"):
+        stored(tmp_path / "a", replace(live, frames=failing), images=images)
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_full_disk_in_the_middle_of_the_pictures(tmp_path, make_pictured, monkeypatch):
+    put, count = atomic.put, 0
+
+    def full(path, body):
+        nonlocal count
+        count += 1
+        if count == 60:
+            raise OSError(28, "No space left on device")
+        put(path, body)
+
+    monkeypatch.setattr(atomic, "put", full)
+    with pytest.raises(WorkError, match="No space left"):
+        stored(tmp_path / "a", make_pictured(3, ALL))
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_another_sample_than_its_own(tmp_path, make_pictured):
+    live = make_pictured(3, ("left",))
+    own = stored(tmp_path / "a", live, ("left",), "png")
+    assert own.source["background"] == "50 empty frames before frame 1"
+    (read,) = open_source(tmp_path / "a", background="first:3")
+    assert read.source["background"] == "first 3 frames (causal from frame 3)"
+    assert np.array_equal(read.background(), np.stack([f.image for f in live][:3]))
+    stored(tmp_path / "m", live, ("left",), "mp4")
+    (read,) = open_source(tmp_path / "m", background="spread:4")
+    every = [f.image for f in read]
+    assert np.array_equal(read.background(), np.stack([every[k - 1] for k in (2, 5, 8, 11)]))
+    with pytest.raises(InputError, match="recording of 12 frames"):
+        open_source(tmp_path / "a", background="first:13")
+    stored(tmp_path / "none", make_pictured(3, ()), ())
+    with pytest.raises(InputError, match="without pictures"):
+        open_source(tmp_path / "none", background="first:3")
+
+
+def test_pixel_truth_of_nobody(tmp_path, make_pictured):
+    live = make_pictured(3, ("left", "ids"))
+    t = live.truth
+    cut = {f: getattr(t, f)[:0] for f in ("frame", "id", "group", "pos", "vel", "box", "visibility", "z", "heading")}
+    cut |= {f: getattr(t, f)[:0] for f in ("height", "truncation", "visible_box")}
+    lone = t.replace(**cut, groups=tuple(g.none() for g in t.groups), groups_px=None, events=(), near=None, orders=())
+    empty = PixelTruth(
+        np.zeros((48, 64), np.int64), None, np.zeros(0), np.zeros(0), np.zeros((0, 4)), np.zeros(0, np.int64)
+    )
+    read = stored(
+        tmp_path / "a", replace(live, load_truth=lambda: lone, load_pixels=lambda _: empty), ("left", "ids"), "png"
+    )
+    assert read.load_pixels(3).box.shape == (0, 4)
+    assert not read.load_pixels(3).ids.any()
+
+
+def relisted(folder, change):
+    """The manifest with another list of files or other facts, sealed anew."""
+    whole = manifest(folder)
+    change(whole)
+    (folder / "manifest.json").write_text(json.dumps(sealed(whole)))
+
+
+@pytest.mark.parametrize("name", ["img1/000003.png", "ids/000003.png", "disparity/000003.png", "background/000003.png"])
+def test_validate_looks_at_every_exact_picture(tmp_path, make_pictured, name):
+    """Even one whose hash the manifest was made to name."""
+    folder = tmp_path / "a"
+    stored(folder, make_pictured(3, ALL), images="png")
+    image = cv2.imread(str(folder / name), cv2.IMREAD_UNCHANGED)
+    image[5, 5] += 1
+    body = cv2.imencode(".png", image)[1].tobytes()
+    (folder / name).write_bytes(body)
+    facts = {"sha256": file_hash(body), "bytes": len(body)}
+    relisted(folder, lambda m: m["files"].update({name: facts}))
+    (problem,) = validate(folder)
+    assert "other pixels" in problem.got
+
+
+@pytest.mark.parametrize("images", ["jpg", "png", "mp4"])
+def test_validate_counts_and_measures(tmp_path, make_pictured, images):
+    folder = tmp_path / "a"
+    stored(folder, make_pictured(3, ("left",)), ("left",), images)
+    relisted(folder, lambda m: m["sequence"].update(image_size=[32, 48]))
+    assert any("64×48" in p.got for p in validate(folder))
+    relisted(folder, lambda m: m["sequence"].update(image_size=[64, 48]))
+    assert validate(folder) == []
+    if images == "mp4":
+        movie = folder / "background.mp4"
+        movie.write_bytes((folder / "left.mp4").read_bytes())
+        facts = {"sha256": file_hash(movie.read_bytes()), "bytes": movie.stat().st_size}
+        relisted(folder, lambda m: m["files"].update({"background.mp4": facts}))
+        assert ["12 pictures" in p.got for p in validate(folder)] == [True]
+    else:
+        name = f"img1/000012.{images}"
+        (folder / name).unlink()
+        relisted(folder, lambda m: m["files"].pop(name))
+        assert [p.file for p in validate(folder)] == [str(folder / name)]
+        extra = f"img1/000013.{images}"
+        body = (folder / f"img1/000011.{images}").read_bytes()
+        facts = {"sha256": file_hash(body), "bytes": len(body)}
+        for here in (name, extra):
+            (folder / here).write_bytes(body)
+        relisted(folder, lambda m: m["files"].update({name: facts, extra: facts}))
+        assert any(p.file == str(folder / extra) for p in validate(folder))

@@ -1,0 +1,197 @@
+import json
+
+import numpy as np
+import pytest
+
+from scenarios.errors import InputError
+from sim.io.store.track_files import read_tracks, tracks_files, write_tracks
+
+
+@pytest.mark.parametrize("plane", ["ground", "space", "image"])
+@pytest.mark.parametrize("unit", ["person", "group"])
+@pytest.mark.parametrize("boxed", [True, False])
+@pytest.mark.parametrize("seed", range(3))
+def test_tracks_come_back_equal(tmp_path, make_tracks, same, plane, unit, boxed, seed):
+    live = make_tracks(seed, plane=plane, unit=unit, boxed=boxed)
+    write_tracks(tmp_path / "t", live, fps=10.0)
+    same(live, read_tracks(tmp_path / "t"))
+    same(live, read_tracks(tmp_path / "t" / "tracks.txt"))
+
+
+def test_no_tracks_at_all(tmp_path, make_tracks, same):
+    write_tracks(tmp_path / "t", [], fps=10.0)
+    assert read_tracks(tmp_path / "t") == []
+    bare = [t.replace(groups=None, events=()) for t in make_tracks(1)]
+    write_tracks(tmp_path / "t", bare, fps=10.0)
+    same(bare, read_tracks(tmp_path / "t"))
+    assert not (tmp_path / "t" / "groups.csv").exists()
+
+
+def test_whether_groups_and_events_were_derived_is_kept(tmp_path, make_tracks):
+    tracks = make_tracks(1)
+    for derived in (True, False):
+        write_tracks(tmp_path, [t.replace(derived=derived) for t in tracks], fps=10.0)
+        assert {t.derived for t in read_tracks(tmp_path)} == {derived}
+    write_tracks(tmp_path, [t.replace(derived=True) for t in tracks], fps=10.0)
+    (tmp_path / "events.json").unlink()
+    assert not any(t.derived for t in read_tracks(tmp_path))
+
+
+def test_what_an_earlier_run_left_goes_away_but_no_more(tmp_path, make_tracks):
+    write_tracks(tmp_path / "t", make_tracks(1), fps=10.0)
+    (tmp_path / "t" / "mine.txt").write_text("x")
+    write_tracks(tmp_path / "t", [t.replace(groups=None) for t in make_tracks(1)], fps=10.0, info={"tracker": "blob"})
+    assert not (tmp_path / "t" / "groups.parquet").exists()
+    assert (tmp_path / "t" / "mine.txt").exists()
+    assert json.loads((tmp_path / "t" / "run.json").read_text()) == {
+        "format": 1,
+        "tracker": "blob",
+        "boxes": "measured",
+    }
+
+
+def test_text_alone(tmp_path, make_tracks):
+    live = make_tracks(4)
+    files = tracks_files(live, fps=10.0)
+    (tmp_path / "tracks.txt").write_bytes(files["tracks.txt"])
+    (tmp_path / "groups.csv").write_bytes(files["groups.csv"])
+    read = read_tracks(tmp_path, fps=10.0, length=len(live))
+    assert len(read) == len(live)
+    for a, b in zip(live, read, strict=True):
+        order = np.argsort(a.id)
+        assert np.array_equal(a.id[order], b.id)
+        assert b.plane == "ground"
+        np.testing.assert_allclose(a.pos[order], b.pos, atol=6e-4)
+        known = a.groups.id if a.groups is not None else []
+        assert np.array_equal(known, b.groups.id)
+
+
+def test_seven_columns_are_boxes_in_the_image(tmp_path):
+    (tmp_path / "x.txt").write_text("1,5,10,20,30,40,0.5\n3,5,14,20,30,40,0.5\n")
+    first, empty, last = read_tracks(tmp_path / "x.txt", fps=10.0)
+    assert (first.plane, len(empty.id)) == ("image", 0)
+    assert first.pos.tolist() == [[25, 40]]
+    assert last.vel.tolist() == [[20, 0]]
+    assert last.score.tolist() == [0.5]
+
+
+@pytest.mark.parametrize(
+    ("text", "word"),
+    [
+        ("1,5,10,20,30,40,0.5\n1,5,10,20,30,40,0.5\n", "once"),
+        ("1,-1,10,20,30,40,0.5\n", "ids from 0"),
+        ("1,5,-1,-1,-1,-1,0.5\n", "a box"),
+        ("1,5,10,20,0,40,0.5\n", "above 0"),
+        ("1,5,10,20,nan,40,0.5\n", "finite"),
+        ("1,5,10\n", "6 to 10"),
+    ],
+)
+def test_bad_text_is_one_line(tmp_path, text, word):
+    (tmp_path / "x.txt").write_text(text)
+    with pytest.raises(InputError, match=word) as error:
+        read_tracks(tmp_path / "x.txt")
+    assert "\n" not in str(error.value)
+    assert "line " in error.value.place
+
+
+@pytest.mark.parametrize(
+    ("row", "word"),
+    [
+        ("1,2,1 2,0,0,POLYGON ((0 0", "POLYGON"),
+        ("99,2,1 2,0,0,", "frames from"),
+        ("1,two,1 2,0,0,", "two"),
+        ("1,2,1 2,0,0,\n1,2,1 2,0,0,", "once"),
+    ],
+)
+def test_bad_groups_are_one_line(tmp_path, row, word):
+    (tmp_path / "tracks.txt").write_text("1,5,10,20,30,40,0.5,1,1,0\n")
+    (tmp_path / "groups.csv").write_text(f"frame,group,members,x,y,hull\n{row}\n")
+    with pytest.raises(InputError, match=word) as error:
+        read_tracks(tmp_path)
+    assert error.value.place.startswith("line ")
+
+
+EVENT = '"kind": "merge", "before": [1, 2], "after": [1], "members": [1, 2], "pos": [0, 0]'
+
+
+@pytest.mark.parametrize(
+    ("body", "place"),
+    [
+        (f'{{"format": 7, "events": [{{{EVENT}, "start": 1, "end": 2, "emitted": 3}}]}}', "format"),
+        (f'{{"format": 1, "events": [{{{EVENT}, "start": 1, "end": 2, "emitted": 99}}]}}', "events[0]"),
+        (f'{{"format": 1, "events": [{{{EVENT}, "start": 1, "end": 99, "emitted": null}}]}}', "events[0]"),
+        (f'{{"format": 1, "events": [{{{EVENT}, "start": 1, "end": 2, "emitted": 3, "frame": 0}}]}}', "events[0]"),
+        (f'{{"format": 1, "events": [{{{EVENT}, "start": 1, "end": 2, "emitted": 3, "frame": "3"}}]}}', "events[0]"),
+    ],
+)
+def test_events_that_no_frame_can_hold_are_one_line(tmp_path, make_tracks, body, place):
+    write_tracks(tmp_path, make_tracks(1), fps=10.0)
+    (tmp_path / "events.json").write_text(body)
+    for name in ("tracks.parquet", "tracks.txt"):
+        with pytest.raises(InputError) as error:
+            read_tracks(tmp_path, fps=10.0, length=9)
+        assert error.value.place == place
+        assert "\n" not in str(error.value)
+        (tmp_path / name).unlink()
+
+
+@pytest.mark.parametrize("body", ['{"events": 3}', '{"events": [{"kind": "merge"}]}', "{", "[]"])
+def test_bad_events_are_one_line(tmp_path, make_tracks, body):
+    write_tracks(tmp_path, make_tracks(1), fps=10.0)
+    (tmp_path / "events.json").write_text(body)
+    with pytest.raises(InputError) as error:
+        read_tracks(tmp_path)
+    assert "\n" not in str(error.value)
+
+
+@pytest.mark.parametrize("boxes", ["projected", "measured", None])
+def test_projected_boxes_are_no_measurement(tmp_path, boxes):
+    """As run.json beside the text says; without it the boxes of a text are what somebody measured."""
+    (tmp_path / "tracks.txt").write_text("1,5,10,20,30,40,0.5,1,2,0\n")
+    if boxes is not None:
+        (tmp_path / "run.json").write_text(json.dumps({"format": 1, "boxes": boxes}))
+    (only,) = read_tracks(tmp_path, fps=10.0)
+    assert (only.plane, only.pos.tolist()) == ("ground", [[1, 2]])
+    assert (only.box is None) == (boxes == "projected")
+
+
+def test_one_metre_below_ground_is_no_unknown_place(tmp_path, make_tracks):
+    live = [t.replace(pos=np.c_[t.pos[:, :2], np.full(len(t.id), -1.0)]) for t in make_tracks(2, plane="space")]
+    (tmp_path / "tracks.txt").write_bytes(tracks_files(live, fps=10.0)["tracks.txt"])
+    for a, b in zip(live, read_tracks(tmp_path, fps=10.0, length=len(live)), strict=True):
+        assert b.plane == "ground"
+        np.testing.assert_allclose(a.pos[np.argsort(a.id), :2], b.pos, atol=6e-4)
+
+
+def test_one_unknown_place_moves_nobody_to_the_image(tmp_path):
+    (tmp_path / "x.txt").write_text("1,5,10,20,30,40,0.5,1,2,0\n2,5,10,20,30,40,0.5,1,2,-1\n")
+    with pytest.raises(InputError, match="z other than -1") as error:
+        read_tracks(tmp_path / "x.txt", fps=10.0)
+    assert error.value.place == "line 2"
+
+
+def test_a_text_without_a_row(tmp_path):
+    (tmp_path / "x.txt").write_text("\n")
+    with pytest.raises(InputError, match="no row"):
+        read_tracks(tmp_path / "x.txt", fps=10.0)
+    with pytest.warns(UserWarning, match="no row"):
+        assert len(read_tracks(tmp_path / "x.txt", fps=10.0, length=3)) == 3
+
+
+def test_tracks_stand_on_the_stairs(make_tracks, make_sequence):
+    from sim.scene.terrain import height_at
+
+    live, scene = make_tracks(2, boxed=False), make_sequence(1).scene
+    high = height_at(scene, np.concatenate([t.pos for t in live]))
+    assert (high > 0.01).any()
+    body = tracks_files(live, fps=10.0, scene=scene)["tracks.txt"].decode()
+    z = [float(line.rsplit(",", 1)[1]) for line in body.splitlines()]
+    np.testing.assert_allclose(z, high, atol=6e-4)
+
+
+def test_nothing_there(tmp_path):
+    with pytest.raises(InputError, match="no tracks"):
+        read_tracks(tmp_path)
+    (tmp_path / "tracks.parquet").write_bytes(b"PAR1")
+    with pytest.raises(InputError, match="Parquet"):
+        read_tracks(tmp_path)

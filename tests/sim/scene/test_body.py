@@ -1,0 +1,98 @@
+import numpy as np
+import pytest
+
+from sim.scene.body import BODY, HEAD, boxes, contour, distance, ellipsoids, outlines
+from sim.scene.camera import project
+from sim.scene.terrain import height_at
+from sim.types import Camera, Scene, Stairs
+from tests.reference_sense import above, pinhole, surface
+
+CAMERAS = [pinhole(), pinhole(0), pinhole(75, 200, (8, 5, 9)), pinhole(90, 0, (8, 5, 9)), above(), above(25)]
+
+
+@pytest.mark.parametrize("camera", CAMERAS)
+def test_boxes_enclose_the_surface_exactly(camera: Camera) -> None:
+    r = np.random.default_rng(0)
+    for _ in range(10):
+        pos3 = np.array([*r.uniform([4, 3], [12, 9]), r.uniform(0, 1)])
+        heading, height = r.uniform(0, 2 * np.pi), r.uniform(1.5, 1.95)
+        uv, depth = project(camera, surface(pos3, heading, height))
+        if (depth < 0.5).any():
+            continue
+        left, top, width, tall = boxes(camera, pos3[None], np.array([heading]), np.array([height]))[0]
+        low, high = uv.min(axis=0), uv.max(axis=0)
+        size = max(width, tall)
+        assert [left, top] == pytest.approx(low, abs=2e-3 * size)
+        assert [left + width, top + tall] == pytest.approx(high, abs=2e-3 * size)
+        assert left <= low[0] + 1e-9
+        assert top <= low[1] + 1e-9
+
+
+def test_a_person_is_as_tall_and_wide_as_the_contract_says() -> None:
+    camera = above()
+    box = boxes(camera, np.array([[8.0, 5.0, 0.0]]), np.array([np.pi / 2]), np.array([1.7]))[0]
+    assert box[2:] / 40 == pytest.approx([0.27 * 1.7, 0.16 * 1.7])
+    assert pytest.approx(1.0) == HEAD.centre + HEAD.up
+    assert pytest.approx(0.0) == BODY.centre - BODY.up
+    shapes = ellipsoids(np.zeros((1, 3)), np.zeros(1), np.array([1.7]))
+    assert np.sqrt(shapes.shape[0, 0, 1, 1]) == pytest.approx(0.135 * 1.7)  # across the heading
+
+
+def test_turning_a_person_by_half_changes_nothing() -> None:
+    pos3 = np.array([[6.0, 4.0, 0.0]])
+    a = boxes(pinhole(), pos3, np.array([0.4]), np.array([1.7]))
+    assert boxes(pinhole(), pos3, np.array([0.4 + np.pi]), np.array([1.7])) == pytest.approx(a)
+
+
+def test_contours_touch_the_boxes() -> None:
+    pos3 = np.array([[6.0, 4.0, 0.0], [9.0, 7.0, 0.0]])
+    heading, height = np.array([0.3, 2.0]), np.array([1.6, 1.9])
+    edge = contour(outlines(pinhole(), ellipsoids(pos3, heading, height)), points=720)
+    box = boxes(pinhole(), pos3, heading, height)
+    assert edge.min(axis=1) == pytest.approx(box[:, :2], abs=0.01)
+    assert edge.max(axis=1) == pytest.approx(box[:, :2] + box[:, 2:], abs=0.01)
+
+
+def test_who_is_behind_the_camera_has_no_box() -> None:
+    box = boxes(pinhole(0), np.array([[8.0, -9.0, 6.0], [8.0, -6.0, 6.0]]), np.zeros(2), np.full(2, 1.7))
+    assert np.isnan(box).all()
+
+
+def test_nobody_has_no_boxes() -> None:
+    assert boxes(pinhole(), np.zeros((0, 3)), np.zeros(0), np.zeros(0)).shape == (0, 4)
+
+
+def test_near_is_near() -> None:
+    pos3 = np.array([[8.0, 2.0, 0.0], [8.0, 4.0, 0.0]])
+    near, far = distance(pinhole(), pos3, np.full(2, 1.7))
+    assert near < far
+    tall, small = distance(above(), pos3, np.array([1.9, 1.6]))
+    assert tall < small
+
+
+def stairs(steps: int = 10) -> Scene:
+    return Scene(
+        np.array([20.0, 10.0]), stairs=(Stairs(np.array([5.0, 5.0]), np.array([10.0, 5.0]), 3.0, 1.5, steps, 4.0),)
+    )
+
+
+def test_stairs_rise_from_foot_to_head_and_stay() -> None:
+    x = np.linspace(0, 20, 801)
+    z = height_at(stairs(), np.column_stack([x, np.full_like(x, 5.0)]))
+    assert (z[x <= 5] == 0).all()
+    assert z[x == 10] == pytest.approx(1.5)
+    assert z[(x >= 10) & (x <= 14)] == pytest.approx(1.5)
+    assert (z[x > 14.01] == 0).all()
+    up = np.diff(z[(x >= 5) & (x <= 10)])
+    assert (up >= 0).all()
+    assert up.max() < 0.025 * 0.3 * 2.01  # no jump: at most twice the mean slope
+    on_step = height_at(stairs(), np.array([[5.5, 5.0], [6.0, 4.0], [7.5, 5.6]]))
+    assert on_step == pytest.approx([0.15, 0.3, 0.75])
+
+
+def test_beside_stairs_is_level_and_steps_are_felt() -> None:
+    assert (height_at(stairs(), np.array([[7.0, 6.6], [7.0, 3.4]])) == 0).all()
+    assert height_at(stairs(4), np.array([7.0, 5.0])) != pytest.approx(
+        float(height_at(stairs(10), np.array([7.0, 5.0])))
+    )
+    assert height_at(Scene(np.array([5.0, 5.0])), np.zeros((3, 2, 2))).shape == (3, 2)

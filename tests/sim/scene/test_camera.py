@@ -1,0 +1,186 @@
+import numpy as np
+import pytest
+
+from scenarios.errors import InputError
+from scenarios.schema.scenario import CameraSpec
+from sim.scene.body import boxes
+from sim.scene.camera import (
+    disparity,
+    ground_jacobian,
+    looking,
+    project,
+    px_per_m_at_centre,
+    right,
+    solve,
+    to_ground,
+)
+from sim.scene.viewpoint import MARGIN
+from sim.types import Camera, Motion
+from tests.reference_sense import above, crowd, pinhole, walkers
+
+
+def extremes(camera: Camera, motion: Motion) -> np.ndarray:
+    """Left, top, right, bottom of all boxes of all frames."""
+    t, p = np.nonzero(motion.present)
+    pos3 = np.column_stack([motion.pos[t, p], np.zeros(len(t))])
+    box = boxes(camera, pos3, motion.heading[t, p], motion.height[p])
+    return np.array([*box[:, :2].min(0), *(box[:, :2] + box[:, 2:]).max(0)])
+
+
+def test_axes_are_right_down_forward() -> None:
+    camera = pinhole(tilt=0, at=(0, 0, 1))
+    uv, depth = project(camera, np.array([[0, 10, 1], [1, 10, 1], [0, 10, 2], [0, -1, 1.0]]))
+    assert uv[0] == pytest.approx([320, 240])
+    assert uv[1] == pytest.approx([370, 240])  # x is to the right
+    assert uv[2] == pytest.approx([320, 190])  # up is towards smaller v
+    assert np.isnan(uv[3]).all()  # behind
+    assert depth == pytest.approx([10, 10, 10, -1])
+
+
+def test_positive_tilt_looks_down_and_positive_yaw_left() -> None:
+    ahead = np.array([[8.0, 10.0, 7.0]])
+    assert project(pinhole(tilt=20), ahead)[0][0, 1] < 240
+    assert project(pinhole(tilt=0, yaw=10), ahead)[0][0, 0] > 320
+    assert looking(np.pi / 2, 0.0)[2] == pytest.approx([0, 0, -1])
+
+
+@pytest.mark.parametrize("tilt", [5, 40, 70, 90])
+@pytest.mark.parametrize("yaw", [0, 33, 180])
+def test_rotations_are_proper(tilt: float, yaw: float) -> None:
+    r = looking(np.deg2rad(tilt), np.deg2rad(yaw))
+    assert r @ r.T == pytest.approx(np.eye(3))
+    assert np.linalg.det(r) == pytest.approx(1)
+
+
+@pytest.mark.parametrize("camera", [pinhole(), pinhole(70, 30), pinhole(90), above(), above(25)])
+def test_ground_comes_back(camera: Camera) -> None:
+    xy = np.random.default_rng(1).uniform([2, 2], [14, 9], (200, 2))
+    for z in (0.0, 0.8):
+        uv, depth = project(camera, np.column_stack([xy, np.full(200, z)]))
+        seen = depth > 0
+        assert to_ground(camera, uv[seen], z) == pytest.approx(xy[seen], abs=1e-9)
+    assert seen.any()
+
+
+def test_there_is_no_ground_above_the_horizon() -> None:
+    ground = to_ground(pinhole(tilt=10), np.array([[320.0, 0.0], [320.0, 400.0]]))
+    assert np.isnan(ground[0]).all()
+    assert np.isfinite(ground[1]).all()
+
+
+@pytest.mark.parametrize("camera", [pinhole(), pinhole(60, 30), above(25)])
+def test_jacobian_is_the_derivative(camera: Camera) -> None:
+    uv = np.random.default_rng(2).uniform([50, 150], [600, 450], (50, 2))
+    J = ground_jacobian(camera, uv)
+    for k in range(2):
+        step = np.eye(2)[k] * 1e-3
+        assert J[:, :, k] == pytest.approx(
+            (to_ground(camera, uv + step) - to_ground(camera, uv - step)) / 2e-3, rel=1e-5
+        )
+
+
+def test_disparity_is_what_the_right_camera_sees() -> None:
+    camera = pinhole()
+    xyz = np.random.default_rng(3).uniform([2, 2, 0], [14, 9, 1.9], (50, 3))
+    (left_uv, depth), (right_uv, _) = project(camera, xyz), project(right(camera), xyz)
+    assert left_uv[:, 1] == pytest.approx(right_uv[:, 1])
+    assert left_uv[:, 0] - right_uv[:, 0] == pytest.approx(disparity(camera, depth))
+    assert (disparity(camera, depth) > 0).all()
+
+
+def test_scale_is_a_person_at_the_middle() -> None:
+    camera = pinhole()
+    foot = np.array([*to_ground(camera, np.array([[320.0, 240.0]]))[0], 0.0])
+    uv = project(camera, np.stack([foot, foot + np.array([0, 0, 1.7])]))[0]
+    assert px_per_m_at_centre(camera) == pytest.approx((uv[0, 1] - uv[1, 1]) / 1.7)
+    assert px_per_m_at_centre(above()) == 40.0
+    assert px_per_m_at_centre(pinhole(90)) == pytest.approx(500 / 7)
+    assert 0 < px_per_m_at_centre(pinhole(-5)) < 500  # the middle shows sky
+    assert 0 < px_per_m_at_centre(pinhole(-30)) < 500  # no ground at all
+
+
+@pytest.mark.parametrize("seed", range(10))
+@pytest.mark.parametrize("tilt", [0, 10, 40, 65, 90])
+def test_solved_views_show_everybody_and_are_tight(seed: int, tilt: float) -> None:
+    motion = crowd(seed)
+    spec = CameraSpec(tilt_deg=tilt, yaw_deg=37.0 * seed)
+    camera = solve(spec, motion)
+    edge = MARGIN * 480
+    left, top, right_, bottom = extremes(camera, motion)
+    assert min(left, top) >= edge - 1e-6
+    assert right_ <= 640 - edge + 1e-6
+    assert bottom <= 480 - edge + 1e-6
+    across = abs(left - edge) < 1e-6 and abs(640 - edge - right_) < 1e-6
+    along = abs(top - edge) < 1e-6 and abs(480 - edge - bottom) < 1e-6
+    assert across or along  # any nearer, and somebody would leave
+    assert camera.position[2] > 0
+    assert camera.rotation == pytest.approx(looking(np.deg2rad(tilt), np.deg2rad(37.0 * seed)))
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_a_given_height_or_position_is_kept(seed: int) -> None:
+    motion = crowd(seed)
+    free = solve(CameraSpec(), motion)
+    tall = solve(CameraSpec(height=float(free.position[2]) + 3), motion)
+    assert tall.position[2] == free.position[2] + 3
+    assert extremes(tall, motion)[1] >= 0
+    placed = solve(CameraSpec(position=(float(free.position[0]), float(free.position[1]) - 1.0)), motion)
+    assert placed.position[:2] == pytest.approx(free.position[:2] - [0, 1])
+    lower = placed.replace(position=placed.position - np.array([0, 0, 0.05]))
+    left, top, right_, bottom = extremes(lower, motion)
+    assert min(left, top, 640 - right_, 480 - bottom) < MARGIN * 480  # the lowest from which all are seen
+
+
+def test_straight_down_from_a_given_height_is_centred() -> None:
+    motion = crowd(3)
+    camera = solve(CameraSpec(tilt_deg=90, height=25), motion)
+    _, top, _, bottom = extremes(camera, motion)
+    assert abs(top - (480 - bottom)) < 3.0
+
+
+def test_from_above() -> None:
+    motion = crowd(4)
+    camera = solve(CameraSpec(kind="top"), motion)
+    left, top, right_, bottom = extremes(camera, motion)
+    edge = MARGIN * 480
+    assert min(left - edge, top - edge, 640 - edge - right_, 480 - edge - bottom) == pytest.approx(0, abs=1e-9)
+    fixed = solve(CameraSpec(kind="top", px_per_m=30, yaw_deg=20), motion)
+    assert fixed.px_per_m == 30
+    placed = solve(CameraSpec(kind="top", position=(8, 5), yaw_deg=20), motion)
+    assert placed.position[:2] == pytest.approx([8, 5])
+
+
+@pytest.mark.parametrize(
+    ("keys", "named"),
+    [
+        ({"height": 2.0}, "camera.height"),
+        ({"position": (8.0, 5.0)}, "camera.position"),
+        ({"kind": "top", "px_per_m": 200.0}, "camera.px_per_m"),
+    ],
+)
+def test_people_out_of_view_are_refused(keys: dict[str, object], named: str) -> None:
+    motion = crowd(0)
+    with pytest.raises(InputError, match="out of view in frame 1 ") as caught:
+        solve(CameraSpec.model_validate({**keys, "tilt_deg": 40}), motion)
+    assert named in caught.value.place
+    assert caught.value.file == "scenario made-up"
+    solve(CameraSpec.model_validate({**keys, "tilt_deg": 40, "crop": True}), motion)
+
+
+def test_crop_looks_at_the_world_only() -> None:
+    motion = walkers([[8, 5], [8, 5]], [[0, 0], [5, 0]], frames=100)  # the second walks 50 m away
+    wide, near = solve(CameraSpec(), motion), solve(CameraSpec(crop=True), motion)
+    assert px_per_m_at_centre(near) > 1.5 * px_per_m_at_centre(wide)
+
+
+def test_an_empty_scene_shows_the_world() -> None:
+    nobody = walkers([[8, 5]], [[0, 0]], present=np.zeros((40, 1), bool))
+    camera = solve(CameraSpec(), nobody)
+    corners = np.array([[0, 0, 0], [16, 0, 0], [0, 10, 0], [16, 10, 0.0]])
+    uv = project(camera, corners)[0]
+    assert ((uv >= 0) & (uv <= [640, 480])).all()
+
+
+def test_solving_is_deterministic() -> None:
+    a, b = solve(CameraSpec(), crowd(5)), solve(CameraSpec(), crowd(5))
+    assert (a.position == b.position).all()

@@ -1,0 +1,273 @@
+import numpy as np
+import pytest
+
+from scenarios.loading.resolve import load
+from sim.crowd.world import run
+from sim.truth.cross_queue_events import crossings, queue_lines, queues
+
+FPS = 10.0
+T = np.arange(120)[:, None] / FPS
+
+
+def crowd(paths):
+    pos = np.stack(paths, axis=1)
+    return pos, np.gradient(pos, 1 / FPS, axis=0), np.isfinite(pos).all(axis=2)
+
+
+def queued(paths, group=None):
+    """The queues of people on these paths, all alone unless `group` (P,) says otherwise."""
+    pos, vel, present = crowd(paths)
+    label = np.full(len(paths), -1) if group is None else np.array(group)
+    return queues(pos, vel, present, np.tile(label, (len(pos), 1)), FPS)
+
+
+def pair(start, path):
+    """Two people 0.7 m apart across, on `path` (T, 2) from `start`."""
+    return [np.array([start[0], start[1] + y]) + path for y in (-0.35, 0.35)]
+
+
+def straight(vx, vy=0.0):
+    return T * [vx, vy]
+
+
+def there_and_back(vx, turn):
+    return np.minimum(T, 2 * turn - T) * [vx, 0]
+
+
+def groups(*numbers):
+    return np.tile(np.array(numbers), (len(T), 1))
+
+
+def crossed(paths, group=None):
+    group = groups(1, 1, 2, 2) if group is None else group
+    return [(e.start, e.end, e.before, e.after, e.members) for e in crossings(*crowd(paths), group, FPS)]
+
+
+HEAD_ON = pair((0, 5), straight(1)) + pair((10, 5.2), straight(-1))
+
+
+def test_cross_begins_when_hulls_are_within_a_metre():
+    """Hulls 10 - 2 t - 0.5 apart: within 1 m from 4.25 s, until the same after passing at 5 s."""
+    assert crossed(HEAD_ON) == [(44, 58, (1, 2), (1, 2), (1, 2, 3, 4))]
+    (event,) = crossings(*crowd(HEAD_ON), groups(1, 1, 2, 2), FPS)
+    assert event.pos == pytest.approx((5, 5.1))
+    assert event.emitted is None
+
+
+def test_cross_at_a_right_angle():
+    other = [np.array([5 + x, 0]) + straight(0, 1) for x in (-0.35, 0.35)]
+    assert [row[2:] for row in crossed(pair((0, 5), straight(1)) + other)] == [((1, 2), (1, 2), (1, 2, 3, 4))]
+
+
+def test_politely_round_is_a_cross_where_paths_cross():
+    """At a right angle, one 2.4 s behind the other, hulls never overlapping, the middles' paths cross at (5, 5)."""
+    late = [np.array([5 + x, -2.4]) + straight(0, 1) for x in (-0.35, 0.35)]
+    assert [row[2:4] for row in crossed(pair((0, 5), straight(1)) + late)] == [((1, 2), (1, 2))]
+    # the same encounter, but the other turns away before their paths meet
+    turned = np.concatenate([straight(0, 1)[:50], np.tile(straight(0, 1)[50:51], (70, 1))])
+    turned[50:, 1] -= (T[50:, 0] - T[50, 0]) * 1.0
+    away = [np.array([5 + x, -2.4]) + turned for x in (-0.35, 0.35)]
+    assert crossed(pair((0, 5), straight(1)) + away) == []
+
+
+def test_across_and_back_is_no_cross():
+    """A pair steps over the way of the other (y = 5) 3 m ahead of it, at 5.1 s; then back again at 5.9 s, or on."""
+
+    def stepping(*places):
+        y = np.interp(T, [2.5, 5.5, 8.5], places)
+        return pair((0, 5), straight(1)) + [np.concatenate([8.5 + x + 0 * T, y], axis=1) for x in (-0.35, 0.35)]
+
+    assert crossed(stepping(2.4, 5.4, 2.4)) == []
+    assert len(crossed(stepping(2.4, 5.4, 6.9))) == 1
+
+
+@pytest.mark.parametrize("angle", range(0, 360, 15))
+def test_paths_that_meet_in_a_point_of_both_cross_at_any_angle(angle):
+    """Both walk through the very place (5, 5), in different frames: turned about, rounding puts it on either side."""
+    c, s = np.cos(np.radians(angle)), np.sin(np.radians(angle))
+    late = [np.array([5 + x, -2.4]) + straight(0, 1) for x in (-0.35, 0.35)]
+    turned = [(p - 5) @ np.array([[c, -s], [s, c]]) for p in pair((0, 5), straight(1)) + late]
+    assert len(crossed(turned)) == 1
+
+
+@pytest.mark.parametrize(
+    "paths",
+    [
+        pair((0, 5), there_and_back(0.9, 5.2)) + pair((10, 5.2), there_and_back(-0.9, 5.2)),  # bounce back
+        pair((0, 5), straight(1)) + pair((10, 7.0), straight(-1)),  # pass in lanes beside, hulls 0.8 m apart
+        pair((0, 5), straight(1)) + pair((1.5, 5), straight(0.5)),  # too slowly through
+        pair((0, 5), straight(1)) + pair((10, 9), straight(-1)),  # never near
+    ],
+    ids=["bounce", "lanes", "slow", "far"],
+)
+def test_not_a_cross(paths):
+    assert crossed(paths) == []
+
+
+def test_cross_needs_equal_memberships_before_and_after():
+    late = groups(1, 1, 2, 2)
+    late[70:] = 1  # one group 1.2 s after it
+    assert crossed(HEAD_ON, late) == []
+    later = groups(1, 1, 2, 2)
+    later[58 + 21 :] = 1
+    assert len(crossed(HEAD_ON, later)) == 1
+    early = groups(1, 1, 2, 2)
+    early[:30, 3] = -1
+    assert crossed(HEAD_ON, early) == []
+    joined = [*HEAD_ON, np.array([20.0, 20]) + straight(0)]
+    assert len(crossed(joined, groups(1, 1, 2, 2, -1))) == 1
+    grown = groups(1, 1, 2, 2, -1)
+    grown[65:, 4] = 2
+    assert crossed(joined, grown) == []
+
+
+def test_people_alone_do_not_cross():
+    assert crossed(HEAD_ON, groups(1, 1, -1, -1)) == []
+    assert crossed(HEAD_ON, groups(1, 1, 2, -1)) == []
+
+
+def test_who_leaves_after_a_cross_has_crossed():
+    paths = [p.copy() for p in HEAD_ON]
+    paths[0][62:] = paths[1][65:] = np.nan
+    assert len(crossed(paths)) == 1
+    alone = groups(1, 1, 2, 2)
+    alone[62:, 1] = -1
+    assert len(crossed(paths, alone)) == 1, "the one who is left is no group, and yet stays who he was"
+    stays = [p.copy() for p in HEAD_ON]
+    assert crossed(stays, alone) == [], "but where nobody left the scene, the group fell apart"
+
+
+def test_crossings_are_the_same_in_portions(monkeypatch):
+    paths = [p + np.array([0, 20.0 * k]) for k in range(5) for p in HEAD_ON]
+    numbers = groups(*(2 * k + side for k in range(5) for side in (1, 1, 2, 2)))
+    whole = crossed(paths, numbers)
+    assert len(whole) == 5
+    monkeypatch.setattr("sim.truth.cross_queue_events.ROWS", 100)
+    assert crossed(paths, numbers) == whole
+
+
+def waiting(k, arrive=3.0, leave=9.0, spacing=0.8, at=(5.0, 3.0), step=(0.0, 1.2)):
+    """The k-th in line: walks up from behind until `arrive`, leaves sideways at `leave`."""
+    place = np.array([at[0] + spacing * k, at[1]])
+    coming = place + np.maximum(arrive - T, 0) * [1.3, 0]
+    return coming + np.maximum(T - leave, 0) * np.array(step)
+
+
+def test_queue_starts_at_its_onset_and_ends_below_two():
+    """All slow from 3 s on (frame 31; the central difference is halved there), one after another leaves from 9 s."""
+    paths = [waiting(k, leave=9 + 0.9 * k) for k in range(3)]
+    (event,) = queued(paths)
+    assert (event.kind, event.members, event.before, event.after) == ("queue", (1, 2, 3), (-1, -1, -1), (-1, -1, -1))
+    speed = np.hypot(*np.moveaxis(crowd(paths)[1], -1, 0)) < 0.4
+    assert event.start == np.flatnonzero(speed.all(axis=1))[0] + 1 == 32
+    assert event.end == np.flatnonzero(speed.sum(axis=1) >= 2)[-1] + 1
+
+
+def test_queue_names_groups_before_and_after():
+    """One alone, a pair and one alone line up; the first is served and away when less than two are left."""
+    paths = [waiting(k, leave=9 + 0.9 * k) for k in range(4)]
+    paths[0] = np.where(T < 10, paths[0], np.nan)
+    (event,) = queued(paths, [-1, 7, 7, -1])
+    assert (event.before, event.after) == ((-1, -1, 7), (-1, 7))
+
+
+def test_queue_of_two_or_for_less_than_three_seconds_is_none():
+    assert queued([waiting(k) for k in range(2)]) == []
+    assert queued([waiting(k, arrive=3, leave=5.9) for k in range(3)]) == []
+    assert len(queued([waiting(k, arrive=3, leave=6.3) for k in range(3)])) == 1
+
+
+@pytest.mark.parametrize(("spacing", "found"), [(0.3, 0), (0.45, 1), (1.45, 1), (1.6, 0)])
+def test_queue_spacing(spacing, found):
+    assert len(queued([waiting(k, spacing=spacing) for k in range(4)])) == found
+
+
+def served(people=5, service=2.0, spacing=0.8):
+    """The head leaves every `service` seconds; the others then move up at 1 m/s, one place."""
+    paths = []
+    for k in range(people):
+        moved = sum((np.clip(T - service * (n + 1), 0, spacing) for n in range(k)), np.zeros_like(T))
+        x = 5 + spacing * k - moved
+        paths.append(np.concatenate([x, 3 + 1.3 * np.maximum(T - service * (k + 1), 0)], axis=1))
+    return paths
+
+
+def test_advancing_is_waiting_and_first_come_is_first_served():
+    (line,) = queue_lines(*crowd(served()), FPS)
+    assert line.order in ((0, 1, 2, 3, 4), (4, 3, 2, 1, 0))
+    assert line.left == (0, 1, 2)
+    assert line.fifo
+    assert (line.first, line.last) == (0, pytest.approx(79, abs=2))
+
+
+@pytest.mark.parametrize(("leavers", "fifo"), [((0,), True), ((4, 3), True), ((2,), False), ((0, 2), False)])
+def test_first_in_first_out_means_from_one_end(leavers, fifo):
+    late = {k: 7.0 + n for n, k in enumerate(leavers)}
+    (line,) = queue_lines(*crowd([waiting(k, spacing=0.6, leave=late.get(k, 99)) for k in range(5)]), FPS)
+    assert line.left == leavers
+    assert line.fifo == fifo
+
+
+def test_two_served_together_leave_in_order():
+    """The first two of five leave at once, then the third; were it the fourth, one would have been passed over."""
+    for third, fifo in ((2, True), (3, False)):
+        late = {0: 7.0, 1: 7.0, third: 8.5}
+        (line,) = queue_lines(*crowd([waiting(k, spacing=0.6, leave=late.get(k, 99)) for k in range(5)]), FPS)
+        assert (set(line.left), line.fifo) == ({0, 1, third}, fifo)
+
+
+@pytest.mark.parametrize("name", ["queue", "mixed"])
+def test_simulated_queues_are_first_in_first_out(name):
+    for seed in range(3):
+        motion = run(load(name, ["camera.fps=5"]), seed)
+        found = queue_lines(motion.pos, motion.vel, motion.present, motion.fps)
+        assert len(found) == 1
+        assert found[0].fifo
+        assert found[0].left
+
+
+@pytest.mark.parametrize("people", range(3, 9))
+@pytest.mark.parametrize("radius", [0.45, 0.5, 0.55, 0.6, 0.8, 1.0, 1.2])
+def test_a_circle_of_people_talking_is_not_a_queue(people, radius):
+    rng = np.random.default_rng(people)
+    angle = 2 * np.pi * np.arange(people) / people + 0.3
+    stand = [np.array([5, 5]) + radius * np.array([np.cos(a), np.sin(a)]) + 0 * T for a in angle]
+    sway = [p + 0.05 * np.sin(T * rng.uniform(1, 2) + rng.uniform(0, 6, 2)) for p in stand]
+    assert queued(stand) == []
+    assert queued(sway) == []
+
+
+def test_walking_in_file_or_shuffling_abreast_is_not_a_queue():
+    assert queued([np.array([0.8 * k, 0]) + straight(1.2) for k in range(4)]) == []
+    assert queued([np.array([0.8 * k, 0]) + straight(0, 0.3) for k in range(4)]) == []
+    assert len(queued([np.array([0.8 * k, 0]) + straight(0.3, 0) for k in range(4)])) == 1
+
+
+def test_two_queues_at_once():
+    first, second = ([waiting(k, at=(5.0, y)) for k in range(3)] for y in (3.0, 8.0))
+    assert sorted(e.members for e in queued(first + second)) == [(1, 2, 3), (4, 5, 6)]
+
+
+def found(pos, vel, there, group):
+    events = crossings(pos, vel, there, group, FPS) + queues(pos, vel, there, group, FPS)
+    return [(e.kind, e.start, e.end, set(e.members)) for e in events]
+
+
+def test_place_turn_and_order_of_people_change_nothing():
+    turn, order = np.array([[0.6, -0.8], [0.8, 0.6]]), np.array([3, 0, 4, 2, 1])
+    for paths in (served(), [*HEAD_ON, np.array([50.0, 50]) + straight(0)]):
+        (pos, vel, there), group = crowd(paths), groups(1, 1, 2, 2, -1)
+        expected = found(pos, vel, there, group)
+        assert len(expected) == 1
+        assert found(pos @ turn + [9, -4], vel @ turn, there, group) == expected
+        mixed = found(pos[:, order], vel[:, order], there, group[:, order])
+        assert [(*e[:3], {int(order[m - 1]) + 1 for m in e[3]}) for e in mixed] == expected
+
+
+def test_nobody():
+    none = np.zeros((0, 0, 2))
+    assert crossings(none, none, none[..., 0] > 0, np.zeros((0, 0), np.int64), FPS) == []
+    assert queues(none, none, none[..., 0] > 0, np.zeros((0, 0), np.int64), FPS) == []
+    alone = np.zeros((20, 1, 2))
+    assert crossings(alone, alone, alone[..., 0] == 0, np.full((20, 1), -1), FPS) == []
+    assert queues(alone, alone, alone[..., 0] == 0, np.full(alone.shape[:2], -1), FPS) == []

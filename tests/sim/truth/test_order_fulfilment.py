@@ -1,0 +1,137 @@
+import numpy as np
+import pytest
+
+from scenarios.errors import WorkError
+from sim.truth.cross_queue_events import queues
+from sim.truth.order_fulfilment import check_orders
+from sim.types import GroupEvent, Motion, Order, Truth
+from tests.reference_sense import walkers
+
+FRAMES = 150
+
+
+def merging(fired: int | None = 20, kind: str = "merge") -> Motion:
+    """Persons 1 and 2 in one group, 3 in another, one order that the three belong together."""
+    order = Order("m1", kind, fired, ((1, 2), (3,)), ((1, 2, 3),))
+    start = [[2, 2], [2.8, 2], [12, 2]]
+    return walkers(start, [[0.5, 0], [0.5, 0], [-0.2, 0]], frames=FRAMES, orders=(order,))
+
+
+def truth_of(motion: Motion, changes: int, kind: str = "merge", to: tuple[int, ...] = (1, 1, 1)) -> Truth:
+    """A truth in which the groups change once, in frame `changes`, with an event of this kind."""
+    frame = np.repeat(np.arange(1, FRAMES + 1), 3)
+    person = np.tile([1, 2, 3], FRAMES)
+    group = np.where(frame >= changes, np.tile(to, FRAMES), np.tile([1, 1, -1], FRAMES))
+    event = GroupEvent(kind, changes, changes, None, (-1, 1), (1,), (1, 2, 3), (0.0, 0.0))
+    return Truth(
+        "made-up", 10.0, FRAMES, 40.0, frame, person, group, None, None, None, np.ones(len(frame)), events=(event,)
+    )
+
+
+@pytest.mark.parametrize("onset", [20, 57, 100])
+def test_fulfilled_from_the_firing_to_ten_seconds_less_the_rule(onset: int) -> None:
+    motion = merging()
+    assert check_orders(motion, truth_of(motion, onset)) == {"m1": 0}
+
+
+@pytest.mark.parametrize("onset", [19, 101])
+def test_too_early_and_too_late(onset: int) -> None:
+    motion = merging()
+    with pytest.raises(WorkError) as caught:
+        check_orders(motion, truth_of(motion, onset))
+    assert caught.value.file == "scenario made-up"
+    assert "m1" in caught.value.place
+    assert "seed 7" in caught.value.place
+    assert "within 10 s" in caught.value.got
+    assert "nearest" in caught.value.got
+    assert "1.5 m" in caught.value.expected
+
+
+def test_closest_values_are_the_closest() -> None:
+    motion = merging()
+    last = 120 - 1  # 10 s after the firing
+    gap = (12 - 0.2 * last / 10) - (2.8 + 0.5 * last / 10)
+    with pytest.raises(WorkError, match=rf"nearest {gap:.2f} m, velocities then differing by 0\.70 m/s"):
+        check_orders(motion, truth_of(motion, 140))
+
+
+def test_the_wrong_kind_or_the_wrong_people_do_not_count() -> None:
+    motion = merging()
+    with pytest.raises(WorkError):
+        check_orders(motion, truth_of(motion, 50, kind="cross"))
+    with pytest.raises(WorkError):
+        check_orders(motion, truth_of(motion, 50, to=(1, 1, -1)))
+    assert check_orders(motion, truth_of(motion, 50, kind="form")) == {"m1": 0}
+
+
+def test_an_event_after_all_was_done_does_not_count() -> None:
+    motion, truth = merging(), truth_of(merging(), 25)
+    assert truth.events is not None
+    again = GroupEvent("merge", 60, 60, None, (1, -1), (1,), (1, 2, 3), (0.0, 0.0))
+    with pytest.raises(WorkError):
+        check_orders(motion, truth.replace(events=(again,)))
+    assert check_orders(motion, truth.replace(events=(again, *truth.events))) == {"m1": 1}
+
+
+def test_an_order_that_never_fired() -> None:
+    with pytest.raises(WorkError, match="never fired"):
+        check_orders(merging(None), truth_of(merging(None), 50))
+
+
+def test_the_recording_may_end_first() -> None:
+    motion = merging(140)
+    with pytest.raises(WorkError, match="until the recording ends"):
+        check_orders(motion, truth_of(motion, 30))
+
+
+def test_splits() -> None:
+    order = Order("s1", "split", 20, ((1, 2),), ((1,), (2,)))
+    motion = merging().replace(orders=(order,))
+    assert check_orders(motion, truth_of(motion, 50, "split", (-1, -1, -1))) == {"s1": 0}
+    assert check_orders(motion, truth_of(motion, 50, "dissolve", (-1, -1, -1))) == {"s1": 0}
+    with pytest.raises(WorkError, match=r"furthest 0\.80 m"):
+        check_orders(motion, truth_of(motion, 50, "split", (1, 1, -1)))
+
+
+def test_queues_want_three_of_their_people() -> None:
+    order = Order("q1", "queue", 20, ((1, 2), (3,)), ())
+    motion = merging().replace(orders=(order,))
+    truth = truth_of(motion, 50, "queue")
+    assert check_orders(motion, truth) == {"q1": 0}
+    assert truth.events is not None
+    fewer = truth.replace(events=(GroupEvent("queue", 50, 90, None, (), (), (1, 2, 9), (0, 0)),))
+    with pytest.raises(WorkError, match="at most 1 of 3 people slower"):
+        check_orders(motion, fewer)
+    pause = motion.vel.copy()
+    pause[30:47] = 0
+    with pytest.raises(WorkError, match=r"at most 3 of 3 .* 3 of them for 1\.7 s at a stretch"):
+        check_orders(motion.replace(vel=pause), fewer)
+    late = truth_of(motion, 91, "queue")  # 3 s of the rule would end later than 10 s after the firing
+    with pytest.raises(WorkError):
+        check_orders(motion, late)
+
+
+def test_no_orders() -> None:
+    motion = merging().replace(orders=())
+    assert check_orders(motion, truth_of(motion, 50)) == {}
+
+
+@pytest.mark.parametrize("leaving", [(1, 2, 3, 4), (2, 1, 3, 4)])
+def test_queues_are_first_in_first_out(leaving: tuple[int, ...]) -> None:
+    """Four stand in line from the first frame; they leave sideways 2 s after one another, from 5 s on."""
+    t = np.arange(FRAMES) / 10
+    pos = np.empty((FRAMES, 4, 2))
+    for turn, person in enumerate(leaving):
+        pos[:, person - 1] = np.stack([0 * t + 5 + 0.6 * person, np.maximum(t - 5 - 2 * turn, 0) * 1.3], axis=1)
+    base = walkers([[0, 0]] * 4, [[0, 0]] * 4, frames=FRAMES)
+    order = Order("q1", "queue", 1, ((1,), (2,), (3,), (4,)), ((1, 2, 3, 4),))
+    motion = base.replace(pos=pos, vel=np.gradient(pos, 0.1, axis=0), orders=(order,))
+    alone = np.full((FRAMES, 4), -1)
+    truth = truth_of(merging(), 50).replace(
+        events=tuple(queues(motion.pos, motion.vel, motion.present, alone, motion.fps))
+    )
+    if leaving[0] == 1:
+        assert check_orders(motion, truth) == {"q1": 0}
+    else:
+        with pytest.raises(WorkError, match=r"left by people 2, 1.* first in, first out"):
+            check_orders(motion, truth)

@@ -1,0 +1,145 @@
+"""The contact sheet: which frames, where things are, and what cannot be drawn."""
+
+from __future__ import annotations
+
+import dataclasses
+from pathlib import Path
+
+import cv2
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from scenarios.errors import InputError
+from sim.types import GroupEvent, Sequence, Truth
+from tracking.app.pictures.contact_sheet import choose, sheet
+from tracking.drawing.panel import FLOOR, View, _names, colour
+
+
+def bare(length: int, starts: dict[int, str]) -> Truth:
+    events = tuple(GroupEvent(kind, k, k, None, (1,), (1,), (1,), (0.0, 0.0)) for k, kind in sorted(starts.items()))
+    none = np.zeros(0, np.int64)
+    return Truth("t", 10.0, length, 60.0, none, none, none, None, None, None, np.zeros(0), events=events)
+
+
+def test_onsets_come_first_and_gaps_are_filled() -> None:
+    chosen = choose(bare(200, {50: "merge", 120: "split", 60: "enter"}), 8)
+    assert {50, 120} <= set(chosen)
+    assert len(set(chosen)) == 8
+    assert max(np.diff([1, *chosen, 200])) < 45
+    assert chosen == sorted(chosen)
+
+
+def test_fuller_frames_fill_the_gaps(truth: Truth) -> None:
+    few = truth.replace(frame=np.array([70, 70, 71]), id=np.array([1, 2, 1]), events=())
+    assert choose(few, 1) == [70]
+
+
+def test_onsets_close_to_one_another_share_a_picture() -> None:
+    chosen = choose(bare(200, {50: "cross", 55: "cross", 58: "merge", 120: "cross"}), 4)
+    assert {58, 120} <= set(chosen)
+    assert not {50, 55} & set(chosen)
+
+
+def test_the_part_of_the_world_where_people_are_is_shown(sequence: Sequence, truth: Truth) -> None:
+    """With pillars, doors, stairs and service points, and not beyond the walls round it."""
+    from tracking.app.pictures.contact_sheet import _bounds
+
+    wide = dataclasses.replace(sequence, scene=dataclasses.replace(sequence.scene, size=np.array([60.0, 40.0])))
+    low, high = _bounds(wide, truth)
+    np.testing.assert_allclose(high, truth.pos.max(axis=0) + 2)
+    low, high = _bounds(sequence, truth.replace(pos=np.clip(truth.pos, 0, sequence.scene.size)))
+    assert (low >= -1).all()
+    assert (high <= sequence.scene.size + 1).all()
+
+
+def test_a_ring_holds_all_whom_an_event_concerns(truth: Truth) -> None:
+    from tracking.app.pictures.contact_sheet import _around
+
+    merge = next(event for event in truth.events if event.kind == "merge")
+    rows = truth.rows(merge.start)
+    centre, radius = _around(merge, truth.id[rows], truth.pos[rows])
+    apart = np.linalg.norm(truth.pos[rows] - centre, axis=1)
+    assert 0.5 < radius - apart[np.isin(truth.id[rows], merge.members)].max() < 1
+
+
+def test_names_stand_clear_of_discs_and_of_one_another() -> None:
+    """Five in a huddle: no name covers a disc (a covered one would lose its colour), and all are there."""
+    view = View.fit(np.full((300, 300, 3), 255, np.uint8), np.zeros(2), np.array([10.0, 10.0]), upwards=True)
+    ids, places = np.arange(1, 6), np.array([[5, 5], [5.9, 5], [4.1, 5], [5, 5.9], [5, 4.1]])
+    for identity, at in zip(ids.tolist(), places, strict=True):
+        view.disc(at, 7, colour(identity))
+    before = view.canvas.copy()
+    _names(view, ids, places, 7)
+    for identity, at in zip(ids.tolist(), places, strict=True):
+        x, y = view.map(at)[0].astype(int)
+        np.testing.assert_array_equal(view.canvas[y, x], before[y, x])
+        assert (np.abs(view.canvas.astype(int) - colour(identity)).max(axis=2) < 12).sum() > 150
+
+
+def test_merges_and_splits_outrank_the_rest() -> None:
+    events = dict.fromkeys(range(10, 100, 10), "form") | {5: "merge", 150: "split"}
+    assert {5, 150} <= set(choose(bare(200, events), 3))
+
+
+@given(
+    length=st.integers(1, 300),
+    frames=st.integers(1, 12),
+    starts=st.dictionaries(st.integers(1, 300), st.sampled_from(["merge", "split", "cross", "enter"])),
+)
+def test_frames_are_distinct_and_inside(length: int, frames: int, starts: dict[int, str]) -> None:
+    chosen = choose(bare(length, starts), frames)
+    assert len(chosen) == len(set(chosen)) == min(frames, length)
+    assert chosen[0] >= 1
+    assert chosen[-1] <= length
+
+
+def test_a_plan_puts_y_up_and_keeps_the_aspect() -> None:
+    view = View.fit(np.zeros((100, 300, 3), np.uint8), np.zeros(2), np.array([20.0, 10.0]), upwards=True)
+    assert view.scale == 10
+    np.testing.assert_allclose(view.map(np.array([[0, 0], [20, 10], [10, 5]])), [[50, 100], [250, 0], [150, 50]])
+
+
+def test_people_are_drawn_where_they_are(sequence: Sequence, truth: Truth, tmp_path: Path) -> None:
+    from tracking.app.pictures.contact_sheet import HEAD, TITLE, WIDTH, _bounds
+
+    index = choose(truth, 1)[0]
+    path = sheet(sequence, tmp_path / "new" / "sheet.png", frames=1)
+    picture = cv2.imread(str(path))
+    low, high = _bounds(sequence, truth)
+    scale = WIDTH / 2 / (high - low)[0]
+    row = truth.rows(index).start + int(np.flatnonzero(truth.at(index).id == 7)[0])
+    x, y = truth.pos[row] if truth.pos is not None else (0, 0)
+    u, v = 10 + (x - low[0]) * scale, (HEAD + TITLE) / 2 + (high[1] - y) * scale
+    np.testing.assert_allclose(picture[round(v), round(u)], colour(7), atol=12)
+    np.testing.assert_allclose(picture[round(v) + 30, round(u) + 30], FLOOR, atol=12)
+
+
+@pytest.mark.parametrize("frames", [1, 3, 8, 11])
+def test_size_follows_the_number_of_frames(sequence: Sequence, tmp_path: Path, frames: int) -> None:
+    picture = cv2.imread(str(sheet(sequence, tmp_path / "sheet.png", frames=frames)))
+    assert picture.shape[1] == 10 + min(frames, 4) * 450
+
+
+def test_the_same_sequence_gives_the_same_bytes(sequence: Sequence, tmp_path: Path) -> None:
+    a, b = sheet(sequence, tmp_path / "a.png"), sheet(sequence, tmp_path / "b.png")
+    assert a.read_bytes() == b.read_bytes()
+
+
+def test_boxes_alone_are_drawn_in_the_image(sequence: Sequence, truth: Truth, tmp_path: Path) -> None:
+    boxes = Sequence("boxes", 10.0, truth.length, sequence.frames, lambda: truth.replace(pos=None, vel=None))
+    assert sheet(boxes, tmp_path / "boxes.png").stat().st_size > 5000
+
+
+def test_without_people_there_is_no_sheet(sequence: Sequence, tmp_path: Path) -> None:
+    for load in (None, lambda: bare(10, {})):
+        with pytest.raises(InputError, match="no labelled people"):
+            sheet(Sequence("none", 10.0, 10, sequence.frames, load), tmp_path / "none.png")
+    assert not (tmp_path / "none.png").exists()
+
+
+def test_an_unwritable_place_is_one_clear_line(sequence: Sequence, tmp_path: Path) -> None:
+    (tmp_path / "file").write_text("")
+    with pytest.raises(InputError, match="choose another --out"):
+        sheet(sequence, tmp_path / "file" / "sheet.png", frames=1)

@@ -1,0 +1,222 @@
+"""The overlay: every picture in its slot, boxes where they belong, what a frame lacks, what cannot be drawn."""
+
+from __future__ import annotations
+
+import dataclasses
+from pathlib import Path
+
+import cv2
+import numpy as np
+import pytest
+
+from scenarios.errors import InputError
+from sim.geometry.polygons import contains, convex_hull
+from sim.scene.camera import project
+from sim.types import Detections, Frame, GroupEvent, Groups, Sequence, Tracks, Truth
+from tests.coded_pictures import SIZE, coded, number, sequence
+from tests.groups_as_wholes import wholes
+from tracking.app.pictures.overlay import _words, compose, overlay
+from tracking.drawing import marks
+from tracking.drawing.painter import Style
+from tracking.drawing.panel import colour
+
+STRIP = 32
+
+
+def answer(index: int, boxes: dict[int, list[float]], group: int = -1, events: tuple[GroupEvent, ...] = ()) -> Tracks:
+    box = np.array(list(boxes.values()), float).reshape(-1, 4)
+    n = len(box)
+    return Tracks(
+        index, 0.0, "image", "person", np.array(list(boxes), np.int64), np.full(n, group), box[:, :2] + box[:, 2:] / 2,
+        np.zeros((n, 2)), np.tile(np.diag([4.0, 1.0, 1.0, 1.0]), (n, 1, 1)), box, np.ones(n), events=events,
+    )  # fmt: skip
+
+
+def frames_of(path: Path) -> list[np.ndarray]:
+    video, found = cv2.VideoCapture(str(path)), []
+    while True:
+        done, picture = video.read()
+        if not done:
+            return found
+        found.append(picture)
+
+
+def test_every_frame_in_its_slot(tmp_path: Path) -> None:
+    tracks = [answer(k, {3: [40, 30, 10, 20]}) for k in range(1, 13)]
+    steps: list[str] = []
+    path = overlay(sequence(12), tracks, tmp_path / "new" / "o.mp4", step=steps.append)
+    found = frames_of(path)
+    assert [number(picture, STRIP, 2) for picture in found] == list(range(1, 13))
+    assert found[0].shape == (STRIP + 2 * SIZE[1], 2 * SIZE[0], 3)
+    assert len(steps) == 12
+
+
+def test_boxes_are_where_they_belong() -> None:
+    """At twice its size: the left edge of a box at u = 40 is drawn at 80, in the colour of its id, the id above it."""
+    side = marks.of_tracks([answer(1, {3: [40, 30, 10, 20]})], None, None)
+    (picture,) = compose(sequence(1), [[(side, Style())]])
+    edges = np.argwhere(np.abs(picture[STRIP:].astype(int) - colour(3)).max(axis=2) < 12)
+    box = edges[edges[:, 0] > 61]
+    (_, left), (bottom, right) = box.min(axis=0), box.max(axis=0)
+    assert (left, right, bottom) == pytest.approx((80, 100, 100), abs=2)
+    assert 40 < edges[:, 0].min() < 58
+
+
+def test_the_truth_stands_beside_over_or_alone(tmp_path: Path) -> None:
+    truth = Truth(
+        "coded", 10.0, 3, 20.0, np.arange(1, 4), np.ones(3, np.int64), np.full(3, -1), None, None,
+        np.tile([10.0, 30, 10, 20], (3, 1)), np.ones(3),
+    )  # fmt: skip
+    labelled = dataclasses.replace(sequence(3), load_truth=lambda: truth)
+    tracks = [answer(k, {3: [40, 30, 10, 20]}) for k in range(1, 4)]
+    wide = [
+        frames_of(overlay(labelled, given, tmp_path / "o.mp4", how))[0].shape[1]
+        for given, how in ((tracks, None), (tracks, "beside"), (tracks, "over"), (tracks, "only"), (None, None))
+    ]
+    assert wide == [166, 332, 166, 166, 166]
+    for given, how, word in ((tracks, "over", "without labels"), (None, None, "neither tracks nor labels")):
+        with pytest.raises(InputError, match=word):
+            overlay(sequence(3), given, tmp_path / "x.mp4", how)
+    assert not (tmp_path / "x.mp4").exists()
+
+
+def test_a_sequence_without_pictures_is_refused(sequence: Sequence, tracks: list[Tracks], tmp_path: Path) -> None:
+    with pytest.raises(InputError, match="without pictures"):
+        overlay(sequence, tracks, tmp_path / "o.mp4")
+
+
+def test_the_source_itself_is_not_replaced(tmp_path: Path) -> None:
+    path = overlay(sequence(3), [answer(1, {1: [1, 1, 5, 5]})], tmp_path / "o.mp4")
+    with pytest.raises(InputError, match="the source itself"):
+        overlay(sequence(3, path=path), [answer(1, {1: [1, 1, 5, 5]})], path)
+
+
+def test_what_a_frame_lacks_is_told() -> None:
+    """In red, at the right of the strip; the picture before stands still."""
+
+    def frames():
+        found = Detections(1, 0.0, "image", np.zeros((1, 2)), box=np.ones((1, 4)), score=np.ones(1))
+        yield Frame(1, 0.0, coded(1), detections=found)
+        yield Frame(2, 0.1, None, detections=found)
+        yield Frame(3, 0.2, coded(3))
+
+    case = dataclasses.replace(sequence(3), frames=frames, has_detections=True)
+    side = marks.of_tracks([answer(k, {}) for k in (1, 2, 3)], None, None)
+    made = list(compose(case, [[(side, Style())]]))
+    red = [(np.abs(p[:STRIP].astype(int) - colour(6)).max(axis=2) < 4).sum() > 50 for p in made]
+    assert red == [False, True, True]
+    assert [number(p, STRIP, 2) for p in made] == [1, 1, 3]
+
+
+def test_trails_end_at_a_gap() -> None:
+    tracks = [answer(k, {1: [k, 0, 2, 4], 2: [k, 20, 2, 4]} if k != 5 else {1: [k, 0, 2, 4]}) for k in range(1, 9)]
+    side = marks.of_tracks(tracks, None, None)
+    found = dict(side.trails(8, 100))
+    np.testing.assert_array_equal(found[1][:, 0], np.arange(8, 0, -1) + 1)
+    np.testing.assert_array_equal(found[2][:, 0], [9, 8, 7])
+    assert dict(side.trails(8, 2))[1].shape == (3, 2)
+
+
+def test_ellipses_hold_95_percent() -> None:
+    ring = marks.of_tracks([answer(1, {3: [40, 30, 10, 20]})], None, None).at(1).ellipse[0]
+    offset = ring - [45, 40]
+    np.testing.assert_allclose((offset**2 / [4.0, 1.0]).sum(axis=1), 5.991, rtol=1e-6)
+
+
+def test_people_on_the_ground_stand_upright_in_the_picture(sequence: Sequence, tracks: list[Tracks]) -> None:
+    """Without boxes of their own; ellipses lie on the ground round their feet."""
+    plain = [t.replace(box=None) for t in tracks]
+    seen = marks.of_tracks(plain, sequence.camera, sequence.scene).at(1)
+    np.testing.assert_allclose(seen.box, tracks[0].box, atol=25)
+    wide = seen.ellipse[..., 0].max(axis=1) - seen.ellipse[..., 0].min(axis=1)
+    assert (wide > seen.box[:, 2]).all()
+    assert (np.abs(seen.ellipse.mean(axis=1) - seen.at) < 60).all()
+    assert np.isnan(marks.of_tracks(plain, None, None).at(1).box).all()
+
+
+def test_groups_without_people_show_their_hulls() -> None:
+    square = np.array([[10.0, 10], [30, 10], [30, 30], [10, 30]])
+    one, two = np.array([4]), np.zeros((1, 2))
+    groups = Groups(one, (np.zeros(0, np.int64),), two, two, np.zeros((1, 2, 2)), np.array([3.0]), (square,))
+    said = Tracks(1, 0.0, "image", "group", one, one, two, two, np.full((1, 4, 4), np.nan), groups=groups)
+    (region,) = marks.of_tracks([said], None, None).at(1).regions
+    assert (region.id, region.size) == (4, 3.0)
+    np.testing.assert_array_equal(region.hull, square)
+
+
+def test_events_stand_for_a_while_from_when_they_are_known() -> None:
+    merge = GroupEvent("merge", 2, 4, 6, (1, 2), (1,), (1, 2), (0.0, 0.0))
+    enter = GroupEvent("enter", 6, 6, 6, (), (1,), (1,), (0.0, 0.0))
+    tracks = [answer(k, {}, events=(merge, enter) if k == 6 else ()) for k in range(1, 20)]
+    side = marks.of_tracks(tracks, None, None)
+    assert [k for k in range(1, 20) if side.told(k, 5.0)] == [6, 7, 8, 9, 10]
+    assert [e.kind for e in side.told(6, 5.0)] == ["merge"]
+
+
+def coloured(picture: np.ndarray, group: int) -> np.ndarray:
+    """(V, 2) u, v of what has a group's colour, at the picture's own size."""
+    rows = np.argwhere(np.abs(picture[STRIP:].astype(int) - colour(group)).max(axis=2) < 12)
+    return rows[:, ::-1] / 2
+
+
+def a_group(place: tuple[float, float], plane: str = "image", camera_scale: float = 1.0) -> Tracks:
+    """Group 4 of three people, of 3 x 1 units (times the scale) across and moving by ten along x."""
+    at, one = np.array([place]), np.array([4])
+    square = at + camera_scale * np.array([[-3, -1], [3, -1], [3, 1], [-3, 1.0]])
+    extent = camera_scale**2 * np.diag([9.0, 1.0])[None]
+    vel = camera_scale * np.array([[10.0, 0]])
+    groups = Groups(one, (), at, vel, extent, np.array([3.04]), (square,))
+    return Tracks(1, 0.0, plane, "group", one, one, at, vel, np.tile(np.eye(4), (1, 1, 1)), groups=groups)
+
+
+def test_a_group_has_its_extent_its_way_and_its_size() -> None:
+    """9.21 by its extent round its place; as wide in the picture."""
+    side = marks.of_tracks([a_group((40, 30))], None, None)
+    (region,) = side.at(1).regions
+    offset = region.around - [40, 30]
+    np.testing.assert_allclose((offset**2 / [9.0, 1.0]).sum(axis=1), 9.21, rtol=1e-6)
+    np.testing.assert_allclose(region.way, [[40, 30], [50, 30]])
+    assert region.size == 3.04
+    (picture,) = compose(sequence(1), [[(side, Style())]])
+    drawn = coloured(picture, 4)
+    drawn = drawn[drawn[:, 1] <= 30]  # above its name
+    reach = 3 * np.sqrt(9.21)
+    assert (drawn[:, 0].min(), drawn[:, 0].max()) == pytest.approx((40 - reach, 50), abs=1.5)
+
+
+def test_groups_on_the_ground_lie_there_in_the_picture(sequence: Sequence) -> None:
+    """Projected as people are; nothing of them where no camera is known, or all is behind it."""
+    tracks = wholes(sequence, "ground")
+    seen = marks.of_tracks(tracks, sequence.camera, sequence.scene).at(1)
+    for region, pos in zip(seen.regions, tracks[0].pos, strict=True):
+        (uv,), _ = project(sequence.camera, np.array([[*pos, 0.0]]))
+        np.testing.assert_allclose(region.way[0], uv)
+        assert contains(convex_hull(region.hull), uv[None]).all()
+        assert contains(convex_hull(region.around), region.hull).all()
+    np.testing.assert_allclose(seen.at, [region.way[0] for region in seen.regions])
+    blind = marks.of_tracks(tracks, None, None).at(1)
+    assert np.isnan(blind.at).all()
+    assert not any(len(part) for r in blind.regions for part in (r.hull, r.around, r.way))
+    behind = marks.of_tracks([a_group((8.0, -40.0), "ground")], sequence.camera, None).at(1)
+    assert not any(len(part) for r in behind.regions for part in (r.hull, r.around, r.way))
+
+
+def test_what_is_unknown_of_a_group_is_left_out() -> None:
+    plain = a_group((40, 30))
+    unknown = plain.groups.replace(hull=(), extent=np.full((1, 2, 2), np.nan), size=np.array([np.nan]))
+    for given in (plain.replace(groups=None), plain.replace(groups=unknown)):
+        side = marks.of_tracks([given], None, None)
+        (region,) = side.at(1).regions
+        assert (len(region.hull), len(region.around), np.isnan(region.size)) == (0, 0, True)
+        (picture,) = compose(sequence(1), [[(side, Style())]])
+        assert len(coloured(picture, 4)) > 20
+
+
+def test_groups_that_are_tracked_are_counted_as_such() -> None:
+    assert overlay_words([a_group((40, 30))]) == "coded   frame 1 of 1   0.00 s   tracked 1 groups"
+
+
+def overlay_words(tracks: list[Tracks]) -> str:
+    case = sequence(1)
+    side = marks.of_tracks(tracks, None, None)
+    return _words(case, next(iter(case)), [[(side, Style())]])

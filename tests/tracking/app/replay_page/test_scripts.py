@@ -1,0 +1,79 @@
+"""What the page's own scripts make of its data: groups as they were told, the ground where the camera sees it."""
+
+from __future__ import annotations
+
+import json
+import shutil
+import subprocess
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import tracking.app.replay_page
+from sim.io.store.truth_files import standing
+from sim.scene.camera import looking, project
+from sim.types import Camera, Scene, Sequence, Stairs
+from tests.groups_as_wholes import wholes
+from tracking.app.replay_page.page import payload
+from tracking.app.replay_page.people_data import camera_json, scene_json
+from tracking.drawing.marks import WIDE, ring
+
+NODE = shutil.which("node")
+HERE = Path(tracking.app.replay_page.__file__).parent
+pytestmark = pytest.mark.skipif(NODE is None, reason="no node, which runs the page's scripts here")
+
+EMPTY = dict.fromkeys(("truth", "tracks", "detections", "bounds", "image", "video")) | {"length": 1}
+
+
+def ran(data: dict, scripts: tuple[str, ...], what: str) -> list:
+    """The value of an expression after some of the page's scripts have been read."""
+    page = f"const document = {{ getElementById: () => ({{ textContent: {json.dumps(json.dumps(data))} }}) }};"
+    code = "\n".join([page, *((HERE / name).read_text(encoding="utf-8") for name in scripts)])
+    done = subprocess.run(
+        [str(NODE), "-"],
+        input=f"{code}\nconsole.log(JSON.stringify({what}));",
+        capture_output=True,
+        text=True,
+        check=True,
+    )
+    return json.loads(done.stdout)
+
+
+@pytest.mark.parametrize("plane", ["ground", "image"])
+def test_groups(sequence: Sequence, plane: str) -> None:
+    """Place, ellipse, hull and words of every row of a frame."""
+    answers = wholes(sequence, plane)
+    shown = """[...tracks.rows(60)].map(row => [tracks.id[row], [tracks.x[row], tracks.y[row]],
+        ringOf(tracks, row, (x, y) => [x, y]), tracks.wholes.hull[row], tracks.wholes.speed[row],
+        wholeWords(tracks, row)])"""
+    rows = ran(payload(sequence, answers), ("view_data.js", "view_groups.js"), shown)
+    now, near = answers[59], {"atol": 0.05 if plane == "ground" else 3.0}
+    assert [row[0] for row in rows] == now.id.tolist()
+    for k, (_, at, around, hull, speed, words) in enumerate(rows):
+        np.testing.assert_allclose(at, now.pos[k], **near)
+        truly = ring(now.pos[k], now.groups.extent[k], WIDE)
+        for low in (np.min, np.max):
+            np.testing.assert_allclose(low(around, axis=0), low(truly, axis=0), **near)
+            np.testing.assert_allclose(low(hull, axis=0), low(now.groups.hull[k], axis=0), **near)
+        assert speed == pytest.approx(np.hypot(*now.vel[k]), abs=0.51 if plane == "image" else 0.051)
+        assert words == f"T{now.id[k]} ≈{round(now.groups.size[k], 1):g}"
+
+
+@pytest.mark.parametrize("radial", [0.0, 0.3, -0.05])
+def test_places_on_the_ground_are_where_the_camera_sees_them(radial: float) -> None:
+    """Up and down stairs, through lenses that bend either way, and nowhere behind the camera."""
+    up = Stairs(np.array([3.0, 3.0]), np.array([5.0, 4.0]), 3.0, 1.2, 8, 1.5)
+    down = Stairs(np.array([8.0, 3.0]), np.array([8.0, 6.0]), 2.0, -1.0, 5, 0.0)
+    scene = Scene(np.array([12.0, 12.0]), stairs=(up, down))
+    place, turn = np.array([6.0, -8.0, 7.0]), looking(0.7, 0.1)
+    camera = Camera("pinhole", (640, 480), (500.0, 520.0), (320.0, 240.0), place, turn, radial=radial)
+    xy = np.random.default_rng(0).uniform([-2, -30], [14, 14], (300, 2))
+    uv, _ = project(camera, standing(xy, scene))
+    data = {"camera": camera_json(camera), "scene": scene_json(scene)}
+    what = f"{json.dumps(xy.tolist())}.map(([x, y]) => project(x, y, heightAt(x, y)) || [null, null])"
+    found = np.array(ran(EMPTY | data, ("view_data.js", "view_world.js"), what), float)
+    np.testing.assert_array_equal(np.isnan(found), np.isnan(uv))
+    seen = np.isfinite(uv[:, 0]) & (np.abs(uv) < 1500).all(axis=1)
+    assert 50 < seen.sum() < len(xy)
+    np.testing.assert_allclose(found[seen], uv[seen], atol=0.05)

@@ -1,0 +1,73 @@
+"""Episodes: the objective of `evaluate` to the last bit, whole or of a beginning, whatever is in the cache."""
+
+from __future__ import annotations
+
+import math
+
+import pytest
+
+import tracking
+from scenarios.errors import InputError
+from scenarios.loading.resolve import load
+from sim.sequence import simulate
+from tracking.environment.episodes import Cache, Rollout, play, sources, streams_for
+from tracking.tracker_registry import names
+
+SHORT = ["camera.fps=5", "duration=8"]
+CROSS = sources("cross", [3], SHORT)[0]
+
+
+@pytest.fixture(scope="module")
+def cache():
+    return Cache()
+
+
+@pytest.mark.parametrize("mode", ["file", "truth", "image"])
+@pytest.mark.parametrize("name", names())
+def test_the_objective_is_that_of_evaluate(name, mode):
+    source = sources("cross", [3], ["camera.fps=5", "duration=3", "camera.image=[160,120]"])[0]
+    sequence = source.open(streams_for(name, mode))
+    expected = tracking.evaluate(sequence.truth, tracking.track(name, sequence, detections=mode))
+    found = play(name, source, detections=mode, every_score=True)
+    assert found.objective == expected["objective"]
+    assert found.scores == {key: value for key, value in expected.items() if not math.isnan(value)}
+    assert (found.name, found.seed, found.frames) == ("cross", 3, 15)
+
+
+@pytest.mark.parametrize("name", names())
+def test_the_objective_of_a_beginning(name, cache):
+    sequence = CROSS.open()
+    run = tracking.track(name, sequence)
+    rollout = Rollout(name, CROSS, cache=cache)
+    for frame in (1, 7, 22, 40):
+        for _ in rollout.advance(frame):
+            pass
+        expected = tracking.evaluate(sequence.truth, run, frames=frame)["objective"]
+        assert rollout.episode().objective == pytest.approx(expected, abs=1e-12, nan_ok=True)
+    assert rollout.episode().objective == play(name, CROSS, cache=cache, upto=99).objective
+
+
+def test_parameters_reach_the_tracker(cache):
+    plain = play("blob", CROSS, cache=cache)
+    late = play("blob", CROSS, {"report_delay": 4.0, "confirm_gate": 0.1}, cache=cache)
+    assert late.objective < plain.objective
+    assert late.seconds_tracking > 0
+    assert late.seconds_scoring > 0
+
+
+def test_a_source_in_memory_and_one_that_travels_agree(cache):
+    inside = sources(simulate(load("cross", SHORT), 3, 0, ()))[0]
+    assert play("blob", inside, cache=cache).objective == play("blob", CROSS, cache=cache).objective
+
+
+def test_no_labels_no_episode():
+    sequence = simulate(load("cross", SHORT), 3, 0, ())
+    bare = sources(type(sequence)(**{**sequence.__dict__, "load_truth": None, "has_detections": True}))[0]
+    with pytest.raises(InputError, match="nothing to score by"):
+        play("blob", bare)
+
+
+def test_which_pictures_are_drawn():
+    assert streams_for("blob", None) == ()
+    assert streams_for("group-pda", "truth") == ()
+    assert streams_for("blob", "image") == ("left", "background")

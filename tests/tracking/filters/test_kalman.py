@@ -1,0 +1,138 @@
+"""The bank against filterpy, the asymptote against the Riccati solver, gates against chi2, angles in a circle."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from filterpy.common import Q_discrete_white_noise
+from scipy.special import chdtri
+
+from tests.reference_tracking import filterpy_bank, riccati_innovation
+from tracking.filters import kalman
+
+
+def make(r, n=5, d=4):
+    dt = r.uniform(0.03, 0.5)
+    sigma, noise = r.uniform(0.1, 5, d), r.uniform(0.01, 2, d)
+    var, rate_var = r.uniform(0.1, 3, d), r.uniform(0.1, 3, d)
+    place = r.normal(0, 10, (n, d))
+    return dt, sigma, noise, var, rate_var, place
+
+
+def test_process_noise_is_filterpys():
+    q = kalman.white_acceleration(0.3, 2.0)
+    expected = Q_discrete_white_noise(2, 0.3, 4.0)
+    assert np.allclose(q, [expected[0, 0], expected[0, 1], expected[1, 1]], rtol=1e-14)
+
+
+@pytest.mark.parametrize("seed", range(12))
+def test_bank_equals_filterpy_over_random_misses(seed):
+    r = np.random.default_rng(seed)
+    dt, sigma, noise, var, rate_var, place = make(r)
+    bank, q = kalman.born(place, var, rate_var), kalman.white_acceleration(dt, sigma)
+    filters = filterpy_bank(place, var, rate_var, dt, sigma, noise)
+    for _ in range(60):
+        kalman.predict(bank, dt, q)
+        rows = np.flatnonzero(r.random(len(place)) < 0.6)
+        z = r.normal(0, 10, (len(rows), 4))
+        own_noise = noise * r.uniform(0.5, 2, (len(rows), 1))
+        d2 = kalman.distances(bank[:, rows], z, own_noise).diagonal() if len(rows) else np.zeros(0)
+        terms = kalman.update(bank, rows, z, own_noise)
+        for f in filters:
+            f.predict()
+        for k, row in enumerate(rows):
+            filters[row].update(z[k][:, None], R=np.diag(own_noise[k]))
+            assert d2[k] == pytest.approx(filters[row].mahalanobis ** 2, rel=1e-9)
+            assert terms[k].sum() == pytest.approx(d2[k], rel=1e-12)
+        x = np.array([f.x[:, 0] for f in filters])
+        assert np.allclose(bank[kalman.PLACE], x[:, ::2], rtol=1e-9, atol=1e-9)
+        assert np.allclose(bank[kalman.RATE], x[:, 1::2], rtol=1e-9, atol=1e-9)
+        for i, f in enumerate(filters):
+            blocks = np.array([f.P[2 * d : 2 * d + 2, 2 * d : 2 * d + 2] for d in range(4)])
+            expected = blocks[:, [0, 0, 1], [0, 1, 1]].T
+            assert np.allclose(bank[kalman.VAR :, i], expected, rtol=1e-9, atol=1e-9)
+
+
+def test_miss_leaves_the_prediction_exactly():
+    r = np.random.default_rng(0)
+    dt, sigma, noise, var, rate_var, place = make(r)
+    bank = kalman.born(place, var, rate_var)
+    bank[kalman.RATE] = r.normal(size=place.shape)
+    expected = place + dt * bank[kalman.RATE]
+    kalman.predict(bank, dt, kalman.white_acceleration(dt, sigma))
+    kalman.update(bank, np.zeros(0, np.int64), np.zeros((0, 4)), noise)
+    assert np.array_equal(bank[kalman.PLACE], expected)
+
+
+@pytest.mark.parametrize("index", [0.01, 0.1, 1.0, 5.0])
+def test_asymptote_is_the_riccati_solution_and_the_limit_of_updates(index):
+    dt, noise = 0.2, 0.7
+    sigma = index * np.sqrt(noise) / dt**2
+    closed = float(kalman.asymptote(dt, sigma, noise))
+    assert closed == pytest.approx(riccati_innovation(dt, sigma, noise), rel=1e-9)
+    bank, q = kalman.born(np.zeros((1, 1)), noise, 3.0), kalman.white_acceleration(dt, np.array([sigma]))
+    for _ in range(500):
+        kalman.predict(bank, dt, q)
+        s = bank[kalman.VAR, 0, 0] + noise
+        kalman.update(bank, np.array([0]), np.zeros((1, 1)), np.array([noise]))
+    assert s == pytest.approx(closed, rel=1e-9)
+
+
+def test_asymptote_by_hand():
+    assert kalman.asymptote(1.0, np.array([0.1, 1.0]), 1.0) == pytest.approx([1.5625, 4.0])
+
+
+@pytest.mark.parametrize("p", [0.9, 0.99, 0.999])
+def test_gate_holds_its_share(p):
+    r = np.random.default_rng(1)
+    bank = kalman.born(r.normal(0, 5, (1, 4)), r.uniform(0.1, 2, 4), 1.0)
+    noise, n = r.uniform(0.1, 2, 4), 100_000
+    z = bank[kalman.PLACE] + r.normal(size=(n, 4)) * np.sqrt(bank[kalman.VAR] + noise)
+    share = np.mean(kalman.distances(bank, z, noise)[0] <= chdtri(4, 1 - p))
+    assert abs(share - p) < 3 * np.sqrt(p * (1 - p) / n)
+
+
+def test_distances_know_no_unit_and_no_origin():
+    r = np.random.default_rng(2)
+    bank, z, noise = kalman.born(r.normal(0, 5, (6, 4)), 0.5, 1.0), r.normal(0, 5, (9, 4)), r.uniform(0.1, 1, 4)
+    d2 = kalman.distances(bank, z, noise)
+    large = bank.copy()
+    large[:, :, 0] *= np.array([10, 10, 100, 100, 100])[:, None]
+    factor = np.array([10.0, 1, 1, 1])
+    assert np.allclose(kalman.distances(large, z * factor, noise * factor**2), d2, rtol=1e-9)
+    moved = bank.copy()
+    moved[kalman.PLACE] += 5000.0
+    assert np.allclose(kalman.distances(moved, z + 5000.0, noise), d2, rtol=1e-9, atol=1e-9)
+    assert np.allclose(kalman.distances(bank, z, np.tile(noise, (9, 1))), d2, rtol=1e-9, atol=1e-9)
+    scaled = bank.copy()
+    scaled[kalman.PLACE] *= 7
+    assert np.allclose(kalman.distances(scaled, z * 7, noise, np.full(6, 7.0)), d2, rtol=1e-9, atol=1e-9)
+
+
+@pytest.mark.parametrize("shape", [(0, 3), (3, 0), (0, 0)])
+def test_distances_of_nothing(shape):
+    n, m = shape
+    assert kalman.distances(np.zeros((5, n, 4)), np.zeros((m, 4)), np.ones(4)).shape == shape
+
+
+@pytest.mark.parametrize("flip", [0.0, np.pi])
+def test_angle_follows_an_ellipse_round(flip):
+    sigma, noise = np.radians(10.0), np.radians(2.0) ** 2
+    angle, plain = np.array([[0.0], [noise]]), np.array([[0.0], [noise]])
+    one = np.array([0])
+    for k in range(1, 55):
+        true = np.radians(10.0) * k
+        for state, z in ((plain, true % np.pi), (angle, true % np.pi + flip)):
+            state[1] += sigma**2
+            innovation = kalman.angle_innovation(np.array([z]), state[0])
+            assert abs(innovation[0]) < np.radians(20)
+            kalman.angle_update(state, one, np.array([z]), np.array([noise]))
+        assert abs(kalman.angle_innovation(angle[0], np.array([true]))[0]) < np.radians(2)
+    assert np.allclose(angle, plain, rtol=0, atol=1e-12)
+
+
+def test_near_circle_has_no_direction():
+    angle = np.array([[0.3], [0.1]])
+    kalman.angle_update(angle, np.array([0]), np.array([1.2]), np.array([np.radians(31.0) ** 2]))
+    assert angle[0, 0] == 0.3
+    assert angle[1, 0] == 0.1

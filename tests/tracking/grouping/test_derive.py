@@ -1,0 +1,285 @@
+import math
+
+import numpy as np
+import pytest
+
+from scenarios.errors import InputError
+from sim.types import GroupEvent, Groups, Tracks
+from tracking.grouping.derive import Grouping, backward_velocity, derive, with_groups
+
+FPS = 10.0
+
+
+def walk(*pieces, start=(0.0, 0.0)):
+    """A path from velocities: pieces (seconds, (vx, vy))."""
+    vel = np.concatenate([np.tile(np.array(v, float), (round(s * FPS), 1)) for s, v in pieces])
+    return np.array(start) + np.concatenate([[[0, 0]], np.cumsum(vel[:-1], axis=0)]) / FPS, vel
+
+
+def tracks(people, *, scale=1.0, there=None, boxes=False, group=None, vel=True, ids=None):
+    """One Tracks per frame from paths; there (T, P), group (T, P) as a tracker gave it, ids (P,)."""
+    pos, speed = (np.stack([p[k] for p in people], axis=1) * scale for k in (0, 1))
+    there = np.ones(pos.shape[:2], bool) if there is None else there
+    ids = np.arange(1, len(people) + 1) if ids is None else np.array(ids)
+    out = []
+    for t in range(len(pos)):
+        k = np.flatnonzero(there[t])
+        n = len(k)
+        box = np.column_stack([pos[t, k] - [5, 10], np.tile([10.0, 20], (n, 1))]) if boxes else None
+        out.append(
+            Tracks(
+                t + 1, t / FPS, "image" if scale != 1 else "ground", "person", ids[k],
+                np.full(n, -1) if group is None else group[t, k], pos[t, k],
+                speed[t, k] if vel else np.full((n, 2), np.nan), np.zeros((n, 4, 4)), box, np.ones(n),
+            )
+        )  # fmt: skip
+    return out
+
+
+def events(made):
+    return [(t.index, e.kind, e.start, e.before, e.after, e.members) for t in made for e in t.events]
+
+
+def side_by_side(seconds=20.0, n=2):
+    return [walk((seconds, (1, 0)), start=(0, 0.7 * k)) for k in range(n)]
+
+
+def joining(speed=0.4, near=0.8):
+    """A pair, and one who drifts towards it: 6 - 0.4 t < 1.5 from frame 114 on."""
+    seconds = round((6 - near) / speed, 1)
+    return [*side_by_side(), walk((seconds, (1, -speed)), (20 - seconds, (1, 0)), start=(0, 6.7))]
+
+
+def leaving():
+    """A pair, and one 0.69 m beside it who drifts away at 0.4 m/s from 5 s on."""
+    return [*side_by_side(), walk((5, (1, 0)), (15, (1, 0.4)), start=(0, 1.39))]
+
+
+def test_a_pair_is_a_group_once_it_is_acquainted():
+    made = derive(tracks(side_by_side()), FPS)
+    assert [t.group.tolist() for t in made[:9]] == [[-1, -1]] * 9
+    assert all(t.group.tolist() == [1, 1] for t in made[9:])
+    assert all(len(t.groups.id) == (t.index > 9) for t in made)
+    assert events(made) == [], "who was there when it began neither formed nor entered"
+    assert made[50].groups.members[0].tolist() == [1, 2]
+
+
+def test_merge_is_told_when_known_and_dated_back():
+    """Near from frame 114 on: 16 of the last 20 frames from frame 129 on."""
+    made = derive(tracks(joining()), FPS)
+    assert events(made) == [(129, "merge", 114, (-1, 1), (1,), (1, 2, 3))]
+    event = made[128].events[0]
+    assert (event.emitted, event.end) == (129, 129)
+    assert made[127].group.tolist() == [1, 1, -1]
+    assert made[128].group.tolist() == [1, 1, 1]
+
+
+def test_split_after_two_seconds_apart():
+    """0.69 + 0.4 (t - 5) > 2.5 from t > 9.525 s: first in frame 97, for 2 s in frame 116."""
+    made = derive(tracks(leaving()), FPS)
+    assert events(made) == [(116, "split", 97, (1,), (-1, 1), (1, 2, 3))]
+
+
+def test_nobody_looks_ahead():
+    whole = derive(tracks(joining()), FPS)
+    for length in (50, 120, 128, 129, 160):
+        part = derive(tracks(joining())[:length], FPS)
+        assert [t.group.tolist() for t in part] == [t.group.tolist() for t in whole[:length]]
+        assert events(part) == events(whole[:length])
+
+
+def test_strangers_who_pass_are_no_group():
+    made = derive(tracks([walk((20, (1, 0))), walk((20, (-1, 0)), start=(20, 1))]), FPS)
+    assert all((t.group == -1).all() for t in made)
+
+
+def test_in_the_image_lengths_are_multiplied():
+    for scale in (25.0, 400.0):
+        made = derive(tracks(joining(), scale=scale), FPS, px_per_m=scale)
+        assert events(made) == events(derive(tracks(joining()), FPS))
+        assert made[150].groups.pos[0] == pytest.approx(derive(tracks(joining()), FPS)[150].groups.pos[0] * scale)
+        assert made[128].events[0].pos[0] == pytest.approx(derive(tracks(joining()), FPS)[128].events[0].pos[0] * scale)
+    boxed = derive(tracks(side_by_side(), scale=100.0, boxes=True), FPS, px_per_m=100.0)
+    assert boxed[20].groups.hull[0].tolist() == pytest.approx(np.array([[195, -10], [205, -10], [205, 80], [195, 80]]))
+
+
+def test_in_the_image_without_a_scale():
+    with pytest.raises(InputError, match="px_per_m"):
+        derive(tracks(side_by_side(), scale=20.0), FPS, math.nan)
+    assert len(derive(tracks(side_by_side()), FPS, math.nan)) == 200
+
+
+def test_what_a_tracker_says_is_kept():
+    own = np.full((200, 2), -1)
+    own[30:] = 7
+    made = derive(tracks(side_by_side(), group=own), FPS)
+    assert [t.group.tolist() for t in made[28:32]] == [[-1, -1], [-1, -1], [7, 7], [7, 7]]
+    assert events(made) == [(31, "form", 31, (-1, -1), (7,), (1, 2))]
+    assert made[40].groups.id.tolist() == [7]
+    told = GroupEvent("merge", 5, 5, 6, (-1, -1), (7,), (1, 2), (0.0, 0.0))
+    given = [t.replace(groups=Groups.none(), events=(told,) if t.index == 6 else ()) for t in tracks(side_by_side())]
+    made = derive(given, FPS)
+    assert all(t.groups is g.groups for t, g in zip(made, given, strict=True))
+    assert [t.events for t in made] == [t.events for t in given]
+
+
+def test_crossings_and_queues_of_tracks():
+    """The hulls come within 1 m in frame 44 and part after frame 58; 20 frames later it is known."""
+    people = [walk((12, (v, 0)), start=(x, 5 + y)) for x, v in ((0, 1), (10, -1)) for y in (0, 0.7)]
+    found = events(derive(tracks(people), FPS))
+    assert [(i, kind, start, members) for i, kind, start, _, _, members in found] == [(78, "cross", 44, (1, 2, 3, 4))]
+    still = [walk((5, (-1, 0)), (7, (0, 0)), start=(5 + 0.8 * k, 0)) for k in range(3)]
+    (row,) = [e for e in events(derive(tracks(still), FPS)) if e[1] == "queue"]
+    assert row[2] == 51
+    assert row[0] == 51 + 30 + 30 - 1, "3 s, and 3 s more until waiting is told from advancing"
+
+
+def test_who_joins_as_they_come_is_no_merge():
+    there = np.ones((200, 3), bool)
+    there[:60, 2] = False
+    made = derive(tracks(side_by_side(n=3), there=there), FPS)
+    assert events(made) == []
+    assert made[100].group.tolist() == [1, 1, 1]
+    there[:60] = False
+    made = derive(tracks(side_by_side(n=3), there=there), FPS)
+    assert events(made) == [(70, "enter", 61, (), (1,), (1, 2, 3))]
+
+
+def test_a_group_waits_for_a_member_who_is_not_seen():
+    there = np.ones((200, 2), bool)
+    there[50:58, 1] = there[120:, 1] = False
+    made = derive(tracks(side_by_side(), there=there), FPS)
+    assert made[49].group.tolist() == made[58].group.tolist() == [1, 1]
+    assert made[52].group.tolist() == [-1], "a group of which one is seen is none now"
+    assert events(made) == [(131, "leave", 120, (1,), (-1,), (1, 2))]
+
+
+def test_velocities_from_positions_when_a_tracker_has_none():
+    made, known = derive(tracks(joining(), vel=False), FPS), derive(tracks(joining()), FPS)
+    assert [e[1:2] + e[3:] for e in events(made)] == [e[1:2] + e[3:] for e in events(known)]
+    frame, column = np.array([0, 1, 2, 5, 0]), np.array([0, 0, 0, 0, 1])
+    pos = np.array([[0.0, 0], [1, 0], [2, 0], [5, 5], [0, 0]])
+    got = backward_velocity(frame, column, pos, 10.0, 0.2)
+    np.testing.assert_allclose(got, [[np.nan] * 2, [10, 0], [10, 0], [np.nan] * 2, [np.nan] * 2])
+
+
+def test_ids_order_and_place_change_nothing():
+    base = derive(tracks(leaving()), FPS)
+    renamed = derive(tracks(leaving(), ids=[70, 30, 50]), FPS)
+    assert [e[:5] for e in events(base)] == [e[:5] for e in events(renamed)]
+    assert events(renamed)[0][5] == (30, 50, 70)
+    shuffled = [
+        t.replace(**{k: getattr(t, k)[::-1].copy() for k in ("id", "group", "pos", "vel", "cov", "score")})
+        for t in tracks(leaving())
+    ]
+    for a, b in zip(base, derive(shuffled, FPS), strict=True):
+        assert a.group.tolist() == b.group[::-1].tolist()
+    turn = np.array([[0.6, -0.8], [0.8, 0.6]])
+    moved = [t.replace(pos=t.pos @ turn + 5, vel=t.vel @ turn) for t in tracks(leaving())]
+    assert events(derive(moved, FPS)) == events(base)
+
+
+def test_nothing_to_group():
+    assert derive([], FPS) == []
+    empty = derive(tracks(side_by_side(), there=np.zeros((200, 2), bool)), FPS)
+    assert all(len(t.groups.id) == 0 and t.events == () for t in empty)
+    alone = derive(tracks(side_by_side(n=1)), FPS)
+    assert all(t.group.tolist() == [-1] for t in alone)
+
+
+def test_groups_without_people_are_left_alone():
+    given = [t.replace(unit="group", group=t.id) for t in tracks(side_by_side())]
+    assert all(a is b for a, b in zip(derive(given, FPS), given, strict=True))
+
+
+@pytest.mark.parametrize(
+    ("changed", "told"),
+    [
+        (Grouping(near=1.0), 142),  # 6 - 0.4 t < 1 from frame 127 on
+        (Grouping(share=1.0), 133),
+        (Grouping(window=1.0), 121),
+        (Grouping(alike=0.3), 146),  # not before it stops drifting, in frame 131
+    ],
+)
+def test_parameters_of_joining(changed, told):
+    assert [e[0] for e in events(derive(tracks(joining()), FPS, rule=changed))] == [told]
+
+
+@pytest.mark.parametrize(
+    ("changed", "told"),
+    [(Grouping(apart=2.0), 103), (Grouping(patience=1.0), 106), (Grouping(diverge=0.3), 91)],
+)
+def test_parameters_of_parting(changed, told):
+    assert [e[0] for e in events(derive(tracks(leaving()), FPS, rule=changed))] == [told]
+
+
+def test_standing_side_by_side_links_nobody_if_told_so():
+    still = [walk((10, (0, 0)), start=(0, 0.7 * k)) for k in range(2)]
+    assert derive(tracks(still), FPS)[-1].group.tolist() == [1, 1]
+    assert derive(tracks(still), FPS, rule=Grouping(idle=0.3))[-1].group.tolist() == [-1, -1]
+    walked = [walk((5, (1, 0)), (5, (0, 0)), start=(0, 0.7 * k)) for k in range(2)]
+    assert derive(tracks(walked), FPS, rule=Grouping(idle=0.3))[-1].group.tolist() == [1, 1]
+
+
+def passing():
+    """Two pairs that walk through each other."""
+    return [walk((12, (v, 0)), start=(x, 5 + y)) for x, v in ((0, 1), (10, -1)) for y in (0, 0.7)]
+
+
+def test_named_groups_without_events_get_them():
+    """As `with_groups` has it for runs and scores: the groups are the tracker's, what happens to them is derived."""
+    pairs = np.tile([3, 3, 8, 8], (120, 1))
+    named = [t.replace(events=(), derived=False) for t in derive(tracks(passing(), group=pairs), FPS)]
+    assert all(t.groups is not None for t in named)
+    made = with_groups(named, FPS, math.nan)
+    assert events(made) == [(78, "cross", 44, (3, 8), (3, 8), (1, 2, 3, 4))]
+    assert all(t.groups is g.groups for t, g in zip(made, named, strict=True))
+    own = np.full((200, 2), -1)
+    own[30:] = 7
+    named = [t.replace(events=(), derived=False) for t in derive(tracks(side_by_side(), group=own), FPS)]
+    assert events(with_groups(named, FPS, 1.0)) == [(31, "form", 31, (-1, -1), (7,), (1, 2))]
+
+
+def test_groups_named_by_their_members_alone():
+    pairs = np.tile([3, 3, 8, 8], (120, 1))
+    named = [
+        t.replace(events=(), group=np.full(4, -1), derived=False) for t in derive(tracks(passing(), group=pairs), FPS)
+    ]
+    made = with_groups(named, FPS, 1.0)
+    assert [e[1] for e in events(made)] == ["cross"]
+    assert made[0].group.tolist() == [3, 3, 8, 8]
+
+
+def test_a_kind_that_is_told_is_not_derived_but_the_others_are():
+    named = derive(tracks(passing()), FPS)
+    merge = GroupEvent("merge", 5, 5, 6, (-1, -1), (7,), (1, 2), (0.0, 0.0))
+    cross = GroupEvent("cross", 5, 5, 6, (1, 2), (1, 2), (1, 2, 3, 4), (0.0, 0.0))
+    queue = GroupEvent("queue", 5, 5, 6, (), (), (1, 2, 3), (0.0, 0.0))
+    for told, kinds in ((merge, ["merge", "cross"]), (cross, ["cross"]), (queue, ["queue", "cross"])):
+        given = [t.replace(events=(told,) if t.index == 6 else (), derived=False) for t in named]
+        assert [e[1] for e in events(with_groups(given, FPS, 1.0))] == kinds
+
+
+@pytest.mark.parametrize("people", [side_by_side(), joining(), leaving(), passing()])
+def test_deriving_again_changes_nothing(people):
+    """Also of beginnings in which nothing has happened yet."""
+    made = derive(tracks(people), FPS)
+    for length in (9, 40, 100, len(made)):
+        again = derive(made[:length], FPS)
+        assert events(again) == events(made[:length])
+        assert [t.group.tolist() for t in again] == [t.group.tolist() for t in made[:length]]
+
+
+def test_what_is_derived_is_not_derived_again(monkeypatch):
+    made = with_groups(tracks(passing()), FPS, 1.0)
+    assert all(t.derived for t in made)
+    monkeypatch.setattr("tracking.grouping.derive.derive", None)
+    assert with_groups(made, FPS, 1.0) == made
+    with pytest.raises(TypeError):
+        with_groups([*made[:-1], made[-1].replace(derived=False)], FPS, 1.0)
+
+
+def test_the_end_tells_what_is_then_known():
+    """The hulls part after frame 58: known in frame 78, or in the last one before."""
+    made = derive(tracks(passing())[:70], FPS)
+    assert [(i, kind) for i, kind, *_ in events(made)] == [(70, "cross")]

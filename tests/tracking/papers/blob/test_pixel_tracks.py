@@ -1,0 +1,87 @@
+"""The tracks of `blob` from pixels: directions, sizes that return to the expected ones, boxes round their ellipses."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from sim.scene.camera import looking
+from sim.types import Camera, Context
+from tracking.filters import kalman
+from tracking.papers.blob.config import BlobConfig
+from tracking.papers.blob.pixel_tracks import People
+
+FPS, SCALE = 10.0, 40.0
+UP, LEVEL = np.pi / 2, 0.0
+
+
+def people(*ellipses, **config):
+    """Tracks born at these ellipses x, y, h, w, theta."""
+    settings, context = BlobConfig(**config), Context(FPS, SCALE, image_size=(320, 240))
+    made = People(settings, settings.dynamics(FPS), context)
+    made.look(np.zeros((0, 4)))
+    made.give_birth(np.array(ellipses, float), np.ones(len(ellipses)), 0.0)
+    made.confirmed[:] = True
+    return made
+
+
+def test_a_direction_far_off_is_a_distance_and_one_that_is_none_is_not():
+    one = people([100, 100, 68, 24, UP])
+    z, noise = np.array([[100.0, 100, 68, 24, LEVEL]]), np.tile(one.noise, (1, 1))
+    var = np.array([np.radians(10.0) ** 2])
+    expected = UP**2 / (one.angle[1, 0] + var[0])
+    assert one.turned(z[:, 4], var)[0, 0] == pytest.approx(expected)
+    assert one.update(np.array([0]), z, noise, var)[0] == pytest.approx(expected)
+    again = people([100, 100, 68, 24, UP])
+    assert again.update(np.array([0]), z, noise, np.array([np.inf]))[0] == 0.0
+    assert again.angle[0, 0] == UP
+
+
+def test_what_is_expected_of_a_size_is_no_new_evidence_in_each_frame():
+    one, var = people([100, 100, 90, 40, UP]), 0.15**2
+    for _ in range(200):
+        one.settle(np.array([0]), np.array([[68.0, 24.0]]), var)
+    assert one.bank[kalman.PLACE, 0, 2:] == pytest.approx([68, 24])
+    assert one.bank[kalman.VAR, 0, 2:] == pytest.approx(var)
+    assert one.bank[kalman.PLACE, 0, :2] == pytest.approx([100, 100])
+
+
+def test_settling_takes_as_long_at_any_frame_rate():
+    left = []
+    for fps in (5.0, 25.0):
+        settings = BlobConfig()
+        one = People(settings, settings.dynamics(fps), Context(fps, SCALE))
+        one.give_birth(np.array([[100.0, 100, 90, 40, UP]]), np.ones(1), 0.0)
+        for _ in range(int(fps)):
+            one.settle(np.array([0]), np.array([[68.0, 24.0]]), 0.02)
+        left.append(one.bank[kalman.PLACE, 0, 2] - 68)
+    assert left[0] == pytest.approx(left[1])
+    assert 0 < left[0] < 0.2 * (90 - 68)
+
+
+@pytest.mark.parametrize(("x", "wide", "hidden"), [(123, 34, True), (100, 16, False)])
+def test_who_lies_behind_somebody_is_excused_by_the_boxes_round_the_ellipses(x, wide, hidden):
+    """Of 68 px of his length 28 are behind a wide person beside him, 16 behind a slim one in front."""
+    one = people([100, 100, 68, 10, LEVEL], [x, 110, 68, wide, UP])
+    one.mark(np.array([1]), np.ones(1, bool), np.ones(1))
+    one.excuse()
+    assert bool(one.excused[0]) == hidden
+
+
+def test_who_lies_at_the_edge_leaves_by_his_length():
+    one = people([300, 100, 68, 10, LEVEL], [300, 150, 68, 10, UP])
+    one.bank[kalman.RATE, :, 0] = 5.0
+    one.hits[:], one.misses[:] = 10, 0
+    one.mark(np.zeros(0, np.int64), np.zeros(0, bool), np.zeros(0))
+    assert one.reported(1.0).tolist() == [1]
+
+
+def test_from_straight_above_nobody_is_behind_anybody():
+    settings = BlobConfig()
+    camera = Camera("top", (320, 240), (20, 20), (160, 120), np.array([0.0, 0, 10]), looking(UP, 0.0), px_per_m=20.0)
+    one = People(settings, settings.dynamics(FPS), Context(FPS, 20.0, camera=camera, image_size=(320, 240)))
+    one.give_birth(np.array([[100.0, 100, 12, 8, UP], [100, 106, 12, 12, UP]]), np.ones(2), 0.0)
+    one.confirmed[:] = True
+    one.mark(np.array([1]), np.ones(1, bool), np.ones(1))
+    one.excuse()
+    assert not one.excused.any()

@@ -1,0 +1,140 @@
+"""Templates over a mask: kernels against the slow way, support, settling, pruning."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from tests import reference_templates as slow
+from tracking.papers.blob import template_kernels as kernels
+from tracking.papers.blob import template_search_kernels
+from tracking.papers.blob.template import Mask, painted
+from tracking.papers.blob.template_kernels import EXPLAINED
+
+HIGH, WIDE = 90, 120
+
+
+def mask_of(*templates):
+    """(H, W) foreground of ellipses."""
+    return np.any([slow.pixels((HIGH, WIDE), *t) for t in templates], 0)
+
+
+def somewhere(r, n):
+    """(n, 4) templates, some of them reaching out of the image."""
+    h = r.uniform(8, 50, n)
+    return np.column_stack([r.uniform(-10, WIDE + 10, n), r.uniform(5, HIGH + 20, n), h, h * r.uniform(0.3, 0.8, n)])
+
+
+def scenery(seed):
+    """Foreground with holes, people some of whom stand elsewhere, and pixels that are explained already."""
+    r = np.random.default_rng(seed)
+    true = somewhere(r, 8)
+    foreground = mask_of(*true) & (r.random((HIGH, WIDE)) < 0.9) | (r.random((HIGH, WIDE)) < 0.02)
+    cover = np.where(slow.pixels((HIGH, WIDE), *somewhere(r, 1)[0]), EXPLAINED, 0).astype(np.int16)
+    expected = np.concatenate([true + np.append(r.normal(0, 3, (8, 2)), np.zeros((8, 2)), 1), somewhere(r, 2)])
+    return r, foreground, cover, expected
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_kernels_are_the_slow_way(seed):
+    _, foreground, cover, some = scenery(seed)
+    for t in some:
+        got = template_search_kernels.moved(foreground, cover, t, 2, 1.5)
+        assert np.array_equal(got / 2, slow.moved(foreground, cover, t, 2, 1.5))
+    area = [slow.area(cover.shape, t) for t in some]
+    got = kernels.supports(foreground, cover, some, 0)
+    assert np.allclose(got * area, [slow.worth(foreground, cover, t) for t in some], atol=1e-9)
+    assert np.array_equal(painted((HIGH, WIDE), some), slow.painted((HIGH, WIDE), some) > 0)
+
+
+@pytest.mark.parametrize("seed", range(8))
+def test_all_together_are_the_slow_way(seed):
+    r, foreground, cover, expected = scenery(seed)
+    scene, spread = Mask(foreground), r.uniform(1, 6, (len(expected), 2))
+    scene.cover[:] = cover
+    at = scene.settle(expected, spread, 40.0)
+    assert np.array_equal(at, slow.settle(foreground, cover, expected, spread, 40.0))
+    assert np.array_equal(scene.cover, cover + slow.painted(cover.shape, at))
+    assert np.allclose(scene.alone(at), slow.alone(foreground, cover, at), atol=1e-12)
+    assert np.allclose(
+        kernels.pieces(scene.foreground, scene.cover, at), slow.pieces(foreground, cover, at), atol=1e-12
+    )
+    assert np.allclose(scene.shown(at), slow.shown(cover, at), atol=1e-12)
+    for by_pieces in (True, False):
+        again = Mask(foreground)
+        again.cover[:] = scene.cover
+        rows = again.prune(at, 0.45, pieces=by_pieces)
+        assert rows.tolist() == slow.prune(foreground, cover, at, 0.45, by_pieces).tolist()
+        assert 0 < len(rows) < len(at)
+        assert np.array_equal(again.cover, cover + slow.painted(cover.shape, at[rows]))
+
+
+def test_closed_regions_are_explained_and_no_others():
+    label = np.random.default_rng(0).integers(0, 6, (HIGH, WIDE)).astype(np.int32)
+    for rows in ([], [0], [1, 3]):
+        scene = Mask(label > 0)
+        scene.close(label, np.array(rows, int))
+        assert np.array_equal(scene.cover >= EXPLAINED, np.isin(label, np.add(rows, 1)))
+
+
+def test_support_is_one_on_ones_own_pixels_and_minus_a_half_on_none():
+    one = np.array([[60.0, 80.0, 60.0, 24.0]])
+    empty = np.zeros((HIGH, WIDE), np.int16)
+    assert kernels.supports(mask_of(one[0]), empty, one, 0)[0] == pytest.approx(1.0, abs=0.02)
+    assert kernels.supports(np.zeros((HIGH, WIDE), bool), empty, one, 0)[0] == pytest.approx(-0.5, abs=0.02)
+
+
+def test_what_two_cover_supports_neither():
+    one = np.array([[60.0, 80.0, 60.0, 24.0]])
+    scene = Mask(mask_of(one[0]))
+    kernels.paint_all(scene.cover, np.concatenate([one, one]), 1)
+    assert scene.alone(np.concatenate([one, one])).tolist() == [0.0, 0.0]
+    assert len(scene.prune(np.concatenate([one, one]), 0.2)) == 1
+    assert scene.cover.max() == 1
+
+
+@pytest.mark.parametrize("gap", [14.0, 20.0])
+def test_two_in_one_blob_settle_where_they_are(gap):
+    true = np.array([[50.0, 80.0, 60.0, 24.0], [50.0 + gap, 76.0, 60.0, 24.0]])
+    expected = true + np.array([[3.0, -2.0, 0, 0], [-3.0, 2.0, 0, 0]])
+    found = Mask(mask_of(*true)).settle(expected, np.full((2, 2), 4.0), 100.0)
+    assert np.abs(found - true).max() <= 1.5
+
+
+def test_a_post_in_front_keeps_the_template_whole():
+    one = np.array([[60.0, 80.0, 60.0, 24.0]])
+    cut = mask_of(one[0])
+    cut[:, 57:62] = False
+    found = Mask(cut).settle(one + np.array([2.0, 1.0, 0, 0]), np.full((1, 2), 4.0), 20.0)
+    assert np.abs(found - one).max() <= 1.5
+
+
+def test_settling_is_the_same_in_any_order_of_rows():
+    r = np.random.default_rng(2)
+    true = np.column_stack([r.uniform(20, 100, 5), 50 + 8 * np.arange(5.0), np.full(5, 40.0), np.full(5, 16.0)])
+    expected, turn = true + np.append(r.normal(0, 2, (5, 2)), np.zeros((5, 2)), 1), r.permutation(5)
+    found = Mask(mask_of(*true)).settle(expected, np.full((5, 2), 3.0), 50.0)
+    assert np.array_equal(Mask(mask_of(*true)).settle(expected[turn], np.full((5, 2), 3.0), 50.0), found[turn])
+
+
+def test_a_piece_of_who_is_partly_covered_is_enough_but_two_on_one_are_one():
+    """Half hidden behind another template and half of the rest gone; then the same person twice."""
+    near, far = np.array([60.0, 84.0, 60.0, 24.0]), np.array([72.0, 80.0, 60.0, 24.0])
+    cut = mask_of(near, far)
+    cut[:48, 73:] = False
+    scene, both = Mask(cut), np.stack([near, far])
+    kernels.paint_all(scene.cover, both, 1)
+    assert 0.4 < kernels.pieces(scene.foreground, scene.cover, both)[1] < 0.9
+    assert scene.prune(both, 0.3, pieces=True).tolist() == [0, 1]
+    twice = np.stack([near, near + np.array([4.0, 0, 0, 0])])
+    scene = Mask(mask_of(near))
+    kernels.paint_all(scene.cover, twice, 1)
+    assert scene.prune(twice, 0.3, pieces=True).tolist() == [0]
+
+
+def test_who_is_all_but_covered_is_hidden():
+    one = np.array([[60.0, 80.0, 60.0, 24.0]])
+    both = np.concatenate([one, one + np.array([0.5, 0, 0, 0])])
+    scene = Mask(mask_of(*both))
+    kernels.paint_all(scene.cover, both, 1)
+    assert kernels.pieces(scene.foreground, scene.cover, both).tolist() == [0.0, 0.0]

@@ -1,0 +1,416 @@
+"""The tracking stage of `blob` on boxes: limits, the paper's frames 357 and 367, invariants, bytes."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from scenarios.errors import InputError
+from sim.types import Camera, Context, Detections, Frame, Tracks
+from tracking.filters import kalman
+from tracking.papers.blob.config import BlobConfig
+from tracking.papers.blob.tracker import Blob
+
+FPS = 10.0
+BOX = np.array([0.0, 0.0, 28.0, 68.0])  # a person at 40 px per m
+CONTEXT = Context(fps=FPS, px_per_m=40.0, image_size=(2000, 1000))
+
+
+def run(boxes, config=None, scores=None, context=CONTEXT):
+    """Tracks of frames given as lists of boxes."""
+    tracker = Blob(config)
+    tracker.reset(context, 0)
+    made = []
+    for k, rows in enumerate(boxes):
+        box = np.array(rows, float).reshape(-1, 4)
+        score = np.ones(len(box)) if scores is None else np.array(scores[k], float)
+        found = Detections(k + 1, k / FPS, "image", box[:, :2] + box[:, 2:] / 2, None, box, score)
+        made.append(tracker.step(Frame(k + 1, k / FPS, detections=found), found))
+    return made
+
+
+def at(*centres):
+    """Boxes of people with these centres."""
+    return [BOX + np.array([x, y, 0, 0]) for x, y in centres]
+
+
+def crowd(seed, frames=60, people=8):
+    """Boxes of people who walk, some missed, with false alarms."""
+    r = np.random.default_rng(seed)
+    p, v = r.uniform(200, 800, (people, 2)), r.normal(0, 5, (people, 2))
+    out = []
+    for k in range(frames):
+        seen = r.random(people) < 0.85
+        boxes = BOX + np.c_[p + v * k, np.zeros((people, 2))] + r.normal(0, 1.5, (people, 4))
+        false = [[*r.uniform(0, 1000, 2), 28, 68] for _ in range(r.poisson(0.7))]
+        out.append([*boxes[seen], *false])
+    return out
+
+
+def ids(tracks):
+    return {int(i) for t in tracks for i in t.id}
+
+
+def both(association):
+    return BlobConfig(association=association)
+
+
+@pytest.fixture(params=["nearest", "optimal"])
+def config(request):
+    return both(request.param)
+
+
+def test_one_person_is_one_track(config):
+    made = run([at((100 + 4 * k, 200)) for k in range(50)], config)
+    assert len(ids(made)) == 1
+    assert all(len(t.id) == 1 for t in made[5:])
+    assert made[-1].pos[0] == pytest.approx([100 + 4 * 49 + 14, 234], abs=0.5)
+    assert made[-1].vel[0] == pytest.approx([40.0, 0.0], abs=1.0)
+    assert made[-1].box[0] == pytest.approx(at((100 + 4 * 49, 200))[0], abs=1.0)
+
+
+def test_nothing_and_empty_frames(config):
+    assert all(len(t.id) == 0 for t in run([[]] * 5, config))
+    tracker = Blob(config)
+    tracker.reset(CONTEXT, 0)
+    assert len(tracker.step(Frame(1, 0.0), None).id) == 0
+
+
+def test_pieces_of_a_person_start_no_track(config):
+    def frame(k):
+        x, y = 100 + 4 * k, 200
+        if 20 <= k < 30:
+            return [[x, y, 28, 34], [x, y + 34, 28, 34]]
+        return at((x, y))
+
+    made = run([frame(k) for k in range(50)], config)
+    assert len(ids(made)) == 1
+    assert all(len(t.id) == 1 for t in made[5:])
+    assert made[29].box[0] == pytest.approx([100 + 4 * 29, 200, 28, 68], abs=2.0)
+
+
+def test_a_jump_is_one_new_track_and_the_old_one_dies(config):
+    frames = [at((100, 200))] * 30 + [at((500, 200))] * 30
+    made = run(frames, config)
+    assert len(ids(made)) == 2
+    first, second = sorted(ids(made))
+    seen = {i: [k for k, t in enumerate(made) if i in t.id] for i in (first, second)}
+    report = int(np.ceil(config.report_coast * FPS))
+    assert seen[first][-1] == 29 + report
+    assert 30 <= seen[second][0] <= 30 + int(np.ceil(config.report_delay * FPS))
+
+
+@pytest.mark.parametrize("gap", [3, 8])
+def test_a_short_absence_keeps_the_id(config, gap):
+    made = run([at((100 + 4 * k, 200)) if not 25 <= k < 25 + gap else [] for k in range(50)], config)
+    assert len(ids(made)) == 1
+
+
+def test_a_long_absence_ends_the_track_and_ids_are_not_reused(config):
+    frames = [at((100, 200))] * 20 + [[]] * 40 + [at((100, 200))] * 20
+    made = run(frames, config)
+    assert len(ids(made)) == 2
+    assert not set(made[19].id) & set(made[-1].id)
+
+
+def test_crossing_people_keep_their_ids():
+    frames = [at((100 + 12 * k, 200), (700 - 12 * k, 230)) for k in range(50)]
+    made = run(frames, both("optimal"))
+    assert len(ids(made)) == 2
+    assert made[5].pos[np.argsort(made[5].id), 0][0] < made[5].pos[np.argsort(made[5].id), 0][1]
+    assert made[-1].pos[np.argsort(made[-1].id), 0][0] > made[-1].pos[np.argsort(made[-1].id), 0][1]
+
+
+def test_hidden_person_coasts_longer_than_one_who_is_merely_missed():
+    config = BlobConfig(association="optimal", coast_time=0.5, merged_time=3.0)
+
+    def frame(k, front):
+        walker = at((300 + 4 * k, 200))
+        blocker = [[380, 180, 90, 160]] if front else []
+        hidden = 20 <= k < 32
+        return blocker + ([] if hidden else walker)
+
+    behind = run([frame(k, True) for k in range(60)], config)
+    open_field = run([frame(k, False) for k in range(60)], config)
+    assert len(ids(behind)) == 2
+    assert len(ids(open_field)) == 2
+    assert sum(len(t.id) for t in behind[45:]) == 2 * 15
+
+
+def test_a_box_over_two_unseen_people_is_neither_born_nor_their_death():
+    config = BlobConfig(association="optimal", coast_time=0.5, merged_time=3.0)
+
+    def frame(k):
+        if 20 <= k < 35:
+            return [[100 + 4 * k, 200, 28 + 45, 68]]
+        return at((100 + 4 * k, 200), (145 + 4 * k, 200))
+
+    made = run([frame(k) for k in range(60)], config)
+    assert len(ids(made)) == 2
+
+
+def test_two_identical_detections_are_one_person(config):
+    made = run([at((100 + 4 * k, 200)) * (2 if k > 10 else 1) for k in range(40)], config)
+    assert len(ids(made)) == 1
+
+
+def test_weak_detections_continue_but_do_not_start(config):
+    frames = [at((100 + 4 * k, 200)) for k in range(40)]
+    weak = run(frames, config, [[config.score_continue]] * 40)
+    assert not ids(weak)
+    fading = run(frames, config, [[1.0 if k < 15 else config.score_continue] for k in range(40)])
+    assert len(ids(fading)) == 1
+    assert all(len(t.id) == 1 for t in fading[15:])
+
+
+@pytest.mark.parametrize(("credit", "seen", "told"), [(1.0, 6, 6), (0.5, 6, 3), (0.5, 14, 7), (0.0, 6, 0)])
+def test_an_unseen_track_is_reported_for_a_share_of_the_time_it_was_seen(credit, seen, told):
+    config = BlobConfig(confirm_ratio=2.0, report_coast=2.0, coast_time=3.0, report_delay=0.0, report_credit=credit)
+    made = run([at((100, 200))] * seen + [[]] * 20, config)
+    assert [len(t.id) for t in made] == [1] * (seen + told) + [0] * (20 - told)
+
+
+def test_an_unseen_track_on_its_way_out_is_not_reported():
+    config = BlobConfig(report_coast=1.0)
+    frames = [at((100 - 4 * k, 200)) for k in range(25)] + [[]] * 8
+    for context in (CONTEXT, Context(fps=FPS, px_per_m=40.0)):
+        made = run(frames, config, context=context)
+        assert len(made[24].id) == 1
+        assert all(len(t.id) == 0 for t in made[26:])
+    inward = run([at((200 + 4 * k, 200)) for k in range(25)] + [[]] * 8, config)
+    assert len(inward[28].id) == 1
+
+
+def test_weak_detections_choose_after_the_strong():
+    frames = [at((100, 200)) for _ in range(20)] + [at((106, 200), (100, 200))]
+    scores = [[1.0]] * 20 + [[1.0, 0.2]]
+    last = run(frames, both("optimal"), scores)[-1]
+    assert last.score.tolist() == [1.0]
+    assert last.box[0, 0] > 101.0
+
+
+def test_a_strong_detection_is_not_given_twice():
+    frames = [at((100, 200), (112, 200)) for _ in range(20)] + [at((100, 200), (600, 200))]
+    scores = [[1.0, 1.0]] * 20 + [[1.0, 0.2]]
+    tracker = Blob(both("optimal"))
+    tracker.reset(CONTEXT, 0)
+    for k, (rows, score) in enumerate(zip(frames, scores, strict=True)):
+        box = np.array(rows)
+        tracker.step(Frame(k + 1, k / FPS), Detections(k + 1, k / FPS, "image", box[:, :2], None, box, np.array(score)))
+    assert tracker.people.hit.tolist() == [True, False]
+
+
+def test_a_weak_detection_knows_no_second_nearest_track():
+    frames = [at((100, 200), (112, 200)) for _ in range(20)] + [at((100, 200), (103, 200))]
+    scores = [[1.0, 1.0]] * 20 + [[1.0, 0.2]]
+    assert people_after(frames, both("nearest"), scores).hit.tolist() == [True, False]
+    assert people_after(frames, both("optimal"), scores).hit.tolist() == [True, True]
+
+
+def people_after(frames, config, scores=None):
+    """The tracks that `Blob` holds after these frames."""
+    tracker = Blob(config)
+    tracker.reset(CONTEXT, 0)
+    for k, rows in enumerate(frames):
+        box = np.array(rows, float).reshape(-1, 4)
+        score = np.ones(len(box)) if scores is None else np.array(scores[k], float)
+        tracker.step(Frame(k + 1, k / FPS), Detections(k + 1, k / FPS, "image", box[:, :2], None, box, score))
+    return tracker.people
+
+
+def pairs(d2, rho):
+    """Who is paired with whom at these squared distances (N, M), in order."""
+    tracker = Blob(both("optimal"))
+    tracker.reset(CONTEXT, 0)
+    tracker.people.give_birth(np.tile([100.0, 200, 68, 28], (len(d2), 1)), np.ones(len(d2)), 0.0)
+    tracker.people.rho[:] = rho
+    return sorted(zip(*(k.tolist() for k in tracker.people.pairs(np.array(d2), tracker.cascade.gate)), strict=True))
+
+
+def test_a_blind_track_far_away_changes_no_pair():
+    d2, inf = [[0.1, 17.0], [17.0, np.inf]], np.inf
+    assert pairs(d2, [1.0, 1.0]) == pairs([*d2, [inf, inf]], [1.0, 1.0, np.exp(10)]) == [(0, 0)]
+    r = np.random.default_rng(0)
+    for _ in range(200):
+        d2 = r.uniform(0, 18.4, (4, 4))
+        d2[r.random(d2.shape) < 0.4] = inf
+        rho = np.exp(r.uniform(0, 4, 4))
+        with_far = pairs(np.vstack([d2, np.full(4, inf)]), [*rho, np.exp(10)])
+        assert with_far == pairs(d2, rho)
+
+
+@pytest.mark.parametrize("rho", [1.0, 5.0, 80.0, 1e6])
+def test_a_pair_in_a_gate_is_better_than_none(rho):
+    assert pairs([[18.4]], [rho]) == [(0, 0)]
+
+
+def test_pieces_are_found_by_a_track_narrower_than_one_always_seen():
+    config = BlobConfig(size_noise=0.05, size_accel_noise=5.0, size_rate_prior=0.01, speed_prior=5.0)
+    assert len(people_after([at((100, 200)), [*at((100, 200)), [100, 192.5, 28, 83]]], config).id) == 1
+
+
+@pytest.mark.parametrize(
+    "config", [BlobConfig(), BlobConfig.frozen(), BlobConfig(confirm_ratio=1.05, tentative_time=0.1)]
+)
+@pytest.mark.parametrize("fps", [2.5, 7.0, 10.0, 25.0])
+def test_whoever_is_always_seen_is_confirmed(config, fps):
+    tracker = Blob(config)
+    tracker.reset(Context(fps=fps, px_per_m=40.0), 0)
+    for k in range(int(5 * fps)):
+        box = np.array(at((100, 200)))
+        tracker.step(Frame(k + 1, k / fps), Detections(k + 1, k / fps, "image", box[:, :2], None, box, np.ones(1)))
+    assert tracker.people.id.tolist() == [1]
+    assert tracker.people.confirmed.all()
+
+
+@pytest.mark.parametrize("start", [0.0, 0.1, 1.2, 4.1, 8.2, 1000.3])
+def test_a_tentative_track_has_its_time_whenever_it_starts(start):
+    tracker = Blob(BlobConfig(confirm_gate=0.1, tentative_time=1.0))
+    tracker.reset(CONTEXT, 0)
+    first = []
+    for k in range(14):
+        box = np.array(at((100 + 14 * (k % 2), 200)))  # never near enough to be confirmed
+        found = Detections(k + 1, start + k / FPS, "image", box[:, :2], None, box, np.ones(1))
+        tracker.step(Frame(k + 1, start + k / FPS), found)
+        first.append(1 in tracker.people.id)
+    assert not tracker.people.confirmed.any()
+    assert first == [True] * 11 + [False] * 3
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_order_of_detections_matters_to_nothing(config, seed):
+    boxes, r = crowd(seed), np.random.default_rng(seed)
+    first, second = run(boxes, config), run([[b[i] for i in r.permutation(len(b))] for b in boxes], config)
+    for a, b in zip(first, second, strict=True):
+        assert len(a.id) == len(b.id)
+        order_a, order_b = np.lexsort(a.pos.T), np.lexsort(b.pos.T)
+        assert np.allclose(a.pos[order_a], b.pos[order_b], rtol=0, atol=1e-6)
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_moving_the_scene_moves_the_answer(config, seed):
+    boxes, shift = crowd(seed), np.array([333.0, -77.0, 0, 0])
+    open_context = Context(fps=FPS, px_per_m=40.0)
+    first, second = (
+        run(boxes, config, context=open_context),
+        run([list(np.array(b) + shift) if len(b) else b for b in boxes], config, context=open_context),
+    )
+    for a, b in zip(first, second, strict=True):
+        assert np.array_equal(a.id, b.id)
+        assert np.allclose(a.pos + shift[:2], b.pos, rtol=0, atol=1e-6)
+        assert np.allclose(a.cov, b.cov, rtol=1e-9)
+
+
+def same(a: Tracks, b: Tracks) -> bool:
+    return all(getattr(a, k).tobytes() == getattr(b, k).tobytes() for k in ("id", "pos", "vel", "cov", "box", "score"))
+
+
+def test_same_bytes_again_and_after_reset(config):
+    boxes = crowd(1)
+    tracker = Blob(config)
+    found = [
+        Detections(k + 1, k / FPS, "image", np.array(b)[:, :2], None, np.array(b), np.ones(len(b)))
+        for k, b in enumerate(boxes)
+    ]
+    twice = []
+    for _ in range(2):
+        tracker.reset(CONTEXT, 0)
+        twice.append([tracker.step(Frame(d.index, d.t), d) for d in found])
+    assert all(same(a, b) for a, b in zip(*twice, strict=True))
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_covariances_are_sound_and_ids_unique(config, seed):
+    for t in run(crowd(seed), config):
+        assert len(set(t.id.tolist())) == len(t.id)
+        for cov in t.cov:
+            assert np.array_equal(cov, cov.T)
+            assert (np.linalg.eigvalsh(cov) > 0).all()
+
+
+def test_innovations_are_white_and_of_unit_size_on_the_model_itself():
+    r = np.random.default_rng(3)
+    config = BlobConfig(gate=0.999999)
+    tracker = Blob(config)
+    tracker.reset(Context(fps=FPS, px_per_m=40.0), 0)
+    dynamics = config.dynamics(FPS)
+    place, rate = np.array([500.0, 500, 68, 28]), np.zeros(4)
+    found = []
+    for k in range(3000):
+        push = r.normal(0, dynamics.sigma * 40)
+        push[2:] = 0
+        place = place + rate / FPS + push / FPS**2 / 2
+        rate = rate + push / FPS
+        rate[:2] *= 0.999
+        z = place + r.normal(0, np.sqrt(dynamics.noise) * 40) * [1, 1, 0, 0]
+        box = np.array([[z[0] - z[3] / 2, z[1] - z[2] / 2, z[3], z[2]]])
+        before = tracker.people.bank[:, :1, :2].copy() if len(tracker.people.id) else None
+        detections = Detections(k + 1, k / FPS, "image", box[:, :2], None, box, np.ones(1))
+        tracker.step(Frame(k + 1, k / FPS), detections)
+        if before is not None and k > 50:
+            predicted = before[0, 0] + before[1, 0] / FPS
+            found.append((z[:2] - predicted) / (40 * np.sqrt(dynamics.asymptote[:2])))
+    assert tracker.people.next_id == 2
+    found = np.array(found)
+    assert np.mean(found**2) == pytest.approx(1.0, abs=0.08)
+    for lag in range(1, 6):
+        assert abs(np.mean(found[lag:] * found[:-lag])) < 0.06
+
+
+def pinhole(tilt_deg=25.0, height=4.0):
+    tilt = np.radians(tilt_deg)
+    forward, right = np.array([0.0, np.cos(tilt), -np.sin(tilt)]), np.array([1.0, 0, 0])
+    rotation = np.stack([right, np.cross(forward, right), forward])
+    return Camera("pinhole", (640, 480), (500.0, 500.0), (320.0, 240.0), np.array([0.0, 0, height]), rotation)
+
+
+def above():
+    up = np.diag([1.0, -1.0, -1.0])
+    return Camera("top", (640, 480), (1.0, 1.0), (320.0, 240.0), np.array([0.0, 0, 10]), up, px_per_m=40.0)
+
+
+@pytest.mark.parametrize("camera", [pinhole(), above()], ids=["pinhole", "top"])
+def test_reports_on_the_ground_where_the_camera_is_known(camera):
+    from sim.scene.camera import project, px_per_m_at_centre
+
+    context = Context(fps=FPS, px_per_m=px_per_m_at_centre(camera), camera=camera, image_size=camera.image)
+    middle = np.array([0.0, 9.0]) if camera.kind == "pinhole" else np.zeros(2)
+    path = middle + np.array([[-2 + 0.1 * k, 0.03 * k] for k in range(40)])
+    boxes = []
+    for x, y in path:
+        (foot, head), _ = project(camera, np.array([[x, y, 0.0], [x, y, 1.7]]))
+        if camera.kind == "top":
+            boxes.append([[*(foot - 9), 18, 18]])
+        else:
+            boxes.append([[foot[0] - 15, head[1], 30, foot[1] - head[1]]])
+    last = run(boxes, context=context)[-1]
+    assert last.plane == "ground"
+    assert last.pos[0] == pytest.approx(path[-1], abs=0.1)
+    assert last.vel[0] == pytest.approx([1.0, 0.3], abs=0.1)
+    assert (np.linalg.eigvalsh(last.cov[0]) > 0).all()
+
+
+def test_ground_covariance_is_that_of_projected_samples():
+    from sim.scene.camera import to_ground
+    from tracking.papers.blob.report import on_ground
+
+    camera, r, scale = pinhole(), np.random.default_rng(0), np.array([50.0])
+    state = kalman.born(np.array([[300.0, 300, 90, 35]]), np.array([2e-4, 3e-4, 4e-4, 1e-4]), 1e-3)
+    pos, _, cov, seen = on_ground(camera, state, scale)
+    draws = state[0, 0] + r.normal(size=(200_000, 4)) * np.sqrt(state[2, 0]) * scale
+    ground = to_ground(camera, np.c_[draws[:, 0], draws[:, 1] + draws[:, 2] / 2])
+    assert seen.all()
+    assert pos[0] == pytest.approx(ground.mean(0), abs=0.01)
+    assert np.allclose(cov[0, :2, :2], np.cov(ground.T), rtol=0.03, atol=1e-5)
+
+
+def test_nobody_above_the_horizon_is_reported():
+    camera = pinhole(tilt_deg=5.0)
+    context = Context(fps=FPS, px_per_m=40.0, camera=camera, image_size=camera.image)
+    assert not ids(run([[[300, 20, 28, 68]]] * 20, context=context))
+
+
+@pytest.mark.parametrize("scale", [float("nan"), 0.0])
+def test_boxes_without_a_scale_are_refused(scale):
+    with pytest.raises(InputError, match=r"context\.px_per_m"):
+        run([at((100, 100))], context=Context(fps=FPS, px_per_m=scale))

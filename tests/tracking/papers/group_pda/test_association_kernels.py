@@ -1,0 +1,423 @@
+"""Associations of `group-pda` beside a slow oracle, and its limit cases: Kalman, the gate's fixed point, merging."""
+
+from __future__ import annotations
+
+from collections import Counter
+from dataclasses import fields, replace
+from itertools import combinations
+
+import numpy as np
+import pytest
+from filterpy.kalman import KalmanFilter
+from scipy.stats import chi2
+
+from tests import reference_group_pda as reference
+from tracking.filters.components import Constraint
+from tracking.papers.group_pda import association_kernels as kernels
+from tracking.papers.group_pda import split_birth_loss as changes
+from tracking.papers.group_pda.association_kernels import near
+from tracking.papers.group_pda.config import GroupPdaConfig
+from tracking.papers.group_pda.group_bank import Bank, merged, newborn
+from tracking.papers.group_pda.kernel_parameters import make_rules, truncation
+from tracking.papers.group_pda.merging import Merging
+
+STATES = ["nothing", "null", "measured"]
+PLAIN = reference.Rules(
+    Constraint(1.5, 9.21, 0.09 * np.eye(2), 3.0), 0.06, 0.5, 0.15, 1.0, 0.0, np.inf, 0.9, 0.9, True, False, False
+)
+
+
+def positive(r, n, scale=1.0):
+    A = r.normal(size=(n, n)) * scale
+    return A @ A.T / n + 0.05 * scale**2 * np.eye(n)
+
+
+def random_rules(r):
+    """All options, each on in half of the cases."""
+    every, miss, freeze, correct, redrawn = (r.random(5) < 0.5).tolist()
+    constraint = Constraint(
+        r.uniform(0.6, 2), r.uniform(6, 14), positive(r, 2, 0.4), r.uniform(0.5, 4), r.choice([0, 1.2])
+    )
+    return reference.Rules(
+        constraint, r.uniform(0.02, 0.3), r.uniform(0.2, 2), r.uniform(0.05, 0.4), r.uniform(0.6, 1),
+        r.uniform(0.01, 0.5) if miss and not every else 0.0, r.uniform(0, 0.8) if freeze and not every else np.inf,
+        r.uniform(0.1, 0.99), r.uniform(0.1, 0.99), correct, redrawn, every, float(r.choice([1e-9, 1.0])),
+    )  # fmt: skip
+
+
+def random_groups(r, count):
+    x = np.hstack([r.uniform(0, 4, (count, 2)), r.normal(0, 1, (count, 2))])
+    P = np.array([positive(r, 4, 0.3) for _ in range(count)])
+    extent = np.array([positive(r, 2, r.uniform(0.2, 0.8)) for _ in range(count)])
+    return x, P, extent, r.uniform(0.5, 9, count)
+
+
+def random_case(seed):
+    """Up to three groups near each other, up to nine points each, some of them attached to a group; hold."""
+    r = np.random.default_rng(seed)
+    rules, count = random_rules(r), int(r.integers(1, 4))
+    x, P, extent, size = random_groups(r, count)
+    of = r.integers(count, size=int(r.integers(0, 9 * count + 1)))
+    spread = np.array([np.linalg.cholesky(S) for S in extent])[of]
+    points = x[of, :2] + np.einsum("kij,kj->ki", spread, r.normal(0, 1.2, (len(of), 2)))
+    weights = r.uniform(0.2, 1.8, len(of)) if r.random() < 0.5 else np.ones(len(of))
+    wider = r.uniform(0, 0.3, count) * (r.random(count) < 0.3)
+    d2 = kernels.search(points, x, P, extent, rules.noise**2, wider, rules.constraint.gate)
+    hits, own = np.isfinite(d2).sum(0), np.full(len(of), -1)
+    free = np.flatnonzero((hits == 0) & (r.random(len(of)) < 0.7))
+    own[free], hits[free] = r.integers(count, size=len(free)), 1
+    return rules, (points, weights, d2, own, hits, x, P, extent, size, r.random(count) < 0.2), wider
+
+
+def kernel(case, rules):
+    """A copy of the case after the kernel: states, rows chosen, what is told, x, P, extent, size."""
+    points, weights, d2, own, hits, x, P, extent, size, hold = case
+    after = [a.copy() for a in (x, P, extent, size)]
+    found = kernels.associate(points, weights, d2, d2[:, :0], own, hits, *after, hold, rules.numbers)
+    return [STATES[s] for s in found[0].tolist()], *found[1:], *after
+
+
+def test_two_hundred_random_cases() -> None:
+    seen = Counter()
+    for seed in range(200):
+        rules, case, _ = random_case(seed)
+        points, weights, d2, own, hits, x, P, extent, size, hold = case
+        state, chosen, told, *after = kernel(case, rules)
+        for g in range(len(x)):
+            expected = reference.update(
+                g, points, weights, d2, own, hits, x[g], P[g], extent[g], size[g], hold[g], rules
+            )
+            assert state[g] == expected[0], (seed, g)
+            assert sorted(np.flatnonzero(chosen[g])) == sorted(expected[1]), (seed, g)
+            if expected[2] is not None:
+                S = expected[3]
+                np.testing.assert_allclose(told[g, :2], expected[2], rtol=1e-9, atol=1e-11)
+                np.testing.assert_allclose(told[g, 2:], [S[0, 0], S[0, 1], S[1, 1], expected[4]], rtol=1e-7, atol=1e-12)
+            for found, right in zip(after, expected[5:], strict=True):
+                np.testing.assert_allclose(found[g], right, rtol=1e-8, atol=1e-10, err_msg=f"{seed} {g}")
+            seen[state[g]] += 1
+            seen["missed"] += expected[4] > 0.5
+            seen["moved"] += not np.array_equal(after[2][g], extent[g])
+            seen["shared"] += bool(((hits > 1) & np.isfinite(d2[g])).any())
+            seen[rules.every, rules.miss > 0, rules.freeze < np.inf, rules.correct, rules.redrawn] += 1
+    options = [n for key, n in seen.items() if isinstance(key, tuple)]
+    assert len(options) == 4 * 5  # with all points there is neither miss nor freezing: 4 (1 + 4) combinations
+    assert min(seen[k] for k in ("nothing", "null", "measured", "missed", "moved", "shared")) > 5, seen
+
+
+def test_search_regions() -> None:
+    for seed in range(50):
+        rules, (points, _, d2, _, _, x, P, extent, _, _), wider = random_case(seed)
+        expected = reference.search(points, x, P, extent, rules.noise**2, wider, rules.constraint.gate)
+        np.testing.assert_allclose(d2, expected, rtol=1e-9)
+
+
+def test_covariances_stay_covariances() -> None:
+    for seed in range(200):
+        rules, case, _ = random_case(seed)
+        *_, P, extent, size = kernel(case, rules)
+        assert np.array_equal(P, P.transpose(0, 2, 1))
+        assert (np.linalg.eigvalsh(P) > 0).all()
+        assert (np.linalg.eigvalsh(extent) > 0).all()
+        assert (size > 0).all()
+
+
+def test_groups_are_updated_each_by_itself() -> None:
+    """There is no mutual exclusion (4.1): the order of groups and of points does not matter."""
+    for seed in range(60):
+        rules, case, _ = random_case(seed)
+        points, weights, d2, own, hits, *groups = case
+        r = np.random.default_rng(seed)
+        to, by = r.permutation(len(groups[0])), r.permutation(len(points))
+        names = np.where(own >= 0, np.argsort(to)[own], -1)
+        turned = points[by], weights[by], d2[np.ix_(to, by)], names[by], hits[by], *(a[to] for a in groups)
+        before, after = kernel(case, rules), kernel(turned, rules)
+        assert [before[0][k] for k in to] == after[0]
+        assert np.array_equal(before[1][np.ix_(to, by)], after[1])
+        for a, b in zip(before[2:], after[2:], strict=True):
+            np.testing.assert_allclose(b, a[to], rtol=1e-9, atol=1e-11)
+
+
+def kalman(x, P, F, Q):
+    f = KalmanFilter(4, 2)
+    f.x, f.P, f.F, f.Q, f.H = x[:, None].copy(), P.copy(), F, Q, reference.H
+    return f
+
+
+@pytest.mark.parametrize("redrawn", [False, True])
+@pytest.mark.parametrize("seed", range(10))
+def test_one_group_that_shares_nothing_is_a_kalman_filter(seed: int, redrawn: bool) -> None:
+    """E1: x, P are filterpy's on the centroid, extent and size those of (2.4)."""
+    r = np.random.default_rng(seed)
+    made = make_rules(GroupPdaConfig(), 10.0, 1.0)
+    rules = replace(PLAIN, redrawn=redrawn, correct=False)
+    x, P, extent, size = random_groups(r, 1)
+    f = kalman(x[0], P[0], made.F, made.Q)
+    for _ in range(50):
+        count = int(r.integers(1, 8))
+        y = x[0, :2] + r.normal(0, 0.3, (count, 2))
+        n, _, S = reference.moments(y, np.ones(count))
+        R = reference.centroid_noise(count, S, extent[0], size[0], rules)
+        f.update(y.mean(axis=0)[:, None], R=R)
+        inside = np.zeros((1, count)), np.full(count, -1), np.ones(count, np.int64)
+        c = rules.constraint
+        narrow = 0.9 * extent[0] + 0.1 * (n * S + c.strength * c.prior) / (n + c.strength)
+        number = 0.9 * size[0] + 0.1 * count
+        state, chosen, told, x, P, extent, size = kernel(
+            (y, np.ones(count), *inside, x, P, extent, size, np.zeros(1, bool)), rules
+        )
+        assert (state, chosen.all(), told[0, 5]) == (["measured"], True, 0.0)
+        np.testing.assert_allclose(x[0], f.x[:, 0], rtol=1e-12, atol=1e-12)
+        np.testing.assert_allclose(P[0], f.P, rtol=1e-12, atol=1e-12)
+        np.testing.assert_allclose(extent[0], narrow, rtol=1e-12)
+        np.testing.assert_allclose(size[0], number, rtol=1e-12)
+        f.predict()
+        x, P = x @ made.F.T, made.F @ P @ made.F.T + made.Q
+
+
+@pytest.mark.parametrize("seed", range(10))
+def test_masses_sum_to_one(seed: int) -> None:
+    """E1: associations that are all alike, as what they share weighs nothing, are as one; so is the sum of masses."""
+    r = np.random.default_rng(seed)
+    x, P, extent, size = random_groups(r, 1)
+    y = x[0, :2] + r.normal(0, 0.2, (12, 2))
+    weights = np.where(np.arange(12) < 5, 1.0, 0.0)
+    hold = np.zeros(1, bool)
+    alone = y[:5], weights[:5], np.zeros((1, 5)), np.full(5, -1), np.ones(5, np.int64), x, P, extent, size, hold
+    hits = np.where(np.arange(12) < 5, 1, 2)
+    among = y, weights, np.arange(12.0)[None], np.full(12, -1), hits, x, P, extent, size, hold
+    for a, b in zip(kernel(alone, PLAIN)[3:], kernel(among, PLAIN)[3:], strict=True):
+        np.testing.assert_allclose(b, a, rtol=1e-12, atol=1e-12)
+
+
+def occluded(miss):
+    """A group of 50 hidden behind another, of which three stray points are in its region; x, P and size after that."""
+    y = np.array([[1.2, 0.1], [1.3, -0.1], [1.25, 0.2]])
+    x, P, size = np.array([[0.0, 0, 1, 0]]), 0.02 * np.eye(4)[None], np.array([50.0])
+    case = y, np.ones(3), np.square(y).sum(1)[None] / 0.4, np.full(3, -1), np.full(3, 2), x, P, 0.36 * np.eye(2)[None]
+    state, chosen, told, x, P, _, size = kernel((*case, size, np.zeros(1, bool)), replace(PLAIN, miss=miss))
+    return state, chosen.any(), told[0, 5], x[0], P[0], size[0]
+
+
+def test_strays_do_not_drag_a_hidden_group() -> None:
+    """Without the miss hypothesis three points have all the mass, as masses sum to 1."""
+    state, chosen, miss, x, P, size = occluded(0.02)
+    assert (state, chosen) == (["nothing"], False)
+    assert miss > 0.95
+    np.testing.assert_allclose(x, [0, 0, 1, 0], atol=0.01)
+    np.testing.assert_allclose(P, 0.02 * np.eye(4), atol=0.001)
+    assert size == pytest.approx(50, abs=0.2)
+    state, chosen, miss, x, _, size = occluded(0.0)
+    assert (state, chosen, miss) == (["measured"], True, 0)
+    assert x[0] > 0.05
+    assert size < 47
+
+
+def gaussian(count):
+    """Points spread evenly as a Gaussian of covariance I is."""
+    k = np.arange(count)
+    q, t = np.sqrt(-2 * np.log(1 - (k + 0.5) / count)), k * np.pi * (3 - np.sqrt(5))
+    return np.stack([q * np.cos(t), q * np.sin(t)], axis=1)
+
+
+def settled(gate, correct, frames=200, start=1.0, count=4_000):
+    """Extent and size after so long, when only what the region holds is looked at."""
+    points, weights = gaussian(count), np.ones(count)
+    constraint = Constraint(10.0, gate, np.eye(2), 0.0)
+    rules = replace(PLAIN, constraint=constraint, noise=1e-3, correct=correct)
+    x, P, extent, size = np.zeros((1, 4)), 1e-6 * np.eye(4)[None], start * np.eye(2)[None], np.array([float(count)])
+    for _ in range(frames):
+        d2 = kernels.search(points, x, P, extent, rules.noise**2, np.zeros(1), gate)
+        case = points, weights, d2, np.full(count, -1), np.ones(count, np.int64), x, P, extent, size, np.zeros(1, bool)
+        state, *_, x, P, extent, size = kernel(case, rules)
+        assert state == ["measured"]
+    return np.sqrt(np.linalg.det(extent[0])), size[0] / count
+
+
+@pytest.mark.parametrize("start", [0.8, 1.0, 2.0])
+@pytest.mark.parametrize(
+    ("gate", "correct", "extent", "inside"),
+    [
+        (5.99, False, 0.715, 1 - np.exp(-0.715 * 5.99 / 2)),
+        (9.21, False, 0.943, 1 - np.exp(-0.943 * 9.21 / 2)),
+        (13.8, False, 0.993, 1.0),
+        (9.21, True, 1.0, 0.99),
+        (13.8, True, 1.0, 1.0),
+    ],
+)
+def test_what_the_gate_cuts_off(gate: float, correct: bool, extent: float, inside: float, start: float) -> None:
+    """E3: the fixed point of s = c(gate s), or of s = c(gate s) / c(gate), which is 1."""
+    found = settled(gate, correct, start=start)
+    assert found[0] == pytest.approx(extent, abs=0.02)
+    assert found[1] == pytest.approx(inside, abs=0.01)
+
+
+def test_a_narrow_gate_collapses() -> None:
+    assert settled(3.0, False)[0] < 0.01
+
+
+def test_truncation() -> None:
+    for gate in (1.0, 3.0, 6.0, 9.21, 20.0):
+        assert truncation(gate) == pytest.approx(reference.truncation(gate), rel=1e-12)
+    points = gaussian(100_000)
+    inside = points[np.square(points).sum(1) < 6.0]
+    assert np.var(inside, axis=0) == pytest.approx(truncation(6.0), rel=1e-3)
+
+
+def noise_of(seen, extent, size, rules, cov=None):
+    own = np.full(3, np.nan) if cov is None else np.array([cov[0, 0], cov[0, 1], cov[1, 1]])
+    xx, xy, yy = kernels._centroid_noise(float(seen), own, extent, float(size), rules.numbers)
+    return np.array([[xx, xy], [xy, yy]])
+
+
+@pytest.mark.parametrize("seen", [1, 2, 3, 5, 6])
+def test_centroid_of_some_members(seen: int) -> None:
+    """Six people who keep their places, of whom so many are seen: all ways to choose them, and draws with noise."""
+    r = np.random.default_rng(seen)
+    offset = r.normal(0, [1.0, 0.5], (6, 2))
+    extent = np.cov(offset.T, bias=True)
+    exact = noise_of(seen, extent, 6, replace(PLAIN, noise=0.0))
+    means = np.array([offset[list(c)].mean(axis=0) for c in combinations(range(6), seen)]) - offset.mean(axis=0)
+    np.testing.assert_allclose(exact, means.T @ means / len(means), rtol=1e-10, atol=1e-13)
+    draws = np.array([r.permutation(6)[:seen] for _ in range(20_000)])
+    noisy = (offset[draws] + r.normal(0, 0.3, (20_000, seen, 2))).mean(axis=1) - offset.mean(axis=0)
+    found = noise_of(seen, extent + 0.09 * np.eye(2), 6, replace(PLAIN, noise=0.3))
+    np.testing.assert_allclose(noisy.T @ noisy / len(noisy), found, atol=0.03 * np.trace(found))
+
+
+def test_centroid_of_members_drawn_anew() -> None:
+    """(2.1) read literally: as many, but new ones in each frame."""
+    r = np.random.default_rng(0)
+    extent = np.array([[0.5, 0.2], [0.2, 0.3]])  # of measured places
+    y = r.multivariate_normal([0, 0], extent, (20_000, 5))
+    found = noise_of(5, extent, 6, replace(PLAIN, noise=0.3, redrawn=True))
+    np.testing.assert_allclose(np.cov(y.mean(axis=1).T), found, atol=0.03 * np.trace(found))
+
+
+def test_unseen_members_are_there() -> None:
+    """Of n people measured with probability p, N = p n are on average: all of N seen is not all of n."""
+    extent, rules = np.eye(2), replace(PLAIN, noise=0.1, detect=0.75)
+    some = noise_of(6, extent, 6, rules)  # 6 of 8
+    np.testing.assert_allclose(some, noise_of(6, extent, 8, replace(rules, detect=1.0)))
+    assert some[0, 0] == pytest.approx(0.01 / 6 + (8 - 6) / 7 / 6 * 0.99)
+
+
+def test_centroid_with_strangers() -> None:
+    """Nine are seen, six of whom are the group: its centroid is that of any six of them."""
+    r = np.random.default_rng(0)
+    y = r.normal(0, [1.0, 0.5], (9, 2))
+    found = noise_of(9, np.eye(2), 6, replace(PLAIN, noise=0.0), np.cov(y.T, bias=True))
+    means = np.array([y[list(c)].mean(axis=0) for c in combinations(range(9), 6)]) - y.mean(axis=0)
+    np.testing.assert_allclose(found, means.T @ means / len(means), rtol=1e-10)
+    measured = noise_of(9, np.eye(2), 6, replace(PLAIN, noise=0.3), np.cov(y.T, bias=True))
+    np.testing.assert_allclose(measured, found + 0.09 / 6 * np.eye(2))
+
+
+def bank(**given):
+    """Groups, of which only some things are said."""
+    n, made = len(given["size"]), Bank.empty()
+    for f in fields(Bank):
+        none = getattr(made, f.name)
+        nil = [[] for _ in range(n)] if isinstance(none, list) else np.zeros((n, *none.shape[1:]), none.dtype)
+        setattr(made, f.name, given.get(f.name, nil))
+    return replace(
+        made, id=np.arange(n), places=given.get("places", [(np.zeros((1, 2)), np.zeros(1), np.ones(1, bool))] * n)
+    )
+
+
+def samples(r, count):
+    """Groups of points, and their bank with exact 1/N moments."""
+    points = [r.normal(r.uniform(-5, 5, 2), r.uniform(0.2, 2, 2), (int(r.integers(1, 9)), 2)) for _ in range(count)]
+    mean = np.array([y.mean(axis=0) for y in points])
+    x = np.hstack([mean, r.normal(size=(count, 2))])
+    extent = np.array([np.cov(y.T, bias=True).reshape(2, 2) for y in points])
+    P = np.array([positive(r, 4) for _ in range(count)])
+    places = [
+        (y - m, np.full(len(y), float(k)), np.ones(len(y), bool))
+        for k, (y, m) in enumerate(zip(points, mean, strict=True))
+    ]
+    size = np.array([float(len(y)) for y in points])
+    born = r.permutation(count).astype(float)
+    return points, bank(x=x, P=P, extent=extent, size=size, born=born, places=places)
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_merging_pools_moments(seed: int) -> None:
+    """E2: exactly those of the union, (3.1)."""
+    points, groups = samples(np.random.default_rng(seed), 4)
+    one = merged(groups, np.arange(4))
+    union = np.concatenate(points)
+    np.testing.assert_allclose(one.x[0, :2], union.mean(axis=0), rtol=1e-12, atol=1e-12)
+    np.testing.assert_allclose(one.x[0, 2:], np.average(groups.x[:, 2:], axis=0, weights=groups.size), atol=1e-12)
+    np.testing.assert_allclose(one.extent[0], np.cov(union.T, bias=True), rtol=1e-12, atol=1e-12)
+    assert one.size[0] == len(union)
+    place, seen, _ = one.places[0]
+    np.testing.assert_allclose(place + one.x[0, :2], union, atol=1e-12)
+    assert np.array_equal(seen, np.repeat(np.arange(4.0), [len(y) for y in points]))
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_merging_in_any_order(seed: int) -> None:
+    r = np.random.default_rng(seed)
+    _, groups = samples(r, 4)
+    one, other = merged(groups, np.arange(4)), merged(groups, r.permutation(4))
+    step = merged(groups, np.array([0, 1]))
+    for k in (2, 3):
+        step.add(merged(groups, np.array([k])))
+        step = merged(step, np.array([0, 1]))
+    for again in (other, step):
+        for name in ("x", "P", "extent", "size"):
+            np.testing.assert_allclose(getattr(again, name), getattr(one, name), rtol=1e-12, atol=1e-12)
+        assert again.born[0] == one.born[0] == 0
+    assert other.id[0] == one.id[0]
+    assert groups.size[one.id[0]] == groups.size.max()
+
+
+def test_merged_groups_are_as_sure_as_they_say() -> None:
+    """E2: normalised squared errors over 500 merges average to 1; not so with the centroids' spread in P."""
+    r = np.random.default_rng(0)
+    errors, spread = [], []
+    for _ in range(500):
+        count = int(r.integers(2, 5))
+        P, size = np.array([positive(r, 4, 0.2) for _ in range(count)]), r.uniform(1, 9, count)
+        true = np.hstack([r.uniform(0, 6, (count, 2)), r.normal(0, 1, (count, 2))])
+        x = true + np.array([r.multivariate_normal(np.zeros(4), C) for C in P])
+        one = merged(bank(x=x, P=P, size=size), np.arange(count))
+        w = size / size.sum()
+        d, apart = one.x[0] - w @ true, x - one.x[0]
+        errors.append(d @ np.linalg.solve(one.P[0], d))
+        wide = np.einsum("k,kij->ij", w, P + apart[:, :, None] * apart[:, None, :])
+        spread.append(d @ np.linalg.solve(wide, d))
+    low, high = chi2.ppf([0.005, 0.995], 4 * 500) / (4 * 500)
+    assert low < np.mean(errors) / 4 < high
+    assert not low < np.mean(spread) / 4 < high
+
+
+@pytest.mark.parametrize("pixels", [False, True])
+def test_what_split_does_not_merge_in_the_same_frame(pixels: bool) -> None:
+    """E5: groups made of measurements cannot be merged back (3.3), even if merging needs no time at all."""
+    splits = 0
+    for seed in range(100):
+        r = np.random.default_rng(seed)
+        person = np.diag([0.05, 0.2]) if pixels else None
+        rules = make_rules(GroupPdaConfig(merge_time=0.0), 10.0, 1.0, person)
+        points = r.uniform(0, 9, (int(r.integers(2, 9)), 2))
+        if pixels:
+            points = np.concatenate([p + r.normal(0, [0.1, 0.3], (40, 2)) for p in points])
+        weights = np.full(len(points), 1 / 40 if pixels else 1.0)
+        one = newborn(points, weights, np.zeros(len(points), np.int64), rules, 1.0)
+        one.id[:], names = 0, changes.Names()
+        split = changes.split(one, 0, points, weights, rules, 1.0, names)
+        splits += split is not None
+        assert split is None or len(one) == len(split.after) > 1
+        assert not list(Merging().step(one, rules, 1.0)), seed
+    assert splits > 50
+
+
+@pytest.mark.parametrize("seed", range(30))
+def test_near_is_that_of_all_pairs(seed: int) -> None:
+    r = np.random.default_rng(seed)
+    place, points = (np.round(r.uniform(0, 5, (int(r.integers(0, 20)), 2)), 1) for _ in range(2))
+    reach = float(r.choice([0.05, 0.5, 2.0]))
+    squared = np.square(place[:, None] - points).sum(2) <= reach**2
+    np.testing.assert_array_equal(near(place, points, reach), squared.any(1))

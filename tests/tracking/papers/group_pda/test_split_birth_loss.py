@@ -1,0 +1,303 @@
+"""`group-pda` as a user drives it: who is hidden, lost and comes back, merges, splits; and all of it from pixels."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from tests.tracking.papers.test_group_pda import FPS, GROUND, block, changes, events, ids, noisy, sizes, track
+
+from sim.types import Array, Context, Frame, Tracks
+from tracking.papers.group_pda.config import GroupPdaConfig
+from tracking.papers.group_pda.tracker import GroupPda
+
+
+def walk(velocity: tuple[float, float], hidden: range, seed: int = 0, after: Array | None = None) -> list[Array]:
+    """A group of four, not seen for a while; after: its velocity once it is seen again, from where it should be."""
+    r, v, made = np.random.default_rng(seed), np.array(velocity), []
+    place = np.zeros(2)
+    for k in range(hidden.stop + 30):
+        made.append(noisy([] if k in hidden else [block(2, 2) + place], r))
+        place = place + (v if after is None or k < hidden.stop else after) / FPS
+    return made
+
+
+def test_a_hidden_group_goes_straight_on_ever_less_surely() -> None:
+    states: list[tuple[Array, Array]] = []
+    made = track(
+        walk((1.0, 0.3), range(40, 50)), watch=lambda t, _: states.append((t.bank.x[0].copy(), t.bank.P[0].copy()))
+    )
+    x, P = states[39]
+    for k in range(40, 50):
+        assert states[k][0] == pytest.approx([*(x[:2] + (k - 39) / FPS * x[2:]), *x[2:]])
+        assert (np.diag(states[k][1]) > np.diag(states[k - 1][1])).all()
+    assert np.trace(states[49][1]) > 3 * np.trace(P)
+    assert ids(made) == {1}
+    assert made[50].id.tolist() == [1]
+    assert [len(t.id) for t in made[40:50]] == [1] * 5 + [0] * 5  # told for report_coast
+
+
+def test_a_hidden_group_merges_with_nobody() -> None:
+    """Another walks beside it, equally fast, while it is hidden: for longer than merge_time near enough to merge."""
+    r, made = np.random.default_rng(0), []
+    for k in range(90):
+        way, aside = np.array([0.1 * k, 0.0]), 1.95 + 0.03 * abs(k - 45)
+        made.append(noisy([block(2, 2, (0, aside)) + way, *([] if 38 <= k < 52 else [block(2, 2) + way])], r))
+    said = track(made)
+    assert said[30].id.tolist() == said[-1].id.tolist() == [1, 2]
+    assert not changes(said)
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_a_lost_group_takes_its_id_back(seed: int) -> None:
+    frames = walk((1.0, 0.3), range(40, 60), seed)
+    back = track(frames)
+    assert ids(back) == {1}
+    assert events(back, "enter", "leave") == [("enter", 1, (), (1,))]
+    fresh = track(frames, GroupPdaConfig(recapture=False))
+    assert ids(fresh) == {1, 2}
+    assert [e[0] for e in events(fresh, "enter", "leave")] == ["enter", "leave", "enter"]
+
+
+@pytest.mark.parametrize("velocity", [(-1.0, 0.0), (1.0, -1.5)])
+def test_who_comes_with_another_velocity_is_somebody_else(velocity: tuple[float, float]) -> None:
+    assert ids(track(walk((1.0, 0.3), range(40, 60), after=np.array(velocity)))) == {1, 2}
+
+
+def test_a_leave_tells_where_and_when_it_was_seen_last() -> None:
+    made = track([*walk((1.0, 0.3), range(40, 90))[:90]])
+    (gone,) = [e for t in made for e in t.events if e.kind == "leave"]
+    assert abs(gone.start - 40) <= 1
+    assert gone.pos == pytest.approx((3.9, 1.17), abs=0.15)
+    assert gone.emitted == 40 + 31  # the first frame more than recapture_time later
+    assert not len(made[-1].id)
+
+
+def test_a_changed_config_holds_from_the_next_frame_on() -> None:
+    def forget(tracker: GroupPda, t: Tracks) -> None:
+        if t.index == 43:
+            tracker.config = replace(tracker.config, report_coast=0.0)
+
+    made = track(walk((1.0, 0.3), range(40, 50)), watch=forget)
+    assert [len(t.id) for t in made[40:51]] == [1, 1, 1, 0, 0, 0, 0, 0, 0, 0, 1]
+
+
+def joining(seed: int, ranks: tuple[int, int]) -> list[Array]:
+    """A group comes to another's side, 1 m between the nearest from frame 31 on, and walks with it."""
+    r, made = np.random.default_rng(seed), []
+    for k in range(90):
+        s = k / FPS
+        aside = (sum(ranks) - 2) * 0.3 + 1.0 + max(3 - s, 0)
+        made.append(noisy([block(2, ranks[0], (s, 0)), block(2, ranks[1], (s, aside))], r))
+    return made
+
+
+@pytest.mark.parametrize(("ranks", "stays"), [((3, 2), 1), ((2, 3), 2)])
+def test_equally_fast_groups_within_reach_merge_once(ranks: tuple[int, int], stays: int) -> None:
+    for seed in range(3):
+        made = track(joining(seed, ranks))
+        assert made[20].id.tolist() == [1, 2]
+        ((kind, start, before, after),) = changes(made)
+        assert (kind, before, after) == ("merge", (1, 2), (stays,))
+        assert start == pytest.approx(31, abs=5)
+        assert made[-1].id.tolist() == [stays]
+        assert sizes(made[-1]) == pytest.approx([10], abs=0.5)
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_a_merge_begins_when_it_does_though_one_of_them_merges_with_a_third(seed: int) -> None:
+    """A second group comes to the first one's right until frame 21, and they are one before the third on its left,
+    there from frame 27 on, is known to stay."""
+    starts = []
+    for others in ((2.6,), (2.0, 2.6)):
+        r, frames = np.random.default_rng(seed), []
+        for k in range(90):
+            s = k / FPS
+            sides = [y * (1.6 + max(until - s, 0)) for y, until in zip((-1, 1), others[::-1], strict=False)]
+            frames.append(noisy([block(2, 2, (s, y)) for y in (0.0, *sides)], r))
+        found = changes(track(frames))
+        assert [kind for kind, *_ in found] == ["merge"] * len(others)
+        starts.append(found[-1][1])
+    assert starts[1] == pytest.approx(starts[0], abs=2)
+
+
+@pytest.mark.parametrize("seed", range(3))
+@pytest.mark.parametrize("length", [2, 5, 8])
+def test_files_that_join_end_to_end_do_so_when_they_are_near(length: int, seed: int) -> None:
+    """The last of one and the first of the other are 1.2 m apart from frame 41 on, within 2 r, however far their
+    middles are."""
+    r, frames = np.random.default_rng(seed), []
+    for k in range(100):
+        s, file = k / FPS, np.column_stack([0.7 * np.arange(length), np.zeros(length)])
+        behind = file - [0.7 * (length - 1) + 1.2 + 0.9 * max(4.0 - s, 0), 0]
+        frames.append(noisy([file + np.array([s, 0]), behind + np.array([s, 0])], r))
+    ((kind, start, before, _),) = changes(track(frames, GroupPdaConfig(radius=0.75)))
+    assert (kind, before) == ("merge", (1, 2))
+    assert start == pytest.approx(41, abs=4)
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_who_was_missed_before_he_left_has_split_off(seed: int) -> None:
+    """At 2.5 frames/s, with the next sight of him 0.8 s later, 1.3 m on."""
+    r, frames = np.random.default_rng(seed), []
+    for k in range(40):
+        away = np.array([[0.9 + 1.6 * max(k - 20, 0) / 2.5, 0.0]])
+        frames.append(noisy([block(2, 2), *([] if k == 21 else [away])], r))
+    ((kind, _, before, after),) = changes(track(frames, context=replace(GROUND, fps=2.5)))
+    assert (kind, before, after) == ("split", (1,), (1, 2))
+
+
+def parting(seed: int, along: float, apart: float, ranks: int = 1, who: int = 2) -> tuple[list[Array], int]:
+    """Of four abreast, so many ranks deep, the right `who` leave from frame 41 on; the first frame in which the nearest
+    are 1.5 m apart."""
+    r, made = np.random.default_rng(seed), []
+    for k in range(100):
+        group = block(4, ranks, (0.0, along * k / FPS))
+        group[group[:, 0] > 0.3 + 0.6 * (1 - who), 0] += apart * max(k - 40, 0) / FPS
+        made.append(noisy([group], r))
+    return made, 41 + int(np.ceil(0.9 / apart * FPS))
+
+
+@pytest.mark.parametrize("seed", range(3))
+@pytest.mark.parametrize(("along", "apart"), [(0.0, 0.5), (1.0, 0.5), (1.0, 1.2)])
+@pytest.mark.parametrize("who", [1, 2])
+def test_a_group_that_falls_into_two_splits_once(seed: int, along: float, apart: float, who: int) -> None:
+    frames, due = parting(seed, along, apart, who=who)
+    made = track(frames)
+    ((kind, start, before, after),) = changes(made)
+    assert (kind, before, after) == ("split", (1,), (1, 2))
+    assert start == pytest.approx(due, abs=FPS)
+    left, right = made[-1].pos[np.argsort(made[-1].pos[:, 0])], sizes(made[-1])
+    assert left[:, 0] == pytest.approx([-0.9 + 0.3 * (3 - who), 0.9 - 0.3 * (who - 1) + 5.9 * apart], abs=0.1)
+    assert sorted(right) == pytest.approx(sorted([4 - who, who]), abs=0.2)
+    if who == 1:
+        assert sizes(made[-1])[0] == pytest.approx(3, abs=0.2)  # who stay are most, and keep the id
+
+
+@pytest.mark.parametrize("missed", range(5))
+@pytest.mark.parametrize("seed", range(3))
+def test_who_is_not_detected_when_his_group_splits_is_in_his_part_all_the_same(seed: int, missed: int) -> None:
+    """Five in a line, 0.8 m apart: without the second one they would fall into three."""
+    r, frames = np.random.default_rng(seed), []
+    for k in range(100):
+        x = 0.8 * np.arange(5)
+        x[3:] += 0.5 * max(k - 40, 0) / FPS
+        frames.append(noisy([np.column_stack([x, np.zeros(5)])], r))
+    (whole,) = [e for t in track(frames) for e in t.events if e.kind == "split"]
+    frames[whole.emitted - 1] = np.delete(frames[whole.emitted - 1], missed, axis=0)
+    made = track(frames)
+    (split,) = [e for t in made for e in t.events if e.kind != "enter" or e.emitted > 20]
+    assert (split.kind, split.before, split.emitted) == ("split", whole.before, whole.emitted)
+    assert len(split.after) == 2
+    assert sorted(sizes(made[-1])) == pytest.approx([2, 3], abs=0.2)
+
+
+@pytest.mark.parametrize("ranks", [2, 3])
+@pytest.mark.parametrize("seed", range(3))
+def test_one_who_walks_fast_out_of_the_region_is_split_off(ranks: int, seed: int) -> None:
+    """He is a newborn at the region's edge before the group is seen to be two."""
+    r, made = np.random.default_rng(seed), []
+    for k in range(80):
+        made.append(noisy([block(2, ranks), np.array([[0.9 + 1.6 * max(k - 40, 0) / FPS, 0.0]])], r))
+    spells: list[float] = []
+    told = track(made, watch=lambda t, _: spells.append(float(t.bank.null.max(initial=0))))
+    assert max(spells) < GroupPdaConfig().split_time
+    ((kind, start, before, after),) = changes(told)
+    assert (kind, before, after) == ("split", (1,), (1, 2))
+    assert start == pytest.approx(41 + 7.5, abs=FPS)  # 1.5 m from the nearest
+    assert told[-1].vel[1] == pytest.approx([1.6, 0], abs=0.3)
+    assert sizes(told[-1]) == pytest.approx([2 * ranks, 1], abs=0.2)
+
+
+def test_the_larger_part_keeps_the_id() -> None:
+    frames, _ = parting(0, 1.0, 0.8, ranks=2, who=1)
+    for turned, x in ((frames, -0.3), ([-p for p in frames], 0.3)):
+        last = track(turned)[-1]
+        assert last.id.tolist() == [1, 2]
+        assert last.pos[0, 0] == pytest.approx(x, abs=0.1)
+        assert sizes(last) == pytest.approx([6, 2], abs=0.3)
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_children_have_their_parents_velocity(seed: int) -> None:
+    frames, _ = parting(seed, 1.0, 0.5)
+    for config, kept in ((GroupPdaConfig(), 1.0), (GroupPdaConfig(inherit_velocity=False), 0.0)):
+        made = track(frames, config)
+        (k,) = (k for k, t in enumerate(made) if any(e.kind == "split" for e in t.events))
+        assert made[k].vel == pytest.approx(np.repeat(kept * made[k - 1].vel, 2, 0), abs=1e-9)
+        assert np.hypot(*made[k - 1].vel[0]) > 0.8
+
+
+@pytest.mark.parametrize("gap", [2.0, 2.2])
+def test_two_that_stand_beside_each_other_do_not_join_and_part(gap: float) -> None:
+    """Twice 16 people; gap: between the nearest, m."""
+    for seed in range(2):
+        r = np.random.default_rng(seed)
+        made = track([noisy([block(4, 4), block(4, 4, (1.8 + gap, 0))], r) for _ in range(200)])
+        assert not events(made, "split")
+        assert len(events(made, "merge")) <= 1
+
+
+HIGH, WIDE, PX = 120, 160, 20.0
+COLOURS = ((30, 20, 190), (190, 30, 20), (20, 170, 40))
+People = Sequence[tuple[float, float]]
+"""Their middles, px."""
+
+
+def picture(people: People, r: np.random.Generator) -> np.ndarray:
+    """(H, W, 3) ellipses of a person's size on a mottled ground, with noise."""
+    image = np.kron(np.random.default_rng(0).uniform(90, 170, (HIGH // 8, WIDE // 8, 3)), np.ones((8, 8, 1)))
+    v, u = np.arange(HIGH)[:, None] + 0.5, np.arange(WIDE) + 0.5
+    for (x, y), colour in zip(people, COLOURS, strict=False):
+        image[((u - x) / 5) ** 2 + ((v - y) / 17) ** 2 <= 1] = colour
+    return np.clip(image + 2 * r.standard_normal(image.shape), 0, 255).astype(np.uint8)
+
+
+def watched(frames: Sequence[People | None], config: GroupPdaConfig | None = None) -> list[Tracks]:
+    """Answers to pictures of these people; None is a lost one."""
+    r, tracker = np.random.default_rng(0), GroupPda(config)
+    empty = np.stack([picture([], r) for _ in range(20)])
+    tracker.reset(Context(FPS, PX, image_size=(WIDE, HIGH), background=empty), 0)
+    shown = [None if people is None else picture(people, r) for people in frames]
+    return [tracker.step(Frame(k + 1, k / FPS, image), None) for k, image in enumerate(shown)]
+
+
+def test_pixels_of_two_who_walk_abreast_are_one_group_of_two() -> None:
+    frames: list[People | None] = [[(20 + 1.5 * k, 60), (32 + 1.5 * k, 60)] for k in range(80)]
+    frames[0] = frames[40] = frames[41] = None
+    made = watched(frames)
+    assert ids(made) == {1}
+    assert not changes(made)
+    for k in range(10, 80):
+        assert made[k].plane == "image"
+        assert made[k].pos[0] == pytest.approx([26 + 1.5 * k, 60], abs=1.5)
+        assert sizes(made[k]) == pytest.approx([2], abs=0.3)
+    assert made[-1].vel[0] == pytest.approx([15, 0], abs=1)
+
+
+def test_pixels_of_two_who_part_split() -> None:
+    frames = [[(60 - 1.2 * max(k - 30, 0), 60.0), (72 + 1.2 * max(k - 30, 0), 60.0)] for k in range(70)]
+    made = watched(frames)
+    ((kind, start, before, after),) = changes(made)
+    assert (kind, before, after) == ("split", (1,), (1, 2))
+    assert start == pytest.approx(41, abs=FPS)  # the ellipses are 1.5 m apart
+    assert sizes(made[-1]) == pytest.approx([1, 1], abs=0.2)
+    assert np.sort(made[-1].pos[:, 0]) == pytest.approx([60 - 46.8, 72 + 46.8], abs=2)
+
+
+def test_pixels_of_pairs_that_pass_each_other_keep_their_ids() -> None:
+    """On their own ways, one behind the other."""
+    frames = [[(10 + 2.0 * k, 40.0), (20 + 2.0 * k, 40.0), (150 - 2.0 * k, 88.0)] for k in range(70)]
+    made = watched(frames)
+    assert made[10].id.tolist() == made[-1].id.tolist() == [1, 2]
+    assert not changes(made)
+    assert sizes(made[-1]) == pytest.approx(sizes(made[10]), rel=0.2)
+    assert np.sign(made[-1].vel[:, 0]).tolist() == np.sign(made[10].vel[:, 0]).tolist()
+
+
+def test_who_stands_for_long_does_not_become_background() -> None:
+    """Unprotected he would be within two time constants."""
+    made = watched([[(80.0, 60.0)]] * 60, GroupPdaConfig(background_time=1.0, foreground_time=1.0))
+    assert all(t.id.tolist() == [1] for t in made[5:])

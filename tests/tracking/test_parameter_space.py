@@ -1,0 +1,111 @@
+"""The cube of a search space: there and back, clipped, and never a config that cannot be."""
+
+from __future__ import annotations
+
+import dataclasses
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from scenarios.errors import InputError
+from tracking.config import Config, param
+from tracking.parameter_space import decode, encode
+from tracking.tracker_registry import find, names
+
+CONFIGS = [find(name).config_class for name in names()]
+
+
+@dataclasses.dataclass(frozen=True)
+class Mixed(Config):
+    tracker = "mixed"
+    gate: float = param(2.0, (1.0, 5.0), "", "linear")
+    rate: float = param(1.0, (0.01, 100.0), "1/s", "log", "log")
+    count: int = param(3, (2, 6), "", "whole", "int")
+    kind: str = param("b", ("a", "b", "c"), "", "a choice", "categorical")
+    on: bool = param(True, (True, False), "", "a switch", "categorical")
+    fixed: float = param(0.5, (0.0, 1.0), "", "not searched", tunable=False)
+
+    def check(self):
+        if self.gate + self.rate > 50:
+            raise InputError(place="rate", got=str(self.rate), expected="less", remedy="lower it")
+
+
+SPACE = Mixed.space()
+
+
+def test_known_points():
+    assert encode(SPACE, Mixed()) == pytest.approx([-0.5, 0.0, -0.4, 0.0, -0.5])
+    config = decode(SPACE, [1.0, 0.5, 1.0, 1.0, 1.0], Mixed(fixed=0.25))
+    assert config.rate == pytest.approx(10.0)
+    assert (config.gate, config.count, config.kind, config.on, config.fixed) == (5.0, 6, "c", False, 0.25)
+    low = decode(SPACE, [-1.0] * 5, Mixed())
+    assert (low.gate, low.rate, low.count, low.kind, low.on) == (1.0, 0.01, 2, "a", True)
+    assert type(low.count) is int
+
+
+def test_whole_numbers_and_choices_have_equal_shares():
+    points = np.linspace(-1, 1, 6001)[1:-1]
+    found = [decode(SPACE, [0, 0, a, a, a], Mixed()) for a in points]
+    for name, values in (("count", range(2, 7)), ("kind", "abc"), ("on", (True, False))):
+        share = [np.mean([getattr(c, name) == v for c in found]) for v in values]
+        assert share == pytest.approx([1 / len(values)] * len(values), abs=1e-3)
+
+
+@given(st.floats(1, 5), st.floats(0.01, 40), st.integers(2, 6), st.sampled_from("abc"), st.booleans())
+def test_there_and_back(gate, rate, count, kind, on):
+    config = Mixed(gate, rate, count, kind, on)
+    again = decode(SPACE, encode(SPACE, config), Mixed())
+    assert (again.count, again.kind, again.on) == (count, kind, on)
+    assert (again.gate, again.rate) == pytest.approx((gate, rate), rel=1e-12)
+
+
+@given(st.lists(st.floats(-3, 3), min_size=5, max_size=5))
+def test_every_point_is_a_config(action):
+    config = decode(SPACE, action, Mixed())
+    assert config.gate + config.rate <= 50
+    free = dict(zip(["gate", "rate", "count", "kind", "on"], np.clip(action, -1, 1), strict=True))
+    if 0.01 * 1e4 ** ((free["rate"] + 1) / 2) < 45:
+        assert np.abs(encode(SPACE, config)[:2] - [free["gate"], free["rate"]]).max() < 1e-9
+
+
+def test_what_cannot_be_is_drawn_back_along_a_line_as_little_as_may_be():
+    base, action = Mixed(), np.array([-1.0, 1.0, -0.4, 0.0, -0.5])
+    config = decode(SPACE, action, base)
+    origin, point = encode(SPACE, base), encode(SPACE, config)
+    share = (point - origin)[:2] / (action - origin)[:2]
+    assert share[0] == pytest.approx(share[1])
+    assert 40 < config.gate + config.rate <= 50
+    assert decode(SPACE, action, base, allowed=refuse_all) is base
+
+
+def refuse_all(config):
+    raise InputError(place="x", got="y", expected="z", remedy="w")
+
+
+def test_a_further_condition_counts_too():
+    def slow(config):
+        if config.rate > 2:
+            refuse_all(config)
+
+    assert 1.5 < decode(SPACE, [0, 1, 0, 0, 0], Mixed(), allowed=slow).rate <= 2
+
+
+@pytest.mark.parametrize("action", [[0.0] * 4, [[0.0] * 5], [0, 0, 0, 0, np.nan], [0, 0, 0, 0, np.inf]])
+def test_wrong_actions_are_named(action):
+    with pytest.raises(InputError, match="action"):
+        decode(SPACE, action, Mixed())
+
+
+@pytest.mark.parametrize("kind", CONFIGS)
+def test_spaces_of_all_trackers(kind):
+    space, defaults = kind.space(), kind()
+    point = encode(space, defaults)
+    assert (np.abs(point) <= 1).all()
+    back = decode(space, point, kind.frozen()).as_dict()
+    for p in space:
+        value = getattr(defaults, p.name)
+        assert back[p.name] == (pytest.approx(value, rel=1e-12) if type(value) is float else value)
+    for corner in np.random.default_rng(0).choice([-1.0, 1.0], (20, len(space))):
+        assert isinstance(decode(space, corner, defaults), kind)

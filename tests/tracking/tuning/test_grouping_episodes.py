@@ -1,0 +1,147 @@
+"""The rule of groups as something to tune: true people, grouped by it, and nothing of their true groups seen."""
+
+from __future__ import annotations
+
+import json
+
+import numpy as np
+import pytest
+
+from sim.rng import rng
+from tests.tuning_toys import write_scenes
+from tracking.app.cli import run
+from tracking.environment.episodes import Cache, sources
+from tracking.grouping.derive import derive
+from tracking.grouping.link_rule import Grouping
+from tracking.run import track
+from tracking.scoring import evaluate
+from tracking.tuning import tune
+from tracking.tuning.grouping_episodes import FILMED, SURVEYED, Labels, as_labelled, people_as_tracks, play_rule
+
+
+@pytest.fixture
+def source(tmp_path):
+    return sources(write_scenes(tmp_path)[0], (4,))[0]
+
+
+def test_the_people_are_perfect_and_their_groups_unknown(source):
+    truth = source.open().truth
+    answers = people_as_tracks(truth)
+    assert len(answers) == truth.length
+    assert all((t.group == -1).all() and t.groups is None and t.events == () for t in answers)
+    assert evaluate(truth, answers)["HOTA"] == 1.0
+
+
+@pytest.mark.parametrize("seed", [3, 4])
+def test_an_episode_is_what_evaluate_says(tmp_path, seed):
+    (source,) = sources(write_scenes(tmp_path)[0], (seed,))
+    truth, rule = source.open().truth, Grouping(near=1.0)
+    found = play_rule(source, rule, Cache())
+    labels = FILMED if seed % 2 else SURVEYED
+    people = people_as_tracks(as_labelled(truth, labels, seed))
+    factor = labels.scale ** rng(seed, "label").uniform(-1, 1)
+    assert (factor == 1) == (seed == 4)
+    scores = evaluate(truth, derive(people, truth.fps, truth.px_per_m * factor, rule))
+    assert found.objective == scores["objective"]
+    assert found.scores == {key: value for key, value in scores.items() if value == value}
+    assert found.frames == truth.length
+
+
+def test_labels_err_for_a_while_and_do_not_change_who_is_there():
+    source = sources("crossing", (0,))[0]
+    truth = source.open().truth
+    for labels in (Labels(0.06, 0.3, filmed=True), SURVEYED):
+        found = as_labelled(truth, labels, 7)
+        assert (found.vel is None) == (found.pos is None) == labels.filmed
+        assert found.frame.tobytes() + found.id.tobytes() == truth.frame.tobytes() + truth.id.tobytes()
+        error = (found.box - truth.box)[:, :2] / truth.px_per_m if labels.filmed else found.pos - truth.pos
+        assert found.box[:, 2:].tobytes() == truth.box[:, 2:].tobytes()
+        assert error.std(axis=0) == pytest.approx([labels.sd] * 2, rel=0.1)
+        own = error[truth.id == truth.id[0]]
+        stay = np.exp(-1 / (truth.fps * labels.time))
+        assert np.corrcoef(own[1:, 0], own[:-1, 0])[0, 1] == pytest.approx(stay, abs=0.2)
+        again = [as_labelled(truth, labels, seed) for seed in (7, 8)]
+        same, other = (told.box if labels.filmed else told.pos for told in again)
+        here = found.box if labels.filmed else found.pos
+        assert same.tobytes() == here.tobytes()
+        assert other.tobytes() != here.tobytes()
+
+
+def test_one_person_more_moves_nobody_elses_errors():
+    truth = sources("crossing", (0,))[0].open().truth
+    others = truth.id != truth.id[0]
+    rows = (
+        "frame",
+        "id",
+        "group",
+        "pos",
+        "vel",
+        "box",
+        "visibility",
+        "z",
+        "heading",
+        "height",
+        "truncation",
+        "visible_box",
+    )
+    fewer = truth.replace(**{name: a[others] for name in rows if (a := getattr(truth, name)) is not None})
+    every, rest = (as_labelled(t, SURVEYED, 7).pos for t in (truth, fewer))
+    assert every[others].tobytes() == rest.tobytes()
+    assert as_labelled(truth, SURVEYED, 7, repeat=2).pos.tobytes() != every.tobytes()
+
+
+def test_filmed_people_are_grouped_in_the_image():
+    """Boxes alone, at one scale: those who walk behind each other look nearer than they are."""
+    truth = sources("crossing", (0,))[0].open().truth
+    answers = people_as_tracks(as_labelled(truth, FILMED, 1))
+    assert {t.plane for t in answers} == {"image"}
+    assert all(np.isnan(t.vel).all() for t in answers)
+    assert evaluate(truth, derive(answers, truth.fps, truth.px_per_m)).surface == "image"
+
+
+def test_a_rule_that_links_nobody_scores_nothing(source):
+    """The pair walks 0.75 m apart: at half a metre nobody is together."""
+    assert play_rule(source, Grouping(), Cache()).scores["pairwise_F1"] > 0.5
+    assert play_rule(source, Grouping(near=0.5), Cache()).scores["pairwise_F1"] == 0.0
+
+
+def test_the_rule_is_tuned_like_a_tracker(tmp_path):
+    """From a rule that asks for too much at the start."""
+    one, _ = write_scenes(tmp_path)
+    found = tune(
+        "grouping", one, 10, seeds=range(4), validation=range(10_000, 10_004), test=range(20_000, 20_004), check=None,
+        set=["near=0.5"], out=tmp_path / "rule.toml",
+    )  # fmt: skip
+    assert found.plan.goals[0].key == "pairwise_F1"
+    assert "near" not in found.trials[0].params
+    assert Grouping.from_toml(tmp_path / "rule.toml") == found.config
+
+
+def test_first_rule_is_frozen():
+    first = Grouping.frozen()
+    assert (first.near, first.acquaintance, first.idle, first.diverge) == (1.5, 2.0, 0.0, 10.0)
+
+
+def test_a_rule_of_ones_own_groups_what_is_tracked(source, tmp_path):
+    """From Python, from a file; run.json says which; who says nothing gets the usual one."""
+    rule = Grouping(near=0.5)
+    (tmp_path / "rule.toml").write_text(rule.to_toml())
+    sequence = source.open()
+    usual, own, read = (track("blob", sequence, grouping=g) for g in (None, rule, str(tmp_path / "rule.toml")))
+    assert any((t.group >= 0).any() for t in usual)
+    assert not any((t.group >= 0).any() for t in own)
+    assert own.info["grouping"] == read.info["grouping"] == rule.as_dict()
+    assert "grouping" not in usual.info
+
+
+def test_a_rule_on_the_command_line(source, tmp_path, capsys):
+    (tmp_path / "rule.toml").write_text("[params]\nnear = 0.5\n")
+    (tmp_path / "wrong.toml").write_text("[params]\nnaer = 0.5\n")
+    where = str(tmp_path / "data")
+    assert run(["generate", str(tmp_path / "one.toml"), "--seeds", "4", "--streams", "none", "--out", where]) == 0
+    line = ["track", "blob", where, "--out", str(tmp_path / "tracks"), "--grouping"]
+    assert run([*line, str(tmp_path / "rule.toml")]) == 0
+    (info,) = (tmp_path / "tracks").rglob("run.json")
+    assert json.loads(info.read_text())["grouping"]["near"] == 0.5
+    assert run([*line, str(tmp_path / "wrong.toml")]) == 2
+    assert "did you mean near?" in capsys.readouterr().err

@@ -1,0 +1,1 @@
+"""The work of each command; tracking/app/cli.py declares their options."""

@@ -1,0 +1,1 @@
+"""Pictures and videos that commands write: contact sheets, overlays."""

@@ -1,0 +1,1 @@
+"""The replay page of `flockscope view`: its data in Python, its scripts in JavaScript."""

@@ -1,0 +1,69 @@
+// The world as the camera sees it: places as px, the ground's lines, walls and pillars.
+
+// World to image as sim.scene.camera has it; null behind the camera.
+function project(x, y, z) {
+  const { kind, f, c, C, R, scale, k } = data.camera;
+  const p = [x - C[0], y - C[1], z - C[2]];
+  const [a, b, d] = R.map(r => r[0] * p[0] + r[1] * p[1] + r[2] * p[2]);
+  if (kind === "top") return [a * scale + c[0], b * scale + c[1]];
+  if (d < 0.05) return null;
+  const bend = bent(Math.hypot(a, b) / d, k);
+  return Number.isNaN(bend) ? null : [(bend * f[0] * a) / d + c[0], (bend * f[1] * b) / d + c[1]];
+}
+
+// By how much a lens of radial distortion k draws in what an ideal one shows at distance q (sim.scene.lens).
+function bent(q, k) {
+  if (!k || !q) return 1;
+  const root = Math.sqrt(3 * Math.abs(k)), arc = 1.5 * q * root;
+  return ((k > 0 ? Math.sinh(Math.asinh(arc) / 3) : Math.sin(Math.asin(arc) / 3)) * 2) / (root * q);
+}
+
+// The ground's height, as sim.scene.terrain has it: 0 but for stairs.
+function heightAt(x, y) {
+  let height = 0;
+  for (const [fx, fy, hx, hy, width, rise, n, landing] of (data.scene || { stairs: [] }).stairs) {
+    const length = Math.hypot(hx - fx, hy - fy), ex = (hx - fx) / length, ey = (hy - fy) / length;
+    const along = (x - fx) * ex + (y - fy) * ey, across = Math.abs((y - fy) * ex - (x - fx) * ey);
+    if (!(along > 0 && along <= length + landing && across <= width / 2)) continue;
+    const k = Math.min(along / length, 1) * n, h = (rise / n) * (k - Math.sin(2 * Math.PI * k) / (2 * Math.PI));
+    if (Math.abs(h) > Math.abs(height)) height = h;
+  }
+  return height;
+}
+
+function worldLine(ctx, scale, from, to) {
+  const n = Math.max(2, Math.ceil(Math.hypot(to[0] - from[0], to[1] - from[1])));
+  let before = null;
+  for (let k = 0; k <= n; k++) {
+    const p = project(...from.map((v, i) => v + ((to[i] - v) * k) / n));
+    if (p && before) strokeLine(ctx, [before.map(v => v * scale), p.map(v => v * scale)]);
+    before = p;
+  }
+}
+
+function groundLines({ ctx, scale }) {
+  const [x0, y0, x1, y1] = data.scene ? [0, 0, ...data.scene.size] : data.bounds || [0, 0, 0, 0];
+  const step = x1 - x0 > 40 ? 5 : 1;
+  ctx.strokeStyle = theme.grid;
+  ctx.lineWidth = 1;
+  for (let x = x0; x <= x1; x += step) worldLine(ctx, scale, [x, y0, 0], [x, y1, 0]);
+  for (let y = y0; y <= y1; y += step) worldLine(ctx, scale, [x0, y, 0], [x1, y, 0]);
+  if (!data.scene) return;
+  const { walls, wallHeight, pillars, pillarHeight } = data.scene;
+  ctx.fillStyle = theme.thing;
+  ctx.globalAlpha = 0.3;
+  for (const [a, b, c, d] of walls) fillWorld(ctx, scale, [[a, b, 0], [c, d, 0], [c, d, wallHeight], [a, b, wallHeight]]);
+  ctx.globalAlpha = 0.55;
+  for (const [x, y, r] of pillars) {
+    const ringAt = z => Array.from({ length: 16 }, (_, k) => [x + r * Math.cos((k * Math.PI) / 8), y + r * Math.sin((k * Math.PI) / 8), z]);
+    fillWorld(ctx, scale, [...ringAt(0), ...ringAt(pillarHeight)]);
+  }
+  ctx.globalAlpha = 1;
+}
+
+function fillWorld(ctx, scale, corners) {
+  const points = corners.map(p => project(...p)).filter(Boolean).map(p => p.map(v => v * scale));
+  if (points.length < corners.length) return;
+  polygonPath(ctx, convex(points));
+  ctx.fill();
+}

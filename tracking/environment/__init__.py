@@ -1,0 +1,1 @@
+"""The Gymnasium environment, its observations, and the episodes that searches play."""

@@ -1,0 +1,77 @@
+"""Kernel of tracking.filters.ellipsoids: do two filled ellipses have a point in common? Twin:
+tests/reference_components.py.
+
+Numbers of a 2x2 covariance come as xx, xy, yy.
+"""
+
+from __future__ import annotations
+
+from math import sqrt
+
+import numpy as np
+from numba import njit
+
+from sim.types import Array, Bools
+
+STEPS = 60
+
+
+@njit(cache=True)
+def overlap(dx: float, dy: float, axx: float, axy: float, ayy: float, bxx: float, bxy: float, byy: float) -> bool:
+    """Whether {y' A^-1 y <= 1} and {(y - d)' B^-1 (y - d) <= 1} meet; A, B positive definite.
+
+    They are disjoint iff f(s) = d' (A / (1 - s) + B / s)^-1 d > 1 for some s in (0, 1) (Gilitschenski & Hanebeck 2012).
+    In coordinates where B = I and A = diag(l1, l2), f(s) = sum of s (1 - s) d_i^2 / (1 + s (l_i - 1)). It is concave:
+    its tangents at both ends of the bracket bound the maximum.
+    """
+    l11 = sqrt(bxx)  # B = L L'
+    l21 = bxy / l11
+    l22 = sqrt(byy - l21 * l21)
+    u = dx / l11
+    v = (dy - l21 * u) / l22
+    cxx = axx / (l11 * l11)  # C = L^-1 A L^-T
+    cxy = (axy / l11 - l21 * cxx) / l22
+    cyy = (ayy - 2 * l21 * (axy / l11) + l21 * l21 * cxx) / (l22 * l22)
+    half, differ = (cxx + cyy) / 2, (cxx - cyy) / 2
+    root = sqrt(differ * differ + cxy * cxy)
+    large = half + root
+    small = (axx * ayy - axy * axy) / (bxx * byy - bxy * bxy) / large  # half - root would cancel
+    p, q = large - 1, small - 1
+    # Direction of the first eigenvector: (cxy, l1 - cxx) or (l1 - cyy, cxy), whichever is the longer.
+    ex, ey = (root + differ, cxy) if differ >= 0 else (cxy, root - differ)
+    length = sqrt(ex * ex + ey * ey)
+    if length == 0:
+        ex, ey, length = 1.0, 0.0, 1.0
+    a = (u * ex + v * ey) / length
+    b = (v * ex - u * ey) / length
+    a2, b2 = a * a, b * b
+    low, high = 0.0, 1.0
+    value_low, slope_low, value_high, slope_high = 0.0, a2 + b2, 0.0, -(a2 / (1 + p) + b2 / (1 + q))
+    for _ in range(STEPS):
+        if min(value_low + slope_low * (high - low), value_high - slope_high * (high - low)) <= 1:
+            return True
+        s = (low + high) / 2
+        m, n = 1 + s * p, 1 + s * q
+        value = s * (1 - s) * (a2 / m + b2 / n)
+        if value > 1:
+            return False
+        slope = a2 * (1 - 2 * s - s * s * p) / (m * m) + b2 * (1 - 2 * s - s * s * q) / (n * n)
+        if slope > 0:
+            low, value_low, slope_low = s, value, slope
+        else:
+            high, value_high, slope_high = s, value, slope
+    return True
+
+
+@njit(cache=True)
+def overlaps(mean: Array, shape: Array) -> Bools:
+    """(G, G) `overlap` of all with all; shape (G, 2, 2)."""
+    count = len(mean)
+    found = np.ones((count, count), np.bool_)
+    for i in range(count):
+        for j in range(i):
+            a, b = shape[i], shape[j]
+            dx, dy = mean[j, 0] - mean[i, 0], mean[j, 1] - mean[i, 1]
+            found[i, j] = overlap(dx, dy, a[0, 0], a[0, 1], a[1, 1], b[0, 0], b[0, 1], b[1, 1])
+            found[j, i] = found[i, j]
+    return found

@@ -1,0 +1,1 @@
+"""Groups and events of anybody's person tracks."""
