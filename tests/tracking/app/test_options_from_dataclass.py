@@ -1,0 +1,82 @@
+"""A command whose options are the fields of a dataclass: names, defaults, required ones, lists, `--json`."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Annotated
+
+import pytest
+import typer
+
+from tracking.app.exit_codes import carry_out
+from tracking.app.options_from_dataclass import options_from
+from tracking.app.output import Answer
+
+
+@dataclass(frozen=True, kw_only=True)
+class FruitOptions:
+    """Options of the command below."""
+
+    name: Annotated[str, typer.Argument(metavar="NAME", help="Which fruit.")]
+    colour: Annotated[str | None, typer.Option("--colour", metavar="C", help="Its colour.")] = None
+    out: Annotated[Path, typer.Option("--out", help="Where to.")]
+    count: Annotated[int, typer.Option("--count", min=1, help="How many.")] = 3
+    settings: Annotated[list[str], typer.Option("--set", metavar="K=V", help="Set a value.")] = field(
+        default_factory=list
+    )
+
+
+@pytest.fixture
+def app() -> typer.Typer:
+    made = typer.Typer(rich_markup_mode=None)
+
+    @made.command()
+    @options_from(FruitOptions)
+    def fruit(options: FruitOptions) -> Answer:
+        """Sell fruit."""
+        return Answer({}, repr(options))
+
+    @made.command()
+    def other() -> Answer:
+        """Makes the first command one of two."""
+        return Answer({})
+
+    return made
+
+
+def test_the_command_gets_one_instance_with_the_defaults(app, capsys):
+    assert carry_out(app, ["fruit", "apple", "--out", "x"]) == 0
+    assert capsys.readouterr().out.strip() == repr(FruitOptions(name="apple", out=Path("x")))
+
+
+def test_every_option_arrives_and_lists_start_empty_each_time(app, capsys):
+    given = ["fruit", "apple", "--out", "x", "--colour", "red", "--count", "5", "--set", "a=1", "--set", "b=2"]
+    assert carry_out(app, given) == 0
+    expected = FruitOptions(name="apple", colour="red", out=Path("x"), count=5, settings=["a=1", "b=2"])
+    assert capsys.readouterr().out.strip() == repr(expected)
+    assert carry_out(app, ["fruit", "apple", "--out", "x"]) == 0
+    assert capsys.readouterr().out.strip() == repr(FruitOptions(name="apple", out=Path("x")))
+
+
+def test_json_needs_no_field(app, capsys):
+    assert carry_out(app, ["fruit", "apple", "--out", "x", "--json"]) == 0
+    assert capsys.readouterr().out.strip() == '{"status": "ok"}'
+
+
+def test_help_lists_options_in_the_order_of_the_fields(app, capsys):
+    assert carry_out(app, ["fruit", "--help"]) == 0
+    text = capsys.readouterr().out
+    assert "Sell fruit." in text
+    places = [text.index(word) for word in ("Which fruit.", "--colour C", "--out", "--count", "--set K=V", "--json")]
+    assert places == sorted(places)
+    assert "[required]" in text
+
+
+@pytest.mark.parametrize(
+    ("more", "words"),
+    [(["apple"], "--out"), (["--out", "x"], "NAME"), (["apple", "--out", "x", "--count", "0"], "--count")],
+)
+def test_missing_and_wrong_options_are_usage_errors(app, more, words, capsys):
+    assert carry_out(app, ["fruit", *more]) == 2
+    assert words in capsys.readouterr().err

@@ -1,0 +1,70 @@
+"""A command whose options are the fields of a dataclass: each option is written once, with type, default and help.
+
+    @dataclass(frozen=True, kw_only=True)
+    class FitOptions:
+        sources: Annotated[list[Path], typer.Argument(metavar="SOURCE…", help="Labelled recordings.")]
+        settings: Annotated[list[str], typer.Option("--set", metavar="K=V")] = field(default_factory=list)
+
+    @app.command()
+    @options_from(FitOptions)
+    def fit(options: FitOptions) -> Answer:
+        \"""Help text of the command.\"""
+
+Typer reads a command's options from the signature of its function. The decorator gives the function the signature that
+Typer would read if every field were a keyword argument.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import inspect
+from collections.abc import Callable
+from typing import Any, TypeVar, get_type_hints
+
+from tracking.app.output import Answer
+from tracking.app.shared_options import Json
+
+T = TypeVar("T")
+
+
+def options_from(options: type[T]) -> Callable[[Callable[[T], Answer]], Callable[..., Answer]]:
+    """Returns a decorator for a command function that takes one instance of the dataclass `options`.
+
+    The decorated function takes one keyword argument per field, in the order of the fields, and builds the instance.
+    A field without a default is a required option, or a required argument if it is annotated with `typer.Argument`.
+    A field may have a `default_factory`; Typer gets a fresh value of it. Every command also takes `--json`, which
+    needs no field: `tracking.app.exit_codes` reads it from the command line.
+    """
+    parameters = _parameters(options)
+
+    def decorate(command: Callable[[T], Answer]) -> Callable[..., Answer]:
+        def with_keywords(**values: Any) -> Answer:
+            del values["json"]
+            return command(options(**values))
+
+        made: Any = with_keywords
+        for name in ("__name__", "__qualname__", "__module__", "__doc__"):
+            setattr(made, name, getattr(command, name))
+        made.__signature__ = inspect.Signature(parameters)
+        made.__annotations__ = {p.name: p.annotation for p in parameters}
+        return with_keywords
+
+    return decorate
+
+
+def _parameters(options: type) -> list[inspect.Parameter]:
+    """The keyword arguments that stand for the fields, and `json` after them."""
+    types = get_type_hints(options, include_extras=True)
+    found = [_parameter(f.name, types[f.name], _default(f)) for f in dataclasses.fields(options)]
+    return [*found, _parameter("json", Json, False)]
+
+
+def _parameter(name: str, annotation: Any, default: Any) -> inspect.Parameter:
+    return inspect.Parameter(name, inspect.Parameter.KEYWORD_ONLY, default=default, annotation=annotation)
+
+
+def _default(field: dataclasses.Field[Any]) -> Any:
+    """The default of a field, `inspect.Parameter.empty` if it has none."""
+    if field.default_factory is not dataclasses.MISSING:
+        return field.default_factory()
+    return inspect.Parameter.empty if field.default is dataclasses.MISSING else field.default
