@@ -17,7 +17,7 @@ from sim.truth.order_fulfilment import check_orders
 from sim.types import BACKGROUNDS, Camera, Detections, Frame, Image, Motion, Order, PixelTruth, Scene, Sequence, Truth
 
 if TYPE_CHECKING:
-    from scenarios.schema.observation import View
+    from scenarios.schema.observation import ObservationSpec
     from scenarios.schema.scenario import Scenario
 
 STREAMS = frozenset({"left", "right", "disparity", "ids", "background"})
@@ -36,7 +36,7 @@ def simulate(scenario: Scenario, seed: int, repeat: int = 0, streams: Iterable[s
 
 
 def observe(
-    scenario: Scenario | View,
+    scenario: Scenario | ObservationSpec,
     motion: Motion,
     *,
     people: Mapping[str, tuple[int, ...]] | None = None,
@@ -140,7 +140,9 @@ class _Pictures:
         return np.stack([self.stage.background(k) for k in range(BACKGROUNDS)])
 
 
-def _pictures(streams: Iterable[str], scenario: Scenario | View, motion: Motion, camera: Camera) -> _Pictures | None:
+def _pictures(
+    streams: Iterable[str], scenario: Scenario | ObservationSpec, motion: Motion, camera: Camera
+) -> _Pictures | None:
     wanted = frozenset(streams)
     if not wanted <= STREAMS:
         raise InputError(

@@ -6,7 +6,7 @@ import math
 from collections.abc import Iterator
 
 from scenarios.schema.distribution import Distribution, Point, Value
-from scenarios.schema.scenario import Door, World
+from scenarios.schema.scenario import DoorSpec, WorldSpec
 
 Segment = tuple[float, float, float, float]
 DOOR_TOLERANCE = 0.05
@@ -41,14 +41,14 @@ def along(wall: Segment, point: tuple[float, float]) -> tuple[float, float]:
     return x * ex + y * ey, abs(x * ey - y * ex)
 
 
-def fits(door: Door, wall: Segment) -> bool:
+def fits(door: DoorSpec, wall: Segment) -> bool:
     """Whether the whole opening lies on this wall."""
     s, off = along(wall, door.at)
     length = math.dist(wall[:2], wall[2:])
     return off <= DOOR_TOLERANCE and door.width / 2 <= s + 1e-9 and s + door.width / 2 <= length + 1e-9
 
 
-def solid(world: World) -> Iterator[Segment]:
+def solid(world: WorldSpec) -> Iterator[Segment]:
     """The walls without their doors."""
     for wall in world.walls:
         length = math.dist(wall[:2], wall[2:])
@@ -62,7 +62,7 @@ def solid(world: World) -> Iterator[Segment]:
             start = s + half
 
 
-def clearance(point: tuple[float, float], world: World) -> tuple[float, str]:
+def clearance(point: tuple[float, float], world: WorldSpec) -> tuple[float, str]:
     """Metres from a point to the nearest wall or pillar (negative inside a pillar), and what that is."""
     best = (math.inf, "nothing")
     for wall in solid(world):

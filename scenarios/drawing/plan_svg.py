@@ -8,7 +8,7 @@ from html import escape
 
 from scenarios.drawing.plan_geometry import solid
 from scenarios.drawing.routes import XY, Course, Mark
-from scenarios.schema.scenario import StairsSpec, World
+from scenarios.schema.scenario import StairsSpec, WorldSpec
 
 WIDTH, MARGIN = 900.0, 26.0
 STYLE = """
@@ -22,7 +22,7 @@ text { font: 13px system-ui, sans-serif; fill: #1b1f24 } .small { font-size: 11.
 class Plan:
     """World metres to picture px (y up to y down); state: scale and offsets only."""
 
-    def __init__(self, world: World) -> None:
+    def __init__(self, world: WorldSpec) -> None:
         self.world = world
         self.scale = min((WIDTH - 2 * MARGIN) / world.size[0], 620 / world.size[1])
         self.left = (WIDTH - world.size[0] * self.scale) / 2

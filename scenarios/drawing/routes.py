@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 from scenarios.drawing.plan_geometry import bounds
 from scenarios.schema.distribution import Distribution, Point, Value
-from scenarios.schema.scenario import Event, Merge, Queue, Scenario, Split, expand, group_names
+from scenarios.schema.scenario import MergeOrder, QueueOrder, Scenario, ScriptOrder, SplitOrder, expand, group_names
 
 XY = tuple[float, float]
 SLOTS = 6
@@ -42,7 +42,7 @@ class Mark:
     """An order on the plan: its number from 1, where it happens, the ways it opens, and the slots of a queue."""
 
     number: int
-    event: Event
+    event: ScriptOrder
     at: XY
     before: tuple[str, ...]
     after: tuple[str, ...]
@@ -104,18 +104,18 @@ def _mean(points: list[XY]) -> XY:
     return sum(x for x, _ in points) / len(points), sum(y for _, y in points) / len(points)
 
 
-def _mark(number: int, event: Event, places: dict[str, tuple[XY, XY]], world: XY) -> Mark:
+def _mark(number: int, event: ScriptOrder, places: dict[str, tuple[XY, XY]], world: XY) -> Mark:
     """One order; places (where from, where to of every group) move on with it."""
-    if isinstance(event, Merge):
+    if isinstance(event, MergeOrder):
         return _merge(number, event, places)
-    if isinstance(event, Split):
+    if isinstance(event, SplitOrder):
         return _split(number, event, places)
     names = tuple(dict.fromkeys(name for pattern in event.groups for name in expand(pattern, list(places))))
     inside = tuple((x, y) for x, y in slots(event, SLOTS) if 0 <= x <= world[0] and 0 <= y <= world[1])
     return Mark(number, event, event.at, names, names, _served(event, names, places), inside)
 
 
-def _merge(number: int, event: Merge, places: dict[str, tuple[XY, XY]]) -> Mark:
+def _merge(number: int, event: MergeOrder, places: dict[str, tuple[XY, XY]]) -> Mark:
     ways = [places.pop(name) for name in event.groups]
     meeting = _mean([_mean([start, goal]) for start, goal in ways])
     goal = meeting if isinstance(event.goal, str) else _at(event.goal)
@@ -124,7 +124,7 @@ def _merge(number: int, event: Merge, places: dict[str, tuple[XY, XY]]) -> Mark:
     return Mark(number, event, meeting, event.groups, (event.into,), () if goal == meeting else (arrow,))
 
 
-def _split(number: int, event: Split, places: dict[str, tuple[XY, XY]]) -> Mark:
+def _split(number: int, event: SplitOrder, places: dict[str, tuple[XY, XY]]) -> Mark:
     start, goal = places.pop(event.group)
     at = _mean([start, goal])
     arrows = [Arrow(part.id, (at, *map(_at, part.via), _at(part.goal))) for part in event.parts]
@@ -132,7 +132,7 @@ def _split(number: int, event: Split, places: dict[str, tuple[XY, XY]]) -> Mark:
     return Mark(number, event, at, (event.group,), tuple(part.id for part in event.parts), tuple(arrows))
 
 
-def _served(event: Queue, names: tuple[str, ...], places: dict[str, tuple[XY, XY]]) -> tuple[Arrow, ...]:
+def _served(event: QueueOrder, names: tuple[str, ...], places: dict[str, tuple[XY, XY]]) -> tuple[Arrow, ...]:
     if event.goal is None:
         return ()
     goal = _at(event.goal)
@@ -140,7 +140,7 @@ def _served(event: Queue, names: tuple[str, ...], places: dict[str, tuple[XY, XY
     return (Arrow("served", (event.at, goal)),)
 
 
-def slots(event: Queue, count: int) -> tuple[XY, ...]:
+def slots(event: QueueOrder, count: int) -> tuple[XY, ...]:
     """The first places of a queue, head first."""
     angle = math.radians(event.direction_deg)
     (x, y), step = event.at, event.spacing

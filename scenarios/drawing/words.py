@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from scenarios.schema.distribution import Distribution, Point, Value
-from scenarios.schema.scenario import Event, Group, Merge, Scenario, Split, When
+from scenarios.schema.scenario import GroupSpec, MergeOrder, Scenario, ScriptOrder, SplitOrder, When
 
 AT_GOAL = {"stand": "stand there", "leave": "leave", "walk": "walk on"}
 
@@ -62,7 +62,7 @@ def setting(scenario: Scenario) -> list[str]:
     ]
 
 
-def people(group: Group) -> str:
+def people(group: GroupSpec) -> str:
     """One group: who, from where to where, how fast."""
     words = [count(group.size, "person", "people")]
     words[0] = f"{group.repeat} groups of {words[0]}" if group.repeat > 1 else words[0]
@@ -89,12 +89,12 @@ def trigger(when: When) -> str:
     return text if when.delay == 0.0 else f"{text}, {number(when.delay, 's')} later"
 
 
-def order(event: Event) -> str:
+def order(event: ScriptOrder) -> str:
     """What an order does."""
-    if isinstance(event, Merge):
+    if isinstance(event, MergeOrder):
         goal = "to meet and stand" if isinstance(event.goal, str) else f"to {place(event.goal)}"
         return f"merge {' + '.join(event.groups)} → {event.into}, {goal}"
-    if isinstance(event, Split):
+    if isinstance(event, SplitOrder):
         parts = [f"{p.id} ({p.size or 'rest'}) to {place(p.goal)}" for p in event.parts]
         return f"split {event.group} → {', '.join(parts)}"
     served = "" if event.goal is None else f", then to {place(event.goal)}"

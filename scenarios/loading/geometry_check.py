@@ -12,7 +12,7 @@ from scenarios.errors import InputError
 from scenarios.loading.script_check import QUEUE_PEOPLE, check_script, fail
 from scenarios.loading.toml_files import nearest
 from scenarios.schema.distribution import Point
-from scenarios.schema.scenario import Merge, Queue, Scenario, Split, group_names
+from scenarios.schema.scenario import MergeOrder, QueueOrder, Scenario, SplitOrder, group_names
 
 BODY = 0.2
 """m: nobody's middle can be closer to a wall or pillar (the physics radius)."""
@@ -68,8 +68,8 @@ def _check_sensor(scenario: Scenario) -> None:
     known = [name for group in scenario.group for name in group_names(group)] + [
         name
         for event in scenario.event
-        for name in ((event.into,) if isinstance(event, Merge) else ())
-        + (tuple(part.id for part in event.parts) if isinstance(event, Split) else ())
+        for name in ((event.into,) if isinstance(event, MergeOrder) else ())
+        + (tuple(part.id for part in event.parts) if isinstance(event, SplitOrder) else ())
     ]
     for k, hide in enumerate(scenario.sensor.hide):
         if hide.group is not None and hide.group not in known:
@@ -111,12 +111,12 @@ def points(scenario: Scenario) -> Iterator[tuple[str, Point]]:
         key = f"event.{event.id}"
         if event.when.reach is not None and event.when.reach.at is not None:
             yield f"{key}.when.reach.at", event.when.reach.at
-        if isinstance(event, Split):
+        if isinstance(event, SplitOrder):
             for part in event.parts:
                 yield f"{key}.parts.{part.id}.goal", part.goal
                 yield from ((f"{key}.parts.{part.id}.via.{k}", point) for k, point in enumerate(part.via))
             continue
-        if isinstance(event, Queue):
+        if isinstance(event, QueueOrder):
             yield from ((f"{key}.at", slot) for slot in slots(event, QUEUE_PEOPLE))
         else:
             yield from ((f"{key}.via.{k}", point) for k, point in enumerate(event.via))

@@ -7,7 +7,7 @@ from typing import NoReturn
 from scenarios.drawing.plan_geometry import bounds
 from scenarios.errors import InputError
 from scenarios.loading.toml_files import nearest
-from scenarios.schema.scenario import Event, Merge, Queue, Scenario, Split, expand, group_names
+from scenarios.schema.scenario import MergeOrder, QueueOrder, Scenario, ScriptOrder, SplitOrder, expand, group_names
 
 Size = tuple[float, float]
 QUEUE_PEOPLE = 3
@@ -38,7 +38,7 @@ def _people(size: Size) -> Size:
 
 
 def _check_when(
-    event: Event, key: str, orders: list[str], alive: dict[str, Size], gone: dict[str, str], duration: float
+    event: ScriptOrder, key: str, orders: list[str], alive: dict[str, Size], gone: dict[str, str], duration: float
 ) -> None:
     when = event.when
     if when.after is not None and when.after not in orders:
@@ -67,16 +67,16 @@ def _born(name: str, size: Size, place: str, alive: dict[str, Size], gone: dict[
     alive[name] = size
 
 
-def _apply(event: Event, key: str, alive: dict[str, Size], gone: dict[str, str]) -> None:
-    if isinstance(event, Merge):
+def _apply(event: ScriptOrder, key: str, alive: dict[str, Size], gone: dict[str, str]) -> None:
+    if isinstance(event, MergeOrder):
         _merge(event, key, alive, gone)
-    elif isinstance(event, Split):
+    elif isinstance(event, SplitOrder):
         _split(event, key, alive, gone)
     else:
         _queue(event, key, alive, gone)
 
 
-def _merge(event: Merge, key: str, alive: dict[str, Size], gone: dict[str, str]) -> None:
+def _merge(event: MergeOrder, key: str, alive: dict[str, Size], gone: dict[str, str]) -> None:
     for k, name in enumerate(event.groups):
         _exists(name, f"{key}.groups.{k}", alive, gone)
         if name in event.groups[:k]:
@@ -86,7 +86,7 @@ def _merge(event: Merge, key: str, alive: dict[str, Size], gone: dict[str, str])
     _born(event.into, (sum(low for low, _ in sizes), sum(high for _, high in sizes)), f"{key}.into", alive, gone)
 
 
-def _split(event: Split, key: str, alive: dict[str, Size], gone: dict[str, str]) -> None:
+def _split(event: SplitOrder, key: str, alive: dict[str, Size], gone: dict[str, str]) -> None:
     _exists(event.group, f"{key}.group", alive, gone)
     low, high = alive.pop(event.group)
     gone[event.group] = event.id
@@ -102,7 +102,7 @@ def _split(event: Split, key: str, alive: dict[str, Size], gone: dict[str, str])
         _born(part.id, size, f"{key}.parts.{part.id}", alive, gone)
 
 
-def _queue(event: Queue, key: str, alive: dict[str, Size], gone: dict[str, str]) -> None:
+def _queue(event: QueueOrder, key: str, alive: dict[str, Size], gone: dict[str, str]) -> None:
     queued: list[str] = []
     for k, pattern in enumerate(event.groups):
         found = expand(pattern, list(alive))

@@ -24,7 +24,7 @@ from scenarios.schema.scenario import CameraSpec, Light, Picture
 from scenarios.schema.sensor import Sensor
 
 
-class View(Model):
+class ObservationSpec(Model):
     """A scenario's tables of what looks on."""
 
     schema_: Literal[1] = Field(1, alias="schema")
@@ -34,7 +34,7 @@ class View(Model):
     picture: Picture = Picture()
 
 
-class Origin(Model):
+class ReplayOrigin(Model):
     """Whose motion a replay shows.
 
     real: a recording's, on which nothing is tuned. people: the recording's ids of persons 1, 2, … start, duration: the
@@ -53,14 +53,14 @@ class Origin(Model):
     motion: str
 
 
-class Replayed(View):
+class ReplaySpec(ObservationSpec):
     """The resolved form of a replay: what its scenario.toml holds."""
 
     name: str
-    replay: Origin
+    replay: ReplayOrigin
 
 
-def load_view(path: str | Path | None = None, set: Iterable[str] = ()) -> View:
+def load_observation(path: str | Path | None = None, set: Iterable[str] = ()) -> ObservationSpec:
     """The view of a file (None: all defaults) with every `key=value` of `set` applied; InputError otherwise."""
     if path is not None and not Path(path).is_file():
         raise InputError(
@@ -68,4 +68,4 @@ def load_view(path: str | Path | None = None, set: Iterable[str] = ()) -> View:
         )  # fmt: skip
     file = Path(path) if path is not None else ""
     table, places = apply({} if path is None else parse(Path(path)), tuple(set), file)
-    return validate(table, file, places, model=View)
+    return validate(table, file, places, model=ObservationSpec)

@@ -20,7 +20,7 @@ GROUP_SIZE = Distribution(poisson=1.1, clip=(1, 12))
 SPACING = Distribution(normal=(0.75, 0.12), clip=(0.5, 1.2))
 
 
-class Door(Model):
+class DoorSpec(Model):
     """An opening in a wall."""
 
     at: Fixed = Field(description="middle of the opening, m; must lie on a wall")
@@ -41,14 +41,14 @@ class StairsSpec(Model):
     )
 
 
-class World(Model):
+class WorldSpec(Model):
     """What stands still."""
 
     size: tuple[Positive, Positive] = Field((16.0, 10.0), description="extent in x and y, m")
     walls: tuple[tuple[float, float, float, float], ...] = Field((), description="segments x1, y1, x2, y2, m")
     pillars: tuple[tuple[float, float, Positive], ...] = Field((), description="x, y, radius, m")
     stairs: tuple[StairsSpec, ...] = Field((), description="flights of stairs")
-    doors: tuple[Door, ...] = Field((), description="openings in walls")
+    doors: tuple[DoorSpec, ...] = Field((), description="openings in walls")
     service: tuple[Fixed, ...] = Field((), description="service points (counters), m")
     wall_height: Positive = Field(2.5, description="m")
     pillar_height: Positive = Field(2.5, description="m")
@@ -72,7 +72,7 @@ class CameraSpec(Model):
     crop: bool = Field(False, description="accept people who walk out of view")
 
 
-class Switch(Model):
+class LightSwitch(Model):
     """The light changes at once: a lamp, a cloud."""
 
     at: Value = Field(description="when, s")
@@ -95,7 +95,7 @@ class Light(Model):
     cloud: Value = Field(0.0, description="sd of soft patches of brightness that pass over the ground, relative")
     cloud_size: Positive = Field(8.0, description="size of these patches (correlation 0.6 so far apart), m")
     cloud_speed: NonNegative = Field(1.0, description="how fast they pass, m/s")
-    switch: tuple[Switch, ...] = Field((), description="sudden changes")
+    switch: tuple[LightSwitch, ...] = Field((), description="sudden changes")
 
 
 class Picture(Model):
@@ -113,7 +113,7 @@ class Picture(Model):
     sway_time: Positive = Field(0.4, description="how long the sway stays alike (correlation 0.6), s")
 
 
-class Crowd(Model):
+class CrowdSpec(Model):
     """How people walk; defaults are the measured ones (docs/realism.md)."""
 
     free_speed: Value = Field(FREE_SPEED, description="walking speed of someone alone, m/s")
@@ -122,7 +122,7 @@ class Crowd(Model):
     slowdown_per_member: NonNegative = Field(0.05, description="a group of n is slower by this times (n - 1), m/s")
 
 
-class Group(Model):
+class GroupSpec(Model):
     """People who belong together from the start."""
 
     id: Name = Field(description="name in the script; repeat = n makes id-1 … id-n")
@@ -165,7 +165,7 @@ class When(Model):
         return self
 
 
-class Part(Model):
+class SplitPart(Model):
     """One part of a group that splits."""
 
     id: Name = Field(description="name of the new group")
@@ -175,7 +175,7 @@ class Part(Model):
     at_goal: Literal["stand", "leave", "walk"] = Field("stand", description="as for groups")
 
 
-class Merge(Model):
+class MergeOrder(Model):
     """Groups become one."""
 
     id: Name = Field(description="name of the order")
@@ -188,17 +188,17 @@ class Merge(Model):
     when: When
 
 
-class Split(Model):
+class SplitOrder(Model):
     """A group falls into parts."""
 
     id: Name = Field(description="name of the order")
     type: Literal["split"] = Field(description="a group falls into parts")
     group: Name = Field(description="which group parts")
-    parts: Annotated[tuple[Part, ...], Field(min_length=2)]
+    parts: Annotated[tuple[SplitPart, ...], Field(min_length=2)]
     when: When
 
 
-class Queue(Model):
+class QueueOrder(Model):
     """Groups line up, are served one group after the other, and walk on."""
 
     id: Name = Field(description="name of the order")
@@ -215,7 +215,7 @@ class Queue(Model):
     when: When
 
 
-Event = Annotated[Merge | Split | Queue, Field(discriminator="type")]
+ScriptOrder = Annotated[MergeOrder | SplitOrder | QueueOrder, Field(discriminator="type")]
 
 
 class Scenario(Model):
@@ -233,17 +233,17 @@ class Scenario(Model):
         0.0, description="s; how much further on their way all who walk start (negative: back), one draw for all"
     )
     mirror: bool = Field(False, description="a coin decides whether the script is mirrored left to right")
-    world: World = World()
+    world: WorldSpec = WorldSpec()
     camera: CameraSpec = CameraSpec()
     sensor: Sensor = Sensor()
     light: Light = Light()
     picture: Picture = Picture()
-    crowd: Crowd = Crowd()
-    group: Annotated[tuple[Group, ...], Field(min_length=1)]
-    event: tuple[Event, ...] = ()
+    crowd: CrowdSpec = CrowdSpec()
+    group: Annotated[tuple[GroupSpec, ...], Field(min_length=1)]
+    event: tuple[ScriptOrder, ...] = ()
 
 
-def group_names(group: Group) -> list[str]:
+def group_names(group: GroupSpec) -> list[str]:
     """The names a `repeat` makes: id, or id-1 … id-n."""
     return [group.id] if group.repeat == 1 else [f"{group.id}-{k + 1}" for k in range(group.repeat)]
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from scenarios.schema.scenario import World
+from scenarios.schema.scenario import WorldSpec
 from sim.types import Array, Bools, Scene, Stairs
 
 BEHIND = 0.7  # m behind a door, where nobody touches the wall any more
@@ -31,7 +31,7 @@ def cut_walls(walls: Array, doors: list[tuple[Array, float]]) -> tuple[Array, Ar
     return np.array(pieces).reshape(-1, 2, 2), np.array(openings).reshape(-1, 2, 2)
 
 
-def scene_of(world: World) -> Scene:
+def scene_of(world: WorldSpec) -> Scene:
     """The scenario's world as arrays."""
     walls = np.array(world.walls, dtype=float).reshape(-1, 2, 2)
     doors = [(np.array(d.at, dtype=float), d.width) for d in world.doors]

@@ -12,7 +12,7 @@ import numpy as np
 
 from scenarios.errors import InputError
 from scenarios.schema.distribution import Distribution, Point, draw
-from scenarios.schema.scenario import Group, Scenario, group_names
+from scenarios.schema.scenario import GroupSpec, Scenario, group_names
 from sim.crowd.formation import place, walking
 from sim.rng import rng
 from sim.types import Array, Scene
@@ -109,7 +109,7 @@ def cast(scenario: Scenario, scene: Scene, seed: int, repeat: int) -> list[Party
 
 def _party(
     scenario: Scenario,
-    group: Group,
+    group: GroupSpec,
     name: str,
     key: tuple[int, int],
     column: int,
@@ -141,7 +141,7 @@ def walking_speed(free: list[float], slowdown: float) -> float:
 def _find_room(
     scenario: Scenario,
     party: Party,
-    group: Group,
+    group: GroupSpec,
     key: tuple[int, int],
     frame: Frame2,
     scene: Scene,

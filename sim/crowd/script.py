@@ -8,7 +8,7 @@ from __future__ import annotations
 import numpy as np
 
 from scenarios.schema.distribution import draw
-from scenarios.schema.scenario import Merge, Queue, Scenario, Split, expand
+from scenarios.schema.scenario import MergeOrder, QueueOrder, Scenario, SplitOrder, expand
 from sim.crowd.formation import assign, place, standing, walking
 from sim.crowd.meeting import meeting_point, part_sizes, share_out
 from sim.crowd.navigation import Navigator
@@ -31,7 +31,7 @@ class Script:
         self.frame = frame_of(scenario, seed, repeat)
         self.parties, self.waiting = parties, list(parties)
         people = [m for p in parties for m in p.members]
-        made = sum(len(e.parts) if isinstance(e, Split) else 1 for e in scenario.event)
+        made = sum(len(e.parts) if isinstance(e, SplitOrder) else 1 for e in scenario.event)
         self.groups = Groups.empty(len(parties) + made, MAX_WAY)
         self.next_group = len(parties)
         self.alive: dict[str, int] = {p.name: p.index for p in parties}
@@ -54,7 +54,7 @@ class Script:
             for k, e in enumerate(scenario.event)
         ]
 
-    def _time(self, event: Merge | Split | Queue, k: int) -> float:
+    def _time(self, event: MergeOrder | SplitOrder | QueueOrder, k: int) -> float:
         time = event.when.time
         return np.inf if time is None else draw(time, rng(self.seed, "event", k, 1, repeat=self.repeat))
 
@@ -158,9 +158,9 @@ class Script:
     def _fire(self, pending: Pending, frame: int, state: Array) -> None:
         pending.fired = frame + 1
         event = pending.event
-        if isinstance(event, Merge):
+        if isinstance(event, MergeOrder):
             self._merge(pending, event, state)
-        elif isinstance(event, Split):
+        elif isinstance(event, SplitOrder):
             self._split(pending, event, state)
         else:
             self._line_up(pending, event)
@@ -176,7 +176,7 @@ class Script:
     def _pace(self, columns: list[int]) -> float:
         return walking_speed(list(self.free_speed[columns]), self.scenario.crowd.slowdown_per_member)
 
-    def _merge(self, pending: Pending, event: Merge, state: Array) -> None:
+    def _merge(self, pending: Pending, event: MergeOrder, state: Array) -> None:
         parents = [self.alive.pop(name) for name in event.groups]
         parts = [list(self.members[g]) for g in parents]
         pending.before = tuple(tuple(c) for c in parts)
@@ -200,7 +200,7 @@ class Script:
         slots = place(offsets, meeting, self.groups.heading[g])
         self.places[columns] = offsets[assign(state[columns, :2], slots)]
 
-    def _split(self, pending: Pending, event: Split, state: Array) -> None:
+    def _split(self, pending: Pending, event: SplitOrder, state: Array) -> None:
         parent = self.alive.pop(event.group)
         columns = self.members[parent]
         pending.before = (tuple(columns),)
@@ -223,7 +223,7 @@ class Script:
             self.groups.heading[g] = self.groups.heading[parent]
         pending.after = tuple(after)
 
-    def _line_up(self, pending: Pending, event: Queue) -> None:
+    def _line_up(self, pending: Pending, event: QueueOrder) -> None:
         names = [n for pattern in event.groups for n in expand(pattern, list(self.alive))]
         groups = [self.alive[n] for n in names]
         r = rng(self.seed, "service", pending.index, repeat=self.repeat)

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from scenarios.schema.scenario import Merge, Queue, Split, expand
+from scenarios.schema.scenario import MergeOrder, QueueOrder, SplitOrder, expand
 from sim.types import Array
 
 if TYPE_CHECKING:
@@ -24,7 +24,7 @@ HOLD = {"merge": 2.0, "split": 2.0, "queue": 3.0}  # s for which a rule must hol
 class Pending:
     """One order: its trigger, the frame in which it fired and the time at which it came true."""
 
-    event: Merge | Split | Queue
+    event: MergeOrder | SplitOrder | QueueOrder
     index: int
     delay: float
     time: float
@@ -70,9 +70,9 @@ class Pending:
             self.true_at = t
 
 
-def concerned(event: Merge | Split | Queue, alive: list[str]) -> list[str]:
+def concerned(event: MergeOrder | SplitOrder | QueueOrder, alive: list[str]) -> list[str]:
     """Names of the groups that an order concerns."""
-    if isinstance(event, Split):
+    if isinstance(event, SplitOrder):
         return [event.group]
     return [n for pattern in event.groups for n in expand(pattern, alive)]
 
@@ -80,16 +80,16 @@ def concerned(event: Merge | Split | Queue, alive: list[str]) -> list[str]:
 def has_come_true(pending: Pending, state: Array, script: Script) -> bool:
     """Whether the order's rule holds in this frame."""
     event = pending.event
-    if isinstance(event, Queue):
+    if isinstance(event, QueueOrder):
         columns = list(pending.after[0])
         off = np.linalg.norm(state[columns, :2] - script.targets[columns], axis=1)
         return bool(np.sum(off < 0.4) >= min(3, len(columns)))
-    parts = [list(p) for p in (pending.before if isinstance(event, Merge) else pending.after)]
+    parts = [list(p) for p in (pending.before if isinstance(event, MergeOrder) else pending.after)]
     if not all(np.isfinite(state[p]).all() for p in parts):
         return False
     pairs = [(a, b) for k, a in enumerate(parts) for b in parts[k + 1 :]]
     gaps = [(_nearest(state, a, b), _speed_between(state, a, b)) for a, b in pairs]
-    if isinstance(event, Merge):
+    if isinstance(event, MergeOrder):
         joined = [d < 1.5 and v < 0.5 for d, v in gaps]
         return sum(joined) >= len(parts) - 1
     return all(d > 2.5 or (d > 1.5 and v > 0.7) for d, v in gaps)

@@ -16,7 +16,7 @@ from pathlib import Path
 import numpy as np
 
 from scenarios.errors import InputError
-from scenarios.schema.observation import Origin, Replayed, View, load_view
+from scenarios.schema.observation import ObservationSpec, ReplayOrigin, ReplaySpec, load_observation
 from sim.crowd.heading import headings
 from sim.dataset.trajectories import Trajectories, nearest_row, resample
 from sim.hashing import canonical_hash
@@ -44,7 +44,7 @@ WHOLE = Cut()
 
 def replay(
     source: str | Path | Sequence,
-    camera: str | Path | View | None = None,
+    camera: str | Path | ObservationSpec | None = None,
     seed: int = 20_000,
     *,
     cut: Cut = WHOLE,
@@ -53,7 +53,7 @@ def replay(
 ) -> Sequence:
     """A recording's people before our camera: a labelled sequence like any other.
 
-    camera: a View, or a file of one (scenarios.schema.observation), None for the usual one. calibration: of a
+    camera: an ObservationSpec, or a file of one (scenarios.schema.observation), None for the usual one. calibration: of a
     recording that has
     boxes only, to put their feet on the ground. streams: as for `simulate`. `sequence.source["origin"]` says whose
     motion it is. InputError where a source has no places on the ground, several sequences, or nobody in the cut, and
@@ -68,19 +68,19 @@ def replay(
                 file=source, got=f"{len(found)} sequences", expected="one", remedy="give the path of one of them"
             )
         source = found[0]
-    view = camera if isinstance(camera, View) else load_view(camera)
+    view = camera if isinstance(camera, ObservationSpec) else load_observation(camera)
     return resolved(source, view, seed, cut=cut, calibration=calibration, streams=streams)[0]
 
 
 def resolved(
     source: Sequence,
-    view: View,
+    view: ObservationSpec,
     seed: int,
     *,
     cut: Cut = WHOLE,
     calibration: Camera | str | Path | None = None,
     streams: Iterable[str] = (),
-) -> tuple[Sequence, Replayed]:
+) -> tuple[Sequence, ReplaySpec]:
     """A replay and its resolved form, which stands for the scenario."""
     truth = _labels(source)
     places = on_ground(truth, source, _calibrated(calibration, source))
@@ -93,7 +93,9 @@ def resolved(
     if truth.labelled is None or not truth.labelled.any():
         made = replace(made, load_truth=_without_groups(made))
     told = {**made.source, "kind": "replayed", "origin": origin.model_dump()}
-    form = Replayed(name=motion.name, replay=origin, **{name: getattr(view, name) for name in View.model_fields})
+    form = ReplaySpec(
+        name=motion.name, replay=origin, **{name: getattr(view, name) for name in ObservationSpec.model_fields}
+    )
     return replace(made, source=told), form
 
 
@@ -161,10 +163,10 @@ def _moving(places: Array, truth: Truth, source: Sequence, fps: float, cut: Cut)
 
 def _origin(
     source: Sequence, truth: Truth, places: Array, moving: Trajectories, cut: Cut, fps: float, shift: Array
-) -> Origin:
+) -> ReplayOrigin:
     labels = {"frame": truth.frame, "id": truth.id, "group": truth.group, "places": places, "fps": truth.fps}
     first = source.source.get("origin") or {}  # of a replay of a replay
-    return Origin(
+    return ReplayOrigin(
         kind=str(first.get("kind", source.source.get("kind", "unknown"))),
         name=str(first.get("name", source.name)),
         real=is_real(source),
@@ -210,9 +212,9 @@ def _intent(moving: Trajectories, truth: Truth, fps: float, cut: Cut) -> Ints:
 def _heights(people: Ints, truth: Truth, seed: int) -> Array:
     """(P,) m: as labelled, else drawn as for simulated crowds, keyed by the person."""
     from scenarios.schema.distribution import draw
-    from scenarios.schema.scenario import Crowd
+    from scenarios.schema.scenario import CrowdSpec
 
-    drawn = [draw(Crowd().height, rng(seed, "person", int(one))) for one in people]
+    drawn = [draw(CrowdSpec().height, rng(seed, "person", int(one))) for one in people]
     if truth.height is None:
         return np.array(drawn)
     first = [int(np.argmax(truth.id == one)) for one in people]

@@ -10,7 +10,7 @@ from typing import Any, cast
 from scenarios.errors import InputError
 from scenarios.loading.resolve import Entry
 from scenarios.loading.toml_writing import dump
-from scenarios.schema.observation import Replayed, View
+from scenarios.schema.observation import ObservationSpec, ReplaySpec
 from sim.dataset.generate import write_seqmap
 from sim.dataset.replay import WHOLE, Cut, resolved
 from sim.dataset.seed_ranges import split_of
@@ -30,7 +30,7 @@ Progress = Callable[[int, int, str], None]
 class How:
     """What is alike for all replays of a dataset."""
 
-    view: View
+    view: ObservationSpec
     cut: Cut = WHOLE
     calibration: Camera | str | Path | None = None
     streams: tuple[str, ...] = ("left",)
@@ -89,7 +89,7 @@ def _store(recording: Sequence, how: How, seed: int, folder: Path) -> Path:
     return job.folder
 
 
-def _job(form: Replayed, seed: int, folder: Path, how: How) -> Job:
+def _job(form: ReplaySpec, seed: int, folder: Path, how: How) -> Job:
     """The job that knows whether the folder holds this very replay; its resolved form stands for the scenario."""
     entry = Entry(form.name, cast(Any, form))
     return Job(folder / f"{form.name}-s{seed:05d}", entry, seed, how.streams, how.images)

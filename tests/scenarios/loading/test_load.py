@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from scenarios.errors import InputError
 from scenarios.loading.resolve import dump, load, names, resolve
 from scenarios.loading.toml_files import merge
-from scenarios.schema.scenario import Merge, Queue, Scenario, Split
+from scenarios.schema.scenario import MergeOrder, QueueOrder, Scenario, SplitOrder
 
 
 def write(path: Path, text: str) -> Path:
@@ -29,7 +29,7 @@ def error_of(path: Path, *settings: str) -> InputError:
 def test_reads_a_file(path: Path) -> None:
     scenario = load(path)
     assert (scenario.name, scenario.duration, scenario.camera.fps) == ("tour", 30.0, 10.0)
-    assert [type(e) for e in scenario.event] == [Merge, Split, Queue]
+    assert [type(e) for e in scenario.event] == [MergeOrder, SplitOrder, QueueOrder]
     assert load(str(path)) == scenario
 
 

@@ -10,7 +10,7 @@ import pytest
 import sim
 from scenarios.errors import InputError
 from scenarios.loading.resolve import load
-from scenarios.schema.observation import View, load_view
+from scenarios.schema.observation import ObservationSpec, load_observation
 from sim.dataset.replay import Cut, replay
 from sim.io.formats.biwi import open_folder
 from sim.io.formats.real_or_simulated import is_real
@@ -35,7 +35,7 @@ def walk(tmp_path: Path) -> Sequence:
 
 
 def test_real_motion_with_perfect_labels(walk: Sequence) -> None:
-    made = sim.replay(walk, View(), 20_001, streams=())
+    made = sim.replay(walk, ObservationSpec(), 20_001, streams=())
     truth, labels = made.truth, walk.truth
     assert truth is not None
     assert labels is not None
@@ -60,7 +60,7 @@ def test_real_motion_with_perfect_labels(walk: Sequence) -> None:
 
 
 def test_bodies_come_from_the_seed_and_nothing_else(walk: Sequence) -> None:
-    one, same, other = (replay(walk, View(), seed, streams=()).truth for seed in (20_001, 20_001, 20_002))
+    one, same, other = (replay(walk, ObservationSpec(), seed, streams=()).truth for seed in (20_001, 20_001, 20_002))
     assert one is not None
     assert same is not None
     assert other is not None
@@ -68,7 +68,7 @@ def test_bodies_come_from_the_seed_and_nothing_else(walk: Sequence) -> None:
     assert np.array_equal(one.box, same.box)  # type: ignore[arg-type]
     assert np.array_equal(one.pos, other.pos)  # type: ignore[arg-type]
     assert not np.array_equal(one.height, other.height)  # type: ignore[arg-type]
-    part = replay(walk, View(), 20_001, cut=Cut(4.0, 5.0), streams=()).truth
+    part = replay(walk, ObservationSpec(), 20_001, cut=Cut(4.0, 5.0), streams=()).truth
     assert part is not None
     assert part.length == 50
     assert set(np.unique(part.height)) == set(np.unique(one.height))  # type: ignore[arg-type]
@@ -76,7 +76,7 @@ def test_bodies_come_from_the_seed_and_nothing_else(walk: Sequence) -> None:
 
 def test_groups_that_nobody_labelled_are_not_labelled(walk: Sequence, tmp_path: Path) -> None:
     (tmp_path / "walk" / "groups.txt").unlink()
-    truth = replay(open_folder(tmp_path / "walk"), View(), streams=()).truth
+    truth = replay(open_folder(tmp_path / "walk"), ObservationSpec(), streams=()).truth
     assert truth is not None
     assert truth.groups is None
     assert truth.events is None
@@ -87,7 +87,7 @@ def test_groups_that_nobody_labelled_are_not_labelled(walk: Sequence, tmp_path: 
 
 def test_our_own_motion_keeps_its_world_and_bodies() -> None:
     own = simulate(load("merge"), 3, streams=())
-    made = replay(own, load_view(set=["camera.kind=top", "camera.fps=20"]), 4, streams=())
+    made = replay(own, load_observation(set=["camera.kind=top", "camera.fps=20"]), 4, streams=())
     assert own.truth is not None
     assert made.truth is not None
     assert made.scene == own.scene or made.scene.size.tolist() == own.scene.size.tolist()  # type: ignore[union-attr]
@@ -101,13 +101,13 @@ def test_what_is_real_is_told_from_what_is_not(walk: Sequence) -> None:
     own = simulate(load("merge"), 3, streams=())
     assert is_real(walk)
     assert not is_real(own)
-    assert is_real(replay(walk, View(), streams=()))
-    assert not is_real(replay(own, View(), streams=()))
-    assert is_real(replay(replay(walk, View(), streams=()), View(), streams=()))
+    assert is_real(replay(walk, ObservationSpec(), streams=()))
+    assert not is_real(replay(own, ObservationSpec(), streams=()))
+    assert is_real(replay(replay(walk, ObservationSpec(), streams=()), ObservationSpec(), streams=()))
 
 
 def test_pictures_show_them(walk: Sequence) -> None:
-    made = replay(walk, load_view(set=["camera.image=[160, 120]"]), 20_001, cut=Cut(0.0, 1.0))
+    made = replay(walk, load_observation(set=["camera.image=[160, 120]"]), 20_001, cut=Cut(0.0, 1.0))
     frame = next(iter(made))
     empty = made.background()
     assert frame.image is not None
@@ -131,7 +131,7 @@ def test_pictures_show_them(walk: Sequence) -> None:
 )
 def test_what_cannot_be_is_refused(walk: Sequence, changes: list[str], cut: Cut, words: str) -> None:
     with pytest.raises(InputError) as error:
-        list(replay(walk, load_view(set=changes), cut=cut, streams=()))
+        list(replay(walk, load_observation(set=changes), cut=cut, streams=()))
     assert words in str(error.value)
 
 
@@ -147,8 +147,8 @@ def test_boxes_alone_want_a_calibration(tmp_path: Path) -> None:
     (tmp_path / "gt" / "gt.txt").write_text("\n".join(lines))
     (tmp_path / "seqinfo.ini").write_text("[Sequence]\nname=boxes\nframeRate=10\nimWidth=640\nimHeight=480\n")
     with pytest.raises(InputError, match="--calibration"):
-        replay(tmp_path, View(), streams=())
-    made = replay(tmp_path, View(), calibration=own.camera, streams=())
+        replay(tmp_path, ObservationSpec(), streams=())
+    made = replay(tmp_path, ObservationSpec(), calibration=own.camera, streams=())
     assert made.truth is not None
     shift = np.array(made.source["origin"]["shift"])
     away = made.truth.pos[made.truth.rows(51)] - shift - truth.pos[truth.rows(51)]  # type: ignore[index]
@@ -157,21 +157,21 @@ def test_boxes_alone_want_a_calibration(tmp_path: Path) -> None:
 
 def test_a_calibration_of_no_use_is_refused(walk: Sequence) -> None:
     with pytest.raises(InputError, match="--calibration"):
-        replay(walk, View(), calibration=simulate(load("merge"), 3, streams=()).camera)
+        replay(walk, ObservationSpec(), calibration=simulate(load("merge"), 3, streams=()).camera)
 
 
 def test_a_folder_of_many_and_nobody_labelled_are_refused(tmp_path: Path, walk: Sequence) -> None:
     with pytest.raises(InputError, match="no labelled people"):
-        replay(Sequence("empty", 10.0, 5, lambda: iter(())), View())
+        replay(Sequence("empty", 10.0, 5, lambda: iter(())), ObservationSpec())
     with pytest.raises(InputError, match="nothing there"):
-        replay(tmp_path / "nowhere", View())
+        replay(tmp_path / "nowhere", ObservationSpec())
     with pytest.raises(InputError, match="no such file"):
         replay(walk, tmp_path / "none.toml")
 
 
 @pytest.mark.parametrize("name", ["biwi/seq_hotel", "caviar/mwt1gt.xml", "mot/PETS09-S2L1-first200"])
 def test_real_recordings(shared_data: Path, name: str) -> None:
-    made = replay(shared_data / name, View(), cut=Cut(5.0, 20.0), streams=())
+    made = replay(shared_data / name, ObservationSpec(), cut=Cut(5.0, 20.0), streams=())
     truth = made.truth
     assert truth is not None
     assert truth.vel is not None

@@ -9,7 +9,7 @@ import pytest
 
 from scenarios.errors import InputError
 from scenarios.loading.resolve import load
-from scenarios.schema.observation import load_view
+from scenarios.schema.observation import load_observation
 from sim.dataset.replay import Cut
 from sim.dataset.replay_dataset import How, store_replays
 from sim.io.formats.biwi import open_folder
@@ -19,7 +19,7 @@ from sim.io.store.validate import validate
 from sim.sequence import simulate
 from sim.types import Sequence
 
-SMALL = load_view(set=["camera.image=[160, 120]", "camera.fps=5"])
+SMALL = load_observation(set=["camera.image=[160, 120]", "camera.fps=5"])
 
 
 @pytest.fixture
@@ -69,7 +69,7 @@ def test_same_bytes_again_and_what_is_there_is_kept(walk: Sequence, tmp_path: Pa
 
 def test_another_replay_in_its_place_is_refused(walk: Sequence, tmp_path: Path) -> None:
     store_replays([walk], How(SMALL, streams=()), range(20_000, 20_001), tmp_path)
-    other = How(load_view(set=["camera.image=[160, 120]", "camera.fps=5", "sensor.detect_prob=0.5"]), streams=())
+    other = How(load_observation(set=["camera.image=[160, 120]", "camera.fps=5", "sensor.detect_prob=0.5"]), streams=())
     with pytest.raises(InputError, match="another sequence"):
         store_replays([walk], other, range(20_000, 20_001), tmp_path)
 

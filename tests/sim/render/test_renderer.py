@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from scenarios.errors import InputError
-from scenarios.schema.scenario import Light, Picture, Switch
+from scenarios.schema.scenario import Light, LightSwitch, Picture
 from sim.hashing import canonical_hash
 from sim.render.pixel_truth import amodal_mask, modal_mask
 from sim.render.renderer import BACKGROUNDS, render, stage
@@ -143,7 +143,7 @@ def test_walls_and_pillars_cast_shadows_and_stairs_show_steps() -> None:
 
 def test_frames_are_pure_functions_of_their_index() -> None:
     motion, camera = motion_in(BUILT), VIEWS["high"]
-    light = Light(drift=0.1, flicker=0.02, cloud=0.1, switch=(Switch(at=0.5, gain=0.7),))
+    light = Light(drift=0.1, flicker=0.02, cloud=0.1, switch=(LightSwitch(at=0.5, gain=0.7),))
     picture = Picture(jpeg=80, foliage=0.1)
     one, two = (stage(motion, camera, light, picture) for _ in range(2))
     forwards = [one.both(i, right=True, pixels=True, disparity=True) for i in range(1, 5)]
@@ -197,7 +197,7 @@ def test_noise_is_normal_independent_and_the_same_in_empty_frames() -> None:
 def test_light_changes_as_it_is_told() -> None:
     motion, camera = motion_in(BARE, 3), VIEWS["high"]
     steady = stage(motion, camera, Light(), SHARP)
-    switched = stage(motion, camera, Light(switch=(Switch(at=0.5, gain=0.6, ramp=0.2),)), SHARP)
+    switched = stage(motion, camera, Light(switch=(LightSwitch(at=0.5, gain=0.6, ramp=0.2),)), SHARP)
     share = [switched.frame(i).mean() / steady.frame(i).mean() for i in (1, 6, 7, 8, 12)]
     assert share == pytest.approx([1, 1, np.sqrt(0.6), 0.6, 0.6], abs=0.01)
     assert np.array_equal(switched.background(49), steady.background(49))
@@ -309,7 +309,7 @@ def test_what_cannot_be_drawn_is_refused() -> None:
     with pytest.raises(InputError, match="sun_elevation_deg"):
         stage(motion, VIEWS["high"], Light(sun_elevation_deg=-5.0)).frame(1)
     with pytest.raises(InputError, match="gain"):
-        stage(motion, VIEWS["high"], Light(switch=(Switch(at=1.0, gain=-1.0),))).frame(1)
+        stage(motion, VIEWS["high"], Light(switch=(LightSwitch(at=1.0, gain=-1.0),))).frame(1)
 
 
 def test_nobody_behind_the_camera_and_no_people_at_all() -> None:

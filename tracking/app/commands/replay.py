@@ -26,7 +26,7 @@ def replay(
     part: Part, camera: Path | None, seeds: str, out: Path, settings: list[str], streams: str, images: str | None
 ) -> Answer:
     """Every recording of the source with every seed; settings: of camera, sensor, light and picture."""
-    from scenarios.schema.observation import load_view
+    from scenarios.schema.observation import load_observation
     from sim.dataset.replay import Cut
     from sim.dataset.replay_dataset import How, store_replays
     from sim.io.source import open_source
@@ -35,7 +35,7 @@ def replay(
     chosen, (wanted, kind) = option_values.seeds(seeds), option_values.pictures(streams, images)
     if part.duration is not None and part.duration <= 0:
         raise InputError(place="--duration", got=part.duration, expected="seconds above 0", remedy="correct it")
-    view = load_view(camera, settings)
+    view = load_observation(camera, settings)
     sources = open_source(part.source, fps=part.fps, images=False)
     how = How(view, Cut(part.start, part.duration), part.calibration, wanted, kind)
     with Meter("replay") as meter:
