@@ -17,7 +17,7 @@ from pathlib import Path
 
 import numpy as np
 
-from scenarios.schema.observation import View
+from scenarios.schema.observation import ObservationSpec
 from sim.dataset.replay import on_ground, replay
 from sim.io.source import open_source
 from sim.types import Array, Sequence, Truth
@@ -69,7 +69,7 @@ def main() -> None:
     for name in RECORDINGS:
         source = open_source(args.data / name, images=False)[0]
         start = time.perf_counter()
-        made = replay(source, View(), streams=())
+        made = replay(source, ObservationSpec(), streams=())
         labels, truth = source.truth, made.truth
         spent = time.perf_counter() - start
         assert labels is not None

@@ -6,9 +6,9 @@ import math
 from html import escape
 
 from scenarios.drawing import words as describe
-from scenarios.drawing.plan_svg import MARGIN, STYLE, WIDTH, Plan, badge, marker
-from scenarios.drawing.plan_text import sketch
-from scenarios.drawing.routes import Course, Mark, courses, marks
+from scenarios.drawing.plan_svg import MARGIN, STYLE, WIDTH, SvgPlan, badge, marker
+from scenarios.drawing.plan_text import character_plan
+from scenarios.drawing.routes import GroupRoute, OrderMark, group_routes, order_marks
 from scenarios.schema.scenario import Scenario
 
 COLOURS = ("#0072b2", "#d55e00", "#009e73", "#aa3377", "#8a6d00", "#3d6fd6", "#b2182b", "#4d7c0f", "#6a51a3", "#5c5c5c")
@@ -20,7 +20,7 @@ ROW = 30.0
 def text(scenario: Scenario) -> str:
     """What happens in a scenario, with a plan in characters."""
     lines = [scenario.name, *([scenario.about] if scenario.about else []), "", *describe.setting(scenario), ""]
-    lines += [sketch(scenario), "", "People"]
+    lines += [character_plan(scenario), "", "People"]
     wide = max(len(group.id) for group in scenario.group)
     lines += [f"  {group.id:<{wide}}  {describe.people(group)}" for group in scenario.group]
     lines += ["", "Orders"] + ([] if scenario.event else ["  none"])
@@ -31,8 +31,8 @@ def text(scenario: Scenario) -> str:
 
 def svg(scenario: Scenario) -> str:
     """The plan, the starts with their spread, the ways, and the orders beneath as lines that join and fork."""
-    plan = Plan(scenario.world)
-    ways, orders = courses(scenario), marks(scenario)
+    plan = SvgPlan(scenario.world)
+    ways, orders = group_routes(scenario), order_marks(scenario)
     colour = _colours(ways, orders)
     body = [*plan.floor(), *plan.stands()]
     for course in ways:
@@ -56,7 +56,7 @@ def svg(scenario: Scenario) -> str:
     return "\n".join(parts) + "\n"
 
 
-def _colours(ways: list[Course], orders: list[Mark]) -> dict[str, str]:
+def _colours(ways: list[GroupRoute], orders: list[OrderMark]) -> dict[str, str]:
     """A colour per group; the names that a `repeat` makes share theirs."""
     named: dict[str, str] = {}
     for course in ways:
@@ -71,7 +71,9 @@ def _cut(words: str, length: int) -> str:
     return words if len(words) <= length else words[: length - 1] + "…"
 
 
-def _script(ways: list[Course], orders: list[Mark], colour: dict[str, str], top: float) -> tuple[list[str], float]:
+def _script(
+    ways: list[GroupRoute], orders: list[OrderMark], colour: dict[str, str], top: float
+) -> tuple[list[str], float]:
     """The orders as lines of groups that join and fork from left to right, then in words; and where it ends."""
     parts = [f'<text x="{MARGIN}" y="{top:.0f}" style="font-weight:700">Script</text>']
     rows, x0 = {course.id: k for k, course in enumerate(ways)}, MARGIN + 60
@@ -104,20 +106,22 @@ def _script(ways: list[Course], orders: list[Mark], colour: dict[str, str], top:
     return parts, y
 
 
-def _names(course: Course) -> list[str]:
+def _names(course: GroupRoute) -> list[str]:
     return [f"{course.id}-{k + 1}" for k in range(course.repeat)] if course.repeat > 1 else [course.id]
 
 
-Line = tuple[str, int, float, float, float]
+ScriptLine = tuple[str, int, float, float, float]
 
 
-def _lines(rows: dict[str, int], row_of: dict[str, str], orders: list[Mark]) -> tuple[list[Line], dict[int, list[int]]]:
+def _lines(
+    rows: dict[str, int], row_of: dict[str, str], orders: list[OrderMark]
+) -> tuple[list[ScriptLine], dict[int, list[int]]]:
     """Lines (group, row, from order, to order, row at the end), and the rows that each order touches.
 
     One group of a `repeat` (row_of: its name → the repeat's) branches off; the line of the repeat goes on.
     """
     since = dict.fromkeys(rows, 0.0)
-    lines: list[Line] = []
+    lines: list[ScriptLine] = []
     at: dict[int, list[int]] = {}
     for mark in orders:
         if mark.before == mark.after:

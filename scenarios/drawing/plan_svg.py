@@ -6,8 +6,8 @@ import math
 from collections.abc import Iterable
 from html import escape
 
-from scenarios.drawing.plan_geometry import solid
-from scenarios.drawing.routes import XY, Course, Mark
+from scenarios.drawing.routes import XY, GroupRoute, OrderMark
+from scenarios.schema.geometry import walls_without_doors
 from scenarios.schema.scenario import StairsSpec, WorldSpec
 
 WIDTH, MARGIN = 900.0, 26.0
@@ -19,7 +19,7 @@ text { font: 13px system-ui, sans-serif; fill: #1b1f24 } .small { font-size: 11.
 """
 
 
-class Plan:
+class SvgPlan:
     """World metres to picture px (y up to y down); state: scale and offsets only."""
 
     def __init__(self, world: WorldSpec) -> None:
@@ -62,7 +62,7 @@ class Plan:
     def stands(self) -> list[str]:
         """Stairs, walls, doors, pillars, service points."""
         parts = [part for stairs in self.world.stairs for part in self._stairs(stairs)]
-        parts += [self.path([wall[:2], wall[2:]], 'class="wall"') for wall in solid(self.world)]
+        parts += [self.path([wall[:2], wall[2:]], 'class="wall"') for wall in walls_without_doors(self.world)]
         parts += [self.label(door.at, "door", 0, -8, 'class="small" text-anchor="middle"') for door in self.world.doors]
         for x, y, radius in self.world.pillars:
             u, v = self((x, y))
@@ -91,7 +91,7 @@ class Plan:
             self.label(stairs.head, words, 0, 4, 'class="small halo" text-anchor="middle"'),
         ]
 
-    def course(self, course: Course, colour: str) -> list[str]:
+    def course(self, course: GroupRoute, colour: str) -> list[str]:
         """The way of a group, and the goal."""
         end = course.points[-1]
         u, v = self(end)
@@ -111,7 +111,7 @@ class Plan:
             f'fill="{colour}" opacity=".15"/>'
         ]
 
-    def start(self, course: Course, colour: str, lift: int = 0) -> list[str]:
+    def start(self, course: GroupRoute, colour: str, lift: int = 0) -> list[str]:
         """Bodies at the start, at most a dozen, with the group's name and size, `lift` lines further up."""
         at, parts = course.points[0], self._spread(course.points[0], course.spread[0], colour)
         n = min(max(round(course.people), 1), 12)
@@ -127,7 +127,7 @@ class Plan:
         parts.append(self.label(at, words, 0, dy, f'class="halo" text-anchor="middle" style="fill:{colour}"'))
         return parts
 
-    def mark(self, mark: Mark, colour: dict[str, str]) -> list[str]:
+    def mark(self, mark: OrderMark, colour: dict[str, str]) -> list[str]:
         """What an order opens: dashed ways, the slots of a queue."""
         parts = []
         for arrow in mark.arrows:
@@ -143,7 +143,7 @@ class Plan:
             parts.append(f'<circle cx="{u:.1f}" cy="{v:.1f}" r="{r:.1f}" fill="none" stroke="#57606a" class="door"/>')
         return parts
 
-    def numbers(self, orders: list[Mark]) -> list[str]:
+    def numbers(self, orders: list[OrderMark]) -> list[str]:
         """The orders' numbers where they happen; those at one place stand side by side."""
         parts, used = [], dict[tuple[int, int], int]()
         for mark in orders:

@@ -4,15 +4,15 @@ from __future__ import annotations
 
 import math
 
-from scenarios.drawing.plan_geometry import solid
-from scenarios.drawing.routes import XY, courses, marks
+from scenarios.drawing.routes import XY, group_routes, order_marks
+from scenarios.schema.geometry import walls_without_doors
 from scenarios.schema.scenario import Scenario
 
 NUMBERS = "①②③④⑤⑥⑦⑧⑨⑩⑪⑫⑬⑭⑮⑯⑰⑱⑲⑳"
 LEGEND = "A start of a   ◎ goal   · way   ① order   ○ queue   █ wall   ● pillar   ≡ stairs   ▣ service point"
 
 
-class Sketch:
+class CharacterPlan:
     """A grid of characters over the world; state: the characters. The y axis points up."""
 
     def __init__(self, size: XY, columns: int) -> None:
@@ -54,16 +54,16 @@ class Sketch:
         return "\n".join(["┌" + "─" * self.columns + "┐", *rows, "└" + "─" * self.columns + "┘"])
 
 
-def sketch(scenario: Scenario, columns: int = 64) -> str:
+def character_plan(scenario: Scenario, columns: int = 64) -> str:
     """The plan of a scenario and its legend."""
     world = scenario.world
-    plan = Sketch(world.size, columns)
+    plan = CharacterPlan(world.size, columns)
     _stairs(plan, scenario)
-    ways = courses(scenario)
+    ways = group_routes(scenario)
     for course in ways:
         for a, b in zip(course.points, course.points[1:], strict=False):
             plan.line(a, b, "·", over=" ", gap=2)
-    orders = marks(scenario)
+    orders = order_marks(scenario)
     for mark in orders:
         for arrow in mark.arrows:
             for a, b in zip(arrow.points, arrow.points[1:], strict=False):
@@ -71,7 +71,7 @@ def sketch(scenario: Scenario, columns: int = 64) -> str:
             plan.put(arrow.points[-1], "◎")
         for slot in mark.slots:
             plan.put(slot, "○")
-    for wall in solid(world):
+    for wall in walls_without_doors(world):
         plan.line(wall[:2], wall[2:], "█")
     for x, y, radius in world.pillars:
         _disc(plan, (x, y), radius)
@@ -86,7 +86,7 @@ def sketch(scenario: Scenario, columns: int = 64) -> str:
     return plan.text() + f"\n {world.size[0]:g} × {world.size[1]:g} m\n {LEGEND}"
 
 
-def _stairs(plan: Sketch, scenario: Scenario) -> None:
+def _stairs(plan: CharacterPlan, scenario: Scenario) -> None:
     for stairs in scenario.world.stairs:
         (fx, fy), (hx, hy) = stairs.foot, stairs.head
         length = math.dist(stairs.foot, stairs.head)
@@ -96,7 +96,7 @@ def _stairs(plan: Sketch, scenario: Scenario) -> None:
             plan.line((x - nx, y - ny), (x + nx, y + ny), "≡")
 
 
-def _disc(plan: Sketch, centre: XY, radius: float) -> None:
+def _disc(plan: CharacterPlan, centre: XY, radius: float) -> None:
     step = 0.5 / plan.scale
     n = int(radius / step)
     for i in range(-n, n + 1):

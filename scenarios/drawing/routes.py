@@ -9,9 +9,9 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-from scenarios.drawing.plan_geometry import bounds
-from scenarios.schema.distribution import Distribution, Point, Value
+from scenarios.schema.geometry import queue_places
 from scenarios.schema.scenario import MergeOrder, QueueOrder, Scenario, ScriptOrder, SplitOrder, expand, group_names
+from scenarios.schema.values import Distribution, Point, Value, bounds
 
 XY = tuple[float, float]
 SLOTS = 6
@@ -19,7 +19,7 @@ SLOTS = 6
 
 
 @dataclass(frozen=True)
-class Course:
+class GroupRoute:
     """The way of one group (a `repeat` is one): start, via, goal in m, and the half spread of each in x and y."""
 
     id: str
@@ -38,7 +38,7 @@ class Arrow:
 
 
 @dataclass(frozen=True)
-class Mark:
+class OrderMark:
     """An order on the plan: its number from 1, where it happens, the ways it opens, and the slots of a queue."""
 
     number: int
@@ -77,17 +77,17 @@ def spread(value: Value) -> float:
     return wide if math.isfinite(wide) else 2 * middle(value)
 
 
-def courses(scenario: Scenario) -> list[Course]:
+def group_routes(scenario: Scenario) -> list[GroupRoute]:
     """The ways of the groups of the first frame."""
     made = []
     for group in scenario.group:
         points = (group.start, *group.via, group.goal)
         spreads = tuple((spread(x), spread(y)) for x, y in points)
-        made.append(Course(group.id, tuple(map(_at, points)), spreads, middle(group.size), group.repeat))
+        made.append(GroupRoute(group.id, tuple(map(_at, points)), spreads, middle(group.size), group.repeat))
     return made
 
 
-def marks(scenario: Scenario) -> list[Mark]:
+def order_marks(scenario: Scenario) -> list[OrderMark]:
     """The orders, in the order of the file."""
     places = {}
     for group in scenario.group:
@@ -104,32 +104,32 @@ def _mean(points: list[XY]) -> XY:
     return sum(x for x, _ in points) / len(points), sum(y for _, y in points) / len(points)
 
 
-def _mark(number: int, event: ScriptOrder, places: dict[str, tuple[XY, XY]], world: XY) -> Mark:
+def _mark(number: int, event: ScriptOrder, places: dict[str, tuple[XY, XY]], world: XY) -> OrderMark:
     """One order; places (where from, where to of every group) move on with it."""
     if isinstance(event, MergeOrder):
         return _merge(number, event, places)
     if isinstance(event, SplitOrder):
         return _split(number, event, places)
     names = tuple(dict.fromkeys(name for pattern in event.groups for name in expand(pattern, list(places))))
-    inside = tuple((x, y) for x, y in slots(event, SLOTS) if 0 <= x <= world[0] and 0 <= y <= world[1])
-    return Mark(number, event, event.at, names, names, _served(event, names, places), inside)
+    inside = tuple((x, y) for x, y in queue_places(event, SLOTS) if 0 <= x <= world[0] and 0 <= y <= world[1])
+    return OrderMark(number, event, event.at, names, names, _served(event, names, places), inside)
 
 
-def _merge(number: int, event: MergeOrder, places: dict[str, tuple[XY, XY]]) -> Mark:
+def _merge(number: int, event: MergeOrder, places: dict[str, tuple[XY, XY]]) -> OrderMark:
     ways = [places.pop(name) for name in event.groups]
     meeting = _mean([_mean([start, goal]) for start, goal in ways])
     goal = meeting if isinstance(event.goal, str) else _at(event.goal)
     places[event.into] = (meeting, goal)
     arrow = Arrow(event.into, (meeting, *map(_at, event.via), goal))
-    return Mark(number, event, meeting, event.groups, (event.into,), () if goal == meeting else (arrow,))
+    return OrderMark(number, event, meeting, event.groups, (event.into,), () if goal == meeting else (arrow,))
 
 
-def _split(number: int, event: SplitOrder, places: dict[str, tuple[XY, XY]]) -> Mark:
+def _split(number: int, event: SplitOrder, places: dict[str, tuple[XY, XY]]) -> OrderMark:
     start, goal = places.pop(event.group)
     at = _mean([start, goal])
     arrows = [Arrow(part.id, (at, *map(_at, part.via), _at(part.goal))) for part in event.parts]
     places.update({arrow.id: (at, arrow.points[-1]) for arrow in arrows})
-    return Mark(number, event, at, (event.group,), tuple(part.id for part in event.parts), tuple(arrows))
+    return OrderMark(number, event, at, (event.group,), tuple(part.id for part in event.parts), tuple(arrows))
 
 
 def _served(event: QueueOrder, names: tuple[str, ...], places: dict[str, tuple[XY, XY]]) -> tuple[Arrow, ...]:
@@ -138,10 +138,3 @@ def _served(event: QueueOrder, names: tuple[str, ...], places: dict[str, tuple[X
     goal = _at(event.goal)
     places.update(dict.fromkeys(names, (event.at, goal)))
     return (Arrow("served", (event.at, goal)),)
-
-
-def slots(event: QueueOrder, count: int) -> tuple[XY, ...]:
-    """The first places of a queue, head first."""
-    angle = math.radians(event.direction_deg)
-    (x, y), step = event.at, event.spacing
-    return tuple((x + k * step * math.cos(angle), y + k * step * math.sin(angle)) for k in range(count))

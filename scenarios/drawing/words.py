@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from scenarios.schema.distribution import Distribution, Point, Value
 from scenarios.schema.scenario import GroupSpec, MergeOrder, Scenario, ScriptOrder, SplitOrder, When
+from scenarios.schema.values import Distribution, Point, Value
 
 AT_GOAL = {"stand": "stand there", "leave": "leave", "walk": "walk on"}
 

@@ -6,13 +6,12 @@ import math
 from collections.abc import Iterator
 from pathlib import Path
 
-from scenarios.drawing.plan_geometry import bounds, clearance, fits, fixed
-from scenarios.drawing.routes import slots
 from scenarios.errors import InputError
 from scenarios.loading.script_check import QUEUE_PEOPLE, check_script, fail
 from scenarios.loading.toml_files import nearest
-from scenarios.schema.distribution import Point
+from scenarios.schema.geometry import clearance, door_fits, queue_places
 from scenarios.schema.scenario import MergeOrder, QueueOrder, Scenario, SplitOrder, group_names
+from scenarios.schema.values import Point, bounds, fixed
 
 BODY = 0.2
 """m: nobody's middle can be closer to a wall or pillar (the physics radius)."""
@@ -36,7 +35,7 @@ def _check_world(scenario: Scenario) -> None:
         if wall[:2] == wall[2:]:
             fail(f"world.walls.{k}", "a wall of no length", "two different ends", "move one end")
     for k, door in enumerate(world.doors):
-        if not any(fits(door, wall) for wall in world.walls):
+        if not any(door_fits(door, wall) for wall in world.walls):
             got = f"a door {door.width:g} m wide at {list(door.at)}, where no wall holds it"
             fail(
                 f"world.doors.{k}", got, "an opening that lies on one wall", "move it onto a wall, or make it narrower"
@@ -117,7 +116,7 @@ def points(scenario: Scenario) -> Iterator[tuple[str, Point]]:
                 yield from ((f"{key}.parts.{part.id}.via.{k}", point) for k, point in enumerate(part.via))
             continue
         if isinstance(event, QueueOrder):
-            yield from ((f"{key}.at", slot) for slot in slots(event, QUEUE_PEOPLE))
+            yield from ((f"{key}.at", slot) for slot in queue_places(event, QUEUE_PEOPLE))
         else:
             yield from ((f"{key}.via.{k}", point) for k, point in enumerate(event.via))
         if event.goal is not None and not isinstance(event.goal, str):

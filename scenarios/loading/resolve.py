@@ -9,12 +9,12 @@ from pathlib import Path
 from scenarios.errors import InputError
 from scenarios.loading import overrides, suites, toml_files
 from scenarios.loading.geometry_check import check
-from scenarios.loading.toml_files import names, suite_names
-from scenarios.loading.toml_writing import dump
+from scenarios.loading.toml_files import dump, names, suite_names
 from scenarios.loading.validation import validate
+from scenarios.schema.observation import ObservationSpec
 from scenarios.schema.scenario import Scenario
 
-__all__ = ["Entry", "dump", "load", "names", "resolve", "suite_names"]
+__all__ = ["Entry", "dump", "load", "load_observation", "names", "resolve", "suite_names"]
 
 
 @dataclass(frozen=True)
@@ -37,6 +37,17 @@ def load(name_or_path: str | Path, set: Iterable[str] = ()) -> Scenario:
     """
     path = toml_files.find(name_or_path)
     return _build(path, tuple(set))
+
+
+def load_observation(path: str | Path | None = None, set: Iterable[str] = ()) -> ObservationSpec:
+    """The view of a file (None: all defaults) with every `key=value` of `set` applied; InputError otherwise."""
+    if path is not None and not Path(path).is_file():
+        raise InputError(
+            file=path, got="no such file", expected="a TOML file with [camera]", remedy="check --camera"
+        )  # fmt: skip
+    file = Path(path) if path is not None else ""
+    table, places = overrides.apply({} if path is None else toml_files.parse(Path(path)), tuple(set), file)
+    return validate(table, file, places, model=ObservationSpec)
 
 
 def resolve(name: str, set: Iterable[str] = ()) -> list[Entry]:
@@ -75,7 +86,7 @@ def _entries(path: Path, settings: tuple[str, ...]) -> list[Entry]:
     return entries
 
 
-def _load_line(line: suites.Line, path: Path, settings: tuple[str, ...]) -> Scenario:
+def _load_line(line: suites.SuiteLine, path: Path, settings: tuple[str, ...]) -> Scenario:
     try:
         return _build(toml_files.find(line.scenario, beside=path.parent), line.settings + settings)
     except InputError as error:

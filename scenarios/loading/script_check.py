@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from typing import NoReturn
 
-from scenarios.drawing.plan_geometry import bounds
 from scenarios.errors import InputError
 from scenarios.loading.toml_files import nearest
 from scenarios.schema.scenario import MergeOrder, QueueOrder, Scenario, ScriptOrder, SplitOrder, expand, group_names
+from scenarios.schema.values import bounds
 
 Size = tuple[float, float]
 QUEUE_PEOPLE = 3

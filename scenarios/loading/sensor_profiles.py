@@ -12,11 +12,10 @@ from typing import Literal
 from pydantic import Field
 
 from scenarios.errors import InputError
-from scenarios.loading.toml_files import Table, parse
-from scenarios.loading.toml_writing import value
+from scenarios.loading.toml_files import Table, parse, toml_value
 from scenarios.loading.validation import validate
-from scenarios.schema.model import Model
 from scenarios.schema.sensor import Sensor
+from scenarios.schema.values import Model
 
 
 class SensorFile(Model):
@@ -28,7 +27,7 @@ class SensorFile(Model):
 
 def sensor_settings(path: str | Path) -> tuple[str, ...]:
     """`sensor.key=value` for every key of the file; InputError where it is no sensor's table."""
-    return tuple(f"sensor.{key}={value(v)}" for key, v in sensor_table(path).items())
+    return tuple(f"sensor.{key}={toml_value(v)}" for key, v in sensor_table(path).items())
 
 
 def sensor_table(path: str | Path) -> Table:
@@ -49,5 +48,5 @@ def dump_sensor(sensor: Sensor, about: str = "") -> str:
     """The file of a sensor, every key that is there spelt out; about: comment lines above it."""
     table = sensor.model_dump(mode="python", exclude_none=True)
     lines = [f"# {line}".rstrip() for line in about.splitlines()]
-    rows = [f"{key} = {value(v)}" for key, v in table.items() if key != "hide" or v]
+    rows = [f"{key} = {toml_value(v)}" for key, v in table.items() if key != "hide" or v]
     return "\n".join([*lines, "schema = 1", "", "[sensor]", *rows, ""])

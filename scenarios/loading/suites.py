@@ -29,7 +29,7 @@ EXPECTED = {
 
 
 @dataclass(frozen=True)
-class Line:
+class SuiteLine:
     """One expanded entry, not loaded yet."""
 
     name: str
@@ -47,7 +47,7 @@ def find_suite(name: str) -> Path:
     raise InputError(got=repr(name), expected="a suite's name or file", remedy=nearest(name, suite_names()))
 
 
-def lines(path: Path) -> list[Line]:
+def lines(path: Path) -> list[SuiteLine]:
     """The expanded entries of a suite file, in its order."""
     table = parse(path)
     for key in table.keys() - {"about", "entry"}:
@@ -77,14 +77,14 @@ def about(path: Path) -> str:
     return str(parse(path).get("about", ""))
 
 
-def _expand(entry: Any, place: str, path: Path) -> Iterator[Line]:
+def _expand(entry: Any, place: str, path: Path) -> Iterator[SuiteLine]:
     _check(entry, place, path)
     name = entry.get("name", Path(entry["scenario"]).stem)
     settings = tuple(entry.get("set", ()))
     if "repeat" not in entry:
-        yield Line(name, entry["scenario"], settings, 0)
+        yield SuiteLine(name, entry["scenario"], settings, 0)
     for k in range(1, entry.get("repeat", 0) + 1):
-        yield Line(f"{name}-{k}", entry["scenario"], settings, k)
+        yield SuiteLine(f"{name}-{k}", entry["scenario"], settings, k)
 
 
 def _check(entry: Table, place: str, path: Path) -> None:

@@ -11,10 +11,11 @@ A file that says `extends = "base.toml"` (relative to itself, else in the catalo
 from __future__ import annotations
 
 import difflib
+import json
 import tomllib
 from collections.abc import Iterable
 from pathlib import Path
-from typing import Any
+from typing import Any, Protocol
 
 from scenarios.errors import InputError
 
@@ -152,3 +153,47 @@ def _merge_by_id(below: list[Table], above: list[Table]) -> list[Table]:
         else:
             rows[place] = merge(rows[place], row)
     return rows
+
+
+class _Dumps(Protocol):
+    """A pydantic model; a protocol, because this module does without importing pydantic."""
+
+    def model_dump(self, *, mode: str, by_alias: bool, exclude_none: bool) -> dict[str, Any]: ...
+
+
+def dump(scenario: _Dumps) -> str:
+    """The scenario, or another form of such tables, as TOML text."""
+    table = scenario.model_dump(mode="python", by_alias=True, exclude_none=True)
+    flat = [(k, v) for k, v in table.items() if not _is_table(v) and not _is_rows(v)]
+    blocks = [_lines(dict(flat))]
+    for key, value in table.items():
+        if _is_table(value):
+            blocks.append(f"[{key}]\n" + _lines(value))
+        elif _is_rows(value):
+            blocks += [f"[[{key}]]\n" + _lines(row) for row in value]
+    return "\n".join(blocks)
+
+
+def _is_table(value: Any) -> bool:
+    return isinstance(value, dict)
+
+
+def _is_rows(value: Any) -> bool:
+    return isinstance(value, tuple) and bool(value) and isinstance(value[0], dict)
+
+
+def _lines(table: dict[str, Any]) -> str:
+    return "".join(f"{key} = {toml_value(v)}\n" for key, v in table.items())
+
+
+def toml_value(v: Any) -> str:
+    """A value as TOML, on one line."""
+    if isinstance(v, bool):
+        return str(v).lower()
+    if isinstance(v, str):
+        return json.dumps(v, ensure_ascii=False).replace("\x7f", "\\u007f")
+    if isinstance(v, dict):
+        return "{ " + ", ".join(f"{key} = {toml_value(inner)}" for key, inner in v.items()) + " }"
+    if isinstance(v, tuple | list):
+        return "[" + ", ".join(map(toml_value, v)) + "]"
+    return repr(v)

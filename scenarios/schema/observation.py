@@ -9,19 +9,13 @@ schema = 1                  # may be left out, as any of the tables
 
 from __future__ import annotations
 
-from collections.abc import Iterable
-from pathlib import Path
 from typing import Literal
 
 from pydantic import Field
 
-from scenarios.errors import InputError
-from scenarios.loading.overrides import apply
-from scenarios.loading.toml_files import parse
-from scenarios.loading.validation import validate
-from scenarios.schema.model import Model, NonNegative, Positive
 from scenarios.schema.scenario import CameraSpec, Light, Picture
 from scenarios.schema.sensor import Sensor
+from scenarios.schema.values import Model, NonNegative, Positive
 
 
 class ObservationSpec(Model):
@@ -58,14 +52,3 @@ class ReplaySpec(ObservationSpec):
 
     name: str
     replay: ReplayOrigin
-
-
-def load_observation(path: str | Path | None = None, set: Iterable[str] = ()) -> ObservationSpec:
-    """The view of a file (None: all defaults) with every `key=value` of `set` applied; InputError otherwise."""
-    if path is not None and not Path(path).is_file():
-        raise InputError(
-            file=path, got="no such file", expected="a TOML file with [camera]", remedy="check --camera"
-        )  # fmt: skip
-    file = Path(path) if path is not None else ""
-    table, places = apply({} if path is None else parse(Path(path)), tuple(set), file)
-    return validate(table, file, places, model=ObservationSpec)

@@ -1,7 +1,7 @@
 """The strict form of a scenario file: frozen pydantic models, SI units, degrees.
 
 Field descriptions are the documentation: `flockscope scenarios --schema` and docs/scenarios.md print them.
-A value may be a number or a distribution (scenarios.schema.distribution); all are drawn once per seed.
+A value may be a number or a distribution (scenarios.schema.values); all are drawn once per seed.
 """
 
 from __future__ import annotations
@@ -10,10 +10,20 @@ from typing import Annotated, Literal, Self
 
 from pydantic import Field, model_validator
 
-from scenarios.schema.distribution import Distribution, Point, Value
-from scenarios.schema.model import Fixed, Model, Name, NonNegative, Pattern, Positive, Share
 from scenarios.schema.sensor import Hide as Hide
 from scenarios.schema.sensor import Sensor as Sensor
+from scenarios.schema.values import (
+    Distribution,
+    Fixed,
+    Model,
+    Name,
+    NonNegative,
+    Pattern,
+    Point,
+    Positive,
+    Share,
+    Value,
+)
 
 FREE_SPEED = Distribution(normal=(1.34, 0.26), clip=(0.5, 2.2))
 GROUP_SIZE = Distribution(poisson=1.1, clip=(1, 12))

@@ -11,7 +11,7 @@ from typing import Annotated, Literal, Self
 
 from pydantic import Field, model_validator
 
-from scenarios.schema.model import Model, Name, NonNegative, Positive, Share
+from scenarios.schema.values import Model, Name, NonNegative, Positive, Share
 
 Curve = Annotated[tuple[Share, ...], Field(min_length=2)]
 Spread = tuple[float, NonNegative]

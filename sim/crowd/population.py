@@ -11,8 +11,8 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from scenarios.errors import InputError
-from scenarios.schema.distribution import Distribution, Point, draw
 from scenarios.schema.scenario import GroupSpec, Scenario, group_names
+from scenarios.schema.values import Distribution, Point, draw
 from sim.crowd.formation import place, walking
 from sim.rng import rng
 from sim.types import Array, Scene

@@ -7,8 +7,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from scenarios.schema.distribution import draw
 from scenarios.schema.scenario import MergeOrder, QueueOrder, Scenario, SplitOrder, expand
+from scenarios.schema.values import draw
 from sim.crowd.formation import assign, place, standing, walking
 from sim.crowd.meeting import meeting_point, part_sizes, share_out
 from sim.crowd.navigation import Navigator

@@ -16,7 +16,8 @@ from pathlib import Path
 import numpy as np
 
 from scenarios.errors import InputError
-from scenarios.schema.observation import ObservationSpec, ReplayOrigin, ReplaySpec, load_observation
+from scenarios.loading.resolve import load_observation
+from scenarios.schema.observation import ObservationSpec, ReplayOrigin, ReplaySpec
 from sim.crowd.heading import headings
 from sim.dataset.trajectories import Trajectories, nearest_row, resample
 from sim.hashing import canonical_hash
@@ -53,8 +54,8 @@ def replay(
 ) -> Sequence:
     """A recording's people before our camera: a labelled sequence like any other.
 
-    camera: an ObservationSpec, or a file of one (scenarios.schema.observation), None for the usual one. calibration: of a
-    recording that has
+    camera: an ObservationSpec, or a file of one (scenarios.schema.observation), None for the usual one.
+    calibration: of a recording that has
     boxes only, to put their feet on the ground. streams: as for `simulate`. `sequence.source["origin"]` says whose
     motion it is. InputError where a source has no places on the ground, several sequences, or nobody in the cut, and
     where somebody is out of view.
@@ -211,8 +212,8 @@ def _intent(moving: Trajectories, truth: Truth, fps: float, cut: Cut) -> Ints:
 
 def _heights(people: Ints, truth: Truth, seed: int) -> Array:
     """(P,) m: as labelled, else drawn as for simulated crowds, keyed by the person."""
-    from scenarios.schema.distribution import draw
     from scenarios.schema.scenario import CrowdSpec
+    from scenarios.schema.values import draw
 
     drawn = [draw(CrowdSpec().height, rng(seed, "person", int(one))) for one in people]
     if truth.height is None:

@@ -9,7 +9,7 @@ from typing import Any, cast
 
 from scenarios.errors import InputError
 from scenarios.loading.resolve import Entry
-from scenarios.loading.toml_writing import dump
+from scenarios.loading.toml_files import dump
 from scenarios.schema.observation import ObservationSpec, ReplaySpec
 from sim.dataset.generate import write_seqmap
 from sim.dataset.replay import WHOLE, Cut, resolved

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from scenarios.errors import InputError
-from scenarios.schema.distribution import draw
+from scenarios.schema.values import draw
 from sim.render.background import scale, sight, solids
 from sim.render.random_fields import Waves, relaxing, swaying
 from sim.rng import rng

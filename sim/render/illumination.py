@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from scenarios.errors import InputError
-from scenarios.schema.distribution import draw
+from scenarios.schema.values import draw
 from sim.render.random_fields import Waves, passing, relaxing
 from sim.rng import rng
 from sim.types import Array

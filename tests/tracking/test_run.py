@@ -104,7 +104,7 @@ def test_hiding_a_group_by_its_name(tmp_path):
     """Simulated and stored alike: the script's own groups, and those that its orders made."""
     import sim
     from scenarios import load
-    from scenarios.loading.toml_writing import dump
+    from scenarios.loading.toml_files import dump
     from sim.io.store.sequence_folder import open_sequence, write_sequence
 
     scenario = load("merge")

@@ -8,10 +8,11 @@ from pathlib import Path
 import pytest
 
 from scenarios.drawing.explain import svg, text
-from scenarios.drawing.routes import courses, marks, middle, slots, spread
+from scenarios.drawing.routes import group_routes, middle, order_marks, spread
 from scenarios.drawing.words import number, order, trigger
 from scenarios.loading.resolve import load, names
-from scenarios.schema.distribution import Distribution
+from scenarios.schema.geometry import queue_places
+from scenarios.schema.values import Distribution
 
 SVG = "{http://www.w3.org/2000/svg}"
 
@@ -92,14 +93,14 @@ def test_stairs_service_and_turn(path: Path) -> None:
 
 def test_marks_follow_the_script(path: Path) -> None:
     scenario = load(path)
-    merge, split, queue = marks(scenario)
+    merge, split, queue = order_marks(scenario)
     assert (merge.before, merge.after) == (("a", "b"), ("ab",))
     assert merge.arrows[0].points[-1] == (8, 6)
     assert [arrow.points[-1] for arrow in split.arrows] == [(14, 5), (8, 8)]
     assert queue.before == ("w-1", "w-2", "w-3", "c")
     assert len(queue.slots) == 4  # those inside the world
-    assert slots(scenario.event[2], 2)[1] == pytest.approx((12, 7.8))  # type: ignore[arg-type]
-    assert [c.repeat for c in courses(scenario)] == [1, 1, 3]
+    assert queue_places(scenario.event[2], 2)[1] == pytest.approx((12, 7.8))  # type: ignore[arg-type]
+    assert [c.repeat for c in group_routes(scenario)] == [1, 1, 3]
 
 
 @pytest.mark.parametrize(

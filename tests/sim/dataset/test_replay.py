@@ -9,8 +9,8 @@ import pytest
 
 import sim
 from scenarios.errors import InputError
-from scenarios.loading.resolve import load
-from scenarios.schema.observation import ObservationSpec, load_observation
+from scenarios.loading.resolve import load, load_observation
+from scenarios.schema.observation import ObservationSpec
 from sim.dataset.replay import Cut, replay
 from sim.io.formats.biwi import open_folder
 from sim.io.formats.real_or_simulated import is_real

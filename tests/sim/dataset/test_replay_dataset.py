@@ -8,8 +8,7 @@ from pathlib import Path
 import pytest
 
 from scenarios.errors import InputError
-from scenarios.loading.resolve import load
-from scenarios.schema.observation import load_observation
+from scenarios.loading.resolve import load, load_observation
 from sim.dataset.replay import Cut
 from sim.dataset.replay_dataset import How, store_replays
 from sim.io.formats.biwi import open_folder

@@ -26,7 +26,7 @@ def replay(
     part: Part, camera: Path | None, seeds: str, out: Path, settings: list[str], streams: str, images: str | None
 ) -> Answer:
     """Every recording of the source with every seed; settings: of camera, sensor, light and picture."""
-    from scenarios.schema.observation import load_observation
+    from scenarios.loading.resolve import load_observation
     from sim.dataset.replay import Cut
     from sim.dataset.replay_dataset import How, store_replays
     from sim.io.source import open_source

@@ -7,12 +7,26 @@ included), so that a clipped distribution has no spikes at its ends.
 
 from __future__ import annotations
 
+import math
 from typing import Annotated, Self
 
 import numpy as np
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 
 MAX_REDRAWS = 10_000
+
+Positive = Annotated[float, Field(gt=0)]
+NonNegative = Annotated[float, Field(ge=0)]
+Share = Annotated[float, Field(ge=0, le=1)]
+Name = Annotated[str, Field(pattern=r"^[A-Za-z][A-Za-z0-9_.-]*$")]
+Pattern = Annotated[str, Field(pattern=r"^[A-Za-z][A-Za-z0-9_.-]*\*?$")]
+Fixed = tuple[float, float]
+
+
+class Model(BaseModel):
+    """Frozen, strict about keys, no infinities."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False, populate_by_name=True)
 
 
 class Distribution(BaseModel):
@@ -68,3 +82,22 @@ Point = tuple[Value, Value]
 def draw(value: Value, rng: np.random.Generator) -> float:
     """The number, or one draw of the distribution."""
     return value.draw(rng) if isinstance(value, Distribution) else float(value)
+
+
+def bounds(value: Value) -> tuple[float, float]:
+    """The least and greatest number that a value can draw; infinite where nothing bounds it."""
+    if not isinstance(value, Distribution):
+        return float(value), float(value)
+    if value.uniform is not None:
+        low, high = value.uniform
+    elif value.choice is not None:
+        low, high = min(value.choice), max(value.choice)
+    else:
+        low, high = (-math.inf if value.normal is not None else 0.0), math.inf
+    return (low, high) if value.clip is None else (max(low, value.clip[0]), min(high, value.clip[1]))
+
+
+def fixed(point: Point) -> tuple[float, float] | None:
+    """The point where it is two numbers, None where anything is drawn."""
+    x, y = point
+    return None if isinstance(x, Distribution) or isinstance(y, Distribution) else (float(x), float(y))

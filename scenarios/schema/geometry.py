@@ -5,33 +5,14 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 
-from scenarios.schema.distribution import Distribution, Point, Value
-from scenarios.schema.scenario import DoorSpec, WorldSpec
+from scenarios.schema.scenario import DoorSpec, QueueOrder, WorldSpec
+from scenarios.schema.values import Fixed
 
 Segment = tuple[float, float, float, float]
 DOOR_TOLERANCE = 0.05
 
 
-def bounds(value: Value) -> tuple[float, float]:
-    """The least and greatest number that a value can draw; infinite where nothing bounds it."""
-    if not isinstance(value, Distribution):
-        return float(value), float(value)
-    if value.uniform is not None:
-        low, high = value.uniform
-    elif value.choice is not None:
-        low, high = min(value.choice), max(value.choice)
-    else:
-        low, high = (-math.inf if value.normal is not None else 0.0), math.inf
-    return (low, high) if value.clip is None else (max(low, value.clip[0]), min(high, value.clip[1]))
-
-
-def fixed(point: Point) -> tuple[float, float] | None:
-    """The point where it is two numbers, None where anything is drawn."""
-    x, y = point
-    return None if isinstance(x, Distribution) or isinstance(y, Distribution) else (float(x), float(y))
-
-
-def along(wall: Segment, point: tuple[float, float]) -> tuple[float, float]:
+def along(wall: Segment, point: Fixed) -> Fixed:
     """Where a point is beside a wall: metres along it from its first end, and metres off its line."""
     x, y = point[0] - wall[0], point[1] - wall[1]
     length = math.dist(wall[:2], wall[2:])
@@ -41,20 +22,20 @@ def along(wall: Segment, point: tuple[float, float]) -> tuple[float, float]:
     return x * ex + y * ey, abs(x * ey - y * ex)
 
 
-def fits(door: DoorSpec, wall: Segment) -> bool:
+def door_fits(door: DoorSpec, wall: Segment) -> bool:
     """Whether the whole opening lies on this wall."""
     s, off = along(wall, door.at)
     length = math.dist(wall[:2], wall[2:])
     return off <= DOOR_TOLERANCE and door.width / 2 <= s + 1e-9 and s + door.width / 2 <= length + 1e-9
 
 
-def solid(world: WorldSpec) -> Iterator[Segment]:
+def walls_without_doors(world: WorldSpec) -> Iterator[Segment]:
     """The walls without their doors."""
     for wall in world.walls:
         length = math.dist(wall[:2], wall[2:])
         ex, ey = ((wall[2] - wall[0]) / length, (wall[3] - wall[1]) / length) if length else (0.0, 0.0)
         start = 0.0
-        openings = sorted((along(wall, d.at)[0], d.width / 2) for d in world.doors if fits(d, wall))
+        openings = sorted((along(wall, d.at)[0], d.width / 2) for d in world.doors if door_fits(d, wall))
         for s, half in [*openings, (length, 0.0)]:
             if s - half > start or not openings:
                 end = s - half
@@ -62,13 +43,20 @@ def solid(world: WorldSpec) -> Iterator[Segment]:
             start = s + half
 
 
-def clearance(point: tuple[float, float], world: WorldSpec) -> tuple[float, str]:
+def clearance(point: Fixed, world: WorldSpec) -> tuple[float, str]:
     """Metres from a point to the nearest wall or pillar (negative inside a pillar), and what that is."""
     best = (math.inf, "nothing")
-    for wall in solid(world):
+    for wall in walls_without_doors(world):
         s, off = along(wall, point)
         beyond = max(-s, s - math.dist(wall[:2], wall[2:]), 0.0)
         best = min(best, (math.hypot(off, beyond), f"the wall {[round(v, 2) for v in wall]}"))
     for x, y, radius in world.pillars:
         best = min(best, (math.dist(point, (x, y)) - radius, f"the pillar {[x, y, radius]}"))
     return best
+
+
+def queue_places(event: QueueOrder, count: int) -> tuple[Fixed, ...]:
+    """The first places of a queue, head first."""
+    angle = math.radians(event.direction_deg)
+    (x, y), step = event.at, event.spacing
+    return tuple((x + k * step * math.cos(angle), y + k * step * math.sin(angle)) for k in range(count))
