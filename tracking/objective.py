@@ -14,7 +14,7 @@ from functools import cached_property
 
 import numpy as np
 
-from sim.geometry.footprints import Q
+from sim.geometry.footprints import FOOTPRINT
 from sim.geometry.polygons import iou_pairs, pack
 from sim.truth.merge_split_rules import frames_of
 from sim.types import Array, Bools, Ints, Tracks, Truth
@@ -38,7 +38,7 @@ NEAR = 1e-6
 """An overlap so near 0.5 is looked at more closely."""
 FLAT = 1e-12
 """Of a polygon's size squared: a right turn smaller than this is rounding."""
-DISC = np.roll(Q, -int(Q[:, 1].argmin()), axis=0)
+DISC = np.roll(FOOTPRINT, -int(FOOTPRINT[:, 1].argmin()), axis=0)
 """A footprint from its lowest vertex on."""
 
 

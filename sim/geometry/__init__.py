@@ -1,1 +1,1 @@
-"""Plane geometry: polygons, convex hulls, footprints, and joining numbers into sets."""
+"""Plane geometry: polygons, convex hulls, footprints of people, and a union-find for labelling connected sets."""

@@ -1,7 +1,8 @@
-"""Hulls of footprints: the ground that groups cover, for a whole sequence at once.
+"""Hulls of footprints: the ground that groups of people cover, for all groups of a sequence at once.
 
-A footprint is a 16-gon Q on a disc of 0.25 m. The hull of the members' footprints is the Minkowski sum of Q and the
-hull of the members' places: p_i + q_k is a vertex of it where the normal cones of p_i and q_k share an angle.
+The footprint of a person is FOOTPRINT, a regular 16-gon on a circle of 0.25 m. The hull of a group is the convex hull
+of its members' footprints. It equals the Minkowski sum of the 16-gon Q and the hull P of the members' positions:
+p_i + q_k is a vertex of the sum where the normal cones of p_i and q_k share an angle.
 """
 
 from __future__ import annotations
@@ -11,72 +12,84 @@ from itertools import pairwise
 
 import numpy as np
 
-from sim.geometry.polygons import FOOTPRINT, SIDES
 from sim.types import Array, Ints
 
-STEP = 2 * np.pi / SIDES
-Q = FOOTPRINT * np.stack([np.cos(STEP * np.arange(SIDES)), np.sin(STEP * np.arange(SIDES))], axis=1)
-CONES = STEP * (np.arange(SIDES) - 0.5)  # where the normal cone of each vertex of Q begins; all are STEP wide
-CHUNK = 512  # groups worked on at once
-FLAT = 1e-9  # rad: a narrower cone is a rounding error, its vertex lies on an edge
+FOOTPRINT_RADIUS = 0.25  # m
+FOOTPRINT_SIDES = 16
+STEP = 2 * np.pi / FOOTPRINT_SIDES  # rad: width of the normal cone of each footprint vertex
+FOOTPRINT = FOOTPRINT_RADIUS * np.stack(
+    [np.cos(STEP * np.arange(FOOTPRINT_SIDES)), np.sin(STEP * np.arange(FOOTPRINT_SIDES))], axis=1
+)  # (16, 2) m, counter-clockwise, round the origin
+CONES = STEP * (np.arange(FOOTPRINT_SIDES) - 0.5)  # rad: the angle at which each vertex's normal cone begins
+CHUNK = 512  # groups per pass
+FLAT = 1e-9  # rad: a narrower cone is a rounding error, and its vertex lies on an edge
 
 
 def footprint_hull(pos: Array) -> Array:
-    """(V, 2) hull of the footprints of people at pos (N, 2)."""
+    """Return the hull (V, 2) m, counter-clockwise, of the footprints of the people at pos (N, 2) m.
+
+    (0, 2) if nobody is given.
+    """
     pos = np.asarray(pos, float).reshape(-1, 2)
     return footprint_hulls(pos, np.array([len(pos)]))[0]
 
 
-def place_hulls(pos: Array, count: Ints) -> list[Array]:
-    """Like `footprint_hulls`, of the places themselves; vertices may be repeated."""
-    hulls: list[Array] = [np.zeros((0, 2))] * len(count)
-    for rows, members in _by_size(pos, count):
-        for row, hull in zip(rows, _wrap(members)[0], strict=True):
-            hulls[row] = hull
-    return hulls
-
-
 def footprint_hulls(pos: Array, count: Ints) -> list[Array]:
-    """One hull (V, 2) per group: pos (R, 2) holds the members of one group after the other, count (G,) > 0 each."""
+    """Return one hull (V, 2) m per group, counter-clockwise: the hull of its members' footprints.
+
+    pos (R, 2) m holds the members of group 0, then those of group 1, and so on; count (G,) is the number of members of
+    each group. The hull of a group without members is (0, 2).
+    """
     hulls: list[Array] = [np.zeros((0, 2))] * len(count)
-    for rows, members in _by_size(pos, count):
-        for row, hull in zip(rows, _minkowski(*_wrap(members)), strict=True):
-            hulls[row] = hull
+    for groups, members in _groups_of_equal_size(pos, count):
+        for group, hull in zip(groups, _minkowski_sums(*_gift_wrap(members)), strict=True):
+            hulls[group] = hull
     return hulls
 
 
-def _by_size(pos: Array, count: Ints) -> Iterator[tuple[Ints, Array]]:
-    """Groups of equal size together: their numbers (G,), places (G, n, 2); so few that their tables stay in the
-    cache."""
+def position_hulls(pos: Array, count: Ints) -> list[Array]:
+    """Return one hull (V, 2) m per group: the hull of its members' positions, without footprints.
+
+    Arguments as for `footprint_hulls`. A vertex may be repeated. A group without members has (0, 2).
+    """
+    hulls: list[Array] = [np.zeros((0, 2))] * len(count)
+    for groups, members in _groups_of_equal_size(pos, count):
+        for group, hull in zip(groups, _gift_wrap(members)[0], strict=True):
+            hulls[group] = hull
+    return hulls
+
+
+def _groups_of_equal_size(pos: Array, count: Ints) -> Iterator[tuple[Ints, Array]]:
+    """Yield groups of equal size n together: their indices (G,) and positions (G, n, 2), at most CHUNK groups."""
     first = np.cumsum(count) - count
     for n in np.unique(count[count > 0]):
         every = np.flatnonzero(count == n)
         for low in range(0, len(every), CHUNK):
-            rows = every[low : low + CHUNK]
-            yield rows, pos[first[rows, None] + np.arange(n)]
+            groups = every[low : low + CHUNK]
+            yield groups, pos[first[groups, None] + np.arange(n)]
 
 
-def _wrap(pos: Array) -> tuple[Array, Array, Array]:
-    """Convex hulls of G sets of n points (G, n, 2) by gift wrapping, all sets in step.
+def _gift_wrap(pos: Array) -> tuple[Array, Array, Array]:
+    """Return the convex hulls of G sets of n points (G, n, 2), by gift wrapping all sets in step.
 
-    The way round begins where the normal cone of q_0 does, so that none of Q's cones lies across its ends.
-
-    Returns vertices (G, V, 2), the start of each one's normal cone (G, V) and the cone's width (G, V), 0 for padding.
+    Returns vertices (G, V, 2), the angle at which each vertex's normal cone begins (G, V) rad, and the width of that
+    cone (G, V) rad. Padding vertices repeat the last vertex and have width 0. Each walk round a hull begins where the
+    normal cone of footprint vertex 0 begins, so that no footprint cone lies across both ends of the walk.
     """
     rows, n = np.arange(len(pos)), pos.shape[1]
     now = (pos @ np.array([np.cos(CONES[0]), np.sin(CONES[0])])).argmax(axis=1)
     facing = np.full(len(pos), CONES[0] + np.pi / 2)  # direction of the edge that arrives at `now`
     turned = np.zeros(len(pos))
     vertex, start, width = [], [], []
-    for _ in range(n + 1):  # the first comes again as the last, with the rest of its cone
+    for _ in range(n + 1):  # the first vertex comes again as the last one, with the rest of its cone
         arm = pos - pos[rows, now][:, None]
-        there = (arm != 0).any(axis=2)
+        elsewhere = (arm != 0).any(axis=2)
         turn = np.arctan2(arm[..., 1], arm[..., 0]) - facing[:, None]
-        turn = (turn + np.pi / 2) % (2 * np.pi) - np.pi / 2  # a hair to the right is straight on, not all the way round
-        turn = np.where(there, np.maximum(turn, 0.0), np.inf)
+        turn = (turn + np.pi / 2) % (2 * np.pi) - np.pi / 2  # a rounding error to the right is straight on
+        turn = np.where(elsewhere, np.maximum(turn, 0.0), np.inf)
         least = turn.min(axis=1)
         furthest = np.where(turn <= least[:, None] + FLAT, (arm**2).sum(axis=2), -1.0).argmax(axis=1)
-        # The last vertex is where the way round is complete; one place alone turns all the way.
+        # The last vertex is where the turn is complete; a single position turns all the way.
         done = turned + least > 2 * np.pi - FLAT
         cone = np.where(done, 2 * np.pi - turned, least)
         vertex.append(pos[rows, now])
@@ -87,9 +100,12 @@ def _wrap(pos: Array) -> tuple[Array, Array, Array]:
     return np.stack(vertex, axis=1), np.stack(start, axis=1), np.stack(width, axis=1)
 
 
-def _minkowski(p: Array, start: Array, width: Array) -> list[Array]:
-    """Vertices of p_i + q_k in the order of their normals, for each of G sets."""
-    after = (CONES - start[..., None]) % (2 * np.pi)  # (G, V, SIDES): from where p_i's cone begins to q_k's
+def _minkowski_sums(p: Array, start: Array, width: Array) -> list[Array]:
+    """Return the vertices p_i + q_k in the order of their normals, one array (V, 2) for each of G hulls.
+
+    p (G, V, 2), start (G, V) and width (G, V) are the result of `_gift_wrap`.
+    """
+    after = (CONES - start[..., None]) % (2 * np.pi)  # (G, V, 16): angle from the start of p_i's cone to that of q_k's
     before = 2 * np.pi - after
     begins_inside = after < width[..., None]
     shared = np.where(
@@ -97,7 +113,7 @@ def _minkowski(p: Array, start: Array, width: Array) -> list[Array]:
     )
     turned = (start - start[:, :1])[..., None]
     key = np.where(shared > FLAT, turned + np.where(begins_inside, after, 0.0), np.inf).reshape(len(p), -1)
-    corner = (p[:, :, None] + Q).reshape(len(p), -1, 2)
+    corner = (p[:, :, None] + FOOTPRINT).reshape(len(p), -1, 2)
     order = np.argsort(key, axis=1)
     used = np.arange(key.shape[1]) < np.isfinite(key).sum(axis=1)[:, None]
     group, _ = np.nonzero(used)

@@ -1,4 +1,4 @@
-"""Compiled convex hulls of many point sets at once; the one-at-a-time twin is sim.geometry.polygons.convex_hull."""
+"""Compiled convex hulls of many point sets at once. `sim.geometry.polygons.convex_hull` computes a single hull."""
 
 from __future__ import annotations
 
@@ -10,16 +10,17 @@ from numba import njit
 from sim.types import Array
 
 
-def hulls(sets: Sequence[Array]) -> tuple[Array, ...]:
-    """(V, 2) convex hull of each set of points (K, 2), as sim.geometry.polygons.convex_hull has it; (0, 2) of one
-    with a nan.
+def convex_hulls(sets: Sequence[Array]) -> tuple[Array, ...]:
+    """Return the convex hull (V, 2) of each set of points (K, 2), with the vertices that `polygons.convex_hull` gives.
+
+    The hull of an empty set, and of a set that contains a nan, is (0, 2).
     """
     count = np.array([len(points) for points in sets], np.int64)
     if not count.any():
         return tuple(np.zeros((0, 2)) for _ in sets)
-    points, of = np.concatenate(sets), np.repeat(np.arange(len(sets)), count)
-    order = np.lexsort((points[:, 1], points[:, 0], of))
-    vertices, ends = chains(points[order], np.concatenate([[0], np.cumsum(count)]))
+    points, owner = np.concatenate(sets), np.repeat(np.arange(len(sets)), count)
+    order = np.lexsort((points[:, 1], points[:, 0], owner))
+    vertices, ends = monotone_chains(points[order], np.concatenate([[0], np.cumsum(count)]))
     return tuple(np.split(vertices, ends[:-1]))
 
 
@@ -29,10 +30,11 @@ def _turns_left(a, b, c):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True)
-def chains(points, cuts):  # type: ignore[no-untyped-def]
-    """Hulls of points[cuts[g]:cuts[g + 1]], each sorted by x, then y: Andrew's monotone chain, counter-clockwise.
+def monotone_chains(points, cuts):  # type: ignore[no-untyped-def]
+    """Return the hulls of G point sets by Andrew's monotone chain, each counter-clockwise from its leftmost point.
 
-    Returns the vertices of all one after the other (V, 2) and where each hull ends (G,); a set with a nan has none.
+    Set g is points[cuts[g]:cuts[g + 1]], sorted by x, then y; points (N, 2), cuts (G + 1,). Returns the vertices of all
+    hulls one after the other (V, 2), and the index at which each hull ends (G,). A set with a nan has no vertices.
     """
     out = np.empty((2 * len(points) + 2, 2))
     ends = np.empty(len(cuts) - 1, np.int64)
@@ -52,6 +54,6 @@ def chains(points, cuts):  # type: ignore[no-untyped-def]
                     n -= 1
                 out[n] = points[i]
                 n += 1
-            n -= last > first + 1  # the last is the first again
+            n -= last > first + 1  # the chain ends with its first vertex: drop the repetition
         ends[g] = n
     return out[:n].copy(), ends

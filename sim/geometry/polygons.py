@@ -1,7 +1,8 @@
-"""Convex polygons on a plane: hulls, areas, overlaps, gaps, footprints; many at once.
+"""Convex polygons in the plane: hull, area, overlap (IoU), distance, point-in-polygon; many pairs at once.
 
-A polygon is (V, 2), counter-clockwise in (x, y), not closed, no three vertices on a line; fewer than 3 vertices have no
-area. `Hulls` packs N of them, so that K pairs are compared in one go.
+A polygon is an array (V, 2) of vertices, counter-clockwise in (x, y), not closed, without three vertices on a line.
+With fewer than 3 vertices it has no area. `PackedPolygons` holds N polygons in one array, so that the `*_pairs`
+functions compare K pairs in one call. Lengths may have any unit; results have the same unit.
 """
 
 from __future__ import annotations
@@ -13,15 +14,17 @@ import numpy as np
 
 from sim.types import Array, Bools, Ints
 
-FOOTPRINT = 0.25  # m, radius of a person's footprint
-SIDES = 16  # vertices of a footprint, on the circle
-ON = 1e-9  # of a polygon's size: closer than this to an edge is on it
-CHUNK = 4096  # pairs compared at once: their tables stay in the cache
+EDGE_TOLERANCE = 1e-9  # a point closer to an edge than this share of the polygons' size is on the edge
+CHUNK = 4096  # pairs per pass: their arrays stay in the cache
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Hulls:
-    """N polygons: vertex (N, V, 2), the last vertex repeated where fewer; box (N, 4) min x, min y, max x, max y."""
+class PackedPolygons:
+    """N polygons in arrays of equal width.
+
+    vertex (N, V, 2): the last vertex is repeated up to V; nan for a polygon without vertices.
+    box (N, 4): min x, min y, max x, max y. area (N,): signed, negative if clockwise, 0 without vertices.
+    """
 
     vertex: Array
     box: Array
@@ -31,27 +34,27 @@ class Hulls:
         return len(self.vertex)
 
 
-def pack(polygons: Sequence[Array], width: int = 1) -> Hulls:
-    """Polygons ready for `iou_pairs` and `gap_pairs`, at least `width` vertices each.
+def pack(polygons: Sequence[Array], width: int = 1) -> PackedPolygons:
+    """Pack polygons (V, 2) for the `*_pairs` functions, each padded to at least `width` vertices.
 
-    One without vertices is nowhere (nan) and meets nothing.
+    A polygon without vertices becomes nan; it overlaps nothing, and its distance to anything is nan.
     """
     count = np.array([len(p) for p in polygons], np.int64)
     flat = np.concatenate([*(np.asarray(p, float).reshape(-1, 2) for p in polygons), [[np.nan, np.nan]]])
     first = np.cumsum(count) - count
     width = int(count.max(initial=width))
     place = first[:, None] + np.minimum(np.arange(width), np.maximum(count - 1, 0)[:, None])
-    return packed(flat[np.where(count[:, None] > 0, place, len(flat) - 1)])
+    return pack_padded(flat[np.where(count[:, None] > 0, place, len(flat) - 1)])
 
 
-def packed(vertex: Array) -> Hulls:
-    """Hulls of vertices (N, V, 2) that are already padded."""
+def pack_padded(vertex: Array) -> PackedPolygons:
+    """Pack polygons whose vertices (N, V, 2) are already padded by repeating the last one."""
     box = np.concatenate([vertex.min(axis=1), vertex.max(axis=1)], axis=1)
-    return Hulls(vertex, box, np.nan_to_num(_shoelace(vertex)))
+    return PackedPolygons(vertex, box, np.nan_to_num(_shoelace(vertex)))
 
 
 def _shoelace(vertex: Array) -> Array:
-    """Signed area (N,) of (N, V, 2); relative to the first vertex, for the numerics of places far from the origin."""
+    """Signed area (N,) of (N, V, 2), computed relative to the first vertex: exact far from the origin, too."""
     p = vertex - vertex[:, :1]
     return np.asarray(0.5 * _cross(p, np.roll(p, -1, axis=1)).sum(axis=1))
 
@@ -62,12 +65,16 @@ def _cross(a: Array, b: Array) -> Array:
 
 
 def area(polygon: Array) -> float:
-    """Area of one polygon."""
+    """Return the signed area of one polygon (V, 2): negative if clockwise, 0 with fewer than 3 vertices."""
     return float(_shoelace(np.asarray(polygon, float)[None])[0]) if len(polygon) > 2 else 0.0
 
 
 def convex_hull(points: Array) -> Array:
-    """(V, 2) hull of points (N, 2), counter-clockwise from the leftmost (lowest of those); Andrew's monotone chain."""
+    """Return the convex hull (V, 2) of points (N, 2), counter-clockwise, by Andrew's monotone chain.
+
+    The first vertex is the leftmost point, the lowest of several. Repeated points and points on an edge are dropped:
+    points on one line give its two ends, no points give (0, 2).
+    """
     rows = sorted(set(map(tuple, np.asarray(points, float).tolist())))
     if len(rows) < 3:
         return np.array(rows, float).reshape(-1, 2)
@@ -76,6 +83,7 @@ def convex_hull(points: Array) -> Array:
 
 
 def _chain(rows: list[tuple[float, ...]]) -> list[tuple[float, ...]]:
+    """Lower half of the hull of points sorted by x, then y (the upper half, if sorted backwards)."""
     kept: list[tuple[float, ...]] = []
     for x, y in rows:
         while len(kept) > 1:
@@ -87,13 +95,13 @@ def _chain(rows: list[tuple[float, ...]]) -> list[tuple[float, ...]]:
     return kept
 
 
-def intersection_pairs(a: Hulls, b: Hulls, i: Ints, j: Ints) -> Array:
-    """Common area (K,) of polygons a[i[k]] and b[j[k]].
+def intersection_pairs(a: PackedPolygons, b: PackedPolygons, i: Ints, j: Ints) -> Array:
+    """Return the area (K,) that polygons a[i[k]] and b[j[k]] have in common; 0 if either has no positive area.
 
-    The common part of two convex polygons is the hull of what each one's edges have inside the other: of a's edges
-    clipped to b (Cyrus & Beck), and b's vertices inside a. These lie in convex position, so sorting by the angle round
-    their middle orders them; a point counted twice or a hair outside costs a hair, which clipping edge by edge
-    does not promise where edges coincide.
+    The common part is the convex hull of two kinds of points: the ends of a's edges clipped to b (Cyrus & Beck), and
+    the vertices of b inside a. These points are in convex position, so sorting them by angle round their mean orders
+    them. A point counted twice, or off by a rounding error, changes the area by a rounding error; clipping edge by edge
+    does not promise that where edges coincide.
     """
     common = np.zeros(len(i))
     near = (a.box[i, :2] < b.box[j, 2:]).all(axis=1) & (b.box[j, :2] < a.box[i, 2:]).all(axis=1)
@@ -105,21 +113,21 @@ def intersection_pairs(a: Hulls, b: Hulls, i: Ints, j: Ints) -> Array:
 
 
 def _common_area(a: Array, b: Array) -> Array:
-    """Common area (K,) of (K, V, 2) and (K, W, 2)."""
+    """Common area (K,) of polygons (K, V, 2) and (K, W, 2)."""
     origin = a[:, :1]
     a, b = a - origin, b - origin
     size = np.abs(np.concatenate([a, b], axis=1)).max(axis=(1, 2))
-    slack = ON * size[:, None, None] ** 2
+    slack = EDGE_TOLERANCE * size[:, None, None] ** 2
     enter, leave = _clip(a, b, slack)
     edge = np.roll(a, -1, axis=1) - a
-    inside = (_sides(b, a) >= -slack).all(axis=1)
+    inside = (_left_of_edges(b, a) >= -slack).all(axis=1)
     points = np.concatenate([a + enter[..., None] * edge, a + leave[..., None] * edge, b], axis=1)
-    good = np.concatenate([enter <= leave, enter <= leave, inside], axis=1)
-    return _area_round_middle(points, good)
+    valid = np.concatenate([enter <= leave, enter <= leave, inside], axis=1)
+    return _area_by_angle(points, valid)
 
 
-def _sides(points: Array, polygon: Array) -> Array:
-    """(K, V, N): how far left of each of V edges each of N points lies, times the edge's length."""
+def _left_of_edges(points: Array, polygon: Array) -> Array:
+    """Return (K, V, N): distance of each of N points to the left of each of V edges, times the edge's length."""
     edge = np.roll(polygon, -1, axis=1) - polygon
     offset = _cross(polygon, edge)  # cross(e, p - a) = cross(e, p) + cross(a, e)
     return (
@@ -130,24 +138,27 @@ def _sides(points: Array, polygon: Array) -> Array:
 
 
 def _clip(a: Array, b: Array, slack: Array) -> tuple[Array, Array]:
-    """From where to where (K, V), as shares of their lengths, the edges of a are inside b; from > to: nowhere."""
-    start = _sides(a, b)
+    """Return where the edges of a enter and leave b, each (K, V), as shares of the edge's length.
+
+    enter > leave: the edge has no part inside b.
+    """
+    start = _left_of_edges(a, b)
     change = np.roll(start, -1, axis=2) - start
-    beside = np.abs(change) <= slack
+    parallel = np.abs(change) <= slack
     with np.errstate(divide="ignore", invalid="ignore"):
         at = -start / change
-    enter = np.where(beside, np.where(start < -slack, 2.0, 0.0), np.where(change > 0, at, 0.0)).max(axis=1)
-    leave = np.where(~beside & (change < 0), at, 1.0).min(axis=1)
+    enter = np.where(parallel, np.where(start < -slack, 2.0, 0.0), np.where(change > 0, at, 0.0)).max(axis=1)
+    leave = np.where(~parallel & (change < 0), at, 1.0).min(axis=1)
     return enter, leave
 
 
-def _area_round_middle(points: Array, good: Bools) -> Array:
-    """Area (K,) of the convex polygons whose vertices (K, N, 2) are the good ones (K, N), in any order."""
-    n = good.sum(axis=1)
-    middle = np.where(good[..., None], points, 0.0).sum(axis=1) / np.maximum(n, 1)[:, None]
+def _area_by_angle(points: Array, valid: Bools) -> Array:
+    """Area (K,) of the convex polygons whose vertices are the valid ones (K, N) of points (K, N, 2), in any order."""
+    n = valid.sum(axis=1)
+    middle = np.where(valid[..., None], points, 0.0).sum(axis=1) / np.maximum(n, 1)[:, None]
     arm = points - middle[:, None]
-    # What is not a vertex stands on the last one, where it adds no area.
-    angle = np.where(good, np.arctan2(arm[..., 1], arm[..., 0]), np.inf)
+    # Invalid points are moved onto the last vertex, where they add no area.
+    angle = np.where(valid, np.arctan2(arm[..., 1], arm[..., 0]), np.inf)
     order = np.argsort(angle, axis=1)
     order = np.where(
         np.arange(order.shape[1]) < n[:, None], order, order[np.arange(len(n)), np.maximum(n - 1, 0)][:, None]
@@ -156,8 +167,11 @@ def _area_round_middle(points: Array, good: Bools) -> Array:
     return np.where(n > 2, np.maximum(_shoelace(np.nan_to_num(ring, posinf=0.0, neginf=0.0)), 0.0), 0.0)
 
 
-def iou_pairs(a: Hulls, b: Hulls, i: Ints, j: Ints) -> Array:
-    """Intersection over union (K,) of a[i[k]] and b[j[k]]; 0 without area, exactly 1 for the same vertices."""
+def iou_pairs(a: PackedPolygons, b: PackedPolygons, i: Ints, j: Ints) -> Array:
+    """Return the intersection over union (K,) of a[i[k]] and b[j[k]], from 0 to 1; 0 if either has no positive area.
+
+    Polygons with equal vertices, packed to equal width, give exactly 1.
+    """
     common = intersection_pairs(a, b, i, j)
     union = a.area[i] + b.area[j] - common
     iou = np.where(common > 0, np.minimum(common / np.where(union > 0, union, 1.0), 1.0), 0.0)
@@ -167,14 +181,18 @@ def iou_pairs(a: Hulls, b: Hulls, i: Ints, j: Ints) -> Array:
 
 
 def iou_matrix(a: Sequence[Array], b: Sequence[Array]) -> Array:
-    """Intersection over union (N, M) of N and M polygons."""
+    """Return the intersection over union (N, M) of each of N polygons with each of M polygons; see `iou_pairs`."""
     i, j = (g.ravel() for g in np.indices((len(a), len(b))))
     width = max((len(p) for p in (*a, *b)), default=1)
     return iou_pairs(pack(a, width), pack(b, width), i, j).reshape(len(a), len(b))
 
 
-def gap_pairs(a: Hulls, b: Hulls, i: Ints, j: Ints) -> Array:
-    """Distance (K,) between polygons a[i[k]] and b[j[k]]; 0 where they overlap, nan where one has no vertices."""
+def gap_pairs(a: PackedPolygons, b: PackedPolygons, i: Ints, j: Ints) -> Array:
+    """Return the distance (K,) between polygons a[i[k]] and b[j[k]].
+
+    It is 0 where they overlap or touch, and nan where one has no vertices. At least one of the two must have area: for
+    two polygons without area use `edge_distance_pairs`.
+    """
     gap = np.empty(len(i))
     for low in range(0, len(i), CHUNK):
         part = slice(low, low + CHUNK)
@@ -182,35 +200,38 @@ def gap_pairs(a: Hulls, b: Hulls, i: Ints, j: Ints) -> Array:
     return gap
 
 
-def edge_distance_pairs(a: Hulls, b: Hulls, i: Ints, j: Ints) -> Array:
-    """Least distance (K,) of a vertex of either a[i[k]] or b[j[k]] to an edge of the other: their gap, unless they
-    overlap. Cheaper than `gap_pairs`, and right for polygons without area, too."""
-    nearest = np.empty(len(i))
+def edge_distance_pairs(a: PackedPolygons, b: PackedPolygons, i: Ints, j: Ints) -> Array:
+    """Return the least distance (K,) from a vertex of either polygon, a[i[k]] or b[j[k]], to an edge of the other.
+
+    It is the distance between the polygons unless they overlap; nan where one has no vertices. It is cheaper than
+    `gap_pairs`, and polygons need no area.
+    """
+    least = np.empty(len(i))
     for low in range(0, len(i), CHUNK):
         part = slice(low, low + CHUNK)
-        nearest[part] = _nearest(a.vertex[i[part]], b.vertex[j[part]])
-    return nearest
+        least[part] = _edge_distance(a.vertex[i[part]], b.vertex[j[part]])
+    return least
 
 
-def _nearest(a: Array, b: Array) -> Array:
-    return np.minimum(_to_edges(a, b), _to_edges(b, a))
+def _edge_distance(a: Array, b: Array) -> Array:
+    return np.minimum(_distance_to_edges(a, b), _distance_to_edges(b, a))
 
 
 def _gap(a: Array, b: Array) -> Array:
-    """Distance (K,): 0 unless an edge of one has the whole other on its outer side (separating axes)."""
-    nearest = _nearest(a, b)
-    apart = _beyond(b, a) | _beyond(a, b)
-    return np.where(apart | np.isnan(nearest), nearest, 0.0)
+    """Distance (K,): 0 unless an edge of one polygon has the whole other one on its outer side (separating axes)."""
+    least = _edge_distance(a, b)
+    apart = _outside_an_edge(b, a) | _outside_an_edge(a, b)
+    return np.where(apart | np.isnan(least), least, 0.0)
 
 
-def _beyond(points: Array, polygon: Array) -> Bools:
-    """Whether all of the points (K, N, 2) are on the outer side of one edge of the polygon (K, V, 2)."""
-    return np.asarray((_sides(points, polygon).max(axis=2) < 0).any(axis=1))
+def _outside_an_edge(points: Array, polygon: Array) -> Bools:
+    """True (K,) if all of the points (K, N, 2) are on the outer side of one edge of the polygon (K, V, 2)."""
+    return np.asarray((_left_of_edges(points, polygon).max(axis=2) < 0).any(axis=1))
 
 
-def _to_edges(points: Array, polygon: Array) -> Array:
+def _distance_to_edges(points: Array, polygon: Array) -> Array:
     """Least distance (K,) from any of the points (K, N, 2) to any edge of the polygon (K, V, 2)."""
-    # x and y apart: numpy sums over an axis of two slowly.
+    # x and y apart: numpy sums over an axis of length two slowly.
     ex, ey = (np.roll(polygon[..., k], -1, axis=1)[..., None] - polygon[..., k, None] for k in (0, 1))
     ax, ay = (points[:, None, :, k] - polygon[..., k, None] for k in (0, 1))
     length2 = ex * ex + ey * ey
@@ -219,19 +240,22 @@ def _to_edges(points: Array, polygon: Array) -> Array:
     return np.asarray(np.sqrt((dx * dx + dy * dy).min(axis=(1, 2))))
 
 
-def hull_gap(a: Array, b: Array) -> float:
-    """Distance between two polygons; 0 where they overlap."""
+def polygon_gap(a: Array, b: Array) -> float:
+    """Return the distance between two polygons (V, 2), of which one has area; 0 where they overlap; see `gap_pairs`."""
     none = np.zeros(1, np.int64)
     return float(gap_pairs(pack([a]), pack([b]), none, none)[0])
 
 
 def contains(polygon: Array, points: Array, dilate: float = 0.0) -> Bools:
-    """Which points (N, 2) lie in the polygon or no further than `dilate` from it."""
+    """Return which of the points (N, 2) lie in the polygon (V, 2), on its edge, or at most `dilate` away from it.
+
+    A polygon without vertices contains nothing. One without area contains nothing unless `dilate` is above 0.
+    """
     points = np.asarray(points, float).reshape(-1, 2)
     if not len(polygon):
         return np.zeros(len(points), bool)
-    inside = (_sides(points[None], polygon[None])[0].min(axis=0) >= 0) & (len(polygon) > 2)
+    inside = (_left_of_edges(points[None], polygon[None])[0].min(axis=0) >= 0) & (len(polygon) > 2)
     if dilate <= 0:
         return np.asarray(inside)
-    far = _to_edges(points[:, None], np.broadcast_to(polygon, (len(points), *polygon.shape)))
+    far = _distance_to_edges(points[:, None], np.broadcast_to(polygon, (len(points), *polygon.shape)))
     return np.asarray(inside | (far <= dilate))

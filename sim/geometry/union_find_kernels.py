@@ -1,4 +1,4 @@
-"""Compiled: trees of parents that join numbers into sets, for whoever labels connected things."""
+"""Compiled union-find lookup, used to label connected pixels and connected components."""
 
 from __future__ import annotations
 
@@ -8,8 +8,12 @@ from sim.arrays import Ints
 
 
 @njit(cache=True, error_model="numpy")
-def root(parent: Ints, k: int) -> int:
-    """The root of k's tree, parent (M,) being each one's next on the way there; halves the way."""
+def find_root(parent: Ints, k: int) -> int:
+    """Return the root of element k in a union-find forest.
+
+    parent (M,) int64 holds the parent of each element; a root is its own parent. The call shortens the path in place
+    (path halving).
+    """
     while parent[k] != k:
         parent[k] = parent[parent[k]]
         k = parent[k]

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
-from sim.geometry.union_find_kernels import root
+from sim.geometry.union_find_kernels import find_root
 from sim.render.background_kernels import at
 from sim.render.people_shadow_kernels import span
 from sim.scene.raycast_kernels import nearest
@@ -33,14 +33,14 @@ def tally(ids, boxes, id, row_of, count, edges, blob):  # type: ignore[no-untype
                 for k in range(4):  # right, and the three below: each pair of neighbours once
                     y, x = v + (k > 0), u + (1 if k == 0 else k - 2)
                     if y < height and 0 <= x < width and ids[y, x] > 0 and ids[y, x] != id[i]:
-                        a, b = root(parent, i), root(parent, row_of[ids[y, x]])
+                        a, b = find_root(parent, i), find_root(parent, row_of[ids[y, x]])
                         parent[max(a, b)] = min(a, b)
     number = 0
     for i in range(len(id)):
         blob[i] = -1
     for i in range(len(id)):
         if count[i] > 0:
-            r = root(parent, i)
+            r = find_root(parent, i)
             if r == i:
                 blob[r] = number
                 number += 1

@@ -9,8 +9,8 @@ from dataclasses import dataclass, fields
 
 import numpy as np
 
-from sim.geometry.footprints import footprint_hulls, place_hulls
-from sim.geometry.polygons import FOOTPRINT, SIDES, edge_distance_pairs, gap_pairs, pack
+from sim.geometry.footprints import FOOTPRINT_RADIUS, FOOTPRINT_SIDES, footprint_hulls, position_hulls
+from sim.geometry.polygons import edge_distance_pairs, gap_pairs, pack
 from sim.truth.merge_split_rules import frames_of
 from sim.truth.proximity import close_pairs, runs, stretches
 from sim.types import Array, Bools, Ints
@@ -93,17 +93,17 @@ def _within_reach(t: Ints, places: Array, count: Ints) -> tuple[Ints, Ints]:
     """Groups i < j of one frame t (G,) whose hulls are within 1.0 m; places (R, 2): members of group after group."""
     start = np.cumsum(count) - count
     middle = np.add.reduceat(places, start) / count[:, None]
-    radius = np.maximum.reduceat(np.hypot(*(places - np.repeat(middle, count, axis=0)).T), start) + FOOTPRINT
+    radius = np.maximum.reduceat(np.hypot(*(places - np.repeat(middle, count, axis=0)).T), start) + FOOTPRINT_RADIUS
     i, j = close_pairs(t, middle, CROSS_GAP + 2 * float(radius.max()))
     near = np.hypot(*(middle[i] - middle[j]).T) <= CROSS_GAP + radius[i] + radius[j]
     near &= (count[i] > 1) & (count[j] > 1)
     i, j = i[near], j[near]
     # The footprints' 16-gons lie between discs of 0.25 m and of their inner radius: mostly that settles it.
-    bare = pack(place_hulls(places, count))
+    bare = pack(position_hulls(places, count))
     between = edge_distance_pairs(bare, bare, i, j)
-    close = between <= CROSS_GAP + 2 * FOOTPRINT * np.cos(np.pi / SIDES)
+    close = between <= CROSS_GAP + 2 * FOOTPRINT_RADIUS * np.cos(np.pi / FOOTPRINT_SIDES)
     overlap = (bare.box[i, :2] <= bare.box[j, 2:]).all(axis=1) & (bare.box[j, :2] <= bare.box[i, 2:]).all(axis=1)
-    doubt = np.flatnonzero(~close & ((between <= CROSS_GAP + 2 * FOOTPRINT) | overlap))
+    doubt = np.flatnonzero(~close & ((between <= CROSS_GAP + 2 * FOOTPRINT_RADIUS) | overlap))
     whom, place = np.unique(np.concatenate([i[doubt], j[doubt]]), return_inverse=True)
     rows = np.isin(np.repeat(np.arange(len(count)), count), whom)
     hulls = pack(footprint_hulls(places[rows], count[whom]))

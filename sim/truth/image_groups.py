@@ -62,7 +62,7 @@ def hulls(ellipses: Outlines, cuts: Ints) -> list[Array]:
 
     edge = contour(ellipses, POINTS)[: cuts[-1]]
     sets = np.split(edge.reshape(-1, 2), edge.shape[1] * cuts[1:])
-    return list(hull_kernels.hulls(sets[:-1]))
+    return list(hull_kernels.convex_hulls(sets[:-1]))
 
 
 def image_velocities(camera: Camera, middle: Array, vel: Array) -> Array:

@@ -10,7 +10,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from sim.geometry.union_find_kernels import root
+from sim.geometry.union_find_kernels import find_root
 from sim.types import Array, Bools, Ints
 
 Labels = NDArray[np.int32]
@@ -51,7 +51,7 @@ def connect(runs: Labels) -> tuple[Ints, int]:
             above += 1
         other = above
         while runs[other, 0] == row - 1 and runs[other, 1] <= end:
-            a, b = root(parent, k), root(parent, other)
+            a, b = find_root(parent, k), find_root(parent, other)
             parent[max(a, b)] = min(a, b)
             other += 1
     count = 0

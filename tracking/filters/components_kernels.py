@@ -12,7 +12,7 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
-from sim.geometry.union_find_kernels import root
+from sim.geometry.union_find_kernels import find_root
 from sim.types import Array, Bools, Ints
 from tracking.filters.ellipsoids_kernels import overlap
 
@@ -102,7 +102,7 @@ def insert(
         if other < 0 or head[other] < 0:
             continue
         work[0] += 1
-        if root(parent, head[other]) == root(parent, k):
+        if find_root(parent, head[other]) == find_root(parent, k):
             continue
         gap_x = max(box[other, 0] - x, x - box[other, 2], 0.0)
         gap_y = max(box[other, 1] - y, y - box[other, 3], 0.0)
@@ -120,7 +120,7 @@ def insert(
 @njit(cache=True)
 def _join(parent: Ints, sums: Array, a: int, b: int, work: Ints) -> None:
     """Join the components of a and b under the older root, so that roots depend on the order of points alone."""
-    a, b = root(parent, a), root(parent, b)
+    a, b = find_root(parent, a), find_root(parent, b)
     if a == b:
         return
     low, high = min(a, b), max(a, b)
@@ -158,7 +158,7 @@ def components(points: Array, weights: Array, link: float) -> tuple[Ints, Array]
     for k in range(m):
         insert(k, points, weights[k], link, cell, around, parent, head, after, box, sums, work)
     for k in range(m):
-        top = root(parent, k)
+        top = find_root(parent, k)
         if top == k:
             label[k] = count
             sums[count] = sums[k]
@@ -191,20 +191,20 @@ def closure(sums: Array, gate: float, prior: Array, strength: float) -> Ints:
         tree = np.arange(k)
         for i in range(k):
             for j in range(i):
-                if alive[i] and alive[j] and (fresh[i] or fresh[j]) and root(tree, i) != root(tree, j):
+                if alive[i] and alive[j] and (fresh[i] or fresh[j]) and find_root(tree, i) != find_root(tree, j):
                     dx, dy = shape[j, 0] - shape[i, 0], shape[j, 1] - shape[i, 1]
                     a, b = shape[i, 2:], shape[j, 2:]
                     if overlap(dx, dy, a[0], a[1], a[2], b[0], b[1], b[2]):
-                        p, q = root(tree, i), root(tree, j)
+                        p, q = find_root(tree, i), find_root(tree, j)
                         tree[max(p, q)] = min(p, q)
         fresh[:] = False
         for i in range(k):
-            top = root(tree, i)
+            top = find_root(tree, i)
             if alive[i] and top != i:
                 pool(pooled[top], pooled[i])
                 alive[i], fresh[top], changed = False, True, True
         for i in range(k):
-            label[i] = root(tree, label[i])
+            label[i] = find_root(tree, label[i])
     return label
 
 

@@ -8,7 +8,7 @@ from typing import Literal
 
 import numpy as np
 
-from sim.geometry.polygons import edge_distance_pairs, gap_pairs, pack, packed
+from sim.geometry.polygons import edge_distance_pairs, gap_pairs, pack, pack_padded
 from sim.types import Array, Bools, Groups, Ints, Tracks, Truth
 from tracking.scoring.similarity import Rows, compare, numbered
 
@@ -130,7 +130,7 @@ def find(rows: Rows, wanted: Rows) -> Ints:
 
 def people_inside(groups: Crowd, people: Rows, places: Array, scale: float) -> Crowd:
     """The groups with those people for members whose places (R, 2) lie in their hulls or within 0.3 m (times scale)."""
-    hulls, points = pack(groups.hull), packed(places[:, None])
+    hulls, points = pack(groups.hull), pack_padded(places[:, None])
     low, high = hulls.box[:, :2] - INSIDE * scale, hulls.box[:, 2:] + INSIDE * scale
 
     def inside(i: Ints, j: Ints) -> tuple[Ints, Array]:

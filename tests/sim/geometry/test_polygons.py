@@ -1,18 +1,18 @@
 import numpy as np
 import pytest
 
-from sim.geometry.footprints import Q, footprint_hull, footprint_hulls
+from sim.geometry.footprints import FOOTPRINT, footprint_hull, footprint_hulls
 from sim.geometry.polygons import (
     area,
     contains,
     convex_hull,
     edge_distance_pairs,
     gap_pairs,
-    hull_gap,
     intersection_pairs,
     iou_matrix,
     iou_pairs,
     pack,
+    polygon_gap,
 )
 
 SQUARE = np.array([[0.0, 0], [1, 0], [1, 1], [0, 1]])
@@ -116,7 +116,7 @@ def places_of(kind, r):
     if kind == "row":
         return places * [1, 0]
     if kind == "along an edge":
-        return np.outer(places[:, 0], Q[4] - Q[3]) / 0.1
+        return np.outer(places[:, 0], FOOTPRINT[4] - FOOTPRINT[3]) / 0.1
     if kind == "one place":
         return np.repeat(places[:1], len(places), axis=0)
     return places
@@ -127,7 +127,7 @@ def test_footprint_hull_is_the_hull_of_all_footprints(kind):
     r = np.random.default_rng(4)
     for _ in range(200):
         places = places_of(kind, r)
-        hull, slow = footprint_hull(places), convex_hull((places[:, None] + Q).reshape(-1, 2))
+        hull, slow = footprint_hull(places), convex_hull((places[:, None] + FOOTPRINT).reshape(-1, 2))
         assert area(hull) == pytest.approx(area(slow), abs=1e-9)
         edge = np.roll(hull, -1, axis=0) - hull
         after = np.roll(edge, -1, axis=0)
@@ -153,11 +153,11 @@ def test_footprints_of_many_groups_at_once():
     ("moved", "gap"), [((3, 0), 2), ((2, 2), 2**0.5), ((0.5, 0.5), 0), ((0.2, 0), 0), ((0, 1.25), 0.25)]
 )
 def test_gap(moved, gap):
-    assert hull_gap(SQUARE, SQUARE + np.array(moved)) == pytest.approx(gap, abs=1e-12)
+    assert polygon_gap(SQUARE, SQUARE + np.array(moved)) == pytest.approx(gap, abs=1e-12)
 
 
 def test_gap_of_one_inside_another_and_against_samples():
-    assert hull_gap(SQUARE, SQUARE * 0.2 + 0.4) == 0
+    assert polygon_gap(SQUARE, SQUARE * 0.2 + 0.4) == 0
     some = polygons(6, 20, spread=1.0)
     shifted = [h + np.random.default_rng(k).uniform(-3, 3, 2) for k, h in enumerate(some)]
     for a, b in zip(some, reversed(shifted), strict=True):
@@ -165,7 +165,7 @@ def test_gap_of_one_inside_another_and_against_samples():
         rims = [np.concatenate([p + s * (q - p) for p, q in zip(h, np.roll(h, -1, 0), strict=True)]) for h in (a, b)]
         sampled = np.hypot(*np.moveaxis(rims[0][:, None] - rims[1], -1, 0)).min()
         overlap = iou_matrix([a], [b])[0, 0] > 0
-        assert hull_gap(a, b) == pytest.approx(0 if overlap else sampled, abs=0.01)
+        assert polygon_gap(a, b) == pytest.approx(0 if overlap else sampled, abs=0.01)
 
 
 def test_edge_distance_of_lines_in_a_row():

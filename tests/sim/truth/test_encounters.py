@@ -3,7 +3,7 @@ from itertools import pairwise
 import numpy as np
 
 from sim.geometry.footprints import footprint_hull
-from sim.geometry.polygons import hull_gap
+from sim.geometry.polygons import polygon_gap
 from sim.truth.encounters import encounters, net_crossings, roll_call
 
 
@@ -58,7 +58,7 @@ def test_encounters_are_the_frames_in_which_hulls_are_near():
         for t in range(200):
             sides = [pos[t, group[t] == g] for g in names]
             hulls = [footprint_hull(side) for side in sides]
-            near.append(min(len(side) for side in sides) > 1 and hull_gap(*hulls) <= 1.0)
+            near.append(min(len(side) for side in sides) > 1 and polygon_gap(*hulls) <= 1.0)
         frames = np.flatnonzero(near)
         cuts = np.flatnonzero(np.diff(frames) > 5) + 1  # half a second is bridged
         expected = [(int(some[0]), int(some[-1])) for some in np.split(frames, cuts) if len(some)]

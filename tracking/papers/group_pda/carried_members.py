@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from sim.geometry.hull_kernels import hulls
+from sim.geometry.hull_kernels import convex_hulls
 from sim.types import Array, Bools, Ints
 from tracking.papers.group_pda.association_kernels import near
 from tracking.papers.group_pda.group_bank import Bank
@@ -96,7 +96,7 @@ def remember(bank: Bank, claims: Claims, chosen: Bools, rules: Rules, t: float) 
         if not rules.pixels:
             bank.places[row] = (place, when, near(place, bank.places[row][0], rules.scale * rules.config.carry_reach))
             continue
-        (place,) = hulls([place])
+        (place,) = convex_hulls([place])
         bank.places[row] = (place, np.full(len(place), t), np.ones(len(place), bool))
 
 

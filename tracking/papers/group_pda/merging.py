@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from sim.geometry.polygons import hull_gap
+from sim.geometry.polygons import polygon_gap
 from sim.types import Array, Bools, Ints
 from tracking.filters.ellipsoids import overlaps
 from tracking.papers.group_pda.association_kernels import CUT, near
@@ -146,7 +146,7 @@ def _touching(bank: Bank, rows: Ints, rules: Rules) -> Bools:
     gap = np.maximum(low[:, None] - high, low - high[:, None]).max(2, initial=-np.inf)
     for i, j in np.argwhere(np.triu(gap <= rules.constraint.link, 1)).tolist():
         if rules.pixels:
-            d = hull_gap(place[i], place[j]) if min(len(place[i]), len(place[j])) > 2 else gap[i, j]
+            d = polygon_gap(place[i], place[j]) if min(len(place[i]), len(place[j])) > 2 else gap[i, j]
             found[i, j] = found[j, i] = d <= rules.constraint.link
         else:
             found[i, j] = found[j, i] = near(place[i], place[j], rules.constraint.link).any()

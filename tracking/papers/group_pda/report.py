@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from sim.geometry.hull_kernels import hulls
+from sim.geometry.hull_kernels import convex_hulls
 from sim.types import Array, GroupEvent, Groups, Plane, Tracks
 from tracking.papers.group_pda import association_kernels as kernels
 from tracking.papers.group_pda.group_bank import Bank
@@ -37,7 +37,7 @@ def tracks(
 
 def _hulls(places: list[Array], outline: Array) -> tuple[Array, ...]:
     """Convex hulls of an outline (V, 2) round each group's places (K, 2): round those on their own hull."""
-    return hulls([(corner[:, None] + outline).reshape(-1, 2) for corner in hulls(places)])
+    return convex_hulls([(corner[:, None] + outline).reshape(-1, 2) for corner in convex_hulls(places)])
 
 
 def _event(change: Change, index: int, t: float, fps: float) -> GroupEvent:

@@ -41,7 +41,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from sim.geometry.footprints import Q
+from sim.geometry.footprints import FOOTPRINT
 from sim.types import Array, Bools, Context, Detections, Frame, Plane, Tracks
 from tracking.papers.group_pda import association_kernels as kernels
 from tracking.papers.group_pda import split_birth_loss as changes
@@ -133,10 +133,10 @@ class GroupPda:
         if self.pixels is not None:
             return SQUARE * self.pixels.step / 2
         if self.plane == "ground":
-            return Q
+            return FOOTPRINT
         if detections is not None and detections.box is not None and len(detections.box):
             self.box = np.median(detections.box[:, 2:], 0)
-        return Q * self.context.px_per_m if self.box is None else SQUARE * self.box / 2
+        return FOOTPRINT * self.context.px_per_m if self.box is None else SQUARE * self.box / 2
 
     def outlines(self) -> list[Array]:
         """The outlines of the groups that have an id, px, the whole cells of the grid."""
