@@ -17,7 +17,7 @@ import numpy as np
 from blob_vs_peers import Scene, generated, one_thread, ours, walks
 from peers.scores import iou, mot_scores
 
-from tracking.papers.blob import measurements
+from tracking.papers.blob import box_geometry
 from tracking.papers.blob.config import BlobConfig
 from tracking.run import prepare
 from tracking.stats import bootstrap
@@ -70,7 +70,7 @@ def coasted(scene: Scene) -> np.ndarray:
         lost = told[~people.hit[told]]
         if not len(lost) or not len(truth):
             continue
-        box = measurements.to_boxes(people.bank[0])
+        box = box_geometry.to_boxes(people.bank[0])
         overlap = iou(box, truth)
         free = np.ones(len(truth), bool)
         claims = overlap[people.hit]

@@ -24,7 +24,7 @@ from sim.types import DetectionMode, Frame, Image, Tracks, Truth
 from sim.types import Sequence as Recording
 from sim.workers import pool
 from tracking.detect import background
-from tracking.detect.training import Trained, train
+from tracking.detect.background_training import Trained, train
 from tracking.run import Run, track
 from tracking.scoring import evaluate
 

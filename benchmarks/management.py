@@ -15,7 +15,7 @@ from dataclasses import replace
 import numpy as np
 
 from sim.types import Context, Detections, Frame
-from tracking.filters import lifecycle
+from tracking.filters import track_uncertainty
 from tracking.papers.blob.config import BlobConfig
 from tracking.papers.blob.tracker import Blob
 
@@ -35,8 +35,11 @@ def rates() -> None:
             replace(nominal, sigma=nominal.sigma * np.sqrt(10)),
             replace(nominal, noise=nominal.noise * 10),
         )
-        birth = "  ".join(f"{lifecycle.at_birth(d):6.2f}" for d in made)
-        hits = ["  ".join(f"{lifecycle.hits_to_confirm(d, r):4d}" for d in made) for r in (config.confirm_ratio, 1.05)]
+        birth = "  ".join(f"{track_uncertainty.at_birth(d):6.2f}" for d in made)
+        hits = [
+            "  ".join(f"{track_uncertainty.hits_to_confirm(d, r):4d}" for d in made)
+            for r in (config.confirm_ratio, 1.05)
+        ]
         print(f"{fps:4g}   {birth}       {hits[0]}            {hits[1]}")
 
 

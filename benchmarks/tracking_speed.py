@@ -27,8 +27,8 @@ from sim.types import Frame, Sequence
 from tracking.detect import blobs
 from tracking.detect.background import Background
 from tracking.detect.person_size import PersonSize
-from tracking.papers.blob import newcomers
-from tracking.papers.blob.from_pixels import Pixels
+from tracking.papers.blob import new_people
+from tracking.papers.blob.update_from_pixels import Pixels
 from tracking.run import Prepared, prepare
 from tracking.tracker_registry import History
 
@@ -36,10 +36,10 @@ SIZES = (640, 480), (1280, 720)
 RUNS = 3
 PARTS: dict[str, tuple[tuple[object, str], ...]] = {
     "classify": ((Background, "classify"),),
-    "clean, find": ((blobs, "clean"), (Pixels, "_find")),
+    "clean, find": ((blobs, "clean"), (blobs, "find")),
     "associate": ((Pixels, "_associate"),),
     "split": ((Pixels, "_split"),),
-    "newcomers": ((newcomers, "newcomers"),),
+    "newcomers": ((new_people, "newcomers"),),
     "person size": ((PersonSize, "learn"), (Pixels, "_lone"), (Pixels, "_settle_sizes")),
     "adapt": ((Background, "adapt"), (Pixels, "_protected")),
 }

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from tracking.detect import training
+from tracking.detect import background_training
 
 
 def distortions(image, mean, sigma):
@@ -17,23 +17,23 @@ def distortions(image, mean, sigma):
 def spread(values):
     """Of (K, h, w, 3): mean and sigma of the inliers, inliers (K, h, w), pixels never covered and valid ones (h, w)."""
     mean, half = shortest(values)
-    sigma = np.maximum(half * training.AS_SIGMA, training.FLOOR)
-    valid = np.all(sigma <= training.WIDEST, axis=-1)
-    for _ in range(training.ROUNDS):
+    sigma = np.maximum(half * background_training.AS_SIGMA, background_training.FLOOR)
+    valid = np.all(sigma <= background_training.WIDEST, axis=-1)
+    for _ in range(background_training.ROUNDS):
         away = np.abs(values - mean)
-        inlier = np.all(away <= training.INLIER * sigma, axis=-1)
-        clean = np.all(away <= training.CLEAN * sigma, axis=(0, -1))
+        inlier = np.all(away <= background_training.INLIER * sigma, axis=-1)
+        clean = np.all(away <= background_training.CLEAN * sigma, axis=(0, -1))
         n = np.maximum(inlier.sum(axis=0), 1)[..., None]
         mean = np.sum(values, axis=0, where=inlier[..., None]) / n
         var = np.sum(np.square(values - mean), axis=0, where=inlier[..., None]) / n
-        mean, sigma = np.maximum(mean, 1.0), np.maximum(np.sqrt(var), training.FLOOR)
+        mean, sigma = np.maximum(mean, 1.0), np.maximum(np.sqrt(var), background_training.FLOOR)
     return mean, sigma, inlier, clean, valid
 
 
 def shortest(values):
     """Median of, and half, the shortest interval that holds SHARE of the values (K, ...), per pixel and colour."""
     v = np.sort(values, axis=0)
-    held = max(int(np.ceil(training.SHARE * len(v))), 3)
+    held = max(int(np.ceil(background_training.SHARE * len(v))), 3)
     first = (v[held - 1 :] - v[: len(v) - held + 1]).argmin(axis=0)[None]
     low, middle, high = (np.take_along_axis(v, first + k, 0)[0] for k in (0, held // 2, held - 1))
     return middle, (high - low) / 2
@@ -45,7 +45,7 @@ def normalisers(values, mean, sigma, inlier):
     length = np.sqrt(np.sum(np.square(mean / sigma), axis=-1))
     n = np.maximum(inlier.sum(axis=0), 1)
     s, b = (np.sqrt(np.sum(np.square(q), axis=0, where=inlier) / n) for q in ((alpha - 1) * length, cd))
-    least = training.FLOOR / sigma.mean(axis=-1)
+    least = background_training.FLOOR / sigma.mean(axis=-1)
     return np.maximum(s, least), np.maximum(b, np.sqrt(2) * least)
 
 
@@ -71,6 +71,6 @@ def adapt(image, classes, protected, mean, var, gain, rows, fast, slow):
     moves = ~protected[..., None] & rows[:, None, None] & ~((image == 255) & (gain * mean >= 255))
     seen = (classes == 0)[..., None]
     away = image / gain - mean
-    spread = np.maximum(var + fast * (np.square(away * gain) - var), training.FLOOR**2)
+    spread = np.maximum(var + fast * (np.square(away * gain) - var), background_training.FLOOR**2)
     moved = np.maximum(mean + np.where(seen, fast, slow) * away, 1.0)
     return np.where(moves, moved, mean), np.where(moves & seen, spread, var)

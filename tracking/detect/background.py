@@ -20,8 +20,9 @@ import math
 import numpy as np
 
 from sim.types import Bools, Image
-from tracking.detect import gain as gains
+from tracking.detect import brightness_gain as gains
 from tracking.detect.background_settings import BackgroundSettings
+from tracking.detect.background_training import FLOOR, check_frame, thresholds, train
 from tracking.detect.pixel_classes import BACKGROUND as BACKGROUND
 from tracking.detect.pixel_classes import DARK as DARK
 from tracking.detect.pixel_classes import FOREGROUND as FOREGROUND
@@ -29,7 +30,6 @@ from tracking.detect.pixel_classes import HIGHLIGHT as HIGHLIGHT
 from tracking.detect.pixel_classes import SHADOW as SHADOW
 from tracking.detect.pixel_classes import Floats
 from tracking.detect.pixel_classes import foreground as foreground
-from tracking.detect.training import FLOOR, check_frame, thresholds, train
 
 INTERLEAVE = 4
 """One row in so many is adapted per frame, by as many frames' worth."""
@@ -39,7 +39,7 @@ class Background:
     """The model of a still scene; it changes in `classify` (the gain) and in `adapt`.
 
     mean (3, H, W): E at gain 1, grey levels. var (3, H, W): sigma^2, grey levels squared, whatever the gain. s, b
-    (H, W): normalisers of brightness (s = a |E / sigma|, see tracking.detect.training) and of CD, no unit, inf where
+    (H, W): normalisers of brightness (s = a |E / sigma|) and of CD, no unit, inf where
     there is no background. valid (H, W): False where the sample showed none; such pixels are background for ever.
     thresholds: of CD / b, lower and upper of (alpha - 1) / a. gain (3,): brightness of the frame classified last.
     bounds: alpha below which a dark pixel is dark foreground, alpha up to which a bright one is a highlight.

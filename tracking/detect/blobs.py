@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from sim.arrays import Frozen
 from sim.types import Array, Bools, Image
-from tracking.detect import blob_kernels as kernels
+from tracking.detect import blobs_kernels as kernels
 
 Labels = NDArray[np.int32]
 MAJORITY_M, OPEN_M, CLOSE_M = 0.08, 0.05, 0.15

@@ -10,8 +10,8 @@ import numpy as np
 
 from sim.types import Bools, Image
 from tracking.config import Config, param
+from tracking.detect.background_training import check, check_frame
 from tracking.detect.pixel_classes import BACKGROUND, FOREGROUND, SHADOW
-from tracking.detect.training import check, check_frame
 
 SHADOW_VALUE = 127
 """What OpenCV writes where it finds a shadow; foreground is 255."""

@@ -23,6 +23,7 @@ import numpy as np
 
 from sim.types import Array, Bools, Ints
 from tracking.filters import components_kernels as kernels
+from tracking.filters import ellipse_overlap_kernels
 
 
 @dataclass(frozen=True)
@@ -62,3 +63,8 @@ def partition(points: Array, weights: Array, rule: Constraint) -> Ints:
 def prefixes(points: Array, weights: Array, start: int, rule: Constraint) -> Bools:
     """(M - start + 1,) whether the first start, start + 1, … M points (M, 2) satisfy the group constraint."""
     return kernels.prefixes(points, weights, start, rule.link, rule.gate, rule.three, rule.strength, rule.least)[0]
+
+
+def regions_overlap(mean: Array, covariance: Array, gate: float) -> Bools:
+    """(G, G) which of the regions of mean (G, 2), covariance (G, 2, 2) overlap each other."""
+    return ellipse_overlap_kernels.overlaps(np.ascontiguousarray(mean), gate * covariance)

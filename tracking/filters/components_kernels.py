@@ -14,7 +14,7 @@ from numba import njit
 
 from sim.geometry.union_find_kernels import find_root
 from sim.types import Array, Bools, Ints
-from tracking.filters.ellipsoids_kernels import overlap
+from tracking.filters.ellipse_overlap_kernels import overlap
 
 AROUND = 20
 WEIGHT, X, Y, XX, XY, YY = range(6)

@@ -17,8 +17,8 @@ from tracking.detect.background import (
     foreground,
 )
 from tracking.detect.background_settings import BackgroundSettings
+from tracking.detect.background_training import FLOOR, train
 from tracking.detect.mog2 import Mog2
-from tracking.detect.training import FLOOR, train
 
 SIGMA = np.array([3.0, 2.0, 4.0])
 FPS = 10.0
@@ -276,7 +276,7 @@ def test_training_equals_its_twin(follow):
     sample[::3, 5:20, 5:20] = rng.integers(0, 255, 3)
     sample[:, :4, :4] = rng.integers(0, 255, (30, 4, 4, 3))
     made = train(sample, 0.999, follow)
-    from tracking.detect.gain import frame_gains
+    from tracking.detect.brightness_gain import frame_gains
 
     gains = frame_gains(sample) if follow else np.ones((30, 3))
     values = (sample / gains[:, None, None, :]).astype(np.float32).astype(float)

@@ -9,7 +9,7 @@ import numpy as np
 
 from tracking.config import param
 from tracking.detect.background_settings import BackgroundSettings
-from tracking.filters.lifecycle import Dynamics, check_birth
+from tracking.filters.track_uncertainty import Dynamics, check_birth
 
 
 @dataclass(frozen=True)

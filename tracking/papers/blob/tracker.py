@@ -5,14 +5,14 @@ Gonzalez, Rowe, Andrade, Villanueva, "Efficient management of multiple agent tra
 white acceleration (tracking.filters.kalman). The measurement is (x, y, h, w), a box's centre, height and width; a box
 has no
 axis, so the paper's angle, its ninth state, is measured from pixels only, by a blob's ellipse; h and w are then its
-axes (tracking.papers.blob.from_pixels, with what is ours).
+axes (tracking.papers.blob.update_from_pixels, with what is ours).
 
     predict    x = A x, P = A P A' + Q                                             (eqs 1, 2; tracking.filters.kalman)
     gate       z_pred = C A x, d^2 = (z - z_pred)' S^-1 (z - z_pred) <= q          (eqs 8, 9; d^2, not d, is chi2)
                q the quantile `gate` of chi2 of 4 degrees of freedom, 5 with the angle  (eq. 10)
     associate  each measurement to the nearest track in whose gate it lies         (4.4)
     update     y, S, K, x, P                                                       (eqs 3 to 7; tracking.filters.kalman)
-    manage     rho = sqrt|S| / asymptote: confirm low, delete high                 (4.5, 5; tracking.filters.lifecycle)
+    manage     rho = sqrt|S| / asymptote: confirm low, delete high      (4.5, 5; tracking.filters.track_uncertainty)
 
 Departures, all ours:
 - Persons only. Lengths are metres: a track's scale is px per metre, the longer side of its box being 1.7 m (half to
@@ -44,12 +44,12 @@ import numpy as np
 
 from sim.types import Context, Detections, Frame, Plane, Tracks
 from tracking.filters import kalman
-from tracking.papers.blob import measurements, report
+from tracking.papers.blob import box_geometry, report
 from tracking.papers.blob.config import BlobConfig
-from tracking.papers.blob.from_boxes import Boxes
-from tracking.papers.blob.from_pixels import Pixels
-from tracking.papers.blob.pixel_tracks import People
-from tracking.papers.blob.tracks import Population
+from tracking.papers.blob.ellipse_tracks import People
+from tracking.papers.blob.track_management import Population
+from tracking.papers.blob.update_from_boxes import Boxes
+from tracking.papers.blob.update_from_pixels import Pixels
 
 
 class Blob:
@@ -96,7 +96,7 @@ class Blob:
         state, scale = people.bank.take(rows, 1), people.scale[rows]
         camera = self.context.camera
         place, alone = self.cascade.reported(rows), np.full(len(rows), -1)
-        box = measurements.to_boxes(place)
+        box = box_geometry.to_boxes(place)
         if camera is None:
             pos, vel = state[kalman.PLACE, :, :2].copy(), state[kalman.RATE, :, :2].copy()
             cov, plane = report.image_covariance(state, scale), "image"

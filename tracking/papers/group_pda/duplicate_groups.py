@@ -11,7 +11,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from sim.types import Array, Ints
-from tracking.filters.ellipsoids import overlaps
+from tracking.filters.components import regions_overlap
 from tracking.papers.group_pda.group_bank import Bank
 from tracking.papers.group_pda.kernel_parameters import Rules
 
@@ -45,7 +45,7 @@ class Doubles:
 
 
 def _on_each_other(bank: Bank, rows: Ints, gate: float) -> Iterator[tuple[int, int]]:
-    near = overlaps(bank.x[rows, :2], bank.extent[rows], gate)
+    near = regions_overlap(bank.x[rows, :2], bank.extent[rows], gate)
     return ((int(rows[i]), int(rows[j])) for i, j in np.argwhere(np.triu(near, 1)).tolist())
 
 

@@ -12,7 +12,7 @@ import numpy as np
 
 from sim.geometry.polygons import polygon_gap
 from sim.types import Array, Bools, Ints
-from tracking.filters.ellipsoids import overlaps
+from tracking.filters.components import regions_overlap
 from tracking.papers.group_pda.association_kernels import CUT, near
 from tracking.papers.group_pda.duplicate_groups import doubtful
 from tracking.papers.group_pda.event_onsets import FAR_APART, REACH, Encounter
@@ -102,7 +102,7 @@ def _near(bank: Bank, rows: Ints, rules: Rules) -> Iterator[tuple[tuple[int, int
     """R_x: ids of each two groups whose search regions overlap, whether their velocities differ by no more than
     allowed (from pixels: and they are not far apart on the ground), the difference of their centroids on the ground,
     the middle between them, the nearest people's distance."""
-    close = overlaps(bank.x[rows, :2], bank.extent[rows], MARGIN * rules.config.gate)
+    close = regions_overlap(bank.x[rows, :2], bank.extent[rows], MARGIN * rules.config.gate)
     close |= _touching(bank, rows, rules)
     v = bank.x[rows, 2:] * rules.ground
     var = np.einsum("gaa,a->g", bank.P[rows, 2:, 2:], np.square(rules.ground)) / 2

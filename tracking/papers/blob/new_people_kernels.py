@@ -1,4 +1,4 @@
-"""Kernels of tracking.papers.blob.newcomers: where guesses stand, and how many templates explain most."""
+"""Kernels of tracking.papers.blob.new_people: where guesses stand, and how many templates explain most."""
 
 from __future__ import annotations
 
@@ -6,9 +6,9 @@ import numpy as np
 
 from sim.types import Array, Bools, Ints
 from tracking.detect.blobs import Labels
-from tracking.papers.blob import template_kernels as kernels
-from tracking.papers.blob import template_search_kernels as moves
-from tracking.papers.blob.template_kernels import Cover, kernel
+from tracking.papers.blob import person_template_kernels as kernels
+from tracking.papers.blob import person_template_search_kernels as moves
+from tracking.papers.blob.person_template_kernels import Cover, kernel
 
 LOWEST = 0.98  # quantile of a part's rows: where it stands
 REACH = moves.MOST_STEPS + moves.SWEEPS * moves.FINE_STEPS  # coarse steps that settle takes, and some to spare

@@ -1,4 +1,4 @@
-"""Kernels of tracking.papers.blob.template: where templates explain most; twins: tests/reference_templates.
+"""Kernels of tracking.papers.blob.person_template: where templates explain most; twins: tests/reference_templates.
 
 A template is moved on a grid round its place while the others rest. Its rows' sums, in halves of a foreground pixel,
 are differences of the image rows' running sums, so that a place costs one difference per row.
@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sim.types import Array, Bools
-from tracking.papers.blob.template_kernels import (
+from tracking.papers.blob.person_template_kernels import (
     EMPTY,
     HALVES,
     Cover,

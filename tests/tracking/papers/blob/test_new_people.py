@@ -7,8 +7,8 @@ import pytest
 
 from tests import reference_templates as slow
 from tracking.detect import blobs
-from tracking.papers.blob import newcomers, newcomers_kernels, template_kernels
-from tracking.papers.blob.template import Mask
+from tracking.papers.blob import new_people, new_people_kernels, person_template_kernels
+from tracking.papers.blob.person_template import Mask
 
 HIGH, WIDE = 90, 120
 
@@ -44,7 +44,7 @@ def region(seed):
 def test_guesses_are_the_slow_way(seed):
     mask, (h, w) = region(seed)
     found = blobs.find(mask, 20)
-    got = newcomers._guesses(found, np.array([0]), np.array([6]), Fixed(h, w))[0]
+    got = new_people._guesses(found, np.array([0]), np.array([6]), Fixed(h, w))[0]
     assert np.array_equal(got, np.concatenate(slow.guesses(found.label == 1, 6, Fixed(h, w))))
 
 
@@ -52,7 +52,7 @@ def test_guesses_are_the_slow_way(seed):
 def test_a_quantile_is_numpys(n):
     values = np.random.default_rng(n).integers(5, 30, n)
     for q in (0.0, 0.3, 0.5, 0.98, 0.999):
-        assert newcomers_kernels.quantile(np.bincount(values - 5), n, q, 5) == np.quantile(values, q)
+        assert new_people_kernels.quantile(np.bincount(values - 5), n, q, 5) == np.quantile(values, q)
 
 
 @pytest.mark.parametrize("seed", range(6))
@@ -61,7 +61,7 @@ def test_who_enters_is_the_slow_way(seed):
     guesses = slow.guesses(blobs.find(mask, 20).label == 1, 4, Fixed(h, w))
     cover, person = np.zeros(mask.shape, np.int16), float(np.pi / 4 * h * w)
     scene = Mask(mask)
-    got = newcomers._in_region(scene, np.concatenate(guesses), person, 0.4)
+    got = new_people._in_region(scene, np.concatenate(guesses), person, 0.4)
     assert len(got)
     assert np.array_equal(got, slow.enter(mask, cover, guesses, person, 0.4))
     assert np.array_equal(scene.cover, slow.painted(mask.shape, got))
@@ -72,7 +72,7 @@ def test_no_more_are_tried_than_there_are_sizes_for():
     mask = mask_of([40.0, 80.0, 60.0, 24.0], [60.0, 80.0, 60.0, 24.0])
     guesses = np.concatenate(slow.guesses(mask, 3, Fixed(60.0, 24.0)))
     guesses[2, 2] = np.nan
-    found = newcomers._in_region(Mask(mask), guesses, float(np.pi / 4 * 60 * 24), 0.3)
+    found = new_people._in_region(Mask(mask), guesses, float(np.pi / 4 * 60 * 24), 0.3)
     assert len(found) == 1
 
 
@@ -81,7 +81,7 @@ def test_as_many_come_in_as_there_are(count):
     """Side by side, a head's width of each hidden behind the next."""
     true = np.array([[20.0 + 20 * k, 80.0 - 2 * (k % 2), 60.0, 24.0] for k in range(count)])
     scene = Mask(mask_of(*true))
-    found = newcomers.newcomers(scene, Fixed(60.0, 24.0), 0.5)
+    found = new_people.newcomers(scene, Fixed(60.0, 24.0), 0.5)
     assert len(found) == count
     assert np.abs(np.sort(found[:, 0]) - true[:, 0]).max() < 4
 
@@ -90,14 +90,14 @@ def test_half_a_person_and_less_is_nobody_new():
     one = np.array([60.0, 80.0, 60.0, 24.0])
     cut = mask_of(one)
     cut[45:] = False
-    assert not len(newcomers.newcomers(Mask(cut), Fixed(60.0, 24.0), 0.5))
+    assert not len(new_people.newcomers(Mask(cut), Fixed(60.0, 24.0), 0.5))
 
 
 def test_what_is_explained_brings_nobody():
     one = np.array([[60.0, 80.0, 60.0, 24.0]])
     scene = Mask(mask_of(one[0]))
-    template_kernels.paint_all(scene.cover, one, 1)
-    assert not len(newcomers.newcomers(scene, Fixed(60.0, 24.0), 0.5))
+    person_template_kernels.paint_all(scene.cover, one, 1)
+    assert not len(new_people.newcomers(scene, Fixed(60.0, 24.0), 0.5))
     closed = Mask(mask_of(one[0]))
     closed.close(mask_of(one[0]).astype(np.int32), np.array([0]))
-    assert not len(newcomers.newcomers(closed, Fixed(60.0, 24.0), 0.5))
+    assert not len(new_people.newcomers(closed, Fixed(60.0, 24.0), 0.5))

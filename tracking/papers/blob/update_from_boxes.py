@@ -10,9 +10,9 @@ import numpy as np
 from sim.types import Array, Bools, Detections, Frame, Ints
 from tracking import scale
 from tracking.filters import kalman
-from tracking.papers.blob import measurements
+from tracking.papers.blob import box_geometry
 from tracking.papers.blob.config import BlobConfig
-from tracking.papers.blob.tracks import Population
+from tracking.papers.blob.track_management import Population
 
 INSIDE = 0.8  # share of a box within a track's predicted box from which on it may be a piece of that person
 
@@ -63,7 +63,7 @@ class Boxes:
         if score.min() < self.config.score_continue or box[:, 2:].min() <= 0:
             good = (score >= self.config.score_continue) & (box[:, 2:] > 0).all(1)
             box, score = box[good], score[good]
-        return measurements.from_boxes(box), score
+        return box_geometry.from_boxes(box), score
 
     def _associate(self, z: Array, score: Array) -> tuple[Ints, Ints, Bools, Array]:
         """Tracks and measurements (K,) that belong together, one to one; which measurements (M,) are free; distances
@@ -129,7 +129,7 @@ class Boxes:
         for row in np.unique(owner[owner >= 0]).tolist():
             k = own.get(row)
             pieces = np.concatenate([columns[k : k + 1] if k is not None else [], left[owner == row]]).astype(np.int64)
-            whole = measurements.fused(z[pieces])
+            whole = box_geometry.fused(z[pieces])
             limit = self.gate if k is None else self._away(np.array([row]), z[columns[k]][None])[0]
             if self._away(np.array([row]), whole[None])[0] >= limit:
                 continue
@@ -144,11 +144,11 @@ class Boxes:
         """(K,) the track of which each measurement is a piece, or -1; d2 (N, K) their distances."""
         people = self.people
         place, owner = people.bank[kalman.PLACE], np.full(len(pieces), -1)
-        possible = measurements.inside(pieces, place) & people.confirmed
+        possible = box_geometry.inside(pieces, place) & people.confirmed
         if possible.any():
             near = possible.any(1).nonzero()[0]
             smaller = np.prod(pieces[near, 2:], 1)[:, None] < np.prod(place[:, 2:], 1)
-            share = measurements.covered(pieces[near], place) * (possible[near] & smaller)
+            share = box_geometry.covered(pieces[near], place) * (possible[near] & smaller)
             owner[near] = np.where(share.max(1) >= INSIDE, share.argmax(1), -1)
         least = ((people.bank[kalman.VAR] + self.noise) / self.asymptote).min()  # of S / asymptote: d2 least <= away
         if len(rows) and d2.min() * least <= self.orphan_gate:

@@ -13,8 +13,8 @@ import numpy as np
 from sim.types import Array, Ints
 from tracking.detect import blobs as detect
 from tracking.detect.person_size import SLIM, SMALLEST, PersonSize
-from tracking.papers.blob import newcomers_kernels as kernels
-from tracking.papers.blob.template import ELLIPSE, Mask
+from tracking.papers.blob import new_people_kernels as kernels
+from tracking.papers.blob.person_template import ELLIPSE, Mask
 
 LEAST = 0.3  # of a person's area: a smaller region is nobody
 MOST = 6  # people found in one region and frame

@@ -9,7 +9,7 @@ from sim.scene.camera import looking
 from sim.types import Camera, Context
 from tracking.filters import kalman
 from tracking.papers.blob.config import BlobConfig
-from tracking.papers.blob.pixel_tracks import People
+from tracking.papers.blob.ellipse_tracks import People
 
 FPS, SCALE = 10.0, 40.0
 UP, LEVEL = np.pi / 2, 0.0

@@ -2,9 +2,9 @@
 
 classify, clean, find                                                       3   (tracking.detect)
 a blob of one person's size: its ellipse z = (x, y, h, w, theta), gates, association, update      3.3, 4.2 to 4.4
-the other foreground: split among the tracks expected there, by templates   ours (tracking.papers.blob.template)
-what is left and as large as a person: new tracks                           ours (tracking.papers.blob.newcomers)
-axes return to those of a person at his place, where it is known            ours (tracking.papers.blob.pixel_tracks)
+the other foreground: split among the tracks expected there, by templates   ours (tracking.papers.blob.person_template)
+what is left and as large as a person: new tracks                           ours (tracking.papers.blob.new_people)
+axes return to those of a person at his place, where it is known            ours (tracking.papers.blob.ellipse_tracks)
 rho, births, deaths                                                         4.5, 5
 pixels of confirmed tracks are kept out of the background's adaptation      ours
 
@@ -26,10 +26,10 @@ from tracking.detect.mog2 import Mog2, Mog2Settings
 from tracking.detect.person_size import PersonSize
 from tracking.detect.pixel_classes import foreground
 from tracking.filters import kalman
-from tracking.papers.blob import measurements, newcomers
+from tracking.papers.blob import box_geometry, new_people
 from tracking.papers.blob.config import BlobConfig
-from tracking.papers.blob.pixel_tracks import People
-from tracking.papers.blob.template import Mask, painted
+from tracking.papers.blob.ellipse_tracks import People
+from tracking.papers.blob.person_template import Mask, painted
 
 SHARED = 0.35  # share of a predicted box in a blob's from which on the blob may be this track's
 UPRIGHT = 25.0  # deg, standard deviation of the direction of somebody measured by a template, which stands upright
@@ -146,7 +146,7 @@ class Pixels:
                 rows, measured = np.concatenate([rows, more[0]]), np.concatenate([measured, more[1]])
                 noise, support = np.concatenate([noise, more[2]]), np.concatenate([support, more[3]])
                 angles = np.concatenate([angles, np.full(len(more[0]), self.upright)])
-            entered = newcomers.newcomers(scene, self.size, c.entry_support)
+            entered = new_people.newcomers(scene, self.size, c.entry_support)
             newborn = np.concatenate([newborn, self._ellipses(_places(entered))])
         d2 = people.update(rows, measured, noise, angles)
         if split:
@@ -176,13 +176,13 @@ class Pixels:
 
     def _ellipses(self, place: Array) -> Array:
         """(N, 5) x, y, h, w, theta: the ellipses of people in upright boxes (N, 4) x, y, h, w."""
-        return measurements.lying(np.concatenate([place[:, :2], place[:, 2:] / self.size.loose], 1))
+        return box_geometry.lying(np.concatenate([place[:, :2], place[:, 2:] / self.size.loose], 1))
 
     def _several(self, box: Array, expected: Array) -> Bools:
         """(M,) blobs, boxes ltwh (M, 4), in which several confirmed tracks are expected; expected (N, 4) x, y, h, w."""
         sure = expected[self.people.confirmed]
         places = np.column_stack([box[:, 0] + box[:, 2] / 2, box[:, 1] + box[:, 3] / 2, box[:, 3], box[:, 2]])
-        return np.asarray((measurements.covered(sure, places) >= SHARED).sum(0) > 1)
+        return np.asarray((box_geometry.covered(sure, places) >= SHARED).sum(0) > 1)
 
     def _associate(self, z: Array, angle_var: Array) -> tuple[Ints, Ints, Bools]:
         """Tracks and ellipses z (M, 5) that belong together, and which ellipses (M,) lie in some track's gate: of 5

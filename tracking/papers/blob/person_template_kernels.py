@@ -1,4 +1,5 @@
-"""Kernels of tracking.papers.blob.template: sums over upright ellipses, row by row; twins: tests/reference_templates.
+"""Kernels of tracking.papers.blob.person_template: sums over upright ellipses, row by row;
+twins: tests/reference_templates.
 
 A template is an ellipse filling a box of h x w px that stands on the row `foot` at column x. `foreground` (H, W) bool:
 the frame, `cover` (H, W) the number of templates painted over each pixel, EXPLAINED more where it is explained already.

@@ -6,8 +6,8 @@ import numpy as np
 
 from sim.scene.camera import PERSON
 from sim.types import Array, Bools, Context, Ints
-from tracking.filters import assignment, kalman, lifecycle
-from tracking.papers.blob import measurements
+from tracking.filters import assignment, kalman, track_uncertainty
+from tracking.papers.blob import box_geometry
 from tracking.papers.blob.config import BlobConfig
 
 HIDDEN = 0.4  # share of a predicted box behind somebody else from which on a miss is explained
@@ -26,7 +26,7 @@ class Population:
     hits, misses: frames measured in all, and since then. low, high (2,) px: the field of view.
     """
 
-    def __init__(self, config: BlobConfig, dynamics: lifecycle.Dynamics, context: Context) -> None:
+    def __init__(self, config: BlobConfig, dynamics: track_uncertainty.Dynamics, context: Context) -> None:
         self.context = context
         self.top = context.camera is not None and context.camera.kind == "top"
         self.low, self.high = np.full(2, np.inf), np.full(2, -np.inf)
@@ -34,12 +34,12 @@ class Population:
         self._bind(np.zeros((6, 0)), np.zeros((3, 0), bool))
         self.follow(config, dynamics)
 
-    def follow(self, config: BlobConfig, dynamics: lifecycle.Dynamics) -> None:
+    def follow(self, config: BlobConfig, dynamics: track_uncertainty.Dynamics) -> None:
         """Take on a config and the nominal filter that follows from it; the tracks stay as they are."""
         self.config, self.dynamics = config, dynamics
         self.q, self.noise, self.asymptote = dynamics.q, dynamics.noise, dynamics.asymptote
-        self.birth_rho = lifecycle.at_birth(dynamics)
-        self.tentative = max(config.tentative_time, lifecycle.time_to_confirm(dynamics, config.confirm_ratio))
+        self.birth_rho = track_uncertainty.at_birth(dynamics)
+        self.tentative = max(config.tentative_time, track_uncertainty.time_to_confirm(dynamics, config.confirm_ratio))
         self.death = self._after(config.coast_time)
         self.excused_death = max(self.death, self._after(config.merged_time))
         self.blindest = 2 * float(np.log(max(self.excused_death, self.birth_rho)))
@@ -55,7 +55,7 @@ class Population:
     def _after(self, seconds: float) -> float:
         """rho in the frame that ends so many seconds without measurement, from the steady state: sooner otherwise."""
         frames = int(np.ceil(seconds * self.context.fps - 1e-6))
-        return lifecycle.after_misses(self.dynamics, frames - 1)
+        return track_uncertainty.after_misses(self.dynamics, frames - 1)
 
     def predict(self) -> None:
         """One frame on."""
@@ -64,7 +64,7 @@ class Population:
 
     def quality(self) -> Array:
         """(N,) rho: how sure of itself each filter is."""
-        return lifecycle.rho(self.bank, self.noise, self.asymptote)
+        return track_uncertainty.rho(self.bank, self.noise, self.asymptote)
 
     def uprights(self) -> Array:
         """(N, 4) predicted boxes: centre x, y, height, width."""
@@ -93,7 +93,7 @@ class Population:
     def pairs(self, cost: Array, gate: float) -> tuple[Ints, Ints]:
         """Tracks and measurements (K,) one to one; cost (N, M): d^2 within gates, the widest `gate`, inf elsewhere."""
         if self.config.association == "nearest":
-            return measurements.best_pieces(*assignment.nearest(cost), cost)
+            return box_geometry.best_pieces(*assignment.nearest(cost), cost)
         blind = np.minimum(2 * np.log(self.rho), self.blindest)
         return assignment.optimal(cost + blind[:, None], gate + self.blindest)
 
@@ -107,7 +107,7 @@ class Population:
         in_front = self.hit & (foot > foot[lost, None])
         in_front &= np.abs(hidden[:, :1] - place[:, 0]) < (hidden[:, 3:] + place[:, 3]) / 2
         if in_front.any():
-            share = np.where(in_front, measurements.covered(hidden, place), 0.0)
+            share = np.where(in_front, box_geometry.covered(hidden, place), 0.0)
             self.excused[lost[share.max(1) >= HIDDEN]] = True
 
     def merged(self, z: Array, unseen: Bools) -> Bools:
@@ -120,14 +120,14 @@ class Population:
         if not len(z) or not unseen.any():
             return found
         place = self.bank[kalman.PLACE]
-        held = measurements.inside(place, z) & self.confirmed[:, None]
+        held = box_geometry.inside(place, z) & self.confirmed[:, None]
         several = np.add.reduce(held, 0) > 1
         if not several.any():
             return found
         for column in np.flatnonzero(several & held[unseen].any(0)):
             members = held[:, column]
-            alone = max(measurements.hull_overlap(one[None], z[column]) for one in place[members])
-            if measurements.hull_overlap(place[members], z[column]) >= max(SAME, alone):
+            alone = max(box_geometry.hull_overlap(one[None], z[column]) for one in place[members])
+            if box_geometry.hull_overlap(place[members], z[column]) >= max(SAME, alone):
                 found[column] = True
                 self.excused[members & unseen] = True
         return found

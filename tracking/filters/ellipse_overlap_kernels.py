@@ -1,4 +1,4 @@
-"""Kernel of tracking.filters.ellipsoids: do two filled ellipses have a point in common? Twin:
+"""Kernel of tracking.filters.components: do two filled ellipses have a point in common? Twin:
 tests/reference_components.py.
 
 Numbers of a 2x2 covariance come as xx, xy, yy.

@@ -10,7 +10,7 @@ from tests import painted
 from tests.painted import TALL, box, overlap, track
 from tracking.filters import kalman
 from tracking.papers.blob.config import BlobConfig
-from tracking.papers.blob.template import Mask
+from tracking.papers.blob.person_template import Mask
 
 
 def walk(x, foot, step, frames):

@@ -8,7 +8,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from tests.reference_components import meet, nearest
-from tracking.filters.ellipsoids import overlap, overlaps
+from tracking.filters import ellipse_overlap_kernels
+from tracking.filters.components import regions_overlap
 
 GATE = 9.21
 I2 = np.eye(2)
@@ -18,6 +19,15 @@ def turned(angle, major, minor):
     c, s = np.cos(angle), np.sin(angle)
     R = np.array([[c, -s], [s, c]])
     return R @ np.diag([major**2, minor**2]) @ R.T
+
+
+def overlap(mean, covariance, other_mean, other_covariance, gate):
+    """(K,) the kernel's answer for each pair of regions."""
+    found = np.zeros(len(mean), bool)
+    for k in range(len(mean)):
+        a, b, d = gate * covariance[k], gate * other_covariance[k], other_mean[k] - mean[k]
+        found[k] = ellipse_overlap_kernels.overlap(d[0], d[1], a[0, 0], a[0, 1], a[1, 1], b[0, 0], b[0, 1], b[1, 1])
+    return found
 
 
 def one(mean, covariance, other_mean, other_covariance, gate=1.0):
@@ -150,10 +160,10 @@ def test_the_gate_is_the_square_of_the_size() -> None:
 
 def test_all_with_all() -> None:
     mean, S, _, _ = random_pairs(6, 40)
-    found = overlaps(mean, S, 1.0)
+    found = regions_overlap(mean, S, 1.0)
     i, j = (k.ravel() for k in np.indices((40, 40)))
     assert np.array_equal(found.ravel(), overlap(mean[i], S[i], mean[j], S[j], 1.0))
     assert np.array_equal(found, found.T)
     assert found.diagonal().all()
     assert 40 < found.sum() < 1_600
-    assert overlaps(np.zeros((0, 2)), np.zeros((0, 2, 2)), 1.0).shape == (0, 0)
+    assert regions_overlap(np.zeros((0, 2)), np.zeros((0, 2, 2)), 1.0).shape == (0, 0)

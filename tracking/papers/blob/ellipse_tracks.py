@@ -12,9 +12,9 @@ import numpy as np
 
 from sim.types import Array, Context, Ints
 from tracking.detect.person_size import upright
-from tracking.filters import kalman, lifecycle
+from tracking.filters import kalman, track_uncertainty
 from tracking.papers.blob.config import BlobConfig
-from tracking.papers.blob.tracks import Population
+from tracking.papers.blob.track_management import Population
 
 SETTLING = 0.5  # s in which the axes return to the expected ones
 HEADING = 6.0  # times faster than they lean people turn: from straight above the direction turns with the heading
@@ -23,11 +23,11 @@ HEADING = 6.0  # times faster than they lean people turn: from straight above th
 class People(Population):
     """N tracks; angle (2, N): direction rad and its variance; nominal (5, N, 4): as bank, with nominal noise."""
 
-    def __init__(self, config: BlobConfig, dynamics: lifecycle.Dynamics, context: Context) -> None:
+    def __init__(self, config: BlobConfig, dynamics: track_uncertainty.Dynamics, context: Context) -> None:
         self.angle, self.nominal = np.zeros((2, 0)), np.zeros((5, 0, 4))
         super().__init__(config, dynamics, context)
 
-    def follow(self, config: BlobConfig, dynamics: lifecycle.Dynamics) -> None:
+    def follow(self, config: BlobConfig, dynamics: track_uncertainty.Dynamics) -> None:
         """Take on a config and the nominal filter that follows from it; the tracks stay as they are."""
         super().follow(config, dynamics)
         rate = config.angle_rate * (HEADING if self.top else 1.0)
@@ -41,7 +41,7 @@ class People(Population):
 
     def quality(self) -> Array:
         """(N,) rho by the nominal covariance."""
-        return lifecycle.rho(self.nominal, self.noise, self.asymptote)
+        return track_uncertainty.rho(self.nominal, self.noise, self.asymptote)
 
     def uprights(self) -> Array:
         """(N, 4) boxes x, y, h, w round the predicted ellipses."""

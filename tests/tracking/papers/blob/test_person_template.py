@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 from tests import reference_templates as slow
-from tracking.papers.blob import template_kernels as kernels
-from tracking.papers.blob import template_search_kernels
-from tracking.papers.blob.template import Mask, painted
-from tracking.papers.blob.template_kernels import EXPLAINED
+from tracking.papers.blob import person_template_kernels as kernels
+from tracking.papers.blob import person_template_search_kernels
+from tracking.papers.blob.person_template import Mask, painted
+from tracking.papers.blob.person_template_kernels import EXPLAINED
 
 HIGH, WIDE = 90, 120
 
@@ -39,7 +39,7 @@ def scenery(seed):
 def test_kernels_are_the_slow_way(seed):
     _, foreground, cover, some = scenery(seed)
     for t in some:
-        got = template_search_kernels.moved(foreground, cover, t, 2, 1.5)
+        got = person_template_search_kernels.moved(foreground, cover, t, 2, 1.5)
         assert np.array_equal(got / 2, slow.moved(foreground, cover, t, 2, 1.5))
     area = [slow.area(cover.shape, t) for t in some]
     got = kernels.supports(foreground, cover, some, 0)

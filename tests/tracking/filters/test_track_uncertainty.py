@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from scenarios.errors import InputError
-from tracking.filters import kalman, lifecycle
-from tracking.filters.lifecycle import Dynamics
+from tracking.filters import kalman, track_uncertainty
+from tracking.filters.track_uncertainty import Dynamics
 from tracking.papers.blob.config import BlobConfig
 
 MADE = Dynamics(0.04, np.array([2.0, 2.0, 1.0, 1.0]), np.full(4, 0.01), np.full(4, 1.5**2))
@@ -20,7 +20,7 @@ def follow(dynamics, pattern, r):
     state, found = dynamics.newborn(), []
     for hit in pattern:
         kalman.predict(state, dynamics.dt, dynamics.q)
-        found.append(lifecycle.rho(state, dynamics.noise, dynamics.asymptote)[0])
+        found.append(track_uncertainty.rho(state, dynamics.noise, dynamics.asymptote)[0])
         if hit:
             kalman.update(state, np.array([0]), r.normal(0, 3, (1, 4)), dynamics.noise)
     return np.array(found)
@@ -32,7 +32,7 @@ def test_steady_state_in_closed_form():
         kalman.predict(state, MADE.dt, MADE.q)
         kalman.update(state, np.array([0]), np.zeros((1, 4)), MADE.noise)
     assert np.allclose(state[2:], MADE.steady()[2:], rtol=1e-9)
-    assert lifecycle.after_misses(MADE, 0) == pytest.approx(1.0, rel=1e-12)
+    assert track_uncertainty.after_misses(MADE, 0) == pytest.approx(1.0, rel=1e-12)
 
 
 def test_rho_falls_with_hits_and_rises_with_misses():
@@ -40,7 +40,7 @@ def test_rho_falls_with_hits_and_rises_with_misses():
     hits = follow(MADE, [True] * 40, r)
     assert (np.diff(hits[:20]) < 0).all()
     assert hits[-1] > 1 - 1e-12
-    misses = [lifecycle.after_misses(MADE, k) for k in range(30)]
+    misses = [track_uncertainty.after_misses(MADE, k) for k in range(30)]
     assert (np.diff(misses) > 0).all()
 
 
@@ -53,7 +53,7 @@ def test_rho_does_not_see_the_measured_values(seed):
 
 def test_larger_q_confirms_sooner_and_larger_r_later():
     def hits(dynamics):
-        return lifecycle.hits_to_confirm(dynamics, 1.25)
+        return track_uncertainty.hits_to_confirm(dynamics, 1.25)
 
     assert hits(replace(MADE, sigma=MADE.sigma * np.sqrt(10))) < hits(MADE)
     assert hits(replace(MADE, noise=MADE.noise * 10)) > hits(MADE)

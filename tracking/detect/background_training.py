@@ -20,7 +20,7 @@ import numpy as np
 
 from scenarios.errors import InputError
 from sim.types import Bools, Image, Ints
-from tracking.detect.gain import frame_gains
+from tracking.detect.brightness_gain import frame_gains
 from tracking.detect.pixel_classes import Floats
 
 LEAST_FRAMES = 10
@@ -60,7 +60,7 @@ class Trained:
 
 def train(sample: Image, rate: float, follow_gain: bool) -> Trained:
     """The model of a sample (K, H, W, 3); InputError where it is none, too short, or without background."""
-    from tracking.detect import training_kernels
+    from tracking.detect import background_training_kernels
 
     check(sample)
     gains = frame_gains(sample) if follow_gain else np.ones((len(sample), 3), np.float32)
@@ -70,7 +70,7 @@ def train(sample: Image, rate: float, follow_gain: bool) -> Trained:
     counts = np.zeros((2, 2, BINS), np.int64)
     held = max(int(np.ceil(SHARE * len(sample))), 3)
     rules = AS_SIGMA, FLOOR, WIDEST, INLIER, CLEAN, ROUNDS
-    training_kernels.learn(sample, gains, held, rules, (BINS, SPAN), mean, sigma, s, b, valid, counts)
+    background_training_kernels.learn(sample, gains, held, rules, (BINS, SPAN), mean, sigma, s, b, valid, counts)
     if valid.mean() < 0.5:
         raise InputError(
             place="background",

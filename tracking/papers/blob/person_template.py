@@ -4,7 +4,7 @@ A template is an upright ellipse in a box: x (its middle), foot (lower edge), h,
 some template covers counts 1, every background pixel against 1/2, once however many templates cover it: so who is
 partly hidden is measured by what shows of him, and a gap in the mask (a lamp post, camouflage) costs less than a second
 person. Moving one template while the others rest needs sums over its rows only
-(tracking.papers.blob.template_search_kernels).
+(tracking.papers.blob.person_template_search_kernels).
 
     support  of a template = (sum over the pixels that it alone covers) / its area in the image, at most 1
     settle   each in turn to the place of largest evidence * support - d^2 / 2, d from where it was expected
@@ -16,9 +16,9 @@ import numpy as np
 
 from sim.types import Array, Bools, Ints
 from tracking.detect.blobs import Labels
-from tracking.papers.blob import template_kernels as kernels
-from tracking.papers.blob import template_search_kernels as moves
-from tracking.papers.blob.template_kernels import ELLIPSE as ELLIPSE
+from tracking.papers.blob import person_template_kernels as kernels
+from tracking.papers.blob import person_template_search_kernels as moves
+from tracking.papers.blob.person_template_kernels import ELLIPSE as ELLIPSE
 
 
 class Mask:
