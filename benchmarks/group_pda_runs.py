@@ -19,7 +19,7 @@ from benchmarks.group_pda_ids import fates
 from scenarios.errors import FlockscopeError, InputError
 from scenarios.loading.resolve import Entry
 from sim.sequence import simulate
-from sim.truth.groups import box_groups
+from sim.truth.group_hulls import box_groups
 from sim.types import DetectionMode, Frame, Image, Tracks, Truth
 from sim.types import Sequence as Recording
 from sim.workers import pool

@@ -14,7 +14,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from sim.truth.groups import groups_over_time
+from sim.truth.group_hulls import groups_over_time
 from sim.types import Groups, Tracks, Truth
 from tracking.grouping.derive import with_groups
 from tracking.scoring import evaluate

@@ -14,8 +14,10 @@ from collections.abc import Callable
 
 import numpy as np
 
-from sim.truth.cross_queue_events import crossings, queues
-from sim.truth.groups import groups_over_time, memberships
+from sim.truth.crossing_events import crossings
+from sim.truth.group_hulls import groups_over_time
+from sim.truth.merge_split_events import groups_and_events
+from sim.truth.queue_detection import queues
 from tracking.grouping.group_labels import label_people
 from tracking.grouping.link_rule import Grouping, find_links
 
@@ -65,7 +67,7 @@ def main() -> None:
     a = parser.parse_args()
     pos, vel, intent = crowd(a.people, a.frames)
     there = np.ones(intent.shape, bool)
-    found = memberships(pos, vel, there, intent, FPS)
+    found = groups_and_events(pos, vel, there, intent, FPS)
     met, lines = crossings(pos, vel, there, found.group, FPS), queues(pos, vel, there, FPS)
     print(
         f"{a.people} people, {a.frames} frames: {len(found.events)} events, {len(met)} crossings, {len(lines)} queues,"
@@ -78,7 +80,7 @@ def main() -> None:
     rule = Grouping()
     links = find_links(frame, column, *rows, a.frames, FPS, rule)
     truth = {
-        "membership": lambda: memberships(pos, vel, there, intent, FPS),
+        "membership": lambda: groups_and_events(pos, vel, there, intent, FPS),
         "crossings": lambda: crossings(pos, vel, there, found.group, FPS),
         "queues": lambda: queues(pos, vel, there, FPS),
         "hulls": lambda: groups_over_time(frame, column, label, *rows, 0, a.frames),

@@ -29,9 +29,9 @@ from sim.io.formats.group_labels import dense
 from sim.io.formats.velocity import differentiate
 from sim.io.source import open_source
 from sim.sequence import simulate
-from sim.truth.groups import memberships
-from sim.truth.merge_split_rules import SAME_WAY, TOGETHER
-from sim.truth.queue_detection import WAITING
+from sim.truth.merge_split_events import groups_and_events
+from sim.truth.merge_split_rules import MERGE_DISTANCE, MERGE_VELOCITY
+from sim.truth.queue_detection import WAITING_SPEED
 from sim.types import Truth
 from tracking.grouping.derive import Grouping, derive
 from tracking.tuning.grouping_episodes import people_as_tracks
@@ -84,7 +84,7 @@ def hotel(root: Path) -> None:
     print(f"  {'each frame alone, 1.5 m':24} {scores(same, (gap < 1.5) & (differ < 0.5))}")
     print(f"  {f'… best of nine: {d} {v}':24} {scores(same, (gap < d) & (differ < v))}")
     speed = np.hypot(*truth.vel.T)
-    stand = np.maximum(speed[i], speed[j]) < WAITING
+    stand = np.maximum(speed[i], speed[j]) < WAITING_SPEED
     for name, rule in RULES.items():
         said, told = grouped(truth, rule, i, j)
         wrong = f"wrong pairs: {(said & ~same & stand).sum()} stand, {(said & ~same & ~stand).sum()} walk"
@@ -117,7 +117,7 @@ def stretch(truth: Truth, centre: np.ndarray, vel: np.ndarray, a: int, b: int) -
         i, j = at[0][frame], at[1][frame]
         gap, differ = (np.hypot(*(x[i] - x[j])) / truth.px_per_m for x in (centre, vel))
         one = truth.group[i] >= 0 and truth.group[i] == truth.group[j]
-        now = now + 1 if one and gap < TOGETHER and differ < SAME_WAY else 0
+        now = now + 1 if one and gap < MERGE_DISTANCE and differ < MERGE_VELOCITY else 0
         longest = max(longest, now)
     return longest / truth.fps
 
@@ -144,7 +144,7 @@ def caviar(root: Path) -> None:
             for x in (centre / truth.px_per_m, vel / truth.px_per_m, label.astype(float))
         )
         there = np.isfinite(intent)
-        found = memberships(pos, speed, there, np.where(there, intent, -1).astype(np.int64), truth.fps).events
+        found = groups_and_events(pos, speed, there, np.where(there, intent, -1).astype(np.int64), truth.fps).events
         told = [(e.kind, e.start, [int(people[m - 1]) for m in e.members]) for e in found]
         print(f"  event rules, velocities over {window} s: {told}")
     for name, rule in (("default", Grouping()), ("velocities over 1 s", Grouping(smooth=1.0))):

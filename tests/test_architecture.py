@@ -21,8 +21,9 @@ SCORING = (
     "scenarios.errors",
     "sim.arrays",
     "sim.types",
-    "sim.truth.groups",
-    "sim.truth.cross_queue_events",
+    "sim.truth.group_hulls",
+    "sim.truth.crossing_events",
+    "sim.truth.queue_detection",
     "sim.geometry.polygons",
 )
 """What scoring may import of ours: people use it alone, on their own arrays."""
@@ -121,8 +122,10 @@ def test_trackers_and_detectors_see_neither_truth_nor_scores():
         "tracking.truth_detections",
         "tracking.app",
         "sim.truth.label",
-        "sim.truth.groups",
-        "sim.truth.cross_queue_events",
+        "sim.truth.merge_split_events",
+        "sim.truth.group_hulls",
+        "sim.truth.crossing_events",
+        "sim.truth.queue_detection",
         "sim.io",
         "sim.sequence",
     )

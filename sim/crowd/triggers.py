@@ -1,7 +1,6 @@
 """When an order fires, and whether what it orders has come true in the running simulation (for `after` triggers).
 
-The truth of a sequence is measured afresh from its motion (sim.truth.groups, sim.truth.cross_queue_events); this is
-only for the script.
+The truth of a sequence is measured afresh from its motion (sim.truth); this is only for the script.
 """
 
 from __future__ import annotations

@@ -16,7 +16,7 @@ from sim.truth.proximity import close_pairs, runs, stretches
 from sim.types import Array, Bools, Ints
 
 CROSS_GAP = 1.0  # m between hulls
-BRIDGE = 0.5  # s: an encounter may be interrupted for so long
+BRIDGE_TIME = 0.5  # s: an encounter may be interrupted for so long
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -36,7 +36,7 @@ class Encounters:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Roll:
+class GroupRows:
     """Who is in which group when: G groups of a frame sorted by (frame t, name), member rows `first` … of `person`.
 
     key: t * width + name, ascending.
@@ -65,18 +65,18 @@ class Roll:
         return self.person[first[0] : first[0] + count[0]]
 
 
-def roll_call(group: Ints) -> Roll:
-    """The Roll of labels (T, P), -1 alone or absent."""
+def group_rows(group: Ints) -> GroupRows:
+    """The GroupRows of labels (T, P), -1 alone or absent."""
     t, person = np.nonzero(group >= 0)
     order = np.lexsort((person, group[t, person], t))
     t, person = t[order], person[order]
     name = group[t, person]
     first = np.flatnonzero((np.diff(t, prepend=-1) != 0) | (np.diff(name, prepend=-1) != 0))
     t, name, width = t[first], name[first], int(name.max(initial=0)) + 1
-    return Roll(t, name, t * width + name, width, first, np.diff(np.append(first, len(person))), person)
+    return GroupRows(t, name, t * width + name, width, first, np.diff(np.append(first, len(person))), person)
 
 
-def encounters(pos: Array, roll: Roll, fps: float) -> Encounters:
+def encounters(pos: Array, roll: GroupRows, fps: float) -> Encounters:
     """All encounters of groups of 2 or more; pos (T, P, 2)."""
     if not len(roll.t):
         return Encounters(roll.t, roll.t, roll.t, roll.t)
@@ -84,7 +84,7 @@ def encounters(pos: Array, roll: Roll, fps: float) -> Encounters:
     width = roll.width
     pair, when = roll.name[i] * width + roll.name[j], roll.t[i]  # sorted by group within a frame: name[i] < name[j]
     order = np.lexsort((when, pair))
-    pair, first, last = stretches(pair[order], when[order], 1, frames_of(BRIDGE, fps))
+    pair, first, last = stretches(pair[order], when[order], 1, frames_of(BRIDGE_TIME, fps))
     order = np.lexsort((pair, last, first))
     return Encounters(first[order], last[order], pair[order] // width, pair[order] % width)
 
@@ -112,7 +112,7 @@ def _within_reach(t: Ints, places: Array, count: Ints) -> tuple[Ints, Ints]:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Course:
+class GroupPath:
     """One side of each encounter over the frames around it, R rows: middle and mean velocity of who is there of those
     who met (R, 2), nan where nobody is; kept: whether the group is still, or already, these people."""
 
@@ -121,9 +121,9 @@ class Course:
     kept: Bools
 
 
-def course(
-    pos: Array, vel: Array, group: Ints, roll: Roll, name: Ints, met: Ints, encounter: Ints, frame: Ints
-) -> Course:
+def group_paths(
+    pos: Array, vel: Array, group: Ints, roll: GroupRows, name: Ints, met: Ints, encounter: Ints, frame: Ints
+) -> GroupPath:
     """Courses of groups name (E,) as they were in frames met (E,), in rows (encounter, frame) (R,)."""
     first, count = roll.find(met, name)
     row, place = runs(first[encounter], (first + count)[encounter])
@@ -136,7 +136,7 @@ def course(
     # One who stays while the others have left the scene is alone, and yet has changed nothing.
     same = (still == present) | (present < 2)
     others = roll.find(frame, name[encounter])[1] > still
-    return Course(_mean(places, there, start), _mean(speeds, there, start), same & ~others)
+    return GroupPath(_mean(places, there, start), _mean(speeds, there, start), same & ~others)
 
 
 def _mean(values: Array, there: Bools, start: Ints) -> Array:

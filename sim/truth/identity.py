@@ -11,13 +11,13 @@ from collections import Counter
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 
-People = frozenset[int]
-Members = Mapping[int, People]
+PersonSet = frozenset[int]
+Members = Mapping[int, PersonSet]
 ALONE = -1
 
 
 @dataclass(frozen=True, slots=True)
-class Change:
+class GroupChange:
     """What happened between two partitions: before, after: sorted group ids, -1 once for each person alone."""
 
     kind: str
@@ -26,14 +26,14 @@ class Change:
     members: tuple[int, ...]
 
 
-def identify(old: Members, parts: Iterable[People], born: Mapping[int, int]) -> dict[People, int | None]:
+def identify(old: Members, parts: Iterable[PersonSet], born: Mapping[int, int]) -> dict[PersonSet, int | None]:
     """The old id that each new group (2 or more people) keeps; None: it needs a fresh one.
 
     old: members of each group before; born: when each old group came up, smaller is older.
     """
     new = sorted((p for p in parts if len(p) > 1), key=min)
     same = {people: g for g, people in old.items()}  # mostly nothing has changed: no need to compare all with all
-    kept: dict[People, int | None] = {part: same.get(part) for part in new}
+    kept: dict[PersonSet, int | None] = {part: same.get(part) for part in new}
     taken = {g for g in kept.values() if g is not None}
     was = {p: g for g, people in old.items() if g not in taken for p in people}
     shared = []
@@ -48,7 +48,9 @@ def identify(old: Members, parts: Iterable[People], born: Mapping[int, int]) -> 
     return kept
 
 
-def lineage(old: Members, new: Members, before: People, now: People, entered: People = frozenset()) -> list[Change]:
+def lineage(
+    old: Members, new: Members, before: PersonSet, now: PersonSet, entered: PersonSet = frozenset()
+) -> list[GroupChange]:
     """What happened to the groups between two partitions.
 
     before, now: all people of each. Who is not in both, and whoever is named in `entered`, came or went: a group
@@ -58,7 +60,7 @@ def lineage(old: Members, new: Members, before: People, now: People, entered: Pe
     stay = (before & now) - entered
     was, is_ = _unit_of(old, before), _unit_of(new, now)
     unchanged = {g for g, people in old.items() if new.get(g) == people and people <= stay}
-    found: list[Change] = []
+    found: list[GroupChange] = []
     for g in sorted(old.keys() - unchanged):
         found += _of_old(g, old[g], stay, is_, now)
     for g in sorted(new.keys() - unchanged):
@@ -66,7 +68,7 @@ def lineage(old: Members, new: Members, before: People, now: People, entered: Pe
     return found
 
 
-def _unit_of(groups: Members, everybody: People) -> dict[int, int]:
+def _unit_of(groups: Members, everybody: PersonSet) -> dict[int, int]:
     """The group of each person; who is alone gets a negative number of their own."""
     unit = {p: -1 - k for k, p in enumerate(sorted(everybody))}
     return unit | {p: g for g, people in groups.items() for p in people}
@@ -76,26 +78,26 @@ def _names(units: Iterable[int]) -> tuple[int, ...]:
     return tuple(sorted(max(u, ALONE) for u in units))
 
 
-def _of_old(g: int, people: People, stay: People, is_: dict[int, int], now: People) -> list[Change]:
+def _of_old(g: int, people: PersonSet, stay: PersonSet, is_: dict[int, int], now: PersonSet) -> list[GroupChange]:
     """How an old group ended or fell into parts."""
     left = people & stay
     targets = {is_[p] for p in left}
     if len(targets) > 1:
         kind = "dissolve" if max(targets) < 0 else "split"
-        return [Change(kind, (g,), _names(targets), tuple(sorted(people & now)))]
+        return [GroupChange(kind, (g,), _names(targets), tuple(sorted(people & now)))]
     if not left or (max(targets) < 0 and len(people) > 1):
-        return [Change("leave", (g,), _names(targets), tuple(sorted(people)))]
+        return [GroupChange("leave", (g,), _names(targets), tuple(sorted(people)))]
     return []
 
 
-def _of_new(g: int, people: People, stay: People, was: dict[int, int]) -> list[Change]:
+def _of_new(g: int, people: PersonSet, stay: PersonSet, was: dict[int, int]) -> list[GroupChange]:
     """How a new group began or came together."""
     sources = {was[p] for p in people & stay}
     if len(sources) > 1:
         kind = "form" if max(sources) < 0 else "merge"
-        return [Change(kind, _names(sources), (g,), tuple(sorted(people)))]
+        return [GroupChange(kind, _names(sources), (g,), tuple(sorted(people)))]
     if not sources or max(sources) < 0:
-        return [Change("enter", _names(sources), (g,), tuple(sorted(people)))]
+        return [GroupChange("enter", _names(sources), (g,), tuple(sorted(people)))]
     return []
 
 
@@ -104,13 +106,15 @@ class Identities:
     """Groups through time. State: members of each living group, when each came up, the people there, the next id."""
 
     next_id: int = 1
-    groups: dict[int, People] = field(default_factory=dict)
+    groups: dict[int, PersonSet] = field(default_factory=dict)
     born: dict[int, int] = field(default_factory=dict)
-    people: People = frozenset()
+    people: PersonSet = frozenset()
 
-    def step(self, t: int, people: People, parts: Iterable[People], entered: People = frozenset()) -> list[Change]:
+    def step(
+        self, t: int, people: PersonSet, parts: Iterable[PersonSet], entered: PersonSet = frozenset()
+    ) -> list[GroupChange]:
         """Take the partition of time t (singles may be left out); `groups` then has its ids. Arguments as `lineage`."""
-        new: dict[int, People] = {}
+        new: dict[int, PersonSet] = {}
         for part, kept in identify(self.groups, parts, self.born).items():
             g = self.next_id if kept is None else kept
             self.next_id += kept is None

@@ -13,7 +13,7 @@ import numpy as np
 from sim.scene.camera import px_per_m_at_centre
 from sim.scene.viewpoint import Bodies, recorded
 from sim.scene.visibility import look
-from sim.truth.image_groups import image_groups
+from sim.truth.image_group_hulls import image_groups
 from sim.truth.order_fulfilment import check_orders
 from sim.types import Camera, GroupEvent, Groups, Ints, Motion, Truth
 
@@ -53,11 +53,11 @@ def _bodies(motion: Motion, camera: Camera | None, people: Bodies) -> Truth:
 
 def label(motion: Motion, camera: Camera | None) -> Truth:
     """All that is true: `bodies`, and groups, events and hard negatives measured from motion and intent."""
-    from sim.truth.groups import memberships
+    from sim.truth.merge_split_events import groups_and_events
 
     people = recorded(motion)
     truth = _bodies(motion, camera, people)
-    found = memberships(motion.pos, motion.vel, motion.present, motion.intent, motion.fps)
+    found = groups_and_events(motion.pos, motion.vel, motion.present, motion.intent, motion.fps)
     truth = truth.replace(group=found.group[people.frame - 1, people.id - 1])
     ground = tuple(_ground_groups(truth))
     return truth.replace(
@@ -70,7 +70,8 @@ def label(motion: Motion, camera: Camera | None) -> Truth:
 
 
 def _events(motion: Motion, group: Ints, changes: tuple[GroupEvent, ...]) -> tuple[GroupEvent, ...]:
-    from sim.truth.cross_queue_events import crossings, queues
+    from sim.truth.crossing_events import crossings
+    from sim.truth.queue_detection import queues
 
     crossed = crossings(motion.pos, motion.vel, motion.present, group, motion.fps)
     queued = queues(motion.pos, motion.vel, motion.present, group, motion.fps)
@@ -79,7 +80,7 @@ def _events(motion: Motion, group: Ints, changes: tuple[GroupEvent, ...]) -> tup
 
 
 def _ground_groups(truth: Truth) -> Iterator[Groups]:
-    from sim.truth.groups import frame_groups
+    from sim.truth.group_hulls import frame_groups
 
     assert truth.pos is not None
     assert truth.vel is not None

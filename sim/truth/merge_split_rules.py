@@ -12,11 +12,11 @@ import numpy as np
 
 from sim.types import Array, Bools, Ints
 
-TOGETHER = 1.5  # m: nearer than this can be a group
-SAME_WAY = 0.5  # m/s: walking together
-APART = 2.5  # m: further is apart, whatever the velocities
-ANOTHER_WAY = 0.7  # m/s: beyond TOGETHER and differing by more is apart
-HOLD = 2.0  # s: how long either rule must hold
+MERGE_DISTANCE = 1.5  # m: nearer than this can be a group
+MERGE_VELOCITY = 0.5  # m/s: walking together
+SPLIT_DISTANCE = 2.5  # m: further is apart, whatever the velocities
+SPLIT_VELOCITY = 0.7  # m/s: beyond MERGE_DISTANCE and differing by more is apart
+HOLD_TIME = 2.0  # s: how long either rule must hold
 
 
 def frames_of(seconds: float, fps: float) -> int:
@@ -24,7 +24,7 @@ def frames_of(seconds: float, fps: float) -> int:
     return max(1, math.ceil(seconds * fps - 1e-9))
 
 
-def lasting(holds: Bools, frames: int) -> Bools:
+def holds_for(holds: Bools, frames: int) -> Bools:
     """Where `holds` (T, ...) is true in this and the next frames, `frames` in all; a stretch cut off does not count."""
     if len(holds) < frames:
         return np.zeros_like(holds)
@@ -35,7 +35,7 @@ def lasting(holds: Bools, frames: int) -> Bools:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Meeting:
+class Separation:
     """Two parts of a crowd over time (T,): distance of nearest members, difference of mean velocities; inf without."""
 
     distance: Array
@@ -43,23 +43,23 @@ class Meeting:
 
     def together(self) -> Bools:
         """Where the merge rule holds for the moment."""
-        return (self.distance < TOGETHER) & (self.difference < SAME_WAY)
+        return (self.distance < MERGE_DISTANCE) & (self.difference < MERGE_VELOCITY)
 
     def apart(self) -> Bools:
         """Where the split rule holds for the moment; not where a part is gone."""
-        away = (self.distance > TOGETHER) & (self.difference > ANOTHER_WAY)
-        return np.isfinite(self.distance) & ((self.distance > APART) | away)
+        away = (self.distance > MERGE_DISTANCE) & (self.difference > SPLIT_VELOCITY)
+        return np.isfinite(self.distance) & ((self.distance > SPLIT_DISTANCE) | away)
 
 
-def meeting(pos: Array, vel: Array, a: Ints, b: Ints) -> Meeting:
+def separation(pos: Array, vel: Array, a: Ints, b: Ints) -> Separation:
     """How parts with columns a and b meet; pos, vel (T, P, 2), nan where absent."""
     gap2 = ((pos[:, a, None] - pos[:, None, b]) ** 2).sum(axis=-1).reshape(len(pos), -1)
     gap2 = np.where(np.isnan(gap2), np.inf, gap2).min(axis=1, initial=np.inf)
-    difference = np.hypot(*(mean(vel[:, a]) - mean(vel[:, b])).T)
-    return Meeting(np.sqrt(gap2), np.where(np.isnan(difference), np.inf, difference))
+    difference = np.hypot(*(mean_of_present(vel[:, a]) - mean_of_present(vel[:, b])).T)
+    return Separation(np.sqrt(gap2), np.where(np.isnan(difference), np.inf, difference))
 
 
-def mean(values: Array) -> Array:
+def mean_of_present(values: Array) -> Array:
     """Mean (T, 2) over people (T, K, 2) who are there; nan where nobody is."""
     there = np.isfinite(values.sum(axis=-1))
     total = np.where(there[..., None], values, 0.0).sum(axis=1)

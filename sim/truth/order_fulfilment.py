@@ -9,17 +9,22 @@ from __future__ import annotations
 import numpy as np
 
 from scenarios.errors import WorkError
+from sim.truth.merge_split_rules import HOLD_TIME, MERGE_DISTANCE, MERGE_VELOCITY, SPLIT_DISTANCE, SPLIT_VELOCITY
+from sim.truth.queue_detection import QUEUE_PEOPLE, QUEUE_TIME, WAITING_SPEED, detect_queues
+from sim.truth.queue_shapes import MAX_SPACING, MIN_SPACING
 from sim.types import Array, Bools, GroupEvent, Ints, Motion, Order, Truth
 
 PATIENCE = 10.0  # s from the firing until the rule has come true
-RULE = {"merge": 2.0, "split": 2.0, "queue": 3.0}  # s that each rule must hold
+RULE_TIME = {"merge": HOLD_TIME, "split": HOLD_TIME, "queue": QUEUE_TIME}
 KINDS = {"merge": ("merge", "form"), "split": ("split", "dissolve"), "queue": ("queue",)}
 WORDS = {
-    "merge": "nearest members < 1.5 m and velocities differing < 0.5 m/s for 2 s",
-    "split": "nearest members of the parts > 2.5 m, or > 1.5 m with velocities differing > 0.7 m/s, for 2 s",
-    "queue": "3 people in order, 0.4 to 1.5 m apart, < 0.4 m/s, for 3 s",
+    "merge": f"nearest members < {MERGE_DISTANCE:g} m and velocities differing < {MERGE_VELOCITY:g} m/s "
+    f"for {HOLD_TIME:g} s",
+    "split": f"nearest members of the parts > {SPLIT_DISTANCE:g} m, or > {MERGE_DISTANCE:g} m with velocities "
+    f"differing > {SPLIT_VELOCITY:g} m/s, for {HOLD_TIME:g} s",
+    "queue": f"{QUEUE_PEOPLE} people in order, {MIN_SPACING:g} to {MAX_SPACING:g} m apart, < {WAITING_SPEED:g} m/s, "
+    f"for {QUEUE_TIME:g} s",
 }
-IN_QUEUE = 3
 
 
 def check_orders(motion: Motion, truth: Truth) -> dict[str, int]:
@@ -38,9 +43,7 @@ def check_orders(motion: Motion, truth: Truth) -> dict[str, int]:
 
 def _check_turns(order: Order, motion: Motion, event: GroupEvent) -> None:
     """WorkError where people left the queue of an order in another order than they stood: first in, first out."""
-    from sim.truth.cross_queue_events import queue_lines
-
-    for line in queue_lines(motion.pos, motion.vel, motion.present, motion.fps):
+    for line in detect_queues(motion.pos, motion.vel, motion.present, motion.fps):
         people = {p + 1 for p in line.order}
         if (line.first + 1, line.last + 1) == (event.start, event.end) and people == set(event.members):
             if not line.fifo:
@@ -64,7 +67,7 @@ def fulfilment(order: Order, truth: Truth, group: Ints) -> int | None:
     """The first event that fulfils the order; group (T, P) as dense_groups gives it."""
     if order.fired is None:
         return None
-    last = order.fired + (PATIENCE - RULE[order.kind]) * truth.fps
+    last = order.fired + (PATIENCE - RULE_TIME[order.kind]) * truth.fps
     for k, event in enumerate(truth.events or ()):
         if event.kind in KINDS[order.kind] and order.fired <= event.start <= last and _concerns(event, order, group):
             return k
@@ -75,7 +78,7 @@ def _concerns(event: GroupEvent, order: Order, group: Ints) -> bool:
     """Whether this event brings about what the order wants."""
     if order.kind == "queue":
         people = {p for part in order.before for p in part}
-        return len(people & set(event.members)) >= min(IN_QUEUE, len(people))
+        return len(people & set(event.members)) >= min(QUEUE_PEOPLE, len(people))
     wanted = [np.array(part, dtype=np.int64) - 1 for part in order.after]
     done = _together if order.kind == "merge" else _apart
     people = {p for part in order.after for p in part}
@@ -120,11 +123,11 @@ def closest(order: Order, motion: Motion, window: slice) -> str:
         return "the recording had ended"
     if order.kind == "queue":
         people = [p - 1 for part in order.before for p in part]
-        slow = present[:, people] & (np.linalg.norm(np.nan_to_num(vel[:, people]), axis=2) < 0.4)
-        most, stretch = slow.sum(axis=1).max(initial=0), _longest(slow.sum(axis=1) >= IN_QUEUE) / motion.fps
+        slow = present[:, people] & (np.linalg.norm(np.nan_to_num(vel[:, people]), axis=2) < WAITING_SPEED)
+        most, stretch = slow.sum(axis=1).max(initial=0), _longest(slow.sum(axis=1) >= QUEUE_PEOPLE) / motion.fps
         return (
-            f"at most {most} of {len(people)} people slower than 0.4 m/s at once, "
-            f"{IN_QUEUE} of them for {stretch:.1f} s at a stretch"
+            f"at most {most} of {len(people)} people slower than {WAITING_SPEED:g} m/s at once, "
+            f"{QUEUE_PEOPLE} of them for {stretch:.1f} s at a stretch"
         )
     parts = order.before if order.kind == "merge" else order.after
     columns = [np.array(part, dtype=np.int64) - 1 for part in parts]

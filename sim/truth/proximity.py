@@ -6,7 +6,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from sim.truth.merge_split_rules import HOLD, SAME_WAY, TOGETHER, frames_of
+from sim.truth.merge_split_rules import HOLD_TIME, MERGE_DISTANCE, MERGE_VELOCITY, frames_of
 from sim.types import Array, Bools, Ints, Near
 
 CHUNK = 200_000  # people times frames looked at together: bounds memory
@@ -73,15 +73,15 @@ def strangers(pos: Array, vel: Array, present: Bools, intent: Ints, group: Ints,
     Arrays (T, P, …); who are still in one group (it has not yet split) are no strangers. Person ids are column + 1.
     """
     t, p = np.nonzero(present)
-    i, j = close_pairs(t, pos[t, p], TOGETHER)
+    i, j = close_pairs(t, pos[t, p], MERGE_DISTANCE)
     t, a, b = t[i], p[i], p[j]
     differ = np.hypot(*(vel[t, a] - vel[t, b]).T)
     same_group = (group[t, a] >= 0) & (group[t, a] == group[t, b])
-    kept = (differ < SAME_WAY) & (intent[t, a] != intent[t, b]) & ~same_group
+    kept = (differ < MERGE_VELOCITY) & (intent[t, a] != intent[t, b]) & ~same_group
     t, a, b = t[kept], a[kept], b[kept]
     pair = a * present.shape[1] + b
     order = np.lexsort((t, pair))
-    pair, first, last = stretches(pair[order], t[order], frames_of(HOLD, fps))
+    pair, first, last = stretches(pair[order], t[order], frames_of(HOLD_TIME, fps))
     order = np.lexsort((pair, first))
     pair, first, last = pair[order], first[order], last[order]
     return Near(first + 1, last + 1, pair // present.shape[1] + 1, pair % present.shape[1] + 1)

@@ -1,4 +1,4 @@
-"""Chains: people of one moment who stand behind one another; those of all moments are found at once.
+"""QueueShapes: people of one moment who stand behind one another; those of all moments are found at once.
 
 Along the line that fits them best their spacing is 0.4-1.5 m and nobody is more than 0.5 m off it. From one to the next
 the way turns by 60° at most: a conversation circle passes the first two tests when projected, never the third.
@@ -14,16 +14,16 @@ import numpy as np
 
 from sim.types import Array, Bools, Ints
 
-NEAREST, FURTHEST = 0.4, 1.5  # m along the line
-OFF = 0.5  # m
-STRAIGHT = 0.5  # cosine of the greatest turn from one to the next
-FAR = 1e9  # m: where those stand who are off a line
-SHARE = 2 / 3  # of a standing crowd that must be in the chain: else it is a crowd
-CELLS = 2_000_000  # seeds times people looked at together: bounds memory
+MIN_SPACING, MAX_SPACING = 0.4, 1.5  # m along the line
+MAX_OFFSET = 0.5  # m
+MIN_TURN_COSINE = 0.5  # cosine of the greatest turn from one to the next
+OFF_LINE = 1e9  # m: where those stand who are off a line
+MIN_CROWD_SHARE = 2 / 3  # of a standing crowd that must be in the chain: else it is a crowd
+MAX_CELLS = 2_000_000  # seeds times people looked at together: bounds memory
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Chains:
+class QueueShapes:
     """M chains: rows (M, n) of people in order, the first `count` (M,) of each; u (M, 2): direction from the first
     towards the last; middle (M, 2)."""
 
@@ -33,17 +33,17 @@ class Chains:
     middle: Array
 
 
-def chains(pos: Array, i: Ints, j: Ints) -> Iterator[Chains]:
+def queue_shapes(pos: Array, i: Ints, j: Ints) -> Iterator[QueueShapes]:
     """The chain, if there is one, of each crowd among places pos (N, 2); i, j: rows of who stand close to each other,
     which makes crowds. Crowds of equal size come together, each crowd's rows in ascending order."""
     for crowd in _crowds(len(pos), i, j):
-        portion = max(1, CELLS // crowd.shape[1] ** 3)
+        portion = max(1, MAX_CELLS // crowd.shape[1] ** 3)
         for low in range(0, len(crowd), portion):
             some = crowd[low : low + portion]
             order, count = _best(pos[some])
             found = count > 0
             rows, count = np.take_along_axis(some[found], order[found], axis=1), count[found]
-            yield Chains(rows, count, *_axes(pos[rows], count)[:2])
+            yield QueueShapes(rows, count, *_axes(pos[rows], count)[:2])
 
 
 def _crowds(people: int, i: Ints, j: Ints) -> Iterator[Ints]:
@@ -68,7 +68,7 @@ def _best(p: Array) -> tuple[Ints, Ints]:
     u = _axes(p, everybody)[0]
     order = np.argsort((p * u[:, None]).sum(axis=2), axis=1, kind="stable")
     count = np.where(_fits(np.take_along_axis(p, order[..., None], axis=1), everybody), n, 0)
-    least = max(3, int(np.ceil(SHARE * n - 1e-9)))
+    least = max(3, int(np.ceil(MIN_CROWD_SHARE * n - 1e-9)))
     rest = np.flatnonzero(count == 0) if n >= least else np.zeros(0, np.int64)
     if len(rest):
         crowd, some, long, residual = _from_seeds(p[rest], least)
@@ -99,7 +99,7 @@ def _fits(p: Array, count: Ints) -> Bools:
     arm = p - middle[:, None]
     off = np.abs(u[:, None, 0] * arm[..., 1] - u[:, None, 1] * arm[..., 0])
     within = np.arange(p.shape[1]) < count[:, None]
-    good = (off <= OFF) | ~within
+    good = (off <= MAX_OFFSET) | ~within
     good[:, 1:] &= _steps_fit((arm * u[:, None]).sum(axis=2)) | ~within[:, 1:]
     good[:, 2:] &= _turns_fit(p) | ~within[:, 2:]
     return np.asarray(good.all(axis=1))
@@ -107,17 +107,17 @@ def _fits(p: Array, count: Ints) -> Bools:
 
 def _steps_fit(along: Array) -> Bools:
     steps = np.diff(along, axis=1)
-    return np.asarray((steps >= NEAREST) & (steps <= FURTHEST))
+    return np.asarray((steps >= MIN_SPACING) & (steps <= MAX_SPACING))
 
 
 def _turns_fit(p: Array) -> Bools:
     step = np.diff(p, axis=1)
     length = np.hypot(step[..., 0], step[..., 1])
-    return np.asarray((step[:, :-1] * step[:, 1:]).sum(axis=2) >= STRAIGHT * length[:, :-1] * length[:, 1:])
+    return np.asarray((step[:, :-1] * step[:, 1:]).sum(axis=2) >= MIN_TURN_COSINE * length[:, :-1] * length[:, 1:])
 
 
 def _from_seeds(p: Array, least: int) -> tuple[Ints, Ints, Ints, Array]:
-    """Chains of `least` or more people along the lines through two who stand next to each other, in crowds (C, n, 2):
+    """Shapes of `least` or more people along the lines through two who stand next to each other, in crowds (C, n, 2):
     crowd (M,), order (M, n), length (M,), distance from the line (M,)."""
     i, j = np.triu_indices(p.shape[1], 1)
     crowd, seed = np.nonzero(_steps_fit(np.stack([np.zeros((len(p), len(i))), _lengths(p, i, j)], axis=1))[:, 0])
@@ -127,7 +127,7 @@ def _from_seeds(p: Array, least: int) -> tuple[Ints, Ints, Ints, Array]:
     u /= np.hypot(*u.T)[:, None]
     arm = places - (places[rows, i] + places[rows, j])[:, None] / 2
     off = np.abs(u[:, None, 0] * arm[..., 1] - u[:, None, 1] * arm[..., 0])
-    along = np.where(off <= OFF, (arm * u[:, None]).sum(axis=2), FAR)
+    along = np.where(off <= MAX_OFFSET, (arm * u[:, None]).sum(axis=2), OFF_LINE)
     order = np.argsort(along, axis=1, kind="stable")
     places = np.take_along_axis(places, order[..., None], axis=1)
     links = _steps_fit(np.take_along_axis(along, order, axis=1))

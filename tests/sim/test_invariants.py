@@ -5,8 +5,9 @@ import numpy as np
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from sim.truth.cross_queue_events import crossings, queues
-from sim.truth.groups import memberships
+from sim.truth.crossing_events import crossings
+from sim.truth.merge_split_events import groups_and_events
+from sim.truth.queue_detection import queues
 from tests.plots import DURATION, crosses, look, merges, scenes, splits
 
 FPS = 10.0
@@ -15,7 +16,7 @@ SETTLED = 8.0  # s: what ended so long ago is known, whatever follows
 
 def measure(scene):
     """Labels (T, P) and events as (kind, start, end, members, how many groups and people alone before, and after)."""
-    found = memberships(scene.pos, scene.vel, scene.present, scene.intent, scene.fps)
+    found = groups_and_events(scene.pos, scene.vel, scene.present, scene.intent, scene.fps)
     events = [
         *found.events,
         *crossings(scene.pos, scene.vel, scene.present, found.group, scene.fps),

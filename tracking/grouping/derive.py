@@ -2,7 +2,8 @@
 
 Linked people (tracking.grouping.link_rule) form groups, connected through others too; ids follow the identity rule
 (sim.truth.identity).
-Crossings and queues are measured by sim.truth.cross_queue_events. An event is reported in the frame in which it is
+Crossings and queues are measured by sim.truth.crossing_events and sim.truth.queue_detection.
+An event is reported in the frame in which it is
 known, `start` being
 its onset: a merge once its link holds, a crossing 2 s after it, a queue when its people have waited 3 s (and 3 s more,
 as advancing is told from leaving by what follows); a queue's `end`, and who joins it, is known later. The end of a
@@ -19,11 +20,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from scenarios.errors import InputError
-from sim.truth.cross_queue_events import SAME_BEFORE, crossings, queues
-from sim.truth.groups import box_groups, groups_over_time
+from sim.truth.crossing_events import SAME_BEFORE, crossings
+from sim.truth.group_hulls import box_groups, groups_over_time
 from sim.truth.merge_split_rules import frames_of
-from sim.truth.queue_detection import ADVANCE
-from sim.truth.queue_detection import HOLD as QUEUE_HOLD
+from sim.truth.queue_detection import ADVANCE_TIME, QUEUE_TIME, queues
 from sim.types import EVENT_KINDS, Array, Bools, GroupEvent, Groups, Ints, Tracks
 from tracking.grouping.group_labels import label_changes, label_people
 from tracking.grouping.link_rule import Grouping, find_links
@@ -173,7 +173,7 @@ def _encounters(rows: Table, fps: float) -> list[GroupEvent]:
     present: Bools = np.isfinite(pos[..., 0])
     crossed = crossings(pos, vel, present, label, fps)
     queued = queues(pos, vel, present, label, fps)
-    late, waited = frames_of(SAME_BEFORE, fps), frames_of(QUEUE_HOLD, fps) + frames_of(ADVANCE, fps)
+    late, waited = frames_of(SAME_BEFORE, fps), frames_of(QUEUE_TIME, fps) + frames_of(ADVANCE_TIME, fps)
     return [replace(e, emitted=min(e.end + late, rows.length)) for e in crossed] + [
         replace(e, emitted=min(e.start + waited - 1, rows.length)) for e in queued
     ]

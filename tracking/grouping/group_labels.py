@@ -8,7 +8,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from sim.truth.identity import Change, Identities, People, lineage
+from sim.truth.identity import GroupChange, Identities, PersonSet, lineage
 from sim.truth.merge_split_rules import frames_of
 from sim.truth.proximity import stretches
 from sim.types import Array, GroupEvent, Ints
@@ -23,7 +23,7 @@ class _Crowd:
     linked: dict[int, set[int]] = field(default_factory=dict)
     identities: Identities = field(default_factory=Identities)
 
-    def parts(self) -> list[People]:
+    def parts(self) -> list[PersonSet]:
         """Groups among those who are here: linked, or connected through others."""
         found, seen = [], set[int]()
         for p in sorted(self.here.keys() & self.linked.keys()):
@@ -88,7 +88,7 @@ def _come_or_go(crowd: _Crowd, p: int, since: int | None) -> None:
         crowd.here[p] = since
 
 
-def _arrivals(crowd: _Crowd, turned: Iterable[tuple[int, int, bool, int]], late: int) -> People:
+def _arrivals(crowd: _Crowd, turned: Iterable[tuple[int, int, bool, int]], late: int) -> PersonSet:
     """Who has come linked, or nearly: their link began soon after they did, and they were in no group yet."""
     grouped = {p for people in crowd.identities.groups.values() for p in people}
     return frozenset(
@@ -105,7 +105,7 @@ def _seen_only(frame: Ints, group: Ints) -> Ints:
 
 
 def _event(
-    change: Change, t: int, turned: Iterable[tuple[int, int, bool, int]], pos: Array, late: int
+    change: GroupChange, t: int, turned: Iterable[tuple[int, int, bool, int]], pos: Array, late: int
 ) -> GroupEvent | None:
     """The event of a change that is known at t; None for groups that were there when the sequence began."""
     people = set(change.members)
@@ -121,7 +121,7 @@ def _event(
     return _at(change, start, end, t, pos)
 
 
-def _at(change: Change, start: int, end: int, t: int, pos: Array) -> GroupEvent:
+def _at(change: GroupChange, start: int, end: int, t: int, pos: Array) -> GroupEvent:
     """The event where its people are when it starts, or were last."""
     places = pos[max(start - 20, 0) : t + 1, change.members]
     known = np.flatnonzero(np.isfinite(places[..., 0]).sum(axis=1))
@@ -147,12 +147,12 @@ def label_changes(group: Ints, pos: Array) -> list[GroupEvent]:
     return events
 
 
-def _groups_of(state: Ints) -> dict[int, People]:
+def _groups_of(state: Ints) -> dict[int, PersonSet]:
     found: dict[int, set[int]] = {}
     for p in np.flatnonzero(state >= 0).tolist():
         found.setdefault(int(state[p]), set()).add(p)
     return {g: frozenset(people) for g, people in found.items() if len(people) > 1}
 
 
-def _people_of(state: Ints) -> People:
+def _people_of(state: Ints) -> PersonSet:
     return frozenset(np.flatnonzero(state != -2).tolist())

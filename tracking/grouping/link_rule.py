@@ -12,7 +12,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from sim.truth.merge_split_rules import APART, HOLD, SAME_WAY, TOGETHER, frames_of
+from sim.truth.merge_split_rules import HOLD_TIME, MERGE_DISTANCE, MERGE_VELOCITY, SPLIT_DISTANCE, frames_of
 from sim.truth.proximity import close_pairs
 from sim.types import Array, Bools, Ints
 from tracking.config import Config, param
@@ -28,18 +28,18 @@ class Grouping(Config):
 
     tracker: ClassVar[str] = "grouping"
 
-    near: float = param(TOGETHER, (0.5, 3.0), "m", "nearer is together")
-    alike: float = param(SAME_WAY, (0.1, 2.0), "m/s", "velocities that differ by less are alike")
+    near: float = param(MERGE_DISTANCE, (0.5, 3.0), "m", "nearer is together")
+    alike: float = param(MERGE_VELOCITY, (0.1, 2.0), "m/s", "velocities that differ by less are alike")
     share: float = param(0.8, (0.3, 1.0), "share", "of the frames of the last `window` in which both were seen")
-    window: float = param(HOLD, (0.2, 6.0), "s", "how far back it looks")
+    window: float = param(HOLD_TIME, (0.2, 6.0), "s", "how far back it looks")
     acquaintance: float = param(
         1.0,
         (0.0, 6.0),
         "s",
         "of the window in which both must have been seen: who has just come is judged sooner",
     )
-    apart: float = param(APART, (0.5, 5.0), "m", "further is apart")
-    patience: float = param(HOLD, (0.1, 6.0), "s", "apart for so long, and the link breaks")
+    apart: float = param(SPLIT_DISTANCE, (0.5, 5.0), "m", "further is apart")
+    patience: float = param(HOLD_TIME, (0.1, 6.0), "s", "apart for so long, and the link breaks")
     idle: float = param(
         0.0,
         (0.0, 1.0),

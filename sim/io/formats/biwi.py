@@ -74,7 +74,7 @@ def _table(folder: Path) -> tuple[Rows, Ints, Ints]:
 
 
 def read_truth(folder: Path, fps: float = FPS) -> Truth:
-    """The recording as truth on the ground; groups as labelled, hulls and events by sim.truth.groups."""
+    """The recording as truth on the ground; groups as labelled, hulls and events by sim.truth.group_hulls."""
     rows, frame, id = _table(folder)
     pos, vel = rows.values[:, (2, 4)], rows.values[:, (5, 7)]
     length = int(frame.max(initial=0))

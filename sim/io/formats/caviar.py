@@ -18,7 +18,7 @@ from scenarios.errors import InputError
 from sim.io.formats.group_labels import label_truth
 from sim.io.formats.velocity import differentiate
 from sim.scene.camera import PERSON
-from sim.truth.groups import box_groups
+from sim.truth.group_hulls import box_groups
 from sim.types import Array, Frame, Ints, Sequence, Truth
 
 FPS = 25.0

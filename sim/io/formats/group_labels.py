@@ -1,7 +1,7 @@
 """Truth of recordings whose groups somebody labelled: hulls and events beside the labels as they were given.
 
 The label says who belongs together (intent); when groups come true is measured from the motion by the same function
-as for simulated crowds (sim.truth.groups). Work is done in metres; a recording in px is scaled by its px_per_m.
+as for simulated crowds (sim.truth.group_hulls). Work is done in metres; a recording in px is scaled by its px_per_m.
 """
 
 from __future__ import annotations
@@ -28,8 +28,10 @@ def label_truth(
 
     Event ids are labels: each measured group bears the label of its members. Crossings are of the groups as labelled.
     """
-    from sim.truth.cross_queue_events import crossings, queues
-    from sim.truth.groups import groups_over_time, memberships
+    from sim.truth.crossing_events import crossings
+    from sim.truth.group_hulls import groups_over_time
+    from sim.truth.merge_split_events import groups_and_events
+    from sim.truth.queue_detection import queues
 
     metres, speed = pos / px_per_m, vel / px_per_m
     people = np.unique(id)
@@ -39,7 +41,7 @@ def label_truth(
     intent[frame - 1, column] = np.where(label >= 0, label, alone)
     present = intent >= 0
     places, velocities = dense(frame, id, metres, length), dense(frame, id, speed, length)
-    measured = memberships(places, velocities, present, intent, fps)
+    measured = groups_and_events(places, velocities, present, intent, fps)
     names = _names(measured.group[frame - 1, column], label)
     found = [_named(e, names, people, px_per_m) for e in measured.events]
     given = np.full((length, len(people)), -1, np.int64)

@@ -129,7 +129,7 @@ def test_cross():
 
 
 def queueing():
-    """People come down a line towards x = 5 at 1.2 m/s, and stand 0.8 m behind one another.
+    """PersonSet come down a line towards x = 5 at 1.2 m/s, and stand 0.8 m behind one another.
 
     2.0 s: person 1 stands at x = 5; 3.0 s: person 2 at 5.8
     3.5-5.5 s: person 4 stands behind them, at 6.6, then leaves to the side: three in line, but for 2 s only

@@ -63,8 +63,8 @@ def test_nobody_is_no_error() -> None:
 
 
 def test_groups_come_from_the_measurement_on_the_ground_and_in_the_image() -> None:
-    pytest.importorskip("sim.truth.groups", exc_type=ImportError)
-    pytest.importorskip("sim.truth.cross_queue_events", exc_type=ImportError)
+    pytest.importorskip("sim.truth.merge_split_events", exc_type=ImportError)
+    pytest.importorskip("sim.truth.crossing_events", exc_type=ImportError)
     motion, camera = meeting(), pinhole()
     truth = label(motion, camera)
     assert truth.events is not None
@@ -88,8 +88,8 @@ def test_groups_come_from_the_measurement_on_the_ground_and_in_the_image() -> No
 
 
 def test_the_orders_times_change_nothing() -> None:
-    pytest.importorskip("sim.truth.groups", exc_type=ImportError)
-    pytest.importorskip("sim.truth.cross_queue_events", exc_type=ImportError)
+    pytest.importorskip("sim.truth.merge_split_events", exc_type=ImportError)
+    pytest.importorskip("sim.truth.crossing_events", exc_type=ImportError)
     from sim.types import Order
 
     ordered = meeting().replace(orders=(Order("m", "merge", 21, ((1, 2), (3,)), ((1, 2, 3),)),))

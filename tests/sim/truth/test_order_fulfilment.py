@@ -2,8 +2,8 @@ import numpy as np
 import pytest
 
 from scenarios.errors import WorkError
-from sim.truth.cross_queue_events import queues
 from sim.truth.order_fulfilment import check_orders
+from sim.truth.queue_detection import queues
 from sim.types import GroupEvent, Motion, Order, Truth
 from tests.reference_sense import walkers
 

@@ -1,15 +1,15 @@
 import numpy as np
 import pytest
 
-from sim.truth.queue_shapes import chains
-from tests.reference_chains import chain
+from sim.truth.queue_shapes import queue_shapes
+from tests.reference_queue_shapes import chain
 
 
 def found(pos):
-    """The chains among places, as lists of rows, each from its smaller end; all stand close to one another."""
+    """The queue_shapes among places, as lists of rows, each from its smaller end; all stand close to one another."""
     rows = [
         c.rows[k, : c.count[k]].tolist()
-        for c in chains(pos, *np.triu_indices(len(pos), 1))
+        for c in queue_shapes(pos, *np.triu_indices(len(pos), 1))
         for k in range(len(c.count))
     ]
     return [min(r, r[::-1]) for r in rows]
@@ -35,7 +35,7 @@ def test_chains_are_those_tried_line_by_line():
         assert found(pos) == ([min(expected, expected[::-1])] if expected else []), seed
         lengths.append((len(expected), len(pos)))
     assert {n for n, _ in lengths} >= {0, 2, 3, 4, 5, 6, 7, 8}
-    assert sum(0 < n < people for n, people in lengths) > 20, "also chains that leave somebody out"
+    assert sum(0 < n < people for n, people in lengths) > 20, "also queue_shapes that leave somebody out"
 
 
 def test_many_crowds_at_once_are_each_by_itself():
@@ -43,7 +43,7 @@ def test_many_crowds_at_once_are_each_by_itself():
     pos, ends = np.concatenate(places), np.cumsum([len(p) for p in places])
     edges = [np.array(np.triu_indices(len(p), 1)) + end - len(p) for p, end in zip(places, ends, strict=True)]
     together = []
-    for c in chains(pos, *np.concatenate(edges, axis=1)):
+    for c in queue_shapes(pos, *np.concatenate(edges, axis=1)):
         for rows, n, u, middle in zip(c.rows, c.count, c.u, c.middle, strict=True):
             together.append(min(rows[:n].tolist(), rows[:n].tolist()[::-1]))
             assert middle == pytest.approx(pos[rows[:n]].mean(axis=0))
@@ -55,5 +55,5 @@ def test_many_crowds_at_once_are_each_by_itself():
 
 def test_who_stands_next_to_nobody_is_in_no_chain():
     none = np.zeros(0, np.int64)
-    assert list(chains(np.zeros((3, 2)), none, none)) == []
-    assert list(chains(np.zeros((0, 2)), none, none)) == []
+    assert list(queue_shapes(np.zeros((3, 2)), none, none)) == []
+    assert list(queue_shapes(np.zeros((0, 2)), none, none)) == []

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from sim.geometry.polygons import iou_matrix
-from sim.truth.groups import frame_groups
+from sim.truth.group_hulls import frame_groups
 from sim.types import Groups, Tracks, Truth
 from tests.reference_social import group_scores, groups_of, groups_without_people, pairwise_scores, who_is_who
 from tests.reference_trackeval import trackeval_scores

@@ -1,4 +1,4 @@
-"""What labels.py hands to the measuring functions, and how it translates their answer; memberships by a stand-in."""
+"""What group_labels.py passes to the measuring functions and how it uses the result; groups_and_events is a stub."""
 
 import types
 
@@ -16,10 +16,10 @@ POS = np.arange(10.0).reshape(5, 2) * 20
 
 @pytest.fixture
 def measured(monkeypatch):
-    """memberships as a stand-in that notes what it is given and answers with a merge of columns 2 and 3."""
+    """groups_and_events as a stand-in that notes what it is given and answers with a merge of columns 2 and 3."""
     seen = types.SimpleNamespace()
 
-    def memberships(pos, vel, present, intent, fps):
+    def groups_and_events(pos, vel, present, intent, fps):
         seen.given = (pos, vel, present, intent, fps)
         group = np.full(present.shape, -1)
         group[0, 1:] = group[2, 1] = 5
@@ -27,7 +27,7 @@ def measured(monkeypatch):
         one = np.array([1], np.int64)
         return types.SimpleNamespace(group=group, events=(event,), near=Near(one, one, one, one + 2))
 
-    monkeypatch.setattr("sim.truth.groups.memberships", memberships)
+    monkeypatch.setattr("sim.truth.merge_split_events.groups_and_events", groups_and_events)
     return seen
 
 

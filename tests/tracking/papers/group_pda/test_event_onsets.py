@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from sim.truth.merge_split_rules import SAME_WAY
+from sim.truth.merge_split_rules import MERGE_VELOCITY
 from tracking.papers.group_pda.event_onsets import APART, Encounter, chords, parting
 
 FPS, SLOWS, LASTS = 10.0, 2.0, 1.0
@@ -23,8 +23,8 @@ def encounter(noise: float, seed: int, gap: float = 0.5) -> Encounter:
 
 @pytest.mark.parametrize("noise", [0.0, 0.05, 0.1])
 def test_it_is_when_they_had_become_equally_fast(noise: float) -> None:
-    due = SLOWS + LASTS * (1 - SAME_WAY / 2)
-    found = np.array([encounter(noise, seed).onset(SAME_WAY)[0] for seed in range(40)])
+    due = SLOWS + LASTS * (1 - MERGE_VELOCITY / 2)
+    found = np.array([encounter(noise, seed).onset(MERGE_VELOCITY)[0] for seed in range(40)])
     assert abs(found - due).max() <= 0.5
     assert found.mean() == pytest.approx(due, abs=0.25)
 
@@ -32,7 +32,7 @@ def test_it_is_when_they_had_become_equally_fast(noise: float) -> None:
 def test_before_that_they_must_be_near() -> None:
     met = encounter(0.0, 0)
     far = [(t, d, m, APART + 0.1 if t < 4.2 else gap) for t, d, m, gap in met.path]
-    assert Encounter(4.4, far).onset(SAME_WAY)[0] == pytest.approx(4.2)
+    assert Encounter(4.4, far).onset(MERGE_VELOCITY)[0] == pytest.approx(4.2)
 
 
 def test_whole_chords_are_as_sure_at_the_ends_as_elsewhere() -> None:

@@ -4,7 +4,7 @@ import pytest
 from sim.geometry.polygons import area, convex_hull
 from sim.scene.body import Ellipsoids, contour, ellipsoids, outlines
 from sim.scene.camera import project
-from sim.truth.image_groups import POINTS, hulls, image_groups, image_velocities
+from sim.truth.image_group_hulls import POINTS, hulls, image_groups, image_velocities
 from sim.truth.label import bodies
 from sim.types import Array, Groups
 from tests.reference_sense import above, crowd, pinhole

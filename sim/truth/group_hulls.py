@@ -1,62 +1,19 @@
 """Groups over time: the truth measured from motion and intent, and the shape of groups for anybody's people.
 
-sim.truth.membership says who is together when, sim.truth.identity which group is which; here both become labels,
+sim.truth.group_membership says who is together when, sim.truth.identity which group is which; here both become labels,
 events and hulls.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
 
 from sim.geometry.footprints import footprint_hulls
 from sim.geometry.polygons import convex_hull
-from sim.truth.identity import Change, Identities
-from sim.truth.membership import partitions
-from sim.truth.merge_split_rules import HOLD, frames_of, mean
-from sim.truth.proximity import strangers
-from sim.types import Array, Bools, GroupEvent, Groups, Ints, Near
-
-__all__ = ["Membership", "box_groups", "frame_groups", "groups_over_time", "memberships"]
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Membership:
-    """group (T, P): id from 1, -1 alone or absent. events: all kinds but cross and queue. near: strangers."""
-
-    group: Ints
-    events: tuple[GroupEvent, ...]
-    near: Near
-
-
-def memberships(pos: Array, vel: Array, present: Bools, intent: Ints, fps: float) -> Membership:
-    """Truth of groups; pos, vel (T, P, 2) nan where absent, intent (T, P) -1 where absent. Person id is column + 1.
-
-    An event starts at its onset and ends when its rule has come true. Groups that are there in frame 1 do not enter.
-    """
-    group = np.full(present.shape, -1, np.int64)
-    identities, events = Identities(), []
-    hold = frames_of(HOLD, fps)
-    steps = [*partitions(pos, vel, present, intent, fps), (len(present), [])]
-    for (t, parts), (until, _) in pairwise(steps):
-        here = frozenset(np.flatnonzero(present[t]).tolist())
-        changes = identities.step(t, here, parts)
-        for g, people in identities.groups.items():
-            group[t:until, sorted(people)] = g
-        events += [_event(c, t, hold, pos) for c in changes if t > 0]
-    return Membership(group, tuple(events), strangers(pos, vel, present, intent, group, fps))
-
-
-def _event(change: Change, t: int, hold: int, pos: Array) -> GroupEvent:
-    """The event of a change at t (from 0), where its people are; who left was last there one frame before."""
-    start = t if change.kind == "leave" else t + 1
-    end = start if change.kind in ("enter", "leave") else start + hold - 1
-    x, y = mean(pos[start - 1 : start, list(change.members)])[0]
-    people = tuple(p + 1 for p in change.members)
-    return GroupEvent(change.kind, start, end, None, change.before, change.after, people, (float(x), float(y)))
+from sim.types import Array, Groups, Ints
 
 
 def frame_groups(id: Ints, group: Ints, pos: Array, vel: Array) -> Groups:

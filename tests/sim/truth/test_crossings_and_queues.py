@@ -3,7 +3,8 @@ import pytest
 
 from scenarios.loading.resolve import load
 from sim.crowd.world import run
-from sim.truth.cross_queue_events import crossings, queue_lines, queues
+from sim.truth.crossing_events import crossings
+from sim.truth.queue_detection import detect_queues, queues
 
 FPS = 10.0
 T = np.arange(120)[:, None] / FPS
@@ -142,7 +143,7 @@ def test_crossings_are_the_same_in_portions(monkeypatch):
     numbers = groups(*(2 * k + side for k in range(5) for side in (1, 1, 2, 2)))
     whole = crossed(paths, numbers)
     assert len(whole) == 5
-    monkeypatch.setattr("sim.truth.cross_queue_events.ROWS", 100)
+    monkeypatch.setattr("sim.truth.crossing_events.ROWS", 100)
     assert crossed(paths, numbers) == whole
 
 
@@ -193,7 +194,7 @@ def served(people=5, service=2.0, spacing=0.8):
 
 
 def test_advancing_is_waiting_and_first_come_is_first_served():
-    (line,) = queue_lines(*crowd(served()), FPS)
+    (line,) = detect_queues(*crowd(served()), FPS)
     assert line.order in ((0, 1, 2, 3, 4), (4, 3, 2, 1, 0))
     assert line.left == (0, 1, 2)
     assert line.fifo
@@ -203,7 +204,7 @@ def test_advancing_is_waiting_and_first_come_is_first_served():
 @pytest.mark.parametrize(("leavers", "fifo"), [((0,), True), ((4, 3), True), ((2,), False), ((0, 2), False)])
 def test_first_in_first_out_means_from_one_end(leavers, fifo):
     late = {k: 7.0 + n for n, k in enumerate(leavers)}
-    (line,) = queue_lines(*crowd([waiting(k, spacing=0.6, leave=late.get(k, 99)) for k in range(5)]), FPS)
+    (line,) = detect_queues(*crowd([waiting(k, spacing=0.6, leave=late.get(k, 99)) for k in range(5)]), FPS)
     assert line.left == leavers
     assert line.fifo == fifo
 
@@ -212,7 +213,7 @@ def test_two_served_together_leave_in_order():
     """The first two of five leave at once, then the third; were it the fourth, one would have been passed over."""
     for third, fifo in ((2, True), (3, False)):
         late = {0: 7.0, 1: 7.0, third: 8.5}
-        (line,) = queue_lines(*crowd([waiting(k, spacing=0.6, leave=late.get(k, 99)) for k in range(5)]), FPS)
+        (line,) = detect_queues(*crowd([waiting(k, spacing=0.6, leave=late.get(k, 99)) for k in range(5)]), FPS)
         assert (set(line.left), line.fifo) == ({0, 1, third}, fifo)
 
 
@@ -220,7 +221,7 @@ def test_two_served_together_leave_in_order():
 def test_simulated_queues_are_first_in_first_out(name):
     for seed in range(3):
         motion = run(load(name, ["camera.fps=5"]), seed)
-        found = queue_lines(motion.pos, motion.vel, motion.present, motion.fps)
+        found = detect_queues(motion.pos, motion.vel, motion.present, motion.fps)
         assert len(found) == 1
         assert found[0].fifo
         assert found[0].left

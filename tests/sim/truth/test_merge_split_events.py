@@ -1,9 +1,8 @@
 import numpy as np
 import pytest
 
-from sim.geometry.footprints import footprint_hull
-from sim.truth.groups import box_groups, frame_groups, groups_over_time, memberships
-from sim.truth.merge_split_rules import frames_of, lasting
+from sim.truth.merge_split_events import groups_and_events
+from sim.truth.merge_split_rules import frames_of, holds_for
 from tests.reference_groups import labels
 
 FPS = 10.0
@@ -42,7 +41,7 @@ def merging(speed, near):
 
 def test_merge_at_the_frame_in_which_they_are_near():
     """6 - 0.4 t < 1.5 from t > 11.25 s on: frame 114."""
-    m = memberships(*merging(0.4, 0.8), meant((1, (1, 1, 2, 2)), (50, (3, 3, 3, 3)), frames=200), FPS)
+    m = groups_and_events(*merging(0.4, 0.8), meant((1, (1, 1, 2, 2)), (50, (3, 3, 3, 3)), frames=200), FPS)
     assert summary(m.events) == [("merge", 114, 133, (1, 2), (1,), (1, 2, 3, 4))]
     assert (m.group[:113] == [1, 1, 2, 2]).all()
     assert (m.group[113:] == 1).all()
@@ -51,16 +50,16 @@ def test_merge_at_the_frame_in_which_they_are_near():
 
 def test_merge_at_the_frame_in_which_velocities_agree():
     """They come at 0.6 m/s, too fast, until 8.7 s; from frame 88 on they differ by nothing."""
-    m = memberships(*merging(0.6, 0.8), meant((1, (3, 3, 3, 3)), frames=200), FPS)
+    m = groups_and_events(*merging(0.6, 0.8), meant((1, (3, 3, 3, 3)), frames=200), FPS)
     assert (m.group == 1).all(), "together from the first frame when meant to be"
-    m = memberships(*merging(0.6, 0.8), meant((1, (1, 1, 2, 2)), (40, (3, 3, 3, 3)), frames=200), FPS)
+    m = groups_and_events(*merging(0.6, 0.8), meant((1, (1, 1, 2, 2)), (40, (3, 3, 3, 3)), frames=200), FPS)
     assert summary(m.events) == [("merge", 88, 107, (1, 2), (1,), (1, 2, 3, 4))]
 
 
 def test_merge_no_earlier_than_intent_and_not_without():
-    m = memberships(*merging(0.4, 0.8), meant((1, (1, 1, 2, 2)), (150, (3, 3, 3, 3)), frames=200), FPS)
+    m = groups_and_events(*merging(0.4, 0.8), meant((1, (1, 1, 2, 2)), (150, (3, 3, 3, 3)), frames=200), FPS)
     assert [e.start for e in m.events] == [150]
-    m = memberships(*merging(0.4, 0.8), meant((1, (1, 1, 2, 2)), frames=200), FPS)
+    m = groups_and_events(*merging(0.4, 0.8), meant((1, (1, 1, 2, 2)), frames=200), FPS)
     assert m.events == ()
     assert m.near.a.tolist() == [2]
     assert m.near.b.tolist() == [3]
@@ -70,8 +69,8 @@ def test_merge_no_earlier_than_intent_and_not_without():
 def test_a_stretch_cut_off_by_the_end_does_not_count():
     pos, vel, there = merging(0.4, 0.8)
     want = meant((1, (1, 1, 2, 2)), (50, (3, 3, 3, 3)), frames=200)
-    assert len(memberships(pos[:133], vel[:133], there[:133], want[:133], FPS).events) == 1
-    assert len(memberships(pos[:132], vel[:132], there[:132], want[:132], FPS).events) == 0
+    assert len(groups_and_events(pos[:133], vel[:133], there[:133], want[:133], FPS).events) == 1
+    assert len(groups_and_events(pos[:132], vel[:132], there[:132], want[:132], FPS).events) == 0
 
 
 def parting(speed):
@@ -89,14 +88,14 @@ def parting(speed):
     ],
 )
 def test_split_at_the_frame_in_which_they_are_apart(speed, onset):
-    m = memberships(*parting(speed), meant((1, (1, 1, 1, 1)), (20, (1, 1, 2, 2)), frames=150), FPS)
+    m = groups_and_events(*parting(speed), meant((1, (1, 1, 1, 1)), (20, (1, 1, 2, 2)), frames=150), FPS)
     assert summary(m.events) == [("split", onset, onset + 19, (1,), (1, 2), (1, 2, 3, 4))]
     assert (m.group[: onset - 1] == 1).all()
     assert (m.group[onset - 1 :] == [1, 1, 2, 2]).all()
 
 
 def test_no_split_without_intent():
-    assert memberships(*parting(0.8), meant((1, (1, 1, 1, 1)), frames=150), FPS).events == ()
+    assert groups_and_events(*parting(0.8), meant((1, (1, 1, 1, 1)), frames=150), FPS).events == ()
 
 
 def test_who_enters_together_counts_from_the_first_frame():
@@ -104,7 +103,7 @@ def test_who_enters_together_counts_from_the_first_frame():
     there[:20, 1:3] = False
     there[:40, 3] = False
     there[80:, 1:] = False
-    m = memberships(pos, vel, there, np.where(there, [1, 2, 2, 2], -1), FPS)
+    m = groups_and_events(pos, vel, there, np.where(there, [1, 2, 2, 2], -1), FPS)
     assert summary(m.events) == [("enter", 21, 21, (), (1,), (2, 3)), ("leave", 80, 80, (1,), (), (2, 3, 4))]
     assert (m.group[20:40, 1:3] == 1).all()
     assert (m.group[40:80, 1:] == 1).all()
@@ -112,7 +111,7 @@ def test_who_enters_together_counts_from_the_first_frame():
 
 
 def scene(seed, frames=60, people=7, fps=4.0):
-    """People wander about in a small place, come, go and change their minds."""
+    """PersonSet wander about in a small place, come, go and change their minds."""
     r = np.random.default_rng(seed)
     vel = np.cumsum(r.normal(0, 0.35, (frames, people, 2)), 0) * 0.5
     vel -= np.linspace(0, 1, frames)[:, None, None] * vel[-1]
@@ -139,7 +138,7 @@ def test_labels_are_those_of_the_rules_read_frame_by_frame():
     kinds = set()
     for seed in range(60):
         made = scene(seed)
-        m = memberships(*made)
+        m = groups_and_events(*made)
         assert partition(m.group) == labels(*made), seed
         kinds |= {e.kind for e in m.events}
     assert kinds == {"merge", "split", "form", "dissolve", "enter", "leave"}
@@ -149,7 +148,7 @@ def test_events_tell_every_change_of_labels():
     """Between two frames without an event, nobody who stays changes group."""
     for seed in range(30):
         pos, vel, there, intent, fps = scene(seed)
-        m = memberships(pos, vel, there, intent, fps)
+        m = groups_and_events(pos, vel, there, intent, fps)
         starts = {e.start for e in m.events if e.kind != "leave"} | {e.start + 1 for e in m.events if e.kind == "leave"}
         for t in range(1, len(pos)):
             stay = there[t] & there[t - 1] & (m.group[t] != m.group[t - 1])
@@ -160,12 +159,12 @@ def test_order_of_people_and_place_of_the_scene_change_nothing():
     turn = np.array([[0.6, -0.8], [0.8, 0.6]])
     for seed in range(20):
         pos, vel, there, intent, fps = scene(seed)
-        m = memberships(pos, vel, there, intent, fps)
-        moved = memberships(pos @ turn + [30, -7], vel @ turn, there, intent, fps)
+        m = groups_and_events(pos, vel, there, intent, fps)
+        moved = groups_and_events(pos @ turn + [30, -7], vel @ turn, there, intent, fps)
         assert np.array_equal(m.group, moved.group)
         assert summary(m.events) == summary(moved.events)
         order = np.random.default_rng(seed).permutation(there.shape[1])
-        mixed = memberships(pos[:, order], vel[:, order], there[:, order], intent[:, order], fps)
+        mixed = groups_and_events(pos[:, order], vel[:, order], there[:, order], intent[:, order], fps)
         assert partition(m.group[:, order]) == partition(mixed.group)
         assert sorted((e.kind, e.start) for e in m.events) == sorted((e.kind, e.start) for e in mixed.events)
         assert len(m.near.a) == len(mixed.near.a)
@@ -174,7 +173,7 @@ def test_order_of_people_and_place_of_the_scene_change_nothing():
 def test_near_lists_strangers_only_and_whole_stretches():
     for seed in range(30):
         pos, vel, there, intent, fps = scene(seed)
-        m = memberships(pos, vel, there, intent, fps)
+        m = groups_and_events(pos, vel, there, intent, fps)
         expected = []
         for a in range(there.shape[1]):
             for b in range(a + 1, there.shape[1]):
@@ -189,12 +188,12 @@ def test_near_lists_strangers_only_and_whole_stretches():
 
 def test_nobody_and_nothing():
     none = np.zeros((0, 0, 2))
-    assert memberships(none, none, none[..., 0] > 0, np.zeros((0, 0), np.int64), FPS).events == ()
+    assert groups_and_events(none, none, none[..., 0] > 0, np.zeros((0, 0), np.int64), FPS).events == ()
     empty = np.zeros((5, 0, 2))
-    m = memberships(empty, empty, np.zeros((5, 0), bool), np.zeros((5, 0), np.int64), FPS)
+    m = groups_and_events(empty, empty, np.zeros((5, 0), bool), np.zeros((5, 0), np.int64), FPS)
     assert m.group.shape == (5, 0)
     gone = np.full((5, 2, 2), np.nan)
-    m = memberships(gone, gone, np.zeros((5, 2), bool), np.full((5, 2), -1), FPS)
+    m = groups_and_events(gone, gone, np.zeros((5, 2), bool), np.full((5, 2), -1), FPS)
     assert (m.group == -1).all()
 
 
@@ -202,43 +201,5 @@ def test_stretches():
     assert frames_of(2.0, 2.5) == 5
     assert frames_of(0.3, 10) == 3
     holds = np.array([1, 1, 0, 1, 1, 1, 1, 0], bool)
-    assert lasting(holds, 3).tolist() == [0, 0, 0, 1, 1, 0, 0, 0]
-    assert not lasting(holds[:2], 3).any()
-
-
-def test_groups_of_a_frame():
-    id, group = np.array([9, 4, 7, 5, 8]), np.array([2, 1, 2, -1, 3])
-    pos, vel = np.array([[0.0, 0], [5, 5], [1, 0], [9, 9], [3, 3]]), np.arange(10.0).reshape(5, 2)
-    g = frame_groups(id, group, pos, vel)
-    assert g.id.tolist() == [2], "groups of one are none"
-    assert [m.tolist() for m in g.members] == [[7, 9]]
-    assert (g.pos.tolist(), g.vel.tolist(), g.size.tolist()) == ([[0.5, 0]], [[2, 3]], [2])
-    assert g.extent.tolist() == [[[0.25, 0], [0, 0]]]
-    np.testing.assert_allclose(g.hull[0], footprint_hull(pos[[0, 2]]))
-
-
-def test_groups_over_time_are_those_of_each_frame():
-    r = np.random.default_rng(1)
-    frame = np.sort(r.integers(2, 9, 60))
-    frame = frame[frame != 5]
-    id = np.arange(len(frame))
-    group, pos, vel = r.integers(-1, 3, len(frame)), r.normal(size=(len(frame), 2)), r.normal(size=(len(frame), 2))
-    many = groups_over_time(frame, id, group, pos, vel, 1, 10)
-    for t, g in enumerate(many, start=1):
-        one = frame_groups(*(x[frame == t] for x in (id, group, pos, vel)))
-        assert g.id.tolist() == one.id.tolist()
-        assert [m.tolist() for m in g.members] == [m.tolist() for m in one.members]
-        for name in ("pos", "vel", "extent", "size"):
-            np.testing.assert_allclose(getattr(g, name), getattr(one, name))
-        assert all(np.array_equal(a, b) for a, b in zip(g.hull, one.hull, strict=True))
-
-
-def test_groups_in_the_image():
-    frame, id, group = np.zeros(3, np.int64), np.array([1, 2, 3]), np.array([1, 1, -1])
-    pos = np.array([[10.0, 10], [30, 10], [90, 90]])
-    box = np.array([[5.0, 0, 10, 20], [25, 0, 10, 20], [85, 80, 10, 20]])
-    (g,) = box_groups(frame, id, group, pos, pos * 0, box, 0, 1)
-    assert g.hull[0].tolist() == [[5, 0], [35, 0], [35, 20], [5, 20]]
-    (g,) = groups_over_time(frame, id, group, pos, pos * 0, 0, 1, px_per_m=20.0)
-    assert g.hull[0][:, 0].min() == pytest.approx(5)
-    assert g.pos.tolist() == [[20, 10]]
+    assert holds_for(holds, 3).tolist() == [0, 0, 0, 1, 1, 0, 0, 0]
+    assert not holds_for(holds[:2], 3).any()

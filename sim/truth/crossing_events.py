@@ -9,14 +9,13 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from sim.truth.encounters import Course, Encounters, Roll, course, encounters, net_crossings, roll_call
-from sim.truth.merge_split_rules import frames_of, mean
+from sim.truth.encounters import Encounters, GroupPath, GroupRows, encounters, group_paths, group_rows, net_crossings
+from sim.truth.merge_split_rules import frames_of, mean_of_present
 from sim.truth.proximity import runs
-from sim.truth.queue_detection import Line, lines
 from sim.types import Array, Bools, GroupEvent, Ints
 
 CROSS_SPEED = 0.6  # m/s, least difference of velocities over the encounter
-SAME_BEFORE = 2.0  # s before and after, in which memberships are equal
+SAME_BEFORE = 2.0  # s before and after, in which groups_and_events are equal
 ROWS = 500_000  # encounters times frames looked at together: bounds memory
 
 
@@ -30,7 +29,7 @@ def crossings(pos: Array, vel: Array, present: Bools, group: Ints, fps: float) -
     """
     there = present & np.isfinite(pos).all(axis=2)
     places, label = np.where(there[..., None], pos, np.nan), np.where(there, group, -1)
-    roll = roll_call(label)
+    roll = group_rows(label)
     met = encounters(places, roll, fps)
     found: list[GroupEvent] = []
     for some in _portions(met, len(pos), frames_of(SAME_BEFORE, fps)):
@@ -43,11 +42,11 @@ def _portions(met: Encounters, frames: int, margin: int) -> Iterator[Encounters]
     return (met[total // ROWS == k] for k in np.unique(total // ROWS))
 
 
-def _crossed(pos: Array, vel: Array, group: Ints, roll: Roll, met: Encounters, margin: int) -> list[GroupEvent]:
+def _crossed(pos: Array, vel: Array, group: Ints, roll: GroupRows, met: Encounters, margin: int) -> list[GroupEvent]:
     """The events of those encounters that are crossings."""
     low, high = np.maximum(met.first - margin, 0), np.minimum(met.last + margin + 1, len(pos))
     k, frame = runs(low, high)
-    a, b = (course(pos, vel, group, roll, name, met.first, k, frame) for name in (met.a, met.b))
+    a, b = (group_paths(pos, vel, group, roll, name, met.first, k, frame) for name in (met.a, met.b))
     during = (frame >= met.first[k]) & (frame <= met.last[k])
     changed = np.bincount(k, ~(a.kept & b.kept), minlength=len(met)) > 0
     good = ~changed & (_speed(a, b, k, during, len(met)) >= CROSS_SPEED)
@@ -60,14 +59,14 @@ def _crossed(pos: Array, vel: Array, group: Ints, roll: Roll, met: Encounters, m
     for e in np.flatnonzero(good).tolist():
         names, t = (int(met.a[e]), int(met.b[e])), int(frame[closest[e]])
         sides = [roll.members(int(met.first[e]), name) for name in names]
-        x, y = sum(mean(pos[t : t + 1, side])[0] for side in sides) / 2
+        x, y = sum(mean_of_present(pos[t : t + 1, side])[0] for side in sides) / 2
         people = tuple(sorted(int(p) + 1 for p in np.concatenate(sides)))
         first, last = int(met.first[e]) + 1, int(met.last[e]) + 1
         found.append(GroupEvent("cross", first, last, None, names, names, people, (float(x), float(y))))
     return found
 
 
-def _speed(a: Course, b: Course, k: Ints, during: Bools, count: int) -> Array:
+def _speed(a: GroupPath, b: GroupPath, k: Ints, during: Bools, count: int) -> Array:
     """How fast (count,) two groups move on average relative to each other during an encounter; nan if unknown."""
     relative = b.vel - a.vel
     known = during & np.isfinite(relative).all(axis=1)
@@ -81,32 +80,3 @@ def _closest(apart: Array, k: Ints, during: Bools) -> Ints:
     distance = np.where(during & np.isfinite(apart).all(axis=1), np.hypot(*apart.T), np.inf)
     order = np.lexsort((distance, k))
     return order[np.flatnonzero(np.diff(k, prepend=-1))]
-
-
-def queue_lines(pos: Array, vel: Array, present: Bools, fps: float) -> list[Line]:
-    """The queues of `queues`, with who stood in which order and who left when."""
-    there = present & np.isfinite(pos).all(axis=2)
-    return lines(pos, vel, there, fps)
-
-
-def queues(pos: Array, vel: Array, present: Bools, group: Ints, fps: float) -> list[GroupEvent]:
-    """Three or more people waiting in line for 3 s or longer; the event lasts until less than two do.
-
-    Spacing along the line 0.4-1.5 m, nobody more than 0.5 m off it, slower than 0.4 m/s except when advancing.
-    start is the onset, members all who stood in the line for a second or more, pos its
-    middle then; before and after are the members' groups (T, P) in the first and in the last frame.
-    """
-    found = []
-    for q in queue_lines(pos, vel, present, fps):
-        if not q.order:  # nobody stayed for a second
-            continue
-        columns = np.array(sorted(q.order))
-        before, after = (_groups_of(group[t, columns[present[t, columns]]]) for t in (q.first, q.last))
-        people = tuple((columns + 1).tolist())
-        found.append(GroupEvent("queue", q.first + 1, q.last + 1, None, before, after, people, q.middle))
-    return found
-
-
-def _groups_of(label: Ints) -> tuple[int, ...]:
-    """Ascending ids of the groups among people's labels; -1 once for each person alone."""
-    return (-1,) * int((label < 0).sum()) + tuple(np.unique(label[label >= 0]).tolist())
