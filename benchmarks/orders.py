@@ -21,12 +21,11 @@ from scenarios.schema.scenario import Scenario
 from sim.crowd.population import cast, walking_speed
 from sim.crowd.world import run
 from sim.sequence import observe
-from sim.truth.order_fulfilment import PATIENCE
+from sim.truth.order_fulfilment import PATIENCE, RULE_TIME
 from sim.types import Array, Motion, Truth
 from tracking.stats import wilson
 
 WINDOW = 0.8  # s
-RULES = {"merge": 2.0, "split": 2.0, "queue": 3.0}  # s from the onset until an order has come true
 
 
 def paces(scenario: Scenario, motion: Motion, truth: Truth) -> Array:
@@ -38,7 +37,7 @@ def paces(scenario: Scenario, motion: Motion, truth: Truth) -> Array:
     for order in motion.orders:
         assert order.fired is not None
         onset = min(e.start for e in truth.events or () if e.start >= order.fired)
-        last = min(onset + RULES[order.kind] * motion.fps, order.fired + PATIENCE * motion.fps)
+        last = min(onset + RULE_TIME[order.kind] * motion.fps, order.fired + PATIENCE * motion.fps)
         for part in order.before if order.kind == "queue" else order.after:
             columns = np.array(part) - 1
             made = walking_speed(list(motion.free_speed[columns]), scenario.crowd.slowdown_per_member)

@@ -14,10 +14,7 @@ from sim.scene.camera import px_per_m_at_centre
 from sim.scene.viewpoint import Bodies, recorded
 from sim.scene.visibility import look
 from sim.truth.image_group_hulls import image_groups
-from sim.truth.order_fulfilment import check_orders
 from sim.types import Camera, GroupEvent, Groups, Ints, Motion, Truth
-
-__all__ = ["bodies", "check_orders", "label"]
 
 
 def bodies(motion: Motion, camera: Camera | None) -> Truth:
