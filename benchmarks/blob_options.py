@@ -19,7 +19,7 @@ from peers.scores import iou, mot_scores
 
 from tracking.papers.blob import box_geometry
 from tracking.papers.blob.config import BlobConfig
-from tracking.run import prepare
+from tracking.prepare import prepare
 from tracking.stats import bootstrap
 
 UNSEEN = (0.0, 0.1, 0.2, 0.3, 0.45, 0.7, 1.0)  # s
@@ -64,7 +64,7 @@ def coasted(scene: Scene) -> np.ndarray:
     ready, found = prepare("blob", scene.sequence, params=everything), []
     ready.reset(0)
     for frame, truth in zip(ready.frames(), scene.boxes, strict=True):
-        ready.answer(frame)
+        ready.step(frame)
         people = ready.tracker.people
         told = people.reported(frame.t)
         lost = told[~people.hit[told]]

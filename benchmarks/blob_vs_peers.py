@@ -32,7 +32,7 @@ from sim.io.source import open_source
 from sim.sequence import simulate
 from sim.types import Detections, Frame, Sequence
 from tracking.papers.blob.config import BlobConfig
-from tracking.run import prepare
+from tracking.prepare import prepare
 from tracking.stats import bootstrap as over_sequences
 
 PEERS = ("sort", "bytetrack", "ocsort")
@@ -67,7 +67,7 @@ def ours(sequence: Sequence, params: dict | None = None, *, checked: bool = True
     for part in (frames[:WARM], frames):
         ready.reset(0)
         start = time.process_time()
-        made = [ready.answer(f) if checked else ready.tracker.step(f, f.detections) for f in part]
+        made = [ready.step(f) if checked else ready.tracker.step(f, f.detections) for f in part]
     return [(t.id, t.box) for t in made], time.process_time() - start
 
 

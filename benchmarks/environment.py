@@ -37,7 +37,7 @@ from sim.io.store.truth_files import truth_files
 from tracking.environment.episode_cache import Held
 from tracking.environment.episodes import Cache, Rollout, Source, play, sources
 from tracking.environment.observation import Observer
-from tracking.run import Prepared, prepare
+from tracking.prepare import PreparedTracker, prepare
 from tracking.tracker_registry import names
 
 MUST, AIM, SHARE = 0.5, 0.2, 1.15
@@ -63,7 +63,7 @@ def track_alone(tracker: str, held: Held) -> None:
     ready = prepare(tracker, held.sequence)
     ready.reset(0)
     for frame in ready.frames():
-        ready.answer(frame)
+        ready.step(frame)
 
 
 def boxes_alone(source: Source) -> Source:
@@ -165,7 +165,7 @@ def measured(env: gymnasium.Env[Any, Any], rounds: int) -> tuple[float, int, lis
         return inner
 
     with (
-        mock.patch.object(Prepared, "answer", timed(0, Prepared.answer)),
+        mock.patch.object(PreparedTracker, "step", timed(0, PreparedTracker.step)),
         mock.patch.object(Rollout, "scores", timed(1, Rollout.scores)),
         mock.patch.object(Observer, "see", timed(2, Observer.see)),
         mock.patch.object(Observer, "look", timed(2, Observer.look)),

@@ -25,7 +25,7 @@ from scenarios.loading.resolve import load
 from sim.sequence import simulate
 from sim.types import Array, Context, Detections, Frame, Sequence
 from tracking import tracker_registry
-from tracking.run import prepare
+from tracking.prepare import prepare
 
 COUNTS = (100, 200, 500, 1000, 2000, 5000, 10_000, 20_000)
 KINDS = ("parted", "shared", "crowd", "pictures")

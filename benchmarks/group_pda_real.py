@@ -22,7 +22,7 @@ from sim.geometry.polygons import contains
 from sim.io.source import open_source
 from sim.types import Array, Ints, Tracks, Truth
 from tracking.app.pictures.overlay import overlay
-from tracking.grouping.derive import with_groups
+from tracking.grouping.grouped_tracks import with_groups
 from tracking.run import track
 from tracking.scoring import evaluate
 from tracking.scoring.block_resampling import scorer

@@ -25,7 +25,7 @@ from sim.types import Sequence as Recording
 from sim.workers import pool
 from tracking.detect import background
 from tracking.detect.background_training import Trained, train
-from tracking.run import Run, track
+from tracking.run import TrackingRun, track
 from tracking.scoring import evaluate
 
 Row = dict[str, float]
@@ -88,9 +88,9 @@ def one(job: Job) -> dict[str, Row] | str:
     return {v.name: row(truth, seen(said[v.name]) if v.in_image else said[v.name]) for v in job.variants}
 
 
-def tracked(sequence: Recording, variants: Iterable[Variant], mode: DetectionMode) -> dict[str, Run]:
+def tracked(sequence: Recording, variants: Iterable[Variant], mode: DetectionMode) -> dict[str, TrackingRun]:
     """The answers of each variant; those that differ in how they are scored are one run."""
-    made: dict[tuple[str, str], Run] = {}
+    made: dict[tuple[str, str], TrackingRun] = {}
     found = {}
     for v in variants:
         key = v.tracker, repr(v.params)

@@ -16,7 +16,7 @@ import numpy as np
 
 from sim.truth.group_hulls import groups_over_time
 from sim.types import Groups, Tracks, Truth
-from tracking.grouping.derive import with_groups
+from tracking.grouping.grouped_tracks import with_groups
 from tracking.scoring import evaluate
 
 RUNS = 5

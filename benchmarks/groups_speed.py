@@ -19,7 +19,7 @@ from sim.truth.group_hulls import groups_over_time
 from sim.truth.merge_split_events import groups_and_events
 from sim.truth.queue_detection import queues
 from tracking.grouping.group_labels import label_people
-from tracking.grouping.link_rule import Grouping, find_links
+from tracking.grouping.link_rule import LinkRule, find_links
 
 FPS = 10.0
 SIDE = 60.0  # m
@@ -77,7 +77,7 @@ def main() -> None:
     label = found.group[frame, column]
     hulls = groups_over_time(frame, column, label, *rows, 0, a.frames)
     print(f"{sum(len(g.id) for g in hulls)} hulls, {len(found.near.a)} hard negatives")
-    rule = Grouping()
+    rule = LinkRule()
     links = find_links(frame, column, *rows, a.frames, FPS, rule)
     truth = {
         "membership": lambda: groups_and_events(pos, vel, there, intent, FPS),

@@ -33,18 +33,19 @@ from sim.truth.merge_split_events import groups_and_events
 from sim.truth.merge_split_rules import MERGE_DISTANCE, MERGE_VELOCITY
 from sim.truth.queue_detection import WAITING_SPEED
 from sim.types import Truth
-from tracking.grouping.derive import Grouping, derive
+from tracking.grouping.grouped_tracks import derive
+from tracking.grouping.link_rule import LinkRule
 from tracking.tuning.grouping_episodes import people_as_tracks
 
-CHOSEN = Grouping(near=1.0, idle=0.4)  # by --choose 0:4
+CHOSEN = LinkRule(near=1.0, idle=0.4)  # by --choose 0:4
 RULES = {
-    "baseline, seen for 2 s": Grouping(acquaintance=2.0),
-    "baseline (1 s)": Grouping(),
-    "… standing links nobody": Grouping(idle=0.4),
-    "… nearer than 1 m": Grouping(near=1.0),
+    "baseline, seen for 2 s": LinkRule(acquaintance=2.0),
+    "baseline (1 s)": LinkRule(),
+    "… standing links nobody": LinkRule(idle=0.4),
+    "… nearer than 1 m": LinkRule(near=1.0),
     "both: CHOSEN": CHOSEN,
 }
-GRID = [Grouping(near=near, idle=idle) for near in (1.0, 1.2, 1.5) for idle in (0.0, 0.4)]
+GRID = [LinkRule(near=near, idle=idle) for near in (1.0, 1.2, 1.5) for idle in (0.0, 0.4)]
 NINE = [(d, v) for d in (0.9, 1.2, 1.5) for v in (0.3, 0.5, 0.7)]
 
 
@@ -68,7 +69,7 @@ def scores(true: np.ndarray, said: np.ndarray) -> str:
     return f"F1 {f1(true, said):.3f}   precision {hit / said.sum():.3f}   recall {hit / true.sum():.3f}"
 
 
-def grouped(truth: Truth, rule: Grouping, i: np.ndarray, j: np.ndarray) -> tuple[np.ndarray, dict[str, int]]:
+def grouped(truth: Truth, rule: LinkRule, i: np.ndarray, j: np.ndarray) -> tuple[np.ndarray, dict[str, int]]:
     """Which pairs of rows the rule takes for one group, and how many events of each kind it tells."""
     made = derive(people_as_tracks(truth), truth.fps, rule=rule)
     group = np.concatenate([t.group for t in made])
@@ -147,7 +148,7 @@ def caviar(root: Path) -> None:
         found = groups_and_events(pos, speed, there, np.where(there, intent, -1).astype(np.int64), truth.fps).events
         told = [(e.kind, e.start, [int(people[m - 1]) for m in e.members]) for e in found]
         print(f"  event rules, velocities over {window} s: {told}")
-    for name, rule in (("default", Grouping()), ("velocities over 1 s", Grouping(smooth=1.0))):
+    for name, rule in (("default", LinkRule()), ("velocities over 1 s", LinkRule(smooth=1.0))):
         told = [
             (e.kind, e.start, e.emitted, e.members)
             for t in derive(people_as_tracks(truth), truth.fps, truth.px_per_m, rule)

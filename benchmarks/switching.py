@@ -27,16 +27,16 @@ from scenarios.errors import InputError
 from sim.types import Array, DetectionMode, Frame, Tracks
 from sim.workers import pool
 from sim.workers.pool import THREADS
-from tracking.answers import History
 from tracking.config import Config
 from tracking.environment.episode_cache import Held
 from tracking.environment.episodes import streams_for
+from tracking.episode_source import Source, sources
 from tracking.objective import Judge
 from tracking.parameter_space import decode, encode, space_of
-from tracking.run import Prepared, prepare
-from tracking.source import Source, sources
+from tracking.prepare import PreparedTracker, prepare
 from tracking.stats import bootstrap, paired
 from tracking.tracker_registry import find
+from tracking.tracks_check import ReportHistory
 
 CASES = ("blob:clutter:file", "group-pda:clutter:file", "blob:lights:image", "group-pda:lights:image")
 STEP = 0.5
@@ -70,7 +70,7 @@ class State:
     """A tracker in the middle of a sequence, what it answered so far, and how that scores."""
 
     tracker: Any
-    history: History
+    history: ReportHistory
     answers: list[Tracks]
     score: float
 
@@ -93,20 +93,20 @@ def change(base: Config, config: Config) -> str:
     return ", ".join(f"{name}={b:.3g}" if isinstance(b, float) else f"{name}={b}" for (name, a), b in rows if a != b)
 
 
-def go(state: State, config: Config, frames: Sequence[Frame], ready: Prepared, judge: Judge) -> State | None:
+def go(state: State, config: Config, frames: Sequence[Frame], ready: PreparedTracker, judge: Judge) -> State | None:
     """The state after these frames with this config; None where the tracker refuses it there."""
     shared: list[Any] = [ready.context, ready.context.background, ready.context.camera]
     tracker = copy.deepcopy(state.tracker, {id(one): one for one in shared if one is not None})
     tracker.config = config
     there = replace(ready, tracker=tracker, history=copy.deepcopy(state.history))
     try:
-        answers = [*state.answers, *(there.answer(frame) for frame in frames)]
+        answers = [*state.answers, *(there.step(frame) for frame in frames)]
     except InputError:
         return None
     return State(tracker, there.history, answers, objective(there, judge, answers))
 
 
-def objective(ready: Prepared, judge: Judge, answers: list[Tracks]) -> float:
+def objective(ready: PreparedTracker, judge: Judge, answers: list[Tracks]) -> float:
     """Of the frames so far; 0 where they hold nothing to score."""
     found = judge.scores(answers, ready.px_per_m(answers))["objective"]
     return found if np.isfinite(found) else 0.0
@@ -123,7 +123,7 @@ def play(job: Job) -> Found:
     for config in job.candidates:  # a new tracker: some parameters are taken on at reset
         alone = prepare(job.tracker, held.sequence, params=config, detections=job.mode)
         alone.reset(0)
-        fixed.append(objective(alone, held.judge, [alone.answer(frame) for frame in frames]))
+        fixed.append(objective(alone, held.judge, [alone.step(frame) for frame in frames]))
     state, chosen, long = first, [], max(1, round(job.every * held.sequence.fps))
     for begin in range(0, len(frames), long):
         tried = [go(state, c, frames[begin : begin + long], ready, held.judge) for c in job.candidates]

@@ -29,8 +29,8 @@ from tracking.detect.background import Background
 from tracking.detect.person_size import PersonSize
 from tracking.papers.blob import new_people
 from tracking.papers.blob.update_from_pixels import Pixels
-from tracking.run import Prepared, prepare
-from tracking.tracker_registry import History
+from tracking.prepare import PreparedTracker, prepare
+from tracking.tracks_check import ReportHistory
 
 SIZES = (640, 480), (1280, 720)
 RUNS = 3
@@ -96,16 +96,16 @@ def timed(spent: dict[str, float]) -> Iterator[None]:
             patch.stop()
 
 
-def one_run(ready: Prepared) -> Result:
+def one_run(ready: PreparedTracker) -> Result:
     """Track all frames once, by a copy of the tracker, so that the background is trained on but once."""
-    ready = replace(ready, tracker=copy.deepcopy(ready.tracker), history=History())
+    ready = replace(ready, tracker=copy.deepcopy(ready.tracker), history=ReportHistory())
     spent: dict[str, float] = {}
     told = 0
     frames = list(ready.frames())
     with timed(spent):
         start = time.process_time()
         for frame in frames:
-            told += len(ready.answer(frame).id)
+            told += len(ready.step(frame).id)
         whole = time.process_time() - start
     n = len(frames)
     parts = {part: 1e3 * spent.get(part, 0.0) / n for part in PARTS}

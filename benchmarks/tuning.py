@@ -35,8 +35,8 @@ from sim.io.source import open_source
 from sim.types import Ints, Sequence, Tracks
 from tracking.config import Config
 from tracking.environment.episodes import Episode, Source
-from tracking.grouping.derive import derive
-from tracking.grouping.link_rule import Grouping
+from tracking.grouping.grouped_tracks import derive
+from tracking.grouping.link_rule import LinkRule
 from tracking.run import track
 from tracking.scoring.block_resampling import scorer
 from tracking.scoring.catalogue import CATALOGUE
@@ -137,7 +137,7 @@ def real(given: argparse.Namespace) -> None:
 
 def configs(name: str, folder: Path) -> dict[str, Config]:
     """First defaults, present ones, what the search found: of several goals the whole front."""
-    kind = Grouping if name == "grouping" else find(name).config_class
+    kind = LinkRule if name == "grouping" else find(name).config_class
     files = sorted(folder.glob(f"{name}.front-*.toml"), key=lambda path: (len(path.name), path))
     files = files or [folder / f"{name}.toml"]
     found = {path.stem.rpartition(".")[2] if len(files) > 1 else "tuned": kind.from_toml(path) for path in files}
@@ -171,7 +171,7 @@ def compared(name: str, sequence: Sequence, mode: str, chosen: dict[str, Config]
 def answers(name: str, sequence: Sequence, mode: str, config: Config) -> list[Tracks]:
     truth = sequence.truth
     assert truth is not None
-    if isinstance(config, Grouping):
+    if isinstance(config, LinkRule):
         return derive(people_as_tracks(truth), truth.fps, truth.px_per_m, config)
     return list(track(name, sequence, params=config, detections=mode))
 

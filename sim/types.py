@@ -103,8 +103,8 @@ class Tracks(Frozen):
 
     unit "person": group is the id of the person's group, -1 alone. unit "group": id == group.
     cov (N, 2D, 2D) ordered x, y, (z), vx, vy, (vz). box (N, 4) ltwh px or None. groups and events may be left empty:
-    they are then derived by the baseline rule (tracking.grouping.derive). derived: this has been done, nothing is left
-    to do.
+    they are then derived by the baseline rule (tracking.grouping.grouped_tracks). derived: this has been done, nothing
+    is left to do.
     """
 
     index: int

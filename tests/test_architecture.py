@@ -17,7 +17,7 @@ LONGER = {"sim.types": 420}
 
 SCORING = (
     "tracking.scoring",
-    "tracking.grouping.derive",
+    "tracking.grouping.grouped_tracks",
     "scenarios.errors",
     "sim.arrays",
     "sim.types",

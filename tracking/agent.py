@@ -24,7 +24,7 @@ from numpy.typing import ArrayLike
 
 from scenarios.errors import InputError
 from sim.types import Array, Context, Detections, Frame, Tracker, Tracks
-from tracking import scale
+from tracking import image_scale
 from tracking.config import Config, Value
 from tracking.environment.observation import NAMES, Observer
 from tracking.parameter_space import Space, begun, decode, encode
@@ -152,7 +152,7 @@ class Adaptive:
         """The tracker's answer; before it other parameters, if it is time and the tracker takes them."""
         before = self.inner.config
         if self.answers and len(self.answers) % self.long == 0:
-            known = scale.of_answers(self.context.px_per_m, self.px_per_m, self.answers)
+            known = image_scale.from_tracks(self.context.px_per_m, self.px_per_m, self.answers)
             self.inner.config = self.policy.config(self.observer.look(known))
         try:
             answer = cast(Tracks, self.inner.step(frame, detections))

@@ -20,7 +20,7 @@ from sim.workers.pool import Run, crew, in_order
 from tracking.agent import Policy
 from tracking.environment.episodes import Cache, Rollout, play
 from tracking.environment.observation import NAMES, Observer
-from tracking.source import Source
+from tracking.episode_source import Source
 from tracking.stats import paired
 from tracking.tuning import scenes
 

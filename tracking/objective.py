@@ -18,8 +18,9 @@ from sim.geometry.footprints import FOOTPRINT
 from sim.geometry.polygons import iou_pairs, pack
 from sim.truth.merge_split_rules import frames_of
 from sim.types import Array, Bools, Ints, Tracks, Truth
-from tracking.grouping.derive import outlined_boxes, tabled, with_groups
-from tracking.grouping.link_rule import Grouping, find_links
+from tracking.grouping.grouped_tracks import with_groups
+from tracking.grouping.link_rule import LinkRule, find_links
+from tracking.grouping.tracks_table import boxes_of_rows, tabulate
 from tracking.scoring.evaluation import (
     chosen_frames,
     labelled_frames,
@@ -175,8 +176,8 @@ def derived_shapes(answers: Sequence[Tracks], fps: float, px_per_m: float, label
     """The groups of people, where the tracker named none or by `group` alone, as `derive` has them: shapes only."""
     from tracking import objective_kernels as kernels
 
-    rule = Grouping()
-    rows = tabled(answers, fps, px_per_m, rule)
+    rule = LinkRule()
+    rows = tabulate(answers, fps, px_per_m, rule)
     group = rows.group
     if not (group >= 0).any():
         links = find_links(rows.frame, rows.column, rows.pos, rows.vel, rows.length, fps, rule)
@@ -194,7 +195,7 @@ def derived_shapes(answers: Sequence[Tracks], fps: float, px_per_m: float, label
     ends = np.append(first[1:], len(order)) if len(first) else first
     pos = rows.pos[order] * rows.scale
     middle = np.add.reduceat(pos, first) / np.diff(first, append=len(order))[:, None] if len(first) else pos[:0]
-    box = outlined_boxes(answers)
+    box = boxes_of_rows(answers)
     if box is None:
         vertex, ends = kernels.footprints(pos, ends, DISC * rows.scale)
     else:

@@ -1,7 +1,7 @@
-"""Trackers by name, by file or by module; what they need against what a source has; what they may return.
+"""Trackers by name: the registered ones, and classes from "path/to/file.py:Class" or "package.module:Class".
 
-A tracker is given as a registered name ("blob"), as "path/to/file.py:Class" or as "package.module:Class". Workers get
-the string, never a pickle.
+`find` returns the tracker class and refuses a class that is no tracker. Worker processes get the string and find the
+class themselves.
 """
 
 from __future__ import annotations
@@ -15,30 +15,26 @@ from functools import cache
 from pathlib import Path
 from typing import Any, cast
 
-import numpy as np
-
 from scenarios.errors import InputError
 from scenarios.loading.toml_files import closest
-from sim.types import DetectionMode, Detections, Sequence, Tracker
-from tracking.answers import History, check_tracks, finite
+from sim.types import Tracker
 from tracking.config import Config
-
-__all__ = [
-    "History", "check_detections", "check_tracks", "checked", "choose_mode", "code", "config_class", "find", "names",
-    "own_detector",
-]  # fmt: skip
 
 REGISTRY = {"blob": "tracking.papers.blob.tracker:Blob", "group-pda": "tracking.papers.group_pda.tracker:GroupPda"}
 NEEDS = ("pixels", "stereo", "boxes", "points")
 
 
 def names() -> tuple[str, ...]:
-    """The registered trackers."""
+    """Return the names of the registered trackers."""
     return tuple(REGISTRY)
 
 
 def find(spec: str) -> type[Tracker]:
-    """The tracker class that `spec` names; InputError when there is none, or when it is no tracker."""
+    """Return the tracker class that `spec` names: a registered name, "file.py:Class" or "module:Class".
+
+    Raises InputError if the name is unknown, if the file or module is missing or cannot be imported, if it has no such
+    class, or if the class is no tracker.
+    """
     target = REGISTRY.get(spec, spec)
     where, colon, class_name = target.rpartition(":")
     if not colon:
@@ -52,9 +48,10 @@ def find(spec: str) -> type[Tracker]:
 
 
 def _from_file(path: Path) -> Any:
-    """Load a file under a private name, so that it shadows nothing and two of the same stem can live together.
+    """Import a file under a private name that depends on its path and content.
 
-    Loaded once as long as it is what it was: its classes stay the same ones, so that a config fits its tracker.
+    The name hides no other module. An unchanged file is imported once, so that a config keeps fitting its tracker; a
+    changed file is imported again.
     """
     if not path.is_file():
         raise InputError(file=path, got="no such file", expected="a Python file", remedy="check the path")
@@ -72,7 +69,7 @@ def _from_file(path: Path) -> Any:
         spec.loader.exec_module(module)
     except (Exception, SystemExit) as error:
         del sys.modules[name]
-        raise _broken(path, error) from error
+        raise _import_failed(path, error) from error
     return module
 
 
@@ -80,16 +77,21 @@ def _from_module(name: str) -> Any:
     try:
         return importlib.import_module(name)
     except (Exception, SystemExit) as error:
-        raise _broken(name, error) from error
+        raise _import_failed(name, error) from error
 
 
-def _broken(where: object, error: BaseException) -> InputError:
+def _import_failed(where: object, error: BaseException) -> InputError:
     got = f"{type(error).__name__}: {error}".partition("\n")[0]
     return InputError(file=where or "tracker", got=got, expected="a module that can be imported", remedy="correct it")
 
 
 def checked(found: Any, spec: str) -> type[Tracker]:
-    """The class itself if it is a tracker's, else InputError."""
+    """Return `found` unchanged if it is a tracker class. Raises InputError otherwise; `spec` names it in the error.
+
+    A tracker class has `needs` (a tuple or list out of NEEDS, not empty), `reset(context, seed)` and
+    `step(frame, detections)`. It is created with its config if it has a `config_class` (a subclass of Config), else
+    without arguments.
+    """
     fault = _class_fault(found)
     if fault:
         expected = f"a class with reset(context, seed), step(frame, detections) and needs, a tuple out of {NEEDS}"
@@ -98,7 +100,7 @@ def checked(found: Any, spec: str) -> type[Tracker]:
 
 
 def config_class(tracker: type[Tracker], spec: str) -> type[Config]:
-    """The config's class; InputError where the tracker, which was given as `spec`, has no parameters."""
+    """Return the class of the tracker's config. Raises InputError, naming `spec`, if the tracker has no parameters."""
     kind = getattr(tracker, "config_class", None)
     if kind is None:
         remedy = "give the class a config_class that declares them (docs/trackers.md)"
@@ -107,14 +109,17 @@ def config_class(tracker: type[Tracker], spec: str) -> type[Config]:
 
 
 @cache
-def code(tracker: type[Tracker]) -> str:
-    """A short hash of the file that the class is from, as it was when first asked for; "" where there is none."""
+def code_hash(tracker: type[Tracker]) -> str:
+    """Return the first 12 hex digits of the SHA-256 of the file that defines the class; "" if there is no file.
+
+    The file is read at the first call for this class.
+    """
     file = Path(getattr(sys.modules.get(tracker.__module__), "__file__", None) or "")
     return hashlib.sha256(file.read_bytes()).hexdigest()[:12] if file.is_file() else ""
 
 
 def _class_fault(found: Any) -> str | None:
-    """Why this is no tracker's class, or None."""
+    """Why `found` is no tracker class, in words; None if it is one."""
     if not isinstance(found, type):
         return f"a {type(found).__name__}"
     missing = [name for name in ("needs", "reset", "step") if not hasattr(found, name)]
@@ -137,7 +142,7 @@ def _class_fault(found: Any) -> str | None:
 
 
 def _takes(function: Any, count: int) -> bool:
-    """Can this be called with so many arguments? Yes, where its signature cannot be known."""
+    """True if the function can be called with `count` positional arguments, or if its signature is unknown."""
     try:
         inspect.signature(function).bind(*range(count))
     except TypeError:
@@ -145,50 +150,3 @@ def _takes(function: Any, count: int) -> bool:
     except ValueError:
         return True
     return True
-
-
-def own_detector(needs: tuple[str, ...], sequence: Sequence) -> bool:
-    """Does the tracker run a detector of its own on this sequence's pictures?"""
-    return ("pixels" in needs and sequence.has_images) or ("stereo" in needs and sequence.has_right)
-
-
-def choose_mode(needs: tuple[str, ...], sequence: Sequence, asked: DetectionMode | None) -> DetectionMode:
-    """The detection mode: the asked one if it can work, else image, file, truth in this order; InputError if none."""
-    able = [mode for mode in ("image", "file", "truth") if _works(mode, needs, sequence)]
-    if asked in able or (asked is None and able):
-        return asked or able[0]  # type: ignore[return-value]
-    got = f"a tracker that needs {' or '.join(needs)}, and {sequence.name} with {_has(sequence)}"
-    expected = f"--detections {asked}" if asked else "detections of some kind"
-    remedy = f"try --detections {able[0]}" if able else "take another tracker or source"
-    raise InputError(place="--detections", got=got, expected=f"what {expected} needs", remedy=remedy)
-
-
-def _works(mode: str, needs: tuple[str, ...], sequence: Sequence) -> bool:
-    if mode == "image":
-        return own_detector(needs, sequence)
-    takes = {"boxes", "points"} & set(needs)
-    return bool(takes) and (sequence.has_detections if mode == "file" else sequence.load_truth is not None)
-
-
-def _has(sequence: Sequence) -> str:
-    parts = {
-        "images": sequence.has_images,
-        "a right image": sequence.has_right,
-        "detections": sequence.has_detections,
-        "truth": sequence.load_truth is not None,
-    }
-    return ", ".join(name for name, there in parts.items() if there) or "nothing"
-
-
-def check_detections(detections: Detections, needs: tuple[str, ...]) -> None:
-    """Raise InputError on NaN or infinity (frame and row named), or where the tracker needs boxes and has none."""
-    rows = len(detections.pos)
-    arrays = [a for a in (detections.pos, detections.vel, detections.box, detections.score) if a is not None]
-    for a in arrays:
-        if not finite(a):
-            row = int(np.argwhere(~np.isfinite(a.reshape(len(a), -1)).all(1))[0, 0])
-            place = f"frame {detections.index}: detection {row + 1}"
-            raise InputError(place=place, got="NaN or infinity", expected="finite numbers", remedy="correct this row")
-    if rows and detections.box is None and "points" not in needs:
-        place = f"frame {detections.index}"
-        raise InputError(place=place, got="points", expected="boxes", remedy="take a tracker that takes points")

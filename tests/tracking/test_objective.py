@@ -16,9 +16,9 @@ from sim.geometry.polygons import convex_hull, iou_matrix
 from sim.sequence import simulate
 from sim.types import Groups
 from tracking import objective_kernels as kernels
-from tracking.grouping.derive import with_groups
 from tracking.grouping.group_labels import label_people
-from tracking.grouping.link_rule import Grouping, find_links
+from tracking.grouping.grouped_tracks import with_groups
+from tracking.grouping.link_rule import LinkRule, find_links
 from tracking.objective import DISC, FLAT, Judge, Shapes, f1
 from tracking.scoring import evaluate
 
@@ -36,11 +36,11 @@ def same(found, expected):
 
 def raw(name, sequence, **options):
     """Answers without derived groups, and the scale."""
-    from tracking.run import prepare
+    from tracking.prepare import prepare
 
     ready = prepare(name, sequence, **options)
     ready.reset(0)
-    made = [ready.answer(frame) for frame in ready.frames()]
+    made = [ready.step(frame) for frame in ready.frames()]
     return made, ready.px_per_m(made)
 
 
@@ -170,7 +170,7 @@ def test_partitions_are_those_of_the_rule(seed):
     walk = np.cumsum(rng.normal(0, 0.12, (length, people, 2)), 0) + rng.uniform(0, 3, (people, 2))
     seen = rng.random((length, people)) < 0.8
     frame, column = np.nonzero(seen)
-    pos, rule, fps = walk[frame, column], Grouping(window=0.6, patience=0.4, acquaintance=0.2, memory=0.3), 10.0
+    pos, rule, fps = walk[frame, column], LinkRule(window=0.6, patience=0.4, acquaintance=0.2, memory=0.3), 10.0
     links = find_links(frame, column, pos, np.zeros_like(pos), length, fps, rule)
     places = np.where(seen[..., None], walk, np.nan)
     expected = label_people(frame, column, places, links, fps, rule)[0]

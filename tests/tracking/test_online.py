@@ -12,7 +12,7 @@ from scenarios.loading.resolve import load
 from sim.sequence import simulate
 from sim.types import Context
 from tracking.parameter_space import decode
-from tracking.run import prepare
+from tracking.prepare import prepare
 from tracking.tracker_registry import find, names
 
 POINTS = ["camera.fps=5", "duration=4", "sensor.detect_prob=0.9", "sensor.clutter_rate=1"]
@@ -38,7 +38,7 @@ def answers(name, sequence, mode, configs):
     made = []
     for frame in ready.frames():
         ready.tracker.config = configs.get(frame.index, ready.tracker.config)
-        made.append(ready.answer(frame))
+        made.append(ready.step(frame))
     return made
 
 
@@ -130,10 +130,10 @@ def test_any_change_between_any_frames(name, sequence, mode, request):
         before = ready.tracker.config
         ready.tracker.config = decode(space, rng.uniform(-1, 1, len(space)), kind())
         try:
-            ready.answer(frame)
+            ready.step(frame)
         except InputError:
             ready.tracker.config = before
-            ready.answer(frame)
+            ready.step(frame)
 
 
 def test_a_refused_change_leaves_blob_as_it_was(points):
@@ -145,8 +145,8 @@ def test_a_refused_change_leaves_blob_as_it_was(points):
     for frame in ready.frames():
         ready.tracker.config = wrong
         with pytest.raises(InputError, match="confirm_ratio"):
-            ready.answer(frame)
+            ready.step(frame)
         ready.tracker.config = good
-        made.append(ready.answer(frame))
+        made.append(ready.step(frame))
     assert len(made) == 20
     same(plain, made)

@@ -12,10 +12,11 @@ from scenarios.loading.resolve import load
 from sim.io.store.track_files import write_tracks
 from sim.sequence import simulate
 from sim.types import Context, Detections, Frame, Groups, Sequence, Tracks, Truth
-from tracking.grouping.link_rule import Grouping
+from tracking.grouping.link_rule import LinkRule
 from tracking.papers.blob.config import BlobConfig
 from tracking.papers.blob.tracker import Blob
-from tracking.run import Run, prepare, track
+from tracking.prepare import prepare
+from tracking.run import TrackingRun, track
 
 FPS, LENGTH = 10.0, 30
 
@@ -74,7 +75,7 @@ class Wrong(Stranger):
 
 def test_file_mode_never_looks_at_the_truth():
     run = track("blob", source())
-    assert isinstance(run, Run)
+    assert isinstance(run, TrackingRun)
     assert len(run) == LENGTH
     assert [t.index for t in run] == list(range(1, LENGTH + 1))
     assert run.info["detections"] == "file"
@@ -280,12 +281,12 @@ def test_one_plane_in_a_run_and_again_in_the_next():
     for turn in (1, 0):  # after a reset it may be another one
         ready.reset(0)
         ready.tracker.turn = turn
-        ready.answer(next(ready.frames()))
+        ready.step(next(ready.frames()))
 
 
 def test_a_rule_of_groups_that_has_no_effect_is_said_to_have_none(recwarn):
     made = simulate(load("merge", ["duration=4"]), 0, streams=())
-    track("blob", made, detections="file", grouping=Grouping(near=1.0))
+    track("blob", made, detections="file", grouping=LinkRule(near=1.0))
     assert not [w for w in recwarn if "--grouping" in str(w.message)]
     with pytest.warns(UserWarning, match="group-pda names groups itself: --grouping has no effect"):
-        track("group-pda", made, detections="file", grouping=Grouping(near=1.0))
+        track("group-pda", made, detections="file", grouping=LinkRule(near=1.0))

@@ -10,7 +10,7 @@ from typing import Any
 from scenarios.errors import InputError
 from sim.io.store.track_files import read_tracks
 from sim.types import Sequence
-from tracking.run import Run
+from tracking.run import TrackingRun
 
 OURS = ("tracks.parquet", "tracks.txt")
 DEPTH = 3
@@ -25,7 +25,7 @@ class Result:
     path: Path
     info: dict[str, Any]
 
-    def read(self, sequence: Sequence) -> Run:
+    def read(self, sequence: Sequence) -> TrackingRun:
         """The tracks, at the sequence's frame rate; InputError where they were made at another one."""
         fps = self.info.get("fps")
         if fps is not None and abs(fps - sequence.fps) > 1e-9 * sequence.fps:
@@ -33,7 +33,7 @@ class Result:
                 file=self.path, place="run.json", got=f"tracks at {fps:g} fps", expected=f"{sequence.fps:g} fps",
                 remedy=f"read the sequence with --fps {fps:g}, as `track` did",
             )  # fmt: skip
-        return Run(tuple(read_tracks(self.path, fps=sequence.fps, length=sequence.length)), self.info)
+        return TrackingRun(tuple(read_tracks(self.path, fps=sequence.fps, length=sequence.length)), self.info)
 
 
 def results(path: Path) -> list[Result]:

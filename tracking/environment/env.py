@@ -21,13 +21,14 @@ from scenarios.errors import InputError
 from scenarios.loading.toml_files import closest
 from sim.types import DetectionMode, Image, Tracker
 from tracking.config import Config
+from tracking.detection_mode import choose_mode
 from tracking.environment.episode_cache import LIMIT, Cache
 from tracking.environment.episodes import AnyTracker, Rollout, streams_for
 from tracking.environment.observation import NAMES, Observer
+from tracking.episode_source import Source, What, sources
 from tracking.parameter_space import Space, begun, decode, encode, space_of
-from tracking.run import Params, config_of
-from tracking.source import Source, What, sources
-from tracking.tracker_registry import checked, choose_mode, config_class, find
+from tracking.prepare import Params, config_of
+from tracking.tracker_registry import checked, config_class, find
 
 METADATA: dict[str, Any] = {"render_modes": ["rgb_array"], "render_fps": 10}
 SEEN = ("statistics", "parameters", "none")

@@ -13,7 +13,7 @@ import numpy as np
 
 from scenarios.errors import InputError
 from sim.types import Frame, Truth
-from tracking.source import Source
+from tracking.episode_source import Source
 
 if TYPE_CHECKING:
     from tracking.objective import Judge

@@ -12,8 +12,8 @@ from dataclasses import dataclass
 
 from sim.types import DetectionMode, Frame, Sequence, Tracker, Tracks, Truth
 from tracking.environment.episode_cache import Cache, Held
-from tracking.run import Params, prepare
-from tracking.source import Source, sources
+from tracking.episode_source import Source, sources
+from tracking.prepare import Params, prepare
 
 __all__ = ["Cache", "Episode", "Rollout", "Source", "play", "sources", "streams_for"]
 
@@ -106,7 +106,7 @@ class Rollout:
             if frame is None:
                 return
             begun = time.perf_counter()
-            answer = self.ready.answer(frame)
+            answer = self.ready.step(frame)
             self.seconds_tracking += time.perf_counter() - begun
             self.answers.append(answer)
             self._next, self.last = None, frame
@@ -134,7 +134,7 @@ class Rollout:
         return {key: value for key, value in found.items() if value == value}
 
     def _every_score(self, px_per_m: float) -> Mapping[str, float]:
-        from tracking.grouping.derive import with_groups
+        from tracking.grouping.grouped_tracks import with_groups
         from tracking.scoring.evaluation import evaluate
 
         answers = with_groups(self.answers, self.ready.context.fps, px_per_m) if self.answers else ()

@@ -1,7 +1,9 @@
-"""The baseline rule for pairs of tracked people: who is linked to whom when, never looking ahead.
+"""The baseline rule that links two tracked people into one group: distance, velocity difference, share of time.
 
-A pair is linked once it has been near, and moving alike, in enough of the last seconds in which both were seen; the
-link breaks once they have been far apart for long enough. All pairs of a sequence are worked on at once.
+A pair is linked once it has been near, with like velocities, in at least `share` of the frames of the last `window` s
+in which both were seen. The link breaks once the pair has been apart for `patience` s. The rule never looks ahead.
+`LinkRule` holds the parameters, `find_links` returns the switches of all links of a sequence. Constants that are also
+the truth's merge and split rule come from sim.truth.merge_split_rules.
 """
 
 from __future__ import annotations
@@ -17,53 +19,71 @@ from sim.truth.proximity import close_pairs
 from sim.types import Array, Bools, Ints
 from tracking.config import Config, param
 
-CELLS = 4_000_000  # frames times pairs held at once
-NEVER = 10.0  # m/s: velocities of people never differ by more
+CELLS = 4_000_000
+"""Most frames times pairs that are worked on together: bounds memory."""
+NEVER = 10.0
+"""m/s: velocities of people never differ by more, so that this value switches `diverge` off."""
+ARRIVAL = 1.0
+"""s: a link that began within this time of a track's first frame is an arrival, no merge."""
 
 
 @dataclass(frozen=True)
-class Grouping(Config):
-    """Parameters of the baseline rule; lengths in metres, multiplied by px_per_m in the image. Declared like a
-    tracker's, so that they are searched, stored and read in the same way."""
+class LinkRule(Config):
+    """Parameters of the baseline rule, declared, searched and stored like a tracker's. Lengths are metres."""
 
     tracker: ClassVar[str] = "grouping"
 
-    near: float = param(MERGE_DISTANCE, (0.5, 3.0), "m", "nearer is together")
-    alike: float = param(MERGE_VELOCITY, (0.1, 2.0), "m/s", "velocities that differ by less are alike")
-    share: float = param(0.8, (0.3, 1.0), "share", "of the frames of the last `window` in which both were seen")
-    window: float = param(HOLD_TIME, (0.2, 6.0), "s", "how far back it looks")
+    near: float = param(MERGE_DISTANCE, (0.5, 3.0), "m", "a pair nearer than this is near")
+    alike: float = param(MERGE_VELOCITY, (0.1, 2.0), "m/s", "a pair whose velocities differ by less moves alike")
+    share: float = param(
+        0.8,
+        (0.3, 1.0),
+        "share",
+        "of the frames of the last `window` with both seen: a pair near and alike in so many or more is linked",
+    )
+    window: float = param(HOLD_TIME, (0.2, 6.0), "s", "time over which the share is counted")
     acquaintance: float = param(
         1.0,
         (0.0, 6.0),
         "s",
-        "of the window in which both must have been seen: who has just come is judged sooner",
+        "least time within the window in which both must have been seen before they can be linked",
     )
-    apart: float = param(SPLIT_DISTANCE, (0.5, 5.0), "m", "further is apart")
-    patience: float = param(HOLD_TIME, (0.1, 6.0), "s", "apart for so long, and the link breaks")
+    apart: float = param(SPLIT_DISTANCE, (0.5, 5.0), "m", "a pair further than this is apart")
+    patience: float = param(HOLD_TIME, (0.1, 6.0), "s", "time apart after which a link breaks")
     idle: float = param(
         0.0,
         (0.0, 1.0),
         "m/s",
-        "standing side by side, both slower, links nobody; 0: it does, as in a conversation",
+        "a pair that are both slower than this is not near; 0: standing people can be linked",
         before=0.0,
     )
     diverge: float = param(
         NEVER,
         (0.2, NEVER),
         "m/s",
-        "beyond `near`, and velocities differing by more, is apart too; 10: never",
+        "a pair beyond `near` whose velocities differ by more is apart, too; 10: never",
         "log",
         before=NEVER,
     )
-    smooth: float = param(0.0, (0.0, 3.0), "s", "velocities are chords of positions over so long; 0: the tracker's own")
-    memory: float = param(1.0, (0.0, 5.0), "s", "a group waits so long for a member who is not seen")
-    arrival: float = param(1.0, (0.0, 5.0), "s", "a link that began so soon after a track did is an arrival, no merge")
+    smooth: float = param(
+        0.0,
+        (0.0, 3.0),
+        "s",
+        "time over which velocities are taken as chords of positions; 0: the tracker's own velocities",
+    )
+    memory: float = param(1.0, (0.0, 5.0), "s", "time for which a member who is not seen stays in the group")
+    arrival: float = param(
+        ARRIVAL, (0.0, 5.0), "s", "a link that began so soon after a track's first frame is no merge"
+    )
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Links:
-    """Changes of links, L rows sorted by time: frame (from 0), columns a < b, on or off, since: first frame of the
-    stretch that made the change."""
+    """Switches of links of a sequence: L rows, sorted by frame, then pair.
+
+    frame (L,) from 0, in which the link is switched; a, b (L,) columns of the two people, a < b; on (L,) True if the
+    link is set, False if it is removed; since (L,) first frame of the stretch that caused the switch.
+    """
 
     frame: Ints
     a: Ints
@@ -72,14 +92,18 @@ class Links:
     since: Ints
 
 
-def find_links(frame: Ints, column: Ints, pos: Array, vel: Array, length: int, fps: float, rule: Grouping) -> Links:
-    """Links among people; rows sorted by frame (from 0), column (R,) of the person, pos, vel (R, 2) in m, m/s."""
+def find_links(frame: Ints, column: Ints, pos: Array, vel: Array, length: int, fps: float, rule: LinkRule) -> Links:
+    """Return all switches of links in a sequence of `length` frames.
+
+    frame (R,) from 0, sorted; column (R,) of the person; pos, vel (R, 2) in m and m/s. A pair with an unknown (nan)
+    velocity counts as moving alike.
+    """
     i, j = close_pairs(frame, pos, max(rule.apart, rule.near))
     swap = column[i] > column[j]
     i, j = np.where(swap, j, i), np.where(swap, i, j)
     distance = np.hypot(*(pos[i] - pos[j]).T)
     differ = np.hypot(*(vel[i] - vel[j]).T)
-    near = (distance < rule.near) & ~(differ >= rule.alike)  # nan: not yet known
+    near = (distance < rule.near) & ~(differ >= rule.alike)  # true where nan: a velocity is unknown
     speed = np.hypot(*vel.T)
     near &= ~(np.maximum(speed[i], speed[j]) < rule.idle)
     people = int(column.max(initial=0)) + 1
@@ -89,12 +113,12 @@ def find_links(frame: Ints, column: Ints, pos: Array, vel: Array, length: int, f
     present[frame, column] = True
     within = (distance <= rule.apart) & ~((distance > rule.near) & (differ > rule.diverge))
     found = []
-    for some in _portions(known, max(1, CELLS // max(length, 1))):
-        rows = np.flatnonzero((pair >= some[0]) & (pair <= some[-1]))
-        place = np.searchsorted(some, pair[rows])
-        kept = some[np.minimum(place, len(some) - 1)] == pair[rows]
+    for pairs in _portions(known, max(1, CELLS // max(length, 1))):
+        rows = np.flatnonzero((pair >= pairs[0]) & (pair <= pairs[-1]))
+        place = np.searchsorted(pairs, pair[rows])
+        kept = pairs[np.minimum(place, len(pairs) - 1)] == pair[rows]
         rows, place = rows[kept], place[kept]
-        found.append(_changes(frame[i[rows]], place, near[rows], within[rows], some, present, fps, rule))
+        found.append(_switches(frame[i[rows]], place, near[rows], within[rows], pairs, present, fps, rule))
     columns = [np.concatenate([np.zeros(0, np.int64), *(f[k] for f in found)]) for k in range(4)]
     order = np.lexsort((columns[1], columns[0]))
     t, pair, on, since = (c[order] for c in columns)
@@ -102,14 +126,19 @@ def find_links(frame: Ints, column: Ints, pos: Array, vel: Array, length: int, f
 
 
 def _portions(pairs: Ints, size: int) -> Iterator[Ints]:
+    """The pairs in slices of `size`."""
     for low in range(0, len(pairs), size):
         yield pairs[low : low + size]
 
 
-def _changes(
-    frame: Ints, place: Ints, near: Bools, within: Bools, pairs: Ints, present: Bools, fps: float, rule: Grouping
+def _switches(
+    frame: Ints, place: Ints, near: Bools, within: Bools, pairs: Ints, present: Bools, fps: float, rule: LinkRule
 ) -> tuple[Ints, Ints, Ints, Ints]:
-    """(frame, pair, on, since) of the changes of some pairs, from rows (frame, place of the pair) that are close."""
+    """Frame, pair, on (0 or 1) and since of the switches of these pairs.
+
+    pairs (K,): a * P + b. The rows (frame, index of the pair in `pairs`) are those in which a pair is close; near:
+    it is near and alike; within: it is not apart. present (T, P): the people who are seen.
+    """
     people = present.shape[1]
     both = present[:, pairs // people] & present[:, pairs % people]
     together, far = np.zeros_like(both), both.copy()
@@ -131,7 +160,7 @@ def _changes(
 
 
 def _recent(flags: Bools, frames: int) -> Ints:
-    """How many of the last `frames` frames (T, K) are true, this one included."""
+    """The number (T, K) of true flags among the last `frames` frames, the present one included."""
     total = np.cumsum(flags, axis=0)
     late = np.zeros_like(total)
     late[frames:] = total[:-frames] if frames < len(total) else 0
@@ -139,7 +168,7 @@ def _recent(flags: Bools, frames: int) -> Ints:
 
 
 def _onset(together: Bools, window: int) -> Ints:
-    """The first frame with a true flag among the last `window` (T, K)."""
+    """The first frame (T, K) with a true flag among the last `window` frames."""
     t = np.arange(len(together))[:, None]
     after = np.minimum.accumulate(np.where(together, t, len(together))[::-1], axis=0)[::-1]
     return np.asarray(np.take_along_axis(after, np.maximum(t - window + 1, 0) + np.zeros_like(after), axis=0))

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from sim.types import Groups, Plane, Tracks, Truth
-from tracking.grouping.derive import derive
+from tracking.grouping.grouped_tracks import derive
 from tracking.scoring.evaluation import Scores, Similarity, evaluate
 from tracking.scoring.groups import GroupMatch
 

@@ -8,7 +8,7 @@ from itertools import chain
 import numpy as np
 
 from sim.types import Array, Ints, Tracks, Truth
-from tracking.grouping.derive import with_groups
+from tracking.grouping.grouped_tracks import with_groups
 from tracking.scoring.catalogue import ALL, CATALOGUE, CORE
 from tracking.scoring.evaluation import Similarity, evaluate
 from tracking.scoring.groups import GroupMatch

@@ -10,7 +10,7 @@ from typing import Literal
 import numpy as np
 
 from sim.types import Array, Bools, Tracks, Truth
-from tracking.grouping.derive import with_groups
+from tracking.grouping.grouped_tracks import with_groups
 from tracking.scoring.catalogue import CATALOGUE
 from tracking.scoring.group_and_event_scores import Labelled, social_scores
 from tracking.scoring.groups import GroupMatch

@@ -17,8 +17,8 @@ from scipy.signal import lfilter
 from sim.rng import rng
 from sim.types import Array, FrameTruth, Plane, Tracks, Truth
 from tracking.environment.episodes import Cache, Episode, Source
-from tracking.grouping.derive import derive
-from tracking.grouping.link_rule import Grouping
+from tracking.grouping.grouped_tracks import derive
+from tracking.grouping.link_rule import LinkRule
 
 
 @dataclass(frozen=True)
@@ -38,7 +38,7 @@ SURVEYED, FILMED = Labels(0.02, 0.1, filmed=False), Labels(0.06, 0.1, filmed=Tru
 larger, those far behind smaller; 1.5 is a guess, fitted to nothing."""
 
 
-def play_rule(source: Source, rule: Grouping, cache: Cache) -> Episode:
+def play_rule(source: Source, rule: LinkRule, cache: Cache) -> Episode:
     """The rule on the people of a source: who is who is known, so that the rule alone is judged; of a simulated one
     places as labels tell them."""
     from tracking.scoring.evaluation import evaluate

@@ -9,9 +9,9 @@ from scenarios.errors import InputError
 from sim.types import DetectionMode, Tracker
 from tracking.config import Config
 from tracking.environment.episodes import Cache, Episode, Source, play, streams_for
-from tracking.grouping.link_rule import Grouping
+from tracking.grouping.link_rule import LinkRule
 
-RULE = Grouping.tracker
+RULE = LinkRule.tracker
 
 
 @dataclass(frozen=True)
@@ -40,7 +40,7 @@ class Subject:
 
     def accept(self, source: Source, detections: DetectionMode) -> None:
         """InputError where it cannot work on such a source."""
-        from tracking.tracker_registry import choose_mode
+        from tracking.detection_mode import choose_mode
 
         if self.name == RULE:
             if detections != "truth":
@@ -56,7 +56,7 @@ class Subject:
         if self.name == RULE:
             from tracking.tuning.grouping_episodes import play_rule
 
-            return play_rule(source, Grouping.from_dict(values), cache)
+            return play_rule(source, LinkRule.from_dict(values), cache)
         return play(
             self.tracker, source, values, detections=detections, tracker_seed=source.seed, cache=cache,
             every_score=every_score,
@@ -65,10 +65,10 @@ class Subject:
 
 def subject_of(tracker: str | type[Tracker]) -> Subject:
     """The subject of this name, file or class; InputError where it is no tracker or has no parameters."""
-    from tracking.tracker_registry import checked, code, config_class, find
+    from tracking.tracker_registry import checked, code_hash, config_class, find
 
     if tracker == RULE:
-        return Subject(RULE, RULE, Grouping, ("points", "boxes"))
+        return Subject(RULE, RULE, LinkRule, ("points", "boxes"))
     named = tracker if isinstance(tracker, str) else getattr(tracker, "__name__", str(tracker))
     found: Any = find(tracker) if isinstance(tracker, str) else checked(tracker, named)
-    return Subject(tracker, named, config_class(found, named), tuple(found.needs), code(found))
+    return Subject(tracker, named, config_class(found, named), tuple(found.needs), code_hash(found))

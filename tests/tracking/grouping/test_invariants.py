@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 
 from sim.types import Tracks
 from tests.plots import DURATION, crosses, look, merges, scenes, splits
-from tracking.grouping.derive import derive
+from tracking.grouping.grouped_tracks import derive
 
 FPS = 10.0
 

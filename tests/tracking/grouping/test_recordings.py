@@ -5,7 +5,8 @@ import pytest
 
 from sim.io.source import open_source
 from sim.types import Tracks
-from tracking.grouping.derive import Grouping, derive
+from tracking.grouping.grouped_tracks import derive
+from tracking.grouping.link_rule import LinkRule
 
 
 def as_tracks(truth):
@@ -35,8 +36,8 @@ def test_pets_persons_11_and_12_are_a_group(shared_data):
 @pytest.mark.parametrize(
     ("rule", "low", "high"),
     [
-        (Grouping(), 0.63, 0.70),  # takes those who wait at a stop for groups
-        (Grouping(near=1.0, idle=0.4), 0.86, 0.91),  # chosen on simulated crowds
+        (LinkRule(), 0.63, 0.70),  # takes those who wait at a stop for groups
+        (LinkRule(near=1.0, idle=0.4), 0.86, 0.91),  # chosen on simulated crowds
     ],
 )
 def test_seq_hotel(shared_data, rule, low, high):

@@ -11,8 +11,8 @@ from sim.rng import rng
 from tests.tuning_toys import write_scenes
 from tracking.app.cli import run
 from tracking.environment.episodes import Cache, sources
-from tracking.grouping.derive import derive
-from tracking.grouping.link_rule import Grouping
+from tracking.grouping.grouped_tracks import derive
+from tracking.grouping.link_rule import LinkRule
 from tracking.run import track
 from tracking.scoring import evaluate
 from tracking.tuning import tune
@@ -35,7 +35,7 @@ def test_the_people_are_perfect_and_their_groups_unknown(source):
 @pytest.mark.parametrize("seed", [3, 4])
 def test_an_episode_is_what_evaluate_says(tmp_path, seed):
     (source,) = sources(write_scenes(tmp_path)[0], (seed,))
-    truth, rule = source.open().truth, Grouping(near=1.0)
+    truth, rule = source.open().truth, LinkRule(near=1.0)
     found = play_rule(source, rule, Cache())
     labels = FILMED if seed % 2 else SURVEYED
     people = people_as_tracks(as_labelled(truth, labels, seed))
@@ -101,8 +101,8 @@ def test_filmed_people_are_grouped_in_the_image():
 
 def test_a_rule_that_links_nobody_scores_nothing(source):
     """The pair walks 0.75 m apart: at half a metre nobody is together."""
-    assert play_rule(source, Grouping(), Cache()).scores["pairwise_F1"] > 0.5
-    assert play_rule(source, Grouping(near=0.5), Cache()).scores["pairwise_F1"] == 0.0
+    assert play_rule(source, LinkRule(), Cache()).scores["pairwise_F1"] > 0.5
+    assert play_rule(source, LinkRule(near=0.5), Cache()).scores["pairwise_F1"] == 0.0
 
 
 def test_the_rule_is_tuned_like_a_tracker(tmp_path):
@@ -114,17 +114,17 @@ def test_the_rule_is_tuned_like_a_tracker(tmp_path):
     )  # fmt: skip
     assert found.plan.goals[0].key == "pairwise_F1"
     assert "near" not in found.trials[0].params
-    assert Grouping.from_toml(tmp_path / "rule.toml") == found.config
+    assert LinkRule.from_toml(tmp_path / "rule.toml") == found.config
 
 
 def test_first_rule_is_frozen():
-    first = Grouping.frozen()
+    first = LinkRule.frozen()
     assert (first.near, first.acquaintance, first.idle, first.diverge) == (1.5, 2.0, 0.0, 10.0)
 
 
 def test_a_rule_of_ones_own_groups_what_is_tracked(source, tmp_path):
     """From Python, from a file; run.json says which; who says nothing gets the usual one."""
-    rule = Grouping(near=0.5)
+    rule = LinkRule(near=0.5)
     (tmp_path / "rule.toml").write_text(rule.to_toml())
     sequence = source.open()
     usual, own, read = (track("blob", sequence, grouping=g) for g in (None, rule, str(tmp_path / "rule.toml")))

@@ -16,7 +16,7 @@ from optuna.trial import TrialState
 from scenarios.errors import InputError
 from sim.workers.cluster import about
 from tests.tuning_toys import wishes
-from tracking.grouping.link_rule import Grouping
+from tracking.grouping.link_rule import LinkRule
 from tracking.papers.blob.config import BlobConfig
 from tracking.papers.group_pda.config import GroupPdaConfig
 from tracking.tuning.journal import Journal, Locks
@@ -35,7 +35,7 @@ def test_distributions_are_the_declarations(tmp_path):
     }
 
 
-@pytest.mark.parametrize("kind", [BlobConfig, GroupPdaConfig, Grouping])
+@pytest.mark.parametrize("kind", [BlobConfig, GroupPdaConfig, LinkRule])
 def test_every_default_can_be_tried(kind):
     """And both ends, unless the config refuses them together with the other defaults."""
     for p in kind.space():

@@ -17,7 +17,7 @@ from tracking.app.demo_page import Part, Seen, page
 from tracking.app.output import Answer
 from tracking.app.progress import Meter
 from tracking.app.replay_page.video import Film
-from tracking.run import Run
+from tracking.run import TrackingRun
 
 SCENES = ("merge", "split", "cross", "pass-by", "queue", "side-by-side", "party", "mixed")
 SEEDS = range(40_000, 40_003)
@@ -98,7 +98,9 @@ def _part(tracker: str, sequences: list[Sequence], out: Path, meter: Meter) -> P
     return part
 
 
-def _store(who: str, sequence: Sequence, run: Run, row: Row, tracks: Path, place: Path, video: Film | None) -> None:
+def _store(
+    who: str, sequence: Sequence, run: TrackingRun, row: Row, tracks: Path, place: Path, video: Film | None
+) -> None:
     """The tracks as files and as a page."""
     from sim.io.store.track_files import write_tracks
     from tracking.app.replay_page.page import view

@@ -16,8 +16,8 @@ from tracking.app.commands.score_tables import Means, differences, said, tables
 from tracking.app.output import Answer
 from tracking.app.progress import Meter
 from tracking.app.tracks_of_sequences import pair, results
-from tracking.provenance import given
-from tracking.run import Run
+from tracking.run import TrackingRun
+from tracking.run_info import input_summary
 from tracking.scoring import evaluate
 from tracking.scoring.block_resampling import scorer
 from tracking.scoring.catalogue import CATALOGUE
@@ -108,7 +108,7 @@ def _rows(sequences: list[Sequence], tracks: Path, similarity: Similarity | None
 
 
 def score_run(
-    sequence: Sequence, run: Run, similarity: Similarity | None = None, group_match: GroupMatch = "hull"
+    sequence: Sequence, run: TrackingRun, similarity: Similarity | None = None, group_match: GroupMatch = "hull"
 ) -> Row:
     """The scores of one run; InputError where the sequence is not labelled or cannot be compared so."""
     if sequence.truth is None:
@@ -123,7 +123,7 @@ def score_run(
             file=sequence.name, place="--similarity", got=str(error), expected="what both sides have",
             remedy="choose another --similarity",
         ) from None  # fmt: skip
-    return Row(sequence.name, found, given(run.info))
+    return Row(sequence.name, found, input_summary(run.info))
 
 
 def notes(sequence: Sequence) -> list[str]:

@@ -13,9 +13,9 @@ from tracking.app import option_values
 from tracking.app.output import Answer
 from tracking.app.progress import Meter
 from tracking.config import Config
-from tracking.grouping.link_rule import Grouping
-from tracking.provenance import given
-from tracking.run import Run
+from tracking.grouping.link_rule import LinkRule
+from tracking.run import TrackingRun
+from tracking.run_info import input_summary
 
 
 @dataclass(frozen=True)
@@ -27,9 +27,9 @@ class Job:
     detections: DetectionMode | None = None
     sensor: Mapping[str, Any] = field(default_factory=dict)
     seed: int = 0
-    grouping: Grouping | None = None
+    grouping: LinkRule | None = None
 
-    def run(self, sequence: Sequence, progress: Callable[[int], None] | None = None) -> Run:
+    def run(self, sequence: Sequence, progress: Callable[[int], None] | None = None) -> TrackingRun:
         """The tracker's answers."""
         from tracking.run import track
 
@@ -52,7 +52,7 @@ def job(
     found = option_values.settings([*option_values.sensor(detector), *settings], "tracker", ("tracker", "sensor"))
     own = [text for subject, text in found if subject == "tracker"]
     sensor = option_values.values(text for subject, text in found if subject == "sensor")
-    rule = None if grouping is None else Grouping.from_toml(grouping)
+    rule = None if grouping is None else LinkRule.from_toml(grouping)
     return Job(tracker, _config(tracker, params, own), detections, sensor, seed, rule)
 
 
@@ -107,7 +107,7 @@ def track(
 
 
 def _check(job: Job, needs: tuple[str, ...], sequences: list[Sequence], background: str | None) -> None:
-    from tracking.tracker_registry import choose_mode
+    from tracking.detection_mode import choose_mode
 
     modes = [choose_mode(needs, sequence, job.detections) for sequence in sequences]
     if background is not None and "image" not in modes:
@@ -135,7 +135,7 @@ def places(sequences: list[Sequence], source: Path, out: Path) -> list[tuple[Seq
     return [(sequence, out / sequence.name) for sequence in sequences]
 
 
-def _row(run: Run, folder: Path) -> dict[str, Any]:
+def _row(run: TrackingRun, folder: Path) -> dict[str, Any]:
     shown = ["sequence", "detections", "sensor", "background", "causal", "causal_from", "plane", "boxes", "frames"]
     shown += ["frames_per_second", "whole_frames_per_second"]
     ids = {int(id) for tracks in run for id in tracks.id}
@@ -144,5 +144,5 @@ def _row(run: Run, folder: Path) -> dict[str, Any]:
 
 def _line(row: dict[str, Any]) -> str:
     speed = f"{row['frames_per_second']:.0f} frames/s ({row['whole_frames_per_second']:.0f} with reading)"
-    counts = f"{row['frames']} frames, {row['tracks']} tracks, detections {given(row)}, {speed}"
+    counts = f"{row['frames']} frames, {row['tracks']} tracks, detections {input_summary(row)}, {speed}"
     return f"{row['sequence']}: {counts} → {row['folder']}"

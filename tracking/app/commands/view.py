@@ -14,7 +14,7 @@ from tracking.app import option_values
 from tracking.app.output import Answer
 from tracking.app.progress import Meter
 from tracking.app.tracks_of_sequences import pair, results
-from tracking.run import Run
+from tracking.run import TrackingRun
 
 if TYPE_CHECKING:
     from tracking.app.pictures.overlay import HowTrue
@@ -77,11 +77,11 @@ def overlay(recording: Recording, tracks: Path | None, out: Path, truth: HowTrue
     return _each("overlay", sequences, out, ".mp4", draw, _pictures(sequences))
 
 
-def _tracks_of(sequences: list[Sequence], tracks: Path | None) -> Callable[[Sequence], Run | None]:
+def _tracks_of(sequences: list[Sequence], tracks: Path | None) -> Callable[[Sequence], TrackingRun | None]:
     """Reads the tracks of a sequence, if any were given."""
     found = {} if tracks is None else {s.name: result for s, result in pair(sequences, results(tracks))}
 
-    def of(sequence: Sequence) -> Run | None:
+    def of(sequence: Sequence) -> TrackingRun | None:
         result = found.get(sequence.name)
         return None if result is None else result.read(sequence)
 

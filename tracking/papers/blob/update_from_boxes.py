@@ -8,7 +8,7 @@ from __future__ import annotations
 import numpy as np
 
 from sim.types import Array, Bools, Detections, Frame, Ints
-from tracking import scale
+from tracking import image_scale
 from tracking.filters import kalman
 from tracking.papers.blob import box_geometry
 from tracking.papers.blob.config import BlobConfig
@@ -38,7 +38,7 @@ class Boxes:
         z, score = self._measurements(detections)
         people = self.people
         if len(z):
-            scale.needed(people.context.px_per_m)
+            image_scale.required(people.context.px_per_m)
         people.predict()
         people.look(z)
         rows, columns, free, d2 = self._associate(z, score)

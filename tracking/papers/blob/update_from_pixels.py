@@ -18,7 +18,7 @@ from __future__ import annotations
 import numpy as np
 
 from sim.types import Array, Bools, Context, Detections, Frame, Image, Ints
-from tracking import scale
+from tracking import image_scale
 from tracking.detect import blobs as detect
 from tracking.detect import lone_blobs as lone
 from tracking.detect.background import Background
@@ -44,7 +44,7 @@ class Pixels:
     def __init__(self, config: BlobConfig, people: People, context: Context) -> None:
         assert context.background is not None
         if not np.isnan(context.px_per_m):
-            scale.needed(context.px_per_m)
+            image_scale.required(context.px_per_m)
         self.people, self.context = people, context
         self.size = PersonSize(context)
         self.background: Background | Mog2

@@ -10,8 +10,8 @@ from tracking.detect import blobs, lone_blobs
 from tracking.detect.background import Background
 from tracking.detect.person_size import PersonSize
 from tracking.detect.pixel_classes import foreground
+from tracking.image_scale import required
 from tracking.papers.group_pda.config import GroupPdaConfig
-from tracking.scale import needed
 
 SLIM = 0.3
 """Width over height of a person seen from the side: where no camera tells."""
@@ -27,7 +27,7 @@ class Pixels:
         assert context.background is not None
         self.config = config
         self.background = Background(context.background, context.fps, config)
-        self.scale = needed(_learned(self.background, context) if np.isnan(context.px_per_m) else context.px_per_m)
+        self.scale = required(_learned(self.background, context) if np.isnan(context.px_per_m) else context.px_per_m)
         self.step = max(1, round(config.grid * self.scale))
         self.person = _person(context.camera, self.scale)
 

@@ -43,6 +43,7 @@ import numpy as np
 
 from sim.geometry.footprints import FOOTPRINT
 from sim.types import Array, Bools, Context, Detections, Frame, Plane, Tracks
+from tracking.image_scale import required
 from tracking.papers.group_pda import association_kernels as kernels
 from tracking.papers.group_pda import split_birth_loss as changes
 from tracking.papers.group_pda.carried_members import Claims, claimed, exclusive, remember, with_carried
@@ -54,7 +55,6 @@ from tracking.papers.group_pda.group_bank import Bank
 from tracking.papers.group_pda.kernel_parameters import Rules, make_rules
 from tracking.papers.group_pda.merging import Change, Merging
 from tracking.papers.group_pda.report import tracks
-from tracking.scale import needed
 
 SQUARE = np.array([[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]])
 
@@ -158,7 +158,7 @@ class GroupPda:
             steep = steepness(self.context.camera)
             self.rules = make_rules(self.config, self.context.fps, scale, p.spread, steep)
             return self.rules
-        scale = needed(self.context.px_per_m) if self.plane == "image" else 1.0
+        scale = required(self.context.px_per_m) if self.plane == "image" else 1.0
         steep = steepness(self.context.camera) if self.plane == "image" else 1.0
         self.rules = make_rules(self.config, self.context.fps, scale, steep=steep)
         return self.rules

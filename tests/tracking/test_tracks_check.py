@@ -7,7 +7,7 @@ import pytest
 
 from scenarios.errors import WorkError
 from sim.types import GroupEvent, Groups, Tracks
-from tracking.tracker_registry import History, check_tracks
+from tracking.tracks_check import ReportHistory, check_tracks
 
 SQUARE = np.array([[0.0, 0], [1, 0], [1, 1]])
 
@@ -111,16 +111,16 @@ def test_when_an_event_was_told_is_filled_in():
 
 
 def test_who_was_reported_before_may_be_a_member():
-    history = History()
+    history = ReportHistory()
     check(answer(2, (1, 2)), history)
     check(answer(3, (1,), events=(event(kind="leave"),), groups=group()), history)
     refused(answer(3, (1,), events=(event(kind="leave"),)), "2 in the members of a leave")
-    history.forget()
+    history.clear()
     refused(answer(3, (1,), events=(event(kind="leave"),)), "2 in the members of a leave", history)
 
 
 def test_plane_and_unit_stay():
-    history = History()
+    history = ReportHistory()
     check(answer(2), history)
     refused(answer(3, plane="image"), "plane 'image', unit 'person'; expected plane 'ground', unit 'person'", history)
     refused(answer(3, unit="group", group=np.array([1, 2])), "unit 'group'; expected", history)
@@ -144,3 +144,38 @@ def test_no_arrays():
     refused(answer(pos=[[0.0, 0.0], [0.0, 0.0]]), "pos of type list")
     refused(answer(id=np.zeros((2, 2), np.int64)), "id of shape")
     refused(answer(group=np.array([-2, 3])), "group -2")
+
+
+def tracks(n=2, **changes):
+    two = np.zeros((n, 2))
+    alone = np.full(n, -1)
+    made = Tracks(3, 0.2, "ground", "person", np.arange(n), alone, two, two, np.zeros((n, 4, 4)), None, np.ones(n))
+    return made.replace(**changes)
+
+
+@pytest.mark.parametrize(
+    ("changes", "words"),
+    [
+        ({"id": np.array([4, 4])}, "the same id twice"),
+        ({"id": np.array([-1, 4])}, "id -1"),
+        ({"id": np.array([1.0, 2.0])}, "float64"),
+        ({"pos": np.zeros((2, 3))}, r"pos of shape \(2, 3\)"),
+        ({"vel": np.zeros((1, 2))}, "vel of shape"),
+        ({"cov": np.full((2, 4, 4), np.nan)}, "NaN or infinity in cov"),
+        ({"box": np.zeros((2, 3))}, "box of shape"),
+        ({"index": 4}, "index 4"),
+        ({"plane": "floor"}, "floor"),
+    ],
+)
+def test_wrong_answers_name_tracker_frame_and_fault(changes, words):
+    with pytest.raises(WorkError, match=words) as caught:
+        check_tracks(tracks(**changes), 3, "mine.py:Mine")
+    assert str(caught.value).startswith("mine.py:Mine: frame 3")
+
+
+def test_right_answers_pass():
+    assert check_tracks(tracks(), 3, "x").id.tolist() == [0, 1]
+    assert len(check_tracks(tracks(0), 3, "x").id) == 0
+    assert check_tracks(tracks(score=np.zeros(0)), 3, "x").score.tolist() == [1.0, 1.0]
+    with pytest.raises(WorkError, match="NoneType"):
+        check_tracks(None, 3, "x")

@@ -1,4 +1,7 @@
-"""What a tracker may answer, and the first fault of an answer in words."""
+"""Check of the Tracks that a tracker's `step` returns: types, shapes, ids, groups, events; the first fault in words.
+
+`check_tracks` is the entry. The private functions each check one part and return a `Fault`, or None if there is none.
+"""
 
 from __future__ import annotations
 
@@ -13,33 +16,39 @@ from scenarios.errors import WorkError
 from sim.types import EVENT_KINDS, GroupEvent, Groups, Tracks
 
 Fault = tuple[str, str]
-"""What was got, what was expected."""
+"""What the tracker returned, and what was expected instead."""
 
 
 @dataclass
-class History:
-    """What a tracker has answered in a sequence. State: plane and unit of its first answer, all its ids so far."""
+class ReportHistory:
+    """What a tracker has reported in a sequence so far.
 
-    kind: tuple[str, str] | None = None
+    plane_and_unit: of its first tracks, None before. ids: all track ids so far.
+    """
+
+    plane_and_unit: tuple[str, str] | None = None
     ids: set[int] = field(default_factory=set)
 
-    def forget(self) -> None:
-        """Start anew, for another sequence."""
-        self.kind = None
+    def clear(self) -> None:
+        """Forget everything, for the start of another sequence."""
+        self.plane_and_unit = None
         self.ids.clear()
 
 
-def check_tracks(tracks: Any, index: int, tracker: str, history: History | None = None) -> Tracks:
-    """The answer to frame `index` itself, what may be left out filled in; WorkError naming tracker, frame and fault.
+def check_tracks(tracks: Any, index: int, tracker: str, history: ReportHistory | None = None) -> Tracks:
+    """Return the tracks of frame `index` with optional fields filled in.
 
-    Checked are type, index, shapes, finiteness, ids (whole, non-negative, unique in the frame), plane and unit (those
-    of the first answer), groups and events. An id that is not reported for a while and comes back is the same track by
-    definition. Filled in: scores (1), an event's `emitted` and `end` (this frame). history: of this sequence, kept up
-    to date here.
+    Raises WorkError if they are wrong; the error names the tracker, the frame and the first fault.
+
+    Checked are type, frame index, shapes, finite numbers, ids (int64, non-negative, unique in the frame), groups and
+    events. Plane and unit must be those of the first frame in `history`. Members of groups and events must be ids that
+    the tracker has reported in this frame or before. Any reported id may come back after a gap.
+    Filled in are empty scores (1) and, in events, `emitted` and `end` where they are None (this frame).
+    history: of this sequence; it is updated here. None stands for an empty history.
     """
     if isinstance(tracks, Tracks):
         tracks = _filled(tracks)
-    history = History() if history is None else history
+    history = ReportHistory() if history is None else history
     fault = _fault(tracks, index, history)
     if fault:
         got, expected = fault
@@ -49,37 +58,38 @@ def check_tracks(tracks: Any, index: int, tracker: str, history: History | None 
 
 
 def _filled(tracks: Tracks) -> Tracks:
+    """The tracks with empty scores, and events' open `emitted` and `end`, filled in."""
     if not np.size(tracks.score) and np.ndim(tracks.id) == 1:
         tracks = tracks.replace(score=np.ones(len(tracks.id)))
-    if isinstance(tracks.events, tuple) and any(map(_undated, tracks.events)):
-        tracks = tracks.replace(events=tuple(_dated(e, tracks.index) for e in tracks.events))
+    if isinstance(tracks.events, tuple) and any(map(_has_open_frames, tracks.events)):
+        tracks = tracks.replace(events=tuple(_with_frames(e, tracks.index) for e in tracks.events))
     return tracks
 
 
-def _undated(event: Any) -> bool:
+def _has_open_frames(event: Any) -> bool:
     return isinstance(event, GroupEvent) and (event.emitted is None or event.end is None)
 
 
-def _dated(event: Any, index: int) -> Any:
-    """The event with its frames of telling and of ending, this one where it leaves them open."""
-    if not _undated(event):
+def _with_frames(event: Any, index: int) -> Any:
+    """The event with `emitted` and `end` set to this frame where they are None."""
+    if not _has_open_frames(event):
         return event
     emitted = index if event.emitted is None else event.emitted
     end = index if event.end is None else event.end
     return GroupEvent(event.kind, event.start, end, emitted, event.before, event.after, event.members, event.pos)
 
 
-def _fault(tracks: Any, index: int, history: History) -> Fault | None:
-    """What is wrong with an answer, or None."""
+def _fault(tracks: Any, index: int, history: ReportHistory) -> Fault | None:
+    """The first fault of what a tracker returned, or None. Adds plane, unit and ids to the history."""
     if not isinstance(tracks, Tracks):
         return type(tracks).__name__, "sim.types.Tracks"
     if tracks.index != index:
         return f"index {tracks.index}", f"index {index}"
     if tracks.plane not in ("ground", "space", "image") or tracks.unit not in ("person", "group"):
         return f"plane {tracks.plane!r}, unit {tracks.unit!r}", "plane ground, space or image; unit person or group"
-    history.kind = kind = history.kind or (tracks.plane, tracks.unit)
-    if (tracks.plane, tracks.unit) != kind:
-        return f"plane {tracks.plane!r}, unit {tracks.unit!r}", f"plane {kind[0]!r}, unit {kind[1]!r} as before"
+    history.plane_and_unit = first = history.plane_and_unit or (tracks.plane, tracks.unit)
+    if (tracks.plane, tracks.unit) != first:
+        return f"plane {tracks.plane!r}, unit {tracks.unit!r}", f"plane {first[0]!r}, unit {first[1]!r} as before"
     fault = _rows_fault(tracks) or _id_fault(tracks)
     if fault:
         return fault
@@ -91,6 +101,7 @@ def _fault(tracks: Any, index: int, history: History) -> Fault | None:
 
 
 def _rows_fault(tracks: Tracks) -> Fault | None:
+    """Fault in the shape, type or finiteness of the arrays with one row per track."""
     if np.ndim(tracks.id) != 1:
         return f"id of shape {np.shape(tracks.id)}", "(N,)"
     n, d = len(tracks.id), 3 if tracks.plane == "space" else 2
@@ -107,7 +118,7 @@ def _rows_fault(tracks: Tracks) -> Fault | None:
 
 
 def _arrays_fault(shapes: dict[str, tuple[Any, tuple[int, ...]]]) -> Fault | None:
-    """The first that is no array of this shape, or not finite."""
+    """Fault of the first array that is no array of numbers, has another shape, or is not finite."""
     for name, (a, shape) in shapes.items():
         if not isinstance(a, np.ndarray) or a.dtype.kind not in "iuf":
             return f"{name} of type {getattr(a, 'dtype', type(a).__name__)}", "an array of numbers"
@@ -119,11 +130,13 @@ def _arrays_fault(shapes: dict[str, tuple[Any, tuple[int, ...]]]) -> Fault | Non
 
 
 def finite(a: Any) -> bool:
-    """Are all numbers finite? The sum of squares is cheap and nearly always tells; huge numbers may overflow it."""
+    """Return True if all numbers of the array are finite."""
+    # The sum of squares is cheap and finite for ordinary numbers; only if it overflows is each number looked at.
     return isfinite(np.vdot(a, a)) or bool(np.isfinite(a).all())
 
 
 def _id_fault(tracks: Tracks) -> Fault | None:
+    """Fault in the tracks' ids and group ids: type, sign, uniqueness, id == group for unit "group"."""
     if not isinstance(tracks.id, np.ndarray) or tracks.id.dtype != np.int64 or tracks.group.dtype != np.int64:
         kinds = (getattr(a, "dtype", type(a).__name__) for a in (tracks.id, tracks.group))
         return "ids of type {}, groups of type {}".format(*kinds), "int64"
@@ -135,6 +148,7 @@ def _id_fault(tracks: Tracks) -> Fault | None:
 
 
 def _ids_fault(id: Any, name: str) -> Fault | None:
+    """Fault in ids that must be non-negative and unique; `name` stands for them in the message."""
     if len(id) and id.min() < 0:
         return f"{name} {id.min()}", f"non-negative {name}s"
     if len(set(id.tolist())) != len(id):
@@ -143,14 +157,17 @@ def _ids_fault(id: Any, name: str) -> Fault | None:
 
 
 def _groups_fault(groups: Any, d: int, people: Iterable[int]) -> Fault | None:
-    """people: ids that may be members; pos of the groups has d columns. Of extent, size and vel nan is unknown."""
+    """Fault in `Tracks.groups`. d: columns of pos and vel; people: ids that may be members.
+
+    nan is allowed in vel, extent and size, where it means unknown.
+    """
     if not isinstance(groups, Groups):
         return f"groups of type {type(groups).__name__}", "sim.types.Groups or None"
     if not isinstance(groups.id, np.ndarray) or groups.id.ndim != 1 or groups.id.dtype != np.int64:
         return f"groups.id of type {getattr(groups.id, 'dtype', type(groups.id).__name__)}", "(G,) int64"
     n = len(groups.id)
     for name, shape in (("pos", (n, d)), ("vel", (n, d)), ("extent", (n, 2, 2)), ("size", (n,))):
-        a, flat = getattr(groups, name), (n, 2)  # no groups at all are those of Groups.none(), in any plane
+        a, flat = getattr(groups, name), (n, 2)  # without groups any number of columns passes: Groups.none() has 2
         if not isinstance(a, np.ndarray) or (a.shape != shape and (n or a.shape[:1] != flat[:1])):
             return f"groups.{name} of shape {np.shape(a)}", str(shape)
         if name == "pos" and not finite(a):
@@ -159,16 +176,16 @@ def _groups_fault(groups: Any, d: int, people: Iterable[int]) -> Fault | None:
 
 
 def _ragged_fault(groups: Groups, n: int, people: Iterable[int]) -> Fault | None:
-    """Members and hulls: one for each group, or none for all."""
+    """Fault in members and hulls. Each is a tuple with one array per group (n groups), or an empty tuple."""
     for name in ("members", "hull"):
         items = getattr(groups, name)
         if not isinstance(items, tuple) or len(items) not in (0, n):
             got = f"{len(items)} groups.{name}" if isinstance(items, tuple) else f"groups.{name} {type(items).__name__}"
             return got, f"a tuple of {n}, or an empty one"
-    for who in groups.members:
-        if not isinstance(who, np.ndarray) or who.ndim != 1 or (len(who) and who.dtype.kind != "i"):
+    for ids in groups.members:
+        if not isinstance(ids, np.ndarray) or ids.ndim != 1 or (len(ids) and ids.dtype.kind != "i"):
             return "groups.members that are no ids", "(k,) int64 each"
-        if fault := _members_fault(who.tolist(), people, "groups.members"):
+        if fault := _members_fault(ids.tolist(), people, "groups.members"):
             return fault
     for hull in groups.hull:
         if not isinstance(hull, np.ndarray) or hull.ndim != 2 or hull.shape[1] != 2 or hull.dtype.kind not in "if":
@@ -179,6 +196,7 @@ def _ragged_fault(groups: Groups, n: int, people: Iterable[int]) -> Fault | None
 
 
 def _members_fault(members: Iterable[Any], people: Iterable[int], name: str) -> Fault | None:
+    """Fault of the first member that is no whole number or not among `people`."""
     for m in members:
         if not isinstance(m, int | np.integer) or isinstance(m, bool) or m not in people:  # type: ignore[operator]
             return f"{m!r} in {name}", "ids that the tracker has reported"
@@ -203,15 +221,15 @@ def _event_fault(event: Any, index: int, people: Iterable[int]) -> Fault | None:
         if not _whole(getattr(event, name)):
             return f"{event.kind}: {name} {getattr(event, name)!r}", "a whole number"
     if event.emitted != index:
-        return f"{event.kind}: emitted {event.emitted}", f"{index}, the frame answered, or None"
+        return f"{event.kind}: emitted {event.emitted}", f"{index}, the present frame, or None"
     if not 1 <= event.start <= index:
         return f"{event.kind}: start {event.start}", f"a frame from 1 to {index}"
     if event.end < event.start:
         return f"{event.kind}: end {event.end}", f"{event.start} or later: its start"
     for name in ("before", "after"):
-        some = getattr(event, name)
-        if not isinstance(some, tuple) or not all(_whole(g) and g >= -1 for g in some):
-            return f"{event.kind}: {name} {some!r}", "a tuple of group ids, -1 for one alone"
+        groups = getattr(event, name)
+        if not isinstance(groups, tuple) or not all(_whole(g) and g >= -1 for g in groups):
+            return f"{event.kind}: {name} {groups!r}", "a tuple of group ids, -1 for a person alone"
     if not isinstance(event.members, tuple):
         return f"{event.kind}: members {event.members!r}", "a tuple of ids"
     if np.shape(event.pos) != (2,) or not _numbers(event.pos):

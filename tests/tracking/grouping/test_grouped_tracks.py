@@ -5,7 +5,9 @@ import pytest
 
 from scenarios.errors import InputError
 from sim.types import GroupEvent, Groups, Tracks
-from tracking.grouping.derive import Grouping, backward_velocity, derive, with_groups
+from tracking.grouping.grouped_tracks import derive, with_groups
+from tracking.grouping.link_rule import LinkRule
+from tracking.grouping.tracks_table import backward_velocity
 
 FPS = 10.0
 
@@ -195,10 +197,10 @@ def test_groups_without_people_are_left_alone():
 @pytest.mark.parametrize(
     ("changed", "told"),
     [
-        (Grouping(near=1.0), 142),  # 6 - 0.4 t < 1 from frame 127 on
-        (Grouping(share=1.0), 133),
-        (Grouping(window=1.0), 121),
-        (Grouping(alike=0.3), 146),  # not before it stops drifting, in frame 131
+        (LinkRule(near=1.0), 142),  # 6 - 0.4 t < 1 from frame 127 on
+        (LinkRule(share=1.0), 133),
+        (LinkRule(window=1.0), 121),
+        (LinkRule(alike=0.3), 146),  # not before it stops drifting, in frame 131
     ],
 )
 def test_parameters_of_joining(changed, told):
@@ -207,7 +209,7 @@ def test_parameters_of_joining(changed, told):
 
 @pytest.mark.parametrize(
     ("changed", "told"),
-    [(Grouping(apart=2.0), 103), (Grouping(patience=1.0), 106), (Grouping(diverge=0.3), 91)],
+    [(LinkRule(apart=2.0), 103), (LinkRule(patience=1.0), 106), (LinkRule(diverge=0.3), 91)],
 )
 def test_parameters_of_parting(changed, told):
     assert [e[0] for e in events(derive(tracks(leaving()), FPS, rule=changed))] == [told]
@@ -216,9 +218,9 @@ def test_parameters_of_parting(changed, told):
 def test_standing_side_by_side_links_nobody_if_told_so():
     still = [walk((10, (0, 0)), start=(0, 0.7 * k)) for k in range(2)]
     assert derive(tracks(still), FPS)[-1].group.tolist() == [1, 1]
-    assert derive(tracks(still), FPS, rule=Grouping(idle=0.3))[-1].group.tolist() == [-1, -1]
+    assert derive(tracks(still), FPS, rule=LinkRule(idle=0.3))[-1].group.tolist() == [-1, -1]
     walked = [walk((5, (1, 0)), (5, (0, 0)), start=(0, 0.7 * k)) for k in range(2)]
-    assert derive(tracks(walked), FPS, rule=Grouping(idle=0.3))[-1].group.tolist() == [1, 1]
+    assert derive(tracks(walked), FPS, rule=LinkRule(idle=0.3))[-1].group.tolist() == [1, 1]
 
 
 def passing():
@@ -273,7 +275,7 @@ def test_deriving_again_changes_nothing(people):
 def test_what_is_derived_is_not_derived_again(monkeypatch):
     made = with_groups(tracks(passing()), FPS, 1.0)
     assert all(t.derived for t in made)
-    monkeypatch.setattr("tracking.grouping.derive.derive", None)
+    monkeypatch.setattr("tracking.grouping.grouped_tracks.derive", None)
     assert with_groups(made, FPS, 1.0) == made
     with pytest.raises(TypeError):
         with_groups([*made[:-1], made[-1].replace(derived=False)], FPS, 1.0)

@@ -1,0 +1,100 @@
+"""Which detections a tracker gets: the mode (`--detections image`, `file`, `truth`) and the frames that follow from it.
+
+    image  the tracker's own detector works on the pictures: the frames come without detections
+    file   the detections stored with the sequence (det/det.txt)
+    truth  the labelled positions or boxes, degraded only by the sensor settings of the command
+
+A tracker lists in `needs` what it can work with: pixels, stereo, boxes, points. It works with any one of them.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from scenarios.errors import InputError
+from sim.types import DetectionMode, Detections, Frame, Sequence
+from tracking.tracks_check import finite
+
+
+def runs_own_detector(needs: tuple[str, ...], sequence: Sequence) -> bool:
+    """Return True if a tracker with these needs can run its own detector on the sequence's pictures.
+
+    That takes pictures for "pixels", and a right picture for "stereo".
+    """
+    return ("pixels" in needs and sequence.has_images) or ("stereo" in needs and sequence.has_right)
+
+
+def choose_mode(needs: tuple[str, ...], sequence: Sequence, asked: DetectionMode | None) -> DetectionMode:
+    """Return `asked` if that mode can work; if it is None, the first of image, file, truth that can.
+
+    Raises InputError, naming the tracker's needs and what the sequence has, if the asked mode or every mode fails.
+    """
+    able = [mode for mode in ("image", "file", "truth") if _works(mode, needs, sequence)]
+    if asked in able or (asked is None and able):
+        return asked or able[0]  # type: ignore[return-value]
+    got = f"a tracker that needs {' or '.join(needs)}, and {sequence.name} with {_contents(sequence)}"
+    expected = f"--detections {asked}" if asked else "detections of some kind"
+    remedy = f"try --detections {able[0]}" if able else "take another tracker or source"
+    raise InputError(place="--detections", got=got, expected=f"what {expected} needs", remedy=remedy)
+
+
+def _works(mode: str, needs: tuple[str, ...], sequence: Sequence) -> bool:
+    if mode == "image":
+        return runs_own_detector(needs, sequence)
+    takes = {"boxes", "points"} & set(needs)
+    return bool(takes) and (sequence.has_detections if mode == "file" else sequence.load_truth is not None)
+
+
+def _contents(sequence: Sequence) -> str:
+    """What the sequence has, in words for an error message."""
+    parts = {
+        "images": sequence.has_images,
+        "a right image": sequence.has_right,
+        "detections": sequence.has_detections,
+        "truth": sequence.load_truth is not None,
+    }
+    return ", ".join(name for name, there in parts.items() if there) or "nothing"
+
+
+def frames_with_detections(
+    needs: tuple[str, ...], mode: DetectionMode, sequence: Sequence, sensor: Mapping[str, Any], seed: int
+) -> tuple[Frame, ...] | None:
+    """Return the sequence's frames with the detections of `mode` and without pictures; None if `mode` is "image".
+
+    sensor: settings that degrade the detections of mode "truth"; seed: of their random numbers.
+    Raises InputError if there are only points and the tracker does not take points.
+    """
+    if mode == "image":
+        return None
+    if mode == "file":
+        found: list[Detections | None] = [f.detections for f in sequence.without_pictures()]
+    else:
+        from tracking.truth_detections import from_truth
+
+        found = list(from_truth(sequence, sensor, seed))
+    nonempty = [d for d in found if d is not None and len(d.pos)]
+    if nonempty and "points" not in needs and all(d.box is None for d in nonempty):
+        got, remedy = f"points alone, in {sequence.name}", "take a tracker that takes points"
+        raise InputError(place=f"--detections {mode}", got=got, expected="boxes", remedy=remedy)
+    return tuple(Frame(k, (k - 1) / sequence.fps, detections=d) for k, d in enumerate(found, 1))
+
+
+def check_detections(detections: Detections, needs: tuple[str, ...]) -> None:
+    """Raise InputError if a frame's detections cannot be given to a tracker with these needs.
+
+    They cannot if a number is nan or infinite (the error names frame and row), or if there are detections without
+    boxes and the tracker does not take points.
+    """
+    rows = len(detections.pos)
+    arrays = [a for a in (detections.pos, detections.vel, detections.box, detections.score) if a is not None]
+    for a in arrays:
+        if not finite(a):
+            row = int(np.argwhere(~np.isfinite(a.reshape(len(a), -1)).all(1))[0, 0])
+            place = f"frame {detections.index}: detection {row + 1}"
+            raise InputError(place=place, got="NaN or infinity", expected="finite numbers", remedy="correct this row")
+    if rows and detections.box is None and "points" not in needs:
+        place = f"frame {detections.index}"
+        raise InputError(place=place, got="points", expected="boxes", remedy="take a tracker that takes points")

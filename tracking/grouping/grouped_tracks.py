@@ -1,0 +1,138 @@
+"""Fill in groups and events of person tracks, for a tracker that reports none or only some of them.
+
+`with_groups` is the entry for runs and scores; `derive` does the work. Both are causal, apart from the last frame:
+- People are linked by the baseline rule (tracking.grouping.link_rule). Linked people form groups with ids
+  (tracking.grouping.group_labels).
+- Merge, split, form, dissolve, enter and leave events follow from changes of the groups
+  (tracking.grouping.merge_split_events).
+- Crossings and queues are measured by sim.truth.crossing_events and sim.truth.queue_detection.
+
+An event is reported (`emitted`) in the frame in which it is known, and its `start` is the onset: a merge is known once
+the link holds, a crossing 2 s after its end, a queue 6 s after its start (3 s of waiting and 3 s in which people may
+advance). Crossings and queues that are not known by the end of the recording are reported in its last frame, so that
+this frame is not causal. A queue's `end` and `members` are those of the whole recording.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from sim.truth.crossing_events import SAME_BEFORE, crossings
+from sim.truth.group_hulls import box_groups, groups_over_time
+from sim.truth.merge_split_rules import frames_of
+from sim.truth.queue_detection import ADVANCE_TIME, QUEUE_TIME, queues
+from sim.types import EVENT_KINDS, Bools, GroupEvent, Groups, Tracks
+from tracking.grouping.group_labels import label_people
+from tracking.grouping.link_rule import LinkRule, find_links
+from tracking.grouping.merge_split_events import events_of_labels
+from tracking.grouping.tracks_table import TracksTable, boxes_of_rows, tabulate
+
+MEMBERSHIP_KINDS = frozenset(EVENT_KINDS) - {"cross", "queue"}
+"""Kinds of events in which the membership of groups changes."""
+
+
+def with_groups(
+    tracks: Sequence[Tracks], fps: float, px_per_m: float, rule: LinkRule | None = None
+) -> tuple[Tracks, ...]:
+    """Return the tracks with groups and events filled in by `derive`.
+
+    They are returned unchanged if all are marked as derived, or if they are in the image and px_per_m is not finite.
+    """
+    if all(t.derived for t in tracks) or (tracks[0].plane == "image" and not math.isfinite(px_per_m)):
+        return tuple(tracks)
+    return tuple(derive(tracks, fps, px_per_m, rule))
+
+
+def names_groups(tracks: Sequence[Tracks]) -> bool:
+    """Return True if the tracker reports groups itself: unit "group", a `group` above -1, or any `groups`."""
+    return any(t.unit == "group" or t.groups is not None or bool((t.group >= 0).any()) for t in tracks)
+
+
+def derive(tracks: Iterable[Tracks], fps: float, px_per_m: float = 1.0, rule: LinkRule | None = None) -> list[Tracks]:
+    """Return the tracks with `group`, `groups` and `events` filled in where the tracker left them empty.
+
+    The tracks are those of a whole sequence in order; the result is marked as derived. px_per_m is needed if they are
+    in the image. rule: None stands for the default rule.
+    - A tracker that names groups, in `group` or in the members of its `groups`, keeps them. Else the rule forms groups.
+    - Membership events (all kinds but cross and queue) are derived unless the tracker reported any of them.
+    - Crossings are derived unless it reported a crossing, queues unless it reported a queue.
+    No tracks, and tracks with unit "group", are returned as they are.
+    Raises InputError if the tracks are in the image and px_per_m is not a number above 0.
+    """
+    given = list(tracks)
+    if not given or any(t.unit == "group" for t in given):
+        return given
+    rule = rule or LinkRule()
+    table = tabulate(given, fps, px_per_m, rule)
+    named = names_groups(given)
+    reported = {e.kind for t in given for e in t.events}
+    events: list[GroupEvent] = []
+    if not named or not reported & MEMBERSHIP_KINDS:
+        table, events = _grouped(table, named, fps, rule)
+    events = [e for e in events if not reported & MEMBERSHIP_KINDS]
+    return _filled(given, table, events + [e for e in _crossings_and_queues(table, fps) if e.kind not in reported])
+
+
+def _grouped(table: TracksTable, named: bool, fps: float, rule: LinkRule) -> tuple[TracksTable, list[GroupEvent]]:
+    """The table with groups, and the membership events; named: the tracker reports groups itself.
+
+    Groups of the tracker are kept. If they equal those of the rule, the rule's events are used, as their onsets are
+    exact. Else the events follow from the changes of the tracker's labels.
+    """
+    if named and (table.group < 0).all():
+        return table, []
+    links = find_links(table.frame, table.column, table.pos, table.vel, table.length, fps, rule)
+    group, events = label_people(table.frame, table.column, table.positions(), links, fps, rule)
+    if named and not np.array_equal(group, table.group):
+        return table, events_of_labels(table.labels(), table.positions())
+    return replace(table, group=group), events
+
+
+def _crossings_and_queues(table: TracksTable, fps: float) -> list[GroupEvent]:
+    """Crossings and queues of the whole recording, `emitted` in the frame in which each is known."""
+    pos, vel, label = table.positions(), table.velocities(), table.labels()
+    present: Bools = np.isfinite(pos[..., 0])
+    crossed = crossings(pos, vel, present, label, fps)
+    queued = queues(pos, vel, present, label, fps)
+    after_cross, after_queue = frames_of(SAME_BEFORE, fps), frames_of(QUEUE_TIME, fps) + frames_of(ADVANCE_TIME, fps)
+    return [replace(e, emitted=min(e.end + after_cross, table.length)) for e in crossed] + [
+        replace(e, emitted=min(e.start + after_queue - 1, table.length)) for e in queued
+    ]
+
+
+def _filled(given: Sequence[Tracks], table: TracksTable, events: Sequence[GroupEvent]) -> list[Tracks]:
+    """The tracks with the table's groups, hulls where the tracker gave none, and these events added to its own.
+
+    The events' members are columns + 1 and their positions metres; both become the tracks' own ids and unit.
+    """
+    groups = _groups_of_frames(given, table)
+    cuts = np.searchsorted(table.frame, np.arange(table.length + 1))
+    by_frame: dict[int, list[GroupEvent]] = {}
+    for event in events:
+        by_frame.setdefault(event.emitted or event.start, []).append(_with_track_ids(event, table))
+    out = []
+    for t in given:
+        r = slice(int(cuts[t.index - 1]), int(cuts[t.index]))
+        label = table.group[r][np.searchsorted(table.id[r], t.id)]
+        new = tuple(sorted(by_frame.pop(t.index, ()), key=lambda e: (e.start, e.end, e.kind, e.members, e.after)))
+        own = groups[t.index - 1] if t.groups is None else t.groups
+        out.append(t.replace(group=label, groups=own, events=(*t.events, *new), derived=True))
+    return out
+
+
+def _with_track_ids(event: GroupEvent, table: TracksTable) -> GroupEvent:
+    """The event with the tracks' ids as members, and its position in the tracks' unit."""
+    x, y = (v * table.scale for v in event.pos)
+    return replace(event, members=tuple(int(table.ids[p - 1]) for p in event.members), pos=(x, y))
+
+
+def _groups_of_frames(given: Sequence[Tracks], table: TracksTable) -> list[Groups]:
+    """The Groups of every frame, in the tracks' unit: hulls of footprints, or of boxes (see `boxes_of_rows`)."""
+    pos, vel, box = table.pos * table.scale, table.vel * table.scale, boxes_of_rows(given)
+    if box is not None:
+        return box_groups(table.frame, table.id, table.group, pos, vel, box, 0, table.length)
+    return groups_over_time(table.frame, table.id, table.group, pos, vel, 0, table.length, table.scale)

@@ -1,0 +1,66 @@
+"""Pixels per metre of an image: where the scale comes from, and the check that a tracker in the image has one.
+
+Lengths in configs are metres. A tracker that works in the image plane multiplies them by this scale once, in `reset`.
+Rules (docs/formats.md): the camera's scale at the image centre, else the scale that the recording states, else the
+median height of the given boxes divided by 1.7 m.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from collections.abc import Sequence as SequenceOf
+
+import numpy as np
+
+from scenarios.errors import InputError
+from sim.scene.camera import PERSON
+from sim.types import DetectionMode, Detections, Frame, Sequence, Tracks
+
+
+def required(px_per_m: float) -> float:
+    """Return px_per_m unchanged. Raises InputError if it is nan, zero or negative."""
+    if px_per_m > 0:
+        return px_per_m
+    raise InputError(
+        place="context.px_per_m",
+        got=f"{px_per_m:g}",
+        expected="px per m at people, above 0, to track in the image",
+        remedy="give --px-per-m, for instance the median height of boxes / 1.7 m, or a camera",
+    )
+
+
+def from_boxes(frames: Iterable[Detections | Tracks | None]) -> float:
+    """Return the median height of all boxes divided by 1.7 m, in px per m; nan if there is no box.
+
+    frames: detections or tracks of each frame. None, and frames without boxes, are skipped.
+    """
+    heights = [d.box[:, 3] for d in frames if d is not None and d.box is not None and len(d.box)]
+    return float(np.nanmedian(np.concatenate(heights))) / PERSON if heights else float("nan")
+
+
+def from_tracks(given: float, learned: object, tracks: SequenceOf[Tracks]) -> float:
+    """Return the scale for deriving groups from tracks, in px per m; nan if it is unknown.
+
+    The first known value counts: `given` (the context's scale, nan if unknown), `learned` (the tracker's own attribute
+    `px_per_m`, None if it has none), then the scale from the boxes of the tracks.
+    """
+    if np.isfinite(given):
+        return given
+    if isinstance(learned, int | float) and np.isfinite(learned):
+        return float(learned)
+    return from_boxes(tracks)
+
+
+def of_sequence(sequence: Sequence, mode: DetectionMode, frames: tuple[Frame, ...] | None) -> float:
+    """Return the scale that a tracker is given with a sequence, in px per m; nan if it is unknown.
+
+    It is the camera's scale at the image centre, else the sequence's own. If the sequence has none and `mode` is not
+    "image", it follows from the boxes of `frames`, or of the sequence's stored detections if `frames` is None.
+    """
+    if sequence.camera is not None:
+        from sim.scene.camera import px_per_m_at_centre
+
+        return float(px_per_m_at_centre(sequence.camera))
+    if np.isfinite(sequence.px_per_m) or mode == "image":
+        return sequence.px_per_m
+    return from_boxes(f.detections for f in (sequence.without_pictures() if frames is None else frames))

@@ -1,0 +1,185 @@
+"""Before the first frame: a tracker instance with its config, its detections and its context, ready for one sequence.
+
+`prepare(tracker, sequence)` returns a `PreparedTracker`, whose `reset` and `step` check what goes in and what comes
+out. `tracking.run.track` is the loop over it. The environment drives a `PreparedTracker` itself.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from collections.abc import Sequence as SequenceOf
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import Any, cast
+
+from scenarios.errors import FlockscopeError, InputError, WorkError
+from sim.types import Context, DetectionMode, Frame, Sequence, Tracker, Tracks
+from tracking import image_scale, tracker_registry
+from tracking.config import Config
+from tracking.detection_mode import check_detections, choose_mode, frames_with_detections
+from tracking.tracks_check import ReportHistory, check_tracks
+
+Params = Config | Mapping[str, Any] | str | Path | None
+"""A config, parameter values by name, the path of a TOML file, or None for the defaults."""
+
+
+@dataclass(frozen=True, eq=False)
+class PreparedTracker:
+    """A tracker instance and everything that it is given for one sequence. Call `reset` before the first `step`.
+
+    name: as the user gave it. config: None if the tracker has no parameters. mode: of the detections. frames_given:
+    frames with detections and without pictures; None if the sequence's own frames are used (mode "image").
+    history: what the tracker has reported since `reset`.
+    """
+
+    name: str
+    tracker: Tracker
+    config: Config | None
+    context: Context
+    mode: DetectionMode
+    sequence: Sequence
+    frames_given: tuple[Frame, ...] | None
+    history: ReportHistory = field(default_factory=ReportHistory)
+
+    def frames(self) -> Iterator[Frame]:
+        """Return an iterator over the frames as the tracker gets them. It may be called more than once.
+
+        In mode "image" the detections that are stored with the sequence are removed.
+        """
+        if self.frames_given is not None:
+            return iter(self.frames_given)
+        return (replace(f, detections=None) for f in self.sequence)
+
+    def px_per_m(self, tracks: SequenceOf[Tracks]) -> float:
+        """Return the scale for deriving groups from these tracks (tracking.image_scale.from_tracks); nan if unknown."""
+        return image_scale.from_tracks(self.context.px_per_m, getattr(self.tracker, "px_per_m", None), tracks)
+
+    def reset(self, seed: int) -> None:
+        """Reset the tracker for this sequence.
+
+        A FlockscopeError of the tracker passes through, with the recording as its file if it names none.
+        Raises WorkError for any other exception of the tracker.
+        """
+        self.history.clear()
+        try:
+            self.tracker.reset(self.context, seed)
+        except FlockscopeError as error:
+            raise _with_file(error, self.sequence) from error.__cause__
+        except Exception as error:
+            raise _tracker_failed(self.name, "reset", self.sequence.name, error) from error
+
+    def step(self, frame: Frame) -> Tracks:
+        """Return the tracker's checked tracks of the next frame; frames come in order, from `frames`.
+
+        Raises InputError if the frame's detections cannot be given to the tracker, and WorkError if the tracker raises
+        an exception or returns tracks that tracking.tracks_check refuses. A FlockscopeError of the tracker passes
+        through as in `reset`.
+        """
+        detections = frame.detections
+        if detections is not None:
+            check_detections(detections, self.tracker.needs)
+        try:
+            tracks = self.tracker.step(frame, detections)
+        except FlockscopeError as error:
+            raise _with_file(error, self.sequence) from error.__cause__
+        except Exception as error:
+            raise _tracker_failed(self.name, "step", f"{self.sequence.name}, frame {frame.index}", error) from error
+        return check_tracks(tracks, frame.index, self.name, self.history)
+
+
+def _with_file(error: FlockscopeError, sequence: Sequence) -> FlockscopeError:
+    """The same error; if it names no file, with the path (else the name) of the recording as its file."""
+    path = sequence.source.get("path", sequence.name)
+    return error if error.file else type(error)(**{**error.as_dict(), "file": path})
+
+
+def _tracker_failed(tracker: str, method: str, place: str, error: Exception) -> WorkError:
+    """The error for an exception raised by a tracker's own code, with the first line of its message."""
+    got = f"{type(error).__name__}: {error}".partition("\n")[0]
+    remedy = f"correct the tracker's {method}(); FLOCKSCOPE_DEBUG=1 shows where"
+    return WorkError(file=tracker, place=place, got=got, expected="no exception", remedy=remedy)
+
+
+def prepare(
+    tracker: str | type[Tracker] | Tracker,
+    sequence: Sequence,
+    *,
+    params: Params = None,
+    detections: DetectionMode | None = None,
+    sensor: Mapping[str, Any] | None = None,
+    seed: int = 0,
+) -> PreparedTracker:
+    """Return the tracker ready to be reset for the sequence; the arguments are those of `tracking.run.track`.
+
+    seed: of the sensor's random numbers in mode "truth".
+    Raises InputError if `sequence` is no Sequence, if the tracker or its parameters are wrong, if tracker and sequence
+    do not fit, or if `sensor` is given with a mode other than "truth".
+    """
+    if not isinstance(sequence, Sequence):
+        remedy = "open it: sim.io.source.open_source(path), or sim.simulate(scenario, seed)"
+        raise InputError(place="sequence", got=type(sequence).__name__, expected="a Sequence", remedy=remedy)
+    name, instance, config = _make(tracker, params)
+    mode = choose_mode(instance.needs, sequence, detections)
+    if sensor and mode != "truth":
+        remedy = "add --detections truth, or leave out the sensor settings"
+        raise InputError(
+            place="--sensor, --set sensor", got=f"--detections {mode}", expected="--detections truth", remedy=remedy
+        )
+    frames = frames_with_detections(instance.needs, mode, sequence, sensor or {}, seed)
+    context = Context(
+        fps=sequence.fps,
+        px_per_m=image_scale.of_sequence(sequence, mode, frames),
+        camera=sequence.camera,
+        scene=sequence.scene,
+        image_size=sequence.image_size,
+        background=sequence.background() if mode == "image" else None,
+    )
+    return PreparedTracker(name, instance, config, context, mode, sequence, frames)
+
+
+def _make(tracker: str | type[Tracker] | Tracker, params: Params) -> tuple[str, Tracker, Config | None]:
+    """The tracker's name, an instance and its config (None without parameters).
+
+    A class gets its config from its `config_class`; an instance keeps its own and takes no `params`.
+    """
+    if not isinstance(tracker, str | type):
+        if params is not None:
+            got = f"an instance of {type(tracker).__name__}"
+            raise InputError(place="params", got=got, expected="a class or a name", remedy="configure the instance")
+        return type(tracker).__name__, tracker, getattr(tracker, "config", None)
+    name = tracker if isinstance(tracker, str) else tracker.__name__
+    found = tracker_registry.find(tracker) if isinstance(tracker, str) else tracker_registry.checked(tracker, name)
+    kind: type[Config] | None = getattr(found, "config_class", None)
+    if kind is None:
+        if params is not None:
+            remedy = "leave the parameters out, or give the class a config_class (docs/trackers.md)"
+            raise InputError(place="params", got=name, expected="a tracker with parameters", remedy=remedy)
+        return name, _instance(name, found), None
+    config = config_of(kind, params)
+    return name, _instance(name, found, config), config
+
+
+def _instance(name: str, tracker_class: Any, *arguments: Any) -> Tracker:
+    try:
+        return cast(Tracker, tracker_class(*arguments))
+    except FlockscopeError:
+        raise
+    except Exception as error:
+        raise _tracker_failed(name, "__init__", "before the first frame", error) from error
+
+
+def config_of(kind: type[Config], params: Params) -> Config:
+    """Return `params` as a config of the class `kind`; the default config if `params` is None.
+
+    Raises InputError for unknown names, values out of range, an unreadable file, or a config of another tracker.
+    """
+    if params is None:
+        return kind()
+    if isinstance(params, str | Path):
+        return kind.from_toml(params)
+    if isinstance(params, Mapping):
+        return kind.from_dict(params)
+    if not isinstance(params, kind):
+        remedy = "give the config of this very tracker"
+        raise InputError(place="params", got=type(params).__name__, expected=kind.__name__, remedy=remedy)
+    return params

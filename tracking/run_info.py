@@ -1,0 +1,102 @@
+"""The content of run.json: which tracker ran, with which config and seed, on which detections, how fast."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from collections.abc import Sequence as SequenceOf
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from sim.types import Sequence, Tracks
+from tracking.prepare import PreparedTracker
+
+SENSOR_SETTINGS_SHOWN = 6
+"""`input_summary` shows at most so many sensor settings; run.json holds all of them."""
+
+
+@dataclass(frozen=True)
+class Speed:
+    """Speed in frames per second. tracker: of the tracker's steps alone; whole: with reading and decoding frames."""
+
+    tracker: float = 0.0
+    whole: float = 0.0
+
+
+def run_info(
+    prepared: PreparedTracker,
+    tracks: SequenceOf[Tracks],
+    seed: int,
+    sensor: Mapping[str, Any],
+    px_per_m: float,
+    speed: Speed,
+) -> dict[str, Any]:
+    """Return the content of run.json as a dictionary. Two equal runs differ only in their speeds.
+
+    tracks: of the whole run. sensor: settings of mode "truth", empty if none. px_per_m: the scale by which groups were
+    derived; nan is stored as None.
+    """
+    from sim.io.store.box_source import box_source
+
+    sample = prepared.context.background
+    begins = 1 if sample is None else causal_from(prepared.sequence)
+    return {
+        "tracker": prepared.name,
+        "config": prepared.config.as_dict() if prepared.config else {},
+        "seed": seed,
+        "sequence": prepared.sequence.name,
+        "detections": prepared.mode,
+        "sensor": dict(sensor),
+        "plane": tracks[0].plane if len(tracks) else None,
+        "boxes": box_source(tracks, prepared.context.camera),
+        "fps": prepared.context.fps,
+        "px_per_m": None if np.isnan(px_per_m) else px_per_m,
+        "background": None if sample is None else prepared.sequence.source.get("background", f"{len(sample)} frames"),
+        "causal": begins is not None,
+        "causal_from": begins,
+        "frames": len(tracks),
+        "frames_per_second": speed.tracker,
+        "whole_frames_per_second": speed.whole,
+        "versions": _versions(),
+    }
+
+
+def causal_from(sequence: Sequence) -> int | None:
+    """Return the first frame (from 1) whose background sample holds no later frame; None if there is no such frame.
+
+    The result is 1 if the sample holds no frame of the recording itself, N for a sample of the first N frames, and None
+    for a sample spread over the recording.
+    """
+    from sim.io.store.background_sample import Sample
+
+    sample = sequence.load_background
+    if not isinstance(sample, Sample):
+        return 1
+    return sample.choice.count if sample.choice.how == "first" else None
+
+
+def input_summary(info: Mapping[str, Any]) -> str:
+    """Return one line on what a tracker was given, from the content of its run.json.
+
+    The line is the detection mode, then in brackets the background sample and the first sensor settings. It is empty
+    if `info` names no detection mode, background or sensor.
+    """
+    mode, background, sensor = (info.get(key) for key in ("detections", "background", "sensor"))
+    more = [f"background: {background}"] if background else []
+    more += [f"{key} = {value}" for key, value in list((sensor or {}).items())[:SENSOR_SETTINGS_SHOWN]]
+    more += [f"{len(sensor) - SENSOR_SETTINGS_SHOWN} more"] if sensor and len(sensor) > SENSOR_SETTINGS_SHOWN else []
+    return f"{mode} ({', '.join(more)})" if more else str(mode or "")
+
+
+def _versions() -> dict[str, str]:
+    """The versions of flockscope, numpy and scipy; a package that is not installed is left out."""
+    from importlib.metadata import PackageNotFoundError, version
+
+    found = {}
+    for name in ("flockscope", "numpy", "scipy"):
+        try:
+            found[name] = version(name)
+        except PackageNotFoundError:
+            continue
+    return found
