@@ -11,7 +11,7 @@ from typing import Annotated, Literal
 import typer
 
 from scenarios.errors import InputError
-from tracking.app.output import INTERRUPTED, Answer
+from tracking.app.command_result import INTERRUPTED, CommandResult
 from tracking.app.recording_options import fit_sensor, replay
 from tracking.app.shared_options import (
     Calibration,
@@ -67,7 +67,7 @@ def demo(
     quick: Annotated[bool, typer.Option("--quick", help="One short scene only.")] = False,
     out: Out = Path("flockscope-demo"),
     json: Json = False,
-) -> Answer:
+) -> CommandResult:
     """From scenes to a page with scores, start to finish."""
     from tracking.app.commands.demo import demo
 
@@ -81,7 +81,7 @@ def scenarios(
     out: Annotated[Path | None, typer.Option("--out", metavar="FILE.svg", help="Draw the plan and script.")] = None,
     schema: Annotated[bool, typer.Option("--schema", help="List every key of a scenario file.")] = False,
     json: Json = False,
-) -> Answer:
+) -> CommandResult:
     """List them, or explain one with a drawing."""
     from tracking.app.commands import scenario_keys, scenarios
 
@@ -107,12 +107,12 @@ def generate(
     workers: Workers = 1,
     cluster: Cluster = None,
     json: Json = False,
-) -> Answer:
+) -> CommandResult:
     """Simulate scenarios and store them as a dataset."""
-    from tracking.app import option_values
+    from tracking.app import option_parsing
     from tracking.app.commands.datasets import generate
 
-    texts = [*option_values.sensor(sensor), *settings]
+    texts = [*option_parsing.sensor(sensor), *settings]
     return generate(names, seeds, out, texts, streams, images, workers=workers, cluster=cluster)
 
 
@@ -135,7 +135,7 @@ def track(
         typer.Option("--background", metavar="first:N|spread:N", help="Frames a video's background is learned from."),
     ] = None,
     json: Json = False,
-) -> Answer:
+) -> CommandResult:
     """Run a tracker and store what it says."""
     from tracking.app.commands import track
 
@@ -162,7 +162,7 @@ def score(
     fps: Fps = None,
     px_per_m: Scale = None,
     json: Json = False,
-) -> Answer:
+) -> CommandResult:
     """Score tracks against truth."""
     from tracking.app.commands.score import score
 
@@ -197,7 +197,7 @@ def view(
     px_per_m: Scale = None,
     camera: Calibration = None,
     json: Json = False,
-) -> Answer:
+) -> CommandResult:
     """A replay in the browser, tracks beside truth, over the pictures where there are any."""
     from tracking.app.commands.view import Recording, view
 
@@ -211,7 +211,7 @@ def sheet(
     frames: Annotated[int, typer.Option("--frames", min=1, max=64, help="Panels.")] = 8,
     fps: Fps = None,
     json: Json = False,
-) -> Answer:
+) -> CommandResult:
     """A contact sheet of a sequence: its pictures, its truth."""
     from tracking.app.commands.view import Recording, sheet
 
@@ -232,7 +232,7 @@ def overlay(
     px_per_m: Scale = None,
     camera: Calibration = None,
     json: Json = False,
-) -> Answer:
+) -> CommandResult:
     """A video with boxes, ids, trails, groups and events drawn over the pictures."""
     from tracking.app.commands.view import Recording, overlay
 
@@ -242,7 +242,7 @@ def overlay(
 @app.command()
 def validate(
     folder: Annotated[Path, typer.Argument(metavar="DIR", help="A generated sequence or dataset.")], json: Json = False
-) -> Answer:
+) -> CommandResult:
     """Check that a dataset is whole, unaltered and consistent."""
     from tracking.app.commands.datasets import validate
 
@@ -254,7 +254,7 @@ def coco(
     folder: Annotated[Path, typer.Argument(metavar="DIR", help="A sequence or dataset with labelled boxes.")],
     out: Annotated[Path, typer.Option("--out", metavar="FILE.json", help="File to write.")],
     json: Json = False,
-) -> Answer:
+) -> CommandResult:
     """One COCO file with track and group ids."""
     from tracking.app.commands.datasets import export_coco
 
@@ -272,7 +272,7 @@ def webdataset(
         Literal["sequence", "frame"], typer.Option(help="A sample: a sequence with all its files, or a labelled frame.")
     ] = "sequence",
     json: Json = False,
-) -> Answer:
+) -> CommandResult:
     """Tar shards to stream from, as the library webdataset reads them."""
     from tracking.app.commands.datasets import export_webdataset
 
@@ -281,7 +281,7 @@ def webdataset(
 
 def run(arguments: Sequence[str]) -> int:
     """Run the command; everything it says is printed; its exit code."""
-    from tracking.app.exit_codes import carry_out
+    from tracking.app.command_runner import carry_out
 
     return carry_out(app, list(arguments) or ["--help"])
 

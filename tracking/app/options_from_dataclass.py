@@ -7,7 +7,7 @@
 
     @app.command()
     @options_from(FitOptions)
-    def fit(options: FitOptions) -> Answer:
+    def fit(options: FitOptions) -> CommandResult:
         \"""Help text of the command.\"""
 
 Typer reads a command's options from the signature of its function. The decorator gives the function the signature that
@@ -21,24 +21,24 @@ import inspect
 from collections.abc import Callable
 from typing import Any, TypeVar, get_type_hints
 
-from tracking.app.output import Answer
+from tracking.app.command_result import CommandResult
 from tracking.app.shared_options import Json
 
 T = TypeVar("T")
 
 
-def options_from(options: type[T]) -> Callable[[Callable[[T], Answer]], Callable[..., Answer]]:
+def options_from(options: type[T]) -> Callable[[Callable[[T], CommandResult]], Callable[..., CommandResult]]:
     """Returns a decorator for a command function that takes one instance of the dataclass `options`.
 
     The decorated function takes one keyword argument per field, in the order of the fields, and builds the instance.
     A field without a default is a required option, or a required argument if it is annotated with `typer.Argument`.
     A field may have a `default_factory`; Typer gets a fresh value of it. Every command also takes `--json`, which
-    needs no field: `tracking.app.exit_codes` reads it from the command line.
+    needs no field: `tracking.app.command_runner` reads it from the command line.
     """
     parameters = _parameters(options)
 
-    def decorate(command: Callable[[T], Answer]) -> Callable[..., Answer]:
-        def with_keywords(**values: Any) -> Answer:
+    def decorate(command: Callable[[T], CommandResult]) -> Callable[..., CommandResult]:
+        def with_keywords(**values: Any) -> CommandResult:
             del values["json"]
             return command(options(**values))
 

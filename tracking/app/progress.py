@@ -18,7 +18,7 @@ PAUSE = 10.0
 """s between lines where stderr is no terminal."""
 
 
-class Meter:
+class ProgressMeter:
     """Counts what is done. State: how much of how much, and the bar, once it is shown."""
 
     def __init__(self, what: str, total: int | None = None) -> None:

@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from tracking.app.output import Answer
+from tracking.app.command_result import CommandResult
 from tracking.app.shared_options import Detector, Fps, Images, Json, Out, Set, Source, Streams
 
 
@@ -16,7 +16,7 @@ def fit_sensor(
     out: Annotated[Path, typer.Option("--out", metavar="FILE.toml", help="File to write: a [sensor] table.")],
     fps: Fps = None,
     json: Json = False,
-) -> Answer:
+) -> CommandResult:
     """How a detector errs, for synthetic detections that err alike."""
     from tracking.app.commands.fit import sensor
 
@@ -45,11 +45,11 @@ def replay(
         typer.Option("--calibration", metavar="FILE", help="Of a recording with boxes only: ours or Tsai's."),
     ] = None,
     json: Json = False,
-) -> Answer:
+) -> CommandResult:
     """Real trajectories before our cameras: real motion, perfect labels."""
-    from tracking.app import option_values
+    from tracking.app import option_parsing
     from tracking.app.commands import replay
 
     part = replay.Part(source, start, duration, fps, calibration)
-    texts = [*option_values.sensor(sensor), *settings]
+    texts = [*option_parsing.sensor(sensor), *settings]
     return replay.replay(part, camera, seeds, out, texts, streams, images)

@@ -7,7 +7,7 @@ from typing import Annotated, Literal
 
 import typer
 
-from tracking.app.output import Answer
+from tracking.app.command_result import CommandResult
 from tracking.app.shared_options import Cluster, Detector, Json, Set, Workers
 
 
@@ -43,7 +43,7 @@ def tune(
     finalists: Annotated[int, typer.Option("--finalists", metavar="N", help="How many are validated.")] = 5,
     seed: Annotated[int, typer.Option("--seed", help="The search's seed.")] = 0,
     json: Json = False,
-) -> Answer:
+) -> CommandResult:
     """Search a tracker's parameters on simulated scenes; judge them on others."""
     from tracking.app.commands import tune
 

@@ -1,1 +1,1 @@
-"""Drawing what is tracked and what is true, on plain ground or over pictures."""
+"""Draws tracks and truth, on a plan of the ground or over a picture."""

@@ -5,8 +5,10 @@ from __future__ import annotations
 import numpy as np
 
 from sim.types import Array, Detections, Frame, Image, Tracks
-from tracking.drawing import marks, painter
-from tracking.drawing.panel import FLOOR, THING, View, ground
+from tracking.drawing.canvas import FLOOR, THING, TRAIL_SECONDS, Canvas
+from tracking.drawing.layer_painting import draw_banner, draw_captions, letter_size, paint_layer
+from tracking.drawing.layers import Layer, layer_of_tracks, plan_layer_of_tracks
+from tracking.drawing.plan_view import draw_scene
 from tracking.environment.episode_cache import Held
 from tracking.environment.episodes import Rollout
 
@@ -25,13 +27,13 @@ def picture(held: Held, rollout: Rollout | None, score: float) -> Image:
         if frame.detections is not None and not _on_picture(frame):
             _dots(view, frame.detections, answers[-1].plane)
         side = _side(held, answers, view)
-        painter.paint(view, side, frame.index, held.sequence.fps)
-        painter.captions(view.canvas, side, frame.index, held.sequence.fps, painter.letter(view))
-    strip = np.zeros((STRIP, view.canvas.shape[1], 3), np.uint8)
+        paint_layer(view, side, frame.index, held.sequence.fps)
+        draw_captions(view.image, side, frame.index, held.sequence.fps, letter_size(view))
+    strip = np.zeros((STRIP, view.image.shape[1], 3), np.uint8)
     source, done = held.source, len(answers)
     words = f"{source.name} {source.seed}   frame {done} of {held.truth.length}   objective {score:.3f}"
-    painter.banner(strip, words, [], LETTER)
-    whole = np.concatenate([strip, view.canvas])
+    draw_banner(strip, words, [], LETTER)
+    whole = np.concatenate([strip, view.image])
     tall, wide = (n - n % 2 for n in whole.shape[:2])
     return np.ascontiguousarray(whole[:tall, :wide, ::-1])
 
@@ -40,22 +42,22 @@ def _on_picture(frame: Frame | None) -> bool:
     return frame is not None and frame.image is not None
 
 
-def _view(held: Held, frame: Frame | None, answers: list[Tracks]) -> View:
+def _view(held: Held, frame: Frame | None, answers: list[Tracks]) -> Canvas:
     """A canvas with what stands still, and how the world is mapped to it."""
     sequence = held.sequence
     if sequence.has_images and sequence.image_size is not None:
         shown = None if frame is None else frame.image
         empty = np.full((*sequence.image_size[::-1], 3), THING, np.uint8)
         canvas = empty if shown is None else np.array(shown, np.uint8)
-        return View(canvas, 1.0, np.zeros(2), np.array(sequence.image_size, float), upwards=False)
+        return Canvas(canvas, 1.0, np.zeros(2), np.array(sequence.image_size, float), upwards=False)
     canvas = np.full((*SIZE, 3), FLOOR, np.uint8)
     if _flat(held, answers):
         low, high = _bounds(held)
-        view = View.fit(canvas, low, high, upwards=True)
-        ground(view, sequence.scene)
+        view = Canvas.fit(canvas, low, high, upwards=True)
+        draw_scene(view, sequence.scene)
         return view
     size = np.array(sequence.image_size, float) if sequence.image_size is not None else _bounds(held)[1]
-    return View.fit(canvas, np.zeros(2), size, upwards=False)
+    return Canvas.fit(canvas, np.zeros(2), size, upwards=False)
 
 
 def _flat(held: Held, answers: list[Tracks]) -> bool:
@@ -78,16 +80,16 @@ def _bounds(held: Held) -> tuple[Array, Array]:
     return found.min(axis=0) - 1, found.max(axis=0) + 1
 
 
-def _dots(view: View, detections: Detections, plane: str) -> None:
+def _dots(view: Canvas, detections: Detections, plane: str) -> None:
     """Small grey discs where something was detected."""
     if detections.plane == plane or detections.plane != "image" != plane:
         for at in detections.pos[:, :2]:
             view.disc(at, 2.5, THING)
 
 
-def _side(held: Held, answers: list[Tracks], view: View) -> marks.Side:
+def _side(held: Held, answers: list[Tracks], view: Canvas) -> Layer:
     """The answers of the last seconds as marks in the view's unit."""
-    recent = answers[-round(painter.TRAIL * held.sequence.fps) - 1 :]
+    recent = answers[-round(TRAIL_SECONDS * held.sequence.fps) - 1 :]
     if view.upwards:
-        return marks.on_plan(recent)
-    return marks.of_tracks(recent, held.sequence.camera, held.sequence.scene)
+        return plan_layer_of_tracks(recent)
+    return layer_of_tracks(recent, held.sequence.camera, held.sequence.scene)

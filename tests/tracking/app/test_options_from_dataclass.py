@@ -9,9 +9,9 @@ from typing import Annotated
 import pytest
 import typer
 
-from tracking.app.exit_codes import carry_out
+from tracking.app.command_result import CommandResult
+from tracking.app.command_runner import carry_out
 from tracking.app.options_from_dataclass import options_from
-from tracking.app.output import Answer
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -33,14 +33,14 @@ def app() -> typer.Typer:
 
     @made.command()
     @options_from(FruitOptions)
-    def fruit(options: FruitOptions) -> Answer:
+    def fruit(options: FruitOptions) -> CommandResult:
         """Sell fruit."""
-        return Answer({}, repr(options))
+        return CommandResult({}, repr(options))
 
     @made.command()
-    def other() -> Answer:
+    def other() -> CommandResult:
         """Makes the first command one of two."""
-        return Answer({})
+        return CommandResult({})
 
     return made
 

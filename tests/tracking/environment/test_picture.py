@@ -9,7 +9,7 @@ import pytest
 
 from scenarios.loading.resolve import load
 from sim.sequence import simulate
-from tracking.drawing.panel import FLOOR, colour
+from tracking.drawing.canvas import FLOOR, colour
 from tracking.environment.env import TuningEnv
 
 SHORT = ["camera.fps=5", "duration=4"]

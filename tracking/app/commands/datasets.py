@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Iterable
 from pathlib import Path
 
-from tracking.app import option_values
-from tracking.app.output import Answer
-from tracking.app.progress import Meter
+from tracking.app import option_parsing
+from tracking.app.command_result import CommandResult
+from tracking.app.progress import ProgressMeter
 
 
 def generate(
@@ -20,23 +20,23 @@ def generate(
     *,
     workers: int,
     cluster: str | None,
-) -> Answer:
+) -> CommandResult:
     """Every named scenario or suite with every seed, as a dataset."""
     from sim.dataset.generate import generate as make
 
-    option_values.folder(out)
-    chosen, texts = option_values.seeds(seeds), option_values.scenario_settings(settings)
-    wanted, kind = option_values.pictures(streams, images)
-    with Meter("generate") as meter:
+    option_parsing.folder(out)
+    chosen, texts = option_parsing.seeds(seeds), option_parsing.scenario_settings(settings)
+    wanted, kind = option_parsing.pictures(streams, images)
+    with ProgressMeter("generate") as meter:
         folders = make(
             names, chosen, out, set=texts, workers=workers, cluster=cluster, progress=meter.update,
             streams=wanted, images=kind,
         )  # fmt: skip
     text = f"{len(folders)} sequences in {folders[0].parent}"
-    return Answer({"sequences": folders, "folder": folders[0].parent}, text)
+    return CommandResult({"sequences": folders, "folder": folders[0].parent}, text)
 
 
-def validate(folder: Path) -> Answer:
+def validate(folder: Path) -> CommandResult:
     """Whether a sequence or dataset is whole and unaltered; code 1 where it is not."""
     from sim.io.store.validate import content_hash
     from sim.io.store.validate import validate as check
@@ -44,29 +44,31 @@ def validate(folder: Path) -> Answer:
     problems = check(folder)
     if not problems:
         content = content_hash(folder)
-        return Answer({"problems": [], "content_hash": content}, f"{folder}: nothing wrong; content {content[:16]}")
+        return CommandResult(
+            {"problems": [], "content_hash": content}, f"{folder}: nothing wrong; content {content[:16]}"
+        )
     lines = [problem.line() for problem in problems]
     found = [problem.as_dict() for problem in problems]
-    return Answer({"problems": found, "error": found[0]}, "\n".join(lines), code=1)
+    return CommandResult({"problems": found, "error": found[0]}, "\n".join(lines), code=1)
 
 
-def export_coco(source: Path, out: Path) -> Answer:
+def export_coco(source: Path, out: Path) -> CommandResult:
     """A COCO file of every sequence."""
     from sim.io.export.coco import coco
 
     path = coco(source, out)
-    return Answer({"file": path}, str(path))
+    return CommandResult({"file": path}, str(path))
 
 
-def export_webdataset(source: Path, out: Path, shard_size: str, samples: str) -> Answer:
+def export_webdataset(source: Path, out: Path, shard_size: str, samples: str) -> CommandResult:
     """Tar shards of every sequence."""
     from sim.io.export.webdataset import size_of, webdataset
 
-    option_values.folder(out)
-    with Meter("export") as meter:
+    option_parsing.folder(out)
+    with ProgressMeter("export") as meter:
         index = webdataset(source, out, shard_size=size_of(shard_size), samples=samples, progress=meter.update)
     shards = index["shards"]
     count, size = sum(len(s["sequences"]) for s in shards), sum(s["bytes"] for s in shards)
     text = f"{count} sequences in {len(shards)} shards, {size / 1e6:.1f} MB; content {index['content_hash'][:16]}"
     files = [out / s["name"] for s in shards]
-    return Answer({"shards": files, "bytes": size, "content_hash": index["content_hash"]}, text)
+    return CommandResult({"shards": files, "bytes": size, "content_hash": index["content_hash"]}, text)

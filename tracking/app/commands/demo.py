@@ -9,13 +9,13 @@ from pathlib import Path
 
 from sim.types import DetectionMode, Sequence
 from tracking import tracker_registry
-from tracking.app import option_values
+from tracking.app import option_parsing
+from tracking.app.command_result import CommandResult
+from tracking.app.commands.demo_page import Part, Seen, page
 from tracking.app.commands.score import Row, score_run, summary
 from tracking.app.commands.score_tables import SHOWN, number
 from tracking.app.commands.track import Job
-from tracking.app.demo_page import Part, Seen, page
-from tracking.app.output import Answer
-from tracking.app.progress import Meter
+from tracking.app.progress import ProgressMeter
 from tracking.app.replay_page.video import Film
 from tracking.run import TrackingRun
 
@@ -29,22 +29,22 @@ SEEN_QUICKLY = ("camera.fps=5",)
 MODES: tuple[DetectionMode, ...] = ("image", "file")
 
 
-def demo(out: Path, *, quick: bool) -> Answer:
+def demo(out: Path, *, quick: bool) -> CommandResult:
     """Everything into `out`; the answer ends with the path of the page to open."""
     from sim.dataset.generate import generate
     from sim.io.files.atomic import write_file
     from sim.io.source import open_source
 
     start = time.monotonic()
-    option_values.folder(out)
+    option_parsing.folder(out)
     names, seeds = (QUICK, QUICK_SEEDS) if quick else (SCENES, SEEDS)
-    with Meter("generate") as meter:
+    with ProgressMeter("generate") as meter:
         workers = 1 if quick else os.cpu_count() or 1
         folders = generate(names, seeds, out / "data", workers=workers, progress=meter.update, streams=())
         how = SEEN_QUICKLY if quick else ()
         (drawn,) = generate([SEEN], SEEN_SEED, out / "pictures", set=how, streams=("left",), images="mp4")
     sequences = [open_source(folder)[0] for folder in folders]
-    with Meter("track, score, draw", len(sequences) * len(tracker_registry.names())) as meter:
+    with ProgressMeter("track, score, draw", len(sequences) * len(tracker_registry.names())) as meter:
         seen = _seen(open_source(drawn)[0], out)
         parts = [_part(tracker, sequences, out, meter) for tracker in tracker_registry.names()]
     write_file(out / "index.html", page(out, seen, parts).encode())
@@ -53,7 +53,7 @@ def demo(out: Path, *, quick: bool) -> Answer:
     text += [f"one drawn, {drawn}", *(_line(name, [row]) for name, row in alone)]
     text += [f"{time.monotonic() - start:.0f} s; open this page:", str((out / "index.html").resolve())]
     data = {part.title: summary(part.rows) for part in parts}
-    return Answer({"sequences": len(sequences), "scores": data, "page": out / "index.html"}, "\n".join(text))
+    return CommandResult({"sequences": len(sequences), "scores": data, "page": out / "index.html"}, "\n".join(text))
 
 
 def _seen(sequence: Sequence, out: Path) -> Seen:
@@ -84,7 +84,7 @@ def _input(tracker: str, mode: DetectionMode) -> str:
     return "pixels" if mode == "image" else "boxes" if "boxes" in tracker_registry.find(tracker).needs else "points"
 
 
-def _part(tracker: str, sequences: list[Sequence], out: Path, meter: Meter) -> Part:
+def _part(tracker: str, sequences: list[Sequence], out: Path, meter: ProgressMeter) -> Part:
     part = Part(f"{tracker}, from {_input(tracker, 'file')}", [], [], [])
     for sequence in sequences:
         run = Job(tracker).run(sequence)

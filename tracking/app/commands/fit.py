@@ -8,8 +8,8 @@ from pathlib import Path
 import numpy as np
 
 from sim.types import Sequence as Recording
-from tracking.app import option_values
-from tracking.app.output import Answer
+from tracking.app import option_parsing
+from tracking.app.command_result import CommandResult
 
 SEEDS = range(30_000, 30_008)  # of the draws that are laid beside the real errors
 SHOWN = (
@@ -18,7 +18,7 @@ SHOWN = (
 )  # fmt: skip
 
 
-def sensor(sources: Sequence[Path], out: Path, fps: float | None) -> Answer:
+def sensor(sources: Sequence[Path], out: Path, fps: float | None) -> CommandResult:
     """The profile of the detector behind these recordings, pooled, as a file with a [sensor] table."""
     from scenarios.loading.sensor_profiles import dump_sensor
     from sim.io.files.atomic import write_file
@@ -26,7 +26,7 @@ def sensor(sources: Sequence[Path], out: Path, fps: float | None) -> Answer:
     from tracking.fitting.sensor import fit
     from tracking.fitting.statistics import again, statistics
 
-    option_values.named(out, ".toml")
+    option_parsing.named(out, ".toml")
     recordings = _open(sources, fps)
     matched = [match_sequence(recording) for recording in recordings]
     found = fit(matched)
@@ -42,7 +42,7 @@ def sensor(sources: Sequence[Path], out: Path, fps: float | None) -> Answer:
     lines += [f"{name:<{wide}}  {real[name]:8.3f}  {like[name]:8.3f}" for name in SHOWN]
     lines += ["", f"→ {out}: give it as --sensor {out}"]
     data = {"file": out, "sensor": found.model_dump(exclude_none=True), "measured": real, "drawn": like}
-    return Answer(data, "\n".join(lines))
+    return CommandResult(data, "\n".join(lines))
 
 
 def _open(sources: Sequence[Path], fps: float | None) -> list[Recording]:

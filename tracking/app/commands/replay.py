@@ -6,9 +6,9 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from scenarios.errors import InputError
-from tracking.app import option_values
-from tracking.app.output import Answer
-from tracking.app.progress import Meter
+from tracking.app import option_parsing
+from tracking.app.command_result import CommandResult
+from tracking.app.progress import ProgressMeter
 
 
 @dataclass(frozen=True)
@@ -24,21 +24,21 @@ class Part:
 
 def replay(
     part: Part, camera: Path | None, seeds: str, out: Path, settings: list[str], streams: str, images: str | None
-) -> Answer:
+) -> CommandResult:
     """Every recording of the source with every seed; settings: of camera, sensor, light and picture."""
     from scenarios.loading.resolve import load_observation
     from sim.dataset.replay import Cut
     from sim.dataset.replay_dataset import How, store_replays
     from sim.io.source import open_source
 
-    option_values.folder(out)
-    chosen, (wanted, kind) = option_values.seeds(seeds), option_values.pictures(streams, images)
+    option_parsing.folder(out)
+    chosen, (wanted, kind) = option_parsing.seeds(seeds), option_parsing.pictures(streams, images)
     if part.duration is not None and part.duration <= 0:
         raise InputError(place="--duration", got=part.duration, expected="seconds above 0", remedy="correct it")
     view = load_observation(camera, settings)
     sources = open_source(part.source, fps=part.fps, images=False)
     how = How(view, Cut(part.start, part.duration), part.calibration, wanted, kind)
-    with Meter("replay") as meter:
+    with ProgressMeter("replay") as meter:
         folders = store_replays(sources, how, chosen, out, meter.update)
     text = f"{len(folders)} sequences in {folders[0].parent}"
-    return Answer({"sequences": folders, "folder": folders[0].parent}, text)
+    return CommandResult({"sequences": folders, "folder": folders[0].parent}, text)

@@ -7,18 +7,18 @@ from collections.abc import Iterator
 from typing import Any
 
 from scenarios.schema.scenario import Scenario
-from tracking.app.output import Answer
+from tracking.app.command_result import CommandResult
 
 Node = dict[str, Any]
 
 
-def keys() -> Answer:
+def keys() -> CommandResult:
     """Every key with its type, default and meaning; `[]` stands for each of an array."""
     schema = Scenario.model_json_schema(by_alias=True)
     rows = list(_keys(schema, schema["$defs"], ""))
     wide = max(len(row["key"]) for row in rows)
     text = "\n".join(f"{row['key']:<{wide}}  {row['type']}; {row['default']}; {row['meaning']}" for row in rows)
-    return Answer({"keys": rows}, text)
+    return CommandResult({"keys": rows}, text)
 
 
 def _keys(table: Node, known: Node, prefix: str) -> Iterator[dict[str, str]]:

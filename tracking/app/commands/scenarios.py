@@ -10,22 +10,22 @@ from scenarios.errors import InputError
 from scenarios.loading import suites as suite
 from scenarios.loading import toml_files
 from scenarios.loading.resolve import Entry, dump, load, names, resolve, suite_names
-from tracking.app.option_values import named, scenario_settings
-from tracking.app.output import Answer
+from tracking.app.command_result import CommandResult
+from tracking.app.option_parsing import named, scenario_settings
 
 if TYPE_CHECKING:
     from scenarios.schema.scenario import Scenario
 
 
-def catalogue() -> Answer:
+def catalogue() -> CommandResult:
     """Every scenario and suite, each with its line about itself."""
     scenarios = {name: load(name).about for name in names()}
     suites = {name: suite.about(suite.find_suite(name)) for name in suite_names()}
     text = ["Scenarios", *_rows(scenarios), "", "Suites", *_rows(suites)]
-    return Answer({"scenarios": scenarios, "suites": suites}, "\n".join(text))
+    return CommandResult({"scenarios": scenarios, "suites": suites}, "\n".join(text))
 
 
-def explain(name: str, settings: Iterable[str] = (), drawing: Path | None = None) -> Answer:
+def explain(name: str, settings: Iterable[str] = (), drawing: Path | None = None) -> CommandResult:
     """One scenario in words with its plan, or the entries of a suite; `drawing`: where its SVG is written."""
     entries = resolve(name, scenario_settings(settings))
     if not _is_suite(name):
@@ -43,22 +43,22 @@ def _is_suite(name: str) -> bool:
     return name.startswith("suite:") or name not in names()
 
 
-def _one(scenario: Scenario, drawing: Path | None) -> Answer:
+def _one(scenario: Scenario, drawing: Path | None) -> CommandResult:
     from scenarios.drawing import explain
 
     words = explain.text(scenario)
     data = {"name": scenario.name, "about": scenario.about, "text": words, "toml": dump(scenario)}
     if drawing is None:
-        return Answer(data, words)
+        return CommandResult(data, words)
     from sim.io.files.atomic import write_file
 
     write_file(named(drawing, ".svg"), explain.svg(scenario).encode())
-    return Answer({**data, "drawing": drawing}, f"{words}\n{drawing}")
+    return CommandResult({**data, "drawing": drawing}, f"{words}\n{drawing}")
 
 
-def _suite(name: str, entries: list[Entry]) -> Answer:
+def _suite(name: str, entries: list[Entry]) -> CommandResult:
     rows = {entry.name: entry.scenario.about for entry in entries}
-    return Answer({"name": name, "entries": rows}, "\n".join([f"{name}: {len(rows)} entries", *_rows(rows)]))
+    return CommandResult({"name": name, "entries": rows}, "\n".join([f"{name}: {len(rows)} entries", *_rows(rows)]))
 
 
 def _rows(about: dict[str, str]) -> list[str]:

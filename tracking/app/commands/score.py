@@ -12,10 +12,10 @@ import numpy as np
 from scenarios.errors import InputError
 from sim.io.source import open_source
 from sim.types import Array, Ints, Sequence
+from tracking.app.command_result import CommandResult
 from tracking.app.commands.score_tables import Means, differences, said, tables
-from tracking.app.output import Answer
-from tracking.app.progress import Meter
-from tracking.app.tracks_of_sequences import pair, results
+from tracking.app.progress import ProgressMeter
+from tracking.app.stored_tracks import pair, results
 from tracking.run import TrackingRun
 from tracking.run_info import input_summary
 from tracking.scoring import evaluate
@@ -47,7 +47,7 @@ def score(
     group_match: GroupMatch,
     fps: float | None,
     px_per_m: float | None,
-) -> Answer:
+) -> CommandResult:
     """Scores of every sequence of `truth`, matched with `tracks` by name; and how they differ from other tracks'.
 
     blocks: draws for the interval of a single recording, 0 for none.
@@ -87,7 +87,7 @@ def _draw(
 def _recording(sequence: Sequence, draws: int, draw: Callable[[Ints], Array], values: Array) -> Means:
     """One recording's values by key, with intervals by moving blocks for those that do not need time as it was."""
     assert sequence.truth is not None
-    with Meter("draw", draws + 1) as meter:
+    with ProgressMeter("draw", draws + 1) as meter:
 
         def drawn(places: Ints) -> Array:
             meter.step("blocks of frames")
@@ -100,7 +100,7 @@ def _recording(sequence: Sequence, draws: int, draw: Callable[[Ints], Array], va
 def _rows(sequences: list[Sequence], tracks: Path, similarity: Similarity | None, group_match: GroupMatch) -> list[Row]:
     found = pair(sequences, results(tracks))
     rows = []
-    with Meter("score", len(found)) as meter:
+    with ProgressMeter("score", len(found)) as meter:
         for sequence, result in found:
             rows.append(score_run(sequence, result.read(sequence), similarity, group_match))
             meter.step(sequence.name)
@@ -142,7 +142,7 @@ def _givens(rows: list[Row]) -> list[str]:
     return list(dict.fromkeys(row.given for row in rows))
 
 
-def answer(parts: list[tuple[list[Row], Means]], notes: list[str] | None = None) -> Answer:
+def answer(parts: list[tuple[list[Row], Means]], notes: list[str] | None = None) -> CommandResult:
     """Rows that belong together, their means, and notes on them, for people and for --json."""
     from rich.console import Group
 
@@ -155,7 +155,7 @@ def answer(parts: list[tuple[list[Row], Means]], notes: list[str] | None = None)
         "means": [{"given": rows[0].given, "sequences": len(rows), "mean": means} for rows, means in parts],
         "notes": notes,
     }
-    return Answer(data, Group(*texts))
+    return CommandResult(data, Group(*texts))
 
 
 def _row(row: Row) -> dict[str, Any]:
@@ -164,14 +164,14 @@ def _row(row: Row) -> dict[str, Any]:
     return {"name": row.sequence, **chosen, **s}
 
 
-def compared(found: Answer, ends: Means, sequences: int, against: list[str]) -> Answer:
+def compared(found: CommandResult, ends: Means, sequences: int, against: list[str]) -> CommandResult:
     """The answer, and by how much it differs from other tracks on the same sequences, in pairs.
 
     against: what the other tracks' trackers saw.
     """
     from rich.console import Group
 
-    return Answer(
+    return CommandResult(
         {**found.data, "difference": ends, "against": against},
         Group(found.text, "", differences(ends, sequences), f"--against: detections {said(against)}"),
     )

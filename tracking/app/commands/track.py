@@ -9,9 +9,9 @@ from typing import Any
 
 from scenarios.errors import InputError
 from sim.types import DetectionMode, Sequence
-from tracking.app import option_values
-from tracking.app.output import Answer
-from tracking.app.progress import Meter
+from tracking.app import option_parsing
+from tracking.app.command_result import CommandResult
+from tracking.app.progress import ProgressMeter
 from tracking.config import Config
 from tracking.grouping.link_rule import LinkRule
 from tracking.run import TrackingRun
@@ -49,9 +49,9 @@ def job(
     grouping: Path | None = None,
 ) -> Job:
     """The options of the command as a Job; InputError for settings that the tracker does not know."""
-    found = option_values.settings([*option_values.sensor(detector), *settings], "tracker", ("tracker", "sensor"))
+    found = option_parsing.settings([*option_parsing.sensor(detector), *settings], "tracker", ("tracker", "sensor"))
     own = [text for subject, text in found if subject == "tracker"]
-    sensor = option_values.values(text for subject, text in found if subject == "sensor")
+    sensor = option_parsing.values(text for subject, text in found if subject == "sensor")
     rule = None if grouping is None else LinkRule.from_toml(grouping)
     return Job(tracker, _config(tracker, params, own), detections, sensor, seed, rule)
 
@@ -82,7 +82,7 @@ def track(
     px_per_m: float | None,
     camera: Path | None,
     background: str | None,
-) -> Answer:
+) -> CommandResult:
     """Run the job on every sequence of the source and store the answers: in `out`, or in a folder of it for each.
 
     InputError before the first frame is read where the job cannot be done on one of them.
@@ -91,19 +91,19 @@ def track(
     from sim.io.store.track_files import write_tracks
     from tracking.tracker_registry import find
 
-    option_values.folder(out)
+    option_parsing.folder(out)
     needs = find(job.tracker).needs
     pictures = job.detections in (None, "image") and not {"pixels", "stereo"}.isdisjoint(needs)
     sequences = open_source(source, fps=fps, px_per_m=px_per_m, camera=camera, images=pictures, background=background)
     chosen = places(sequences, source, out)
     _check(job, needs, sequences, background)
     rows = []
-    with Meter("track", _frames(sequences)) as meter:
+    with ProgressMeter("track", _frames(sequences)) as meter:
         for sequence, folder in chosen:
             run = job.run(sequence, lambda index, name=sequence.name: meter.step(name))  # type: ignore[misc]
             write_tracks(folder, run, fps=sequence.fps, camera=sequence.camera, scene=sequence.scene, info=run.info)
             rows.append(_row(run, folder))
-    return Answer({"tracker": job.tracker, "runs": rows}, "\n".join(map(_line, rows)))
+    return CommandResult({"tracker": job.tracker, "runs": rows}, "\n".join(map(_line, rows)))
 
 
 def _check(job: Job, needs: tuple[str, ...], sequences: list[Sequence], background: str | None) -> None:

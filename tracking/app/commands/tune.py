@@ -8,9 +8,9 @@ from pathlib import Path
 from typing import Any
 
 from sim.types import DetectionMode
-from tracking.app import option_values
-from tracking.app.output import Answer
-from tracking.app.progress import Meter
+from tracking.app import option_parsing
+from tracking.app.command_result import CommandResult
+from tracking.app.progress import ProgressMeter
 
 NONE = "none"
 
@@ -34,15 +34,15 @@ class Wishes:
     sensor: Path | None = None
 
 
-def tune(wishes: Wishes, **search_options: Any) -> Answer:
+def tune(wishes: Wishes, **search_options: Any) -> CommandResult:
     """Search, judge, write; what was gained as text and data. search_options: as `tracking.tune` takes them."""
     from tracking.tuning import tune as search
 
-    found = option_values.settings(wishes.settings, "tracker", option_values.SUBJECTS)
-    texts = [*option_values.sensor(wishes.sensor), *(f"{subject}.{text}" for subject, text in found)]
+    found = option_parsing.settings(wishes.settings, "tracker", option_parsing.SUBJECTS)
+    texts = [*option_parsing.sensor(wishes.sensor), *(f"{subject}.{text}" for subject, text in found)]
     check = {None: "", NONE: None}.get(wishes.check, wishes.check)
     only = tuple(word.strip() for word in (wishes.only or "").split(",") if word.strip())
-    with Meter("tune", wishes.trials) as meter:
+    with ProgressMeter("tune", wishes.trials) as meter:
         result = search(
             wishes.tracker, wishes.suite, wishes.trials, out=wishes.out, check=check, set=texts, only=only,
             objective=wishes.objective, detections=wishes.detections, progress=meter.update,
@@ -55,7 +55,7 @@ def tune(wishes: Wishes, **search_options: Any) -> Answer:
         for name, (old, new) in result.changed.items()
     ]
     told = "\n".join([*result.lines(), *changed, f"{wishes.out}, all figures and plots beside it"])
-    return Answer({**result.as_dict(), "file": wishes.out}, told)
+    return CommandResult({**result.as_dict(), "file": wishes.out}, told)
 
 
 def _shown(value: Any) -> str:
@@ -64,4 +64,4 @@ def _shown(value: Any) -> str:
 
 
 def _seeds(option: str, text: str | None) -> range | None:
-    return None if text is None else option_values.seeds(text, option)
+    return None if text is None else option_parsing.seeds(text, option)

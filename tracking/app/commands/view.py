@@ -10,10 +10,10 @@ from typing import TYPE_CHECKING
 from scenarios.errors import InputError
 from sim.io.source import open_source
 from sim.types import Sequence
-from tracking.app import option_values
-from tracking.app.output import Answer
-from tracking.app.progress import Meter
-from tracking.app.tracks_of_sequences import pair, results
+from tracking.app import option_parsing
+from tracking.app.command_result import CommandResult
+from tracking.app.progress import ProgressMeter
+from tracking.app.stored_tracks import pair, results
 from tracking.run import TrackingRun
 
 if TYPE_CHECKING:
@@ -39,7 +39,7 @@ class Recording:
         return open_source(self.source, fps=self.fps, px_per_m=self.px_per_m, camera=self.camera, images=True)
 
 
-def view(recording: Recording, tracks: Path | None, out: Path, video: Video) -> Answer:
+def view(recording: Recording, tracks: Path | None, out: Path, video: Video) -> CommandResult:
     """A replay page of each sequence, with its tracks where they are given."""
     from tracking.app.replay_page.page import view as page
     from tracking.app.replay_page.video import film
@@ -54,7 +54,7 @@ def view(recording: Recording, tracks: Path | None, out: Path, video: Video) -> 
     return _each("view", sequences, out, ".html", draw, _pictures(sequences) if video != "none" else 0)
 
 
-def sheet(recording: Recording, out: Path, frames: int) -> Answer:
+def sheet(recording: Recording, out: Path, frames: int) -> CommandResult:
     """A contact sheet of each sequence."""
     from tracking.app.pictures.contact_sheet import sheet as picture
 
@@ -64,7 +64,7 @@ def sheet(recording: Recording, out: Path, frames: int) -> Answer:
     return _each("sheet", recording.open(), out, ".png", draw, 0)
 
 
-def overlay(recording: Recording, tracks: Path | None, out: Path, truth: HowTrue | None) -> Answer:
+def overlay(recording: Recording, tracks: Path | None, out: Path, truth: HowTrue | None) -> CommandResult:
     """A video of each sequence with its tracks, its truth or both drawn over it."""
     from tracking.app.pictures.overlay import overlay as film
 
@@ -94,23 +94,25 @@ def _pictures(sequences: list[Sequence]) -> int | None:
     return None if None in known else sum(length or 0 for length in known)
 
 
-def _each(what: str, sequences: list[Sequence], out: Path, suffix: str, draw: Draw, pictures: int | None) -> Answer:
+def _each(
+    what: str, sequences: list[Sequence], out: Path, suffix: str, draw: Draw, pictures: int | None
+) -> CommandResult:
     """One file for each sequence, each whole or not there: `out`, or NAME<suffix> in it where there are several.
 
     pictures: how often `draw` calls its step over all sequences; 0: never, files are counted.
     """
     files = _files(sequences, out, suffix)
-    with Meter(what, len(files) if pictures == 0 else pictures) as meter:
+    with ProgressMeter(what, len(files) if pictures == 0 else pictures) as meter:
         for sequence, path in zip(sequences, files, strict=True):
             draw(sequence, path, meter.step)
             if pictures == 0:
                 meter.step(sequence.name)
-    return Answer({"files": files}, "\n".join(map(str, files)))
+    return CommandResult({"files": files}, "\n".join(map(str, files)))
 
 
 def _files(sequences: list[Sequence], out: Path, suffix: str) -> list[Path]:
     if len(sequences) == 1:
-        return [option_values.named(out, suffix)]
+        return [option_parsing.named(out, suffix)]
     if out.suffix.lower() == suffix:
         raise InputError(
             file=out, place="--out", got=f"one file for {len(sequences)} sequences", expected="a folder",

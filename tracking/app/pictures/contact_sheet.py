@@ -11,11 +11,11 @@ import numpy as np
 from scenarios.errors import InputError
 from sim.io.files.atomic import write_file
 from sim.types import Array, GroupEvent, Image, Ints, Sequence, Truth
-from tracking.app.pictures.contact_sheet_panels import Pictures
-from tracking.app.pictures.populated_area import MARGIN, peopled
-from tracking.drawing import panel
-from tracking.drawing.painter import KIND_COLOUR, event_words, kind_colour
-from tracking.drawing.panel import INK, QUIET, THING, View, colour, text
+from tracking.app.pictures.panel_pictures import Pictures
+from tracking.drawing.canvas import FLOOR, INK, QUIET, THING, TRAIL_SECONDS, Canvas, colour, text
+from tracking.drawing.layer_painting import KIND_COLOUR, event_words, kind_colour
+from tracking.drawing.plan_area import MARGIN, plan_area
+from tracking.drawing.plan_view import draw_group_hulls, draw_people, draw_scene, draw_trails
 
 # Merges and splits are what a scenario is about; entering and leaving come last.
 RANK = {"merge": 0, "split": 0, "cross": 1, "queue": 1, "form": 2, "dissolve": 2}
@@ -152,30 +152,26 @@ def _places(truth: Truth) -> Array:
 def _bounds(sequence: Sequence, truth: Truth) -> tuple[Array, Array]:
     if truth.pos is None and sequence.image_size is not None:
         return np.zeros(2), np.array(sequence.image_size, float)
-    if truth.pos is not None and sequence.scene is not None:
-        return peopled(sequence.scene, truth.pos)
-    places = _places(truth)
-    if truth.pos is None and truth.box is not None:
-        places = np.concatenate([truth.box[:, :2], truth.box[:, :2] + truth.box[:, 2:]])
-    places = places[np.isfinite(places).all(axis=1)]
-    if not len(places):
-        return np.zeros(2), np.ones(2)
-    margin = MARGIN if truth.pos is not None else 0.0
-    return places.min(axis=0) - margin, places.max(axis=0) + np.maximum(margin, 1e-3)
+    if truth.pos is not None:
+        return plan_area(sequence.scene, truth.pos) or (np.zeros(2), np.ones(2))
+    assert truth.box is not None, "labels have positions or boxes"
+    corners = np.concatenate([truth.box[:, :2], truth.box[:, :2] + truth.box[:, 2:]])
+    corners = corners[np.isfinite(corners).all(axis=1)]
+    return (corners.min(axis=0), corners.max(axis=0) + 1e-3) if len(corners) else (np.zeros(2), np.ones(2))
 
 
 def _plan(area: Image, sequence: Sequence, truth: Truth, index: int, low: Array, high: Array) -> None:
     """People from above, or the boxes of a recording without pictures."""
     plan = truth.pos is not None
-    view = View.fit(area, low, high, upwards=plan)
+    view = Canvas.fit(area, low, high, upwards=plan)
     places, boxes = _places(truth), None if plan else truth.box
-    view.canvas[:] = panel.FLOOR
+    view.image[:] = FLOOR
     if plan:
-        panel.ground(view, sequence.scene)
-    panel.trails(view, truth, index, places)
-    panel.hulls(view, truth, index, places, boxes)
+        draw_scene(view, sequence.scene)
+    draw_trails(view, truth, index, places)
+    draw_group_hulls(view, truth, index, places, boxes)
     rows = truth.rows(index)
-    panel.people(view, truth, index, places, boxes, names=rows.stop - rows.start <= MANY)
+    draw_people(view, truth, index, places, boxes, ids=rows.stop - rows.start <= MANY)
     for event in _now(truth, index) if plan else []:
         at, radius = _around(event, truth.id[rows], places[rows])
         view.disc(at, radius * view.scale, kind_colour(event.kind), 3)
@@ -214,7 +210,7 @@ def _head(canvas: Image, sequence: Sequence, truth: Truth) -> None:
         low, high = np.zeros(2), sequence.scene.size
     people = f"{len(np.unique(truth.id))} people, " if len(truth.id) else ""
     facts = f"{people}{truth.length} frames, {truth.fps:g}/s, "
-    facts += f"{high[0] - low[0]:.4g} x {high[1] - low[1]:.4g} {unit}; trails {panel.TRAIL:g} s"
+    facts += f"{high[0] - low[0]:.4g} x {high[1] - low[1]:.4g} {unit}; trails {TRAIL_SECONDS:g} s"
     text(canvas, facts, (GAP + width + 30, 46), 0.75, QUIET)
 
 

@@ -16,10 +16,9 @@ from sim.io.files.atomic import writing
 from sim.io.pictures.video_encoding import movie
 from sim.types import Frame, Image, Sequence, Tracks
 from tracking.app.replay_page.video import even, refuse_source
-from tracking.drawing import marks, painter
-from tracking.drawing.marks import Side
-from tracking.drawing.painter import Style
-from tracking.drawing.panel import View
+from tracking.drawing.canvas import Canvas
+from tracking.drawing.layer_painting import LayerStyle, draw_banner, draw_captions, draw_label, letter_size, paint_layer
+from tracking.drawing.layers import Layer, layer_of_tracks, layer_of_truth
 from tracking.run import grouped
 
 HowTrue = Literal["beside", "over", "only"]
@@ -58,23 +57,25 @@ def overlay(
 
 def _layers(
     sequence: Sequence, tracks: SequenceOf[Tracks] | None, how: HowTrue | None
-) -> list[list[tuple[Side, Style]]]:
+) -> list[list[tuple[Layer, LayerStyle]]]:
     """What is drawn in each of the pictures that stand beside each other."""
     if tracks is None or how is not None:
         if sequence.truth is None:
             got = "a sequence without labels" if tracks is not None else "neither tracks nor labels"
             remedy = "leave --truth out" if tracks is not None else "give what `flockscope track` wrote"
             raise InputError(file=sequence.name, got=got, expected="something to draw", remedy=remedy)
-        true = marks.of_truth(sequence.truth)
+        true = layer_of_truth(sequence.truth)
     if tracks is None or how == "only":
-        return [[(true, Style())]]
-    said = marks.of_tracks(grouped(tracks, sequence), sequence.camera, sequence.scene)
+        return [[(true, LayerStyle())]]
+    said = layer_of_tracks(grouped(tracks, sequence), sequence.camera, sequence.scene)
     if how == "beside":
-        return [[(true, Style())], [(said, Style())]]
-    return [[(true, Style(plain=True)), (said, Style())] if how == "over" else [(said, Style())]]
+        return [[(true, LayerStyle())], [(said, LayerStyle())]]
+    return [[(true, LayerStyle(plain=True)), (said, LayerStyle())] if how == "over" else [(said, LayerStyle())]]
 
 
-def _write(path: Path, sequence: Sequence, layers: list[list[tuple[Side, Style]]], step: Callable[[str], None]) -> None:
+def _write(
+    path: Path, sequence: Sequence, layers: list[list[tuple[Layer, LayerStyle]]], step: Callable[[str], None]
+) -> None:
     pictures = compose(sequence, layers)
     first = next(pictures)
     with movie(path, (first.shape[1], first.shape[0]), sequence.fps) as film:
@@ -85,7 +86,7 @@ def _write(path: Path, sequence: Sequence, layers: list[list[tuple[Side, Style]]
             step(sequence.name)
 
 
-def compose(sequence: Sequence, layers: list[list[tuple[Side, Style]]]) -> Iterator[Image]:
+def compose(sequence: Sequence, layers: list[list[tuple[Layer, LayerStyle]]]) -> Iterator[Image]:
     """The pictures of the video, of even width and height."""
     last: Image | None = None
     for frame in sequence:
@@ -94,30 +95,30 @@ def compose(sequence: Sequence, layers: list[list[tuple[Side, Style]]]) -> Itera
         panels = [_panel(last, sequence, frame.index, sides) for sides in layers]
         if len(panels) > 1:
             for panel, sides in zip(panels, layers, strict=True):
-                painter.chip(panel, sides[0][0].name, (panel.shape[1] / 2 - 30, 30), 0.7, (60, 51, 45))
+                draw_label(panel, sides[0][0].name, (panel.shape[1] / 2 - 30, 30), 0.7, (60, 51, 45))
         body = np.concatenate(panels, axis=1)
         strip = np.zeros((32, body.shape[1], 3), np.uint8)
-        painter.banner(strip, _words(sequence, frame, layers), _marks(sequence, frame), 0.55)
+        draw_banner(strip, _words(sequence, frame, layers), _marks(sequence, frame), 0.55)
         yield even(np.concatenate([strip, body]))
 
 
-def _panel(picture: Image | None, sequence: Sequence, index: int, sides: list[tuple[Side, Style]]) -> Image:
+def _panel(picture: Image | None, sequence: Sequence, index: int, sides: list[tuple[Layer, LayerStyle]]) -> Image:
     assert sequence.image_size is not None, "pictures have a size"
     width, height = sequence.image_size
     shown = np.full((height, width, 3), GREY, np.uint8) if picture is None else picture
     factor = 2 if height < LEAST else 1
     canvas = np.array(cv2.resize(shown, None, fx=factor, fy=factor, interpolation=cv2.INTER_LINEAR), np.uint8)
-    view = View(canvas, factor, np.zeros(2), np.array([width, height], float), upwards=False)
+    view = Canvas(canvas, factor, np.zeros(2), np.array([width, height], float), upwards=False)
     for side, style in sides:
-        painter.paint(view, side, index, sequence.fps, style)
-    painter.captions(view.canvas, sides[-1][0], index, sequence.fps, painter.letter(view))
-    return view.canvas
+        paint_layer(view, side, index, sequence.fps, style)
+    draw_captions(view.image, sides[-1][0], index, sequence.fps, letter_size(view))
+    return view.image
 
 
-def _words(sequence: Sequence, frame: Frame, layers: list[list[tuple[Side, Style]]]) -> str:
+def _words(sequence: Sequence, frame: Frame, layers: list[list[tuple[Layer, LayerStyle]]]) -> str:
     of = "" if sequence.length is None else f" of {sequence.length}"
     now = {side.name: side.at(frame.index) for sides in layers for side, _ in sides}
-    count = "".join(f"   {name} {len(marks.id)}{' groups' * marks.wholes}" for name, marks in now.items())
+    count = "".join(f"   {name} {len(marks.id)}{' groups' * marks.whole_groups}" for name, marks in now.items())
     return f"{sequence.name}   frame {frame.index}{of}   {frame.t:.2f} s{count}"
 
 

@@ -14,16 +14,16 @@ import numpy as np
 
 from sim.io.files.atomic import write_file
 from sim.types import Array, Sequence, Tracks, Truth
-from tracking.app.pictures.populated_area import MARGIN, peopled
-from tracking.app.replay_page import people_data
-from tracking.app.replay_page.people_data import Json, Rows
+from tracking.app.replay_page import person_rows
+from tracking.app.replay_page.person_rows import Json, Rows
 from tracking.app.replay_page.video import Film
+from tracking.drawing.plan_area import plan_area
 from tracking.run import grouped
 
 HERE = Path(__file__).parent
 SCRIPTS = (
-    "view_data.js", "view_draw.js", "view_groups.js", "view_plan.js", "view_world.js", "view_image.js", "view_time.js",
-    "view_film.js", "view.js",
+    "decode.js", "draw.js", "whole_groups.js", "plan.js", "camera_view.js", "image.js", "timeline.js",
+    "video.js", "page.js",
 )  # fmt: skip
 
 
@@ -42,10 +42,10 @@ def view(
     name = title or sequence.name
     shown = payload(sequence, tracks, scores) | {"video": None if film is None else film.facts()}
     data = json.dumps(shown, separators=(",", ":"), allow_nan=False)
-    page = (HERE / "view.html").read_text(encoding="utf-8")
+    page = (HERE / "page.html").read_text(encoding="utf-8")
     parts = {
         "TITLE": escape(name),
-        "STYLE": (HERE / "view.css").read_text(encoding="utf-8"),
+        "STYLE": (HERE / "page.css").read_text(encoding="utf-8"),
         "DATA": data.replace("<", "\\u003c").replace("\u2028", "\\u2028").replace("\u2029", "\\u2029"),
         "FILM": "" if film is None else film.inside,
         "SCRIPT": "\n".join((HERE / script).read_text(encoding="utf-8") for script in SCRIPTS),
@@ -61,9 +61,9 @@ def payload(sequence: Sequence, tracks: SequenceOf[Tracks] | None, scores: Mappi
     """All that the page shows, ready for JSON."""
     truth = sequence.truth
     answers = None if tracks is None else grouped(tracks, sequence)
-    true = None if truth is None else people_data.truth_rows(truth)
-    tracked = None if answers is None else people_data.track_rows(answers)
-    found = people_data.detections(sequence)
+    true = None if truth is None else person_rows.truth_rows(truth)
+    tracked = None if answers is None else person_rows.track_rows(answers)
+    found = person_rows.detections(sequence)
     sides = [rows for rows in (true, tracked) if rows is not None]
     return {
         "name": sequence.name,
@@ -72,12 +72,12 @@ def payload(sequence: Sequence, tracks: SequenceOf[Tracks] | None, scores: Mappi
         "length": _length(sequence, sides, found),
         "image": sequence.image_size or _image_size(sides),
         "bounds": _bounds(sequence, sides),
-        "scene": people_data.scene_json(sequence.scene),
-        "camera": people_data.camera_json(sequence.camera),
-        "truth": None if true is None or truth is None else people_data.side(true, truth.events or ()),
+        "scene": person_rows.scene_json(sequence.scene),
+        "camera": person_rows.camera_json(sequence.camera),
+        "truth": None if true is None or truth is None else person_rows.side(true, truth.events or ()),
         "tracks": None
         if tracked is None or answers is None
-        else people_data.side(tracked, [e for t in answers for e in t.events]),
+        else person_rows.side(tracked, [e for t in answers for e in t.events]),
         "detections": found,
         "unlabelled": _unlabelled(truth),
         "near": _near(truth),
@@ -124,15 +124,8 @@ def _image_size(sides: list[Rows]) -> list[int] | None:
 def _bounds(sequence: Sequence, sides: list[Rows]) -> list[float] | None:
     """x0, y0, x1, y1 of the plan in m: what people and things need; None without ground."""
     points = [part for rows in sides if rows.plane == "ground" for part in _places(rows)]
-    known = np.concatenate([np.zeros((0, 2)), *points])
-    known = known[np.isfinite(known).all(axis=1)]
-    if sequence.scene is not None:
-        low, high = peopled(sequence.scene, known)
-    elif len(known):
-        low, high = known.min(axis=0) - MARGIN, known.max(axis=0) + MARGIN
-    else:
-        return None
-    return [round(float(v), 2) for v in (*low, *high)]
+    area = plan_area(sequence.scene, np.concatenate([np.zeros((0, 2)), *points]))
+    return None if area is None else [round(float(v), 2) for corner in area for v in corner]
 
 
 def _places(rows: Rows) -> list[Array]:

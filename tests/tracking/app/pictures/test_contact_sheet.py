@@ -14,7 +14,8 @@ from hypothesis import strategies as st
 from scenarios.errors import InputError
 from sim.types import GroupEvent, Sequence, Truth
 from tracking.app.pictures.contact_sheet import choose, sheet
-from tracking.drawing.panel import FLOOR, View, _names, colour
+from tracking.drawing.canvas import FLOOR, Canvas, colour
+from tracking.drawing.plan_view import draw_ids
 
 
 def bare(length: int, starts: dict[int, str]) -> Truth:
@@ -66,16 +67,16 @@ def test_a_ring_holds_all_whom_an_event_concerns(truth: Truth) -> None:
 
 def test_names_stand_clear_of_discs_and_of_one_another() -> None:
     """Five in a huddle: no name covers a disc (a covered one would lose its colour), and all are there."""
-    view = View.fit(np.full((300, 300, 3), 255, np.uint8), np.zeros(2), np.array([10.0, 10.0]), upwards=True)
+    view = Canvas.fit(np.full((300, 300, 3), 255, np.uint8), np.zeros(2), np.array([10.0, 10.0]), upwards=True)
     ids, places = np.arange(1, 6), np.array([[5, 5], [5.9, 5], [4.1, 5], [5, 5.9], [5, 4.1]])
     for identity, at in zip(ids.tolist(), places, strict=True):
         view.disc(at, 7, colour(identity))
-    before = view.canvas.copy()
-    _names(view, ids, places, 7)
+    before = view.image.copy()
+    draw_ids(view, ids, places, 7)
     for identity, at in zip(ids.tolist(), places, strict=True):
         x, y = view.map(at)[0].astype(int)
-        np.testing.assert_array_equal(view.canvas[y, x], before[y, x])
-        assert (np.abs(view.canvas.astype(int) - colour(identity)).max(axis=2) < 12).sum() > 150
+        np.testing.assert_array_equal(view.image[y, x], before[y, x])
+        assert (np.abs(view.image.astype(int) - colour(identity)).max(axis=2) < 12).sum() > 150
 
 
 def test_merges_and_splits_outrank_the_rest() -> None:
@@ -96,7 +97,7 @@ def test_frames_are_distinct_and_inside(length: int, frames: int, starts: dict[i
 
 
 def test_a_plan_puts_y_up_and_keeps_the_aspect() -> None:
-    view = View.fit(np.zeros((100, 300, 3), np.uint8), np.zeros(2), np.array([20.0, 10.0]), upwards=True)
+    view = Canvas.fit(np.zeros((100, 300, 3), np.uint8), np.zeros(2), np.array([20.0, 10.0]), upwards=True)
     assert view.scale == 10
     np.testing.assert_allclose(view.map(np.array([[0, 0], [20, 10], [10, 5]])), [[50, 100], [250, 0], [150, 50]])
 

@@ -16,9 +16,9 @@ from sim.types import Detections, Frame, GroupEvent, Groups, Sequence, Tracks, T
 from tests.coded_pictures import SIZE, coded, number, sequence
 from tests.groups_as_wholes import wholes
 from tracking.app.pictures.overlay import _words, compose, overlay
-from tracking.drawing import marks
-from tracking.drawing.painter import Style
-from tracking.drawing.panel import colour
+from tracking.drawing.canvas import colour
+from tracking.drawing.layer_painting import LayerStyle
+from tracking.drawing.layers import layer_of_tracks
 
 STRIP = 32
 
@@ -53,8 +53,8 @@ def test_every_frame_in_its_slot(tmp_path: Path) -> None:
 
 def test_boxes_are_where_they_belong() -> None:
     """At twice its size: the left edge of a box at u = 40 is drawn at 80, in the colour of its id, the id above it."""
-    side = marks.of_tracks([answer(1, {3: [40, 30, 10, 20]})], None, None)
-    (picture,) = compose(sequence(1), [[(side, Style())]])
+    side = layer_of_tracks([answer(1, {3: [40, 30, 10, 20]})], None, None)
+    (picture,) = compose(sequence(1), [[(side, LayerStyle())]])
     edges = np.argwhere(np.abs(picture[STRIP:].astype(int) - colour(3)).max(axis=2) < 12)
     box = edges[edges[:, 0] > 61]
     (_, left), (bottom, right) = box.min(axis=0), box.max(axis=0)
@@ -101,8 +101,8 @@ def test_what_a_frame_lacks_is_told() -> None:
         yield Frame(3, 0.2, coded(3))
 
     case = dataclasses.replace(sequence(3), frames=frames, has_detections=True)
-    side = marks.of_tracks([answer(k, {}) for k in (1, 2, 3)], None, None)
-    made = list(compose(case, [[(side, Style())]]))
+    side = layer_of_tracks([answer(k, {}) for k in (1, 2, 3)], None, None)
+    made = list(compose(case, [[(side, LayerStyle())]]))
     red = [(np.abs(p[:STRIP].astype(int) - colour(6)).max(axis=2) < 4).sum() > 50 for p in made]
     assert red == [False, True, True]
     assert [number(p, STRIP, 2) for p in made] == [1, 1, 3]
@@ -110,7 +110,7 @@ def test_what_a_frame_lacks_is_told() -> None:
 
 def test_trails_end_at_a_gap() -> None:
     tracks = [answer(k, {1: [k, 0, 2, 4], 2: [k, 20, 2, 4]} if k != 5 else {1: [k, 0, 2, 4]}) for k in range(1, 9)]
-    side = marks.of_tracks(tracks, None, None)
+    side = layer_of_tracks(tracks, None, None)
     found = dict(side.trails(8, 100))
     np.testing.assert_array_equal(found[1][:, 0], np.arange(8, 0, -1) + 1)
     np.testing.assert_array_equal(found[2][:, 0], [9, 8, 7])
@@ -118,7 +118,7 @@ def test_trails_end_at_a_gap() -> None:
 
 
 def test_ellipses_hold_95_percent() -> None:
-    ring = marks.of_tracks([answer(1, {3: [40, 30, 10, 20]})], None, None).at(1).ellipse[0]
+    ring = layer_of_tracks([answer(1, {3: [40, 30, 10, 20]})], None, None).at(1).ellipse[0]
     offset = ring - [45, 40]
     np.testing.assert_allclose((offset**2 / [4.0, 1.0]).sum(axis=1), 5.991, rtol=1e-6)
 
@@ -126,12 +126,12 @@ def test_ellipses_hold_95_percent() -> None:
 def test_people_on_the_ground_stand_upright_in_the_picture(sequence: Sequence, tracks: list[Tracks]) -> None:
     """Without boxes of their own; ellipses lie on the ground round their feet."""
     plain = [t.replace(box=None) for t in tracks]
-    seen = marks.of_tracks(plain, sequence.camera, sequence.scene).at(1)
+    seen = layer_of_tracks(plain, sequence.camera, sequence.scene).at(1)
     np.testing.assert_allclose(seen.box, tracks[0].box, atol=25)
     wide = seen.ellipse[..., 0].max(axis=1) - seen.ellipse[..., 0].min(axis=1)
     assert (wide > seen.box[:, 2]).all()
     assert (np.abs(seen.ellipse.mean(axis=1) - seen.at) < 60).all()
-    assert np.isnan(marks.of_tracks(plain, None, None).at(1).box).all()
+    assert np.isnan(layer_of_tracks(plain, None, None).at(1).box).all()
 
 
 def test_groups_without_people_show_their_hulls() -> None:
@@ -139,7 +139,7 @@ def test_groups_without_people_show_their_hulls() -> None:
     one, two = np.array([4]), np.zeros((1, 2))
     groups = Groups(one, (np.zeros(0, np.int64),), two, two, np.zeros((1, 2, 2)), np.array([3.0]), (square,))
     said = Tracks(1, 0.0, "image", "group", one, one, two, two, np.full((1, 4, 4), np.nan), groups=groups)
-    (region,) = marks.of_tracks([said], None, None).at(1).regions
+    (region,) = layer_of_tracks([said], None, None).at(1).groups
     assert (region.id, region.size) == (4, 3.0)
     np.testing.assert_array_equal(region.hull, square)
 
@@ -148,9 +148,9 @@ def test_events_stand_for_a_while_from_when_they_are_known() -> None:
     merge = GroupEvent("merge", 2, 4, 6, (1, 2), (1,), (1, 2), (0.0, 0.0))
     enter = GroupEvent("enter", 6, 6, 6, (), (1,), (1,), (0.0, 0.0))
     tracks = [answer(k, {}, events=(merge, enter) if k == 6 else ()) for k in range(1, 20)]
-    side = marks.of_tracks(tracks, None, None)
-    assert [k for k in range(1, 20) if side.told(k, 5.0)] == [6, 7, 8, 9, 10]
-    assert [e.kind for e in side.told(6, 5.0)] == ["merge"]
+    side = layer_of_tracks(tracks, None, None)
+    assert [k for k in range(1, 20) if side.recent_events(k, 5.0)] == [6, 7, 8, 9, 10]
+    assert [e.kind for e in side.recent_events(6, 5.0)] == ["merge"]
 
 
 def coloured(picture: np.ndarray, group: int) -> np.ndarray:
@@ -171,13 +171,13 @@ def a_group(place: tuple[float, float], plane: str = "image", camera_scale: floa
 
 def test_a_group_has_its_extent_its_way_and_its_size() -> None:
     """9.21 by its extent round its place; as wide in the picture."""
-    side = marks.of_tracks([a_group((40, 30))], None, None)
-    (region,) = side.at(1).regions
-    offset = region.around - [40, 30]
+    side = layer_of_tracks([a_group((40, 30))], None, None)
+    (region,) = side.at(1).groups
+    offset = region.extent - [40, 30]
     np.testing.assert_allclose((offset**2 / [9.0, 1.0]).sum(axis=1), 9.21, rtol=1e-6)
-    np.testing.assert_allclose(region.way, [[40, 30], [50, 30]])
+    np.testing.assert_allclose(region.motion, [[40, 30], [50, 30]])
     assert region.size == 3.04
-    (picture,) = compose(sequence(1), [[(side, Style())]])
+    (picture,) = compose(sequence(1), [[(side, LayerStyle())]])
     drawn = coloured(picture, 4)
     drawn = drawn[drawn[:, 1] <= 30]  # above its name
     reach = 3 * np.sqrt(9.21)
@@ -187,28 +187,28 @@ def test_a_group_has_its_extent_its_way_and_its_size() -> None:
 def test_groups_on_the_ground_lie_there_in_the_picture(sequence: Sequence) -> None:
     """Projected as people are; nothing of them where no camera is known, or all is behind it."""
     tracks = wholes(sequence, "ground")
-    seen = marks.of_tracks(tracks, sequence.camera, sequence.scene).at(1)
-    for region, pos in zip(seen.regions, tracks[0].pos, strict=True):
+    seen = layer_of_tracks(tracks, sequence.camera, sequence.scene).at(1)
+    for region, pos in zip(seen.groups, tracks[0].pos, strict=True):
         (uv,), _ = project(sequence.camera, np.array([[*pos, 0.0]]))
-        np.testing.assert_allclose(region.way[0], uv)
+        np.testing.assert_allclose(region.motion[0], uv)
         assert contains(convex_hull(region.hull), uv[None]).all()
-        assert contains(convex_hull(region.around), region.hull).all()
-    np.testing.assert_allclose(seen.at, [region.way[0] for region in seen.regions])
-    blind = marks.of_tracks(tracks, None, None).at(1)
+        assert contains(convex_hull(region.extent), region.hull).all()
+    np.testing.assert_allclose(seen.at, [region.motion[0] for region in seen.groups])
+    blind = layer_of_tracks(tracks, None, None).at(1)
     assert np.isnan(blind.at).all()
-    assert not any(len(part) for r in blind.regions for part in (r.hull, r.around, r.way))
-    behind = marks.of_tracks([a_group((8.0, -40.0), "ground")], sequence.camera, None).at(1)
-    assert not any(len(part) for r in behind.regions for part in (r.hull, r.around, r.way))
+    assert not any(len(part) for r in blind.groups for part in (r.hull, r.extent, r.motion))
+    behind = layer_of_tracks([a_group((8.0, -40.0), "ground")], sequence.camera, None).at(1)
+    assert not any(len(part) for r in behind.groups for part in (r.hull, r.extent, r.motion))
 
 
 def test_what_is_unknown_of_a_group_is_left_out() -> None:
     plain = a_group((40, 30))
     unknown = plain.groups.replace(hull=(), extent=np.full((1, 2, 2), np.nan), size=np.array([np.nan]))
     for given in (plain.replace(groups=None), plain.replace(groups=unknown)):
-        side = marks.of_tracks([given], None, None)
-        (region,) = side.at(1).regions
-        assert (len(region.hull), len(region.around), np.isnan(region.size)) == (0, 0, True)
-        (picture,) = compose(sequence(1), [[(side, Style())]])
+        side = layer_of_tracks([given], None, None)
+        (region,) = side.at(1).groups
+        assert (len(region.hull), len(region.extent), np.isnan(region.size)) == (0, 0, True)
+        (picture,) = compose(sequence(1), [[(side, LayerStyle())]])
         assert len(coloured(picture, 4)) > 20
 
 
@@ -218,5 +218,5 @@ def test_groups_that_are_tracked_are_counted_as_such() -> None:
 
 def overlay_words(tracks: list[Tracks]) -> str:
     case = sequence(1)
-    side = marks.of_tracks(tracks, None, None)
-    return _words(case, next(iter(case)), [[(side, Style())]])
+    side = layer_of_tracks(tracks, None, None)
+    return _words(case, next(iter(case)), [[(side, LayerStyle())]])

@@ -11,10 +11,10 @@ import pytest
 
 from scenarios.errors import InputError
 from sim.types import Groups, Sequence, Tracks, Truth
-from tracking.app.replay_page import columns
+from tracking.app.replay_page import column_encoding
 from tracking.app.replay_page.page import payload, view
 
-NIL = columns.NIL
+NIL = column_encoding.NIL
 
 
 def page_data(page: str) -> dict:
@@ -30,7 +30,7 @@ def column(values: list[int]) -> np.ndarray:
 
 
 def decode(side: dict) -> dict[str, np.ndarray]:
-    """What view_data.js does."""
+    """What decode.js does."""
     stints = np.array(side["stints"]).reshape(-1, 3)
     frame = np.concatenate([np.arange(a, a + n) for _, a, n in stints]) if len(stints) else np.zeros(0)
     pairs = np.array(side["group"]).reshape(-1, 2)
@@ -80,8 +80,8 @@ def test_tracks_come_back(sequence: Sequence, tracks: list[Tracks]) -> None:
 
 def test_whoever_leaves_and_returns_has_two_stints() -> None:
     frame, ids = np.array([1, 2, 4, 5, 2, 3]), np.array([7, 7, 7, 7, 8, 8])
-    assert columns.stints(ids, frame) == [[7, 1, 2], [7, 4, 2], [8, 2, 2]]
-    assert columns.stints(ids[:0], frame[:0]) == []
+    assert column_encoding.stints(ids, frame) == [[7, 1, 2], [7, 4, 2], [8, 2, 2]]
+    assert column_encoding.stints(ids[:0], frame[:0]) == []
 
 
 def test_detections_come_back(sequence: Sequence) -> None:

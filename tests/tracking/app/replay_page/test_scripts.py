@@ -16,8 +16,8 @@ from sim.scene.camera import looking, project
 from sim.types import Camera, Scene, Sequence, Stairs
 from tests.groups_as_wholes import wholes
 from tracking.app.replay_page.page import payload
-from tracking.app.replay_page.people_data import camera_json, scene_json
-from tracking.drawing.marks import WIDE, ring
+from tracking.app.replay_page.person_rows import camera_json, scene_json
+from tracking.drawing.layers import SIGMA_99, ellipse
 
 NODE = shutil.which("node")
 HERE = Path(tracking.app.replay_page.__file__).parent
@@ -47,12 +47,12 @@ def test_groups(sequence: Sequence, plane: str) -> None:
     shown = """[...tracks.rows(60)].map(row => [tracks.id[row], [tracks.x[row], tracks.y[row]],
         ringOf(tracks, row, (x, y) => [x, y]), tracks.wholes.hull[row], tracks.wholes.speed[row],
         wholeWords(tracks, row)])"""
-    rows = ran(payload(sequence, answers), ("view_data.js", "view_groups.js"), shown)
+    rows = ran(payload(sequence, answers), ("decode.js", "whole_groups.js"), shown)
     now, near = answers[59], {"atol": 0.05 if plane == "ground" else 3.0}
     assert [row[0] for row in rows] == now.id.tolist()
     for k, (_, at, around, hull, speed, words) in enumerate(rows):
         np.testing.assert_allclose(at, now.pos[k], **near)
-        truly = ring(now.pos[k], now.groups.extent[k], WIDE)
+        truly = ellipse(now.pos[k], now.groups.extent[k], SIGMA_99)
         for low in (np.min, np.max):
             np.testing.assert_allclose(low(around, axis=0), low(truly, axis=0), **near)
             np.testing.assert_allclose(low(hull, axis=0), low(now.groups.hull[k], axis=0), **near)
@@ -72,7 +72,7 @@ def test_places_on_the_ground_are_where_the_camera_sees_them(radial: float) -> N
     uv, _ = project(camera, standing(xy, scene))
     data = {"camera": camera_json(camera), "scene": scene_json(scene)}
     what = f"{json.dumps(xy.tolist())}.map(([x, y]) => project(x, y, heightAt(x, y)) || [null, null])"
-    found = np.array(ran(EMPTY | data, ("view_data.js", "view_world.js"), what), float)
+    found = np.array(ran(EMPTY | data, ("decode.js", "camera_view.js"), what), float)
     np.testing.assert_array_equal(np.isnan(found), np.isnan(uv))
     seen = np.isfinite(uv[:, 0]) & (np.abs(uv) < 1500).all(axis=1)
     assert 50 < seen.sum() < len(xy)

@@ -13,8 +13,8 @@ from sim.geometry.footprints import footprint_hull, footprint_hulls
 from sim.geometry.polygons import area, convex_hull
 from sim.types import Groups, Sequence, Tracks
 from tests.groups_as_wholes import wholes
-from tracking.app.replay_page import group_data
-from tracking.app.replay_page.columns import NIL
+from tracking.app.replay_page import group_rows
+from tracking.app.replay_page.column_encoding import NIL
 from tracking.app.replay_page.page import payload, view
 
 
@@ -25,7 +25,7 @@ def column(values: list[int]) -> np.ndarray:
 
 
 def rows_of(side: dict) -> dict[str, np.ndarray]:
-    """What view_data.js does with the columns of groups."""
+    """What decode.js does with the columns of groups."""
     table, scale = np.array(side["stints"]).reshape(-1, 3), side["scale"]
     own = side["wholes"]
     return {
@@ -110,8 +110,8 @@ def test_the_page_shows_all_of_their_hulls(sequence: Sequence) -> None:
 def test_thinned_hulls_are_nearly_the_same(places: list[tuple[float, float]]) -> None:
     """Never outside, no more than two steps of tolerance inside, in their order."""
     hull = footprint_hull(np.array(places))
-    less = group_data.thin(hull, 0.02)
-    assert len(less) <= group_data.MAX_HULL
+    less = group_rows.thin(hull, 0.02)
+    assert len(less) <= group_rows.MAX_HULL
     assert {tuple(p) for p in less} <= {tuple(p) for p in hull}
     np.testing.assert_allclose(area(less), area(convex_hull(less)), rtol=1e-9)
     edge = np.roll(less, -1, axis=0) - less
@@ -123,7 +123,7 @@ def test_thinned_hulls_are_nearly_the_same(places: list[tuple[float, float]]) ->
 def test_a_hull_of_few_corners_stays() -> None:
     for n in range(4):
         corners = np.array([[0, 0], [1e-4, 0], [0, 1e-4]])[:n]
-        np.testing.assert_array_equal(group_data.thin(corners, 1.0), corners)
+        np.testing.assert_array_equal(group_rows.thin(corners, 1.0), corners)
 
 
 def test_a_long_recording_of_groups_stays_small(tmp_path) -> None:

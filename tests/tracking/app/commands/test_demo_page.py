@@ -9,8 +9,8 @@ import pytest
 
 from sim.types import Sequence, Tracks
 from tests.groups_as_wholes import wholes
+from tracking.app.commands.demo_page import WITHOUT_PEOPLE, Part, Seen, page
 from tracking.app.commands.score import Row
-from tracking.app.demo_page import WITHOUT_PEOPLE, Part, Seen, page
 from tracking.scoring import evaluate
 
 

@@ -8,10 +8,9 @@ import cv2
 import numpy as np
 
 from sim.types import Array, Frame, Image, Ints, PixelTruth, Sequence, Truth
-from tracking.drawing import marks, painter
-from tracking.drawing.marks import Side
-from tracking.drawing.painter import Style
-from tracking.drawing.panel import FLOOR, GRID, INK, View, colour
+from tracking.drawing.canvas import FLOOR, GRID, INK, Canvas, colour
+from tracking.drawing.layer_painting import LayerStyle, draw_label, paint_layer
+from tracking.drawing.layers import Layer, layer_of_truth
 
 STANDING = (150, 140, 132)
 GREY = 128
@@ -27,7 +26,7 @@ class Pictures:
         self.frames = _frames(sequence, set(chosen)) if sequence.has_images and self.size is not None else {}
         pixels = sequence.load_pixels
         self.pixels = {} if pixels is None else {index: pixels(index) for index in self.frames}
-        self.side = marks.of_truth(truth) if self.frames else Side("true", "G", {})
+        self.side = layer_of_truth(truth) if self.frames else Layer("true", "G", {})
 
     def kinds(self) -> tuple[str, ...]:
         """Which small pictures there are: right, ids, disparity; the left one itself beside one of these alone."""
@@ -53,8 +52,8 @@ class Pictures:
         assert self.size is not None
         picture = self.frames[index].image if index in self.frames else None
         _fill(area, picture)
-        view = View.fit(area, np.zeros(2), np.array(self.size, float), upwards=False)
-        painter.paint(view, self.side, index, self.fps, Style(rim=False))
+        view = Canvas.fit(area, np.zeros(2), np.array(self.size, float), upwards=False)
+        paint_layer(view, self.side, index, self.fps, LayerStyle(rim=False))
 
     def small(self, area: Image, index: int) -> None:
         """The right view, ids and disparity, beside each other."""
@@ -63,7 +62,7 @@ class Pictures:
         for k, kind in enumerate(kinds):
             part = area[:, k * width : (k + 1) * width]
             words = _draw(part, kind, self.frames.get(index), self.pixels.get(index))
-            painter.chip(part, words, (4, 30), 0.62, INK)
+            draw_label(part, words, (4, 30), 0.62, INK)
 
 
 def _frames(sequence: Sequence, chosen: set[int]) -> dict[int, Frame]:

@@ -13,8 +13,8 @@ from scenarios.errors import InputError
 from sim.types import PixelTruth, Sequence, Truth
 from tests.coded_pictures import SIZE, number, sequence
 from tracking.app.pictures.contact_sheet import HEAD, TITLE, WIDTH, _nobody, choose, compose, sheet
-from tracking.app.pictures.contact_sheet_panels import STANDING, Pictures, coloured_disparity, coloured_ids
-from tracking.drawing.panel import FLOOR, GRID, colour
+from tracking.app.pictures.panel_pictures import STANDING, Pictures, coloured_disparity, coloured_ids
+from tracking.drawing.canvas import FLOOR, GRID, colour
 
 
 def pixels(index: int) -> PixelTruth:

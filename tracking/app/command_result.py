@@ -23,7 +23,7 @@ WIDE = 160
 
 
 @dataclass(frozen=True)
-class Answer:
+class CommandResult:
     """What a command has to say: data for --json, text (or what rich can print) for people.
 
     code: 0, or 1 where a check said no.
@@ -34,7 +34,7 @@ class Answer:
     code: int = 0
 
 
-def show(answer: Answer, as_json: bool) -> int:
+def show(answer: CommandResult, as_json: bool) -> int:
     """Print an answer; its exit code."""
     if as_json:
         _print_json({"status": STATUS[answer.code], **answer.data})

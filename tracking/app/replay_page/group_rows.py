@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from sim.types import Array, Bools, Groups, Ints, Tracks
-from tracking.app.replay_page.columns import deltas
+from tracking.app.replay_page.column_encoding import deltas
 
 MAX_HULL = 24
 FINE = {"ground": 0.02, "image": 1.0}

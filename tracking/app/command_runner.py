@@ -14,7 +14,7 @@ from typing import Any
 import typer
 
 from scenarios.errors import FlockscopeError, InputError, WorkError
-from tracking.app.output import DEBUG, INTERRUPTED, Answer, interrupted, refuse, show, unexpected
+from tracking.app.command_result import DEBUG, INTERRUPTED, CommandResult, interrupted, refuse, show, unexpected
 
 HELP = {"-h", "--help", "--version"}
 
@@ -29,7 +29,7 @@ def carry_out(app: typer.Typer, arguments: list[str]) -> int:
         try:
             warnings.showwarning = _once()
             answer = _spoken(app, arguments) if as_json else _answer(app, arguments)
-            return _said(answer, as_json) if isinstance(answer, Answer) else answer
+            return _said(answer, as_json) if isinstance(answer, CommandResult) else answer
         except KeyboardInterrupt:
             return interrupted(as_json)
         except FlockscopeError as error:
@@ -38,7 +38,7 @@ def carry_out(app: typer.Typer, arguments: list[str]) -> int:
             return refuse(error, as_json)
 
 
-def _spoken(app: typer.Typer, arguments: list[str]) -> Answer | int:
+def _spoken(app: typer.Typer, arguments: list[str]) -> CommandResult | int:
     """The command's answer, stdout kept free for its one object: help becomes its text, all else goes to stderr."""
     printed = io.StringIO()
     try:
@@ -46,13 +46,13 @@ def _spoken(app: typer.Typer, arguments: list[str]) -> Answer | int:
             answer = _answer(app, arguments)
         if answer == 0:
             text, printed = printed.getvalue().rstrip("\n"), io.StringIO()
-            return Answer({"text": text}, text)
+            return CommandResult({"text": text}, text)
         return answer
     finally:
         print(printed.getvalue(), end="", file=sys.stderr)
 
 
-def _answer(app: typer.Typer, arguments: list[str]) -> Answer | int:
+def _answer(app: typer.Typer, arguments: list[str]) -> CommandResult | int:
     """What the command has to say, or the code of one that has said it (--help)."""
     command: Any = typer.main.get_command(app)
     usage: Any = typer.BadParameter.__base__  # the class of all usage errors, typer's own or click's
@@ -68,7 +68,7 @@ def _answer(app: typer.Typer, arguments: list[str]) -> Answer | int:
         raise unexpected(error) from error
     if result == INTERRUPTED:  # typer's word for Ctrl-C
         raise KeyboardInterrupt
-    return result if isinstance(result, Answer) else int(result or 0)
+    return result if isinstance(result, CommandResult) else int(result or 0)
 
 
 def _is_of_interruption(error: BaseException | None) -> bool:
@@ -86,7 +86,7 @@ def _usage(error: Any) -> InputError:
     return InputError(place=where, got=got, expected="a command line as in the help", remedy=remedy)
 
 
-def _said(answer: Answer, as_json: bool) -> int:
+def _said(answer: CommandResult, as_json: bool) -> int:
     """Print the answer; a reader who has gone away has read enough, a full disk is told on stderr."""
     try:
         return show(answer, as_json)

@@ -2,7 +2,7 @@
 
 Rows are sorted by (id, frame); a *stint* is a run of one id over consecutive frames. Numbers are integers (metres
 times 100, px times 2, degrees), each column the differences from row to row; groups and visibility are run lengths.
-A page decodes them with cumulative sums (view_data.js).
+A page decodes them with cumulative sums (decode.js).
 """
 
 from __future__ import annotations
@@ -16,9 +16,9 @@ from typing import Any
 import numpy as np
 
 from sim.types import Array, Camera, GroupEvent, Ints, Scene, Sequence, Tracks, Truth
-from tracking.app.replay_page import group_data
-from tracking.app.replay_page.columns import deltas, run_lengths, stints
-from tracking.app.replay_page.group_data import Wholes
+from tracking.app.replay_page import group_rows
+from tracking.app.replay_page.column_encoding import deltas, run_lengths, stints
+from tracking.app.replay_page.group_rows import Wholes
 from tracking.app.replay_page.group_timeline import Bar, bars, links
 
 SCALE = {"ground": 100, "space": 100, "image": 2}
@@ -69,7 +69,7 @@ def track_rows(tracks: SequenceOf[Tracks]) -> Rows:
         _angles(vel, len(vel)),
         np.concatenate([np.zeros((0, 4)), *box]),
         np.ones(len(vel)),
-        group_data.wholes(tracks) if any(t.unit == "group" for t in tracks) else None,
+        group_rows.wholes(tracks) if any(t.unit == "group" for t in tracks) else None,
     )
 
 
@@ -102,7 +102,7 @@ def side(rows: Rows, events: Iterable[GroupEvent]) -> Json:
         "box": [] if np.isnan(box).all() else [deltas(box[:, k]) for k in range(4)],
         "group": run_lengths(group),
         "vis": run_lengths(np.nan_to_num(rows.visibility[order] * 10, nan=10).round().astype(np.int64)),
-        "wholes": None if rows.wholes is None else group_data.columns(rows.wholes, order, rows.plane, scale),
+        "wholes": None if rows.wholes is None else group_rows.columns(rows.wholes, order, rows.plane, scale),
         "events": [event_json(e, scale) for e in events if e.start >= 1],
         "bars": [list(asdict(bar).values()) for bar in _bars(rows)],
         "links": [list(asdict(link).values()) for link in links(events)],

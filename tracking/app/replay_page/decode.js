@@ -1,4 +1,4 @@
-// Decodes the embedded columns (view_data.py) into typed arrays, and finds the rows of a frame.
+// Decodes the embedded columns (person_rows.py) into typed arrays, and finds the rows of a frame.
 
 const NIL = -99999;
 const data = JSON.parse(document.getElementById("data").textContent);

@@ -1,0 +1,130 @@
+"""A picture in memory that is drawn on in world or image coordinates: lines, discs, arrows, polygons, text, id colours.
+
+Coordinates are rounded to 1/16 px. Colours are BGR.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+
+from sim.types import Array, Image
+
+INK, QUIET, GRID, FLOOR, THING, WALL = (
+    (36, 31, 27),
+    (120, 112, 104),
+    (238, 234, 230),
+    (253, 252, 251),
+    (144, 133, 125),
+    (60, 51, 45),
+)
+PALETTE = ("0072b2", "b84a00", "00805e", "a33a7a", "6a51a3", "8a6d00", "b2182b", "20708c", "4d7c0f", "7a4a2a")
+"""Colours of ids as RRGGBB; an id takes the colour at its number modulo 10."""
+
+SHIFT = 4
+"""Fractional bits of the coordinates that cv2 is given."""
+
+TRAIL_SECONDS = 3.0
+"""s: how far back trails reach."""
+
+Colour = tuple[int, int, int]
+
+
+def colour(identity: int) -> Colour:
+    """The BGR colour of an id, the same as on the replay page; grey for a negative id."""
+    if identity < 0:
+        return THING
+    text = PALETTE[identity % len(PALETTE)]
+    return int(text[4:], 16), int(text[2:4], 16), int(text[:2], 16)
+
+
+@dataclass(frozen=True, eq=False)
+class Canvas:
+    """A picture with a mapping from drawing coordinates to its pixels.
+
+    image: (H, W, 3) uint8 BGR, drawn on in place. scale: px per drawing unit (m on a plan, px over a picture).
+    low, high: (2,) drawing coordinates of the picture's smallest and largest x and y. upwards: y grows upwards, as on
+    a plan; else downwards, as in a picture.
+    """
+
+    image: Image
+    scale: float
+    low: Array
+    high: Array
+    upwards: bool
+
+    @classmethod
+    def fit(cls, image: Image, low: Array, high: Array, upwards: bool) -> Canvas:
+        """A canvas on `image` that shows the rectangle from `low` to `high`, centred, at the largest scale."""
+        height, width = image.shape[:2]
+        span = high - low
+        scale = min(width / span[0], height / span[1])
+        spare = (np.array([width, height]) / scale - span) / 2
+        return cls(image, float(scale), low - spare, high + spare, upwards)
+
+    def map(self, points: Array) -> Array:
+        """Pixel coordinates (N, 2) of points (N, 2) in drawing coordinates."""
+        points = np.asarray(points, float).reshape(-1, 2)
+        y = self.high[1] - points[:, 1] if self.upwards else points[:, 1] - self.low[1]
+        return np.stack([points[:, 0] - self.low[0], y], axis=1) * self.scale
+
+    def line(self, points: Array, ink: Colour, width: int, closed: bool = False) -> None:
+        """Draws a polyline through points (N, 2), `width` px wide; `closed` joins the last point to the first."""
+        cv2.polylines(self.image, [fixed_point(self.map(points))], closed, ink, width, cv2.LINE_AA, SHIFT)
+
+    def disc(self, at: Array, radius: float, ink: Colour, width: int = -1) -> None:
+        """Draws a disc of `radius` px round the point `at` (2,); with `width` > 0 a ring whose line is that wide."""
+        x, y = fixed_point(self.map(at))[0]
+        cv2.circle(self.image, (int(x), int(y)), round(radius * 2**SHIFT), ink, width, cv2.LINE_AA, SHIFT)
+
+    def arrow(self, ends: Array, ink: Colour, width: int) -> None:
+        """Draws an arrow from ends[0] to ends[1] (2, 2); its head is at most 7 px and half the arrow long."""
+        a, b = self.map(ends)
+        far = float(np.hypot(*(b - a)))
+        tip = min(7.0, far / 2) / far if far > 0 else 0.0
+        start, end = ((int(x), int(y)) for x, y in fixed_point(np.stack([a, b])))
+        cv2.arrowedLine(self.image, start, end, ink, width, cv2.LINE_AA, SHIFT, tip)
+
+    def fill(self, polygon: Array, ink: Colour, opacity: float) -> None:
+        """Fills a polygon (V, 2), given in pixel coordinates, at an opacity from 0 to 1."""
+        low = np.maximum(np.floor(polygon.min(axis=0)).astype(int) - 1, 0)
+        high = np.ceil(polygon.max(axis=0)).astype(int) + 2
+        patch = self.image[low[1] : high[1], low[0] : high[0]]
+        if patch.size == 0:
+            return
+        over = patch.copy()
+        cv2.fillPoly(over, [fixed_point(polygon - low)], ink, cv2.LINE_AA, SHIFT)
+        cv2.addWeighted(over, opacity, patch, 1 - opacity, 0, dst=patch)
+
+
+def fixed_point(points: Array) -> np.ndarray:
+    """Pixel coordinates as int32 with SHIFT fractional bits, for cv2, whose whole coordinates are pixel centres.
+
+    Coordinates are limited to ±30,000 px.
+    """
+    limited = np.clip(points - 0.5, -30_000, 30_000)
+    return np.asarray(np.rint(limited * 2**SHIFT), np.int32)
+
+
+def box_corners(box: Array) -> Array:
+    """The corners (4, 2) of a box (left, top, width, height): upper left, upper right, lower right, lower left."""
+    x, y, w, h = box
+    return np.array([[x, y], [x + w, y], [x + w, y + h], [x, y + h]])
+
+
+def ascii_only(words: str) -> str:
+    """The text with a question mark for each character outside ASCII, which cv2 cannot draw."""
+    return words.encode("ascii", "replace").decode()
+
+
+def text(image: Image, words: str, at: tuple[float, float], size: float, ink: Colour = INK, bold: int = 1) -> None:
+    """Writes `words` with a light rim; `at` is the lower left corner in px, `size` cv2's font scale.
+
+    Characters outside ASCII become question marks.
+    """
+    place = (round(at[0]), round(at[1]))
+    words = ascii_only(words)
+    cv2.putText(image, words, place, cv2.FONT_HERSHEY_SIMPLEX, size, FLOOR, bold + 4, cv2.LINE_AA)
+    cv2.putText(image, words, place, cv2.FONT_HERSHEY_SIMPLEX, size, ink, bold, cv2.LINE_AA)

@@ -1,0 +1,208 @@
+"""Draws a layer on a canvas: boxes with ids, trails, ellipses, groups; and captions of events and a banner of facts."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+
+from sim.types import Array, GroupEvent, Image
+from tracking.drawing.canvas import (
+    FLOOR,
+    INK,
+    TRAIL_SECONDS,
+    Canvas,
+    Colour,
+    ascii_only,
+    box_corners,
+    colour,
+)
+from tracking.drawing.layers import GroupMark, Layer
+
+CAPTION_SECONDS = 2.5
+"""s for which an event's caption is shown."""
+
+CAPTIONS = 6
+"""Captions in a picture at most."""
+
+MANY = 60
+"""Ids of people are left out of frames with more people than this; of more groups only the first are named."""
+
+PLAIN_INK = (250, 250, 250)
+ALARM = 6
+"""The id whose colour marks what a frame lacks, and events of unknown kind."""
+
+KIND_COLOUR = {"merge": 0, "split": 1, "cross": 3, "queue": 2, "form": 4, "dissolve": 5, "enter": 7, "leave": 9}
+"""The id whose colour an event's kind has."""
+
+
+@dataclass(frozen=True)
+class LayerStyle:
+    """How a layer is drawn.
+
+    plain: thin white boxes (and discs for people without a box) only, no trails, ellipses, ids or groups; for the
+    truth under tracks. rim: boxes have a light edge; without effect on plain and dashed boxes.
+    """
+
+    plain: bool = False
+    rim: bool = True
+
+
+def kind_colour(kind: str) -> Colour:
+    """The BGR colour of a kind of event."""
+    return colour(KIND_COLOUR.get(kind, ALARM))
+
+
+def event_words(event: GroupEvent, prefix: str = "G") -> str:
+    """An event in ASCII, as "merge G1+G2 -> G1"; one list of groups if they are the same before and after.
+
+    People who were or are alone are counted: "alone", "2 alone".
+    """
+
+    def listed(ids: tuple[int, ...]) -> str:
+        alone = sum(i < 0 for i in ids)
+        some = ["alone" if alone == 1 else f"{alone} alone"] if alone else []
+        return "+".join([*some, *(f"{prefix}{i}" for i in ids if i >= 0)])
+
+    if event.before == event.after:
+        return f"{event.kind} {listed(event.before)}"
+    return f"{event.kind} {listed(event.before)} -> {listed(event.after)}"
+
+
+def paint_layer(canvas: Canvas, layer: Layer, index: int, fps: float, style: LayerStyle = LayerStyle()) -> None:
+    """Draws frame `index` of a layer: groups first, then trails, boxes (a ring for people without a box), and ids."""
+    marks = layer.at(index)
+    groups = () if style.plain else marks.groups
+    for group in groups:
+        _paint_group(canvas, group, colour(group.id))
+    if not style.plain:
+        for identity, points in layer.trails(index, round(TRAIL_SECONDS * fps)):
+            canvas.line(points, colour(identity), 2)
+    for k, identity in enumerate(marks.id.tolist()):
+        ink = PLAIN_INK if style.plain else colour(identity)
+        if not style.plain and np.isfinite(marks.ellipse[k]).all():
+            _paint_ellipse(canvas, marks.ellipse[k], ink)
+        if np.isfinite(marks.box[k]).all():
+            _paint_box(canvas, marks.box[k], ink, style, dashed=bool(marks.hidden[k]))
+        elif np.isfinite(marks.at[k]).all():
+            canvas.disc(marks.at[k], 5, ink, 2)
+    if not style.plain:
+        _paint_ids(canvas, layer, index)
+        for group in groups[:MANY]:
+            _paint_group_id(canvas, layer.prefix, group)
+
+
+def _paint_group(canvas: Canvas, group: GroupMark, ink: Colour) -> None:
+    """The hull filled, the extent dotted, and an arrow from the centre to where it is in 1 s."""
+    if len(group.hull):
+        canvas.fill(canvas.map(group.hull), ink, 0.18)
+        canvas.line(group.hull, ink, 2, closed=True)
+    if len(group.extent):
+        _paint_dots(canvas, group.extent, ink)
+    if len(group.motion):
+        canvas.arrow(group.motion, FLOOR, 4)
+        canvas.arrow(group.motion, ink, 2)
+
+
+def _paint_dots(canvas: Canvas, ring: Array, ink: Colour) -> None:
+    """A closed line of dots some 7 px apart, each with a light rim; nothing if it is wider or higher than the image."""
+    ends = np.concatenate([ring, ring[:1]])
+    along = np.r_[0.0, np.cumsum(np.hypot(*np.diff(ends, axis=0).T))]
+    if not _fits(canvas, ring):
+        return
+    places = np.linspace(0.0, along[-1], max(int(along[-1] * canvas.scale / 7), 8), endpoint=False)
+    dots = np.stack([np.interp(places, along, ends[:, axis]) for axis in (0, 1)], axis=1)
+    for radius, tone in ((2.4, FLOOR), (1.5, ink)):
+        for at in dots:
+            canvas.disc(at, radius, tone)
+
+
+def _fits(canvas: Canvas, ring: Array) -> bool:
+    """True if the points span less than the image in both directions."""
+    return bool((np.ptp(ring, axis=0) * canvas.scale < canvas.image.shape[1::-1]).all())
+
+
+def _paint_box(canvas: Canvas, box: Array, ink: Colour, style: LayerStyle, dashed: bool) -> None:
+    corners = box_corners(box)
+    if dashed:
+        for a, b in zip(corners, np.roll(corners, -1, axis=0), strict=True):
+            _paint_dashes(canvas, a, b, ink)
+        return
+    if style.rim and not style.plain:
+        canvas.line(corners, FLOOR, 4, closed=True)
+    canvas.line(corners, ink, 1 if style.plain else 2, closed=True)
+
+
+def _paint_dashes(canvas: Canvas, a: Array, b: Array, ink: Colour) -> None:
+    """A dashed line from a to b with dashes of about 4 px."""
+    count = max(int(np.hypot(*(b - a)) * canvas.scale / 8), 1)
+    for k in range(count):
+        ends = a + (b - a) * np.array([[k / count], [(k + 0.5) / count]])
+        canvas.line(ends, ink, 1)
+
+
+def _paint_ellipse(canvas: Canvas, ring: Array, ink: Colour) -> None:
+    """Draws an ellipse; nothing if it is larger than the image, because the position is then as good as unknown."""
+    if _fits(canvas, ring):
+        canvas.line(ring, ink, 1, closed=True)
+
+
+def _paint_ids(canvas: Canvas, layer: Layer, index: int) -> None:
+    marks = layer.at(index)
+    if len(marks.id) > MANY or marks.whole_groups:
+        return
+    top = np.where(np.isfinite(marks.box[:, :2]), marks.box[:, :2], marks.at)
+    size = letter_size(canvas)
+    for identity, at in zip(marks.id.tolist(), canvas.map(top), strict=True):
+        if np.isfinite(at).all():
+            draw_label(canvas.image, str(identity), (at[0] - 1, at[1] - 1), size, colour(identity))
+
+
+def _paint_group_id(canvas: Canvas, prefix: str, group: GroupMark) -> None:
+    """The group's id, with its estimated size if known, below the lowest point of its hull, extent or arrow."""
+    points = canvas.map(
+        next(points for points in (group.hull, group.extent, group.motion, np.zeros((1, 2))) if len(points))
+    )
+    x, y = points[points[:, 1].argmax()]
+    words = f"{prefix}{group.id}" + (f" ~{round(group.size, 1):g}" if np.isfinite(group.size) else "")
+    size = letter_size(canvas)
+    draw_label(canvas.image, words, (x - 14 * size, y + 38 * size), size * 1.1, colour(group.id))
+
+
+def letter_size(canvas: Canvas) -> float:
+    """cv2's font scale that suits the height of the canvas, from 0.42 to 0.9."""
+    return float(np.clip(canvas.image.shape[0] / 1200, 0.42, 0.9))
+
+
+def draw_label(image: Image, words: str, at: tuple[float, float], size: float, ink: Colour) -> int:
+    """Writes light words on a rectangle of colour `ink` and returns the rectangle's height in px.
+
+    at: its lower left corner in px, moved so that the rectangle lies inside the image. size: cv2's font scale.
+    """
+    words = ascii_only(words)
+    (width, height), baseline = cv2.getTextSize(words, cv2.FONT_HERSHEY_SIMPLEX, size, 1)
+    x = int(np.clip(at[0], 0, max(image.shape[1] - width - 5, 0)))
+    y = int(np.clip(at[1], height + baseline + 2, image.shape[0] - 1))
+    cv2.rectangle(image, (x, y - height - baseline - 1), (x + width + 4, y), ink, -1)
+    cv2.putText(image, words, (x + 2, y - baseline), cv2.FONT_HERSHEY_SIMPLEX, size, FLOOR, 1, cv2.LINE_AA)
+    return height + baseline + 2
+
+
+def draw_captions(image: Image, layer: Layer, index: int, fps: float, size: float) -> None:
+    """Writes the events that became known in the last 2.5 s, upwards from the lower left corner, the newest lowest."""
+    y = float(image.shape[0] - 6)
+    for event in layer.recent_events(index, CAPTION_SECONDS * fps)[:CAPTIONS]:
+        y -= draw_label(image, event_words(event, layer.prefix), (6, y), size * 1.25, kind_colour(event.kind)) + 3
+
+
+def draw_banner(image: Image, words: str, warnings: list[str], size: float) -> None:
+    """Fills the whole image with the floor's colour, writes `words` at its left and `warnings` on red at its right."""
+    image[:] = FLOOR
+    y = image.shape[0] * 0.5 + 9 * size
+    cv2.putText(image, words, (6, round(y)), cv2.FONT_HERSHEY_SIMPLEX, size, INK, 1, cv2.LINE_AA)
+    x = float(image.shape[1] - 4)
+    for warning in warnings:
+        (width, _), _ = cv2.getTextSize(warning, cv2.FONT_HERSHEY_SIMPLEX, size, 1)
+        x -= width + 10
+        draw_label(image, warning, (x, y + 6), size, colour(ALARM))

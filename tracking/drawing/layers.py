@@ -1,0 +1,246 @@
+"""What to draw over a picture or plan: a layer holds boxes, trails, ellipses, groups and events of truth or tracks.
+
+Layers are computed from `Truth` or `Tracks` here, in drawing coordinates (px, or m on a plan); `layer_painting` draws
+them.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator
+from collections.abc import Sequence as SequenceOf
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from sim.geometry.polygons import convex_hull
+from sim.io.store.truth_files import standing
+from sim.io.store.upright_boxes import upright_boxes
+from sim.types import Array, Bools, Camera, GroupEvent, Groups, Ints, Scene, Tracks, Truth
+
+SIGMA_95 = math.sqrt(5.991)
+"""Standard deviations: the ellipse at this distance holds 95 % of a normal distribution in the plane."""
+
+SIGMA_99 = math.sqrt(9.21)
+"""The same for 99 %: the points d from a group's centre with d' E^-1 d = 9.21 for its extent E."""
+
+UNIT_CIRCLE = np.stack([f(np.linspace(0, 2 * np.pi, 32, endpoint=False)) for f in (np.cos, np.sin)], axis=1)
+BOX_MARGIN = 5.0
+"""px between members' boxes and the outline of their group."""
+
+HIDDEN = 0.2
+"""A person whose visible share is below this gets a dashed box."""
+
+NOT_CAPTIONED = ("enter", "leave")
+"""Kinds of events without a caption."""
+
+NO_POINTS = np.zeros((0, 2))
+
+
+@dataclass(frozen=True, eq=False)
+class GroupMark:
+    """One group in one frame, in drawing coordinates. hull: (V, 2) polygon; no vertex where it is unknown or unseen.
+
+    The other fields are known only of a group that is tracked as a whole. extent: (32, 2), the ellipse that holds 99 %
+    of the group by its extent. motion: (2, 2), its centre now and in 1 s. size: its estimated number of people. Unknown
+    arrays have no rows; an unknown size is nan.
+    """
+
+    id: int
+    hull: Array
+    extent: Array = field(default_factory=NO_POINTS.copy)
+    motion: Array = field(default_factory=NO_POINTS.copy)
+    size: float = math.nan
+
+
+@dataclass(frozen=True, eq=False)
+class FrameMarks:
+    """One layer in one frame: N people, or N groups if `whole_groups`, in drawing coordinates.
+
+    id: (N,). box: (N, 4) ltwh, nan where unknown. at: (N, 2), the point that trails follow, nan where unknown. ellipse:
+    (N, 32, 2), holds the position with 95 % probability, nan where unknown. hidden: (N,), true people of whom less than
+    HIDDEN is visible. groups: the groups of the frame.
+    """
+
+    id: Ints
+    box: Array
+    at: Array
+    ellipse: Array
+    hidden: Bools
+    groups: tuple[GroupMark, ...] = ()
+    whole_groups: bool = False
+
+    @classmethod
+    def none(cls) -> FrameMarks:
+        """A frame without people and groups."""
+        return cls(np.zeros(0, np.int64), np.zeros((0, 4)), NO_POINTS, np.zeros((0, 32, 2)), np.zeros(0, bool))
+
+
+@dataclass(frozen=True, eq=False)
+class Layer:
+    """The truth or a tracker's output over a sequence. name: "true" or "tracked". prefix: of group ids, "G" or "T".
+
+    frames: the marks by frame index. events: each event with the frame in which it becomes known: for tracks the frame
+    in which it was emitted, for truth its first frame.
+    """
+
+    name: str
+    prefix: str
+    frames: dict[int, FrameMarks]
+    events: tuple[tuple[int, GroupEvent], ...] = field(default=())
+
+    def at(self, index: int) -> FrameMarks:
+        """The marks of a frame; empty ones for a frame that has none."""
+        return self.frames.get(index, FrameMarks.none())
+
+    def trails(self, index: int, past: int) -> Iterator[tuple[int, Array]]:
+        """(id, points) of each trail that ends in frame `index`; points (K, 2), the newest first, K >= 2.
+
+        A trail reaches back `past` frames at most, and ends before a frame in which the point is unknown.
+        """
+        trails: dict[int, list[Array]] = {}
+        unbroken = set(self.at(index).id.tolist())
+        for k in range(index, max(index - past, 1) - 1, -1):
+            marks = self.at(k)
+            points = dict(zip(marks.id.tolist(), marks.at, strict=True))
+            unbroken &= {i for i, at in points.items() if np.isfinite(at).all()}
+            for i in unbroken:
+                trails.setdefault(i, []).append(points[i])
+        return ((i, np.array(points)) for i, points in trails.items() if len(points) > 1)
+
+    def recent_events(self, index: int, frames: float) -> list[GroupEvent]:
+        """Events that became known in frame `index` or less than `frames` before it, newest first; no enter, leave."""
+        recent = [(known, e) for known, e in self.events if 0 <= index - known < frames and e.kind not in NOT_CAPTIONED]
+        return [event for _, event in sorted(recent, key=lambda pair: -pair[0])]
+
+
+def layer_of_truth(truth: Truth) -> Layer:
+    """The truth's layer, in px. Frames without a person, and all frames of a truth without boxes, have no marks."""
+    frames = {}
+    for index in range(1, truth.length + 1):
+        now = truth.at(index)
+        if now.box is None or not len(now.id):
+            continue
+        ellipse = np.full((len(now.id), 32, 2), np.nan)
+        hidden = now.visibility < HIDDEN
+        frames[index] = FrameMarks(now.id, now.box, _feet(now.box), ellipse, hidden, _box_hulls(now.group, now.box))
+    return Layer("true", "G", frames, tuple((e.start, e) for e in truth.events or ()))
+
+
+def layer_of_tracks(tracks: SequenceOf[Tracks], camera: Camera | None, scene: Scene | None) -> Layer:
+    """A tracker's layer over pictures, in px.
+
+    Tracks on the ground are projected through `camera`; people without boxes get the box of an upright person. Without
+    a camera their places are unknown. scene: gives the ground's height; None: the ground is flat.
+    """
+    frames = {t.index: _marks_in_picture(t, camera, scene) for t in tracks}
+    return Layer("tracked", "T", frames, _emitted(tracks))
+
+
+def plan_layer_of_tracks(tracks: SequenceOf[Tracks]) -> Layer:
+    """A tracker's layer on a plan, in m, without boxes; the tracks must be on the ground."""
+    return Layer("tracked", "T", {t.index: _marks_on_plan(t) for t in tracks}, _emitted(tracks))
+
+
+def _emitted(tracks: SequenceOf[Tracks]) -> tuple[tuple[int, GroupEvent], ...]:
+    return tuple((e.start if e.emitted is None else e.emitted, e) for t in tracks for e in t.events)
+
+
+def _marks_in_picture(t: Tracks, camera: Camera | None, scene: Scene | None) -> FrameMarks:
+    if t.unit == "group":
+        return _whole_groups_in_picture(t, camera, scene)
+    n = len(t.id)
+    box = t.box if t.box is not None else np.full((n, 4), np.nan)
+    if t.box is None and t.plane != "image" and camera is not None:
+        box = upright_boxes(camera, standing(t.pos, scene))
+    at = _feet(box)
+    if t.plane == "image":
+        at = np.where(np.isfinite(at), at, t.pos)
+    return FrameMarks(t.id, box, at, _ellipses(t, camera, scene), np.zeros(n, bool), _box_hulls(t.group, box))
+
+
+def _whole_groups_in_picture(t: Tracks, camera: Camera | None, scene: Scene | None) -> FrameMarks:
+    n = len(t.id)
+    groups = _whole_groups(t, lambda points: _in_picture(points, t.plane, camera, scene))
+    at = np.array([g.motion[0] if len(g.motion) else [np.nan, np.nan] for g in groups]).reshape(n, 2)
+    no_box, no_ellipse = np.full((n, 4), np.nan), np.full((n, len(UNIT_CIRCLE), 2), np.nan)
+    return FrameMarks(t.id, no_box, at, no_ellipse, np.zeros(n, bool), groups, whole_groups=True)
+
+
+def _marks_on_plan(t: Tracks) -> FrameMarks:
+    n, groups, at = len(t.id), t.groups or Groups.none(), t.pos[:, :2]
+    if t.unit == "group":
+        marks = _whole_groups(t, lambda points: points[:, :2])
+    else:
+        hulls = groups.hull or tuple(NO_POINTS for _ in groups.id)
+        marks = tuple(GroupMark(g, hull) for g, hull in zip(groups.id.tolist(), hulls, strict=True))
+    rings = [ellipse(p, cov, SIGMA_95) for p, cov in zip(at, t.cov[:, :2, :2], strict=True)]
+    unknown = np.full((len(UNIT_CIRCLE), 2), np.nan)
+    ellipses = np.array([ring if len(ring) else unknown for ring in rings]).reshape(n, len(UNIT_CIRCLE), 2)
+    return FrameMarks(t.id, np.full((n, 4), np.nan), at, ellipses, np.zeros(n, bool), marks, t.unit == "group")
+
+
+def _whole_groups(t: Tracks, to_drawing: Callable[[Array], Array]) -> tuple[GroupMark, ...]:
+    """The groups of tracks whose rows are groups; `to_drawing` maps points to drawing coordinates."""
+    groups = t.groups or Groups.none()
+    rows = dict(zip(groups.id.tolist(), range(len(groups.id)), strict=True))
+
+    def mark(k: int, name: int) -> GroupMark:
+        row, motion = rows.get(name), to_drawing(np.stack([t.pos[k], t.pos[k] + t.vel[k]]))
+        if row is None:
+            return GroupMark(name, NO_POINTS, motion=motion)
+        hull = groups.hull[row] if groups.hull else NO_POINTS
+        extent = ellipse(t.pos[k, :2], groups.extent[row], SIGMA_99)
+        return GroupMark(name, to_drawing(hull), to_drawing(extent), motion, float(groups.size[row]))
+
+    return tuple(mark(k, name) for k, name in enumerate(t.id.tolist()))
+
+
+def _feet(box: Array) -> Array:
+    """The middles (N, 2) of the lower edges of boxes (N, 4) ltwh."""
+    return np.asarray(box[:, :2] + box[:, 2:] * np.array([0.5, 1.0]))
+
+
+def _box_hulls(group: Ints, box: Array) -> tuple[GroupMark, ...]:
+    """Each group that has two or more known boxes, with the hull of these, widened by BOX_MARGIN."""
+    names = np.unique(group[group >= 0])
+    box = box + BOX_MARGIN * np.array([-1, -1, 2, 2])
+    found = [(int(g), box[(group == g) & np.isfinite(box[:, 0])]) for g in names]
+    return tuple(GroupMark(g, convex_hull(_all_corners(own))) for g, own in found if len(own) > 1)
+
+
+def _all_corners(box: Array) -> Array:
+    return np.concatenate([box[:, :2] + box[:, 2:] * np.array(c) for c in ((0, 0), (1, 0), (1, 1), (0, 1))])
+
+
+def _in_picture(points: Array, plane: str, camera: Camera | None, scene: Scene | None) -> Array:
+    """Points (K, 2 or 3) of a tracker's plane as (K, 2) px; (0, 2) if a point off the image plane cannot be seen."""
+    if plane == "image" or not len(points):
+        return points
+    if camera is None:
+        return NO_POINTS
+    from sim.scene.camera import project
+
+    uv, depth = project(camera, standing(points, scene))
+    return uv if (depth > 0).all() and np.isfinite(uv).all() else NO_POINTS
+
+
+def ellipse(centre: Array, cov: Array, sigmas: float) -> Array:
+    """(32, 2) points at `sigmas` standard deviations of the covariance `cov` (2, 2) round `centre` (2,).
+
+    Returns (0, 2) if an entry of `cov` is not finite.
+    """
+    if not np.isfinite(cov).all():
+        return NO_POINTS
+    values, vectors = np.linalg.eigh(cov)
+    return np.asarray(centre + sigmas * (UNIT_CIRCLE * np.sqrt(np.maximum(values, 0.0))) @ vectors.T)
+
+
+def _ellipses(t: Tracks, camera: Camera | None, scene: Scene | None) -> Array:
+    """The 95 % ellipses of people's positions, (N, 32, 2) px; nan where the covariance is unknown or it is unseen."""
+    found = np.full((len(t.id), len(UNIT_CIRCLE), 2), np.nan)
+    for k, cov in enumerate(t.cov[:, :2, :2]):
+        points = _in_picture(ellipse(t.pos[k, :2], cov, SIGMA_95), t.plane, camera, scene)
+        if len(points):
+            found[k] = points
+    return found
