@@ -16,7 +16,8 @@ from pathlib import Path
 
 import numpy as np
 
-from sim.workers.pool import THREADS, crew
+from sim.workers.protocol import THREAD_VARIABLES
+from sim.workers.start import start_workers
 from tracking.agent_search import learn, played
 from tracking.environment.episodes import sources
 from tracking.stats import bootstrap, paired
@@ -42,7 +43,7 @@ def main() -> None:
     made.add_argument("--workers", type=int, default=2)
     made.add_argument("--out", type=Path, help="the agent found, *.json")
     given = made.parse_args()
-    for name in THREADS:
+    for name in THREAD_VARIABLES:
         os.environ.setdefault(name, "1")
     tracker, scenario, mode = given.case.split(":")
     names, seen = given.parameters.split(","), given.statistics.split(",")
@@ -54,7 +55,7 @@ def main() -> None:
         print("  in validation {}: {:+.2f} [{:+.2f}, {:+.2f}]".format(word, *(100 * g for g in gain)))
     test = sources(scenario, range(*map(int, given.seeds.split(":"))), given.set)
     none = replace(found.fixed, offset=np.zeros(len(names)))
-    with crew(given.workers) as run:
+    with start_workers(given.workers) as run:
         rows = np.stack([played(run, p, test, mode) for p in (none, found.fixed, found.agent)], axis=1)
     mean, low, high = bootstrap(100 * rows)
     print(f"\n{given.case}, seeds {given.seeds}, {', '.join(names)} every {given.every:g} s by {', '.join(seen)}\n")

@@ -19,8 +19,9 @@ from pathlib import Path
 from typing import Any
 
 from scenarios.loading.resolve import dump, load, names
-from sim.hashing import ENGINE, cpu_level, scenario_hash, truth_hash
+from sim.hashing import ENGINE, scenario_hash, truth_hash
 from sim.sequence import simulate
+from sim.versions import cpu_level
 
 FILE = Path(__file__).resolve().parents[1] / "tests" / "sim" / "golden.json"
 LIBRARIES = ("numpy", "scipy", "numba", "llvmlite", "pymunk")

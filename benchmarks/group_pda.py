@@ -31,7 +31,7 @@ from benchmarks import (
     group_pda_real,
     group_pda_scenes,
 )
-from sim.workers.pool import THREADS
+from sim.workers.protocol import THREAD_VARIABLES
 
 MODES: dict[str, Callable[[argparse.Namespace], Any]] = {
     "scenarios": group_pda_scenes.scenarios,
@@ -69,7 +69,7 @@ def beside() -> Path:
 
 def main() -> None:
     given = parser().parse_args()
-    for name in THREADS:
+    for name in THREAD_VARIABLES:
         os.environ.setdefault(name, "1")
     found = MODES[given.mode](given)
     if given.json is not None:

@@ -28,7 +28,7 @@ from sim.crowd.world import run as walk
 from sim.scene.camera import solve
 from sim.sequence import observe
 from sim.types import DetectionMode, Motion, Truth
-from sim.workers import pool
+from sim.workers.pool import process_pool
 from tracking import tracker_registry
 from tracking.stats import wilson
 
@@ -149,7 +149,7 @@ def difference(given: argparse.Namespace) -> Any:
 def collected(jobs: Sequence[Job], processes: int) -> Answer:
     """By variant, the answers of all seeds, difference after difference within a seed."""
     made = {}
-    with pool.pool(processes) as run:
+    with process_pool(processes) as run:
         for job, answer in run(one, list(jobs)):
             made[job.seed] = answer
             print(f"\r{job.kind}: {len(made)}/{len(jobs)} seeds", end="", file=sys.stderr, flush=True)

@@ -22,7 +22,7 @@ from sim.sequence import simulate
 from sim.truth.group_hulls import box_groups
 from sim.types import DetectionMode, Frame, Image, Tracks, Truth
 from sim.types import Sequence as Recording
-from sim.workers import pool
+from sim.workers.pool import process_pool
 from tracking.detect import background
 from tracking.detect.background_training import Trained, train
 from tracking.run import TrackingRun, track
@@ -63,7 +63,7 @@ def trackers(name: str, mode: DetectionMode) -> tuple[Variant, ...]:
 def measure(jobs: Iterable[Job], processes: int) -> Iterator[tuple[Job, dict[str, Row]]]:
     """Rows by variant of each job as they come; a seed that cannot be is said and left out."""
     todo = list(jobs)
-    with pool.pool(processes) as run:
+    with process_pool(processes) as run:
         for done, (job, found) in enumerate(run(one, todo), 1):
             print(f"\r{done}/{len(todo)} sequences", end="", file=sys.stderr, flush=True)
             if isinstance(found, str):

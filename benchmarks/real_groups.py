@@ -25,7 +25,7 @@ import numpy as np
 
 from scenarios.loading.resolve import load, names
 from sim.io.formats.caviar import CHORD
-from sim.io.formats.group_labels import dense
+from sim.io.formats.group_labels import rows_to_grid
 from sim.io.formats.velocity import differentiate
 from sim.io.source import open_source
 from sim.sequence import simulate
@@ -141,7 +141,7 @@ def caviar(root: Path) -> None:
     for window in (0.5, 1.0, 2.0):
         vel = differentiate(truth.frame, truth.id, centre, truth.fps, window)
         pos, speed, intent = (
-            dense(truth.frame, truth.id, x, truth.length)
+            rows_to_grid(truth.frame, truth.id, x, truth.length)
             for x in (centre / truth.px_per_m, vel / truth.px_per_m, label.astype(float))
         )
         there = np.isfinite(intent)

@@ -22,7 +22,7 @@ from pathlib import Path
 
 from sim.dataset.generate import generate
 from sim.io.export.webdataset import webdataset
-from sim.workers.pool import crew
+from sim.workers.start import start_workers
 from tests.errands import process
 from tests.loopback import loopback
 
@@ -63,7 +63,11 @@ def cost(entries: list[str], seeds: range, streams: tuple[str, ...], images: str
 
 def rate(items: int) -> float:
     """Items a second that a cluster of two workers gets through, if there is nothing to do."""
-    with tempfile.TemporaryDirectory() as name, loopback(Path(name)) as cluster, crew(1, cluster.address) as run:
+    with (
+        tempfile.TemporaryDirectory() as name,
+        loopback(Path(name)) as cluster,
+        start_workers(1, cluster.address) as run,
+    ):
         list(run(process, range(20), ahead=20))
         begin = time.perf_counter()
         list(run(process, range(items), ahead=100))

@@ -25,8 +25,8 @@ import numpy as np
 
 from scenarios.errors import InputError
 from sim.types import Array, DetectionMode, Frame, Tracks
-from sim.workers import pool
-from sim.workers.pool import THREADS
+from sim.workers.protocol import THREAD_VARIABLES
+from sim.workers.start import results_in_order, start_workers
 from tracking.config import Config
 from tracking.environment.episode_cache import Held
 from tracking.environment.episodes import streams_for
@@ -135,8 +135,8 @@ def play(job: Job) -> Found:
 
 def played(jobs: list[Job], count: int) -> Iterator[Found]:
     """All jobs, in their order."""
-    with pool.crew(count) as run:
-        for done, found in enumerate(pool.in_order(run, play, jobs), 1):
+    with start_workers(count) as run:
+        for done, found in enumerate(results_in_order(run, play, jobs), 1):
             print(f"\r{done}/{len(jobs)} sequences", end="", file=sys.stderr, flush=True)
             yield found
     print(file=sys.stderr)
@@ -183,7 +183,7 @@ def main() -> None:
     made.add_argument("--every", type=float, default=2.5, help="s between decisions")
     made.add_argument("--workers", type=int, default=1)
     given = made.parse_args()
-    for name in THREADS:
+    for name in THREAD_VARIABLES:
         os.environ.setdefault(name, "1")
     for name in given.cases.split(","):
         case(name, given)

@@ -70,20 +70,6 @@ class PixelHash:
         return self._h.hexdigest()
 
 
-def cpu_level() -> str:
-    """The vector instructions numpy may use here, on which last bits depend: machine and x86-64 level or features."""
-    import importlib
-    import platform
-
-    has = importlib.import_module("numpy._core._multiarray_umath").__cpu_features__
-    machine = platform.machine().lower()
-    if machine in ("x86_64", "amd64"):
-        third = has.get("X86_V3", has.get("AVX2") and has.get("FMA3"))  # as older numpy says it
-        level = 4 if has.get("X86_V4", has.get("AVX512_SKX")) else 3 if third else 2
-        return f"x86-64-v{level}"
-    return "+".join([machine, *sorted(name for name in ("ASIMD", "SVE", "VSX", "VX") if has.get(name))])
-
-
 def _feed(h: Any, value: Any) -> None:
     match value:
         case None:

@@ -9,12 +9,24 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from scenarios.errors import InputError
-from sim.io.store.background_sample import OWN
 from sim.render.renderer import Rendered, Stage, stage
 from sim.scene.camera import px_per_m_at_centre, solve
 from sim.truth.label import bodies, label
 from sim.truth.order_fulfilment import check_orders
-from sim.types import BACKGROUNDS, Camera, Detections, Frame, Image, Motion, Order, PixelTruth, Scene, Sequence, Truth
+from sim.types import (
+    BACKGROUNDS,
+    OWN_BACKGROUND,
+    Camera,
+    Detections,
+    Frame,
+    Image,
+    Motion,
+    Order,
+    PixelTruth,
+    Scene,
+    Sequence,
+    Truth,
+)
 
 if TYPE_CHECKING:
     from scenarios.schema.observation import ObservationSpec
@@ -101,7 +113,7 @@ def observe(
             "kind": "simulated",
             "seed": motion.seed,
             "repeat": motion.repeat,
-            **({} if drawn is None else {"background": OWN}),
+            **({} if drawn is None else {"background": OWN_BACKGROUND}),
         },
         has_images=drawn is not None and drawn.has_image,
         has_right=drawn is not None and drawn.has_right,

@@ -24,6 +24,7 @@ Plane = Literal["ground", "space", "image"]
 Unit = Literal["person", "group"]
 DetectionMode = Literal["image", "truth", "file"]
 BACKGROUNDS = 50  # empty frames before the first, of a sequence of ours
+OWN_BACKGROUND = f"{BACKGROUNDS} empty frames before frame 1"
 EVENT_KINDS = ("merge", "split", "cross", "queue", "form", "dissolve", "enter", "leave")
 
 

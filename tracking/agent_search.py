@@ -16,7 +16,8 @@ import numpy as np
 
 from scenarios.errors import InputError
 from sim.types import Array, DetectionMode, Ints
-from sim.workers.pool import Run, crew, in_order
+from sim.workers.protocol import RunItems
+from sim.workers.start import results_in_order, start_workers
 from tracking.agent import Policy
 from tracking.environment.episodes import Cache, Rollout, play
 from tracking.environment.observation import NAMES, Observer
@@ -97,12 +98,12 @@ def learn(
     zero = Policy(tracker, every, tuple(parameters), tuple(statistics), p, np.outer(p, f), f, f + 1)
     usual, spread = usual_statistics(zero, train[:BATCH], detections)
     zero = replace(zero, usual=usual, spread=spread)
-    with crew(workers) as run:
+    with start_workers(workers) as run:
         base = dict(zip(train, played(run, zero, train, detections), strict=True))
 
         def gains(policies: list[Policy], part: Sequence[Source]) -> Array:
             jobs = [Job(policy, s, detections) for policy in policies for s in part]
-            value = np.reshape(list(in_order(run, objective, jobs)), (len(policies), len(part)))
+            value = np.reshape(list(results_in_order(run, objective, jobs)), (len(policies), len(part)))
             return np.asarray(value - np.array([base[s] for s in part]))
 
         history: list[float] = []
@@ -173,9 +174,9 @@ def moved(policy: Policy, which: Ints, by: Array) -> Policy:
     return replace(policy, offset=point[:p], weights=point[p:].reshape(p, f))
 
 
-def played(run: Run, policy: Policy, among: Sequence[Source], mode: DetectionMode) -> Array:
+def played(run: RunItems, policy: Policy, among: Sequence[Source], mode: DetectionMode) -> Array:
     """The objective (S,) of a policy on each of the sources."""
-    return np.array(list(in_order(run, objective, [Job(policy, s, mode) for s in among])))
+    return np.array(list(results_in_order(run, objective, [Job(policy, s, mode) for s in among])))
 
 
 def usual_statistics(policy: Policy, among: Sequence[Source], mode: DetectionMode) -> tuple[Array, Array]:

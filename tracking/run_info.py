@@ -37,7 +37,7 @@ def run_info(
     tracks: of the whole run. sensor: settings of mode "truth", empty if none. px_per_m: the scale by which groups were
     derived; nan is stored as None.
     """
-    from sim.io.store.box_source import box_source
+    from sim.io.store.track_boxes import box_source
 
     sample = prepared.context.background
     begins = 1 if sample is None else causal_from(prepared.sequence)
@@ -68,10 +68,10 @@ def causal_from(sequence: Sequence) -> int | None:
     The result is 1 if the sample holds no frame of the recording itself, N for a sample of the first N frames, and None
     for a sample spread over the recording.
     """
-    from sim.io.store.background_sample import Sample
+    from sim.io.pictures.background_sample import BackgroundSample
 
     sample = sequence.load_background
-    if not isinstance(sample, Sample):
+    if not isinstance(sample, BackgroundSample):
         return 1
     return sample.choice.count if sample.choice.how == "first" else None
 

@@ -1,7 +1,7 @@
-"""Many sequences at once: every entry with every seed, stored as a dataset, by as many workers as wanted.
+"""Generate a dataset: simulate every entry with every seed on any number of workers, and store the sequences.
 
-A sequence is whole or not there, so an interrupted run goes on where it was, and what a dead worker was at is made by
-another; what is stored depends on scenario, seed and versions alone, never on who makes it.
+A sequence folder appears complete or not at all, so an interrupted command can be run again: stored sequences are kept.
+The stored bytes depend on scenario, seed and versions only, not on the workers.
 """
 
 from __future__ import annotations
@@ -13,16 +13,18 @@ from uuid import uuid4
 
 from scenarios.errors import FlockscopeError, InputError, WorkError
 from scenarios.loading.resolve import Entry
-from sim.dataset.seed_ranges import split_of
-from sim.dataset.sequence_job import Job, attempt, begun, given_up, plan
-from sim.io.files.atomic import PARTIAL, sweep, write_file
-from sim.io.files.lock import alone
+from sim.dataset.sequence_job import SequenceJob, lost_job, plan_jobs, run_job, stored_manifest
+from sim.dataset.splits import split_of
+from sim.io.files.atomic import PARTIAL, remove_partials, write_file
+from sim.io.files.lock import lock_folder
 from sim.io.store.manifest import MANIFEST
-from sim.io.store.streams import chosen
-from sim.workers.pool import crew
+from sim.io.store.streams import check_streams
+from sim.workers.start import WorkerOptions, start_workers
 
-AHEAD = 100  # jobs that wait at a scheduler, beside one for each worker
+QUEUED_JOBS = 100  # jobs that wait at a cluster's scheduler, beside one for each worker
+ONE_WORKER = WorkerOptions()
 Progress = Callable[[int, int, str], None]
+"""Called as progress(sequences done, sequences in all, name of the last one)."""
 
 
 def generate(
@@ -31,40 +33,43 @@ def generate(
     out: str | Path,
     *,
     set: Iterable[str] = (),
-    workers: int = 1,
+    workers: WorkerOptions = ONE_WORKER,
     progress: Progress | None = None,
     streams: Iterable[str] = ("left",),
     images: str = "jpg",
-    cluster: str | None = None,
 ) -> list[Path]:
-    """Make OUT/flockscope-<split>/<name>-s<seed>/ of every entry (or name of one) and seed, and OUT/seqmaps.
+    """Write OUT/flockscope-<split>/<name>-s<seed>/ for every entry and seed, and OUT/seqmaps; returns the folders.
 
-    Sequences that are complete and of the same scenario and seed are kept. progress(done, all, name) is called after
-    each. streams, images: the pictures to store (sim.io.store.streams.STREAMS, () none), and as what. cluster: the
-    address
-    of a dask scheduler whose workers make them, in a folder that all machines share. InputError before anything is
-    made where names clash, the range is wrong, or a folder holds another scenario's sequence; WorkError at the end, the
-    others kept, where a sequence failed; at once where nothing can be written any more.
+    The folders come in the order of entries, then seeds. Stored sequences of the same scenario, seed and pictures are
+    kept.
+
+    entries: resolved entries, or names of scenarios, suites or TOML files. set: "key=value" settings for the named
+    ones. seeds: inside one split. streams: pictures to store (sim.io.store.streams.STREAMS; () for none). images:
+    their file type, "jpg", "png" or "mp4". The workers of a cluster must share the folder `out` under the same path.
+
+    Raises InputError before anything is simulated if an option is wrong, entries share a name, or a folder holds
+    another sequence. If sequences fail, the others are made and then the first error is raised, with the number of
+    failures. An error that would hit every sequence, as a full disk, is raised at once.
     """
-    if workers < 1:
-        raise InputError(place="workers", got=workers, expected="1 or more", remedy="correct --workers")
-    split, root = split_of(seeds), Path(out) if cluster is None else Path(out).absolute()
+    if workers.count < 1:
+        raise InputError(place="workers", got=workers.count, expected="1 or more", remedy="correct --workers")
+    split, root = split_of(seeds), Path(out) if workers.cluster is None else Path(out).absolute()
     folder = root / f"flockscope-{split}"
-    pictures = chosen(streams, images)
-    jobs = [replace(job, streams=pictures, images=images) for job in plan(_resolved(entries, set), seeds, folder)]
-    with alone(root):
-        sweep(root, folder, root / "seqmaps")
+    pictures = check_streams(streams, images)
+    jobs = [replace(job, streams=pictures, images=images) for job in plan_jobs(_resolved(entries, set), seeds, folder)]
+    with lock_folder(root):
+        remove_partials(root, folder, root / "seqmaps")
         for job in jobs:
-            begun(job)
+            stored_manifest(job)
         try:
-            errors = _run(jobs, workers, cluster, _counted(progress, len(jobs)))
+            errors = _run_jobs(jobs, workers, _counter(progress, len(jobs)))
         finally:
-            sweep(root, folder)
+            remove_partials(root, folder)
         try:
-            there = write_seqmap(root, split)
+            complete = write_seqmap(root, split)
         except FlockscopeError as error:
             errors["seqmaps"] = error
-    errors = errors or {job.name: _unseen(job) for job in jobs if job.name not in there}
+    errors = errors or {job.name: _not_visible(job) for job in jobs if job.name not in complete}
     if errors:
         raise _summary(errors, len(jobs))
     return [job.folder for job in jobs]
@@ -77,31 +82,33 @@ def _resolved(entries: Iterable[Entry | str], set: Iterable[str]) -> list[Entry]
     return [e for entry in entries for e in (resolve(entry, settings) if isinstance(entry, str) else [entry])]
 
 
-def _run(jobs: list[Job], workers: int, cluster: str | None, done: Callable[[Job], None]) -> dict[str, FlockscopeError]:
-    """Make all, as long as something can be written; the errors by sequence, in the order of the jobs."""
+def _run_jobs(
+    jobs: list[SequenceJob], workers: WorkerOptions, done: Callable[[SequenceJob], None]
+) -> dict[str, FlockscopeError]:
+    """Run all jobs, or those up to the first fatal error; returns the errors by name, in the order of the jobs."""
     errors: dict[str, FlockscopeError] = {}
-    with crew(min(workers, max(1, len(jobs))), cluster) as run:
-        marked = jobs if cluster is None else _marked(jobs)
-        for job, outcome in run(attempt, marked, ahead=AHEAD, lost=given_up):
+    with start_workers(min(workers.count, max(1, len(jobs))), workers.cluster) as run:
+        marked = jobs if workers.cluster is None else _with_marker(jobs)
+        for job, outcome in run(run_job, marked, ahead=QUEUED_JOBS, on_loss=lost_job):
             if outcome.error is not None:
                 errors[job.name] = outcome.error
-            if outcome.hopeless:
+            if outcome.fatal:
                 break
             done(job)
     return {job.name: errors[job.name] for job in jobs if job.name in errors}
 
 
-def _marked(jobs: list[Job]) -> list[Job]:
-    """Jobs for whoever sees the folder that we see; the mark goes away with what else is left over."""
-    mark = jobs[0].folder.parents[1] / f"{PARTIAL}{uuid4().hex}"
-    write_file(mark, b"")
-    return [replace(job, mark=mark) for job in jobs]
+def _with_marker(jobs: list[SequenceJob]) -> list[SequenceJob]:
+    """Write a marker file into OUT and return the jobs that ask for it; remove_partials deletes it."""
+    marker = jobs[0].folder.parents[1] / f"{PARTIAL}{uuid4().hex}"
+    write_file(marker, b"")
+    return [replace(job, marker=marker) for job in jobs]
 
 
-def _counted(progress: Progress | None, total: int) -> Callable[[Job], None]:
+def _counter(progress: Progress | None, total: int) -> Callable[[SequenceJob], None]:
     count = 0
 
-    def done(job: Job) -> None:
+    def done(job: SequenceJob) -> None:
         nonlocal count
         count += 1
         if progress is not None:
@@ -110,7 +117,7 @@ def _counted(progress: Progress | None, total: int) -> Callable[[Job], None]:
     return done
 
 
-def _unseen(job: Job) -> WorkError:
+def _not_visible(job: SequenceJob) -> WorkError:
     return WorkError(
         file=job.folder, got="nothing, though a worker has made it", expected="a folder that all machines share",
         remedy="run again, or choose another --out",
@@ -118,7 +125,10 @@ def _unseen(job: Job) -> WorkError:
 
 
 def write_seqmap(root: Path, split: str) -> set[str]:
-    """seqmaps/flockscope-<split>.txt: every complete sequence of the split, sorted, for TrackEval. Their names."""
+    """Write ROOT/seqmaps/flockscope-<split>.txt, TrackEval's list of sequences; returns the names it lists.
+
+    It lists every sequence folder of the split that has a manifest, sorted. No file is written if there is none.
+    """
     folder = root / f"flockscope-{split}"
     complete = sorted(p.parent.name for p in folder.glob(f"*/{MANIFEST}") if not p.parent.name.startswith("."))
     if complete:
@@ -127,7 +137,7 @@ def write_seqmap(root: Path, split: str) -> set[str]:
 
 
 def _summary(errors: dict[str, FlockscopeError], total: int) -> FlockscopeError:
-    """The first error, and which other sequences failed; a single one as it is."""
+    """Return a single error unchanged, else the first one with the count and up to five names of the others."""
     first, *_ = errors.values()
     if len(errors) == 1:
         return first

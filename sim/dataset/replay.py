@@ -19,9 +19,9 @@ from scenarios.errors import InputError
 from scenarios.loading.resolve import load_observation
 from scenarios.schema.observation import ObservationSpec, ReplayOrigin, ReplaySpec
 from sim.crowd.heading import headings
+from sim.dataset.splits import is_real
 from sim.dataset.trajectories import Trajectories, nearest_row, resample
 from sim.hashing import canonical_hash
-from sim.io.formats.real_or_simulated import is_real
 from sim.rng import rng
 from sim.scene.body import DEPTH, SHOULDERS
 from sim.sequence import observe
@@ -70,10 +70,10 @@ def replay(
             )
         source = found[0]
     view = camera if isinstance(camera, ObservationSpec) else load_observation(camera)
-    return resolved(source, view, seed, cut=cut, calibration=calibration, streams=streams)[0]
+    return resolve_replay(source, view, seed, cut=cut, calibration=calibration, streams=streams)[0]
 
 
-def resolved(
+def resolve_replay(
     source: Sequence,
     view: ObservationSpec,
     seed: int,
@@ -135,11 +135,13 @@ def on_ground(truth: Truth, source: Sequence, calibration: Camera | None = None)
 
 
 def _calibrated(calibration: Camera | str | Path | None, source: Sequence) -> Camera | None:
-    from sim.io.store.camera_files import fitted, read_calibration
+    from sim.io.formats.calibration import read_calibration, scaled_to_image
 
     if calibration is None or isinstance(calibration, Camera):
         return calibration
-    return fitted(read_calibration(Path(calibration)), source.image_size, Path(str(source.source.get("path", ""))))
+    return scaled_to_image(
+        read_calibration(Path(calibration)), source.image_size, Path(str(source.source.get("path", "")))
+    )
 
 
 def _moving(places: Array, truth: Truth, source: Sequence, fps: float, cut: Cut) -> Trajectories:

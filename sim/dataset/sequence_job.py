@@ -1,4 +1,4 @@
-"""One sequence of a dataset to make: where, and of what; whether it is there; how it is made, here or elsewhere."""
+"""One sequence of a dataset: where it goes, whether it is already stored, and how a worker simulates and stores it."""
 
 from __future__ import annotations
 
@@ -11,49 +11,61 @@ from typing import Any
 from scenarios.errors import FlockscopeError, InputError, WorkError
 from scenarios.loading.resolve import Entry
 from sim.io.store import sequence_folder
-from sim.io.store.manifest import MANIFEST, altered, identity, read_manifest
+from sim.io.store.manifest import MANIFEST, damaged_files, identity, read_manifest
 
-LATER = 5.0  # s after which a file that one machine has written is seen by another
+MARKER_TIMEOUT = 5.0  # s that a shared file system may take to show one machine the file of another
 
 
 @dataclass(frozen=True)
-class Job:
-    """One sequence to make; mark: a file that whoever makes it must see, or it would write somewhere else."""
+class SequenceJob:
+    """One sequence to make.
+
+    folder: where it is stored; its last part is the sequence's name. streams, images: the pictures to store and their
+    file type, as in sim.io.store.streams. marker: a file that every worker must see before it starts, else it would
+    write to another file system; None for local workers.
+    """
 
     folder: Path
     entry: Entry
     seed: int
     streams: tuple[str, ...] = ()
     images: str = "jpg"
-    mark: Path | None = None
+    marker: Path | None = None
 
     @property
     def name(self) -> str:
-        """The sequence's name."""
+        """The sequence's name: <entry>-s<seed, 5 digits>."""
         return self.folder.name
 
 
 @dataclass(frozen=True)
-class Outcome:
-    """What went wrong, if anything did, and whether it will with all others too: a disk that takes no more."""
+class JobOutcome:
+    """The error of a job, None if its sequence is stored; fatal: every other job would fail likewise (disk full)."""
 
     error: FlockscopeError | None = None
-    hopeless: bool = False
+    fatal: bool = False
 
 
-def plan(entries: list[Entry], seeds: range, folder: Path) -> list[Job]:
-    """The jobs in order of entry and seed; InputError where two entries would be one folder."""
+def plan_jobs(entries: list[Entry], seeds: range, folder: Path) -> list[SequenceJob]:
+    """Return one job per entry and seed, all seeds of the first entry first, without pictures.
+
+    Raises InputError if two entries have the same name, since they would share a folder.
+    """
     names = [e.name for e in entries]
     twice = next((n for k, n in enumerate(names) if n in names[:k]), None)
     if twice is not None:
         raise InputError(
             place="entries", got=f"{twice} twice", expected="unique names", remedy="give it once, or rename one"
         )
-    return [Job(folder / f"{e.name}-s{seed:05d}", e, seed) for e in entries for seed in seeds]
+    return [SequenceJob(folder / f"{e.name}-s{seed:05d}", e, seed) for e in entries for seed in seeds]
 
 
-def begun(job: Job) -> dict[str, Any] | None:
-    """The manifest of this very sequence where there is one; InputError where the folder holds another."""
+def stored_manifest(job: SequenceJob) -> dict[str, Any] | None:
+    """Return the manifest in the job's folder; None if the folder or a readable manifest is missing.
+
+    Only the identity is compared, not the files. Raises InputError if the folder holds another sequence: another
+    scenario, seed, version, or choice of pictures.
+    """
     from scenarios.loading.resolve import dump
 
     if not job.folder.exists():
@@ -63,24 +75,31 @@ def begun(job: Job) -> dict[str, Any] | None:
     except InputError:
         return None
     wanted = identity(dump(job.entry.scenario), job.seed, job.entry.repeat, job.streams, job.images)
-    other = [key for key, value in wanted.items() if manifest.get(key) != value]
-    if other:
-        expected = "the same scenario, version, streams and images, or nothing"
+    different = [key for key, value in wanted.items() if manifest.get(key) != value]
+    if different:
+        expected = "the same scenario, version, streams and images, or an empty place"
         raise InputError(
-            file=job.folder, place=MANIFEST, got=f"another sequence ({', '.join(other)} differ)",
+            file=job.folder, place=MANIFEST, got=f"another sequence ({', '.join(different)} differ)",
             expected=expected, remedy="choose another --out, or delete that folder",
         )  # fmt: skip
     return manifest
 
 
-def is_done(job: Job) -> bool:
-    """Whether the folder holds this very sequence, whole to the last byte. InputError where it holds another one."""
-    manifest = begun(job)
-    return manifest is not None and next(altered(job.folder, manifest), None) is None
+def is_stored(job: SequenceJob) -> bool:
+    """Return True if the folder holds the job's sequence and every file has the bytes that its manifest names.
+
+    Raises InputError if the folder holds another sequence.
+    """
+    manifest = stored_manifest(job)
+    return manifest is not None and next(damaged_files(job.folder, manifest), None) is None
 
 
-def make(job: Job) -> None:
-    """Simulate and store one sequence; any failure as WorkError or InputError that names the scenario's file."""
+def simulate_and_store(job: SequenceJob) -> None:
+    """Simulate the job's scenario and write its folder.
+
+    Raises InputError or WorkError with the scenario's file, also for an unexpected exception. An error that an
+    OSError caused passes unchanged.
+    """
     from scenarios.loading.resolve import dump
     from sim.sequence import simulate
 
@@ -89,7 +108,7 @@ def make(job: Job) -> None:
         sequence = replace(simulate(entry.scenario, job.seed, entry.repeat, job.streams), name=job.name)
         sequence_folder.write_sequence(
             job.folder, sequence, scenario=dump(entry.scenario), seed=job.seed, repeat=entry.repeat,
-            streams=job.streams, images=job.images, keep=lambda: is_done(job),
+            streams=job.streams, images=job.images, keep=lambda: is_stored(job),
         )  # fmt: skip
     except FlockscopeError as error:
         if isinstance(error.__cause__, OSError):
@@ -102,32 +121,35 @@ def make(job: Job) -> None:
         ) from error  # fmt: skip
 
 
-def attempt(job: Job) -> Outcome:
-    """See to it that the sequence is there; what goes wrong elsewhere says on which machine."""
+def run_job(job: SequenceJob) -> JobOutcome:
+    """Make the job's sequence unless it is already stored; returns errors instead of raising them.
+
+    An error is fatal if an OSError caused it. The fatal error of a job with a marker names the worker's machine.
+    """
     try:
-        if job.mark is not None:
-            _look_for(job.mark)
-        if not is_done(job):
-            make(job)
+        if job.marker is not None:
+            _wait_for_marker(job.marker)
+        if not is_stored(job):
+            simulate_and_store(job)
     except FlockscopeError as error:
-        hopeless = isinstance(error.__cause__, OSError)
-        if hopeless and job.mark is not None:
+        fatal = isinstance(error.__cause__, OSError)
+        if fatal and job.marker is not None:
             error = type(error)(**{**error.as_dict(), "place": f"on {socket.gethostname()}"})
-        return Outcome(error, hopeless)
-    return Outcome()
+        return JobOutcome(error, fatal)
+    return JobOutcome()
 
 
-def given_up(job: Job, error: WorkError) -> Outcome:
-    """The outcome of a job that has cost too many workers."""
-    return Outcome(WorkError(**{**error.as_dict(), "file": job.name}))
+def lost_job(job: SequenceJob, error: WorkError) -> JobOutcome:
+    """Return the outcome of a job that killed too many workers: `error` with the sequence's name as its file."""
+    return JobOutcome(WorkError(**{**error.as_dict(), "file": job.name}))
 
 
-def _look_for(mark: Path) -> None:
-    end = time.monotonic() + LATER
-    while not mark.exists():
+def _wait_for_marker(marker: Path) -> None:
+    end = time.monotonic() + MARKER_TIMEOUT
+    while not marker.exists():
         if time.monotonic() > end:
             raise InputError(
-                file=mark.parent, got="another folder, or none", expected="the one that the command writes to",
+                file=marker.parent, got="another folder, or none", expected="the one that the command writes to",
                 remedy="choose an --out that all machines share under the same path",
-            ) from FileNotFoundError(mark)  # fmt: skip
-        time.sleep(LATER / 20)
+            ) from FileNotFoundError(marker)  # fmt: skip
+        time.sleep(MARKER_TIMEOUT / 20)

@@ -31,7 +31,7 @@ class Trajectories:
 
 
 Curve = Callable[[Array], Array]
-Stretch = tuple[int, Array, Curve, Curve]
+Segment = tuple[int, Array, Curve, Curve]
 
 
 def resample(frame: Ints, id: Ints, pos: Array, rate: float, fps: float, first: float, last: float) -> Trajectories:
@@ -41,12 +41,12 @@ def resample(frame: Ints, id: Ints, pos: Array, rate: float, fps: float, first: 
     """
     t = first + np.arange(int(np.floor((last - first) * fps + 1e-6)) + 1) / fps
     for tau in TIMES:
-        stretches = [s for one in np.unique(id) for s in _stretches(frame, id, pos, int(one), rate, tau)]
-        if _acceleration(stretches, fps) <= LIMIT:
+        segments = [s for one in np.unique(id) for s in _segments(frame, id, pos, int(one), rate, tau)]
+        if _acceleration(segments, fps) <= LIMIT:
             break
-    people = np.array(sorted({s[0] for s in stretches if _inside(s[1], t).any()}), np.int64)
+    people = np.array(sorted({s[0] for s in segments if _inside(s[1], t).any()}), np.int64)
     pos, vel = np.full((len(t), len(people), 2), np.nan), np.full((len(t), len(people), 2), np.nan)
-    for one, times, place, velocity in stretches:
+    for one, times, place, velocity in segments:
         here = _inside(times, t)
         if here.any():
             column = int(np.searchsorted(people, one))
@@ -58,23 +58,23 @@ def _inside(times: Array, t: Array) -> Bools:
     return np.asarray((t >= times[0] - 1e-9) & (t <= times[-1] + 1e-9))
 
 
-def _stretches(frame: Ints, id: Ints, pos: Array, one: int, rate: float, tau: float) -> list[Stretch]:
-    """A person's stretches without a gap: id, times, and place and velocity as functions of time."""
+def _segments(frame: Ints, id: Ints, pos: Array, one: int, rate: float, tau: float) -> list[Segment]:
+    """A person's segments without a gap: id, times, and place and velocity as functions of time."""
     from scipy.interpolate import CubicSpline
 
     rows = np.flatnonzero(id == one)
     rows = rows[np.argsort(frame[rows])]
     cuts = np.flatnonzero(np.diff(frame[rows]) > GAP * rate) + 1
-    made: list[Stretch] = []
+    made: list[Segment] = []
     for part in np.split(rows, cuts):
         if len(part) >= 2:
             times = (frame[part] - 1) / rate
-            f = CubicSpline(times, smoothed(times, pos[part], tau**4 * rate), bc_type="natural")
+            f = CubicSpline(times, smoothing_spline(times, pos[part], tau**4 * rate), bc_type="natural")
             made.append((one, times, f, f.derivative()))
     return made
 
 
-def smoothed(t: Array, y: Array, weight: float) -> Array:
+def smoothing_spline(t: Array, y: Array, weight: float) -> Array:
     """Places (N, 2) of the natural cubic spline f at its knots t: the least Σ |y - f|² + weight ∫ |f''|².
 
     Reinsch (1967): f = y - weight Q γ with (R + weight Qᵀ Q) γ = Qᵀ y, γ being f'' at the inner knots.
@@ -99,10 +99,10 @@ def smoothed(t: Array, y: Array, weight: float) -> Array:
     return f
 
 
-def _acceleration(stretches: list[Stretch], fps: float) -> float:
+def _acceleration(segments: list[Segment], fps: float) -> float:
     """The 99 % quantile of accelerations, m/s², at `fps` instants per second."""
     size = [np.zeros(1)]
-    for _, times, _, velocity in stretches:
+    for _, times, _, velocity in segments:
         t = np.arange(times[0], times[-1], 1 / fps)
         size.append(np.linalg.norm(np.diff(velocity(t), axis=0), axis=1) * fps)
     return float(np.quantile(np.concatenate(size), 0.99))

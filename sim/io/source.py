@@ -7,9 +7,9 @@ from pathlib import Path
 
 from scenarios.errors import InputError
 from sim.io.formats import biwi, caviar, mot_folder, video
+from sim.io.formats.calibration import read_calibration
+from sim.io.pictures.background_sample import BackgroundChoice, parse_choice
 from sim.io.store import sequence_folder
-from sim.io.store.background_sample import Choice, read_choice
-from sim.io.store.camera_files import read_calibration
 from sim.io.store.manifest import is_sequence
 from sim.types import Camera, Sequence
 
@@ -39,7 +39,7 @@ def open_source(
             raise InputError(place=option, got=value, expected="a number above 0", remedy=f"correct {option}")
     if isinstance(camera, str | Path):
         camera = read_calibration(Path(camera))
-    options = Options(fps, px_per_m, camera, images, None if background is None else read_choice(background))
+    options = RecordingOptions(fps, px_per_m, camera, images, None if background is None else parse_choice(background))
     if not path.exists():
         raise InputError(file=path, got="nothing there", expected=KINDS, remedy="check the path")
     if path.is_file():
@@ -50,7 +50,7 @@ def open_source(
     return [_open_folder(p, options) for p in found]
 
 
-def folders(path: Path, kind: str) -> list[Path]:
+def sequence_folders(path: Path, kind: str) -> list[Path]:
     """The folders of sequences of a dataset or of one, all of a kind; InputError where there are none, or others."""
     found = _find(path, DEPTH) if path.is_dir() else []
     other = next((p for p in found if p.is_file() or _kind(p) != kind), None)
@@ -61,22 +61,22 @@ def folders(path: Path, kind: str) -> list[Path]:
     return found
 
 
-def named(folder: Path) -> str:
+def split_and_name(folder: Path) -> str:
     """<split>/<name> of a stored sequence, by which datasets call it."""
     return "/".join(folder.absolute().parts[-2:])
 
 
 @dataclass(frozen=True)
-class Options:
+class RecordingOptions:
     """What a user says about a recording; None: nothing."""
 
     fps: float | None
     px_per_m: float | None
     camera: Camera | None
     images: bool
-    background: Choice | None
+    background: BackgroundChoice | None
 
-    def refuse(self, path: Path, kind: str, why: str, *names: str) -> None:
+    def reject(self, path: Path, kind: str, why: str, *names: str) -> None:
         """InputError for options that would be without effect."""
         given = [f"--{name.replace('_', '-')}" for name in names if getattr(self, name) is not None]
         if given:
@@ -84,10 +84,10 @@ class Options:
             raise InputError(file=path, got=" and ".join(given), expected=f"none for {kind}", remedy=remedy)
 
 
-def _open_file(path: Path, options: Options) -> Sequence:
+def _open_file(path: Path, options: RecordingOptions) -> Sequence:
     suffix, o = path.suffix.lower(), options
     if suffix == ".xml":
-        o.refuse(path, "a CAVIAR recording", "its truth is in the image, without pictures", "camera", "background")
+        o.reject(path, "a CAVIAR recording", "its truth is in the image, without pictures", "camera", "background")
         return caviar.open_file(path, fps=o.fps, px_per_m=o.px_per_m)
     if path.name == "obsmat.txt":
         return _open_folder(path.parent, o)
@@ -96,7 +96,7 @@ def _open_file(path: Path, options: Options) -> Sequence:
             path, fps=o.fps, px_per_m=o.px_per_m, camera=o.camera, background=o.background or video.ANY
         )
     if suffix in (".txt", ".csv"):
-        o.refuse(path, "a text", "it has no pictures", "background")
+        o.reject(path, "a text", "it has no pictures", "background")
         return mot_folder.open_text(path, fps=o.fps, px_per_m=o.px_per_m, camera=o.camera)
     raise InputError(file=path, got=f"a {suffix or 'nameless'} file", expected=VIDEOS, remedy="check the path")
 
@@ -126,16 +126,16 @@ def _is_recording(path: Path) -> bool:
     return suffix in video.SUFFIXES or (suffix == ".xml" and caviar.is_caviar(path))
 
 
-def _open_folder(path: Path, options: Options) -> Sequence:
+def _open_folder(path: Path, options: RecordingOptions) -> Sequence:
     o = options
     if path.is_file():
         return _open_file(path, o)
     match _kind(path):
         case "generated":
-            o.refuse(path, "a generated sequence", "it knows its own", "fps", "px_per_m", "camera")
+            o.reject(path, "a generated sequence", "it knows its own", "fps", "px_per_m", "camera")
             return sequence_folder.open_sequence(path, background=o.background)
         case "biwi":
-            o.refuse(path, "a BIWI recording", "it is in metres, without pictures", "px_per_m", "camera", "background")
+            o.reject(path, "a BIWI recording", "it is in metres, without pictures", "px_per_m", "camera", "background")
             return biwi.open_folder(path, fps=o.fps)
         case _:
             return mot_folder.open_folder(

@@ -1,1 +1,1 @@
-"""Running a function over many items: in this process, in spawned processes, or on a dask cluster."""
+"""Run a function over many items: in this process, in local worker processes, or on a dask cluster."""

@@ -1,13 +1,12 @@
-"""The workers of a dask.distributed cluster as a crew.
+"""The workers of a dask.distributed cluster.
 
-The scheduler is only given bytes. A worker must have the same sources, libraries and vector instructions as we here,
-or what it makes could be other bytes: it is refused before it does anything. The work of one that dies is given to
-another by the scheduler.
+The scheduler is given bytes only, so it needs none of our code. A worker refuses an item unless it has the same
+versions, sources and CPU instructions as this process, because its results could differ in their bytes otherwise
+(sim.versions.runtime). If a worker dies, the scheduler gives its item to another worker.
 """
 
 from __future__ import annotations
 
-import hashlib
 import logging
 import os
 import pickle
@@ -21,58 +20,65 @@ import warnings
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
-from functools import cache, partial
+from functools import partial
 from itertools import islice
-from pathlib import Path
 from typing import Any
 
 from scenarios.errors import InputError, WorkError
-from sim.workers.pool import THREADS, R, Run, T, died
-from sim.workers.process import Answer, answered
+from sim.versions import runtime
+from sim.workers.process import WorkResult, run_pickled
+from sim.workers.protocol import THREAD_VARIABLES, R, RunItems, T, worker_loss
 
 ADDRESS = r"[a-z]+://([^\s/:\[\]]+|\[[0-9a-fA-F:.]+\]):\d+/?"
-PATIENCE = 10.0  # s to reach a scheduler
-COUNT = 1.0  # s between counts of its workers
-SILENCE = 20.0  # s without any worker until the user is told
-REMEDY = "run the same command again: what is complete is kept"
-SOUND = (3, 11, 9)  # Python before may stand still for ever where sys._current_frames meets garbage (its issue 106883)
-PACKAGES = ("scenarios", "sim", "tracking")
+CONNECT_TIMEOUT = 10.0  # s to reach a scheduler
+COUNT_INTERVAL = 1.0  # s between two counts of the cluster's workers
+NO_WORKERS_WARNING = 20.0  # s without any worker before a warning
+REMEDY = "run the same command again: complete results are kept"
+PROFILE_SAFE = (
+    3,
+    11,
+    9,
+)  # earlier Pythons may deadlock in sys._current_frames, which dask's profiler calls (gh-106883)
 
 
 @contextmanager
-def connected(address: str, workers: int = 1) -> Iterator[Run]:
-    """The run of a cluster; InputError or WorkError where it cannot be reached."""
-    client = _client(address)
+def cluster_workers(address: str, workers: int = 1) -> Iterator[RunItems]:
+    """Give the RunItems of the cluster whose scheduler listens at `address`; at least `workers` items are under way.
+
+    Raises InputError if the address is malformed or dask.distributed is not installed, WorkError if no scheduler
+    answers. A lost connection, or a worker that cannot take part, raises WorkError while results are read.
+    """
+    client = _connect(address)
 
     def run(
         function: Callable[[T], R],
         items: Iterable[T],
         *,
         ahead: int = 0,
-        lost: Callable[[T, WorkError], R] | None = None,
+        on_loss: Callable[[T, WorkError], R] | None = None,
     ) -> Iterator[tuple[T, R]]:
-        staff = _Staff(client, address, workers)
-        coming, done = iter(items), queue.SimpleQueue[str]()
+        capacity = _ClusterCapacity(client, address, workers)
+        waiting, finished = iter(items), queue.SimpleQueue[str]()
         under_way: dict[str, tuple[T, Any]] = {}
         while True:
-            for item in islice(coming, max(0, staff.count() + ahead - len(under_way))):
-                future = _submitted(client, function, item)
+            for item in islice(waiting, max(0, capacity.count() + ahead - len(under_way))):
+                future = _submit(client, function, item)
                 under_way[future.key] = item, future
-                future.add_done_callback(lambda f: done.put(f.key))
+                future.add_done_callback(lambda f: finished.put(f.key))
             if not under_way:
                 return
-            ready = [under_way.pop(key) for key in _drained(done)]
-            for (item, _), fetch in zip(ready, _fetched(client, [f for _, f in ready]), strict=True):
-                yield item, _result(fetch, item, address, lost)
+            ready = [under_way.pop(key) for key in _drain(finished)]
+            for (item, _), fetch in zip(ready, _fetchers(client, [f for _, f in ready]), strict=True):
+                yield item, _result(fetch, item, address, on_loss)
 
     try:
         yield run
     finally:
         with suppress(OSError):
-            client.close(timeout=PATIENCE)
+            client.close(timeout=CONNECT_TIMEOUT)
 
 
-def _client(address: str) -> Any:
+def _connect(address: str) -> Any:
     if not re.fullmatch(ADDRESS, address):
         expected, remedy = "tcp://HOST:PORT", "give the address that `dask scheduler` prints"
         raise InputError(place="--cluster", got=repr(address), expected=expected, remedy=remedy)
@@ -83,9 +89,9 @@ def _client(address: str) -> Any:
             place="--cluster", got="no dask.distributed here", expected="the extra [cluster]",
             remedy="pip install 'flockscope[cluster]'",
         ) from None  # fmt: skip
-    logging.getLogger("distributed").setLevel(logging.CRITICAL)  # what it would say, our errors do
+    logging.getLogger("distributed").setLevel(logging.CRITICAL)  # our errors say the same in one line
     try:
-        return Client(address, timeout=PATIENCE, set_as_default=False, name="flockscope")
+        return Client(address, timeout=CONNECT_TIMEOUT, set_as_default=False, name="flockscope")
     except (OSError, ValueError) as error:
         raise WorkError(
             place="--cluster", got=f"no answer from {address} ({error})", expected="a dask scheduler there",
@@ -93,150 +99,139 @@ def _client(address: str) -> Any:
         ) from None  # fmt: skip
 
 
-class _Staff:
-    """State: how many threads the cluster's workers had when last counted, and since when there are none."""
+class _ClusterCapacity:
+    """State: the number of the cluster's worker threads at the last count, and since when there are none."""
 
     def __init__(self, client: Any, address: str, least: int) -> None:
         self._client, self._address, self._least = client, address, least
-        self._here, self._counted = 0, -COUNT
-        self._alone_since: float | None = time.monotonic()
+        self._threads, self._counted = 0, -COUNT_INTERVAL
+        self._empty_since: float | None = time.monotonic()
 
     def count(self) -> int:
-        """How many items can be done at a time, at least as many as the user says."""
+        """Return how many items can run at a time, at least `least`.
+
+        Counts anew after COUNT_INTERVAL. Raises WorkError if the connection to the scheduler is lost.
+        """
         now = time.monotonic()
-        if now - self._counted >= COUNT:
+        if now - self._counted >= COUNT_INTERVAL:
             if self._client.status not in ("running", "connecting"):
                 raise lost_connection(self._address)
             with suppress(OSError):  # a scheduler that is lost just now shows in its futures
-                self._here, self._counted = sum(self._client.nthreads().values()), now
-            self._mind(now)
-        return max(self._least, self._here)
+                self._threads, self._counted = sum(self._client.nthreads().values()), now
+            self._warn_if_empty(now)
+        return max(self._least, self._threads)
 
-    def _mind(self, now: float) -> None:
-        if self._here:
-            self._alone_since = now
-        elif self._alone_since is not None and now - self._alone_since >= SILENCE:
-            self._alone_since = None
+    def _warn_if_empty(self, now: float) -> None:
+        if self._threads:
+            self._empty_since = now
+        elif self._empty_since is not None and now - self._empty_since >= NO_WORKERS_WARNING:
+            self._empty_since = None
             warnings.warn(f"{self._address} has no workers: waiting for some to come", stacklevel=2)
 
 
 def lost_connection(address: str) -> WorkError:
-    """The error of a scheduler that went away."""
+    """Return the error for a scheduler that can no longer be reached."""
     got = f"a lost connection to {address}"
-    return WorkError(place="--cluster", got=got, expected="a scheduler that stays", remedy=REMEDY)
+    return WorkError(place="--cluster", got=got, expected="a scheduler that stays reachable", remedy=REMEDY)
 
 
-def _submitted(client: Any, function: Callable[[Any], Any], item: Any) -> Any:
-    """Its future: unpickling the bytes does the work, so whoever passes them on needs nothing of ours."""
+def _submit(client: Any, function: Callable[[Any], Any], item: Any) -> Any:
+    """Submit one call and return its future. The worker runs it by unpickling the bytes of a ClusterCall."""
     name = getattr(getattr(function, "func", function), "__name__", "work").strip("_")
-    body = pickle.dumps(Order(pickle.dumps((function, item)), tuple(about().items())))
+    body = pickle.dumps(ClusterCall(pickle.dumps((function, item)), tuple(runtime().items())))
     return client.submit(pickle.loads, body, key=f"{name}-{uuid.uuid4().hex}", pure=False)
 
 
 @dataclass(frozen=True)
-class Order:
-    """Pickled work and what a worker must be like; unpickled, it is the Answer's bytes."""
+class ClusterCall:
+    """A pickled (function, item) and the runtime that a worker must have; its pickle unpickles to a pickled WorkResult.
 
-    work: bytes
-    like: tuple[tuple[str, str], ...]
+    `__reduce__` makes unpickling run the call: whoever only forwards the bytes needs no code of ours.
+    """
+
+    call: bytes
+    required: tuple[tuple[str, str], ...]
 
     def __reduce__(self) -> tuple[Any, ...]:
-        return carry_out, (self.work, self.like)
+        return run_on_worker, (self.call, self.required)
 
 
-def carry_out(work: bytes, like: tuple[tuple[str, str], ...]) -> bytes:
-    """On a worker: the pickled Answer; WorkError if it is not like that."""
+def run_on_worker(call: bytes, required: tuple[tuple[str, str], ...]) -> bytes:
+    """Run a pickled call on a dask worker and return the pickled WorkResult.
+
+    Raises WorkError if the worker has more than one thread, or if its runtime differs from `required`.
+    """
     from distributed import get_worker
 
-    for name in THREADS:
+    for name in THREAD_VARIABLES:
         os.environ.setdefault(name, "1")
     worker = get_worker()
-    if sys.version_info < SOUND:
-        _stop_profile(worker)
+    if sys.version_info < PROFILE_SAFE:
+        _stop_profiler(worker)
     if worker.state.nthreads != 1:
         raise WorkError(
             file=worker.address, got=f"a worker of {worker.state.nthreads} threads", expected="one thread per worker",
             remedy="start `dask worker` with --nthreads 1 --nworkers N (a deployment: processes=cores)",
         )  # fmt: skip
-    here = about()
-    other = [name for name, value in like if here.get(name) != value]
-    if other:
-        wanted = dict(like)
+    here = runtime()
+    different = [name for name, value in required if here.get(name) != value]
+    if different:
+        wanted = dict(required)
         raise WorkError(
-            file=worker.address, got="a worker with " + ", ".join(f"{k} {here.get(k)}" for k in other),
-            expected=", ".join(f"{k} {wanted[k]}" for k in other) + " as here", remedy=_remedy(other),
+            file=worker.address, got="a worker with " + ", ".join(f"{k} {here.get(k)}" for k in different),
+            expected=", ".join(f"{k} {wanted[k]}" for k in different) + " as here", remedy=_remedy(different),
         )  # fmt: skip
-    return answered(work)
+    return run_pickled(call)
 
 
-def _stop_profile(worker: Any) -> None:
-    """Dask's profile asks a hundred times a second what each thread is at."""
+def _stop_profiler(worker: Any) -> None:
+    """Stop dask's profiler, which inspects the stack of each thread a hundred times a second."""
     profile = worker.periodic_callbacks.get("profile")
     if profile is not None and profile.is_running():
         worker.loop.add_callback(profile.stop)
         stopped = threading.Event()
         worker.loop.add_callback(stopped.set)
-        stopped.wait(PATIENCE)
+        stopped.wait(CONNECT_TIMEOUT)
 
 
-def _remedy(other: list[str]) -> str:
-    if other == ["cpu"]:
+def _remedy(different: list[str]) -> str:
+    if different == ["cpu"]:
         return "use machines of one kind, or give all the same NPY_DISABLE_CPU_FEATURES"
-    return "install the same on all (pip install -c constraints.txt) and start the workers anew"
+    return "install the same on all (pip install -c constraints.txt) and restart the workers"
 
 
-@cache
-def about() -> dict[str, str]:
-    """What the bytes depend on, in this process: versions, sources of ours, instructions."""
-    from sim.hashing import cpu_level
-    from sim.io.store.manifest import versions
-
-    root = Path(__file__).resolve().parents[2]
-    return {**versions(drawn=True), "sources": sources(root), "cpu": cpu_level()}
-
-
-def sources(root: Path) -> str:
-    """A short hash over our packages in a folder."""
-    h = hashlib.sha256()
-    for package in PACKAGES:
-        for path in sorted((root / package).rglob("*")):
-            if path.suffix in (".py", ".toml"):
-                h.update(f"{path.relative_to(root).as_posix()}\0".encode() + path.read_bytes() + b"\0")
-    return h.hexdigest()[:12]
-
-
-def _drained(done: queue.SimpleQueue[str]) -> Iterator[str]:
-    """All that is there, after waiting a moment for the first."""
+def _drain(finished: queue.SimpleQueue[str]) -> Iterator[str]:
+    """Yield all keys in the queue, after waiting at most COUNT_INTERVAL for the first."""
     with suppress(queue.Empty):
-        yield done.get(timeout=COUNT)
+        yield finished.get(timeout=COUNT_INTERVAL)
         while True:
-            yield done.get_nowait()
+            yield finished.get_nowait()
 
 
-def _fetched(client: Any, futures: list[Any]) -> list[Callable[[], bytes]]:
-    """What gives, or raises, the results of futures; those of many that went well are fetched at once."""
+def _fetchers(client: Any, futures: list[Any]) -> list[Callable[[], bytes]]:
+    """Return for each future a call that returns its bytes or raises its error; several are gathered at once."""
     if len(futures) > 1:
-        with suppress(Exception):  # whose it is, its own result() says
+        with suppress(Exception):  # one of them failed: its own result() raises the error
             return [partial(bytes, body) for body in client.gather(futures)]
     return [future.result for future in futures]
 
 
-def _result(fetch: Callable[[], bytes], item: T, address: str, lost: Callable[[T, WorkError], R] | None) -> R:
+def _result(fetch: Callable[[], bytes], item: T, address: str, on_loss: Callable[[T, WorkError], R] | None) -> R:
     from distributed import CancelledError, KilledWorker
 
     try:
-        answer: Answer = pickle.loads(fetch())
+        outcome: WorkResult = pickle.loads(fetch())
     except KilledWorker as error:
-        told = died(error.allowed_failures + 1, f"the loss of {error.last_worker.address}")
-        if lost is None:
-            raise told from None
-        return lost(item, told)
+        loss = worker_loss(error.allowed_failures + 1, f"the loss of {error.last_worker.address}")
+        if on_loss is None:
+            raise loss from None
+        return on_loss(item, loss)
     except (CancelledError, OSError) as error:
         raise lost_connection(address) from error
     except (ImportError, AttributeError) as error:
         raise WorkError(
-            place="--cluster", got=f"a worker that cannot begin ({error})", expected="flockscope as it is here",
-            remedy=_remedy([]),
+            place="--cluster", got=f"a worker that cannot import flockscope ({error})",
+            expected="flockscope as it is installed here", remedy=_remedy([]),
         ) from None  # fmt: skip
-    result: R = answer.result()
+    result: R = outcome.result()
     return result

@@ -1,4 +1,8 @@
-"""One spawned process that does one thing after another, obeys Ctrl-C through its parent, and ends when it does."""
+"""One worker process: started when it gets its first item, started again after its death.
+
+The process is spawned, runs one item at a time, ignores Ctrl-C (its parent handles it), and exits when its parent does.
+Functions, items and results pass through a pipe as pickles.
+"""
 
 from __future__ import annotations
 
@@ -12,68 +16,75 @@ from contextlib import suppress
 from dataclasses import dataclass
 from typing import Any
 
-PATIENCE = 5.0  # s within which a process that is told to end has ended
+EXIT_TIMEOUT = 5.0  # s that a terminated process has to exit before it is killed
 
 
-class Elsewhere(Exception):
-    """The traceback of an error in another process, as its cause."""
+class RemoteTraceback(Exception):
+    """The text of a traceback from a worker; stands as the cause of the exception that is raised here."""
 
     def __str__(self) -> str:
         return f"\n{self.args[0]}"
 
 
 @dataclass(frozen=True)
-class Answer:
-    """What a function returned, or raised and where."""
+class WorkResult:
+    """The outcome of one call in a worker: its return value, or its exception with the text of the traceback."""
 
     value: Any = None
     error: BaseException | None = None
     trace: str = ""
 
     def result(self) -> Any:
-        """The value; raises the error."""
+        """Return the value; raises the call's exception, with a RemoteTraceback as its cause, if there was one."""
         if self.error is not None:
-            raise self.error from Elsewhere(self.trace)
+            raise self.error from RemoteTraceback(self.trace)
         return self.value
 
 
-class Hand:
-    """State: a process, started when there is work, anew when it has died; the pipe to it; how the last ended."""
+class WorkerProcess:
+    """A worker process.
+
+    State: the process (None before its first item and after its end), the pipe to it, and `ended`, a text that says
+    how the last process ended: "exit code 3" or "signal 9 (SIGKILL)".
+    """
 
     def __init__(self) -> None:
         self.ended = ""
         self._process: Any = None
         self._pipe: Any = None
 
-    def begin(self, function: Callable[[Any], Any], item: Any) -> Any:
-        """Give it work; the connection that can be read when there is an answer, or no hope of one."""
-        work = pickle.dumps((function, item))
+    def send(self, function: Callable[[Any], Any], item: Any) -> Any:
+        """Send one call; returns the connection that becomes readable when the call is done or the process is dead.
+
+        Starts a process if none is alive. Raises the pickling error of a function or item that cannot be pickled.
+        """
+        call = pickle.dumps((function, item))
         if self._process is None or not self._process.is_alive():
             self._start()
-        with suppress(OSError):  # it has died since: no answer will say so
-            self._pipe.send_bytes(work)
+        with suppress(OSError):  # the process died just now: receive() returns None
+            self._pipe.send_bytes(call)
         return self._pipe
 
-    def answer(self) -> Answer | None:
-        """What it says; None if it has died."""
+    def receive(self) -> WorkResult | None:
+        """Wait for the outcome of the call that was sent last; returns None if the process died instead."""
         try:
             body = self._pipe.recv_bytes()
         except (EOFError, OSError):
             self.join()
             return None
-        answer: Answer = pickle.loads(body)
-        return answer
+        result: WorkResult = pickle.loads(body)
+        return result
 
-    def end(self) -> None:
-        """Do not wait for work nobody wants any more."""
+    def terminate(self) -> None:
+        """Ask the process to exit at once, without waiting for its call or for its exit."""
         if self._process is not None:
             self._process.terminate()
 
     def join(self) -> None:
-        """Wait for its end and say how it was."""
+        """Wait until the process has exited, set `ended`; kills a process that takes longer than EXIT_TIMEOUT."""
         if self._process is None:
             return
-        self._process.join(PATIENCE)
+        self._process.join(EXIT_TIMEOUT)
         if self._process.is_alive():
             self._process.kill()
             self._process.join()
@@ -88,36 +99,40 @@ class Hand:
         if self._process is not None:
             self.join()
         context = get_context("spawn")
-        self._pipe, theirs = context.Pipe()
-        self._process = context.Process(target=_work, args=(theirs,))
+        self._pipe, child_end = context.Pipe()
+        self._process = context.Process(target=_serve, args=(child_end,))
         self._process.start()
-        theirs.close()
+        child_end.close()
 
 
-def _work(pipe: Any) -> None:
-    """In the process: leave Ctrl-C to the parent, do not outlive it, do what it says until it ends."""
+def _serve(pipe: Any) -> None:
+    """Run in the worker: answer calls from the pipe until the parent closes it."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
-    threading.Thread(target=_follow_parent, daemon=True).start()
+    threading.Thread(target=_exit_with_parent, daemon=True).start()
     with suppress(EOFError, OSError):
         while True:
-            pipe.send_bytes(answered(pipe.recv_bytes()))
+            pipe.send_bytes(run_pickled(pipe.recv_bytes()))
 
 
-def answered(work: bytes) -> bytes:
-    """The pickled Answer to a pickled function and item."""
+def run_pickled(call: bytes) -> bytes:
+    """Run a pickled (function, item) and return the pickled WorkResult; never raises.
+
+    A result that cannot be pickled becomes a WorkResult with the pickling error. An exception that does not survive
+    pickling becomes a RuntimeError with its type and text.
+    """
     try:
-        function, item = pickle.loads(work)
-        return pickle.dumps(Answer(function(item)))
+        function, item = pickle.loads(call)
+        return pickle.dumps(WorkResult(function(item)))
     except BaseException as error:
         trace = traceback.format_exc()
         with suppress(Exception):
-            body = pickle.dumps(Answer(error=error, trace=trace))
+            body = pickle.dumps(WorkResult(error=error, trace=trace))
             pickle.loads(body)
             return body
-        return pickle.dumps(Answer(error=RuntimeError(f"{type(error).__name__}: {error}"), trace=trace))
+        return pickle.dumps(WorkResult(error=RuntimeError(f"{type(error).__name__}: {error}"), trace=trace))
 
 
-def _follow_parent() -> None:
+def _exit_with_parent() -> None:
     from multiprocessing import parent_process
     from multiprocessing.connection import wait
 

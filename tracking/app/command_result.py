@@ -85,11 +85,11 @@ def unexpected(error: Exception) -> FlockscopeError:
 
 def _of_system(error: OSError) -> FlockscopeError:
     """What the operating system refused: the work where the disk is full, else the user's path."""
-    from sim.io.files.atomic import FULL
+    from sim.io.files.atomic import DISK_FULL
 
     reason = error.strerror or type(error).__name__
     file = "" if error.filename is None else error.filename
-    if error.errno in FULL or error.errno in (errno.EIO, errno.ENOMEM):
+    if error.errno in DISK_FULL or error.errno in (errno.EIO, errno.ENOMEM):
         return WorkError(file=file, got=reason, expected="room on the disk", remedy="free some, then run it again")
     return InputError(file=file, got=reason, expected="a path that can be used", remedy="check path and rights")
 

@@ -14,8 +14,8 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from sim.geometry.polygons import convex_hull
-from sim.io.store.truth_files import standing
-from sim.io.store.upright_boxes import upright_boxes
+from sim.io.store.truth_files import with_ground_height
+from sim.io.store.track_boxes import upright_boxes
 from sim.types import Array, Bools, Camera, GroupEvent, Groups, Ints, Scene, Tracks, Truth
 
 SIGMA_95 = math.sqrt(5.991)
@@ -152,7 +152,7 @@ def _marks_in_picture(t: Tracks, camera: Camera | None, scene: Scene | None) -> 
     n = len(t.id)
     box = t.box if t.box is not None else np.full((n, 4), np.nan)
     if t.box is None and t.plane != "image" and camera is not None:
-        box = upright_boxes(camera, standing(t.pos, scene))
+        box = upright_boxes(camera, with_ground_height(t.pos, scene))
     at = _feet(box)
     if t.plane == "image":
         at = np.where(np.isfinite(at), at, t.pos)
@@ -221,7 +221,7 @@ def _in_picture(points: Array, plane: str, camera: Camera | None, scene: Scene |
         return NO_POINTS
     from sim.scene.camera import project
 
-    uv, depth = project(camera, standing(points, scene))
+    uv, depth = project(camera, with_ground_height(points, scene))
     return uv if (depth > 0).all() and np.isfinite(uv).all() else NO_POINTS
 
 

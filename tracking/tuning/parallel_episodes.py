@@ -45,12 +45,12 @@ def players(
 
     Once its taker stops nothing more is begun.
     """
-    from sim.workers.pool import crew, in_order
+    from sim.workers.start import results_in_order, start_workers
 
     if isinstance(subject.tracker, type) and (workers > 1 or cluster):
         remedy = "give file.py:Class or module:Class, or one worker"
         raise InputError(place="--workers", got="a class", expected="a name that workers can look up", remedy=remedy)
-    with crew(workers, cluster) as run:
+    with start_workers(workers, cluster) as run:
         alone, held = workers == 1 and cluster is None, Cache(HELD)
 
         def play(sources: Sequence[Source], values: dict[str, Any], every: bool) -> Generator[Answer, None, None]:
@@ -58,7 +58,7 @@ def players(
             if alone:
                 yield from (_attempt(job, subject, held) for job in jobs)
             else:
-                yield from in_order(run, play_job, jobs)
+                yield from results_in_order(run, play_job, jobs)
 
         yield play
 

@@ -8,7 +8,7 @@ from pathlib import Path
 from scenarios.errors import InputError
 from scenarios.loading import suites as suite
 from scenarios.loading import toml_files
-from sim.dataset.seed_ranges import SPLITS, split_of
+from sim.dataset.splits import SPLITS, split_of
 from tracking.environment.episodes import Source, sources
 
 Scenes = str | Path | Sequence[str | Path]

@@ -16,7 +16,7 @@ from typing import Any
 
 from scenarios.errors import InputError
 from sim.types import DetectionMode, Tracker
-from sim.workers.cluster import about
+from sim.versions import runtime
 from tracking.config import Config, Param, Value
 from tracking.environment.episodes import Source
 from tracking.tuning import scenes
@@ -88,7 +88,7 @@ class Plan:
         return {
             "tracker": self.tracker,
             "code": self.subject.code,
-            "versions": _digest(version for name, version in about().items() if name != "cpu"),
+            "versions": _digest(version for name, version in runtime().items() if name != "cpu"),
             "suite": self.scenes,
             "seeds": text(self.seeds),
             "motions": _digest(source.key for source in self.training),

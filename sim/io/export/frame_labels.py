@@ -37,7 +37,7 @@ def _people(truth: FrameTruth) -> Iterator[dict[str, Any]]:
         row |= dict(zip(("x", "y"), _finite(truth.pos[k]), strict=True))
         if truth.vel is not None:
             row |= dict(zip(("vx", "vy"), _finite(truth.vel[k]), strict=True))
-        yield {**row, "visibility": tables.finite(float(truth.visibility[k]))}
+        yield {**row, "visibility": tables.nan_to_none(float(truth.visibility[k]))}
 
 
 def _groups(groups: Groups | None) -> list[dict[str, Any]] | None:
@@ -54,4 +54,4 @@ def _detections(found: Detections) -> Iterator[dict[str, Any]]:
 
 
 def _finite(row: Array) -> list[float | None]:
-    return [tables.finite(value) for value in row.tolist()]
+    return [tables.nan_to_none(value) for value in row.tolist()]

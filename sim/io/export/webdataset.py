@@ -22,10 +22,10 @@ from scenarios.errors import InputError
 from sim import hashing
 from sim.io.export.frame_labels import labels
 from sim.io.files import tables
-from sim.io.files.atomic import new_file, sweep, write_file
-from sim.io.files.lock import alone
-from sim.io.pictures.stored_pictures import Stored
-from sim.io.source import folders, named
+from sim.io.files.atomic import new_file, remove_partials, write_file
+from sim.io.files.lock import lock_folder
+from sim.io.pictures.stored_pictures import StoredPictures
+from sim.io.source import sequence_folders, split_and_name
 from sim.io.store.manifest import MANIFEST, read_manifest
 from sim.io.store.streams import file_name
 
@@ -53,7 +53,7 @@ class Item:
     @property
     def name(self) -> str:
         """<split>/<name>."""
-        return named(self.folder)
+        return split_and_name(self.folder)
 
     @property
     def key(self) -> str:
@@ -77,8 +77,8 @@ def webdataset(
     """
     items, root = _items(Path(source), samples), Path(out)
     shards = list(_shards(items, shard_size))
-    with alone(root):
-        sweep(root)
+    with lock_folder(root):
+        remove_partials(root)
         plan = [_facts(samples, number, some) for number, some in enumerate(shards)]
         _refuse_others(root, plan)
         for number, (facts, some) in enumerate(zip(plan, shards, strict=True), 1):
@@ -88,7 +88,7 @@ def webdataset(
         hashes = {name: value for facts in plan for name, value in facts["sequences"].items()}
         index = {"format": tables.FORMAT, "samples": samples, "content_hash": hashing.dataset_hash(hashes)}
         index["shards"] = plan
-        write_file(root / INDEX, tables.document(index))
+        write_file(root / INDEX, tables.json_document(index))
     return index
 
 
@@ -105,7 +105,7 @@ def size_of(text: str) -> int:
 
 def _items(source: Path, samples: str) -> list[Item]:
     """What to pack, in the order of names."""
-    found = sorted(map(_item, folders(source, "generated")), key=lambda item: item.name)
+    found = sorted(map(_item, sequence_folders(source, "generated")), key=lambda item: item.name)
     twice = next((a.name for a, b in pairwise(found) if a.name == b.name), None)
     if twice is not None:
         raise InputError(file=source, got=f"two sequences {twice}", expected="unique names", remedy="export them apart")
@@ -175,7 +175,7 @@ def _written(root: Path, facts: dict[str, Any], items: list[Item]) -> dict[str, 
         with beside.open("rb") as file:
             digest = hashlib.file_digest(file, "sha256").hexdigest()
     done = {**facts, "bytes": path.stat().st_size, "sha256": digest}
-    write_file(path.with_suffix(".json"), tables.document(done))
+    write_file(path.with_suffix(".json"), tables.json_document(done))
     return done
 
 
@@ -191,7 +191,7 @@ def _tar(path: Path, members: Iterable[Member]) -> None:
 def _members(item: Item, samples: str) -> Iterator[Member]:
     """The files of a sequence's samples, in order; InputError where one has been altered."""
     manifest = read_manifest(item.folder)
-    stored = Stored(item.folder, manifest)
+    stored = StoredPictures(item.folder, manifest)
     if samples == "sequence":
         yield f"{item.key}.{MANIFEST}", (item.folder / MANIFEST).read_bytes
         for name in manifest["files"]:

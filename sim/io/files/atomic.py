@@ -14,14 +14,14 @@ from uuid import uuid4
 from scenarios.errors import FlockscopeError, InputError, WorkError
 
 PARTIAL = ".partial-"
-AT_ONCE = 8  # files flushed at a time
-FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
+SYNC_THREADS = 8  # files flushed at a time
+DISK_FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
 
 
-def refusal(path: Path, error: OSError) -> FlockscopeError:
+def write_error(path: Path, error: OSError) -> FlockscopeError:
     """What an OSError while writing means to the user."""
     reason = error.strerror or type(error).__name__
-    if error.errno in FULL:
+    if error.errno in DISK_FULL:
         return WorkError(
             file=path, got=reason, expected="room on the disk", remedy="free some; what was complete is kept"
         )
@@ -29,7 +29,7 @@ def refusal(path: Path, error: OSError) -> FlockscopeError:
 
 
 @contextmanager
-def writing(target: Path) -> Iterator[Path]:
+def staged_path(target: Path) -> Iterator[Path]:
     """A partial path beside the target to write to; gone afterwards, and so are folders made for nothing.
 
     No other writer has it: processes of two machines may have one number.
@@ -40,7 +40,7 @@ def writing(target: Path) -> Iterator[Path]:
         target.parent.mkdir(parents=True, exist_ok=True)
         yield partial
     except OSError as error:
-        raise refusal(target, error) from error
+        raise write_error(target, error) from error
     finally:
         _remove(partial)
         with suppress(OSError):
@@ -50,20 +50,20 @@ def writing(target: Path) -> Iterator[Path]:
 
 def write_file(target: Path, content: bytes) -> None:
     """A file, whole or not at all."""
-    with writing(target) as partial:
-        _flushed(partial, content)
+    with staged_path(target) as partial:
+        _write_synced(partial, content)
         os.replace(partial, target)
-        _flush_folder(target.parent)
+        _sync_folder(target.parent)
 
 
 @contextmanager
 def new_file(target: Path) -> Iterator[Path]:
     """A path beside the target to write a file to, which takes its place when left well."""
-    with writing(target) as partial:
+    with staged_path(target) as partial:
         yield partial
-        _flush(partial)
+        _sync_file(partial)
         os.replace(partial, target)
-        _flush_folder(target.parent)
+        _sync_folder(target.parent)
 
 
 @contextmanager
@@ -72,10 +72,10 @@ def new_folder(target: Path, keep: Callable[[], bool] = lambda: False) -> Iterat
 
     keep: whether one that has come to stand there meanwhile shall stay instead.
     """
-    with writing(target) as partial:
+    with staged_path(target) as partial:
         partial.mkdir()
         yield partial
-        _flush_all(partial)
+        _sync_tree(partial)
         if target.exists():
             if keep():
                 return
@@ -85,29 +85,29 @@ def new_folder(target: Path, keep: Callable[[], bool] = lambda: False) -> Iterat
         except OSError:
             if not keep():
                 raise
-        _flush_folder(target.parent)
+        _sync_folder(target.parent)
 
 
 def write_folder(target: Path, files: Mapping[str, bytes]) -> None:
     """A folder of files, whole or not at all; one that stood there is replaced."""
     with new_folder(target) as partial:
         for name, content in files.items():
-            put(partial / name, content)
+            write_unsynced(partial / name, content)
 
 
-def put(path: Path, content: bytes) -> None:
+def write_unsynced(path: Path, content: bytes) -> None:
     """A file of a new folder."""
     path.parent.mkdir(parents=True, exist_ok=True)
     path.write_bytes(content)
 
 
-def write_into(target: Path, files: Mapping[str, bytes], stale: tuple[str, ...] = ()) -> None:
+def replace_files(target: Path, files: Mapping[str, bytes], stale: tuple[str, ...] = ()) -> None:
     """Files into a folder that may hold others: all are on the disk before the first takes its place, in order.
 
     stale: names of an earlier run that go away unless written again.
     """
-    with writing(target) as partial:
-        _fill(partial, files)
+    with staged_path(target) as partial:
+        _write_synced_files(partial, files)
         target.mkdir(exist_ok=True)
         for name in stale:
             if name not in files:
@@ -115,44 +115,44 @@ def write_into(target: Path, files: Mapping[str, bytes], stale: tuple[str, ...] 
         for name in files:
             (target / name).parent.mkdir(parents=True, exist_ok=True)
             os.replace(partial / name, target / name)
-        _flush_folder(target)
+        _sync_folder(target)
 
 
-def sweep(*folders: Path) -> None:
+def remove_partials(*folders: Path) -> None:
     """Remove what killed runs left behind in folders."""
     for path in [p for folder in folders for p in folder.glob(f"{PARTIAL}*")]:
         _remove(path)
 
 
-def _fill(folder: Path, files: Mapping[str, bytes]) -> None:
+def _write_synced_files(folder: Path, files: Mapping[str, bytes]) -> None:
     folder.mkdir()
     for name, content in files.items():
-        put(folder / name, content)
-    _flush_all(folder)
+        write_unsynced(folder / name, content)
+    _sync_tree(folder)
 
 
-def _flush_all(folder: Path) -> None:
+def _sync_tree(folder: Path) -> None:
     """Every file and folder in a folder, and itself; several at once, as disks wait for each alone."""
     within = sorted(folder.rglob("*"))
-    with ThreadPoolExecutor(AT_ONCE) as pool:
-        list(pool.map(_flush, [path for path in within if not path.is_dir()]))
+    with ThreadPoolExecutor(SYNC_THREADS) as pool:
+        list(pool.map(_sync_file, [path for path in within if not path.is_dir()]))
     for path in [*(path for path in within if path.is_dir()), folder]:
-        _flush_folder(path)
+        _sync_folder(path)
 
 
-def _flush(path: Path) -> None:
+def _sync_file(path: Path) -> None:
     with path.open("rb+") as file:
         os.fsync(file.fileno())
 
 
-def _flushed(path: Path, content: bytes) -> None:
+def _write_synced(path: Path, content: bytes) -> None:
     with path.open("wb") as file:
         file.write(content)
         file.flush()
         os.fsync(file.fileno())
 
 
-def _flush_folder(path: Path) -> None:
+def _sync_folder(path: Path) -> None:
     """Flush a folder's entries, where the system can."""
     with suppress(OSError):
         descriptor = os.open(path, os.O_RDONLY)

@@ -8,11 +8,11 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 
 from scenarios.errors import InputError
-from sim.io.files.atomic import refusal
+from sim.io.files.atomic import write_error
 
 
 @contextmanager
-def alone(root: Path) -> Iterator[None]:
+def lock_folder(root: Path) -> Iterator[None]:
     """One run at a time in a folder, where the system can tell; a folder made for nothing goes away again."""
     made = [p for p in (root, *root.parents) if not p.exists()]
     try:
@@ -20,7 +20,7 @@ def alone(root: Path) -> Iterator[None]:
         with _lock(root):
             yield
     except OSError as error:
-        raise refusal(root, error) from error
+        raise write_error(root, error) from error
     finally:
         with suppress(OSError):
             for folder in made:

@@ -13,24 +13,24 @@ from sim.types import Array, Bools, Ints
 
 
 @dataclass(frozen=True)
-class Rows:
+class NumericTable:
     """Numbers of a text file: values (N, C), line (N,) the 1-based line of each row."""
 
     file: Path
     values: Array
     line: Ints
 
-    def refuse(self, wrong: Bools | np.bool_, expected: str, remedy: str) -> None:
+    def reject(self, wrong: Bools | np.bool_, expected: str, remedy: str) -> None:
         """InputError about the first row where `wrong` (N,) holds."""
         if np.any(wrong):
             k = int(np.argmax(wrong))
             got = ",".join(f"{v:g}" for v in self.values[k])
             raise InputError(file=self.file, place=f"line {self.line[k]}", got=got, expected=expected, remedy=remedy)
 
-    def whole(self, column: int, name: str) -> Ints:
+    def integers(self, column: int, name: str) -> Ints:
         """A column as integers; InputError where a value is none."""
         v = self.values[:, column]
-        self.refuse((v != np.round(v)) | (np.abs(v) > 2**52), f"a whole number as {name}", f"correct the {name}")
+        self.reject((v != np.round(v)) | (np.abs(v) > 2**52), f"a whole number as {name}", f"correct the {name}")
         return v.astype(np.int64)
 
 
@@ -48,14 +48,14 @@ def read_text(path: Path) -> str:
         ) from None
 
 
-def read_rows(path: Path, columns: tuple[int, int]) -> Rows:
+def read_numbers(path: Path, columns: tuple[int, int]) -> NumericTable:
     """All non-empty lines as numbers, separated by commas, else by blanks; as many columns in each line.
 
     InputError (line, got, expected) for a word, NaN or infinity, or a number of columns outside `columns`.
     """
     numbered = [(k, line) for k, line in enumerate(read_text(path).splitlines(), 1) if line.strip()]
     if not numbered:
-        return Rows(path, np.zeros((0, columns[0])), np.zeros(0, np.int64))
+        return NumericTable(path, np.zeros((0, columns[0])), np.zeros(0, np.int64))
     lines = np.array([k for k, _ in numbered], np.int64)
     separator = "," if "," in numbered[0][1] else None
     try:
@@ -63,12 +63,12 @@ def read_rows(path: Path, columns: tuple[int, int]) -> Rows:
         values = np.loadtxt(text, delimiter=separator, comments=None, ndmin=2, dtype=np.float64)
     except ValueError:
         raise _first_bad_line(path, numbered, separator) from None
-    rows = Rows(path, values, lines)
+    rows = NumericTable(path, values, lines)
     low, high = columns
     if not low <= values.shape[1] <= high:
         span = str(low) if low == high else f"{low} to {high}"
-        rows.refuse(np.ones(len(lines), bool), f"{span} columns", "check that this is the right file")
-    rows.refuse(~np.isfinite(values).all(axis=1), "finite numbers", "remove or correct the line")
+        rows.reject(np.ones(len(lines), bool), f"{span} columns", "check that this is the right file")
+    rows.reject(~np.isfinite(values).all(axis=1), "finite numbers", "remove or correct the line")
     return rows
 
 

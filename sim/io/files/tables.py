@@ -30,7 +30,7 @@ class Column:
 
 
 @dataclass(frozen=True)
-class Table:
+class StoredTable:
     """A table as read: columns by name, and the facts stored with it."""
 
     file: Path
@@ -93,7 +93,7 @@ def _arrow(column: Column) -> Any:
     return pa.ListArray.from_arrays(pa.array(offsets), pa.array(flat))
 
 
-def read_table(path: Path) -> Table:
+def read_table(path: Path) -> StoredTable:
     """A table of ours; InputError where it is truncated, another's, or holds nulls."""
     import pyarrow as pa
     import pyarrow.parquet as pq
@@ -113,7 +113,7 @@ def read_table(path: Path) -> Table:
         if column.null_count:
             raise InputError(file=path, place=name, got="empty cells", expected="none", remedy=REDO)
         columns[name] = _numpy(column.combine_chunks())
-    return Table(path, columns, facts)
+    return StoredTable(path, columns, facts)
 
 
 def _numpy(column: Any) -> Any:
@@ -130,12 +130,12 @@ def json_text(value: Any) -> str:
     return json.dumps(value, ensure_ascii=False, allow_nan=False)
 
 
-def document(value: dict[str, Any]) -> bytes:
+def json_document(value: dict[str, Any]) -> bytes:
     """A JSON file for reading: two blanks of indentation, a newline at the end."""
     return (json.dumps(value, ensure_ascii=False, allow_nan=False, indent=2) + "\n").encode()
 
 
-def listing(name: str, items: Iterable[dict[str, Any]]) -> bytes:
+def json_list(name: str, items: Iterable[dict[str, Any]]) -> bytes:
     """{"format": 1, name: [...]} with one item per line."""
     lines = ",\n".join(json_text(item) for item in items)
     body = f"[\n{lines}\n]" if lines else "[]"
@@ -166,11 +166,11 @@ def read_document(path: Path) -> dict[str, Any]:
     return value
 
 
-def finite(value: float) -> float | None:
+def nan_to_none(value: float) -> float | None:
     """A number for JSON: None for nan."""
     return None if value != value else float(value)
 
 
-def number(value: float | None) -> float:
+def none_to_nan(value: float | None) -> float:
     """A number from JSON: nan for None."""
     return float("nan") if value is None else float(value)

@@ -13,14 +13,14 @@ from pathlib import Path
 import numpy as np
 
 from scenarios.errors import InputError
-from sim.io.files.numeric_text import Rows, read_rows, read_text
-from sim.io.formats.group_labels import label_truth
+from sim.io.files.numeric_text import NumericTable, read_numbers, read_text
+from sim.io.formats.group_labels import labelled_truth_fields
 from sim.types import Frame, Ints, Sequence, Truth
 
 FPS = 2.5
 
 
-def slots(raw: Ints) -> Ints:
+def frame_numbers(raw: Ints) -> Ints:
     """1-based frames round((raw - first) / step) + 1, with the most frequent step between raw frames."""
     steps = np.diff(np.unique(raw))
     if len(steps) == 0:
@@ -61,16 +61,16 @@ def _ids(path: Path, number: int, line: str) -> list[int]:
     )
 
 
-def _table(folder: Path) -> tuple[Rows, Ints, Ints]:
+def _table(folder: Path) -> tuple[NumericTable, Ints, Ints]:
     """obsmat.txt sorted by (frame, id), its slots and ids."""
-    rows = read_rows(folder / "obsmat.txt", (8, 8))
-    frame, id = slots(rows.whole(0, "frame")), rows.whole(1, "id")
-    rows.refuse(id < 0, "ids from 0", "correct the id")
+    rows = read_numbers(folder / "obsmat.txt", (8, 8))
+    frame, id = frame_numbers(rows.integers(0, "frame")), rows.integers(1, "id")
+    rows.reject(id < 0, "ids from 0", "correct the id")
     order = np.lexsort((id, frame))
     twice = np.zeros(len(order), bool)
     twice[order[1:]] = (np.diff(frame[order]) == 0) & (np.diff(id[order]) == 0)
-    rows.refuse(twice, "each id once in a frame", "remove one of the two lines")
-    return Rows(rows.file, rows.values[order], rows.line[order]), frame[order], id[order]
+    rows.reject(twice, "each id once in a frame", "remove one of the two lines")
+    return NumericTable(rows.file, rows.values[order], rows.line[order]), frame[order], id[order]
 
 
 def read_truth(folder: Path, fps: float = FPS) -> Truth:
@@ -87,7 +87,7 @@ def read_truth(folder: Path, fps: float = FPS) -> Truth:
         return truth
     names = read_groups(folder / "groups.txt")
     label = np.array([names.get(int(i), -1) for i in id], np.int64)
-    return truth.replace(group=label, **label_truth(frame, id, label, pos, vel, fps=fps, length=length))
+    return truth.replace(group=label, **labelled_truth_fields(frame, id, label, pos, vel, fps=fps, length=length))
 
 
 def open_folder(folder: Path, *, fps: float | None = None) -> Sequence:

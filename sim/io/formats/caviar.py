@@ -15,7 +15,7 @@ from pathlib import Path
 import numpy as np
 
 from scenarios.errors import InputError
-from sim.io.formats.group_labels import label_truth
+from sim.io.formats.group_labels import labelled_truth_fields
 from sim.io.formats.velocity import differentiate
 from sim.scene.camera import PERSON
 from sim.truth.group_hulls import box_groups
@@ -27,7 +27,7 @@ CHORD = 1.0  # s, for velocities: labels stand still for frames and then jump by
 
 
 @dataclass(frozen=True)
-class Recording:
+class CaviarRecording:
     """Rows sorted by (frame, id): centre (R, 2) and size (R, 2) in px, label -1 alone; labelled: has group lists."""
 
     name: str
@@ -45,7 +45,7 @@ class Recording:
         return float(np.median(self.size.max(axis=1))) / PERSON if len(self.size) else float("nan")
 
 
-def read_xml(path: Path) -> Recording:
+def read_xml(path: Path) -> CaviarRecording:
     """The people and groups of a CAVIAR file; InputError with the frame of what cannot be read."""
     root = _root(path)
     rows: list[tuple[float, ...]] = []
@@ -66,7 +66,7 @@ def read_xml(path: Path) -> Recording:
             remedy="remove one of the two",
         )  # fmt: skip
     name = root.get("name", path.stem)
-    return Recording(name, last, frame, id, label_, table[:, 3:5], table[:, 5:7], labelled)
+    return CaviarRecording(name, last, frame, id, label_, table[:, 3:5], table[:, 5:7], labelled)
 
 
 def _root(path: Path) -> ET.Element:
@@ -147,7 +147,7 @@ def read_truth(path: Path, fps: float = FPS, px_per_m: float | None = None) -> T
     if not found.labelled or not len(box):
         return truth
     vel = differentiate(found.frame, found.id, found.centre, fps, CHORD)
-    known = label_truth(
+    known = labelled_truth_fields(
         found.frame, found.id, found.label, found.centre, vel, fps=fps, length=found.length, px_per_m=scale
     )
     del known["groups"]  # of footprints: in the image nobody sees any

@@ -14,14 +14,14 @@ import numpy as np
 from sim.types import Array, GroupEvent, Groups, Ints
 
 
-def dense(frame: Ints, id: Ints, values: Array, length: int) -> Array:
+def rows_to_grid(frame: Ints, id: Ints, values: Array, length: int) -> Array:
     """(T, P, ...) of rows, nan where absent; columns in the order of ids."""
     out = np.full((length, len(np.unique(id)), *values.shape[1:]), np.nan)
     out[frame - 1, np.searchsorted(np.unique(id), id)] = values
     return out
 
 
-def label_truth(
+def labelled_truth_fields(
     frame: Ints, id: Ints, label: Ints, pos: Array, vel: Array, *, fps: float, length: int, px_per_m: float = 1.0
 ) -> dict[str, Any]:
     """The fields groups, events and near of a Truth, for rows sorted by (frame, id); label -1: alone.
@@ -40,7 +40,7 @@ def label_truth(
     alone = label.max(initial=0) + 1 + column
     intent[frame - 1, column] = np.where(label >= 0, label, alone)
     present = intent >= 0
-    places, velocities = dense(frame, id, metres, length), dense(frame, id, speed, length)
+    places, velocities = rows_to_grid(frame, id, metres, length), rows_to_grid(frame, id, speed, length)
     measured = groups_and_events(places, velocities, present, intent, fps)
     names = _names(measured.group[frame - 1, column], label)
     found = [_named(e, names, people, px_per_m) for e in measured.events]
@@ -50,7 +50,7 @@ def label_truth(
     found += [_named(e, {}, people, px_per_m) for e in met]
     events = tuple(sorted(found, key=lambda e: (e.start, e.end, e.kind, e.members, e.after)))
     near = replace(measured.near, a=people[measured.near.a - 1], b=people[measured.near.b - 1])
-    groups = tuple(scaled(g, px_per_m) for g in groups_over_time(frame, id, label, metres, speed, 1, length))
+    groups = tuple(scale_groups(g, px_per_m) for g in groups_over_time(frame, id, label, metres, speed, 1, length))
     return {"groups": groups, "events": events, "near": near, "labelled": np.ones(length, bool)}
 
 
@@ -71,7 +71,7 @@ def _named(event: GroupEvent, names: dict[int, int], people: Ints, px_per_m: flo
     )
 
 
-def scaled(groups: Groups, factor: float) -> Groups:
+def scale_groups(groups: Groups, factor: float) -> Groups:
     """Groups with every length multiplied by `factor`."""
     if factor == 1.0:
         return groups

@@ -11,9 +11,9 @@ from pathlib import Path
 from scenarios.errors import InputError
 from sim.io.files.numeric_text import read_text
 from sim.io.formats import mot_text
-from sim.io.pictures.picture_folder import filled, picture_folder
-from sim.io.store.background_sample import Choice, Sample
-from sim.io.store.camera_files import fitted
+from sim.io.formats.calibration import scaled_to_image
+from sim.io.pictures.background_sample import BackgroundChoice, BackgroundSample
+from sim.io.pictures.picture_folder import fill_gaps, find_pictures
 from sim.types import Camera, Frame, Image, Sequence
 
 DEFAULT_FPS = 25.0
@@ -81,7 +81,7 @@ def open_folder(
     px_per_m: float | None = None,
     camera: Camera | None = None,
     images: bool = True,
-    background: Choice | None = None,
+    background: BackgroundChoice | None = None,
 ) -> Sequence:
     """A MOTChallenge folder as Sequence; its pictures, decoded one by one, are left out where not `images`."""
     ini = path / "seqinfo.ini"
@@ -90,7 +90,7 @@ def open_folder(
     scale = float("nan") if px_per_m is None else px_per_m
     gt, det = path / "gt" / "gt.txt", path / "det" / "det.txt"
     found = mot_text.read_detections(det, info.length) if det.is_file() else None
-    pictures = picture_folder(path / info.image_dir, info.length, gt.is_file() or found is not None)
+    pictures = find_pictures(path / info.image_dir, info.length, gt.is_file() or found is not None)
     length = info.length or max(_labelled(found, gt), pictures.last)
     if not length:
         expected = "a row in gt.txt or det.txt, a picture, or seqLength in seqinfo.ini"
@@ -100,26 +100,26 @@ def open_folder(
     if background is not None and not pictures.files:
         got, remedy = "--background", "leave it out: it has none"
         raise InputError(file=path, got=got, expected="none for a recording without pictures", remedy=remedy)
-    choice = (background or Choice()).of(length, path) if pictures.files else None
+    choice = (background or BackgroundChoice()).of(length, path) if pictures.files else None
 
     def bare() -> Iterator[Frame]:
         for index in range(1, length + 1):
             yield Frame(index, (index - 1) / rate, detections=None if found is None else found.at(index, rate))
 
     def frames() -> Iterator[Frame]:
-        shown = pictures.some(range(1, length + 1), seen)
-        for frame, picture in zip(bare(), filled(shown, length, path.name), strict=True):
+        shown = pictures.read(range(1, length + 1), seen)
+        for frame, picture in zip(bare(), fill_gaps(shown, length, path.name), strict=True):
             yield frame.replace(image=picture)
 
     def sample(wanted: list[int]) -> Iterator[tuple[int, Image]]:
-        return pictures.some(wanted, seen if images else pictures.first_size())
+        return pictures.read(wanted, seen if images else pictures.first_size())
 
     return Sequence(
         name=info.name, fps=rate, length=length, frames=frames if images and pictures.files else bare, bare=bare,
         load_truth=(lambda: mot_text.read_truth(gt, info.name, rate, length, scale)) if gt.is_file() else None,
-        image_size=size, camera=None if camera is None else fitted(camera, size, path),
+        image_size=size, camera=None if camera is None else scaled_to_image(camera, size, path),
         px_per_m=scale, has_images=images and bool(pictures.files), has_detections=found is not None,
-        load_background=None if choice is None else Sample(choice, length, path, sample),
+        load_background=None if choice is None else BackgroundSample(choice, length, path, sample),
         source={"kind": "mot", "path": str(path), **({} if choice is None else {"background": str(choice)})},
     )  # fmt: skip
 

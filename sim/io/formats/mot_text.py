@@ -12,7 +12,7 @@ from pathlib import Path
 
 import numpy as np
 
-from sim.io.files.numeric_text import Rows, read_rows
+from sim.io.files.numeric_text import NumericTable, read_numbers
 from sim.io.formats.velocity import differentiate
 from sim.scene.camera import PERSON
 from sim.types import Array, Bools, Detections, Ints, Plane, Truth
@@ -23,16 +23,16 @@ MAX_FRAME = 10_000_000
 
 @dataclass(frozen=True)
 class MotTable:
-    """Rows of a MOT text file in the order of the file; rest (N, 0..4): what follows the box."""
+    """NumericTable of a MOT text file in the order of the file; rest (N, 0..4): what follows the box."""
 
-    rows: Rows
+    rows: NumericTable
     frame: Ints
     id: Ints
     box: Array
     rest: Array
 
-    def boxless(self) -> Bools:
-        """Rows that say -1,-1,-1,-1: no box."""
+    def without_box(self) -> Bools:
+        """NumericTable that say -1,-1,-1,-1: no box."""
         return np.asarray((self.box == -1).all(axis=1))
 
     def ground(self) -> Array | None:
@@ -45,26 +45,26 @@ class MotTable:
 
 def read_table(path: Path, *, length: int | None = None, boxless: bool = False) -> MotTable:
     """A MOT text file of 7 to 10 columns, checked row by row; `boxless` lets -1,-1,-1,-1 stand for "no box"."""
-    rows = read_rows(path, (6, 10))
-    frame, id = rows.whole(0, "frame"), rows.whole(1, "id")
+    rows = read_numbers(path, (6, 10))
+    frame, id = rows.integers(0, "frame"), rows.integers(1, "id")
     table = MotTable(rows, frame, id, rows.values[:, 2:6], rows.values[:, 6:])
     last = MAX_FRAME if length is None else length
-    rows.refuse((frame < 1) | (frame > last), f"frames from 1 to {last}", "correct the frame, or seqLength")
+    rows.reject((frame < 1) | (frame > last), f"frames from 1 to {last}", "correct the frame, or seqLength")
     flat = (table.box[:, 2:] <= 0).any(axis=1)
     if boxless:
-        flat &= ~table.boxless()
-    rows.refuse(flat, "boxes with width and height above 0", "remove or correct the line")
+        flat &= ~table.without_box()
+    rows.reject(flat, "boxes with width and height above 0", "remove or correct the line")
     return table
 
 
-def refuse_twice(table: MotTable, keep: Bools) -> None:
+def reject_duplicate_ids(table: MotTable, keep: Bools) -> None:
     """InputError where an id stands twice in a frame; id -1 (a detection's) may."""
     order = np.lexsort((np.arange(len(table.frame)), table.id, table.frame))
     same = (np.diff(table.frame[order]) == 0) & (np.diff(table.id[order]) == 0)
     counted = (keep & (table.id >= 0))[order]
     twice = np.zeros(len(order), bool)
     twice[order[1:]] = same & counted[1:] & counted[:-1]
-    table.rows.refuse(twice, "each id once in a frame", "remove one of the two lines")
+    table.rows.reject(twice, "each id once in a frame", "remove one of the two lines")
 
 
 @dataclass(frozen=True)
@@ -88,18 +88,18 @@ class DetectionTable:
 def read_detections(path: Path, length: int | None) -> DetectionTable:
     """det.txt: points on the ground where every row has one, else boxes in the image."""
     table = read_table(path, length=length, boxless=True)
-    ground, boxless = table.ground(), table.boxless()
+    ground, boxless = table.ground(), table.without_box()
     score = unit_scores(table.rest[:, 0] if table.rest.shape[1] else np.ones(len(table.frame)))
     plane: Plane = "image" if ground is None or np.isnan(ground).any() else "ground"
     if plane == "image":
-        table.rows.refuse(boxless, "a box, or x, y, z in every line", "give each detection a box or a ground position")
+        table.rows.reject(boxless, "a box, or x, y, z in every line", "give each detection a box or a ground position")
     pos = ground[:, :2] if plane == "ground" and ground is not None else table.box[:, :2] + table.box[:, 2:] / 2
     order = np.argsort(table.frame, kind="stable")
     box = None if boxless.any() else table.box[order]
     return DetectionTable(table.frame[order], table.id[order], plane, pos[order], box, score[order])
 
 
-def place_text(xyz: Sequence[float]) -> str:
+def ground_cells(xyz: Sequence[float]) -> str:
     """The last three cells of a line, x,y,z in m: a z that would read as unknown is written a millimetre lower."""
     x, y, z = (f"{v:.3f}" for v in xyz)
     return f"{x},{y},{z if z != '-1.000' else '-1.001'}"
@@ -114,7 +114,7 @@ def unit_scores(score: Array) -> Array:
 
 
 def read_truth(path: Path, name: str, fps: float, length: int | None = None, px_per_m: float = float("nan")) -> Truth:
-    """gt.txt as truth of people; groups are not labelled. Rows with flag 0 or another class are left out, as in
+    """gt.txt as truth of people; groups are not labelled. NumericTable with flag 0 or another class are left out, as in
     MOTChallenge's own scoring. px_per_m, if not given: the median height of the boxes / 1.7 m."""
     table = read_table(path, length=length)
     keep = table.id >= 0
@@ -123,14 +123,14 @@ def read_truth(path: Path, name: str, fps: float, length: int | None = None, px_
         keep &= table.rest[:, 0] != 0
     if nine:
         keep &= table.rest[:, 1] == PEDESTRIAN
-    refuse_twice(table, keep)
+    reject_duplicate_ids(table, keep)
     order = np.flatnonzero(keep)
     order = order[np.lexsort((table.id[order], table.frame[order]))]
     frame, id, box = table.frame[order], table.id[order], table.box[order]
     visibility = np.ones(len(order))
     if table.rest.shape[1] == 3:
         v = table.rest[:, 2]
-        table.rows.refuse((v > 1) | ((v < 0) & (v != -1)), "visibility from 0 to 1, or -1", "correct the last column")
+        table.rows.reject((v > 1) | ((v < 0) & (v != -1)), "visibility from 0 to 1, or -1", "correct the last column")
         visibility = np.where(v[order] < 0, 1.0, v[order])
     ground = table.ground()
     place = None if ground is None else ground[order]

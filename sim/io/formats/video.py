@@ -13,10 +13,10 @@ from pathlib import Path
 import numpy as np
 
 from scenarios.errors import InputError
+from sim.io.formats.calibration import scaled_to_image
 from sim.io.pictures import video_decoding
-from sim.io.pictures.picture_folder import checked, filled, size_of
-from sim.io.store.background_sample import Choice, Sample
-from sim.io.store.camera_files import fitted
+from sim.io.pictures.background_sample import BackgroundChoice, BackgroundSample
+from sim.io.pictures.picture_folder import fill_gaps, require_size, size_of
 from sim.types import Camera, Frame, Image, Sequence
 
 SUFFIXES = (
@@ -27,7 +27,7 @@ RATES = (0.1, 300.0)  # frames/s that make sense
 AGREE = 0.02  # by which the container's rate may differ from that of the time stamps
 GAP, GAPS = 1.0, 5.0  # s, and times the usual step: time without a frame that is told
 DEFAULT_FPS = 25.0
-ANY = Choice()
+ANY = BackgroundChoice()
 
 
 def open_video(
@@ -36,12 +36,12 @@ def open_video(
     fps: float | None = None,
     px_per_m: float | None = None,
     camera: Camera | None = None,
-    background: Choice = ANY,
+    background: BackgroundChoice = ANY,
 ) -> Sequence:
     """A video file as Sequence; InputError where no picture can be decoded."""
-    index = video_decoding.packets(path)
+    index = video_decoding.index_packets(path)
     length = len(index.stamps)
-    first = next((picture for _, picture in video_decoding.pictures(path, index)), None)
+    first = next((picture for _, picture in video_decoding.decode_frames(path, index)), None)
     if first is None:
         got = f"{length} frames, none of which can be decoded" if length else "no frame"
         raise InputError(file=path, got=got, expected="a video with pictures", remedy=video_decoding.REMEDY)
@@ -52,20 +52,20 @@ def open_video(
     choice = background.of(length, path)
 
     def frames() -> Iterator[Frame]:
-        for k, picture in enumerate(filled(_pictures(path, index, size), known, path.name), 1):
+        for k, picture in enumerate(fill_gaps(_pictures(path, index, size), known, path.name), 1):
             yield Frame(k, (k - 1) / rate, picture)
 
     return Sequence(
         name=path.stem, fps=rate, length=known, frames=frames,
-        image_size=size, camera=None if camera is None else fitted(camera, size, path),
+        image_size=size, camera=None if camera is None else scaled_to_image(camera, size, path),
         px_per_m=float("nan") if px_per_m is None else px_per_m, has_images=True,
-        load_background=Sample(choice, length, path, lambda wanted: _pictures(path, index, size, wanted)),
+        load_background=BackgroundSample(choice, length, path, lambda wanted: _pictures(path, index, size, wanted)),
         source={"kind": "video", "path": str(path), "fps": words, "background": str(choice)},
         bare=None if known is None else lambda: (Frame(k, (k - 1) / rate) for k in range(1, known + 1)),
     )  # fmt: skip
 
 
-def missing(index: video_decoding.Packets) -> Iterator[str]:
+def missing(index: video_decoding.PacketIndex) -> Iterator[str]:
     """In words, what of a video is not there: its end, by its own header, and times at which it shows nothing."""
     times, length = index.times(), len(index.stamps)
     step = np.diff(times)
@@ -83,7 +83,7 @@ def missing(index: video_decoding.Packets) -> Iterator[str]:
         yield f"nothing for {step[gaps[0] - 1]:.1f} s after frame {gaps[0]}{more}; frames are numbered without the gap"
 
 
-def frame_rate(name: str, given: float | None, index: video_decoding.Packets) -> tuple[float, str]:
+def frame_rate(name: str, given: float | None, index: video_decoding.PacketIndex) -> tuple[float, str]:
     """Frames per second and where they come from: --fps, the container, its time stamps, else 25 with a warning."""
     if given is not None:
         return given, f"{given:g}, as given"
@@ -104,7 +104,7 @@ def _sensible(rate: float) -> bool:
     return RATES[0] <= rate <= RATES[1]
 
 
-def stamped_rate(index: video_decoding.Packets) -> float:
+def stamped_rate(index: video_decoding.PacketIndex) -> float:
     """Frames per second by the time stamps, to 1e-3, gaps left out; 0 where stamps do not tell."""
     step = np.diff(index.times())
     if not len(step):
@@ -114,8 +114,9 @@ def stamped_rate(index: video_decoding.Packets) -> float:
 
 
 def _pictures(
-    path: Path, index: video_decoding.Packets, size: tuple[int, int], wanted: list[int] | None = None
+    path: Path, index: video_decoding.PacketIndex, size: tuple[int, int], wanted: list[int] | None = None
 ) -> Iterator[tuple[int, Image]]:
     return (
-        (k, checked(picture, size, path, f"frame {k}")) for k, picture in video_decoding.pictures(path, index, wanted)
+        (k, require_size(picture, size, path, f"frame {k}"))
+        for k, picture in video_decoding.decode_frames(path, index, wanted)
     )

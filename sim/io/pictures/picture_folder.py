@@ -20,21 +20,21 @@ Picture = TypeVar("Picture", bound=NDArray[Any])
 SPARSE = 100  # numbers in names that leave more than 99 of 100 out are no frames (time stamps)
 
 
-def filled(pairs: Iterable[tuple[int, Image]], length: int | None, place: str) -> Iterator[Image | None]:
+def fill_gaps(pairs: Iterable[tuple[int, Image]], length: int | None, place: str) -> Iterator[Image | None]:
     """A picture for each frame, None for those of `pairs` (frame, picture) that are not there; these are told once."""
     shown, told = 0, False
     for number, picture in pairs:
         for lost in range(shown + 1, number):
-            told = told or _tell(place, lost)
+            told = told or _warn_lost(place, lost)
             yield None
         shown = max(shown, number)
         yield picture
     for lost in range(shown + 1, (length or 0) + 1):
-        told = told or _tell(place, lost)
+        told = told or _warn_lost(place, lost)
         yield None
 
 
-def _tell(place: str, frame: int) -> bool:
+def _warn_lost(place: str, frame: int) -> bool:
     text = f"{place}: frame {frame} has no readable picture; it and any others like it are lost frames"
     warnings.warn(text, stacklevel=3)
     return True
@@ -45,7 +45,7 @@ def size_of(picture: NDArray[Any]) -> tuple[int, int]:
     return picture.shape[1], picture.shape[0]
 
 
-def checked(picture: Picture, size: tuple[int, int], path: Path, place: str = "") -> Picture:
+def require_size(picture: Picture, size: tuple[int, int], path: Path, place: str = "") -> Picture:
     """The picture; InputError where it is not of the recording's size."""
     if size_of(picture) != size:
         got, expected = "{}×{} px".format(*size_of(picture)), "{}×{} px like the first".format(*size)
@@ -64,7 +64,7 @@ def read_picture(path: Path) -> Image | None:
         body = path.read_bytes()
     except OSError:
         return None
-    if not ends(body):
+    if not is_complete(body):
         return None
     level = cv2.utils.logging.setLogLevel(cv2.utils.logging.LOG_LEVEL_SILENT)
     try:
@@ -76,7 +76,7 @@ def read_picture(path: Path) -> Image | None:
     return None if picture is None else np.asarray(picture, np.uint8)
 
 
-def ends(body: bytes) -> bool:
+def is_complete(body: bytes) -> bool:
     """Whether a JPEG or PNG goes on to its end; older decoders give half a picture, and libraries grumble on stderr."""
     if body.startswith(b"\xff\xd8"):
         return body.rfind(b"\xff\xd9") > body.rfind(b"\xff\xda") > 0
@@ -100,7 +100,7 @@ class PictureFolder:
         found = (read_picture(path) for path in self.files.values())
         return next((size_of(picture) for picture in found if picture is not None), None)
 
-    def some(self, frames: Iterable[int], size: tuple[int, int] | None) -> Iterator[tuple[int, Image]]:
+    def read(self, frames: Iterable[int], size: tuple[int, int] | None) -> Iterator[tuple[int, Image]]:
         """(frame, picture) of those that can be read; InputError where no file of the folder can, or sizes differ."""
         if size is None:
             raise InputError(
@@ -110,10 +110,10 @@ class PictureFolder:
         for k in frames:
             picture = read_picture(self.files[k]) if k in self.files else None
             if picture is not None:
-                yield k, checked(picture, size, self.files[k])
+                yield k, require_size(picture, size, self.files[k])
 
 
-def picture_folder(folder: Path, length: int | None, labelled: bool) -> PictureFolder:
+def find_pictures(folder: Path, length: int | None, labelled: bool) -> PictureFolder:
     """The pictures of a folder by the numbers that their names end with, by the order of names that have none.
 
     Numbers are frames. They are counted from the lowest where that is 0, where they go beyond `length`, or where

@@ -15,7 +15,7 @@ from scenarios.errors import InputError
 from sim import hashing
 from sim.io.files import atomic
 from sim.io.files.tables import Column, table_bytes
-from sim.io.pictures.video_encoding import Movie, movie
+from sim.io.pictures.video_encoding import VideoWriter, write_video
 from sim.io.store import streams
 from sim.types import Frame, Image, PixelTruth, Sequence, Truth
 
@@ -27,7 +27,7 @@ Facts = dict[str, dict[str, Any]]
 
 
 @dataclass(frozen=True)
-class Pictures:
+class WrittenPictures:
     """What has been written: which streams, as what, the hash of each one's raw pixels, and its files' hashes."""
 
     streams: tuple[str, ...] = ()
@@ -36,18 +36,18 @@ class Pictures:
     files: Facts = field(default_factory=dict)
 
 
-NONE = Pictures()
+NO_PICTURES = WrittenPictures()
 
 
-class Output:
+class StreamWriter:
     """One stream: takes a picture at a time; `files` holds size and hash of what has been written."""
 
     def __init__(self, folder: Path, stream: str, images: str, size: tuple[int, int], fps: float):
         self.stream, self.images, self.folder = stream, images, folder
         self.pixels, self.files = hashing.PixelHash(), Facts()
-        self._open: AbstractContextManager[Movie | None] = nullcontext()
+        self._open: AbstractContextManager[VideoWriter | None] = nullcontext()
         if streams.suffix(stream, images) == "mp4":
-            self._open = movie(folder / streams.file_name(stream, images, 1), size, fps)
+            self._open = write_video(folder / streams.file_name(stream, images, 1), size, fps)
 
     def add(self, picture: NDArray[Any]) -> None:
         """The next picture: (H, W, 3) uint8, or (H, W) uint16 of an exact stream."""
@@ -57,10 +57,10 @@ class Output:
             return
         name = streams.file_name(self.stream, self.images, self.pixels.count)
         body = encoded(picture, streams.suffix(self.stream, self.images))
-        atomic.put(self.folder / name, body)
+        atomic.write_unsynced(self.folder / name, body)
         self.files[name] = {"sha256": hashing.file_hash(body), "bytes": len(body)}
 
-    def __enter__(self) -> Output:
+    def __enter__(self) -> StreamWriter:
         self._movie = self._open.__enter__()
         return self
 
@@ -83,15 +83,15 @@ def encoded(picture: NDArray[Any], kind: str) -> bytes:
     return body.tobytes()
 
 
-def write_pictures(folder: Path, sequence: Sequence, wanted: tuple[str, ...], images: str) -> Pictures:
+def write_pictures(folder: Path, sequence: Sequence, wanted: tuple[str, ...], images: str) -> WrittenPictures:
     """Draw a sequence's streams into a folder; with them, where its pixels are known, who shows where (TABLE)."""
     if not wanted:
-        return NONE
+        return NO_PICTURES
     assert sequence.image_size is not None, "pictures have a size"
     known: list[PixelTruth] = []
     with ExitStack() as stack:
         form = (images, sequence.image_size, sequence.fps)
-        outputs = {name: stack.enter_context(Output(folder, name, *form)) for name in wanted}
+        outputs = {name: stack.enter_context(StreamWriter(folder, name, *form)) for name in wanted}
         if "background" in outputs:
             for picture in _background(sequence):
                 outputs["background"].add(picture)
@@ -101,10 +101,10 @@ def write_pictures(folder: Path, sequence: Sequence, wanted: tuple[str, ...], im
     files = {name: facts for output in outputs.values() for name, facts in output.files.items()}
     if known and sequence.truth is not None:
         body = pixel_table(sequence.truth, known)
-        atomic.put(folder / TABLE, body)
+        atomic.write_unsynced(folder / TABLE, body)
         files[TABLE] = {"sha256": hashing.file_hash(body), "bytes": len(body)}
     pixels = {name: output.pixels.hex() for name, output in outputs.items()}
-    return Pictures(wanted, streams.coding(wanted, images), pixels, files)
+    return WrittenPictures(wanted, streams.coding(wanted, images), pixels, files)
 
 
 def _background(sequence: Sequence) -> Image:
@@ -114,7 +114,7 @@ def _background(sequence: Sequence) -> Image:
     return found
 
 
-def _add(outputs: dict[str, Output], sequence: Sequence, frame: Frame, known: list[PixelTruth]) -> None:
+def _add(outputs: dict[str, StreamWriter], sequence: Sequence, frame: Frame, known: list[PixelTruth]) -> None:
     """One frame to each stream."""
     for name, picture in (("left", frame.image), ("right", frame.right)):
         if name in outputs:
@@ -127,11 +127,11 @@ def _add(outputs: dict[str, Output], sequence: Sequence, frame: Frame, known: li
         return
     pixels = sequence.load_pixels(frame.index)
     if "ids" in outputs:
-        outputs["ids"].add(streams.coded_ids(pixels.ids))
+        outputs["ids"].add(streams.encode_ids(pixels.ids))
     if "disparity" in outputs:
         if pixels.disparity is None:
             raise _missing(sequence, "disparity")
-        outputs["disparity"].add(streams.coded_disparity(pixels.disparity))
+        outputs["disparity"].add(streams.encode_disparity(pixels.disparity))
     known.append(pixels.replace(ids=np.zeros((0, 0), np.int64), disparity=None))
 
 

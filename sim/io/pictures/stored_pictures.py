@@ -1,4 +1,4 @@
-"""Pictures of a stored sequence, read when asked for and checked against the manifest."""
+"""Pictures of a stored sequence, read when asked for and require_size against the manifest."""
 
 from __future__ import annotations
 
@@ -13,9 +13,9 @@ from numpy.typing import NDArray
 
 from scenarios.errors import InputError
 from sim import hashing
-from sim.io.files.tables import Table, read_table
+from sim.io.files.tables import StoredTable, read_table
 from sim.io.pictures import video_decoding
-from sim.io.pictures.picture_folder import checked
+from sim.io.pictures.picture_folder import require_size
 from sim.io.pictures.picture_writer import BOX, TABLE
 from sim.io.store import streams
 from sim.io.store.manifest import REDO
@@ -23,7 +23,7 @@ from sim.types import Array, Image, Ints, PixelTruth
 
 
 @dataclass(frozen=True)
-class Stored:
+class StoredPictures:
     """The pictures of a sequence's folder, as its manifest tells."""
 
     folder: Path
@@ -60,7 +60,7 @@ class Stored:
         picture = cv2.imdecode(np.frombuffer(self.body(name), np.uint8), mode)
         if picture is None or picture.dtype != (np.uint16 if stream in streams.EXACT else np.uint8):
             raise InputError(file=self.folder / name, got="no readable picture", expected="one", remedy=REDO)
-        return checked(picture, self._size, self.folder / name)
+        return require_size(picture, self._size, self.folder / name)
 
     @property
     def _size(self) -> tuple[int, int]:
@@ -75,8 +75,10 @@ class Stored:
         name = streams.file_name(stream, self.images, 1)
         self.body(name)
         path, found = self.folder / name, 0
-        for found, (_, picture) in enumerate(video_decoding.pictures(path, video_decoding.packets(path), wanted), 1):
-            yield checked(picture, self._size, path, f"frame {found}")
+        for found, (_, picture) in enumerate(
+            video_decoding.decode_frames(path, video_decoding.index_packets(path), wanted), 1
+        ):
+            yield require_size(picture, self._size, path, f"frame {found}")
         if found != (count if wanted is None else len(wanted)):
             raise InputError(file=path, got=f"{found} pictures", expected=count, remedy=REDO)
 
@@ -84,7 +86,7 @@ class Stored:
         """(frame, picture) of some frames of the left camera."""
         return zip(wanted, self.all("left", self.manifest["sequence"]["length"], wanted), strict=True)
 
-    def table(self) -> Table:
+    def table(self) -> StoredTable:
         """Who shows how much, where, and in which blob."""
         return read_table(self.folder / TABLE)
 
@@ -100,9 +102,9 @@ class Stored:
         def pixels(index: int) -> PixelTruth:
             frame, visible, amodal, box, blob = columns()
             rows = slice(*np.searchsorted(frame, (index, index + 1)).tolist())
-            ids = streams.decoded_ids(self.one("ids", index))
+            ids = streams.decode_ids(self.one("ids", index))
             known = "disparity" in self.streams
-            disparity = streams.decoded_disparity(self.one("disparity", index)) if known else None
+            disparity = streams.decode_disparity(self.one("disparity", index)) if known else None
             return PixelTruth(ids, disparity, visible[rows], amodal[rows], box[rows], blob[rows])
 
         return pixels

@@ -27,7 +27,7 @@ REMEDY = "give a video that a player plays to its end"
 
 
 @dataclass(frozen=True)
-class Packets:
+class PacketIndex:
     """The packets of a video stream in the order of the file: when shown (units of time_base; None unknown), and
     where groups begin that can be decoded by themselves. promised, seconds: what the header says, 0 = nothing.
     broken: why reading ended before the file does, "" = it did not."""
@@ -66,7 +66,7 @@ class Packets:
 
 
 @contextmanager
-def opened(path: Path) -> Iterator[tuple[Any, Any]]:
+def open_stream(path: Path) -> Iterator[tuple[Any, Any]]:
     """The container and its first video stream; InputError where there is none to be read."""
     import av
 
@@ -92,12 +92,12 @@ def _reason(error: Exception) -> str:
     return str(getattr(error, "strerror", None) or error).partition("\n")[0][:80]
 
 
-def packets(path: Path) -> Packets:
+def index_packets(path: Path) -> PacketIndex:
     """What the file holds, without decoding; one that breaks off ends there."""
     import av
 
     found, broken = [], ""
-    with opened(path) as (container, stream):
+    with open_stream(path) as (container, stream):
         try:
             for p in container.demux(stream):
                 if p.size and not p.is_discard:
@@ -105,7 +105,7 @@ def packets(path: Path) -> Packets:
         except av.FFmpegError as error:
             broken = _reason(error)
         context = stream.codec_context
-        return Packets(
+        return PacketIndex(
             tuple(pts for pts, _ in found), tuple(key for _, key in found), stream.time_base,
             float(stream.average_rate or 0), int(stream.frames), _seconds(stream), broken, context.name,
             bool(context.has_b_frames),
@@ -121,7 +121,7 @@ def _seconds(stream: Any) -> float:
 
 
 def _demuxed(container: Any, stream: Any) -> Iterator[Any]:
-    """Packets up to where `packets` ended."""
+    """PacketIndex up to where `index_packets` ended."""
     import av
 
     packets = container.demux(stream)
@@ -135,12 +135,12 @@ def _demuxed(container: Any, stream: Any) -> Iterator[Any]:
         yield packet
 
 
-def pictures(path: Path, index: Packets, wanted: list[int] | None = None) -> Iterator[tuple[int, Image]]:
+def decode_frames(path: Path, index: PacketIndex, wanted: list[int] | None = None) -> Iterator[tuple[int, Image]]:
     """(frame, picture) in order, of all frames or of those wanted; what cannot be decoded is left out."""
     ranks, last, count = index.ranks(), max(wanted or [0]), 0
     some = None if wanted is None else set(wanted)
     groups = None if some is None else index.groups(some)
-    with opened(path) as (container, stream):
+    with open_stream(path) as (container, stream):
         for frame in _decoded(container, stream, groups):
             count += 1
             number = count if ranks is None or frame is None else ranks.get(frame.pts, 0)
@@ -157,15 +157,15 @@ def _decoded(container: Any, stream: Any, groups: set[int] | None) -> Iterator[A
         group += packet.is_keyframe
         if packet.size and groups is not None and group not in groups:
             if running:
-                yield from _some(stream, None)
+                yield from _decode_packet(stream, None)
                 stream.codec_context.flush_buffers()
             running = False
             continue
         running = True
-        yield from _some(stream, packet)
+        yield from _decode_packet(stream, packet)
 
 
-def _some(stream: Any, packet: Any) -> list[Any]:
+def _decode_packet(stream: Any, packet: Any) -> list[Any]:
     import av
 
     try:

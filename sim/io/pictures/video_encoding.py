@@ -26,7 +26,7 @@ def rate_of(fps: float) -> Fraction:
 
 
 @contextmanager
-def movie(path: Path, size: tuple[int, int], fps: float, quality: int = QUALITY) -> Iterator[Movie]:
+def write_video(path: Path, size: tuple[int, int], fps: float, quality: int = QUALITY) -> Iterator[VideoWriter]:
     """A video file of pictures of this size (width, height) to write; it is whole when left without an error."""
     if size[0] % 2 or size[1] % 2:
         raise InputError(
@@ -36,7 +36,7 @@ def movie(path: Path, size: tuple[int, int], fps: float, quality: int = QUALITY)
     # The file is ours, as libav keeps its own open where a video cannot be ended; and it is without Python code, which
     # Ctrl-C would end unseen in a callback of libav.
     with path.open("wb", buffering=0) as file:
-        made = Movie(file, size, fps, quality)
+        made = VideoWriter(file, size, fps, quality)
         try:
             yield made
             made.end()
@@ -44,7 +44,7 @@ def movie(path: Path, size: tuple[int, int], fps: float, quality: int = QUALITY)
             made.close()
 
 
-class Movie:
+class VideoWriter:
     """A video that takes (H, W, 3) BGR pictures one after the other; see `movie`."""
 
     def __init__(self, file: Any, size: tuple[int, int], fps: float, quality: int):

@@ -11,8 +11,6 @@ from scenarios.errors import InputError
 from sim.io.files import tables
 from sim.types import Array, Camera, Scene, Stairs
 
-SHAPE = 0.01  # by which the ratio of width to height may differ between a calibration and a recording
-
 
 def camera_document(camera: Camera) -> dict[str, Any]:
     """camera.json: kind, image [width, height] px, focal_px, centre_px, position (3) m, rotation 3x3 (world to
@@ -27,41 +25,9 @@ def camera_document(camera: Camera) -> dict[str, Any]:
         "position": camera.position.tolist(),
         "rotation": camera.rotation.tolist(),
         "baseline": camera.baseline,
-        "px_per_m": tables.finite(camera.px_per_m),
+        "px_per_m": tables.nan_to_none(camera.px_per_m),
         **bend,
     }
-
-
-def read_calibration(path: Path) -> Camera:
-    """A camera.json of ours or, ending in .xml, Tsai's calibration."""
-    if not path.is_file():
-        expected = "a camera.json, or Tsai's calibration as .xml"
-        raise InputError(file=path, got="no file", expected=expected, remedy="check --camera")
-    from sim.io.formats.tsai import read_tsai
-
-    return read_tsai(path) if path.suffix.lower() == ".xml" else read_camera(path)
-
-
-def fitted(camera: Camera, image: tuple[int, int] | None, path: Path) -> Camera:
-    """The camera of a recording of that size: scaled where it was calibrated at another. None: taken as it is.
-
-    InputError where the two have different shapes: then the calibration is of another recording.
-    """
-    if image is None or image == camera.image:
-        return camera
-    x, y = image[0] / camera.image[0], image[1] / camera.image[1]
-    if abs(x / y - 1) > SHAPE:
-        raise InputError(
-            file=path, place="--camera", got="a calibration for {}×{} px".format(*camera.image),
-            expected="one for {}×{} px, or of that shape".format(*image), remedy="give this recording's calibration",
-        )  # fmt: skip
-    (fx, fy), (cx, cy) = camera.focal_px, camera.centre_px
-    return camera.replace(
-        image=image,
-        focal_px=(fx * x, fy * y),
-        centre_px=(cx * x, cy * y),
-        px_per_m=float(camera.px_per_m * np.sqrt(x * y)),
-    )
 
 
 def read_camera(path: Path) -> Camera:

@@ -10,7 +10,7 @@ import numpy as np
 
 from scenarios.errors import InputError
 from sim.io.files.numeric_text import read_text
-from sim.io.files.tables import finite, listing, number, read_document
+from sim.io.files.tables import json_list, nan_to_none, none_to_nan, read_document
 from sim.types import EVENT_KINDS, GroupEvent, Near, Order
 
 NEAR_COLUMNS = "start,end,a,b"
@@ -22,13 +22,13 @@ def event_dict(event: GroupEvent) -> dict[str, Any]:
         "kind": event.kind, "start": int(event.start), "end": int(event.end),
         "emitted": None if event.emitted is None else int(event.emitted),
         "before": [int(g) for g in event.before], "after": [int(g) for g in event.after],
-        "members": [int(m) for m in event.members], "pos": [finite(float(v)) for v in event.pos],
+        "members": [int(m) for m in event.members], "pos": [nan_to_none(float(v)) for v in event.pos],
     }  # fmt: skip
 
 
 def events_bytes(events: Iterable[GroupEvent]) -> bytes:
     """events.json of a truth."""
-    return listing("events", map(event_dict, events))
+    return json_list("events", map(event_dict, events))
 
 
 def read_events(path: Path) -> list[tuple[GroupEvent, int | None]]:
@@ -52,7 +52,7 @@ def _event(path: Path, k: int, e: Any) -> GroupEvent:
             str(e["kind"]), _whole(e["start"]), _whole(e["end"]),
             None if e["emitted"] is None else _whole(e["emitted"]),
             tuple(map(_whole, e["before"])), tuple(map(_whole, e["after"])), tuple(map(_whole, e["members"])),
-            (number(e["pos"][0]), number(e["pos"][1])),
+            (none_to_nan(e["pos"][0]), none_to_nan(e["pos"][1])),
         )  # fmt: skip
     except (KeyError, TypeError, ValueError, IndexError) as error:
         raise _bad(path, k, f"{type(error).__name__} {error}", "an event with all its keys") from None
@@ -101,7 +101,7 @@ def script_bytes(orders: Iterable[Order], fulfilled: Iterable[int | None]) -> by
         {"id": o.id, "kind": o.kind, "fired": o.fired, "before": o.before, "after": o.after, "event": event}
         for o, event in zip(orders, fulfilled, strict=True)
     )
-    return listing("orders", rows)
+    return json_list("orders", rows)
 
 
 def read_script(path: Path) -> tuple[Order, ...]:

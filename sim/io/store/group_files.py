@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from scenarios.errors import InputError
 from sim.io.files.numeric_text import read_text
-from sim.io.files.tables import Column, Table, table_bytes
+from sim.io.files.tables import Column, StoredTable, table_bytes
 from sim.types import Array, Groups, Ints
 
 CSV_COLUMNS = ("frame", "group", "members", "x", "y", "hull", "size")
@@ -56,7 +56,7 @@ def _stack(parts: list[Array], width: int) -> Array:
     return np.concatenate([np.zeros((0, width)), *parts])
 
 
-def read_groups(table: Table) -> list[Groups | None]:
+def read_groups(table: StoredTable) -> list[Groups | None]:
     """The groups of each frame, from groups.parquet."""
     first, count = int(table.fact("first")), int(table.fact("frames"))
     missing, memberless = set(table.fact("missing")), set(table.fact("memberless"))

@@ -6,23 +6,18 @@ or path: the same seed, scenario and versions give the same bytes.
 
 from __future__ import annotations
 
-import platform
 from collections.abc import Iterable, Iterator
-from functools import lru_cache
-from importlib import metadata
 from pathlib import Path
 from typing import Any
 
 from scenarios.errors import InputError
 from sim import hashing
 from sim.io.files import tables
-from sim.io.store.streams import chosen, coding, is_picture
+from sim.io.store.streams import check_streams, coding, is_picture
 
 SCHEMA = 1
 MANIFEST = "manifest.json"
 REDO = "run the same `flockscope generate` again"
-LIBRARIES = ("numpy", "scipy", "numba", "pymunk", "pyarrow", "pydantic")
-PICTURES = ("opencv-python-headless", "av")
 
 
 def is_sequence(folder: Path) -> bool:
@@ -32,7 +27,7 @@ def is_sequence(folder: Path) -> bool:
 
 def identity(scenario: str, seed: int, repeat: int, streams: Iterable[str] = (), images: str = "jpg") -> dict[str, Any]:
     """What says that a stored sequence is the one asked for."""
-    wanted = chosen(streams, images)
+    wanted = check_streams(streams, images)
     return {
         "format": tables.FORMAT,
         "schema": SCHEMA,
@@ -45,19 +40,7 @@ def identity(scenario: str, seed: int, repeat: int, streams: Iterable[str] = (),
     }
 
 
-@lru_cache(maxsize=2)
-def versions(drawn: bool) -> dict[str, str]:
-    """Versions of what a sequence's bytes depend on, those of its pictures included or not."""
-    found = {"python": platform.python_version()}
-    for name in ("flockscope", *LIBRARIES, *(PICTURES if drawn else ())):
-        try:
-            found[name] = metadata.version(name)
-        except metadata.PackageNotFoundError:
-            found[name] = "unknown"
-    return found
-
-
-def sealed(manifest: dict[str, Any]) -> dict[str, Any]:
+def with_hash(manifest: dict[str, Any]) -> dict[str, Any]:
     """The manifest with the hash of all its other fields as `sha256`, so that none can change unnoticed."""
     body = {key: value for key, value in manifest.items() if key != "sha256"}
     return {**body, "sha256": hashing.canonical_hash(body)}
@@ -77,12 +60,12 @@ def read_manifest(folder: Path) -> dict[str, Any]:
     missing -= manifest.keys()
     if missing:
         raise InputError(file=path, got=f"no {', '.join(sorted(missing))}", expected="all keys", remedy=REDO)
-    if manifest["sha256"] != sealed(manifest)["sha256"]:
+    if manifest["sha256"] != with_hash(manifest)["sha256"]:
         raise InputError(file=path, got="altered fields", expected="those that its sha256 names", remedy=REDO)
     return manifest
 
 
-def altered(folder: Path, manifest: dict[str, Any], *, pictures: bool = True) -> Iterator[InputError]:
+def damaged_files(folder: Path, manifest: dict[str, Any], *, pictures: bool = True) -> Iterator[InputError]:
     """Each file that is missing or not the one of the manifest; pictures may be taken at their size."""
     for name, facts in manifest["files"].items():
         path = folder / name

@@ -13,15 +13,16 @@ import numpy as np
 from scenarios.errors import InputError
 from sim import hashing
 from sim.io.files import atomic, tables
-from sim.io.pictures.picture_writer import NONE, Pictures, write_pictures
-from sim.io.pictures.stored_pictures import Stored
-from sim.io.store import background_sample, truth_files
-from sim.io.store.background_sample import Choice, Sample
+from sim.io.pictures.background_sample import BackgroundChoice, BackgroundSample
+from sim.io.pictures.picture_writer import NO_PICTURES, WrittenPictures, write_pictures
+from sim.io.pictures.stored_pictures import StoredPictures
+from sim.io.store import truth_files
 from sim.io.store.camera_files import camera_document, read_camera, read_scene, scene_document
 from sim.io.store.event_files import read_script
-from sim.io.store.manifest import MANIFEST, altered, identity, read_manifest, sealed, versions
-from sim.io.store.streams import chosen, file_name
-from sim.types import Detections, Frame, Image, Sequence
+from sim.io.store.manifest import MANIFEST, damaged_files, identity, read_manifest, with_hash
+from sim.io.store.streams import check_streams, file_name
+from sim.types import BACKGROUNDS, OWN_BACKGROUND, Detections, Frame, Image, Sequence
+from sim.versions import cpu_level, versions
 
 
 def write_sequence(
@@ -41,19 +42,19 @@ def write_sequence(
     a time
     is in memory. keep: whether what another has written there meanwhile shall stay.
     """
-    wanted = chosen(streams, images)
+    wanted = check_streams(streams, images)
     with atomic.new_folder(folder, keep) as partial:
         truth = sequence.truth  # a script that fails does so before a picture is drawn
         assert truth is None or truth.length == sequence.length
         pictures = write_pictures(partial, sequence, wanted, images)
         files = sequence_files(sequence, scenario=scenario, seed=seed, repeat=repeat, pictures=pictures)
         for name, body in files.items():
-            atomic.put(partial / name, body)
+            atomic.write_unsynced(partial / name, body)
     return folder
 
 
 def sequence_files(
-    sequence: Sequence, *, scenario: str, seed: int, repeat: int = 0, pictures: Pictures = NONE
+    sequence: Sequence, *, scenario: str, seed: int, repeat: int = 0, pictures: WrittenPictures = NO_PICTURES
 ) -> dict[str, bytes]:
     """All files of a sequence by name but its pictures, the manifest last."""
     frames = list(sequence.without_pictures())
@@ -61,9 +62,9 @@ def sequence_files(
     assert len(found) in (0, len(frames)), "a sensor answers every frame or none"
     files = {"scenario.toml": scenario.encode(), "seqinfo.ini": _seqinfo(sequence, len(frames), pictures)}
     if sequence.camera is not None:
-        files["camera.json"] = tables.document(camera_document(sequence.camera))
+        files["camera.json"] = tables.json_document(camera_document(sequence.camera))
     if sequence.scene is not None:
-        files["scene.json"] = tables.document(scene_document(sequence.scene))
+        files["scene.json"] = tables.json_document(scene_document(sequence.scene))
     if sequence.truth is not None:
         files |= truth_files.truth_files(sequence.truth)
     if found:
@@ -72,11 +73,17 @@ def sequence_files(
     manifest = _manifest(sequence, found, len(frames), scenario, seed, repeat, pictures)
     listed = {name: {"sha256": hashing.file_hash(body), "bytes": len(body)} for name, body in files.items()}
     listed = dict(sorted((listed | pictures.files).items()))
-    return {**files, MANIFEST: tables.document(sealed({**manifest, "files": listed}))}
+    return {**files, MANIFEST: tables.json_document(with_hash({**manifest, "files": listed}))}
 
 
 def _manifest(
-    sequence: Sequence, found: list[Detections], length: int, scenario: str, seed: int, repeat: int, pictures: Pictures
+    sequence: Sequence,
+    found: list[Detections],
+    length: int,
+    scenario: str,
+    seed: int,
+    repeat: int,
+    pictures: WrittenPictures,
 ) -> dict[str, Any]:
     truth = hashing.truth_hash(scenario, seed, repeat, sequence.truth)
     origin = {"origin": sequence.source["origin"]} if "origin" in sequence.source else {}
@@ -91,14 +98,14 @@ def _manifest(
             "fps": sequence.fps,
             "length": length,
             "image_size": None if sequence.image_size is None else list(sequence.image_size),
-            "px_per_m": tables.finite(sequence.px_per_m),
+            "px_per_m": tables.nan_to_none(sequence.px_per_m),
         },
-        "cpu": hashing.cpu_level(),
+        "cpu": cpu_level(),
         "versions": versions(bool(pictures.streams)),
     }
 
 
-def _seqinfo(sequence: Sequence, length: int, pictures: Pictures) -> bytes:
+def _seqinfo(sequence: Sequence, length: int, pictures: WrittenPictures) -> bytes:
     """Without pictures of its own a sequence says what MOTChallenge's would be, so that their tools read it."""
     width, height = sequence.image_size or (0, 0)
     folder, _, name = file_name("left", "png" if pictures.images == "png" else "jpg", 1).partition("/")
@@ -113,15 +120,15 @@ def _seqinfo(sequence: Sequence, length: int, pictures: Pictures) -> bytes:
     return "\n".join(["[Sequence]", *lines, ""]).encode()
 
 
-def open_sequence(folder: Path, *, background: Choice | None = None) -> Sequence:
+def open_sequence(folder: Path, *, background: BackgroundChoice | None = None) -> Sequence:
     """A stored sequence, equal to the one written; InputError about the first file that is missing or altered.
 
     Its pictures are checked when they are read. background: a sample of its frames instead of its own background.
     """
     manifest = read_manifest(folder)
-    for error in altered(folder, manifest, pictures=False):
+    for error in damaged_files(folder, manifest, pictures=False):
         raise error
-    about, has, pictures = manifest["sequence"], manifest["files"].keys(), Stored(folder, manifest)
+    about, has, pictures = manifest["sequence"], manifest["files"].keys(), StoredPictures(folder, manifest)
     size, length, fps = about["image_size"], about["length"], about["fps"]
     left, right = "left" in pictures.streams, "right" in pictures.streams
     load_background, words = _background(pictures, background, length)
@@ -148,7 +155,7 @@ def open_sequence(folder: Path, *, background: Choice | None = None) -> Sequence
         image_size=None if size is None else (size[0], size[1]),
         camera=read_camera(folder / "camera.json") if "camera.json" in has else None,
         scene=read_scene(folder / "scene.json") if "scene.json" in has else None,
-        px_per_m=tables.number(about["px_per_m"]),
+        px_per_m=tables.none_to_nan(about["px_per_m"]),
         has_images=left, has_right=right, has_detections="det/det.parquet" in has, load_background=load_background,
         load_people=(lambda: _people(folder, manifest)) if "gt/script.json" in has and not origin else None,
         source={
@@ -162,7 +169,7 @@ def open_sequence(folder: Path, *, background: Choice | None = None) -> Sequence
 
 
 def _background(
-    pictures: Stored, choice: Choice | None, length: int
+    pictures: StoredPictures, choice: BackgroundChoice | None, length: int
 ) -> tuple[Callable[[], Image] | None, dict[str, str]]:
     """How to load the sample that was asked for, else the sequence's own, and what it is in words."""
     if choice is not None:
@@ -170,12 +177,10 @@ def _background(
             got, remedy = "--background", "leave it out: it has none"
             raise InputError(file=pictures.folder, got=got, expected="none for one without pictures", remedy=remedy)
         fits = choice.of(length, pictures.folder)
-        return Sample(fits, length, pictures.folder, pictures.sample), {"background": str(fits)}
+        return BackgroundSample(fits, length, pictures.folder, pictures.sample), {"background": str(fits)}
     if "background" not in pictures.streams:
         return None, {}
-    return (lambda: np.stack(list(pictures.all("background", background_sample.FRAMES)))), {
-        "background": background_sample.OWN
-    }
+    return (lambda: np.stack(list(pictures.all("background", BACKGROUNDS)))), {"background": OWN_BACKGROUND}
 
 
 def _people(folder: Path, manifest: dict[str, Any]) -> dict[str, tuple[int, ...]]:

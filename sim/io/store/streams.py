@@ -23,7 +23,7 @@ PEOPLE = 999  # that class × 1000 + id leaves room for
 Codes = NDArray[np.uint16]
 
 
-def chosen(streams: Iterable[str], images: str) -> tuple[str, ...]:
+def check_streams(streams: Iterable[str], images: str) -> tuple[str, ...]:
     """The streams in their order, the background with those that need one; InputError for a word that is none."""
     wanted = set(streams)
     unknown = sorted(wanted - set(STREAMS))
@@ -58,7 +58,7 @@ def is_picture(name: str) -> bool:
     return name.endswith(".mp4") or name.partition("/")[0] in FOLDERS.values()
 
 
-def coded_ids(ids: Ints) -> Codes:
+def encode_ids(ids: Ints) -> Codes:
     """(H, W) uint16 as in MOTS: 2000 + person, 0 the ground; 3000 walls and pillars (-2)."""
     if ids.max(initial=0) > PEOPLE:
         raise WorkError(
@@ -68,19 +68,19 @@ def coded_ids(ids: Ints) -> Codes:
     return np.where(ids > 0, ids + PERSON, np.where(ids < 0, STANDING, 0)).astype(np.uint16)
 
 
-def decoded_ids(codes: Codes) -> Ints:
+def decode_ids(codes: Codes) -> Ints:
     """(H, W) int64 person, 0 or -2."""
     wide = codes.astype(np.int64)
     return np.where(wide == STANDING, -2, np.where(wide > PERSON, wide - PERSON, 0))
 
 
-def coded_disparity(disparity: Array) -> Codes:
+def encode_disparity(disparity: Array) -> Codes:
     """(H, W) uint16: 64 d, rounded; 0 unknown."""
     known = np.isfinite(disparity)
     steps = np.clip(np.rint(np.where(known, disparity, 0.0) * STEPS), 1, 65535)
     return np.where(known, steps, 0).astype(np.uint16)
 
 
-def decoded_disparity(codes: Codes) -> Array:
+def decode_disparity(codes: Codes) -> Array:
     """(H, W) px, nan where unknown."""
     return np.where(codes > 0, codes / STEPS, np.nan)

@@ -15,15 +15,14 @@ import numpy as np
 
 from scenarios.errors import InputError
 from sim.io.files import tables
-from sim.io.files.atomic import write_into
-from sim.io.files.tables import Column, Table, table_bytes
-from sim.io.formats.mot_text import place_text
-from sim.io.store.box_source import box_source
+from sim.io.files.atomic import replace_files
+from sim.io.files.tables import Column, StoredTable, table_bytes
+from sim.io.formats.mot_text import ground_cells
 from sim.io.store.event_files import event_dict, read_events
 from sim.io.store.group_files import AXES, groups_bytes, groups_csv, read_groups
-from sim.io.store.track_text import from_text, with_groups
-from sim.io.store.truth_files import BOX, scores, standing
-from sim.io.store.upright_boxes import upright_boxes
+from sim.io.store.track_boxes import box_source, upright_boxes
+from sim.io.store.track_text import read_track_text, with_groups
+from sim.io.store.truth_files import BOX, scores_or_ones, with_ground_height
 from sim.types import Array, Bools, Camera, GroupEvent, Scene, Tracks
 
 NAMES = ("tracks.txt", "tracks.mot.txt", "tracks.parquet", "groups.csv", "groups.parquet", "events.json", "run.json")
@@ -44,7 +43,7 @@ def write_tracks(
     the ground's height stands, on which they do.
     """
     folder = Path(folder)
-    write_into(folder, tracks_files(tracks, fps=fps, camera=camera, scene=scene, info=info), stale=NAMES)
+    replace_files(folder, tracks_files(tracks, fps=fps, camera=camera, scene=scene, info=info), stale=NAMES)
     return folder
 
 
@@ -59,7 +58,7 @@ def tracks_files(
     """The files of `write_tracks` by name."""
     every = list(tracks)
     rows, boxes = _flatten(every, fps), box_source(every, camera)
-    text_box, place = rows.box, None if rows.plane == "image" else standing(rows.pos, scene)
+    text_box, place = rows.box, None if rows.plane == "image" else with_ground_height(rows.pos, scene)
     if boxes == "projected" and camera is not None and place is not None:
         text_box = upright_boxes(camera, place)
     files = {
@@ -73,8 +72,8 @@ def tracks_files(
         files["groups.parquet"] = groups_bytes(groups, first, "px" if rows.plane == "image" else "m")
         files["groups.csv"] = groups_csv(groups, None, first)
     events = [{**event_dict(e), "frame": t.index} for t in every for e in t.events]
-    files["events.json"] = tables.listing("events", events)
-    files["run.json"] = tables.document({"format": tables.FORMAT, **(info or {}), "boxes": boxes})
+    files["events.json"] = tables.json_list("events", events)
+    files["run.json"] = tables.json_document({"format": tables.FORMAT, **(info or {}), "boxes": boxes})
     return files
 
 
@@ -113,7 +112,7 @@ def _flatten(every: list[Tracks], fps: float) -> _Rows:
         join([t.pos for t in every], np.zeros((0, d))), join([t.vel for t in every], np.zeros((0, d))),
         join([t.cov for t in every], np.zeros((0, 2 * d, 2 * d))), join(no_box, np.zeros((0, 4))),
         np.repeat(np.array([t.box is None for t in every], bool), counts),
-        join([scores(t.score, len(t.id)) for t in every], np.zeros(0)),
+        join([scores_or_ones(t.score, len(t.id)) for t in every], np.zeros(0)),
     )  # fmt: skip
 
 
@@ -157,7 +156,7 @@ def _text(rows: _Rows, box: Array, place: Array | None, *, full: bool) -> bytes:
     ):
         left, top, width, height = box[k].tolist()
         corner = f"{left:.2f},{top:.2f},{max(width, 0.01):.2f},{max(height, 0.01):.2f}" if boxed[k] else "-1,-1,-1,-1"
-        where = place_text(places[k]) if placed[k] else "-1,-1,-1"
+        where = ground_cells(places[k]) if placed[k] else "-1,-1,-1"
         lines.append(f"{frame},{id},{corner},{score:.4f}" + (f",{where}\n" if full else "\n"))
     return "".join(lines).encode()
 
@@ -182,7 +181,7 @@ def read_tracks(path: str | Path, *, fps: float | None = None, length: int | Non
             remedy="give the folder that `flockscope track` made",
         )  # fmt: skip
     projected = ours and (folder / "run.json").is_file() and _boxes(folder / "run.json") == "projected"
-    found = from_text(text, 25.0 if fps is None else fps, length, projected=projected)
+    found = read_track_text(text, 25.0 if fps is None else fps, length, projected=projected)
     if not ours:
         return found
     groups = folder / "groups.csv"
@@ -219,7 +218,7 @@ def _exact(path: Path, folder: Path) -> list[Tracks]:
     return found
 
 
-def _cuts(table: Table, first: int, count: int) -> Any:
+def _cuts(table: StoredTable, first: int, count: int) -> Any:
     frame = table.ints("frame")
     if len(frame) and (frame.min() < first or frame.max() >= first + count or (np.diff(frame) < 0).any()):
         wanted = f"frames {first} to {first + count - 1}, in order"

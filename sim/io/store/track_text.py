@@ -8,29 +8,29 @@ from pathlib import Path
 import numpy as np
 
 from scenarios.errors import InputError
-from sim.io.formats.mot_text import MotTable, read_table, refuse_twice, unit_scores
+from sim.io.formats.mot_text import MotTable, read_table, reject_duplicate_ids, unit_scores
 from sim.io.formats.velocity import differentiate
 from sim.io.store.group_files import read_groups_csv
 from sim.types import Array, Plane, Tracks
 
 
-def from_text(path: Path, fps: float, length: int | None, *, projected: bool = False) -> list[Tracks]:
+def read_track_text(path: Path, fps: float, length: int | None, *, projected: bool = False) -> list[Tracks]:
     """Tracks of frames 1 … length; velocity the chord over 0.5 s, covariance nan, nobody in a group.
 
     projected: the boxes were made of the ground positions and are no measurement, so they are left out.
     """
     table = read_table(path, length=length, boxless=True)
-    _refuse_nobody(table, length)
-    table.rows.refuse(table.id < 0, "ids from 0", "give each track an id")
-    refuse_twice(table, np.ones(len(table.id), bool))
+    _reject_empty(table, length)
+    table.rows.reject(table.id < 0, "ids from 0", "give each track an id")
+    reject_duplicate_ids(table, np.ones(len(table.id), bool))
     order = np.lexsort((table.id, table.frame))
     frame, id = table.frame[order], table.id[order]
     ground = table.ground()
     if ground is not None:
         remedy = "complete the line, or write z = -1 in all"
-        table.rows.refuse(np.isnan(ground[:, 0]), "a ground position (z other than -1), as in other lines", remedy)
+        table.rows.reject(np.isnan(ground[:, 0]), "a ground position (z other than -1), as in other lines", remedy)
     pos = _centres(table)[order] if ground is None else ground[order][:, :2]
-    box = None if table.boxless().any() or (projected and ground is not None) else table.box[order]
+    box = None if table.without_box().any() or (projected and ground is not None) else table.box[order]
     score = unit_scores(table.rest[:, 0] if table.rest.shape[1] else np.ones(len(order)))[order]
     plane: Plane = "image" if ground is None else "ground"
     vel, count = differentiate(frame, id, pos, fps), length or int(frame.max(initial=0))
@@ -48,7 +48,7 @@ def from_text(path: Path, fps: float, length: int | None, *, projected: bool = F
     return found
 
 
-def _refuse_nobody(table: MotTable, length: int | None) -> None:
+def _reject_empty(table: MotTable, length: int | None) -> None:
     """A text without a row says nothing, also not how long it is: a tracker that saw nobody, or a file cut off."""
     if len(table.frame):
         return
@@ -59,7 +59,7 @@ def _refuse_nobody(table: MotTable, length: int | None) -> None:
 
 def _centres(table: MotTable) -> Array:
     """Middles of the boxes, where no ground position is known."""
-    table.rows.refuse(table.boxless(), "a box, or a ground position in every line", "complete the lines")
+    table.rows.reject(table.without_box(), "a box, or a ground position in every line", "complete the lines")
     return table.box[:, :2] + table.box[:, 2:] / 2
 
 

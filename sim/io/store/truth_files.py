@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 
 from scenarios.errors import InputError
-from sim.io.files.tables import REDO, Column, Table, finite, number, read_table, table_bytes
-from sim.io.formats.mot_text import place_text
+from sim.io.files.tables import REDO, Column, StoredTable, nan_to_none, none_to_nan, read_table, table_bytes
+from sim.io.formats.mot_text import ground_cells
 from sim.io.store.event_files import events_bytes, near_bytes, read_events, read_near, read_script, script_bytes
 from sim.io.store.group_files import groups_bytes, groups_csv, read_groups
 from sim.scene.terrain import height_at
@@ -63,7 +63,7 @@ def _table(truth: Truth) -> bytes:
     singles = ((name, unit, getattr(truth, name)) for name, unit in SINGLE)
     columns += [Column(name, array, unit) for name, unit, array in singles if array is not None]
     facts = {
-        "name": truth.name, "fps": truth.fps, "length": truth.length, "px_per_m": finite(truth.px_per_m),
+        "name": truth.name, "fps": truth.fps, "length": truth.length, "px_per_m": nan_to_none(truth.px_per_m),
         "labelled": None if truth.labelled is None else _spans(truth.labelled),
     }  # fmt: skip
     return table_bytes(columns, facts)
@@ -105,7 +105,8 @@ def read_truth(folder: Path) -> Truth:
     frame, id = table.ints("frame"), table.ints("id")
     _check_rows(table, length)
     return Truth(
-        name=table.fact("name"), fps=float(table.fact("fps")), length=length, px_per_m=number(table.fact("px_per_m")),
+        name=table.fact("name"), fps=float(table.fact("fps")), length=length,
+        px_per_m=none_to_nan(table.fact("px_per_m")),
         frame=frame, id=id, group=table.ints("group"),
         pos=several("x", "y"), vel=several("vx", "vy"), box=several(*BOX), visible_box=several(*VISIBLE),
         visibility=table.floats("visibility"),
@@ -118,7 +119,7 @@ def read_truth(folder: Path) -> Truth:
     )  # fmt: skip
 
 
-def _check_rows(table: Table, length: int) -> None:
+def _check_rows(table: StoredTable, length: int) -> None:
     frame, id = table.ints("frame"), table.ints("id")
     step = np.diff(frame)
     wrong = (step < 0) | ((step == 0) & (np.diff(id) <= 0))
@@ -145,7 +146,7 @@ def detection_files(detections: list[Detections], fps: float, scene: Scene | Non
     unit = "px" if plane == "image" else "m"
     counts = [len(d.pos) for d in detections]
     pos = np.concatenate([np.zeros((0, len(axes))), *(d.pos for d in detections)])
-    score = np.concatenate([np.zeros(0), *(scores(d.score, len(d.pos)) for d in detections)])
+    score = np.concatenate([np.zeros(0), *(scores_or_ones(d.score, len(d.pos)) for d in detections)])
     columns = [
         Column("frame", np.repeat(np.arange(1, len(detections) + 1, dtype=np.int64), counts)),
         *(Column(a, pos[:, k], unit) for k, a in enumerate(axes)),
@@ -158,7 +159,7 @@ def detection_files(detections: list[Detections], fps: float, scene: Scene | Non
     if box is not None:
         columns += [Column(name, box[:, k], "px") for k, name in enumerate(BOX)]
     facts = {"plane": plane, "frames": len(detections), "fps": fps}
-    text = _det_text(columns[0].values, box, score, None if plane == "image" else standing(pos, scene))
+    text = _det_text(columns[0].values, box, score, None if plane == "image" else with_ground_height(pos, scene))
     return {"det/det.parquet": table_bytes(columns, facts), "det/det.txt": text}
 
 
@@ -169,12 +170,12 @@ def _form(detections: list[Detections]) -> tuple[str, bool, bool]:
     return next(iter(forms), ("image", True, False))
 
 
-def scores(score: Array, rows: int) -> Array:
+def scores_or_ones(score: Array, rows: int) -> Array:
     """The scores, 1 each where a detector or tracker gives none."""
     return score if len(score) == rows else np.ones(rows)
 
 
-def standing(pos: Array, scene: Scene | None) -> Array:
+def with_ground_height(pos: Array, scene: Scene | None) -> Array:
     """(N, 3) m of places (N, 2 or 3): those on the ground with the height it has there, 0 without a scene."""
     if pos.shape[1] == 3:
         return pos
@@ -187,7 +188,7 @@ def _det_text(frame: Any, box: Array | None, score: Array, ground: Array | None)
     lines = []
     for k, f in enumerate(frame):
         corner = "-1,-1,-1,-1" if box is None else ",".join(f"{v:.2f}" for v in boxes[k])
-        place = "-1,-1,-1" if ground is None else place_text(ground[k])
+        place = "-1,-1,-1" if ground is None else ground_cells(ground[k])
         lines.append(f"{f},-1,{corner},{score[k]:.4f},{place}\n")
     return "".join(lines).encode()
 

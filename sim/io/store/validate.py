@@ -11,14 +11,13 @@ from scenarios.errors import FlockscopeError, InputError
 from sim import hashing
 from sim.io.files.atomic import PARTIAL
 from sim.io.formats.mot_folder import read_seqinfo
-from sim.io.pictures.stored_pictures import Stored
-from sim.io.source import folders, named
+from sim.io.pictures.stored_pictures import StoredPictures
+from sim.io.source import sequence_folders, split_and_name
 from sim.io.store import manifest as manifests
 from sim.io.store import truth_files
-from sim.io.store.background_sample import FRAMES
 from sim.io.store.camera_files import read_scene
 from sim.io.store.streams import file_name, is_picture, suffix
-from sim.types import Detections, Groups, Truth
+from sim.types import BACKGROUNDS, Detections, Groups, Truth
 
 
 def validate(folder: str | Path) -> list[FlockscopeError]:
@@ -39,7 +38,10 @@ def validate(folder: str | Path) -> list[FlockscopeError]:
 
 def content_hash(folder: str | Path) -> str:
     """The hash of all content hashes of a dataset of ours, or of a sequence: what every export of it has too."""
-    found = {named(p): manifests.read_manifest(p)["content_hash"] for p in folders(Path(folder), "generated")}
+    found = {
+        split_and_name(p): manifests.read_manifest(p)["content_hash"]
+        for p in sequence_folders(Path(folder), "generated")
+    }
     return hashing.dataset_hash(found)
 
 
@@ -72,7 +74,7 @@ def _seqmaps(root: Path) -> Iterator[InputError]:
 def _sequence(folder: Path) -> list[FlockscopeError]:
     try:
         manifest = manifests.read_manifest(folder)
-        problems: list[FlockscopeError] = list(manifests.altered(folder, manifest))
+        problems: list[FlockscopeError] = list(manifests.damaged_files(folder, manifest))
         return problems or [*_extra(folder, manifest), *_content(folder, manifest)]
     except FlockscopeError as error:
         return [error]
@@ -110,10 +112,10 @@ def _content(folder: Path, manifest: dict[str, Any]) -> Iterator[FlockscopeError
 
 def _pictures(folder: Path, manifest: dict[str, Any], length: int) -> Iterator[FlockscopeError]:
     """Every picture is there, can be read and has its size; those kept exactly have the raw pixels that were drawn."""
-    stored = Stored(folder, manifest)
+    stored = StoredPictures(folder, manifest)
     named = {name for name in manifest["files"] if is_picture(name)}
     for stream in stored.streams:
-        count, digest = FRAMES if stream == "background" else length, hashing.PixelHash()
+        count, digest = BACKGROUNDS if stream == "background" else length, hashing.PixelHash()
         named -= {file_name(stream, stored.images, k) for k in range(1, count + 1)}
         try:
             for picture in stored.all(stream, count):

@@ -14,10 +14,11 @@ from scenarios.errors import InputError, WorkError
 from scenarios.loading.resolve import Entry
 from scenarios.schema.scenario import Scenario
 from sim.dataset.generate import generate
-from sim.dataset.seed_ranges import split_of
+from sim.dataset.splits import split_of
 from sim.io.files import atomic
 from sim.io.source import open_source
 from sim.io.store.validate import validate
+from sim.workers.start import WorkerOptions
 
 FAKES = Path(__file__).resolve().parents[1] / "io" / "conftest.py"
 ROOT = Path(__file__).resolve().parents[3]
@@ -42,7 +43,8 @@ sys.modules["sim.sequence"] = types.SimpleNamespace(simulate=simulate)
 from scenarios.loading.resolve import Entry
 from scenarios.schema.scenario import Scenario
 from sim.dataset.generate import generate
-from sim.io import atomic
+from sim.io.files import atomic
+from sim.workers.start import WorkerOptions
 
 if __name__ == "__main__":
     out, workers, kill_after = sys.argv[1], int(sys.argv[2]), int(sys.argv[3])
@@ -63,7 +65,7 @@ if __name__ == "__main__":
     atomic.os.fsync = die
     scenario = Scenario.model_validate({{"schema": 1, "group": [{{"id": "a", "start": [1, 1], "goal": [2, 2]}}]}})
     entries = [Entry("x", scenario, 0), Entry("y-1", scenario, 1)]
-    generate(entries, range(3), out, workers=workers, progress=parent_dies, streams=())
+    generate(entries, range(3), out, workers=WorkerOptions(workers), progress=parent_dies, streams=())
 """
 
 
@@ -162,7 +164,7 @@ def test_wrong_requests_make_nothing(tmp_path, simulate):
     x = Entry("x", scenario())
     for entries, more, word in (
         ([x, x], {}, "twice"),
-        ([x], {"workers": 0}, "workers"),
+        ([x], {"workers": WorkerOptions(0)}, "workers"),
     ):
         with pytest.raises(InputError, match=word):
             generate(entries, range(2), tmp_path / "new", **more)
@@ -204,7 +206,7 @@ def test_a_disk_that_takes_no_more_ends_all_at_once(tmp_path, simulate, monkeypa
     """The first sequence fits, the second in part; nobody tries the third. With room again, all is as ever."""
     generate([Entry("x", scenario())], range(3), tmp_path / "right")
     room = 1.5 * sum(len(body) for name, body in content(tmp_path / "right").items() if "x-s00000" in name)
-    write = atomic.put
+    write = atomic.write_unsynced
     simulate.made.clear()
 
     def write_while_there_is_room(path, body):
@@ -215,7 +217,7 @@ def test_a_disk_that_takes_no_more_ends_all_at_once(tmp_path, simulate, monkeypa
             raise OSError(number, os.strerror(number))
         write(path, body)
 
-    monkeypatch.setattr(atomic, "put", write_while_there_is_room)
+    monkeypatch.setattr(atomic, "write_unsynced", write_while_there_is_room)
     with pytest.raises(InputError if number == errno.EACCES else WorkError) as caught:
         generate([Entry("x", scenario())], range(3), tmp_path / "out")
     assert os.strerror(number) in str(caught.value)

@@ -52,11 +52,13 @@ sys.modules["sim.sequence"] = types.SimpleNamespace(simulate=simulate)
 from scenarios.loading.resolve import Entry
 from scenarios.schema.scenario import Scenario
 from sim.dataset.generate import generate
+from sim.workers.start import WorkerOptions
 
 if __name__ == "__main__":
     scenario = Scenario.model_validate({{"schema": 1, "group": [{{"id": "a", "start": [1, 1], "goal": [2, 2]}}]}})
     entries = [Entry("x", scenario, 0), Entry("y-1", scenario, 1)]
-    generate(entries, range(2), sys.argv[1], workers=int(sys.argv[2]), streams={STREAMS!r}, images=sys.argv[3])
+    workers = WorkerOptions(int(sys.argv[2]))
+    generate(entries, range(2), sys.argv[1], workers=workers, streams={STREAMS!r}, images=sys.argv[3])
 """
 
 
@@ -145,12 +147,12 @@ def test_words_that_are_no_streams_make_nothing(tmp_path, simulate):
     assert not (tmp_path / "new").exists()
 
 
-def altered(path: Path) -> None:
+def alter(path: Path) -> None:
     """Other bytes, as many as before."""
     path.write_bytes(path.read_bytes()[:-5] + bytes(5))
 
 
-@pytest.mark.parametrize("harm", [altered, Path.unlink])
+@pytest.mark.parametrize("harm", [alter, Path.unlink])
 @pytest.mark.parametrize("name", ["img1/000003.jpg", "background/000009.jpg"])
 def test_altered_pictures_are_made_anew(tmp_path, simulate, harm, name):
     (made,) = generate([Entry("x", scenario())], range(1), tmp_path, streams=("left",))

@@ -13,6 +13,7 @@ from sim.io.files.tables import read_table
 from sim.io.source import open_source
 from sim.io.store.validate import validate
 from sim.sequence import simulate
+from sim.workers.start import WorkerOptions
 
 ALL = ("left", "right", "disparity", "ids")
 SCENARIO = Scenario.model_validate(
@@ -29,7 +30,9 @@ SCENARIO = Scenario.model_validate(
 
 
 def made(out: Path, streams=ALL, images="jpg", workers=1) -> tuple[list[dict], dict[str, bytes]]:
-    folders = generate([Entry("x", SCENARIO)], range(2), out, streams=streams, images=images, workers=workers)
+    folders = generate(
+        [Entry("x", SCENARIO)], range(2), out, streams=streams, images=images, workers=WorkerOptions(workers)
+    )
     assert validate(out) == []
     body = {str(p.relative_to(out)): p.read_bytes() for p in sorted(out.rglob("*")) if p.is_file()}
     return [json.loads((f / "manifest.json").read_text()) for f in folders], body

@@ -12,8 +12,8 @@ from scenarios.errors import InputError
 from scenarios.loading.resolve import load, load_observation
 from scenarios.schema.observation import ObservationSpec
 from sim.dataset.replay import Cut, replay
+from sim.dataset.splits import is_real
 from sim.io.formats.biwi import open_folder
-from sim.io.formats.real_or_simulated import is_real
 from sim.sequence import simulate
 from sim.types import Sequence
 

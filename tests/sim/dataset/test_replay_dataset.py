@@ -10,9 +10,9 @@ import pytest
 from scenarios.errors import InputError
 from scenarios.loading.resolve import load, load_observation
 from sim.dataset.replay import Cut
-from sim.dataset.replay_dataset import How, store_replays
+from sim.dataset.replay_dataset import ReplayOptions, store_replays
+from sim.dataset.splits import is_real
 from sim.io.formats.biwi import open_folder
-from sim.io.formats.real_or_simulated import is_real
 from sim.io.source import open_source
 from sim.io.store.validate import validate
 from sim.sequence import simulate
@@ -35,7 +35,7 @@ def content(folder: Path) -> dict[str, bytes]:
 
 
 def test_a_dataset_like_any_other(walk: Sequence, tmp_path: Path) -> None:
-    how, told = How(SMALL, Cut(1.0, 2.0)), []
+    how, told = ReplayOptions(SMALL, Cut(1.0, 2.0)), []
     made = store_replays([walk], how, range(20_000, 20_002), tmp_path / "a", lambda *words: told.append(words))
     assert [p.name for p in made] == ["walk-t1-s20000", "walk-t1-s20001"]
     assert told[-1] == (2, 2, "walk-t1-s20001")
@@ -54,7 +54,7 @@ def test_a_dataset_like_any_other(walk: Sequence, tmp_path: Path) -> None:
 
 
 def test_same_bytes_again_and_what_is_there_is_kept(walk: Sequence, tmp_path: Path) -> None:
-    how = How(SMALL, Cut(0.0, 1.0), streams=("left", "ids"))
+    how = ReplayOptions(SMALL, Cut(0.0, 1.0), streams=("left", "ids"))
     (first,) = store_replays([walk], how, range(20_000, 20_001), tmp_path / "a")
     (second,) = store_replays([walk], how, range(20_000, 20_001), tmp_path / "b")
     assert content(first) == content(second)
@@ -67,8 +67,10 @@ def test_same_bytes_again_and_what_is_there_is_kept(walk: Sequence, tmp_path: Pa
 
 
 def test_another_replay_in_its_place_is_refused(walk: Sequence, tmp_path: Path) -> None:
-    store_replays([walk], How(SMALL, streams=()), range(20_000, 20_001), tmp_path)
-    other = How(load_observation(set=["camera.image=[160, 120]", "camera.fps=5", "sensor.detect_prob=0.5"]), streams=())
+    store_replays([walk], ReplayOptions(SMALL, streams=()), range(20_000, 20_001), tmp_path)
+    other = ReplayOptions(
+        load_observation(set=["camera.image=[160, 120]", "camera.fps=5", "sensor.detect_prob=0.5"]), streams=()
+    )
     with pytest.raises(InputError, match="another sequence"):
         store_replays([walk], other, range(20_000, 20_001), tmp_path)
 
@@ -76,10 +78,10 @@ def test_another_replay_in_its_place_is_refused(walk: Sequence, tmp_path: Path) 
 def test_real_motion_stays_out_of_what_is_tuned_on(walk: Sequence, tmp_path: Path) -> None:
     for first in (0, 10_000):
         with pytest.raises(InputError, match="20000"):
-            store_replays([walk], How(SMALL, streams=()), range(first, first + 1), tmp_path)
+            store_replays([walk], ReplayOptions(SMALL, streams=()), range(first, first + 1), tmp_path)
     own = simulate(load("merge", set=["duration=2.0", "event=[]"]), 3, streams=())
-    (made,) = store_replays([own], How(SMALL, streams=()), range(1), tmp_path)
+    (made,) = store_replays([own], ReplayOptions(SMALL, streams=()), range(1), tmp_path)
     assert made.parent.name == "flockscope-train"
     assert not is_real(open_source(made)[0])
     with pytest.raises(InputError, match="two recordings"):
-        store_replays([walk, walk], How(SMALL, streams=()), range(20_000, 20_001), tmp_path)
+        store_replays([walk, walk], ReplayOptions(SMALL, streams=()), range(20_000, 20_001), tmp_path)

@@ -15,7 +15,7 @@ from scenarios.errors import InputError, WorkError
 from scenarios.loading.resolve import Entry
 from scenarios.schema.scenario import Scenario
 from sim.dataset import sequence_job as jobs
-from sim.dataset.sequence_job import Job, Outcome, attempt, begun, given_up, is_done
+from sim.dataset.sequence_job import JobOutcome, SequenceJob, is_stored, lost_job, run_job, stored_manifest
 from sim.io.files import atomic
 
 FAKES = Path(__file__).resolve().parents[1] / "io" / "conftest.py"
@@ -40,52 +40,52 @@ def made(monkeypatch: pytest.MonkeyPatch) -> list[int]:
 
 
 @pytest.fixture
-def job(tmp_path: Path) -> Job:
+def job(tmp_path: Path) -> SequenceJob:
     text = {"schema": 1, "group": [{"id": "a", "start": [1, 1], "goal": [2, 2]}]}
-    return Job(tmp_path / "flockscope-train" / "x-s00001", Entry("x", Scenario.model_validate(text)), 1)
+    return SequenceJob(tmp_path / "flockscope-train" / "x-s00001", Entry("x", Scenario.model_validate(text)), 1)
 
 
-def content(job: Job) -> dict[str, tuple[bytes, int]]:
+def content(job: SequenceJob) -> dict[str, tuple[bytes, int]]:
     files = [p for p in job.folder.parent.rglob("*") if p.is_file()]
     return {p.relative_to(job.folder.parent).as_posix(): (p.read_bytes(), p.stat().st_ino) for p in files}
 
 
-def test_what_is_whole_is_left_alone(job: Job, made: list[int]) -> None:
-    assert begun(job) is None
-    assert attempt(job) == Outcome()
+def test_what_is_whole_is_left_alone(job: SequenceJob, made: list[int]) -> None:
+    assert stored_manifest(job) is None
+    assert run_job(job) == JobOutcome()
     before = content(job)
-    assert is_done(job)
-    assert attempt(job) == Outcome()
+    assert is_stored(job)
+    assert run_job(job) == JobOutcome()
     assert made == [1]
     assert content(job) == before
 
 
-def test_what_is_altered_is_begun_but_not_done(job: Job, made: list[int]) -> None:
-    attempt(job)
+def test_what_is_altered_is_begun_but_not_done(job: SequenceJob, made: list[int]) -> None:
+    run_job(job)
     before = {name: body for name, (body, _) in content(job).items()}
     (job.folder / "gt/gt.txt").write_text("")
-    assert begun(job) is not None
-    assert not is_done(job)
-    attempt(job)
+    assert stored_manifest(job) is not None
+    assert not is_stored(job)
+    run_job(job)
     assert {name: body for name, (body, _) in content(job).items()} == before
 
 
 @pytest.mark.parametrize("late", [False, True])
 def test_of_two_who_make_it_at_once_the_first_counts(
-    job: Job, made: list[int], monkeypatch: pytest.MonkeyPatch, late: bool
+    job: SequenceJob, made: list[int], monkeypatch: pytest.MonkeyPatch, late: bool
 ) -> None:
     """A worker that was thought dead ends first: before ours looks, or between looking and renaming."""
-    real, name = (os.rename, "rename") if late else (atomic._flush_all, "_flush_all")
+    real, name = (os.rename, "rename") if late else (atomic._sync_tree, "_sync_tree")
 
     def first_the_other(*args: Any) -> None:
         monkeypatch.setattr(os if late else atomic, name, real)
-        assert attempt(job) == Outcome()
+        assert run_job(job) == JobOutcome()
         others.update(content(job))
         real(*args)
 
     others: dict[str, tuple[bytes, int]] = {}
     monkeypatch.setattr(os if late else atomic, name, first_the_other)
-    assert attempt(job) == Outcome()
+    assert run_job(job) == JobOutcome()
     assert made == [1, 1]
     whole = {k: v for k, v in others.items() if not k.startswith(atomic.PARTIAL)}
     assert content(job) == whole
@@ -93,48 +93,48 @@ def test_of_two_who_make_it_at_once_the_first_counts(
 
 
 def test_who_does_not_see_the_mark_writes_nothing(
-    job: Job, made: list[int], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    job: SequenceJob, made: list[int], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(jobs, "LATER", 0.0)
-    elsewhere = Job(job.folder, job.entry, job.seed, mark=tmp_path / "mark")
-    outcome = attempt(elsewhere)
-    assert outcome.hopeless
+    monkeypatch.setattr(jobs, "MARKER_TIMEOUT", 0.0)
+    elsewhere = SequenceJob(job.folder, job.entry, job.seed, marker=tmp_path / "mark")
+    outcome = run_job(elsewhere)
+    assert outcome.fatal
     assert isinstance(outcome.error, InputError)
     assert "another folder, or none" in str(outcome.error)
     assert not job.folder.parent.exists()
     (tmp_path / "mark").write_text("")
-    assert attempt(elsewhere) == Outcome()
+    assert run_job(elsewhere) == JobOutcome()
 
 
 def test_a_machine_that_cannot_write_is_named(
-    job: Job, made: list[int], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    job: SequenceJob, made: list[int], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     def refuse(path: Path, body: bytes) -> None:
         raise PermissionError(13, "Permission denied")
 
-    monkeypatch.setattr(atomic, "put", refuse)
+    monkeypatch.setattr(atomic, "write_unsynced", refuse)
     monkeypatch.setattr(jobs.socket, "gethostname", lambda: "node7")
     (tmp_path / "mark").write_text("")
-    outcome = attempt(Job(job.folder, job.entry, job.seed, mark=tmp_path / "mark"))
-    assert outcome.hopeless
+    outcome = run_job(SequenceJob(job.folder, job.entry, job.seed, marker=tmp_path / "mark"))
+    assert outcome.fatal
     assert str(outcome.error).startswith(f"{job.folder}: on node7: got Permission denied")
 
 
 @pytest.mark.parametrize("error", [KeyError("k"), WorkError(got="a", expected="b", remedy="c")])
 def test_an_error_of_one_is_not_that_of_all(
-    job: Job, monkeypatch: pytest.MonkeyPatch, made: list[int], error: Exception
+    job: SequenceJob, monkeypatch: pytest.MonkeyPatch, made: list[int], error: Exception
 ) -> None:
     def simulate(*_: object) -> None:
         raise error
 
     monkeypatch.setattr(sys.modules["sim.sequence"], "simulate", simulate)
-    outcome = attempt(job)
+    outcome = run_job(job)
     assert isinstance(outcome.error, WorkError)
     assert outcome.error.file == "x-s00001"
-    assert not outcome.hopeless
+    assert not outcome.fatal
 
 
-def test_given_up(job: Job) -> None:
-    outcome = given_up(job, WorkError(got="3 workers that died at it", expected="b", remedy="c"))
-    assert outcome == Outcome(outcome.error)
+def test_given_up(job: SequenceJob) -> None:
+    outcome = lost_job(job, WorkError(got="3 workers that died at it", expected="b", remedy="c"))
+    assert outcome == JobOutcome(outcome.error)
     assert str(outcome.error).startswith("x-s00001: got 3 workers that died at it")

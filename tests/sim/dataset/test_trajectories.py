@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 from scipy.interpolate import make_smoothing_spline
 
-from sim.dataset.trajectories import GAP, LIMIT, nearest_row, resample, smoothed
+from sim.dataset.trajectories import GAP, LIMIT, nearest_row, resample, smoothing_spline
 
 RATE = 2.5
 
@@ -88,10 +88,10 @@ def test_smoothing_is_that_of_scipy(weight: float) -> None:
     t, y = np.cumsum(r.uniform(0.2, 0.8, 40)), r.normal(0, 1, (40, 2))
     for k in (0, 1):
         wanted = make_smoothing_spline(t, y[:, k], lam=weight)(t)
-        assert smoothed(t, y, weight)[:, k] == pytest.approx(wanted, abs=1e-7)
-    assert np.array_equal(smoothed(t[:2], y[:2], weight), y[:2])
+        assert smoothing_spline(t, y, weight)[:, k] == pytest.approx(wanted, abs=1e-7)
+    assert np.array_equal(smoothing_spline(t[:2], y[:2], weight), y[:2])
     line = np.stack([t, 2.0 - t], axis=1)
-    assert smoothed(t, line, weight) == pytest.approx(line)
+    assert smoothing_spline(t, line, weight) == pytest.approx(line)
 
 
 def test_nearest_rows() -> None:

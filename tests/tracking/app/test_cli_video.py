@@ -147,7 +147,7 @@ def test_which_background_is_told(tmp_path, capsys):
 def test_options_that_cannot_work(option, words, tmp_path, capsys, monkeypatch):
     """Before a frame is read."""
     path = film(tmp_path)
-    monkeypatch.setattr("sim.io.store.background_sample.Sample.__call__", None)
+    monkeypatch.setattr("sim.io.pictures.background_sample.BackgroundSample.__call__", None)
     assert run(["track", "blob", str(path), "--out", str(tmp_path / "out"), *option.split()]) == 2
     (line,) = capsys.readouterr().err.splitlines()
     assert all(word in line for word in words), line

@@ -14,7 +14,7 @@ from optuna.distributions import CategoricalDistribution, FloatDistribution, Int
 from optuna.trial import TrialState
 
 from scenarios.errors import InputError
-from sim.workers.cluster import about
+from sim.versions import runtime
 from tests.tuning_toys import wishes
 from tracking.grouping.link_rule import LinkRule
 from tracking.papers.blob.config import BlobConfig
@@ -207,8 +207,8 @@ def test_a_study_is_of_one_version(tmp_path, monkeypatch, what):
     made = plan(**wishes(tmp_path))
     with opened(made, tmp_path / "j", "x") as study:
         study.tell(study.ask(), [0.1])
-    other = {**about(), "cpu": "another"}
-    monkeypatch.setattr("tracking.tuning.search_plan.about", lambda: other)
+    other = {**runtime(), "cpu": "another"}
+    monkeypatch.setattr("tracking.tuning.search_plan.runtime", lambda: other)
     with opened(made, tmp_path / "j", "x") as study:
         assert len(study.finished()) == 1, "what workers of a cluster may not differ in, going on may"
     other[what] = "another"

@@ -23,14 +23,15 @@ def generate(
 ) -> CommandResult:
     """Every named scenario or suite with every seed, as a dataset."""
     from sim.dataset.generate import generate as make
+    from sim.workers.start import WorkerOptions
 
     option_parsing.folder(out)
     chosen, texts = option_parsing.seeds(seeds), option_parsing.scenario_settings(settings)
     wanted, kind = option_parsing.pictures(streams, images)
     with ProgressMeter("generate") as meter:
         folders = make(
-            names, chosen, out, set=texts, workers=workers, cluster=cluster, progress=meter.update,
-            streams=wanted, images=kind,
+            names, chosen, out, set=texts, workers=WorkerOptions(workers, cluster),
+            progress=meter.update, streams=wanted, images=kind,
         )  # fmt: skip
     text = f"{len(folders)} sequences in {folders[0].parent}"
     return CommandResult({"sequences": folders, "folder": folders[0].parent}, text)

@@ -34,12 +34,13 @@ def demo(out: Path, *, quick: bool) -> CommandResult:
     from sim.dataset.generate import generate
     from sim.io.files.atomic import write_file
     from sim.io.source import open_source
+    from sim.workers.start import WorkerOptions
 
     start = time.monotonic()
     option_parsing.folder(out)
     names, seeds = (QUICK, QUICK_SEEDS) if quick else (SCENES, SEEDS)
     with ProgressMeter("generate") as meter:
-        workers = 1 if quick else os.cpu_count() or 1
+        workers = WorkerOptions(1 if quick else os.cpu_count() or 1)
         folders = generate(names, seeds, out / "data", workers=workers, progress=meter.update, streams=())
         how = SEEN_QUICKLY if quick else ()
         (drawn,) = generate([SEEN], SEEN_SEED, out / "pictures", set=how, streams=("left",), images="mp4")

@@ -28,7 +28,7 @@ def replay(
     """Every recording of the source with every seed; settings: of camera, sensor, light and picture."""
     from scenarios.loading.resolve import load_observation
     from sim.dataset.replay import Cut
-    from sim.dataset.replay_dataset import How, store_replays
+    from sim.dataset.replay_dataset import ReplayOptions, store_replays
     from sim.io.source import open_source
 
     option_parsing.folder(out)
@@ -37,7 +37,7 @@ def replay(
         raise InputError(place="--duration", got=part.duration, expected="seconds above 0", remedy="correct it")
     view = load_observation(camera, settings)
     sources = open_source(part.source, fps=part.fps, images=False)
-    how = How(view, Cut(part.start, part.duration), part.calibration, wanted, kind)
+    how = ReplayOptions(view, Cut(part.start, part.duration), part.calibration, wanted, kind)
     with ProgressMeter("replay") as meter:
         folders = store_replays(sources, how, chosen, out, meter.update)
     text = f"{len(folders)} sequences in {folders[0].parent}"

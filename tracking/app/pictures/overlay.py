@@ -12,8 +12,8 @@ import cv2
 import numpy as np
 
 from scenarios.errors import InputError
-from sim.io.files.atomic import writing
-from sim.io.pictures.video_encoding import movie
+from sim.io.files.atomic import staged_path
+from sim.io.pictures.video_encoding import write_video
 from sim.types import Frame, Image, Sequence, Tracks
 from tracking.app.replay_page.video import even, refuse_source
 from tracking.drawing.canvas import Canvas
@@ -49,7 +49,7 @@ def overlay(
     path = Path(out)
     refuse_source(sequence, path)
     layers = _layers(sequence, tracks, truth)
-    with writing(path) as partial:
+    with staged_path(path) as partial:
         _write(partial, sequence, layers, step)
         os.replace(partial, path)
     return path
@@ -78,7 +78,7 @@ def _write(
 ) -> None:
     pictures = compose(sequence, layers)
     first = next(pictures)
-    with movie(path, (first.shape[1], first.shape[0]), sequence.fps) as film:
+    with write_video(path, (first.shape[1], first.shape[0]), sequence.fps) as film:
         film.add(first)
         step(sequence.name)
         for picture in pictures:

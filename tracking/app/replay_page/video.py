@@ -13,8 +13,8 @@ from urllib.parse import quote
 import numpy as np
 
 from scenarios.errors import InputError
-from sim.io.files.atomic import writing
-from sim.io.pictures.video_encoding import movie, rate_of
+from sim.io.files.atomic import staged_path
+from sim.io.pictures.video_encoding import rate_of, write_video
 from sim.types import Image, Sequence
 
 Video = Literal["auto", "inside", "beside", "none"]
@@ -55,7 +55,7 @@ def film(
     beside = page.with_suffix(".view.mp4")
     refuse_source(sequence, beside)
     rate = float(rate_of(sequence.fps))
-    with writing(beside) as partial:
+    with staged_path(beside) as partial:
         lost = encode(sequence, partial, step)
         if video == "inside" or (video == "auto" and partial.stat().st_size < LARGE):
             return Film("", base64.b64encode(partial.read_bytes()).decode(), rate, lost)
@@ -76,7 +76,7 @@ def encode(sequence: Sequence, path: Path, step: Callable[[str], None]) -> tuple
     width, height = sequence.image_size
     last: Image = np.full((height, width, 3), GREY, np.uint8)
     lost = []
-    with movie(path, (width + width % 2, height + height % 2), sequence.fps, QUALITY) as film:
+    with write_video(path, (width + width % 2, height + height % 2), sequence.fps, QUALITY) as film:
         for frame in sequence:
             if frame.image is None:
                 lost.append(frame.index)

@@ -5,7 +5,7 @@ import types
 import numpy as np
 import pytest
 
-from sim.io.formats.group_labels import dense, label_truth
+from sim.io.formats.group_labels import labelled_truth_fields, rows_to_grid
 from sim.types import GroupEvent, Near
 
 FRAME = np.array([1, 1, 1, 3, 3], np.int64)
@@ -32,7 +32,7 @@ def measured(monkeypatch):
 
 
 def test_rows_become_metres_over_time_and_people(measured):
-    label_truth(FRAME, ID, LABEL, POS, POS, fps=25.0, length=3, px_per_m=20.0)
+    labelled_truth_fields(FRAME, ID, LABEL, POS, POS, fps=25.0, length=3, px_per_m=20.0)
     pos, vel, present, intent, fps = measured.given
     assert (pos.shape, vel.shape, fps) == ((3, 3, 2), (3, 3, 2), 25.0)
     assert pos[0, 1].tolist() == [2, 3]
@@ -44,7 +44,7 @@ def test_rows_become_metres_over_time_and_people(measured):
 
 
 def test_answers_come_back_in_the_recordings_ids_and_unit(measured):
-    found = label_truth(FRAME, ID, LABEL, POS, POS, fps=25.0, length=3, px_per_m=20.0)
+    found = labelled_truth_fields(FRAME, ID, LABEL, POS, POS, fps=25.0, length=3, px_per_m=20.0)
     (event,) = found["events"]
     assert (event.before, event.after, event.members, event.pos) == ((-1, -1), (0,), (7, 9), (20.0, 40.0))
     assert (found["near"].a.tolist(), found["near"].b.tolist()) == ([4], [9])
@@ -59,7 +59,7 @@ def test_answers_come_back_in_the_recordings_ids_and_unit(measured):
 
 
 def test_dense_keeps_order_of_ids():
-    values = dense(FRAME, ID, np.arange(5.0), 3)
+    values = rows_to_grid(FRAME, ID, np.arange(5.0), 3)
     assert np.array_equal(values, [[0, 1, 2], [np.nan] * 3, [3, 4, np.nan]], equal_nan=True)
 
 
@@ -72,7 +72,7 @@ def test_labelled_groups_cross_and_queue_in_their_own_ids_and_unit():
     frame, id = np.repeat(np.arange(1, 121), 7), np.tile([10, 20, 30, 40, 50, 60, 70], 120)
     label = np.tile([8, 8, 3, 3, -1, -1, -1], 120)
     rows = (20 * x.reshape(-1, 2) for x in (pos, vel))
-    queue, cross = label_truth(frame, id, label, *rows, fps=10.0, length=120, px_per_m=20.0)["events"]
+    queue, cross = labelled_truth_fields(frame, id, label, *rows, fps=10.0, length=120, px_per_m=20.0)["events"]
     assert (queue.kind, queue.start, queue.end, queue.members) == ("queue", 1, 120, (50, 60, 70))
     assert queue.before == queue.after == (-1, -1, -1)
     assert (cross.kind, cross.start, cross.end, cross.members) == ("cross", 44, 58, (10, 20, 30, 40))

@@ -61,9 +61,9 @@ def test_biwi_groups_survive_their_traps(tmp_path):
 
 
 def test_biwi_slots_take_the_most_frequent_step():
-    assert biwi.slots(np.array([1, 11, 21, 81, 81])).tolist() == [1, 2, 3, 9, 9]
-    assert biwi.slots(np.array([780, 786, 792, 799])).tolist() == [1, 2, 3, 4]
-    assert biwi.slots(np.array([5, 5])).tolist() == [1, 1]
+    assert biwi.frame_numbers(np.array([1, 11, 21, 81, 81])).tolist() == [1, 2, 3, 9, 9]
+    assert biwi.frame_numbers(np.array([780, 786, 792, 799])).tolist() == [1, 2, 3, 4]
+    assert biwi.frame_numbers(np.array([5, 5])).tolist() == [1, 1]
 
 
 def test_biwi_without_groups_is_not_labelled(tmp_path):

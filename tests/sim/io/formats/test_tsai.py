@@ -4,9 +4,10 @@ import numpy as np
 import pytest
 
 from scenarios.errors import InputError
+from sim.io.formats.calibration import scaled_to_image
 from sim.io.formats.tsai import read_tsai
 from sim.io.source import open_source
-from sim.io.store.camera_files import camera_document, fitted, read_camera
+from sim.io.store.camera_files import camera_document, read_camera
 from sim.scene.camera import project, to_ground
 
 XML = """<?xml version="1.0" encoding="UTF-8"?>
@@ -55,13 +56,13 @@ def test_a_bent_camera_comes_back_and_a_straight_one_says_nothing_of_it(tmp_path
 def test_a_calibration_is_scaled_to_the_recording(tmp_path):
     (tmp_path / "c.xml").write_text(XML)
     camera = read_tsai(tmp_path / "c.xml")
-    half = fitted(camera, (384, 288), tmp_path)
+    half = scaled_to_image(camera, (384, 288), tmp_path)
     xyz = np.random.default_rng(0).uniform(-8, 8, (50, 3))
     assert project(half, xyz)[0] == pytest.approx(project(camera, xyz)[0] / 2)
     assert half.image == (384, 288)
-    assert fitted(camera, None, tmp_path) is camera
+    assert scaled_to_image(camera, None, tmp_path) is camera
     with pytest.raises(InputError, match="768×576"):
-        fitted(camera, (640, 360), tmp_path)
+        scaled_to_image(camera, (640, 360), tmp_path)
 
 
 @pytest.mark.parametrize(

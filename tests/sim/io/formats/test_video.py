@@ -214,7 +214,7 @@ def test_the_background_sample(tmp_path, name, asked, wanted, words):
 
 def test_the_sample_decodes_the_groups_it_needs(tmp_path, monkeypatch):
     path = write_video(tmp_path / "a.mp4", [picture(k) for k in range(60)], options={"g": "5", "bf": "2"})
-    some, count = video_decoding._some, 0
+    some, count = video_decoding._decode_packet, 0
 
     def counted(stream, packet):
         nonlocal count
@@ -223,7 +223,7 @@ def test_the_sample_decodes_the_groups_it_needs(tmp_path, monkeypatch):
         return found
 
     sequence = one(path, background="spread:2")
-    monkeypatch.setattr(video_decoding, "_some", counted)
+    monkeypatch.setattr(video_decoding, "_decode_packet", counted)
     assert len(sequence.background()) == 2
     assert count < 20
 
@@ -232,10 +232,10 @@ def test_the_sample_decodes_the_groups_it_needs(tmp_path, monkeypatch):
 def test_any_frames_of_any_groups(tmp_path, wanted):
     """Also those that the decoder still holds when the next group is left out."""
     path = write_video(tmp_path / "a.mp4", [picture(k) for k in range(60)], options={"g": "5", "bf": "3"})
-    index = video_decoding.packets(path)
+    index = video_decoding.index_packets(path)
     assert sum(index.keys) >= 12
-    every = dict(video_decoding.pictures(path, index))
-    found = dict(video_decoding.pictures(path, index, wanted))
+    every = dict(video_decoding.decode_frames(path, index))
+    found = dict(video_decoding.decode_frames(path, index, wanted))
     assert list(found) == wanted
     assert all(np.array_equal(found[k], every[k]) for k in wanted)
 

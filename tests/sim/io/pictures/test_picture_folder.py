@@ -84,8 +84,8 @@ def test_a_lost_picture_is_told_once(tmp_path, capfd, suffix):
 def test_a_picture_cut_off_anywhere_is_none(kind):
     """Seen without decoding: OpenCV 4 makes half a picture of it."""
     body = cv2.imencode(kind, picture(3))[1].tobytes()
-    assert pictures.ends(body)
-    assert not any(pictures.ends(body[:n]) for n in range(8, len(body) - 8, 7))
+    assert pictures.is_complete(body)
+    assert not any(pictures.is_complete(body[:n]) for n in range(8, len(body) - 8, 7))
 
 
 def test_pictures_cost_nothing_where_nobody_asks(tmp_path, monkeypatch):

@@ -11,7 +11,7 @@ from sim.io.files import atomic
 from sim.io.files.tables import read_table
 from sim.io.source import open_source
 from sim.io.store import sequence_folder, streams
-from sim.io.store.manifest import sealed
+from sim.io.store.manifest import with_hash
 from sim.io.store.validate import validate
 from sim.types import PixelTruth
 
@@ -95,11 +95,11 @@ def test_what_the_exact_streams_hold(tmp_path, make_pictured):
 
 def test_codes_there_and_back():
     ids = np.array([[0, 1, 999], [-2, 2, 0]])
-    assert np.array_equal(streams.decoded_ids(streams.coded_ids(ids)), ids)
+    assert np.array_equal(streams.decode_ids(streams.encode_ids(ids)), ids)
     with pytest.raises(WorkError, match="person 1000"):
-        streams.coded_ids(np.array([[1000]]))
+        streams.encode_ids(np.array([[1000]]))
     d = np.array([[np.nan, 1e-6, 0.5, 100.01, 2000.0]])
-    assert streams.decoded_disparity(streams.coded_disparity(d))[0] == pytest.approx(
+    assert streams.decode_disparity(streams.encode_disparity(d))[0] == pytest.approx(
         [np.nan, 1 / 64, 0.5, 100.015625, 65535 / 64], nan_ok=True
     )
 
@@ -231,7 +231,7 @@ def test_a_renderer_that_fails_leaves_nothing(tmp_path, make_pictured, images):
 
 
 def test_a_full_disk_in_the_middle_of_the_pictures(tmp_path, make_pictured, monkeypatch):
-    put, count = atomic.put, 0
+    put, count = atomic.write_unsynced, 0
 
     def full(path, body):
         nonlocal count
@@ -240,7 +240,7 @@ def test_a_full_disk_in_the_middle_of_the_pictures(tmp_path, make_pictured, monk
             raise OSError(28, "No space left on device")
         put(path, body)
 
-    monkeypatch.setattr(atomic, "put", full)
+    monkeypatch.setattr(atomic, "write_unsynced", full)
     with pytest.raises(WorkError, match="No space left"):
         stored(tmp_path / "a", make_pictured(3, ALL))
     assert list(tmp_path.iterdir()) == []
@@ -281,10 +281,10 @@ def test_pixel_truth_of_nobody(tmp_path, make_pictured):
 
 
 def relisted(folder, change):
-    """The manifest with another list of files or other facts, sealed anew."""
+    """The manifest with another list of files or other facts, with_hash anew."""
     whole = manifest(folder)
     change(whole)
-    (folder / "manifest.json").write_text(json.dumps(sealed(whole)))
+    (folder / "manifest.json").write_text(json.dumps(with_hash(whole)))
 
 
 @pytest.mark.parametrize("name", ["img1/000003.png", "ids/000003.png", "disparity/000003.png", "background/000003.png"])

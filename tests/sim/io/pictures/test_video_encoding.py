@@ -6,12 +6,12 @@ import av
 import pytest
 
 from scenarios.errors import InputError
-from sim.io.pictures.video_encoding import BT601, NARROW, movie
+from sim.io.pictures.video_encoding import BT601, NARROW, write_video
 from tests.small_videos import SIZE, picture
 
 
 def made(path: Path, fps: float = 10.0) -> Path:
-    with movie(path, SIZE, fps) as film:
+    with write_video(path, SIZE, fps) as film:
         for k in range(25):
             film.add(picture(k))
     return path
@@ -41,6 +41,6 @@ def test_the_same_pictures_give_the_same_bytes(tmp_path):
 
 @pytest.mark.parametrize("size", [(95, 64), (96, 63)])
 def test_odd_sizes_are_refused(tmp_path, size):
-    with pytest.raises(InputError, match="even"), movie(tmp_path / "a.mp4", size, 10.0):
+    with pytest.raises(InputError, match="even"), write_video(tmp_path / "a.mp4", size, 10.0):
         raise AssertionError("no film of that size")
     assert not (tmp_path / "a.mp4").exists()

@@ -9,7 +9,7 @@ from scenarios.errors import InputError, WorkError
 from sim.io.files import atomic
 from sim.io.source import open_source
 from sim.io.store import sequence_folder
-from sim.io.store.manifest import sealed
+from sim.io.store.manifest import with_hash
 from sim.io.store.validate import validate
 from sim.types import Frame, Sequence
 
@@ -155,7 +155,7 @@ def swap(path, old, new):
     manifest = json.loads((folder / "manifest.json").read_text())
     body = path.read_bytes()
     manifest["files"][path.relative_to(folder).as_posix()] = {"sha256": file_hash(body), "bytes": len(body)}
-    (folder / "manifest.json").write_text(json.dumps(sealed(manifest)))
+    (folder / "manifest.json").write_text(json.dumps(with_hash(manifest)))
 
 
 @pytest.mark.parametrize(
@@ -205,7 +205,7 @@ def test_a_failing_write_leaves_nothing(tmp_path, make_sequence, monkeypatch, nu
             raise OSError(number, os.strerror(number))
 
     monkeypatch.setattr(atomic.os, "fsync", fsync)
-    monkeypatch.setattr(atomic, "_flush_folder", lambda path: None)
+    monkeypatch.setattr(atomic, "_sync_folder", lambda path: None)
     with pytest.raises(kind) as error:
         sequence_folder.write_sequence(tmp_path / "new" / "a", make_sequence(1), scenario=SCENARIO, seed=1)
     assert os.strerror(number) in str(error.value)

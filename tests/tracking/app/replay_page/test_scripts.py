@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 import tracking.app.replay_page
-from sim.io.store.truth_files import standing
+from sim.io.store.truth_files import with_ground_height
 from sim.scene.camera import looking, project
 from sim.types import Camera, Scene, Sequence, Stairs
 from tests.groups_as_wholes import wholes
@@ -69,7 +69,7 @@ def test_places_on_the_ground_are_where_the_camera_sees_them(radial: float) -> N
     place, turn = np.array([6.0, -8.0, 7.0]), looking(0.7, 0.1)
     camera = Camera("pinhole", (640, 480), (500.0, 520.0), (320.0, 240.0), place, turn, radial=radial)
     xy = np.random.default_rng(0).uniform([-2, -30], [14, 14], (300, 2))
-    uv, _ = project(camera, standing(xy, scene))
+    uv, _ = project(camera, with_ground_height(xy, scene))
     data = {"camera": camera_json(camera), "scene": scene_json(scene)}
     what = f"{json.dumps(xy.tolist())}.map(([x, y]) => project(x, y, heightAt(x, y)) || [null, null])"
     found = np.array(ran(EMPTY | data, ("decode.js", "camera_view.js"), what), float)

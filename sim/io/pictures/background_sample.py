@@ -14,16 +14,13 @@ import numpy as np
 from scenarios.errors import InputError
 from sim.types import BACKGROUNDS, Image
 
-FRAMES = BACKGROUNDS
-OWN = f"{FRAMES} empty frames before frame 1"
-
 
 @dataclass(frozen=True)
-class Choice:
+class BackgroundChoice:
     """Which frames: the first `count`, or `count` spread over the recording; `asked` for, or taken by default."""
 
     how: Literal["first", "spread"] = "spread"
-    count: int = FRAMES
+    count: int = BACKGROUNDS
     asked: bool = False
 
     def __str__(self) -> str:
@@ -32,7 +29,7 @@ class Choice:
             return f"first {self.count} frames (causal from frame {self.count})"
         return f"{self.count} frames spread over the recording (not causal)"
 
-    def of(self, length: int, path: Path) -> Choice:
+    def of(self, length: int, path: Path) -> BackgroundChoice:
         """The same for a recording so long: InputError where it is shorter than asked for, all of it by default."""
         if length >= self.count:
             return self
@@ -50,26 +47,26 @@ class Choice:
         return [int((k + 0.5) * length / self.count) + 1 for k in range(self.count)]
 
 
-def read_choice(text: str | None) -> Choice:
+def parse_choice(text: str | None) -> BackgroundChoice:
     """`first:N` or `spread:N`; None is spread:50, not asked for."""
     if text is None:
-        return Choice()
+        return BackgroundChoice()
     found = re.fullmatch(r"(first|spread):([0-9]{1,6})", text)
     if found is None or int(found[2]) < 1:
         raise InputError(
             place="--background", got=text, expected="first:N or spread:N, N frames", remedy="for instance first:50"
         )
-    return Choice("first" if found[1] == "first" else "spread", int(found[2]), True)
+    return BackgroundChoice("first" if found[1] == "first" else "spread", int(found[2]), True)
 
 
 @dataclass(frozen=True)
-class Sample:
+class BackgroundSample:
     """A recording's sample: called, (K, H, W, 3); InputError where none of its pictures can be read.
 
     pictures(frames): (frame, picture) of those of these frames that can be read.
     """
 
-    choice: Choice
+    choice: BackgroundChoice
     length: int
     path: Path
     pictures: Callable[[list[int]], Iterable[tuple[int, Image]]]
@@ -86,7 +83,7 @@ class Sample:
                 file=self.path, got="no readable picture in the background sample", expected="one at least",
                 remedy="choose others: --background first:N or spread:N",
             )  # fmt: skip
-        if self.choice.count < FRAMES and not self.choice.asked:
-            text = f"{self.path.name}: shorter than a background sample of {FRAMES} frames; all {self.length} are taken"
-            warnings.warn(text, stacklevel=2)
+        if self.choice.count < BACKGROUNDS and not self.choice.asked:
+            words = f"shorter than a background sample of {BACKGROUNDS} frames; all {self.length} are taken"
+            warnings.warn(f"{self.path.name}: {words}", stacklevel=2)
         return found[:count]

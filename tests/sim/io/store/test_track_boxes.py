@@ -3,8 +3,8 @@ import json
 import numpy as np
 import pytest
 
+from sim.io.store.track_boxes import HEIGHT, WIDTH, upright_boxes
 from sim.io.store.track_files import read_tracks, tracks_files, write_tracks
-from sim.io.store.upright_boxes import HEIGHT, WIDTH, upright_boxes
 from sim.types import Camera
 
 # Level, at (0, 0, 1.7), looking along +y: x right, z down, y forward.

@@ -11,28 +11,30 @@ from pathlib import Path
 import pytest
 
 from scenarios.errors import InputError, WorkError
-from sim.workers.pool import THREADS, TRIES, crew, in_order, pool
-from sim.workers.process import Elsewhere
+from sim.workers.pool import process_pool
+from sim.workers.process import RemoteTraceback
+from sim.workers.protocol import MAX_LOSSES, THREAD_VARIABLES
+from sim.workers.start import results_in_order, start_workers
 from tests.errands import complain, fall, fall_at_first, hide, process, refuse, root_of, told
 
 
 @pytest.mark.parametrize("workers", [1, 2])
 def test_every_item_with_its_result(workers: int) -> None:
-    with crew(workers) as run:
+    with start_workers(workers) as run:
         assert sorted(run(root_of, [9.0, 4.0, 16.0])) == [(4.0, 2.0), (9.0, 3.0), (16.0, 4.0)]
         assert list(run(root_of, [])) == []
 
 
 def test_one_worker_is_this_process_and_two_are_others() -> None:
-    with crew(1) as run:
+    with start_workers(1) as run:
         assert dict(run(process, [1])) == {1: os.getpid()}
-    with crew(2) as run:
+    with start_workers(2) as run:
         assert os.getpid() not in dict(run(process, range(4))).values()
 
 
 def test_no_worker_is_refused() -> None:
     with pytest.raises(InputError, match="workers"):
-        crew(0)
+        start_workers(0)
 
 
 @pytest.mark.parametrize("workers", [1, 3])
@@ -45,29 +47,29 @@ def test_items_are_taken_when_there_is_somebody_to_do_them(workers: int) -> None
             taken.append(k)
             yield k
 
-    with crew(workers) as run:
+    with start_workers(workers) as run:
         for k, _ in run(process, items()):
             seen.append(k)
     assert sorted(seen) == list(range(12))
 
 
 def test_one_thread_each_and_the_environment_is_as_before(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setenv("OMP_NUM_THREADS", "7")
-    monkeypatch.delenv("MKL_NUM_THREADS", raising=False)
+    monkeypatch.setenv("OMP_NUM_THREAD_VARIABLES", "7")
+    monkeypatch.delenv("MKL_NUM_THREAD_VARIABLES", raising=False)
     before = dict(os.environ)
-    with pool(1) as run:
-        assert dict(run(os.getenv, list(THREADS))) == dict.fromkeys(THREADS, "1")
+    with process_pool(1) as run:
+        assert dict(run(os.getenv, list(THREAD_VARIABLES))) == dict.fromkeys(THREAD_VARIABLES, "1")
     assert dict(os.environ) == before
 
 
 def test_the_work_of_dead_workers_is_done_again(tmp_path: Path) -> None:
     markers = [tmp_path / str(k) for k in range(4)]
-    with pool(2) as run:
+    with process_pool(2) as run:
         assert sorted(run(fall_at_first, markers)) == [(m, m.name) for m in markers]
 
 
 def test_a_worker_killed_while_it_waits_is_replaced() -> None:
-    with pool(1) as run:
+    with process_pool(1) as run:
         ((_, first),) = run(process, [0])
         os.kill(first, signal.SIGKILL)
         ((_, second),) = run(process, [0])
@@ -76,33 +78,33 @@ def test_a_worker_killed_while_it_waits_is_replaced() -> None:
 
 def test_an_item_that_kills_all_its_workers_is_one_clear_error() -> None:
     with (
-        pytest.raises(WorkError, match=f"got {TRIES} workers that died at it, the last by exit code 3"),
-        pool(2) as run,
+        pytest.raises(WorkError, match=f"got an item that killed {MAX_LOSSES} workers, the last by exit code 3"),
+        process_pool(2) as run,
     ):
         list(run(fall, [0, 3, 2]))
 
 
 def test_or_has_a_result_of_its_own_and_the_others_theirs() -> None:
-    with pool(2) as run:
-        found = dict(run(fall, range(4), lost=lambda item, error: -item if "died" in str(error) else 0))
+    with process_pool(2) as run:
+        found = dict(run(fall, range(4), on_loss=lambda item, error: -item if "killed" in str(error) else 0))
     assert found == {0: 0, 1: -1, 2: 2, 3: -3}
 
 
 def test_workers_that_only_die_are_not_started_for_ever() -> None:
-    with pytest.raises(WorkError, match="died"), pool(1) as run:
-        list(run(fall, range(1, 99, 2), lost=lambda item, error: 0))
+    with pytest.raises(WorkError, match="killed"), process_pool(1) as run:
+        list(run(fall, range(1, 99, 2), on_loss=lambda item, error: 0))
 
 
 def test_an_error_ends_what_the_others_are_at() -> None:
     """Half an hour of it, here; a negative time is refused at once."""
-    with pytest.raises(ValueError, match="non-negative") as caught, pool(2) as run:
+    with pytest.raises(ValueError, match="non-negative") as caught, process_pool(2) as run:
         list(run(time.sleep, [1800.0, -1.0]))
-    assert isinstance(caught.value.__cause__, Elsewhere)
+    assert isinstance(caught.value.__cause__, RemoteTraceback)
     assert "Traceback" in str(caught.value.__cause__)
 
 
 def test_who_stops_looking_can_run_again() -> None:
-    with pool(2) as run:
+    with process_pool(2) as run:
         for _ in run(time.sleep, [0.0, 1800.0]):
             break
         assert sorted(run(refuse, range(3))) == [(0, 0), (1, 1), (2, 2)]
@@ -111,15 +113,15 @@ def test_who_stops_looking_can_run_again() -> None:
 @pytest.mark.parametrize("workers", [1, 3])
 def test_results_in_the_order_of_the_items_whoever_was_first(workers: int, tmp_path: Path) -> None:
     items = [(tmp_path / str(k), seconds) for k, seconds in enumerate((0.5, 0.0, 0.2, 0.0))]
-    with crew(workers) as run:
-        assert list(in_order(run, told, items)) == ["0", "1", "2", "3"]
-        assert list(in_order(run, told, [])) == []
+    with start_workers(workers) as run:
+        assert list(results_in_order(run, told, items)) == ["0", "1", "2", "3"]
+        assert list(results_in_order(run, told, [])) == []
 
 
 def test_once_the_taker_stops_what_is_under_way_ends_and_nothing_more_begins(tmp_path: Path) -> None:
     items = [(tmp_path / str(k), 0.3) for k in range(20)]
-    with pool(2) as run:
-        coming = in_order(run, told, items)
+    with process_pool(2) as run:
+        coming = results_in_order(run, told, items)
         next(coming)
         coming.close()
         found = [marker.read_text() for marker, _ in items if marker.exists()]
@@ -128,7 +130,7 @@ def test_once_the_taker_stops_what_is_under_way_ends_and_nothing_more_begins(tmp
 
 
 def test_what_cannot_be_sent_back_is_an_error_not_a_death() -> None:
-    with pytest.raises(TypeError, match="pickle"), pool(1) as run:
+    with pytest.raises(TypeError, match="pickle"), process_pool(1) as run:
         list(run(hide, [0]))
-    with pytest.raises(RuntimeError, match="Awkward: ab"), pool(1) as run:
+    with pytest.raises(RuntimeError, match="Awkward: ab"), process_pool(1) as run:
         list(run(complain, [0]))

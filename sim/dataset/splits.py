@@ -1,0 +1,45 @@
+"""Which data serve what: the seed range of each split, and the rule that nothing is tuned on real motion."""
+
+from __future__ import annotations
+
+from scenarios.errors import InputError
+from sim.types import Sequence
+
+SPLITS = (("train", 0, 10_000), ("val", 10_000, 20_000), ("test", 20_000, 30_000), ("fit", 30_000, 40_000))
+"""(name, first seed, seed after the last)."""
+
+DEMO = ("demo", 40_000, 2**63)
+TUNING_SPLITS = ("train", "val")
+"""Splits on which parameters may be chosen; replays of recordings are refused there."""
+
+SIMULATED = ("simulated", "generated", "replayed")
+"""Values of `Sequence.source["kind"]` that are no recordings."""
+
+
+def split_of(seeds: range) -> str:
+    """Return the split that holds all seeds: "train", "val", "test", "fit" or "demo".
+
+    Raises InputError if the range is empty, has a negative seed, or crosses the border between two splits.
+    """
+    if len(seeds) == 0 or min(seeds) < 0:
+        raise InputError(
+            place="seeds", got=f"{seeds.start}:{seeds.stop}", expected="a:b with 0 <= a < b", remedy="correct --seeds"
+        )
+    for name, low, high in (*SPLITS, DEMO):
+        if low <= min(seeds) < high:
+            if max(seeds) < high:
+                return name
+            raise InputError(
+                place="seeds", got=f"{seeds.start}:{seeds.stop}", expected=f"a range inside {low}:{high} ({name})",
+                remedy=f"end the range at {high} or begin it there",
+            )  # fmt: skip
+    raise AssertionError("every seed has a split")
+
+
+def is_real(sequence: Sequence) -> bool:
+    """Return True if the sequence shows real motion: a recording, or a replay of a recording.
+
+    A sequence whose `source` has neither "origin" nor "kind" counts as simulated.
+    """
+    kind, origin = sequence.source.get("kind"), sequence.source.get("origin")
+    return bool(origin["real"]) if origin is not None else kind is not None and kind not in SIMULATED

@@ -1,0 +1,50 @@
+"""The camera calibration that a user gives for a recording (`--camera FILE`): read it, scale it to the pictures."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+
+from scenarios.errors import InputError
+from sim.io.formats.tsai import read_tsai
+from sim.io.store.camera_files import read_camera
+from sim.types import Camera
+
+SHAPE_TOLERANCE = 0.01  # relative difference allowed between the aspect ratios of calibration and recording
+
+
+def read_calibration(path: Path) -> Camera:
+    """Return the camera of a calibration file: Tsai's XML if its name ends in .xml, else our camera.json.
+
+    Raises InputError if there is no such file or its content is invalid.
+    """
+    if not path.is_file():
+        expected = "a camera.json, or Tsai's calibration as .xml"
+        raise InputError(file=path, got="no file", expected=expected, remedy="check --camera")
+    return read_tsai(path) if path.suffix.lower() == ".xml" else read_camera(path)
+
+
+def scaled_to_image(camera: Camera, image: tuple[int, int] | None, path: Path) -> Camera:
+    """Return the camera for pictures of `image` = (width, height) px.
+
+    Focal lengths, image centre and px_per_m are scaled if the calibration was made at another size. `image` None
+    returns the camera unchanged. `path` is the recording, for the error.
+
+    Raises InputError if the aspect ratios differ by more than SHAPE_TOLERANCE.
+    """
+    if image is None or image == camera.image:
+        return camera
+    x, y = image[0] / camera.image[0], image[1] / camera.image[1]
+    if abs(x / y - 1) > SHAPE_TOLERANCE:
+        raise InputError(
+            file=path, place="--camera", got="a calibration for {}×{} px".format(*camera.image),
+            expected="one for {}×{} px, or of that shape".format(*image), remedy="give this recording's calibration",
+        )  # fmt: skip
+    (fx, fy), (cx, cy) = camera.focal_px, camera.centre_px
+    return camera.replace(
+        image=image,
+        focal_px=(fx * x, fy * y),
+        centre_px=(cx * x, cy * y),
+        px_per_m=float(camera.px_per_m * np.sqrt(x * y)),
+    )

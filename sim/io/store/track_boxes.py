@@ -1,0 +1,42 @@
+"""The boxes that are written for tracks: a tracker's own, or projections of upright people, or none."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Literal
+
+import numpy as np
+
+from sim.types import Array, Camera, Tracks
+
+HEIGHT = 1.70  # m, of the upright cylinder
+WIDTH = 0.50  # m, its diameter
+
+
+def box_source(tracks: Sequence[Tracks], camera: Camera | None) -> Literal["measured", "projected", "none"]:
+    """Return where the boxes of stored tracks come from, the value `boxes` of run.json.
+
+    "measured": the tracker gave a box in at least one frame. "projected": it gave none, tracks people on the ground,
+    and the camera is known. "none": otherwise, that is without a camera, for tracks in the image, or for groups.
+    """
+    if any(t.box is not None and len(t.id) for t in tracks):
+        return "measured"
+    upright = not any(t.plane == "image" or t.unit == "group" for t in tracks)
+    return "projected" if camera is not None and upright else "none"
+
+
+def upright_boxes(camera: Camera, pos: Array) -> Array:
+    """Return the boxes (N, 4) ltwh px of upright cylinders, HEIGHT high and WIDTH across, that stand at `pos`.
+
+    pos: (N, 3) m, or (N, 2) m on the ground z = 0. A cylinder that is partly behind the camera has a box of nan.
+    """
+    from sim.scene.camera import project
+
+    angle = np.arange(16) * (np.pi / 8)
+    rim = WIDTH / 2 * np.stack([np.cos(angle), np.sin(angle)], axis=1)
+    rim = np.concatenate([np.c_[rim, np.zeros(16)], np.c_[rim, np.full(16, HEIGHT)]])
+    foot = pos if pos.shape[1] == 3 else np.concatenate([pos, np.zeros((len(pos), 1))], axis=1)
+    uv, depth = project(camera, (foot[:, None] + rim).reshape(-1, 3))
+    uv = np.where((depth > 0)[:, None], uv, np.nan).reshape(len(pos), 32, 2)
+    low, high = uv.min(axis=1), uv.max(axis=1)
+    return np.concatenate([low, high - low], axis=1)

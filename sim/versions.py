@@ -1,0 +1,72 @@
+"""What the bytes of a result depend on besides its inputs: versions, our own sources, the CPU's vector instructions."""
+
+from __future__ import annotations
+
+import hashlib
+import importlib
+import platform
+from functools import cache, lru_cache
+from importlib import metadata
+from pathlib import Path
+
+LIBRARIES = ("numpy", "scipy", "numba", "pymunk", "pyarrow", "pydantic")
+PICTURE_LIBRARIES = ("opencv-python-headless", "av")
+DISTRIBUTION = "flockscope"
+
+
+@lru_cache(maxsize=2)
+def versions(drawn: bool) -> dict[str, str]:
+    """Return the versions of Python, flockscope and LIBRARIES by name; "unknown" for one that is not installed.
+
+    drawn: include PICTURE_LIBRARIES, on which the bytes of pictures depend.
+    """
+    found = {"python": platform.python_version()}
+    for name in (DISTRIBUTION, *LIBRARIES, *(PICTURE_LIBRARIES if drawn else ())):
+        try:
+            found[name] = metadata.version(name)
+        except metadata.PackageNotFoundError:
+            found[name] = "unknown"
+    return found
+
+
+@cache
+def runtime() -> dict[str, str]:
+    """Return everything that two machines must share to produce the same bytes, as name to value.
+
+    The names are those of `versions(drawn=True)`, "sources" (source_hash) and "cpu" (cpu_level). Computed once.
+    """
+    root = Path(__file__).resolve().parents[1]
+    return {**versions(drawn=True), "sources": source_hash(root), "cpu": cpu_level()}
+
+
+def packages() -> tuple[str, ...]:
+    """Return the top-level packages of the installed distribution; those that `sim` needs if it is not installed."""
+    try:
+        listed = metadata.distribution(DISTRIBUTION).read_text("top_level.txt")
+    except metadata.PackageNotFoundError:
+        listed = None
+    return tuple(sorted(listed.split())) if listed else ("scenarios", "sim")
+
+
+def source_hash(root: Path) -> str:
+    """Return 12 hex digits of the SHA-256 over names and bytes of all .py and .toml files of `packages()` in `root`."""
+    h = hashlib.sha256()
+    for package in packages():
+        for path in sorted((root / package).rglob("*")):
+            if path.suffix in (".py", ".toml"):
+                h.update(f"{path.relative_to(root).as_posix()}\0".encode() + path.read_bytes() + b"\0")
+    return h.hexdigest()[:12]
+
+
+def cpu_level() -> str:
+    """Return the vector instructions that numpy may use here; the last bits of its results depend on them.
+
+    On x86-64 the level, "x86-64-v2" to "x86-64-v4"; elsewhere the machine's name and its features, as "arm64+ASIMD".
+    """
+    has = importlib.import_module("numpy._core._multiarray_umath").__cpu_features__
+    machine = platform.machine().lower()
+    if machine in ("x86_64", "amd64"):
+        third = has.get("X86_V3", has.get("AVX2") and has.get("FMA3"))  # older numpy lists the single features
+        level = 4 if has.get("X86_V4", has.get("AVX512_SKX")) else 3 if third else 2
+        return f"x86-64-v{level}"
+    return "+".join([machine, *sorted(name for name in ("ASIMD", "SVE", "VSX", "VX") if has.get(name))])

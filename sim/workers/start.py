@@ -1,0 +1,72 @@
+"""Start the workers that a command asks for: this process, local processes, or a dask cluster, behind one call."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Generator, Iterable, Iterator, Sequence
+from contextlib import AbstractContextManager, contextmanager
+from dataclasses import dataclass
+from typing import Any
+
+from scenarios.errors import InputError
+from sim.workers.cluster import cluster_workers
+from sim.workers.pool import process_pool
+from sim.workers.protocol import R, RunItems, T
+
+
+@dataclass(frozen=True)
+class WorkerOptions:
+    """Which workers to use.
+
+    count: number of workers, 1 or more; 1 without a cluster is this process. cluster: address of a dask scheduler
+    (tcp://HOST:PORT), None for local workers.
+    """
+
+    count: int = 1
+    cluster: str | None = None
+
+
+def start_workers(workers: int = 1, cluster: str | None = None) -> AbstractContextManager[RunItems]:
+    """Return a context manager that starts workers, gives their RunItems, and ends them with its block.
+
+    cluster None: this process for one worker, else `workers` spawned processes. Otherwise the workers of the dask
+    cluster with that address; `workers` is then the least number of items under way. Raises InputError if `workers` is
+    below 1; entering the block raises InputError or WorkError if the cluster's address is wrong or nobody answers.
+    """
+    if workers < 1:
+        raise InputError(place="workers", got=workers, expected="1 or more", remedy="correct --workers")
+    if cluster is not None:
+        return cluster_workers(cluster, workers)
+    return process_pool(workers) if workers > 1 else this_process()
+
+
+def results_in_order(run: RunItems, function: Callable[[T], R], items: Sequence[T]) -> Generator[R, None, None]:
+    """Yield function(item) in the order of the items. No object may stand twice among the items.
+
+    Results that arrive early are kept in memory until their turn. When the caller closes the generator, no further
+    item is started; items under way are waited for. Raises what `run` raises.
+    """
+    wanted, found = True, dict[int, R]()
+    arriving = run(function, (item for item in items if wanted))
+    try:
+        for item in items:
+            while id(item) not in found:
+                done, result = next(arriving)
+                found[id(done)] = result
+            yield found.pop(id(item))
+    finally:
+        wanted = False
+        for _ in arriving:
+            pass
+
+
+@contextmanager
+def this_process() -> Iterator[RunItems]:
+    """Give a RunItems that calls the function in this process, one item after another."""
+
+    def run(
+        function: Callable[[T], R], items: Iterable[T], *, ahead: int = 0, on_loss: Any = None
+    ) -> Iterator[tuple[T, R]]:
+        for item in items:
+            yield item, function(item)
+
+    yield run
