@@ -14,8 +14,8 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from sim.geometry.polygons import convex_hull
-from sim.io.store.truth_files import with_ground_height
 from sim.io.store.track_boxes import upright_boxes
+from sim.io.store.truth_files import with_ground_height
 from sim.types import Array, Bools, Camera, GroupEvent, Groups, Ints, Scene, Tracks, Truth
 
 SIGMA_95 = math.sqrt(5.991)
