@@ -33,7 +33,7 @@ ADDRESS = r"[a-z]+://([^\s/:\[\]]+|\[[0-9a-fA-F:.]+\]):\d+/?"
 CONNECT_TIMEOUT = 10.0  # s to reach a scheduler
 COUNT_INTERVAL = 1.0  # s between two counts of the cluster's workers
 NO_WORKERS_WARNING = 20.0  # s without any worker before a warning
-REMEDY = "run the same command again: complete results are kept"
+REMEDY = "run the same command again: what is complete is kept"
 PROFILE_SAFE = (
     3,
     11,

@@ -135,6 +135,6 @@ def test_an_error_of_one_is_not_that_of_all(
 
 
 def test_given_up(job: SequenceJob) -> None:
-    outcome = lost_job(job, WorkError(got="3 workers that died at it", expected="b", remedy="c"))
+    outcome = lost_job(job, WorkError(got="an item that killed 3 workers", expected="b", remedy="c"))
     assert outcome == JobOutcome(outcome.error)
-    assert str(outcome.error).startswith("x-s00001: got 3 workers that died at it")
+    assert str(outcome.error).startswith("x-s00001: got an item that killed 3 workers")
