@@ -277,7 +277,8 @@ def test_the_work_of_a_killed_worker_is_done_by_another(tmp_path, whole):
 def test_a_sequence_that_kills_its_workers_fails_alone(tmp_path, whole):
     done = run_program(tmp_path, tmp_path / "out", 2, kill_after=-3)
     assert done.returncode == 1
-    assert b"x-s00001: got an item that killed 3 workers, the last by signal 9 (SIGKILL)" in done.stderr.splitlines()[-1]
+    message = b"x-s00001: got an item that killed 3 workers, the last by signal 9 (SIGKILL)"
+    assert message in done.stderr.splitlines()[-1]
     others = {name: body for name, body in whole.items() if "x-s00001" not in name and "seqmaps" not in name}
     assert {k: v for k, v in content(tmp_path / "out").items() if "seqmaps" not in k} == others
     assert validate(tmp_path / "out") == []
