@@ -1,0 +1,104 @@
+"""What every registered tracker promises, on every scenario of the catalogue (contract, section 3).
+
+A tracker returns finite, well-shaped tracks; it never looks at the truth or at later frames; it changes no input; the
+same seed and input give the same bytes, after a reset as in a new instance.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import fields, is_dataclass, replace
+from functools import cache
+from itertools import islice
+from typing import Any
+
+import numpy as np
+import pytest
+
+from scenarios.loading.resolve import load
+from scenarios.loading.toml_files import names as scenario_names
+from sim.sequence import simulate
+from sim.types import Frame, Sequence, Tracks, Truth
+from tracking.run import Prepared, prepare
+from tracking.tracker_registry import find, names
+
+FPS = 5
+LENGTHS = {"file": 30, "image": 12}
+"""Frames tracked, by kind of detections."""
+
+
+def forbidden_truth() -> Truth:
+    raise AssertionError("a tracker looked at the truth")
+
+
+@cache
+def recorded(scenario: str, mode: str) -> tuple[Sequence, tuple[Frame, ...]]:
+    """The sequence of a scenario without its truth, and its first frames, made once for all trackers."""
+    streams = ("left", "background") if mode == "image" else ()
+    settings = [f"camera.fps={FPS}"] + (["camera.image=[160,120]"] if mode == "image" else [])
+    sequence = simulate(load(scenario, settings), 40_001, 0, streams)
+    return replace(sequence, load_truth=forbidden_truth), tuple(islice(sequence, LENGTHS[mode]))
+
+
+def cut(scenario: str, mode: str, length: int) -> Sequence:
+    """The first frames of a scenario as a sequence of its own."""
+    sequence, frames = recorded(scenario, mode)
+    return replace(sequence, frames=lambda: iter(frames[:length]), bare=None, length=length)
+
+
+def run(ready: Prepared) -> list[Tracks]:
+    ready.reset(0)
+    return [ready.answer(frame) for frame in ready.frames()]
+
+
+def arrays(value: Any) -> Iterator[np.ndarray]:
+    """All arrays in a value made of dataclasses, tuples and arrays."""
+    if isinstance(value, np.ndarray):
+        yield value
+    elif isinstance(value, tuple):
+        for item in value:
+            yield from arrays(item)
+    elif is_dataclass(value):
+        for field in fields(value):
+            yield from arrays(getattr(value, field.name))
+
+
+def content(tracks: list[Tracks]) -> list[bytes]:
+    """The bytes of each frame's tracks, groups and events."""
+    return [b"".join(a.tobytes() for a in arrays(t)) + repr([repr(e) for e in t.events]).encode() for t in tracks]
+
+
+@pytest.mark.parametrize("mode", LENGTHS)
+@pytest.mark.parametrize("tracker", names())
+@pytest.mark.parametrize("scenario", scenario_names())
+def test_contract(scenario: str, tracker: str, mode: str) -> None:
+    needs = find(tracker).needs
+    if mode == "image" and not {"pixels", "stereo", "boxes"} & set(needs):
+        pytest.skip(f"{tracker} takes no pictures")
+    length = LENGTHS[mode]
+    whole = cut(scenario, mode, length)
+    before = [[a.copy() for a in arrays(frame)] for frame in whole]
+    ready = prepare(tracker, whole, detections=mode)
+    tracks = run(ready)
+
+    assert [t.index for t in tracks] == list(range(1, length + 1))
+    reports_groups = {t.unit for t in tracks} == {"group"}
+    for t in tracks:
+        n, d = t.pos.shape
+        assert t.vel.shape == (n, d)
+        assert t.cov.shape == (n, 2 * d, 2 * d)
+        assert all(np.isfinite(a).all() for a in (t.pos, t.vel, t.cov, t.score))
+        assert np.allclose(t.cov, t.cov.transpose(0, 2, 1))
+        assert (np.linalg.eigvalsh(t.cov) > -1e-9).all()
+        assert (t.id >= 0).all()
+        assert len(set(t.id.tolist())) == n
+        if reports_groups:
+            assert np.array_equal(t.group, t.id)
+        assert all(e.emitted == t.index and e.start <= t.index for e in t.events)
+
+    after = [list(arrays(frame)) for frame in whole]
+    assert all(np.array_equal(a, b, equal_nan=True) for x, y in zip(before, after, strict=True) for a, b in zip(x, y, strict=True))
+
+    prefix = prepare(tracker, cut(scenario, mode, length // 2), detections=mode)
+    assert content(run(prefix)) == content(tracks)[: length // 2], "a sequence cut short gives other tracks"
+    assert content(run(ready)) == content(tracks), "after a reset the same input gives other tracks"
