@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from tests.tracking.papers.test_group_pda import FPS, GROUND, block, changes, events, ids, noisy, sizes, track
+from tests.tracking.papers.group_pda.test_tracker import FPS, GROUND, block, changes, events, ids, noisy, sizes, track
 
 from sim.types import Array, Context, Frame, Tracks
 from tracking.papers.group_pda.config import GroupPdaConfig
