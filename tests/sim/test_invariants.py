@@ -65,19 +65,30 @@ def test_numbers_of_people_do_not_matter(plots, random):
     assert rows(events) == rows(told, lambda p: order[p - 1] + 1)
 
 
+CORNER_DEG = 22.5
+"""Angle between the corners of a footprint, a 16-gon. Turned by another angle its hull is up to 5 mm smaller, so that
+an encounter (hulls within 1.0 m) may begin or end one frame earlier or later."""
+ANGLES = st.one_of(st.floats(0, 360), st.integers(0, 15).map(lambda corners: CORNER_DEG * corners))
+
+
 @settings(max_examples=20, deadline=None)
-@given(scenes(), st.floats(-1000, 1000), st.floats(-1000, 1000), st.floats(0, 360), st.booleans())
+@given(scenes(), st.floats(-1000, 1000), st.floats(-1000, 1000), ANGLES, st.booleans())
 def test_place_and_turn_of_the_world_do_not_matter(plots, x, y, degrees, mirror):
     scene = look(plots, FPS)
     c, s = np.cos(np.radians(degrees)), np.sin(np.radians(degrees))
     turn = np.array([[c, s], [-s, c]]) @ np.diag([1.0, -1.0 if mirror else 1.0])
-    (group, events), (again, told) = (
+    (group, events), (again, turned) = (
         measure(scene),
         measure(scene.but(pos=scene.pos @ turn + [x, y], vel=scene.vel @ turn)),
     )
     assert np.array_equal(group, again)
-    assert rows(events) == rows(told)
-    for a, b in zip(*(sorted(e, key=lambda e: (e.kind, e.members)) for e in (events, told)), strict=True):
+    exact = abs(degrees / CORNER_DEG - round(degrees / CORNER_DEG)) < 1e-9
+    slack = 0 if exact else 1
+    by_members = [sorted(rows(e), key=lambda row: (row[0], row[3], row[1])) for e in (events, turned)]
+    for a, b in zip(*by_members, strict=True):
+        assert (a[0], *a[3:]) == (b[0], *b[3:])
+        assert np.abs(np.subtract(a[1:3], b[1:3])).max() <= (slack if a[0] == "cross" else 0)
+    for a, b in zip(*(sorted(e, key=lambda e: (e.kind, e.members)) for e in (events, turned)), strict=True):
         np.testing.assert_allclose(np.array(a.pos) @ turn + [x, y], b.pos, atol=1e-6)
 
 

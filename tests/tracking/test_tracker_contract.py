@@ -97,7 +97,11 @@ def test_contract(scenario: str, tracker: str, mode: str) -> None:
         assert all(e.emitted == t.index and e.start <= t.index for e in t.events)
 
     after = [list(arrays(frame)) for frame in whole]
-    assert all(np.array_equal(a, b, equal_nan=True) for x, y in zip(before, after, strict=True) for a, b in zip(x, y, strict=True))
+    assert all(
+        np.array_equal(a, b, equal_nan=True)
+        for x, y in zip(before, after, strict=True)
+        for a, b in zip(x, y, strict=True)
+    )
 
     prefix = prepare(tracker, cut(scenario, mode, length // 2), detections=mode)
     assert content(run(prefix)) == content(tracks)[: length // 2], "a sequence cut short gives other tracks"
