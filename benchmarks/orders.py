@@ -18,7 +18,7 @@ import numpy as np
 from scenarios.errors import FlockscopeError
 from scenarios.loading.resolve import Entry, names, resolve
 from scenarios.schema.scenario import Scenario
-from sim.crowd.population import cast, walking_speed
+from sim.crowd.population import draw_population, walking_speed
 from sim.crowd.world import run
 from sim.sequence import observe
 from sim.truth.order_fulfilment import PATIENCE, RULE_TIME
@@ -31,7 +31,7 @@ WINDOW = 0.8  # s
 def paces(scenario: Scenario, motion: Motion, truth: Truth) -> Array:
     """Greatest speed of each person while obeying, as a share of the own speed; one value per order and person."""
     found = np.full(len(motion.free_speed), np.nan)
-    for party in cast(scenario, motion.scene, motion.seed, motion.repeat):
+    for party in draw_population(scenario, motion.scene, motion.seed, motion.repeat):
         found[[m.column for m in party.members]] = party.speed
     shares = []
     for order in motion.orders:

@@ -23,7 +23,7 @@ import pymunk
 import pymunk.batch
 
 from scenarios.schema.scenario import Scenario
-from sim.crowd.steering import Steering
+from sim.crowd.forces import Steering
 from sim.crowd.world import WRITE, World
 
 RUNNER = Path(__file__).parent / "peers" / "run_jupedsim.py"
@@ -98,7 +98,7 @@ def physics(people: int) -> float:
         begin = time.process_time()
         for force in world.space.forces:
             again.force[:] = force
-            pymunk.batch.set_space_bodies(again.space, WRITE, again._put)
+            pymunk.batch.set_space_bodies(again.space, WRITE, again._write_buffer)
             if stepping:
                 again.space.step(again.dt)
         seconds[stepping] += time.process_time() - begin
@@ -109,7 +109,7 @@ def layout(people: int) -> str:
     """What the peer is given: the same people, each on his own way."""
     world = World(scenario(people), 0, 0, Steering())
     scene = {"start": [], "goal": [], "speed": []}
-    for party in world.parties:
+    for party in world.entering:
         for member, pos in zip(party.members, party.pos.tolist(), strict=True):
             scene["start"].append(pos)
             scene["goal"].append((np.array(pos) - party.start + party.goal).tolist())

@@ -173,9 +173,9 @@ def named_people(
     scenario: Scenario, scene: Scene, seed: int, repeat: int, orders: Iterable[Order]
 ) -> dict[str, tuple[int, ...]]:
     """Ids of the people of each group that the script names: those it starts with, and those its orders made."""
-    from sim.crowd.population import cast
+    from sim.crowd.population import draw_population
 
-    parties = cast(scenario, scene, seed, repeat)
+    parties = draw_population(scenario, scene, seed, repeat)
     names = {party.name: tuple(m.column + 1 for m in party.members) for party in parties}
     after = {order.id: order.after for order in orders if order.fired is not None}
     for event in scenario.event:

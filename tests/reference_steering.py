@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from sim.crowd.steering import Steering
+from sim.crowd.forces import Steering
 from sim.types import Array, Ints
 
 
@@ -47,7 +47,7 @@ def between_people(state: Array, tag: Ints, s: Steering) -> Array:
 
 
 def between_groups(now: Array, s: Steering) -> Array:
-    """Acceleration of each group as a whole, (G, 2), `now` as in sim.crowd.steering; the larger of two yields less."""
+    """Acceleration of each group as a whole, (G, 2), `now` as in sim.crowd.forces; the larger of two yields less."""
     out = np.zeros((len(now), 2))
     for a in range(len(now)):
         for b in range(len(now)):

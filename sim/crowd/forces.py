@@ -1,23 +1,173 @@
-"""All forces on everybody: where they want to go, then what they avoid on the way. Arrays and units:
-sim.crowd.steering.
+"""The forces people walk by: their parameters, and the names of all columns and slots that the force kernels use.
+
+Forces on a person, in the order in which they are computed:
+
+- towards the goal, the person's place in the group's formation and the group's velocity: `forces_goal_kernels`;
+- away from other people, other groups, walls and pillars: `forces_avoidance_kernels`.
+
+`sim.crowd.world.accelerate` adds them up. A body weighs 1 kg, so a force is an acceleration in m/s². The sum of the
+avoidance forces and the goal force is capped at `Steering.max_acceleration`. Forces turn and move with the scene. The
+order of people changes them by rounding only.
+
+Model: boids inside a group (separation, alignment, cohesion), and a power law of the time to collision between
+strangers (Karamouzas, Skinner & Guy 2014). *Ours*: groups also avoid each other as wholes, so strangers walk round a
+group and seldom through it. A group waits at its gathering point until all members are there.
+
+numba bakes the integers below into the compiled kernels, and its cache does not notice a change in this file. Delete
+`sim/crowd/__pycache__` after changing one.
 """
 
 from __future__ import annotations
 
-from sim.crowd.avoidance_kernels import avoid
-from sim.crowd.driving_kernels import drive
-from sim.crowd.steering import Groups, Obstacles, People
-from sim.types import Array
+from dataclasses import astuple, dataclass
+from typing import NamedTuple
+
+import numpy as np
+
+from sim.types import Array, Bools, Ints
+
+# columns of `state` (N, 4): position in m, velocity in m/s
+X, Y, VX, VY = range(4)
+
+# columns of PeopleArrays.tag (N, 4)
+GROUP, MODE, QUEUE, WAYPOINT = range(4)
+# MODE of a person: walks with the group, or walks to a place in a queue
+IN_GROUP, TO_TARGET = range(2)
+
+# kinds of a waypoint: pass it, pass it in single file (a door), wait there for the whole group, end of the way
+PASS, NARROW, GATHER, END = range(4)
+# what a group does at the end of its way
+STAND, LEAVE = range(2)
+
+# columns of GroupArrays.status (G, 10): number of members present; mean of their positions, m; mean of their
+# velocities, m/s; largest distance of a member from the mean position, m; largest distance of a member from its place
+# in the formation, m; wanted velocity, m/s; 1.0 while other groups avoid this group as a whole, else 0.0
+COUNT, MEAN_X, MEAN_Y, MEAN_VX, MEAN_VY, RADIUS, MAX_OFF_PLACE, WANTED_VX, WANTED_VY, AVOIDED = range(10)
+
+# columns of Obstacles.walls (W, 4), .pillars (P, 3) and .stairs (S, 7)
+X1, Y1, X2, Y2 = range(4)
+PILLAR_X, PILLAR_Y, PILLAR_RADIUS = range(3)
+FOOT_X, FOOT_Y, AXIS_X, AXIS_Y, LENGTH, WIDTH, SLOWDOWN = range(7)
+
+# slots of Steering.array(), in the order of the fields of Steering
+(
+    RELAXATION,
+    COHESION_TIME,
+    ALIGNMENT,
+    SEPARATION,
+    SEPARATION_RANGE,
+    HASTE,
+    TURN_TIME,
+    SLOW_TIME,
+    AVOID_PERSON,
+    AVOID_GROUP,
+    AVOID_TIME,
+    PERSON_RADIUS,
+    PERSON_RANGE,
+    GROUP_RANGE,
+    AVOID_MAX,
+    SHOVE,
+    WALL,
+    WALL_RANGE,
+    GATHER_RADIUS,
+    PASS_RADIUS,
+    MAX_ACCELERATION,
+) = range(21)
 
 
-def accelerate(
-    state: Array, people: People, groups: Groups, obstacles: Obstacles, dt: float, p: Array, push: Array, out: Array
-) -> bool:
-    """Accelerations of all into out (N, 2); advances the groups' ways and headings by dt.
+@dataclass(frozen=True, slots=True)
+class Steering:
+    """Parameters of the forces. The order of the fields is the order of the slots above."""
 
-    state (N, 4): x, y, vx, vy. p: Steering.array(). push (G, 2): scratch. Returns False where a state is not finite.
+    relaxation: float = 0.5  # s: time in which a person takes up the wanted velocity
+    cohesion_time: float = 1.6  # s: time in which a member returns to its place in the formation
+    alignment: float = 0.25  # 1/s: rate at which a member takes up the group's mean velocity
+    separation: float = 2.5  # m/s²: repulsion between two members at distance zero
+    separation_range: float = 0.6  # m: distance at which that repulsion ends
+    haste: float = 0.15  # share of the group's speed that a member may add to keep its place
+    turn_time: float = 0.7  # s: time in which a group's heading follows its way
+    slow_time: float = 0.9  # s: how early a group slows down before a goal where it stands
+    avoid_person: float = 1.3  # strength of the power law between strangers
+    avoid_group: float = 1.6  # strength of the power law between whole groups
+    avoid_time: float = 2.5  # s: time constant of the power law; collisions beyond four times this are ignored
+    person_radius: float = 0.29  # m: half the distance that strangers keep
+    person_range: float = 3.5  # m: strangers further apart ignore each other
+    group_range: float = 8.0  # m: groups further apart ignore each other
+    avoid_max: float = 2.0  # m/s²: cap of each avoidance force
+    shove: float = 3.0  # m/s²: repulsion between strangers at distance zero
+    wall: float = 4.0  # m/s²: repulsion of a wall or pillar at contact
+    wall_range: float = 0.25  # m: distance over which that repulsion falls to 37 %
+    gather_radius: float = 0.9  # m: a group has gathered when all members are this close to their places
+    pass_radius: float = 0.8  # m: a waypoint counts as passed at this distance
+    max_acceleration: float = 2.2  # m/s²: cap of the sum of all forces
+
+    def array(self) -> Array:
+        """Returns the parameters as the kernels take them, shape (21,), one slot per field."""
+        return np.array(astuple(self))
+
+
+class GroupArrays(NamedTuple):
+    """State of G groups and of their ways. The goal kernels read it and update `current`, `heading`, `arrived`.
+
+    route (G, W, 2): waypoints in m; kind (G, W): PASS, NARROW, GATHER or END; length (G,): number of waypoints; current
+    (G,): index of the waypoint the group is walking to; speed (G,) m/s; heading (G, 2): unit vector; finish (G,): STAND
+    or LEAVE; arrived (G,): the end of the way is reached; status (G, 10): columns COUNT … AVOIDED, rewritten in each
+    step.
     """
-    if not drive(state, *people, *groups, obstacles.stairs, dt, p, out):
-        return False
-    avoid(state, people.tag, groups.now, obstacles.walls, obstacles.pillars, p, push, out)
-    return True
+
+    route: Array
+    kind: Ints
+    length: Ints
+    current: Ints
+    speed: Array
+    heading: Array
+    finish: Ints
+    arrived: Bools
+    status: Array
+
+    @classmethod
+    def empty(cls, g: int, w: int) -> GroupArrays:
+        """Returns arrays for g groups with ways of at most w waypoints: no way, heading along +x, speed 0."""
+        return cls(
+            np.zeros((g, w, 2)),
+            np.zeros((g, w), np.int64),
+            np.zeros(g, np.int64),
+            np.zeros(g, np.int64),
+            np.zeros(g),
+            np.tile([1.0, 0.0], (g, 1)),
+            np.zeros(g, np.int64),
+            np.zeros(g, np.bool_),
+            np.zeros((g, 10)),
+        )
+
+
+class PeopleArrays(NamedTuple):
+    """What the kernels know of the N people present, in the order of the physics engine's rows.
+
+    place (N, 2): place in the formation, (forward, left) of the group's middle, m; target (N, 2): place in a queue, m,
+    of people in mode TO_TARGET; pace (N,): greatest speed on the way to the target, m/s; wander (N, 2): fluctuation of
+    the wanted velocity, m/s; tag (N, 4): columns GROUP, MODE, QUEUE (-1: in no queue), WAYPOINT (index of the first
+    waypoint that this person has not passed).
+    """
+
+    place: Array
+    target: Array
+    pace: Array
+    wander: Array
+    tag: Ints
+
+    @classmethod
+    def empty(cls, n: int) -> PeopleArrays:
+        """Returns arrays for n people: places and targets zero, pace 1 m/s, all tags -1."""
+        return cls(np.zeros((n, 2)), np.zeros((n, 2)), np.ones(n), np.zeros((n, 2)), np.full((n, 4), -1, np.int64))
+
+
+class Obstacles(NamedTuple):
+    """What stands still, m: walls (W, 4) x1 y1 x2 y2; pillars (P, 3) x y radius; stairs (S, 7).
+
+    Columns of stairs: foot x y, unit vector from foot to head x y, length, width, share of the speed kept on them.
+    """
+
+    walls: Array
+    pillars: Array
+    stairs: Array

@@ -1,7 +1,8 @@
-"""Where the members of a group walk and stand relative to its middle.
+"""Where the members of a group walk and stand, where groups meet, and how a group divides into parts.
 
-Walking: pairs abreast, triads in a V whose middle member is slightly behind, larger groups made of rows of pairs and
-triads (Zanlungo & Kanda 2013). Standing: a circle, facing inwards. Offsets are (forward, left) in metres, mean zero.
+Places in a formation are (forward, left) of the group's middle in metres; their mean is zero. Walking: pairs abreast,
+triads in a V whose middle member is slightly behind, larger groups in rows of pairs and triads (Zanlungo & Kanda 2013).
+Standing: a circle.
 """
 
 from __future__ import annotations
@@ -12,10 +13,14 @@ from sim.types import Array, Ints
 
 V_DEPTH = 0.3  # how far the middle of a triad falls behind, in neighbour distances
 ROW_GAP = 1.15  # distance of rows, in neighbour distances: feet need a little more room ahead than aside
+SIDEWAYS_LEAD = 0.6  # groups side by side meet this share of their distance further on
 
 
 def rows_of(n: int) -> list[int]:
-    """Sizes of the rows of a group of n: pairs and triads only (1 alone), triads in front."""
+    """Returns the sizes of the rows of a walking group of n people, front row first.
+
+    Up to 3 people form one row. More people form rows of 3 in front and rows of 2 behind.
+    """
     if n <= 3:
         return [n]
     triads = {0: n // 3, 1: (n - 4) // 3, 2: (n - 2) // 3}[n % 3]
@@ -23,7 +28,7 @@ def rows_of(n: int) -> list[int]:
 
 
 def walking(n: int, spacing: float) -> Array:
-    """(n, 2) offsets of a walking group of n; neighbours in a row are `spacing` apart."""
+    """Returns the places (n, 2) of a walking group, m; neighbours in a row are `spacing` metres apart."""
     rows = []
     for k, size in enumerate(rows_of(n)):
         left = (np.arange(size)[::-1] - (size - 1) / 2) * spacing
@@ -32,12 +37,12 @@ def walking(n: int, spacing: float) -> Array:
             ahead[1] -= V_DEPTH * spacing
             left *= np.sqrt(1 - V_DEPTH**2)
         rows.append(np.stack([ahead, left], axis=1))
-    offsets = np.concatenate(rows)
-    return np.asarray(offsets - offsets.mean(axis=0))
+    places = np.concatenate(rows)
+    return np.asarray(places - places.mean(axis=0))
 
 
 def standing(n: int, spacing: float) -> Array:
-    """(n, 2) offsets of a group in conversation: a circle with neighbours `spacing` apart."""
+    """Returns the places (n, 2) of a group in conversation, m: a circle with neighbours `spacing` metres apart."""
     if n == 1:
         return np.zeros((1, 2))
     angle = 2 * np.pi * (np.arange(n) + 0.5) / n
@@ -45,15 +50,65 @@ def standing(n: int, spacing: float) -> Array:
     return np.asarray(radius * np.stack([np.cos(angle), np.sin(angle)], axis=1))
 
 
-def place(offsets: Array, middle: Array, heading: Array) -> Array:
-    """Offsets (n, 2) as points in the world, `heading` (2,) being a unit vector."""
+def to_world(places: Array, middle: Array, heading: Array) -> Array:
+    """Returns places (n, 2) of a formation as points (n, 2) of the world, m; heading (2,) is a unit vector."""
     left = np.array([-heading[1], heading[0]])
-    return np.asarray(middle + offsets[:, :1] * heading + offsets[:, 1:] * left)
+    return np.asarray(middle + places[:, :1] * heading + places[:, 1:] * left)
 
 
-def assign(pos: Array, slots: Array) -> Ints:
-    """Which slot each person takes: the assignment with the least sum of squared ways; both (n, 2)."""
+def assign(pos: Array, points: Array) -> Ints:
+    """Returns the index of the point that each person takes (n,): the least sum of squared distances; both (n, 2)."""
     from scipy.optimize import linear_sum_assignment
 
-    cost = np.sum((pos[:, None] - slots[None]) ** 2, axis=2)
+    cost = np.sum((pos[:, None] - points[None]) ** 2, axis=2)
     return np.asarray(linear_sum_assignment(cost)[1], dtype=np.int64)
+
+
+def meeting_point(middles: Array, speeds: Array, goal: Array | None) -> Array:
+    """Returns where G groups that walk to each other meet (2,), m, all at about the same time.
+
+    middles (G, 2): where the groups are, m; speeds (G,) m/s; goal (2,): where they go together, None if nowhere. The
+    point is the mean of the middles, weighted by 1 / speed. With a goal it is shifted towards it, the further the more
+    the groups walk side by side, but never beyond it.
+    """
+    weights = (1 / speeds) / np.sum(1 / speeds)
+    centre = np.asarray(weights @ middles)
+    if goal is None:
+        return centre
+    ahead = goal - centre
+    far = float(np.linalg.norm(ahead))
+    if far < 1e-6:
+        return centre
+    apart = middles - centre
+    across = np.abs(apart[:, 0] * ahead[1] - apart[:, 1] * ahead[0]) / far
+    return np.asarray(centre + ahead / far * min(far, 2 * SIDEWAYS_LEAD * float(across.mean())))
+
+
+def part_sizes(sizes: list[int | None], total: int) -> list[int]:
+    """Returns the sizes of all parts of a group of `total` people.
+
+    None in `sizes` stands for an equal share of the people left over; the first of these parts get one more where the
+    division leaves a remainder.
+    """
+    open_parts = [k for k, s in enumerate(sizes) if s is None]
+    rest = total - sum(s for s in sizes if s is not None)
+    out = [s if s is not None else 0 for s in sizes]
+    for n, k in enumerate(open_parts):
+        out[k] = rest // len(open_parts) + (n < rest % len(open_parts))
+    return out
+
+
+def divide(offsets: Array, ways: Array, sizes: list[int]) -> Ints:
+    """Returns the index of the part that each of n members joins (n,); those furthest in a part's direction join it.
+
+    offsets (n, 2): positions relative to the group's middle, m; ways (K, 2): from the middle to each part's goal, m;
+    sizes: number of members of each part. Members in excess of the sizes join the last part.
+    """
+    from scipy.optimize import linear_sum_assignment
+
+    seats = np.repeat(np.arange(len(sizes)), sizes)
+    unit = ways / np.maximum(np.linalg.norm(ways, axis=1, keepdims=True), 1e-9)
+    rows, chosen = linear_sum_assignment(-(offsets @ unit.T)[:, seats])
+    out = np.full(len(offsets), len(sizes) - 1)
+    out[rows] = seats[chosen]
+    return np.asarray(out, dtype=np.int64)

@@ -1,4 +1,4 @@
-"""Which way people face: along their way while they walk, towards their group while they stand."""
+"""Which way people face: along their velocity while they walk, towards their group while they stand."""
 
 from __future__ import annotations
 
@@ -6,21 +6,26 @@ import numpy as np
 
 from sim.types import Array, Bools, Ints
 
-WALKING = 0.25  # m/s: slower people turn to their group
+WALKING_SPEED = 0.25  # m/s: slower people turn to their group
 TURN_TIME = 0.3  # s
 
 
 def headings(pos: Array, vel: Array, present: Bools, intent: Ints, fps: float) -> Array:
-    """(T, P) radians from +x, nan while absent; smooth in time."""
+    """Returns where each person faces in each frame, shape (T, P), radians from +x, nan while absent.
+
+    pos, vel (T, P, 2): m, m/s; present (T, P); intent (T, P): group index, -1 while absent. A heading follows the
+    wanted direction with time constant TURN_TIME. A slow person who is alone keeps the heading. A person who enters
+    faces the wanted direction at once, +x if there is none.
+    """
     out = np.full(present.shape, np.nan)
     facing = np.zeros((present.shape[1], 2))
     share = min(1.0, 1 / (fps * TURN_TIME))
     for t in range(len(present)):
         here = present[t]
         wanted = np.where(here[:, None], vel[t], 0.0)
-        slow = here & (np.hypot(wanted[:, 0], wanted[:, 1]) < WALKING)
+        slow = here & (np.hypot(wanted[:, 0], wanted[:, 1]) < WALKING_SPEED)
         if slow.any():
-            wanted[slow] = _to_group(pos[t], intent[t], slow, facing)
+            wanted[slow] = _towards_group(pos[t], intent[t], slow, facing)
         size = np.linalg.norm(wanted, axis=1, keepdims=True)
         wanted = np.divide(wanted, size, out=np.zeros_like(wanted), where=size > 1e-9)
         fresh = here & ~facing.any(axis=1)
@@ -30,8 +35,8 @@ def headings(pos: Array, vel: Array, present: Bools, intent: Ints, fps: float) -
     return out
 
 
-def _to_group(pos: Array, intent: Ints, slow: Bools, facing: Array) -> Array:
-    """Directions of the slow towards the middle of their group; alone, as they faced before."""
+def _towards_group(pos: Array, intent: Ints, slow: Bools, facing: Array) -> Array:
+    """Directions (K, 2) from the K slow people to the middle of their group; of people alone, their present facing."""
     here = intent >= 0
     groups = np.where(here, intent, 0)
     n = int(groups.max()) + 1

@@ -1,4 +1,7 @@
-"""Ways round walls and through doors: the shortest path over wall ends and door middles."""
+"""Ways round walls and through doors: the shortest path over wall ends and door middles.
+
+Also turns a scenario's world into the arrays of a Scene, with the doors' openings cut out of the walls.
+"""
 
 from __future__ import annotations
 
@@ -12,7 +15,10 @@ CLEARANCE = 0.6  # m kept from a wall's end on the way round it
 
 
 def cut_walls(walls: Array, doors: list[tuple[Array, float]]) -> tuple[Array, Array]:
-    """Walls (W, 2, 2) with the doors' openings taken out, and the openings (D, 2, 2)."""
+    """Returns the walls (W, 2, 2) with the doors' openings cut out, and the openings (D, 2, 2): two ends each, m.
+
+    walls (N, 2, 2): both ends, m; doors: middle (2,) and width of each, m. A door is cut out of the wall nearest to it.
+    """
     pieces = [np.asarray(w, dtype=float) for w in walls]
     openings = []
     for at, width in doors:
@@ -32,7 +38,7 @@ def cut_walls(walls: Array, doors: list[tuple[Array, float]]) -> tuple[Array, Ar
 
 
 def scene_of(world: WorldSpec) -> Scene:
-    """The scenario's world as arrays."""
+    """Returns the world of a scenario as arrays; its walls leave out the openings of doors."""
     walls = np.array(world.walls, dtype=float).reshape(-1, 2, 2)
     doors = [(np.array(d.at, dtype=float), d.width) for d in world.doors]
     pieces, openings = cut_walls(walls, doors)
@@ -52,13 +58,17 @@ def scene_of(world: WorldSpec) -> Scene:
 
 
 def _distance(point: Array, wall: Array) -> float:
+    """Distance of a point (2,) from a wall (2, 2), m."""
     along = wall[1] - wall[0]
     s = np.clip((point - wall[0]) @ along / max(along @ along, 1e-12), 0, 1)
     return float(np.linalg.norm(point - wall[0] - s * along))
 
 
 def blocked(a: Array, b: Array, walls: Array) -> Bools:
-    """Whether the segments a-b, both (..., 2), cross any of the walls (W, 2, 2)."""
+    """Returns True (...) for each segment from a to b, both (..., 2), that crosses one of the walls (W, 2, 2).
+
+    Touching a wall with an end is no crossing.
+    """
     if not len(walls):
         return np.zeros(a.shape[:-1], dtype=np.bool_)
     p, q = walls[:, 0], walls[:, 1]
@@ -74,9 +84,11 @@ def blocked(a: Array, b: Array, walls: Array) -> Bools:
 
 
 class Navigator:
-    """Shortest ways in one scene. State: nodes (wall ends with clearance, door middles) and their distances.
+    """Finds shortest ways in one scene.
 
-    `closed` is walls and doors alike: whoever goes through a door goes by its middle.
+    State: `nodes` (N, 2), m: the middles of all doors, then points CLEARANCE beyond the ends of walls; `edges` (N, N):
+    their distances, inf where a wall or door lies between. Doors block segments like walls, so that every way through a
+    door leads over its middle.
     """
 
     def __init__(self, scene: Scene) -> None:
@@ -88,6 +100,7 @@ class Navigator:
         self.edges = self._lengths(self.nodes, self.nodes)
 
     def _wall_ends(self) -> Array:
+        """Points (K, 2) beyond both ends of each wall that lie in the world and clear of other walls."""
         along = self.walls[:, 1] - self.walls[:, 0]
         along = along / np.linalg.norm(along, axis=1, keepdims=True)
         ends = np.concatenate([self.walls[:, 0] - CLEARANCE * along, self.walls[:, 1] + CLEARANCE * along])
@@ -96,12 +109,16 @@ class Navigator:
         return np.asarray(ends[inside & np.array(free, dtype=bool)])
 
     def _lengths(self, a: Array, b: Array) -> Array:
+        """Distances (A, B) between points, m; inf where the straight line is blocked."""
         d = np.linalg.norm(a[:, None] - b[None], axis=2)
         hidden = blocked(np.repeat(a[:, None], len(b), 1), np.repeat(b[None], len(a), 0), self.closed)
         return np.asarray(np.where(hidden, np.inf, d))
 
     def way(self, start: Array, goal: Array) -> tuple[Array, Bools] | None:
-        """Points to walk to, goal included, and which of them are doors; None where no way exists."""
+        """Returns the points (K, 2) to walk to, the goal last, and which of them belong to a door (K,); None if no way.
+
+        A door gives two points: its middle, and one BEHIND metres beyond it.
+        """
         ends = np.stack([start, goal])
         if not blocked(ends[:1], ends[1:], self.closed)[0]:
             return ends[1:], np.zeros(1, dtype=np.bool_)
@@ -119,19 +136,20 @@ class Navigator:
             way.append(points[k])
             narrow.append(k < len(self.doors))
             if narrow[-1]:
-                way.append(points[k] + self._out(k, points[k] - here))
+                way.append(points[k] + self._beyond_door(k, points[k] - here))
                 narrow.append(True)
             here = points[k]
         return np.array(way), np.array(narrow)
 
-    def _out(self, door: int, way: Array) -> Array:
-        """From the middle of a door to a place behind it, for those who come this way: straight through the wall."""
+    def _beyond_door(self, door: int, way: Array) -> Array:
+        """Vector (2,) across the wall, BEHIND metres long, from the middle of a door to where `way` leads."""
         along = self.doors[door, 1] - self.doors[door, 0]
         across = np.array([-along[1], along[0]]) / np.linalg.norm(along)
         return np.asarray(BEHIND * across * (1.0 if across @ way > 0 else -1.0))
 
 
 def _dijkstra(lengths: Array, start: int, goal: int) -> list[int] | None:
+    """Shortest path over lengths (N, N), inf = no edge: nodes after the start, the goal last; None if there is none."""
     n = len(lengths)
     far, before, done = np.full(n, np.inf), np.full(n, -1), np.zeros(n, dtype=bool)
     far[start] = 0.0

@@ -1,11 +1,12 @@
-"""Who takes part: groups, sizes, bodies, speeds, starts and goals, drawn from the scenario, one stream per person.
+"""Draws who takes part: groups with sizes, starts and goals, and each person's height, speed and gait.
 
-A fixed start that is taken or lies in a wall is the scenario's error; a drawn one is drawn again for this group alone
-(nobody else moves by it).
+Every person draws from streams of their own, so one person more changes nobody else. A start from a distribution is
+drawn again, for this group alone, until the group has room there.
 """
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -13,19 +14,26 @@ import numpy as np
 from scenarios.errors import InputError
 from scenarios.schema.scenario import GroupSpec, Scenario, group_names
 from scenarios.schema.values import Distribution, Point, draw
-from sim.crowd.formation import place, walking
+from sim.crowd.formation import to_world, walking
 from sim.rng import rng
 from sim.types import Array, Scene
 
 BODY_RADIUS = 0.20  # m, in the physics
-ROOM = 0.55  # m between people of different groups at the start
-TRIES = 400
-STANDS = 0.3  # m: a group whose goal is nearer than this stands
+START_GAP = 0.55  # m between people of different groups at the start
+TRIES = 400  # draws of a start
+STANDING_DISTANCE = 0.3  # m: a group whose goal is no further than this stands
+MIN_SPEED = 0.3  # m/s, of a group
+WANDER_SD = 0.06  # m/s, standard deviation per axis
+WANDER_TIME = 1.5  # s, correlation time
 
 
 @dataclass(frozen=True)
-class Frame2:
-    """The turn, the mirror and the lead (s) that a seed gives to a whole script."""
+class ScriptPlacement:
+    """How a seed places a whole script in the world.
+
+    middle (2,): middle of the world, m; turn: radians about it, counter-clockwise; flip: -1.0 mirrors x before the
+    turn, 1.0 does not; lead: s by which all walking groups start further along their way.
+    """
 
     middle: Array
     turn: float
@@ -33,12 +41,12 @@ class Frame2:
     lead: float = 0.0
 
     def point(self, p: Array) -> Array:
-        """A point of the script in the world."""
+        """Returns where a point (2,) of the script lies in the world, m."""
         d = (p - self.middle) * np.array([self.flip, 1.0])
         return self.middle + self.vector(d, flip=False)
 
     def vector(self, d: Array, *, flip: bool = True) -> Array:
-        """A direction of the script in the world."""
+        """Returns a direction (2,) of the script as one of the world; flip=False leaves out the mirror."""
         if flip:
             d = d * np.array([self.flip, 1.0])
         c, s = np.cos(self.turn), np.sin(self.turn)
@@ -46,8 +54,8 @@ class Frame2:
 
 
 @dataclass
-class Member:
-    """One person: column in the Motion, free speed, body."""
+class Person:
+    """One person: column in the Motion, key of the random streams, free speed (m/s), height (m)."""
 
     column: int
     key: tuple[int, ...]
@@ -56,12 +64,16 @@ class Member:
 
 
 @dataclass
-class Party:
-    """One group of the script as it enters."""
+class EnteringGroup:
+    """One group of the script as it enters.
+
+    index: of the group among all groups; start, goal, via: points (2,) in m; speed: m/s, of the group; spacing: m
+    between neighbours; enter: s; finish: "stand", "leave" or "walk"; pos (n, 2): where the members start, m.
+    """
 
     name: str
     index: int
-    members: list[Member]
+    members: list[Person]
     start: Array
     goal: Array
     via: list[Array]
@@ -71,109 +83,117 @@ class Party:
     finish: str
     pos: Array = field(default_factory=lambda: np.zeros((0, 2)))
 
+    @property
+    def walks(self) -> bool:
+        """True if the goal is further from the start than STANDING_DISTANCE."""
+        return bool(np.linalg.norm(self.goal - self.start) > STANDING_DISTANCE)
 
-def frame_of(scenario: Scenario, seed: int, repeat: int) -> Frame2:
-    """The seed's turn and mirror of the script."""
+
+def script_placement(scenario: Scenario, seed: int, repeat: int) -> ScriptPlacement:
+    """Returns the turn, mirror and lead that a seed draws for the script of a scenario."""
     r = rng(seed, "layout", repeat=repeat)
     turn = np.deg2rad(draw(scenario.turn_deg, r))
     flip = -1.0 if scenario.mirror and r.random() < 0.5 else 1.0
-    return Frame2(np.array(scenario.world.size) / 2, float(turn), flip, draw(scenario.lead, r))
+    return ScriptPlacement(np.array(scenario.world.size) / 2, float(turn), flip, draw(scenario.lead, r))
 
 
-def point_of(point: Point, frame: Frame2, r: np.random.Generator) -> Array:
-    """A point of the script, drawn and put into the world."""
-    return frame.point(np.array([draw(point[0], r), draw(point[1], r)]))
+def draw_point(point: Point, placement: ScriptPlacement, r: np.random.Generator) -> Array:
+    """Returns a point of the script in the world (2,), m; each coordinate that is a distribution is drawn from r."""
+    return placement.point(np.array([draw(point[0], r), draw(point[1], r)]))
 
 
-def _is_drawn(point: Point) -> bool:
-    return any(isinstance(v, Distribution) for v in point)
+@dataclass(frozen=True)
+class _Draws:
+    """What every draw of a population needs."""
+
+    scenario: Scenario
+    scene: Scene
+    placement: ScriptPlacement
+    seed: int
+    repeat: int
+
+    def rng(self, role: str, *keys: int) -> np.random.Generator:
+        return rng(self.seed, role, *keys, repeat=self.repeat)
 
 
-def cast(scenario: Scenario, scene: Scene, seed: int, repeat: int) -> list[Party]:
-    """All groups with their people, in the order of the script; members placed in formation at the start."""
-    frame = frame_of(scenario, seed, repeat)
+def draw_population(scenario: Scenario, scene: Scene, seed: int, repeat: int) -> list[EnteringGroup]:
+    """Returns all groups of the script with their members, in the order of the file.
+
+    Columns of people count through all groups. Members stand in formation at the group's start. Raises InputError if a
+    group has no free place at its start; a start of two numbers is tried once, a drawn one TRIES times. Only groups
+    that are there from the first frame need room among each other.
+    """
+    draws = _Draws(scenario, scene, script_placement(scenario, seed, repeat), seed, repeat)
     taken: list[Array] = []
-    parties: list[Party] = []
+    groups: list[EnteringGroup] = []
     column = 0
-    for k, group in enumerate(scenario.group):
-        for n, name in enumerate(group_names(group)):
-            party = _party(scenario, group, name, (k, n), column, frame, seed, repeat)
-            _find_room(scenario, party, group, (k, n), frame, scene, taken, seed, repeat)
-            party.index = len(parties)
-            column += len(party.members)
-            parties.append(party)
-            if party.enter == 0:
-                taken.append(party.pos)
-    return parties
+    for k, spec in enumerate(scenario.group):
+        for n, name in enumerate(group_names(spec)):
+            group = _draw_group(draws, spec, name, (k, n), column)
+            _find_room(draws, group, spec, (k, n), taken)
+            group.index = len(groups)
+            column += len(group.members)
+            groups.append(group)
+            if group.enter == 0:
+                taken.append(group.pos)
+    return groups
 
 
-def _party(
-    scenario: Scenario,
-    group: GroupSpec,
-    name: str,
-    key: tuple[int, int],
-    column: int,
-    frame: Frame2,
-    seed: int,
-    repeat: int,
-) -> Party:
-    r = rng(seed, "group", *key, 0, repeat=repeat)
-    crowd = scenario.crowd
-    size = max(1, round(draw(group.size, r)))
+def _draw_group(draws: _Draws, spec: GroupSpec, name: str, key: tuple[int, int], column: int) -> EnteringGroup:
+    """Draws a group and its members, without its start; `column` is the first member's."""
+    r = draws.rng("group", *key, 0)
+    crowd = draws.scenario.crowd
+    size = max(1, round(draw(spec.size, r)))
     spacing = draw(crowd.spacing, r)
-    enter = max(0.0, draw(group.enter, r))
-    own = draw(group.speed, r) if group.speed is not None else None
-    goal = point_of(group.goal, frame, r)
-    via = [point_of(p, frame, r) for p in group.via]
+    enter = max(0.0, draw(spec.enter, r))
+    own = draw(spec.speed, r) if spec.speed is not None else None
+    goal = draw_point(spec.goal, draws.placement, r)
+    via = [draw_point(p, draws.placement, r) for p in spec.via]
     members = []
     for m in range(size):
-        p = rng(seed, "person", *key, m, repeat=repeat)
-        members.append(Member(column + m, (*key, m), draw(crowd.free_speed, p), draw(crowd.height, p)))
+        p = draws.rng("person", *key, m)
+        members.append(Person(column + m, (*key, m), draw(crowd.free_speed, p), draw(crowd.height, p)))
     speed = own if own is not None else walking_speed([m.free_speed for m in members], crowd.slowdown_per_member)
-    return Party(name, -1, members, np.zeros(2), goal, via, speed, spacing, enter, group.at_goal)
+    return EnteringGroup(name, -1, members, np.zeros(2), goal, via, speed, spacing, enter, spec.at_goal)
 
 
 def walking_speed(free: list[float], slowdown: float) -> float:
-    """A group walks at its members' mean minus `slowdown` (n - 1), but not below 0.3 m/s."""
-    return max(0.3, float(np.mean(free)) - slowdown * (len(free) - 1))
+    """Returns the speed of a group in m/s: the mean of its members' free speeds minus slowdown (n - 1), at least 0.3.
+
+    free: free speeds of the n members, m/s; slowdown: m/s for each member after the first.
+    """
+    return max(MIN_SPEED, float(np.mean(free)) - slowdown * (len(free) - 1))
 
 
-def _find_room(
-    scenario: Scenario,
-    party: Party,
-    group: GroupSpec,
-    key: tuple[int, int],
-    frame: Frame2,
-    scene: Scene,
-    taken: list[Array],
-    seed: int,
-    repeat: int,
-) -> None:
-    """Draw the start until the formation stands free of walls, pillars and those already placed."""
-    r = rng(seed, "group", *key, 1, repeat=repeat)
-    for _ in range(TRIES if _is_drawn(group.start) else 1):
-        party.start = point_of(group.start, frame, r)
-        first = party.via[0] if party.via else party.goal
-        way = first - party.start
+def _find_room(draws: _Draws, group: EnteringGroup, spec: GroupSpec, key: tuple[int, int], taken: list[Array]) -> None:
+    """Sets start and pos of the group so that it stands clear of walls, pillars and `taken`; raises InputError."""
+    placement, drawn = draws.placement, any(isinstance(v, Distribution) for v in spec.start)
+    r = draws.rng("group", *key, 1)
+    for _ in range(TRIES if drawn else 1):
+        group.start = draw_point(spec.start, placement, r)
+        first = group.via[0] if group.via else group.goal
+        way = first - group.start
         length = float(np.linalg.norm(way))
-        heading = way / length if length > 1e-6 else frame.vector(np.array([1.0, 0.0]))
-        party.start = party.start + min(frame.lead * party.speed, length / 2) * heading * (length > STANDS)
-        party.pos = place(walking(len(party.members), party.spacing), party.start, heading)
-        if _is_free(party.pos, scene, taken if party.enter == 0 else []):
+        heading = way / length if length > 1e-6 else placement.vector(np.array([1.0, 0.0]))
+        lead = min(placement.lead * group.speed, length / 2)
+        group.start = group.start + lead * heading * (length > STANDING_DISTANCE)
+        group.pos = to_world(walking(len(group.members), group.spacing), group.start, heading)
+        if _is_free(group.pos, draws.scene, taken if group.enter == 0 else []):
             return
     raise InputError(
-        file=f"scenario {scenario.name}",
-        place=f"group.{group.id}.start (seed {seed})",
-        got="no free place" if _is_drawn(group.start) else "a place in a wall, a pillar or another group",
-        expected=f"{len(party.members)} people {ROOM} m clear of others and {BODY_RADIUS} m of walls",
+        file=f"scenario {draws.scenario.name}",
+        place=f"group.{spec.id}.start (seed {draws.seed})",
+        got="no free place" if drawn else "a place in a wall, a pillar or another group",
+        expected=f"{len(group.members)} people {START_GAP} m clear of others and {BODY_RADIUS} m of walls",
         remedy="move the start, widen its distribution, or have fewer people",
     )
 
 
 def _is_free(pos: Array, scene: Scene, taken: list[Array]) -> bool:
+    """True if all places (n, 2) are clear of the taken places, of walls and of pillars."""
     if taken:
         others = np.concatenate(taken)
-        if np.min(np.sum((pos[:, None] - others[None]) ** 2, axis=2)) < ROOM**2:
+        if np.min(np.sum((pos[:, None] - others[None]) ** 2, axis=2)) < START_GAP**2:
             return False
     for wall in scene.walls:
         u = wall[1] - wall[0]
@@ -182,3 +202,20 @@ def _is_free(pos: Array, scene: Scene, taken: list[Array]) -> bool:
             return False
     d = np.linalg.norm(pos[:, None] - scene.pillars[None, :, :2], axis=2) - scene.pillars[None, :, 2]
     return bool((d >= BODY_RADIUS).all())
+
+
+def wander(keys: Sequence[tuple[int, ...]], frames: int, fps: float, seed: int, repeat: int) -> Array:
+    """Returns how each person's wanted velocity fluctuates, shape (frames, P, 2) in m/s, for P people with these keys.
+
+    An Ornstein-Uhlenbeck process per axis, stationary from the first frame: u_k = a u_(k-1) + sqrt(1 - a²) WANDER_SD
+    n_k, with a = exp(-1 / (fps WANDER_TIME)), standard normal n_k and u_0 = WANDER_SD n_0.
+    """
+    keep = float(np.exp(-1 / (fps * WANDER_TIME)))
+    out = np.empty((frames, len(keys), 2))
+    for p, key in enumerate(keys):
+        out[:, p] = rng(seed, "gait", *key, repeat=repeat).normal(size=(frames, 2))
+    out[1:] *= np.sqrt(1 - keep**2)
+    out *= WANDER_SD
+    for k in range(1, frames):
+        out[k] += keep * out[k - 1]
+    return out

@@ -1,8 +1,8 @@
-"""The dynamics: a scenario and a seed become a Motion. The only module that knows pymunk.
+"""The physics: turns a scenario and a seed into a Motion. The only module that imports pymunk.
 
-Bodies are discs of BODY_RADIUS and weigh 1, so that a force is an acceleration; the space resolves contacts. State is
-read and forces are written in batches (`pymunk.batch`), rows being mapped to people after each coming and going.
-Nothing sets a position or a velocity after a person has come; a frame is the state after the step that ends at it.
+People are discs of BODY_RADIUS and mass 1, so a force is an acceleration. The space resolves contacts. States are read
+and forces written in batches (`pymunk.batch`); `World.columns` says which row of a batch is which person. Only forces
+move a person who has entered. A frame is the state after the step that ends at its time.
 """
 
 from __future__ import annotations
@@ -17,59 +17,95 @@ import pymunk.batch
 
 from scenarios.errors import WorkError
 from scenarios.schema.scenario import Scenario
-from sim.crowd.navigation import Navigator, scene_of
-from sim.crowd.population import BODY_RADIUS, Party, cast
-from sim.crowd.script import Script
-from sim.crowd.steering import Groups, Obstacles, People, Steering
-from sim.crowd.wander import wander
+from sim.crowd.forces import WAYPOINT, GroupArrays, Obstacles, PeopleArrays, Steering
+from sim.crowd.group_state import GroupState
+from sim.crowd.heading import headings
+from sim.crowd.navigation import Navigator, blocked, scene_of
+from sim.crowd.order_execution import OrderExecution, groups_made
+from sim.crowd.population import BODY_RADIUS, EnteringGroup, draw_population, script_placement, wander
+from sim.scene.body import DEPTH, SHOULDERS
 from sim.types import Array, Ints, Motion, Scene
 
 MAX_STEP = 0.02  # s
-WIDTH, DEPTH = 0.27, 0.16  # shoulder width and depth of a body, shares of its height
+ENTRY_GAP = 2.2  # body radii between a person who enters and all others
 READ = pymunk.batch.BodyFields.POSITION | pymunk.batch.BodyFields.VELOCITY
 WRITE = pymunk.batch.BodyFields.FORCE
 
 
 def run(scenario: Scenario, seed: int, repeat: int = 0, steering: Steering | None = None) -> Motion:
-    """The whole motion of a scenario; InputError where it cannot begin, WorkError where it blows up."""
+    """Returns the whole motion of a scenario for a seed. steering: None for the default parameters.
+
+    Raises InputError if a group has no free place at its start, WorkError if a position or velocity becomes infinite.
+    """
     world = World(scenario, seed, repeat, steering or Steering())
     return world.run()
 
 
 def steps_per_frame(fps: float) -> int:
-    """The least number of physics steps per frame that keeps a step within MAX_STEP."""
+    """Returns the least number of physics steps per frame that keeps a step within MAX_STEP seconds."""
     return max(1, math.ceil(1 / (fps * MAX_STEP) - 1e-9))
 
 
+def accelerate(
+    state: Array,
+    people: PeopleArrays,
+    groups: GroupArrays,
+    obstacles: Obstacles,
+    dt: float,
+    rules: Array,
+    push: Array,
+    out: Array,
+) -> bool:
+    """Writes the accelerations of all people to out (N, 2), m/s², and advances the groups' ways by dt (s).
+
+    state (N, 4): x, y, vx, vy in m and m/s; rules: Steering.array(); push (G, 2): scratch. Returns False if a state is
+    not finite.
+    """
+    from sim.crowd.forces_avoidance_kernels import avoid
+    from sim.crowd.forces_goal_kernels import drive
+
+    if not drive(state, *people, *groups, obstacles.stairs, dt, rules, out):
+        return False
+    avoid(state, people.tag, groups.status, obstacles.walls, obstacles.pillars, rules, push, out)
+    return True
+
+
 class World:
-    """A scenario in motion. State: the space, the kernel's arrays for those present, the script, the record."""
+    """A scenario in motion.
+
+    State: `space` and `bodies` (by column) of the physics; `state` (N, 4), `force` and `people`: arrays of the N people
+    present, whose columns are `columns`; `groups` and `orders`: the script; `states` (P, 4) and `group_of` (P,): the
+    frame being recorded, by column.
+    """
 
     def __init__(self, scenario: Scenario, seed: int, repeat: int, steering: Steering) -> None:
         self.scenario, self.seed, self.repeat = scenario, seed, repeat
         self.scene: Scene = scene_of(scenario.world)
-        self.parties: list[Party] = cast(scenario, self.scene, seed, repeat)
-        self.members = [m for p in self.parties for m in p.members]
+        self.entering: list[EnteringGroup] = draw_population(scenario, self.scene, seed, repeat)
+        self.waiting = list(self.entering)
+        self.members = [m for group in self.entering for m in group.members]
         self.fps = scenario.camera.fps
         self.substeps = steps_per_frame(self.fps)
         self.dt = 1 / (self.fps * self.substeps)
-        self.parameters = steering.array()
-        self.navigator = Navigator(self.scene)
-        self.script = Script(scenario, self.parties, self.navigator, seed, repeat)
-        self.groups: Groups = self.script.groups
-        self.push = np.zeros((len(self.groups.speed), 2))
+        self.rules = steering.array()
+        slowdown = scenario.crowd.slowdown_per_member
+        self.groups = GroupState(self.entering, groups_made(scenario), Navigator(self.scene), slowdown)
+        placement = script_placement(scenario, seed, repeat)
+        self.orders = OrderExecution(scenario, self.groups, placement, seed, repeat)
+        self.push = np.zeros((len(self.groups.arrays.speed), 2))
         self.obstacles = _obstacles(self.scene, scenario)
         self.space = _space(self.scene)
         self.bodies: dict[int, pymunk.Body] = {}
         self.columns = np.zeros(0, np.int64)
-        self.everybody = np.full((len(self.members), 4), np.nan)
+        self.states = np.full((len(self.members), 4), np.nan)
         self.group_of = np.full(len(self.members), -1, np.int64)
-        self.people = People.empty(0)
+        self.people = PeopleArrays.empty(0)
         self.state = np.zeros((0, 4))
         self.force = np.zeros((0, 2))
-        self._get, self._put = pymunk.batch.Buffer(), pymunk.batch.Buffer()
+        self._read_buffer, self._write_buffer = pymunk.batch.Buffer(), pymunk.batch.Buffer()
 
     def run(self) -> Motion:
-        """Warm up, then record duration · fps frames."""
+        """Simulates the warm-up, then records duration · fps frames."""
         frames = max(1, round(self.scenario.duration * self.fps))
         record = np.empty((frames, len(self.members), 4))
         intent = np.empty((frames, len(self.members)), np.int64)
@@ -78,29 +114,27 @@ class World:
         return self._motion(record, intent)
 
     def frames(self, length: int) -> Iterator[tuple[Array, Ints]]:
-        """After the warm-up, `length` times (P, 4) x, y, vx, vy and (P,) group, nan and -1 where absent.
+        """Yields `length` frames after the warm-up: (P, 4) x, y, vx, vy in m and m/s, and (P,) group index.
 
-        Both are filled anew for the next frame.
+        nan and -1 where absent. Both arrays are overwritten by the next frame.
         """
-        from sim.crowd.forces import accelerate
-
         warm = round(self.scenario.warmup * self.fps)
         noise = wander([m.key for m in self.members], warm + length, self.fps, self.seed, self.repeat)
         for f in range(-warm, length):
             if f > -warm:
-                self._advance(accelerate, noise[f + warm])
+                self._advance(noise[f + warm])
             t = f / self.fps
             self._come_and_go(t, f == -warm)
             if f < 0:
                 continue
-            self.everybody[self.columns] = self.state
-            self.group_of[self.columns] = self.script.group_of[self.columns]
-            if self.script.advance(f, t, self.everybody):
-                self._retag()
-            yield self.everybody, self.group_of
+            self.states[self.columns] = self.state
+            self.group_of[self.columns] = self.groups.group_of[self.columns]
+            if self.orders.advance(f, t, self.states):
+                self._fill_people()
+            yield self.states, self.group_of
 
-    def _advance(self, accelerate: Any, noise: Array) -> None:
-        """One frame: `substeps` of forces, physics and reading back."""
+    def _advance(self, noise: Array) -> None:
+        """Simulates one frame: `substeps` times forces, physics and reading back; noise (P, 2): m/s."""
         n = len(self.columns)
         if n == 0:
             return
@@ -108,14 +142,14 @@ class World:
         out = self.force[:n]
         for _ in range(self.substeps):
             if not accelerate(
-                self.state, self.people, self.groups, self.obstacles, self.dt, self.parameters, self.push, out
+                self.state, self.people, self.groups.arrays, self.obstacles, self.dt, self.rules, self.push, out
             ):
                 raise self._blown_up()
-            pymunk.batch.set_space_bodies(self.space, WRITE, self._put)
+            pymunk.batch.set_space_bodies(self.space, WRITE, self._write_buffer)
             self.space.step(self.dt)
-            self._get.clear()
-            pymunk.batch.get_space_bodies(self.space, READ, self._get)
-        self.script.waypoint[self.columns] = self.people.tag[:, 3]
+            self._read_buffer.clear()
+            pymunk.batch.get_space_bodies(self.space, READ, self._read_buffer)
+        self.groups.waypoint[self.columns] = self.people.tag[:, WAYPOINT]
 
     def _blown_up(self) -> WorkError:
         return WorkError(
@@ -127,43 +161,48 @@ class World:
         )
 
     def _read(self) -> Array:
-        """(rows, 4) x, y, vx, vy: the engine's own buffer, which every further reading of as many bodies fills anew."""
-        self._get.clear()
-        pymunk.batch.get_space_bodies(self.space, READ, self._get)
-        return np.frombuffer(self._get.float_buf()).reshape(-1, 4)
+        """Returns x, y, vx, vy (rows, 4): a view of the buffer that the next read of as many bodies overwrites."""
+        self._read_buffer.clear()
+        pymunk.batch.get_space_bodies(self.space, READ, self._read_buffer)
+        return np.frombuffer(self._read_buffer.float_buf()).reshape(-1, 4)
 
     def _come_and_go(self, t: float, first: bool) -> None:
-        gone = self.script.leaving(self.columns)
-        coming = [party for party in self.script.waiting if (party.enter <= 0 if first else party.enter <= t)]
-        coming = [party for party in coming if first or self._has_room(party)]
+        """Removes people who leave at time t (s) and adds groups that enter; `first`: the first frame of the warm-up.
+
+        A group that is there from the start begins the warm-up as far back on its way as it will walk meanwhile, if
+        nothing stands there. A group whose place is taken enters later.
+        """
+        gone = self.groups.remove_leaving(self.columns)
+        coming = [group for group in self.waiting if (group.enter <= 0 if first else group.enter <= t)]
+        coming = [group for group in coming if first or self._has_room(group)]
         if not gone and not coming:
             return
         for column in gone:
             body = self.bodies.pop(column)
             self.space.remove(body, *body.shapes)
-        for party in coming:
-            self.script.enter(party)
-            heading = self.groups.heading[party.index]
-            back = self.scenario.warmup * party.speed * heading if first and self._free_way(party, heading) else 0.0
-            for member, pos in zip(party.members, party.pos - back, strict=True):
-                self.bodies[member.column] = self._body(
-                    pos, party.speed * heading if self.script.walks(party) else heading * 0
-                )
+        for group in coming:
+            self.waiting.remove(group)
+            self.groups.enter(group)
+            heading = self.groups.arrays.heading[group.index]
+            start_back = first and self._way_back_is_free(group, heading)
+            back = self.scenario.warmup * group.speed * heading if start_back else 0.0
+            velocity = group.speed * heading if group.walks else heading * 0
+            for member, pos in zip(group.members, group.pos - back, strict=True):
+                self.bodies[member.column] = self._body(pos, velocity)
         self._map_rows()
 
-    def _free_way(self, party: Party, heading: Array) -> bool:
-        from sim.crowd.navigation import blocked
-
-        if not self.script.walks(party):
+    def _way_back_is_free(self, group: EnteringGroup, heading: Array) -> bool:
+        """True if the group walks, no wall lies behind it on its way of the warm-up, and the scene has no pillar."""
+        if not group.walks:
             return False
-        back = party.pos - self.scenario.warmup * party.speed * heading
-        return not blocked(party.pos, back, self.scene.walls).any() and not len(self.scene.pillars)
+        back = group.pos - self.scenario.warmup * group.speed * heading
+        return not blocked(group.pos, back, self.scene.walls).any() and not len(self.scene.pillars)
 
-    def _has_room(self, party: Party) -> bool:
+    def _has_room(self, group: EnteringGroup) -> bool:
         if not len(self.state):
             return True
-        d = np.linalg.norm(party.pos[:, None] - self.state[None, :, :2], axis=2)
-        return bool(d.min() > 2.2 * BODY_RADIUS)
+        d = np.linalg.norm(group.pos[:, None] - self.state[None, :, :2], axis=2)
+        return bool(d.min() > ENTRY_GAP * BODY_RADIUS)
 
     def _body(self, pos: Array, velocity: Array) -> pymunk.Body:
         body = pymunk.Body(1.0, float("inf"))
@@ -175,28 +214,26 @@ class World:
         return body
 
     def _map_rows(self) -> None:
-        """Find which row of a batch is whom; dynamic bodies come first, in an order of the engine's own."""
-        self._get.clear()
-        pymunk.batch.get_space_bodies(self.space, pymunk.batch.BodyFields.BODY_ID, self._get)
-        ids = np.frombuffer(self._get.int_buf(), dtype=np.uintp)
+        """Finds the column of each row of a batch: dynamic bodies first, in the engine's order, then static ones."""
+        self._read_buffer.clear()
+        pymunk.batch.get_space_bodies(self.space, pymunk.batch.BodyFields.BODY_ID, self._read_buffer)
+        ids = np.frombuffer(self._read_buffer.int_buf(), dtype=np.uintp)
         column = {body.id: c for c, body in self.bodies.items()}
         n = len(self.bodies)
         assert all(int(i) in column for i in ids[:n]), "static bodies must come after all others"
         self.columns = np.array([column[int(i)] for i in ids[:n]], dtype=np.int64)
         self.force = np.zeros((len(ids), 2))
-        self._put.set_float_buf(self.force)
+        self._write_buffer.set_float_buf(self.force)
         self.state = self._read()[:n]
-        self.people = People.empty(n)
-        self.everybody[:], self.group_of[:] = np.nan, -1
-        self._retag()
+        self.people = PeopleArrays.empty(n)
+        self.states[:], self.group_of[:] = np.nan, -1
+        self._fill_people()
 
-    def _retag(self) -> None:
-        """Bring the kernel's arrays up to the script: groups, places, targets."""
-        self.script.fill(self.people, self.columns)
+    def _fill_people(self) -> None:
+        """Copies groups, places and targets of the people present to the kernels' arrays."""
+        self.groups.fill(self.people, self.columns)
 
     def _motion(self, record: Array, intent: Any) -> Motion:
-        from sim.crowd.heading import headings
-
         height = np.array([m.height for m in self.members])
         pos, vel = record[:, :, :2], record[:, :, 2:]
         present = np.isfinite(pos[:, :, 0])
@@ -211,20 +248,20 @@ class World:
             present=present,
             intent=intent,
             height=height,
-            width=WIDTH * height,
+            width=SHOULDERS * height,
             depth=DEPTH * height,
             free_speed=np.array([m.free_speed for m in self.members]),
             scene=self.scene,
-            orders=self.script.orders(),
+            orders=self.orders.record(),
         )
 
 
 def _obstacles(scene: Scene, scenario: Scenario) -> Obstacles:
-    stairs = np.zeros((len(scene.stairs), 8))
+    stairs = np.zeros((len(scene.stairs), 7))
     for row, s, spec in zip(stairs, scene.stairs, scenario.world.stairs, strict=True):
         along = s.head - s.foot
         length = float(np.linalg.norm(along))
-        row[:] = (*s.foot, *(along / length), length, s.width, spec.slowdown, s.landing)
+        row[:] = (*s.foot, *(along / length), length, s.width, spec.slowdown)
     return Obstacles(np.array(scene.walls).reshape(-1, 4), np.array(scene.pillars), stairs)
 
 

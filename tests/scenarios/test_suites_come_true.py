@@ -6,14 +6,14 @@ import pytest
 
 from scenarios.loading.resolve import Entry, resolve
 from sim.crowd.navigation import scene_of
-from sim.crowd.population import cast
+from sim.crowd.population import draw_population
 from sim.sequence import simulate
 
 FRIENDS = resolve("suite:friends-meet")
 
 
 def people(entry: Entry, seed: int) -> int:
-    parties = cast(entry.scenario, scene_of(entry.scenario.world), seed, entry.repeat)
+    parties = draw_population(entry.scenario, scene_of(entry.scenario.world), seed, entry.repeat)
     return sum(len(party.members) for party in parties)
 
 

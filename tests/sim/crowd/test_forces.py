@@ -2,29 +2,31 @@
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Callable
 
 import numpy as np
 import pytest
 
-from sim.crowd.avoidance_kernels import _avoid_groups, _pairs, _walls
-from sim.crowd.forces import accelerate
-from sim.crowd.steering import END, GATHER, Groups, Obstacles, People, Steering
+import sim.crowd.forces as forces_names
+from sim.crowd.forces import END, GATHER, GROUP, MODE, QUEUE, WAYPOINT, GroupArrays, Obstacles, PeopleArrays, Steering
+from sim.crowd.forces_avoidance_kernels import _avoid_groups, _pairs, _walls
+from sim.crowd.world import accelerate
 from tests.reference_steering import between_groups, between_people, from_things
 
-NOTHING = Obstacles(np.zeros((0, 4)), np.zeros((0, 3)), np.zeros((0, 8)))
+NOTHING = Obstacles(np.zeros((0, 4)), np.zeros((0, 3)), np.zeros((0, 7)))
 
 
-def crowd(n: int, seed: int, side: float = 6.0) -> tuple[np.ndarray, People, Groups]:
+def crowd(n: int, seed: int, side: float = 6.0) -> tuple[np.ndarray, PeopleArrays, GroupArrays]:
     r = np.random.default_rng(seed)
     state = np.concatenate([r.uniform(0, side, (n, 2)), r.normal(0, 1, (n, 2))], axis=1)
-    people = People.empty(n)
-    people.tag[:, 0] = np.arange(n) // 3
-    people.tag[:, 1] = 0
-    people.tag[:, 2] = np.where(r.random(n) < 0.2, 0, -1)
-    people.tag[:, 3] = 0
+    people = PeopleArrays.empty(n)
+    people.tag[:, GROUP] = np.arange(n) // 3
+    people.tag[:, MODE] = 0
+    people.tag[:, QUEUE] = np.where(r.random(n) < 0.2, 0, -1)
+    people.tag[:, WAYPOINT] = 0
     people.place[:] = r.normal(0, 0.7, (n, 2))
-    groups = Groups.empty(int(people.tag[:, 0].max()) + 1, 4)
+    groups = GroupArrays.empty(int(people.tag[:, GROUP].max()) + 1, 4)
     groups.route[:, 0] = r.uniform(0, side, groups.route[:, 0].shape)
     groups.kind[:, 0] = r.choice([END, GATHER], len(groups.speed))
     groups.length[:] = 1
@@ -34,7 +36,7 @@ def crowd(n: int, seed: int, side: float = 6.0) -> tuple[np.ndarray, People, Gro
     return state, people, groups
 
 
-def forces(state: np.ndarray, people: People, groups: Groups, obstacles: Obstacles = NOTHING) -> np.ndarray:
+def forces(state: np.ndarray, people: PeopleArrays, groups: GroupArrays, obstacles: Obstacles = NOTHING) -> np.ndarray:
     out = np.zeros((len(state), 2))
     push = np.zeros((len(groups.speed), 2))
     assert accelerate(state, people, groups, obstacles, 0.02, Steering().array(), push, out)
@@ -118,7 +120,7 @@ def test_turning_and_moving_the_scene_turns_the_forces(seed: int) -> None:
     state, people, groups = crowd(60, seed)
     walls = np.array([[0.0, -1.0, 6.0, -1.0]])
     pillars = np.array([[3.0, 3.0, 0.3]])
-    a = forces(state, people, groups, Obstacles(walls, pillars, np.zeros((0, 8))))
+    a = forces(state, people, groups, Obstacles(walls, pillars, np.zeros((0, 7))))
     c, s = np.cos(0.7), np.sin(0.7)
     turn, shift = np.array([[c, -s], [s, c]]), np.array([13.0, -4.0])
     state, people, groups = crowd(60, seed)
@@ -127,7 +129,7 @@ def test_turning_and_moving_the_scene_turns_the_forces(seed: int) -> None:
     groups.heading[:] = groups.heading @ turn.T
     walls = (walls.reshape(-1, 2) @ turn.T + shift).reshape(-1, 4)
     pillars = np.concatenate([pillars[:, :2] @ turn.T + shift, pillars[:, 2:]], axis=1)
-    b = forces(turned, people, groups, Obstacles(walls, pillars, np.zeros((0, 8))))
+    b = forces(turned, people, groups, Obstacles(walls, pillars, np.zeros((0, 7))))
     np.testing.assert_allclose(b, a @ turn.T, atol=1e-9)
 
 
@@ -136,7 +138,7 @@ def test_the_order_of_people_does_not_matter() -> None:
     a = forces(state, people, groups)
     state, people, groups = crowd(60, 3)
     order = np.random.default_rng(0).permutation(60)
-    shuffled = People(*[np.ascontiguousarray(x[order]) for x in people])
+    shuffled = PeopleArrays(*[np.ascontiguousarray(x[order]) for x in people])
     b = forces(np.ascontiguousarray(state[order]), shuffled, groups)
     np.testing.assert_allclose(b, a[order], atol=1e-9)
 
@@ -147,3 +149,10 @@ def test_forces_are_capped_and_states_that_are_not_finite_are_noticed() -> None:
     state[5, 0] = np.nan
     out, push = np.zeros((100, 2)), np.zeros((len(groups.speed), 2))
     assert not accelerate(state, people, groups, NOTHING, 0.02, Steering().array(), push, out)
+
+
+def test_slots_are_named_for_the_fields_of_steering() -> None:
+    """A field that is added or moved without its slot would give the kernels another parameter's value."""
+    for k, f in enumerate(dataclasses.fields(Steering)):
+        assert getattr(forces_names, f.name.upper()) == k
+    assert len(Steering().array()) == len(dataclasses.fields(Steering))

@@ -7,7 +7,7 @@ import pymunk.batch
 import pytest
 
 from scenarios.loading.resolve import load, names
-from sim.crowd.steering import Steering
+from sim.crowd.forces import Steering
 from sim.crowd.world import WRITE, World, run, steps_per_frame
 
 
@@ -51,7 +51,7 @@ def test_batches_read_what_the_loop_reads() -> None:
     by_loop = np.array([(*b.position, *b.velocity) for b in (world.bodies[c] for c in world.columns)])
     np.testing.assert_array_equal(world.state, by_loop)
     world.force[: len(by_loop)] = np.arange(2 * len(by_loop)).reshape(-1, 2)
-    pymunk.batch.set_space_bodies(world.space, WRITE, world._put)
+    pymunk.batch.set_space_bodies(world.space, WRITE, world._write_buffer)
     assert [tuple(world.bodies[c].force) for c in world.columns] == [tuple(f) for f in world.force[: len(by_loop)]]
 
 

@@ -1,0 +1,288 @@
+"""Forces that keep people, groups, walls and pillars apart, as numba kernels; numpy twins: tests/reference_steering.py.
+
+`avoid` is the entry. sim.crowd.forces names all columns, slots and units. Neighbours are found through a cell list once
+there are more than BRUTE people. A first pass without branches, which the compiler vectorises, picks the pairs that may
+act on each other. Only those pairs go through the formulas.
+"""
+
+from __future__ import annotations
+
+from math import exp, sqrt
+
+import numpy as np
+from numba import njit
+
+# isort: off
+# fmt: off
+from sim.crowd.forces import (
+    AVOID_GROUP, AVOID_MAX, AVOID_PERSON, AVOID_TIME, AVOIDED, COUNT, GROUP, GROUP_RANGE, IN_GROUP,
+    MAX_ACCELERATION, MEAN_VX, MEAN_VY, MEAN_X, MEAN_Y, MODE, PERSON_RADIUS, PERSON_RANGE, PILLAR_RADIUS,
+    PILLAR_X, PILLAR_Y, QUEUE, RADIUS, SEPARATION, SEPARATION_RANGE, SHOVE, VX, VY, WALL, WALL_RANGE, X1, X2,
+    Y1, Y2, X, Y,
+)
+# fmt: on
+# isort: on
+
+BRUTE = 48  # people, up to which all pairs are tried
+TINY = 1e-9  # m
+QUEUE_SEPARATION_RANGE = 0.5  # m: members of one queue repel each other up to this distance
+WALL_REACH, PILLAR_REACH = 1.2, 6.0  # m from a wall, from the edge of a pillar: no force beyond
+BODY = 0.2  # m: distance from a wall or a pillar's edge at contact
+PILLAR_MARGIN = 1.2  # person radii that are added to a pillar's radius in the power law
+
+
+@njit(cache=True, inline="always")
+def _power_law(dx, dy, wx, wy, radius, strength, horizon, cap):  # type: ignore[no-untyped-def]
+    """Avoidance acceleration (fx, fy) in m/s² of one of two discs whose radii add up to `radius` (m).
+
+    d = own position - other position, w = own velocity - other velocity. Minus the gradient of strength exp(-tau /
+    horizon) / tau² over the relative position, tau being the time to collision (Karamouzas 2014, eq. 2-3), at most
+    `cap` long. Zero where no collision lies ahead within 4 horizon. *Ours*: tau is at least 0.05 s.
+    """
+    a = wx * wx + wy * wy
+    c = dx * dx + dy * dy - radius * radius
+    b = -(dx * wx + dy * wy)
+    if a < 1e-6 or c <= 0.0 or b <= 0.0:
+        return 0.0, 0.0
+    cross = dx * wy - dy * wx
+    root = a * radius * radius - cross * cross  # = b^2 - a c, without its cancellation
+    if root <= 1e-12:
+        return 0.0, 0.0
+    root = sqrt(root)
+    tau = (b - root) / a
+    if tau <= 0.0 or tau > 4.0 * horizon:
+        return 0.0, 0.0
+    tau = max(tau, 0.05)
+    size = strength * exp(-tau / horizon) / (a * tau * tau) * (2.0 / tau + 1.0 / horizon)
+    fx = -size * (wx - (b * wx + a * dx) / root)
+    fy = -size * (wy - (b * wy + a * dy) / root)
+    f = sqrt(fx * fx + fy * fy)
+    if f > cap:
+        fx, fy = fx * cap / f, fy * cap / f
+    return fx, fy
+
+
+@njit(cache=True)
+def _avoid_groups(status, rules, push):  # type: ignore[no-untyped-def]
+    """Write the acceleration of each group, taken as a disc, to push (G, 2), m/s²; the smaller group yields more."""
+    strength, horizon, radius = rules[AVOID_GROUP], rules[AVOID_TIME], rules[PERSON_RADIUS]
+    reach, cap = rules[GROUP_RANGE], rules[AVOID_MAX]
+    push[:] = 0.0
+    live = np.empty(len(status), np.int64)
+    m = 0
+    for g in range(len(status)):
+        live[m] = g
+        m += status[g, AVOIDED] > 0.0
+    live = live[:m][np.argsort(status[live[:m], MEAN_X])]
+    rows = np.empty((RADIUS + 1, m))  # columns COUNT … RADIUS of `status` as rows, groups sorted by x
+    for s in range(m):
+        for k in range(RADIUS + 1):
+            rows[k, s] = status[live[s], k]
+    found = np.empty(m + 1, np.int64)
+    last = 0
+    for s in range(m):
+        a = live[s]
+        while last < m and rows[MEAN_X, s] - rows[MEAN_X, last] >= -reach:
+            last += 1
+        for k in range(_near_discs(rows, s, last, reach, radius, found)):
+            b = live[found[k]]
+            dx, dy = status[a, MEAN_X] - status[b, MEAN_X], status[a, MEAN_Y] - status[b, MEAN_Y]
+            wx, wy = status[a, MEAN_VX] - status[b, MEAN_VX], status[a, MEAN_VY] - status[b, MEAN_VY]
+            size = status[a, RADIUS] + status[b, RADIUS] + 2.0 * radius
+            fx, fy = _power_law(dx, dy, wx, wy, size, strength, horizon, cap)
+            if fx == 0.0 and fy == 0.0:
+                continue
+            share = 2.0 * status[b, COUNT] / (status[a, COUNT] + status[b, COUNT])
+            push[a, 0] += share * fx
+            push[a, 1] += share * fy
+            push[b, 0] -= (2.0 - share) * fx
+            push[b, 1] -= (2.0 - share) * fy
+
+
+@njit(cache=True, inline="always")
+def _near_discs(rows, s, last, reach, radius, found):  # type: ignore[no-untyped-def]
+    """Write to `found` the discs s + 1 … last - 1 within reach of disc s and on collision course; returns how many.
+
+    Two groups of one person each are left out: they avoid each other as people.
+    """
+    count, x, y = rows[COUNT], rows[MEAN_X], rows[MEAN_Y]
+    vx, vy, disc = rows[MEAN_VX], rows[MEAN_VY], rows[RADIUS]
+    k = 0
+    for t in range(s + 1, last):
+        dx, dy = x[s] - x[t], y[s] - y[t]
+        wx, wy = vx[s] - vx[t], vy[s] - vy[t]
+        size = disc[s] + disc[t] + 2.0 * radius
+        cross = dx * wy - dy * wx
+        root = (wx * wx + wy * wy) * size * size - cross * cross
+        found[k] = t
+        near = (dx * dx + dy * dy <= reach * reach) & (count[s] + count[t] >= 2.5)
+        k += near & (dx * wx + dy * wy < 0.0) & (root > 1e-12)
+    return k
+
+
+@njit(cache=True, inline="always")
+def _pair(state, tag, i, j, dx, dy, d2, rules, out):  # type: ignore[no-untyped-def]
+    """Add the forces between persons i and j to `out`; d = position of i - position of j, d2 = |d|².
+
+    Members of one group, and people in one queue, repel each other linearly at short range. Strangers repel each other
+    linearly where they are too close, else by the power law.
+    """
+    if tag[i, GROUP] == tag[j, GROUP]:
+        if d2 >= rules[SEPARATION_RANGE] * rules[SEPARATION_RANGE]:
+            return
+        d = max(sqrt(d2), TINY)
+        f = rules[SEPARATION] * (1.0 - d / rules[SEPARATION_RANGE]) / d
+        fx, fy = f * dx, f * dy
+    elif tag[i, QUEUE] >= 0 and tag[i, QUEUE] == tag[j, QUEUE]:
+        if d2 >= QUEUE_SEPARATION_RANGE * QUEUE_SEPARATION_RANGE:
+            return
+        d = max(sqrt(d2), TINY)
+        f = rules[SEPARATION] * (1.0 - d / QUEUE_SEPARATION_RANGE) / d
+        fx, fy = f * dx, f * dy
+    else:
+        size = 2.0 * rules[PERSON_RADIUS]
+        wx, wy = state[i, VX] - state[j, VX], state[i, VY] - state[j, VY]
+        if d2 < size * size:
+            d = max(sqrt(d2), TINY)
+            f = rules[SHOVE] * (1.0 - d / size) / d
+            fx, fy = f * dx, f * dy
+        else:
+            fx, fy = _power_law(dx, dy, wx, wy, size, rules[AVOID_PERSON], rules[AVOID_TIME], rules[AVOID_MAX])
+            if fx == 0.0 and fy == 0.0:
+                return
+    out[i, X] += fx
+    out[i, Y] += fy
+    out[j, X] -= fx
+    out[j, Y] -= fy
+
+
+@njit(cache=True)
+def _cells(state, reach):  # type: ignore[no-untyped-def]
+    """Sort people into square cells at least `reach` (m) wide.
+
+    Returns order (N,): people, cell after cell; start (C + 1,): where each cell begins in `order`; the number of cells
+    in a row of the grid. All people share one cell where there are at most BRUTE of them.
+    """
+    n = len(state)
+    if n <= BRUTE:
+        return np.arange(n), np.array([0, n]), 1
+    x0, y0 = state[0, X], state[0, Y]
+    x1, y1 = x0, y0
+    for i in range(n):
+        x0, x1 = min(x0, state[i, X]), max(x1, state[i, X])
+        y0, y1 = min(y0, state[i, Y]), max(y1, state[i, Y])
+    cell = max(reach, sqrt((x1 - x0) * (y1 - y0) / (4.0 * n)), (x1 - x0) / 1000.0, (y1 - y0) / 1000.0)
+    nx, ny = int((x1 - x0) / cell) + 1, int((y1 - y0) / cell) + 1
+    start = np.zeros(nx * ny + 1, np.int64)
+    cells = np.empty(n, np.int64)
+    for i in range(n):
+        cells[i] = int((state[i, Y] - y0) / cell) * nx + int((state[i, X] - x0) / cell)
+        start[cells[i] + 1] += 1
+    for c in range(nx * ny):
+        start[c + 1] += start[c]
+    fill = start[:-1].copy()
+    order = np.empty(n, np.int64)
+    for i in range(n):
+        order[fill[cells[i]]] = i
+        fill[cells[i]] += 1
+    return order, start, nx
+
+
+@njit(cache=True, inline="always")
+def _candidates(rows, s, first, last, reach, touch, radius, found, m):  # type: ignore[no-untyped-def]
+    """Append to found[m:] those of first … last - 1 that may act on s; returns the new length.
+
+    They are nearer than the square root of `reach`, and either nearer than the square root of `touch` or on collision
+    course. No branches.
+    """
+    x, y, vx, vy = rows[X], rows[Y], rows[VX], rows[VY]
+    for t in range(first, last):
+        dx, dy = x[s] - x[t], y[s] - y[t]
+        wx, wy = vx[s] - vx[t], vy[s] - vy[t]
+        d2 = dx * dx + dy * dy
+        cross = dx * wy - dy * wx
+        root = (wx * wx + wy * wy) * radius * radius - cross * cross
+        found[m] = t
+        m += (d2 < reach) & ((d2 < touch) | ((dx * wx + dy * wy < 0.0) & (root > 1e-12)))
+    return m
+
+
+@njit(cache=True)
+def _pairs(state, tag, rules, out):  # type: ignore[no-untyped-def]
+    """Add the forces between all people within reach to out (N, 2), each pair once."""
+    n = len(state)
+    order, start, nx = _cells(state, rules[PERSON_RANGE])
+    reach, radius = rules[PERSON_RANGE] * rules[PERSON_RANGE], 2.0 * rules[PERSON_RADIUS]
+    touch = max(rules[SEPARATION_RANGE], QUEUE_SEPARATION_RANGE, radius) ** 2
+    rows = np.empty((4, n))
+    for s in range(n):
+        for k in range(4):
+            rows[k, s] = state[order[s], k]
+    found = np.empty(n + 1, np.int64)
+    for c in range(len(start) - 1):
+        left, right = c % nx > 0, c % nx + 1 < nx
+        above = c + nx < len(start) - 1
+        for s in range(start[c], start[c + 1]):
+            m = _candidates(rows, s, s + 1, start[c + 1 + right], reach, touch, radius, found, 0)
+            if above:
+                first, last = start[c + nx - left], start[c + nx + right + 1]
+                m = _candidates(rows, s, first, last, reach, touch, radius, found, m)
+            i = order[s]
+            for k in range(m):
+                j = order[found[k]]
+                dx, dy = state[i, X] - state[j, X], state[i, Y] - state[j, Y]
+                _pair(state, tag, i, j, dx, dy, dx * dx + dy * dy, rules, out)
+
+
+@njit(cache=True)
+def _walls(state, walls, pillars, rules, out):  # type: ignore[no-untyped-def]
+    """Add the forces of walls and pillars to out (N, 2): exponential repulsion; of pillars the power law, too."""
+    strength, decay = rules[WALL], rules[WALL_RANGE]
+    for i in range(len(state)):
+        x, y = state[i, X], state[i, Y]
+        for k in range(len(walls)):
+            ax, ay = walls[k, X1], walls[k, Y1]
+            ux, uy = walls[k, X2] - ax, walls[k, Y2] - ay
+            side = (x - ax) * uy - (y - ay) * ux
+            if side * side > 1.5 * (ux * ux + uy * uy):  # further from its line than WALL_REACH: the common case
+                continue
+            s = ((x - ax) * ux + (y - ay) * uy) / (ux * ux + uy * uy + TINY)
+            s = min(1.0, max(0.0, s))
+            dx, dy = x - ax - s * ux, y - ay - s * uy
+            d = max(sqrt(dx * dx + dy * dy), TINY)
+            if d < WALL_REACH:
+                f = strength * exp(-(d - BODY) / decay) / d
+                out[i, X] += f * dx
+                out[i, Y] += f * dy
+        for k in range(len(pillars)):
+            dx, dy = x - pillars[k, PILLAR_X], y - pillars[k, PILLAR_Y]
+            r = pillars[k, PILLAR_RADIUS]
+            d = max(sqrt(dx * dx + dy * dy), TINY)
+            if d < r + PILLAR_REACH:
+                f = strength * exp(-(d - BODY - r) / decay) / d
+                wide = r + PILLAR_MARGIN * rules[PERSON_RADIUS]
+                vx, vy = state[i, VX], state[i, VY]
+                fx, fy = _power_law(dx, dy, vx, vy, wide, rules[AVOID_PERSON], rules[AVOID_TIME], rules[AVOID_MAX])
+                out[i, X] += f * dx + fx
+                out[i, Y] += f * dy + fy
+
+
+@njit(cache=True)
+def avoid(state, tag, status, walls, pillars, rules, push, out):  # type: ignore[no-untyped-def]
+    """Add all avoidance accelerations to out (N, 2), m/s², and cap each sum at MAX_ACCELERATION.
+
+    status (G, 10): as `drive` of forces_goal_kernels left it. push (G, 2): scratch. People in a queue do not take part
+    in the avoidance of their group as a whole.
+    """
+    _avoid_groups(status, rules, push)
+    _pairs(state, tag, rules, out)
+    _walls(state, walls, pillars, rules, out)
+    cap = rules[MAX_ACCELERATION]
+    for i in range(len(state)):
+        if tag[i, MODE] == IN_GROUP:
+            out[i, X] += push[tag[i, GROUP], 0]
+            out[i, Y] += push[tag[i, GROUP], 1]
+        size = sqrt(out[i, X] ** 2 + out[i, Y] ** 2)
+        if size > cap:
+            out[i, X] *= cap / size
+            out[i, Y] *= cap / size

@@ -1,0 +1,241 @@
+"""Forces towards goals, as numba kernels: ways and headings of groups, places in formations, doors, queues, stairs.
+
+`drive` is the entry. sim.crowd.forces names all columns, slots and units. No kernel calls a kernel of another file,
+because numba's cache does not notice changes in other files.
+"""
+
+from __future__ import annotations
+
+from math import sqrt
+
+import numpy as np
+from numba import njit
+
+# isort: off
+# fmt: off
+from sim.crowd.forces import (
+    ALIGNMENT, AVOIDED, AXIS_X, AXIS_Y, COHESION_TIME, COUNT, END, FOOT_X, FOOT_Y, GATHER, GATHER_RADIUS, GROUP,
+    HASTE, LENGTH, MAX_OFF_PLACE, MEAN_VX, MEAN_VY, MEAN_X, MEAN_Y, MODE, NARROW, PASS, PASS_RADIUS, RADIUS,
+    RELAXATION, SLOW_TIME, SLOWDOWN, STAND, TO_TARGET, TURN_TIME, VX, VY, WANTED_VX, WANTED_VY, WAYPOINT, WIDTH,
+    GroupArrays, PeopleArrays, X, Y,
+)
+# fmt: on
+# isort: on
+
+TINY = 1e-9  # m
+TARGET_TIME = 0.7  # s: time in which a person reaches a place in a queue, speed permitting
+GATHER_TIME = 0.8  # s: time in which a member reaches its place at the gathering point, speed permitting
+STANDING_SPEED = 0.3  # m/s: fastest shift of a group that has arrived; fluctuations grow up to this speed
+TURN_DISTANCE = 0.3  # m: nearer to the waypoint the heading is kept
+ARRIVED, NEARLY_ARRIVED = 0.25, 1.5  # m from the end: arrived; still arrived after having been so
+DOOR_DISTANCE = 0.45  # m from the middle of a door: the person is through
+DOOR_PACE = 0.6  # share of the speed of those who are through and wait for the others
+LOOSE = 2.2  # m: a group with a larger radius is not avoided as a whole
+
+
+@njit(cache=True)
+def _average(state, tag, status):  # type: ignore[no-untyped-def]
+    """Write COUNT and the means of each group to `status`; all other columns but AVOIDED become 0."""
+    status[:, :AVOIDED] = 0.0
+    for i in range(len(state)):
+        g = tag[i, GROUP]
+        status[g, COUNT] += 1.0
+        for k in range(4):
+            status[g, MEAN_X + k] += state[i, k]
+    for g in range(len(status)):
+        if status[g, COUNT] > 0.0:
+            for k in range(MEAN_X, MEAN_VY + 1):
+                status[g, k] /= status[g, COUNT]
+
+
+@njit(cache=True)
+def _spread(state, place, tag, groups, status):  # type: ignore[no-untyped-def]
+    """Write RADIUS and MAX_OFF_PLACE of each group to `status`."""
+    for i in range(len(state)):
+        g = tag[i, GROUP]
+        dx, dy = state[i, X] - status[g, MEAN_X], state[i, Y] - status[g, MEAN_Y]
+        status[g, RADIUS] = max(status[g, RADIUS], sqrt(dx * dx + dy * dy))
+        hx, hy = groups.heading[g, 0], groups.heading[g, 1]
+        mx, my = status[g, MEAN_X], status[g, MEAN_Y]
+        w = groups.current[g]
+        if groups.kind[g, w] == GATHER:
+            mx, my = groups.route[g, w, 0], groups.route[g, w, 1]
+        dx = state[i, X] - mx - place[i, 0] * hx + place[i, 1] * hy
+        dy = state[i, Y] - my - place[i, 0] * hy - place[i, 1] * hx
+        status[g, MAX_OFF_PLACE] = max(status[g, MAX_OFF_PLACE], sqrt(dx * dx + dy * dy))
+
+
+@njit(cache=True)
+def _pass_doors(groups, people, status):  # type: ignore[no-untyped-def]
+    """Advance each group at a door to its next waypoint once every member present is through. Overwrites AVOIDED."""
+    for g in range(len(status)):
+        groups.status[g, AVOIDED] = 1.0
+    for i in range(len(people.tag)):
+        g = people.tag[i, GROUP]
+        if groups.kind[g, groups.current[g]] == NARROW and people.tag[i, WAYPOINT] <= groups.current[g]:
+            groups.status[g, AVOIDED] = 0.0
+    for g in range(len(status)):
+        at_door = groups.length[g] > 0 and groups.kind[g, groups.current[g]] == NARROW
+        if status[g, COUNT] > 0.0 and at_door and groups.status[g, AVOIDED] > 0.0:
+            groups.current[g] += 1
+
+
+@njit(cache=True)
+def _lead_groups(groups, status, dt, rules):  # type: ignore[no-untyped-def]
+    """Advance each group on its way by dt (s): current waypoint, arrival, heading, wanted velocity."""
+    turn_time, slow_time = rules[TURN_TIME], rules[SLOW_TIME]
+    gather, radius = rules[GATHER_RADIUS], rules[PASS_RADIUS]
+    for g in range(len(status)):
+        if status[g, COUNT] == 0.0 or groups.length[g] == 0:
+            continue
+        w, last = groups.current[g], groups.length[g] - 1
+        kind = groups.kind[g, w]
+        dx, dy = groups.route[g, w, 0] - status[g, MEAN_X], groups.route[g, w, 1] - status[g, MEAN_Y]
+        d = sqrt(dx * dx + dy * dy)
+        if (kind == PASS and d < radius + 0.3 * status[g, RADIUS]) or (
+            kind == GATHER and status[g, MAX_OFF_PLACE] < gather
+        ):
+            if w < last:
+                groups.current[g] = w + 1
+                w += 1
+                kind = groups.kind[g, w]
+                dx, dy = groups.route[g, w, 0] - status[g, MEAN_X], groups.route[g, w, 1] - status[g, MEAN_Y]
+                d = sqrt(dx * dx + dy * dy)
+            elif kind == GATHER:
+                groups.arrived[g] = True
+        pace = groups.speed[g]
+        if w == last and kind == END:
+            if groups.finish[g] == STAND:
+                pace = min(pace, d / slow_time)
+                if d < ARRIVED or (groups.arrived[g] and d < NEARLY_ARRIVED):
+                    groups.arrived[g] = True
+            elif d < radius:
+                groups.arrived[g] = True
+        if d > TURN_DISTANCE and kind != GATHER and not groups.arrived[g]:
+            _turn(groups.heading, g, dx / d, dy / d, dt / turn_time)
+        if groups.arrived[g] and groups.finish[g] == STAND:
+            status[g, WANTED_VX], status[g, WANTED_VY] = dx / slow_time, dy / slow_time
+            size = sqrt(status[g, WANTED_VX] ** 2 + status[g, WANTED_VY] ** 2)
+            if size > STANDING_SPEED:
+                status[g, WANTED_VX] *= STANDING_SPEED / size
+                status[g, WANTED_VY] *= STANDING_SPEED / size
+        else:
+            status[g, WANTED_VX], status[g, WANTED_VY] = pace * groups.heading[g, 0], pace * groups.heading[g, 1]
+
+
+@njit(cache=True)
+def _turn(heading, g, ex, ey, share):  # type: ignore[no-untyped-def]
+    """Turn the heading of group g towards the unit vector (ex, ey) by this share (at most 1) of the angle between."""
+    hx, hy = heading[g, 0], heading[g, 1]
+    angle = np.arctan2(hx * ey - hy * ex, hx * ex + hy * ey) * min(share, 1.0)
+    c, s = np.cos(angle), np.sin(angle)
+    hx, hy = c * hx - s * hy, s * hx + c * hy
+    size = sqrt(hx * hx + hy * hy)
+    heading[g, 0], heading[g, 1] = hx / size, hy / size
+
+
+@njit(cache=True)
+def _seek(state, people, groups, stairs, rules, out):  # type: ignore[no-untyped-def]
+    """Write the acceleration of each person towards its goal to out (N, 2), m/s².
+
+    A person in a queue walks to its target, a member at a door to and through the door, any other member to its place
+    in the formation. Stairs slow all of them down.
+    """
+    status = groups.status
+    relax, cohesion = rules[RELAXATION], rules[COHESION_TIME]
+    alignment, haste = rules[ALIGNMENT], rules[HASTE]
+    for i in range(len(state)):
+        g = people.tag[i, GROUP]
+        x, y, vx, vy = state[i, X], state[i, Y], state[i, VX], state[i, VY]
+        w = groups.current[g]
+        kind = groups.kind[g, w]
+        align = 0.0
+        if people.tag[i, MODE] == TO_TARGET:
+            limit = people.pace[i]
+            tx, ty = (people.target[i, 0] - x) / TARGET_TIME, (people.target[i, 1] - y) / TARGET_TIME
+        elif kind == NARROW and groups.length[g] > 0:
+            limit = groups.speed[g]
+            tx, ty = _through_door(groups, people, i, g, x, y, limit)
+        else:
+            hx, hy = groups.heading[g, 0], groups.heading[g, 1]
+            ox = people.place[i, 0] * hx - people.place[i, 1] * hy
+            oy = people.place[i, 0] * hy + people.place[i, 1] * hx
+            if kind == GATHER:
+                limit = groups.speed[g]
+                tx = (groups.route[g, w, 0] + ox - x) / GATHER_TIME
+                ty = (groups.route[g, w, 1] + oy - y) / GATHER_TIME
+            else:
+                limit = groups.speed[g] * (1.0 + haste)
+                tx = status[g, WANTED_VX] + (status[g, MEAN_X] + ox - x) / cohesion
+                ty = status[g, WANTED_VY] + (status[g, MEAN_Y] + oy - y) / cohesion
+                if status[g, COUNT] > 1.0:
+                    align = alignment
+        limit *= _pace_on_stairs(x, y, stairs)
+        size = sqrt(tx * tx + ty * ty)
+        if size > limit:
+            tx, ty = tx * limit / size, ty * limit / size
+        share = min(1.0, size / STANDING_SPEED)
+        tx += share * people.wander[i, 0]
+        ty += share * people.wander[i, 1]
+        out[i, 0] = (tx - vx) / relax + align * (status[g, MEAN_VX] - vx)
+        out[i, 1] = (ty - vy) / relax + align * (status[g, MEAN_VY] - vy)
+
+
+@njit(cache=True)
+def _through_door(groups, people, i, g, x, y, limit):  # type: ignore[no-untyped-def]
+    """Wanted velocity of person i whose group g is at a door; counts the person as through near its middle."""
+    door = groups.current[g]
+    w = max(people.tag[i, WAYPOINT], door)
+    dx, dy = groups.route[g, w, 0] - x, groups.route[g, w, 1] - y
+    d = max(sqrt(dx * dx + dy * dy), TINY)
+    if w == door and d < DOOR_DISTANCE:
+        people.tag[i, WAYPOINT] = door + 1
+    if w > door:
+        limit *= DOOR_PACE
+    return dx / d * limit, dy / d * limit
+
+
+@njit(cache=True)
+def _pace_on_stairs(x, y, stairs):  # type: ignore[no-untyped-def]
+    """Share of the speed kept at a point: that of the first stairs it lies on, 1 off the stairs."""
+    for k in range(len(stairs)):
+        dx, dy = x - stairs[k, FOOT_X], y - stairs[k, FOOT_Y]
+        s = dx * stairs[k, AXIS_X] + dy * stairs[k, AXIS_Y]
+        t = dy * stairs[k, AXIS_X] - dx * stairs[k, AXIS_Y]
+        if 0.0 <= s <= stairs[k, LENGTH] and abs(t) <= stairs[k, WIDTH] / 2:
+            return stairs[k, SLOWDOWN]
+    return 1.0
+
+
+@njit(cache=True)
+def _mark_avoided(groups):  # type: ignore[no-untyped-def]
+    """Set AVOIDED of each group: 1.0 where its members are close together and it is not at a door."""
+    status = groups.status
+    for g in range(len(status)):
+        together = status[g, COUNT] > 0.0 and status[g, RADIUS] <= LOOSE
+        status[g, AVOIDED] = 1.0 if together and groups.kind[g, groups.current[g]] != NARROW else 0.0
+
+
+@njit(cache=True)
+def drive(  # type: ignore[no-untyped-def]
+    state, place, target, pace, wander, tag,
+    route, kind, length, current, speed, heading, finish, arrived, status,
+    stairs, dt, rules, out,
+):  # fmt: skip
+    """Write the accelerations towards goals to out (N, 2), m/s², and advance the groups' ways and headings by dt (s).
+
+    Returns False, with nothing written, where a state is not finite. Also rewrites `status`. The arrays of PeopleArrays
+    and GroupArrays are separate arguments, because numba takes 3 µs to unpack a named tuple.
+    """
+    for i in range(len(state)):
+        if not abs(state[i, X]) + abs(state[i, Y]) + abs(state[i, VX]) + abs(state[i, VY]) < 1e9:
+            return False
+    people = PeopleArrays(place, target, pace, wander, tag)
+    groups = GroupArrays(route, kind, length, current, speed, heading, finish, arrived, status)
+    _average(state, tag, status)
+    _spread(state, place, tag, groups, status)
+    _pass_doors(groups, people, status)
+    _lead_groups(groups, status, dt, rules)
+    _seek(state, people, groups, stairs, rules, out)
+    _mark_avoided(groups)
+    return True

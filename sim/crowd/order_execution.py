@@ -1,0 +1,169 @@
+"""Carries out the orders of the script while the simulation runs: fires merges, splits and queues, serves queues.
+
+Orders change who belongs to which group, ways, places and targets (GroupState). They never touch a position, a velocity
+or a force. Whether an order came true is checked later, by sim.truth.order_fulfilment.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from scenarios.schema.scenario import MergeOrder, QueueOrder, Scenario, SplitOrder
+from scenarios.schema.values import draw
+from sim.crowd.forces import GATHER
+from sim.crowd.formation import divide, meeting_point, part_sizes, standing, walking
+from sim.crowd.group_state import GroupState
+from sim.crowd.population import ScriptPlacement, draw_point
+from sim.crowd.queue_service import ServiceQueue
+from sim.crowd.triggers import PendingOrder, concerned, rule_holds
+from sim.rng import rng
+from sim.types import Array, Order
+
+
+def groups_made(scenario: Scenario) -> int:
+    """Returns how many groups the orders of a scenario make at most."""
+    return sum(len(e.parts) if isinstance(e, SplitOrder) else 1 for e in scenario.event)
+
+
+class OrderExecution:
+    """State: the pending orders, ids of those that have come true, and the queues, by index of their order."""
+
+    def __init__(
+        self, scenario: Scenario, groups: GroupState, placement: ScriptPlacement, seed: int, repeat: int
+    ) -> None:
+        self.groups, self.placement, self.seed, self.repeat = groups, placement, seed, repeat
+        self.fps = scenario.camera.fps
+        self.queues: dict[int, ServiceQueue] = {}
+        self.come_true: set[str] = set()
+        self.pending = [self._pending(order, k) for k, order in enumerate(scenario.event)]
+
+    def _rng(self, role: str, *keys: int) -> np.random.Generator:
+        return rng(self.seed, role, *keys, repeat=self.repeat)
+
+    def _pending(self, order: MergeOrder | SplitOrder | QueueOrder, k: int) -> PendingOrder:
+        when = order.when
+        time = np.inf if when.time is None else draw(when.time, self._rng("event", k, 1))
+        at = None if when.reach is None or when.reach.at is None else self.placement.point(np.array(when.reach.at))
+        return PendingOrder(order, k, draw(when.delay, self._rng("event", k, 0)), time, at)
+
+    def advance(self, frame: int, t: float, state: Array) -> bool:
+        """Fires orders that are due at time t (s), serves queues, and lets groups that have arrived stand.
+
+        frame counts from 0; state (P, 4) by column, nan where absent. Returns False only if nothing has changed that
+        `GroupState.fill` writes.
+        """
+        changed = bool(self.queues)
+        for pending in self.pending:
+            if pending.fired is None and pending.is_due(t, state, self.groups, self.come_true):
+                self._fire(pending, frame, state)
+                changed = True
+            elif pending.fired is not None and pending.true_at is None:
+                pending.watch(t, self.fps, rule_holds(pending, state, self.groups.targets))
+                if pending.true_at is not None:
+                    self.come_true.add(pending.order.id)
+        for k, queue in self.queues.items():
+            self._serve(k, queue, t, state)
+        return self.groups.settle_arrived(state) or changed
+
+    def _fire(self, pending: PendingOrder, frame: int, state: Array) -> None:
+        pending.fired = frame + 1
+        order = pending.order
+        if isinstance(order, MergeOrder):
+            self._merge(pending, order, state)
+        elif isinstance(order, SplitOrder):
+            self._split(pending, order, state)
+        else:
+            self._line_up(pending, order)
+
+    def _merge(self, pending: PendingOrder, order: MergeOrder, state: Array) -> None:
+        """Makes one group of the parents: it gathers where they meet, then stands there or goes to the order's goal."""
+        groups, arrays = self.groups, self.groups.arrays
+        parents = [groups.alive.pop(name) for name in order.groups]
+        parts = [list(groups.members[g]) for g in parents]
+        pending.before = tuple(tuple(c) for c in parts)
+        columns = sorted(c for part in parts for c in part)
+        pending.after = (tuple(columns),)
+        g = groups.new_group(order.into, columns, float(np.mean([groups.spacing[p] for p in parents])))
+        pace = min(float(arrays.speed[p]) for p in parents)
+        r = self._rng("event", pending.index, 2)
+        middles = np.array([state[c, :2].mean(axis=0) for c in parts])
+        speeds = np.array([arrays.speed[p] for p in parents])
+        goal = None if order.goal == "meet" else draw_point(order.goal, self.placement, r)
+        meeting = meeting_point(middles, speeds, goal)
+        if goal is None:
+            groups.write_way(g, [(meeting, GATHER)], "stand", pace, meeting)
+            places = standing(len(columns), groups.spacing[g])
+            groups.settled.add(g)
+        else:
+            via = [draw_point(p, self.placement, r) for p in order.via]
+            speed = min(pace, groups.walking_speed(columns))
+            groups.go(g, meeting, via, goal, order.at_goal, speed, gather=meeting)
+            places = walking(len(columns), groups.spacing[g])
+        groups.take_places(columns, places, meeting, g, state[columns, :2])
+
+    def _split(self, pending: PendingOrder, order: SplitOrder, state: Array) -> None:
+        """Divides a group into the order's parts, each of which sets out for its own goal."""
+        groups = self.groups
+        parent = groups.alive.pop(order.group)
+        columns = groups.members[parent]
+        pending.before = (tuple(columns),)
+        r = self._rng("event", pending.index, 2)
+        goals = [draw_point(part.goal, self.placement, r) for part in order.parts]
+        middle = state[columns, :2].mean(axis=0)
+        sizes = part_sizes([part.size for part in order.parts], len(columns))
+        part_of = divide(state[columns, :2] - middle, np.array(goals) - middle, sizes)
+        after = []
+        for k, (part, goal) in enumerate(zip(order.parts, goals, strict=True)):
+            own = [c for c, p in zip(columns, part_of, strict=True) if p == k]
+            after.append(tuple(own))
+            g = groups.new_group(part.id, own, groups.spacing[parent])
+            here = state[own, :2].mean(axis=0)
+            via = [draw_point(p, self.placement, r) for p in part.via]
+            groups.go(g, here, via, goal, part.at_goal, groups.walking_speed(own))
+            groups.take_places(own, walking(len(own), groups.spacing[g]), here, g, state[own, :2])
+            groups.arrays.heading[g] = groups.arrays.heading[parent]
+        pending.after = tuple(after)
+
+    def _line_up(self, pending: PendingOrder, order: QueueOrder) -> None:
+        """Opens a queue, sends the groups to it, and draws how long each is served and where it goes afterwards."""
+        groups = self.groups
+        queuing = [groups.alive[n] for n in concerned(order, list(groups.alive))]
+        r = self._rng("service", pending.index)
+        service = {g: draw(order.service, r) for g in queuing}
+        a = np.deg2rad(order.direction_deg)
+        along = self.placement.vector(np.array([np.cos(a), np.sin(a)]))
+        head = self.placement.point(np.array(order.at))
+        self.queues[pending.index] = ServiceQueue(head, along, order.spacing, service, coming=list(queuing))
+        columns = [c for g in queuing for c in groups.members[g]]
+        groups.queue_of[columns] = pending.index
+        pending.before = tuple(tuple(groups.members[g]) for g in queuing)
+        pending.after = (tuple(sorted(columns)),)
+        q = self._rng("event", pending.index, 2)
+        for g in queuing:
+            goal, finish = groups.goals.get(g, (head, "stand"))
+            groups.goals[g] = (
+                goal if order.goal is None else draw_point(order.goal, self.placement, q),
+                finish if order.goal is None else order.at_goal,
+            )
+
+    def _serve(self, k: int, queue: ServiceQueue, t: float, state: Array) -> None:
+        """Moves queue k on: sets the target of each person in it, and sends groups that are done to their goals."""
+        groups = self.groups
+        slots, done = queue.advance(t, groups.members, state[:, :2])
+        for column, slot in slots.items():
+            groups.targets[column] = slot
+        for g in done:
+            columns = groups.members[g]
+            groups.queue_of[columns] = -1
+            goal, finish = groups.goals[g]
+            groups.go(g, state[columns, :2].mean(axis=0), [], goal, finish, groups.walking_speed(columns))
+            groups.settled.discard(g)
+            groups.places[columns] = walking(len(columns), groups.spacing[g])
+
+    def record(self) -> tuple[Order, ...]:
+        """Returns all orders, fired or not, with person ids (column + 1) of the groups before and after."""
+
+        def ids(parts: tuple[tuple[int, ...], ...]) -> tuple[tuple[int, ...], ...]:
+            return tuple(tuple(c + 1 for c in part) for part in parts)
+
+        return tuple(Order(p.order.id, p.order.type, p.fired, ids(p.before), ids(p.after)) for p in self.pending)
