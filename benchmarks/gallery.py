@@ -13,7 +13,7 @@ import numpy as np
 from scenarios.loading.resolve import load
 from sim.crowd.world import run
 from sim.render.renderer import Stage, stage
-from sim.scene.camera import solve
+from sim.scene.camera_placement import place_camera
 
 SHOWN = (
     ("crowd", 60),
@@ -31,7 +31,7 @@ def made(name: str) -> Stage:
     above = ["camera.kind=top"] if name == "mixed" else []
     scenario = load(name, above)
     motion = run(scenario, SEED)
-    return stage(motion, solve(scenario.camera, motion), scenario.light, scenario.picture)
+    return stage(motion, place_camera(scenario.camera, motion), scenario.light, scenario.picture)
 
 
 def truth(shown: Stage, index: int) -> np.ndarray:

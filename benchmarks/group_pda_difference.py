@@ -25,7 +25,7 @@ from benchmarks.group_pda_runs import Variant, held, seeds_of, tracked, trained_
 from benchmarks.group_pda_tables import share, table
 from scenarios.schema.scenario import CameraSpec, Scenario
 from sim.crowd.world import run as walk
-from sim.scene.camera import solve
+from sim.scene.camera_placement import place_camera
 from sim.sequence import observe
 from sim.types import DetectionMode, Motion, Truth
 from sim.workers.pool import process_pool
@@ -82,7 +82,7 @@ def one_camera(motions: Sequence[Motion]) -> CameraSpec:
     parts = ("pos", "vel", "heading", "present", "intent")
     beside = {name: np.concatenate([getattr(m, name) for m in motions], axis=1) for name in parts}
     bodies = {name: np.concatenate([getattr(m, name) for m in motions]) for name in ("height", "width", "depth")}
-    camera = solve(CameraSpec(), motions[0].replace(**beside, **bodies))
+    camera = place_camera(CameraSpec(), motions[0].replace(**beside, **bodies))
     x, y, z = camera.position.tolist()
     return CameraSpec(position=(x, y), height=z)
 

@@ -20,7 +20,7 @@ import numpy as np
 from scenarios.loading.resolve import load, names
 from sim.crowd.world import run
 from sim.render.renderer import Stage, stage
-from sim.scene.camera import solve
+from sim.scene.camera_placement import place_camera
 from sim.truth.label import bodies
 from sim.types import Camera, Motion
 from tests import reference_render as slow
@@ -79,7 +79,7 @@ def main() -> None:
     for name in names():
         scenario = load(name)
         motion = run(scenario, args.seed)
-        camera = solve(scenario.camera, motion)
+        camera = place_camera(scenario.camera, motion)
         wrong = exactness(motion, halved(camera), len(motion.present) // 2)
         off, edge = against_geometry(stage(motion, camera), args.step)
         every.append(off)

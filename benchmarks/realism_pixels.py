@@ -26,7 +26,7 @@ from scipy.stats import wasserstein_distance
 from scenarios.schema.scenario import Light, Picture, Scenario
 from sim.crowd.world import run
 from sim.render.renderer import stage
-from sim.scene.camera import solve
+from sim.scene.camera_placement import place_camera
 from sim.truth.label import bodies
 
 PETS = "mot/PETS09-S2L1-first200"
@@ -76,7 +76,7 @@ def ours(seed: int, picture: Picture, light: Light | None = None, frames: int = 
     keys = {"schema": 1, "name": "pets-like", "group": group, "duration": frames / 7, "camera": CAMERA, "world": world}
     scenario = Scenario.model_validate(keys)
     motion = run(scenario, seed)
-    camera = solve(scenario.camera, motion)
+    camera = place_camera(scenario.camera, motion)
     made, truth = stage(motion, camera, light or scenario.light, picture), bodies(motion, camera)
     assert truth.box is not None
     boxes = [b[np.isfinite(b).all(axis=1)] for b in (truth.box[truth.rows(k + 1)] for k in range(frames))]

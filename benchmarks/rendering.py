@@ -20,7 +20,7 @@ from scenarios.schema.scenario import Scenario
 from sim.crowd.world import run
 from sim.render import people_shadow_kernels, renderer
 from sim.render.renderer import Stage, stage
-from sim.scene.camera import solve
+from sim.scene.camera_placement import place_camera
 
 STRETCH = 10
 
@@ -31,7 +31,7 @@ def street(people: int) -> Stage:
     group = [{"id": "g", "size": 1, "start": place, "goal": place, "repeat": people}]
     scenario = Scenario.model_validate({"schema": 1, "group": group, "duration": 10.0, "camera": {"crop": True}})
     motion = run(scenario, 1)
-    return stage(motion, solve(scenario.camera, motion), scenario.light, scenario.picture)
+    return stage(motion, place_camera(scenario.camera, motion), scenario.light, scenario.picture)
 
 
 def rate(draw: Callable[[int], object], frames: int) -> float:

@@ -10,7 +10,8 @@ import numpy as np
 
 from scenarios.errors import InputError
 from sim.render.renderer import Rendered, Stage, stage
-from sim.scene.camera import px_per_m_at_centre, solve
+from sim.scene.camera import px_per_m_at_centre
+from sim.scene.camera_placement import place_camera
 from sim.truth.label import bodies, label
 from sim.truth.order_fulfilment import check_orders
 from sim.types import (
@@ -63,7 +64,7 @@ def observe(
     where `sensor.hide` names one and the motion was not made from the scenario itself. streams: as for `simulate`;
     any of them brings empty frames for a background and exact pixels, with disparities if those are a stream.
     """
-    camera = solve(scenario.camera, motion)
+    camera = place_camera(scenario.camera, motion)
     drawn = _pictures(streams, scenario, motion, camera)
 
     @cache

@@ -4,20 +4,20 @@ from __future__ import annotations
 
 import numpy as np
 
-from sim.scene.body import DEPTH, SHOULDERS, ellipsoids
-from sim.scene.camera import looking
+from sim.scene.body import DEPTH_SHARE, SHOULDER_SHARE, ellipsoids
+from sim.scene.camera import camera_rotation
 from sim.types import Array, Camera, Motion, Order, Scene
 
 
 def pinhole(tilt: float = 40.0, yaw: float = 0.0, at: tuple[float, float, float] = (8.0, -6.0, 7.0)) -> Camera:
     """640 × 480, focal length 500 px."""
-    rotation = looking(np.deg2rad(tilt), np.deg2rad(yaw))
+    rotation = camera_rotation(np.deg2rad(tilt), np.deg2rad(yaw))
     return Camera("pinhole", (640, 480), (500.0, 500.0), (320.0, 240.0), np.array(at), rotation, 0.12)
 
 
 def above(yaw: float = 0.0) -> Camera:
     """640 × 480, 40 px/m, over (8, 5)."""
-    rotation = looking(np.pi / 2, np.deg2rad(yaw))
+    rotation = camera_rotation(np.pi / 2, np.deg2rad(yaw))
     return Camera(
         "top", (640, 480), (500.0, 500.0), (320.0, 240.0), np.array([8.0, 5.0, 20.0]), rotation, px_per_m=40.0
     )
@@ -48,7 +48,7 @@ def walkers(
     h = np.broadcast_to(np.asarray(height, float), (people,))
     return Motion(
         "made-up", 7, 0, fps, pos, vel, heading, there, np.where(there, wanted, -1).astype(np.int64), h,
-        SHOULDERS * h, DEPTH * h, np.full(people, 1.34), scene or Scene(np.array([16.0, 10.0])), orders,
+        SHOULDER_SHARE * h, DEPTH_SHARE * h, np.full(people, 1.34), scene or Scene(np.array([16.0, 10.0])), orders,
     )  # fmt: skip
 
 
@@ -112,12 +112,12 @@ def wall_hit(origin: Array, direction: Array, wall: Array, tall: float, far: flo
 
 def raster_visibility(camera: Camera, scene: Scene, pos3: Array, heading: Array, height: Array, n: int = 60) -> Array:
     """Share of each person's silhouette that is visible, (N,): n × n rays over the amodal box, nearest surface wins."""
-    from sim.scene.body import boxes
+    from sim.scene.body import person_boxes
     from sim.scene.camera import rays
 
     shapes = ellipsoids(pos3, heading, height)
     out = np.zeros(len(pos3))
-    for i, (left, top, width, tall) in enumerate(boxes(camera, pos3, heading, height)):
+    for i, (left, top, width, tall) in enumerate(person_boxes(camera, pos3, heading, height)):
         u, v = np.meshgrid(left + (np.arange(n) + 0.5) / n * width, top + (np.arange(n) + 0.5) / n * tall)
         origin, direction = rays(camera, np.column_stack([u.ravel(), v.ravel()]))
         hits = np.full((len(pos3), len(origin)), np.inf)

@@ -13,7 +13,7 @@ from collections.abc import Sequence as SequenceOf
 import numpy as np
 
 from scenarios.errors import InputError
-from sim.scene.camera import PERSON
+from sim.scene.body import PERSON_HEIGHT
 from sim.types import DetectionMode, Detections, Frame, Sequence, Tracks
 
 
@@ -35,7 +35,7 @@ def from_boxes(frames: Iterable[Detections | Tracks | None]) -> float:
     frames: detections or tracks of each frame. None, and frames without boxes, are skipped.
     """
     heights = [d.box[:, 3] for d in frames if d is not None and d.box is not None and len(d.box)]
-    return float(np.nanmedian(np.concatenate(heights))) / PERSON if heights else float("nan")
+    return float(np.nanmedian(np.concatenate(heights))) / PERSON_HEIGHT if heights else float("nan")
 
 
 def from_tracks(given: float, learned: object, tracks: SequenceOf[Tracks]) -> float:

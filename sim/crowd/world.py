@@ -23,7 +23,7 @@ from sim.crowd.heading import headings
 from sim.crowd.navigation import Navigator, blocked, scene_of
 from sim.crowd.order_execution import OrderExecution, groups_made
 from sim.crowd.population import BODY_RADIUS, EnteringGroup, draw_population, script_placement, wander
-from sim.scene.body import DEPTH, SHOULDERS
+from sim.scene.body import DEPTH_SHARE, SHOULDER_SHARE
 from sim.types import Array, Ints, Motion, Scene
 
 MAX_STEP = 0.02  # s
@@ -248,8 +248,8 @@ class World:
             present=present,
             intent=intent,
             height=height,
-            width=SHOULDERS * height,
-            depth=DEPTH * height,
+            width=SHOULDER_SHARE * height,
+            depth=DEPTH_SHARE * height,
             free_speed=np.array([m.free_speed for m in self.members]),
             scene=self.scene,
             orders=self.orders.record(),

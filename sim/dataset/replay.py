@@ -23,7 +23,7 @@ from sim.dataset.splits import is_real
 from sim.dataset.trajectories import Trajectories, nearest_row, resample
 from sim.hashing import canonical_hash
 from sim.rng import rng
-from sim.scene.body import DEPTH, SHOULDERS
+from sim.scene.body import DEPTH_SHARE, SHOULDER_SHARE
 from sim.sequence import observe
 from sim.types import Array, Camera, Ints, Motion, Scene, Sequence, Truth
 
@@ -197,8 +197,8 @@ def _motion(moving: Trajectories, truth: Truth, name: str, fps: float, cut: Cut,
         present=moving.present,
         intent=intent,
         height=height,
-        width=SHOULDERS * height,
-        depth=DEPTH * height,
+        width=SHOULDER_SHARE * height,
+        depth=DEPTH_SHARE * height,
         free_speed=np.nanmedian(np.linalg.norm(moving.vel, axis=2), axis=0),
         scene=Scene(np.nanmax(pos, axis=(0, 1)) + MARGIN),
     )

@@ -12,8 +12,8 @@ import numpy as np
 
 from sim.detector.sense import Readings, quantiles, uniforms
 from sim.rng import rng
-from sim.scene.body import boxes
-from sim.scene.camera import PERSON, project, to_ground
+from sim.scene.body import PERSON_HEIGHT, SHOULDER_SHARE, person_boxes
+from sim.scene.camera import project, to_ground
 from sim.types import Array, Camera, Ints, Truth
 
 if TYPE_CHECKING:
@@ -84,9 +84,9 @@ def _seen_by(camera: Camera, u: Array) -> tuple[Array, Array]:
     pos = to_ground(camera, uv)
     tall = 1.5 + 0.45 * u[:, HEIGHT]
     pos3 = np.column_stack([pos, np.zeros(len(pos))])
-    box = boxes(camera, pos3, 2 * np.pi * u[:, HEADING], tall)
+    box = person_boxes(camera, pos3, 2 * np.pi * u[:, HEADING], tall)
     behind = ~np.isfinite(box).all(axis=1)  # right under the camera: a person-sized box there all the same
-    size = np.stack([0.27 * tall, tall], axis=1) * camera.focal_px[0] / max(camera.position[2], 1.0)
+    size = np.stack([SHOULDER_SHARE * tall, tall], axis=1) * camera.focal_px[0] / max(camera.position[2], 1.0)
     box[behind] = np.concatenate([uv - size / 2, size], axis=1)[behind]
     return pos, box
 
@@ -96,7 +96,7 @@ def _furthest_row(camera: Camera) -> float:
     v = np.linspace(0.0, camera.image[1], 241)
     ground = to_ground(camera, np.column_stack([np.full_like(v, camera.centre_px[0]), v]))
     foot = np.column_stack([ground, np.zeros(len(v))])
-    tall = foot + np.array([0.0, 0.0, PERSON])
+    tall = foot + np.array([0.0, 0.0, PERSON_HEIGHT])
     size = np.linalg.norm(project(camera, tall)[0] - project(camera, foot)[0], axis=1)
     at_middle = size[len(v) // 2] if np.isfinite(size[len(v) // 2]) else np.nanmax(size, initial=0.0)
     enough = np.flatnonzero(np.nan_to_num(size) >= SMALLEST * at_middle)
@@ -152,9 +152,9 @@ class Ground:
         if self.camera is None:
             return float(np.clip(self.line @ [1.0, v], *self.extremes))
         pos = to_ground(self.camera, np.array([[u, v]]))
-        tall = boxes(self.camera, np.column_stack([pos, [0.0]]), np.zeros(1), np.full(1, PERSON))[0, 3]
+        tall = person_boxes(self.camera, np.column_stack([pos, [0.0]]), np.zeros(1), np.full(1, PERSON_HEIGHT))[0, 3]
         if not np.isfinite(tall):  # right under the camera
-            tall = PERSON * self.camera.focal_px[1] / max(float(self.camera.position[2]), 1.0)
+            tall = PERSON_HEIGHT * self.camera.focal_px[1] / max(float(self.camera.position[2]), 1.0)
         return float(tall)
 
     def points(self, u: Array, v: Array, otherwise: Array) -> Array:

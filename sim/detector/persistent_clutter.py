@@ -16,7 +16,7 @@ import numpy as np
 from sim.detector.clutter import Ground, clipped, false_scores
 from sim.detector.sense import Readings, normals, uniforms
 from sim.rng import rng
-from sim.scene.camera import PERSON
+from sim.scene.body import PERSON_HEIGHT
 from sim.types import Array, Bools, Camera, Ints, Truth
 
 if TYPE_CHECKING:
@@ -117,7 +117,9 @@ def _beside(model: FalseAlarms, ground: Ground, row: Ints, n: Array) -> tuple[Ar
     """Boxes (L, 4) and points (L, 2) that go with a person in these rows of the truth."""
     truth = ground.truth
     across, down = (mean + sd * n[c] for (mean, sd), c in ((model.across, X), (model.foot, Y)))
-    pos = np.zeros((len(row), 2)) if truth.pos is None else truth.pos[row] + PERSON * across * np.array([1.0, 0.0])
+    pos = (
+        np.zeros((len(row), 2)) if truth.pos is None else truth.pos[row] + PERSON_HEIGHT * across * np.array([1.0, 0.0])
+    )
     if truth.box is None:
         return np.zeros((len(row), 4)), pos
     left, top, w, h = truth.box[row].T

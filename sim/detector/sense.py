@@ -19,7 +19,7 @@ import numpy as np
 
 from scenarios.errors import InputError
 from sim.rng import rng
-from sim.scene.body import SHOULDERS
+from sim.scene.body import SHOULDER_SHARE
 from sim.types import Array, Bools, Camera, Detections, Ints, Plane, Truth
 
 if TYPE_CHECKING:
@@ -176,7 +176,7 @@ def detection_probability(truth: Truth, sensor: Sensor, camera: Camera | None = 
     if sensor.small_px and truth.box is not None:
         from_above = camera is not None and camera.kind == "top"
         # Seen from above a person is as large as one of this shoulder width is high when seen from the side.
-        size = truth.box[:, 2:].max(axis=1) / SHOULDERS if from_above else truth.box[:, 3]
+        size = truth.box[:, 2:].max(axis=1) / SHOULDER_SHARE if from_above else truth.box[:, 3]
         p = p * np.minimum(1.0, np.nan_to_num(size) / (2 * sensor.small_px))
     return np.asarray(np.where(visible >= sensor.min_visibility, p, 0.0))
 

@@ -6,16 +6,10 @@ import numpy as np
 from numba import njit
 
 from sim.render.texture_kernels import COS, SIN, grain, overgrown, seen, slabs, smooth
-from sim.scene.raycast_kernels import GROUND, NOTHING, PILLAR, RISER, TREAD, WALL, nearest
+from sim.scene.raycast import GROUND, NOTHING, PILLAR, RISER, TREAD, WALL
+from sim.scene.raycast_kernels import at_pixel, first_hit
 
 GREY, GRASS, BRICK, STONE, STEP, SKY = range(6)  # rows of the palette
-
-
-@njit(cache=True)
-def at(field, u, v, out):  # type: ignore[no-untyped-def]
-    """field (3, 3) times (u, v, 1)."""
-    for k in range(3):
-        out[k] = field[k, 0] * u + field[k, 1] * v + field[k, 2]
 
 
 @njit(cache=True)
@@ -79,14 +73,14 @@ def _sky(d, key, palette, out):  # type: ignore[no-untyped-def]
 @njit(cache=True)
 def _sunlit(point, normal, sun, penumbra, still, spare, hit):  # type: ignore[no-untyped-def]
     """Share of four points across the penumbra before which nothing stands in the sun."""
-    if len(still[0]) + len(still[2]) + len(still[4]) == 0:
+    if len(still.walls) + len(still.pillars) + len(still.flights) == 0:
         return 1.0
     share = 0.0
     for k in range(4):
         spare[0] = point[0] + 1e-4 * normal[0] + penumbra * ((k % 2) - 0.5) * 0.7
         spare[1] = point[1] + 1e-4 * normal[1] + penumbra * ((k // 2) - 0.5) * 0.7
         spare[2] = point[2] + 1e-4 * normal[2]
-        if np.isinf(nearest(spare, sun, still, hit)):
+        if np.isinf(first_hit(spare, sun, still, hit)):
             share += 0.25
     return share
 
@@ -98,9 +92,9 @@ def depths(origin, direction, still, depth, kind, place):  # type: ignore[no-unt
     o, d, hit = np.empty(3), np.empty(3), np.empty(6)
     for v in range(height):
         for u in range(width):
-            at(origin, u + 0.5, v + 0.5, o)
-            at(direction, u + 0.5, v + 0.5, d)
-            t = nearest(o, d, still, hit)
+            at_pixel(origin, u + 0.5, v + 0.5, o)
+            at_pixel(direction, u + 0.5, v + 0.5, d)
+            t = first_hit(o, d, still, hit)
             depth[v, u], kind[v, u] = t, int(hit[0])
             for k in range(3):
                 place[v, u, k] = o[k] + t * d[k] if t < 1e9 else 1e9
@@ -113,9 +107,9 @@ def _seen(x, y, rays, focal, sun, shadow, penumbra, still, size, look, palette, 
 
     o, d, hit, more (4, 6): scratch.
     """
-    at(rays[0], x, y, o)
-    at(rays[1], x, y, d)
-    t = nearest(o, d, still, hit)
+    at_pixel(rays[0], x, y, o)
+    at_pixel(rays[1], x, y, d)
+    t = first_hit(o, d, still, hit)
     kind = int(hit[0])
     if kind == NOTHING:
         _sky(d, key, palette, out)

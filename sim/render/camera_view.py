@@ -9,11 +9,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from sim.render.background import Geometry, Plate, Rays, Solids, paint_plate, scale, sight, solids, survey
+from sim.render.background import Geometry, Plate, paint_plate, survey
 from sim.render.illumination import Illumination
 from sim.render.random_fields import Swell
 from sim.render.silhouettes import Crowd
-from sim.scene.raycast_kernels import GROUND, NOTHING, PILLAR, WALL
+from sim.scene.raycast import GROUND, NOTHING, PILLAR, WALL, PixelRays, Solids, pixel_rays, signed_scale, solids_of
 from sim.types import Array, Camera, Ints, Motion
 
 if TYPE_CHECKING:
@@ -43,8 +43,8 @@ class View:
     ) -> None:
         self.camera, self.motion, self.light, self.picture, self.plants = camera, motion, light, picture, plants
         self.width, self.height = camera.image
-        self.rays: Rays = sight(camera)
-        self.solids: Solids = solids(motion.scene)
+        self.rays: PixelRays = pixel_rays(camera)
+        self.solids: Solids = solids_of(motion.scene)
         self._spare: list[Easel] = []
 
     def easel(self) -> Easel:
@@ -115,7 +115,7 @@ class View:
         o, d = self.rays.origin @ uv1, self.rays.direction @ uv1
         down = d[2] < 0
         t = np.where(down, -o[2] / np.where(down, d[2], -1.0), 0.0)
-        per_px = (t if self.camera.kind == "pinhole" else 1.0) / abs(scale(self.camera))
+        per_px = (t if self.camera.kind == "pinhole" else 1.0) / abs(signed_scale(self.camera))
         slope = np.abs(d[2]) / np.linalg.norm(d, axis=0)
         spread = np.where(down, 0.5 * NODES * per_px / np.maximum(slope, 1e-9), np.inf)
         return (o + t * d)[:2].T, spread
@@ -180,10 +180,10 @@ def sunlit(fixed: Solids, people: Crowd, sun: Array) -> Array:
     lit = np.ones((len(people.id), 3))
     if not any(len(part) for part in fixed if isinstance(part, np.ndarray)):
         return lit
-    from sim.scene.raycast_kernels import nearest
+    from sim.scene.raycast_kernels import first_hit
 
     hit = np.empty(6)
     for row, place, height in zip(lit, people.pos3, people.height, strict=True):
         for k, up in enumerate((0.12, 0.5, 0.95)):  # feet stand a step deep in drawn stairs
-            row[k] = float(np.isinf(nearest(place + np.array([0.0, 0.0, up * height]), sun, fixed, hit)))
+            row[k] = float(np.isinf(first_hit(place + np.array([0.0, 0.0, up * height]), sun, fixed, hit)))
     return lit

@@ -13,9 +13,9 @@ import numpy as np
 
 from scenarios.errors import InputError
 from scenarios.schema.values import draw
-from sim.render.background import scale, sight, solids
 from sim.render.random_fields import Waves, relaxing, swaying
 from sim.rng import rng
+from sim.scene.raycast import pixel_rays, signed_scale, solids_of
 from sim.types import Camera, Scene
 
 if TYPE_CHECKING:
@@ -61,8 +61,8 @@ def grow(picture: Picture, camera: Camera, scene: Scene, seed: int, repeat: int 
     key = int(source.integers(1 << 20))
     width, height = camera.image
     pattern, near = np.empty((2, -(-height // EVERY), -(-width // EVERY)))
-    rays, size = sight(camera), np.array(scene.size, dtype=float)
-    survey((rays.origin, rays.direction), scale(camera), EVERY, solids(scene), size, key, pattern, near)
+    rays, size = pixel_rays(camera), np.array(scene.size, dtype=float)
+    survey((rays.origin, rays.direction), signed_scale(camera), EVERY, solids_of(scene), size, key, pattern, near)
     order = np.argsort(-pattern, axis=None, kind="stable")
     covered = np.cumsum(near.ravel()[order])
     if covered[-1] == 0:

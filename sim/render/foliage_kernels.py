@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
-from sim.render.background_kernels import at
 from sim.render.people_shadow_kernels import touch
 from sim.render.texture_kernels import overgrown, wild
-from sim.scene.raycast_kernels import GROUND, nearest
+from sim.scene.raycast import GROUND
+from sim.scene.raycast_kernels import at_pixel, first_hit
 
 
 @njit(cache=True)
@@ -19,9 +19,9 @@ def survey(rays, focal, every, still, size, key, pattern, share):  # type: ignor
     o, d, hit = np.empty(3), np.empty(3), np.empty(6)
     for j in range(pattern.shape[0]):
         for i in range(pattern.shape[1]):
-            at(rays[0], (i + 0.5) * every, (j + 0.5) * every, o)
-            at(rays[1], (i + 0.5) * every, (j + 0.5) * every, d)
-            t = nearest(o, d, still, hit)
+            at_pixel(rays[0], (i + 0.5) * every, (j + 0.5) * every, o)
+            at_pixel(rays[1], (i + 0.5) * every, (j + 0.5) * every, d)
+            t = first_hit(o, d, still, hit)
             pattern[j, i], share[j, i] = -np.inf, 0.0
             if int(hit[0]) == GROUND:
                 slope = abs(d[2]) / np.sqrt(d[0] * d[0] + d[1] * d[1] + d[2] * d[2])

@@ -4,9 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from sim.scene.body import ellipsoids, outlines
+from sim.scene.body import ellipsoids, outlines, packed_inverse
 from sim.scene.terrain import height_at
-from sim.scene.visibility import packed_inverse
 from sim.types import Array, Bools, Camera, Ints, Motion, PixelTruth
 
 

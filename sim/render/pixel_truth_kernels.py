@@ -6,9 +6,8 @@ import numpy as np
 from numba import njit
 
 from sim.geometry.union_find_kernels import find_root
-from sim.render.background_kernels import at
 from sim.render.people_shadow_kernels import span
-from sim.scene.raycast_kernels import nearest
+from sim.scene.raycast_kernels import at_pixel, first_hit
 
 SAME = 1e-3  # m: what lies nearer by less is taken for the same point
 
@@ -54,7 +53,7 @@ def known(depth, scale, origin, direction, still, out):  # type: ignore[no-untyp
     origin, direction: rays of the right camera; sky has none.
     """
     height, width = depth.shape
-    solid = len(still[0]) + len(still[2]) + len(still[4]) > 0
+    solid = len(still.walls) + len(still.pillars) + len(still.flights) > 0
     o, d, hit = np.empty(3), np.empty(3), np.empty(6)
     for v in range(height):
         for u in range(width):
@@ -62,9 +61,9 @@ def known(depth, scale, origin, direction, still, out):  # type: ignore[no-untyp
             x = u + 0.5 - scale / z
             out[v, u] = scale / z if z < np.inf and x >= 0.0 else np.nan
             if solid and out[v, u] == out[v, u]:
-                at(origin, x, v + 0.5, o)
-                at(direction, x, v + 0.5, d)
-                if nearest(o, d, still, hit) < z - SAME:
+                at_pixel(origin, x, v + 0.5, o)
+                at_pixel(direction, x, v + 0.5, d)
+                if first_hit(o, d, still, hit) < z - SAME:
                     out[v, u] = np.nan
 
 
@@ -105,7 +104,7 @@ def disparities(  # type: ignore[no-untyped-def]
     (N, 2) m: no point of the part is nearer; background (H, W): depth of the empty scene for the right camera.
     """
     height, width = depth.shape
-    solid = len(still[0]) + len(still[2]) + len(still[4]) > 0
+    solid = len(still.walls) + len(still.pillars) + len(still.flights) > 0
     o, d, hit, row = np.empty(3), np.empty(3), np.empty(6), np.empty(6)
     for i in range(len(id)):
         for v in range(boxes[i, 0], boxes[i, 1]):
@@ -118,9 +117,9 @@ def disparities(  # type: ignore[no-untyped-def]
                 if solid and x >= 0.0:
                     j = int(x)
                     if min(background[v, max(j - 1, 0)], background[v, j], background[v, min(j + 1, width - 1)]) < z:
-                        at(origin, x, v + 0.5, o)
-                        at(direction, x, v + 0.5, d)
-                        if nearest(o, d, still, hit) < z - SAME:
+                        at_pixel(origin, x, v + 0.5, o)
+                        at_pixel(direction, x, v + 0.5, d)
+                        if first_hit(o, d, still, hit) < z - SAME:
                             out[v, u] = np.nan
     for i in range(len(id)):
         for e in range(2):

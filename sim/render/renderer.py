@@ -69,7 +69,7 @@ class Stage:
     def right_view(self) -> View:
         """What the right camera of the pair sees; InputError where there is none."""
         self.check_pair()
-        return View(cameras.right(self.camera), self.motion, self.illumination, self.picture, self._plants)
+        return View(cameras.right_camera(self.camera), self.motion, self.illumination, self.picture, self._plants)
 
     def check_pair(self) -> None:
         """InputError where there is no right camera."""

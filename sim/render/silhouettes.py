@@ -7,11 +7,10 @@ from typing import TypeVar
 
 import numpy as np
 
-from sim.render.background import Rays
-from sim.scene.body import Ellipsoids, Outlines, ellipsoids, half_axes, outlines
+from sim.scene.body import Ellipsoids, Outlines, ellipsoids, half_axes, outlines, packed_inverse
 from sim.scene.camera import project
+from sim.scene.raycast import PixelRays
 from sim.scene.terrain import height_at
-from sim.scene.visibility import packed_inverse
 from sim.types import Array, Camera, Ints, Motion
 
 T = TypeVar("T")
@@ -74,7 +73,7 @@ def cut(value: T, rows: slice) -> T:
     return type(value)(**kept)
 
 
-def cast(camera: Camera, rays: Rays, people: Crowd) -> Cast:
+def cast(camera: Camera, rays: PixelRays, people: Crowd) -> Cast:
     """These people before this camera."""
     to_ball = people.turn[:, None] / people.half[..., None]
     start = to_ball @ rays.origin

@@ -1,1 +1,1 @@
-"""What stands in the world and how a camera sees it: camera, bodies, terrain, rays, visibility."""
+"""Geometry of what a camera sees: cameras, people's bodies, ground, ray casting, visibility."""

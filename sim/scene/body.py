@@ -1,10 +1,10 @@
-"""The shape of a person and its exact outline in an image.
+"""The shape of a person, and its exact outline in an image. Home of the body's proportions and of the 1.7 m person.
 
 A person of height h is two upright ellipsoids, body and head (BODY, HEAD), turned by the heading. An ellipsoid with
-centre c and shape S = A diag(a²) Aᵀ, in camera coordinates, is the dual quadric [[S - ccᵀ, -c], [-cᵀ, -1]]; a pinhole
-camera maps it to the dual conic C* = K (S - c cᵀ) Kᵀ, an ellipse with centre C*₁₃/C*₃₃, C*₂₃/C*₃₃ and shape
-E = m mᵀ - C*₁..₂/C*₃₃ (Hartley & Zisserman, Multiple View Geometry, 8.3): its points obey (u - m)ᵀ E⁻¹ (u - m) <= 1 and
-its box is m ± sqrt(diag E). Nothing here is sampled.
+centre c and shape S = A diag(a²) Aᵀ, in camera coordinates, is the dual quadric [[S - ccᵀ, -c], [-cᵀ, -1]]. A pinhole
+camera maps it to the dual conic C* = K (S - c cᵀ) Kᵀ: an ellipse with centre m = (C*₁₃, C*₂₃)/C*₃₃ and shape E = m mᵀ -
+C*₁..₂/C*₃₃ (Hartley & Zisserman, Multiple View Geometry, 8.3). Its points obey (u - m)ᵀ E⁻¹ (u - m) <= 1, and its box
+is m ± sqrt(diag E). All outlines are closed-form; nothing is sampled.
 """
 
 from __future__ import annotations
@@ -13,16 +13,22 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from sim.types import Array, Camera
+from sim.scene.terrain import height_at
+from sim.types import Array, Camera, Ints, Motion
 
-SHOULDERS, DEPTH = 0.27, 0.16  # of the height: width across the shoulders, depth along the heading
+PERSON_HEIGHT = 1.7  # m: height of the standard person, who gives an image its scale
+SHOULDER_SHARE = 0.27  # width across the shoulders, as a share of the height
+DEPTH_SHARE = 0.16  # depth along the heading, as a share of the height
+
+BODY_PART, HEAD_PART = 0, 1  # places on the part axis, the second axis of Ellipsoids and Outlines
+XX, XY, YY = 0, 1, 2  # entries of a symmetric 2 x 2 matrix packed by `packed_inverse`
 
 
 @dataclass(frozen=True)
-class Part:
+class BodyPart:
     """One ellipsoid of a person of height 1: height of its centre, half axes across, along the heading, and up.
 
-    The body's across and along are shares of the person's own width and depth instead.
+    For BODY, `across` and `along` are shares of the person's own width and depth, not of the height.
     """
 
     centre: float
@@ -31,13 +37,13 @@ class Part:
     up: float
 
 
-BODY = Part(centre=0.44, across=0.5, along=0.5, up=0.44)
-HEAD = Part(centre=0.93, across=0.045, along=0.057, up=0.07)
+BODY = BodyPart(centre=0.44, across=0.5, along=0.5, up=0.44)
+HEAD = BodyPart(centre=0.93, across=0.045, along=0.057, up=0.07)
 
 
 @dataclass(frozen=True)
 class Ellipsoids:
-    """Bodies and heads of N people: centre (N, 2, 3), shape (N, 2, 3, 3) m, the second axis being body, head."""
+    """Bodies and heads of N people: centre (N, 2, 3) m, shape (N, 2, 3, 3) m². The second axis is body, head."""
 
     centre: Array
     shape: Array
@@ -45,26 +51,41 @@ class Ellipsoids:
 
 @dataclass(frozen=True)
 class Outlines:
-    """Silhouettes of N people as two ellipses each: centre (N, 2, 2) px, shape (N, 2, 2, 2) px²; nan if behind."""
+    """Silhouettes of N people, two ellipses each: centre (N, 2, 2) px, shape (N, 2, 2, 2) px². The second axis is body,
+    head. All nan for a person who is not wholly in front of the camera."""
 
     centre: Array
     shape: Array
 
 
+@dataclass(frozen=True)
+class RecordedBodies:
+    """All bodies of a Motion, B rows sorted by frame, then id: frame (B,) from 1 on, id (B,), feet pos3 (B, 3) m,
+    shapes."""
+
+    frame: Ints
+    id: Ints
+    pos3: Array
+    shapes: Ellipsoids
+
+
 def half_axes(height: Array, width: Array | None = None, depth: Array | None = None) -> Array:
-    """Half axes (N, 2, 3) m of bodies and heads: across, along the heading, up; see `ellipsoids`."""
-    width = SHOULDERS * height if width is None else width
-    depth = DEPTH * height if depth is None else depth
+    """Return the half axes (N, 2, 3) m of bodies and heads: across, along the heading, up.
+
+    height, width, depth (N,) m; without width or depth, SHOULDER_SHARE or DEPTH_SHARE of the height.
+    """
+    width = SHOULDER_SHARE * height if width is None else width
+    depth = DEPTH_SHARE * height if depth is None else depth
     half = np.empty((len(height), 2, 3))
-    half[:, 0] = np.stack([BODY.across * width, BODY.along * depth, BODY.up * height], axis=1)
-    half[:, 1] = height[:, None] * np.array([HEAD.across, HEAD.along, HEAD.up])
+    half[:, BODY_PART] = np.stack([BODY.across * width, BODY.along * depth, BODY.up * height], axis=1)
+    half[:, HEAD_PART] = height[:, None] * np.array([HEAD.across, HEAD.along, HEAD.up])
     return half
 
 
 def ellipsoids(
     pos3: Array, heading: Array, height: Array, width: Array | None = None, depth: Array | None = None
 ) -> Ellipsoids:
-    """Ellipsoids of N people standing at pos3 (N, 3) m, heading (N,) rad; width, depth follow height if absent."""
+    """Return the ellipsoids of N people with feet at pos3 (N, 3) m who face heading (N,) rad; sizes as `half_axes`."""
     half = half_axes(height, width, depth)
     c, s = np.cos(heading), np.sin(heading)
     a = half**2
@@ -78,8 +99,25 @@ def ellipsoids(
     return Ellipsoids(centre, shape)
 
 
+def bodies_at(motion: Motion, t: Ints, p: Ints) -> tuple[Array, Ellipsoids]:
+    """Return feet (N, 3) m and ellipsoids of the people in columns p (N,) of a Motion, in its time rows t (N,).
+
+    The feet are on the ground of the scene, stairs included.
+    """
+    xy = motion.pos[t, p]
+    pos3 = np.column_stack([xy, height_at(motion.scene, xy)])
+    return pos3, ellipsoids(pos3, motion.heading[t, p], motion.height[p], motion.width[p], motion.depth[p])
+
+
+def recorded_bodies(motion: Motion) -> RecordedBodies:
+    """Return the bodies of all people in all frames in which they are present."""
+    t, p = np.nonzero(motion.present)
+    return RecordedBodies(t + 1, p + 1, *bodies_at(motion, t, p))
+
+
 def outlines(camera: Camera, people: Ellipsoids) -> Outlines:
-    """The image of each ellipsoid, exactly; nan where it does not lie wholly in front of a pinhole camera."""
+    """Return the exact outline of each ellipsoid in the image; nan where it is not wholly in front of a pinhole
+    camera."""
     R = camera.rotation
     c = (people.centre - camera.position) @ R.T
     S = R @ people.shape @ R.T
@@ -96,21 +134,30 @@ def outlines(camera: Camera, people: Ellipsoids) -> Outlines:
 
 
 def outline_boxes(ellipses: Outlines) -> Array:
-    """Boxes (N, 4) ltwh px round body and head together, amodal and unclipped; nan for who is not in front."""
+    """Return boxes (N, 4) ltwh px round body and head: amodal, not clipped to the image; nan where an outline is nan."""
     half = np.sqrt(np.diagonal(ellipses.shape, axis1=2, axis2=3))
     low, high = (ellipses.centre - half).min(axis=1), (ellipses.centre + half).max(axis=1)
     return np.concatenate([low, high - low], axis=1)
 
 
-def boxes(
+def person_boxes(
     camera: Camera, pos3: Array, heading: Array, height: Array, width: Array | None = None, depth: Array | None = None
 ) -> Array:
-    """Amodal, unclipped boxes (N, 4) ltwh px of people standing at pos3 (N, 3) m."""
+    """Return the boxes (N, 4) ltwh px of people with feet at pos3 (N, 3) m: `outline_boxes` of their `ellipsoids`."""
     return outline_boxes(outlines(camera, ellipsoids(pos3, heading, height, width, depth)))
 
 
+def packed_inverse(shape: Array) -> Array:
+    """Return E⁻¹ of symmetric matrices E (..., 2, 2) as (..., 3): its entries 11, 12, 22 (slots XX, XY, YY)."""
+    a, b, d = shape[..., 0, 0], shape[..., 0, 1], shape[..., 1, 1]
+    return np.asarray(np.stack([d, -b, a], axis=-1) / (a * d - b * b)[..., None])
+
+
 def contour(ellipses: Outlines, points: int = 16) -> Array:
-    """Points on the outlines, (N, 2 * points, 2) px: m + L (cos, sin) with L Lᵀ = E; nan for who is not in front."""
+    """Return points on the outlines (N, 2 * points, 2) px, those of the body first; nan where an outline is nan.
+
+    They are m + L (cos, sin) with L Lᵀ = E, at `points` evenly spaced angles.
+    """
     angle = 2 * np.pi * np.arange(points) / points
     circle = np.stack([np.cos(angle), np.sin(angle)], axis=1)
     a, b, d = ellipses.shape[..., 0, 0], ellipses.shape[..., 0, 1], ellipses.shape[..., 1, 1]
@@ -122,11 +169,11 @@ def contour(ellipses: Outlines, points: int = 16) -> Array:
     return np.stack([u, v], axis=-1).reshape(len(a), 2 * points, 2)
 
 
-def distance(camera: Camera, pos3: Array, height: Array) -> Array:
-    """What orders people from near to far, (N,): along a line of sight the smaller hides the larger.
+def occlusion_distance(camera: Camera, pos3: Array, height: Array) -> Array:
+    """Return a distance (N,) m that orders people from near to far: of two on one line of sight, the nearer hides.
 
-    Upright bodies are met by any ray in the order of their axes' horizontal distance from a pinhole camera (whatever
-    its tilt); seen from above, the higher head is nearer.
+    Pinhole: the horizontal distance from the camera to the body's axis. A ray meets upright bodies in this order,
+    whatever the camera's tilt. From above: the height of the camera over the top of the head.
     """
     if camera.kind == "top":
         return np.asarray(camera.position[2] - pos3[:, 2] - height)

@@ -1,54 +1,61 @@
-"""How much of each labelled person is seen, where a recording has boxes and nothing else: by their silhouettes.
+"""How much of each labelled person is visible in a recording that has boxes only: estimated from the boxes.
 
-Each box is taken for the upright person of sim.scene.body, body and head filling it, and the one whose box ends lower
-in
-the image for the nearer (flat ground, a level camera). Things that hide people and are not labelled hide nobody here.
+Each box is taken for an upright person of `sim.scene.body` whose body and head fill it. Of two people, the one whose
+box ends lower in the image is the nearer (flat ground, a level camera). Only labelled people hide people here: walls
+and other objects are unknown.
 """
 
 from __future__ import annotations
 
 import numpy as np
 
-from sim.scene.body import BODY, HEAD, SHOULDERS, Outlines
+from sim.scene.body import BODY, BODY_PART, HEAD, HEAD_PART, SHOULDER_SHARE, Outlines, packed_inverse
+from sim.scene.raycast import only_flights
+from sim.scene.visibility import frame_starts
 from sim.types import Array, Truth
 
 
 def with_visibility(truth: Truth, image_size: tuple[int, int] | None) -> Truth:
-    """The truth with visibility, truncation and visible boxes from its boxes; as it is where these are labelled.
+    """Return the truth with visibility, truncation and visible boxes estimated from its boxes.
 
-    A visibility that the labels give is kept.
+    The truth is returned unchanged if it has no boxes, or has visible boxes already. If any labelled visibility is
+    below 1, all labelled visibilities are kept. image_size: width, height in px; if None, the image is taken to end at
+    the furthest right and lower edges of the boxes.
     """
     if truth.box is None or truth.visible_box is not None or not len(truth.box):
         return truth
-    from sim.scene.visibility import packed_inverse
-    from sim.scene.visibility_kernels import look
+    from sim.scene.visibility_kernels import sample_visibility
 
-    size = np.array(image_size if image_size is not None else extent(truth.box), dtype=float)
-    starts = np.concatenate([[0], np.flatnonzero(np.diff(truth.frame)) + 1, [len(truth.frame)]]).astype(np.int64)
-    ellipses = inscribed(truth.box)
-    nowhere, flat = np.zeros((0, 2, 2)), (np.zeros((0, 4)), 0.0, np.zeros((0, 3)), 0.0, np.zeros((0, 9)))
-    seen, cut, part = look(
-        starts, np.array(truth.box), np.ascontiguousarray(ellipses.centre), packed_inverse(ellipses.shape),
-        -(truth.box[:, 1] + truth.box[:, 3]), np.zeros((len(truth.box), 2)), size, False, np.zeros(3), np.eye(3),
-        nowhere, 0.0, np.zeros((0, 3)), 0.0, flat,
+    size = np.array(image_size if image_size is not None else image_size_of_boxes(truth.box), dtype=float)
+    ellipses = inscribed_outlines(truth.box)
+    nothing = only_flights(np.zeros((0, 9)))
+    seen, truncation, visible_box = sample_visibility(
+        frame_starts(truth.frame), np.array(truth.box), np.ascontiguousarray(ellipses.centre),
+        packed_inverse(ellipses.shape), -(truth.box[:, 1] + truth.box[:, 3]), np.zeros((len(truth.box), 2)), size,
+        False, np.zeros(3), np.eye(3), nothing, nothing,
     )  # fmt: skip
     labelled = bool((truth.visibility < 1).any())
-    return truth.replace(visibility=truth.visibility if labelled else seen, truncation=cut, visible_box=part)
+    return truth.replace(
+        visibility=truth.visibility if labelled else seen, truncation=truncation, visible_box=visible_box
+    )
 
 
-def inscribed(box: Array) -> Outlines:
-    """Body and head as ellipses that fill boxes (N, 4) ltwh, as a person's fill theirs."""
+def inscribed_outlines(box: Array) -> Outlines:
+    """Return body and head as ellipses that fill boxes (N, 4) ltwh px, as a person's fill the person's box."""
     left, top, width, height = box.T
     middle = left + width / 2
     centre, shape = np.empty((len(box), 2, 2)), np.zeros((len(box), 2, 2, 2))
-    for k, (part, wide) in enumerate(((BODY, 0.5), (HEAD, HEAD.across / SHOULDERS))):
+    for k, part, half_width in ((BODY_PART, BODY, 0.5), (HEAD_PART, HEAD, HEAD.across / SHOULDER_SHARE)):
         centre[:, k] = np.stack([middle, top + (1.0 - part.centre) * height], axis=1)
-        shape[:, k, 0, 0], shape[:, k, 1, 1] = (wide * width) ** 2, (part.up * height) ** 2
+        shape[:, k, 0, 0], shape[:, k, 1, 1] = (half_width * width) ** 2, (part.up * height) ** 2
     return Outlines(centre, shape)
 
 
-def extent(*boxes: Array) -> tuple[int, int]:
-    """An image that holds all these boxes: its width and height, px."""
+def image_size_of_boxes(*boxes: Array) -> tuple[int, int]:
+    """Return width and height (px, rounded up) of the smallest image from (0, 0) that holds all boxes (N, 4) ltwh.
+
+    (1, 1) without boxes.
+    """
     far = np.concatenate([box[:, :2] + box[:, 2:] for box in boxes]) if boxes else np.zeros((0, 2))
     width, height = np.ceil(far.max(axis=0, initial=1.0)) if len(far) else (1.0, 1.0)
     return int(width), int(height)

@@ -1,9 +1,9 @@
-"""Tsai's radial distortion, both ways in closed form.
+"""Tsai's radial lens distortion: distort, undistort and the derivative, all in closed form.
 
-A lens of coefficient k shows at x (N, 2), |x| = r, what an ideal one shows at y = x (1 + k r²); both in units of the
-focal length from the centre. Given |y| = q the distorted r is the root of r + k r³ = q that continues r = 0:
-r = 2/√(3k) sinh(asinh(3/2 q √(3k))/3) for k > 0, and with √(-3k), sin and asin for k < 0, where nothing is shown of
-q > 2/(3 √(-3k)).
+Coordinates are in units of the focal length, from the image centre. A lens of coefficient k shows at the distorted
+point x, |x| = r, what an ideal lens shows at y = x (1 + k r²). Given |y| = q, the distorted radius r is the root of
+r + k r³ = q that continues r = 0: r = 2/√(3k) sinh(asinh(3/2 q √(3k))/3) for k > 0. For k < 0 sin and asin with √(-3k)
+replace sinh and asinh; points with q > 2/(3 √(-3k)) are not shown at all.
 """
 
 from __future__ import annotations
@@ -13,15 +13,15 @@ import numpy as np
 from sim.types import Array
 
 
-def straight(x: Array, k: float) -> Array:
-    """Where an ideal lens would show what is seen at x (N, 2)."""
+def undistort(x: Array, k: float) -> Array:
+    """Return the ideal points (N, 2) of distorted points x (N, 2); x itself if k is 0."""
     if k == 0.0:
         return x
     return np.asarray(x * (1.0 + k * (x**2).sum(axis=1, keepdims=True)))
 
 
-def bent(y: Array, k: float) -> Array:
-    """Where the lens shows what an ideal one shows at y (N, 2); nan where it shows it nowhere."""
+def distort(y: Array, k: float) -> Array:
+    """Return the distorted points (N, 2) of ideal points y (N, 2); y itself if k is 0, nan where the lens shows none."""
     if k == 0.0:
         return y
     root = np.sqrt(3.0 * abs(k))
@@ -31,7 +31,7 @@ def bent(y: Array, k: float) -> Array:
         return np.asarray(y * np.where(q > 0, r / q, 1.0))
 
 
-def slope(x: Array, k: float) -> Array:
-    """(N, 2, 2) derivative of `straight`: (1 + k r²) I + 2 k x xᵀ."""
+def undistort_jacobian(x: Array, k: float) -> Array:
+    """Return the derivative (N, 2, 2) of `undistort` at x (N, 2): (1 + k r²) I + 2 k x xᵀ."""
     r2 = (x**2).sum(axis=1)
     return np.asarray((1.0 + k * r2)[:, None, None] * np.eye(2) + 2.0 * k * x[:, :, None] * x[:, None, :])

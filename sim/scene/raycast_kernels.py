@@ -1,7 +1,8 @@
-"""Compiled: what a ray meets of all that stands still: ground, walls, pillars, stairs.
+"""Compiled ray casting: the first thing that a ray meets among the ground, walls, pillars and stairs.
 
-Rays are o + t d. Stairs are drawn as steps: tread k of n lies at z = k rise/n, from (k - 1/2)/n to (k + 1/2)/n of the
-way (the last: to the end of the landing), where the smooth height of sim.scene.terrain is exactly that in the middle.
+A ray is o + t d. Stairs are drawn as steps: tread k of n lies at z = k rise/n, from (k - 1/2)/n to (k + 1/2)/n of the
+way; the last tread reaches to the end of the landing. In the middle of a tread, the smooth height of
+`sim.scene.terrain` equals the tread's.
 """
 
 from __future__ import annotations
@@ -9,38 +10,74 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
-NOTHING, GROUND, WALL, PILLAR, TREAD, RISER = range(6)
+from sim.scene.raycast import (
+    CENTRE_X,
+    CENTRE_Y,
+    GROUND,
+    HIT_INDEX,
+    HIT_KIND,
+    HIT_PLACE,
+    NORMAL_X,
+    NORMAL_Y,
+    NORMAL_Z,
+    NOTHING,
+    PILLAR,
+    RADIUS,
+    RISER,
+    TREAD,
+    WALL,
+    X1,
+    X2,
+    Y1,
+    Y2,
+)
+from sim.scene.terrain import AXIS_X, AXIS_Y, FOOT_X, FOOT_Y, HALF_WIDTH, LANDING, LENGTH, RISE, STEPS
+
 TINY = 1e-9
 
 
 @njit(cache=True)
-def _wall(o, d, wall, height, hit, best, index):  # type: ignore[no-untyped-def]
-    ex, ey = wall[2] - wall[0], wall[3] - wall[1]
+def at_pixel(field, u, v, out):  # type: ignore[no-untyped-def]
+    """Set out (3,) to field (3, 3) times (u, v, 1): origin or direction of a pixel's ray, from a PixelRays matrix."""
+    for k in range(3):
+        out[k] = field[k, 0] * u + field[k, 1] * v + field[k, 2]
+
+
+@njit(cache=True)
+def _set_hit(hit, kind, normal_x, normal_y, normal_z, index, place):  # type: ignore[no-untyped-def]
+    hit[HIT_KIND], hit[NORMAL_X], hit[NORMAL_Y], hit[NORMAL_Z] = kind, normal_x, normal_y, normal_z
+    hit[HIT_INDEX], hit[HIT_PLACE] = index, place
+
+
+@njit(cache=True)
+def _hit_wall(o, d, wall, height, hit, best, index):  # type: ignore[no-untyped-def]
+    """Return the t of the hit with one wall if it is below `best`, else `best`; `hit` is set accordingly."""
+    ex, ey = wall[X2] - wall[X1], wall[Y2] - wall[Y1]
     cross = d[0] * ey - d[1] * ex
     if cross == 0.0:
         return best
-    ax, ay = wall[0] - o[0], wall[1] - o[1]
+    ax, ay = wall[X1] - o[0], wall[Y1] - o[1]
     t = (ax * ey - ay * ex) / cross
     s = (ax * d[1] - ay * d[0]) / cross
     z = o[2] + t * d[2]
     if TINY < t < best and 0 <= s <= 1 and 0 <= z <= height:
         length = np.hypot(ex, ey)
         side = 1.0 if d[0] * ey - d[1] * ex < 0 else -1.0
-        hit[0], hit[1], hit[2], hit[3] = WALL, side * ey / length, -side * ex / length, 0
-        hit[4], hit[5] = index, s * length
+        _set_hit(hit, WALL, side * ey / length, -side * ex / length, 0.0, index, s * length)
         return t
     return best
 
 
 @njit(cache=True)
-def _pillar(o, d, pillar, height, hit, best, index):  # type: ignore[no-untyped-def]
-    px, py, r = o[0] - pillar[0], o[1] - pillar[1], pillar[2]
+def _hit_pillar(o, d, pillar, height, hit, best, index):  # type: ignore[no-untyped-def]
+    """Return the t of the hit with the top or side of one pillar if it is below `best`, else `best`."""
+    px, py, r = o[0] - pillar[CENTRE_X], o[1] - pillar[CENTRE_Y], pillar[RADIUS]
     a, b, c = d[0] * d[0] + d[1] * d[1], px * d[0] + py * d[1], px * px + py * py - r * r
     if d[2] < 0.0:
         t = (height - o[2]) / d[2]
         x, y = px + t * d[0], py + t * d[1]
         if TINY < t < best and x * x + y * y <= r * r:
-            hit[0], hit[1], hit[2], hit[3], hit[4], hit[5] = PILLAR, 0, 0, 1, index, 0
+            _set_hit(hit, PILLAR, 0.0, 0.0, 1.0, index, 0.0)
             best = t
     root = b * b - a * c
     if root > 0 and a > 0:
@@ -48,37 +85,36 @@ def _pillar(o, d, pillar, height, hit, best, index):  # type: ignore[no-untyped-
         z = o[2] + t * d[2]
         if TINY < t < best and 0 <= z <= height:
             nx, ny = (px + t * d[0]) / r, (py + t * d[1]) / r
-            hit[0], hit[1], hit[2], hit[3], hit[4], hit[5] = PILLAR, nx, ny, 0, index, np.arctan2(ny, nx) * r
+            _set_hit(hit, PILLAR, nx, ny, 0.0, index, np.arctan2(ny, nx) * r)
             return t
     return best
 
 
 @njit(cache=True)
 def step_height(flight, along):  # type: ignore[no-untyped-def]
-    """Height of the drawn step `along` m from the foot; 0 before the first riser."""
-    n = flight[7]
-    return flight[6] / n * min(max(np.floor(along / flight[4] * n + 0.5), 0.0), n)
+    """Return the height (m) of the drawn step `along` m from the foot of a flight; 0 before the first riser."""
+    n = flight[STEPS]
+    return flight[RISE] / n * min(max(np.floor(along / flight[LENGTH] * n + 0.5), 0.0), n)
 
 
 @njit(cache=True)
-def _turned(o, d, flight):  # type: ignore[no-untyped-def]
-    """Origin and direction along and across a flight."""
-    ux, uy = flight[2], flight[3]
-    x, y = o[0] - flight[0], o[1] - flight[1]
+def _in_flight_axes(o, d, flight):  # type: ignore[no-untyped-def]
+    """Return origin along, origin across, direction along and direction across a flight's axis."""
+    ux, uy = flight[AXIS_X], flight[AXIS_Y]
+    x, y = o[0] - flight[FOOT_X], o[1] - flight[FOOT_Y]
     return x * ux + y * uy, y * ux - x * uy, d[0] * ux + d[1] * uy, d[1] * ux - d[0] * uy
 
 
 @njit(cache=True)
-def _put(hit, kind, flight, along, across, up, index, place):  # type: ignore[no-untyped-def]
-    """Note a hit whose normal is given along, across and up a flight."""
-    hit[0], hit[3], hit[4], hit[5] = kind, up, index, place
-    hit[1] = along * flight[2] - across * flight[3]
-    hit[2] = along * flight[3] + across * flight[2]
+def _set_flight_hit(hit, kind, flight, along, across, up, index, place):  # type: ignore[no-untyped-def]
+    """Set a hit whose normal is given along a flight, across it, and up."""
+    ux, uy = flight[AXIS_X], flight[AXIS_Y]
+    _set_hit(hit, kind, along * ux - across * uy, along * uy + across * ux, up, index, place)
 
 
 @njit(cache=True)
-def _within(o, d, low, high, first, last):  # type: ignore[no-untyped-def]
-    """The part of first <= t <= last in which low <= o + t d <= high (and a little more); empty: first > last."""
+def _clip_interval(o, d, low, high, first, last):  # type: ignore[no-untyped-def]
+    """Return the part of first <= t <= last in which low <= o + t d <= high, widened by TINY; empty: first > last."""
     low, high = low - TINY, high + TINY
     if d == 0.0:
         return (first, last) if low <= o <= high else (1.0, 0.0)
@@ -87,14 +123,15 @@ def _within(o, d, low, high, first, last):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True)
-def _stairs(o, d, flight, hit, best, index):  # type: ignore[no-untyped-def]
-    """Nearest hit with treads, risers, both sides and the back of one flight."""
-    oa, oc, da, dc = _turned(o, d, flight)
-    length, half, rise, n, end = flight[4], flight[5], flight[6], int(flight[7]), flight[4] + flight[8]
+def _hit_flight(o, d, flight, hit, best, index):  # type: ignore[no-untyped-def]
+    """Return the t of the nearest hit with treads, risers, sides or back of one flight if below `best`, else `best`."""
+    oa, oc, da, dc = _in_flight_axes(o, d, flight)
+    length, half, rise, n = flight[LENGTH], flight[HALF_WIDTH], flight[RISE], int(flight[STEPS])
+    end = flight[LENGTH] + flight[LANDING]
     first = 0.5 / n * length
-    enter, leave = _within(oa, da, first, end, 0.0, best)
-    enter, leave = _within(oc, dc, -half, half, enter, leave)
-    enter, leave = _within(o[2], d[2], min(0.0, rise), max(0.0, rise), enter, leave)
+    enter, leave = _clip_interval(oa, da, first, end, 0.0, best)
+    enter, leave = _clip_interval(oc, dc, -half, half, enter, leave)
+    enter, leave = _clip_interval(o[2], d[2], min(0.0, rise), max(0.0, rise), enter, leave)
     if enter > leave + TINY:
         return best
     for k in range(1, n + 1):
@@ -104,13 +141,13 @@ def _stairs(o, d, flight, hit, best, index):  # type: ignore[no-untyped-def]
             t = (z - o[2]) / d[2]
             a = oa + t * da
             if TINY < t < best and low <= a <= high and abs(oc + t * dc) <= half:
-                _put(hit, TREAD, flight, 0.0, 0.0, 1.0, index, a)
+                _set_flight_hit(hit, TREAD, flight, 0.0, 0.0, 1.0, index, a)
                 best = t
         if da != 0.0:
             t = (low - oa) / da
             h = o[2] + t * d[2]
             if TINY < t < best and abs(oc + t * dc) <= half and min(z, z - rise / n) <= h <= max(z, z - rise / n):
-                _put(hit, RISER, flight, -1.0 if da > 0 else 1.0, 0.0, 0.0, index, oc + t * dc)
+                _set_flight_hit(hit, RISER, flight, -1.0 if da > 0 else 1.0, 0.0, 0.0, index, oc + t * dc)
                 best = t
     for side in (-1.0, 1.0):
         if dc != 0.0:
@@ -118,46 +155,48 @@ def _stairs(o, d, flight, hit, best, index):  # type: ignore[no-untyped-def]
             a, h = oa + t * da, o[2] + t * d[2]
             z = step_height(flight, a)
             if TINY < t < best and first <= a <= end and min(0.0, z) <= h <= max(0.0, z):
-                _put(hit, RISER, flight, 0.0, -1.0 if dc > 0 else 1.0, 0.0, index, a)
+                _set_flight_hit(hit, RISER, flight, 0.0, -1.0 if dc > 0 else 1.0, 0.0, index, a)
                 best = t
     if da != 0.0:
         t = (end - oa) / da
         h = o[2] + t * d[2]
         if TINY < t < best and abs(oc + t * dc) <= half and min(0.0, rise) <= h <= max(0.0, rise):
-            _put(hit, RISER, flight, -1.0 if da > 0 else 1.0, 0.0, 0.0, index, oc + t * dc)
+            _set_flight_hit(hit, RISER, flight, -1.0 if da > 0 else 1.0, 0.0, 0.0, index, oc + t * dc)
             best = t
     return best
 
 
 @njit(cache=True)
 def _on_stairs(x, y, flights):  # type: ignore[no-untyped-def]
-    """Whether a flight takes the place of level ground here."""
+    """Return True if a flight replaces the level ground at (x, y)."""
     for k in range(len(flights)):
         f = flights[k]
-        dx, dy = x - f[0], y - f[1]
-        along, across = dx * f[2] + dy * f[3], dy * f[2] - dx * f[3]
-        if 0.5 / f[7] * f[4] < along <= f[4] + f[8] and abs(across) <= f[5]:
+        dx, dy = x - f[FOOT_X], y - f[FOOT_Y]
+        along, across = dx * f[AXIS_X] + dy * f[AXIS_Y], dy * f[AXIS_X] - dx * f[AXIS_Y]
+        if 0.5 / f[STEPS] * f[LENGTH] < along <= f[LENGTH] + f[LANDING] and abs(across) <= f[HALF_WIDTH]:
             return True
     return False
 
 
 @njit(cache=True)
-def nearest(o, d, still, hit):  # type: ignore[no-untyped-def]
-    """t of the first thing on the ray, inf if none; still: see sim.render.background.solids; hit: kind, normal (3),
-    index, place
-    along it (m)."""
-    walls, wall_height, pillars, pillar_height, flights = still
+def first_hit(o, d, solids, hit):  # type: ignore[no-untyped-def]
+    """Return the t of the first thing on the ray o + t d, t > 0; inf if the ray meets nothing.
+
+    solids: a `sim.scene.raycast.Solids`. hit (6,) is set: kind, normal x, y, z, index among its kind, and the place
+    along the thing in m (along a wall, round a pillar, along or across a flight; 0 on the ground). Without a hit only
+    its kind is set, to NOTHING.
+    """
     best = np.inf
-    hit[0] = NOTHING
+    hit[HIT_KIND] = NOTHING
     if d[2] != 0.0:
         t = -o[2] / d[2]
-        if t > TINY and not _on_stairs(o[0] + t * d[0], o[1] + t * d[1], flights):
+        if t > TINY and not _on_stairs(o[0] + t * d[0], o[1] + t * d[1], solids.flights):
             best = t
-            hit[0], hit[1], hit[2], hit[3], hit[4], hit[5] = GROUND, 0, 0, 1, 0, 0
-    for k in range(len(walls)):
-        best = _wall(o, d, walls[k], wall_height, hit, best, k)
-    for k in range(len(pillars)):
-        best = _pillar(o, d, pillars[k], pillar_height, hit, best, k)
-    for k in range(len(flights)):
-        best = _stairs(o, d, flights[k], hit, best, k)
+            _set_hit(hit, GROUND, 0.0, 0.0, 1.0, 0, 0.0)
+    for k in range(len(solids.walls)):
+        best = _hit_wall(o, d, solids.walls[k], solids.wall_height, hit, best, k)
+    for k in range(len(solids.pillars)):
+        best = _hit_pillar(o, d, solids.pillars[k], solids.pillar_height, hit, best, k)
+    for k in range(len(solids.flights)):
+        best = _hit_flight(o, d, solids.flights[k], hit, best, k)
     return best

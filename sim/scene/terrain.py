@@ -1,4 +1,4 @@
-"""The height of the ground: z = h(x, y), zero but for stairs."""
+"""The height of the ground, z = h(x, y): zero except on stairs."""
 
 from __future__ import annotations
 
@@ -6,22 +6,27 @@ import numpy as np
 
 from sim.types import Array, Scene, Stairs
 
+FOOT_X, FOOT_Y, AXIS_X, AXIS_Y, LENGTH, HALF_WIDTH, RISE, STEPS, LANDING = range(9)  # columns of `flight_rows`
+
 
 def height_at(scene: Scene, xy: Array) -> Array:
-    """Ground height (...) in m at places (..., 2); nan places stand at 0. Where stairs overlap, the higher."""
+    """Return the ground's height (...) m at points xy (..., 2) m: 0 off the stairs, and 0 where xy is nan.
+
+    Where two flights overlap, the height further from 0 counts.
+    """
     xy = np.asarray(xy, dtype=float)
     z = np.zeros(xy.shape[:-1])
     for stairs in scene.stairs:
-        h = _flight(stairs, xy)
+        h = _flight_height(stairs, xy)
         z = np.where(np.abs(h) > np.abs(z), h, z)
     return z
 
 
-def _flight(stairs: Stairs, xy: Array) -> Array:
-    """Height of one flight: each step rises smoothly over its tread, as a walker's body does.
+def _flight_height(stairs: Stairs, xy: Array) -> Array:
+    """Height (...) of one flight; each step rises smoothly over its tread, as a walker's body does.
 
-    h = rise/n (k + r - sin(2πr)/2π) with k + r = n s, s the share of the way from foot to head: continuous in value
-    and slope, rise/n per step, level at each edge.
+    h = rise/n (k + r - sin(2πr)/2π) with k + r = n s, where s is the share of the way from foot to head. Value and
+    slope are continuous; each step adds rise/n and is level at both its edges.
     """
     axis = stairs.head - stairs.foot
     length = float(np.hypot(axis[0], axis[1]))
@@ -37,8 +42,11 @@ def _flight(stairs: Stairs, xy: Array) -> Array:
     return np.where(inside, h, 0.0)
 
 
-def flights(scene: Scene) -> Array:
-    """Stairs as rows (S, 9): foot x, y, unit axis x, y, length, half width, rise, steps, landing; m."""
+def flight_rows(scene: Scene) -> Array:
+    """Return the stairs as rows (S, 9) for the compiled ray casting, in m.
+
+    Columns: foot x, foot y, unit axis x, unit axis y, length, half width, rise, number of steps, landing.
+    """
     rows = np.zeros((len(scene.stairs), 9))
     for row, stairs in zip(rows, scene.stairs, strict=True):
         axis = stairs.head - stairs.foot

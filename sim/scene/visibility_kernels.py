@@ -1,37 +1,43 @@
-"""Compiled loops of sim.scene.visibility: which samples of a silhouette are hidden. The numpy twin is in the tests."""
+"""Compiled loops of `sim.scene.visibility`: which samples of a silhouette are visible. The tests hold a numpy twin."""
 
 from __future__ import annotations
 
 import numpy as np
 from numba import njit
 
-from sim.scene.raycast_kernels import nearest
+from sim.scene.body import XX, XY, YY
+from sim.scene.raycast import CENTRE_X, CENTRE_Y, HIT_SLOTS, RADIUS, X1, X2, Y1, Y2
+from sim.scene.raycast_kernels import at_pixel, first_hit
 
-COLUMNS, ROWS = 16, 32  # cells laid over each amodal box
+COLUMNS, ROWS = 16, 32  # cells laid over each amodal box, one sample in the middle of each
+LEFT, TOP, WIDTH, HEIGHT = range(4)  # columns of boxes
 
 
 @njit(cache=True)
 def _inside(centre, inverse, i, u, v):  # type: ignore[no-untyped-def]
-    """Whether (u, v) lies in body or head of row i: (u - m)ᵀ E⁻¹ (u - m) <= 1, E⁻¹ packed as a, b, d."""
-    for k in range(2):
-        x, y = u - centre[i, k, 0], v - centre[i, k, 1]
-        if x * x * inverse[i, k, 0] + 2 * x * y * inverse[i, k, 1] + y * y * inverse[i, k, 2] <= 1.0:
+    """Return True if (u, v) lies in the body or head of row i: (u - m)ᵀ E⁻¹ (u - m) <= 1."""
+    for part in range(2):
+        x, y = u - centre[i, part, 0], v - centre[i, part, 1]
+        if x * x * inverse[i, part, XX] + 2 * x * y * inverse[i, part, XY] + y * y * inverse[i, part, YY] <= 1.0:
             return True
     return False
 
 
 @njit(cache=True)
-def _nearer(i, first, last, box, distance, found):  # type: ignore[no-untyped-def]
-    """Rows of the same frame that are nearer than i and whose boxes overlap i's, into `found`; their number."""
+def _nearer_people(i, first, last, box, distance, found):  # type: ignore[no-untyped-def]
+    """Write into `found` the rows of the same frame nearer than i whose boxes overlap that of i; return their number.
+
+    Of two rows at one distance the lower one is nearer.
+    """
     n = 0
     for j in range(first, last):
         if distance[j] > distance[i] or (distance[j] == distance[i] and j >= i):
             continue
         if (
-            box[j, 0] < box[i, 0] + box[i, 2]
-            and box[i, 0] < box[j, 0] + box[j, 2]
-            and box[j, 1] < box[i, 1] + box[i, 3]
-            and box[i, 1] < box[j, 1] + box[j, 3]
+            box[j, LEFT] < box[i, LEFT] + box[i, WIDTH]
+            and box[i, LEFT] < box[j, LEFT] + box[j, WIDTH]
+            and box[j, TOP] < box[i, TOP] + box[i, HEIGHT]
+            and box[i, TOP] < box[j, TOP] + box[j, HEIGHT]
         ):
             found[n] = j
             n += 1
@@ -40,11 +46,11 @@ def _nearer(i, first, last, box, distance, found):  # type: ignore[no-untyped-de
 
 @njit(cache=True)
 def _walls_between(x, y, eye, walls, found):  # type: ignore[no-untyped-def]
-    """Walls with the person at (x, y) and the eye on different sides of their line, into `found`; their number."""
+    """Write into `found` the walls whose line separates the person at (x, y) from the eye; return their number."""
     n = 0
     for w in range(len(walls)):
-        ax, ay = walls[w, 0, 0], walls[w, 0, 1]
-        ex, ey = walls[w, 1, 0] - ax, walls[w, 1, 1] - ay
+        ax, ay = walls[w, X1], walls[w, Y1]
+        ex, ey = walls[w, X2] - ax, walls[w, Y2] - ay
         if (ex * (y - ay) - ey * (x - ax)) * (ex * (eye[1] - ay) - ey * (eye[0] - ax)) < 0:
             found[n] = w
             n += 1
@@ -53,22 +59,25 @@ def _walls_between(x, y, eye, walls, found):  # type: ignore[no-untyped-def]
 
 @njit(cache=True)
 def _pillars_before(x, y, eye, pillars, found):  # type: ignore[no-untyped-def]
-    """Pillars nearer to the eye than the person: those whose tangent from the eye is shorter than the way to (x, y)."""
+    """Write into `found` the pillars nearer to the eye than the person at (x, y); return their number.
+
+    A pillar is nearer if the tangent from the eye to it is shorter than the way to the person.
+    """
     n = 0
     dx, dy = x - eye[0], y - eye[1]
     for p in range(len(pillars)):
-        px, py = pillars[p, 0] - eye[0], pillars[p, 1] - eye[1]
-        if dx * dx + dy * dy > px * px + py * py - pillars[p, 2] ** 2 and px * dx + py * dy > 0:
+        px, py = pillars[p, CENTRE_X] - eye[0], pillars[p, CENTRE_Y] - eye[1]
+        if dx * dx + dy * dy > px * px + py * py - pillars[p, RADIUS] ** 2 and px * dx + py * dy > 0:
             found[n] = p
             n += 1
     return n
 
 
 @njit(cache=True)
-def _wall_hit(d, eye, wall, height):  # type: ignore[no-untyped-def]
-    """Whether the ray eye + s d, s > 0, meets the upright rectangle over `wall` from z = 0 to `height`."""
-    ex, ey = wall[1, 0] - wall[0, 0], wall[1, 1] - wall[0, 1]
-    ax, ay = wall[0, 0] - eye[0], wall[0, 1] - eye[1]
+def _meets_wall(d, eye, wall, height):  # type: ignore[no-untyped-def]
+    """Return True if the ray eye + s d, s > 0, meets the upright rectangle over `wall` from z = 0 to `height`."""
+    ex, ey = wall[X2] - wall[X1], wall[Y2] - wall[Y1]
+    ax, ay = wall[X1] - eye[0], wall[Y1] - eye[1]
     cross = d[0] * ey - d[1] * ex
     if cross == 0.0:
         return False
@@ -79,12 +88,12 @@ def _wall_hit(d, eye, wall, height):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True)
-def _pillar_hit(d, eye, pillar, height):  # type: ignore[no-untyped-def]
-    """Whether the ray eye + s d, s > 0, meets the upright cylinder from z = 0 to `height`, its top included."""
-    px, py = pillar[0] - eye[0], pillar[1] - eye[1]
+def _meets_pillar(d, eye, pillar, height):  # type: ignore[no-untyped-def]
+    """Return True if the ray eye + s d, s > 0, meets the upright cylinder from z = 0 to `height`, its top included."""
+    px, py = pillar[CENTRE_X] - eye[0], pillar[CENTRE_Y] - eye[1]
     a = d[0] * d[0] + d[1] * d[1]
     b = px * d[0] + py * d[1]
-    root = b * b - a * (px * px + py * py - pillar[2] ** 2)
+    root = b * b - a * (px * px + py * py - pillar[RADIUS] ** 2)
     if root <= 0 or a == 0.0 or b <= 0:
         return False
     enter = eye[2] + max(0.0, (b - np.sqrt(root)) / a) * d[2]
@@ -93,10 +102,11 @@ def _pillar_hit(d, eye, pillar, height):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True)
-def span(start, length, cells, low, high, first, last, limit):  # type: ignore[no-untyped-def]
-    """Start and length of the visible cells low … high along one axis, cut at the image.
+def visible_span(start, length, cells, low, high, first, last, limit):  # type: ignore[no-untyped-def]
+    """Return start and length (px) of the visible cells low … high along one axis of a box, clipped to 0 … limit.
 
-    Where the silhouette's own first or last cell is visible, its amodal edge is taken, whatever the cell's middle.
+    start, length: of the amodal box; `cells`: number of cells along it; first, last: the outermost cells that the
+    silhouette covers. If an outermost cell is visible, the span reaches to the edge of the amodal box.
     """
     a = start + (0 if low == first else low) * length / cells
     b = start + (cells if high == last else high + 1) * length / cells
@@ -105,44 +115,55 @@ def span(start, length, cells, low, high, first, last, limit):  # type: ignore[n
 
 
 @njit(cache=True)
-def _meets(d, eye, walls, between, tall, pillars, before, high):  # type: ignore[no-untyped-def]
-    """Whether the ray eye + s d meets one of the walls `between` or one of the pillars `before`."""
+def _meets_any(d, eye, between, before, solids):  # type: ignore[no-untyped-def]
+    """Return True if the ray eye + s d meets one of the walls `between` or one of the pillars `before`."""
     hit = False
     for w in between:
-        hit = hit or _wall_hit(d, eye, walls[w], tall)
+        hit = hit or _meets_wall(d, eye, solids.walls[w], solids.wall_height)
     for p in before:
-        hit = hit or _pillar_hit(d, eye, pillars[p], high)
+        hit = hit or _meets_pillar(d, eye, solids.pillars[p], solids.pillar_height)
     return hit
 
 
 @njit(cache=True)
-def _stairs_before(d, eye, x, y, still, hit):  # type: ignore[no-untyped-def]
-    """Whether the ray eye + s d meets stairs, or ground before a flight that goes down, before the upright plane
-    through (x, y) that faces the eye."""
+def _stairs_before(d, eye, x, y, stairs, hit):  # type: ignore[no-untyped-def]
+    """Return True if the ray eye + s d meets stairs or ground before the upright plane through (x, y) facing the eye.
+
+    Level ground can come first only in front of a flight that goes down.
+    """
     dx, dy = x - eye[0], y - eye[1]
     towards = d[0] * dx + d[1] * dy
-    return towards > 0.0 and nearest(eye, d, still, hit) < (dx * dx + dy * dy) / towards
+    return towards > 0.0 and first_hit(eye, d, stairs, hit) < (dx * dx + dy * dy) / towards
 
 
 @njit(cache=True)
-def look(starts, box, centre, inverse, distance, pos, size, has_eye, eye, unproject, walls, tall, pillars, high, still):  # type: ignore[no-untyped-def]
-    """Visibility (R,), truncation (R,) and visible boxes (R, 4) of all rows; see sim.scene.visibility.look."""
+def sample_visibility(  # type: ignore[no-untyped-def]
+    starts, box, centre, inverse, distance, pos, image_size, has_eye, eye, unproject, solids, stairs
+):
+    """Return visibility (R,), truncation (R,) and visible boxes (R, 4) ltwh px of R people, sorted by frame.
+
+    starts (F + 1,): first row of each frame, and R. box (R, 4) ltwh px: amodal. centre (R, 2, 2), inverse (R, 2, 3):
+    ellipses of body and head. distance (R,): occlusion order. pos (R, 2) m. image_size (2,): width, height. has_eye:
+    False for a camera from above, which ignores solids. eye (3,) m. unproject (3, 3): see `raycast.unprojection`.
+    solids: walls and pillars count; stairs: Solids with nothing but the flights. A row whose box is nan or empty has 0,
+    1 and nan.
+    """
     rows = len(box)
     seen, cut, part = np.zeros(rows), np.ones(rows), np.full((rows, 4), np.nan)
     people = np.empty(rows, np.int64)
-    between, before = np.empty(len(walls), np.int64), np.empty(len(pillars), np.int64)
-    d, hit = np.empty(3), np.empty(6)
-    stairs = has_eye and len(still[4]) > 0
+    between, before = np.empty(len(solids.walls), np.int64), np.empty(len(solids.pillars), np.int64)
+    d, hit = np.empty(3), np.empty(HIT_SLOTS)
+    has_stairs = has_eye and len(stairs.flights) > 0
     for f in range(len(starts) - 1):
         for i in range(starts[f], starts[f + 1]):
-            left, top, width, height = box[i, 0], box[i, 1], box[i, 2], box[i, 3]
+            left, top, width, height = box[i, LEFT], box[i, TOP], box[i, WIDTH], box[i, HEIGHT]
             if not (width > 0 and height > 0):
                 continue
-            n = _nearer(i, starts[f], starts[f + 1], box, distance, people)
-            n_walls = _walls_between(pos[i, 0], pos[i, 1], eye, walls, between) if has_eye else 0
-            n_pillars = _pillars_before(pos[i, 0], pos[i, 1], eye, pillars, before) if has_eye else 0
-            whole = left >= 0 and top >= 0 and left + width <= size[0] and top + height <= size[1]
-            if whole and n + n_walls + n_pillars == 0 and not stairs:
+            n = _nearer_people(i, starts[f], starts[f + 1], box, distance, people)
+            n_walls = _walls_between(pos[i, 0], pos[i, 1], eye, solids.walls, between) if has_eye else 0
+            n_pillars = _pillars_before(pos[i, 0], pos[i, 1], eye, solids.pillars, before) if has_eye else 0
+            whole = left >= 0 and top >= 0 and left + width <= image_size[0] and top + height <= image_size[1]
+            if whole and n + n_walls + n_pillars == 0 and not has_stairs:
                 seen[i], cut[i], part[i] = 1.0, 0.0, box[i]
                 continue
             total = inside = visible = 0
@@ -157,7 +178,7 @@ def look(starts, box, centre, inverse, distance, pos, size, has_eye, eye, unproj
                     total += 1
                     all_low_c, all_high_c = min(all_low_c, c), max(all_high_c, c)
                     all_low_r, all_high_r = min(all_low_r, r), max(all_high_r, r)
-                    if not (0 <= u < size[0] and 0 <= v < size[1]):
+                    if not (0 <= u < image_size[0] and 0 <= v < image_size[1]):
                         continue
                     inside += 1
                     hidden = False
@@ -165,12 +186,11 @@ def look(starts, box, centre, inverse, distance, pos, size, has_eye, eye, unproj
                         if _inside(centre, inverse, people[k], u, v):
                             hidden = True
                             break
-                    if not hidden and (stairs or n_walls + n_pillars):
-                        for k in range(3):
-                            d[k] = unproject[k, 0] * u + unproject[k, 1] * v + unproject[k, 2]
-                        hidden = _meets(d, eye, walls, between[:n_walls], tall, pillars, before[:n_pillars], high)
-                        if not hidden and stairs:
-                            hidden = _stairs_before(d, eye, pos[i, 0], pos[i, 1], still, hit)
+                    if not hidden and (has_stairs or n_walls + n_pillars):
+                        at_pixel(unproject, u, v, d)
+                        hidden = _meets_any(d, eye, between[:n_walls], before[:n_pillars], solids)
+                        if not hidden and has_stairs:
+                            hidden = _stairs_before(d, eye, pos[i, 0], pos[i, 1], stairs, hit)
                     if not hidden:
                         visible += 1
                         low_c, high_c = min(low_c, c), max(high_c, c)
@@ -179,6 +199,10 @@ def look(starts, box, centre, inverse, distance, pos, size, has_eye, eye, unproj
                 continue
             seen[i], cut[i] = visible / total, 1 - inside / total
             if visible:
-                part[i, 0], part[i, 2] = span(left, width, COLUMNS, low_c, high_c, all_low_c, all_high_c, size[0])
-                part[i, 1], part[i, 3] = span(top, height, ROWS, low_r, high_r, all_low_r, all_high_r, size[1])
+                part[i, LEFT], part[i, WIDTH] = visible_span(
+                    left, width, COLUMNS, low_c, high_c, all_low_c, all_high_c, image_size[0]
+                )
+                part[i, TOP], part[i, HEIGHT] = visible_span(
+                    top, height, ROWS, low_r, high_r, all_low_r, all_high_r, image_size[1]
+                )
     return seen, cut, part

@@ -10,21 +10,21 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from sim.scene.body import RecordedBodies, recorded_bodies
 from sim.scene.camera import px_per_m_at_centre
-from sim.scene.viewpoint import Bodies, recorded
-from sim.scene.visibility import look
+from sim.scene.visibility import measure_visibility
 from sim.truth.image_group_hulls import image_groups
 from sim.types import Camera, GroupEvent, Groups, Ints, Motion, Truth
 
 
 def bodies(motion: Motion, camera: Camera | None) -> Truth:
     """Places, boxes, visibility of everybody in every frame; no groups and no events (group is -1 throughout)."""
-    return _bodies(motion, camera, recorded(motion))
+    return _bodies(motion, camera, recorded_bodies(motion))
 
 
-def _bodies(motion: Motion, camera: Camera | None, people: Bodies) -> Truth:
+def _bodies(motion: Motion, camera: Camera | None, people: RecordedBodies) -> Truth:
     t, p = people.frame - 1, people.id - 1
-    seen = None if camera is None else look(
+    seen = None if camera is None else measure_visibility(
         camera, motion.scene, people.frame, people.pos3, motion.height[p], people.shapes
     )  # fmt: skip
     return Truth(
@@ -52,7 +52,7 @@ def label(motion: Motion, camera: Camera | None) -> Truth:
     """All that is true: `bodies`, and groups, events and hard negatives measured from motion and intent."""
     from sim.truth.merge_split_events import groups_and_events
 
-    people = recorded(motion)
+    people = recorded_bodies(motion)
     truth = _bodies(motion, camera, people)
     found = groups_and_events(motion.pos, motion.vel, motion.present, motion.intent, motion.fps)
     truth = truth.replace(group=found.group[people.frame - 1, people.id - 1])

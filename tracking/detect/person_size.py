@@ -12,7 +12,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from sim.scene.camera import PERSON
+from sim.scene.body import PERSON_HEIGHT
 from sim.types import Array, Bools, Camera, Context
 from tracking.detect import person_size_kernels as kernels
 
@@ -113,7 +113,7 @@ class PersonSize:
     @property
     def px_per_m(self) -> float:
         """Scale of the image: the median height of the lone blobs seen / 1.7 m; nan without any."""
-        return float(np.median(self.seen[:, 2])) / PERSON if len(self.seen) else float("nan")
+        return float(np.median(self.seen[:, 2])) / PERSON_HEIGHT if len(self.seen) else float("nan")
 
     def learn(self, box: Array, ellipse: Array, whole: Bools) -> None:
         """Add the blobs (M, 4) ltwh, (M, 5), that may be somebody alone; `whole` (M,): away from the image's edge."""
@@ -212,7 +212,7 @@ def _crowding(place: Array) -> Array:
 
 def _table(camera: Camera, low: Array) -> Array:
     """(2, V, U) height and width at nodes STEP px apart from `low` on; nan where nobody can stand."""
-    from sim.scene.body import boxes
+    from sim.scene.body import person_boxes
     from sim.scene.camera import to_ground
 
     size = (np.array(camera.image) * (1 + 2 * MARGIN) / STEP).astype(int) + 2
@@ -225,7 +225,9 @@ def _table(camera: Camera, low: Array) -> Array:
         if not seen.any():
             break
         place = np.column_stack([ground[seen], np.zeros(int(seen.sum()))])
-        turned = [boxes(camera, place, np.full(len(place), a), np.full(len(place), PERSON)) for a in _TURNS]
+        turned = [
+            person_boxes(camera, place, np.full(len(place), a), np.full(len(place), PERSON_HEIGHT)) for a in _TURNS
+        ]
         box = np.mean(turned, 0)
         found[seen] = box[:, :1:-1]
         aim[seen] += np.nan_to_num(foot[seen] - _feet(box))
@@ -234,9 +236,9 @@ def _table(camera: Camera, low: Array) -> Array:
 
 def _from_above(camera: Camera) -> Array:
     """(2,) longer and shorter axis of a person, px."""
-    from sim.scene.body import boxes
+    from sim.scene.body import person_boxes
 
-    return np.sort(boxes(camera, np.zeros((1, 3)), np.zeros(1), np.array([PERSON]))[0, 2:])[::-1]
+    return np.sort(person_boxes(camera, np.zeros((1, 3)), np.zeros(1), np.array([PERSON_HEIGHT]))[0, 2:])[::-1]
 
 
 _TURNS = np.radians([0.0, 45.0, 90.0, 135.0])

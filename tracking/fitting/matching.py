@@ -17,7 +17,7 @@ from scenarios.errors import InputError
 from scenarios.schema.sensor import BoxNoise
 from sim.detector.box_noise import box_errors, erring
 from sim.io.formats import mot_text
-from sim.scene.box_visibility import extent, with_visibility
+from sim.scene.box_visibility import image_size_of_boxes, with_visibility
 from sim.types import Array, Bools, Camera, Detections, Ints, Sequence, Truth
 from tracking.filters.assignment import optimal
 
@@ -95,7 +95,7 @@ def match(
     score = np.concatenate([np.zeros(0), *(d.score for d in found)])
     on_ground = truth.pos is not None and any(d.plane == "ground" for d in found if len(d.pos))
     pos = np.concatenate([np.zeros((0, 2)), *(d.pos for d in found)]) if on_ground else None
-    size = size if size is not None else extent(box, truth.box)
+    size = size if size is not None else image_size_of_boxes(box, truth.box)
     true, truth = truth.box, with_visibility(truth, size)
     pairs = _pairs(truth, frame, box)
     if len(pairs[0]):

@@ -61,10 +61,10 @@ def fit_misses(recordings: Sequence[Matched]) -> tuple[Chance, tuple[Memory, ...
 def _heights(m: Matched) -> Array:
     """What decides on size: the boxes' heights, from above what sim.detector.sense takes for them."""
     assert m.truth.box is not None
-    from sim.scene.body import SHOULDERS
+    from sim.scene.body import SHOULDER_SHARE
 
     if m.camera is not None and m.camera.kind == "top":
-        return np.asarray(m.truth.box[:, 2:].max(axis=1) / SHOULDERS)
+        return np.asarray(m.truth.box[:, 2:].max(axis=1) / SHOULDER_SHARE)
     return m.truth.box[:, 3]
 
 

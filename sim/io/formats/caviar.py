@@ -17,7 +17,7 @@ import numpy as np
 from scenarios.errors import InputError
 from sim.io.formats.group_labels import labelled_truth_fields
 from sim.io.formats.velocity import differentiate
-from sim.scene.camera import PERSON
+from sim.scene.body import PERSON_HEIGHT
 from sim.truth.group_hulls import box_groups
 from sim.types import Array, Frame, Ints, Sequence, Truth
 
@@ -42,7 +42,7 @@ class CaviarRecording:
     @property
     def px_per_m(self) -> float:
         """Median of the longer sides / 1.7 m; nan without boxes."""
-        return float(np.median(self.size.max(axis=1))) / PERSON if len(self.size) else float("nan")
+        return float(np.median(self.size.max(axis=1))) / PERSON_HEIGHT if len(self.size) else float("nan")
 
 
 def read_xml(path: Path) -> CaviarRecording:

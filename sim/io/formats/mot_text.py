@@ -14,7 +14,7 @@ import numpy as np
 
 from sim.io.files.numeric_text import NumericTable, read_numbers
 from sim.io.formats.velocity import differentiate
-from sim.scene.camera import PERSON
+from sim.scene.body import PERSON_HEIGHT
 from sim.types import Array, Bools, Detections, Ints, Plane, Truth
 
 PEDESTRIAN = 1
@@ -135,7 +135,7 @@ def read_truth(path: Path, name: str, fps: float, length: int | None = None, px_
     ground = table.ground()
     place = None if ground is None else ground[order]
     if not np.isfinite(px_per_m) and len(box):
-        px_per_m = float(np.median(box[:, 3])) / PERSON
+        px_per_m = float(np.median(box[:, 3])) / PERSON_HEIGHT
     frames = length if length is not None else int(frame.max(initial=0))
     return Truth(
         name=name, fps=fps, length=frames, px_per_m=px_per_m, frame=frame, id=id,

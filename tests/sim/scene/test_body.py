@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from sim.scene.body import BODY, HEAD, boxes, contour, distance, ellipsoids, outlines
+from sim.scene.body import BODY, HEAD, contour, ellipsoids, occlusion_distance, outlines, person_boxes
 from sim.scene.camera import project
 from sim.scene.terrain import height_at
 from sim.types import Camera, Scene, Stairs
@@ -19,7 +19,7 @@ def test_boxes_enclose_the_surface_exactly(camera: Camera) -> None:
         uv, depth = project(camera, surface(pos3, heading, height))
         if (depth < 0.5).any():
             continue
-        left, top, width, tall = boxes(camera, pos3[None], np.array([heading]), np.array([height]))[0]
+        left, top, width, tall = person_boxes(camera, pos3[None], np.array([heading]), np.array([height]))[0]
         low, high = uv.min(axis=0), uv.max(axis=0)
         size = max(width, tall)
         assert [left, top] == pytest.approx(low, abs=2e-3 * size)
@@ -30,7 +30,7 @@ def test_boxes_enclose_the_surface_exactly(camera: Camera) -> None:
 
 def test_a_person_is_as_tall_and_wide_as_the_contract_says() -> None:
     camera = above()
-    box = boxes(camera, np.array([[8.0, 5.0, 0.0]]), np.array([np.pi / 2]), np.array([1.7]))[0]
+    box = person_boxes(camera, np.array([[8.0, 5.0, 0.0]]), np.array([np.pi / 2]), np.array([1.7]))[0]
     assert box[2:] / 40 == pytest.approx([0.27 * 1.7, 0.16 * 1.7])
     assert pytest.approx(1.0) == HEAD.centre + HEAD.up
     assert pytest.approx(0.0) == BODY.centre - BODY.up
@@ -40,33 +40,33 @@ def test_a_person_is_as_tall_and_wide_as_the_contract_says() -> None:
 
 def test_turning_a_person_by_half_changes_nothing() -> None:
     pos3 = np.array([[6.0, 4.0, 0.0]])
-    a = boxes(pinhole(), pos3, np.array([0.4]), np.array([1.7]))
-    assert boxes(pinhole(), pos3, np.array([0.4 + np.pi]), np.array([1.7])) == pytest.approx(a)
+    a = person_boxes(pinhole(), pos3, np.array([0.4]), np.array([1.7]))
+    assert person_boxes(pinhole(), pos3, np.array([0.4 + np.pi]), np.array([1.7])) == pytest.approx(a)
 
 
 def test_contours_touch_the_boxes() -> None:
     pos3 = np.array([[6.0, 4.0, 0.0], [9.0, 7.0, 0.0]])
     heading, height = np.array([0.3, 2.0]), np.array([1.6, 1.9])
     edge = contour(outlines(pinhole(), ellipsoids(pos3, heading, height)), points=720)
-    box = boxes(pinhole(), pos3, heading, height)
+    box = person_boxes(pinhole(), pos3, heading, height)
     assert edge.min(axis=1) == pytest.approx(box[:, :2], abs=0.01)
     assert edge.max(axis=1) == pytest.approx(box[:, :2] + box[:, 2:], abs=0.01)
 
 
 def test_who_is_behind_the_camera_has_no_box() -> None:
-    box = boxes(pinhole(0), np.array([[8.0, -9.0, 6.0], [8.0, -6.0, 6.0]]), np.zeros(2), np.full(2, 1.7))
+    box = person_boxes(pinhole(0), np.array([[8.0, -9.0, 6.0], [8.0, -6.0, 6.0]]), np.zeros(2), np.full(2, 1.7))
     assert np.isnan(box).all()
 
 
 def test_nobody_has_no_boxes() -> None:
-    assert boxes(pinhole(), np.zeros((0, 3)), np.zeros(0), np.zeros(0)).shape == (0, 4)
+    assert person_boxes(pinhole(), np.zeros((0, 3)), np.zeros(0), np.zeros(0)).shape == (0, 4)
 
 
 def test_near_is_near() -> None:
     pos3 = np.array([[8.0, 2.0, 0.0], [8.0, 4.0, 0.0]])
-    near, far = distance(pinhole(), pos3, np.full(2, 1.7))
+    near, far = occlusion_distance(pinhole(), pos3, np.full(2, 1.7))
     assert near < far
-    tall, small = distance(above(), pos3, np.array([1.9, 1.6]))
+    tall, small = occlusion_distance(above(), pos3, np.array([1.9, 1.6]))
     assert tall < small
 
 

@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from sim.scene.box_visibility import extent, with_visibility
+from sim.scene.box_visibility import image_size_of_boxes, with_visibility
 from sim.truth.label import bodies
 from sim.types import Truth
 from tests.reference_sense import crowd, pinhole
@@ -37,5 +37,5 @@ def test_what_is_labelled_is_kept() -> None:
 
 def test_an_image_of_unknown_size_holds_all_boxes() -> None:
     box = np.array([[10.0, 20.0, 30.2, 40.0], [100.0, 5.0, 10.0, 10.0]])
-    assert extent(box) == (110, 60)
-    assert extent(np.zeros((0, 4))) == extent() == (1, 1)
+    assert image_size_of_boxes(box) == (110, 60)
+    assert image_size_of_boxes(np.zeros((0, 4))) == image_size_of_boxes() == (1, 1)

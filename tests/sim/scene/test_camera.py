@@ -3,18 +3,17 @@ import pytest
 
 from scenarios.errors import InputError
 from scenarios.schema.scenario import CameraSpec
-from sim.scene.body import boxes
+from sim.scene.body import person_boxes
 from sim.scene.camera import (
+    camera_rotation,
     disparity,
     ground_jacobian,
-    looking,
     project,
     px_per_m_at_centre,
-    right,
-    solve,
+    right_camera,
     to_ground,
 )
-from sim.scene.viewpoint import MARGIN
+from sim.scene.camera_placement import MARGIN, place_camera
 from sim.types import Camera, Motion
 from tests.reference_sense import above, crowd, pinhole, walkers
 
@@ -23,7 +22,7 @@ def extremes(camera: Camera, motion: Motion) -> np.ndarray:
     """Left, top, right, bottom of all boxes of all frames."""
     t, p = np.nonzero(motion.present)
     pos3 = np.column_stack([motion.pos[t, p], np.zeros(len(t))])
-    box = boxes(camera, pos3, motion.heading[t, p], motion.height[p])
+    box = person_boxes(camera, pos3, motion.heading[t, p], motion.height[p])
     return np.array([*box[:, :2].min(0), *(box[:, :2] + box[:, 2:]).max(0)])
 
 
@@ -41,13 +40,13 @@ def test_positive_tilt_looks_down_and_positive_yaw_left() -> None:
     ahead = np.array([[8.0, 10.0, 7.0]])
     assert project(pinhole(tilt=20), ahead)[0][0, 1] < 240
     assert project(pinhole(tilt=0, yaw=10), ahead)[0][0, 0] > 320
-    assert looking(np.pi / 2, 0.0)[2] == pytest.approx([0, 0, -1])
+    assert camera_rotation(np.pi / 2, 0.0)[2] == pytest.approx([0, 0, -1])
 
 
 @pytest.mark.parametrize("tilt", [5, 40, 70, 90])
 @pytest.mark.parametrize("yaw", [0, 33, 180])
 def test_rotations_are_proper(tilt: float, yaw: float) -> None:
-    r = looking(np.deg2rad(tilt), np.deg2rad(yaw))
+    r = camera_rotation(np.deg2rad(tilt), np.deg2rad(yaw))
     assert r @ r.T == pytest.approx(np.eye(3))
     assert np.linalg.det(r) == pytest.approx(1)
 
@@ -82,7 +81,7 @@ def test_jacobian_is_the_derivative(camera: Camera) -> None:
 def test_disparity_is_what_the_right_camera_sees() -> None:
     camera = pinhole()
     xyz = np.random.default_rng(3).uniform([2, 2, 0], [14, 9, 1.9], (50, 3))
-    (left_uv, depth), (right_uv, _) = project(camera, xyz), project(right(camera), xyz)
+    (left_uv, depth), (right_uv, _) = project(camera, xyz), project(right_camera(camera), xyz)
     assert left_uv[:, 1] == pytest.approx(right_uv[:, 1])
     assert left_uv[:, 0] - right_uv[:, 0] == pytest.approx(disparity(camera, depth))
     assert (disparity(camera, depth) > 0).all()
@@ -104,7 +103,7 @@ def test_scale_is_a_person_at_the_middle() -> None:
 def test_solved_views_show_everybody_and_are_tight(seed: int, tilt: float) -> None:
     motion = crowd(seed)
     spec = CameraSpec(tilt_deg=tilt, yaw_deg=37.0 * seed)
-    camera = solve(spec, motion)
+    camera = place_camera(spec, motion)
     edge = MARGIN * 480
     left, top, right_, bottom = extremes(camera, motion)
     assert min(left, top) >= edge - 1e-6
@@ -114,17 +113,17 @@ def test_solved_views_show_everybody_and_are_tight(seed: int, tilt: float) -> No
     along = abs(top - edge) < 1e-6 and abs(480 - edge - bottom) < 1e-6
     assert across or along  # any nearer, and somebody would leave
     assert camera.position[2] > 0
-    assert camera.rotation == pytest.approx(looking(np.deg2rad(tilt), np.deg2rad(37.0 * seed)))
+    assert camera.rotation == pytest.approx(camera_rotation(np.deg2rad(tilt), np.deg2rad(37.0 * seed)))
 
 
 @pytest.mark.parametrize("seed", range(5))
 def test_a_given_height_or_position_is_kept(seed: int) -> None:
     motion = crowd(seed)
-    free = solve(CameraSpec(), motion)
-    tall = solve(CameraSpec(height=float(free.position[2]) + 3), motion)
+    free = place_camera(CameraSpec(), motion)
+    tall = place_camera(CameraSpec(height=float(free.position[2]) + 3), motion)
     assert tall.position[2] == free.position[2] + 3
     assert extremes(tall, motion)[1] >= 0
-    placed = solve(CameraSpec(position=(float(free.position[0]), float(free.position[1]) - 1.0)), motion)
+    placed = place_camera(CameraSpec(position=(float(free.position[0]), float(free.position[1]) - 1.0)), motion)
     assert placed.position[:2] == pytest.approx(free.position[:2] - [0, 1])
     lower = placed.replace(position=placed.position - np.array([0, 0, 0.05]))
     left, top, right_, bottom = extremes(lower, motion)
@@ -133,20 +132,20 @@ def test_a_given_height_or_position_is_kept(seed: int) -> None:
 
 def test_straight_down_from_a_given_height_is_centred() -> None:
     motion = crowd(3)
-    camera = solve(CameraSpec(tilt_deg=90, height=25), motion)
+    camera = place_camera(CameraSpec(tilt_deg=90, height=25), motion)
     _, top, _, bottom = extremes(camera, motion)
     assert abs(top - (480 - bottom)) < 3.0
 
 
 def test_from_above() -> None:
     motion = crowd(4)
-    camera = solve(CameraSpec(kind="top"), motion)
+    camera = place_camera(CameraSpec(kind="top"), motion)
     left, top, right_, bottom = extremes(camera, motion)
     edge = MARGIN * 480
     assert min(left - edge, top - edge, 640 - edge - right_, 480 - edge - bottom) == pytest.approx(0, abs=1e-9)
-    fixed = solve(CameraSpec(kind="top", px_per_m=30, yaw_deg=20), motion)
+    fixed = place_camera(CameraSpec(kind="top", px_per_m=30, yaw_deg=20), motion)
     assert fixed.px_per_m == 30
-    placed = solve(CameraSpec(kind="top", position=(8, 5), yaw_deg=20), motion)
+    placed = place_camera(CameraSpec(kind="top", position=(8, 5), yaw_deg=20), motion)
     assert placed.position[:2] == pytest.approx([8, 5])
 
 
@@ -161,26 +160,26 @@ def test_from_above() -> None:
 def test_people_out_of_view_are_refused(keys: dict[str, object], named: str) -> None:
     motion = crowd(0)
     with pytest.raises(InputError, match="out of view in frame 1 ") as caught:
-        solve(CameraSpec.model_validate({**keys, "tilt_deg": 40}), motion)
+        place_camera(CameraSpec.model_validate({**keys, "tilt_deg": 40}), motion)
     assert named in caught.value.place
     assert caught.value.file == "scenario made-up"
-    solve(CameraSpec.model_validate({**keys, "tilt_deg": 40, "crop": True}), motion)
+    place_camera(CameraSpec.model_validate({**keys, "tilt_deg": 40, "crop": True}), motion)
 
 
 def test_crop_looks_at_the_world_only() -> None:
     motion = walkers([[8, 5], [8, 5]], [[0, 0], [5, 0]], frames=100)  # the second walks 50 m away
-    wide, near = solve(CameraSpec(), motion), solve(CameraSpec(crop=True), motion)
+    wide, near = place_camera(CameraSpec(), motion), place_camera(CameraSpec(crop=True), motion)
     assert px_per_m_at_centre(near) > 1.5 * px_per_m_at_centre(wide)
 
 
 def test_an_empty_scene_shows_the_world() -> None:
     nobody = walkers([[8, 5]], [[0, 0]], present=np.zeros((40, 1), bool))
-    camera = solve(CameraSpec(), nobody)
+    camera = place_camera(CameraSpec(), nobody)
     corners = np.array([[0, 0, 0], [16, 0, 0], [0, 10, 0], [16, 10, 0.0]])
     uv = project(camera, corners)[0]
     assert ((uv >= 0) & (uv <= [640, 480])).all()
 
 
 def test_solving_is_deterministic() -> None:
-    a, b = solve(CameraSpec(), crowd(5)), solve(CameraSpec(), crowd(5))
+    a, b = place_camera(CameraSpec(), crowd(5)), place_camera(CameraSpec(), crowd(5))
     assert (a.position == b.position).all()

@@ -1,21 +1,23 @@
 import numpy as np
 import pytest
 
-from sim.scene.body import boxes, distance, ellipsoids, outline_boxes, outlines
-from sim.scene.visibility import Seen, look
-from sim.scene.visibility_kernels import COLUMNS, ROWS, span
+from sim.scene.body import ellipsoids, occlusion_distance, outline_boxes, outlines, person_boxes
+from sim.scene.visibility import BodyVisibility, measure_visibility
+from sim.scene.visibility_kernels import COLUMNS, ROWS, visible_span
 from sim.types import Array, Camera, Scene
 from tests.reference_sense import above, pinhole, raster_visibility, twin_look
 
 OPEN = Scene(np.array([16.0, 10.0]))
 
 
-def see(camera: Camera, scene: Scene, xy: Array, heading: Array | None = None, height: Array | None = None) -> Seen:
+def see(
+    camera: Camera, scene: Scene, xy: Array, heading: Array | None = None, height: Array | None = None
+) -> BodyVisibility:
     pos3 = np.column_stack([xy, np.zeros(len(xy))])
     heading = np.zeros(len(xy)) if heading is None else heading
     height = np.full(len(xy), 1.7) if height is None else height
     frame = np.ones(len(xy), np.int64)
-    return look(camera, scene, frame, pos3, height, ellipsoids(pos3, heading, height))
+    return measure_visibility(camera, scene, frame, pos3, height, ellipsoids(pos3, heading, height))
 
 
 def crowded(seed: int, people: int = 14) -> tuple[Array, Array, Array]:
@@ -29,7 +31,7 @@ def test_kernel_equals_its_twin(seed: int) -> None:
     for camera in (pinhole(), pinhole(15, 20), above()):
         pos3 = np.column_stack([xy, np.zeros(len(xy))])
         ellipses = outlines(camera, ellipsoids(pos3, heading, height))
-        near = distance(camera, pos3, height)
+        near = occlusion_distance(camera, pos3, height)
         twin = twin_look(camera, outline_boxes(ellipses), ellipses.centre, ellipses.shape, near, COLUMNS, ROWS)
         assert see(camera, OPEN, xy, heading, height).visibility == pytest.approx(twin, abs=1e-12)
 
@@ -157,9 +159,11 @@ def test_order_of_rows_and_further_frames_change_nothing(seed: int) -> None:
     pos3 = np.column_stack([xy, np.zeros(len(xy))])
     twice, tall = np.concatenate([pos3, pos3]), np.concatenate([height, height])
     frame = np.repeat([1, 4], len(xy))
-    both = look(pinhole(), OPEN, frame, twice, tall, ellipsoids(twice, np.concatenate([heading, heading]), tall))
+    both = measure_visibility(
+        pinhole(), OPEN, frame, twice, tall, ellipsoids(twice, np.concatenate([heading, heading]), tall)
+    )
     assert both.visibility == pytest.approx(np.concatenate([one.visibility, one.visibility]))
-    assert one.box == pytest.approx(boxes(pinhole(), pos3, heading, height))
+    assert one.box == pytest.approx(person_boxes(pinhole(), pos3, heading, height))
 
 
 def test_nobody() -> None:
@@ -185,7 +189,7 @@ def test_a_wide_pillar_hides_who_stands_beyond_its_tangent() -> None:
 
 
 def test_spans_reach_the_amodal_edge_and_end_with_the_image() -> None:
-    assert span(10.0, 16.0, 16, 3, 5, 1, 9, 100.0) == (13.0, 3.0)
-    assert span(10.0, 16.0, 16, 1, 5, 1, 9, 100.0) == (10.0, 6.0)  # nothing of the silhouette is in cell 0
-    assert span(10.0, 16.0, 16, 3, 9, 1, 9, 100.0) == (13.0, 13.0)
-    assert span(-4.0, 16.0, 16, 3, 9, 0, 15, 4.5) == (0.0, 4.5)
+    assert visible_span(10.0, 16.0, 16, 3, 5, 1, 9, 100.0) == (13.0, 3.0)
+    assert visible_span(10.0, 16.0, 16, 1, 5, 1, 9, 100.0) == (10.0, 6.0)  # nothing of the silhouette is in cell 0
+    assert visible_span(10.0, 16.0, 16, 3, 9, 1, 9, 100.0) == (13.0, 13.0)
+    assert visible_span(-4.0, 16.0, 16, 3, 9, 0, 15, 4.5) == (0.0, 4.5)

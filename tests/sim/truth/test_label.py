@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from sim.scene.body import boxes
+from sim.scene.body import person_boxes
 from sim.truth.label import bodies, label
 from sim.types import Motion, Scene, Stairs
 from tests.reference_sense import crowd, pinhole, walkers
@@ -29,7 +29,7 @@ def test_rows_are_sorted_and_say_what_the_motion_says() -> None:
     assert (truth.pos == motion.pos[truth.frame - 1, truth.id - 1]).all()
     assert (truth.height == motion.height[truth.id - 1]).all()
     pos3 = np.column_stack([truth.pos, np.zeros(len(truth.id))])
-    assert truth.box == pytest.approx(boxes(pinhole(), pos3, truth.heading, truth.height))  # type: ignore[arg-type]
+    assert truth.box == pytest.approx(person_boxes(pinhole(), pos3, truth.heading, truth.height))  # type: ignore[arg-type]
     now = truth.at(7)
     assert now.id.tolist() == (np.flatnonzero(motion.present[6]) + 1).tolist()
 

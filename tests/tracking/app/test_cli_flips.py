@@ -241,11 +241,11 @@ def test_a_key_changes_what_is_made(key):
 def three_people():
     """Two seconds of three people, and their camera."""
     from sim.crowd.world import run as simulate
-    from sim.scene.camera import solve
+    from sim.scene.camera_placement import place_camera
 
     scenario = picture_scenario("")
     motion = simulate(scenario, 3)
-    return motion, solve(scenario.camera, motion)
+    return motion, place_camera(scenario.camera, motion)
 
 
 def picture_scenario(settings: str):

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from sim.scene.camera import looking, project
+from sim.scene.camera import camera_rotation, project
 from sim.types import Camera, Context
 from tracking.detect.person_size import ENOUGH, SMALLEST, PersonSize
 
@@ -14,7 +14,9 @@ BARE = Context(10.0, float("nan"), image_size=(480, 360))
 
 def camera(tilt):
     """Five metres up, looking down by `tilt` degrees."""
-    return Camera("pinhole", (480, 360), (400.0, 400.0), (240.0, 180.0), np.array([0.0, 0, 5]), looking(tilt, 0.0))
+    return Camera(
+        "pinhole", (480, 360), (400.0, 400.0), (240.0, 180.0), np.array([0.0, 0, 5]), camera_rotation(tilt, 0.0)
+    )
 
 
 def ellipses(box):

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from sim.scene.camera import PERSON
+from sim.scene.body import PERSON_HEIGHT
 from sim.types import Array, Bools, Context, Ints
 from tracking.filters import assignment, kalman, track_uncertainty
 from tracking.papers.blob import box_geometry
@@ -87,7 +87,7 @@ class Population:
         whole = self.context.px_per_m
         if self.top:
             return np.full(len(place), whole)
-        size = np.maximum(place[:, 2], place[:, 3]) / PERSON
+        size = np.maximum(place[:, 2], place[:, 3]) / PERSON_HEIGHT
         return np.asarray(np.minimum(np.maximum(size, whole / 2), whole * 2))
 
     def pairs(self, cost: Array, gate: float) -> tuple[Ints, Ints]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from sim.scene.camera import PERSON
+from sim.scene.body import PERSON_HEIGHT
 from sim.types import Array, Bools, Camera, Context, Image
 from tracking.detect import blobs, lone_blobs
 from tracking.detect.background import Background
@@ -87,8 +87,8 @@ def _learned(background: Background, context: Context) -> float:
 
 def _person(camera: Camera | None, scale: float) -> Array:
     if camera is None:
-        return scale * PERSON * np.array([SLIM, 1.0])
-    from sim.scene.body import boxes
+        return scale * PERSON_HEIGHT * np.array([SLIM, 1.0])
+    from sim.scene.body import person_boxes
     from sim.scene.camera import to_ground
 
     middle = to_ground(camera, np.array([camera.image], float) / 2)
@@ -96,4 +96,4 @@ def _person(camera: Camera | None, scale: float) -> Array:
     if not np.isfinite(middle).all():  # above the horizon
         return _person(None, scale)
     place = np.column_stack([np.repeat(middle, len(turns), 0), np.zeros(len(turns))])
-    return np.asarray(boxes(camera, place, turns, np.full(len(turns), PERSON))[:, 2:].mean(0))
+    return np.asarray(person_boxes(camera, place, turns, np.full(len(turns), PERSON_HEIGHT))[:, 2:].mean(0))

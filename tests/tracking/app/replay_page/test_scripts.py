@@ -12,7 +12,7 @@ import pytest
 
 import tracking.app.replay_page
 from sim.io.store.truth_files import with_ground_height
-from sim.scene.camera import looking, project
+from sim.scene.camera import camera_rotation, project
 from sim.types import Camera, Scene, Sequence, Stairs
 from tests.groups_as_wholes import wholes
 from tracking.app.replay_page.page import payload
@@ -66,7 +66,7 @@ def test_places_on_the_ground_are_where_the_camera_sees_them(radial: float) -> N
     up = Stairs(np.array([3.0, 3.0]), np.array([5.0, 4.0]), 3.0, 1.2, 8, 1.5)
     down = Stairs(np.array([8.0, 3.0]), np.array([8.0, 6.0]), 2.0, -1.0, 5, 0.0)
     scene = Scene(np.array([12.0, 12.0]), stairs=(up, down))
-    place, turn = np.array([6.0, -8.0, 7.0]), looking(0.7, 0.1)
+    place, turn = np.array([6.0, -8.0, 7.0]), camera_rotation(0.7, 0.1)
     camera = Camera("pinhole", (640, 480), (500.0, 520.0), (320.0, 240.0), place, turn, radial=radial)
     xy = np.random.default_rng(0).uniform([-2, -30], [14, 14], (300, 2))
     uv, _ = project(camera, with_ground_height(xy, scene))

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from sim.scene.camera import looking
+from sim.scene.camera import camera_rotation
 from sim.types import Camera, Context
 from tracking.filters import kalman
 from tracking.papers.blob.config import BlobConfig
@@ -78,7 +78,9 @@ def test_who_lies_at_the_edge_leaves_by_his_length():
 
 def test_from_straight_above_nobody_is_behind_anybody():
     settings = BlobConfig()
-    camera = Camera("top", (320, 240), (20, 20), (160, 120), np.array([0.0, 0, 10]), looking(UP, 0.0), px_per_m=20.0)
+    camera = Camera(
+        "top", (320, 240), (20, 20), (160, 120), np.array([0.0, 0, 10]), camera_rotation(UP, 0.0), px_per_m=20.0
+    )
     one = People(settings, settings.dynamics(FPS), Context(FPS, 20.0, camera=camera, image_size=(320, 240)))
     one.give_birth(np.array([[100.0, 100, 12, 8, UP], [100, 106, 12, 12, UP]]), np.ones(2), 0.0)
     one.confirmed[:] = True

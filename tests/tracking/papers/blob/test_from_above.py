@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from sim.scene.camera import looking
+from sim.scene.camera import camera_rotation
 from sim.types import Camera, Context, Frame
 from tests import painted
 from tests.painted import overlap
@@ -23,7 +23,7 @@ def camera(scale):
         (scale, scale),
         (WIDE / 2, HIGH / 2),
         np.array([0.0, 0, 10]),
-        looking(np.pi / 2, 0.0),
+        camera_rotation(np.pi / 2, 0.0),
         px_per_m=scale,
     )
 
