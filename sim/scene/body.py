@@ -134,7 +134,7 @@ def outlines(camera: Camera, people: Ellipsoids) -> Outlines:
 
 
 def outline_boxes(ellipses: Outlines) -> Array:
-    """Return boxes (N, 4) ltwh px round body and head: amodal, not clipped to the image; nan where an outline is nan."""
+    """Return boxes (N, 4) ltwh px round body and head: amodal, not clipped to the image; nan if an outline is nan."""
     half = np.sqrt(np.diagonal(ellipses.shape, axis1=2, axis2=3))
     low, high = (ellipses.centre - half).min(axis=1), (ellipses.centre + half).max(axis=1)
     return np.concatenate([low, high - low], axis=1)

@@ -21,7 +21,7 @@ def undistort(x: Array, k: float) -> Array:
 
 
 def distort(y: Array, k: float) -> Array:
-    """Return the distorted points (N, 2) of ideal points y (N, 2); y itself if k is 0, nan where the lens shows none."""
+    """Return the distorted points (N, 2) of ideal points y (N, 2); y itself if k is 0, nan if the lens shows none."""
     if k == 0.0:
         return y
     root = np.sqrt(3.0 * abs(k))

@@ -58,7 +58,7 @@ def only_flights(flights: Array) -> Solids:
 
 
 def unprojection(camera: Camera) -> Array:
-    """Return the matrix (3, 3) that maps (u, v, 1) to a direction of sight in the world, Rᵀ K⁻¹; pinhole cameras only."""
+    """Return the matrix Rᵀ K⁻¹ (3, 3) that maps (u, v, 1) to a line of sight in the world; pinhole cameras only."""
     (fx, fy), (cx, cy) = camera.focal_px, camera.centre_px
     inverse = np.array([[1 / fx, 0, -cx / fx], [0, 1 / fy, -cy / fy], [0, 0, 1]])
     return np.asarray(camera.rotation.T @ inverse)

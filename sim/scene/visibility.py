@@ -1,5 +1,4 @@
-"""How much of each person a camera sees, computed from geometry alone; the truth has it whether or not images are
-drawn.
+"""How much of each person a camera sees, computed from geometry alone, whether or not images are drawn.
 
 Each silhouette (body and head, `sim.scene.body`) is sampled on a grid over its amodal box. A sample is visible if it
 meets three conditions: it lies in the image; no nearer silhouette covers it; its line of sight meets no wall, pillar or
