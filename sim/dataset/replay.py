@@ -122,9 +122,9 @@ def on_ground(truth: Truth, source: Sequence, calibration: Camera | None = None)
     assert truth.box is not None, "labels have positions or boxes"
     camera = calibration or source.camera
     if camera is not None:
-        from sim.detector.box_noise import feet
+        from sim.detector.box_noise import foot_points
 
-        return feet(truth.box, np.zeros(len(truth.box)), camera)
+        return foot_points(truth.box, np.zeros(len(truth.box)), camera)
     if source.source.get("kind") in FLAT:
         centre = truth.box[:, :2] + truth.box[:, 2:] / 2
         return np.asarray(np.stack([centre[:, 0], -centre[:, 1]], axis=1) / truth.px_per_m)

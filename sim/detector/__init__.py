@@ -1,1 +1,1 @@
-"""The simulated detector: which people it finds, where it reports them, and its false alarms."""
+"""The simulated detector: which people it detects, where it reports them, and its false alarms."""

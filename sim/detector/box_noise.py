@@ -1,4 +1,8 @@
-"""Errors of a detector's boxes in proportion to their size, as scenarios.schema.sensor.BoxNoise describes them."""
+"""Errors of a detector's boxes in proportion to their size, as `scenarios.schema.sensor.BoxNoise` describes them.
+
+The four errors of a box are, in order: middle to the right, foot downwards, top downwards (all in box heights), and the
+logarithm of the width. `perturb_boxes` applies them, `box_errors` measures them.
+"""
 
 from __future__ import annotations
 
@@ -12,13 +16,14 @@ if TYPE_CHECKING:
     from scenarios.schema.sensor import BoxNoise
 
 
-def erring(box: Array, visibility: Array, noise: BoxNoise, n: Array) -> Array:
-    """Boxes (R, 4) ltwh moved by errors n (R, 4), standard normals for middle, foot, top and width.
+def perturb_boxes(box: Array, visibility: Array, noise: BoxNoise, n: Array) -> Array:
+    """Return boxes (R, 4) ltwh px moved by random errors, by standard normals n (R, 4): middle, foot, top, width.
 
-    With h the box's height: middle += h e0, foot += h e1, top += h e2, log width += e3. At least 1 px (or what there
-    was) remains of width and height.
+    An error is mean + standard deviation × n, as `noise` gives them. `noise.occluded` times the hidden share raises the
+    standard deviation, `noise.tails` gives n heavier tails. visibility (R,): share of each person that is visible.
+    Width and height keep at least 1 px, or their former value if that was less.
     """
-    n = heavier(n, noise.tails)
+    n = heavy_tailed(n, noise.tails)
     means, sds = np.array([noise.across, noise.foot, noise.top, noise.width]).T
     e = means + sds * (1.0 + noise.occluded * (1.0 - visibility))[:, None] * n
     left, top, w, h = box.T
@@ -29,18 +34,34 @@ def erring(box: Array, visibility: Array, noise: BoxNoise, n: Array) -> Array:
     return np.stack([middle - width / 2, foot - height, width, height], axis=1)
 
 
-def heavier(n: Array, tails: float) -> Array:
-    """Standard normals made Student's t of unit variance and excess kurtosis `tails`, each at its quantile."""
-    if not tails:
+def move_edges(box: Array, move: Array) -> Array:
+    """Return boxes (R, 4) ltwh px whose left, top, right and lower edges move by the columns of move (R, 4) px.
+
+    Width and height keep at least 1 px, or their former value if that was less; then the right or lower edge yields.
+    """
+    edges = np.concatenate([box[:, :2], box[:, :2] + box[:, 2:]], axis=1) + move
+    size = np.maximum(edges[:, 2:] - edges[:, :2], np.minimum(box[:, 2:], 1.0))
+    return np.concatenate([edges[:, :2], size], axis=1)
+
+
+def heavy_tailed(n: Array, excess_kurtosis: float) -> Array:
+    """Return standard normals n, of any shape, mapped to Student's t of variance 1 and this excess kurtosis.
+
+    Quantiles are mapped to quantiles. n itself is returned if the excess kurtosis is 0.
+    """
+    if not excess_kurtosis:
         return n
     from scipy.special import ndtr, stdtrit
 
-    freedom = 4.0 + 6.0 / tails
+    freedom = 4.0 + 6.0 / excess_kurtosis
     return np.asarray(stdtrit(freedom, ndtr(n)) * np.sqrt((freedom - 2.0) / freedom))
 
 
 def box_errors(box: Array, true: Array) -> Array:
-    """(R, 4) errors of boxes against true ones: `erring` the other way round, means and sds not taken off."""
+    """Return the errors (R, 4) of boxes (R, 4) ltwh against the true boxes (R, 4): middle, foot, top, log width.
+
+    This undoes `perturb_boxes` but for means and standard deviations. Heights are those of the true boxes.
+    """
     h = true[:, 3]
     foot, true_foot = box[:, 1] + box[:, 3], true[:, 1] + h
     middle, true_middle = box[:, 0] + box[:, 2] / 2, true[:, 0] + true[:, 2] / 2
@@ -48,10 +69,11 @@ def box_errors(box: Array, true: Array) -> Array:
     return np.stack([across, low, high, np.log(box[:, 2] / true[:, 2])], axis=1)
 
 
-def feet(box: Array, z: Array, camera: Camera) -> Array:
-    """(R, 2) m: where boxes say that people stand, at the ground's height z (R,); nan where they show no ground.
+def foot_points(box: Array, z: Array, camera: Camera) -> Array:
+    """Return the points (R, 2) m where people with boxes (R, 4) ltwh px stand, on ground of height z (R,) m.
 
-    The middle of the lower edge; from above the box's middle.
+    The point is seen at the middle of the box's lower edge, from above at the box's middle. nan where no ground is
+    seen.
     """
     from sim.scene.camera import rays
 

@@ -1,8 +1,8 @@
-"""Random numbers that stay alike for a while: stationary sums of AR(1) parts and of what is new in each frame.
+"""Normal draws that stay correlated over time: sums of stationary AR(1) processes and of white noise.
 
-A part of share s and time tau is sqrt(s) x, x_t = rho x_(t-1) + sqrt(1 - rho²) e_t with rho = exp(-1 / (fps tau)), so
-that the whole is N(0, 1) with correlation sum s exp(-lag / tau) over the parts, and the rest of the variance is white.
-Chains begin in frame 1, whoever is there by then: who enters later meets the same numbers.
+A part of share s and time constant tau is sqrt(s) x with x_t = rho x_(t-1) + sqrt(1 - rho²) e_t and
+rho = exp(-1 / (fps tau)). The sum of all parts is N(0, 1) with autocorrelation sum s exp(-lag / tau); the rest of the
+variance is white. Every process begins in frame 1, so that the draws of a frame do not depend on when a person enters.
 """
 
 from __future__ import annotations
@@ -19,10 +19,14 @@ if TYPE_CHECKING:
     from scenarios.schema.sensor import Memory
 
 
-def lasting(
+def correlated_normals(
     fresh: Array, memory: Sequence[Memory], first: int, fps: float, seed: int, *keys: int, repeat: int = 0
 ) -> Array:
-    """(F, D) normals of frames `first` …; fresh (F, D) are their white parts, keys name the streams of the others."""
+    """Return correlated standard normals (F, D) of frames `first`, `first` + 1, …; `fresh` itself if memory is empty.
+
+    fresh (F, D): standard normals, used as the white part. memory: share of variance and time (s) of each AR(1) part;
+    its random stream is named by `keys` and its number. The D columns are independent.
+    """
     if not memory:
         return fresh
     white = max(0.0, 1.0 - sum(part.share for part in memory))
@@ -31,12 +35,12 @@ def lasting(
     for k, part in enumerate(memory):
         rho = float(np.exp(-1.0 / (fps * part.time)))
         e = rng(seed, "detect", *keys, k, repeat=repeat).standard_normal((last, fresh.shape[1]))
-        out += np.sqrt(part.share) * _chain(e, rho)[first - 1 :]
+        out += np.sqrt(part.share) * _autoregression(e, rho)[first - 1 :]
     return np.asarray(out)
 
 
-def _chain(e: Array, rho: float) -> Array:
-    """x_1 = e_1, x_t = rho x_(t-1) + sqrt(1 - rho²) e_t down the rows."""
+def _autoregression(e: Array, rho: float) -> Array:
+    """x_1 = e_1, x_t = rho x_(t-1) + sqrt(1 - rho²) e_t down the rows of e, which is changed."""
     from scipy.signal import lfilter
 
     e[1:] *= np.sqrt(1.0 - rho**2)

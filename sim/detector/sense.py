@@ -1,43 +1,36 @@
-"""The point and box sensor: what a detector with these settings would report of what is true.
+"""The simulated point and box detector: from the truth to the detections that a detector with these settings reports.
 
-Who is detected: u < p with p = detect_prob · visibility^occlusion_power · min(1, size / (2 small_px)), 0 below
-min_visibility and while hidden. Each person has one stream, each place of a false alarm another, all read at the
-frame's own offset: a person or a frame more moves nobody else, and a setting changed leaves all other draws as they
-were, so that sweeps are paired. Everything is drawn as uniforms; normals are their quantiles.
-A measured profile (`flockscope fit sensor`) puts a curve in the place of visibility^occlusion_power, makes luck and
-noise last (sim.detector.correlated_noise) and noise grow with the box (sim.detector.box_noise).
+A person is detected if u < p with p = detect_prob · visibility^occlusion_power · min(1, size / (2 small_px)). p is 0
+below min_visibility and for people hidden by `sensor.hide`. Each person has one random stream and each false alarm
+another; all are read at the frame's own offset. One person or one frame more therefore changes no other draw, and a
+changed setting keeps all draws, so that sweeps over settings are paired. Everything is drawn as uniforms
+(`sim.detector.draws`).
+
+A measured profile (`flockscope fit sensor`) replaces visibility^occlusion_power by a curve. It makes misses and errors
+correlated over time (`sim.detector.correlated_noise`) and errors proportional to the box (`sim.detector.box_noise`).
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
-from itertools import pairwise
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from scenarios.errors import InputError
+from sim.detector.box_noise import foot_points, move_edges, perturb_boxes
+from sim.detector.clutter import false_alarms
+from sim.detector.correlated_noise import correlated_normals
+from sim.detector.draws import normals, true_scores, uniforms
+from sim.detector.readings import Readings, detections_by_frame
 from sim.rng import rng
 from sim.scene.body import SHOULDER_SHARE
-from sim.types import Array, Bools, Camera, Detections, Ints, Plane, Truth
+from sim.types import Array, Bools, Camera, Detections, Ints, Truth
 
 if TYPE_CHECKING:
     from scenarios.schema.sensor import Sensor
 
-KEEP, DETECT, EDGES, POINT, SCORE, PLACE, DRAWS = 0, 1, slice(2, 6), slice(6, 8), 8, 9, 10  # a person's frame's draws
-
-
-@dataclass(frozen=True)
-class Readings:
-    """R detections of a whole sequence: frame (R,), pos (R, 2), box (R, 4) or None, score (R,), place (R,) in (0, 1):
-    where in its frame's list each stands, so that the order tells nothing."""
-
-    frame: Ints
-    pos: Array
-    box: Array | None
-    score: Array
-    place: Array
+KEEP, DETECT, EDGES, POINT, SCORE, ORDER, DRAWS = 0, 1, slice(2, 6), slice(6, 8), 8, 9, 10  # a person's draws per frame
 
 
 def sense(
@@ -49,85 +42,61 @@ def sense(
     repeat: int = 0,
     people: Mapping[str, tuple[int, ...]] | None = None,
 ) -> list[Detections]:
-    """The detections of frames 1 … length.
+    """Return the detections of each frame, 1 to truth.length, false alarms included.
 
-    On the ground (pos = point, box beside it where boxes are known) if the truth has positions, else in the image
-    (pos = the box's centre). people: ids of each group of the script, for `hide`; InputError for an unknown group, and
-    for visible boxes of a truth that has none.
+    If the truth has positions, `pos` is the ground point (m), with the box beside it if boxes are known. Else `pos` is
+    the centre of the box (px). camera, image_size: place and size the false alarms; the camera also scales `small_px`
+    seen from above, and turns boxes into ground points if `sensor.points` is "foot". seed, repeat: name the random
+    streams. people: ids of each group of the script, for `sensor.hide`.
+    Raises InputError in two cases: `sensor.hide` names an unknown group, or `sensor.box` is "visible" and the truth has
+    boxes but no visible boxes.
     """
-    from sim.detector.clutter import false_alarms
-
     if sensor.box == "visible" and truth.box is not None and truth.visible_box is None:
         raise InputError(
-            file=truth.name, place="sensor.box", got="visible", expected="amodal: the visible parts are not labelled",
+            file=truth.name, place="sensor.box", got="visible", expected="amodal: visible parts are not labelled",
             remedy="leave sensor.box out",
         )  # fmt: skip
-    true = _found(truth, sensor, seed, repeat, people or {}, camera)
+    true = _true_detections(truth, sensor, seed, repeat, people or {}, camera)
     false = false_alarms(truth, sensor, seed, camera, image_size, repeat)
-    return _by_frame(true, false, truth)
+    return detections_by_frame(true, false, truth)
 
 
-def _by_frame(true: Readings, false: Readings, truth: Truth) -> list[Detections]:
-    frame = np.concatenate([true.frame, false.frame])
-    order = np.lexsort((np.concatenate([true.place, false.place]), frame))
-    pos = np.concatenate([true.pos, false.pos])[order]
-    score = np.concatenate([true.score, false.score])[order]
-    box = None if true.box is None or false.box is None else np.concatenate([true.box, false.box])[order]
-    plane: Plane = "image" if truth.pos is None else "ground"
-    cuts = np.searchsorted(frame[order], np.arange(1, truth.length + 2))
-    found = []
-    for k, (a, b) in enumerate(pairwise(cuts)):
-        here = None if box is None else box[a:b]
-        found.append(Detections(k + 1, k / truth.fps, plane, pos[a:b], None, here, score[a:b]))
-    return found
-
-
-def _found(
+def _true_detections(
     truth: Truth, sensor: Sensor, seed: int, repeat: int, people: Mapping[str, tuple[int, ...]], camera: Camera | None
 ) -> Readings:
-    """The true detections."""
     u = person_draws(truth, seed, repeat, sensor)
-    hidden = _hidden(truth, sensor, people)
+    hidden = _artificially_hidden(truth, sensor, people)
     seen = (u[:, DETECT] < detection_probability(truth, sensor, camera)) & ~hidden
-    base = _boxes(truth, sensor)
+    base = _sensed_boxes(truth, sensor)
     if base is not None:
         seen &= np.isfinite(base).all(axis=1)
     u = u[seen]
-    box = None if base is None else _boxed(base[seen], truth.visibility[seen], sensor, u[:, EDGES])
+    box = None if base is None else _with_box_noise(base[seen], truth.visibility[seen], sensor, u[:, EDGES])
     if truth.pos is not None:
         pos = truth.pos[seen] + sensor.noise_m * normals(u[:, POINT]) if sensor.noise_m else truth.pos[seen]
         if sensor.points == "foot" and box is not None and camera is not None:
-            pos = _standing(box, truth, seen, camera, pos)
+            pos = _foot_points_or(pos, box, truth, seen, camera)
     else:
         assert box is not None, "labels have positions or boxes"
         pos = box[:, :2] + box[:, 2:] / 2
     score = true_scores(u[:, SCORE], truth.visibility[seen], sensor)
-    return Readings(truth.frame[seen], pos, box, score, u[:, PLACE])
+    return Readings(truth.frame[seen], pos, box, score, u[:, ORDER])
 
 
-def _standing(box: Array, truth: Truth, seen: Bools, camera: Camera, otherwise: Array) -> Array:
-    """The ground under the boxes' feet; the point sensor's where a box shows none."""
-    from sim.detector.box_noise import feet
-
+def _foot_points_or(otherwise: Array, box: Array, truth: Truth, seen: Bools, camera: Camera) -> Array:
+    """Ground points (N, 2) m under the boxes; rows of `otherwise` where a box shows no ground."""
     z = np.zeros(len(box)) if truth.z is None else truth.z[seen]
-    pos = feet(box, z, camera)
+    pos = foot_points(box, z, camera)
     return np.where(np.isfinite(pos), pos, otherwise)
 
 
-def _boxed(box: Array, visibility: Array, sensor: Sensor, u: Array) -> Array:
-    if sensor.box_noise is None:
-        return _noisy_boxes(box, sensor.noise_px, u)
-    from sim.detector.box_noise import erring
-
-    return erring(box, visibility, sensor.box_noise, normals(u))
-
-
 def person_draws(truth: Truth, seed: int, repeat: int, sensor: Sensor) -> Array:
-    """Uniforms in (0, 1) for each row of the truth, (R, DRAWS), keyed by the person and the frame.
+    """Return the uniforms in (0, 1) of each row of the truth, (R, DRAWS), keyed by the person and the frame.
 
-    persistence ρ: a person's DETECT is the previous frame's again with chance ρ; it stays uniform, and misses of
-    neighbouring frames are correlated by exactly ρ where the detection probability does not change. Memories make
-    the normal quantiles of DETECT or EDGES last instead.
+    Columns: KEEP, DETECT, four box edges, two point coordinates, SCORE, ORDER. With `sensor.persistence` ρ, DETECT is
+    that of the previous frame with probability ρ. It stays uniform, and misses of neighbouring frames have correlation
+    ρ if the detection probability is constant. `miss_memory` and `box_noise.memory` make DETECT and the edges
+    correlated over time (their normal quantiles are AR(1) sums).
     """
     u = np.empty((len(truth.id), DRAWS))
     by_person = np.argsort(truth.id, kind="stable")
@@ -141,7 +110,7 @@ def person_draws(truth: Truth, seed: int, repeat: int, sensor: Sensor) -> Array:
 def _one_person(id: int, frame: Ints, seed: int, repeat: int, sensor: Sensor, fps: float) -> Array:
     first = int(frame[0])
     u = uniforms(rng(seed, "detect", id, repeat=repeat), first, int(frame[-1]) - first + 1, DRAWS)
-    _make_last(u, first, sensor, fps, seed, id, repeat)
+    _correlate(u, first, sensor, fps, seed, id, repeat)
     if sensor.persistence:
         fresh = u[:, KEEP] >= sensor.persistence
         fresh[0] = True
@@ -150,52 +119,46 @@ def _one_person(id: int, frame: Ints, seed: int, repeat: int, sensor: Sensor, fp
     return u[frame - first]
 
 
-def _make_last(u: Array, first: int, sensor: Sensor, fps: float, seed: int, id: int, repeat: int) -> None:
-    """Misses and errors of boxes that last, in the place of new ones; u (F, DRAWS) of frames `first` … is changed."""
+def _correlate(u: Array, first: int, sensor: Sensor, fps: float, seed: int, id: int, repeat: int) -> None:
+    """Replace DETECT and EDGES of u (F, DRAWS), frames `first` on, by correlated draws where a memory is set."""
     of_boxes = None if sensor.box_noise is None else sensor.box_noise.memory
     parts = ((0, slice(DETECT, DETECT + 1), sensor.miss_memory), (1, EDGES, of_boxes))
     for key, columns, memory in parts:
         if memory:
             from scipy.special import ndtr
 
-            from sim.detector.correlated_noise import lasting
-
-            u[:, columns] = ndtr(lasting(normals(u[:, columns]), memory, first, fps, seed, id, key, repeat=repeat))
-
-
-def uniforms(generator: np.random.Generator, first: int, frames: int, per_frame: int) -> Array:
-    """Uniforms in (0, 1), (frames, per_frame), for frames `first` … of a stream that spends per_frame on each frame."""
-    generator.bit_generator.advance((first - 1) * per_frame)  # type: ignore[attr-defined]
-    return np.asarray(generator.random((frames, per_frame)) + 2.0**-54)
+            n = correlated_normals(normals(u[:, columns]), memory, first, fps, seed, id, key, repeat=repeat)
+            u[:, columns] = ndtr(n)
 
 
 def detection_probability(truth: Truth, sensor: Sensor, camera: Camera | None = None) -> Array:
-    """The chance of each row to be detected, (R,), hiding apart."""
+    """Return the probability (R,) that each row of the truth is detected, `sensor.hide` not considered."""
     visible = truth.visibility
-    p = sensor.detect_prob * _in_sight(visible, sensor)
+    p = sensor.detect_prob * _visibility_factor(visible, sensor)
     if sensor.small_px and truth.box is not None:
         from_above = camera is not None and camera.kind == "top"
-        # Seen from above a person is as large as one of this shoulder width is high when seen from the side.
+        # Seen from above, size is the height from the side of a person with this shoulder width.
         size = truth.box[:, 2:].max(axis=1) / SHOULDER_SHARE if from_above else truth.box[:, 3]
         p = p * np.minimum(1.0, np.nan_to_num(size) / (2 * sensor.small_px))
     return np.asarray(np.where(visible >= sensor.min_visibility, p, 0.0))
 
 
-def _in_sight(visible: Array, sensor: Sensor) -> Array:
-    """What occlusion leaves of the chance to be detected."""
+def _visibility_factor(visible: Array, sensor: Sensor) -> Array:
+    """Factor (R,) that occlusion leaves of the detection probability."""
     if sensor.by_visibility is None:
         return np.asarray(visible**sensor.occlusion_power)
     return np.interp(visible, np.linspace(0.0, 1.0, len(sensor.by_visibility)), sensor.by_visibility)
 
 
-def _hidden(truth: Truth, sensor: Sensor, people: Mapping[str, tuple[int, ...]]) -> Bools:
+def _artificially_hidden(truth: Truth, sensor: Sensor, people: Mapping[str, tuple[int, ...]]) -> Bools:
+    """True (R,) for rows that a `sensor.hide` covers; raises InputError if it names an unknown group."""
     t = (truth.frame - 1) / truth.fps
     hidden = np.zeros(len(t), dtype=np.bool_)
     for k, hide in enumerate(sensor.hide):
         if hide.group is not None and hide.group not in people:
             raise InputError(
                 file=truth.name, place=f"sensor.hide.{k}.group", got=repr(hide.group),
-                expected=f"one of the script's groups ({', '.join(people) or 'none is known here'})",
+                expected=f"a group of the script ({', '.join(people) or 'none is known here'})",
                 remedy="leave out `group` to hide everybody",
             )  # fmt: skip
         now = (t >= hide.start) & (t < hide.end)
@@ -203,42 +166,19 @@ def _hidden(truth: Truth, sensor: Sensor, people: Mapping[str, tuple[int, ...]])
     return hidden
 
 
-def _boxes(truth: Truth, sensor: Sensor) -> Array | None:
-    """What the sensor frames: the visible part (amodal where nothing is), or all of it."""
+def _sensed_boxes(truth: Truth, sensor: Sensor) -> Array | None:
+    """Boxes (R, 4) that the sensor frames before noise: visible parts, amodal where nothing is visible or if it says
+    so.
+
+    None if the truth has no boxes.
+    """
     if truth.box is None or truth.visible_box is None or sensor.box == "amodal":
         return truth.box
     return np.where(np.isfinite(truth.visible_box), truth.visible_box, truth.box)
 
 
-def _noisy_boxes(box: Array, noise: float, u: Array) -> Array:
-    """Each edge moved by noise · N(0, 1); at least 1 px (or what there was) remains of width and height."""
-    if not noise:
-        return box
-    move = noise * normals(u)
-    edges = np.concatenate([box[:, :2], box[:, :2] + box[:, 2:]], axis=1) + move
-    size = np.maximum(edges[:, 2:] - edges[:, :2], np.minimum(box[:, 2:], 1.0))
-    return np.concatenate([edges[:, :2], size], axis=1)
-
-
-def quantiles(curve: tuple[float, ...], u: Array) -> Array:
-    """The quantile function through evenly spaced quantiles, at u."""
-    return np.interp(u, np.linspace(0.0, 1.0, len(curve)), curve)
-
-
-def normals(u: Array) -> Array:
-    """Standard normals at these uniforms; one that was rounded to 1 is taken for the number below."""
-    from scipy.special import ndtri
-
-    return np.asarray(ndtri(np.minimum(u, 1.0 - 2.0**-53)))
-
-
-def true_scores(u: Array, visibility: Array, sensor: Sensor) -> Array:
-    """Confidence of true detections: mean 0.8 in full view, half of that when hardly visible; 1 if it never errs.
-
-    Where the detector's own scores are known, their quantiles.
-    """
-    if sensor.true_scores is not None:
-        return quantiles(sensor.true_scores, u)
-    if sensor.detect_prob == 1.0 and sensor.clutter_rate == 0.0:
-        return np.ones(len(u))
-    return np.asarray((0.4 + 0.6 * np.sqrt(u)) * (0.5 + 0.5 * visibility))
+def _with_box_noise(box: Array, visibility: Array, sensor: Sensor, u: Array) -> Array:
+    """Boxes with the errors of `sensor.box_noise` or, without it, of `sensor.noise_px`, by uniforms u (N, 4)."""
+    if sensor.box_noise is not None:
+        return perturb_boxes(box, visibility, sensor.box_noise, normals(u))
+    return move_edges(box, sensor.noise_px * normals(u)) if sensor.noise_px else box

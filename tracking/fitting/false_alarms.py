@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from scenarios.schema.sensor import FalseAlarms
-from sim.detector.clutter import Ground
+from sim.detector.visible_ground import VisibleGround
 from sim.types import Array, Ints
 from tracking.fitting.matching import Matched, intersections, overlaps
 
@@ -184,7 +184,7 @@ def _apart(chains: Sequence[Chain]) -> dict[str, object]:
     """Sizes against those of people standing there, places, and how fast they drift."""
     height, place, speed = [], [], []
     for c in chains:
-        ground = Ground(c.m.truth, c.m.camera, np.array(c.m.size, dtype=float))
+        ground = VisibleGround(c.m.truth, c.m.camera, np.array(c.m.size, dtype=float))
         middle, foot = c.box[:, 0] + c.box[:, 2] / 2, c.box[:, 1] + c.box[:, 3]
         usual = [max(ground.usual_height(float(u), float(v)), 1.0) for u, v in zip(middle, foot, strict=True)]
         height.append(float(np.log(c.box[:, 3] / usual).mean()))

@@ -15,7 +15,7 @@ import numpy as np
 
 from scenarios.errors import InputError
 from scenarios.schema.sensor import BoxNoise
-from sim.detector.box_noise import box_errors, erring
+from sim.detector.box_noise import box_errors, perturb_boxes
 from sim.io.formats import mot_text
 from sim.scene.box_visibility import image_size_of_boxes, with_visibility
 from sim.types import Array, Bools, Camera, Detections, Ints, Sequence, Truth
@@ -117,7 +117,7 @@ def _pairs(truth: Truth, frame: Ints, box: Array, usual: Array | None = None) ->
     part = whole if truth.visible_box is None else np.where(np.isfinite(truth.visible_box), truth.visible_box, whole)
     if usual is not None:
         bias = BoxNoise(**dict(zip(("across", "foot", "top", "width"), ((float(e), 0.0) for e in usual), strict=True)))
-        whole, part = (erring(b, np.ones(len(b)), bias, np.zeros((len(b), 4))) for b in (whole, part))
+        whole, part = (perturb_boxes(b, np.ones(len(b)), bias, np.zeros((len(b), 4))) for b in (whole, part))
     rows, columns = [np.zeros(0, np.int64)], [np.zeros(0, np.int64)]
     for index in range(1, truth.length + 1):
         r = truth.rows(index)

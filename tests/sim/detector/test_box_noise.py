@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 
 from scenarios.schema.sensor import BoxNoise
-from sim.detector.box_noise import box_errors, erring, feet
+from sim.detector.box_noise import box_errors, foot_points, perturb_boxes
 from sim.scene.camera import project
 from tests.reference_sense import above, pinhole
 
@@ -17,22 +17,22 @@ def some(count: int = 20_000) -> tuple[np.ndarray, np.ndarray]:
 
 def test_errors_have_the_means_and_sds_asked_for() -> None:
     box, n = some()
-    e = box_errors(erring(box, np.ones(len(box)), NOISE, n), box)
+    e = box_errors(perturb_boxes(box, np.ones(len(box)), NOISE, n), box)
     assert e.mean(axis=0) == pytest.approx([0.02, -0.03, 0.01, 0.2], abs=0.003)
     assert e.std(axis=0) == pytest.approx([0.05, 0.04, 0.06, 0.1], rel=0.03)
 
 
 def test_errors_grow_with_occlusion() -> None:
     box, n = some()
-    e = box_errors(erring(box, np.full(len(box), 0.25), NOISE, n), box)
+    e = box_errors(perturb_boxes(box, np.full(len(box), 0.25), NOISE, n), box)
     assert e.std(axis=0) == pytest.approx(2.5 * np.array([0.05, 0.04, 0.06, 0.1]), rel=0.03)
 
 
 def test_no_noise_moves_nothing_and_no_box_vanishes() -> None:
     box, n = some(500)
-    assert erring(box, np.ones(500), BoxNoise(), n) == pytest.approx(box)
+    assert perturb_boxes(box, np.ones(500), BoxNoise(), n) == pytest.approx(box)
     wild = BoxNoise(foot=(0.0, 3.0), top=(0.0, 3.0), width=(0.0, 5.0))
-    assert (erring(box, np.ones(500), wild, n)[:, 2:] >= 1.0 - 1e-9).all()
+    assert (perturb_boxes(box, np.ones(500), wild, n)[:, 2:] >= 1.0 - 1e-9).all()
 
 
 @pytest.mark.parametrize("camera", [pinhole(), above()])
@@ -42,8 +42,8 @@ def test_feet_are_where_they_project_from(camera, z: float) -> None:
     uv, _ = project(camera, xyz)
     share = 0.5 if camera.kind == "top" else 1.0
     box = np.column_stack([uv - np.array([10.0, 40.0 * share]), np.full(30, 20.0), np.full(30, 40.0)])
-    assert feet(box, xyz[:, 2], camera) == pytest.approx(xyz[:, :2])
+    assert foot_points(box, xyz[:, 2], camera) == pytest.approx(xyz[:, :2])
 
 
 def test_above_the_horizon_nobody_stands() -> None:
-    assert np.isnan(feet(np.array([[300.0, -2000.0, 10.0, 20.0]]), np.zeros(1), pinhole())).all()
+    assert np.isnan(foot_points(np.array([[300.0, -2000.0, 10.0, 20.0]]), np.zeros(1), pinhole())).all()

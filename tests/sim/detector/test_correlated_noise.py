@@ -2,17 +2,17 @@ import numpy as np
 import pytest
 
 from scenarios.schema.sensor import Memory
-from sim.detector.correlated_noise import lasting
+from sim.detector.correlated_noise import correlated_normals
 
 
 def drawn(memory: list[Memory], frames: int = 4000, first: int = 1, id: int = 1) -> np.ndarray:
     fresh = np.random.default_rng(id).standard_normal((frames, 3))
-    return lasting(fresh, memory, first, 10.0, 7, id, 0)
+    return correlated_normals(fresh, memory, first, 10.0, 7, id, 0)
 
 
 def test_without_memory_all_is_new() -> None:
     fresh = np.random.default_rng(0).standard_normal((5, 2))
-    assert np.array_equal(lasting(fresh, [], 1, 10.0, 7, 1, 0), fresh)
+    assert np.array_equal(correlated_normals(fresh, [], 1, 10.0, 7, 1, 0), fresh)
 
 
 def test_correlation_is_the_sum_of_the_parts() -> None:

@@ -6,7 +6,7 @@ from scipy.special import ndtr
 from scipy.stats import multivariate_normal
 
 from scenarios.schema.sensor import Memory
-from sim.detector.correlated_noise import lasting
+from sim.detector.correlated_noise import correlated_normals
 from sim.types import Truth
 from tracking.fitting.error_correlation import Correlations, correlations, hidden_correlations, memory, together
 
@@ -22,7 +22,7 @@ def drawn(truth: Truth, parts: list[Memory]) -> np.ndarray:
     z = np.empty((len(truth.id), 1))
     for one in np.unique(truth.id):
         fresh = np.random.default_rng(int(one)).standard_normal((truth.length, 1))
-        z[truth.id == one] = lasting(fresh, parts, 1, truth.fps, 5, int(one), 0)
+        z[truth.id == one] = correlated_normals(fresh, parts, 1, truth.fps, 5, int(one), 0)
     return z
 
 

@@ -1,0 +1,45 @@
+"""Detections of a whole sequence as rows, and how true ones and false alarms become the lists of single frames."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+
+from sim.types import Array, Detections, Ints, Plane, Truth
+
+
+@dataclass(frozen=True)
+class Readings:
+    """R detections of a whole sequence, true ones or false alarms.
+
+    frame (R,) from 1 on. pos (R, 2): m on the ground, or px where the truth has no positions. box (R, 4) ltwh px, or
+    None. score (R,) in [0, 1]. order (R,) in (0, 1), random: detections of a frame are listed by it, so that a place in
+    the list tells nothing.
+    """
+
+    frame: Ints
+    pos: Array
+    box: Array | None
+    score: Array
+    order: Array
+
+
+def detections_by_frame(true: Readings, false: Readings, truth: Truth) -> list[Detections]:
+    """Return one Detections for each frame of the truth, empty ones included: true detections and false alarms mixed.
+
+    The plane is "ground" if the truth has positions, else "image". Boxes are None unless both kinds have boxes.
+    """
+    frame = np.concatenate([true.frame, false.frame])
+    order = np.lexsort((np.concatenate([true.order, false.order]), frame))
+    pos = np.concatenate([true.pos, false.pos])[order]
+    score = np.concatenate([true.score, false.score])[order]
+    box = None if true.box is None or false.box is None else np.concatenate([true.box, false.box])[order]
+    plane: Plane = "image" if truth.pos is None else "ground"
+    cuts = np.searchsorted(frame[order], np.arange(1, truth.length + 2))
+    found = []
+    for k, (a, b) in enumerate(pairwise(cuts)):
+        here = None if box is None else box[a:b]
+        found.append(Detections(k + 1, k / truth.fps, plane, pos[a:b], None, here, score[a:b]))
+    return found

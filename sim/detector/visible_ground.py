@@ -1,0 +1,110 @@
+"""Where false alarms can be: the part of an image that shows ground, and the height of a person standing there."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from sim.scene.body import PERSON_HEIGHT, person_boxes
+from sim.scene.camera import project, to_ground
+from sim.types import Array, Camera, Truth
+
+SMALLEST = 0.25  # ground ends where people are smaller than this share of a person in the middle of the image
+
+
+class VisibleGround:
+    """The part of an image that shows ground, and the height of people there: by the camera, else by the labels.
+
+    State: `low`, `high` (2,) px, the upper left and lower right corner of that part. Without a camera, a person's
+    height is linear in the row of the feet, as on flat ground, and limited to half the least and 1.5 times the greatest
+    labelled height. The part ends at the row where people have SMALLEST of the height in the middle of the image.
+    Without a camera and without an image size, it is the rectangle round the labelled feet.
+    """
+
+    def __init__(self, truth: Truth, camera: Camera | None, size: Array | None) -> None:
+        self.truth, self.camera = truth, camera
+        self.low, self.high = np.zeros(2), np.zeros(2)
+        self.line, self.limits = np.array([1.0, 0.0]), (1.0, 1.0)
+        if camera is not None:
+            self.high = np.array(camera.image, dtype=float)
+            self.low[1] = 0.0 if camera.kind == "top" else furthest_row(camera)
+        elif truth.box is not None and len(truth.box):
+            foot = truth.box[:, :2] + truth.box[:, 2:] * [0.5, 1.0]
+            self.line = height_line(foot[:, 1], truth.box[:, 3])
+            self.limits = 0.5 * float(truth.box[:, 3].min()), 1.5 * float(truth.box[:, 3].max())
+            self.low, self.high = foot.min(axis=0), foot.max(axis=0)
+            if size is not None:
+                self.low, self.high = np.array([0.0, _furthest_labelled_row(self.line, float(size[1]))]), np.array(size)
+
+    def image_point(self, x: float, y: float) -> tuple[float, float]:
+        """Return the image point (u, v) px at share x of the width and share y of the height of the ground part."""
+        u, v = self.low + np.array([x, y]) * (self.high - self.low)
+        return float(u), float(v)
+
+    def usual_height(self, u: float, v: float) -> float:
+        """Return the height in px of the box of a standard person whose feet are at (u, v) px."""
+        if self.camera is None:
+            return float(np.clip(self.line @ [1.0, v], *self.limits))
+        pos = to_ground(self.camera, np.array([[u, v]]))
+        height = np.full(1, PERSON_HEIGHT)
+        tall = person_boxes(self.camera, np.column_stack([pos, [0.0]]), np.zeros(1), height)[0, 3]
+        if not np.isfinite(tall):  # right under the camera
+            tall = PERSON_HEIGHT * self.camera.focal_px[1] / max(float(self.camera.position[2]), 1.0)
+        return float(tall)
+
+    def ground_points(self, u: Array, v: Array, otherwise: Array) -> Array:
+        """Return the ground points (L, 2) m seen at image points u, v (L,) px.
+
+        Rows of `otherwise` (L, 2) replace points where no ground is seen, and all points if there is no camera. Image
+        points above the ground part are moved down to its upper edge.
+        """
+        if self.camera is None:
+            return otherwise
+        top = self.low[1]
+        pos = to_ground(self.camera, np.stack([u, np.maximum(v, top)], axis=1))
+        return np.where(np.isfinite(pos), pos, otherwise)
+
+    def labelled_point(self, x: float, y: float) -> Array:
+        """Return the point (2,) m at shares x, y of the rectangle round all labelled positions; (0, 0) without any."""
+        pos = self.truth.pos
+        if pos is None or not len(pos):
+            return np.zeros(2)
+        low, high = pos.min(axis=0), pos.max(axis=0)
+        return np.asarray(low + np.array([x, y]) * (high - low))
+
+
+def furthest_row(camera: Camera) -> float:
+    """Return the uppermost image row (px) at which people are not too small, by SMALLEST; for pinhole cameras.
+
+    0 if they are too small at every row. Rows are tested along the column through the image centre.
+    """
+    v = np.linspace(0.0, camera.image[1], 241)
+    ground = to_ground(camera, np.column_stack([np.full_like(v, camera.centre_px[0]), v]))
+    foot = np.column_stack([ground, np.zeros(len(v))])
+    head = foot + np.array([0.0, 0.0, PERSON_HEIGHT])
+    size = np.linalg.norm(project(camera, head)[0] - project(camera, foot)[0], axis=1)
+    at_middle = size[len(v) // 2] if np.isfinite(size[len(v) // 2]) else np.nanmax(size, initial=0.0)
+    enough = np.flatnonzero(np.nan_to_num(size) >= SMALLEST * at_middle)
+    return float(v[enough[0]]) if len(enough) else 0.0
+
+
+def _furthest_labelled_row(line: Array, rows: float) -> float:
+    """The same by a `height_line`, in an image of so many rows; 0 if heights do not grow downwards."""
+    a, b = line
+    return float(np.clip((SMALLEST * (a + b * rows / 2) - a) / b, 0.0, rows / 2)) if b > 1e-6 else 0.0
+
+
+def height_line(foot: Array, height: Array) -> Array:
+    """Return (a, b) of the least-squares line height = a + b foot through box heights (N,) and foot rows (N,), px.
+
+    b is 0 if all feet are in one row.
+    """
+    spread = foot - foot.mean()
+    b = float(spread @ height / (spread @ spread)) if spread @ spread > 1e-9 * len(foot) else 0.0
+    return np.array([height.mean() - b * foot.mean(), b])
+
+
+def clip_boxes(box: Array, image_size: tuple[int, int]) -> Array:
+    """Return the parts (N, 4) ltwh px of boxes that lie in the image; width or height 0 for a box outside."""
+    limit = np.array(image_size, dtype=float)
+    low, high = np.clip(box[:, :2], 0, limit), np.clip(box[:, :2] + box[:, 2:], 0, limit)
+    return np.concatenate([low, high - low], axis=1)
