@@ -7,10 +7,10 @@ from typing import Literal
 
 import numpy as np
 
+from sim.scene.body import PERSON_HEIGHT
 from sim.types import Array, Camera, Tracks
 
-HEIGHT = 1.70  # m, of the upright cylinder
-WIDTH = 0.50  # m, its diameter
+WIDTH = 0.50  # m, diameter of the upright cylinder
 
 
 def box_source(tracks: Sequence[Tracks], camera: Camera | None) -> Literal["measured", "projected", "none"]:
@@ -26,7 +26,7 @@ def box_source(tracks: Sequence[Tracks], camera: Camera | None) -> Literal["meas
 
 
 def upright_boxes(camera: Camera, pos: Array) -> Array:
-    """Return the boxes (N, 4) ltwh px of upright cylinders, HEIGHT high and WIDTH across, that stand at `pos`.
+    """Return the boxes (N, 4) ltwh px of upright cylinders, PERSON_HEIGHT high and WIDTH across, that stand at `pos`.
 
     pos: (N, 3) m, or (N, 2) m on the ground z = 0. A cylinder that is partly behind the camera has a box of nan.
     """
@@ -34,7 +34,7 @@ def upright_boxes(camera: Camera, pos: Array) -> Array:
 
     angle = np.arange(16) * (np.pi / 8)
     rim = WIDTH / 2 * np.stack([np.cos(angle), np.sin(angle)], axis=1)
-    rim = np.concatenate([np.c_[rim, np.zeros(16)], np.c_[rim, np.full(16, HEIGHT)]])
+    rim = np.concatenate([np.c_[rim, np.zeros(16)], np.c_[rim, np.full(16, PERSON_HEIGHT)]])
     foot = pos if pos.shape[1] == 3 else np.concatenate([pos, np.zeros((len(pos), 1))], axis=1)
     uv, depth = project(camera, (foot[:, None] + rim).reshape(-1, 3))
     uv = np.where((depth > 0)[:, None], uv, np.nan).reshape(len(pos), 32, 2)

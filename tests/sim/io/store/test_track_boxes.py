@@ -3,8 +3,9 @@ import json
 import numpy as np
 import pytest
 
-from sim.io.store.track_boxes import HEIGHT, WIDTH, upright_boxes
+from sim.io.store.track_boxes import WIDTH, upright_boxes
 from sim.io.store.track_files import read_tracks, tracks_files, write_tracks
+from sim.scene.body import PERSON_HEIGHT
 from sim.types import Camera
 
 # Level, at (0, 0, 1.7), looking along +y: x right, z down, y forward.
@@ -32,7 +33,7 @@ def test_boxes_of_upright_people():
     boxes = upright_boxes(LEVEL, np.array([[0.0, 10.0], [2.0, 20.0], [0.0, -10.0]]))
     left, top, width, height = boxes[0]
     assert top == pytest.approx(240, abs=1e-9)
-    assert height == pytest.approx(500 * HEIGHT / (10 - WIDTH / 2))
+    assert height == pytest.approx(500 * PERSON_HEIGHT / (10 - WIDTH / 2))
     assert width == pytest.approx(500 * WIDTH / 10, rel=0.01)
     assert left + width / 2 == pytest.approx(320)
     assert boxes[1, 0] > left + width
