@@ -1,8 +1,9 @@
-"""Tar shards for streaming, as the library webdataset reads them: the files of a sample stand together under one key.
+"""WebDataset export: pack stored sequences into tar shards that the library webdataset streams.
 
-A sample is a whole sequence, with every file it has and so its content hash, or one frame with its labels. The same
-dataset gives the same bytes: order by name, no times, no owners. A shard is whole or not there, with a .json beside it
-that says what it holds; index.json, written last, names all.
+A sample is a whole sequence (all its files, hence its content hash), or one frame with its labels; all files of a
+sample share a key and stand next to each other. The same dataset gives the same bytes: members are sorted by sequence
+and have no times or owners. A shard appears complete or not at all, with a .json beside it that describes it.
+index.json, written last, lists all shards.
 """
 
 from __future__ import annotations
@@ -12,53 +13,23 @@ import io
 import re
 import tarfile
 from collections.abc import Callable, Iterable, Iterator
-from dataclasses import dataclass
-from functools import partial
 from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
 from scenarios.errors import InputError
 from sim import hashing
-from sim.io.export.frame_labels import labels
+from sim.io.export.webdataset_samples import Member, SequenceItem, read_item, tar_members
 from sim.io.files import tables
 from sim.io.files.atomic import new_file, remove_partials, write_file
 from sim.io.files.lock import lock_folder
-from sim.io.pictures.stored_pictures import StoredPictures
-from sim.io.source import sequence_folders, split_and_name
-from sim.io.store.manifest import MANIFEST, read_manifest
-from sim.io.store.streams import file_name
+from sim.io.source import sequence_folders
 
 SAMPLES = ("sequence", "frame")
 UNITS = {"": 1, "k": 10**3, "M": 10**6, "G": 10**9}
 INDEX = "index.json"
-HEADER = 1024  # bytes of a member in a tar, beside its own, about
-FRAMED = ("left", "right", "disparity", "ids")
-"""Streams with one picture per frame."""
 
-Member = tuple[str, Callable[[], bytes]]
 Progress = Callable[[int, int, str], None]
-
-
-@dataclass(frozen=True)
-class Item:
-    """A stored sequence to pack: its folder, bytes in a shard, content hash, manifest's hash, pictures' kind."""
-
-    folder: Path
-    bytes: int
-    content: str
-    manifest: str
-    images: str | None
-
-    @property
-    def name(self) -> str:
-        """<split>/<name>."""
-        return split_and_name(self.folder)
-
-    @property
-    def key(self) -> str:
-        """Its name in a shard: webdataset ends a key at its first dot, so those of a name are written %2E."""
-        return self.name.replace(".", "%2E")
 
 
 def webdataset(
@@ -69,20 +40,23 @@ def webdataset(
     samples: str = "sequence",
     progress: Progress | None = None,
 ) -> dict[str, Any]:
-    """Pack a dataset of ours into OUT/shard-000000.tar, …; the index. Sequences are never cut in two.
+    """Pack a generated dataset into OUT/shard-000000.tar, …, and write OUT/index.json; returns the index.
 
-    shard_size: bytes that a shard shall not exceed, unless one sequence does; samples: "sequence" or "frame". Shards
-    that are there whole are kept. progress(done, all, name) is called after each. InputError where OUT holds another
-    dataset's, or the source is not ours, or of videos where frames are wanted.
+    shard_size: bytes that a shard may have. A sequence is never divided, so a shard of a single sequence may be larger.
+    samples: "sequence" or "frame". Complete shards of an earlier run are kept. progress(shards done, shards in all,
+    name of the last one) is called after each shard.
+
+    Raises InputError if the source is no generated dataset, if two sequences share a name, if OUT holds shards of
+    another export, or if samples are frames and the pictures are videos.
     """
     items, root = _items(Path(source), samples), Path(out)
     shards = list(_shards(items, shard_size))
     with lock_folder(root):
         remove_partials(root)
         plan = [_facts(samples, number, some) for number, some in enumerate(shards)]
-        _refuse_others(root, plan)
+        _reject_other_shards(root, plan)
         for number, (facts, some) in enumerate(zip(plan, shards, strict=True), 1):
-            plan[number - 1] = _kept(root, facts) or _written(root, facts, some)
+            plan[number - 1] = _complete_shard(root, facts) or _write_shard(root, facts, some)
             if progress is not None:
                 progress(number, len(plan), facts["name"])
         hashes = {name: value for facts in plan for name, value in facts["sequences"].items()}
@@ -93,7 +67,10 @@ def webdataset(
 
 
 def size_of(text: str) -> int:
-    """Bytes of `500MB`, `1.5 GB`, `20000000`."""
+    """Return the number of bytes that a text names: `500MB`, `1.5 GB`, `20000000`; units of 1000.
+
+    Raises InputError if the text is no such size or rounds to less than one byte.
+    """
     found = re.fullmatch(r"(\d{1,12}(?:\.\d{1,6})?)\s*(?:([kMG])?B)?", text.strip())
     size = 0 if found is None else round(float(found[1]) * UNITS[found[2] or ""])
     if size < 1:
@@ -103,9 +80,9 @@ def size_of(text: str) -> int:
     return size
 
 
-def _items(source: Path, samples: str) -> list[Item]:
-    """What to pack, in the order of names."""
-    found = sorted(map(_item, sequence_folders(source, "generated")), key=lambda item: item.name)
+def _items(source: Path, samples: str) -> list[SequenceItem]:
+    """Return the sequences to pack, sorted by name."""
+    found = sorted(map(read_item, sequence_folders(source, "generated")), key=lambda item: item.name)
     twice = next((a.name for a, b in pairwise(found) if a.name == b.name), None)
     if twice is not None:
         raise InputError(file=source, got=f"two sequences {twice}", expected="unique names", remedy="export them apart")
@@ -118,14 +95,9 @@ def _items(source: Path, samples: str) -> list[Item]:
     return found
 
 
-def _item(folder: Path) -> Item:
-    manifest = read_manifest(folder)
-    size = sum(HEADER + facts["bytes"] for facts in manifest["files"].values())
-    return Item(folder, size, manifest["content_hash"], manifest["sha256"], manifest.get("images"))
-
-
-def _shards(items: list[Item], size: int) -> Iterator[list[Item]]:
-    some: list[Item] = []
+def _shards(items: list[SequenceItem], size: int) -> Iterator[list[SequenceItem]]:
+    """Yield the sequences of each shard: consecutive ones, as many as fit into `size` bytes, one at the least."""
+    some: list[SequenceItem] = []
     full = 0
     for item in items:
         if some and full + item.bytes > size:
@@ -136,15 +108,15 @@ def _shards(items: list[Item], size: int) -> Iterator[list[Item]]:
     yield some
 
 
-def _facts(samples: str, number: int, items: list[Item]) -> dict[str, Any]:
-    """What is known of a shard before it is written."""
+def _facts(samples: str, number: int, items: list[SequenceItem]) -> dict[str, Any]:
+    """Return what the shard's .json holds before the tar is written: all but its size and hash."""
     manifests = hashing.canonical_hash([item.manifest for item in items])
     hashes = {item.name: item.content for item in items}
     return {"name": f"shard-{number:06d}.tar", "samples": samples, "manifests": manifests, "sequences": hashes}
 
 
-def _refuse_others(root: Path, plan: list[dict[str, Any]]) -> None:
-    """InputError where a shard stands that is none of these."""
+def _reject_other_shards(root: Path, plan: list[dict[str, Any]]) -> None:
+    """Raise InputError if OUT holds a shard that the plan does not name or whose .json contradicts the plan."""
     wanted = {facts["name"]: facts for facts in plan}
     for path in sorted(root.glob("shard-*.tar")):
         beside = path.with_suffix(".json")
@@ -156,8 +128,8 @@ def _refuse_others(root: Path, plan: list[dict[str, Any]]) -> None:
             )  # fmt: skip
 
 
-def _kept(root: Path, facts: dict[str, Any]) -> dict[str, Any] | None:
-    """What is known of a shard that is there whole."""
+def _complete_shard(root: Path, facts: dict[str, Any]) -> dict[str, Any] | None:
+    """Return the .json of a shard whose tar has the hash that it names; None otherwise."""
     path = root / facts["name"]
     if not path.is_file() or not path.with_suffix(".json").is_file():
         return None
@@ -167,11 +139,11 @@ def _kept(root: Path, facts: dict[str, Any]) -> dict[str, Any] | None:
     return there if digest == there.get("sha256") else None
 
 
-def _written(root: Path, facts: dict[str, Any], items: list[Item]) -> dict[str, Any]:
+def _write_shard(root: Path, facts: dict[str, Any], items: list[SequenceItem]) -> dict[str, Any]:
     path = root / facts["name"]
     path.with_suffix(".json").unlink(missing_ok=True)
     with new_file(path) as beside:
-        _tar(beside, (member for item in items for member in _members(item, facts["samples"])))
+        _tar(beside, (member for item in items for member in tar_members(item, facts["samples"])))
         with beside.open("rb") as file:
             digest = hashlib.file_digest(file, "sha256").hexdigest()
     done = {**facts, "bytes": path.stat().st_size, "sha256": digest}
@@ -186,20 +158,3 @@ def _tar(path: Path, members: Iterable[Member]) -> None:
             info = tarfile.TarInfo(name)
             info.size = len(body)
             tar.addfile(info, io.BytesIO(body))
-
-
-def _members(item: Item, samples: str) -> Iterator[Member]:
-    """The files of a sequence's samples, in order; InputError where one has been altered."""
-    manifest = read_manifest(item.folder)
-    stored = StoredPictures(item.folder, manifest)
-    if samples == "sequence":
-        yield f"{item.key}.{MANIFEST}", (item.folder / MANIFEST).read_bytes
-        for name in manifest["files"]:
-            yield f"{item.key}.{name.replace('/', '.')}", partial(stored.body, name)
-        return
-    there = [stream for stream in stored.streams if stream in FRAMED]
-    for index, body in enumerate(labels(item.folder, manifest), 1):
-        yield f"{item.key}/{index:06d}.json", partial(bytes, body)
-        for stream in there:
-            name = file_name(stream, stored.images, index)
-            yield f"{item.key}/{index:06d}.{stream}{Path(name).suffix}", partial(stored.body, name)

@@ -1,0 +1,126 @@
+"""The samples of a WebDataset export: the tar members of one stored sequence, and the JSON labels of one frame."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+from sim.io.files import tables
+from sim.io.pictures.stored_pictures import StoredPictures
+from sim.io.source import split_and_name
+from sim.io.store.manifest import MANIFEST, read_manifest
+from sim.io.store.sequence_folder import open_sequence
+from sim.io.store.streams import file_name
+from sim.types import Array, Detections, FrameTruth, Groups
+
+FRAME_STREAMS = ("left", "right", "disparity", "ids")
+"""Streams with one picture per frame; a frame's sample holds those of them that are stored."""
+
+TAR_HEADER = 1024  # bytes that one member adds to a tar beside its content, about
+
+Member = tuple[str, Callable[[], bytes]]
+"""Name of a file in the tar, and a call that reads its content."""
+
+
+@dataclass(frozen=True)
+class SequenceItem:
+    """A stored sequence to pack.
+
+    bytes: its size in a tar, about. content: its content hash. manifest: the hash of its manifest. images: file type of
+    its pictures ("jpg", "png" or "mp4"), None without pictures or with 16-bit streams only.
+    """
+
+    folder: Path
+    bytes: int
+    content: str
+    manifest: str
+    images: str | None
+
+    @property
+    def name(self) -> str:
+        """The name <split>/<sequence>."""
+        return split_and_name(self.folder)
+
+    @property
+    def key(self) -> str:
+        """The name as a sample's key; dots are written %2E because webdataset ends a key at its first dot."""
+        return self.name.replace(".", "%2E")
+
+
+def read_item(folder: Path) -> SequenceItem:
+    """Return the item of a sequence folder. Raises InputError if its manifest is missing or damaged."""
+    manifest = read_manifest(folder)
+    size = sum(TAR_HEADER + facts["bytes"] for facts in manifest["files"].values())
+    return SequenceItem(folder, size, manifest["content_hash"], manifest["sha256"], manifest.get("images"))
+
+
+def tar_members(item: SequenceItem, samples: str) -> Iterator[Member]:
+    """Yield the tar members of a sequence in the order in which they are packed.
+
+    samples "sequence": every file of the sequence, the manifest first. Otherwise, for each frame, its JSON labels and
+    its pictures. Reading a member raises InputError if its file differs from the manifest.
+    """
+    manifest = read_manifest(item.folder)
+    stored = StoredPictures(item.folder, manifest)
+    if samples == "sequence":
+        yield f"{item.key}.{MANIFEST}", (item.folder / MANIFEST).read_bytes
+        for name in manifest["files"]:
+            yield f"{item.key}.{name.replace('/', '.')}", partial(stored.body, name)
+        return
+    streams = [stream for stream in stored.streams if stream in FRAME_STREAMS]
+    for index, body in enumerate(frame_labels(item.folder, manifest), 1):
+        yield f"{item.key}/{index:06d}.json", partial(bytes, body)
+        for stream in streams:
+            name = file_name(stream, stored.images, index)
+            yield f"{item.key}/{index:06d}.{stream}{Path(name).suffix}", partial(stored.body, name)
+
+
+def frame_labels(folder: Path, manifest: dict[str, Any]) -> Iterator[bytes]:
+    """Yield one JSON object per frame of a stored sequence; unknown values are null.
+
+    Keys: sequence, fps, image_size, frame, t; people (id, group with -1 for alone, box ltwh px amodal, x, y in m,
+    vx, vy in m/s, visibility) and groups (id, members, hull in m) where the truth is stored; detections (score, box,
+    plane, and x, y, z in its unit) where detections are stored.
+    """
+    sequence = open_sequence(folder)
+    truth = sequence.truth
+    about = {"sequence": sequence.name, "fps": sequence.fps, "image_size": manifest["sequence"]["image_size"]}
+    for frame in sequence.without_pictures():
+        row: dict[str, Any] = {**about, "frame": frame.index, "t": frame.t}
+        if truth is not None:
+            here = truth.at(frame.index)
+            row |= {"people": list(_people(here)), "groups": _groups(here.groups)}
+        if frame.detections is not None:
+            row["detections"] = list(_detections(frame.detections))
+        yield tables.json_text(row).encode()
+
+
+def _people(truth: FrameTruth) -> Iterator[dict[str, Any]]:
+    assert truth.pos is not None, "simulated people have positions"
+    for k, (number, group) in enumerate(zip(truth.id.tolist(), truth.group.tolist(), strict=True)):
+        row = {"id": number, "group": group, "box": None if truth.box is None else _numbers(truth.box[k])}
+        row |= dict(zip(("x", "y"), _numbers(truth.pos[k]), strict=True))
+        if truth.vel is not None:
+            row |= dict(zip(("vx", "vy"), _numbers(truth.vel[k]), strict=True))
+        yield {**row, "visibility": tables.nan_to_none(float(truth.visibility[k]))}
+
+
+def _groups(groups: Groups | None) -> list[dict[str, Any]] | None:
+    if groups is None:
+        return None
+    rows = zip(groups.id.tolist(), groups.members, groups.hull, strict=True)
+    return [{"id": number, "members": members.tolist(), "hull": hull.tolist()} for number, members, hull in rows]
+
+
+def _detections(found: Detections) -> Iterator[dict[str, Any]]:
+    for k, score in enumerate(found.score.tolist()):
+        row = {"score": score, "box": None if found.box is None else _numbers(found.box[k])}
+        yield {**row, "plane": found.plane, **dict(zip("xyz", _numbers(found.pos[k]), strict=False))}
+
+
+def _numbers(row: Array) -> list[float | None]:
+    """Return a row's values as JSON numbers, None for nan."""
+    return [tables.nan_to_none(value) for value in row.tolist()]
