@@ -1,7 +1,7 @@
-"""The world: crowds, cameras, sensors, truth, and how sequences are stored and read.
+"""The simulator: crowds, cameras, detectors and truth, and how sequences are stored and read.
 
-`sim.simulate(scenario, seed)` is the whole of it, and `sim.replay(recording, camera)` for people who were filmed;
-nothing heavy is imported before it is asked for.
+`sim.simulate(scenario, seed)` returns a simulated sequence, `sim.replay(recording, camera)` a sequence that shows the
+people of a recording. Both are imported on first use, so `import sim` alone is quick.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""Arrays as fields of frozen dataclasses: their kinds of number, and how they become read-only."""
+"""Array types of the frozen dataclasses: fixed number types, and arrays that are read-only."""
 
 from __future__ import annotations
 
@@ -17,10 +17,12 @@ Image = NDArray[np.uint8]
 
 
 class Frozen:
-    """Makes the arrays of a frozen dataclass read-only and, from any other width of number, float64 or int64.
+    """Base of frozen dataclasses whose array fields become read-only and get the declared number type.
 
-    What is of the right kind is not copied: the field is a read-only view, and whoever keeps the array itself can
-    still write to it. Floats given as ids stay what they are, for the check of a tracker's answer to name them.
+    A field declared Array becomes float64, Ints int64, Bools bool, Image uint8; the items of a tuple of arrays likewise.
+    An array that already has the type is not copied: the field is a read-only view, and the original stays writable. An
+    array whose conversion could lose values (floats where ids are declared) keeps its type, so that the check of a
+    tracker's answer can report it.
     """
 
     def __post_init__(self) -> None:
@@ -33,7 +35,7 @@ class Frozen:
                 object.__setattr__(self, name, _settled(value, kind))
 
     def replace(self, **changes: Any) -> Self:
-        """A copy with these fields changed."""
+        """Return a copy with the given fields changed."""
         return replace(self, **changes)  # type: ignore[type-var]
 
 
@@ -43,7 +45,7 @@ KINDS["Image"] = np.dtype(np.uint8)
 
 @cache
 def _array_fields(kind: Any) -> tuple[tuple[str, np.dtype[Any], bool], ...]:
-    """The fields of a dataclass that are declared as arrays: name, kind of number, whether a tuple of arrays."""
+    """Return (name, number type, True for a tuple of arrays) of each field that is declared as an array."""
     found = []
     for f in fields(kind):
         declared = re.fullmatch(r"(tuple\[)?(Array|Ints|Bools|Image)\b.*", str(f.type))
@@ -53,7 +55,7 @@ def _array_fields(kind: Any) -> tuple[tuple[str, np.dtype[Any], bool], ...]:
 
 
 def _settled(a: NDArray[Any], kind: np.dtype[Any]) -> NDArray[Any]:
-    """The array read-only and of the wanted kind; of its own where numbers could be lost (floats as ids)."""
+    """Return the array read-only and converted to `kind`; not converted if values could be lost (floats as ids)."""
     if a.dtype is not kind and a.dtype != kind and np.can_cast(a.dtype, kind, "same_kind"):
         a = a.astype(kind)
     if a.flags.writeable:
@@ -63,5 +65,5 @@ def _settled(a: NDArray[Any], kind: np.dtype[Any]) -> NDArray[Any]:
 
 
 def no_ids() -> Ints:
-    """An empty id array."""
+    """Return an empty array of ids, shape (0,), int64."""
     return np.zeros(0, np.int64)

@@ -1,7 +1,8 @@
-"""Canonical hashes: the same content gives the same hash in any process, on any platform of the same number format.
+"""Canonical hashes: equal content gives the same SHA-256 in any process and on any platform.
 
-Every value is fed to SHA-256 with its kind and size in front, so that no two different values read alike: arrays by
-shape and little-endian bytes (every NaN the same), text by its UTF-8, dataclasses and dicts by sorted field names.
+Each value is hashed with its kind and size in front, so that different values never produce the same bytes. An array
+is hashed by number type, shape and little-endian bytes, with all NaN alike; text by its UTF-8; a dict by sorted keys; a
+dataclass as the dict of its fields.
 """
 
 from __future__ import annotations
@@ -16,57 +17,71 @@ from numpy.typing import NDArray
 
 from sim.types import Truth
 
-# Raised whenever the same scenario and seed give another truth; golden hashes in the tests guard it.
+# Raise this whenever the same scenario and seed give another truth; golden hashes in the tests check that.
 ENGINE = 2
 
 
 def canonical_hash(value: Any) -> str:
-    """SHA-256, in hex, of None, bool, int, float, str, bytes, arrays, and tuples, lists, dicts, dataclasses of them."""
+    """Return the SHA-256, in hex, of a value.
+
+    The value may be None, bool, int, float, str, bytes, an array of numbers or bools, or a tuple, list, dict or
+    dataclass of such values; a tuple and a list with equal items have the same hash. Raises TypeError for other types.
+    """
     h = hashlib.sha256()
     _feed(h, value)
     return h.hexdigest()
 
 
 def file_hash(content: bytes) -> str:
-    """SHA-256 of a file's bytes, in hex."""
+    """Return the SHA-256 of a file's bytes, in hex."""
     return hashlib.sha256(content).hexdigest()
 
 
 def scenario_hash(text: str) -> str:
-    """Hash of a resolved scenario, given as the text of scenarios.loading.resolve.dump."""
+    """Return the hash of a resolved scenario, given as the TOML text that `dump` of scenarios.loading writes."""
     return canonical_hash(("scenario", text))
 
 
 def truth_hash(scenario: str, seed: int, repeat: int, truth: Truth | None) -> str:
-    """Hash of the resolved scenario (its text), seed, repeat and all truth; the same whatever is rendered."""
+    """Return the hash of a resolved scenario's text, seed, repeat and truth; it does not depend on what is rendered.
+
+    All fields of the truth count but its name. A truth of None counts as None.
+    """
     named = None if truth is None else {f.name: getattr(truth, f.name) for f in fields(truth) if f.name != "name"}
     return canonical_hash(("truth", scenario, seed, repeat, named))
 
 
 def content_hash(truth: str, detections: Any, pixels: Mapping[str, str] | None = None) -> str:
-    """Hash of a truth_hash, the detections and, by stream, the hashes of raw pixels before encoding, if any."""
+    """Return the hash of a whole sequence: its truth_hash, its detections, and the raw pixels of its streams.
+
+    pixels: hash of the pictures before encoding, by stream; None or empty without pictures. The hash is therefore the
+    same for jpg, png and mp4.
+    """
     return canonical_hash(("content", truth, detections, dict(pixels) if pixels else ()))
 
 
 def dataset_hash(contents: Mapping[str, str]) -> str:
-    """Hash of a dataset: of the content hashes by name of sequence, <split>/<name>."""
+    """Return the hash of a dataset, given the content hash of each sequence by its name <split>/<sequence>."""
     return canonical_hash(("dataset", dict(contents)))
 
 
 class PixelHash:
-    """Hash of a stream of pictures as they are added, by their shapes, types and raw bytes; `count` of them so far."""
+    """A hash over pictures that are added one by one: their number types, shapes and raw bytes.
+
+    State: the SHA-256 so far, and `count`, the number of pictures added.
+    """
 
     def __init__(self) -> None:
         self.count = 0
         self._h = hashlib.sha256()
 
     def add(self, picture: NDArray[Any]) -> None:
-        """The next picture."""
+        """Add the next picture, an array of any shape and number type."""
         self.count += 1
         _array(self._h, picture)
 
     def hex(self) -> str:
-        """The hash of all so far."""
+        """Return the hash of all pictures added so far, in hex."""
         return self._h.hexdigest()
 
 

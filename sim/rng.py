@@ -1,10 +1,10 @@
-"""Keyed random streams: one generator per (seed, role, keys), so that one draw more moves nobody else."""
+"""Keyed random streams: one generator per (seed, role, keys), so that an extra draw changes no other stream."""
 
 from __future__ import annotations
 
 import numpy as np
 
-# Numbers are part of every stored hash: add at the end, never change one.
+# Every stored hash depends on these numbers: add at the end, never change one.
 ROLE = {
     "layout": 0,
     "group": 1,
@@ -25,9 +25,11 @@ ROLE = {
 
 
 def rng(seed: int, role: str, *keys: int, repeat: int = 0) -> np.random.Generator:
-    """A generator over `SeedSequence(seed, spawn_key=(ROLE[role], *keys))`.
+    """Return the generator over `SeedSequence(seed, spawn_key=(ROLE[role], *keys))`.
 
-    `repeat` (the n of a suite's `name-n`) is one more key where it is not zero. Keys are non-negative.
+    The same arguments give the same numbers. role: a key of ROLE, else KeyError. keys: what the stream belongs to, as a
+    person's id or a frame; non-negative. repeat: the n of a suite's entry `name-n`; 1,000,000 + repeat is a further key
+    unless repeat is 0.
     """
     spawn_key = (ROLE[role], *keys) if repeat == 0 else (ROLE[role], *keys, 1_000_000 + repeat)
     return np.random.default_rng(np.random.SeedSequence(seed, spawn_key=spawn_key))

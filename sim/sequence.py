@@ -1,4 +1,4 @@
-"""A scenario and a seed as a Sequence: motion, camera, truth and detections, each made when first asked for."""
+"""Simulate a scenario: a Sequence whose pictures, truth and detections are computed when they are first used."""
 
 from __future__ import annotations
 
@@ -37,11 +37,15 @@ STREAMS = frozenset({"left", "right", "disparity", "ids", "background"})
 
 
 def simulate(scenario: Scenario, seed: int, repeat: int = 0, streams: Iterable[str] = ("left",)) -> Sequence:
-    """Run the world and look at it: pictures, points and boxes by the scenario's sensor, truth by its camera.
+    """Return the sequence that a scenario and a seed define: frames, detections by its sensor, truth by its camera.
 
-    streams, some of STREAMS: which pictures the frames have (`left`, `right`), drawn as frames are asked for, and what
-    is known of pixels (`ids`, `disparity`); () none. InputError where the scenario cannot be (no room, people out of
-    view, a right view without a baseline).
+    repeat: the n of a suite's entry `name-n`. streams, some of STREAMS: "left" and "right" give frames with pictures,
+    drawn while iterating; any stream gives `background()` and exact pixels (`load_pixels`), whose disparity is known if
+    "disparity" is among them; () draws nothing.
+
+    Raises InputError if the scenario is impossible (no room for its people, people out of view, a right view or
+    disparity without a baseline) or a stream is unknown. Reading the truth raises WorkError if an order of the script
+    was not fulfilled.
     """
     from sim.crowd.world import run
 
@@ -56,13 +60,15 @@ def observe(
     check: bool = True,
     streams: Iterable[str] = (),
 ) -> Sequence:
-    """The sequence that the scenario's camera and sensor make of a Motion.
+    """Return the sequence that a scenario's camera and sensor make of a Motion.
 
-    check: asking for the truth of a Motion whose orders did not come true is a WorkError.
-    The camera is solved at once (a scenario whose people leave the view is refused here); truth and detections are
-    lazy, and detections never touch the truth that the sequence gives out. people: ids of each of the script's groups,
-    where `sensor.hide` names one and the motion was not made from the scenario itself. streams: as for `simulate`;
-    any of them brings empty frames for a background and exact pixels, with disparities if those are a stream.
+    The camera is solved at once; truth and detections are computed when they are first used, independently of each
+    other. people: ids of the people of each group that `sensor.hide` may name; None derives them from the scenario,
+    which must then be the one that the motion was simulated from. check: reading the truth raises WorkError if an order
+    of the script was not fulfilled. streams: as for `simulate`.
+
+    Raises InputError if people leave the view, if a stream is unknown, or if the camera has no baseline for a right
+    view or disparities.
     """
     camera = place_camera(scenario.camera, motion)
     drawn = _pictures(streams, scenario, motion, camera)
@@ -73,7 +79,7 @@ def observe(
             return people
         from scenarios.schema import scenario as schema
 
-        assert isinstance(scenario, schema.Scenario), "a view knows no groups: give people"
+        assert isinstance(scenario, schema.Scenario), "only a scenario names groups: give people"
         return named_people(scenario, motion.scene, motion.seed, motion.repeat, motion.orders)
 
     @cache
@@ -125,7 +131,10 @@ def observe(
 
 
 class _Pictures:
-    """The pictures that were asked for. Holds the exact pixels of the frame drawn last: they are often wanted next."""
+    """Draws the requested streams.
+
+    State: the exact pixels of the frame that was drawn last, because they are usually read next.
+    """
 
     def __init__(self, stage: Stage, streams: frozenset[str]) -> None:
         self.stage, self.streams = stage, streams
@@ -133,7 +142,7 @@ class _Pictures:
         self._last: tuple[int, PixelTruth | None] = (0, None)
 
     def draw(self, index: int) -> Rendered:
-        """The frame's pictures, and its exact pixels where a stream shows them."""
+        """Draw a frame: its pictures by the requested streams, and its exact pixels if "ids" or "disparity" is one."""
         if not self.has_image:
             return Rendered(right=self.stage.right(index) if self.has_right else None)
         labels = not self.streams.isdisjoint({"ids", "disparity"})
@@ -142,14 +151,14 @@ class _Pictures:
         return made
 
     def pixels(self, index: int) -> PixelTruth:
-        """Exact pixels of a frame, with disparities if they are a stream."""
+        """Return the exact pixels of a frame; disparity is None unless "disparity" was requested."""
         last, known = self._last
         if known is not None and last == index:
             return known
         return self.stage.pixels(index, disparity="disparity" in self.streams)
 
     def background(self) -> Image:
-        """Empty frames before the first (BACKGROUNDS, H, W, 3)."""
+        """Return pictures of the empty scene, (BACKGROUNDS, H, W, 3) BGR uint8."""
         return np.stack([self.stage.background(k) for k in range(BACKGROUNDS)])
 
 
@@ -173,7 +182,10 @@ def _pictures(
 def named_people(
     scenario: Scenario, scene: Scene, seed: int, repeat: int, orders: Iterable[Order]
 ) -> dict[str, tuple[int, ...]]:
-    """Ids of the people of each group that the script names: those it starts with, and those its orders made."""
+    """Return the ids of the people of each group that the script names.
+
+    These are the groups it starts with, and those that fired merge and split orders made (`into`, `parts`).
+    """
     from sim.crowd.population import draw_population
 
     parties = draw_population(scenario, scene, seed, repeat)

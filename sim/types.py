@@ -1,8 +1,9 @@
-"""All types that cross a module's border: what sensors deliver, what trackers answer, what is true.
+"""The types that modules exchange: frames, detections, tracks, groups, events, cameras, truth, sequences.
 
-Conventions (docs/formats.md): metres on the ground, x right, y away from the default camera, z up; px in the image,
-(0, 0) the upper left corner, u right, v down; frames are 1-based, t = (frame - 1) / fps; seconds; radians.
-Arrays are float64 except ids (int64), flags (bool) and images (uint8); every array of these types is read-only.
+Conventions (docs/formats.md): on the ground metres, x right, y away from the default camera, z up; in images px, (0, 0)
+the upper left corner, u right, v down; frames are 1-based, t = (frame - 1) / fps in s; angles in radians.
+Arrays are float64 except ids (int64), flags (bool) and images (uint8); every array of these types is read-only. "ltwh"
+is left, top, width, height.
 """
 
 from __future__ import annotations
@@ -23,7 +24,7 @@ from sim.arrays import no_ids as no_ids
 Plane = Literal["ground", "space", "image"]
 Unit = Literal["person", "group"]
 DetectionMode = Literal["image", "truth", "file"]
-BACKGROUNDS = 50  # empty frames before the first, of a sequence of ours
+BACKGROUNDS = 50  # empty frames that precede frame 1 of a simulated sequence
 OWN_BACKGROUND = f"{BACKGROUNDS} empty frames before frame 1"
 EVENT_KINDS = ("merge", "split", "cross", "queue", "form", "dissolve", "enter", "leave")
 
@@ -32,8 +33,9 @@ EVENT_KINDS = ("merge", "split", "cross", "queue", "form", "dissolve", "enter", 
 class Detections(Frozen):
     """What a detector found in one frame, M rows.
 
-    plane says what `pos` is in: "ground" (x, y in m), "space" (x, y, z in m) or "image" (px, the box's centre).
-    box (M, 4) left, top, width, height in px; a detector that delivers points only has None. score in [0, 1].
+    plane is the plane of `pos` (M, D): "ground" (x, y in m), "space" (x, y, z in m) or "image" (px, the box's centre).
+    vel (M, D) in the plane's unit per s, None if unknown. box (M, 4) ltwh px, None from a detector of points. score
+    (M,) in [0, 1]; empty if the detector gives none.
     """
 
     index: int
@@ -47,7 +49,8 @@ class Detections(Frozen):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Frame(Frozen):
-    """What the sensors deliver at one instant, nothing else; `image`, `right` are (H, W, 3) BGR uint8."""
+    """What the sensors deliver for one frame; image (left camera) and right are (H, W, 3) BGR uint8, None if missing;
+    detections are None without a detector."""
 
     index: int
     t: float
@@ -58,10 +61,11 @@ class Frame(Frozen):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Groups(Frozen):
-    """Groups of one frame, G rows, in the plane of the Tracks or Truth that holds them.
+    """Groups of one frame, G rows, in the plane and unit of the Tracks or Truth that holds them.
 
-    members: person ids of each (empty for a method that knows groups only); hull: (V, 2) polygons, counter-clockwise
-    in (x, y); extent: 2x2 covariance of the members' places, nan if unknown; size: people, nan if unknown.
+    id (G,). members: ids of each group's people, empty if the method knows groups only. pos, vel (G, D): of the centre.
+    extent (G, 2, 2): covariance of the members' positions, nan if unknown. size (G,): people, nan if unknown. hull: a
+    polygon (V, 2) for each group, counter-clockwise in (x, y).
     """
 
     id: Ints
@@ -74,18 +78,18 @@ class Groups(Frozen):
 
     @classmethod
     def none(cls) -> Groups:
-        """No groups."""
+        """Return the Groups of a frame without groups."""
         two = np.zeros((0, 2))
         return cls(no_ids(), (), two, two, np.zeros((0, 2, 2)), np.zeros(0), ())
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class GroupEvent:
-    """One event of groups. Frames are 1-based, both ends inclusive.
+    """One event of groups, from frame `start` to frame `end`, both inclusive.
 
-    kind: one of EVENT_KINDS. start may be back-dated to the onset; emitted is the frame in which a tracker said so
-    (None in the truth). before, after: sorted group ids, -1 once for each person alone. members: all people concerned,
-    sorted (empty when unknown). pos: where, in the plane's unit.
+    kind: one of EVENT_KINDS. start: the onset, which may be earlier than emitted, the frame in which the tracker
+    reported the event (None in the truth). before, after: sorted group ids, with -1 once for each person alone.
+    members: ids of all people concerned, sorted, empty if unknown. pos: the place, in the plane's unit.
     """
 
     kind: str
@@ -100,12 +104,12 @@ class GroupEvent:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Tracks(Frozen):
-    """A tracker's answer to one frame, N rows.
+    """What a tracker reports for one frame, N rows.
 
-    unit "person": group is the id of the person's group, -1 alone. unit "group": id == group.
-    cov (N, 2D, 2D) ordered x, y, (z), vx, vy, (vz). box (N, 4) ltwh px or None. groups and events may be left empty:
-    they are then derived by the baseline rule (tracking.grouping.grouped_tracks). derived: this has been done, nothing
-    is left to do.
+    unit "person": group (N,) is the id of the person's group, -1 for alone. unit "group": rows are groups, group == id.
+    pos, vel (N, D) in the plane's unit (per s). cov (N, 2D, 2D): covariance of x, y, (z), vx, vy, (vz). box (N, 4) ltwh
+    px or None. score (N,) in [0, 1] or empty. A tracker may leave groups and events empty: they are then derived from
+    the tracks. derived: True once that is done.
     """
 
     index: int
@@ -126,8 +130,8 @@ class Tracks(Frozen):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Stairs(Frozen):
-    """A ramp of steps: z rises from 0 at the edge whose middle is `foot` to `rise` at that of `head`, over `width`
-    across the axis; beyond the head the plateau of `landing` metres keeps z = rise."""
+    """Stairs: z rises in `steps` steps from 0 at the edge with midpoint foot (2,) to `rise` at the edge with midpoint
+    head (2,), `width` wide; behind the head a plateau of length `landing` has z = rise. All lengths in m."""
 
     foot: Array
     head: Array
@@ -139,8 +143,8 @@ class Stairs(Frozen):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Scene(Frozen):
-    """What stands still: size (2,) m; walls (W, 2, 2) segments; pillars (P, 3) x, y, radius; doors (D, 2, 2) openings
-    in walls; service (S, 2) service points. wall_height and pillar_height in m."""
+    """The static world, in m: size (2,); walls (W, 2, 2) segments; pillars (P, 3) x, y, radius; doors (D, 2, 2),
+    segments that are openings in walls; service (S, 2) service points; stairs; heights of walls and pillars."""
 
     size: Array
     walls: Array = field(default_factory=lambda: np.zeros((0, 2, 2)))
@@ -154,12 +158,12 @@ class Scene(Frozen):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Camera(Frozen):
-    """A camera; see sim.scene.camera for what it sees.
+    """A camera; sim.scene.camera projects with it.
 
-    kind "pinhole": x_cam = rotation (X - position), u = fx x/z + cx, v = fy y/z + cy, (cx, cy) the image's middle
-    unless given. kind "top": orthographic, px_per_m, looking straight down on `position`.
-    baseline (m): the right camera is at +baseline along camera x; 0 = none. image: (width, height) px.
-    radial: Tsai's distortion of a pinhole's image, x_ideal = x (1 + radial |x|²) for x = ((u - cx)/fx, (v - cy)/fy).
+    kind "pinhole": x_cam = rotation (X - position), u = fx x/z + cx, v = fy y/z + cy with focal_px (fx, fy), centre_px
+    (cx, cy). kind "top": orthographic with scale px_per_m, looking straight down on `position`. image: (width, height)
+    px. position (3,) m. rotation (3, 3), world to camera. baseline in m: the right camera is at +baseline along camera
+    x; 0 without one. radial: Tsai's distortion, x_ideal = x (1 + radial |x|²) for x = ((u - cx)/fx, (v - cy)/fy).
     """
 
     kind: Literal["pinhole", "top"]
@@ -175,7 +179,8 @@ class Camera(Frozen):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Context(Frozen):
-    """What a tracker may know before the first frame. background: K frames (K, H, W, 3), or None."""
+    """What a tracker may know before the first frame, None where unknown. px_per_m: image scale. image_size: (width,
+    height) px. background: sample pictures (K, H, W, 3) BGR uint8."""
 
     fps: float
     px_per_m: float
@@ -187,9 +192,10 @@ class Context(Frozen):
 
 @dataclass(frozen=True, slots=True)
 class Order:
-    """One order of the script and when it fired: for the record (gt/script.json), never for the measurement.
+    """One order of the script, as recorded in gt/script.json; measured events never depend on it.
 
-    before, after: people (ids) of each group concerned, as the script wants them before and after.
+    fired: frame in which it took effect, None if it never did. before, after: ids of the people of each group
+    concerned, as the script plans them before and after.
     """
 
     id: str
@@ -201,10 +207,11 @@ class Order:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Motion(Frozen):
-    """A whole simulated crowd before a pixel is drawn: T frames, P people; person id = column + 1.
+    """The motion of a whole crowd: T frames, P people; person id = column + 1.
 
-    pos, vel (T, P, 2), heading (T, P): nan while absent. present (T, P). intent (T, P): number of the group that the
-    script wants this person in (unique where alone; -1 absent). height, width, depth (P,) m: the body.
+    pos (T, P, 2) m, vel (T, P, 2) m/s, heading (T, P) rad: nan while absent. present (T, P). intent (T, P): number of
+    the group that the script assigns the person to (a number of its own for a person alone, -1 while absent). height,
+    width, depth (P,) m of the body. free_speed (P,) m/s. repeat: further random key, as in sim.rng.
     """
 
     name: str
@@ -226,7 +233,8 @@ class Motion(Frozen):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Near(Frozen):
-    """Hard negatives: strangers who satisfy the merge rule without belonging together (gt/near.csv), K rows."""
+    """Hard negatives (gt/near.csv), K rows: people a and b satisfy the merge rule from frame start to end, but are
+    strangers (not in one group). a, b are person ids; all fields (K,)."""
 
     start: Ints
     end: Ints
@@ -235,13 +243,13 @@ class Near(Frozen):
 
     @classmethod
     def none(cls) -> Near:
-        """No hard negatives."""
+        """Return a Near without rows."""
         return cls(no_ids(), no_ids(), no_ids(), no_ids())
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class FrameTruth(Frozen):
-    """What is true in one frame, N people; never reaches a tracker. Fields as in Truth."""
+    """The truth of one frame, N people; fields as in Truth. It never reaches a tracker."""
 
     index: int
     t: float
@@ -258,12 +266,12 @@ class FrameTruth(Frozen):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class PixelTruth(Frozen):
-    """What is true of one frame's pixels, N people in the order of FrameTruth's rows.
+    """The truth of one frame's pixels, N people in the order of FrameTruth's rows.
 
-    ids (H, W) int64: person id, -2 walls and pillars, 0 all else (ground, stairs, sky). disparity (H, W) px, nan
-    where the right camera does not see the point; None without a right camera. visible_px, amodal_px (N,): px that
-    show the person, and would if nobody and nothing were in the way (inside the image); box (N, 4) ltwh px of what
-    shows, nan where nothing does. blob (N,): people with the same number show in one connected region, -1 hidden.
+    ids (H, W) int64: person id, -2 for walls and pillars, 0 elsewhere. disparity (H, W) px, nan where the right camera
+    does not see the point; None if it was not computed. visible_px (N,): pixels that show the person; amodal_px (N,):
+    pixels inside the image that would without any occlusion. box (N, 4) ltwh px of the visible pixels, nan without any.
+    blob (N,): number of the connected region of people that shows the person, -1 if hidden.
     """
 
     ids: Ints
@@ -275,19 +283,19 @@ class PixelTruth(Frozen):
 
     @property
     def visibility(self) -> Array:
-        """(N,) visible share of each silhouette by pixels; 0 where it has none."""
+        """Return visible_px / amodal_px, shape (N,); 0 for a person without amodal pixels."""
         return np.asarray(self.visible_px / np.maximum(self.amodal_px, 1.0))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Truth(Frozen):
-    """What is true in a sequence: R rows sorted by (frame, id), one per person and frame.
+    """The truth of a sequence of `length` frames: R rows sorted by (frame, id), one per person and frame.
 
-    frame, id, group (-1 alone). pos, vel (R, 2) on the ground in m, m/s, None if unknown; z (R,) ground height.
-    box (R, 4) amodal, unclipped, px, None without camera; visibility (R,) geometric share in [0, 1];
-    truncation (R,); visible_box (R, 4): box of the visible part, nan where hidden. heading, height (R,).
-    groups / groups_px: one Groups per frame on the ground / in the image, None where groups are not labelled.
-    labelled (T,): frames whose groups are labelled. events, near: measured from the motion.
+    frame, id, group (R,), group -1 for alone. pos (R, 2) m, vel (R, 2) m/s on the ground. z (R,) m, height of the
+    ground. box (R, 4) ltwh px, amodal and unclipped. visible_box (R, 4): of the visible part, nan if hidden.
+    visibility, truncation (R,): visible share, share outside the image. heading (R,) rad, height (R,) m of the person.
+    groups, groups_px: one Groups per frame, on the ground and in the image. labelled (T,): frames with group labels.
+    events, near: measured from the motion. orders: of the script. Optional fields are None if unknown.
     """
 
     name: str
@@ -314,12 +322,12 @@ class Truth(Frozen):
     orders: tuple[Order, ...] = ()
 
     def rows(self, index: int) -> slice:
-        """Rows of frame `index`."""
+        """Return the slice of the rows of frame `index` (1-based)."""
         low, high = np.searchsorted(self.frame, (index, index + 1))
         return slice(int(low), int(high))
 
     def at(self, index: int) -> FrameTruth:
-        """The truth of frame `index` (1-based)."""
+        """Return the truth of frame `index` (1-based), without its pixels."""
         r = self.rows(index)
 
         def cut(a: Array | None) -> Array | None:
@@ -341,14 +349,13 @@ class Truth(Frozen):
 
 @dataclass(frozen=True)
 class Sequence:
-    """A sequence of frames, simulated, stored or real: re-iterable, and all a command needs to know.
+    """A sequence of frames, simulated, stored or recorded; it can be iterated any number of times.
 
-    frames(): a new iterator over Frame, `detections` being the file's (or the simulated sensor's), if any.
-    truth: a function, called once when first asked for, or None. background: a function giving (K, H, W, 3) or None.
-    planes: what the detections' `pos` is in, "ground" or "image"; px_per_m nan = to be found from boxes.
-    load_people: a function giving the ids of the people of each group that the script names, or None without a script.
-    bare: frames without their pictures, where making those takes time. load_pixels: a function giving the exact pixels
-    of a frame by its index, or None.
+    frames(): a new iterator over Frame, with the file's or simulated sensor's detections. bare(): the same without
+    pictures, None if that is not quicker. length: None if unknown before reading. px_per_m: nan if unknown.
+    Each load_ field is a function, or None if there is nothing to load: load_truth() the Truth; load_background()
+    sample pictures (K, H, W, 3); load_people() the ids of the people of each group that the script names;
+    load_pixels(index) the PixelTruth of a frame. source: where the sequence comes from ("kind", "path", "seed", …).
     """
 
     name: str
@@ -373,11 +380,11 @@ class Sequence:
         return self.frames()
 
     def without_pictures(self) -> Iterator[Frame]:
-        """A new iterator over the frames for those who need detections only."""
+        """Return a new iterator over the frames; their pictures are left out where that saves time."""
         return self.frames() if self.bare is None else self.bare()
 
     def frame_truth(self, index: int) -> FrameTruth | None:
-        """What is true in frame `index`, its pixels included where they are known."""
+        """Return the truth of frame `index` with its pixels if they are known; None without truth."""
         if self.truth is None:
             return None
         here = self.truth.at(index)
@@ -385,7 +392,7 @@ class Sequence:
 
     @property
     def truth(self) -> Truth | None:
-        """What is true, or None where nothing is labelled; loaded once."""
+        """The truth, loaded on first use and then kept; None if nothing is labelled."""
         if self.load_truth is None:
             return None
         cached: Truth | None = self.__dict__.get("_truth")
@@ -395,18 +402,18 @@ class Sequence:
         return cached
 
     def background(self) -> Image | None:
-        """A sample of frames for training a background model, or None."""
+        """Return sample pictures (K, H, W, 3) BGR uint8 to train a background model on, or None."""
         return None if self.load_background is None else self.load_background()
 
 
 class Tracker(Protocol):
-    """What any tracker is. needs: alternatives out of "pixels", "stereo", "boxes", "points"."""
+    """The interface of a tracker. needs: the inputs it accepts, out of "pixels", "stereo", "boxes", "points"."""
 
     needs: tuple[str, ...]
 
     def reset(self, context: Context, seed: int) -> None:
-        """Forget everything and get ready for a sequence."""
+        """Forget all state and start a new sequence."""
 
     def step(self, frame: Frame, detections: Detections | None) -> Tracks:
-        """Answer one frame, never looking ahead."""
+        """Return the tracks of this frame, computed from this and earlier frames only."""
         ...
