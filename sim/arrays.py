@@ -19,7 +19,7 @@ Image = NDArray[np.uint8]
 class Frozen:
     """Base of frozen dataclasses whose array fields become read-only and get the declared number type.
 
-    A field declared Array becomes float64, Ints int64, Bools bool, Image uint8; the items of a tuple of arrays likewise.
+    A field declared Array becomes float64, Ints int64, Bools bool, Image uint8; so do the items of a tuple of arrays.
     An array that already has the type is not copied: the field is a read-only view, and the original stays writable. An
     array whose conversion could lose values (floats where ids are declared) keeps its type, so that the check of a
     tracker's answer can report it.
