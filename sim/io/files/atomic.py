@@ -1,4 +1,4 @@
-"""Writing so that nothing is ever seen half-written: beside the target, flushed to disk, then renamed."""
+"""Atomic writing: a file or folder is written under a temporary name, synced to disk, then renamed to its target."""
 
 from __future__ import annotations
 
@@ -13,13 +13,13 @@ from uuid import uuid4
 
 from scenarios.errors import FlockscopeError, InputError, WorkError
 
-PARTIAL = ".partial-"
-SYNC_THREADS = 8  # files flushed at a time
+PARTIAL = ".partial-"  # beginning of temporary names
+SYNC_THREADS = 8  # files synced at a time
 DISK_FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
 
 
 def write_error(path: Path, error: OSError) -> FlockscopeError:
-    """What an OSError while writing means to the user."""
+    """Return the user's error for an OSError while writing: WorkError if the disk is full, else InputError."""
     reason = error.strerror or type(error).__name__
     if error.errno in DISK_FULL:
         return WorkError(
@@ -30,9 +30,11 @@ def write_error(path: Path, error: OSError) -> FlockscopeError:
 
 @contextmanager
 def staged_path(target: Path) -> Iterator[Path]:
-    """A partial path beside the target to write to; gone afterwards, and so are folders made for nothing.
+    """Give a temporary path beside the target for the length of the block, then delete what is left there.
 
-    No other writer has it: processes of two machines may have one number.
+    The block creates a file or folder at that path and renames it. The target's parents are created, and removed again
+    if they stay empty. The name is random, since writers on two machines may share a process id. An OSError inside the
+    block is raised as InputError or WorkError (write_error).
     """
     partial = target.parent / f"{PARTIAL}{target.name}-{uuid4().hex[:12]}"
     made = [p for p in (target.parent, *target.parent.parents) if not p.exists()]
@@ -49,7 +51,7 @@ def staged_path(target: Path) -> Iterator[Path]:
 
 
 def write_file(target: Path, content: bytes) -> None:
-    """A file, whole or not at all."""
+    """Write a file that appears complete or not at all; replaces an existing one. Raises as `staged_path`."""
     with staged_path(target) as partial:
         _write_synced(partial, content)
         os.replace(partial, target)
@@ -58,7 +60,7 @@ def write_file(target: Path, content: bytes) -> None:
 
 @contextmanager
 def new_file(target: Path) -> Iterator[Path]:
-    """A path beside the target to write a file to, which takes its place when left well."""
+    """Give a temporary path to write a file to; the file replaces the target if the block ends without an exception."""
     with staged_path(target) as partial:
         yield partial
         _sync_file(partial)
@@ -68,9 +70,10 @@ def new_file(target: Path) -> Iterator[Path]:
 
 @contextmanager
 def new_folder(target: Path, keep: Callable[[], bool] = lambda: False) -> Iterator[Path]:
-    """An empty folder beside the target to fill, which takes its place when left well; one that stood there goes.
+    """Give an empty temporary folder to fill; it becomes the target if the block ends without an exception.
 
-    keep: whether one that has come to stand there meanwhile shall stay instead.
+    An existing target is deleted first, unless `keep()` returns True: then the new folder is dropped. `keep` serves two
+    writers of the same sequence, of which the first one wins. Raises as `staged_path`.
     """
     with staged_path(target) as partial:
         partial.mkdir()
@@ -89,22 +92,22 @@ def new_folder(target: Path, keep: Callable[[], bool] = lambda: False) -> Iterat
 
 
 def write_folder(target: Path, files: Mapping[str, bytes]) -> None:
-    """A folder of files, whole or not at all; one that stood there is replaced."""
+    """Write a folder of files (content by relative name), complete or not at all; replaces an existing folder."""
     with new_folder(target) as partial:
         for name, content in files.items():
             write_unsynced(partial / name, content)
 
 
 def write_unsynced(path: Path, content: bytes) -> None:
-    """A file of a new folder."""
+    """Write a file into a folder that is still temporary, parents included, without syncing it."""
     path.parent.mkdir(parents=True, exist_ok=True)
     path.write_bytes(content)
 
 
 def replace_files(target: Path, files: Mapping[str, bytes], stale: tuple[str, ...] = ()) -> None:
-    """Files into a folder that may hold others: all are on the disk before the first takes its place, in order.
+    """Write files into a folder that may hold other files; all are synced before the first replaces its target.
 
-    stale: names of an earlier run that go away unless written again.
+    The files appear one by one, in the order of `files`. stale: names that are deleted first unless written again.
     """
     with staged_path(target) as partial:
         _write_synced_files(partial, files)
@@ -119,7 +122,7 @@ def replace_files(target: Path, files: Mapping[str, bytes], stale: tuple[str, ..
 
 
 def remove_partials(*folders: Path) -> None:
-    """Remove what killed runs left behind in folders."""
+    """Delete the temporary files and folders that killed runs left in the given folders; their content is lost."""
     for path in [p for folder in folders for p in folder.glob(f"{PARTIAL}*")]:
         _remove(path)
 
@@ -132,7 +135,7 @@ def _write_synced_files(folder: Path, files: Mapping[str, bytes]) -> None:
 
 
 def _sync_tree(folder: Path) -> None:
-    """Every file and folder in a folder, and itself; several at once, as disks wait for each alone."""
+    """Sync all files and folders below a folder, and itself; files in parallel, which is faster than one by one."""
     within = sorted(folder.rglob("*"))
     with ThreadPoolExecutor(SYNC_THREADS) as pool:
         list(pool.map(_sync_file, [path for path in within if not path.is_dir()]))
@@ -153,7 +156,7 @@ def _write_synced(path: Path, content: bytes) -> None:
 
 
 def _sync_folder(path: Path) -> None:
-    """Flush a folder's entries, where the system can."""
+    """Sync a folder's entries; does nothing on systems that cannot."""
     with suppress(OSError):
         descriptor = os.open(path, os.O_RDONLY)
         try:

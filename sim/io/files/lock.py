@@ -1,4 +1,4 @@
-"""One run at a time in a folder."""
+"""A lock on an output folder: two commands never write to one folder at the same time."""
 
 from __future__ import annotations
 
@@ -13,7 +13,11 @@ from sim.io.files.atomic import write_error
 
 @contextmanager
 def lock_folder(root: Path) -> Iterator[None]:
-    """One run at a time in a folder, where the system can tell; a folder made for nothing goes away again."""
+    """Create a folder and hold its lock for the length of the block; folders it created are removed if they stay empty.
+
+    Raises InputError if another process holds the lock, and InputError or WorkError (write_error) for an OSError inside
+    the block. Systems and file systems without such locks, as NFS, run unlocked.
+    """
     made = [p for p in (root, *root.parents) if not p.exists()]
     try:
         root.mkdir(parents=True, exist_ok=True)
@@ -41,11 +45,11 @@ def _lock(root: Path) -> Iterator[None]:
         except BlockingIOError:
             raise InputError(
                 file=root,
-                got="another run at work here",
+                got="another run that writes here",
                 expected="one at a time",
                 remedy="wait, or choose another --out",
             ) from None
-        except OSError:  # a file system that many machines share may lock no folders: NFS does not
+        except OSError:  # NFS cannot lock folders
             pass
         yield
     finally:

@@ -1,4 +1,4 @@
-"""Strict reading of numeric text: one table of numbers, and one clear line about the first that is wrong."""
+"""Strict reading of text files with rows of numbers; an error names the first line that is wrong."""
 
 from __future__ import annotations
 
@@ -14,28 +14,28 @@ from sim.types import Array, Bools, Ints
 
 @dataclass(frozen=True)
 class NumericTable:
-    """Numbers of a text file: values (N, C), line (N,) the 1-based line of each row."""
+    """The rows of a numeric text file: values (N, C), and line (N,), the 1-based line number of each row."""
 
     file: Path
     values: Array
     line: Ints
 
     def reject(self, wrong: Bools | np.bool_, expected: str, remedy: str) -> None:
-        """InputError about the first row where `wrong` (N,) holds."""
+        """Raise InputError about the first row where `wrong` (N,) is True; do nothing if there is none."""
         if np.any(wrong):
             k = int(np.argmax(wrong))
             got = ",".join(f"{v:g}" for v in self.values[k])
             raise InputError(file=self.file, place=f"line {self.line[k]}", got=got, expected=expected, remedy=remedy)
 
     def integers(self, column: int, name: str) -> Ints:
-        """A column as integers; InputError where a value is none."""
+        """Return a column as integers (N,). Raises InputError at the first value that is no integer up to 2**52."""
         v = self.values[:, column]
         self.reject((v != np.round(v)) | (np.abs(v) > 2**52), f"a whole number as {name}", f"correct the {name}")
         return v.astype(np.int64)
 
 
 def read_text(path: Path) -> str:
-    """The text of a file; InputError where there is none to be had."""
+    """Return the text of a UTF-8 file, its byte order mark removed. Raises InputError if unreadable or not UTF-8."""
     try:
         return path.read_text(encoding="utf-8-sig")
     except UnicodeDecodeError as error:
@@ -49,9 +49,11 @@ def read_text(path: Path) -> str:
 
 
 def read_numbers(path: Path, columns: tuple[int, int]) -> NumericTable:
-    """All non-empty lines as numbers, separated by commas, else by blanks; as many columns in each line.
+    """Read all non-empty lines as rows of numbers, separated by commas if the first line has one, else by blanks.
 
-    InputError (line, got, expected) for a word, NaN or infinity, or a number of columns outside `columns`.
+    columns: least and greatest number of columns. A file without lines gives a table of shape (0, columns[0]). Raises
+    InputError with the line if a cell is no finite number or the lines differ in their number of columns, and if that
+    number is outside `columns`.
     """
     numbered = [(k, line) for k, line in enumerate(read_text(path).splitlines(), 1) if line.strip()]
     if not numbered:
@@ -73,7 +75,7 @@ def read_numbers(path: Path, columns: tuple[int, int]) -> NumericTable:
 
 
 def _first_bad_line(path: Path, numbered: list[tuple[int, str]], separator: str | None) -> InputError:
-    """What is wrong with the first line that is no row of as many numbers as the first."""
+    """Return the error for the first line that holds a word or differs from the first in its number of cells."""
     width = len(numbered[0][1].split(separator))
     for k, line in numbered:
         cells = line.split(separator)

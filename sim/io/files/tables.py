@@ -1,4 +1,4 @@
-"""Parquet tables with a unit at each column, and JSON documents: to bytes and, strictly, back."""
+"""Our Parquet tables (a unit for each column, metadata in the schema) and JSON files: to bytes and strictly back."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ REDO = "run the command that made it again"
 
 @dataclass(frozen=True)
 class Column:
-    """A column: values (R,), or a list of arrays of `kind` for a column of lists; unit as in the schema."""
+    """A column to write: values (R,), or R arrays of number type `kind` for a column of lists; unit as a text."""
 
     name: str
     values: NDArray[Any] | list[NDArray[Any]]
@@ -31,44 +31,44 @@ class Column:
 
 @dataclass(frozen=True)
 class StoredTable:
-    """A table as read: columns by name, and the facts stored with it."""
+    """A table as read: `columns` by name, and `facts`, the metadata that was stored with it."""
 
     file: Path
     columns: dict[str, Any]
     facts: dict[str, Any]
 
     def has(self, name: str) -> bool:
-        """Whether there is such a column."""
+        """Return True if the table has this column."""
         return name in self.columns
 
     def floats(self, *names: str) -> Array:
-        """(R,) of one column, (R, n) of several."""
+        """Return one column as (R,), or n columns as (R, n), float64. Raises InputError if a column is missing."""
         found = [np.asarray(self._get(name), np.float64) for name in names]
         return found[0] if len(found) == 1 else np.stack(found, axis=1)
 
     def ints(self, name: str) -> Ints:
-        """(R,) ids or frames."""
+        """Return a column as (R,), int64. Raises InputError if it is missing."""
         return np.asarray(self._get(name), np.int64)
 
     def lists(self, name: str, kind: type) -> list[NDArray[Any]]:
-        """The arrays of a column of lists."""
+        """Return the R arrays of a column of lists. Raises InputError if it is missing."""
         values, ends = self._get(name)
         return [np.asarray(v, kind) for v in np.split(values, ends[:-1])] if len(ends) else []
 
     def _get(self, name: str) -> Any:
         if name not in self.columns:
-            raise InputError(file=self.file, got=f"no column {name}", expected="one", remedy=REDO)
+            raise InputError(file=self.file, got=f"no column {name}", expected="that column", remedy=REDO)
         return self.columns[name]
 
     def fact(self, name: str) -> Any:
-        """A stored fact; InputError where it is missing."""
+        """Return one value of the metadata. Raises InputError if it is missing."""
         if name not in self.facts:
-            raise InputError(file=self.file, place="schema", got=f"no {name}", expected="one", remedy=REDO)
+            raise InputError(file=self.file, place="schema", got=f"no {name}", expected="that value", remedy=REDO)
         return self.facts[name]
 
 
 def table_bytes(columns: Iterable[Column], facts: dict[str, Any]) -> bytes:
-    """A Parquet file; the same content gives the same bytes."""
+    """Return a Parquet file as bytes; equal content gives equal bytes. `facts` becomes JSON in the schema."""
     import pyarrow as pa
     import pyarrow.parquet as pq
 
@@ -94,14 +94,14 @@ def _arrow(column: Column) -> Any:
 
 
 def read_table(path: Path) -> StoredTable:
-    """A table of ours; InputError where it is truncated, another's, or holds nulls."""
+    """Read a table that table_bytes wrote. Raises InputError if it is missing, damaged, foreign, or holds nulls."""
     import pyarrow as pa
     import pyarrow.parquet as pq
 
     try:
         table = pq.read_table(path, partitioning=None)
     except (pa.ArrowException, OSError) as error:
-        reason = "nothing there" if not path.exists() else f"no readable Parquet ({str(error).splitlines()[0]})"
+        reason = "no file" if not path.exists() else f"no readable Parquet ({str(error).splitlines()[0]})"
         raise InputError(file=path, got=reason[:160], expected="a whole Parquet file", remedy=REDO) from None
     facts = json.loads((table.schema.metadata or {}).get(KEY, b"{}"))
     if facts.get("format") != FORMAT:
@@ -126,24 +126,24 @@ def _numpy(column: Any) -> Any:
 
 
 def json_text(value: Any) -> str:
-    """JSON on one line, keys in the order given, no NaN."""
+    """Return a value as JSON on one line, keys in their order. Raises ValueError for NaN and infinity."""
     return json.dumps(value, ensure_ascii=False, allow_nan=False)
 
 
 def json_document(value: dict[str, Any]) -> bytes:
-    """A JSON file for reading: two blanks of indentation, a newline at the end."""
+    """Return a JSON file, indented by two blanks, as bytes. Raises ValueError for NaN and infinity."""
     return (json.dumps(value, ensure_ascii=False, allow_nan=False, indent=2) + "\n").encode()
 
 
 def json_list(name: str, items: Iterable[dict[str, Any]]) -> bytes:
-    """{"format": 1, name: [...]} with one item per line."""
+    """Return the JSON file {"format": 1, name: [items]} as bytes, with one item per line."""
     lines = ",\n".join(json_text(item) for item in items)
     body = f"[\n{lines}\n]" if lines else "[]"
     return f'{{"format": {FORMAT}, "{name}": {body}}}\n'.encode()
 
 
 def read_json(path: Path) -> dict[str, Any]:
-    """A JSON object; InputError with the line where it is none."""
+    """Read a file that holds one JSON object. Raises InputError if it cannot be read or is no JSON object."""
     from sim.io.files.numeric_text import read_text
 
     try:
@@ -158,19 +158,22 @@ def read_json(path: Path) -> dict[str, Any]:
 
 
 def read_document(path: Path) -> dict[str, Any]:
-    """A JSON object of ours; InputError where it says another format (one that says none is taken as ours)."""
+    """Read a JSON object of ours. Raises InputError as read_json, and if its key "format" differs from FORMAT.
+
+    A file without that key is accepted.
+    """
     value = read_json(path)
-    said = value.get("format", FORMAT)
-    if said != FORMAT or isinstance(said, bool):
-        raise InputError(file=path, place="format", got=said, expected=FORMAT, remedy="use the same version")
+    found = value.get("format", FORMAT)
+    if found != FORMAT or isinstance(found, bool):
+        raise InputError(file=path, place="format", got=found, expected=FORMAT, remedy="use the same version")
     return value
 
 
 def nan_to_none(value: float) -> float | None:
-    """A number for JSON: None for nan."""
+    """Return a number for JSON: None for nan."""
     return None if value != value else float(value)
 
 
 def none_to_nan(value: float | None) -> float:
-    """A number from JSON: nan for None."""
+    """Return a number from JSON: nan for None."""
     return float("nan") if value is None else float(value)

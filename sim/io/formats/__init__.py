@@ -1,1 +1,1 @@
-"""Files of others, read as sequences: MOTChallenge, BIWI, CAVIAR, Tsai calibrations, videos."""
+"""Readers for recordings in public formats: MOTChallenge, BIWI, CAVIAR, videos, and Tsai's calibrations."""

@@ -1,7 +1,8 @@
-"""BIWI walking pedestrians (Pellegrini 2009): obsmat.txt, groups.txt.
+"""Reader for BIWI walking pedestrians (Pellegrini 2009): the files obsmat.txt and groups.txt of a folder.
 
-obsmat.txt: `frame id x z y vx vz vy` in m and m/s (y up is called z there and is 0); raw frames come every `step`
-video frames, with gaps where nobody was annotated. groups.txt: the ids of one group per line, for their whole life.
+obsmat.txt has lines `frame id x z y vx vz vy` in m and m/s; its z is the height, which is 0. Its frames are numbers of
+video frames, annotated at a fixed step, with gaps where nobody was there. groups.txt has one group per line, as ids
+that belong together for the whole recording.
 """
 
 from __future__ import annotations
@@ -21,7 +22,10 @@ FPS = 2.5
 
 
 def frame_numbers(raw: Ints) -> Ints:
-    """1-based frames round((raw - first) / step) + 1, with the most frequent step between raw frames."""
+    """Return our 1-based frames, round((raw - first) / step) + 1, shape of `raw` (N,).
+
+    raw: video frames. step: the most frequent difference between successive raw frames. Equal raw frames give ones.
+    """
     steps = np.diff(np.unique(raw))
     if len(steps) == 0:
         return np.ones(len(raw), np.int64)
@@ -31,8 +35,11 @@ def frame_numbers(raw: Ints) -> Ints:
 
 
 def read_groups(path: Path) -> dict[int, int]:
-    """Person id → label (1, 2, … in the order of the lines). An id listed twice in a line counts once; a line of one
-    person is no group; lines that share a person are one group, with a warning."""
+    """Return the group label of each person in a groups.txt, by id; labels are 1, 2, … in the order of the lines.
+
+    Lines with fewer than two different ids are no group. Lines that share a person become one group, with a warning.
+    Raises InputError with the line if a word is no integer.
+    """
     label: dict[int, int] = {}
     for number, line in enumerate(read_text(path).splitlines(), 1):
         members = set(_ids(path, number, line))
@@ -62,7 +69,7 @@ def _ids(path: Path, number: int, line: str) -> list[int]:
 
 
 def _table(folder: Path) -> tuple[NumericTable, Ints, Ints]:
-    """obsmat.txt sorted by (frame, id), its slots and ids."""
+    """Return obsmat.txt sorted by (frame, id), with our frames (R,) and the ids (R,)."""
     rows = read_numbers(folder / "obsmat.txt", (8, 8))
     frame, id = frame_numbers(rows.integers(0, "frame")), rows.integers(1, "id")
     rows.reject(id < 0, "ids from 0", "correct the id")
@@ -74,7 +81,11 @@ def _table(folder: Path) -> tuple[NumericTable, Ints, Ints]:
 
 
 def read_truth(folder: Path, fps: float = FPS) -> Truth:
-    """The recording as truth on the ground; groups as labelled, hulls and events by sim.truth.group_hulls."""
+    """Return the recording's truth: positions and velocities on the ground, no boxes.
+
+    Groups are those of groups.txt; hulls and events are measured (group_labels). Without groups.txt no frame has group
+    labels. Raises InputError if a file is invalid.
+    """
     rows, frame, id = _table(folder)
     pos, vel = rows.values[:, (2, 4)], rows.values[:, (5, 7)]
     length = int(frame.max(initial=0))
@@ -91,7 +102,10 @@ def read_truth(folder: Path, fps: float = FPS) -> Truth:
 
 
 def open_folder(folder: Path, *, fps: float | None = None) -> Sequence:
-    """A BIWI folder as Sequence: positions on the ground, no boxes, no pixels."""
+    """Return a BIWI folder as Sequence, without pictures and detections. fps None: 2.5.
+
+    Raises InputError if a file is invalid.
+    """
     rate = FPS if fps is None else fps
     length = int(_table(folder)[1].max(initial=0))
 

@@ -1,7 +1,7 @@
-"""CAVIAR ground truth (CVML): an XML file of 25 fps, 384x288, frames numbered from 0.
+"""Reader for CAVIAR ground truth (CVML): an XML file of a recording with 25 fps and 384x288 px, frames from 0.
 
-A box is stored as centre and size, mostly wider than tall although people stand: rely on centres. The scale is the
-median of the longer sides / 1.7 m. Groups are labelled frame by frame, with their members.
+A box is stored as centre and size. Most boxes are wider than tall although the people stand, so only their centres can
+be relied on. The image scale is the median of the longer sides / 1.7 m. Groups are labelled in each frame.
 """
 
 from __future__ import annotations
@@ -23,12 +23,16 @@ from sim.types import Array, Frame, Ints, Sequence, Truth
 
 FPS = 25.0
 IMAGE_SIZE = (384, 288)
-CHORD = 1.0  # s, for velocities: labels stand still for frames and then jump by pixels; shorter chords see the jumps
+CHORD = 1.0  # s, for velocities: labels rest for some frames and then jump by pixels, which shorter windows pick up
 
 
 @dataclass(frozen=True)
 class CaviarRecording:
-    """Rows sorted by (frame, id): centre (R, 2) and size (R, 2) in px, label -1 alone; labelled: has group lists."""
+    """A CAVIAR file: R rows sorted by (frame, id), `length` frames.
+
+    frame, id (R,); label (R,), the group's id, -1 for alone; centre, size (R, 2) px of the box. labelled: True if the
+    file lists groups.
+    """
 
     name: str
     length: int
@@ -41,12 +45,16 @@ class CaviarRecording:
 
     @property
     def px_per_m(self) -> float:
-        """Median of the longer sides / 1.7 m; nan without boxes."""
+        """The image scale: median of the boxes' longer sides / 1.7 m; nan without boxes."""
         return float(np.median(self.size.max(axis=1))) / PERSON_HEIGHT if len(self.size) else float("nan")
 
 
 def read_xml(path: Path) -> CaviarRecording:
-    """The people and groups of a CAVIAR file; InputError with the frame of what cannot be read."""
+    """Read the people and groups of a CAVIAR file. Our frames are those of the file + 1.
+
+    A list of one member is no group; a person in two groups of a frame stays in the first, with a warning. Raises
+    InputError, with the frame, if the file is no valid CVML or an id stands twice in a frame.
+    """
     root = _root(path)
     rows: list[tuple[float, ...]] = []
     last, labelled = 0, False
@@ -100,7 +108,7 @@ def _number(path: Path, place: str, element: ET.Element, key: str) -> float:
 
 
 def _labels(path: Path, index: int, element: ET.Element) -> dict[int, int]:
-    """Person → group of one frame; groups of one are none, the first of two groups holds."""
+    """Return the group of each person in one frame, by id."""
     label: dict[int, int] = {}
     for group in element.iterfind("grouplist/group"):
         words = (group.findtext("members") or "").replace(",", " ").split()
@@ -120,7 +128,7 @@ def _labels(path: Path, index: int, element: ET.Element) -> dict[int, int]:
 
 
 def _row(path: Path, index: int, person: ET.Element, label: dict[int, int]) -> tuple[float, ...]:
-    """frame, id, label, centre, size of one object."""
+    """Return one object as (frame, id, label, centre x, centre y, width, height)."""
     place = f"frame {index - 1}"
     id, box = int(_number(path, place, person, "id")), person.find("box")
     if box is None:
@@ -135,7 +143,11 @@ def _row(path: Path, index: int, person: ET.Element, label: dict[int, int]) -> t
 
 
 def read_truth(path: Path, fps: float = FPS, px_per_m: float | None = None) -> Truth:
-    """The recording as truth in the image; hulls are of boxes, as those of anybody who tracks boxes there."""
+    """Return the recording's truth in the image: boxes, no positions on the ground.
+
+    Group hulls are hulls of boxes. px_per_m None: the scale of the boxes. Without group lists no frame has labels.
+    Raises InputError as read_xml.
+    """
     found = read_xml(path)
     scale = found.px_per_m if px_per_m is None else px_per_m
     box = np.concatenate([found.centre - found.size / 2, found.size], axis=1)
@@ -150,13 +162,16 @@ def read_truth(path: Path, fps: float = FPS, px_per_m: float | None = None) -> T
     known = labelled_truth_fields(
         found.frame, found.id, found.label, found.centre, vel, fps=fps, length=found.length, px_per_m=scale
     )
-    del known["groups"]  # of footprints: in the image nobody sees any
+    del known["groups"]  # hulls of footprints, which the image does not show
     shapes = box_groups(found.frame, found.id, found.label, found.centre, vel, box, 1, found.length)
     return truth.replace(groups_px=tuple(shapes), **known)
 
 
 def open_file(path: Path, *, fps: float | None = None, px_per_m: float | None = None) -> Sequence:
-    """A CAVIAR file as Sequence: boxes in the image, no pixels."""
+    """Return a CAVIAR file as Sequence, without pictures and detections.
+
+    fps None: 25. px_per_m None: the scale of the boxes. Raises InputError as read_xml.
+    """
     rate, found = FPS if fps is None else fps, read_xml(path)
     scale = found.px_per_m if px_per_m is None else px_per_m
 
@@ -171,6 +186,6 @@ def open_file(path: Path, *, fps: float | None = None, px_per_m: float | None = 
 
 
 def is_caviar(path: Path) -> bool:
-    """Whether an XML file begins like CAVIAR's."""
+    """Return True if the first 1000 bytes of a file contain CVML's root element."""
     with path.open("rb") as file:
         return b"<dataset" in file.read(1000)

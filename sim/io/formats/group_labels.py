@@ -1,7 +1,7 @@
-"""Truth of recordings whose groups somebody labelled: hulls and events beside the labels as they were given.
+"""Truth of recordings with labelled groups: hulls and events, measured as for simulated crowds.
 
-The label says who belongs together (intent); when groups come true is measured from the motion by the same function
-as for simulated crowds (sim.truth.group_hulls). Work is done in metres; a recording in px is scaled by its px_per_m.
+A label says who belongs together. When such people form a group, and their events, are measured from the motion. The
+rules are in metres, so a recording in px is divided by its px_per_m and the result multiplied by it.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from sim.types import Array, GroupEvent, Groups, Ints
 
 
 def rows_to_grid(frame: Ints, id: Ints, values: Array, length: int) -> Array:
-    """(T, P, ...) of rows, nan where absent; columns in the order of ids."""
+    """Return rows (R, …) as an array (T, P, …) of frames and people, nan where absent; people in ascending order of id."""
     out = np.full((length, len(np.unique(id)), *values.shape[1:]), np.nan)
     out[frame - 1, np.searchsorted(np.unique(id), id)] = values
     return out
@@ -24,9 +24,11 @@ def rows_to_grid(frame: Ints, id: Ints, values: Array, length: int) -> Array:
 def labelled_truth_fields(
     frame: Ints, id: Ints, label: Ints, pos: Array, vel: Array, *, fps: float, length: int, px_per_m: float = 1.0
 ) -> dict[str, Any]:
-    """The fields groups, events and near of a Truth, for rows sorted by (frame, id); label -1: alone.
+    """Return the fields groups, events, near and labelled of a Truth, by name.
 
-    Event ids are labels: each measured group bears the label of its members. Crossings are of the groups as labelled.
+    frame, id, label (R,) sorted by (frame, id), label -1 for alone; pos (R, 2), vel (R, 2) per s, in px if px_per_m is
+    not 1, else in m. groups: as labelled. Merges, splits and the like: of measured groups, which get the label of their
+    members as id. Crossings and queues: of the labelled groups. Places of events and hulls are in the unit of pos.
     """
     from sim.truth.crossing_events import crossings
     from sim.truth.group_hulls import groups_over_time
@@ -55,13 +57,13 @@ def labelled_truth_fields(
 
 
 def _names(measured: Ints, label: Ints) -> dict[int, int]:
-    """The label of each measured group, from its first row."""
+    """Return the label of each measured group, by its measured id, read from the group's first row."""
     found, first = np.unique(measured, return_index=True)
     return {int(g): int(label[k]) for g, k in zip(found, first, strict=True) if g >= 0}
 
 
 def _named(event: GroupEvent, names: dict[int, int], people: Ints, px_per_m: float) -> GroupEvent:
-    """An event in the recording's own ids and unit."""
+    """Return an event with the recording's person ids, group labels and unit."""
     return replace(
         event,
         before=tuple(sorted(names.get(g, g) for g in event.before)),
@@ -72,7 +74,7 @@ def _named(event: GroupEvent, names: dict[int, int], people: Ints, px_per_m: flo
 
 
 def scale_groups(groups: Groups, factor: float) -> Groups:
-    """Groups with every length multiplied by `factor`."""
+    """Return groups with every length multiplied by `factor`, and extents by its square."""
     if factor == 1.0:
         return groups
     return groups.replace(

@@ -1,4 +1,4 @@
-"""MOTChallenge folders and bare text files as Sequences."""
+"""Readers for MOTChallenge folders (seqinfo.ini, img1/, gt/, det/) and for single MOT text files, as Sequences."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ DEFAULT_FPS = 25.0
 
 @dataclass(frozen=True)
 class SeqInfo:
-    """seqinfo.ini, None where it does not say."""
+    """The content of a seqinfo.ini; None for a key that is missing. image_size: (width, height) px."""
 
     name: str
     fps: float | None
@@ -31,7 +31,7 @@ class SeqInfo:
 
 
 def read_seqinfo(path: Path) -> SeqInfo:
-    """seqinfo.ini; InputError where a value makes no sense."""
+    """Read a seqinfo.ini. Raises InputError if it is no ini file, or a number in it is not positive."""
     parser = configparser.ConfigParser(interpolation=None)
     try:
         parser.read_string(read_text(path))
@@ -61,13 +61,16 @@ def read_seqinfo(path: Path) -> SeqInfo:
 
 
 def frame_rate(given: float | None, found: float | None) -> float:
-    """--fps, else what the recording says, else 25 with a warning."""
+    """Return the frames per second: `given` by --fps, else `found` in the recording, else 25 with a warning.
+
+    Raises InputError if `given` is not above 0.
+    """
     if given is not None:
         if not given > 0:
             raise InputError(place="fps", got=given, expected="a number above 0", remedy="correct --fps")
         return given
     if found is None:
-        # Names no path: of a dataset's many recordings a command says it once.
+        # The text names no path, so that a command over many recordings prints it once.
         text = f"MOTChallenge data without a frame rate is taken at {DEFAULT_FPS:g} fps (--fps says otherwise)"
         warnings.warn(text, stacklevel=3)
         return DEFAULT_FPS
@@ -83,7 +86,15 @@ def open_folder(
     images: bool = True,
     background: BackgroundChoice | None = None,
 ) -> Sequence:
-    """A MOTChallenge folder as Sequence; its pictures, decoded one by one, are left out where not `images`."""
+    """Return a MOTChallenge folder as Sequence.
+
+    images False leaves the pictures out; otherwise they are decoded one by one while iterating. fps and px_per_m
+    replace what the recording says. camera: its calibration. background: sample for background models, None for 50
+    frames spread over the recording.
+
+    Raises InputError if a file is invalid, if nothing tells the length, if pictures differ from seqinfo.ini in size, or
+    if `background` is given without pictures.
+    """
     ini = path / "seqinfo.ini"
     info = read_seqinfo(ini) if ini.is_file() else SeqInfo(path.name, None, None, None)
     rate = frame_rate(fps, info.fps)
@@ -94,7 +105,7 @@ def open_folder(
     length = info.length or max(_labelled(found, gt), pictures.last)
     if not length:
         expected = "a row in gt.txt or det.txt, a picture, or seqLength in seqinfo.ini"
-        raise InputError(file=path, got="nothing that says how long it is", expected=expected, remedy="complete it")
+        raise InputError(file=path, got="nothing that tells its length", expected=expected, remedy="complete it")
     seen = pictures.first_size() if images else None
     size = _agreed(ini, info.image_size, seen)
     if background is not None and not pictures.files:
@@ -125,7 +136,7 @@ def open_folder(
 
 
 def _agreed(ini: Path, said: tuple[int, int] | None, seen: tuple[int, int] | None) -> tuple[int, int] | None:
-    """The size that seqinfo.ini and the pictures agree on."""
+    """Return the picture size by seqinfo.ini or the pictures, None if unknown. Raises InputError if they differ."""
     if said is not None and seen is not None and said != seen:
         raise InputError(
             file=ini, place="imWidth, imHeight", got="{} × {}".format(*said),
@@ -137,7 +148,10 @@ def _agreed(ini: Path, said: tuple[int, int] | None, seen: tuple[int, int] | Non
 def open_text(
     path: Path, *, fps: float | None = None, px_per_m: float | None = None, camera: Camera | None = None
 ) -> Sequence:
-    """A bare MOT text file as Sequence: detections where every id is -1, else truth."""
+    """Return a single MOT text file as Sequence without pictures: detections if every id is -1, else truth.
+
+    fps None: 25 with a warning. Raises InputError if the file is invalid or has no row.
+    """
     rate = frame_rate(fps, None)
     scale = float("nan") if px_per_m is None else px_per_m
     found = mot_text.read_detections(path, None)
@@ -159,6 +173,6 @@ def open_text(
 
 
 def _labelled(found: mot_text.DetectionTable | None, gt: Path) -> int:
-    """The last frame that texts speak of."""
+    """Return the last frame in det.txt and gt.txt; 0 if both are missing or empty."""
     last = 0 if found is None else int(found.frame.max(initial=0))
     return max(last, int(mot_text.read_table(gt).frame.max(initial=0))) if gt.is_file() else last

@@ -1,7 +1,7 @@
-"""MOTChallenge text: gt.txt and det.txt, read strictly.
+"""Strict reader for MOTChallenge text: gt.txt and det.txt.
 
-gt.txt comes in two kinds, told apart by the number of columns: 9 (MOT16 on: flag, class, visibility) and 10 (MOT15:
-confidence and the ground position x, y, z, unknown where all three are -1). Frames begin at 1.
+The number of columns tells two kinds of gt.txt apart: 9 (from MOT16 on: flag, class, visibility) and 10 (MOT15:
+confidence and the ground position x, y, z in m, unknown where z is -1). Frames begin at 1. Boxes are ltwh px.
 """
 
 from __future__ import annotations
@@ -23,7 +23,10 @@ MAX_FRAME = 10_000_000
 
 @dataclass(frozen=True)
 class MotTable:
-    """NumericTable of a MOT text file in the order of the file; rest (N, 0..4): what follows the box."""
+    """A MOT text file, N rows in its order.
+
+    frame, id (N,). box (N, 4) ltwh px. rest (N, 0 to 4): the columns after the box.
+    """
 
     rows: NumericTable
     frame: Ints
@@ -32,11 +35,11 @@ class MotTable:
     rest: Array
 
     def without_box(self) -> Bools:
-        """NumericTable that say -1,-1,-1,-1: no box."""
+        """Return flags (N,), True for rows whose box is -1,-1,-1,-1, that is, without box."""
         return np.asarray((self.box == -1).all(axis=1))
 
     def ground(self) -> Array | None:
-        """(N, 3) x, y, z of a 10-column file, nan where unknown (z = -1); None where no row has any."""
+        """Return x, y, z in m (N, 3), nan where unknown (z = -1); None if they are missing or unknown in all rows."""
         if self.rest.shape[1] < 4:
             return None
         known = self.rest[:, 3] != -1
@@ -44,7 +47,11 @@ class MotTable:
 
 
 def read_table(path: Path, *, length: int | None = None, boxless: bool = False) -> MotTable:
-    """A MOT text file of 7 to 10 columns, checked row by row; `boxless` lets -1,-1,-1,-1 stand for "no box"."""
+    """Read a MOT text file of 6 to 10 columns.
+
+    length: the last frame allowed. boxless: allow -1,-1,-1,-1 for "no box". Raises InputError with the line if a frame
+    is outside 1 to `length`, a box has no area, or a frame or id is no integer.
+    """
     rows = read_numbers(path, (6, 10))
     frame, id = rows.integers(0, "frame"), rows.integers(1, "id")
     table = MotTable(rows, frame, id, rows.values[:, 2:6], rows.values[:, 6:])
@@ -58,7 +65,7 @@ def read_table(path: Path, *, length: int | None = None, boxless: bool = False) 
 
 
 def reject_duplicate_ids(table: MotTable, keep: Bools) -> None:
-    """InputError where an id stands twice in a frame; id -1 (a detection's) may."""
+    """Raise InputError if an id stands twice in a frame among the rows `keep` (N,); negative ids are not checked."""
     order = np.lexsort((np.arange(len(table.frame)), table.id, table.frame))
     same = (np.diff(table.frame[order]) == 0) & (np.diff(table.id[order]) == 0)
     counted = (keep & (table.id >= 0))[order]
@@ -69,7 +76,7 @@ def reject_duplicate_ids(table: MotTable, keep: Bools) -> None:
 
 @dataclass(frozen=True)
 class DetectionTable:
-    """det.txt in the order of its frames: pos (N, 2) in `plane`, box (N, 4) or None, score (N,)."""
+    """A det.txt, N rows sorted by frame: pos (N, 2) in m or px by `plane`, box (N, 4) ltwh px or None, score (N,)."""
 
     frame: Ints
     id: Ints
@@ -79,14 +86,18 @@ class DetectionTable:
     score: Array
 
     def at(self, index: int, fps: float) -> Detections:
-        """The detections of one frame."""
+        """Return the detections of frame `index`; their time is (index - 1) / fps."""
         low, high = np.searchsorted(self.frame, (index, index + 1))
         box = None if self.box is None else self.box[low:high]
         return Detections(index, (index - 1) / fps, self.plane, self.pos[low:high], None, box, self.score[low:high])
 
 
 def read_detections(path: Path, length: int | None) -> DetectionTable:
-    """det.txt: points on the ground where every row has one, else boxes in the image."""
+    """Read a det.txt: points on the ground if every row has one, else the centres of boxes in the image.
+
+    box is None if any row lacks one. Scores are scaled by unit_scores. length: the last frame allowed, None for any.
+    Raises InputError as read_table, and if a row has neither ground point nor box.
+    """
     table = read_table(path, length=length, boxless=True)
     ground, boxless = table.ground(), table.without_box()
     score = unit_scores(table.rest[:, 0] if table.rest.shape[1] else np.ones(len(table.frame)))
@@ -100,13 +111,16 @@ def read_detections(path: Path, length: int | None) -> DetectionTable:
 
 
 def ground_cells(xyz: Sequence[float]) -> str:
-    """The last three cells of a line, x,y,z in m: a z that would read as unknown is written a millimetre lower."""
+    """Return the last three cells of a line: x,y,z in m, 3 digits. z = -1 would mean unknown and is written -1.001."""
     x, y, z = (f"{v:.3f}" for v in xyz)
     return f"{x},{y},{z if z != '-1.000' else '-1.001'}"
 
 
 def unit_scores(score: Array) -> Array:
-    """Scores in [0, 1]: as they are where they are so; else the file's range stretched to [0, 1], equal ones to 1."""
+    """Return scores in [0, 1], shape (N,).
+
+    They are unchanged if all lie in [0, 1]. Otherwise their range is mapped to [0, 1]; if all are equal they become 1.
+    """
     if len(score) == 0 or (score.min() >= 0 and score.max() <= 1):
         return score
     span = score.max() - score.min()
@@ -114,8 +128,13 @@ def unit_scores(score: Array) -> Array:
 
 
 def read_truth(path: Path, name: str, fps: float, length: int | None = None, px_per_m: float = float("nan")) -> Truth:
-    """gt.txt as truth of people; groups are not labelled. NumericTable with flag 0 or another class are left out, as in
-    MOTChallenge's own scoring. px_per_m, if not given: the median height of the boxes / 1.7 m."""
+    """Read a gt.txt as truth of people, without group labels.
+
+    Rows with flag 0 or a class other than 1 are left out, as in MOTChallenge's own scoring; so are negative ids. length
+    None: up to the last frame. px_per_m nan: the median height of the boxes / 1.7 m. Velocities, where the file has
+    ground positions, are differences over 0.5 s. Raises InputError as read_table, for an id twice in a frame, and for a
+    visibility outside [0, 1] other than -1.
+    """
     table = read_table(path, length=length)
     keep = table.id >= 0
     nine = table.rest.shape[1] in (2, 3)

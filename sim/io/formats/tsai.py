@@ -1,7 +1,8 @@
-"""Tsai's camera calibration as XML (the form of PETS 2009): Geometry, Intrinsic, Extrinsic.
+"""Reader for Tsai's camera calibration as XML (as in PETS 2009): elements Geometry, Intrinsic, Extrinsic.
 
-x_cam = R X + T in mm with R = Rz Ry Rx; ideal sensor mm f x/z; distorted Xd (1 + kappa1 r_d²) = ideal;
-px Xf = sx Xd/dpx + cx, Yf = Yd/dpy + cy. Tsai's px count from the middle of the first pixel, ours from its corner.
+Model: x_cam = R X + T in mm with R = Rz Ry Rx; ideal sensor position (f x/z, f y/z) in mm; distorted position Xd with
+Xd (1 + kappa1 |Xd|²) = ideal; pixel Xf = sx Xd/dpx + cx, Yf = Yd/dpy + cy. Tsai's pixel coordinates begin at the middle
+of the first pixel, ours at its corner.
 """
 
 from __future__ import annotations
@@ -25,7 +26,7 @@ POSITIVE = ("width", "height", "dpx", "dpy", "focal", "sx")
 
 
 def read_tsai(path: Path) -> Camera:
-    """The calibrated camera, world in metres; InputError where the file is none or lacks a number."""
+    """Return the camera of a calibration file. Raises InputError if it is no XML or a number is missing or wrong."""
     v = _values(path)
     rotation = _rotation(v["rx"], v["ry"], v["rz"])
     shift = np.array([v["tx"], v["ty"], v["tz"]]) / MM
@@ -66,7 +67,7 @@ def _values(path: Path) -> dict[str, float]:
 
 
 def _rotation(rx: float, ry: float, rz: float) -> Array:
-    """Rz Ry Rx, radians."""
+    """Return the rotation Rz Ry Rx (3, 3) of three angles in rad."""
     (a, b, c), (sa, sb, sc) = np.cos([rx, ry, rz]), np.sin([rx, ry, rz])
     x = np.array([[1, 0, 0], [0, a, -sa], [0, sa, a]])
     y = np.array([[b, 0, sb], [0, 1, 0], [-sb, 0, b]])

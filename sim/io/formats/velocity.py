@@ -1,4 +1,4 @@
-"""Velocities of positions that were stored without any."""
+"""Velocities from positions, for recordings and tracks that are stored without velocities."""
 
 from __future__ import annotations
 
@@ -6,13 +6,15 @@ import numpy as np
 
 from sim.types import Array, Ints
 
-WINDOW = 0.5  # s
+WINDOW = 0.5  # s, length of the time window round a row
 
 
 def differentiate(frame: Ints, id: Ints, pos: Array, fps: float, window: float = WINDOW) -> Array:
-    """(R, D) velocity per second: the chord over the frames of the same id within `window` seconds round each row.
+    """Return velocities (R, D), in the unit of `pos` per s.
 
-    Rows in any order, ids unique in a frame. 0 where an id has no second row in the window.
+    A row's velocity is the difference between the last and the first position of its id inside the window, divided by
+    their time. It is 0 if the id has no other row there. frame, id (R,), pos (R, D): rows in any order, each id once in
+    a frame. window: s, centred on the row, at least one frame to each side.
     """
     if len(frame) == 0:
         return np.zeros_like(pos)

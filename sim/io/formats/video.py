@@ -1,7 +1,7 @@
-"""Video files as Sequences, through PyAV: pictures only, sound is left alone.
+"""Reader for video files, as Sequences: every frame has a number, also one that cannot be decoded.
 
-A frame is a slot: what cannot be decoded is a frame without a picture. Containers lie about their frame rate: it is
-believed where the time stamps agree.
+A frame that cannot be decoded has no picture. The container's frame rate is often wrong, so it is used only if the time
+stamps agree with it. Sound is ignored.
 """
 
 from __future__ import annotations
@@ -23,9 +23,9 @@ SUFFIXES = (
     ".mp4", ".m4v", ".mov", ".3gp", ".mkv", ".webm", ".avi", ".wmv", ".flv", ".ogv", ".mpg", ".mpeg",
     ".ts", ".mts", ".m2ts", ".h264", ".h265", ".hevc", ".y4m",
 )  # fmt: skip
-RATES = (0.1, 300.0)  # frames/s that make sense
-AGREE = 0.02  # by which the container's rate may differ from that of the time stamps
-GAP, GAPS = 1.0, 5.0  # s, and times the usual step: time without a frame that is told
+RATES = (0.1, 300.0)  # plausible frames/s
+AGREE = 0.02  # relative difference allowed between the container's rate and that of the time stamps
+GAP, GAPS = 1.0, 5.0  # a gap without frames is reported if longer than 1 s and than 5 usual steps
 DEFAULT_FPS = 25.0
 ANY = BackgroundChoice()
 
@@ -38,7 +38,12 @@ def open_video(
     camera: Camera | None = None,
     background: BackgroundChoice = ANY,
 ) -> Sequence:
-    """A video file as Sequence; InputError where no picture can be decoded."""
+    """Return a video file as Sequence; its pictures are decoded while iterating.
+
+    fps None: see frame_rate. px_per_m, camera: image scale and calibration, None if unknown. background: sample for
+    background models. Warns if the video is shorter than its header says or has gaps. Raises InputError if no picture
+    can be decoded.
+    """
     index = video_decoding.index_packets(path)
     length = len(index.stamps)
     first = next((picture for _, picture in video_decoding.decode_frames(path, index)), None)
@@ -66,7 +71,7 @@ def open_video(
 
 
 def missing(index: video_decoding.PacketIndex) -> Iterator[str]:
-    """In words, what of a video is not there: its end, by its own header, and times at which it shows nothing."""
+    """Yield a text for each part of a video that is missing: its end, compared with its header, and gaps in time."""
     times, length = index.times(), len(index.stamps)
     step = np.diff(times)
     usual = float(np.median(step)) if len(step) else 0.0
@@ -84,28 +89,32 @@ def missing(index: video_decoding.PacketIndex) -> Iterator[str]:
 
 
 def frame_rate(name: str, given: float | None, index: video_decoding.PacketIndex) -> tuple[float, str]:
-    """Frames per second and where they come from: --fps, the container, its time stamps, else 25 with a warning."""
+    """Return the frames per second and a text that says where they come from.
+
+    In this order: `given` by --fps; the container's rate, if plausible and within AGREE of the time stamps; the rate of
+    the time stamps; 25. The last two warn.
+    """
     if given is not None:
         return given, f"{given:g}, as given"
-    said, timed = index.rate, stamped_rate(index)
-    if _sensible(said) and (not _sensible(timed) or abs(said / timed - 1) <= AGREE):
-        return said, f"{said:g}, as the container says"
-    if _sensible(timed):
-        text = f"{timed:g} by its time stamps (the container says {said:g})"
+    header, timed = index.rate, stamped_rate(index)
+    if _plausible(header) and (not _plausible(timed) or abs(header / timed - 1) <= AGREE):
+        return header, f"{header:g}, as the container says"
+    if _plausible(timed):
+        text = f"{timed:g} by its time stamps (the container says {header:g})"
         rate = timed
     else:
-        text = f"{DEFAULT_FPS:g} (the container says {said:g}, its time stamps {timed:g})"
+        text = f"{DEFAULT_FPS:g} (the container says {header:g}, its time stamps {timed:g})"
         rate = DEFAULT_FPS
     warnings.warn(f"{name}: frames per second taken as {text}; --fps says otherwise", stacklevel=3)
     return rate, text
 
 
-def _sensible(rate: float) -> bool:
+def _plausible(rate: float) -> bool:
     return RATES[0] <= rate <= RATES[1]
 
 
 def stamped_rate(index: video_decoding.PacketIndex) -> float:
-    """Frames per second by the time stamps, to 1e-3, gaps left out; 0 where stamps do not tell."""
+    """Return the frames per second by the time stamps, rounded to 0.001, without gaps; 0 with fewer than two stamps."""
     step = np.diff(index.times())
     if not len(step):
         return 0.0
