@@ -15,7 +15,7 @@ from sim.types import Array, GroupEvent, Groups, Ints
 
 
 def rows_to_grid(frame: Ints, id: Ints, values: Array, length: int) -> Array:
-    """Return rows (R, …) as an array (T, P, …) of frames and people, nan where absent; people in ascending order of id."""
+    """Return rows (R, …) as an array (T, P, …), nan where absent; people stand in ascending order of id."""
     out = np.full((length, len(np.unique(id)), *values.shape[1:]), np.nan)
     out[frame - 1, np.searchsorted(np.unique(id), id)] = values
     return out

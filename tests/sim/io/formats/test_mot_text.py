@@ -166,7 +166,7 @@ def test_nothing_says_how_long_it_is(tmp_path):
     (tmp_path / "x.txt").write_text("\n")
     with pytest.raises(InputError, match="no row"):
         open_source(tmp_path / "x.txt", fps=10)
-    with pytest.raises(InputError, match="how long"):
+    with pytest.raises(InputError, match="tells its length"):
         open_source(folder(tmp_path, det="", ini="frameRate=10\n"))
     (s,) = open_source(folder(tmp_path, det="", ini="frameRate=10\nseqLength=3\n"))
     assert [len(f.detections.pos) for f in s] == [0, 0, 0]
