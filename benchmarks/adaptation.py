@@ -22,7 +22,7 @@ import numpy as np
 from benchmarks.chart import Panel, lines
 from scenarios import load
 from sim import simulate
-from tracking.detect.background import BACKGROUND, Background, foreground
+from tracking.detect.background import BACKGROUND, Background, fused_foreground
 from tracking.detect.background_settings import BackgroundSettings
 
 SECONDS, CHANGE, SHOWN = 900, 60, 6
@@ -67,7 +67,7 @@ def staying(sample: np.ndarray, frames: Iterator[np.ndarray], where, settings, p
     model, curve = Background(sample, 1.0, settings), []
     for frame in frames:
         classes = model.classify(frame)
-        curve.append(float(foreground(classes)[where].mean()))
+        curve.append(float(fused_foreground(classes)[where].mean()))
         model.adapt(frame, classes, protected)
     return curve
 

@@ -66,14 +66,14 @@ def coasted(scene: Scene) -> np.ndarray:
     for frame, truth in zip(ready.frames(), scene.boxes, strict=True):
         ready.step(frame)
         people = ready.tracker.people
-        told = people.reported(frame.t)
-        lost = told[~people.hit[told]]
+        told = people.rows_to_report(frame.t)
+        lost = told[~people.measured[told]]
         if not len(lost) or not len(truth):
             continue
-        box = box_geometry.to_boxes(people.bank[0])
+        box = box_geometry.ltwh_from_centred(people.bank[0])
         overlap = iou(box, truth)
         free = np.ones(len(truth), bool)
-        claims = overlap[people.hit]
+        claims = overlap[people.measured]
         free[claims.argmax(1)[claims.max(1) >= 0.5]] = False
         right = np.where(free, overlap[lost], 0.0).max(1) >= 0.5
         times = np.stack([people.misses[lost], people.hits[lost]], 1) / scene.sequence.fps

@@ -64,7 +64,7 @@ def trace() -> None:
         people, words = tracker.people, []
         for i, id in enumerate(people.id.tolist()):
             state = "confirmed" if people.confirmed[i] else "tentative"
-            state += "" if people.hit[i] else ", unseen"
+            state += "" if people.measured[i] else ", unseen"
             words.append(f"{id} {people.rho[i]:6.2f} {state}{'*' if id in told.id else ''}")
         print(f"{k:5d} {len(box):6d}  " + " | ".join(words))
 

@@ -22,7 +22,7 @@ from scenarios import load
 from sim import simulate
 from sim.types import Sequence
 from tracking.detect import blobs
-from tracking.detect.background import Background, foreground
+from tracking.detect.background import Background, fused_foreground
 from tracking.detect.background_settings import BackgroundSettings
 from tracking.detect.mog2 import Mog2
 
@@ -94,7 +94,7 @@ def highway(data: Path, out: Path | None) -> None:
         model = maker(sample, 25.0)
         raw, cleaned = Count(), Count()
         for image, mask in tests:
-            said = foreground(model.classify(image))
+            said = fused_foreground(model.classify(image))
             true, shadow, counts = mask == 255, mask == 50, np.isin(mask, (0, 50, 255))
             raw.add(said, true, counts, shadow)
             cleaned.add(blobs.clean(said, SCALE), true, counts, shadow)
@@ -157,7 +157,7 @@ def measure(sequence: Sequence, made: dict[str, Maker], totals: dict[str, tuple[
             classes = model.classify(frame.image)
             model.adapt(frame.image, classes)
             if frame.index % 10 == 0:
-                said = foreground(classes)
+                said = fused_foreground(classes)
                 raw, cleaned = totals[name]
                 raw.add(said, true, everywhere, none)
                 cleaned.add(blobs.clean(said, sequence.px_per_m), true, everywhere, none)

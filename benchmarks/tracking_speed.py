@@ -28,7 +28,7 @@ from tracking.detect import blobs
 from tracking.detect.background import Background
 from tracking.detect.person_size import PersonSize
 from tracking.papers.blob import new_people
-from tracking.papers.blob.update_from_pixels import Pixels
+from tracking.papers.blob.update_from_pixels import PixelUpdater
 from tracking.prepare import PreparedTracker, prepare
 from tracking.tracks_check import ReportHistory
 
@@ -37,11 +37,11 @@ RUNS = 3
 PARTS: dict[str, tuple[tuple[object, str], ...]] = {
     "classify": ((Background, "classify"),),
     "clean, find": ((blobs, "clean"), (blobs, "find")),
-    "associate": ((Pixels, "_associate"),),
-    "split": ((Pixels, "_split"),),
-    "newcomers": ((new_people, "newcomers"),),
-    "person size": ((PersonSize, "learn"), (Pixels, "_lone"), (Pixels, "_settle_sizes")),
-    "adapt": ((Background, "adapt"), (Pixels, "_protected")),
+    "associate": ((PixelUpdater, "_associate"),),
+    "split": ((PixelUpdater, "_measure_by_templates"),),
+    "newcomers": ((new_people, "find_new_people"),),
+    "person size": ((PersonSize, "learn"), (PixelUpdater, "_lone_people"), (PixelUpdater, "_relax_sizes")),
+    "adapt": ((Background, "adapt"), (PixelUpdater, "_protected")),
 }
 
 

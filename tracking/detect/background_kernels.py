@@ -1,26 +1,46 @@
-"""All pixels in one pass each, as numba kernels: classes, adaptation; numpy twins: tests/reference_background.py.
+"""Kernels of tracking.detect.background: the class of each pixel, and adaptation of the model, in one pass each.
 
-Pixels lie in a row, colours in planes, so that the loops vectorise: image planes i (N,) uint8; E: mean colours, V:
-variances (3, N); s, b: normalisers (N,), inf where there is no background; g: gain per colour (3,). All float32.
+Numpy twins: tests/reference_background.py. The module also defines the five classes (Gonzalez et al. 2006, 3.2).
+
+Colour is the first axis of the model's arrays, so that the loop over pixels vectorises. Arrays, float32 unless noted:
+    E, V   (3, N) or (3, H, W): mean colour, grey levels, and its variance, squared grey levels
+    s, b   (N,): normalisers of brightness and of chromaticity distortion; inf where the background is unknown
+    g      (3,): gain of the frame per colour channel
 """
 
 from __future__ import annotations
 
 import numpy as np
 from numba import njit
+from numpy.typing import NDArray
 
 from sim.types import Bools, Image
-from tracking.detect.pixel_classes import Floats
+
+Floats = NDArray[np.float32]
+
+BACKGROUND, FOREGROUND, DARK, SHADOW, HIGHLIGHT = range(5)
+"""The classes of a pixel (uint8); DARK is dark foreground."""
+
+CHROMATICITY, LOWER, UPPER, DARK_BELOW, BRIGHT_ABOVE = range(5)
+"""Slots of `limits`: thresholds of CD / b and of (alpha - 1) / a, lower and upper; limits of alpha itself."""
+
+CLIPPED = 255
+"""Grey level at which the camera clips."""
 
 
 @njit(cache=True, error_model="numpy")
 def classify(
     i0: Image, i1: Image, i2: Image, E: Floats, V: Floats, s: Floats, b: Floats, g: Floats, limits: Floats, out: Image
 ) -> None:
-    """Fill `out` (N,) with classes; limits (5,): thresholds of CD / b, lower and upper of (alpha - 1) / a; dark, bright
-    of alpha; see tracking.detect.background. What is asked first in the paper is written last here."""
-    one, top = np.float32(1.0), np.float32(255.0)
-    tau, lower, upper, dark, bright = limits[0], limits[1], limits[2], limits[3], limits[4]
+    """Write the class of each pixel into `out` (N,) uint8.
+
+    i0, i1, i2 (N,) uint8: the frame's colour planes in the order of E. limits (5,): see the slots above.
+    The paper tests CD first, then dark, highlight, shadow. Here the test that the paper makes first is made last, and
+    overwrites the others. The result is the same.
+    """
+    one, top = np.float32(1.0), np.float32(CLIPPED)
+    tau, lower, upper = limits[CHROMATICITY], limits[LOWER], limits[UPPER]
+    dark, bright = limits[DARK_BELOW], limits[BRIGHT_ABOVE]
     g0, g1, g2 = g[0], g[1], g[2]
     E0, E1, E2, V0, V1, V2 = E[0], E[1], E[2], V[0], V[1], V[2]
     for n in range(len(out)):
@@ -33,10 +53,10 @@ def classify(
         cd2 = w0 * d0 * d0 + w1 * d1 * d1 + w2 * d2 * d2  # eq. 6, squared
         brightness = (alpha - one) * np.sqrt(length2) / s[n]  # eq. 9, with a_i = s_i / sqrt(length2)
         most = tau * b[n]  # eq. 10: CD / b_i > tau, without a root or a division
-        kind = np.uint8(0)
-        kind = (np.uint8(1) if alpha > bright else np.uint8(4)) if brightness > upper else kind
-        kind = (np.uint8(2) if alpha < dark else np.uint8(3)) if brightness < lower else kind
-        out[n] = np.uint8(1) if cd2 > most * most else kind
+        kind = np.uint8(BACKGROUND)
+        kind = (np.uint8(FOREGROUND) if alpha > bright else np.uint8(HIGHLIGHT)) if brightness > upper else kind
+        kind = (np.uint8(DARK) if alpha < dark else np.uint8(SHADOW)) if brightness < lower else kind
+        out[n] = np.uint8(FOREGROUND) if cd2 > most * most else kind
 
 
 @njit(cache=True, error_model="numpy")
@@ -53,24 +73,26 @@ def adapt(
     slow: float,
     least: float,
 ) -> None:
-    """Move E and V (3, H, W) by a frame (H, W, 3) uint8 of gain g in rows first, first + step, …; not where protected.
+    """Move E and V (3, H, W) towards a frame (H, W, 3) uint8 of gain g, in rows first, first + step, … only.
 
-    E goes towards I / g by `fast` where background, by `slow` elsewhere, never below 1 (a black pixel's brightness
-    would have no measure); V follows the squared residuals of background, never below `least`. A clipped value that was
-    to be clipped tells nothing.
+    classes (H, W): the frame's. Pixels where `protected` (H, W) is True stay as they are.
+    E moves towards I / g by the share `fast` where the class is BACKGROUND, by `slow` elsewhere. It stays at 1 or
+    above, as the brightness of a black pixel is undefined. V moves towards the squared residual, by `fast`, where the
+    class is BACKGROUND. It stays at `least` or above.
+    A channel at 255 is skipped where the model expects 255 or more: a clipped value does not show the true brightness.
     """
     quick, late, floor = np.float32(fast), np.float32(slow), np.float32(least)
     for r in range(first, image.shape[0], step):
         for c in range(image.shape[1]):
             if protected[r, c]:
                 continue
-            seen = classes[r, c] == 0
-            rate = quick if seen else late
+            background = classes[r, c] == BACKGROUND
+            rate = quick if background else late
             for k in range(3):
                 value = image[r, c, k]
-                if value == 255 and g[k] * E[k, r, c] >= np.float32(255.0):
+                if value == CLIPPED and g[k] * E[k, r, c] >= np.float32(CLIPPED):
                     continue
                 d = np.float32(value) / g[k] - E[k, r, c]
                 E[k, r, c] = max(E[k, r, c] + rate * d, np.float32(1.0))
-                if seen:
+                if background:
                     V[k, r, c] = max(V[k, r, c] + rate * (d * d * g[k] * g[k] - V[k, r, c]), floor)

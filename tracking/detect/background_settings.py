@@ -1,4 +1,7 @@
-"""The parameters of the background models; a tracker's config may inherit them or hold fields of the same names."""
+"""The parameters of the background models.
+
+The config of a tracker from pixels inherits `BackgroundSettings`, or has fields of the same names.
+"""
 
 from __future__ import annotations
 
@@ -11,7 +14,7 @@ from tracking.config import Config, param
 
 @dataclass(frozen=True)
 class BackgroundSettings(Config):
-    """Thresholds, bounds of shadows and highlights, and rates of adaptation."""
+    """Detection rate, limits of shadows and highlights, and time constants of adaptation."""
 
     tracker: ClassVar[str] = "background"
 
@@ -19,43 +22,57 @@ class BackgroundSettings(Config):
         0.9995,
         (0.9, 0.999999),
         "probability",
-        "share of background pixels inside each threshold, by training",
+        "share of the training sample's background pixels that each threshold leaves background",
         "log",
         sees="pixels",
     )
     dark: float = param(
-        0.5, (0.0, 1.0), "", "brightness, relative, below which a pixel is dark foreground, no shadow", sees="pixels"
+        0.5,
+        (0.0, 1.0),
+        "",
+        "brightness relative to the background: a darker pixel below it is dark foreground, above it shadow",
+        sees="pixels",
     )
     bright: float = param(
         1.3,
         (1.0, 100.0),
         "",
-        "brightness, relative, above which a pixel is foreground, no highlight (ours)",
+        "brightness relative to the background: a brighter pixel above it is foreground, below it highlight (ours)",
         "log",
         sees="pixels",
     )
     background_time: float = param(
-        20.0, (1.0, 1e6), "s", "time constant of adaptation where background is seen", "log", sees="pixels"
+        20.0,
+        (1.0, 1e6),
+        "s",
+        "time constant with which pixels classified as background adapt (ours)",
+        "log",
+        sees="pixels",
     )
     foreground_time: float = param(
-        200.0, (1.0, 1e9), "s", "the same where it is not, outside protected places (ours)", "log", sees="pixels"
+        200.0,
+        (1.0, 1e9),
+        "s",
+        "time constant with which all other pixels adapt, except protected ones (ours)",
+        "log",
+        sees="pixels",
     )
     gain: str = param(
         "global",
         ("global", "none"),
         "",
-        "follow the brightness of the whole frame per channel (ours)",
+        "global: each frame's brightness is estimated per colour channel and corrected (ours); none: it is not",
         "categorical",
         sees="pixels",
         online=False,
     )
 
     def check(self) -> None:
-        """Foreground adapts no faster than background."""
+        """Raises InputError if foreground_time is shorter than background_time."""
         if self.foreground_time < self.background_time:
             raise InputError(
                 place="foreground_time",
                 got=f"{self.foreground_time:g}",
                 expected=f"at least background_time = {self.background_time:g}",
-                remedy="give the foreground the longer time",
+                remedy="raise foreground_time or lower background_time",
             )

@@ -1,13 +1,14 @@
-"""Robust training of the background model from a sample of frames that people may walk through.
+"""Robust training of the background model from a sample of frames; people may walk through the sample.
 
-Equations are those of Horprasert et al. (2000). Per pixel and colour: the shortest interval that holds SHARE of the
-values finds the inliers; E and sigma are their mean and standard deviation (eqs 3, 4, of all frames there), in turn,
-until they settle. (The median and MAD of a pixel where people stand about half of the time lie between them and the
-ground, with a sigma that hides both.)
-Per pixel: a_i and b_i are the RMS of alpha - 1 and of CD over the inliers (eqs 7, 8). a_i is kept as
-s_i = a_i sqrt(sum (E/sigma)^2), which is 1 for independent Gaussian noise and stays true when the gain changes.
-Thresholds: quantiles of the normalised distortions at the detection rate (the paper's Fig. 2), over the pixels that
-nobody covered in any frame of the sample.
+Input: a sample (K, H, W, 3) BGR uint8 of a still camera. Output: `Trained`. Equations: Horprasert et al. (2000).
+
+1. E and sigma of each pixel and colour channel (eqs 3, 4). The paper takes all frames; here the inliers only (ours).
+   The first inliers are the shortest interval of grey levels that holds SHARE of the frames. Then inliers, E and sigma
+   are computed in turn until they settle. Median and MAD would fail where people stand about half of the time.
+2. a_i and b_i of each pixel: the RMS of alpha - 1 and of CD over the inliers (eqs 7, 8). a_i is kept as
+   s_i = a_i sqrt(sum (E / sigma)^2), which is 1 for independent Gaussian noise and holds at any gain (ours).
+3. Thresholds: quantiles of the normalised distortions at the detection rate (Gonzalez et al. 2006, Fig. 2), over
+   pixels that were background in all frames of the sample.
 """
 
 from __future__ import annotations
@@ -20,34 +21,39 @@ import numpy as np
 
 from scenarios.errors import InputError
 from sim.types import Bools, Image, Ints
+from tracking.detect import background_training_kernels as kernels
+from tracking.detect.background_kernels import Floats
 from tracking.detect.brightness_gain import frame_gains
-from tracking.detect.pixel_classes import Floats
 
 LEAST_FRAMES = 10
-"""With fewer, SHARE of them are too few values to tell a spread by."""
+"""Fewest frames of a sample: SHARE of fewer frames are too few values for a standard deviation."""
 FLOOR = 2.0
-"""Grey levels: least sigma, and least noise that the normalisers stand for. Compressed pictures rest and then
-jump by a level or two; with less, the thresholds stand for these jumps (OpenCV's MOG2 has 2, too)."""
+"""Grey levels: least sigma, and least noise from which the normalisers are computed. Compressed frames stay constant
+and then jump by a level or two. With a lower floor these jumps would be foreground. OpenCV's MOG2 has 2, too."""
 INLIER = 3.5
-"""Robust sigmas within which a sample is background, for E, sigma and the normalisers."""
+"""A frame is an inlier of a pixel if all its channels lie within so many sigmas of E."""
 SHARE = 0.35
-"""Of the sample: the ground must show as often as this to be found; else whatever rests so often is taken for it."""
+"""Share of the frames in which the background must be visible; a thing at rest in so many frames may replace it."""
 AS_SIGMA = 2.2
-"""Standard deviations of a Gaussian per half length of the interval about its mean that holds SHARE."""
+"""Standard deviation of a Gaussian over half the length of the central interval that holds SHARE of it."""
 ROUNDS = 10
-"""At most; the inliers settle after three or four."""
+"""Most rounds of step 1; inliers settle after three or four."""
 CLEAN = 6.0
-"""As INLIER, for thresholds, where the tail counts: a pixel with any value beyond was covered; it is left out whole."""
+"""Sigmas: a pixel with any frame beyond was covered by something; all its frames are left out of the thresholds."""
 WIDEST = 20.0
-"""Grey levels: a pixel whose shortest interval is wider than this sigma's shows no background."""
+"""Grey levels: a pixel whose first sigma is larger has no background (`valid` is False)."""
 BINS, SPAN = 4000, 20.0
-"""Of the histograms: bins from -SPAN to SPAN, so wide that thresholds lie within; what is beyond counts at the ends."""
+"""Number of bins of the histograms, which reach from -SPAN to SPAN; values beyond are counted in the end bins."""
 
 
 @dataclass(frozen=True)
 class Trained:
-    """E, sigma (H, W, 3), grey levels; s, b (H, W), no unit; valid (H, W); thresholds of CD / b, of (alpha - 1) / a
-    the lower and the upper one; counts (2, BINS): the histograms that these are read off."""
+    """The trained model.
+
+    mean, sigma (H, W, 3): E and its standard deviation, grey levels. s, b (H, W): normalisers, no unit. valid (H, W):
+    False where the sample shows no background. thresholds: of CD / b, then lower and upper of (alpha - 1) / a.
+    counts (2, BINS): histograms of the normalised brightness and chromaticity distortions, in this order.
+    """
 
     mean: Floats
     sigma: Floats
@@ -59,9 +65,12 @@ class Trained:
 
 
 def train(sample: Image, rate: float, follow_gain: bool) -> Trained:
-    """The model of a sample (K, H, W, 3); InputError where it is none, too short, or without background."""
-    from tracking.detect import background_training_kernels
+    """Returns the model of a sample (K, H, W, 3) uint8.
 
+    rate: the detection rate of the thresholds. follow_gain: divide each frame by its gain first.
+    Raises InputError if the sample has a wrong shape or dtype, has fewer than LEAST_FRAMES frames, or if fewer than
+    half of its pixels show a background.
+    """
     check(sample)
     gains = frame_gains(sample) if follow_gain else np.ones((len(sample), 3), np.float32)
     size = sample.shape[1:3]
@@ -70,12 +79,12 @@ def train(sample: Image, rate: float, follow_gain: bool) -> Trained:
     counts = np.zeros((2, 2, BINS), np.int64)
     held = max(int(np.ceil(SHARE * len(sample))), 3)
     rules = AS_SIGMA, FLOOR, WIDEST, INLIER, CLEAN, ROUNDS
-    background_training_kernels.learn(sample, gains, held, rules, (BINS, SPAN), mean, sigma, s, b, valid, counts)
+    kernels.learn(sample, gains, held, rules, (BINS, SPAN), mean, sigma, s, b, valid, counts)
     if valid.mean() < 0.5:
         raise InputError(
             place="background",
-            got=f"{1 - valid.mean():.0%} of the pixels never rest in {len(sample)} frames",
-            expected="a still camera: no background can be had",
+            got=f"{1 - valid.mean():.0%} of the pixels never keep one colour in {len(sample)} frames",
+            expected="a still camera; from this sample no background can be learned",
             remedy="give a sample of the empty scene, or detections instead of pixels",
         )
     enough = counts[1, 1].sum() >= 0.05 * counts[0, 1].sum()
@@ -84,7 +93,7 @@ def train(sample: Image, rate: float, follow_gain: bool) -> Trained:
 
 
 def check(sample: Image) -> None:
-    """InputError unless this is a sample of colour frames, enough of them."""
+    """Raises InputError unless the sample is (K, H, W, 3) uint8 with at least LEAST_FRAMES frames."""
     shape, kind = np.shape(sample), getattr(sample, "dtype", None)
     expected, remedy = "", ""
     if kind != np.uint8 or len(shape) != 4 or shape[-1] != 3 or 0 in shape[1:3]:
@@ -96,21 +105,22 @@ def check(sample: Image) -> None:
 
 
 def check_frame(image: Image, size: tuple[int, ...]) -> None:
-    """InputError unless a frame is of the kind and size (H, W) of the sample."""
+    """Raises InputError unless a frame is (H, W, 3) uint8; `size` is (H, W) of the sample."""
     if image.dtype != np.uint8 or image.shape != (*size, 3):
         raise InputError(
             place="frame",
             got=f"{image.shape} of {image.dtype}",
             expected=f"{(*size, 3)} of uint8, as the background sample",
-            remedy="give frames of one size and kind",
+            remedy="give 8-bit colour frames of one size",
         )
 
 
 def thresholds(counts: Ints, rate: float) -> tuple[float, float, float]:
-    """CD, lower, upper at the detection rate, from histograms (brightness, CD) over -SPAN..SPAN.
+    """Returns the thresholds of CD / b, and lower and upper of (alpha - 1) / a, at the detection rate.
 
-    None is nearer than Gaussian noise of unit RMS would have it: a still picture has no tails. Such brightness is
-    normal; CD^2 is then chi2 of 2 degrees of freedom over its mean 2, so that P(CD > t) = exp(-t^2).
+    counts (2, BINS): histograms of brightness and CD. An empty histogram gives the Gaussian thresholds below.
+    No threshold is nearer to the background than that of Gaussian noise with unit RMS, as a still sample has no tails.
+    The brightness of such noise is normal, and its CD has P(CD > t) = exp(-t^2) (chi2 of 2 degrees over its mean 2).
     """
     edges = np.linspace(-SPAN, SPAN, BINS + 1)
     shares = [np.concatenate([[0], np.cumsum(c)]) / max(c.sum(), 1) for c in counts]

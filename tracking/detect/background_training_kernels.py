@@ -1,4 +1,7 @@
-"""Robust training, all pixels in one pass, as a numba kernel; numpy twin: tests/reference_background.py."""
+"""Kernels of tracking.detect.background_training: the model of each pixel in one pass over the sample.
+
+Numpy twins: tests/reference_background.py. Equations: Horprasert et al. (2000).
+"""
 
 from __future__ import annotations
 
@@ -6,12 +9,12 @@ import numpy as np
 from numba import njit
 
 from sim.types import Array, Bools, Image, Ints
-from tracking.detect.pixel_classes import Floats
+from tracking.detect.background_kernels import Floats
 
 
 @njit(cache=True, error_model="numpy")
 def sort(values: Floats) -> None:
-    """Sort a few values (K,) in place, by Shell's method."""
+    """Sort values (K,) in place by Shell's method, which is quick for small K."""
     for gap in (13, 4, 1):
         for t in range(gap, len(values)):
             x, j = values[t], t
@@ -23,7 +26,7 @@ def sort(values: Floats) -> None:
 
 @njit(cache=True, error_model="numpy")
 def shortest(values: Floats, held: int) -> tuple[int, float]:
-    """Of sorted values (K,): where the shortest interval that holds `held` of them begins, and its length."""
+    """Returns the first index and the length of the shortest interval that holds `held` of the sorted values (K,)."""
     first, best = 0, values[held - 1] - values[0]
     for t in range(1, len(values) - held + 1):
         length = values[t + held - 1] - values[t]
@@ -34,9 +37,11 @@ def shortest(values: Floats, held: int) -> tuple[int, float]:
 
 @njit(cache=True, error_model="numpy")
 def inliers(value: Floats, m: Array, sd: Array, inlier: Bools, rules: tuple[float, float, float, int]) -> bool:
-    """Settle E and sigma, m and sd (3,), and which of a pixel's values (K, 3) are `inlier` (K,), all in place.
+    """Compute one pixel's E and sigma, `m` and `sd` (3,), and its inliers, `inlier` (K,), in turn until they settle.
 
-    rules: least sigma, sigmas of inliers and of clean pixels, rounds. Is the pixel clean?
+    All three are changed in place; `m` and `sd` hold first guesses. value (K, 3): grey levels at gain 1.
+    rules: least sigma; sigmas within which a frame is an inlier; sigmas within which a frame is clean; most rounds.
+    Returns True if all frames of the pixel are clean.
     """
     least, inside, untouched, rounds = rules
     clean = True
@@ -69,7 +74,11 @@ def inliers(value: Floats, m: Array, sd: Array, inlier: Bools, rules: tuple[floa
 
 @njit(cache=True, error_model="numpy")
 def distortions(value: Floats, m: Array, sd: Array, inlier: Bools, alpha: Array, cd: Array) -> tuple[float, float]:
-    """Fill alpha and cd (K,): (alpha - 1) |E / sigma| and CD of a pixel's values (K, 3); their RMS over the inliers."""
+    """Write (alpha - 1) |E / sigma| and CD of one pixel's frames into `alpha` and `cd` (K,).
+
+    value (K, 3): grey levels; m, sd (3,): E and sigma. Returns the RMS of `alpha` and of `cd` over the inliers, 0 if
+    there is no inlier: s (eq. 7) and b (eq. 8).
+    """
     norm = 0.0
     for k in range(3):
         norm += (m[k] / sd[k]) ** 2
@@ -104,11 +113,13 @@ def learn(
     valid: Bools,
     counts: Ints,
 ) -> None:
-    """Fill the model of (K, H, W, 3) uint8, and histograms `counts` (2 inlier or clean, 2 brightness or CD, bins).
+    """Train on a sample (K, H, W, 3) uint8 and write the model into the last six arguments.
 
-    gains (K, 3): brightness of each frame, which it is divided by. held: values in the shortest interval. rules: sigmas
-    per half length, least and widest sigma, sigmas of inliers and of clean pixels, rounds. bins: number, span.
-    Equations are those of Horprasert et al. (2000).
+    gains (K, 3): gain of each frame, by which it is divided. held: frames in the shortest interval.
+    rules: sigma over half the interval's length; least sigma; widest sigma of a valid pixel; sigmas of an inlier;
+    sigmas of a clean frame; most rounds. bins: number and span of the histograms.
+    Written: mean, sigma (H, W, 3); s, b, valid (H, W); counts (2, 2, bins), to which the valid pixels are added: first
+    axis inliers or frames of clean pixels, second axis brightness or CD.
     """
     as_sigma, least, widest, inside, untouched, rounds = rules
     number, span = bins

@@ -1,9 +1,11 @@
-"""From foreground pixels to blobs: majority, opening, closing, least area, labels, ellipses (González et al., 3.3).
+"""Cleaning of a foreground mask, and its connected regions as blobs with ellipses (Gonzalez et al. 2006, 3.3).
 
-Sizes are metres at the person, made px by the scene's scale. The ellipse keeps first and second moments: a filled one
-with full axes h >= w has variances (h/4)^2, (w/4)^2, so h = 4 sqrt(l1), w = 4 sqrt(l2) with l1 >= l2 the eigenvalues of
-the pixels' covariance (1/12 added: a pixel is a square). theta: from the abscissa to the major axis, in (-pi/2, pi/2],
-v down. Its noise: var theta = l1 l2 / (n (l1 - l2)^2).
+`clean` applies majority, opening and closing; its windows are in metres and follow the image's scale (ours). `find`
+labels the regions, drops small ones and computes the ellipse z = (x, y, h, w, theta) of each from its moments:
+    h = 4 sqrt(l1), w = 4 sqrt(l2)     full axes, l1 >= l2 the eigenvalues of the covariance of the region's pixels
+    var theta = l1 l2 / (n (l1 - l2)^2)     variance of the direction (ours), n the number of pixels
+A filled ellipse with full axes h, w has variances (h/4)^2, (w/4)^2. 1/12 px^2 is added to both, as a pixel is a square.
+theta is the angle from the abscissa to the major axis, rad in (-pi/2, pi/2], with v down.
 """
 
 from __future__ import annotations
@@ -22,15 +24,18 @@ from tracking.detect import blobs_kernels as kernels
 
 Labels = NDArray[np.int32]
 MAJORITY_M, OPEN_M, CLOSE_M = 0.08, 0.05, 0.15
-"""Windows of the three operations, m: opening removes what is narrower than its own, closing fills narrower gaps."""
+"""Windows of the three operations, m. Opening removes narrower parts of the foreground, closing fills narrower gaps."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Blobs(Frozen):
-    """Blobs of one frame, M rows, largest first.
+    """The blobs of one frame, M rows, the largest first.
 
-    box (M, 4) ltwh px; area (M,) px; ellipse (M, 5): x, y, h, w, theta (px, rad), centre by the corner convention (a
-    pixel's centre is at + 0.5); angle_var (M,) rad^2, inf for a circle; label (H, W) int32: row + 1, 0 elsewhere.
+    box (M, 4)        left, top, width, height, px
+    area (M,)         number of pixels
+    ellipse (M, 5)    x, y, h, w (px), theta (rad); the centre of pixel (0, 0) is at (0.5, 0.5)
+    angle_var (M,)    variance of theta, rad^2; inf for a circle
+    label (H, W)      int32: a pixel of blob m has m + 1, a pixel of no blob has 0
     """
 
     box: Array
@@ -43,20 +48,29 @@ class Blobs(Frozen):
         return len(self.area)
 
     def contour(self, row: int) -> Array:
-        """(V, 2) outer contour of one blob, px, through pixel centres."""
+        """Returns the outer contour of one blob, (V, 2) px, through pixel centres."""
         left, top, wide, high = self.box[row].astype(int)
-        cut = (self.label[top : top + high, left : left + wide] == row + 1).astype(np.uint8)
-        outlines, _ = cv2.findContours(cut, cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_SIMPLE)
+        part = (self.label[top : top + high, left : left + wide] == row + 1).astype(np.uint8)
+        outlines, _ = cv2.findContours(part, cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_SIMPLE)
         longest = np.reshape(max(outlines, key=len), (-1, 2))
         return np.asarray(longest + np.array([left + 0.5, top + 0.5]))
 
     def hull(self, row: int) -> Array:
-        """(V, 2) convex hull of one blob's contour, px, counter-clockwise in (x, y)."""
+        """Returns the convex hull of one blob's contour, (V, 2) px, counter-clockwise in (x, y)."""
         return np.asarray(cv2.convexHull(self.contour(row).astype(np.float32), clockwise=False), float).reshape(-1, 2)
+
+    def cut(self) -> Bools:
+        """Returns True for each blob (M,) whose box reaches the edge of the image, to within 1 px."""
+        high, wide = self.label.shape
+        right, bottom = self.box[:, 0] + self.box[:, 2], self.box[:, 1] + self.box[:, 3]
+        return np.asarray((self.box[:, 0] <= 1) | (self.box[:, 1] <= 1) | (right >= wide - 1) | (bottom >= high - 1))
 
 
 def clean(foreground: Bools, px_per_m: float) -> Bools:
-    """(H, W) foreground after majority, opening and closing with windows that follow the scale, px per m (3.3)."""
+    """Returns a foreground mask (H, W) after majority, opening and closing at a scale in px per m (3.3).
+
+    The windows are at least 3, 1 and 3 px wide.
+    """
     mask: NDArray[Any] = foreground.astype(np.uint8)
     size = odd(MAJORITY_M * px_per_m, 3)
     mask = (cv2.boxFilter(mask, cv2.CV_16U, (size, size), normalize=False) > size * size // 2).astype(np.uint8)
@@ -66,20 +80,22 @@ def clean(foreground: Bools, px_per_m: float) -> Bools:
 
 
 def odd(size: float, least: int) -> int:
-    """The nearest odd number of px, not below `least`."""
+    """Returns the odd number of px nearest to `size`, but at least `least`."""
     return max(least, 2 * round((size - 1) / 2) + 1)
 
 
 @cache
 def disc(size: int) -> Image:
-    """A round structuring element of odd diameter (OpenCV's own ellipse is not symmetric)."""
+    """Returns a round structuring element (size, size) uint8 of odd diameter; OpenCV's own ellipse is not symmetric."""
     v, u = np.mgrid[:size, :size] - (size - 1) / 2
     return np.asarray(np.hypot(u, v) <= size / 2, np.uint8)
 
 
 def find(mask: Bools, min_area: float) -> Blobs:
-    """Connected regions of a mask (H, W), 8 neighbours, of at least `min_area` px^2, largest first, then by their first
-    pixels."""
+    """Returns the connected regions (8 neighbours) of a mask (H, W) that have at least `min_area` pixels.
+
+    The largest region comes first; regions of equal size are in raster order of their first pixels.
+    """
     runs = kernels.runs(mask)
     region, count = kernels.connect(runs)
     area, corners = kernels.extents(runs, region, count)
@@ -89,7 +105,7 @@ def find(mask: Bools, min_area: float) -> Blobs:
     rank[order] = np.arange(len(order))
     region, area, corners = rank[region], area[order], corners[order]
     label = np.zeros(mask.shape, np.int32)
-    kernels.labelled(runs, region, label)
+    kernels.write_labels(runs, region, label)
     n = area.astype(float)
     ellipse, angle_var = ellipses(n, *_moments(*kernels.moments(runs, region, area)))
     box = np.concatenate([corners[:, :2], corners[:, 2:] - corners[:, :2]], 1).astype(float)
@@ -97,15 +113,15 @@ def find(mask: Bools, min_area: float) -> Blobs:
 
 
 def _moments(centre: Array, spread: Array) -> tuple[Array, Array]:
-    """Centre (M, 2) and covariance (M, 2, 2) of pixels that are unit squares, from those of their indices."""
+    """Returns centre (M, 2) and covariance (M, 2, 2) of unit-square pixels from the moments of their indices."""
     xx, xy, yy = spread.T
     return centre + 0.5, np.stack([xx + 1 / 12, xy, xy, yy + 1 / 12], axis=-1).reshape(-1, 2, 2)
 
 
 def ellipses(n: Array, centre: Array, cov: Array) -> tuple[Array, Array]:
-    """(M, 5) z = x, y, h, w, theta (3.3; px, rad) and (M,) variance of theta, rad^2, from the moments of n (M,) pixels.
+    """Returns the ellipses (M, 5) x, y, h, w (px), theta (rad), and the variance of theta (M,), rad^2 (3.3).
 
-    centre (M, 2) px, cov (M, 2, 2) px^2.
+    n (M,): number of pixels; centre (M, 2) px; cov (M, 2, 2) px^2. The variance is inf where both axes are equal.
     """
     half, differ = (cov[:, 0, 0] + cov[:, 1, 1]) / 2, (cov[:, 0, 0] - cov[:, 1, 1]) / 2
     root = np.hypot(differ, cov[:, 0, 1])

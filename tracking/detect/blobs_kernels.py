@@ -1,7 +1,7 @@
-"""Kernels of tracking.detect.blobs: connected regions by runs, so that the picture is read once.
+"""Kernels of tracking.detect.blobs: connected regions of a mask, from runs of pixels.
 
-A run is a row of foreground pixels without a gap: row, first column, last column + 1. Runs are in raster order. Slow
-twins: tests/reference_blobs.py.
+A run is a maximal sequence of foreground pixels in one row. `runs` (R, 3) int32 has row, first column, last column + 1
+of each, in raster order. After the runs are found the mask is not read again. Slow twins: tests/reference_blobs.py.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ Labels = NDArray[np.int32]
 
 @njit(cache=True)
 def runs(mask: Bools) -> Labels:
-    """(R, 3) the runs of a mask (H, W); where eight pixels in a row are background they are passed in one step."""
+    """Returns the runs (R, 3) of a mask (H, W); eight background pixels at once are skipped in one step."""
     high, wide = mask.shape
     pixels = mask.ravel().view(np.uint8)
     eights = pixels[: len(pixels) // 8 * 8].view(np.uint64)
@@ -42,7 +42,10 @@ def runs(mask: Bools) -> Labels:
 
 @njit(cache=True)
 def connect(runs: Labels) -> tuple[Ints, int]:
-    """(R,) the region of each run, 0, 1, … in the order of their first pixels, 8 neighbours; how many there are."""
+    """Returns the region of each run (R,), numbered 0, 1, … by first pixels, and the number of regions.
+
+    Pixels are connected to their 8 neighbours.
+    """
     parent = np.arange(len(runs))
     above = 0
     for k in range(len(runs)):
@@ -66,7 +69,8 @@ def connect(runs: Labels) -> tuple[Ints, int]:
 
 @njit(cache=True)
 def extents(runs: Labels, region: Ints, count: int) -> tuple[Ints, Ints]:
-    """(M,) px of each region and (M, 4) its first column and row, last column and row + 1."""
+    """Returns the pixels of each region (M,), and its corners (M, 4): first column, first row, last column + 1, last
+    row + 1."""
     area, corners = np.zeros(count, np.int64), np.zeros((count, 4), np.int64)
     for k in range(len(runs)):
         row, first, end = runs[k]
@@ -81,8 +85,11 @@ def extents(runs: Labels, region: Ints, count: int) -> tuple[Ints, Ints]:
 
 @njit(cache=True)
 def moments(runs: Labels, region: Ints, area: Ints) -> tuple[Array, Array]:
-    """Of the regions 0 … M - 1, as if there were no others: (M, 2) mean column and row; (M, 3) variance of columns,
-    covariance, variance of rows."""
+    """Returns mean column and row (M, 2), and variance of columns, covariance, variance of rows (M, 3) of each region.
+
+    region (R,): number of each run's region; runs with a negative number are left out. area (M,): pixels of each
+    region.
+    """
     centre, spread = np.zeros((len(area), 2)), np.zeros((len(area), 3))
     for k in range(len(runs)):
         row, first, end = runs[k]
@@ -106,8 +113,8 @@ def moments(runs: Labels, region: Ints, area: Ints) -> tuple[Array, Array]:
 
 
 @njit(cache=True)
-def labelled(runs: Labels, region: Ints, label: Labels) -> None:
-    """Write region + 1 into the pixels of `label` (H, W); nothing where it is below 0."""
+def write_labels(runs: Labels, region: Ints, label: Labels) -> None:
+    """Write region + 1 into the pixels of each run in `label` (H, W); runs with a negative region are left out."""
     for k in range(len(runs)):
         if region[k] >= 0:
             label[runs[k, 0], runs[k, 1] : runs[k, 2]] = region[k] + 1

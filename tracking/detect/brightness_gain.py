@@ -1,42 +1,47 @@
-"""How bright a frame is beside the model: one factor per colour, the median of I / E over background pixels (ours)."""
+"""The brightness of a frame relative to the background model: one factor per colour channel (ours).
+
+The factor of a channel is the median of I / E over background pixels, I the frame's grey level and E the model's mean.
+"""
 
 from __future__ import annotations
 
 import numpy as np
 
 from sim.types import Bools, Image
-from tracking.detect.pixel_classes import Floats
+from tracking.detect.background_kernels import Floats
 
 POINTS = 6000
-"""Pixels of the grid on which a gain is estimated."""
+"""About so many pixels, on a regular grid, are used for the estimate."""
 DARKEST, BRIGHTEST = 16.0, 235.0
-"""Grey levels between which I and E must lie: below noise rules, above the camera clips."""
+"""Grey levels between which a pixel is usable: noise dominates below, the camera clips above."""
 FEWEST = 50
-"""Usable grid pixels without which a colour tells no gain."""
+"""Fewest usable grid pixels from which the factor of a channel is estimated."""
 
 
 def grid(high: int, wide: int) -> tuple[slice, slice]:
-    """Rows and columns of the grid."""
+    """Returns the rows and the columns of the grid in an image of high x wide px."""
     step = max(1, int(np.sqrt(high * wide / POINTS)))
     return slice(step // 2, None, step), slice(step // 2, None, step)
 
 
 def gain(image: Floats, mean: Floats, where: Bools) -> Floats | None:
-    """(3,) median of I / E over grid pixels (3, h, w) that are `where` (h, w); None if too few can be used.
+    """Returns the factor of each channel, (3,) float32, or None if no channel has FEWEST usable pixels.
 
-    A colour that cannot be used, as blue under sodium lamps, is taken to change as the others do on average.
+    image, mean (3, h, w): grey levels of the frame and of the model on the grid. where (h, w): the pixels to use.
+    A channel with too few usable pixels, as blue under sodium lamps, gets the mean factor of the other channels.
     """
-    found = [_one_colour(i[where], e[where]) for i, e in zip(image, mean, strict=True)]
+    found = [_one_channel(i[where], e[where]) for i, e in zip(image, mean, strict=True)]
     known = [factor for factor in found if factor is not None]
     if not known:
         return None
     return np.array([np.mean(known) if factor is None else factor for factor in found], np.float32)
 
 
-def _one_colour(seen: Floats, mean: Floats) -> float | None:
-    """The median ratio over pixels that neither noise rules nor the camera clips.
+def _one_channel(seen: Floats, mean: Floats) -> float | None:
+    """Returns the median of seen / mean over the usable pixels, None if these are fewer than FEWEST.
 
-    Which these are is told by a first guess, since to choose them by what is seen would take sides.
+    A pixel is usable if its expected grey level, factor * mean, lies between DARKEST and BRIGHTEST. A first pass, which
+    chooses by the seen grey level, guesses the factor; alone it would be biased, as noise decides which pixels pass.
     """
     usable = (mean > DARKEST) & (seen > DARKEST) & (seen < BRIGHTEST)
     for _ in range(2):
@@ -48,7 +53,7 @@ def _one_colour(seen: Floats, mean: Floats) -> float | None:
 
 
 def _median(values: Floats) -> float:
-    """numpy's median of one or more numbers, in a quarter of its time: none of them is nan."""
+    """Returns numpy's median of at least one number in a quarter of its time; the numbers must not be nan."""
     half = len(values) // 2
     middle = np.partition(values, half)
     above = middle[half]
@@ -56,7 +61,10 @@ def _median(values: Floats) -> float:
 
 
 def frame_gains(sample: Image) -> Floats:
-    """(K, 3): brightness of each frame of a sample beside their median frame; 1 where it cannot be told."""
+    """Returns the gain of each frame of a sample (K, H, W, 3) relative to the median frame, (K, 3) float32.
+
+    The gain of a frame that has too few usable pixels is 1 in all channels.
+    """
     rows, columns = grid(*sample.shape[1:3])
     values = np.moveaxis(sample[:, rows, columns], -1, 1).astype(np.float32)
     middle = np.median(values, axis=0)

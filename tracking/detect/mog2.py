@@ -1,42 +1,57 @@
-"""OpenCV's mixture of Gaussians (Zivkovic 2004) as another source of the classes, for comparison."""
+"""OpenCV's mixture of Gaussians (Zivkovic 2004) as an alternative background model, for comparison."""
 
 from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import ClassVar
+from typing import ClassVar, Self
 
+import cv2
 import numpy as np
 
 from sim.types import Bools, Image
 from tracking.config import Config, param
+from tracking.detect.background_kernels import BACKGROUND, FOREGROUND, SHADOW
+from tracking.detect.background_settings import BackgroundSettings
 from tracking.detect.background_training import check, check_frame
-from tracking.detect.pixel_classes import BACKGROUND, FOREGROUND, SHADOW
 
 SHADOW_VALUE = 127
-"""What OpenCV writes where it finds a shadow; foreground is 255."""
+"""The value that OpenCV writes into a shadow pixel; foreground is 255, background 0."""
 
 
 @dataclass(frozen=True)
 class Mog2Settings(Config):
-    """OpenCV's own defaults, its history as a time."""
+    """The parameters of `Mog2`; the defaults of `variance` and `shadow` are OpenCV's."""
 
     tracker: ClassVar[str] = "mog2"
 
-    variance: float = param(16.0, (1.0, 1000.0), "", "squared Mahalanobis distance beyond which a pixel is new", "log")
-    shadow: float = param(0.5, (0.0, 1.0), "", "brightness, relative, below which a pixel is no shadow")
+    variance: float = param(
+        16.0,
+        (1.0, 1000.0),
+        "",
+        "squared Mahalanobis distance beyond which no Gaussian of the mixture explains a pixel",
+        "log",
+    )
+    shadow: float = param(0.5, (0.0, 1.0), "", "brightness relative to the background below which a pixel is no shadow")
     background_time: float = param(20.0, (1.0, 1e6), "s", "time constant of adaptation", "log")
+
+    @classmethod
+    def like(cls, settings: BackgroundSettings) -> Self:
+        """Returns settings with the shadow limit and the background_time of the five-class model's settings."""
+        return cls(shadow=settings.dark, background_time=settings.background_time)
 
 
 class Mog2:
-    """The mixture model behind the interface of `Background`; state: OpenCV's, per pixel.
+    """A mixture of Gaussians per pixel with the interface of `background.Background`.
 
-    valid (H, W): True everywhere. Highlights are foreground, nothing is dark foreground; there is no gain.
+    State: OpenCV's model. valid (H, W) is True everywhere. The classes DARK and HIGHLIGHT do not occur.
     """
 
     def __init__(self, sample: Image, fps: float, settings: Mog2Settings | None = None) -> None:
-        import cv2
+        """Learn from sample (K, H, W, 3) BGR uint8; `settings` None: the defaults.
 
+        Raises InputError if the sample has a wrong shape or dtype, or too few frames.
+        """
         check(sample)
         settings = settings or Mog2Settings()
         self.fps = fps
@@ -48,14 +63,17 @@ class Mog2:
             self._model.apply(frame)
 
     def follow(self, settings: Mog2Settings) -> None:
-        """Take on thresholds and the time; what was learned stays."""
+        """Use other settings from now on; everything learned stays."""
         self.settings = settings
         self._rate = 1 - math.exp(-1 / (self.fps * settings.background_time))
         self._model.setVarThreshold(settings.variance)
         self._model.setShadowThreshold(settings.shadow)
 
     def classify(self, image: Image) -> Image:
-        """(H, W) uint8 classes of a frame (H, W, 3) BGR uint8."""
+        """Returns the class of each pixel of a frame (H, W, 3) BGR uint8, as (H, W) uint8.
+
+        Raises InputError if the frame's size or dtype is not the sample's.
+        """
         check_frame(image, self.valid.shape)
         found = self._model.apply(image, learningRate=0)
         classes = np.full(found.shape, BACKGROUND, np.uint8)
@@ -64,7 +82,11 @@ class Mog2:
         return classes
 
     def adapt(self, image: Image, classes: Image, protected: Bools | None = None) -> None:
-        """Learn from a frame; `classes` are unused. Where `protected` (H, W), the model sees its own background."""
+        """Learn from a frame (H, W, 3) BGR uint8; `classes` is not used.
+
+        Where `protected` (H, W) is True the model is shown its own background image instead of the frame. Raises
+        InputError if the frame's size or dtype is not the sample's.
+        """
         check_frame(image, self.valid.shape)
         if protected is not None and protected.any():
             image = np.where(protected[..., None], self._model.getBackgroundImage(), image)

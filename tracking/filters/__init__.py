@@ -1,3 +1,1 @@
-"""Building blocks of trackers: Kalman filters, assignment, track confirmation and deletion, connected components,
-ellipse overlap.
-"""
+"""Building blocks of trackers: Kalman filters, assignment, track uncertainty, connected components, ellipse overlap."""

@@ -1,9 +1,9 @@
-"""Who measured whom: gated nearest neighbour, or the assignment of least total cost.
+"""Assignment of measurements to tracks: gated nearest neighbour, or least total cost.
 
-Both work on the gated pairs only, given as a cost matrix with inf outside the gates. They answer (track, measurement)
-pairs in which no measurement occurs twice; a track may occur twice only with `nearest`, where a measurement goes to the
-track of least d^2 in whose gate it lies (Gonzalez et al. 2006, 4.4) and one person may come in several pieces.
-`optimal` is ours.
+Input: a cost matrix (N, M), one row per track, one column per measurement, inf outside a track's gate. Output: two
+index arrays (K,), rows and columns of the assigned pairs. No measurement is assigned twice. A track can have several
+measurements with `nearest` only: there each measurement goes to the track of least d^2 in whose gate it lies (Gonzalez
+et al. 2006, 4.4), and one person may be detected in several pieces. `optimal` is ours.
 """
 
 from __future__ import annotations
@@ -14,7 +14,10 @@ from sim.types import Array, Ints
 
 
 def nearest(cost: Array) -> tuple[Ints, Ints]:
-    """Each measurement (column) to its cheapest track (row), where it is in any gate; ties go to the first row."""
+    """Returns pairs of each measurement and its cheapest track; of equal costs the first row wins.
+
+    A measurement outside all gates is in no pair. An empty matrix gives no pairs.
+    """
     if not cost.size:
         return np.zeros(0, np.int64), np.zeros(0, np.int64)
     row = cost.argmin(0)
@@ -22,10 +25,23 @@ def nearest(cost: Array) -> tuple[Ints, Ints]:
     return row[columns], columns
 
 
-def optimal(cost: Array, unassigned: float) -> tuple[Ints, Ints]:
-    """One to one with least total cost, a track left out costing `unassigned`, the same for all; no pair costs more.
+def cheapest_per_track(rows: Ints, columns: Ints, cost: Array) -> tuple[Ints, Ints]:
+    """Returns the cheapest pair of each track among the pairs `rows`, `columns` (K,), sorted by track.
 
-    Pairs that compete with no other pair are taken as they are; only the rest goes through scipy's solver.
+    Of equal costs the smallest column wins.
+    """
+    order = np.lexsort((columns, cost[rows, columns], rows))
+    rows, columns = rows[order], columns[order]
+    first = np.ones(len(rows), bool)
+    first[1:] = rows[1:] != rows[:-1]
+    return rows[first], columns[first]
+
+
+def optimal(cost: Array, unassigned: float) -> tuple[Ints, Ints]:
+    """Returns one-to-one pairs of least total cost, where each track without a measurement costs `unassigned`.
+
+    A pair that costs `unassigned` or more is never made. Pairs that share neither row nor column with another possible
+    pair are taken directly; scipy solves the rest.
     """
     rows, columns = np.nonzero(cost < unassigned)
     in_row = np.bincount(rows, minlength=cost.shape[0])
@@ -42,6 +58,7 @@ def optimal(cost: Array, unassigned: float) -> tuple[Ints, Ints]:
 
 
 def _solve(cost: Array, unassigned: float) -> tuple[Ints, Ints]:
+    """Returns the pairs of scipy's assignment that cost less than `unassigned`."""
     from scipy.optimize import linear_sum_assignment
 
     r, c = linear_sum_assignment(cost)

@@ -1,16 +1,21 @@
-"""A bank of Kalman filters in arrays: independent position-velocity blocks, and a random-walk angle.
+"""A bank of Kalman filters in arrays: constant velocity in each coordinate, and a random-walk direction.
 
-Each of D measured coordinates (centre x, y, axes h, w) has a 2-state filter of its own: x = (place, rate),
-A = [[1, dt], [0, 1]], C = [1, 0], and Q = s^2 [[dt^4/4, dt^3/2], [dt^3/2, dt^2]], a white acceleration of standard
-deviation s held over a step (filterpy's Q_discrete_white_noise). Since no block speaks to another, a filter of 2 D
-states is D times three numbers of covariance, and a bank is one array `state` (5, N, D): place, rate, and P's entries
-11, 12, 22.
+The model is filterpy's: kinematics of order 1 (`filterpy.common.kinematic_kf`, constant velocity) driven by
+`filterpy.common.Q_discrete_white_noise`, a white acceleration of standard deviation sigma held over a step dt. A bank
+is equal to as many `filterpy.kalman.KalmanFilter` to 1e-9, and faster.
+
+Each of D measured coordinates (for example x, y, h, w) has a filter of its own with state x = (place, rate), A = [[1,
+dt], [0, 1]], C = [1, 0]. As the coordinates are independent, a bank of N filters is one array `state` (5, N, D) with
+rows
+    PLACE, RATE               the state
+    VAR, COV, RATE_VAR        entries 11, 12, 22 of the covariance P
 
     predict  x = A x,  P = A P A' + Q          (Gonzalez et al. 2006, eqs 1, 2; eq. 8: C A x is the predicted place)
-    update   S = P11 + R,  K = (P11, P12) / S,  x += K y,  P -= K S K'      (eqs 3-7; eq 4 needs brackets: (I - K C) P)
+    update   y = z - C x,  S = P11 + R,  K = (P11, P12) / S,  x += K y,  P = (I - K C) P      (eqs 5, 6, 7, 3, 4)
+Eq. 4 is printed without the brackets. Eq. 9 is printed with row and column exchanged.
 
-Places may be in a unit of their own (px) while covariances are in another (m^2): gains have no unit, so only a distance
-needs the scale (N,) between the two.
+Places may be in another unit (px) than covariances (m^2): gains have no unit, so that only distances need the scale
+(N,) between the two units.
 """
 
 from __future__ import annotations
@@ -20,24 +25,36 @@ import numpy as np
 from sim.types import Array, Bools, Ints
 
 PLACE, RATE, VAR, COV, RATE_VAR = range(5)
-VAGUE = np.radians(30.0) ** 2  # rad^2: an axis is within pi / 2 of any other, with (52 deg)^2 if nothing is known
+"""Rows of a bank's `state`."""
+VAGUE = np.radians(30.0) ** 2
+"""rad^2: a measured direction with this variance or more carries no information. (An axis differs from any other by at
+most pi / 2; a uniform distribution has a standard deviation of 52 deg.)"""
 
 
 def white_acceleration(dt: float, sigma: Array | float) -> Array:
-    """(3, ...) entries 11, 12, 22 of Q for a white acceleration of standard deviation sigma, held over dt."""
+    """Returns entries 11, 12, 22 of Q, (3, ...) in the shape of `sigma`: filterpy's Q_discrete_white_noise.
+
+    dt: s. sigma: standard deviation of the acceleration, unit of the place per s^2.
+    """
+    from filterpy.common import Q_discrete_white_noise
+
+    unit = Q_discrete_white_noise(2, dt)
     q = np.square(np.asarray(sigma, float))
-    return np.stack([q * dt**4 / 4, q * dt**3 / 2, q * dt**2])
+    return np.stack([q * unit[0, 0], q * unit[0, 1], q * unit[1, 1]])
 
 
 def born(place: Array, var: Array | float, rate_var: Array | float) -> Array:
-    """(5, N, D) new filters at `place` (N, D), at rest, with uncorrelated variances."""
+    """Returns the state (5, N, D) of new filters at `place` (N, D) with rate 0.
+
+    var, rate_var: variances of place and rate, (D,) or a number. Their covariance is 0.
+    """
     state = np.zeros((5, *place.shape))
     state[PLACE], state[VAR], state[RATE_VAR] = place, var, rate_var
     return state
 
 
 def predict(state: Array, dt: float, q: Array) -> None:
-    """One step of dt, s, in place; q (3, N, D) or (3, D) from `white_acceleration`."""
+    """Predict a bank one step of dt s ahead, in place; q (3, N, D) or (3, D) from `white_acceleration`."""
     place, rate, var, cov, rate_var = state
     place += dt * rate  # eq. 1
     step = dt * rate_var  # eq. 2, to the end
@@ -47,9 +64,11 @@ def predict(state: Array, dt: float, q: Array) -> None:
 
 
 def update(state: Array, rows: Ints, z: Array, noise: Array | float) -> Array:
-    """Measure filters `rows` (each at most once) at z (K, D) with variances `noise` (K, D) or (D,), in place.
+    """Update the filters `rows` (K,), each at most once, with measurements z (K, D), in place.
 
-    Returns (K, D) y^2 / S of each coordinate, in squared units of z per unit of covariance (summed: eq. 9).
+    noise: variances of the measurements, (K, D) or (D,), in the covariances' unit.
+    Returns y^2 / S of each coordinate, (K, D); the sum over the coordinates is d^2 (eq. 9). Its unit is the squared
+    unit of z per unit of covariance.
     """
     new = state.take(rows, 1)
     place, rate, var, cov, rate_var = new
@@ -66,9 +85,10 @@ def update(state: Array, rows: Ints, z: Array, noise: Array | float) -> Array:
 
 
 def distances(state: Array, z: Array, noise: Array | float, scale: Array | float = 1.0) -> Array:
-    """(N, M) squared Mahalanobis distances y' S^-1 y between N predictions and M measurements (the paper's MSD, eq. 9).
+    """Returns squared Mahalanobis distances y' S^-1 y (N, M) of N predictions and M measurements z (M, D) (eq. 9).
 
-    noise (M, D) or (D,) in the covariances' unit, scale (N,) or a number: units of z per unit of covariance.
+    noise: variances of the measurements, (M, D) or (D,), in the covariances' unit. scale: units of z per square root of
+    the covariances' unit, (N,) or a number.
     """
     place, spread = state[PLACE], np.reshape(np.square(scale), (-1, 1))
     if np.ndim(noise) < 2:
@@ -79,7 +99,10 @@ def distances(state: Array, z: Array, noise: Array | float, scale: Array | float
 
 
 def _common_noise(place: Array, z: Array, w: Array) -> Array:
-    """Sum over d of w (z - place)^2, expanded to matrix products: about one of the points, so that little cancels."""
+    """Returns the sum over d of w (z - place)^2, (N, M), by matrix products.
+
+    place, w (N, D); z (M, D). Both are taken relative to the first measurement, so that little precision cancels.
+    """
     if not len(place) or not len(z):
         return np.zeros((len(place), len(z)))
     p, m = place - z[0], z - z[0]
@@ -91,9 +114,10 @@ def _common_noise(place: Array, z: Array, w: Array) -> Array:
 
 
 def asymptote(dt: float, sigma: Array | float, noise: Array | float) -> Array:
-    """S that an unbroken run of measurements settles at: the Riccati equation of one block in closed form.
+    """Returns the innovation variance S to which an unbroken run of measurements converges, in the shape of the input.
 
-    With l = sigma dt^2 / sqrt(noise):  r = (4 + l - sqrt(8 l + l^2)) / 4,  S = noise / r^2 (Kalata).
+    The solution of one coordinate's Riccati equation in closed form (Kalata 1984): with l = sigma dt^2 / sqrt(noise),
+    r = (4 + l - sqrt(8 l + l^2)) / 4 and S = noise / r^2. noise: variance of a measurement.
     """
     index = np.asarray(sigma) * dt**2 / np.sqrt(noise)
     r = (4 + index - np.sqrt(8 * index + index**2)) / 4
@@ -101,19 +125,23 @@ def asymptote(dt: float, sigma: Array | float, noise: Array | float) -> Array:
 
 
 def angle_innovation(measured: Array, predicted: Array) -> Array:
-    """Difference of two axes' directions (eq. 5), rad, in [-pi/2, pi/2): an axis turned by pi is the same axis."""
+    """Returns measured - predicted of two axes' directions (eq. 5), rad in [-pi/2, pi/2).
+
+    An axis turned by pi is the same axis.
+    """
     return (measured - predicted + np.pi / 2) % np.pi - np.pi / 2
 
 
 def directed(noise: Array) -> Bools:
-    """Do axes measured with these variances (N,), rad^2, have a direction at all? Those of a near circle have none."""
+    """Returns True where a measured direction's variance (N,), rad^2, is below VAGUE; that of a near circle is not."""
     return np.asarray(noise < VAGUE)
 
 
 def angle_update(angle: Array, rows: Ints, z: Array, noise: Array) -> None:
-    """Measure the axes `rows` of angle (2, N), direction rad and its variance, at z (K,) with `noise` (K,), in place.
+    """Update the directions `rows` (K,) of `angle` (2, N) with measured directions z (K,) rad, in place.
 
-    A measurement without a direction is left out.
+    Rows of angle: direction, rad, and its variance, rad^2. noise (K,): variances of the measurements, rad^2. A
+    measurement that is not `directed` is left out.
     """
     usable = directed(noise)
     rows, z, noise = rows[usable], z[usable], noise[usable]

@@ -1,15 +1,19 @@
-"""Birth, confirmation and death of tracks from rho = sqrt|S| / its asymptote.
+"""The uncertainty of a track, rho = sqrt|S| / its asymptote, and the values of rho that decide about tracks.
 
-Gonzalez et al. (2006, 4.5, 5) manage tracks by the innovation covariance's determinant: it falls towards an asymptote
-while measurements come, rises while they don't, and knows nothing of their values. The paper names no numbers. It
-confirms "below a certain percentage" of the asymptote, here one above 100, as rho falls from above, and deletes beyond
-what "a certain number" of misses gives. A newborn's |S| hangs on its first covariance too, hence the checks (ours):
+Gonzalez et al. (2006, 4.5, 5) manage tracks by sqrt|S|, S the innovation covariance (eq. 6): it falls towards an
+asymptote while measurements are associated and rises while they are missed. It does not depend on measured values. This
+module computes rho and its thresholds; tracking.papers.blob.track_management starts, confirms and deletes tracks by
+them.
 
-- confirm where rho <= confirm_ratio (a little above 1) and the measurement of that frame was near,
-- a newborn must start above it, so that one sighting never confirms (checked when the config is made concrete),
-- a confirmed track dies where rho reaches what k misses from the steady state give: sooner if it was not there yet,
-- a tentative one dies (ours) where rho, unseen, reaches its value at birth, or after a time limit, never before
-  it could be confirmed.
+The paper prints no numbers. It confirms "below a certain percentage" of the asymptote; as rho falls towards 1 from
+above, the percentage is above 100. It deletes at the value that "a certain number" of misses gives. The value at birth
+depends on the first covariance, too. Rules, ours where the paper has none:
+- A track is confirmed if rho <= confirm_ratio (above 1) and the measurement of that frame is near.
+- A new track must start above confirm_ratio, so that one measurement never confirms it (`check_birth`).
+- A confirmed track is deleted if rho reaches the value after k misses from the steady state. A track that is not yet in
+  the steady state gets there after fewer misses.
+- A tentative track is deleted if rho, while the track is missed, reaches its value at birth, or after a time limit. The
+  time limit is at least the time that confirmation takes (`time_to_confirm`).
 """
 
 from __future__ import annotations
@@ -25,7 +29,11 @@ from tracking.filters import kalman
 
 @dataclass(frozen=True)
 class Dynamics:
-    """Nominal filter of one track, D coordinates in m: dt; sigma (D,) acceleration; noise (D,), birth_rate_var (D,)."""
+    """The nominal filter of one track with D coordinates, lengths in m.
+
+    dt: step, s. sigma (D,): standard deviation of the acceleration, m/s^2. noise (D,): variance of a measurement, m^2.
+    birth_rate_var (D,): variance of a new track's rate, (m/s)^2; that of its place is `noise`.
+    """
 
     dt: float
     sigma: Array
@@ -34,22 +42,22 @@ class Dynamics:
 
     @property
     def q(self) -> Array:
-        """(3, D) process noise of a step."""
+        """Entries 11, 12, 22 of the process noise Q of a step, (3, D)."""
         return kalman.white_acceleration(self.dt, self.sigma)
 
     @property
     def asymptote(self) -> Array:
-        """(D,) S of a track that is always measured."""
+        """Innovation variance S of each coordinate, (D,) m^2, of a track that is measured in every frame."""
         return kalman.asymptote(self.dt, self.sigma, self.noise)
 
     def newborn(self) -> Array:
-        """(5, 1, D) state of a track that was just born at 0."""
+        """Returns the state (5, 1, D) of a new track at 0."""
         return kalman.born(np.zeros((1, len(self.noise))), self.noise, self.birth_rate_var)
 
     def steady(self) -> Array:
-        """(5, 1, D) state just after a measurement in the steady state, in closed form.
+        """Returns the state (5, 1, D) of a track at 0 just after a measurement in the steady state, in closed form.
 
-        With K = 1 - R/S the posterior is P11 = K R, and the Riccati equation gives P12 and P22.
+        With K = 1 - R / S the posterior P11 is K R. P12 and P22 follow from the Riccati equation.
         """
         s = self.asymptote
         k = 1 - self.noise / s
@@ -62,49 +70,55 @@ class Dynamics:
 
 
 def rho(state: Array, noise: Array, asymptote: Array) -> Array:
-    """(N,) sqrt|S| of predicted filters (S: eq. 6) relative to its asymptote (4.5).
+    """Returns sqrt|S| / its asymptote (N,) of predicted filters (4.5; S: eq. 6).
 
-    state (5, N, D), noise and asymptote (D,) in its covariances' unit; S is diagonal, so |S| is a product.
+    state (5, N, D). noise, asymptote (D,): variance of a measurement and asymptotic S, in the covariances' unit. As S
+    is diagonal, |S| is a product over the coordinates.
     """
     return np.asarray(np.sqrt(np.multiply.reduce((state[kalman.VAR] + noise) / asymptote, 1)))
 
 
 def after_misses(dynamics: Dynamics, misses: int) -> float:
-    """rho at the prediction that follows `misses` frames without measurement, from the steady state."""
-    return _follow(dynamics, dynamics.steady(), misses + 1)
+    """Returns rho at the prediction that follows `misses` frames without measurement, from the steady state."""
+    return _rho_after(dynamics, dynamics.steady(), misses + 1)
 
 
 def at_birth(dynamics: Dynamics) -> float:
-    """rho at the first prediction of a newborn."""
-    return _follow(dynamics, dynamics.newborn(), 1)
+    """Returns rho at the first prediction of a new track."""
+    return _rho_after(dynamics, dynamics.newborn(), 1)
 
 
 def hits_to_confirm(dynamics: Dynamics, confirm_ratio: float, limit: int = 1000) -> int:
-    """Sightings in a row, the first included, that bring rho down to confirm_ratio."""
-    state = dynamics.newborn()
+    """Returns how many frames with a measurement in a row, the first included, bring rho down to confirm_ratio.
+
+    Returns `limit` if more frames are needed.
+    """
+    state, q = dynamics.newborn(), dynamics.q
     for hits in range(1, limit):
-        kalman.predict(state, dynamics.dt, dynamics.q)
+        kalman.predict(state, dynamics.dt, q)
         if rho(state, dynamics.noise, dynamics.asymptote)[0] <= confirm_ratio:
             return hits + 1
         kalman.update(state, np.zeros(1, np.int64), np.zeros((1, len(dynamics.noise))), dynamics.noise)
     return limit
 
 
-def _follow(dynamics: Dynamics, state: Array, steps: int) -> float:
+def _rho_after(dynamics: Dynamics, state: Array, steps: int) -> float:
+    """Returns rho after so many predictions of `state` (5, 1, D), which is changed."""
+    q = dynamics.q
     for _ in range(steps):
-        kalman.predict(state, dynamics.dt, dynamics.q)
+        kalman.predict(state, dynamics.dt, q)
     return float(rho(state, dynamics.noise, dynamics.asymptote)[0])
 
 
 def check_birth(dynamics: Dynamics, confirm_ratio: float) -> None:
-    """InputError where a newborn would be confirmed at first sight."""
+    """Raises InputError if rho of a new track is at or below confirm_ratio: its first measurement would confirm it."""
     start = at_birth(dynamics)
     if start <= confirm_ratio:
-        got = f"{confirm_ratio:g}, and newborn tracks that start at {start:.3g} of the asymptote"
+        got = f"{confirm_ratio:g}, while new tracks start at {start:.3g} times the asymptote"
         remedy = "raise speed_prior or size_rate_prior, or lower confirm_ratio or the acceleration noises"
-        raise InputError(place="confirm_ratio", got=got, expected="newborn tracks above it", remedy=remedy)
+        raise InputError(place="confirm_ratio", got=got, expected="new tracks that start above it", remedy=remedy)
 
 
 def time_to_confirm(dynamics: Dynamics, confirm_ratio: float) -> float:
-    """s, the least age until which a track seen in every frame must live; it is confirmed in the frame after that."""
+    """Returns the age, s, that a track measured in every frame must be allowed to reach; the next frame confirms it."""
     return (hits_to_confirm(dynamics, confirm_ratio) - 2) * dynamics.dt

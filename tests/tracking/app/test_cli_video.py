@@ -60,7 +60,7 @@ BROKEN: dict[str, tuple[Callable[[Path], Path], list[str]]] = {
     ),
     "every pixel changes": (
         lambda f: jpegs(f / "mot", [noise(k) for k in range(60)]),
-        ["/mot: ", "no background can be had"],
+        ["/mot: ", "no background can be learned"],
     ),
 }  # fmt: skip
 

@@ -14,7 +14,7 @@ from tracking.detect.background import (
     INTERLEAVE,
     SHADOW,
     Background,
-    foreground,
+    fused_foreground,
 )
 from tracking.detect.background_settings import BackgroundSettings
 from tracking.detect.background_training import FLOOR, train
@@ -106,7 +106,7 @@ def test_five_classes_of_known_colours():
     for band, kind in enumerate((BACKGROUND, SHADOW, DARK, HIGHLIGHT, FOREGROUND)):
         assert np.all(classes[:20, 10 * band : 10 * band + 10] == kind), band
     assert np.all(classes[20:] == FOREGROUND)
-    assert share(foreground(classes), True) == pytest.approx((20 * 20 + 10 * 50) / 1500)
+    assert share(fused_foreground(classes), True) == pytest.approx((20 * 20 + 10 * 50) / 1500)
 
 
 def test_a_dark_place_that_gets_darker_by_noise_is_no_dark_foreground():
@@ -120,7 +120,7 @@ def test_where_the_camera_clips_the_brighter_background_stays_background():
     mean = scene(low=150, top=240)
     made = model(mean)
     classes = made.classify(shot(mean, np.random.default_rng(3), gain=1.4))
-    assert share(foreground(classes), True) < 0.02
+    assert share(fused_foreground(classes), True) < 0.02
 
 
 # --- a sample with people, light and change ---------------------------------------------------------------------------
@@ -167,7 +167,7 @@ def test_a_sudden_change_of_light_does_not_flood_the_frame(gain):
     classes = model(mean, detection_rate=0.9999).classify(picture)
     hole = np.ones(classes.shape, bool)
     hole[5:20, 5:15] = False
-    assert share(foreground(classes)[~hole], True) > 0.95
+    assert share(fused_foreground(classes)[~hole], True) > 0.95
     assert share(classes[hole], BACKGROUND) > 0.99
     blind = model(mean, gain="none").classify(picture)
     assert share(blind[hole], BACKGROUND) < 0.5
@@ -181,7 +181,7 @@ def foreground_over_time(made, picture, seconds, protected=None, seed=8):
     for _ in range(int(seconds * FPS)):
         frame = shot(picture, rng)
         classes = made.classify(frame)
-        curve.append(foreground(classes)[8:16, 8:16].mean())
+        curve.append(fused_foreground(classes)[8:16, 8:16].mean())
         made.adapt(frame, classes, protected)
     return np.array(curve)
 
@@ -302,7 +302,7 @@ def test_kernels_equal_their_twins():
         twin = reference.classify(picture, planes[0], np.sqrt(planes[1]), made.s, made.b, made.valid, made.gain, limits)
         assert np.bincount(classes.ravel(), minlength=5).min() > 20
         assert np.mean(classes != twin) < 1e-3
-        keep, rows = rng.random((40, 50)) < 0.3, np.arange(40) % INTERLEAVE == made._turn
+        keep, rows = rng.random((40, 50)) < 0.3, np.arange(40) % INTERLEAVE == made._first_row
         fast, slow = (1 - np.exp(-INTERLEAVE / (FPS * t)) for t in (20.0, 200.0))
         twins = reference.adapt(picture, classes, keep, *planes, made.gain.astype(float), rows, fast, slow)
         made.adapt(picture, classes, keep)
@@ -332,7 +332,7 @@ def test_a_still_picture_can_be_trained_on():
     assert share(made.classify(still[0] + np.uint8(1)), BACKGROUND) == 1
     dark = still[0].copy()
     dark[:15] //= 8
-    assert share(foreground(made.classify(dark)[:15]), True) > 0.95
+    assert share(fused_foreground(made.classify(dark)[:15]), True) > 0.95
 
 
 # --- bad input --------------------------------------------------------------------------------------------------------
@@ -345,7 +345,7 @@ def test_a_still_picture_can_be_trained_on():
         (np.zeros((50, 8, 8, 3)), "uint8, BGR"),
         (np.zeros((50, 0, 8, 3), np.uint8), "uint8, BGR"),
         (np.zeros((9, 8, 8, 3), np.uint8), "at least 10 frames"),
-        (np.random.default_rng(0).integers(0, 255, (50, 8, 8, 3), np.uint8), "no background can be had"),
+        (np.random.default_rng(0).integers(0, 255, (50, 8, 8, 3), np.uint8), "no background can be learned"),
     ],
     ids=["grey", "floats", "empty", "few", "all pixels change"],
 )

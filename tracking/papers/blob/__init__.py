@@ -1,1 +1,1 @@
-"""The tracker `blob` (González, Rowe, Andrade, Villanueva 2006): people as boxes or blobs."""
+"""The tracker `blob` (Gonzalez, Rowe, Andrade, Villanueva 2006): people tracked from boxes or from pixels."""

@@ -1,14 +1,17 @@
-"""Boxes as measurements (x, y, h, w) of `blob`: conversion, pieces of one person, one box over several people."""
+"""Geometry of boxes as `blob` measures them: conversion, overlap, and fusing the pieces of one person.
+
+A centred box is (x, y, h, w): centre, height, width, px. A detection's box is (left, top, width, height), px.
+"""
 
 from __future__ import annotations
 
 import numpy as np
 
-from sim.types import Array, Bools, Ints
+from sim.types import Array, Bools
 
 
-def from_boxes(box: Array) -> Array:
-    """(M, 4) centre x, y, height, width of (M, 4) left, top, width, height."""
+def centred_from_ltwh(box: Array) -> Array:
+    """Returns centred boxes (M, 4) of boxes left, top, width, height (M, 4)."""
     z = np.empty_like(box)
     np.multiply(box[:, 2:], 0.5, out=z[:, :2])
     z[:, :2] += box[:, :2]
@@ -16,8 +19,8 @@ def from_boxes(box: Array) -> Array:
     return z
 
 
-def to_boxes(place: Array) -> Array:
-    """(N, 4) left, top, width, height of (N, 4) centre x, y, height, width; at least 1 px wide and high."""
+def ltwh_from_centred(place: Array) -> Array:
+    """Returns boxes left, top, width, height (N, 4) of centred boxes (N, 4); sides are at least 1 px."""
     box = np.empty_like(place)
     np.maximum(place[:, :1:-1], 1.0, out=box[:, 2:])
     np.multiply(box[:, 2:], -0.5, out=box[:, :2])
@@ -25,18 +28,35 @@ def to_boxes(place: Array) -> Array:
     return box
 
 
-def lying(box: Array) -> Array:
-    """(N, 5) ellipses x, y, h, w, theta inscribed in boxes (N, 4) x, y, h, w: h the longer axis."""
+def inscribed_ellipses(box: Array) -> Array:
+    """Returns the ellipses (N, 5) x, y, h, w (px), theta (rad) inscribed in centred boxes (N, 4).
+
+    h is the longer axis; theta is pi / 2 if it is vertical, else 0.
+    """
     tall = box[:, 2] >= box[:, 3]
     axes = np.where(tall[:, None], box[:, 2:], box[:, :1:-1])
     return np.column_stack([box[:, :2], axes, np.where(tall, np.pi / 2, 0.0)])
 
 
-def fused(pieces: Array) -> Array:
-    """One box with the area-weighted first and second moments of several (K, 4) boxes.
+def standing(box: Array) -> Array:
+    """Returns boxes x, foot, h, w (N, 4) of centred boxes (N, 4); foot is the row of the lower edge."""
+    out = box.copy()
+    out[:, 1] += box[:, 2] / 2
+    return out
 
-    A filled box of side L has variance L^2 / 12 along it; the pieces' spread is added, so that two halves of a box give
-    the box itself.
+
+def centred(standing_box: Array) -> Array:
+    """Returns centred boxes (N, 4) of boxes x, foot, h, w (N, 4)."""
+    out = standing_box.copy()
+    out[:, 1] -= standing_box[:, 2] / 2
+    return out
+
+
+def fuse_pieces(pieces: Array) -> Array:
+    """Returns one centred box (4,) with the area-weighted mean and variance of several boxes (K, 4).
+
+    A filled box of side L has variance L^2 / 12 along it, and the spread of the centres is added. So two halves of a
+    box give the box itself.
     """
     centre, side = pieces[:, :2], pieces[:, :1:-1]
     w = np.prod(side, 1)
@@ -46,8 +66,8 @@ def fused(pieces: Array) -> Array:
     return np.concatenate([mean, np.sqrt(12 * var)[::-1]])
 
 
-def covered(place: Array, others: Array) -> Array:
-    """(N, M) share of each box of `place` that lies in each box of `others`; both (., 4) x, y, h, w."""
+def covered_share(place: Array, others: Array) -> Array:
+    """Returns the share of each box of `place` (N, 4) that lies in each box of `others` (M, 4), (N, M); all centred."""
     shared = np.ones((len(place), len(others)))
     for centre, side in ((0, 3), (1, 2)):
         half, other_half = place[:, side, None] / 2, others[:, side] / 2
@@ -57,25 +77,16 @@ def covered(place: Array, others: Array) -> Array:
     return np.asarray(shared / np.maximum(place[:, 2] * place[:, 3], 1e-9)[:, None])
 
 
-def inside(points: Array, boxes: Array) -> Bools:
-    """(N, M) does point (x, y) lie in box (x, y, h, w)?"""
+def points_inside(points: Array, boxes: Array) -> Bools:
+    """Returns True where a point lies in a centred box, (N, M); points (N, 2 or more): x, y first; boxes (M, 4)."""
     away = np.abs(points[:, None, :2] - boxes[:, :2]) <= boxes[:, :1:-1] / 2
     return np.asarray(away[..., 0] & away[..., 1])
 
 
-def hull_overlap(places: Array, box: Array) -> float:
-    """IoU of the bounding box of several boxes (K, 4) with another (4,), all x, y, h, w."""
+def hull_iou(places: Array, box: Array) -> float:
+    """Returns the IoU of the bounding box of several boxes (K, 4) with another box (4,); all centred."""
     low = (places[:, :2] - places[:, :1:-1] / 2).min(0)
     high = (places[:, :2] + places[:, :1:-1] / 2).max(0)
     whole = np.concatenate([(low + high) / 2, (high - low)[::-1]])[None]
-    shared = float(covered(whole, box[None])[0, 0]) * float(np.prod(whole[0, 2:]))
+    shared = float(covered_share(whole, box[None])[0, 0]) * float(np.prod(whole[0, 2:]))
     return shared / float(np.prod(whole[0, 2:]) + np.prod(box[2:]) - shared)
-
-
-def best_pieces(rows: Ints, columns: Ints, cost: Array) -> tuple[Ints, Ints]:
-    """Of (track, measurement) pairs the cheapest of each track."""
-    order = np.lexsort((columns, cost[rows, columns], rows))
-    rows, columns = rows[order], columns[order]
-    first = np.ones(len(rows), bool)
-    first[1:] = rows[1:] != rows[:-1]
-    return rows[first], columns[first]

@@ -1,4 +1,4 @@
-"""The parameters of `blob`, and the nominal filter that follows from them at a frame rate."""
+"""The parameters of `blob`, and its nominal filter at a frame rate."""
 
 from __future__ import annotations
 
@@ -14,55 +14,77 @@ from tracking.filters.track_uncertainty import Dynamics, check_birth
 
 @dataclass(frozen=True)
 class BlobConfig(BackgroundSettings):
-    """Gates, noises, association, management and output of `blob`. Lengths are metres at the person."""
+    """Noises, gates, association, management and reporting of `blob`. Lengths are metres at the person."""
 
     tracker: ClassVar[str] = "blob"
 
-    accel_noise: float = param(0.5, (0.05, 10.0), "m/s^1.5", "white acceleration of the centre, per root second", "log")
-    size_accel_noise: float = param(0.1, (0.01, 5.0), "m/s^1.5", "white acceleration of height and width", "log")
+    accel_noise: float = param(
+        0.5, (0.05, 10.0), "m/s^1.5", "white acceleration of the centre: root of its spectral density", "log"
+    )
+    size_accel_noise: float = param(
+        0.1, (0.01, 5.0), "m/s^1.5", "white acceleration of height and width: root of its spectral density", "log"
+    )
     position_noise: float = param(0.09, (0.005, 1.0), "m", "standard deviation of a measured centre", "log")
     size_noise: float = param(0.2, (0.005, 1.0), "m", "standard deviation of a measured height or width", "log")
-    speed_prior: float = param(1.3, (0.1, 5.0), "m/s", "standard deviation of a newborn's velocity", "log")
-    size_rate_prior: float = param(0.2, (0.01, 3.0), "m/s", "standard deviation of a newborn's growth", "log")
-    gate: float = param(0.999, (0.5, 0.999999), "probability", "share of true measurements inside a track's gate")
+    speed_prior: float = param(1.3, (0.1, 5.0), "m/s", "standard deviation of a new track's velocity, per axis", "log")
+    size_rate_prior: float = param(
+        0.2, (0.01, 3.0), "m/s", "standard deviation of the rate of a new track's height and width", "log"
+    )
+    gate: float = param(
+        0.999, (0.5, 0.999999), "probability", "share of a track's own measurements that its gate holds"
+    )
     association: str = param(
         "optimal",
         ("nearest", "optimal"),
         "",
-        "nearest gated track (the paper) or least total cost (ours)",
+        "nearest: each measurement to its nearest gated track (the paper); optimal: least total cost (ours)",
         "categorical",
     )
     orphan_gate: float = param(
         0.9,
         (0.01, 0.999999),
         "probability",
-        "gate of a measured track within which a measurement left over starts none (ours)",
+        "gate of a measured track inside which a free measurement starts no track (ours)",
     )
     confirm_ratio: float = param(1.5, (1.01, 2.0), "", "rho at or below which a track is confirmed")
-    confirm_gate: float = param(0.99, (0.1, 0.999999), "probability", "gate of the confirming measurement")
+    confirm_gate: float = param(
+        0.99, (0.1, 0.999999), "probability", "gate in which the confirming measurement must lie"
+    )
     coast_time: float = param(
-        1.5, (0.0, 10.0), "s", "a confirmed track dies after so long without measurement, from the steady state"
+        1.5, (0.0, 10.0), "s", "a confirmed track is deleted after this time without measurement, from the steady state"
     )
     tentative_time: float = param(
-        1.0, (0.1, 10.0), "s", "a tentative track not confirmed by then dies, but not before it could be"
+        1.0, (0.1, 10.0), "s", "a tentative track is deleted at this age, but not before it can be confirmed"
     )
     merged_time: float = param(
-        3.0, (0.0, 20.0), "s", "the same once another track, or a merged blob, explained that it is not seen"
+        3.0,
+        (0.0, 20.0),
+        "s",
+        "coast_time, if longer, of a track whose miss is explained: hidden, or merged with others in one box (ours)",
     )
     score_start: float = param(0.5, (0.0, 1.0), "score", "least score of a detection that starts a track")
     score_continue: float = param(0.1, (0.0, 1.0), "score", "least score of a detection that continues one")
     report_delay: float = param(
-        0.1, (0.0, 5.0), "s", "a tentative track is reported, where it is measured, from this age on"
+        0.1, (0.0, 5.0), "s", "a tentative track is reported from this age on, in frames in which it is measured"
     )
     report_coast: float = param(
-        0.6, (0.0, 10.0), "s", "a track is reported so long after its last measurement, from the steady state"
+        0.6,
+        (0.0, 10.0),
+        "s",
+        "a confirmed track is reported for this time after its last measurement, from the steady state",
     )
-    report_hidden: float = param(0.7, (0.0, 10.0), "s", "the same once it was hidden or merged", before=0.0)
+    report_hidden: float = param(
+        0.7,
+        (0.0, 10.0),
+        "s",
+        "report_coast, if longer, of a track whose miss is explained: hidden, or merged with others",
+        before=0.0,
+    )
     report_credit: float = param(
         0.33,
         (0.0, 10.0),
         "",
-        "an unseen track is reported no longer than this share of the time it was seen",
+        "a missed track is reported for at most this share of the time in which it was measured",
         before=1.0,
     )
 
@@ -70,7 +92,7 @@ class BlobConfig(BackgroundSettings):
         "horprasert",
         ("horprasert", "mog2"),
         "",
-        "from pixels: five classes (the paper's), or OpenCV's mixture of Gaussians",
+        "from pixels: horprasert: five classes of pixels (the paper); mog2: OpenCV's mixture of Gaussians",
         "categorical",
         online=False,
         before="horprasert",
@@ -80,7 +102,7 @@ class BlobConfig(BackgroundSettings):
         True,
         (True, False),
         "",
-        "from pixels: people who share a blob are told apart (ours)",
+        "from pixels: people who share a blob are separated by templates (ours)",
         "categorical",
         before=True,
         sees="pixels",
@@ -89,7 +111,7 @@ class BlobConfig(BackgroundSettings):
         10.0,
         (1.0, 500.0),
         "nats",
-        "what a wholly seen template is worth beside its distance (ours)",
+        "from pixels: log-likelihood of a template's full support, against d^2 / 2 of its place (ours)",
         "log",
         before=10.0,
         sees="pixels",
@@ -98,18 +120,23 @@ class BlobConfig(BackgroundSettings):
         0.3,
         (0.02, 0.8),
         "share",
-        "foreground in what no other covers of a confirmed track measured (ours)",
+        "from pixels: least foreground in the part of a confirmed track's template that no other covers (ours)",
         before=0.3,
         sees="pixels",
     )
     entry_support: float = param(
-        0.5, (0.1, 0.9), "share", "support from which on a template is somebody new (ours)", before=0.5, sees="pixels"
+        0.5,
+        (0.1, 0.9),
+        "share",
+        "from pixels: least support of the template of a new person or of a tentative track (ours)",
+        before=0.5,
+        sees="pixels",
     )
     person_noise: float = param(
         0.15,
         (0.01, 5.0),
         "m",
-        "how far people's axes are from those expected at their place (ours)",
+        "from pixels: standard deviation of people's axes about those expected at their place (ours)",
         "log",
         before=0.15,
         sees="pixels",
@@ -118,7 +145,7 @@ class BlobConfig(BackgroundSettings):
         8.0,
         (0.5, 45.0),
         "deg",
-        "standard deviation of a measured direction, beside the moments' own",
+        "from pixels: standard deviation of a measured direction, beside that of the blob's moments",
         "log",
         before=8.0,
         sees="pixels",
@@ -127,7 +154,7 @@ class BlobConfig(BackgroundSettings):
         15.0,
         (0.5, 180.0),
         "deg/s^0.5",
-        "random walk of the direction, per root second",
+        "from pixels: random walk of the direction: its standard deviation after one second",
         "log",
         before=15.0,
         sees="pixels",
@@ -136,14 +163,17 @@ class BlobConfig(BackgroundSettings):
         0.6,
         (0.05, 1.0),
         "share",
-        "a frame with more foreground tells nothing: lights, camera (ours)",
+        "from pixels: a frame with a larger share of foreground is not measured: light switched, camera moved (ours)",
         before=0.6,
         sees="pixels",
     )
 
     def dynamics(self, fps: float) -> Dynamics:
-        """The nominal filter of (x, y, h, w): Q, R and a newborn's P. Accelerations are spectral densities, so
-        sigma = noise / sqrt(dt)."""
+        """Returns the nominal filter of (x, y, h, w) at `fps` frames per second, lengths in m.
+
+        The acceleration noises are roots of spectral densities, so sigma = noise / sqrt(dt) (ours). Raises InputError
+        if the first measurement would confirm a new track.
+        """
         root = np.sqrt(fps)
         accel, size = self.accel_noise * root, self.size_accel_noise * root
         made = Dynamics(

@@ -1,9 +1,12 @@
-"""The tracks of `blob` from pixels: the population of boxes, and for each track an angle and a nominal covariance.
+"""The tracks of `blob` from pixels: the table of tracks, with a direction and a nominal covariance for each track.
 
-Where a person is partly hidden the measurement is noisier than R, and axes are drawn to the expected ones; the paper's
-rho, which counts measurements (4.5), is therefore taken from a second covariance that knows the nominal R only. The
-state's h, w are the ellipse's axes, the longer one first as they are measured, and theta is the direction of h from the
-abscissa, v down, modulo pi: a random walk (4.1). A track's upright box is the box round its ellipse.
+The state's h, w are the axes of the person's ellipse, the longer one first as measured, and theta is the direction of h
+from the abscissa, v down, modulo pi. theta is a random walk (Gonzalez et al. 2006, 4.1). The box of a track is the
+bounding box of its ellipse.
+
+The paper's rho counts measurements by the covariance (4.5). Here the covariance also knows that a partly hidden person
+is measured with more noise, and that axes return to expected ones (both ours). So rho is computed from a second,
+nominal covariance, which is updated with the nominal R only.
 """
 
 from __future__ import annotations
@@ -14,72 +17,83 @@ from sim.types import Array, Context, Ints
 from tracking.detect.person_size import upright
 from tracking.filters import kalman, track_uncertainty
 from tracking.papers.blob.config import BlobConfig
-from tracking.papers.blob.track_management import Population
+from tracking.papers.blob.track_management import TrackedPeople
 
-SETTLING = 0.5  # s in which the axes return to the expected ones
-HEADING = 6.0  # times faster than they lean people turn: from straight above the direction turns with the heading
+RELAXATION = 0.5  # s, time constant with which axes return to the expected ones
+HEADING = 6.0  # seen from straight above, the direction turns with the heading: so many times faster than a body leans
 
 
-class People(Population):
-    """N tracks; angle (2, N): direction rad and its variance; nominal (5, N, 4): as bank, with nominal noise."""
+class TrackedEllipses(TrackedPeople):
+    """State, beside that of TrackedPeople: angle (2, N), direction (rad) and its variance (rad^2); nominal (5, N, 4), a
+    bank as `bank`, updated with the nominal noise."""
 
     def __init__(self, config: BlobConfig, dynamics: track_uncertainty.Dynamics, context: Context) -> None:
         self.angle, self.nominal = np.zeros((2, 0)), np.zeros((5, 0, 4))
         super().__init__(config, dynamics, context)
 
     def follow(self, config: BlobConfig, dynamics: track_uncertainty.Dynamics) -> None:
-        """Take on a config and the nominal filter that follows from it; the tracks stay as they are."""
+        """Use another config and its nominal filter from now on; the tracks stay as they are."""
         super().follow(config, dynamics)
         rate = config.angle_rate * (HEADING if self.top else 1.0)
-        self.turn = np.radians(rate) ** 2 * dynamics.dt
+        self.angle_var_per_step = np.radians(rate) ** 2 * dynamics.dt
 
     def predict(self) -> None:
-        """One frame on."""
+        """Predict all tracks one frame ahead (eqs 1, 2); the direction stays, its variance grows."""
         kalman.predict(self.nominal, self.dynamics.dt, self.q)
-        self.angle[1] += self.turn
+        self.angle[1] += self.angle_var_per_step
         super().predict()
 
-    def quality(self) -> Array:
-        """(N,) rho by the nominal covariance."""
+    def compute_rho(self) -> Array:
+        """Returns rho (N,) from the nominal covariance."""
         return track_uncertainty.rho(self.nominal, self.noise, self.asymptote)
 
-    def uprights(self) -> Array:
-        """(N, 4) boxes x, y, h, w round the predicted ellipses."""
+    def upright_boxes(self) -> Array:
+        """Returns the bounding boxes x, y, h, w (N, 4) px of the ellipses; centred."""
         return upright(self.bank[kalman.PLACE], self.angle[0])
 
-    def keep(self, rows: Ints) -> None:
-        """Forget all other tracks."""
+    def keep_only(self, rows: Ints) -> None:
+        """Delete all tracks but `rows`."""
         self.angle, self.nominal = self.angle.take(rows, 1), self.nominal.take(rows, 1)
-        super().keep(rows)
+        super().keep_only(rows)
 
-    def give_birth(self, z: Array, score: Array, t: float) -> None:
-        """A tentative track for each z (K, 5), its direction hardly known, so that the next one counts for more."""
-        super().give_birth(z[:, :4], score, t)
+    def start_tracks(self, z: Array, score: Array, t: float) -> None:
+        """Start a tentative track for each ellipse z (K, 5) x, y, h, w, theta.
+
+        The variance of the direction starts at kalman.VAGUE, so that the next measured direction counts for more.
+        """
+        super().start_tracks(z[:, :4], score, t)
         new = np.stack([z[:, 4], np.full(len(z), kalman.VAGUE)])
         self.angle = np.concatenate([self.angle, new], 1)
         self.nominal = np.concatenate([self.nominal, self.bank[:, self.bank.shape[1] - len(z) :]], 1)
 
-    def turned(self, z: Array, angle_var: Array) -> Array:
-        """(N, M) the direction's term y^2 / S of d^2 (eq. 9); z (M,) rad, angle_var (M,) rad^2; 0 for z without one."""
+    def direction_distances(self, z: Array, angle_var: Array) -> Array:
+        """Returns the direction's part y^2 / S of d^2 (eq. 9), (N, M).
+
+        z (M,): directions, rad; angle_var (M,): their variances, rad^2. The part of a direction that is not
+        `kalman.directed` is 0.
+        """
         s = self.angle[1][:, None] + angle_var
         turn = kalman.angle_innovation(z, self.angle[0][:, None])
         return np.where(kalman.directed(angle_var), turn * turn / s, 0.0)
 
     def update(self, rows: Ints, z: Array, noise: Array, angle_var: Array) -> Array:
-        """Measure tracks at z (K, 5) with R noise (K, 4) m^2 and angle_var (K,) rad^2; d^2 (K,), direction included."""
+        """Update the tracks `rows` (K,) with ellipses z (K, 5); returns d^2 (K,), direction included (eqs 3 to 9).
+
+        noise (K, 4): variances of x, y, h, w, m^2; angle_var (K,): variances of theta, rad^2.
+        """
         terms = kalman.update(self.bank, rows, z[:, :4], noise)
-        turn = self.turned(z[:, 4], angle_var)[rows, np.arange(len(rows))]
+        turn = self.direction_distances(z[:, 4], angle_var)[rows, np.arange(len(rows))]
         kalman.update(self.nominal, rows, z[:, :4], self.noise)
         kalman.angle_update(self.angle, rows, z[:, 4], angle_var)
         return np.asarray(np.add.reduce(terms, 1) / np.square(self.scale[rows]) + turn)
 
-    def settle(self, rows: Ints, axes: Array, var: float) -> None:
-        """Axes of tracks return to those (K, 2) px expected there, with variance `var` m^2; rho does not know of it.
+    def relax_axes(self, rows: Ints, axes: Array, var: float) -> None:
+        """Move the axes of tracks `rows` (K,) towards expected ones (K, 2) px with variance `var` m^2 (ours).
 
-        An Ornstein-Uhlenbeck step: s = e^(-dt / SETTLING), x = s x + (1 - s) expected, P = s^2 P + (1 - s^2) var.
-        What is expected is the same in every frame, so it must not be counted as a measurement of each.
+        An Ornstein-Uhlenbeck step: s = exp(-dt / RELAXATION), x = s x + (1 - s) expected, P = s^2 P + (1 - s^2) var.
+        It is no measurement, as the expectation is the same in every frame. rho does not change.
         """
-        stay = np.exp(-self.dynamics.dt / SETTLING)
+        stay = np.exp(-self.dynamics.dt / RELAXATION)
         bank = self.bank[:, rows, 2:]
         bank[kalman.PLACE] += (1 - stay) * (axes - bank[kalman.PLACE])
         bank[kalman.VAR] = stay**2 * bank[kalman.VAR] + (1 - stay**2) * var

@@ -14,7 +14,7 @@ from sim.types import Array, Ints
 from tracking.detect import blobs as detect
 from tracking.detect.person_size import SLIM, SMALLEST, PersonSize
 from tracking.papers.blob import new_people_kernels as kernels
-from tracking.papers.blob.person_template import ELLIPSE, Mask
+from tracking.papers.blob.person_template import ELLIPSE, ExplainedForeground
 
 LEAST = 0.3  # of a person's area: a smaller region is nobody
 MOST = 6  # people found in one region and frame
@@ -22,9 +22,9 @@ ROAM = 0.25  # of a person's height, the deviation of a first guess
 EVIDENCE = 1000.0  # nats of full support: so many that a first guess holds nobody back
 
 
-def newcomers(scene: Mask, size: PersonSize, support: float) -> Array:
+def find_new_people(scene: ExplainedForeground, size: PersonSize, support: float) -> Array:
     """(K, 4) templates of new people, painted; `support` is what each needs."""
-    found = detect.find(scene.left(), LEAST * SMALLEST**2 * SLIM * ELLIPSE)
+    found = detect.find(scene.unexplained(), LEAST * SMALLEST**2 * SLIM * ELLIPSE)
     box = found.box
     h, w = size.at(np.stack([box[:, 0] + box[:, 2] / 2, box[:, 1] + box[:, 3]], 1)).T
     person = ELLIPSE * h * w
@@ -36,14 +36,14 @@ def newcomers(scene: Mask, size: PersonSize, support: float) -> Array:
     return np.concatenate([_in_region(scene, g, p, support) for g, p in zip(guesses, person[rows], strict=True)])
 
 
-def _in_region(scene: Mask, guesses: Array, person: float, support: float) -> Array:
+def _in_region(scene: ExplainedForeground, guesses: Array, person: float, support: float) -> Array:
     """(K, 4) as many of a region's newcomers as explain most, out of guesses for 1, 2, ... of them, painted."""
     known = np.asarray(np.isfinite(guesses).all(1))
     sure = len(known) if known.all() else int(known.argmin())
     most = int((np.sqrt(8 * sure + 1) - 1) / 2)  # 1 + 2 + ... + most <= sure
     guesses = guesses[: most * (most + 1) // 2]
     spread = np.maximum(ROAM * guesses[:, 2:3], 1.0) * np.ones(2)
-    return kernels.enter(scene.foreground, scene.cover, guesses, most, person, support, spread, EVIDENCE)
+    return kernels.fit_new_people(scene.foreground, scene.cover, guesses, most, person, support, spread, EVIDENCE)
 
 
 def _guesses(found: detect.Blobs, rows: Ints, most: Ints, size: PersonSize) -> list[Array]:
@@ -51,7 +51,7 @@ def _guesses(found: detect.Blobs, rows: Ints, most: Ints, size: PersonSize) -> l
     if size.above:
         return [_from_above(found, row, n, size) for row, n in zip(rows.tolist(), most.tolist(), strict=True)]
     box = found.box.astype(int)
-    feet = [kernels.feet(found.label, k + 1, box[k], n) for k, n in zip(rows.tolist(), most.tolist(), strict=True)]
+    feet = [kernels.part_feet(found.label, k + 1, box[k], n) for k, n in zip(rows.tolist(), most.tolist(), strict=True)]
     stand = np.concatenate(feet)
     return np.split(np.column_stack([stand, size.at(stand)]), np.cumsum([len(f) for f in feet])[:-1])
 

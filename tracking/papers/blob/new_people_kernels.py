@@ -16,7 +16,7 @@ ROUNDING = 1e-9
 
 
 @kernel
-def feet(label: Labels, which: int, box: Ints, most: int) -> Array:
+def part_feet(label: Labels, which: int, box: Ints, most: int) -> Array:
     """(1 + 2 + … + most, 2) where parts of the region `which` of labels (H, W) stand, box ltwh: for each number of
     parts up to `most` the region's columns, with as many pixels each, left to right; their mean x and lower end."""
     left, top, wide, high = box
@@ -61,7 +61,7 @@ def quantile(counts: Ints, n: int, q: float, least: int) -> float:
 
 
 @kernel
-def enter(
+def fit_new_people(
     foreground: Bools,
     cover: Cover,
     guesses: Array,
@@ -75,16 +75,16 @@ def enter(
     (1 + 2 + … + most, 4), each number's after the other; each costs `support` of a person's area, and needs as much of
     its own. spread, nats: as settle has them. Numbers too great to be worth more are not tried."""
     best, worth = np.zeros((0, 4)), 0.0
-    first, bound = 0, within_reach(foreground, cover, guesses) / person + ROUNDING
+    first, bound = 0, unexplained_within_reach(foreground, cover, guesses) / person + ROUNDING
     for count in range(1, most + 1):
         if bound - count * support <= worth:
             break
         one, far = guesses[first : first + count], spread[first : first + count]
         first += count
-        at = moves.settle(foreground, cover, one, far, nats)
+        at = moves.fit_places(foreground, cover, one, far, nats)
         alone = kernels.supports(foreground, cover, at, 1)
         kernels.paint_all(cover, at, -1)
-        value = explained(foreground, cover, at) / person - count * support
+        value = joint_support(foreground, cover, at) / person - count * support
         if value > worth and alone.min() >= support:
             best, worth = at, value
     kernels.paint_all(cover, best, 1)
@@ -92,7 +92,7 @@ def enter(
 
 
 @kernel
-def within_reach(foreground: Bools, cover: Cover, guesses: Array) -> int:
+def unexplained_within_reach(foreground: Bools, cover: Cover, guesses: Array) -> int:
     """Uncovered foreground pixels in the box that holds these templates wherever settle may take them."""
     low, high, left, right = np.inf, -np.inf, np.inf, -np.inf
     for k in range(len(guesses)):
@@ -108,7 +108,7 @@ def within_reach(foreground: Bools, cover: Cover, guesses: Array) -> int:
 
 
 @kernel
-def explained(foreground: Bools, cover: Cover, templates: Array) -> float:
+def joint_support(foreground: Bools, cover: Cover, templates: Array) -> float:
     """Sum of what pixels are worth that these templates cover; none of them is painted."""
     total = 0.0
     for k in range(len(templates)):

@@ -26,7 +26,7 @@ kernel = njit(cache=True, error_model="numpy")
 
 
 @kernel
-def span(x: float, half: float, width: int) -> tuple[int, int]:
+def column_range(x: float, half: float, width: int) -> tuple[int, int]:
     """Columns whose middle lies within `half` of x, clipped to the image: left, right (excluded)."""
     left, right = int(np.ceil(x - half - 0.5)), int(np.floor(x + half - 0.5)) + 1
     return min(max(left, 0), width), min(max(right, 0), width)
@@ -40,7 +40,7 @@ def half_width(row: int, foot: float, h: float, w: float) -> float:
 
 
 @kernel
-def rows_of(foot: float, h: float, high: int) -> tuple[int, int]:
+def row_range(foot: float, h: float, high: int) -> tuple[int, int]:
     """Rows in which a template may have pixels: first, last + 1."""
     return max(int(foot - h), 0), min(int(foot) + 1, high)
 
@@ -58,11 +58,11 @@ def area(template: Array, high: int, wide: int) -> float:
 def paint(cover: Cover, template: Array, more: int) -> None:
     """Add `more` to the pixels of a template."""
     x, foot, h, w = template
-    low, high = rows_of(foot, h, cover.shape[0])
+    low, high = row_range(foot, h, cover.shape[0])
     for row in range(low, high):
         half = half_width(row, foot, h, w)
         if half > 0:
-            left, right = span(x, half, cover.shape[1])
+            left, right = column_range(x, half, cover.shape[1])
             for column in range(left, right):
                 cover[row, column] += more
 
@@ -75,7 +75,7 @@ def paint_all(cover: Cover, templates: Array, more: int) -> None:
 
 
 @kernel
-def close(cover: Cover, label: Labels, which: Bools) -> None:
+def mark_explained(cover: Cover, label: Labels, which: Bools) -> None:
     """Add EXPLAINED to the pixels whose label k has which[k]; labels beyond have not."""
     for row in range(cover.shape[0]):
         for column in range(cover.shape[1]):
@@ -85,15 +85,15 @@ def close(cover: Cover, label: Labels, which: Bools) -> None:
 
 
 @kernel
-def count(foreground: Bools, cover: Cover, template: Array, covered: int) -> tuple[int, int]:
-    """Pixels of a template that so many templates cover, and those of them that are foreground."""
+def count_pixels(foreground: Bools, cover: Cover, template: Array, covered: int) -> tuple[int, int]:
+    """PixelUpdater of a template that so many templates cover, and those of them that are foreground."""
     x, foot, h, w = template
-    low, high = rows_of(foot, h, cover.shape[0])
+    low, high = row_range(foot, h, cover.shape[0])
     bare, seen = 0, 0
     for row in range(low, high):
         half = half_width(row, foot, h, w)
         if half > 0:
-            left, right = span(x, half, cover.shape[1])
+            left, right = column_range(x, half, cover.shape[1])
             for column in range(left, right):
                 own = cover[row, column] == covered
                 bare += own
@@ -104,7 +104,7 @@ def count(foreground: Bools, cover: Cover, template: Array, covered: int) -> tup
 @kernel
 def support(foreground: Bools, cover: Cover, template: Array, covered: int) -> float:
     """Support of a template by the pixels that so many cover: 0 if it is not painted, 1 if it is."""
-    bare, seen = count(foreground, cover, template, covered)
+    bare, seen = count_pixels(foreground, cover, template, covered)
     halves = HALVES * seen + EMPTY * (bare - seen)
     return halves / HALVES / area(template, cover.shape[0], cover.shape[1])
 
@@ -119,19 +119,19 @@ def supports(foreground: Bools, cover: Cover, templates: Array, covered: int) ->
 
 
 @kernel
-def piece(foreground: Bools, cover: Cover, template: Array) -> float:
+def piece_support(foreground: Bools, cover: Cover, template: Array) -> float:
     """Share of foreground in the pixels of a painted template that no other covers; 0 where these are few."""
-    bare, seen = count(foreground, cover, template, 1)
+    bare, seen = count_pixels(foreground, cover, template, 1)
     whole = area(template, cover.shape[0], cover.shape[1])
     return seen / whole / (bare / whole) if bare / whole >= BARE else 0.0
 
 
 @kernel
-def pieces(foreground: Bools, cover: Cover, templates: Array) -> Array:
+def piece_supports(foreground: Bools, cover: Cover, templates: Array) -> Array:
     """(K,) the same of each of the templates (K, 4)."""
     found = np.zeros(len(templates))
     for k in range(len(templates)):
-        found[k] = piece(foreground, cover, templates[k])
+        found[k] = piece_support(foreground, cover, templates[k])
     return found
 
 
@@ -147,18 +147,18 @@ def near_first(templates: Array) -> Ints:
 
 
 @kernel
-def shown(cover: Cover, templates: Array) -> Array:
+def visible_share(cover: Cover, templates: Array) -> Array:
     """(K,) share of each template that none of these with a lower foot, and nothing explained, covers."""
     hidden = np.zeros(cover.shape, np.bool_)
     share = np.zeros(len(templates))
     for k in near_first(templates):
         x, foot, h, w = templates[k]
-        low, high = rows_of(foot, h, cover.shape[0])
+        low, high = row_range(foot, h, cover.shape[0])
         bare = 0
         for row in range(low, high):
             half = half_width(row, foot, h, w)
             if half > 0:
-                left, right = span(x, half, cover.shape[1])
+                left, right = column_range(x, half, cover.shape[1])
                 for column in range(left, right):
                     bare += not (hidden[row, column] or cover[row, column] >= EXPLAINED)
                     hidden[row, column] = True
@@ -170,7 +170,7 @@ def shown(cover: Cover, templates: Array) -> Array:
 def prune(foreground: Bools, cover: Cover, templates: Array, least: float, by_pieces: bool) -> Bools:
     """(K,) which painted templates have `least` when the others are taken away, the weakest first."""
     stays = np.ones(len(templates), np.bool_)
-    worth = pieces(foreground, cover, templates) if by_pieces else supports(foreground, cover, templates, 1)
+    worth = piece_supports(foreground, cover, templates) if by_pieces else supports(foreground, cover, templates, 1)
     while stays.any():
         k = worth.argmin()
         if worth[k] >= least:
@@ -178,14 +178,16 @@ def prune(foreground: Bools, cover: Cover, templates: Array, least: float, by_pi
         stays[k], worth[k] = False, np.inf
         paint(cover, templates[k], -1)
         for other in np.flatnonzero(stays):
-            if meet(templates[k], templates[other]):
+            if boxes_touch(templates[k], templates[other]):
                 one = templates[other]
-                worth[other] = piece(foreground, cover, one) if by_pieces else support(foreground, cover, one, 1)
+                worth[other] = (
+                    piece_support(foreground, cover, one) if by_pieces else support(foreground, cover, one, 1)
+                )
     return stays
 
 
 @kernel
-def meet(one: Array, other: Array) -> bool:
+def boxes_touch(one: Array, other: Array) -> bool:
     """Do the boxes of two templates touch?"""
     aside = abs(one[0] - other[0]) <= (one[3] + other[3]) / 2 + 1
     return bool(aside and one[1] - one[2] <= other[1] + 1 and other[1] - other[2] <= one[1] + 1)

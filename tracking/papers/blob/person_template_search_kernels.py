@@ -20,7 +20,7 @@ from tracking.papers.blob.person_template_kernels import (
     near_first,
     paint,
     paint_all,
-    rows_of,
+    row_range,
 )
 
 Whole = NDArray[np.int32]
@@ -31,7 +31,7 @@ SWEEPS = 3  # over all templates: one coarse, the others fine
 
 
 @kernel
-def span_within(x: float, half: float, low: np.int32, high: np.int32) -> tuple[np.int32, np.int32]:
+def column_range_within(x: float, half: float, low: np.int32, high: np.int32) -> tuple[np.int32, np.int32]:
     """As `span`, but within the columns low..high and counted from low; both ends are equal where there are none."""
     left, right = np.int32(np.ceil(x - half - 0.5)), np.int32(np.floor(x + half - 0.5)) + np.int32(1)
     left = min(max(left, low), high)
@@ -39,7 +39,7 @@ def span_within(x: float, half: float, low: np.int32, high: np.int32) -> tuple[n
 
 
 @kernel
-def moved(foreground: Bools, cover: Cover, template: Array, steps: int, step: float) -> Whole:
+def worth_when_moved(foreground: Bools, cover: Cover, template: Array, steps: int, step: float) -> Whole:
     """(2 steps + 1, 2 steps + 1) what uncovered pixels of the template are worth, in halves, when it is moved by
     multiples of step (rows: down). Each of its rows takes one difference of the image row's running sum."""
     x, foot, h, w = template
@@ -52,22 +52,22 @@ def moved(foreground: Bools, cover: Cover, template: Array, steps: int, step: fl
         return found
     middle, edges = x + step * np.arange(-steps, steps + 1), (np.int32(left), np.int32(right))
     begin, end = np.empty(n, np.int32), np.empty(n, np.int32)
-    sums = running(foreground[low:high, left:right], cover[low:high, left:right])
+    sums = row_sums(foreground[low:high, left:right], cover[low:high, left:right])
     for i in range(n):
         down = foot + (i - steps) * step
-        first, last = rows_of(down, h, cover.shape[0])
+        first, last = row_range(down, h, cover.shape[0])
         for row in range(first, last):
             half = half_width(row, down, h, w)
             if half > 0:
                 for j in range(n):
-                    begin[j], end[j] = span_within(middle[j], half, *edges)
+                    begin[j], end[j] = column_range_within(middle[j], half, *edges)
                 for j in range(n):
                     found[i, j] += sums[row - low, end[j]] - sums[row - low, begin[j]]
     return found
 
 
 @kernel
-def running(foreground: Bools, cover: Cover) -> Whole:
+def row_sums(foreground: Bools, cover: Cover) -> Whole:
     """(H, W + 1) sums along rows of what uncovered pixels are worth, in halves."""
     sums = np.empty((cover.shape[0], cover.shape[1] + 1), np.int32)
     for row in range(cover.shape[0]):
@@ -81,7 +81,7 @@ def running(foreground: Bools, cover: Cover) -> Whole:
 
 
 @kernel
-def better(
+def best_place(
     foreground: Bools, cover: Cover, at: Array, expected: Array, spread: Array, evidence: float, fine: bool
 ) -> tuple[float, float]:
     """The best x, foot round `at` of a template that is not painted: evidence * support - d^2 / 2, see settle."""
@@ -90,7 +90,7 @@ def better(
         step /= 2
     else:
         steps = int(min(max(np.ceil(2.5 * max(spread[0], spread[1]) / step), FINE_STEPS), MOST_STEPS))
-    halves = moved(foreground, cover, at, steps, step)
+    halves = worth_when_moved(foreground, cover, at, steps, step)
     whole = area(at, cover.shape[0], cover.shape[1])
     best, right, down = -np.inf, 0.0, 0.0
     for i in range(2 * steps + 1):
@@ -106,7 +106,7 @@ def better(
 
 
 @kernel
-def settle(foreground: Bools, cover: Cover, templates: Array, spread: Array, evidence: float) -> Array:
+def fit_places(foreground: Bools, cover: Cover, templates: Array, spread: Array, evidence: float) -> Array:
     """(K, 4) templates where they explain most, near ones first, each while the others rest; painted when done.
 
     spread (K, 2): standard deviation px of each one's expected x and foot; evidence: nats for full support.
@@ -117,7 +117,7 @@ def settle(foreground: Bools, cover: Cover, templates: Array, spread: Array, evi
         any_moved = False
         for k in order:
             paint(cover, found[k], -1)
-            x, foot = better(foreground, cover, found[k], templates[k], spread[k], evidence, sweep > 0)
+            x, foot = best_place(foreground, cover, found[k], templates[k], spread[k], evidence, sweep > 0)
             any_moved |= x != found[k, 0] or foot != found[k, 1]
             found[k, 0], found[k, 1] = x, foot
             paint(cover, found[k], 1)

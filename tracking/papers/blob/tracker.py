@@ -1,39 +1,44 @@
-"""`blob`: gates, association, a bank of Kalman filters and track management, on boxes or from pixels.
+"""The tracker `blob`: gates, association, a bank of Kalman filters and track management, on boxes or from pixels.
 
 Gonzalez, Rowe, Andrade, Villanueva, "Efficient management of multiple agent tracking through observation handling",
-2006. State per track: (x, x', y, y', h, h', w, w') in image px and s, its covariance in m and s, constant speed with
-white acceleration (tracking.filters.kalman). The measurement is (x, y, h, w), a box's centre, height and width; a box
-has no
-axis, so the paper's angle, its ninth state, is measured from pixels only, by a blob's ellipse; h and w are then its
-axes (tracking.papers.blob.update_from_pixels, with what is ours).
+2006. State of a track (4.1): (x, x', y, y', h, h', w, w'), constant speed with white acceleration; places in image px,
+covariances in m and s. The measurement is z = (x, y, h, w): centre, height and width of a box. A box has no direction;
+the paper's ninth state, the angle theta, is measured from pixels only. There h and w are the axes of a blob's ellipse.
 
-    predict    x = A x, P = A P A' + Q                                             (eqs 1, 2; tracking.filters.kalman)
-    gate       z_pred = C A x, d^2 = (z - z_pred)' S^-1 (z - z_pred) <= q          (eqs 8, 9; d^2, not d, is chi2)
-               q the quantile `gate` of chi2 of 4 degrees of freedom, 5 with the angle  (eq. 10)
-    associate  each measurement to the nearest track in whose gate it lies         (4.4)
-    update     y, S, K, x, P                                                       (eqs 3 to 7; tracking.filters.kalman)
-    manage     rho = sqrt|S| / asymptote: confirm low, delete high      (4.5, 5; tracking.filters.track_uncertainty)
+    predict    x = A x,  P = A P A' + Q                        eqs 1, 2        tracking.filters.kalman
+    gate       z_pred = C A x (x before the prediction)        eq. 8           update_from_boxes, update_from_pixels
+               d^2 = (z - z_pred)' S^-1 (z - z_pred) <= q      eqs 9, 10       q: the quantile `gate` of chi2 with 4
+                                                                               degrees of freedom, 5 with theta
+    associate  each measurement to its nearest gated track     4.4             track_management.associate
+    update     y, S, K, x, P                                   eqs 3 to 7      tracking.filters.kalman
+    manage     rho = sqrt|S| / asymptote: confirm, delete      4.5, 5          track_management,
+                                                                               tracking.filters.track_uncertainty
+    pixels     five classes, cleaning, blobs, ellipses         3.2, 3.3        tracking.detect
+
+Readings of the paper: eq. 4 needs brackets, P = (I - K C) P; eq. 9 has row and column exchanged; 4.3 compares d^2
+with "the Mahalanobis radius", by which the quantile of chi2 is meant.
 
 Departures, all ours:
-- Persons only. Lengths are metres: a track's scale is px per metre, the longer side of its box being 1.7 m (half to
-  twice the sequence's), so that near and far people have the same noise in metres; from straight above it is the
-  camera's. Accelerations are densities.
-- rho is that of x, y, h, w; the angle's S is no part of it.
-- association = "optimal": one to one, least total cost d^2 + 2 ln rho, which is ln |S| in metres less a constant (a
-  track that has long been blind pays for its wide gate). A track left out costs the gate + 2 ln rho where a track dies
-  at the latest, whoever else there is, so that a pair in a gate, alone, is better than none.
-- Of several measurements whose nearest track is the same one, the nearest updates it.
-- A person in pieces: boxes in the orphan_gate of a measured track (as wide as that of a track always seen, so narrower
-  than the gate: the paper has the gate), or inside the predicted box of a confirmed one, start no track; they are fused
-  by moments where that fits better than one alone.
-- A box that covers several confirmed tracks as a whole, an unseen one among them, starts no track; the unseen ones, and
-  any that are hidden behind another person, may coast for merged_time rather than coast_time until measured again.
-- Detections below score_start continue tracks but start none, and choose after the others (ByteTrack, Zhang et al.
-  2022); under `nearest` each still knows only its nearest track.
-- Reported are confirmed tracks, and measured tentative ones from report_delay on, until report_coast (hidden ones:
-  report_hidden) after the last measurement, but no longer than report_credit times the time they were seen: a track
-  that was hardly seen was mostly a false alarm. An unseen track is silent on its way out of view, and dies when its
-  centre leaves the image, where its size is known.
+- All tracks are persons. Noises are in metres at the person: the scale of a track is px per m, the longer side of its
+  box being 1.7 m, but half to twice the sequence's scale. From straight above it is the sequence's. Acceleration noises
+  are spectral densities.
+- rho is that of x, y, h, w. theta is not part of it.
+- association = "optimal": one to one, of least total cost d^2 + 2 ln rho, which is ln |S| in metres but for a constant.
+  So a track that was missed for long pays for its wide gate. A track left without measurement costs the gate plus the
+  largest 2 ln rho that any track can have, so that a lone pair inside a gate is always associated.
+- association = "nearest" (the paper's): of several measurements with the same nearest track the nearest updates it.
+- Pieces of one person: a free box in the orphan_gate of a measured track, or inside the predicted box of a confirmed
+  one, starts no track. The orphan_gate is that of a track measured in every frame; the paper uses the gate itself
+  (frame 367). Pieces are fused by their moments if the fused box fits better than a single one.
+- A box that covers several confirmed tracks, at least one of them missed, updates and starts no track. The missed ones
+  among them, and missed tracks hidden behind another track, survive merged_time instead of coast_time, until measured.
+- Detections below score_start continue tracks but start none, and choose after all others (ByteTrack, Zhang et al.
+  2022). With "nearest" such a detection still chooses only its nearest track.
+- Reported are confirmed tracks, and measured tentative ones from the age report_delay on. A missed track is reported
+  for report_coast (hidden or merged ones: report_hidden), but for at most report_credit times the time it was measured,
+  as a rarely measured track is mostly a false alarm. A missed track that is leaving the field of view is not reported.
+  It is deleted when its centre leaves the image, if the image's size is known.
+- From pixels: see update_from_pixels, person_template, new_people and ellipse_tracks.
 """
 
 from __future__ import annotations
@@ -42,18 +47,18 @@ from typing import ClassVar, cast
 
 import numpy as np
 
-from sim.types import Context, Detections, Frame, Plane, Tracks
+from sim.types import Array, Bools, Camera, Context, Detections, Frame, Plane, Tracks
 from tracking.filters import kalman
-from tracking.papers.blob import box_geometry, report
+from tracking.papers.blob import box_geometry
 from tracking.papers.blob.config import BlobConfig
-from tracking.papers.blob.ellipse_tracks import People
-from tracking.papers.blob.track_management import Population
-from tracking.papers.blob.update_from_boxes import Boxes
-from tracking.papers.blob.update_from_pixels import Pixels
+from tracking.papers.blob.ellipse_tracks import TrackedEllipses
+from tracking.papers.blob.track_management import TrackedPeople
+from tracking.papers.blob.update_from_boxes import BoxUpdater
+from tracking.papers.blob.update_from_pixels import PixelUpdater
 
 
 class Blob:
-    """The tracker. State: the population (filters and what is known of each track), the cascade that feeds it."""
+    """The tracker. State: `people`, the table of tracks, and `updater`, which updates it from boxes or from pixels."""
 
     needs: ClassVar[tuple[str, ...]] = ("pixels", "boxes")
     config_class: ClassVar[type[BlobConfig]] = BlobConfig
@@ -62,47 +67,104 @@ class Blob:
         self.config = config or BlobConfig()
 
     def reset(self, context: Context, seed: int) -> None:
-        """Forget everything; with a background sample pixels will be tracked, else boxes. `seed` is unused."""
+        """Delete all tracks and start a sequence: from pixels if the context has a background sample, else from boxes.
+
+        `seed` is not used. Raises InputError if the config's noises confirm new tracks at once, or if the background
+        sample or the scale cannot be used.
+        """
         c = self.config
         if context.image_size is None and context.background is not None:
             context = context.replace(image_size=context.background.shape[2:0:-1])
         self.context = context
         dynamics = c.dynamics(context.fps)
-        self.people: Population
-        self.cascade: Boxes | Pixels
+        self.people: TrackedPeople
+        self.updater: BoxUpdater | PixelUpdater
         if context.background is None:
-            self.people = Population(c, dynamics, context)
-            self.cascade = Boxes(c, self.people)
+            self.people = TrackedPeople(c, dynamics, context)
+            self.updater = BoxUpdater(c, self.people)
         else:
-            people = People(c, dynamics, context)
-            self.people, self.cascade = people, Pixels(c, people, context)
+            people = TrackedEllipses(c, dynamics, context)
+            self.people, self.updater = people, PixelUpdater(c, people, context)
 
     def step(self, frame: Frame, detections: Detections | None) -> Tracks:
-        """Predict, gate, associate, update, manage; a picture or boxes in, boxes out.
+        """Returns the tracks after a frame: boxes in the image, positions on the ground if the context has a camera.
 
-        `config` may have been replaced since the last frame: the tracks go on with the new one. InputError, and all is
-        as it was, where it cannot be.
+        If `config` was replaced since the last frame, all tracks go on with the new one. Raises InputError and leaves
+        everything as it was if the new config is invalid at this frame rate.
         """
         if self.config is not self.people.config:
             dynamics = self.config.dynamics(self.context.fps)
             self.people.follow(self.config, dynamics)
-            self.cascade.follow(self.config)
-        self.cascade.step(frame, detections)
+            self.updater.follow(self.config)
+        self.updater.step(frame, detections)
         return self._report(frame)
 
     def _report(self, frame: Frame) -> Tracks:
+        """Returns the tracks to report. With a camera a track above the horizon has no ground position: left out."""
         people = self.people
-        rows = people.reported(frame.t)
+        rows = people.rows_to_report(frame.t)
         state, scale = people.bank.take(rows, 1), people.scale[rows]
         camera = self.context.camera
-        place, alone = self.cascade.reported(rows), np.full(len(rows), -1)
-        box = box_geometry.to_boxes(place)
+        place, alone = self.updater.reported_boxes(rows), np.full(len(rows), -1)
+        box = box_geometry.ltwh_from_centred(place)
         if camera is None:
             pos, vel = state[kalman.PLACE, :, :2].copy(), state[kalman.RATE, :, :2].copy()
-            cov, plane = report.image_covariance(state, scale), "image"
+            cov, plane = image_covariance(state, scale), "image"
         else:
             state[kalman.PLACE] = place
-            pos, vel, cov, seen = report.on_ground(camera, state, scale)
+            pos, vel, cov, seen = on_ground(camera, state, scale)
             rows, box, alone, plane = rows[seen], box[seen], alone[seen], "ground"
         id, score = people.id[rows], people.score[rows]
         return Tracks(frame.index, frame.t, cast(Plane, plane), "person", id, alone, pos, vel, cov, box, score)
+
+
+def image_covariance(state: Array, scale: Array) -> Array:
+    """Returns covariances (N, 4, 4) of x, y, vx, vy in px and px/s.
+
+    state (5, N, D): a bank whose first coordinates are x, y, with covariances in m^2; scale (N,): px per m.
+    """
+    cov = np.zeros((state.shape[1], 16))  # entry (i, j) at 4 i + j: the strides below walk along diagonals
+    var, cross, rate = state[kalman.VAR :, :, :2] * (scale * scale)[:, None]
+    cov[:, 0:6:5], cov[:, 10:16:5] = var, rate
+    cov[:, 2:8:5] = cov[:, 8:14:5] = cross
+    return cov.reshape(-1, 4, 4)
+
+
+def on_ground(camera: Camera, state: Array, scale: Array) -> tuple[Array, Array, Array, Bools]:
+    """Returns ground positions (K, 2) m, velocities (K, 2) m/s, covariances (K, 4, 4), and which tracks have one (N,).
+
+    state (5, N, 4): a bank of x, y, h, w; scale (N,): px per m. A track above the horizon has no ground position.
+    The projected point is the bottom centre of the box for a pinhole, its centre from straight above. With the Jacobian
+    J of sim.scene.camera.to_ground: v = J (u', v'), and P = J P_uv J' block by block.
+    """
+    from sim.scene.camera import ground_jacobian, to_ground
+
+    foot, rate, cov = _foot(camera, state, scale)
+    ground = to_ground(camera, foot)
+    seen = np.asarray(np.isfinite(ground).all(1))
+    if not seen.all():
+        ground, foot, rate, cov = ground[seen], foot[seen], rate[seen], cov[seen]
+    jacobian = ground_jacobian(camera, foot)
+    turn = np.zeros((len(foot), 4, 4))
+    turn[:, :2, :2] = turn[:, 2:, 2:] = jacobian
+    out = turn @ cov @ turn.transpose(0, 2, 1)
+    return ground, np.einsum("nij,nj->ni", jacobian, rate), (out + out.transpose(0, 2, 1)) / 2, seen
+
+
+def _foot(camera: Camera, state: Array, scale: Array) -> tuple[Array, Array, Array]:
+    """Returns place (N, 2) px, velocity (N, 2) px/s and covariance (N, 4, 4) of the point projected to the ground.
+
+    For a pinhole this is (x, y + h / 2). The place of `state` is the reported box; its variances of h are those of the
+    bank, taken for the box's height.
+    """
+    place, rate = state[kalman.PLACE, :, :2].copy(), state[kalman.RATE, :, :2].copy()
+    cov = image_covariance(state, scale)
+    if camera.kind == "pinhole":
+        place[:, 1] += state[kalman.PLACE, :, 2] / 2
+        rate[:, 1] += state[kalman.RATE, :, 2] / 2
+        var, cross, rate_var = state[kalman.VAR :, :, 2] * np.square(scale) / 4
+        cov[:, 1, 1] += var
+        cov[:, 1, 3] += cross
+        cov[:, 3, 1] += cross
+        cov[:, 3, 3] += rate_var
+    return place, rate, cov

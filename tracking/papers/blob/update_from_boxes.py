@@ -1,6 +1,8 @@
-"""The cascade of `blob` on boxes: gates (4.3), association (4.4), pieces, update (4.2), management (4.5).
+"""One frame of `blob` from boxes: the cascade of Gonzalez et al. (2006) on a detector's boxes.
 
-Sections are those of Gonzalez et al. (2006); see tracking.papers.blob.tracker. z (M, 4): x, y, h, w in px, score (M,).
+Order of a frame, with the paper's sections: predict (4.2, eqs 1, 2), gate (4.3, eqs 8 to 10), associate (4.4), fuse the
+pieces of one person (ours), update (4.2, eqs 3 to 7), manage the tracks (4.5, 5; track_management). Departures are
+listed in tracking.papers.blob.tracker. A measurement z is a centred box (x, y, h, w), px, with a score from 0 to 1.
 """
 
 from __future__ import annotations
@@ -12,50 +14,58 @@ from tracking import image_scale
 from tracking.filters import kalman
 from tracking.papers.blob import box_geometry
 from tracking.papers.blob.config import BlobConfig
-from tracking.papers.blob.track_management import Population
+from tracking.papers.blob.track_management import TrackedPeople
 
-INSIDE = 0.8  # share of a box within a track's predicted box from which on it may be a piece of that person
+INSIDE = 0.8  # share of a box that must lie in a larger predicted box to be a piece of that track's person
 
 
-class Boxes:
-    """From the boxes of each frame to the population's next state; holds the constants of its gates."""
+class BoxUpdater:
+    """Updates the tracks from the boxes of each frame. State: the config and the gates that follow from it."""
 
-    def __init__(self, config: BlobConfig, people: Population) -> None:
+    def __init__(self, config: BlobConfig, people: TrackedPeople) -> None:
         self.people = people
         self.follow(config)
 
     def follow(self, config: BlobConfig) -> None:
-        """Take on a config, which the population has taken on before."""
+        """Use another config, which `people` follow already."""
         from scipy.special import chdtri
 
         self.config = config
         self.noise, self.asymptote = self.people.noise, self.people.asymptote
         shares = 1 - np.array([config.gate, config.orphan_gate, config.confirm_gate])
-        self.gate, self.orphan_gate, self.confirm_gate = chdtri(4, shares)  # d^2 at these shares (eq. 10)
+        self.gate, self.orphan_gate, self.confirm_gate = chdtri(4, shares)  # largest d^2 at these shares (eq. 10)
 
     def step(self, frame: Frame, detections: Detections | None) -> None:
-        """Predict, gate, associate, update, manage."""
+        """Update the tracks with a frame's detections; `None`, no boxes or no detection are a frame without
+        measurement.
+
+        Raises InputError if there are boxes and the scale (px per m) is unknown.
+        """
         z, score = self._measurements(detections)
         people = self.people
         if len(z):
             image_scale.required(people.context.px_per_m)
         people.predict()
-        people.look(z)
+        people.widen_view(z)
         rows, columns, free, d2 = self._associate(z, score)
-        rows, columns = self._without_merged(rows, columns, z)
+        rows, columns = self._without_merged_boxes(rows, columns, z)
         rows, best, measured, free = self._with_pieces(rows, columns, free, z, score, d2)
         near = self._update(rows, measured)
-        people.mark(rows, near <= self.confirm_gate, best)
-        people.excuse()
+        people.record_measured(rows, near <= self.confirm_gate, best)
+        people.explain_misses()
         orphans = self._orphans(z, score, free)
-        people.bury(frame.t)
-        people.give_birth(z[orphans], score[orphans], frame.t)
+        people.delete_tracks(frame.t)
+        people.start_tracks(z[orphans], score[orphans], frame.t)
 
-    def reported(self, rows: Ints) -> Array:
-        """(K, 4) boxes x, y, h, w of tracks, as they are told."""
-        return self.people.uprights()[rows]
+    def reported_boxes(self, rows: Ints) -> Array:
+        """Returns the centred boxes x, y, h, w (K, 4) px that the tracker reports for `rows` (K,)."""
+        return self.people.upright_boxes()[rows]
 
     def _measurements(self, detections: Detections | None) -> tuple[Array, Array]:
+        """Returns z (M, 4) and scores (M,) of the boxes with a positive size and at least score_continue.
+
+        Without scores all are 1.
+        """
         if detections is None or detections.box is None or not len(detections.box):
             return np.zeros((0, 4)), np.zeros(0)
         box, score = detections.box, detections.score
@@ -63,11 +73,13 @@ class Boxes:
         if score.min() < self.config.score_continue or box[:, 2:].min() <= 0:
             good = (score >= self.config.score_continue) & (box[:, 2:] > 0).all(1)
             box, score = box[good], score[good]
-        return box_geometry.from_boxes(box), score
+        return box_geometry.centred_from_ltwh(box), score
 
     def _associate(self, z: Array, score: Array) -> tuple[Ints, Ints, Bools, Array]:
-        """Tracks and measurements (K,) that belong together, one to one; which measurements (M,) are free; distances
-        d^2 (N, M) (eq. 9)."""
+        """Returns rows and columns (K,) of associated tracks and measurements, the free measurements (M,), d^2 (N, M).
+
+        Measurements below score_start choose after all others (ours). d^2: eq. 9; gates: eq. 10.
+        """
         people, free = self.people, np.ones(len(z), bool)
         if not len(z) or not len(people.id):
             return np.zeros(0, np.int64), np.zeros(0, np.int64), free, np.zeros((len(people.id), len(z)))
@@ -75,27 +87,31 @@ class Boxes:
         cost = np.where(d2 <= self.gate, d2, np.inf)
         strong = score >= self.config.score_start
         if strong.all():
-            rows, columns = people.pairs(cost, self.gate)
+            rows, columns = people.associate(cost, self.gate)
         else:
-            rows, columns = people.pairs(np.where(strong, cost, np.inf), self.gate)
+            rows, columns = people.associate(np.where(strong, cost, np.inf), self.gate)
             more = self._weak_pairs(np.where(strong, np.inf, cost), rows)
             rows, columns = np.concatenate([rows, more[0]]), np.concatenate([columns, more[1]])
         free[columns] = False
         return rows, columns, free, d2
 
     def _weak_pairs(self, cost: Array, taken: Ints) -> tuple[Ints, Ints]:
-        """Pairs of the weak measurements with tracks that are not taken; `nearest` knows no second choice."""
+        """Returns pairs of weak measurements and tracks that are not `taken` (K,).
+
+        cost (N, M): inf for strong measurements. With "nearest" a measurement whose nearest track is taken has no pair.
+        """
         if self.config.association == "optimal":
             cost[taken] = np.inf
-            return self.people.pairs(cost, self.gate)
-        rows, columns = self.people.pairs(cost, self.gate)
+            return self.people.associate(cost, self.gate)
+        rows, columns = self.people.associate(cost, self.gate)
         open_rows = ~np.isin(rows, taken)
         return rows[open_rows], columns[open_rows]
 
-    def _without_merged(self, rows: Ints, columns: Ints, z: Array) -> tuple[Ints, Ints]:
-        """The pairs without boxes that are several people at once, which a blind track's wide gate would let in.
+    def _without_merged_boxes(self, rows: Ints, columns: Ints, z: Array) -> tuple[Ints, Ints]:
+        """Returns the pairs without those whose box covers several people, which the wide gate of a long-missed track
+        would let in (ours).
 
-        Looked at are pairs whose size is far from the prediction by the measure of a track that is always seen.
+        Only boxes whose size is outside the gate of a track that is measured in every frame are examined.
         """
         people = self.people
         if len(rows) == len(people.id):
@@ -106,16 +122,18 @@ class Boxes:
             return rows, columns
         lost = people.confirmed.copy()
         lost[rows[~odd]] = False
-        odd[odd] = people.merged(z[columns[odd]], lost)
+        odd[odd] = people.cover_several(z[columns[odd]], lost)
         return rows[~odd], columns[~odd]
 
     def _with_pieces(
         self, rows: Ints, columns: Ints, free: Bools, z: Array, score: Array, d2: Array
     ) -> tuple[Ints, Array, Array, Bools]:
-        """Measured tracks, their scores and measurements, with pieces fused; and what is still free.
+        """Returns rows (K,), scores (K,) and measurements (K, 4) of the tracks with pieces fused, and the free ones
+        (M,).
 
-        A piece lies in the gate of a measured track, or almost wholly inside a confirmed track's predicted box. Pieces
-        update the track, with its own measurement if it has one, where the fused box is in the gate and nearer.
+        Free measurements that are pieces of a track (`_owners`) are fused, together with the track's own measurement if
+        it has one. The fused box updates the track if it is nearer than the own measurement, or, without one, inside
+        the gate. A piece is no longer free in any case.
         """
         people, measured, best = self.people, z[columns], score[columns]
         left = free.nonzero()[0]
@@ -129,7 +147,7 @@ class Boxes:
         for row in np.unique(owner[owner >= 0]).tolist():
             k = own.get(row)
             pieces = np.concatenate([columns[k : k + 1] if k is not None else [], left[owner == row]]).astype(np.int64)
-            whole = box_geometry.fused(z[pieces])
+            whole = box_geometry.fuse_pieces(z[pieces])
             limit = self.gate if k is None else self._away(np.array([row]), z[columns[k]][None])[0]
             if self._away(np.array([row]), whole[None])[0] >= limit:
                 continue
@@ -141,37 +159,43 @@ class Boxes:
         return rows, best, measured, free
 
     def _owners(self, rows: Ints, pieces: Array, d2: Array) -> Ints:
-        """(K,) the track of which each measurement is a piece, or -1; d2 (N, K) their distances."""
+        """Returns the row (K,) of the track of which each free measurement (K, 4) is a piece, -1 if of none (ours).
+
+        It is a piece of the nearest of the measured tracks `rows` if it lies in that track's orphan_gate, by the S of a
+        track measured in every frame. Otherwise it is a piece of the confirmed track that covers most of it, if it is
+        smaller than the predicted box, its centre lies inside and INSIDE of it is covered. d2 (N, K): distances.
+        """
         people = self.people
         place, owner = people.bank[kalman.PLACE], np.full(len(pieces), -1)
-        possible = box_geometry.inside(pieces, place) & people.confirmed
+        possible = box_geometry.points_inside(pieces, place) & people.confirmed
         if possible.any():
             near = possible.any(1).nonzero()[0]
             smaller = np.prod(pieces[near, 2:], 1)[:, None] < np.prod(place[:, 2:], 1)
-            share = box_geometry.covered(pieces[near], place) * (possible[near] & smaller)
+            share = box_geometry.covered_share(pieces[near], place) * (possible[near] & smaller)
             owner[near] = np.where(share.max(1) >= INSIDE, share.argmax(1), -1)
-        least = ((people.bank[kalman.VAR] + self.noise) / self.asymptote).min()  # of S / asymptote: d2 least <= away
-        if len(rows) and d2.min() * least <= self.orphan_gate:
+        smallest = ((people.bank[kalman.VAR] + self.noise) / self.asymptote).min()  # S / asymptote; d2 * it <= away
+        if len(rows) and d2.min() * smallest <= self.orphan_gate:
             y = (pieces[:, None] - place[rows]) / people.scale[rows, None]
             away = (y * y / self.asymptote).sum(2)
             owner = np.where(away.min(1) <= self.orphan_gate, rows[away.argmin(1)], owner)
         return np.asarray(owner)
 
     def _away(self, rows: Ints, measured: Array) -> Array:
-        """(K,) squared distances (eq. 9) of tracks `rows` (K,) and their measurements (K, 4)."""
+        """Returns d^2 (K,) of tracks `rows` (K,) and their measurements (K, 4) (eq. 9)."""
         people = self.people
         y = (measured - people.bank[kalman.PLACE, rows]) / people.scale[rows, None]
         return np.asarray((y * y / (people.bank[kalman.VAR, rows] + self.noise)).sum(1))
 
     def _update(self, rows: Ints, measured: Array) -> Array:
-        """Update the measured tracks; returns each one's squared distance (K,)."""
+        """Update the tracks `rows` (K,) with their measurements (K, 4), px; returns d^2 (K,) (eqs 3 to 9)."""
         people = self.people
         terms = kalman.update(people.bank, rows, measured, self.noise)
         return np.asarray(np.add.reduce(terms, 1) / np.square(people.scale[rows]))
 
     def _orphans(self, z: Array, score: Array, free: Bools) -> Ints:
-        """Strong measurements that nobody took, no piece of anybody, nor several unseen people at once."""
+        """Returns the columns (K,) of the measurements that start tracks: free, at least score_start, not over several
+        people."""
         left, people = (free & (score >= self.config.score_start)).nonzero()[0], self.people
         if not len(left):
             return left
-        return np.asarray(left[~people.merged(z[left], people.confirmed & ~people.hit)])
+        return np.asarray(left[~people.cover_several(z[left], people.confirmed & ~people.measured)])

@@ -6,10 +6,8 @@ import numpy as np
 
 from sim.scene.body import PERSON_HEIGHT
 from sim.types import Array, Bools, Camera, Context, Image
-from tracking.detect import blobs, lone_blobs
-from tracking.detect.background import Background
+from tracking.detect.foreground import Foreground, convex_areas
 from tracking.detect.person_size import PersonSize
-from tracking.detect.pixel_classes import foreground
 from tracking.image_scale import required
 from tracking.papers.group_pda.config import GroupPdaConfig
 
@@ -20,21 +18,22 @@ LEAST_STEEP = 0.2
 
 
 class Pixels:
-    """State: the background model. scale: px per m, the context's or learned from lone blobs of its background sample;
-    step: grid step, px; person (2,): width and height of a person in the image, px."""
+    """State: the foreground pipeline. scale: px per m, the context's or learned from lone blobs of its background
+    sample; step: grid step, px; person (2,): width and height of a person in the image, px."""
 
     def __init__(self, config: GroupPdaConfig, context: Context) -> None:
         assert context.background is not None
         self.config = config
-        self.background = Background(context.background, context.fps, config)
-        self.scale = required(_learned(self.background, context) if np.isnan(context.px_per_m) else context.px_per_m)
+        self.foreground = Foreground(context, config, config.most_foreground)
+        self.scale = required(_learned(self.foreground, context) if np.isnan(context.px_per_m) else context.px_per_m)
+        self.foreground.px_per_m = self.scale
         self.step = max(1, round(config.grid * self.scale))
         self.person = _person(context.camera, self.scale)
 
     def follow(self, config: GroupPdaConfig) -> None:
         """Take on a config; background and scale stay as learned."""
         self.config = config
-        self.background.follow(config)
+        self.foreground.follow(config, config.most_foreground)
         self.step = max(1, round(config.grid * self.scale))
 
     @property
@@ -52,17 +51,9 @@ class Pixels:
 
         What lies in the groups' outlines (V, 2) stays out of the background, however long they stand.
         """
-        import cv2
-
-        classes = self.background.classify(image)
-        mask = blobs.clean(foreground(classes), self.scale)
-        protected = np.zeros(mask.shape, np.uint8)
-        for outline in outlines:
-            cv2.fillConvexPoly(protected, cv2.convexHull(np.rint(outline).astype(np.int32)), 1)
-        self.background.adapt(image, classes, protected.astype(bool))
-        if np.count_nonzero(mask) / mask.size > self.config.most_foreground:
-            return None
-        return grid_points(mask, self.step)
+        seen = self.foreground.segment(image)
+        self.foreground.adapt(seen, convex_areas(self.foreground.shape, outlines))
+        return grid_points(seen.mask, self.step) if seen.plausible else None
 
 
 def grid_points(mask: Bools, step: int) -> Array:
@@ -77,11 +68,11 @@ def steepness(camera: Camera | None) -> float:
     return 1.0 if camera is None else float(max(-camera.rotation[2, 2], LEAST_STEEP))
 
 
-def _learned(background: Background, context: Context) -> float:
+def _learned(foreground: Foreground, context: Context) -> float:
     """px per m by the lone blobs of the background sample; nan where nobody was alone in it."""
     assert context.background is not None
     size = PersonSize(context)
-    lone_blobs.learn(size, background, context.background, context.px_per_m)
+    foreground.learn_person_size(size, context.background)
     return size.px_per_m
 
 

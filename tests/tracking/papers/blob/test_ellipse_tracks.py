@@ -9,7 +9,7 @@ from sim.scene.camera import camera_rotation
 from sim.types import Camera, Context
 from tracking.filters import kalman
 from tracking.papers.blob.config import BlobConfig
-from tracking.papers.blob.ellipse_tracks import People
+from tracking.papers.blob.ellipse_tracks import TrackedEllipses
 
 FPS, SCALE = 10.0, 40.0
 UP, LEVEL = np.pi / 2, 0.0
@@ -18,9 +18,9 @@ UP, LEVEL = np.pi / 2, 0.0
 def people(*ellipses, **config):
     """Tracks born at these ellipses x, y, h, w, theta."""
     settings, context = BlobConfig(**config), Context(FPS, SCALE, image_size=(320, 240))
-    made = People(settings, settings.dynamics(FPS), context)
-    made.look(np.zeros((0, 4)))
-    made.give_birth(np.array(ellipses, float), np.ones(len(ellipses)), 0.0)
+    made = TrackedEllipses(settings, settings.dynamics(FPS), context)
+    made.widen_view(np.zeros((0, 4)))
+    made.start_tracks(np.array(ellipses, float), np.ones(len(ellipses)), 0.0)
     made.confirmed[:] = True
     return made
 
@@ -30,7 +30,7 @@ def test_a_direction_far_off_is_a_distance_and_one_that_is_none_is_not():
     z, noise = np.array([[100.0, 100, 68, 24, LEVEL]]), np.tile(one.noise, (1, 1))
     var = np.array([np.radians(10.0) ** 2])
     expected = UP**2 / (one.angle[1, 0] + var[0])
-    assert one.turned(z[:, 4], var)[0, 0] == pytest.approx(expected)
+    assert one.direction_distances(z[:, 4], var)[0, 0] == pytest.approx(expected)
     assert one.update(np.array([0]), z, noise, var)[0] == pytest.approx(expected)
     again = people([100, 100, 68, 24, UP])
     assert again.update(np.array([0]), z, noise, np.array([np.inf]))[0] == 0.0
@@ -40,7 +40,7 @@ def test_a_direction_far_off_is_a_distance_and_one_that_is_none_is_not():
 def test_what_is_expected_of_a_size_is_no_new_evidence_in_each_frame():
     one, var = people([100, 100, 90, 40, UP]), 0.15**2
     for _ in range(200):
-        one.settle(np.array([0]), np.array([[68.0, 24.0]]), var)
+        one.relax_axes(np.array([0]), np.array([[68.0, 24.0]]), var)
     assert one.bank[kalman.PLACE, 0, 2:] == pytest.approx([68, 24])
     assert one.bank[kalman.VAR, 0, 2:] == pytest.approx(var)
     assert one.bank[kalman.PLACE, 0, :2] == pytest.approx([100, 100])
@@ -50,10 +50,10 @@ def test_settling_takes_as_long_at_any_frame_rate():
     left = []
     for fps in (5.0, 25.0):
         settings = BlobConfig()
-        one = People(settings, settings.dynamics(fps), Context(fps, SCALE))
-        one.give_birth(np.array([[100.0, 100, 90, 40, UP]]), np.ones(1), 0.0)
+        one = TrackedEllipses(settings, settings.dynamics(fps), Context(fps, SCALE))
+        one.start_tracks(np.array([[100.0, 100, 90, 40, UP]]), np.ones(1), 0.0)
         for _ in range(int(fps)):
-            one.settle(np.array([0]), np.array([[68.0, 24.0]]), 0.02)
+            one.relax_axes(np.array([0]), np.array([[68.0, 24.0]]), 0.02)
         left.append(one.bank[kalman.PLACE, 0, 2] - 68)
     assert left[0] == pytest.approx(left[1])
     assert 0 < left[0] < 0.2 * (90 - 68)
@@ -63,17 +63,17 @@ def test_settling_takes_as_long_at_any_frame_rate():
 def test_who_lies_behind_somebody_is_excused_by_the_boxes_round_the_ellipses(x, wide, hidden):
     """Of 68 px of his length 28 are behind a wide person beside him, 16 behind a slim one in front."""
     one = people([100, 100, 68, 10, LEVEL], [x, 110, 68, wide, UP])
-    one.mark(np.array([1]), np.ones(1, bool), np.ones(1))
-    one.excuse()
-    assert bool(one.excused[0]) == hidden
+    one.record_measured(np.array([1]), np.ones(1, bool), np.ones(1))
+    one.explain_misses()
+    assert bool(one.miss_explained[0]) == hidden
 
 
 def test_who_lies_at_the_edge_leaves_by_his_length():
     one = people([300, 100, 68, 10, LEVEL], [300, 150, 68, 10, UP])
     one.bank[kalman.RATE, :, 0] = 5.0
     one.hits[:], one.misses[:] = 10, 0
-    one.mark(np.zeros(0, np.int64), np.zeros(0, bool), np.zeros(0))
-    assert one.reported(1.0).tolist() == [1]
+    one.record_measured(np.zeros(0, np.int64), np.zeros(0, bool), np.zeros(0))
+    assert one.rows_to_report(1.0).tolist() == [1]
 
 
 def test_from_straight_above_nobody_is_behind_anybody():
@@ -81,9 +81,9 @@ def test_from_straight_above_nobody_is_behind_anybody():
     camera = Camera(
         "top", (320, 240), (20, 20), (160, 120), np.array([0.0, 0, 10]), camera_rotation(UP, 0.0), px_per_m=20.0
     )
-    one = People(settings, settings.dynamics(FPS), Context(FPS, 20.0, camera=camera, image_size=(320, 240)))
-    one.give_birth(np.array([[100.0, 100, 12, 8, UP], [100, 106, 12, 12, UP]]), np.ones(2), 0.0)
+    one = TrackedEllipses(settings, settings.dynamics(FPS), Context(FPS, 20.0, camera=camera, image_size=(320, 240)))
+    one.start_tracks(np.array([[100.0, 100, 12, 8, UP], [100, 106, 12, 12, UP]]), np.ones(2), 0.0)
     one.confirmed[:] = True
-    one.mark(np.array([1]), np.ones(1, bool), np.ones(1))
-    one.excuse()
-    assert not one.excused.any()
+    one.record_measured(np.array([1]), np.ones(1, bool), np.ones(1))
+    one.explain_misses()
+    assert not one.miss_explained.any()

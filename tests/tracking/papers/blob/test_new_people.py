@@ -8,7 +8,7 @@ import pytest
 from tests import reference_templates as slow
 from tracking.detect import blobs
 from tracking.papers.blob import new_people, new_people_kernels, person_template_kernels
-from tracking.papers.blob.person_template import Mask
+from tracking.papers.blob.person_template import ExplainedForeground
 
 HIGH, WIDE = 90, 120
 
@@ -60,7 +60,7 @@ def test_who_enters_is_the_slow_way(seed):
     mask, (h, w) = region(seed)
     guesses = slow.guesses(blobs.find(mask, 20).label == 1, 4, Fixed(h, w))
     cover, person = np.zeros(mask.shape, np.int16), float(np.pi / 4 * h * w)
-    scene = Mask(mask)
+    scene = ExplainedForeground(mask)
     got = new_people._in_region(scene, np.concatenate(guesses), person, 0.4)
     assert len(got)
     assert np.array_equal(got, slow.enter(mask, cover, guesses, person, 0.4))
@@ -72,7 +72,7 @@ def test_no_more_are_tried_than_there_are_sizes_for():
     mask = mask_of([40.0, 80.0, 60.0, 24.0], [60.0, 80.0, 60.0, 24.0])
     guesses = np.concatenate(slow.guesses(mask, 3, Fixed(60.0, 24.0)))
     guesses[2, 2] = np.nan
-    found = new_people._in_region(Mask(mask), guesses, float(np.pi / 4 * 60 * 24), 0.3)
+    found = new_people._in_region(ExplainedForeground(mask), guesses, float(np.pi / 4 * 60 * 24), 0.3)
     assert len(found) == 1
 
 
@@ -80,8 +80,8 @@ def test_no_more_are_tried_than_there_are_sizes_for():
 def test_as_many_come_in_as_there_are(count):
     """Side by side, a head's width of each hidden behind the next."""
     true = np.array([[20.0 + 20 * k, 80.0 - 2 * (k % 2), 60.0, 24.0] for k in range(count)])
-    scene = Mask(mask_of(*true))
-    found = new_people.newcomers(scene, Fixed(60.0, 24.0), 0.5)
+    scene = ExplainedForeground(mask_of(*true))
+    found = new_people.find_new_people(scene, Fixed(60.0, 24.0), 0.5)
     assert len(found) == count
     assert np.abs(np.sort(found[:, 0]) - true[:, 0]).max() < 4
 
@@ -90,14 +90,14 @@ def test_half_a_person_and_less_is_nobody_new():
     one = np.array([60.0, 80.0, 60.0, 24.0])
     cut = mask_of(one)
     cut[45:] = False
-    assert not len(new_people.newcomers(Mask(cut), Fixed(60.0, 24.0), 0.5))
+    assert not len(new_people.find_new_people(ExplainedForeground(cut), Fixed(60.0, 24.0), 0.5))
 
 
 def test_what_is_explained_brings_nobody():
     one = np.array([[60.0, 80.0, 60.0, 24.0]])
-    scene = Mask(mask_of(one[0]))
+    scene = ExplainedForeground(mask_of(one[0]))
     person_template_kernels.paint_all(scene.cover, one, 1)
-    assert not len(new_people.newcomers(scene, Fixed(60.0, 24.0), 0.5))
-    closed = Mask(mask_of(one[0]))
-    closed.close(mask_of(one[0]).astype(np.int32), np.array([0]))
-    assert not len(new_people.newcomers(closed, Fixed(60.0, 24.0), 0.5))
+    assert not len(new_people.find_new_people(scene, Fixed(60.0, 24.0), 0.5))
+    closed = ExplainedForeground(mask_of(one[0]))
+    closed.mark_explained(mask_of(one[0]).astype(np.int32), np.array([0]))
+    assert not len(new_people.find_new_people(closed, Fixed(60.0, 24.0), 0.5))

@@ -8,7 +8,7 @@ import pytest
 from tests import reference_templates as slow
 from tracking.papers.blob import person_template_kernels as kernels
 from tracking.papers.blob import person_template_search_kernels
-from tracking.papers.blob.person_template import Mask, painted
+from tracking.papers.blob.person_template import ExplainedForeground, template_mask
 from tracking.papers.blob.person_template_kernels import EXPLAINED
 
 HIGH, WIDE = 90, 120
@@ -39,29 +39,29 @@ def scenery(seed):
 def test_kernels_are_the_slow_way(seed):
     _, foreground, cover, some = scenery(seed)
     for t in some:
-        got = person_template_search_kernels.moved(foreground, cover, t, 2, 1.5)
+        got = person_template_search_kernels.worth_when_moved(foreground, cover, t, 2, 1.5)
         assert np.array_equal(got / 2, slow.moved(foreground, cover, t, 2, 1.5))
     area = [slow.area(cover.shape, t) for t in some]
     got = kernels.supports(foreground, cover, some, 0)
     assert np.allclose(got * area, [slow.worth(foreground, cover, t) for t in some], atol=1e-9)
-    assert np.array_equal(painted((HIGH, WIDE), some), slow.painted((HIGH, WIDE), some) > 0)
+    assert np.array_equal(template_mask((HIGH, WIDE), some), slow.painted((HIGH, WIDE), some) > 0)
 
 
 @pytest.mark.parametrize("seed", range(8))
 def test_all_together_are_the_slow_way(seed):
     r, foreground, cover, expected = scenery(seed)
-    scene, spread = Mask(foreground), r.uniform(1, 6, (len(expected), 2))
+    scene, spread = ExplainedForeground(foreground), r.uniform(1, 6, (len(expected), 2))
     scene.cover[:] = cover
-    at = scene.settle(expected, spread, 40.0)
+    at = scene.fit_places(expected, spread, 40.0)
     assert np.array_equal(at, slow.settle(foreground, cover, expected, spread, 40.0))
     assert np.array_equal(scene.cover, cover + slow.painted(cover.shape, at))
-    assert np.allclose(scene.alone(at), slow.alone(foreground, cover, at), atol=1e-12)
+    assert np.allclose(scene.support(at), slow.alone(foreground, cover, at), atol=1e-12)
     assert np.allclose(
-        kernels.pieces(scene.foreground, scene.cover, at), slow.pieces(foreground, cover, at), atol=1e-12
+        kernels.piece_supports(scene.foreground, scene.cover, at), slow.pieces(foreground, cover, at), atol=1e-12
     )
-    assert np.allclose(scene.shown(at), slow.shown(cover, at), atol=1e-12)
+    assert np.allclose(scene.visible_share(at), slow.shown(cover, at), atol=1e-12)
     for by_pieces in (True, False):
-        again = Mask(foreground)
+        again = ExplainedForeground(foreground)
         again.cover[:] = scene.cover
         rows = again.prune(at, 0.45, pieces=by_pieces)
         assert rows.tolist() == slow.prune(foreground, cover, at, 0.45, by_pieces).tolist()
@@ -72,8 +72,8 @@ def test_all_together_are_the_slow_way(seed):
 def test_closed_regions_are_explained_and_no_others():
     label = np.random.default_rng(0).integers(0, 6, (HIGH, WIDE)).astype(np.int32)
     for rows in ([], [0], [1, 3]):
-        scene = Mask(label > 0)
-        scene.close(label, np.array(rows, int))
+        scene = ExplainedForeground(label > 0)
+        scene.mark_explained(label, np.array(rows, int))
         assert np.array_equal(scene.cover >= EXPLAINED, np.isin(label, np.add(rows, 1)))
 
 
@@ -86,9 +86,9 @@ def test_support_is_one_on_ones_own_pixels_and_minus_a_half_on_none():
 
 def test_what_two_cover_supports_neither():
     one = np.array([[60.0, 80.0, 60.0, 24.0]])
-    scene = Mask(mask_of(one[0]))
+    scene = ExplainedForeground(mask_of(one[0]))
     kernels.paint_all(scene.cover, np.concatenate([one, one]), 1)
-    assert scene.alone(np.concatenate([one, one])).tolist() == [0.0, 0.0]
+    assert scene.support(np.concatenate([one, one])).tolist() == [0.0, 0.0]
     assert len(scene.prune(np.concatenate([one, one]), 0.2)) == 1
     assert scene.cover.max() == 1
 
@@ -97,7 +97,7 @@ def test_what_two_cover_supports_neither():
 def test_two_in_one_blob_settle_where_they_are(gap):
     true = np.array([[50.0, 80.0, 60.0, 24.0], [50.0 + gap, 76.0, 60.0, 24.0]])
     expected = true + np.array([[3.0, -2.0, 0, 0], [-3.0, 2.0, 0, 0]])
-    found = Mask(mask_of(*true)).settle(expected, np.full((2, 2), 4.0), 100.0)
+    found = ExplainedForeground(mask_of(*true)).fit_places(expected, np.full((2, 2), 4.0), 100.0)
     assert np.abs(found - true).max() <= 1.5
 
 
@@ -105,7 +105,7 @@ def test_a_post_in_front_keeps_the_template_whole():
     one = np.array([[60.0, 80.0, 60.0, 24.0]])
     cut = mask_of(one[0])
     cut[:, 57:62] = False
-    found = Mask(cut).settle(one + np.array([2.0, 1.0, 0, 0]), np.full((1, 2), 4.0), 20.0)
+    found = ExplainedForeground(cut).fit_places(one + np.array([2.0, 1.0, 0, 0]), np.full((1, 2), 4.0), 20.0)
     assert np.abs(found - one).max() <= 1.5
 
 
@@ -113,8 +113,9 @@ def test_settling_is_the_same_in_any_order_of_rows():
     r = np.random.default_rng(2)
     true = np.column_stack([r.uniform(20, 100, 5), 50 + 8 * np.arange(5.0), np.full(5, 40.0), np.full(5, 16.0)])
     expected, turn = true + np.append(r.normal(0, 2, (5, 2)), np.zeros((5, 2)), 1), r.permutation(5)
-    found = Mask(mask_of(*true)).settle(expected, np.full((5, 2), 3.0), 50.0)
-    assert np.array_equal(Mask(mask_of(*true)).settle(expected[turn], np.full((5, 2), 3.0), 50.0), found[turn])
+    found = ExplainedForeground(mask_of(*true)).fit_places(expected, np.full((5, 2), 3.0), 50.0)
+    again = ExplainedForeground(mask_of(*true)).fit_places(expected[turn], np.full((5, 2), 3.0), 50.0)
+    assert np.array_equal(again, found[turn])
 
 
 def test_a_piece_of_who_is_partly_covered_is_enough_but_two_on_one_are_one():
@@ -122,12 +123,12 @@ def test_a_piece_of_who_is_partly_covered_is_enough_but_two_on_one_are_one():
     near, far = np.array([60.0, 84.0, 60.0, 24.0]), np.array([72.0, 80.0, 60.0, 24.0])
     cut = mask_of(near, far)
     cut[:48, 73:] = False
-    scene, both = Mask(cut), np.stack([near, far])
+    scene, both = ExplainedForeground(cut), np.stack([near, far])
     kernels.paint_all(scene.cover, both, 1)
-    assert 0.4 < kernels.pieces(scene.foreground, scene.cover, both)[1] < 0.9
+    assert 0.4 < kernels.piece_supports(scene.foreground, scene.cover, both)[1] < 0.9
     assert scene.prune(both, 0.3, pieces=True).tolist() == [0, 1]
     twice = np.stack([near, near + np.array([4.0, 0, 0, 0])])
-    scene = Mask(mask_of(near))
+    scene = ExplainedForeground(mask_of(near))
     kernels.paint_all(scene.cover, twice, 1)
     assert scene.prune(twice, 0.3, pieces=True).tolist() == [0]
 
@@ -135,6 +136,6 @@ def test_a_piece_of_who_is_partly_covered_is_enough_but_two_on_one_are_one():
 def test_who_is_all_but_covered_is_hidden():
     one = np.array([[60.0, 80.0, 60.0, 24.0]])
     both = np.concatenate([one, one + np.array([0.5, 0, 0, 0])])
-    scene = Mask(mask_of(*both))
+    scene = ExplainedForeground(mask_of(*both))
     kernels.paint_all(scene.cover, both, 1)
-    assert kernels.pieces(scene.foreground, scene.cover, both).tolist() == [0.0, 0.0]
+    assert kernels.piece_supports(scene.foreground, scene.cover, both).tolist() == [0.0, 0.0]

@@ -197,14 +197,14 @@ def test_a_strong_detection_is_not_given_twice():
     for k, (rows, score) in enumerate(zip(frames, scores, strict=True)):
         box = np.array(rows)
         tracker.step(Frame(k + 1, k / FPS), Detections(k + 1, k / FPS, "image", box[:, :2], None, box, np.array(score)))
-    assert tracker.people.hit.tolist() == [True, False]
+    assert tracker.people.measured.tolist() == [True, False]
 
 
 def test_a_weak_detection_knows_no_second_nearest_track():
     frames = [at((100, 200), (112, 200)) for _ in range(20)] + [at((100, 200), (103, 200))]
     scores = [[1.0, 1.0]] * 20 + [[1.0, 0.2]]
-    assert people_after(frames, both("nearest"), scores).hit.tolist() == [True, False]
-    assert people_after(frames, both("optimal"), scores).hit.tolist() == [True, True]
+    assert people_after(frames, both("nearest"), scores).measured.tolist() == [True, False]
+    assert people_after(frames, both("optimal"), scores).measured.tolist() == [True, True]
 
 
 def people_after(frames, config, scores=None):
@@ -218,30 +218,30 @@ def people_after(frames, config, scores=None):
     return tracker.people
 
 
-def pairs(d2, rho):
+def associate(d2, rho):
     """Who is paired with whom at these squared distances (N, M), in order."""
     tracker = Blob(both("optimal"))
     tracker.reset(CONTEXT, 0)
-    tracker.people.give_birth(np.tile([100.0, 200, 68, 28], (len(d2), 1)), np.ones(len(d2)), 0.0)
+    tracker.people.start_tracks(np.tile([100.0, 200, 68, 28], (len(d2), 1)), np.ones(len(d2)), 0.0)
     tracker.people.rho[:] = rho
-    return sorted(zip(*(k.tolist() for k in tracker.people.pairs(np.array(d2), tracker.cascade.gate)), strict=True))
+    return sorted(zip(*(k.tolist() for k in tracker.people.associate(np.array(d2), tracker.updater.gate)), strict=True))
 
 
 def test_a_blind_track_far_away_changes_no_pair():
     d2, inf = [[0.1, 17.0], [17.0, np.inf]], np.inf
-    assert pairs(d2, [1.0, 1.0]) == pairs([*d2, [inf, inf]], [1.0, 1.0, np.exp(10)]) == [(0, 0)]
+    assert associate(d2, [1.0, 1.0]) == associate([*d2, [inf, inf]], [1.0, 1.0, np.exp(10)]) == [(0, 0)]
     r = np.random.default_rng(0)
     for _ in range(200):
         d2 = r.uniform(0, 18.4, (4, 4))
         d2[r.random(d2.shape) < 0.4] = inf
         rho = np.exp(r.uniform(0, 4, 4))
-        with_far = pairs(np.vstack([d2, np.full(4, inf)]), [*rho, np.exp(10)])
-        assert with_far == pairs(d2, rho)
+        with_far = associate(np.vstack([d2, np.full(4, inf)]), [*rho, np.exp(10)])
+        assert with_far == associate(d2, rho)
 
 
 @pytest.mark.parametrize("rho", [1.0, 5.0, 80.0, 1e6])
 def test_a_pair_in_a_gate_is_better_than_none(rho):
-    assert pairs([[18.4]], [rho]) == [(0, 0)]
+    assert associate([[18.4]], [rho]) == [(0, 0)]
 
 
 def test_pieces_are_found_by_a_track_narrower_than_one_always_seen():
@@ -392,7 +392,7 @@ def test_reports_on_the_ground_where_the_camera_is_known(camera):
 
 def test_ground_covariance_is_that_of_projected_samples():
     from sim.scene.camera import to_ground
-    from tracking.papers.blob.report import on_ground
+    from tracking.papers.blob.tracker import on_ground
 
     camera, r, scale = pinhole(), np.random.default_rng(0), np.array([50.0])
     state = kalman.born(np.array([[300.0, 300, 90, 35]]), np.array([2e-4, 3e-4, 4e-4, 1e-4]), 1e-3)

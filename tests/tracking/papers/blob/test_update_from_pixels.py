@@ -10,7 +10,7 @@ from tests import painted
 from tests.painted import TALL, box, overlap, track
 from tracking.filters import kalman
 from tracking.papers.blob.config import BlobConfig
-from tracking.papers.blob.person_template import Mask
+from tracking.papers.blob.person_template import ExplainedForeground
 
 
 def walk(x, foot, step, frames):
@@ -79,14 +79,14 @@ def test_a_ghost_that_is_pruned_hides_nobody():
     """The template of a track that is lost, before one person: he is measured as wholly seen."""
     last = []
     track([[p] for p in walk(60, 180, 4, 20)], watch=lambda tracker, _: last.append(tracker))
-    people, cascade = last[-1].people, last[-1].cascade
-    x, y, h, w = people.uprights()[0]
-    people.give_birth(np.array([[x + 0.3 * w, y + 2, h, w, np.pi / 2]]), np.ones(1), 2.0)
+    people, updater = last[-1].people, last[-1].updater
+    x, y, h, w = people.upright_boxes()[0]
+    people.start_tracks(np.array([[x + 0.3 * w, y + 2, h, w, np.pi / 2]]), np.ones(1), 2.0)
     people.confirmed[:] = True
-    scene = Mask(painted.shape((x, y + h / 2, h)))
-    rows, _, noise, _ = cascade._split(scene, people.uprights(), np.zeros(0, np.int64), True)
-    assert len(rows) == 1
-    assert noise[0, :2] == pytest.approx(people.noise[:2], rel=0.1)
+    scene = ExplainedForeground(painted.shape((x, y + h / 2, h)))
+    made = updater._measure_by_templates(scene, people.upright_boxes(), np.zeros(0, np.int64), True)
+    assert len(made.rows) == 1
+    assert made.noise[0, :2] == pytest.approx(people.noise[:2], rel=0.1)
 
 
 def test_a_post_does_not_cut_a_person_in_two():
@@ -169,7 +169,7 @@ def test_a_track_that_lies_stands_up_where_templates_measure_it():
 
 def test_mog2_follows_the_same_settings():
     config, seen = BlobConfig(segmentation="mog2", dark=0.3, background_time=7.0), []
-    track([[]], config, watch=lambda tracker, _: seen.append(tracker.cascade.background.settings))
+    track([[]], config, watch=lambda tracker, _: seen.append(tracker.updater.foreground.model.settings))
     assert (seen[0].shadow, seen[0].background_time) == (0.3, 7.0)
 
 
