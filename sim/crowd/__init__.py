@@ -1,1 +1,1 @@
-"""How the simulated crowd moves: who takes part, orders, ways, forces. Only `world` imports pymunk."""
+"""How the simulated crowd moves: population, orders, ways, forces, physics. Only `world` imports pymunk."""

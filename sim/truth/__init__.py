@@ -1,1 +1,1 @@
-"""What is true of a crowd, measured from its motion: groups, ids, events, and whether orders were fulfilled."""
+"""The truth of a simulated crowd, measured from its motion: groups, ids, events, and whether orders came true."""

@@ -1,6 +1,7 @@
-"""Crossings and queues, measured from motion: one function for the truth and for anybody's tracks.
+"""Makes cross events: two groups that pass through each other, or closely round each other, and stay the same groups.
 
-Dense arrays (T, P, ...), nan or not present = absent; person ids are column + 1. Frames of events are 1-based.
+For truth and trackers alike. Arrays are dense, (T, P, ...), one column for each person. A person is absent where a
+position is nan or `present` is False. The id of a person is the column + 1; frames of events count from 1.
 """
 
 from __future__ import annotations
@@ -14,42 +15,49 @@ from sim.truth.merge_split_rules import frames_of, mean_of_present
 from sim.truth.proximity import runs
 from sim.types import Array, Bools, GroupEvent, Ints
 
-CROSS_SPEED = 0.6  # m/s, least difference of velocities over the encounter
-SAME_BEFORE = 2.0  # s before and after, in which groups_and_events are equal
-ROWS = 500_000  # encounters times frames looked at together: bounds memory
+CROSS_VELOCITY = 0.6  # m/s: least difference of the mean velocities over the encounter
+SAME_BEFORE = 2.0  # s before and after the encounter in which the members stay the same
+ROWS = 500_000  # frames of encounters handled together: bounds memory
 
 
 def crossings(pos: Array, vel: Array, present: Bools, group: Ints, fps: float) -> list[GroupEvent]:
-    """Two groups (of 2 or more) that pass through, or closely round, each other and stay who they are.
+    """Returns a cross event for each crossing of two groups of two or more people, in order of their first frames.
 
-    An encounter is a stretch with hulls within 1.0 m. The mean of their relative velocity over it must be at least
-    0.6 m/s, and each must get to the other's other side: the way from one middle to the other turns by more than 90°
-    meanwhile, or the paths of their middles cross between 2 s before and 2 s after, and not back again (who bounces
-    back, or passes by in a lane beside, does neither). Members are the same 2 s before and after.
+    pos, vel (T, P, 2): m, m/s; present (T, P); group (T, P): group ids, -1 = alone. An encounter is a stretch in which
+    the hulls of two groups are within 1.0 m. It is a crossing if all of this holds:
+
+    - the mean over the encounter of their relative velocity is at least CROSS_VELOCITY long;
+    - they change sides: the direction from one middle to the other turns by more than 90° from the first to the last
+      frame, or the paths of the middles cross, not counting crossings back, from SAME_BEFORE before the encounter to
+      SAME_BEFORE after it;
+    - in that time both groups keep their members.
+
+    The event lasts as long as the encounter. Its position is the mean of both middles where these are closest.
     """
     there = present & np.isfinite(pos).all(axis=2)
     places, label = np.where(there[..., None], pos, np.nan), np.where(there, group, -1)
-    roll = group_rows(label)
-    met = encounters(places, roll, fps)
+    rows = group_rows(label)
+    met = encounters(places, rows, fps)
     found: list[GroupEvent] = []
     for some in _portions(met, len(pos), frames_of(SAME_BEFORE, fps)):
-        found += _crossed(places, vel, label, roll, some, frames_of(SAME_BEFORE, fps))
+        found += _crossed(places, vel, label, rows, some, frames_of(SAME_BEFORE, fps))
     return found
 
 
 def _portions(met: Encounters, frames: int, margin: int) -> Iterator[Encounters]:
+    """The encounters in portions of about ROWS frames, `margin` frames before and after each encounter included."""
     total = np.cumsum(met.last - met.first + 1 + 2 * margin)
     return (met[total // ROWS == k] for k in np.unique(total // ROWS))
 
 
-def _crossed(pos: Array, vel: Array, group: Ints, roll: GroupRows, met: Encounters, margin: int) -> list[GroupEvent]:
-    """The events of those encounters that are crossings."""
+def _crossed(pos: Array, vel: Array, group: Ints, rows: GroupRows, met: Encounters, margin: int) -> list[GroupEvent]:
+    """The events of those encounters that are crossings; margin: SAME_BEFORE in frames."""
     low, high = np.maximum(met.first - margin, 0), np.minimum(met.last + margin + 1, len(pos))
     k, frame = runs(low, high)
-    a, b = (group_paths(pos, vel, group, roll, name, met.first, k, frame) for name in (met.a, met.b))
+    a, b = (group_paths(pos, vel, group, rows, name, met.first, k, frame) for name in (met.a, met.b))
     during = (frame >= met.first[k]) & (frame <= met.last[k])
-    changed = np.bincount(k, ~(a.kept & b.kept), minlength=len(met)) > 0
-    good = ~changed & (_speed(a, b, k, during, len(met)) >= CROSS_SPEED)
+    changed = np.bincount(k, ~(a.same_members & b.same_members), minlength=len(met)) > 0
+    good = ~changed & (_relative_speed(a, b, k, during, len(met)) >= CROSS_VELOCITY)
     start = np.cumsum(high - low) - (high - low)
     apart = b.middle - a.middle
     turned = (apart[start + met.first - low] * apart[start + met.last - low]).sum(axis=1) < 0
@@ -58,16 +66,16 @@ def _crossed(pos: Array, vel: Array, group: Ints, roll: GroupRows, met: Encounte
     found = []
     for e in np.flatnonzero(good).tolist():
         names, t = (int(met.a[e]), int(met.b[e])), int(frame[closest[e]])
-        sides = [roll.members(int(met.first[e]), name) for name in names]
-        x, y = sum(mean_of_present(pos[t : t + 1, side])[0] for side in sides) / 2
-        people = tuple(sorted(int(p) + 1 for p in np.concatenate(sides)))
+        both = [rows.members(int(met.first[e]), name) for name in names]
+        x, y = sum(mean_of_present(pos[t : t + 1, members])[0] for members in both) / 2
+        people = tuple(sorted(int(p) + 1 for p in np.concatenate(both)))
         first, last = int(met.first[e]) + 1, int(met.last[e]) + 1
         found.append(GroupEvent("cross", first, last, None, names, names, people, (float(x), float(y))))
     return found
 
 
-def _speed(a: GroupPath, b: GroupPath, k: Ints, during: Bools, count: int) -> Array:
-    """How fast (count,) two groups move on average relative to each other during an encounter; nan if unknown."""
+def _relative_speed(a: GroupPath, b: GroupPath, k: Ints, during: Bools, count: int) -> Array:
+    """Length in m/s of the mean relative velocity during each encounter (count,); nan where it is unknown."""
     relative = b.vel - a.vel
     known = during & np.isfinite(relative).all(axis=1)
     total = [np.bincount(k[known], relative[known, axis], minlength=count) for axis in (0, 1)]

@@ -1,6 +1,6 @@
-"""Encounters of groups: stretches of time in which two hulls are within 1.0 m, and the courses of who meets there.
+"""Finds encounters of groups, stretches in which two hulls are within CROSS_GAP, and the paths of the groups that meet.
 
-Everything is worked on for all encounters at once. Ragged tables are flat: rows of one encounter after the other.
+All encounters are handled at once. Ragged tables are flat: the rows of one encounter follow those of another.
 """
 
 from __future__ import annotations
@@ -16,12 +16,12 @@ from sim.truth.proximity import close_pairs, runs, stretches
 from sim.types import Array, Bools, Ints
 
 CROSS_GAP = 1.0  # m between hulls
-BRIDGE_TIME = 0.5  # s: an encounter may be interrupted for so long
+BRIDGE_TIME = 0.5  # s for which hulls may be further apart within one encounter
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Encounters:
-    """E encounters ordered by time: first, last frame (from 0), groups a < b."""
+    """E encounters, sorted by first and last frame: first, last (E,): frames from 0; a, b (E,): group ids, a < b."""
 
     first: Ints
     last: Ints
@@ -37,9 +37,10 @@ class Encounters:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class GroupRows:
-    """Who is in which group when: G groups of a frame sorted by (frame t, name), member rows `first` … of `person`.
+    """The members of each group in each frame: G rows, one for each group and frame, sorted by (frame, group id).
 
-    key: t * width + name, ascending.
+    t (G,): frame from 0; name (G,): group id; key (G,): t * width + name, ascending, for look-ups; first, count (G,):
+    the members are person[first : first + count]; person (R,): columns.
     """
 
     t: Ints
@@ -51,7 +52,9 @@ class GroupRows:
     person: Ints
 
     def find(self, t: Ints, name: Ints) -> tuple[Ints, Ints]:
-        """(first, count) of these groups in these frames; count 0 where there is no such group."""
+        """Returns (first, count) of groups `name` in frames `t`, all (K,); count is 0 where the group does not
+        exist.
+        """
         if not len(self.t):
             return np.zeros_like(t), np.zeros_like(t)
         key = t * self.width + name
@@ -60,13 +63,13 @@ class GroupRows:
         return self.first[place], np.where(found, self.count[place], 0)
 
     def members(self, t: int, name: int) -> Ints:
-        """The people of one group in one frame."""
+        """Returns the columns of the members of one group in one frame; empty if the group does not exist then."""
         first, count = self.find(np.array([t]), np.array([name]))
         return self.person[first[0] : first[0] + count[0]]
 
 
 def group_rows(group: Ints) -> GroupRows:
-    """The GroupRows of labels (T, P), -1 alone or absent."""
+    """Returns the members of all groups from group ids (T, P), -1 = alone or absent."""
     t, person = np.nonzero(group >= 0)
     order = np.lexsort((person, group[t, person], t))
     t, person = t[order], person[order]
@@ -76,13 +79,13 @@ def group_rows(group: Ints) -> GroupRows:
     return GroupRows(t, name, t * width + name, width, first, np.diff(np.append(first, len(person))), person)
 
 
-def encounters(pos: Array, roll: GroupRows, fps: float) -> Encounters:
-    """All encounters of groups of 2 or more; pos (T, P, 2)."""
-    if not len(roll.t):
-        return Encounters(roll.t, roll.t, roll.t, roll.t)
-    i, j = _within_reach(roll.t, pos[np.repeat(roll.t, roll.count), roll.person], roll.count)
-    width = roll.width
-    pair, when = roll.name[i] * width + roll.name[j], roll.t[i]  # sorted by group within a frame: name[i] < name[j]
+def encounters(pos: Array, rows: GroupRows, fps: float) -> Encounters:
+    """Returns all encounters of groups of two or more people; pos (T, P, 2): m."""
+    if not len(rows.t):
+        return Encounters(rows.t, rows.t, rows.t, rows.t)
+    i, j = _within_reach(rows.t, pos[np.repeat(rows.t, rows.count), rows.person], rows.count)
+    width = rows.width
+    pair, when = rows.name[i] * width + rows.name[j], rows.t[i]  # sorted by group within a frame: name[i] < name[j]
     order = np.lexsort((when, pair))
     pair, first, last = stretches(pair[order], when[order], 1, frames_of(BRIDGE_TIME, fps))
     order = np.lexsort((pair, last, first))
@@ -90,7 +93,10 @@ def encounters(pos: Array, roll: GroupRows, fps: float) -> Encounters:
 
 
 def _within_reach(t: Ints, places: Array, count: Ints) -> tuple[Ints, Ints]:
-    """Groups i < j of one frame t (G,) whose hulls are within 1.0 m; places (R, 2): members of group after group."""
+    """Pairs i < j of groups of two or more people of one frame whose hulls are within CROSS_GAP.
+
+    t, count (G,): frame and size of each group; places (R, 2): members of group after group, m.
+    """
     start = np.cumsum(count) - count
     middle = np.add.reduceat(places, start) / count[:, None]
     radius = np.maximum.reduceat(np.hypot(*(places - np.repeat(middle, count, axis=0)).T), start) + FOOTPRINT_RADIUS
@@ -98,49 +104,59 @@ def _within_reach(t: Ints, places: Array, count: Ints) -> tuple[Ints, Ints]:
     near = np.hypot(*(middle[i] - middle[j]).T) <= CROSS_GAP + radius[i] + radius[j]
     near &= (count[i] > 1) & (count[j] > 1)
     i, j = i[near], j[near]
-    # The footprints' 16-gons lie between discs of 0.25 m and of their inner radius: mostly that settles it.
+    # A footprint lies between its circumscribed and its inscribed disc. In most cases these two decide; only the cases
+    # between them need the hulls of the footprints.
     bare = pack(position_hulls(places, count))
     between = edge_distance_pairs(bare, bare, i, j)
     close = between <= CROSS_GAP + 2 * FOOTPRINT_RADIUS * np.cos(np.pi / FOOTPRINT_SIDES)
     overlap = (bare.box[i, :2] <= bare.box[j, 2:]).all(axis=1) & (bare.box[j, :2] <= bare.box[i, 2:]).all(axis=1)
     doubt = np.flatnonzero(~close & ((between <= CROSS_GAP + 2 * FOOTPRINT_RADIUS) | overlap))
-    whom, place = np.unique(np.concatenate([i[doubt], j[doubt]]), return_inverse=True)
-    rows = np.isin(np.repeat(np.arange(len(count)), count), whom)
-    hulls = pack(footprint_hulls(places[rows], count[whom]))
+    group, place = np.unique(np.concatenate([i[doubt], j[doubt]]), return_inverse=True)
+    rows = np.isin(np.repeat(np.arange(len(count)), count), group)
+    hulls = pack(footprint_hulls(places[rows], count[group]))
     close[doubt] = gap_pairs(hulls, hulls, *np.split(place, 2)) <= CROSS_GAP
     return i[close], j[close]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class GroupPath:
-    """One side of each encounter over the frames around it, R rows: middle and mean velocity of who is there of those
-    who met (R, 2), nan where nobody is; kept: whether the group is still, or already, these people."""
+    """One group of each encounter in R frames around it.
+
+    middle, vel (R, 2): mean position, m, and mean velocity, m/s, of those members at the meeting who are present; nan
+    where none is. same_members (R,): the group has no other members than at the meeting, and those present are in it.
+    """
 
     middle: Array
     vel: Array
-    kept: Bools
+    same_members: Bools
 
 
 def group_paths(
-    pos: Array, vel: Array, group: Ints, roll: GroupRows, name: Ints, met: Ints, encounter: Ints, frame: Ints
+    pos: Array, vel: Array, group: Ints, rows: GroupRows, name: Ints, met: Ints, encounter: Ints, frame: Ints
 ) -> GroupPath:
-    """Courses of groups name (E,) as they were in frames met (E,), in rows (encounter, frame) (R,)."""
-    first, count = roll.find(met, name)
+    """Returns the paths of groups `name` (E,), with the members they had in frames `met` (E,).
+
+    pos, vel (T, P, 2): m, m/s; group (T, P): group ids; encounter, frame (R,): the rows wanted, in order of encounters.
+    A single member who stays after the others have left the scene counts as the same group.
+    """
+    first, count = rows.find(met, name)
     row, place = runs(first[encounter], (first + count)[encounter])
-    who, start = roll.person[place], np.cumsum(count[encounter]) - count[encounter]
+    person, start = rows.person[place], np.cumsum(count[encounter]) - count[encounter]
     when = frame[row]
-    places, speeds = pos[when, who], vel[when, who]
+    places, speeds = pos[when, person], vel[when, person]
     there = np.isfinite(places[:, 0]) & np.isfinite(places[:, 1])
-    own = group[when, who] == name[encounter[row]]
+    own = group[when, person] == name[encounter[row]]
     present, still = (np.add.reduceat(x.astype(np.int64), start) if len(start) else start for x in (there, own & there))
-    # One who stays while the others have left the scene is alone, and yet has changed nothing.
+    # A member who stays while the others have left the scene is alone, but the group has not changed.
     same = (still == present) | (present < 2)
-    others = roll.find(frame, name[encounter])[1] > still
+    others = rows.find(frame, name[encounter])[1] > still
     return GroupPath(_mean(places, there, start), _mean(speeds, there, start), same & ~others)
 
 
 def _mean(values: Array, there: Bools, start: Ints) -> Array:
-    """Means (R, 2) of runs of values (N, 2) that begin at `start`, of those who are there and known; nan of none."""
+    """Means (R, 2) of runs of values (N, 2) that begin at `start` (R,), over present people; nan where none is
+    known.
+    """
     known = there & np.isfinite(values[:, 0]) & np.isfinite(values[:, 1])
     if not len(start):
         return np.zeros((0, 2))
@@ -150,27 +166,33 @@ def _mean(values: Array, there: Bools, start: Ints) -> Array:
 
 
 def net_crossings(a: Array, b: Array, encounter: Ints, count: int) -> Ints:
-    """How often (count,) path b crosses path a, left to right minus right to left, at whatever times.
+    """Returns how often path b crosses path a from left to right, minus right to left, for each encounter (count,).
 
-    a, b (R, 2): the paths of each encounter, one after the other; nan points are left out. The difference b(t) - a(s)
-    goes round 0 once for each crossing as (s, t) goes round the square of times: the turns along its four sides are
-    summed. Unlike cutting segments, that does not mind paths that meet in a vertex of both.
+    a, b (R, 2): points of both paths, encounter after encounter; nan points are left out. The two need not be at the
+    crossing at the same time.
+
+    Let s and t be times on a and b. The difference b(t) - a(s) winds round zero once for each crossing as (s, t) goes
+    round the square of all times. The turns along the four sides of the square are summed. Paths that meet in a vertex
+    of both are no special case, as they would be if segments were intersected.
     """
     turns = _turns(a, b, encounter, count) - _turns(b, a, encounter, count)
     return np.asarray(np.round(turns / (2 * np.pi)), np.int64)
 
 
 def _turns(path: Array, other: Array, encounter: Ints, count: int) -> Array:
-    """How far the arm to `path` turns as seen from the first point of `other`, less as seen from its last (count,)."""
+    """By how much the direction to `path` turns, seen from the first point of `other` less seen from its last (count,).
+
+    In radians.
+    """
     known = np.isfinite(path).all(axis=1)
-    point, whose = path[known], encounter[known]
+    point, own = path[known], encounter[known]
     seen = np.flatnonzero(np.isfinite(other).all(axis=1))
     total = np.zeros(count)
     for sign, end in ((1.0, seen[::-1]), (-1.0, seen)):
         from_ = np.zeros((count, 2))
         from_[encounter[end]] = other[end]  # of several rows the last one stays: reversed, that is the first
-        arm = point - from_[whose]
+        arm = point - from_[own]
         a, b = arm[:-1], arm[1:]
         angle = np.arctan2(a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0], (a * b).sum(axis=1))
-        total += sign * np.bincount(whose[1:], np.where(whose[1:] == whose[:-1], angle, 0.0), minlength=count)
+        total += sign * np.bincount(own[1:], np.where(own[1:] == own[:-1], angle, 0.0), minlength=count)
     return total

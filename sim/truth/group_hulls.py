@@ -1,12 +1,9 @@
-"""Groups over time: the truth measured from motion and intent, and the shape of groups for anybody's people.
-
-sim.truth.group_membership says who is together when, sim.truth.identity which group is which; here both become labels,
-events and hulls.
-"""
+"""Hulls, mean positions and extents of groups, from people whose group ids are known (truth or tracks)."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
@@ -15,11 +12,32 @@ from sim.geometry.footprints import footprint_hulls
 from sim.geometry.polygons import convex_hull
 from sim.types import Array, Groups, Ints
 
+__all__ = ["box_groups", "frame_groups", "groups_over_time"]
+
+
+@dataclass(frozen=True, eq=False)
+class _MemberRows:
+    """Rows of the R people in groups of two or more, sorted by (frame, group, id), and where each group starts."""
+
+    frame: Ints
+    id: Ints
+    group: Ints
+    pos: Array
+    vel: Array
+    starts: Ints
+
+    @property
+    def counts(self) -> Ints:
+        """Number of members of each group."""
+        return np.diff(np.append(self.starts, len(self.id)))
+
 
 def frame_groups(id: Ints, group: Ints, pos: Array, vel: Array) -> Groups:
-    """The groups (2 or more people) of one frame: people id (N,), group (N,) -1 alone, pos, vel (N, 2 or 3) in m.
+    """Returns the groups of two or more people of one frame, in order of their ids.
 
-    hull: of the members' footprints on the ground; pos, vel: means; extent: covariance of the places (over n).
+    id (N,): person ids; group (N,): group ids, -1 = alone; pos, vel (N, D): m, m/s, D = 2 or 3. Of each group: pos,
+    vel: means over the members; extent (2, 2): covariance of their x and y (divided by the number of members), m²;
+    hull: convex hull of their footprints on the ground.
     """
     return groups_over_time(np.zeros(len(id), np.int64), id, group, pos, vel, 0, 1)[0]
 
@@ -27,60 +45,55 @@ def frame_groups(id: Ints, group: Ints, pos: Array, vel: Array) -> Groups:
 def groups_over_time(
     frame: Ints, id: Ints, group: Ints, pos: Array, vel: Array, first: int, length: int, px_per_m: float = 1.0
 ) -> list[Groups]:
-    """`frame_groups` of frames first … first + length - 1, from rows sorted by frame. In px with px_per_m other than 1:
-    footprints are then discs round the places in the image."""
-    rows, starts = _sorted_groups(frame, id, group)
-    counts = np.diff(np.append(starts, len(rows)))
-    hulls = footprint_hulls(pos[rows, :2] / px_per_m, counts)
-    return _assemble(frame, id, group, pos, vel, rows, starts, [h * px_per_m for h in hulls], first, length)
+    """Returns what `frame_groups` returns for each of the frames first … first + length - 1.
+
+    Rows: frame (R,); the other arrays as for `frame_groups`. px_per_m other than 1: pos and vel are in px and px/s, and
+    footprints are discs of that scale in the image; all results are then in px. A frame without a group gives empty
+    Groups.
+    """
+    rows, order = _member_rows(frame, id, group, pos, vel)
+    hulls = footprint_hulls(pos[order, :2] / px_per_m, rows.counts)
+    return _assemble(rows, [h * px_per_m for h in hulls], first, length)
 
 
 def box_groups(
     frame: Ints, id: Ints, group: Ints, pos: Array, vel: Array, box: Array, first: int, length: int
 ) -> list[Groups]:
-    """Like `groups_over_time`, in the image: hulls of the members' boxes (R, 4) ltwh."""
-    rows, starts = _sorted_groups(frame, id, group)
+    """Returns what `groups_over_time` returns in the image, with the convex hulls of the members' boxes.
+
+    box (R, 4): left, top, width, height in px; pos, vel: px, px/s.
+    """
+    rows, order = _member_rows(frame, id, group, pos, vel)
     low, high = box[:, :2], box[:, :2] + box[:, 2:]
     corners = np.stack([low, np.stack([high[:, 0], low[:, 1]], 1), high, np.stack([low[:, 0], high[:, 1]], 1)], 1)
-    ends = np.append(starts, len(rows))
-    hulls = [convex_hull(corners[rows[a:b]].reshape(-1, 2)) for a, b in pairwise(ends)]
-    return _assemble(frame, id, group, pos, vel, rows, starts, hulls, first, length)
+    ends = np.append(rows.starts, len(order))
+    hulls = [convex_hull(corners[order[a:b]].reshape(-1, 2)) for a, b in pairwise(ends)]
+    return _assemble(rows, hulls, first, length)
 
 
-def _sorted_groups(frame: Ints, id: Ints, group: Ints) -> tuple[Ints, Ints]:
-    """Rows of people in groups of 2 or more, sorted by (frame, group, id), and where each group starts among them."""
+def _member_rows(frame: Ints, id: Ints, group: Ints, pos: Array, vel: Array) -> tuple[_MemberRows, Ints]:
+    """The rows of people in groups of two or more, sorted, and their indices in the given arrays."""
     rows = np.lexsort((id, group, frame))
     rows = rows[group[rows] >= 0]
     new = (np.diff(frame[rows], prepend=-1) != 0) | (np.diff(group[rows], prepend=-1) != 0)
     number = np.cumsum(new) - 1
     rows = rows[np.bincount(number)[number] > 1] if len(rows) else rows
     new = (np.diff(frame[rows], prepend=-1) != 0) | (np.diff(group[rows], prepend=-1) != 0)
-    return rows, np.flatnonzero(new)
+    return _MemberRows(frame[rows], id[rows], group[rows], pos[rows], vel[rows], np.flatnonzero(new)), rows
 
 
-def _assemble(
-    frame: Ints,
-    id: Ints,
-    group: Ints,
-    pos: Array,
-    vel: Array,
-    rows: Ints,
-    starts: Ints,
-    hulls: Sequence[Array],
-    first: int,
-    length: int,
-) -> list[Groups]:
+def _assemble(rows: _MemberRows, hulls: Sequence[Array], first: int, length: int) -> list[Groups]:
+    """One Groups for each frame; hulls: of all groups, in the order of the rows."""
+    starts, counts = rows.starts, rows.counts
     if not len(starts):
         return [Groups.none()] * length
-    counts = np.diff(np.append(starts, len(rows)))
-    middle = np.add.reduceat(pos[rows], starts) / counts[:, None]
-    speed = np.add.reduceat(vel[rows], starts) / counts[:, None]
-    arm = (pos[rows] - np.repeat(middle, counts, axis=0))[:, :2]
+    middle = np.add.reduceat(rows.pos, starts) / counts[:, None]
+    speed = np.add.reduceat(rows.vel, starts) / counts[:, None]
+    arm = (rows.pos - np.repeat(middle, counts, axis=0))[:, :2]
     extent = np.add.reduceat(arm[:, :, None] * arm[:, None], starts) / counts[:, None, None]
-    people = id[rows]
-    members = [people[a:b] for a, b in pairwise([*starts.tolist(), len(rows)])]
-    cuts = np.searchsorted(frame[rows[starts]], np.arange(first, first + length + 1))
-    name = group[rows[starts]]
+    members = [rows.id[a:b] for a, b in pairwise([*starts.tolist(), len(rows.id)])]
+    cuts = np.searchsorted(rows.frame[starts], np.arange(first, first + length + 1))
+    name = rows.group[starts]
     size = counts.astype(float)
     return [
         Groups(name[a:b], tuple(members[a:b]), middle[a:b], speed[a:b], extent[a:b], size[a:b], tuple(hulls[a:b]))

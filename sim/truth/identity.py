@@ -1,8 +1,9 @@
-"""Which group is which: ids through merges and splits, and what became of whom. One rule for truth and trackers.
+"""Keeps group ids through merges and splits, and names the change between two partitions. For truth and trackers alike.
 
-A merge keeps the id of the parent with most members, a split gives it to the child with most: of all pairs of an old
-and a new group, those with most people in common are matched first. Ties: the older group, then the smaller id; among
-children the one with the smaller person id. Fewer than two in common is not the same group. All others get fresh ids.
+A merge keeps the id of the parent with most members; a split gives it to the child with most members. To this end pairs
+of an old and a new group are matched greedily, the pair with most people in common first. Ties go to the older group,
+then to the smaller group id, then to the new group with the smallest person id. Groups with fewer than two people in
+common are never the same group. New groups without a match get new ids.
 """
 
 from __future__ import annotations
@@ -18,7 +19,11 @@ ALONE = -1
 
 @dataclass(frozen=True, slots=True)
 class GroupChange:
-    """What happened between two partitions: before, after: sorted group ids, -1 once for each person alone."""
+    """What happened to a group between two partitions.
+
+    kind: merge, split, form (people alone become a group), dissolve (a group becomes people alone), enter or leave;
+    before, after: sorted ids of the groups concerned, -1 once for each person alone; members: sorted person ids.
+    """
 
     kind: str
     before: tuple[int, ...]
@@ -27,9 +32,10 @@ class GroupChange:
 
 
 def identify(old: Members, parts: Iterable[PersonSet], born: Mapping[int, int]) -> dict[PersonSet, int | None]:
-    """The old id that each new group (2 or more people) keeps; None: it needs a fresh one.
+    """Returns the old id that each new group keeps, None for a group that needs a new id.
 
-    old: members of each group before; born: when each old group came up, smaller is older.
+    old: members of each group before; parts: the new partition, in which sets of one person are ignored; born: when
+    each old group began.
     """
     new = sorted((p for p in parts if len(p) > 1), key=min)
     same = {people: g for g, people in old.items()}  # mostly nothing has changed: no need to compare all with all
@@ -39,8 +45,8 @@ def identify(old: Members, parts: Iterable[PersonSet], born: Mapping[int, int]) 
     shared = []
     for k, part in enumerate(new):
         if kept[part] is None:
-            held = Counter(was[p] for p in part if p in was)
-            shared += [(-n, born[g], g, k) for g, n in held.items()]
+            common_with = Counter(was[p] for p in part if p in was)
+            shared += [(-n, born[g], g, k) for g, n in common_with.items()]
     for common, _, g, k in sorted(shared):
         if common <= -2 and g not in taken and kept[new[k]] is None:
             kept[new[k]] = g
@@ -51,35 +57,41 @@ def identify(old: Members, parts: Iterable[PersonSet], born: Mapping[int, int]) 
 def lineage(
     old: Members, new: Members, before: PersonSet, now: PersonSet, entered: PersonSet = frozenset()
 ) -> list[GroupChange]:
-    """What happened to the groups between two partitions.
+    """Returns what happened to the groups between two partitions, old groups first, each kind in order of the ids.
 
-    before, now: all people of each. Who is not in both, and whoever is named in `entered`, came or went: a group
-    that grows or shrinks so neither merges nor splits. One whose people are all new enters, also round one person who
-    was there; one that is left with nobody, or with one, because others went, leaves.
+    old, new: members of each group; before, now: all people present; entered: people who count as having just entered
+    though they are in both. People who are not in both have entered or left.
+
+    A group that only grows or shrinks by such people gives no change. A new group enters if
+    all its people have just entered, or all but one who was alone. An old group leaves if all its people have left, or
+    all but one.
     """
     stay = (before & now) - entered
     was, is_ = _unit_of(old, before), _unit_of(new, now)
     unchanged = {g for g, people in old.items() if new.get(g) == people and people <= stay}
     found: list[GroupChange] = []
     for g in sorted(old.keys() - unchanged):
-        found += _of_old(g, old[g], stay, is_, now)
+        found += _changes_of_old(g, old[g], stay, is_, now)
     for g in sorted(new.keys() - unchanged):
-        found += _of_new(g, new[g], stay, was)
+        found += _changes_of_new(g, new[g], stay, was)
     return found
 
 
 def _unit_of(groups: Members, everybody: PersonSet) -> dict[int, int]:
-    """The group of each person; who is alone gets a negative number of their own."""
+    """The group id of each person; a person alone gets a negative number of their own."""
     unit = {p: -1 - k for k, p in enumerate(sorted(everybody))}
     return unit | {p: g for g, people in groups.items() for p in people}
 
 
 def _names(units: Iterable[int]) -> tuple[int, ...]:
+    """Sorted group ids, with -1 for each person alone."""
     return tuple(sorted(max(u, ALONE) for u in units))
 
 
-def _of_old(g: int, people: PersonSet, stay: PersonSet, is_: dict[int, int], now: PersonSet) -> list[GroupChange]:
-    """How an old group ended or fell into parts."""
+def _changes_of_old(
+    g: int, people: PersonSet, stay: PersonSet, is_: dict[int, int], now: PersonSet
+) -> list[GroupChange]:
+    """The split, dissolve or leave of an old group, if there is one."""
     left = people & stay
     targets = {is_[p] for p in left}
     if len(targets) > 1:
@@ -90,8 +102,8 @@ def _of_old(g: int, people: PersonSet, stay: PersonSet, is_: dict[int, int], now
     return []
 
 
-def _of_new(g: int, people: PersonSet, stay: PersonSet, was: dict[int, int]) -> list[GroupChange]:
-    """How a new group began or came together."""
+def _changes_of_new(g: int, people: PersonSet, stay: PersonSet, was: dict[int, int]) -> list[GroupChange]:
+    """The merge, form or enter of a new group, if there is one."""
     sources = {was[p] for p in people & stay}
     if len(sources) > 1:
         kind = "form" if max(sources) < 0 else "merge"
@@ -103,7 +115,10 @@ def _of_new(g: int, people: PersonSet, stay: PersonSet, was: dict[int, int]) -> 
 
 @dataclass
 class Identities:
-    """Groups through time. State: members of each living group, when each came up, the people there, the next id."""
+    """Group ids through time.
+
+    State: `groups`: members of each group; `born`: when each id began; `people`: all people present; `next_id`.
+    """
 
     next_id: int = 1
     groups: dict[int, PersonSet] = field(default_factory=dict)
@@ -113,7 +128,11 @@ class Identities:
     def step(
         self, t: int, people: PersonSet, parts: Iterable[PersonSet], entered: PersonSet = frozenset()
     ) -> list[GroupChange]:
-        """Take the partition of time t (singles may be left out); `groups` then has its ids. Arguments as `lineage`."""
+        """Takes the partition of time t and returns what has changed; `groups` then has the new members by id.
+
+        people: all people present; parts: the partition, in which people alone may be left out; entered: as in
+        `lineage`. Times must not fall.
+        """
         new: dict[int, PersonSet] = {}
         for part, kept in identify(self.groups, parts, self.born).items():
             g = self.next_id if kept is None else kept

@@ -1,6 +1,7 @@
-"""Groups of people in the image: hulls of their silhouettes, all frames at once.
+"""Groups in the image: hulls of their members' silhouettes, mean positions, extents, all frames at once.
 
-Each silhouette is taken as two POINTS-gons inscribed in the ellipses of body and head; their hulls are exact.
+A silhouette is two polygons of POINTS vertices, inscribed in the ellipses of body and head. The hull of these polygons
+is exact.
 """
 
 from __future__ import annotations
@@ -13,15 +14,17 @@ from sim.scene.body import Ellipsoids, Outlines, contour, outlines
 from sim.scene.camera import project
 from sim.types import Array, Camera, Groups, Ints, Truth
 
-POINTS = 24
-INSTANT = 0.02  # s: half the step that turns ground velocities into image velocities
+POINTS = 24  # vertices of each polygon
+INSTANT = 0.02  # s: half the step by which ground velocities become image velocities
 
 
 def image_groups(truth: Truth, ground: tuple[Groups, ...], camera: Camera, shapes: Ellipsoids) -> tuple[Groups, ...]:
-    """The groups on the ground, frame by frame, as the camera sees them; shapes: of the truth's rows.
+    """Returns the groups of each frame as the camera sees them, with the ids, members and sizes of the ground groups.
 
-    pos, extent: mean and covariance of the middles of the members' boxes, px; vel: of their middles, px/s. A group of
-    which somebody is behind the camera has nan and an empty hull.
+    ground: groups of each frame on the ground; shapes: ellipsoids of the people in the truth's rows. pos, extent: mean
+    (px) and covariance (px²) of the middles of the members' boxes; vel: mean velocity of their bodies' centres, px/s;
+    hull: of their silhouettes, px. A group with a member behind the camera has nan and an empty hull. The truth must
+    have boxes and velocities.
     """
     assert truth.box is not None
     assert truth.vel is not None
@@ -40,7 +43,7 @@ def image_groups(truth: Truth, ground: tuple[Groups, ...], camera: Camera, shape
 
 
 def _members(truth: Truth, ground: tuple[Groups, ...]) -> tuple[Ints, Ints]:
-    """Rows of the members of all groups, one group after the other, and where each group begins (and the end)."""
+    """Rows of the members of all groups, group after group, and where each group begins (G + 1,), the end last."""
     starts = np.searchsorted(truth.frame, np.arange(1, len(ground) + 1))
     rows, sizes = [np.zeros(0, np.int64)], [0]
     for index, (start, groups) in enumerate(zip(starts, ground, strict=True), start=1):
@@ -51,13 +54,17 @@ def _members(truth: Truth, ground: tuple[Groups, ...]) -> tuple[Ints, Ints]:
 
 
 def _means(values: Array, cuts: Ints) -> Array:
-    """Mean of each group's rows, (G, ...)."""
+    """Mean (G, ...) of the values of each group's rows."""
     count = np.diff(cuts).reshape(-1, *[1] * (values.ndim - 1))
     return np.asarray(np.add.reduceat(values, cuts[:-1], axis=0) / count) if len(count) else values[:0]
 
 
 def hulls(ellipses: Outlines, cuts: Ints) -> list[Array]:
-    """Hulls (V, 2) of groups of silhouettes, counter-clockwise in (u, v); (0, 2) where a silhouette is nan."""
+    """Returns the convex hull (V, 2) of each group of silhouettes, px, counter-clockwise in (u, v).
+
+    ellipses: of all members, group after group; cuts (G + 1,): where each group begins, the end last. A group with a
+    silhouette that is nan gets an empty hull (0, 2).
+    """
     from sim.geometry import hull_kernels
 
     edge = contour(ellipses, POINTS)[: cuts[-1]]
@@ -66,6 +73,6 @@ def hulls(ellipses: Outlines, cuts: Ints) -> list[Array]:
 
 
 def image_velocities(camera: Camera, middle: Array, vel: Array) -> Array:
-    """px/s (N, 2) of points (N, 3) that move at vel (N, 2) m/s over level ground."""
+    """Returns the velocities (N, 2) in px/s of points (N, 3), m, that move at vel (N, 2), m/s, over level ground."""
     step = INSTANT * np.column_stack([vel, np.zeros(len(vel))])
     return np.asarray((project(camera, middle + step)[0] - project(camera, middle - step)[0]) / (2 * INSTANT))

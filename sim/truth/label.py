@@ -1,7 +1,7 @@
-"""What is true of a simulated crowd: bodies as the camera sees them, groups and events as they are measured.
+"""Makes the truth of a motion: bodies as the camera sees them, and groups and events as they are measured.
 
-`bodies` is the part that sensors need; `label` adds groups, events and hard negatives. Nothing here knows when an
-order was given; whether orders came true is asked afterwards, by sim.truth.order_fulfilment.
+`bodies` gives the part that sensors need; `label` adds groups, events and hard negatives. The times of orders are not
+used; sim.truth.order_fulfilment checks afterwards whether the orders came true.
 """
 
 from __future__ import annotations
@@ -18,11 +18,15 @@ from sim.types import Camera, GroupEvent, Groups, Ints, Motion, Truth
 
 
 def bodies(motion: Motion, camera: Camera | None) -> Truth:
-    """Places, boxes, visibility of everybody in every frame; no groups and no events (group is -1 throughout)."""
+    """Returns positions, boxes and visibility of every person in every frame; group is -1, groups and events are None.
+
+    camera: None for no camera; boxes, truncation and visible boxes are then None, and visibility is 1.
+    """
     return _bodies(motion, camera, recorded_bodies(motion))
 
 
 def _bodies(motion: Motion, camera: Camera | None, people: RecordedBodies) -> Truth:
+    """`bodies`, with the rows and shapes of the people given."""
     t, p = people.frame - 1, people.id - 1
     seen = None if camera is None else measure_visibility(
         camera, motion.scene, people.frame, people.pos3, motion.height[p], people.shapes
@@ -49,7 +53,10 @@ def _bodies(motion: Motion, camera: Camera | None, people: RecordedBodies) -> Tr
 
 
 def label(motion: Motion, camera: Camera | None) -> Truth:
-    """All that is true: `bodies`, and groups, events and hard negatives measured from motion and intent."""
+    """Returns the whole truth: `bodies`, and groups, events and hard negatives measured from motion and intent.
+
+    camera: None for no camera; there are then no groups in the image.
+    """
     from sim.truth.merge_split_events import groups_and_events
 
     people = recorded_bodies(motion)
@@ -67,6 +74,7 @@ def label(motion: Motion, camera: Camera | None) -> Truth:
 
 
 def _events(motion: Motion, group: Ints, changes: tuple[GroupEvent, ...]) -> tuple[GroupEvent, ...]:
+    """The events of group membership together with crossings and queues, sorted by start, end, kind and members."""
     from sim.truth.crossing_events import crossings
     from sim.truth.queue_detection import queues
 
@@ -77,6 +85,7 @@ def _events(motion: Motion, group: Ints, changes: tuple[GroupEvent, ...]) -> tup
 
 
 def _ground_groups(truth: Truth) -> Iterator[Groups]:
+    """The groups of each frame on the ground."""
     from sim.truth.group_hulls import frame_groups
 
     assert truth.pos is not None

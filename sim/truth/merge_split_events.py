@@ -1,4 +1,8 @@
-"""Makes the merge, split, form, dissolve, enter and leave events of a crowd, and the group id of each person."""
+"""Makes the merge, split, form, dissolve, enter and leave events of a crowd, and the group id of each person.
+
+Steps: sim.truth.group_membership says who is together in each frame, sim.truth.identity which group keeps its id and
+what kind of event a change is. Crossings and queues: sim.truth.crossing_events, sim.truth.queue_detection.
+"""
 
 from __future__ import annotations
 
@@ -16,7 +20,11 @@ from sim.types import Array, Bools, GroupEvent, Ints, Near
 
 @dataclass(frozen=True, slots=True, eq=False)
 class GroupsAndEvents:
-    """group (T, P): id from 1, -1 alone or absent. events: all kinds but cross and queue. near: strangers."""
+    """What is measured of groups.
+
+    group (T, P): id of each person's group, from 1; -1 for a person who is alone or absent. events: of all kinds but
+    cross and queue, in order of their frames. near: pairs of strangers who satisfy the merge rule (hard negatives).
+    """
 
     group: Ints
     events: tuple[GroupEvent, ...]
@@ -24,9 +32,14 @@ class GroupsAndEvents:
 
 
 def groups_and_events(pos: Array, vel: Array, present: Bools, intent: Ints, fps: float) -> GroupsAndEvents:
-    """Truth of groups; pos, vel (T, P, 2) nan where absent, intent (T, P) -1 where absent. Person id is column + 1.
+    """Returns the groups, events and near strangers of a motion.
 
-    An event starts at its onset and ends when its rule has come true. Groups that are there in frame 1 do not enter.
+    pos, vel (T, P, 2): m, m/s; present (T, P); intent (T, P): index of the group a person is meant to belong to. pos
+    and vel are nan, intent is -1 where a person is absent. The id of a person is the column + 1.
+
+    A merge, split, form or dissolve event starts in the first frame in which its rule holds, and ends when the rule has
+    held for HOLD_TIME. An enter event lies in the group's first frame, a leave event in the last frame before the
+    change. Groups that are there in frame 1 have no enter event.
     """
     group = np.full(present.shape, -1, np.int64)
     identities, events = Identities(), []
@@ -42,7 +55,7 @@ def groups_and_events(pos: Array, vel: Array, present: Bools, intent: Ints, fps:
 
 
 def _event(change: GroupChange, t: int, hold: int, pos: Array) -> GroupEvent:
-    """The event of a change at t (from 0), where its people are; who left was last there one frame before."""
+    """The event of a change in frame t (from 0); its position is the mean of its people in its first frame."""
     start = t if change.kind == "leave" else t + 1
     end = start if change.kind in ("enter", "leave") else start + hold - 1
     x, y = mean_of_present(pos[start - 1 : start, list(change.members)])[0]

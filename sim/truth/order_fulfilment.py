@@ -1,7 +1,8 @@
-"""Did the script's orders come true? Asked of the finished truth; the measurement itself never sees an order.
+"""Checks whether the orders of the script came true, from the finished truth, which is measured without the orders.
 
-An order is fulfilled by a measured event of its kind, with the right people, whose stretch starts no earlier than the
-order's firing and whose rule has come true within 10 s of it (the 2 or 3 s of the rule included).
+An order is fulfilled by a measured event of its kind, with the right people, that starts no earlier than the order
+fired. The event's rule must have held for its whole time within PATIENCE of the firing. Orders are carried out by
+sim.crowd.order_execution.
 """
 
 from __future__ import annotations
@@ -14,8 +15,10 @@ from sim.truth.queue_detection import QUEUE_PEOPLE, QUEUE_TIME, WAITING_SPEED, d
 from sim.truth.queue_shapes import MAX_SPACING, MIN_SPACING
 from sim.types import Array, Bools, GroupEvent, Ints, Motion, Order, Truth
 
-PATIENCE = 10.0  # s from the firing until the rule has come true
+PATIENCE = 10.0  # s from the firing of an order until its rule has come true
+# s for which the rule of each kind of order must hold
 RULE_TIME = {"merge": HOLD_TIME, "split": HOLD_TIME, "queue": QUEUE_TIME}
+# kinds of events that fulfil each kind of order
 KINDS = {"merge": ("merge", "form"), "split": ("split", "dissolve"), "queue": ("queue",)}
 WORDS = {
     "merge": f"nearest members < {MERGE_DISTANCE:g} m and velocities differing < {MERGE_VELOCITY:g} m/s "
@@ -28,7 +31,11 @@ WORDS = {
 
 
 def check_orders(motion: Motion, truth: Truth) -> dict[str, int]:
-    """The index in `truth.events` of the event that fulfils each order; WorkError for the first that none does."""
+    """Returns for each order id the index in `truth.events` of the event that fulfils it.
+
+    Raises WorkError for the first order that no event fulfils, and for a queue that people left in another order than
+    they stood in. The error says how close the motion came to the rule.
+    """
     group = dense_groups(truth, motion.present.shape)
     fulfilled = {}
     for order in motion.orders:
@@ -37,34 +44,37 @@ def check_orders(motion: Motion, truth: Truth) -> dict[str, int]:
             raise _unfulfilled(order, motion, truth.length)
         fulfilled[order.id] = index
         if order.kind == "queue":
-            _check_turns(order, motion, (truth.events or ())[index])
+            _check_fifo(order, motion, (truth.events or ())[index])
     return fulfilled
 
 
-def _check_turns(order: Order, motion: Motion, event: GroupEvent) -> None:
-    """WorkError where people left the queue of an order in another order than they stood: first in, first out."""
-    for line in detect_queues(motion.pos, motion.vel, motion.present, motion.fps):
-        people = {p + 1 for p in line.order}
-        if (line.first + 1, line.last + 1) == (event.start, event.end) and people == set(event.members):
-            if not line.fifo:
+def _check_fifo(order: Order, motion: Motion, event: GroupEvent) -> None:
+    """Raises WorkError if the people of a queue did not leave it first in, first out."""
+    for queue in detect_queues(motion.pos, motion.vel, motion.present, motion.fps):
+        people = {p + 1 for p in queue.order}
+        if (queue.first + 1, queue.last + 1) == (event.start, event.end) and people == set(event.members):
+            if not queue.fifo:
                 raise WorkError(
                     file=f"scenario {motion.name}", place=f"event {order.id} (seed {motion.seed})",
-                    got=f"a queue left by people {', '.join(str(p + 1) for p in line.left)} in this order",
-                    expected=f"first in, first out: {', '.join(str(p + 1) for p in line.order)} or from the other end",
+                    got=f"a queue left by people {', '.join(str(p + 1) for p in queue.left)} in this order",
+                    expected=f"first in, first out: {', '.join(str(p + 1) for p in queue.order)} or from the other end",
                     remedy="give the line more room, or let people come from behind it",
                 )  # fmt: skip
             return
 
 
 def dense_groups(truth: Truth, shape: tuple[int, ...]) -> Ints:
-    """Group of each person in each frame (T, P): -1 alone, -2 absent."""
+    """Returns the group id of each person in each frame, of shape (T, P): -1 = alone, -2 = absent."""
     group = np.full(shape, -2, np.int64)
     group[truth.frame - 1, truth.id - 1] = truth.group
     return group
 
 
 def fulfilment(order: Order, truth: Truth, group: Ints) -> int | None:
-    """The first event that fulfils the order; group (T, P) as dense_groups gives it."""
+    """Returns the index in `truth.events` of the first event that fulfils an order, None if no event does.
+
+    group (T, P): result of `dense_groups`. An order that never fired is not fulfilled.
+    """
     if order.fired is None:
         return None
     last = order.fired + (PATIENCE - RULE_TIME[order.kind]) * truth.fps
@@ -75,7 +85,11 @@ def fulfilment(order: Order, truth: Truth, group: Ints) -> int | None:
 
 
 def _concerns(event: GroupEvent, order: Order, group: Ints) -> bool:
-    """Whether this event brings about what the order wants."""
+    """True if an event of the right kind and time does what the order says.
+
+    Queue: at least QUEUE_PEOPLE of the order's people, or all if they are fewer, are members. Merge and split: the
+    event has some of the order's people, and its first frame, but not the frame before, shows the order's groups.
+    """
     if order.kind == "queue":
         people = {p for part in order.before for p in part}
         return len(people & set(event.members)) >= min(QUEUE_PEOPLE, len(people))
@@ -87,17 +101,18 @@ def _concerns(event: GroupEvent, order: Order, group: Ints) -> bool:
 
 
 def _together(wanted: list[Ints], group: Ints) -> bool:
-    """All people of each part in one group."""
+    """True if the people of each part are in one group; a part of one person always is."""
     return all(group[w[0]] >= 0 and bool((group[w] == group[w[0]]).all()) for w in wanted if len(w) > 1)
 
 
 def _apart(wanted: list[Ints], group: Ints) -> bool:
-    """No group holds people of two parts."""
-    held = [set(group[w][group[w] >= 0].tolist()) for w in wanted]
-    return sum(map(len, held)) == len(set().union(*held))
+    """True if no group has people of two parts."""
+    ids = [set(group[w][group[w] >= 0].tolist()) for w in wanted]
+    return sum(map(len, ids)) == len(set().union(*ids))
 
 
 def _unfulfilled(order: Order, motion: Motion, length: int) -> WorkError:
+    """The error of an order that no event fulfils; length: frames of the recording."""
     place = f"event {order.id} (seed {motion.seed})"
     if order.fired is None:
         return WorkError(
@@ -117,7 +132,11 @@ def _unfulfilled(order: Order, motion: Motion, length: int) -> WorkError:
 
 
 def closest(order: Order, motion: Motion, window: slice) -> str:
-    """The values that came nearest to the rule, in words."""
+    """Returns in words how close the motion came to an order's rule within a window of frames.
+
+    Queue: the greatest number of people who waited at once. Merge: the smallest distance; split: the greatest distance;
+    both with the velocity difference at that time.
+    """
     pos, vel, present = motion.pos[window], motion.vel[window], motion.present[window]
     if not len(pos):
         return "the recording had ended"
@@ -140,15 +159,16 @@ def closest(order: Order, motion: Motion, window: slice) -> str:
 
 
 def _longest(holds: Bools) -> int:
-    """Frames of the longest stretch of True."""
+    """Number of frames of the longest stretch of True in holds (T,)."""
     edges = np.flatnonzero(np.diff(np.concatenate([[False], holds, [False]]).astype(np.int8)))
     return int((edges[1::2] - edges[::2]).max(initial=0))
 
 
 def _gaps(columns: list[Ints], pos: Array, vel: Array, present: Bools, widest: bool) -> tuple[Array, Array]:
-    """Per frame (T,): distance of nearest members and velocity difference between one part and the rest, nan if absent.
+    """Distance in m of the nearest members, and velocity difference in m/s, of one part and all others, each (T,).
 
-    Of more than two parts, the one that lags behind: the widest gap (it has to close) or the narrowest (to open).
+    The part is chosen in each frame: that with the widest gap (`widest`, for merges) or the narrowest gap (for splits).
+    nan where nobody to compare is present.
     """
     gaps, differences = [], []
     for i, a in enumerate(columns):
@@ -163,6 +183,7 @@ def _gaps(columns: list[Ints], pos: Array, vel: Array, present: Bools, widest: b
 
 
 def _mean_velocity(vel: Array, present: Bools, columns: Ints) -> Array:
+    """Mean velocity (T, 2) of the people in these columns who are present, m/s; nan where none is."""
     n = present[:, columns].sum(axis=1)[:, None]
     total = np.where(present[:, columns, None], vel[:, columns], 0.0).sum(axis=1)
     return np.where(n > 0, total / np.maximum(n, 1), np.nan)

@@ -1,4 +1,6 @@
-"""Who is near whom, over a whole sequence at once, and stretches of time that pairs have in common."""
+"""Finds pairs of people near each other, stretches of time that pairs share, and strangers who satisfy the merge
+rule.
+"""
 
 from __future__ import annotations
 
@@ -9,11 +11,14 @@ import numpy as np
 from sim.truth.merge_split_rules import HOLD_TIME, MERGE_DISTANCE, MERGE_VELOCITY, frames_of
 from sim.types import Array, Bools, Ints, Near
 
-CHUNK = 200_000  # people times frames looked at together: bounds memory
+CHUNK = 200_000  # rows handled together: bounds memory
 
 
 def close_pairs(frame: Ints, pos: Array, reach: float) -> tuple[Ints, Ints]:
-    """All pairs of rows i < j of one frame that are nearer than `reach`; frame (R,) sorted, pos (R, 2)."""
+    """Returns all pairs of rows i < j of the same frame that are less than `reach` apart, sorted by (i, j).
+
+    frame (R,): ascending; pos (R, 2), in the unit of reach. Both results have shape (K,).
+    """
     found = [_pairs_of(frame, pos, low, high, reach) for low, high in _portions(frame)]
     i, j = (np.concatenate([np.zeros(0, np.int64), *(f[k] for f in found)]) for k in (0, 1))
     order = np.lexsort((j, i))
@@ -21,7 +26,7 @@ def close_pairs(frame: Ints, pos: Array, reach: float) -> tuple[Ints, Ints]:
 
 
 def _portions(frame: Ints) -> Iterator[tuple[int, int]]:
-    """Slices of whole frames with about CHUNK rows each."""
+    """Ranges of rows that hold whole frames, of about CHUNK rows each."""
     low = 0
     while low < len(frame):
         high = int(np.searchsorted(frame, frame[min(low + CHUNK, len(frame)) - 1], side="right"))
@@ -30,7 +35,11 @@ def _portions(frame: Ints) -> Iterator[tuple[int, int]]:
 
 
 def _pairs_of(frame: Ints, pos: Array, low: int, high: int, reach: float) -> tuple[Ints, Ints]:
-    """Rows are sorted by (frame, column, row) of a grid of `reach`; a neighbour is in one of two runs behind a row."""
+    """The close pairs among rows low … high - 1, unsorted.
+
+    Rows are sorted by frame and by the cells of a grid as wide as `reach`; all neighbours of a row then lie in two runs
+    behind it.
+    """
     f, p = frame[low:high] - frame[low], pos[low:high]
     cell = np.floor((p - p.min(axis=0)) / reach).astype(np.int64) + 1
     rows, columns = int(cell[:, 1].max()) + 2, int(cell[:, 0].max()) + 2
@@ -41,22 +50,23 @@ def _pairs_of(frame: Ints, pos: Array, low: int, high: int, reach: float) -> tup
     i1, j1 = runs(here + 1, np.searchsorted(key, key + 1, side="right"))
     i2, j2 = runs(np.searchsorted(key, key + rows - 1), np.searchsorted(key, key + rows + 1, side="right"))
     i, j = order[np.concatenate([i1, i2])], order[np.concatenate([j1, j2])]
-    near = ((p[i] - p[j]) ** 2).sum(axis=1) < reach**2
-    i, j = i[near] + low, j[near] + low
+    close = ((p[i] - p[j]) ** 2).sum(axis=1) < reach**2
+    i, j = i[close] + low, j[close] + low
     return np.minimum(i, j), np.maximum(i, j)
 
 
 def runs(first: Ints, end: Ints) -> tuple[Ints, Ints]:
-    """For each row k the pairs (k, first[k]) … (k, end[k] - 1)."""
+    """Returns the pairs (k, first[k]) … (k, end[k] - 1) for each k, as two arrays; first, end (K,)."""
     n = np.maximum(end - first, 0)
     i = np.repeat(np.arange(len(n)), n)
     return i, np.arange(len(i)) - np.repeat(np.cumsum(n) - n, n) + first[i]
 
 
 def stretches(pair: Ints, frame: Ints, least: int, bridge: int = 1) -> tuple[Ints, Ints, Ints]:
-    """(pair, first, last) of each run of `least` or more frames, no more than `bridge` from one to the next.
+    """Returns (pair, first frame, last frame) of each stretch that is at least `least` frames long.
 
-    Rows (K,) sorted by (pair, frame).
+    pair, frame (K,): rows sorted by (pair, frame). A stretch is a run of rows of one pair whose frames are at most
+    `bridge` apart; 1 means without a gap.
     """
     if not len(pair):
         return pair, frame, frame
@@ -68,9 +78,11 @@ def stretches(pair: Ints, frame: Ints, least: int, bridge: int = 1) -> tuple[Int
 
 
 def strangers(pos: Array, vel: Array, present: Bools, intent: Ints, group: Ints, fps: float) -> Near:
-    """Hard negatives: stretches in which two people satisfy the merge rule though they do not belong together.
+    """Returns the hard negatives: stretches in which two people satisfy the merge rule but do not belong together.
 
-    Arrays (T, P, …); who are still in one group (it has not yet split) are no strangers. Person ids are column + 1.
+    pos, vel (T, P, 2): m, m/s; present (T, P); intent (T, P): index of the group a person is meant to belong to; group
+    (T, P): measured group ids, -1 = alone. Two people of one measured group, which has not split yet, are no strangers.
+    The rule holds for at least HOLD_TIME. Frames count from 1, a person's id is the column + 1.
     """
     t, p = np.nonzero(present)
     i, j = close_pairs(t, pos[t, p], MERGE_DISTANCE)

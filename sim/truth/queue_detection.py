@@ -1,4 +1,9 @@
-"""Lines of waiting people: found moment by moment as queue_shapes, followed through time by who is in them."""
+"""Recognises queues in measured motion: people who wait in line behind one another. For truth and trackers alike.
+
+In each moment sim.truth.queue_shapes finds the lines of people who wait. Here lines are followed through time by the
+people in them, and those that last long enough become queues. Serving queues in the simulation:
+sim.crowd.queue_service.
+"""
 
 from __future__ import annotations
 
@@ -13,25 +18,27 @@ from sim.truth.proximity import close_pairs, stretches
 from sim.truth.queue_shapes import MAX_SPACING, QueueShapes, queue_shapes
 from sim.types import Array, Bools, GroupEvent, Ints
 
-WAITING_SPEED = 0.4  # m/s
-ADVANCE_TIME = 3.0  # s: one who waited and will wait again within so long is advancing (a pair served moves all by two)
-QUEUE_TIME = 3.0  # s with three people or more
-QUEUE_PEOPLE = 3  # people, for a queue to be one
-BRIDGE_TIME = 1.5  # s: a line may be lost for so long
-MEMBER_TIME = 1.0  # s in line, to count as one of it
-SIDEWAYS_SPEED = 0.1  # m/s: a line that as a whole moves sideways, and less along, is a row of people abreast
-MAX_RATE = 10.0  # Hz: looked at no more often
+WAITING_SPEED = 0.4  # m/s: slower people wait
+ADVANCE_TIME = 3.0  # s: people who move for no longer between two waits advance in the queue, and count as waiting
+QUEUE_TIME = 3.0  # s for which a queue must have QUEUE_PEOPLE
+QUEUE_PEOPLE = 3
+BRIDGE_TIME = 1.5  # s for which a line may be lost
+MEMBER_TIME = 1.0  # s in line, from which a person counts as a member of the queue
+SIDEWAYS_SPEED = 0.1  # m/s: a line that moves sideways faster than this, and less along itself, is no queue
+MAX_RATE = 10.0  # Hz, at most, at which moments are examined
 
 Vector = tuple[float, float]
 
 
 @dataclass(frozen=True, slots=True)
 class DetectedQueue:
-    """A queue: first and last frame (from 0), columns of its people in the order in which they came to stand (whichever
-    end was the head), `left`: those who left it before the end, in the order of leaving; middle: where.
+    """A queue.
 
-    fifo: whether all who left stood, when last in line, at one and the same end of it (next to none but such as left
-    within a second, too)."""
+    first, last: frames from 0; order: columns of its members from one end of the line to the other (either end may be
+    the head), people who joined later being inserted between those they stood between; left: members who left before
+    the end, in the order of leaving; middle: of the line in its first moment, m; fifo: True if everyone who left did
+    so from the same end of the line; a person may leave up to MEMBER_TIME before people nearer to that end.
+    """
 
     first: int
     last: int
@@ -42,8 +49,12 @@ class DetectedQueue:
 
 
 @dataclass(frozen=True, slots=True)
-class _Moment:
-    """A chain at time t (frame from 0): columns in order, direction, middle, mean velocity along it and aside."""
+class _LineNow:
+    """A line in frame t (from 0).
+
+    order: columns from one end to the other; u: unit vector from the first person towards the last; middle: m; drift:
+    mean velocity of its people along u and to the left of it, m/s.
+    """
 
     t: int
     order: tuple[int, ...]
@@ -51,37 +62,46 @@ class _Moment:
     middle: Vector
     drift: Vector
 
-    def turned(self) -> _Moment:
-        """The same, looked at from its other end."""
+    def turned(self) -> _LineNow:
+        """The same line with its ends exchanged."""
         return replace(self, order=self.order[::-1], u=(-self.u[0], -self.u[1]), drift=(-self.drift[0], -self.drift[1]))
 
 
 @dataclass
-class _Followed:
-    """A line being followed. State: when last seen, and as what; since when and until when it had three people;
-    moments in it, last moment and rank of each person; sums of the velocity along and aside over moments."""
+class _FollowedLine:
+    """A line that is followed through time.
 
-    now: _Moment
+    State: `now`: the line when last seen; `since`: the first frame with QUEUE_PEOPLE, and `three`: the last such frame;
+    `middle`: in the first frame; by person: `seen`: number of moments in the line, `gone`: the line in the last of
+    these; `ranks`: all people in order; `drift`: sum of the drifts over `moments` moments.
+    """
+
+    now: _LineNow
     since: int
     three: int
     middle: Vector
     seen: dict[int, int] = field(default_factory=dict)
-    gone: dict[int, _Moment] = field(default_factory=dict)
+    gone: dict[int, _LineNow] = field(default_factory=dict)
     ranks: list[int] = field(default_factory=list)
     drift: Vector = (0.0, 0.0)
     moments: int = 0
 
 
 def queues(pos: Array, vel: Array, present: Bools, group: Ints, fps: float) -> list[GroupEvent]:
-    """Three or more people waiting in line for 3 s or longer; the event lasts until less than two do.
+    """Returns a queue event for each queue, in order of their first frames.
 
-    Spacing along the line 0.4-1.5 m, nobody more than 0.5 m off it, slower than 0.4 m/s except when advancing.
-    start is the onset, members all who stood in the line for a second or more, pos its
-    middle then; before and after are the members' groups (T, P) in the first and in the last frame.
+    pos, vel (T, P, 2): m, m/s; present (T, P); group (T, P): group ids, -1 = alone. A queue is a line (queue_shapes) of
+    waiting people that has QUEUE_PEOPLE for at least QUEUE_TIME. Waiting means slower than WAITING_SPEED, except when
+    advancing.
+
+    The event starts in the first frame with QUEUE_PEOPLE and ends when fewer than two are left in line. Its members are
+    all people who were in line for MEMBER_TIME; a queue without one gives no event. Its position is the middle of the
+    line in the first frame. before, after: sorted ids of the members' groups in the first and last frame, -1 once for
+    each member alone. The id of a person is the column + 1; frames count from 1.
     """
     found = []
     for q in detect_queues(pos, vel, present, fps):
-        if not q.order:  # nobody stayed for a second
+        if not q.order:
             continue
         columns = np.array(sorted(q.order))
         before, after = (_groups_of(group[t, columns[present[t, columns]]]) for t in (q.first, q.last))
@@ -96,37 +116,43 @@ def _groups_of(label: Ints) -> tuple[int, ...]:
 
 
 def detect_queues(pos: Array, vel: Array, present: Bools, fps: float) -> list[DetectedQueue]:
-    """All queues; pos, vel (T, P, 2), present (T, P)."""
+    """Returns all queues, sorted by first frame, last frame and members; arguments as for `queues`."""
     there = present & np.isfinite(pos).all(axis=2)
     stride = max(1, round(fps / MAX_RATE))
     hold, bridge = frames_of(QUEUE_TIME, fps), max(frames_of(BRIDGE_TIME, fps), stride)
-    following: list[_Followed] = []
+    following: list[_FollowedLine] = []
     found: list[DetectedQueue] = []
-    for t, moments in groupby(_moments(pos, vel, waiting(vel, there, fps), stride), key=lambda m: m.t):
+    for t, moments in groupby(_lines(pos, vel, waiting_people(vel, there, fps), stride), key=lambda m: m.t):
         ended = [f for f in following if t - f.now.t > bridge]
         following = [f for f in following if t - f.now.t <= bridge]
-        found += [line for f in ended for line in _finished(f, hold, stride, fps)]
+        found += [queue for f in ended for queue in _finished(f, hold, stride, fps)]
         for moment in moments:
             _follow(following, moment, hold, bridge)
-    found += [line for f in following for line in _finished(f, hold, stride, fps)]
+    found += [queue for f in following for queue in _finished(f, hold, stride, fps)]
     return sorted(found, key=lambda q: (q.first, q.last, q.order))
 
 
-def waiting(vel: Array, there: Bools, fps: float) -> Bools:
-    """Who (T, P) waits: slower than 0.4 m/s, or between two moments of that no more than 3 s apart."""
+def waiting_people(vel: Array, there: Bools, fps: float) -> Bools:
+    """Returns True (T, P) for each person who waits.
+
+    A person waits who is slower than WAITING_SPEED, or was and will be with at most ADVANCE_TIME between. vel (T, P,
+    2): m/s; there (T, P): the person is present.
+    """
     with np.errstate(invalid="ignore"):
         slow = there & (np.hypot(vel[..., 0], vel[..., 1]) < WAITING_SPEED)
     p, t = np.nonzero(slow.T)
     out = np.zeros((len(slow) + 1, slow.shape[1]), np.int64)
-    who, first, last = stretches(p, t, 1, frames_of(ADVANCE_TIME, fps))
-    np.add.at(out, (first, who), 1)
-    np.add.at(out, (last + 1, who), -1)
+    person, first, last = stretches(p, t, 1, frames_of(ADVANCE_TIME, fps))
+    np.add.at(out, (first, person), 1)
+    np.add.at(out, (last + 1, person), -1)
     return np.asarray((np.cumsum(out, axis=0)[:-1] > 0) & there)
 
 
-def _moments(pos: Array, vel: Array, waits: Bools, stride: int) -> list[_Moment]:
-    """The shapes of all moments looked at, ordered by time; of two people only where both are elsewhen in a longer
-    one."""
+def _lines(pos: Array, vel: Array, waits: Bools, stride: int) -> list[_LineNow]:
+    """The lines of every `stride`-th frame, ordered by time.
+
+    A line of two people is left out unless each of them is in a line of QUEUE_PEOPLE in some frame.
+    """
     t, p = np.nonzero(waits[::stride])
     i, j = close_pairs(t, pos[t * stride, p], MAX_SPACING)
     tables = list(queue_shapes(pos[t * stride, p], i, j))
@@ -134,32 +160,38 @@ def _moments(pos: Array, vel: Array, waits: Bools, stride: int) -> list[_Moment]
     for c in tables:
         long = np.arange(c.rows.shape[1]) < np.where(c.count >= QUEUE_PEOPLE, c.count, 0)[:, None]
         queuing[p[c.rows[long]]] = True
-    made: list[_Moment] = []
+    made: list[_LineNow] = []
     for c in tables:
-        made += _of_table(c, t * stride, p, vel, (c.count >= QUEUE_PEOPLE) | queuing[p[c.rows[:, :2]]].all(axis=1))
+        kept = (c.count >= QUEUE_PEOPLE) | queuing[p[c.rows[:, :2]]].all(axis=1)
+        made += _of_table(c, t * stride, p, vel, kept)
     return sorted(made, key=lambda m: (m.t, min(m.order)))
 
 
-def _of_table(c: QueueShapes, t: Ints, p: Ints, vel: Array, kept: Bools) -> Iterator[_Moment]:
+def _of_table(c: QueueShapes, t: Ints, p: Ints, vel: Array, kept: Bools) -> Iterator[_LineNow]:
+    """The lines of a table that are `kept` (M,); t, p: frame and column of each place."""
     within = np.arange(c.rows.shape[1]) < c.count[:, None]
     mean = np.where(within[..., None], np.nan_to_num(vel[t[c.rows], p[c.rows]]), 0.0).sum(axis=1) / c.count[:, None]
     along, aside = (mean * c.u).sum(axis=1), mean[:, 1] * c.u[:, 0] - mean[:, 0] * c.u[:, 1]
     columns = [t[c.rows[:, 0]], c.count, *c.u.T, *c.middle.T, along, aside]
     table = zip(p[c.rows][kept].tolist(), *(x[kept].tolist() for x in columns), strict=True)
     for people, when, n, ux, uy, x, y, forward, sideways in table:
-        yield _Moment(when, tuple(people[:n]), (ux, uy), (x, y), (forward, sideways))
+        yield _LineNow(when, tuple(people[:n]), (ux, uy), (x, y), (forward, sideways))
 
 
-def _follow(following: list[_Followed], now: _Moment, hold: int, bridge: int) -> None:
-    """Take a chain as the next moment of the line with most of its people, or as a new line."""
+def _follow(following: list[_FollowedLine], now: _LineNow, hold: int, bridge: int) -> None:
+    """Adds a line to the followed line with most of its people, or follows it as a new one.
+
+    A followed line fits if it shares at least two people with the line, in the same order. A line of fewer than
+    QUEUE_PEOPLE that fits none is dropped.
+    """
     people, long = set(now.order), len(now.order) >= QUEUE_PEOPLE
     fits = [f for f in following if f.now.t < now.t and len(people.intersection(f.now.order)) > 1]
-    fits = [f for f in fits if _continues(f.now, now)]
+    fits = [f for f in fits if _same_order(f.now, now)]
     if fits:
         f = max(fits, key=lambda f: (len(people.intersection(f.now.order)), -f.since))
         now = now if _dot(f.now.u, now.u) >= 0 else now.turned()
     elif long:
-        f = _Followed(now, now.t, now.t, now.middle)
+        f = _FollowedLine(now, now.t, now.t, now.middle)
         following.append(f)
     else:
         return
@@ -170,21 +202,21 @@ def _follow(following: list[_Followed], now: _Moment, hold: int, bridge: int) ->
     f.now = now
     f.drift = (f.drift[0] + now.drift[0], f.drift[1] + now.drift[1])
     f.moments += 1
-    _note(f)
+    _record_people(f)
 
 
 def _dot(a: Vector, b: Vector) -> float:
     return a[0] * b[0] + a[1] * b[1]
 
 
-def _continues(before: _Moment, now: _Moment) -> bool:
-    """Whether those of the line who stand in the chain do so in the same order."""
+def _same_order(before: _LineNow, now: _LineNow) -> bool:
+    """True if the people whom both lines share stand in the same order."""
     order = now.order if _dot(before.u, now.u) >= 0 else now.order[::-1]
     return [p for p in order if p in before.order] == [p for p in before.order if p in order]
 
 
-def _note(f: _Followed) -> None:
-    """Who is in line, and where those who are new stand among the others."""
+def _record_people(f: _FollowedLine) -> None:
+    """Counts the people in line now, and inserts new people behind those who stand before them."""
     for k, p in enumerate(f.now.order):
         f.seen[p] = f.seen.get(p, 0) + 1
         f.gone[p] = f.now
@@ -193,8 +225,8 @@ def _note(f: _Followed) -> None:
             f.ranks.insert(max(ahead) + 1 if ahead else 0, p)
 
 
-def _finished(f: _Followed, hold: int, stride: int, fps: float) -> list[DetectedQueue]:
-    """The queue that a followed line was, if it was one."""
+def _finished(f: _FollowedLine, hold: int, stride: int, fps: float) -> list[DetectedQueue]:
+    """The queue that a followed line was; empty if it was too short or moved sideways."""
     along, aside = (abs(v) / f.moments for v in f.drift)
     if f.three - f.since + stride < hold or (aside > SIDEWAYS_SPEED and aside > along):
         return []
@@ -203,8 +235,8 @@ def _finished(f: _Followed, hold: int, stride: int, fps: float) -> list[Detected
     return [DetectedQueue(f.since, f.now.t, order, tuple(left), f.middle, _from_one_end(f, left, MEMBER_TIME * fps))]
 
 
-def _from_one_end(f: _Followed, left: list[int], late: float) -> bool:
-    """Whether all who left did so from one end: those beyond them left no more than `late` frames later."""
+def _from_one_end(f: _FollowedLine, left: list[int], late: float) -> bool:
+    """True if everyone who left did so from the same end: people beyond them left at most `late` frames later."""
 
     def stay(p: int, beyond: tuple[int, ...]) -> bool:
         return any(f.gone[q].t > f.gone[p].t + late for q in beyond)

@@ -1,8 +1,12 @@
-"""QueueShapes: people of one moment who stand behind one another; those of all moments are found at once.
+"""Finds lines of people who stand behind one another, each in one moment: the shape of a queue.
 
-Along the line that fits them best their spacing is 0.4-1.5 m and nobody is more than 0.5 m off it. From one to the next
-the way turns by 60° at most: a conversation circle passes the first two tests when projected, never the third.
-Tables of places (M, n, 2) hold M sets, in order, of which the first `count` (M,) places are meant.
+People of one moment who stand close to each other form a crowd. A line is an ordered set of people of a crowd for which
+three tests hold along the straight line that fits them best: neighbours are MIN_SPACING to MAX_SPACING apart, nobody is
+more than MAX_OFFSET off the straight line, and the direction from one person to the next turns by at most 60°. A circle
+of people in conversation can pass the first two tests, but not the third.
+
+All moments are handled at once. Tables of positions (M, n, 2) hold M ordered sets; only the first `count` (M,)
+positions of each set count.
 """
 
 from __future__ import annotations
@@ -16,16 +20,19 @@ from sim.types import Array, Bools, Ints
 
 MIN_SPACING, MAX_SPACING = 0.4, 1.5  # m along the line
 MAX_OFFSET = 0.5  # m
-MIN_TURN_COSINE = 0.5  # cosine of the greatest turn from one to the next
-OFF_LINE = 1e9  # m: where those stand who are off a line
-MIN_CROWD_SHARE = 2 / 3  # of a standing crowd that must be in the chain: else it is a crowd
-MAX_CELLS = 2_000_000  # seeds times people looked at together: bounds memory
+MIN_TURN_COSINE = 0.5  # cosine of the greatest turn from one person to the next
+OFF_LINE = 1e9  # m: stands for the position along the line of people who are off it
+MIN_CROWD_SHARE = 2 / 3  # of a crowd that must be in the line: else it is no queue
+MAX_CELLS = 2_000_000  # numbers handled together: bounds memory
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class QueueShapes:
-    """M chains: rows (M, n) of people in order, the first `count` (M,) of each; u (M, 2): direction from the first
-    towards the last; middle (M, 2)."""
+    """M lines of people.
+
+    rows (M, n): rows of the people in order, of which the first `count` (M,) count; u (M, 2): unit vector along the
+    line from the first person towards the last; middle (M, 2): mean position, m.
+    """
 
     rows: Ints
     count: Ints
@@ -34,8 +41,12 @@ class QueueShapes:
 
 
 def queue_shapes(pos: Array, i: Ints, j: Ints) -> Iterator[QueueShapes]:
-    """The chain, if there is one, of each crowd among places pos (N, 2); i, j: rows of who stand close to each other,
-    which makes crowds. Crowds of equal size come together, each crowd's rows in ascending order."""
+    """Yields the lines of all crowds, at most one for each crowd, crowds of equal size together.
+
+    pos (N, 2): m; i, j (K,): pairs of rows that stand close to each other. A crowd is a connected set of two or more
+    rows. The line holds the whole crowd if that passes the tests, else the longest line of at least three people and
+    MIN_CROWD_SHARE of the crowd.
+    """
     for crowd in _crowds(len(pos), i, j):
         portion = max(1, MAX_CELLS // crowd.shape[1] ** 3)
         for low in range(0, len(crowd), portion):
@@ -61,17 +72,19 @@ def _crowds(people: int, i: Ints, j: Ints) -> Iterator[Ints]:
 
 
 def _best(p: Array) -> tuple[Ints, Ints]:
-    """Order (C, n) and length (C,) of the chain in each crowd p (C, n, 2), 0 where there is none: all of them, or the
-    longest, straightest one along the line through two of them."""
+    """Order (C, n) and length (C,) of the line in each crowd p (C, n, 2), 0 where there is none.
+
+    Of several lines in a crowd the longest is taken, then the one with the smallest squared distances from it.
+    """
     n = p.shape[1]
-    everybody = np.full(len(p), n)
-    u = _axes(p, everybody)[0]
+    whole_crowd = np.full(len(p), n)
+    u = _axes(p, whole_crowd)[0]
     order = np.argsort((p * u[:, None]).sum(axis=2), axis=1, kind="stable")
-    count = np.where(_fits(np.take_along_axis(p, order[..., None], axis=1), everybody), n, 0)
+    count = np.where(_fits(np.take_along_axis(p, order[..., None], axis=1), whole_crowd), n, 0)
     least = max(3, int(np.ceil(MIN_CROWD_SHARE * n - 1e-9)))
     rest = np.flatnonzero(count == 0) if n >= least else np.zeros(0, np.int64)
     if len(rest):
-        crowd, some, long, residual = _from_seeds(p[rest], least)
+        crowd, some, long, residual = _lines_through_pairs(p[rest], least)
         ranked = np.lexsort((residual, -long, crowd))
         ranked = ranked[np.flatnonzero(np.diff(crowd[ranked], prepend=-1))]
         order[rest[crowd[ranked]]], count[rest[crowd[ranked]]] = some[ranked], long[ranked]
@@ -79,8 +92,11 @@ def _best(p: Array) -> tuple[Ints, Ints]:
 
 
 def _axes(p: Array, count: Ints) -> tuple[Array, Array, Array]:
-    """Unit vector (M, 2) along the line that fits each set best, from the first towards the last; the middles (M, 2);
-    the root of the sum of squares of distances from the line (M,)."""
+    """The straight line that fits each set of positions p (M, n, 2) best.
+
+    Returns its unit vector (M, 2), from the first position towards the last; the middles (M, 2), m; the root of the sum
+    of squared distances from it (M,), m.
+    """
     within = np.arange(p.shape[1]) < count[:, None]
     middle = np.where(within[..., None], p, 0.0).sum(axis=1) / count[:, None]
     arm = np.where(within[..., None], p - middle[:, None], 0.0)
@@ -94,7 +110,7 @@ def _axes(p: Array, count: Ints) -> tuple[Array, Array, Array]:
 
 
 def _fits(p: Array, count: Ints) -> Bools:
-    """Which sets (M,) are chains."""
+    """True (M,) for each set of positions p (M, n, 2) that passes the three tests."""
     u, middle, _ = _axes(p, count)
     arm = p - middle[:, None]
     off = np.abs(u[:, None, 0] * arm[..., 1] - u[:, None, 1] * arm[..., 0])
@@ -106,19 +122,23 @@ def _fits(p: Array, count: Ints) -> Bools:
 
 
 def _steps_fit(along: Array) -> Bools:
+    """True (M, n - 1) where the spacing of neighbours fits; along (M, n): positions along the line, m."""
     steps = np.diff(along, axis=1)
     return np.asarray((steps >= MIN_SPACING) & (steps <= MAX_SPACING))
 
 
 def _turns_fit(p: Array) -> Bools:
+    """True (M, n - 2) where the direction turns by at most 60° at a position."""
     step = np.diff(p, axis=1)
     length = np.hypot(step[..., 0], step[..., 1])
     return np.asarray((step[:, :-1] * step[:, 1:]).sum(axis=2) >= MIN_TURN_COSINE * length[:, :-1] * length[:, 1:])
 
 
-def _from_seeds(p: Array, least: int) -> tuple[Ints, Ints, Ints, Array]:
-    """Shapes of `least` or more people along the lines through two who stand next to each other, in crowds (C, n, 2):
-    crowd (M,), order (M, n), length (M,), distance from the line (M,)."""
+def _lines_through_pairs(p: Array, least: int) -> tuple[Ints, Ints, Ints, Array]:
+    """Lines of `least` or more people in crowds p (C, n, 2), along the straight lines through two neighbours.
+
+    Returns for each line: crowd (M,), order (M, n), length (M,), root of the sum of squared distances from it (M,), m.
+    """
     i, j = np.triu_indices(p.shape[1], 1)
     crowd, seed = np.nonzero(_steps_fit(np.stack([np.zeros((len(p), len(i))), _lengths(p, i, j)], axis=1))[:, 0])
     i, j, places = i[seed], j[seed], p[crowd]
@@ -140,12 +160,13 @@ def _from_seeds(p: Array, least: int) -> tuple[Ints, Ints, Ints, Array]:
 
 
 def _lengths(p: Array, i: Ints, j: Ints) -> Array:
+    """Distances (C, K) of positions i and j in each crowd."""
     step = p[:, j] - p[:, i]
     return np.hypot(step[..., 0], step[..., 1])
 
 
 def _longest(links: Bools) -> tuple[Ints, Ints]:
-    """First place and number of places (M,) of the longest run that is linked throughout, of links (M, n - 1)."""
+    """Start and length (M,), in positions, of the longest run of linked positions; links (M, n - 1): k to k + 1."""
     start, count, run = np.zeros(len(links), np.int64), np.ones(len(links), np.int64), np.ones(len(links), np.int64)
     for k in range(links.shape[1]):
         run = np.where(links[:, k], run + 1, 1)

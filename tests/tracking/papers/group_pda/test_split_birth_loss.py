@@ -7,9 +7,9 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from tests.tracking.papers.group_pda.test_tracker import FPS, GROUND, block, changes, events, ids, noisy, sizes, track
 
 from sim.types import Array, Context, Frame, Tracks
+from tests.tracking.papers.group_pda.test_tracker import FPS, GROUND, block, changes, events, ids, noisy, sizes, track
 from tracking.papers.group_pda.config import GroupPdaConfig
 from tracking.papers.group_pda.tracker import GroupPda
 
