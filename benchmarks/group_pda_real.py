@@ -21,7 +21,7 @@ from benchmarks.group_pda_tables import interval, table
 from sim.geometry.polygons import contains
 from sim.io.source import open_source
 from sim.types import Array, Ints, Tracks, Truth
-from tracking.app.pictures.overlay import overlay
+from tracking.app.pictures.overlay import write_overlay
 from tracking.grouping.grouped_tracks import with_groups
 from tracking.run import track
 from tracking.scoring import evaluate
@@ -114,7 +114,7 @@ def pets(given: argparse.Namespace) -> Any:
     print("events (kind, start, told in, before, after):", *told, sep="\n  ")
     seen, one = together(truth, run)
     print(f"people {PAIR[0]} and {PAIR[1]}: both there in {seen} frames, in one hull in {one}")
-    print(overlay(sequence, run, given.out or OUT))
+    print(write_overlay(sequence, run, given.out or OUT))
     return {"groups": count, "events": told, "pair": [seen, one]}
 
 

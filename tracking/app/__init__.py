@@ -1,1 +1,1 @@
-"""The commands: everything is imported here, nothing imports this."""
+"""The command line: it may import every other package, and no other package imports it."""

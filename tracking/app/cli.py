@@ -1,4 +1,4 @@
-"""The command `flockscope`: every command with its options; what they do stands in the modules named after them."""
+"""The command `flockscope`: declares every command. The work of each is in the module of `commands/` that it calls."""
 
 from __future__ import annotations
 
@@ -6,29 +6,25 @@ import os
 import sys
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Annotated
 
 import typer
 
-from scenarios.errors import InputError
-from tracking.app.command_result import INTERRUPTED, CommandResult
-from tracking.app.recording_options import fit_sensor, replay
-from tracking.app.shared_options import (
-    Calibration,
-    Cluster,
-    Detector,
-    Fps,
-    Images,
-    Json,
-    Out,
-    Rule,
-    Scale,
-    Set,
-    Source,
-    Streams,
-    Tracked,
-    Workers,
+from tracking.app.command_options import (
+    FitSensorOptions,
+    GenerateOptions,
+    OverlayOptions,
+    ReplayCommandOptions,
+    ScenariosOptions,
+    ScoreOptions,
+    SheetOptions,
+    TrackOptions,
+    ViewOptions,
+    WebdatasetOptions,
 )
+from tracking.app.command_result import INTERRUPTED, CommandResult
+from tracking.app.options_from_dataclass import options_from
+from tracking.app.shared_options import Json, Out
 from tracking.app.tune_options import tune
 
 app = typer.Typer(
@@ -38,14 +34,14 @@ app = typer.Typer(
     context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 110},
     help="Group tracking under test: simulate labelled crowds, track people and groups, score.",
 )
-export = typer.Typer(rich_markup_mode=None, help="Turn a dataset into another form.")
+export = typer.Typer(rich_markup_mode=None, help="Convert a dataset to another format.")
 app.add_typer(export, name="export")
-fit = typer.Typer(rich_markup_mode=None, help="Learn a table from recordings.")
+fit = typer.Typer(rich_markup_mode=None, help="Fit a model to recordings.")
 app.add_typer(fit, name="fit")
 
 
-def _version(asked: bool) -> None:
-    if asked:
+def _version(wanted: bool) -> None:
+    if wanted:
         from importlib.metadata import PackageNotFoundError, version
 
         try:
@@ -57,7 +53,9 @@ def _version(asked: bool) -> None:
 
 @app.callback()
 def _start(
-    version: Annotated[bool, typer.Option("--version", callback=_version, is_eager=True, help="Say which.")] = False,
+    version: Annotated[
+        bool, typer.Option("--version", callback=_version, is_eager=True, help="Show the version and exit.")
+    ] = False,
 ) -> None:
     """Options of the command itself."""
 
@@ -68,182 +66,101 @@ def demo(
     out: Out = Path("flockscope-demo"),
     json: Json = False,
 ) -> CommandResult:
-    """From scenes to a page with scores, start to finish."""
+    """Generate scenes, track them, score the tracks and write a page with the results."""
     from tracking.app.commands.demo import demo
 
     return demo(out, quick=quick)
 
 
 @app.command()
-def scenarios(
-    name: Annotated[str | None, typer.Argument(help="Scenario, *.toml file or suite to explain.")] = None,
-    settings: Set = [],  # noqa: B006 (typer copies it)
-    out: Annotated[Path | None, typer.Option("--out", metavar="FILE.svg", help="Draw the plan and script.")] = None,
-    schema: Annotated[bool, typer.Option("--schema", help="List every key of a scenario file.")] = False,
-    json: Json = False,
-) -> CommandResult:
-    """List them, or explain one with a drawing."""
-    from tracking.app.commands import scenario_keys, scenarios
+@options_from(ScenariosOptions)
+def scenarios(options: ScenariosOptions) -> CommandResult:
+    """List scenarios and suites, or explain one with a drawing."""
+    from tracking.app.commands.scenarios import scenarios
 
-    if name is not None and not schema:
-        return scenarios.explain(name, settings, out)
-    unused = {"NAME": name, "--out": out, "--set": settings}
-    for option, value in unused.items():
-        if value:
-            got, remedy = f"{option} with nothing to explain", "name a scenario, without --schema"
-            raise InputError(place=option, got=got, expected="NAME", remedy=remedy)
-    return scenario_keys.keys() if schema else scenarios.catalogue()
+    return scenarios(options)
 
 
 @app.command()
-def generate(
-    names: Annotated[list[str], typer.Argument(metavar="NAME…", help="Scenarios, *.toml files or suites.")],
-    seeds: Annotated[str, typer.Option("--seeds", metavar="A:B", help="Seeds from A to B - 1, or one.")],
-    out: Out,
-    settings: Set = [],  # noqa: B006
-    sensor: Detector = None,
-    streams: Streams = "left",
-    images: Images = None,
-    workers: Workers = 1,
-    cluster: Cluster = None,
-    json: Json = False,
-) -> CommandResult:
+@options_from(GenerateOptions)
+def generate(options: GenerateOptions) -> CommandResult:
     """Simulate scenarios and store them as a dataset."""
-    from tracking.app import option_parsing
     from tracking.app.commands.datasets import generate
 
-    texts = [*option_parsing.sensor(sensor), *settings]
-    return generate(names, seeds, out, texts, streams, images, workers=workers, cluster=cluster)
+    return generate(options)
 
 
 @app.command()
-def track(
-    tracker: Annotated[str, typer.Argument(metavar="TRACKER", help="Its name, file.py:Class or module:Class.")],
-    source: Source,
-    out: Out,
-    params: Annotated[Path | None, typer.Option("--params", metavar="FILE.toml", help="Its parameters.")] = None,
-    settings: Set = [],  # noqa: B006
-    detections: Annotated[Literal["image", "truth", "file"] | None, typer.Option(help="What it is given.")] = None,
-    sensor: Detector = None,
-    grouping: Rule = None,
-    seed: Annotated[int, typer.Option("--seed", min=0, help="The tracker's seed.")] = 0,
-    fps: Fps = None,
-    px_per_m: Scale = None,
-    camera: Calibration = None,
-    background: Annotated[
-        str | None,
-        typer.Option("--background", metavar="first:N|spread:N", help="Frames a video's background is learned from."),
-    ] = None,
-    json: Json = False,
-) -> CommandResult:
-    """Run a tracker and store what it says."""
-    from tracking.app.commands import track
+@options_from(TrackOptions)
+def track(options: TrackOptions) -> CommandResult:
+    """Run a tracker and store its tracks."""
+    from tracking.app.commands.track import track
 
-    job = track.job(tracker, params, settings, detections, seed, sensor, grouping)
-    return track.track(job, source, out, fps=fps, px_per_m=px_per_m, camera=camera, background=background)
+    return track(options)
 
 
 @app.command()
-def score(
-    truth: Annotated[Path, typer.Argument(metavar="TRUTH", help="Labelled sequence or dataset.")],
-    tracks: Annotated[Path, typer.Argument(metavar="TRACKS", help="What `track` wrote, or MOT text.")],
-    similarity: Annotated[
-        Literal["boxes", "ground", "image"] | None, typer.Option(help="What is compared; chosen where absent.")
-    ] = None,
-    group_match: Annotated[
-        Literal["hull", "members"], typer.Option("--group-match", help="By what true and estimated groups are matched.")
-    ] = "hull",
-    against: Annotated[
-        Path | None, typer.Option("--against", metavar="TRACKS", help="Other tracks: say how the scores differ.")
-    ] = None,
-    blocks: Annotated[
-        int, typer.Option("--blocks", min=0, metavar="N", help="One recording: an interval by N draws of blocks.")
-    ] = 0,
-    fps: Fps = None,
-    px_per_m: Scale = None,
-    json: Json = False,
-) -> CommandResult:
-    """Score tracks against truth."""
+@options_from(ScoreOptions)
+def score(options: ScoreOptions) -> CommandResult:
+    """Score tracks against the truth."""
     from tracking.app.commands.score import score
 
-    return score(
-        truth,
-        tracks,
-        against=against,
-        blocks=blocks,
-        similarity=similarity,
-        group_match=group_match,
-        fps=fps,
-        px_per_m=px_per_m,
-    )
+    return score(options)
 
 
 app.command()(tune)
-app.command()(replay)
-fit.command("sensor")(fit_sensor)
 
 
 @app.command()
-def view(
-    source: Source,
-    tracks: Tracked = None,
-    *,
-    out: Annotated[Path, typer.Option("--out", metavar="FILE.html", help="Page to write; a folder for many.")],
-    video: Annotated[
-        Literal["auto", "inside", "beside", "none"],
-        typer.Option(help="Pictures inside the page, as FILE.view.mp4 beside it (auto: from 12 MB on), or none."),
-    ] = "auto",
-    fps: Fps = None,
-    px_per_m: Scale = None,
-    camera: Calibration = None,
-    json: Json = False,
-) -> CommandResult:
-    """A replay in the browser, tracks beside truth, over the pictures where there are any."""
-    from tracking.app.commands.view import Recording, view
+@options_from(ReplayCommandOptions)
+def replay(options: ReplayCommandOptions) -> CommandResult:
+    """Render recorded trajectories: real motion, simulated pictures and detections, exact labels."""
+    from tracking.app.commands.replay import replay
 
-    return view(Recording(source, fps, px_per_m, camera), tracks, out, video)
+    return replay(options)
+
+
+@fit.command("sensor")
+@options_from(FitSensorOptions)
+def fit_sensor(options: FitSensorOptions) -> CommandResult:
+    """Measure the errors of a detector, so that simulated detections have the same errors."""
+    from tracking.app.commands.fit import fit_sensor
+
+    return fit_sensor(options)
 
 
 @app.command()
-def sheet(
-    source: Source,
-    out: Annotated[Path, typer.Option("--out", metavar="FILE.png", help="Picture to write; a folder for many.")],
-    frames: Annotated[int, typer.Option("--frames", min=1, max=64, help="Panels.")] = 8,
-    fps: Fps = None,
-    json: Json = False,
-) -> CommandResult:
-    """A contact sheet of a sequence: its pictures, its truth."""
-    from tracking.app.commands.view import Recording, sheet
+@options_from(ViewOptions)
+def view(options: ViewOptions) -> CommandResult:
+    """Write a page that replays a sequence in the browser: truth, tracks, and pictures if it has any."""
+    from tracking.app.commands.view import view
 
-    return sheet(Recording(source, fps), out, frames)
+    return view(options)
 
 
 @app.command()
-def overlay(
-    source: Source,
-    tracks: Tracked = None,
-    *,
-    out: Annotated[Path, typer.Option("--out", metavar="FILE.mp4", help="Video to write; a folder for many.")],
-    truth: Annotated[
-        Literal["beside", "over", "only"] | None,
-        typer.Option(help="The truth beside the tracks, over the same picture, or alone; alone without TRACKS."),
-    ] = None,
-    fps: Fps = None,
-    px_per_m: Scale = None,
-    camera: Calibration = None,
-    json: Json = False,
-) -> CommandResult:
-    """A video with boxes, ids, trails, groups and events drawn over the pictures."""
-    from tracking.app.commands.view import Recording, overlay
+@options_from(SheetOptions)
+def sheet(options: SheetOptions) -> CommandResult:
+    """Write a contact sheet: several frames of a sequence in one picture, with the truth."""
+    from tracking.app.commands.view import sheet
 
-    return overlay(Recording(source, fps, px_per_m, camera), tracks, out, truth)
+    return sheet(options)
+
+
+@app.command()
+@options_from(OverlayOptions)
+def overlay(options: OverlayOptions) -> CommandResult:
+    """Write a video with boxes, ids, trails, groups and events drawn over the pictures."""
+    from tracking.app.commands.view import overlay
+
+    return overlay(options)
 
 
 @app.command()
 def validate(
     folder: Annotated[Path, typer.Argument(metavar="DIR", help="A generated sequence or dataset.")], json: Json = False
 ) -> CommandResult:
-    """Check that a dataset is whole, unaltered and consistent."""
+    """Check that a dataset is complete, unaltered and consistent."""
     from tracking.app.commands.datasets import validate
 
     return validate(folder)
@@ -255,39 +172,30 @@ def coco(
     out: Annotated[Path, typer.Option("--out", metavar="FILE.json", help="File to write.")],
     json: Json = False,
 ) -> CommandResult:
-    """One COCO file with track and group ids."""
+    """Write one COCO file with track and group ids."""
     from tracking.app.commands.datasets import export_coco
 
     return export_coco(folder, out)
 
 
 @export.command()
-def webdataset(
-    folder: Annotated[Path, typer.Argument(metavar="DIR", help="A generated sequence or dataset.")],
-    out: Out,
-    shard_size: Annotated[
-        str, typer.Option("--shard-size", metavar="SIZE", help="What a shard may hold: 500MB, 2GB.")
-    ] = "1GB",
-    samples: Annotated[
-        Literal["sequence", "frame"], typer.Option(help="A sample: a sequence with all its files, or a labelled frame.")
-    ] = "sequence",
-    json: Json = False,
-) -> CommandResult:
-    """Tar shards to stream from, as the library webdataset reads them."""
+@options_from(WebdatasetOptions)
+def webdataset(options: WebdatasetOptions) -> CommandResult:
+    """Write tar shards for streaming, in the format of the library webdataset."""
     from tracking.app.commands.datasets import export_webdataset
 
-    return export_webdataset(folder, out, shard_size, samples)
+    return export_webdataset(options)
 
 
 def run(arguments: Sequence[str]) -> int:
-    """Run the command; everything it says is printed; its exit code."""
-    from tracking.app.command_runner import carry_out
+    """Runs the command line `arguments`, prints its result or error, and returns its exit code. Empty: the help."""
+    from tracking.app.command_runner import run_command
 
-    return carry_out(app, list(arguments) or ["--help"])
+    return run_command(app, list(arguments) or ["--help"])
 
 
 def main() -> None:
-    """The entry point."""
+    """Runs the command line of this process and ends the process with the command's exit code."""
     code = run(sys.argv[1:])
     if code == INTERRUPTED:
         sys.stdout.flush()

@@ -1,6 +1,6 @@
-"""How a command answers: one object on stdout with --json, else text; errors as one line; exit codes.
+"""The result of a command and its output: one JSON object on stdout with --json, else text; errors as one line.
 
-0 done; 1 the work failed or a check said no; 2 wrong input or usage; 130 interrupted.
+Exit codes: 0 done; 1 the work failed or a check found problems; 2 wrong input or usage; 130 interrupted.
 """
 
 from __future__ import annotations
@@ -16,17 +16,21 @@ from typing import Any
 from scenarios.errors import FlockscopeError, InputError, WorkError
 
 STATUS = {0: "ok", 1: "failed", 2: "refused", 130: "interrupted"}
+"""The "status" of the JSON object, by exit code."""
+
 INTERRUPTED = 130
 DEBUG = "FLOCKSCOPE_DEBUG"
-WIDE = 160
+"""With this environment variable set, an unexpected exception is raised with its traceback."""
+
+WIDTH = 160
 """Columns of a table that goes to a file or another program."""
 
 
 @dataclass(frozen=True)
 class CommandResult:
-    """What a command has to say: data for --json, text (or what rich can print) for people.
+    """What a command returns. data: for --json. text: for people; a string or anything that rich can print.
 
-    code: 0, or 1 where a check said no.
+    code: the exit code, 0, or 1 if a check found problems.
     """
 
     data: dict[str, Any]
@@ -34,28 +38,28 @@ class CommandResult:
     code: int = 0
 
 
-def show(answer: CommandResult, as_json: bool) -> int:
-    """Print an answer; its exit code."""
+def print_result(result: CommandResult, as_json: bool) -> int:
+    """Prints a result on stdout, as one JSON object if `as_json`; returns its exit code."""
     if as_json:
-        _print_json({"status": STATUS[answer.code], **answer.data})
+        _print_json({"status": STATUS[result.code], **result.data})
     else:
-        text = answer.text if isinstance(answer.text, str) else _laid_out(answer.text)
+        text = result.text if isinstance(result.text, str) else _rendered(result.text)
         print(text.rstrip("\n"), flush=True)
-    return answer.code
+    return result.code
 
 
-def _laid_out(tables: Any) -> str:
-    """What rich makes of tables, in colour where somebody looks."""
+def _rendered(tables: Any) -> str:
+    """What rich prints of `tables`: as wide as the terminal and coloured there, else WIDTH columns of plain text."""
     from rich.console import Console
 
-    console = Console(width=None if sys.stdout and sys.stdout.isatty() else WIDE, highlight=False)
+    console = Console(width=None if sys.stdout and sys.stdout.isatty() else WIDTH, highlight=False)
     with console.capture() as captured:
         console.print(tables)
     return captured.get()
 
 
-def refuse(error: FlockscopeError, as_json: bool) -> int:
-    """Print an error as one line or one object; its exit code."""
+def print_error(error: FlockscopeError, as_json: bool) -> int:
+    """Prints an error as one line on stderr, or as one JSON object on stdout; returns its exit code."""
     if as_json:
         _print_json({"status": STATUS[error.exit_code], "error": error.as_dict()})
     else:
@@ -63,9 +67,9 @@ def refuse(error: FlockscopeError, as_json: bool) -> int:
     return error.exit_code
 
 
-def interrupted(as_json: bool) -> int:
-    """Say that Ctrl-C ended the command; 130."""
-    remedy = "run the same command again: what was complete is kept"
+def print_interrupted(as_json: bool) -> int:
+    """Prints that Ctrl-C ended the command, as one line on stderr or one JSON object on stdout; returns 130."""
+    remedy = "run the same command again: completed parts are kept"
     error = WorkError(got="an interruption", expected="to finish", remedy=remedy)
     if as_json:
         _print_json({"status": STATUS[INTERRUPTED], "error": error.as_dict()})
@@ -74,17 +78,19 @@ def interrupted(as_json: bool) -> int:
     return INTERRUPTED
 
 
-def unexpected(error: Exception) -> FlockscopeError:
-    """An exception nobody foresaw, as an error for the user's eyes."""
+def as_flockscope_error(error: Exception) -> FlockscopeError:
+    """An unexpected exception as an error for users.
+
+    An OSError becomes a WorkError if the disk or memory is full or broken, else an InputError about the path. Any other
+    exception becomes a WorkError that calls it a bug.
+    """
     if isinstance(error, OSError):
-        return _of_system(error)
-    return WorkError(
-        got=f"{type(error).__name__}: {error}", expected="no such thing", remedy=f"a bug: {DEBUG}=1 shows where"
-    )
+        return _system_error(error)
+    remedy = f"this is a bug: {DEBUG}=1 shows where"
+    return WorkError(got=f"{type(error).__name__}: {error}", expected="no exception", remedy=remedy)
 
 
-def _of_system(error: OSError) -> FlockscopeError:
-    """What the operating system refused: the work where the disk is full, else the user's path."""
+def _system_error(error: OSError) -> FlockscopeError:
     from sim.io.files.atomic import DISK_FULL
 
     reason = error.strerror or type(error).__name__
@@ -95,19 +101,19 @@ def _of_system(error: OSError) -> FlockscopeError:
 
 
 def _print_json(data: dict[str, Any]) -> None:
-    print(json.dumps(plain(data), ensure_ascii=False, allow_nan=False), flush=True)
+    print(json.dumps(as_json_value(data), ensure_ascii=False, allow_nan=False), flush=True)
 
 
-def plain(value: Any) -> Any:
-    """What JSON can hold: numpy numbers and arrays as Python's, paths as text, NaN and infinity as null."""
+def as_json_value(value: Any) -> Any:
+    """The value in types that `json` writes: numpy values as Python's, paths as text, nan and infinity as None."""
     if isinstance(value, dict):
-        return {str(key): plain(v) for key, v in value.items()}
+        return {str(key): as_json_value(v) for key, v in value.items()}
     if isinstance(value, list | tuple | range):
-        return [plain(v) for v in value]
+        return [as_json_value(v) for v in value]
     if isinstance(value, Path):
         return str(value)
     if hasattr(value, "tolist"):
-        return plain(value.tolist())
+        return as_json_value(value.tolist())
     if isinstance(value, float) and not math.isfinite(value):
         return None
     return value

@@ -1,4 +1,4 @@
-"""Carrying out a command line: whatever happens, the right exit code and one clear line (or one JSON object)."""
+"""Runs a command line: prints the command's result, and turns every exception into an exit code and one clear line."""
 
 from __future__ import annotations
 
@@ -14,98 +14,112 @@ from typing import Any
 import typer
 
 from scenarios.errors import FlockscopeError, InputError, WorkError
-from tracking.app.command_result import DEBUG, INTERRUPTED, CommandResult, interrupted, refuse, show, unexpected
+from tracking.app.command_result import (
+    DEBUG,
+    INTERRUPTED,
+    CommandResult,
+    as_flockscope_error,
+    print_error,
+    print_interrupted,
+    print_result,
+)
 
 HELP = {"-h", "--help", "--version"}
 
 
-def carry_out(app: typer.Typer, arguments: list[str]) -> int:
-    """Run the command that the arguments name and print what it says; its exit code."""
+def run_command(app: typer.Typer, arguments: list[str]) -> int:
+    """Runs the command that the arguments name, prints its result or error, and returns its exit code.
+
+    Raises only an unexpected exception, and only if the environment variable FLOCKSCOPE_DEBUG is set.
+    """
     as_json = "--json" in arguments
-    if as_json and not HELP.isdisjoint(arguments):  # which some levels of the command line take without --json alone
+    if as_json and not HELP.isdisjoint(arguments):  # some levels of the command line know --help but not --json
         arguments = [argument for argument in arguments if argument != "--json"]
     with warnings.catch_warnings():
         warnings.simplefilter("always", UserWarning)
         try:
-            warnings.showwarning = _once()
-            answer = _spoken(app, arguments) if as_json else _answer(app, arguments)
-            return _said(answer, as_json) if isinstance(answer, CommandResult) else answer
+            warnings.showwarning = _print_warnings_once()
+            result = _run_quietly(app, arguments) if as_json else _run(app, arguments)
+            return _print(result, as_json) if isinstance(result, CommandResult) else result
         except KeyboardInterrupt:
-            return interrupted(as_json)
+            return print_interrupted(as_json)
         except FlockscopeError as error:
             if error.__cause__ is not None and os.environ.get(DEBUG):
                 raise
-            return refuse(error, as_json)
+            return print_error(error, as_json)
 
 
-def _spoken(app: typer.Typer, arguments: list[str]) -> CommandResult | int:
-    """The command's answer, stdout kept free for its one object: help becomes its text, all else goes to stderr."""
+def _run_quietly(app: typer.Typer, arguments: list[str]) -> CommandResult | int:
+    """As `_run`, but leaves stdout to the JSON object: a help text becomes the result, other text goes to stderr."""
     printed = io.StringIO()
     try:
         with redirect_stdout(printed):
-            answer = _answer(app, arguments)
-        if answer == 0:
+            result = _run(app, arguments)
+        if result == 0:
             text, printed = printed.getvalue().rstrip("\n"), io.StringIO()
             return CommandResult({"text": text}, text)
-        return answer
+        return result
     finally:
         print(printed.getvalue(), end="", file=sys.stderr)
 
 
-def _answer(app: typer.Typer, arguments: list[str]) -> CommandResult | int:
-    """What the command has to say, or the code of one that has said it (--help)."""
+def _run(app: typer.Typer, arguments: list[str]) -> CommandResult | int:
+    """The command's result, or the exit code of a command that printed itself, as --help does.
+
+    Raises FlockscopeError for everything that goes wrong, KeyboardInterrupt for Ctrl-C.
+    """
     command: Any = typer.main.get_command(app)
-    usage: Any = typer.BadParameter.__base__  # the class of all usage errors, typer's own or click's
+    usage_error: Any = typer.BadParameter.__base__  # the class of all usage errors, typer's own or click's
     try:
         result = command.main(arguments, prog_name="flockscope", standalone_mode=False)
     except FlockscopeError:
         raise
-    except usage as error:
+    except usage_error as error:
         raise _usage(error) from None
     except Exception as error:
-        if _is_of_interruption(error):
+        if _comes_from_interrupt(error):
             raise KeyboardInterrupt from None
-        raise unexpected(error) from error
-    if result == INTERRUPTED:  # typer's word for Ctrl-C
+        raise as_flockscope_error(error) from error
+    if result == INTERRUPTED:  # what typer returns for Ctrl-C
         raise KeyboardInterrupt
     return result if isinstance(result, CommandResult) else int(result or 0)
 
 
-def _is_of_interruption(error: BaseException | None) -> bool:
-    """Whether Ctrl-C is what an error came from: an import that it ends may end in another error."""
+def _comes_from_interrupt(error: BaseException | None) -> bool:
+    """True if Ctrl-C caused the error. An interrupted import may raise another exception in its place."""
     while error is not None and not isinstance(error, KeyboardInterrupt):
         error = error.__cause__ or error.__context__
     return error is not None
 
 
 def _usage(error: Any) -> InputError:
-    """A wrong command line."""
+    """The error of a wrong command line."""
     where = "flockscope" if error.ctx is None else error.ctx.command_path
     message = error.format_message().rstrip(".")
     got, remedy = message[:1].lower() + message[1:], f"see {where} --help"
     return InputError(place=where, got=got, expected="a command line as in the help", remedy=remedy)
 
 
-def _said(answer: CommandResult, as_json: bool) -> int:
-    """Print the answer; a reader who has gone away has read enough, a full disk is told on stderr."""
+def _print(result: CommandResult, as_json: bool) -> int:
+    """Prints the result and returns its exit code. A closed pipe is no error; a full disk is, and returns 1."""
     try:
-        return show(answer, as_json)
+        return print_result(result, as_json)
     except OSError as error:
-        os.dup2(os.open(os.devnull, os.O_WRONLY), 1)  # else Python tries the rest again at its end
+        os.dup2(os.open(os.devnull, os.O_WRONLY), 1)  # else Python tries to write the rest when it exits
         if error.errno == errno.EPIPE:
-            return answer.code
+            return result.code
         reason = error.strerror or type(error).__name__
         remedy = "free some, or send it elsewhere; files are written"
-        return refuse(WorkError(file="stdout", got=reason, expected="room to write", remedy=remedy), as_json=False)
+        return print_error(WorkError(file="stdout", got=reason, expected="room to write", remedy=remedy), as_json=False)
 
 
-def _once() -> Callable[..., None]:
-    """How a command shows warnings: each text once, however many recordings it is true of."""
-    said: set[str] = set()
+def _print_warnings_once() -> Callable[..., None]:
+    """A replacement for `warnings.showwarning` that prints each text once on stderr."""
+    printed: set[str] = set()
 
     def warn(message: Warning | str, *_: object) -> None:
-        if str(message) not in said:
+        if str(message) not in printed:
             print(f"warning: {message}", file=sys.stderr)
-        said.add(str(message))
+        printed.add(str(message))
 
     return warn

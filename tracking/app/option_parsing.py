@@ -1,4 +1,4 @@
-"""What options mean: `--seeds a:b`, `--streams a,b`, `--set subject.key=value`, folders to write to."""
+"""Parses the texts of options: `--seeds a:b`, `--streams a,b`, `--set key=value`, `--sensor`, and checks `--out`."""
 
 from __future__ import annotations
 
@@ -10,10 +10,11 @@ from typing import Any
 from scenarios.errors import InputError
 
 SUBJECTS = ("tracker", "sensor", "scenario")
+"""What a setting can belong to, as in `--set sensor.noise_px=2`."""
 
 
 def seeds(text: str, option: str = "--seeds") -> range:
-    """`a:b`, half-open, or one seed."""
+    """The seeds of `a:b`, from a to b - 1, or of one number. Raises InputError, naming `option`, for any other text."""
     found = re.fullmatch(r"(\d{1,18})(?::(\d{1,18}))?", text.strip())
     if found is None:
         raise InputError(
@@ -23,41 +24,47 @@ def seeds(text: str, option: str = "--seeds") -> range:
     return range(first, first + 1 if found[2] is None else int(found[2]))
 
 
-def settings(texts: Iterable[str], own: str, takes: Iterable[str]) -> list[tuple[str, str]]:
-    """`--set` assignments as (subject, key=value without the subject); a bare key is about `own`.
+def settings(texts: Iterable[str], default: str, subjects: Iterable[str]) -> list[tuple[str, str]]:
+    """Splits `--set` texts into (subject, "key=value"); a key that begins with no subject belongs to `default`.
 
-    InputError for one without "=", and for a subject that the command does not take.
+    Raises InputError for a text without "=" or without a key, and for a subject that is not in `subjects`.
     """
-    return [_setting(text, own, tuple(takes)) for text in texts]
+    return [_setting(text, default, tuple(subjects)) for text in texts]
 
 
-def _setting(text: str, own: str, takes: tuple[str, ...]) -> tuple[str, str]:
+def _setting(text: str, default: str, subjects: tuple[str, ...]) -> tuple[str, str]:
     key, equals, value = text.partition("=")
     if not equals or not key.strip():
         raise InputError(
-            place=f"--set {text}", got=repr(text), expected="key=value", remedy=f"write --set {own}.key=value"
+            place=f"--set {text}", got=repr(text), expected="key=value", remedy=f"write --set {default}.key=value"
         )
     subject, dot, rest = key.strip().partition(".")
     if not dot or subject not in SUBJECTS:
-        subject, rest = own, key.strip()
-    if subject not in takes:
+        subject, rest = default, key.strip()
+    if subject not in subjects:
         raise InputError(
             place=f"--set {text}",
             got=f"a setting of the {subject}",
-            expected="one of the " + " or the ".join(takes),
-            remedy="give it to the command that makes the " + subject,
+            expected="a setting of the " + " or the ".join(subjects),
+            remedy=f"set it in the command that makes the {subject}",
         )
     return subject, f"{rest}={value}"
 
 
 def scenario_settings(texts: Iterable[str]) -> list[str]:
-    """`--set` of commands about scenarios: `sensor.` is the scenario's own sensor."""
+    """The `--set` texts of a command on scenarios as "key=value"; keys of the sensor keep their prefix `sensor.`.
+
+    Raises InputError as `settings` does.
+    """
     found = settings(texts, "scenario", ("scenario", "sensor"))
     return [f"sensor.{text}" if subject == "sensor" else text for subject, text in found]
 
 
-def sensor(file: Path | None) -> tuple[str, ...]:
-    """`--sensor FILE.toml` as `--set` would say it: `sensor.key=value`; what `--set` says itself comes after it."""
+def sensor_settings(file: Path | None) -> tuple[str, ...]:
+    """The texts "sensor.key=value" of the file of `--sensor`; empty for None.
+
+    Raises InputError if the file is missing or is no sensor profile.
+    """
     if file is None:
         return ()
     from scenarios import sensor_settings
@@ -65,44 +72,46 @@ def sensor(file: Path | None) -> tuple[str, ...]:
     return sensor_settings(file)
 
 
-def streams(text: str) -> tuple[str, ...]:
-    """Words between commas; () for none."""
-    return () if text.strip() == "none" else tuple(word.strip() for word in text.split(",") if word.strip())
+def pictures(streams: str, images: str | None) -> tuple[tuple[str, ...], str]:
+    """The streams of `--streams` (none: empty) and the format of `--images` (absent: "jpg").
 
-
-def pictures(text: str, images: str | None) -> tuple[tuple[str, ...], str]:
-    """`--streams` and `--images`; InputError for images of streams that have no choice."""
+    Raises InputError if `--images` is given and no stream is stored in that format.
+    """
     from sim.io.store.streams import coding
 
-    wanted = streams(text)
-    if images is not None and coding(wanted, images) is None:
-        got, remedy = f"{images} with --streams {text}", "leave --images out: ids and disparity are always png"
+    words = () if streams.strip() == "none" else tuple(word.strip() for word in streams.split(",") if word.strip())
+    if images is not None and coding(words, images) is None:
+        got, remedy = f"{images} with --streams {streams}", "leave --images out: ids and disparity are always png"
         raise InputError(place="--images", got=got, expected="left, right or background", remedy=remedy)
-    return wanted, images or "jpg"
+    return words, images or "jpg"
 
 
-def values(texts: Iterable[str]) -> dict[str, Any]:
-    """key=value texts as TOML values by key."""
+def toml_values(texts: Iterable[str]) -> dict[str, Any]:
+    """Texts "key=value" as a dictionary; values are read as TOML, a bare word as a string.
+
+    Raises InputError for a value that is neither.
+    """
     from scenarios.loading.overrides import parse
 
     return {".".join(steps): value for steps, value in map(parse, texts)}
 
 
-def named(out: Path, suffix: str) -> Path:
-    """A file to write whose name says what it is; InputError where it says something else."""
-    there = out.is_dir()
-    if there or out.suffix.lower() != suffix:
-        got, better = (f"{out}, a folder", out / "page") if there else (str(out), out.with_suffix(""))
+def output_file(out: Path, suffix: str) -> Path:
+    """Returns `out`. Raises InputError if it is a folder or does not end in `suffix`."""
+    is_folder = out.is_dir()
+    if is_folder or out.suffix.lower() != suffix:
+        got, better = (f"{out}, a folder", out / "page") if is_folder else (str(out), out.with_suffix(""))
         remedy = f"write {better}{suffix}"
         raise InputError(place="--out", got=got, expected=f"a file that ends in {suffix}", remedy=remedy)
     return out
 
 
-def folder(out: Path) -> Path:
-    """A folder to write to, there or to be made; InputError before any work where it cannot be one."""
-    there = next(p for p in (out, *out.parents) if p.exists())
-    if not there.is_dir():
+def output_folder(out: Path) -> Path:
+    """Returns `out`. Raises InputError if it, or the nearest parent that exists, is a file."""
+    existing = next(p for p in (out, *out.parents) if p.exists())
+    if not existing.is_dir():
         raise InputError(
-            file=there, place="--out", got="a file", expected="a folder, there or to be made", remedy="choose another"
-        )
+            file=existing, place="--out", got="a file", expected="a folder, existing or new",
+            remedy="choose another --out",
+        )  # fmt: skip
     return out

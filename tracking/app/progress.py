@@ -1,4 +1,4 @@
-"""A progress bar on stderr for whatever takes longer than two seconds; nothing at all before that."""
+"""A progress bar on stderr for work that takes longer than two seconds."""
 
 from __future__ import annotations
 
@@ -15,16 +15,19 @@ PATIENCE = 2.0
 """s before anything is shown."""
 
 PAUSE = 10.0
-"""s between lines where stderr is no terminal."""
+"""s between lines if stderr is no terminal."""
 
 
 class ProgressMeter:
-    """Counts what is done. State: how much of how much, and the bar, once it is shown."""
+    """Counts finished items and shows them: a bar on a terminal, else a line every 10 s. A context manager.
+
+    State: done and total (None if unknown), the current item's name, and the bar once it is shown.
+    """
 
     def __init__(self, what: str, total: int | None = None) -> None:
         self.what, self.total, self.done, self.item = what, total, 0, ""
         self._bar: Progress | None = None
-        self._said = time.monotonic() + PATIENCE - PAUSE
+        self._last_line = time.monotonic() + PATIENCE - PAUSE
         self._timer = threading.Timer(PATIENCE, self._show)
         self._lock = threading.Lock()
 
@@ -41,20 +44,20 @@ class ProgressMeter:
                 self._bar.stop()
 
     def step(self, item: str = "", amount: int = 1) -> None:
-        """So much more is done."""
+        """Adds `amount` finished items; `item` is the name of the last."""
         self.update(self.done + amount, self.total, item)
 
     def update(self, done: int, total: int | None, item: str = "") -> None:
-        """So much of so much is done; item: what is at hand or just done."""
+        """Sets the number of finished items and of all items, None if unknown; `item` is the name that is shown."""
         self.done, self.total, self.item = done, total, item
         if self._bar is not None:
             self._bar.update(self._bar.task_ids[0], completed=done, total=total, item=item)
-        elif not sys.stderr.isatty() and time.monotonic() - self._said > PAUSE:
-            self._said = time.monotonic()
+        elif not sys.stderr.isatty() and time.monotonic() - self._last_line > PAUSE:
+            self._last_line = time.monotonic()
             print(f"{self.what}: {done}{'' if total is None else f' of {total}'} {item}".rstrip(), file=sys.stderr)
 
     def _show(self) -> None:
-        """Begin the bar (from the timer's thread)."""
+        """Shows the bar if stderr is a terminal. Runs in the timer's thread."""
         if not sys.stderr.isatty():
             return
         from rich.console import Console

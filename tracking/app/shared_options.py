@@ -1,4 +1,4 @@
-"""Arguments and options that several commands take, each said once."""
+"""Options and arguments that several commands have in common: name, value's form and help text of each, for Typer."""
 
 from __future__ import annotations
 
@@ -8,30 +8,51 @@ from typing import Annotated, Literal
 import typer
 
 Json = Annotated[bool, typer.Option("--json", help="Print one JSON object instead of text.")]
-Set = Annotated[list[str], typer.Option("--set", metavar="K=V", help="Set a value; may be given often.")]
+Set = Annotated[list[str], typer.Option("--set", metavar="K=V", help="Set a value. Can be given several times.")]
 Out = Annotated[Path, typer.Option("--out", metavar="DIR", help="Folder to write to.")]
 Source = Annotated[
     Path, typer.Argument(metavar="SOURCE", help="Sequence or dataset: generated, MOT, video, BIWI, CAVIAR.")
 ]
-Fps = Annotated[float | None, typer.Option("--fps", help="Frames per second, where the recording does not say.")]
-Scale = Annotated[float | None, typer.Option("--px-per-m", help="Pixels per metre, where there is no camera.")]
+Tracker = Annotated[
+    str, typer.Argument(metavar="TRACKER", help="Name of a tracker, or file.py:Class, or module:Class.")
+]
+Tracks = Annotated[Path | None, typer.Argument(metavar="TRACKS", help="Output of `track`, or MOT text.")]
+Detections = Annotated[
+    Literal["image", "truth", "file"] | None,
+    typer.Option(
+        help="Detections that the tracker gets. Default: the first of image, file, truth that it and the source allow."
+    ),
+]
+Fps = Annotated[
+    float | None,
+    typer.Option("--fps", help="Frames per second of a recording, in place of its own. Not for generated sequences."),
+]
+Scale = Annotated[float | None, typer.Option("--px-per-m", help="Pixels per metre of a recording without a camera.")]
 Calibration = Annotated[
-    Path | None, typer.Option("--camera", metavar="FILE", help="A recording's calibration: camera.json or Tsai's XML.")
+    Path | None,
+    typer.Option("--camera", metavar="FILE", help="Calibration of a recording: camera.json or Tsai's XML."),
 ]
 Detector = Annotated[
-    Path | None, typer.Option("--sensor", metavar="FILE.toml", help="A detector's profile, by `fit sensor`.")
+    Path | None, typer.Option("--sensor", metavar="FILE.toml", help="Detector profile, as `fit sensor` writes it.")
 ]
-Workers = Annotated[int, typer.Option("--workers", min=1, help="Processes; on a cluster, so many at once at least.")]
+Workers = Annotated[
+    int, typer.Option("--workers", min=1, help="Processes. On a cluster: the least number of tasks at a time.")
+]
 Cluster = Annotated[
-    str | None, typer.Option("--cluster", metavar="tcp://HOST:PORT", help="Scheduler of a dask cluster that works.")
+    str | None,
+    typer.Option("--cluster", metavar="tcp://HOST:PORT", help="Scheduler of a dask cluster that does the work."),
 ]
 Streams = Annotated[
-    str, typer.Option("--streams", metavar="A,B,…", help="Pictures: left, right, disparity, ids, background; or none.")
+    str,
+    typer.Option(
+        "--streams", metavar="A,B,…", help="Pictures to store: left, right, disparity, ids, background; or none."
+    ),
 ]
 Images = Annotated[
-    Literal["jpg", "png", "mp4"] | None, typer.Option(help="How pictures are stored; jpg if nothing is said.")
+    Literal["jpg", "png", "mp4"] | None,
+    typer.Option(help="Format of left, right and background pictures. Default: jpg."),
 ]
 Rule = Annotated[
-    Path | None, typer.Option("--grouping", metavar="FILE.toml", help="The rule of groups, by `tune grouping`.")
+    Path | None,
+    typer.Option("--grouping", metavar="FILE.toml", help="Rule that derives groups, as `tune grouping` writes it."),
 ]
-Tracked = Annotated[Path | None, typer.Argument(metavar="TRACKS", help="What `track` wrote, or MOT text.")]

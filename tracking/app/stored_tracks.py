@@ -1,4 +1,4 @@
-"""Which tracks belong to which sequence: by name, over whole datasets on either side."""
+"""Finds the stored tracks below a path and matches them with sequences by name."""
 
 from __future__ import annotations
 
@@ -12,21 +12,32 @@ from sim.io.store.track_files import read_tracks
 from sim.types import Sequence
 from tracking.run import TrackingRun
 
-OURS = ("tracks.parquet", "tracks.txt")
+TRACK_FILES = ("tracks.parquet", "tracks.txt")
+"""A folder with one of these files holds the tracks of one sequence."""
+
 DEPTH = 3
-EXPECTED = "a folder made by `flockscope track`, a folder of such, or MOTChallenge text"
+"""Tracks are looked for in this many levels of folders below the path."""
+
+EXPECTED = "a folder made by `flockscope track`, a folder of such folders, or MOTChallenge text"
 
 
 @dataclass(frozen=True)
-class Result:
-    """Stored tracks: the sequence they say they are of ("" where they do not say), where, and what run.json holds."""
+class StoredTracks:
+    """The stored tracks of one sequence, not read yet.
+
+    name: the sequence's, from run.json or the folder's or text's name; "" for a text that was given itself. info: the
+    content of run.json, empty if there is none.
+    """
 
     name: str
     path: Path
     info: dict[str, Any]
 
     def read(self, sequence: Sequence) -> TrackingRun:
-        """The tracks, at the sequence's frame rate; InputError where they were made at another one."""
+        """Reads the tracks at the sequence's frame rate.
+
+        Raises InputError if run.json states another frame rate, or if a file is damaged.
+        """
         fps = self.info.get("fps")
         if fps is not None and abs(fps - sequence.fps) > 1e-9 * sequence.fps:
             raise InputError(
@@ -36,62 +47,65 @@ class Result:
         return TrackingRun(tuple(read_tracks(self.path, fps=sequence.fps, length=sequence.length)), self.info)
 
 
-def results(path: Path) -> list[Result]:
-    """All stored tracks of a path, in the order of their paths; InputError where there are none."""
+def find_tracks(path: Path) -> list[StoredTracks]:
+    """All stored tracks at or below a path, in the order of their paths; text files of a folder come last.
+
+    Raises InputError if the path does not exist or holds no tracks, or if a run.json is no JSON object.
+    """
     if not path.exists():
-        raise InputError(file=path, got="nothing there", expected=EXPECTED, remedy="check the path")
-    found = [Result("", path, {})] if path.is_file() else list(_below(path, DEPTH))
+        raise InputError(file=path, got="no such file or folder", expected=EXPECTED, remedy="check the path")
+    found = [StoredTracks("", path, {})] if path.is_file() else list(_below(path, DEPTH))
     if not found:
         raise InputError(file=path, got="no tracks", expected=EXPECTED, remedy="check the path")
     return found
 
 
-def _below(folder: Path, depth: int) -> list[Result]:
-    if any((folder / name).is_file() for name in OURS):
+def _below(folder: Path, depth: int) -> list[StoredTracks]:
+    if any((folder / name).is_file() for name in TRACK_FILES):
         info = _run_info(folder / "run.json")
-        return [Result(str(info.get("sequence", folder.name)), folder, info)]
-    texts = [Result(p.stem, p, {}) for p in sorted(folder.glob("*.txt"))]
+        return [StoredTracks(str(info.get("sequence", folder.name)), folder, info)]
+    texts = [StoredTracks(p.stem, p, {}) for p in sorted(folder.glob("*.txt"))]
     if depth == 0:
         return texts
     inner = [p for p in sorted(folder.iterdir()) if p.is_dir() and not p.name.startswith(".")]
-    return [result for p in inner for result in _below(p, depth - 1)] + texts
+    return [stored for p in inner for stored in _below(p, depth - 1)] + texts
 
 
 def _run_info(path: Path) -> dict[str, Any]:
-    """What run.json holds, {} where it is not there."""
+    """The content of run.json, empty if there is no such file."""
     if not path.is_file():
         return {}
     try:
-        found = json.loads(path.read_text(encoding="utf-8"))
+        info = json.loads(path.read_text(encoding="utf-8"))
     except ValueError:
-        found = None
-    if not isinstance(found, dict):
+        info = None
+    if not isinstance(info, dict):
         raise InputError(
-            file=path, got="no JSON object", expected="what `flockscope track` wrote", remedy="track again"
+            file=path, got="no JSON object", expected="the run.json of `flockscope track`", remedy="track again"
         )
-    return found
+    return info
 
 
-def pair(sequences: list[Sequence], found: list[Result]) -> list[tuple[Sequence, Result]]:
-    """Each sequence with its tracks. One sequence and one text without a name belong together; else names decide.
+def match_tracks(sequences: list[Sequence], stored: list[StoredTracks]) -> list[tuple[Sequence, StoredTracks]]:
+    """Each sequence with the tracks of the same name; a single text and a single sequence match whatever their names.
 
-    Tracks of sequences that are not there are left out; InputError for a sequence without tracks, or with two.
+    Tracks of other sequences are ignored. Raises InputError if a sequence has no tracks, or if two have the same name.
     """
-    if len(sequences) == len(found) == 1 and not found[0].name:
-        return [(sequences[0], found[0])]
-    by_name: dict[str, Result] = {}
-    for result in found:
-        name = result.name or result.path.stem
+    if len(sequences) == len(stored) == 1 and not stored[0].name:
+        return [(sequences[0], stored[0])]
+    by_name: dict[str, StoredTracks] = {}
+    for each in stored:
+        name = each.name or each.path.stem
         if name in by_name:
             raise InputError(
-                file=result.path, got=f"tracks of {name} a second time", expected="one result for each sequence",
+                file=each.path, got=f"tracks of {name} a second time", expected="one result for each sequence",
                 remedy=f"the first: {by_name[name].path}; give one run at a time",
             )  # fmt: skip
-        by_name[name] = result
+        by_name[name] = each
     for sequence in sequences:
         if sequence.name not in by_name:
             raise InputError(
-                file=found[0].path.parent if len(found) > 1 else found[0].path,
+                file=stored[0].path.parent if len(stored) > 1 else stored[0].path,
                 got="tracks of " + ", ".join(sorted(by_name)[:5]), expected=f"tracks of {sequence.name}",
                 remedy="track it first, or give the right folder",
             )  # fmt: skip

@@ -73,7 +73,7 @@ def _ctrl_c():
 @pytest.fixture(autouse=True)
 def _small_pictures(monkeypatch):
     """The demo's one drawn scene is quickly tracked."""
-    monkeypatch.setattr("tracking.app.commands.demo.SEEN_QUICKLY", ("camera.fps=5", "camera.image=[160,120]"))
+    monkeypatch.setattr("tracking.app.commands.demo.QUICK_PIXEL_SETTINGS", ("camera.fps=5", "camera.image=[160,120]"))
 
 
 @pytest.fixture
@@ -291,7 +291,7 @@ def _leaves(group):
         ("track blob x --out y --seed one", "invalid value for '--seed'"),
         ("track blob x --out y --detections magic", "magic"),
         ("generate merge --seeds 0:2 --out y --workers 0", "invalid value for '--workers'"),
-        ("scenarios --out x.svg", "--out with nothing to explain"),
+        ("scenarios --out x.svg", "--out without a scenario to explain"),
         ("export coc", "no such command 'coc'"),
     ],
 )

@@ -18,7 +18,7 @@ from sim.io.store.sequence_folder import sequence_files
 from sim.io.store.track_files import tracks_files
 from tracking import track, tracker_registry
 from tracking.app.cli import app, run
-from tracking.app.commands.scenario_keys import keys
+from tracking.app.commands.scenario_keys import list_keys
 
 ROOT = Path(__file__).resolve().parents[3]
 FAKE = f"{ROOT / 'tests' / 'fake_tracker.py'}:Nearest"
@@ -225,7 +225,7 @@ def differ(before: str, after: str) -> bool:
 
 
 def test_every_key_is_in_the_table():
-    known = {row["key"] for row in keys().data["keys"]}
+    known = {row["key"] for row in list_keys().data["keys"]}
     when = {key for key in known if ".when." in key} | {key for key in known if key.endswith(".type")}
     profile = {key for key in known if key.removeprefix("sensor.").startswith(PROFILE) and key.startswith("sensor.")}
     assert known - when - profile == set(KEYS) | set(PICTURES) | TEXT_ONLY

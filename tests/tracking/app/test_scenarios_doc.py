@@ -6,7 +6,7 @@ import re
 from pathlib import Path
 
 from scenarios.loading.resolve import load, names, suite_names
-from tracking.app.commands.scenario_keys import keys
+from tracking.app.commands.scenario_keys import list_keys
 
 DOC = (Path(__file__).resolve().parents[3] / "docs" / "scenarios.md").read_text(encoding="utf-8")
 
@@ -25,5 +25,5 @@ def test_catalogue() -> None:
 
 
 def test_keys() -> None:
-    assert f"```\n{keys().text.rstrip()}\n```" in DOC, "put the output of `flockscope scenarios --schema` into it"
-    assert all(row["meaning"] for row in keys().data["keys"])
+    assert f"```\n{list_keys().text.rstrip()}\n```" in DOC, "put the output of `flockscope scenarios --schema` into it"
+    assert all(row["meaning"] for row in list_keys().data["keys"])

@@ -1,1 +1,1 @@
-"""The work of each command; tracking/app/cli.py declares their options."""
+"""The work of each command. `app/cli.py` declares the commands, `app/command_options.py` their options."""

@@ -1,4 +1,4 @@
-"""`flockscope demo`: the main job from start to finish: scenes, tracks of every tracker, scores, pages to open."""
+"""`flockscope demo`: generates scenes, tracks them with every tracker, scores the tracks and writes pages to open."""
 
 from __future__ import annotations
 
@@ -11,107 +11,123 @@ from sim.types import DetectionMode, Sequence
 from tracking import tracker_registry
 from tracking.app import option_parsing
 from tracking.app.command_result import CommandResult
-from tracking.app.commands.demo_page import Part, Seen, page
-from tracking.app.commands.score import Row, score_run, summary
-from tracking.app.commands.score_tables import SHOWN, number
-from tracking.app.commands.track import Job
+from tracking.app.commands.demo_page import PixelScene, ResultSection, demo_page
+from tracking.app.commands.score import score_run, summary
+from tracking.app.commands.score_tables import SHOWN, SequenceScores, number
+from tracking.app.commands.track import TrackerSetup
 from tracking.app.progress import ProgressMeter
-from tracking.app.replay_page.video import Film
+from tracking.app.replay_page.video import PageVideo
 from tracking.run import TrackingRun
 
 SCENES = ("merge", "split", "cross", "pass-by", "queue", "side-by-side", "party", "mixed")
 SEEDS = range(40_000, 40_003)
-QUICK, QUICK_SEEDS = ("quick",), range(40_000, 40_001)
-SEEN, SEEN_SEED = "split", range(40_000, 40_001)
-SEEN_QUICKLY = ("camera.fps=5",)
-"""The scene that is drawn, and what --quick changes of it."""
+QUICK_SCENES, QUICK_SEEDS = ("quick",), range(40_000, 40_001)
+PIXEL_SCENE, PIXEL_SEED = "split", range(40_000, 40_001)
+"""The scene that is rendered and tracked from its pictures."""
+
+QUICK_PIXEL_SETTINGS = ("camera.fps=5",)
+"""What --quick changes in that scene."""
 
 MODES: tuple[DetectionMode, ...] = ("image", "file")
 
 
 def demo(out: Path, *, quick: bool) -> CommandResult:
-    """Everything into `out`; the answer ends with the path of the page to open."""
+    """Writes data, tracks and pages into `out`; returns the mean scores by tracker and the path of the page to open.
+
+    Raises InputError if `out` is a file, or holds sequences of other scenarios.
+    """
     from sim.dataset.generate import generate
     from sim.io.files.atomic import write_file
     from sim.io.source import open_source
     from sim.workers.start import WorkerOptions
 
     start = time.monotonic()
-    option_parsing.folder(out)
-    names, seeds = (QUICK, QUICK_SEEDS) if quick else (SCENES, SEEDS)
+    option_parsing.output_folder(out)
+    names, seeds = (QUICK_SCENES, QUICK_SEEDS) if quick else (SCENES, SEEDS)
     with ProgressMeter("generate") as meter:
         workers = WorkerOptions(1 if quick else os.cpu_count() or 1)
         folders = generate(names, seeds, out / "data", workers=workers, progress=meter.update, streams=())
-        how = SEEN_QUICKLY if quick else ()
-        (drawn,) = generate([SEEN], SEEN_SEED, out / "pictures", set=how, streams=("left",), images="mp4")
+        settings = QUICK_PIXEL_SETTINGS if quick else ()
+        (rendered,) = generate(
+            [PIXEL_SCENE], PIXEL_SEED, out / "pictures", set=settings, streams=("left",), images="mp4"
+        )  # fmt: skip
     sequences = [open_source(folder)[0] for folder in folders]
-    with ProgressMeter("track, score, draw", len(sequences) * len(tracker_registry.names())) as meter:
-        seen = _seen(open_source(drawn)[0], out)
-        parts = [_part(tracker, sequences, out, meter) for tracker in tracker_registry.names()]
-    write_file(out / "index.html", page(out, seen, parts).encode())
-    text = [f"{len(sequences)} sequences in {folders[0].parent}", *(_line(part.title, part.rows) for part in parts)]
-    alone = zip(seen.part.names, seen.part.rows, strict=True)
-    text += [f"one drawn, {drawn}", *(_line(name, [row]) for name, row in alone)]
-    text += [f"{time.monotonic() - start:.0f} s; open this page:", str((out / "index.html").resolve())]
-    data = {part.title: summary(part.rows) for part in parts}
-    return CommandResult({"sequences": len(sequences), "scores": data, "page": out / "index.html"}, "\n".join(text))
+    trackers = tracker_registry.names()
+    with ProgressMeter("track, score, draw", len(sequences) * len(trackers)) as meter:
+        scene = _pixel_scene(open_source(rendered)[0], out)
+        sections = [_section(tracker, sequences, out, meter) for tracker in trackers]
+    page = out / "index.html"
+    write_file(page, demo_page(out, scene, sections).encode())
+    text = [f"{len(sequences)} sequences in {folders[0].parent}", *(_line(s.title, s.rows) for s in sections)]
+    alone = zip(scene.section.names, scene.section.rows, strict=True)
+    text += [f"one sequence with pictures, {rendered}", *(_line(name, [row]) for name, row in alone)]
+    text += [f"{time.monotonic() - start:.0f} s; open this page:", str(page.resolve())]
+    data = {section.title: summary(section.rows) for section in sections}
+    return CommandResult({"sequences": len(sequences), "scores": data, "page": page}, "\n".join(text))
 
 
-def _seen(sequence: Sequence, out: Path) -> Seen:
-    """One scene from its pixels and from what a detector found, replays over one and the same video, and overlays."""
-    from tracking.app.pictures.overlay import overlay
-    from tracking.app.replay_page.video import film
+def _pixel_scene(sequence: Sequence, out: Path) -> PixelScene:
+    """Tracks one sequence from its pictures and from its stored detections; writes replays and overlay videos.
+
+    All replays share one video file.
+    """
+    from tracking.app.pictures.overlay import write_overlay
+    from tracking.app.replay_page.video import page_video
 
     folder = out / "pages" / "pictures"
-    video = film(sequence, folder / f"{sequence.name}.html", "beside")
-    part, films = Part(f"{sequence.name}, from its pictures", [], [], []), {}
+    video = page_video(sequence, folder / f"{sequence.name}.html", "beside")
+    section, overlays = ResultSection(f"{sequence.name}, from its pictures"), {}
     for tracker in [name for name in tracker_registry.names() if "pixels" in tracker_registry.find(name).needs]:
         for mode in MODES:
-            run = Job(tracker, detections=mode).run(sequence)
-            row, name = score_run(sequence, run), f"{tracker} from {_input(tracker, mode)}"
-            place = folder / f"{tracker}-{mode}.html"
-            _store(name, sequence, run, row, out / "tracks" / f"{tracker}-{mode}", place, video)
-            part.rows.append(row)
-            part.pages.append(place)
-            part.names.append(name)
+            run = TrackerSetup(tracker, detections=mode).run(sequence)
+            row, name = score_run(sequence, run), f"{tracker} from {_input_word(tracker, mode)}"
+            page = folder / f"{tracker}-{mode}.html"
+            _write_tracks(sequence, run, out / "tracks" / f"{tracker}-{mode}")
+            _write_page(name, sequence, run, row, page, video)
+            section.add(row, page, name)
             if mode == "image":
-                films[tracker] = overlay(sequence, run, folder / f"{tracker}.mp4", "over")
+                overlays[tracker] = write_overlay(sequence, run, folder / f"{tracker}.mp4", "over")
     frames = sequence.length or 0
-    return Seen(part, films, frames, frames / sequence.fps)
+    return PixelScene(section, overlays, frames, frames / sequence.fps)
 
 
-def _input(tracker: str, mode: DetectionMode) -> str:
-    """What it is given, in a word."""
+def _input_word(tracker: str, mode: DetectionMode) -> str:
+    """What the tracker gets in this mode: "pixels", "boxes" or "points"."""
     return "pixels" if mode == "image" else "boxes" if "boxes" in tracker_registry.find(tracker).needs else "points"
 
 
-def _part(tracker: str, sequences: list[Sequence], out: Path, meter: ProgressMeter) -> Part:
-    part = Part(f"{tracker}, from {_input(tracker, 'file')}", [], [], [])
+def _section(tracker: str, sequences: list[Sequence], out: Path, meter: ProgressMeter) -> ResultSection:
+    """Tracks all sequences with one tracker from their stored detections, and writes their replays."""
+    section = ResultSection(f"{tracker}, from {_input_word(tracker, 'file')}")
     for sequence in sequences:
-        run = Job(tracker).run(sequence)
+        run = TrackerSetup(tracker).run(sequence)
         row = score_run(sequence, run)
-        place = out / "pages" / tracker / f"{sequence.name}.html"
-        _store(tracker, sequence, run, row, out / "tracks" / tracker, place, None)
-        part.rows.append(row)
-        part.pages.append(place)
-        part.names.append(sequence.name)
+        page = out / "pages" / tracker / f"{sequence.name}.html"
+        _write_tracks(sequence, run, out / "tracks" / tracker)
+        _write_page(tracker, sequence, run, row, page, None)
+        section.add(row, page, sequence.name)
         meter.step(f"{tracker} on {sequence.name}")
-    return part
+    return section
 
 
-def _store(
-    who: str, sequence: Sequence, run: TrackingRun, row: Row, tracks: Path, place: Path, video: Film | None
-) -> None:
-    """The tracks as files and as a page."""
+def _write_tracks(sequence: Sequence, run: TrackingRun, folder: Path) -> None:
     from sim.io.store.track_files import write_tracks
-    from tracking.app.replay_page.page import view
 
-    folder = tracks / sequence.name
-    write_tracks(folder, run, fps=sequence.fps, camera=sequence.camera, scene=sequence.scene, info=run.info)
-    view(sequence, run, place, row.scores, f"{who} on {sequence.name}", video)
+    write_tracks(
+        folder / sequence.name, run, fps=sequence.fps, camera=sequence.camera, scene=sequence.scene, info=run.info
+    )  # fmt: skip
 
 
-def _line(title: str, rows: list[Row]) -> str:
+def _write_page(
+    name: str, sequence: Sequence, run: TrackingRun, row: SequenceScores, page: Path, video: PageVideo | None
+) -> None:
+    from tracking.app.replay_page.page import write_page
+
+    write_page(sequence, run, page, row.scores, f"{name} on {sequence.name}", video)
+
+
+def _line(title: str, rows: list[SequenceScores]) -> str:
+    """The means of the SHOWN scores that are known, in one line."""
     means = summary(rows)
     return f"{title}: " + ", ".join(
         f"{key} {number(key, means[key]['mean'], mean=True)}" for key in SHOWN if math.isfinite(means[key]["mean"])

@@ -1,14 +1,14 @@
-"""The page that `flockscope demo` ends with: one scene as it was seen, and tables of scores, rows linked to replays."""
+"""The HTML page that `flockscope demo` writes: videos of one scene, and tables of scores whose rows link to replays."""
 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from html import escape
 from pathlib import Path
 
-from tracking.app.commands.score import Row, summary
-from tracking.app.commands.score_tables import SHOWN, number
+from tracking.app.commands.score import summary
+from tracking.app.commands.score_tables import SHOWN, SequenceScores, number
 from tracking.scoring.catalogue import CATALOGUE
 
 STYLE = """
@@ -24,68 +24,79 @@ video { display: block; width: 100%; border-radius: 8px }
 """
 INTRO = """<h1>flockscope demo</h1>
 <p>Scenes in which groups merge, split, cross and queue were simulated, tracked and scored. Each name below opens a
-replay: what was tracked beside what is true, with a timeline of events. The scores are those of
-<code>flockscope score</code>; rest on a heading to read what it means.</p>
+replay: the tracks beside the truth, with a timeline of events. The scores are those of
+<code>flockscope score</code>; point at a heading to read what it means.</p>
 """
-SEEN = """<h2>One scene, from its pictures</h2>
-<p>The same {frames} frames, tracked from pixels, by background subtraction, and from what a simulated detector found.
-The videos show what was found in the pixels: trails, groups, events; the truth as thin white boxes. A dash in a table:
-nothing that could be scored, as of people where only groups are followed.</p>
+FROM_PIXELS = """<h2>One scene, from its pictures</h2>
+<p>The same {frames} frames were tracked twice: from pixels, by background subtraction, and from the detections of a
+simulated detector. The videos show the tracks from pixels: trails, groups, events; thin white boxes are the truth. A
+dash in a table means that there is nothing to score, for example people where a tracker reports only groups.</p>
 """
-FILM = """<figure><video src="{film}#t={start:.1f}" controls muted loop playsinline preload="metadata"></video>
-<figcaption>{about}</figcaption></figure>"""
-OF_PEOPLE = "<code>{tracker}</code>: boxes of people with ids, hulls of their groups"
-OF_GROUPS = (
-    "<code>{tracker}</code>: groups as wholes, with hull, extent (dotted), arrow to where it is in 1 s, people (~)"
+VIDEO = """<figure><video src="{address}#t={start:.1f}" controls muted loop playsinline preload="metadata"></video>
+<figcaption>{caption}</figcaption></figure>"""
+PEOPLE_CAPTION = "<code>{tracker}</code>: boxes of people with ids, hulls of their groups"
+GROUPS_CAPTION = (
+    "<code>{tracker}</code>: groups with hull, extent (dotted), arrow to where it is in 1 s, number of people (~)"
 )
-WITHOUT_PEOPLE = "<p>It follows groups as wholes: of single people it says nothing, and no score of them is known.</p>"
+WITHOUT_PEOPLE = "<p>This tracker reports groups without people, so people cannot be scored.</p>"
+"""The note on a tracker that reports groups only."""
 
 
 @dataclass(frozen=True)
-class Part:
-    """Results under one heading: for each row of scores its page, and a name where that is not the sequence's."""
+class ResultSection:
+    """The scores under one heading: for each row of scores its replay page and the name that links to it."""
 
     title: str
-    rows: list[Row]
-    pages: list[Path]
-    names: list[str]
+    rows: list[SequenceScores] = field(default_factory=list)
+    pages: list[Path] = field(default_factory=list)
+    names: list[str] = field(default_factory=list)
+
+    def add(self, row: SequenceScores, page: Path, name: str) -> None:
+        """Appends one row of scores with its page and name."""
+        self.rows.append(row)
+        self.pages.append(page)
+        self.names.append(name)
 
 
 @dataclass(frozen=True)
-class Seen:
-    """A scene that was tracked from its pictures: its results, a video by tracker, and how many frames it has."""
+class PixelScene:
+    """The scene that was tracked from its pictures: scores, a video for each tracker, its frames and seconds.
 
-    part: Part
-    films: dict[str, Path]
+    The names in `section` begin with the tracker's name.
+    """
+
+    section: ResultSection
+    videos: dict[str, Path]
     frames: int
     seconds: float
 
 
-def page(root: Path, seen: Seen, parts: list[Part]) -> str:
-    """The page as HTML; root: the folder in which it will stand."""
+def demo_page(root: Path, scene: PixelScene, sections: list[ResultSection]) -> str:
+    """The page as HTML. root: the folder that will hold the page; all its links are relative to it."""
     head = f'<!doctype html><html lang="en"><meta charset="utf-8"><title>flockscope demo</title><style>{STYLE}</style>'
-    first = SEEN.format(frames=seen.frames) + _films(root, seen) + _table(seen.part, root)
-    rest = "\n".join(_section(part, root) for part in parts)
+    first = FROM_PIXELS.format(frames=scene.frames) + _videos(root, scene) + _table(scene.section, root)
+    rest = "\n".join(_section(section, root) for section in sections)
     return f"{head}{INTRO}{first}{rest}</html>\n"
 
 
-def _films(root: Path, seen: Seen) -> str:
-    """The videos beside each other."""
-    with_people = {name.split()[0] for name, row in zip(seen.part.names, seen.part.rows, strict=True) if _people(row)}
+def _videos(root: Path, scene: PixelScene) -> str:
+    """The videos side by side, each beginning at 40 % of the scene."""
+    section = scene.section
+    with_people = {name.split()[0] for name, row in zip(section.names, section.rows, strict=True) if _has_people(row)}
     shown = []
-    for tracker, path in seen.films.items():
-        about = (OF_PEOPLE if tracker in with_people else OF_GROUPS).format(tracker=escape(tracker))
-        shown.append(FILM.format(film=escape(_link(path, root)), start=0.4 * seen.seconds, about=about))
+    for tracker, path in scene.videos.items():
+        caption = (PEOPLE_CAPTION if tracker in with_people else GROUPS_CAPTION).format(tracker=escape(tracker))
+        shown.append(VIDEO.format(address=escape(_link(path, root)), start=0.4 * scene.seconds, caption=caption))
     return f'<div class="films">{"".join(shown)}</div>'
 
 
-def _section(part: Part, root: Path) -> str:
-    note = "" if any(map(_people, part.rows)) else WITHOUT_PEOPLE
-    return f"<h2>{escape(part.title)}</h2>{note}{_table(part, root)}"
+def _section(section: ResultSection, root: Path) -> str:
+    note = "" if any(map(_has_people, section.rows)) else WITHOUT_PEOPLE
+    return f"<h2>{escape(section.title)}</h2>{note}{_table(section, root)}"
 
 
-def _people(row: Row) -> bool:
-    """Are people scored, not groups alone?"""
+def _has_people(row: SequenceScores) -> bool:
+    """True if people are scored, False if only groups are."""
     return math.isfinite(row.scores["HOTA"])
 
 
@@ -93,17 +104,17 @@ def _link(path: Path, root: Path) -> str:
     return path.relative_to(root).as_posix()
 
 
-def _table(part: Part, root: Path) -> str:
-    """The shown scores of which any is known, with their mean and interval where there are several sequences."""
-    keys = [key for key in SHOWN if any(math.isfinite(row.scores[key]) for row in part.rows)]
+def _table(section: ResultSection, root: Path) -> str:
+    """A table of the SHOWN scores that some row has; for several sequences, their mean with its interval below."""
+    keys = [key for key in SHOWN if any(math.isfinite(row.scores[key]) for row in section.rows)]
     rows = []
-    for row, place, name in zip(part.rows, part.pages, part.names, strict=True):
-        link = f'<a href="{escape(_link(place, root))}">{escape(name)}</a>'
+    for row, page, name in zip(section.rows, section.pages, section.names, strict=True):
+        link = f'<a href="{escape(_link(page, root))}">{escape(name)}</a>'
         rows.append(_cells("td", [link, *(number(key, row.scores[key]) for key in keys)]))
     head = "<tr><th>sequence</th>" + "".join(map(_heading, keys)) + "</tr>"
     foot = ""
-    if len({row.sequence for row in part.rows}) > 1:
-        means = summary(part.rows)
+    if len({row.sequence for row in section.rows}) > 1:
+        means = summary(section.rows)
         ends = [_interval(key, means[key]) for key in keys]
         foot = f"<tfoot>{_cells('td', ['mean<br><small>95 % interval</small>', *ends])}</tfoot>"
     table = f"<table><thead>{head}</thead><tbody>{''.join(rows)}</tbody>{foot}</table>"
@@ -111,9 +122,10 @@ def _table(part: Part, root: Path) -> str:
 
 
 def _heading(key: str) -> str:
-    about = CATALOGUE[key]
-    unit = f" [{about.unit}]" if about.unit not in ("1", "count") else ""
-    return f'<th title="{escape(about.meaning)}">{escape(key)}{unit}</th>'
+    """A column's heading with its unit; its meaning is shown when the mouse rests on it."""
+    score = CATALOGUE[key]
+    unit = f" [{score.unit}]" if score.unit not in ("1", "count") else ""
+    return f'<th title="{escape(score.meaning)}">{escape(key)}{unit}</th>'
 
 
 def _interval(key: str, mean: dict[str, float]) -> str:

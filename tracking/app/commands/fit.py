@@ -1,4 +1,4 @@
-"""`flockscope fit`: tables learned from recordings. `sensor`: a detector's error profile from its det and gt."""
+"""`flockscope fit sensor`: measures the errors of a detector on recordings and writes them as a [sensor] table."""
 
 from __future__ import annotations
 
@@ -9,39 +9,47 @@ import numpy as np
 
 from sim.types import Sequence as Recording
 from tracking.app import option_parsing
+from tracking.app.command_options import FitSensorOptions
 from tracking.app.command_result import CommandResult
 
-SEEDS = range(30_000, 30_008)  # of the draws that are laid beside the real errors
+CHECK_SEEDS = range(30_000, 30_008)
+"""Seeds of the simulated detections whose statistics are shown beside the measured ones."""
+
 SHOWN = (
     "missed", "misses: mean run, s", "false alarms per frame", "false alarms: at people", "false alarms: mean stay, s",
     "overlap, 10% quantile", "overlap, 50% quantile", "overlap, 90% quantile", "error correlation after 0.2 s",
 )  # fmt: skip
+"""The statistics that the text shows; --json has all of them."""
 
 
-def sensor(sources: Sequence[Path], out: Path, fps: float | None) -> CommandResult:
-    """The profile of the detector behind these recordings, pooled, as a file with a [sensor] table."""
+def fit_sensor(options: FitSensorOptions) -> CommandResult:
+    """Writes the profile of the detector behind the recordings, pooled over all of them, and returns it.
+
+    Measured statistics stand beside those of detections simulated with the profile. Raises InputError if --out is no
+    .toml file, or if a source is missing or has no labels or detections.
+    """
     from scenarios.loading.sensor_profiles import dump_sensor
     from sim.io.files.atomic import write_file
     from tracking.fitting.matching import match_sequence
     from tracking.fitting.sensor import fit
     from tracking.fitting.statistics import again, statistics
 
-    option_parsing.named(out, ".toml")
-    recordings = _open(sources, fps)
+    out = option_parsing.output_file(options.out, ".toml")
+    recordings = _open(options.sources, options.fps)
     matched = [match_sequence(recording) for recording in recordings]
-    found = fit(matched)
-    real = statistics(matched)
-    drawn = [statistics([again(m, found, seed) for m in matched]) for seed in SEEDS]
-    like = {name: _mean([d[name] for d in drawn]) for name in real}
+    profile = fit(matched)
+    measured = statistics(matched)
+    per_seed = [statistics([again(m, profile, seed) for m in matched]) for seed in CHECK_SEEDS]
+    simulated = {name: _mean([drawn[name] for drawn in per_seed]) for name in measured}
     people = sum(len(m.match) for m in matched)
     names = ", ".join(recording.name for recording in recordings)
-    write_file(out, dump_sensor(found, f"A detector's profile, of {people} labelled people in {names}").encode())
+    write_file(out, dump_sensor(profile, f"A detector's profile, of {people} labelled people in {names}").encode())
     lines = [f"{people} labelled people, {sum(len(m.box) for m in matched)} detections in {names}", ""]
-    wide = max(map(len, SHOWN))
-    lines += [f"{'':<{wide}}  measured  so drawn"]
-    lines += [f"{name:<{wide}}  {real[name]:8.3f}  {like[name]:8.3f}" for name in SHOWN]
-    lines += ["", f"→ {out}: give it as --sensor {out}"]
-    data = {"file": out, "sensor": found.model_dump(exclude_none=True), "measured": real, "drawn": like}
+    width = max(map(len, SHOWN))
+    lines += [f"{'':<{width}}  measured  simulated"]
+    lines += [f"{name:<{width}}  {measured[name]:8.3f}  {simulated[name]:9.3f}" for name in SHOWN]
+    lines += ["", f"→ {out}: use it as --sensor {out}"]
+    data = {"file": out, "sensor": profile.model_dump(exclude_none=True), "measured": measured, "drawn": simulated}
     return CommandResult(data, "\n".join(lines))
 
 
@@ -52,6 +60,6 @@ def _open(sources: Sequence[Path], fps: float | None) -> list[Recording]:
 
 
 def _mean(values: list[float]) -> float:
-    """Of those that are known."""
+    """The mean of the finite values, nan if there is none."""
     known = [v for v in values if np.isfinite(v)]
     return float(np.mean(known)) if known else float("nan")

@@ -1,44 +1,34 @@
-"""`flockscope replay`: people who were filmed, before our cameras, as a dataset."""
+"""`flockscope replay`: renders recorded trajectories with a simulated camera and sensor and stores a dataset."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from pathlib import Path
-
 from scenarios.errors import InputError
 from tracking.app import option_parsing
+from tracking.app.command_options import ReplayCommandOptions
 from tracking.app.command_result import CommandResult
 from tracking.app.progress import ProgressMeter
 
 
-@dataclass(frozen=True)
-class Part:
-    """Which recording, which part of it, and what the recording does not say itself."""
+def replay(options: ReplayCommandOptions) -> CommandResult:
+    """Stores one sequence for every recording of the source and every seed; returns their folders.
 
-    source: Path
-    start: float
-    duration: float | None
-    fps: float | None
-    calibration: Path | None
-
-
-def replay(
-    part: Part, camera: Path | None, seeds: str, out: Path, settings: list[str], streams: str, images: str | None
-) -> CommandResult:
-    """Every recording of the source with every seed; settings: of camera, sensor, light and picture."""
+    Settings of `--sensor` and `--set` take precedence over the file of `--camera`. Raises InputError if --out, --seeds,
+    --duration, a setting or a file is wrong, or if a recording cannot be replayed.
+    """
     from scenarios.loading.resolve import load_observation
     from sim.dataset.replay import Cut
     from sim.dataset.replay_dataset import ReplayOptions, store_replays
     from sim.io.source import open_source
 
-    option_parsing.folder(out)
-    chosen, (wanted, kind) = option_parsing.seeds(seeds), option_parsing.pictures(streams, images)
-    if part.duration is not None and part.duration <= 0:
-        raise InputError(place="--duration", got=part.duration, expected="seconds above 0", remedy="correct it")
-    view = load_observation(camera, settings)
-    sources = open_source(part.source, fps=part.fps, images=False)
-    how = ReplayOptions(view, Cut(part.start, part.duration), part.calibration, wanted, kind)
+    option_parsing.output_folder(options.out)
+    seeds = option_parsing.seeds(options.seeds)
+    streams, images = option_parsing.pictures(options.streams, options.images)
+    if options.duration is not None and options.duration <= 0:
+        raise InputError(place="--duration", got=options.duration, expected="seconds above 0", remedy="correct it")
+    view = load_observation(options.camera, [*option_parsing.sensor_settings(options.sensor), *options.settings])
+    recordings = open_source(options.source, fps=options.fps, images=False)
+    replays = ReplayOptions(view, Cut(options.start, options.duration), options.calibration, streams, images)
     with ProgressMeter("replay") as meter:
-        folders = store_replays(sources, how, chosen, out, meter.update)
+        folders = store_replays(recordings, replays, seeds, options.out, meter.update)
     text = f"{len(folders)} sequences in {folders[0].parent}"
     return CommandResult({"sequences": folders, "folder": folders[0].parent}, text)

@@ -1,4 +1,4 @@
-"""`flockscope scenarios --schema`: every key of a scenario file, read off the strict form."""
+"""`flockscope scenarios --schema`: lists every key of a scenario file, read from the schema of its models."""
 
 from __future__ import annotations
 
@@ -10,18 +10,20 @@ from scenarios.schema.scenario import Scenario
 from tracking.app.command_result import CommandResult
 
 Node = dict[str, Any]
+"""A part of a JSON schema."""
 
 
-def keys() -> CommandResult:
-    """Every key with its type, default and meaning; `[]` stands for each of an array."""
+def list_keys() -> CommandResult:
+    """Every key with its type, default and meaning. `[]` after a key stands for every element of its array."""
     schema = Scenario.model_json_schema(by_alias=True)
     rows = list(_keys(schema, schema["$defs"], ""))
-    wide = max(len(row["key"]) for row in rows)
-    text = "\n".join(f"{row['key']:<{wide}}  {row['type']}; {row['default']}; {row['meaning']}" for row in rows)
+    width = max(len(row["key"]) for row in rows)
+    text = "\n".join(f"{row['key']:<{width}}  {row['type']}; {row['default']}; {row['meaning']}" for row in rows)
     return CommandResult({"keys": rows}, text)
 
 
 def _keys(table: Node, known: Node, prefix: str) -> Iterator[dict[str, str]]:
+    """The keys of a table and of the tables in it. known: the schema's named tables. prefix: of the keys' names."""
     required = table.get("required", [])
     for name, node in table["properties"].items():
         many = "[]" if any("items" in each for each in (node, *node.get("anyOf", ()))) else ""
@@ -37,7 +39,7 @@ def _keys(table: Node, known: Node, prefix: str) -> Iterator[dict[str, str]]:
 
 
 def _tables(node: Node, known: Node) -> Iterator[Node]:
-    """The tables that a value is made of; a distribution is a value."""
+    """The tables that a key can hold, directly or in an array; none for a plain value. A distribution is a value."""
     ref = node.get("$ref", "").rpartition("/")[2]
     if ref and ref != "Distribution":
         yield known[ref]
@@ -47,6 +49,7 @@ def _tables(node: Node, known: Node) -> Iterator[Node]:
 
 
 def _type(node: Node) -> str:
+    """The type of a value in words: its choices, alternatives, elements, or its JSON type."""
     if "$ref" in node:
         return str(node["$ref"]).rpartition("/")[2].lower()
     for choices in (node.get("enum"), [node["const"]] if "const" in node else None):
@@ -60,6 +63,7 @@ def _type(node: Node) -> str:
 
 
 def _default(node: Node) -> str:
+    """The default in words; "absent" if it is None. Keys of a default table that are None are left out."""
     value = node.get("default")
     if isinstance(value, dict):
         value = {key: v for key, v in value.items() if v is not None}

@@ -1,8 +1,7 @@
-"""`flockscope scenarios`: what there is, one of them in words with a drawing of its script."""
+"""`flockscope scenarios`: lists scenarios and suites, or explains one in words with a drawing of its script."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -10,31 +9,55 @@ from scenarios.errors import InputError
 from scenarios.loading import suites as suite
 from scenarios.loading import toml_files
 from scenarios.loading.resolve import Entry, dump, load, names, resolve, suite_names
+from tracking.app.command_options import ScenariosOptions
 from tracking.app.command_result import CommandResult
-from tracking.app.option_parsing import named, scenario_settings
+from tracking.app.option_parsing import output_file, scenario_settings
 
 if TYPE_CHECKING:
     from scenarios.schema.scenario import Scenario
 
 
+def scenarios(options: ScenariosOptions) -> CommandResult:
+    """Explains the named scenario or suite; without a name lists all, or with --schema the keys of a scenario file.
+
+    Raises InputError if NAME, --out or --set is given together with --schema, or --out or --set without NAME.
+    """
+    if options.name is not None and not options.schema:
+        return explain(options.name, options.settings, options.out)
+    unused = {"NAME": options.name, "--out": options.out, "--set": options.settings}
+    for option, value in unused.items():
+        if value:
+            got, remedy = f"{option} without a scenario to explain", "name a scenario, and leave --schema out"
+            raise InputError(place=option, got=got, expected="NAME", remedy=remedy)
+    if options.schema:
+        from tracking.app.commands.scenario_keys import list_keys
+
+        return list_keys()
+    return catalogue()
+
+
 def catalogue() -> CommandResult:
-    """Every scenario and suite, each with its line about itself."""
+    """Every scenario and suite with its line of description."""
     scenarios = {name: load(name).about for name in names()}
     suites = {name: suite.about(suite.find_suite(name)) for name in suite_names()}
     text = ["Scenarios", *_rows(scenarios), "", "Suites", *_rows(suites)]
     return CommandResult({"scenarios": scenarios, "suites": suites}, "\n".join(text))
 
 
-def explain(name: str, settings: Iterable[str] = (), drawing: Path | None = None) -> CommandResult:
-    """One scenario in words with its plan, or the entries of a suite; `drawing`: where its SVG is written."""
+def explain(name: str, settings: list[str], drawing: Path | None) -> CommandResult:
+    """A scenario in words with a text drawing of its plan, or the entries of a suite.
+
+    drawing: the SVG file to write, None for none. Raises InputError for a name or setting that is wrong, for a drawing
+    of a suite, and for a `drawing` that does not end in .svg.
+    """
     entries = resolve(name, scenario_settings(settings))
     if not _is_suite(name):
-        return _one(entries[0].scenario, drawing)
+        return _explain_scenario(entries[0].scenario, drawing)
     if drawing is not None:
         raise InputError(
             place="--out", got=f"the suite {name}", expected="one scenario", remedy="name one of its entries"
         )
-    return _suite(name, entries)
+    return _list_entries(name, entries)
 
 
 def _is_suite(name: str) -> bool:
@@ -43,7 +66,7 @@ def _is_suite(name: str) -> bool:
     return name.startswith("suite:") or name not in names()
 
 
-def _one(scenario: Scenario, drawing: Path | None) -> CommandResult:
+def _explain_scenario(scenario: Scenario, drawing: Path | None) -> CommandResult:
     from scenarios.drawing import explain
 
     words = explain.text(scenario)
@@ -52,15 +75,16 @@ def _one(scenario: Scenario, drawing: Path | None) -> CommandResult:
         return CommandResult(data, words)
     from sim.io.files.atomic import write_file
 
-    write_file(named(drawing, ".svg"), explain.svg(scenario).encode())
+    write_file(output_file(drawing, ".svg"), explain.svg(scenario).encode())
     return CommandResult({**data, "drawing": drawing}, f"{words}\n{drawing}")
 
 
-def _suite(name: str, entries: list[Entry]) -> CommandResult:
+def _list_entries(name: str, entries: list[Entry]) -> CommandResult:
     rows = {entry.name: entry.scenario.about for entry in entries}
     return CommandResult({"name": name, "entries": rows}, "\n".join([f"{name}: {len(rows)} entries", *_rows(rows)]))
 
 
 def _rows(about: dict[str, str]) -> list[str]:
-    wide = max(map(len, about), default=0)
-    return [f"  {name:<{wide}}  {words}".rstrip() for name, words in about.items()] or ["  none"]
+    """One indented line for each name with its description, the descriptions aligned; "none" if there is no name."""
+    width = max(map(len, about), default=0)
+    return [f"  {name:<{width}}  {words}".rstrip() for name, words in about.items()] or ["  none"]

@@ -1,18 +1,17 @@
-"""Scores as tables for a terminal: a row for each sequence, the mean with its interval beneath."""
+"""Tables of scores for the terminal: a row per sequence, with the mean and its 95 % interval below."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any
+from dataclasses import dataclass
+from typing import Any
 
 from tracking.scoring.catalogue import CATALOGUE
-
-if TYPE_CHECKING:
-    from tracking.app.commands.score import Row
+from tracking.scoring.evaluation import Scores
 
 SHOWN = ("HOTA", "MOTA", "IDF1", "group_F1", "group_GDSR2", "group_MOTA", "pairwise_F1", "event_F1", "event_latency")
-"""The few that stand for all, where there is room for one line."""
+"""The keys that are shown where there is room for one line only."""
 
 PEOPLE = ("objective", "HOTA", "DetA", "AssA", "MOTA", "MOTP", "IDF1", "FP", "FN", "IDSW", "GOSPA")
 GROUPS = tuple(
@@ -27,56 +26,69 @@ TABLES = {
     "groups, core (without 1 s before and after each true merge and split)": tuple(f"{key}_core" for key in GROUPS),
     "members and events": EVENTS,
 }
-"""What a terminal has room for; --json holds everything."""
+"""Title and keys of each table. Only keys of groups have a core score. --json holds every key of the catalogue."""
 
-OF_GROUPS = {title: PEOPLE[:1] * (keys is GROUPS) + keys for title, keys in TABLES.items() if keys is not PEOPLE}
-"""The same for a tracker that knows groups only: the objective is theirs."""
+GROUP_TRACKER_TABLES = {
+    title: PEOPLE[:1] * (keys is GROUPS) + keys for title, keys in TABLES.items() if keys is not PEOPLE
+}
+"""The tables for a tracker that reports groups without people: the objective moves to the groups' table."""
 
 SIMILARITY = {
     "boxes": "overlap (IoU) of boxes",
     "ground": "1 - distance / 2 m on the ground",
     "image": "1 - distance / 2 m in the image",
 }
-MATCHED = {"hull": "overlap (IoU) of hulls", "members": "common members (Jaccard index)"}
+GROUP_MATCH = {"hull": "overlap (IoU) of hulls", "members": "common members (Jaccard index)"}
 SURFACE = {"ground": "on the ground, m", "image": "in the image, px"}
 
 ENOUGH = 100
-"""Sequences from which a difference counts."""
+"""A difference over fewer sequences than this is called an indication."""
 
 Means = dict[str, dict[str, float]]
+"""By key: "mean", and "low" and "high" of its 95 % interval; nan where unknown."""
 
 
-def tables(rows: list[Row], means: Means, notes: Sequence[str] = (), total: int = 0) -> Any:
-    """A table for each family of which something is known, by what people and groups were compared, and the notes.
+@dataclass(frozen=True)
+class SequenceScores:
+    """The scores of one sequence. given: what detections the tracker got, in words; "" if there is no run.json."""
 
-    total: so many sequences have been scored; where these are not all, what their tracker saw stands above them.
+    sequence: str
+    scores: Scores
+    given: str = ""
+
+
+def tables(rows: list[SequenceScores], means: Means, notes: Sequence[str] = (), total: int = 0) -> Any:
+    """A rich renderable: one table per family that has a known score, then how people and groups were compared.
+
+    rows: sequences whose trackers got the same detections. total: the number of all scored sequences; if it is larger
+    than the number of rows, a heading says which detections these rows belong to. notes: further lines.
     """
     from rich.console import Group
 
-    seen = f"detections {said([rows[0].given])}"
-    people = _known(PEOPLE[1:], means)
-    titles = TABLES if people else OF_GROUPS
-    known = {title: keys for title, keys in titles.items() if _known(keys, means)}
+    detections = f"detections {detections_words([rows[0].given])}"
+    people = _any_known(PEOPLE[1:], means)
+    titles = TABLES if people else GROUP_TRACKER_TABLES
+    known = {title: keys for title, keys in titles.items() if _any_known(keys, means)}
     parts = [_table(title, keys, rows, means) for title, keys in known.items()]
-    lines = [seen, *_compared(rows, people, "groups, strict" in known)]
+    lines = [detections, *_comparison_lines(rows, people, "groups, strict" in known)]
     if len(rows) == 1 and math.isfinite(means["objective"]["low"]):
         lines.append("intervals by moving blocks of frames")
-    some = len(rows) < total
-    head = [f"{len(rows)} of {total} sequences, {seen}", ""] if some else []
-    return Group(*head, *parts, "\n".join([*lines, *notes]), *([""] if some else []))
+    partial = len(rows) < total
+    head = [f"{len(rows)} of {total} sequences, {detections}", ""] if partial else []
+    return Group(*head, *parts, "\n".join([*lines, *notes]), *([""] if partial else []))
 
 
-def _known(keys: Sequence[str], means: Means) -> bool:
+def _any_known(keys: Sequence[str], means: Means) -> bool:
     return any(math.isfinite(means[key]["mean"]) for key in keys)
 
 
-def said(given: Sequence[str]) -> str:
-    """What trackers saw, in words."""
-    return ", ".join(words or "not said (no run.json)" for words in given)
+def detections_words(given: Sequence[str]) -> str:
+    """The detections that trackers got, in words, separated by commas."""
+    return ", ".join(words or "unknown (no run.json)" for words in given)
 
 
-def _table(title: str, keys: tuple[str, ...], rows: list[Row], means: Means) -> Any:
-    table = _empty()
+def _table(title: str, keys: tuple[str, ...], rows: list[SequenceScores], means: Means) -> Any:
+    table = _empty_table()
     table.add_column("sequence", overflow="fold")
     for key in keys:
         table.add_column(key.removeprefix("group_").removesuffix("_core"), justify="right", no_wrap=True)
@@ -86,51 +98,51 @@ def _table(title: str, keys: tuple[str, ...], rows: list[Row], means: Means) -> 
         for name, part in (("mean", "mean"), ("95 % low", "low"), ("95 % high", "high"))[len(rows) == 1 :]:
             cells = (number(key, means[key][part], mean=True) for key in keys)
             table.add_row(name, *cells, style="bold" if part == "mean" else None)
-    return _headed(title, table)
+    return _with_title(title, table)
 
 
-def _empty() -> Any:
+def _empty_table() -> Any:
     from rich.table import Table
 
     return Table(box=None, pad_edge=False, header_style="bold")
 
 
-def _headed(title: str, table: Any) -> Any:
-    """A title that is not folded into the width of its table."""
+def _with_title(title: str, table: Any) -> Any:
+    """The title above the table, not wrapped to the table's width."""
     from rich.console import Group
     from rich.text import Text
 
     return Group(Text(title, style="italic"), table, "")
 
 
-def _compared(rows: list[Row], people: bool, groups: bool) -> list[str]:
+def _comparison_lines(rows: list[SequenceScores], people: bool, groups: bool) -> list[str]:
     def each(words: dict[str, str], name: str) -> str:
         return ", ".join(words[kind] for kind in dict.fromkeys(getattr(row.scores, name) for row in rows))
 
-    lines = [f"people by {each(SIMILARITY, 'similarity')}" if people else "people are not tracked"]
+    lines = [f"people compared by {each(SIMILARITY, 'similarity')}" if people else "people are not tracked"]
     if not groups:
         return [*lines, "groups are not labelled"]
-    return [*lines, f"groups by {each(MATCHED, 'group_match')}, {each(SURFACE, 'surface')}"]
+    return [*lines, f"groups compared by {each(GROUP_MATCH, 'group_match')}, {each(SURFACE, 'surface')}"]
 
 
-def differences(found: Means, sequences: int) -> Any:
-    """How the means differ from those of other tracks; a star where the interval is off zero."""
+def difference_table(differences: Means, sequences: int) -> Any:
+    """A rich table of the differences to other tracks, with a star where the interval does not hold zero."""
     over = "the same frames" if sequences == 1 else f"{sequences} sequences"
     title = f"these tracks minus --against, in pairs over {over}"
     title += "" if sequences >= ENOUGH or sequences == 1 else f" (fewer than {ENOUGH}: an indication)"
-    table = _empty()
+    table = _empty_table()
     for name in ("score", "difference", "95 % low", "95 % high", ""):
         table.add_column(name, justify="left" if name == "score" else "right")
     for key in (key for keys in TABLES.values() for key in keys):
-        d = found[key]
+        d = differences[key]
         if math.isfinite(d["mean"]):
             cells = (number(key, d[part], mean=True) for part in ("mean", "low", "high"))
             table.add_row(key, *cells, "*" if d["low"] > 0 or d["high"] < 0 else "")
-    return _headed(title, table)
+    return _with_title(title, table)
 
 
 def number(key: str, value: float, *, mean: bool = False) -> str:
-    """A score as text: fractions with three digits, counts whole, their means with one; nan ("not labelled") a dash."""
+    """A score as text: three decimals, none for a count, one for the mean of a count; a dash for nan and infinity."""
     if not math.isfinite(value):
         return "–"
     return f"{value:.3f}" if CATALOGUE[key].unit != "count" else f"{value:.{int(mean)}f}"

@@ -1,8 +1,8 @@
-"""`flockscope track`: a tracker over a sequence, or over every sequence of a dataset, its answers stored."""
+"""`flockscope track`: runs a tracker over a sequence, or over every sequence of a dataset, and stores the tracks."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -10,6 +10,7 @@ from typing import Any
 from scenarios.errors import InputError
 from sim.types import DetectionMode, Sequence
 from tracking.app import option_parsing
+from tracking.app.command_options import TrackOptions
 from tracking.app.command_result import CommandResult
 from tracking.app.progress import ProgressMeter
 from tracking.config import Config
@@ -17,10 +18,20 @@ from tracking.grouping.link_rule import LinkRule
 from tracking.run import TrackingRun
 from tracking.run_info import input_summary
 
+ROW_KEYS = (
+    "sequence", "detections", "sensor", "background", "causal", "causal_from", "plane", "boxes", "frames",
+    "frames_per_second", "whole_frames_per_second",
+)  # fmt: skip
+"""What --json repeats of each run.json."""
+
 
 @dataclass(frozen=True)
-class Job:
-    """How a tracker is to be run: tracker as `tracking.track` takes it; config None: its own default, if it has one."""
+class TrackerSetup:
+    """A tracker with its parameters and inputs, as `tracking.track` takes them.
+
+    config: None for a tracker's own defaults. detections: None for the first mode that works. sensor: settings that
+    degrade detections of mode "truth". grouping: the rule for trackers that report no groups; None for the default.
+    """
 
     tracker: str
     config: Config | None = None
@@ -30,7 +41,7 @@ class Job:
     grouping: LinkRule | None = None
 
     def run(self, sequence: Sequence, progress: Callable[[int], None] | None = None) -> TrackingRun:
-        """The tracker's answers."""
+        """Tracks the sequence. `progress` is called with each frame's index when that frame is done."""
         from tracking.run import track
 
         return track(
@@ -39,24 +50,48 @@ class Job:
         )  # fmt: skip
 
 
-def job(
-    tracker: str,
-    params: Path | None,
-    settings: Iterable[str],
-    detections: DetectionMode | None,
-    seed: int,
-    detector: Path | None = None,
-    grouping: Path | None = None,
-) -> Job:
-    """The options of the command as a Job; InputError for settings that the tracker does not know."""
-    found = option_parsing.settings([*option_parsing.sensor(detector), *settings], "tracker", ("tracker", "sensor"))
+def track(options: TrackOptions) -> CommandResult:
+    """Tracks every sequence of the source; stores tracks in --out, or for several sequences in a folder of it for each.
+
+    Raises InputError before the first frame if an option is wrong, if the tracker cannot work on one of the sequences,
+    or if two sequences have the same name.
+    """
+    from sim.io.source import open_source
+    from sim.io.store.track_files import write_tracks
+    from tracking.tracker_registry import find
+
+    setup = _setup(options)
+    option_parsing.output_folder(options.out)
+    needs = find(setup.tracker).needs
+    pictures = setup.detections in (None, "image") and not {"pixels", "stereo"}.isdisjoint(needs)
+    sequences = open_source(
+        options.source, fps=options.fps, px_per_m=options.px_per_m, camera=options.camera, images=pictures,
+        background=options.background,
+    )  # fmt: skip
+    folders = _output_folders(sequences, options.source, options.out)
+    _check_modes(setup, needs, sequences, options.background)
+    rows = []
+    with ProgressMeter("track", _total_frames(sequences)) as meter:
+        for sequence, folder in zip(sequences, folders, strict=True):
+            run = setup.run(sequence, lambda index, name=sequence.name: meter.step(name))  # type: ignore[misc]
+            write_tracks(folder, run, fps=sequence.fps, camera=sequence.camera, scene=sequence.scene, info=run.info)
+            rows.append(_row(run, folder))
+    return CommandResult({"tracker": setup.tracker, "runs": rows}, "\n".join(map(_line, rows)))
+
+
+def _setup(options: TrackOptions) -> TrackerSetup:
+    """Raises InputError for settings that the tracker or the sensor does not know."""
+    texts = [*option_parsing.sensor_settings(options.sensor), *options.settings]
+    found = option_parsing.settings(texts, "tracker", ("tracker", "sensor"))
     own = [text for subject, text in found if subject == "tracker"]
-    sensor = option_parsing.values(text for subject, text in found if subject == "sensor")
-    rule = None if grouping is None else LinkRule.from_toml(grouping)
-    return Job(tracker, _config(tracker, params, own), detections, sensor, seed, rule)
+    sensor = option_parsing.toml_values(text for subject, text in found if subject == "sensor")
+    rule = None if options.grouping is None else LinkRule.from_toml(options.grouping)
+    config = _config(options.tracker, options.params, own)
+    return TrackerSetup(options.tracker, config, options.detections, sensor, options.seed, rule)
 
 
 def _config(tracker: str, params: Path | None, settings: list[str]) -> Config | None:
+    """The tracker's config with parameters and settings applied; None for a tracker without parameters."""
     from tracking.tracker_registry import find
 
     kind: type[Config] | None = getattr(find(tracker), "config_class", None)
@@ -73,73 +108,42 @@ def _config(tracker: str, params: Path | None, settings: list[str]) -> Config | 
     )
 
 
-def track(
-    job: Job,
-    source: Path,
-    out: Path,
-    *,
-    fps: float | None,
-    px_per_m: float | None,
-    camera: Path | None,
-    background: str | None,
-) -> CommandResult:
-    """Run the job on every sequence of the source and store the answers: in `out`, or in a folder of it for each.
-
-    InputError before the first frame is read where the job cannot be done on one of them.
-    """
-    from sim.io.source import open_source
-    from sim.io.store.track_files import write_tracks
-    from tracking.tracker_registry import find
-
-    option_parsing.folder(out)
-    needs = find(job.tracker).needs
-    pictures = job.detections in (None, "image") and not {"pixels", "stereo"}.isdisjoint(needs)
-    sequences = open_source(source, fps=fps, px_per_m=px_per_m, camera=camera, images=pictures, background=background)
-    chosen = places(sequences, source, out)
-    _check(job, needs, sequences, background)
-    rows = []
-    with ProgressMeter("track", _frames(sequences)) as meter:
-        for sequence, folder in chosen:
-            run = job.run(sequence, lambda index, name=sequence.name: meter.step(name))  # type: ignore[misc]
-            write_tracks(folder, run, fps=sequence.fps, camera=sequence.camera, scene=sequence.scene, info=run.info)
-            rows.append(_row(run, folder))
-    return CommandResult({"tracker": job.tracker, "runs": rows}, "\n".join(map(_line, rows)))
-
-
-def _check(job: Job, needs: tuple[str, ...], sequences: list[Sequence], background: str | None) -> None:
+def _check_modes(
+    setup: TrackerSetup, needs: tuple[str, ...], sequences: list[Sequence], background: str | None
+) -> None:
+    """Raises InputError if the tracker cannot work on one of the sequences, or if `background` would have no effect."""
     from tracking.detection_mode import choose_mode
 
-    modes = [choose_mode(needs, sequence, job.detections) for sequence in sequences]
+    modes = [choose_mode(needs, sequence, setup.detections) for sequence in sequences]
     if background is not None and "image" not in modes:
         got, expected = f"--detections {modes[0]}", "a tracker that works on pictures"
         raise InputError(place="--background", got=got, expected=expected, remedy="leave --background out")
 
 
-def _frames(sequences: list[Sequence]) -> int | None:
-    """Frames of all, None where that is not known."""
+def _total_frames(sequences: list[Sequence]) -> int | None:
+    """The number of frames of all sequences, None if one of them does not know its length."""
     lengths = [sequence.length for sequence in sequences]
     return None if None in lengths else sum(length or 0 for length in lengths)
 
 
-def places(sequences: list[Sequence], source: Path, out: Path) -> list[tuple[Sequence, Path]]:
-    """Where each sequence's results go: `out` itself for a source that is one sequence, else a folder by its name."""
+def _output_folders(sequences: list[Sequence], source: Path, out: Path) -> list[Path]:
+    """The folder for each sequence's tracks: `out` itself if the source is one sequence, else out/<sequence name>."""
     own = Path(sequences[0].source.get("path", source))
     if len(sequences) == 1 and (own == source or source.is_file() or own.is_file()):
-        return [(sequences[0], out)]
+        return [out]
     names = [sequence.name for sequence in sequences]
     for k, name in enumerate(names):
         if name in names[:k]:
             raise InputError(
-                file=source, got=f"two sequences named {name}", expected="unique names", remedy="give one at a time"
-            )
-    return [(sequence, out / sequence.name) for sequence in sequences]
+                file=source, got=f"two sequences named {name}", expected="unique names",
+                remedy="track them one at a time",
+            )  # fmt: skip
+    return [out / name for name in names]
 
 
 def _row(run: TrackingRun, folder: Path) -> dict[str, Any]:
-    shown = ["sequence", "detections", "sensor", "background", "causal", "causal_from", "plane", "boxes", "frames"]
-    shown += ["frames_per_second", "whole_frames_per_second"]
     ids = {int(id) for tracks in run for id in tracks.id}
-    return {**{key: run.info[key] for key in shown}, "tracks": len(ids), "folder": folder}
+    return {**{key: run.info[key] for key in ROW_KEYS}, "tracks": len(ids), "folder": folder}
 
 
 def _line(row: dict[str, Any]) -> str:

@@ -39,7 +39,7 @@ def tune(wishes: Wishes, **search_options: Any) -> CommandResult:
     from tracking.tuning import tune as search
 
     found = option_parsing.settings(wishes.settings, "tracker", option_parsing.SUBJECTS)
-    texts = [*option_parsing.sensor(wishes.sensor), *(f"{subject}.{text}" for subject, text in found)]
+    texts = [*option_parsing.sensor_settings(wishes.sensor), *(f"{subject}.{text}" for subject, text in found)]
     check = {None: "", NONE: None}.get(wishes.check, wishes.check)
     only = tuple(word.strip() for word in (wishes.only or "").split(",") if word.strip())
     with ProgressMeter("tune", wishes.trials) as meter:

@@ -1,110 +1,101 @@
-"""`flockscope view`, `sheet` and `overlay`: pages, pictures and videos of a sequence, or one for each of a dataset."""
+"""`flockscope view`, `sheet` and `overlay`: write a page, picture or video for each sequence of a source."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from scenarios.errors import InputError
 from sim.io.source import open_source
 from sim.types import Sequence
 from tracking.app import option_parsing
+from tracking.app.command_options import OverlayOptions, SheetOptions, ViewOptions
 from tracking.app.command_result import CommandResult
 from tracking.app.progress import ProgressMeter
-from tracking.app.stored_tracks import pair, results
+from tracking.app.stored_tracks import find_tracks, match_tracks
 from tracking.run import TrackingRun
 
-if TYPE_CHECKING:
-    from tracking.app.pictures.overlay import HowTrue
-    from tracking.app.replay_page.video import Video
-
-
 Step = Callable[[str], None]
-Draw = Callable[[Sequence, Path, Step], None]
+"""Reports that one picture of the named sequence is done."""
+
+Write = Callable[[Sequence, Path, Step], None]
+"""Writes the file of one sequence."""
 
 
-@dataclass(frozen=True)
-class Recording:
-    """A source as a command is given it, with what it may be told about it (sim.io.source.open_source)."""
+def view(options: ViewOptions) -> CommandResult:
+    """Writes a replay page for each sequence, with its tracks if they are given; returns the paths."""
+    from tracking.app.replay_page.page import write_page
+    from tracking.app.replay_page.video import page_video
 
-    source: Path
-    fps: float | None = None
-    px_per_m: float | None = None
-    camera: Path | None = None
+    sequences = _open(options)
+    tracks_of = _tracks_reader(sequences, options.tracks)
 
-    def open(self) -> list[Sequence]:
-        """Its sequences, with their pictures."""
-        return open_source(self.source, fps=self.fps, px_per_m=self.px_per_m, camera=self.camera, images=True)
+    def write(sequence: Sequence, path: Path, step: Step) -> None:
+        tracks = tracks_of(sequence)
+        write_page(sequence, tracks, path, video=page_video(sequence, path, options.video, step))
 
-
-def view(recording: Recording, tracks: Path | None, out: Path, video: Video) -> CommandResult:
-    """A replay page of each sequence, with its tracks where they are given."""
-    from tracking.app.replay_page.page import view as page
-    from tracking.app.replay_page.video import film
-
-    sequences = recording.open()
-    of = _tracks_of(sequences, tracks)
-
-    def draw(sequence: Sequence, path: Path, step: Step) -> None:
-        said = of(sequence)
-        page(sequence, said, path, film=film(sequence, path, video, step))
-
-    return _each("view", sequences, out, ".html", draw, _pictures(sequences) if video != "none" else 0)
+    pictures = _picture_count(sequences) if options.video != "none" else 0
+    return _write_each("view", sequences, options.out, ".html", write, pictures)
 
 
-def sheet(recording: Recording, out: Path, frames: int) -> CommandResult:
-    """A contact sheet of each sequence."""
-    from tracking.app.pictures.contact_sheet import sheet as picture
+def sheet(options: SheetOptions) -> CommandResult:
+    """Writes a contact sheet for each sequence; returns the paths."""
+    from tracking.app.pictures.contact_sheet import write_sheet
 
-    def draw(sequence: Sequence, path: Path, _: Step) -> None:
-        picture(sequence, path, frames)
+    def write(sequence: Sequence, path: Path, _: Step) -> None:
+        write_sheet(sequence, path, options.frames)
 
-    return _each("sheet", recording.open(), out, ".png", draw, 0)
-
-
-def overlay(recording: Recording, tracks: Path | None, out: Path, truth: HowTrue | None) -> CommandResult:
-    """A video of each sequence with its tracks, its truth or both drawn over it."""
-    from tracking.app.pictures.overlay import overlay as film
-
-    sequences = recording.open()
-    of = _tracks_of(sequences, tracks)
-
-    def draw(sequence: Sequence, path: Path, step: Step) -> None:
-        film(sequence, of(sequence), path, truth, step)
-
-    return _each("overlay", sequences, out, ".mp4", draw, _pictures(sequences))
+    sequences = open_source(options.source, fps=options.fps, images=True)
+    return _write_each("sheet", sequences, options.out, ".png", write, 0)
 
 
-def _tracks_of(sequences: list[Sequence], tracks: Path | None) -> Callable[[Sequence], TrackingRun | None]:
-    """Reads the tracks of a sequence, if any were given."""
-    found = {} if tracks is None else {s.name: result for s, result in pair(sequences, results(tracks))}
+def overlay(options: OverlayOptions) -> CommandResult:
+    """Writes a video for each sequence with tracks, truth or both drawn over its pictures; returns the paths."""
+    from tracking.app.pictures.overlay import write_overlay
 
-    def of(sequence: Sequence) -> TrackingRun | None:
-        result = found.get(sequence.name)
-        return None if result is None else result.read(sequence)
+    sequences = _open(options)
+    tracks_of = _tracks_reader(sequences, options.tracks)
 
-    return of
+    def write(sequence: Sequence, path: Path, step: Step) -> None:
+        write_overlay(sequence, tracks_of(sequence), path, options.truth, step)
 
-
-def _pictures(sequences: list[Sequence]) -> int | None:
-    """How many pictures there are to be drawn, None where that is not known."""
-    known = [sequence.length for sequence in sequences if sequence.has_images]
-    return None if None in known else sum(length or 0 for length in known)
+    return _write_each("overlay", sequences, options.out, ".mp4", write, _picture_count(sequences))
 
 
-def _each(
-    what: str, sequences: list[Sequence], out: Path, suffix: str, draw: Draw, pictures: int | None
+def _open(options: ViewOptions | OverlayOptions) -> list[Sequence]:
+    return open_source(
+        options.source, fps=options.fps, px_per_m=options.px_per_m, camera=options.camera, images=True
+    )  # fmt: skip
+
+
+def _tracks_reader(sequences: list[Sequence], tracks: Path | None) -> Callable[[Sequence], TrackingRun | None]:
+    """A function that reads the stored tracks of a sequence; it returns None if `tracks` is None."""
+    stored = {} if tracks is None else {s.name: found for s, found in match_tracks(sequences, find_tracks(tracks))}
+
+    def read(sequence: Sequence) -> TrackingRun | None:
+        found = stored.get(sequence.name)
+        return None if found is None else found.read(sequence)
+
+    return read
+
+
+def _picture_count(sequences: list[Sequence]) -> int | None:
+    """The number of pictures of all sequences, None if a sequence with pictures does not know its length."""
+    lengths = [sequence.length for sequence in sequences if sequence.has_images]
+    return None if None in lengths else sum(length or 0 for length in lengths)
+
+
+def _write_each(
+    what: str, sequences: list[Sequence], out: Path, suffix: str, write: Write, pictures: int | None
 ) -> CommandResult:
-    """One file for each sequence, each whole or not there: `out`, or NAME<suffix> in it where there are several.
+    """Writes one file for each sequence: `out` itself for a single sequence, else out/<sequence name><suffix>.
 
-    pictures: how often `draw` calls its step over all sequences; 0: never, files are counted.
+    pictures: the number of calls of `step` over all sequences; None if unknown. 0: progress counts files instead.
     """
     files = _files(sequences, out, suffix)
     with ProgressMeter(what, len(files) if pictures == 0 else pictures) as meter:
         for sequence, path in zip(sequences, files, strict=True):
-            draw(sequence, path, meter.step)
+            write(sequence, path, meter.step)
             if pictures == 0:
                 meter.step(sequence.name)
     return CommandResult({"files": files}, "\n".join(map(str, files)))
@@ -112,7 +103,7 @@ def _each(
 
 def _files(sequences: list[Sequence], out: Path, suffix: str) -> list[Path]:
     if len(sequences) == 1:
-        return [option_parsing.named(out, suffix)]
+        return [option_parsing.output_file(out, suffix)]
     if out.suffix.lower() == suffix:
         raise InputError(
             file=out, place="--out", got=f"one file for {len(sequences)} sequences", expected="a folder",

@@ -1,1 +1,1 @@
-"""Pictures and videos that commands write: contact sheets, overlays."""
+"""Pictures and videos that commands write: contact sheets and overlays."""

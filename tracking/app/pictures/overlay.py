@@ -1,4 +1,4 @@
-"""A video of a sequence with what a tracker says, what is true, or both drawn over its pictures."""
+"""Writes a video of a sequence with tracks, truth or both drawn over its pictures."""
 
 from __future__ import annotations
 
@@ -15,31 +15,44 @@ from scenarios.errors import InputError
 from sim.io.files.atomic import staged_path
 from sim.io.pictures.video_encoding import write_video
 from sim.types import Frame, Image, Sequence, Tracks
-from tracking.app.replay_page.video import even, refuse_source
+from tracking.app.replay_page.video import even_size, refuse_source
 from tracking.drawing.canvas import Canvas
-from tracking.drawing.layer_painting import LayerStyle, draw_banner, draw_captions, draw_label, letter_size, paint_layer
+from tracking.drawing.layer_painting import (
+    LayerStyle,
+    draw_banner,
+    draw_captions,
+    draw_label,
+    letter_size,
+    paint_layer,
+)
 from tracking.drawing.layers import Layer, layer_of_tracks, layer_of_truth
 from tracking.run import grouped
 
-HowTrue = Literal["beside", "over", "only"]
-LEAST = 400
-"""px: pictures lower than that are shown at twice their size."""
+TruthPlacement = Literal["beside", "over", "only"]
+Panel = list[tuple[Layer, LayerStyle]]
+"""The layers that are drawn over one copy of the picture, the lowest first."""
 
+LOW = 400
+"""px: pictures less high than this are shown at twice their size."""
+
+BANNER_HEIGHT = 32
 GREY = (128, 128, 128)
+PANEL_NAME_COLOUR = (60, 51, 45)
 
 
-def overlay(
+def write_overlay(
     sequence: Sequence,
     tracks: SequenceOf[Tracks] | None,
     out: str | Path,
-    truth: HowTrue | None = None,
+    truth: TruthPlacement | None = None,
     step: Callable[[str], None] = lambda _: None,
 ) -> Path:
-    """Writes the MP4, whole or not at all, and returns its path.
+    """Writes the MP4 and returns its path. The file is complete, or is not written at all.
 
-    Without tracks the truth is drawn; with them it stands `beside` them, as white boxes `over` the same picture, or
-    alone (`only`). step: called after each frame. InputError where the sequence has no pictures, or no truth that is
-    asked for.
+    tracks: None to draw the truth alone. truth: draw the truth in a second picture `beside` the tracks, as thin white
+    boxes `over` the same picture, or draw `only` the truth; None: tracks only. step: called with the sequence's name
+    after each frame. Raises InputError if the sequence has no pictures, if the truth is wanted and there is none, or if
+    `out` is the file that the sequence is read from.
     """
     if not sequence.has_images:
         raise InputError(
@@ -48,82 +61,84 @@ def overlay(
         )  # fmt: skip
     path = Path(out)
     refuse_source(sequence, path)
-    layers = _layers(sequence, tracks, truth)
+    panels = _panels(sequence, tracks, truth)
     with staged_path(path) as partial:
-        _write(partial, sequence, layers, step)
+        _write(partial, sequence, panels, step)
         os.replace(partial, path)
     return path
 
 
-def _layers(
-    sequence: Sequence, tracks: SequenceOf[Tracks] | None, how: HowTrue | None
-) -> list[list[tuple[Layer, LayerStyle]]]:
-    """What is drawn in each of the pictures that stand beside each other."""
-    if tracks is None or how is not None:
+def _panels(sequence: Sequence, tracks: SequenceOf[Tracks] | None, placement: TruthPlacement | None) -> list[Panel]:
+    """The panels from left to right."""
+    if tracks is None or placement is not None:
         if sequence.truth is None:
             got = "a sequence without labels" if tracks is not None else "neither tracks nor labels"
             remedy = "leave --truth out" if tracks is not None else "give what `flockscope track` wrote"
             raise InputError(file=sequence.name, got=got, expected="something to draw", remedy=remedy)
         true = layer_of_truth(sequence.truth)
-    if tracks is None or how == "only":
+    if tracks is None or placement == "only":
         return [[(true, LayerStyle())]]
-    said = layer_of_tracks(grouped(tracks, sequence), sequence.camera, sequence.scene)
-    if how == "beside":
-        return [[(true, LayerStyle())], [(said, LayerStyle())]]
-    return [[(true, LayerStyle(plain=True)), (said, LayerStyle())] if how == "over" else [(said, LayerStyle())]]
+    tracked = layer_of_tracks(grouped(tracks, sequence), sequence.camera, sequence.scene)
+    if placement == "beside":
+        return [[(true, LayerStyle())], [(tracked, LayerStyle())]]
+    if placement == "over":
+        return [[(true, LayerStyle(plain=True)), (tracked, LayerStyle())]]
+    return [[(tracked, LayerStyle())]]
 
 
-def _write(
-    path: Path, sequence: Sequence, layers: list[list[tuple[Layer, LayerStyle]]], step: Callable[[str], None]
-) -> None:
-    pictures = compose(sequence, layers)
+def _write(path: Path, sequence: Sequence, panels: list[Panel], step: Callable[[str], None]) -> None:
+    pictures = overlay_pictures(sequence, panels)
     first = next(pictures)
-    with write_video(path, (first.shape[1], first.shape[0]), sequence.fps) as film:
-        film.add(first)
+    with write_video(path, (first.shape[1], first.shape[0]), sequence.fps) as video:
+        video.add(first)
         step(sequence.name)
         for picture in pictures:
-            film.add(picture)
+            video.add(picture)
             step(sequence.name)
 
 
-def compose(sequence: Sequence, layers: list[list[tuple[Layer, LayerStyle]]]) -> Iterator[Image]:
-    """The pictures of the video, of even width and height."""
+def overlay_pictures(sequence: Sequence, panels: list[Panel]) -> Iterator[Image]:
+    """The video's pictures, one per frame, of even width and height: a banner above the panels side by side.
+
+    A frame without a picture shows the last picture before it, or grey if there is none.
+    """
     last: Image | None = None
     for frame in sequence:
         if frame.image is not None:
             last = frame.image
-        panels = [_panel(last, sequence, frame.index, sides) for sides in layers]
-        if len(panels) > 1:
-            for panel, sides in zip(panels, layers, strict=True):
-                draw_label(panel, sides[0][0].name, (panel.shape[1] / 2 - 30, 30), 0.7, (60, 51, 45))
-        body = np.concatenate(panels, axis=1)
-        strip = np.zeros((32, body.shape[1], 3), np.uint8)
-        draw_banner(strip, _words(sequence, frame, layers), _marks(sequence, frame), 0.55)
-        yield even(np.concatenate([strip, body]))
+        drawn = [_draw_panel(last, sequence, frame.index, panel) for panel in panels]
+        if len(drawn) > 1:
+            for image, panel in zip(drawn, panels, strict=True):
+                draw_label(image, panel[0][0].name, (image.shape[1] / 2 - 30, 30), 0.7, PANEL_NAME_COLOUR)
+        body = np.concatenate(drawn, axis=1)
+        banner = np.zeros((BANNER_HEIGHT, body.shape[1], 3), np.uint8)
+        draw_banner(banner, banner_words(sequence, frame, panels), _warnings(sequence, frame), 0.55)
+        yield even_size(np.concatenate([banner, body]))
 
 
-def _panel(picture: Image | None, sequence: Sequence, index: int, sides: list[tuple[Layer, LayerStyle]]) -> Image:
+def _draw_panel(picture: Image | None, sequence: Sequence, index: int, panel: Panel) -> Image:
     assert sequence.image_size is not None, "pictures have a size"
     width, height = sequence.image_size
     shown = np.full((height, width, 3), GREY, np.uint8) if picture is None else picture
-    factor = 2 if height < LEAST else 1
-    canvas = np.array(cv2.resize(shown, None, fx=factor, fy=factor, interpolation=cv2.INTER_LINEAR), np.uint8)
-    view = Canvas(canvas, factor, np.zeros(2), np.array([width, height], float), upwards=False)
-    for side, style in sides:
-        paint_layer(view, side, index, sequence.fps, style)
-    draw_captions(view.image, sides[-1][0], index, sequence.fps, letter_size(view))
-    return view.image
+    factor = 2 if height < LOW else 1
+    image = np.array(cv2.resize(shown, None, fx=factor, fy=factor, interpolation=cv2.INTER_LINEAR), np.uint8)
+    canvas = Canvas(image, factor, np.zeros(2), np.array([width, height], float), upwards=False)
+    for layer, style in panel:
+        paint_layer(canvas, layer, index, sequence.fps, style)
+    draw_captions(image, panel[-1][0], index, sequence.fps, letter_size(canvas))
+    return image
 
 
-def _words(sequence: Sequence, frame: Frame, layers: list[list[tuple[Layer, LayerStyle]]]) -> str:
+def banner_words(sequence: Sequence, frame: Frame, panels: list[Panel]) -> str:
+    """The banner's text: sequence, frame, time, and how many people or groups each layer has in this frame."""
     of = "" if sequence.length is None else f" of {sequence.length}"
-    now = {side.name: side.at(frame.index) for sides in layers for side, _ in sides}
-    count = "".join(f"   {name} {len(marks.id)}{' groups' * marks.whole_groups}" for name, marks in now.items())
+    marks = {layer.name: layer.at(frame.index) for panel in panels for layer, _ in panel}
+    count = "".join(f"   {name} {len(m.id)}{' groups' * m.whole_groups}" for name, m in marks.items())
     return f"{sequence.name}   frame {frame.index}{of}   {frame.t:.2f} s{count}"
 
 
-def _marks(sequence: Sequence, frame: Frame) -> list[str]:
-    """What this frame lacks."""
+def _warnings(sequence: Sequence, frame: Frame) -> list[str]:
+    """What the frame lacks: its picture, or detections in a sequence that has them."""
     lost = ["lost frame"] if frame.image is None else []
     empty = frame.detections is None or not len(frame.detections.pos)
     return lost + (["no detections"] if sequence.has_detections and empty else [])

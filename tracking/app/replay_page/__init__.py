@@ -1,1 +1,1 @@
-"""The replay page of `flockscope view`: its data in Python, its scripts in JavaScript."""
+"""The replay page: its data, its video, and the HTML, CSS and JavaScript that show them in the browser."""

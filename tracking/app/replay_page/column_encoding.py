@@ -1,6 +1,8 @@
-"""Columns of the replay page: whole numbers as differences from row to row, ids and flags as run lengths."""
+"""Encodes columns of the replay page as short lists of whole numbers, so that long recordings stay small."""
 
 from __future__ import annotations
+
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -8,18 +10,24 @@ from numpy.typing import NDArray
 from sim.types import Ints
 
 NIL = -99_999
-"""Stands for an unknown number in a column."""
+"""Stands for an unknown number (nan) in a column."""
+
+Json = dict[str, Any]
+"""An object that `json` can write."""
 
 
 def deltas(column: NDArray[np.float64]) -> list[int]:
-    """A column rounded and differenced; nan becomes NIL."""
+    """The column (N,) rounded, as its first value and the difference of each value from the one before.
+
+    nan counts as NIL. A cumulative sum restores the rounded column.
+    """
     whole = np.where(np.isfinite(column), np.rint(column), NIL).astype(np.int64)
     listed: list[int] = np.diff(whole, prepend=0).tolist()
     return listed
 
 
 def run_lengths(column: Ints) -> list[int]:
-    """value, count, value, count, …"""
+    """The column (N,) as value, count, value, count, … of its runs of equal values."""
     if not len(column):
         return []
     first = np.flatnonzero(np.r_[True, np.diff(column) != 0])
@@ -28,7 +36,10 @@ def run_lengths(column: Ints) -> list[int]:
 
 
 def stints(ids: Ints, frame: Ints) -> list[list[int]]:
-    """[id, first frame, frames] of each stint of sorted rows."""
+    """[id, first frame, number of frames] of each stint: one id in consecutive frames.
+
+    ids, frame: (R,), sorted by id and then by frame.
+    """
     if not len(ids):
         return []
     first = np.flatnonzero(np.r_[True, (np.diff(ids) != 0) | (np.diff(frame) != 1)])

@@ -1,4 +1,4 @@
-"""What the replay page holds of a tracker that follows groups as wholes: hulls, extents, sizes and speeds by row."""
+"""The rows of a tracker that reports groups without people: hulls, extents, sizes and speeds, and their encoding."""
 
 from __future__ import annotations
 
@@ -12,18 +12,23 @@ import numpy as np
 from sim.types import Array, Bools, Groups, Ints, Tracks
 from tracking.app.replay_page.column_encoding import deltas
 
-MAX_HULL = 24
-FINE = {"ground": 0.02, "image": 1.0}
+MAX_CORNERS = 24
+"""Corners of an encoded hull at most."""
+
+LEAST_CORNER = {"ground": 0.02, "image": 1.0}
 """m, px: corners of a hull that stand out by less are left out."""
 
-SPEED = {"ground": 10, "image": 1}
-"""Steps per m/s and px/s."""
+SPEED_SCALE = {"ground": 10, "image": 1}
+"""Encoded steps per m/s and px/s."""
 
 
 @dataclass(frozen=True, eq=False)
-class Wholes:
-    """Rows that are groups, as in Groups: hull a polygon each (no vertex: unknown), extent (R, 2, 2), size (R,); speed
-    (R,) per second; nan where unknown."""
+class GroupRows:
+    """R groups, one per row; nan where unknown.
+
+    hull: R polygons (V, 2), without vertices where unknown. extent: (R, 2, 2), the covariance of where the group's
+    people are. size: (R,), estimated number of people. speed: (R,), m/s or px/s.
+    """
 
     hull: tuple[Array, ...]
     extent: Array
@@ -31,12 +36,12 @@ class Wholes:
     speed: Array
 
 
-def wholes(tracks: SequenceOf[Tracks]) -> Wholes:
-    """The groups of a tracker's rows, in the order of these."""
+def rows_of_groups(tracks: SequenceOf[Tracks]) -> GroupRows:
+    """The groups of all rows of `tracks`, in their order. A row that its frame's `groups` lacks is unknown."""
     rows = [row for t in tracks for row in _rows(t)]
     speed = [np.hypot(t.vel[:, 0], t.vel[:, 1]) for t in tracks]
     extent, size = [row[1] for row in rows], [row[2] for row in rows]
-    return Wholes(
+    return GroupRows(
         tuple(row[0] for row in rows),
         np.array(extent).reshape(-1, 2, 2),
         np.array(size, float),
@@ -45,28 +50,34 @@ def wholes(tracks: SequenceOf[Tracks]) -> Wholes:
 
 
 def _rows(tracks: Tracks) -> list[tuple[Array, Array, float]]:
-    """Hull, extent and size of each row."""
+    """Hull, extent and size of each row of one frame."""
     groups, no_hull = tracks.groups or Groups.none(), np.zeros((0, 2))
     hulls = groups.hull or (no_hull,) * len(groups.id)
     known = dict(zip(groups.id.tolist(), zip(hulls, groups.extent, groups.size, strict=True), strict=True))
     return [known.get(name, (no_hull, np.full((2, 2), np.nan), math.nan)) for name in tracks.id.tolist()]
 
 
-def columns(found: Wholes, order: Ints, plane: str, scale: int) -> dict[str, Any]:
-    """The rows in this order: sizes by tenths, ellipses as two standard deviations and a direction in degrees, and
-    hulls as their first corner and the steps to each next one."""
-    axes = ellipses(found.extent[order])
+def encode_groups(rows: GroupRows, order: Ints, plane: str, scale: int) -> dict[str, Any]:
+    """The rows in the order `order` as encoded columns; scale: encoded steps per m or px.
+
+    size: in tenths. speed: by SPEED_SCALE. ellipse: long and short standard deviation, and direction in degrees. hull:
+    for each row the first corner and the steps to each next corner, as x, y, x, y, ….
+    """
+    axes = ellipses(rows.extent[order])
+    hulls = [simplified(rows.hull[k], LEAST_CORNER[plane]) for k in order]
     return {
-        "size": deltas(found.size[order] * 10),
-        "speed": deltas(found.speed[order] * SPEED[plane]),
+        "size": deltas(rows.size[order] * 10),
+        "speed": deltas(rows.speed[order] * SPEED_SCALE[plane]),
         "ellipse": [deltas(axes[:, 0] * scale), deltas(axes[:, 1] * scale), deltas(np.degrees(axes[:, 2]))],
-        "hull": [_steps(np.rint(thin(found.hull[k], FINE[plane]) * scale).astype(np.int64)) for k in order],
+        "hull": [_steps(np.rint(hull * scale).astype(np.int64)) for hull in hulls],
     }
 
 
 def ellipses(extent: Array) -> Array:
-    """(R, 3) of covariances (R, 2, 2): standard deviations, the larger first, and the direction of that one in
-    [0, π); nan where unknown."""
+    """(R, 3) of covariances (R, 2, 2): long and short standard deviation, direction of the long axis in [0, π) rad.
+
+    nan where an entry of the covariance is not finite.
+    """
     known: Bools = np.asarray(np.isfinite(extent).all(axis=(1, 2)))
     values, vectors = np.linalg.eigh(np.where(known[:, None, None], extent, np.eye(2)))
     sigma = np.sqrt(np.maximum(values, 0.0))
@@ -74,9 +85,12 @@ def ellipses(extent: Array) -> Array:
     return np.where(known[:, None], np.stack([sigma[:, 1], sigma[:, 0], angle], axis=1), np.nan)
 
 
-def thin(hull: Array, least: float) -> Array:
-    """A convex polygon without corners that stand out by less than `least` over those beside them (of neighbours only
-    one goes; twice), and with no more than MAX_HULL."""
+def simplified(hull: Array, least: float) -> Array:
+    """A convex polygon (V, 2) without the corners that stand out by less than `least` over their neighbours.
+
+    Two passes remove every other corner at most, so that no two neighbours go at once. Of a polygon that then still has
+    more than MAX_CORNERS corners every k-th is kept, with the least k that suffices.
+    """
     for odd in (1, 0):
         n = len(hull)
         if n > 3:
@@ -84,10 +98,10 @@ def thin(hull: Array, least: float) -> Array:
             along, out = after - before, hull - before
             area = np.abs(along[:, 0] * out[:, 1] - along[:, 1] * out[:, 0])
             flat = area < least * np.hypot(along[:, 0], along[:, 1])
-            turn = np.arange(n) % 2 == odd
-            turn[-1] &= n % 2 == 0  # of an odd number the last stands beside the first
-            hull = hull[~(flat & turn)]
-    return hull if len(hull) <= MAX_HULL else hull[:: math.ceil(len(hull) / MAX_HULL)]
+            candidates = np.arange(n) % 2 == odd
+            candidates[-1] &= n % 2 == 0  # with an odd number of corners the last is a neighbour of the first
+            hull = hull[~(flat & candidates)]
+    return hull if len(hull) <= MAX_CORNERS else hull[:: math.ceil(len(hull) / MAX_CORNERS)]
 
 
 def _steps(corners: Ints) -> list[int]:

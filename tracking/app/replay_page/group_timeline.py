@@ -1,4 +1,4 @@
-"""Group ids over time as bars in lanes, and the merges and splits that join them."""
+"""The group timeline of the replay page: the life of each group id as a bar in a lane, and links between bars."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from sim.types import Array, GroupEvent, Ints
 
 @dataclass(frozen=True)
 class Bar:
-    """One unbroken life of a group id: frames (both inclusive), lane from 0, most people in it (a whole number)."""
+    """One unbroken life of a group id. start, end: frames, both inclusive. lane: from 0. size: most people in it."""
 
     id: int
     start: int
@@ -23,7 +23,7 @@ class Bar:
 
 @dataclass(frozen=True)
 class Link:
-    """Group `a` becomes, or joins, group `b` at a frame: where a tracker said so, though the onset was earlier."""
+    """Group `a` becomes or joins group `b`. frame: when a tracker reported it; for truth the event's first frame."""
 
     frame: int
     a: int
@@ -31,10 +31,11 @@ class Link:
 
 
 def bars(frame: Ints, group: Ints, least: int = 2, gap: int = 1, people: Array | None = None) -> list[Bar]:
-    """The lives of the groups that rows of (frame, group) make, -1 being nobody's; shorter gaps than `gap` are closed.
+    """The bars of the groups in rows of (frame, group), (R,) each, by first frame. Rows with group -1 are left out.
 
-    least: people from which a group counts. people: how many each row stands for, one where nothing is said. Lanes are
-    filled greedily: a bar takes the lowest lane that is free, so that a page stays low.
+    least: a group with fewer people in a frame is absent from it. gap: frames may differ by so much within one bar.
+    people: (R,), how many people each row stands for; None: one. A bar takes the lane of the last bar of its id if that
+    is free, else the lowest free lane.
     """
     rows = group >= 0
     pairs, place = np.unique(np.stack([group[rows], frame[rows]], axis=1), axis=0, return_inverse=True)
@@ -49,6 +50,7 @@ def bars(frame: Ints, group: Ints, least: int = 2, gap: int = 1, people: Array |
 
 
 def _in_lanes(lives: list[tuple[int, int, int, int]]) -> list[Bar]:
+    """Bars of (start, end, id, size) sorted by start."""
     free_from: list[int] = []
     last: dict[int, int] = {}
     made = []
@@ -64,7 +66,7 @@ def _in_lanes(lives: list[tuple[int, int, int, int]]) -> list[Bar]:
 
 
 def links(events: Iterable[GroupEvent]) -> list[Link]:
-    """What merges and splits (and the forming and dissolving that scores count as such) say about ids."""
+    """A link for each pair of different groups before and after a merge or split; other kinds of events have none."""
     return [
         Link(event.start if event.emitted is None else event.emitted, a, b)
         for event in events

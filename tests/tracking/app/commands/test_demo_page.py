@@ -9,16 +9,16 @@ import pytest
 
 from sim.types import Sequence, Tracks
 from tests.groups_as_wholes import wholes
-from tracking.app.commands.demo_page import WITHOUT_PEOPLE, Part, Seen, page
-from tracking.app.commands.score import Row
+from tracking.app.commands.demo_page import WITHOUT_PEOPLE, PixelScene, ResultSection, demo_page
+from tracking.app.commands.score_tables import SequenceScores
 from tracking.scoring import evaluate
 
 
 @pytest.fixture
-def rows(sequence: Sequence, tracks: list[Tracks]) -> dict[str, Row]:
+def rows(sequence: Sequence, tracks: list[Tracks]) -> dict[str, SequenceScores]:
     """What a tracker of people and one of groups get for the same scene."""
     said = {"people": tracks, "groups": wholes(sequence, "ground")}
-    return {name: Row("meeting", evaluate(sequence.truth, answers)) for name, answers in said.items()}
+    return {name: SequenceScores("meeting", evaluate(sequence.truth, answers)) for name, answers in said.items()}
 
 
 def tables(text: str) -> list[list[list[str]]]:
@@ -31,13 +31,16 @@ def tables(text: str) -> list[list[list[str]]]:
     return found
 
 
-def test_what_is_not_known_of_any_row_has_no_column(rows: dict[str, Row], tmp_path: Path) -> None:
-    both = Part(
+def test_what_is_not_known_of_any_row_has_no_column(rows: dict[str, SequenceScores], tmp_path: Path) -> None:
+    both = ResultSection(
         "both", [rows["people"], rows["groups"]], [tmp_path / "a.html", tmp_path / "b.html"], ["p of x", "g of x"]
     )
     films = {"p": tmp_path / "p.mp4", "g": tmp_path / "x" / "g & g.mp4"}
-    alone = [Part(f"{name} alone", [rows[name]], [tmp_path / f"{name}.html"], [name]) for name in ("people", "groups")]
-    text = page(tmp_path, Seen(both, films, 160, 16.0), alone)
+    alone = [
+        ResultSection(f"{name} alone", [rows[name]], [tmp_path / f"{name}.html"], [name])
+        for name in ("people", "groups")
+    ]
+    text = demo_page(tmp_path, PixelScene(both, films, 160, 16.0), alone)
     first, people, groups = tables(text)
     assert first[0] == people[0]
     assert [cell for cell in people[0] if cell not in groups[0]] == ["HOTA", "MOTA", "IDF1"]

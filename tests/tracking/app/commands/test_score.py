@@ -104,7 +104,7 @@ def test_no_mean_over_what_trackers_saw_differently(made: Path, tmp_path: Path, 
     assert [part["mean"]["HOTA"]["mean"] for part in found["means"]] == [row["HOTA"] for row in found["sequences"]]
     assert run(["score", str(tmp_path / "data"), str(tracks)]) == 0
     text = capsys.readouterr().out
-    for words in ("file", "truth", "truth (noise_px = 3)", "not said (no run.json)"):
+    for words in ("file", "truth", "truth (noise_px = 3)", "unknown (no run.json)"):
         assert f"1 of 4 sequences, detections {words}\n" in text
     assert "95 % low" not in text
     against = scored(capsys, made / "data", made / "file", "--against", made / "truth")
@@ -192,8 +192,8 @@ def test_tables(made: Path, capsys) -> None:
     assert run(["score", str(made / "data"), str(made / "file"), "--against", str(made / "truth")]) == 0
     said = capsys.readouterr().out
     for words in (
-        "groups, strict", "groups, core", "members and events", "people by overlap (IoU) of boxes",
-        "groups by overlap (IoU) of hulls, on the ground, m", "in pairs over 2 sequences (fewer than 100",
+        "groups, strict", "groups, core", "members and events", "people compared by overlap (IoU) of boxes",
+        "groups compared by overlap (IoU) of hulls, on the ground, m", "in pairs over 2 sequences (fewer than 100",
     ):  # fmt: skip
         assert words in said
     assert max(map(len, said.splitlines())) <= 160

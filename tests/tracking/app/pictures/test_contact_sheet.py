@@ -13,7 +13,8 @@ from hypothesis import strategies as st
 
 from scenarios.errors import InputError
 from sim.types import GroupEvent, Sequence, Truth
-from tracking.app.pictures.contact_sheet import choose, sheet
+from tracking.app.pictures.contact_sheet import write_sheet
+from tracking.app.pictures.frame_choice import choose_frames
 from tracking.drawing.canvas import FLOOR, Canvas, colour
 from tracking.drawing.plan_view import draw_ids
 
@@ -25,7 +26,7 @@ def bare(length: int, starts: dict[int, str]) -> Truth:
 
 
 def test_onsets_come_first_and_gaps_are_filled() -> None:
-    chosen = choose(bare(200, {50: "merge", 120: "split", 60: "enter"}), 8)
+    chosen = choose_frames(bare(200, {50: "merge", 120: "split", 60: "enter"}), 8)
     assert {50, 120} <= set(chosen)
     assert len(set(chosen)) == 8
     assert max(np.diff([1, *chosen, 200])) < 45
@@ -34,33 +35,33 @@ def test_onsets_come_first_and_gaps_are_filled() -> None:
 
 def test_fuller_frames_fill_the_gaps(truth: Truth) -> None:
     few = truth.replace(frame=np.array([70, 70, 71]), id=np.array([1, 2, 1]), events=())
-    assert choose(few, 1) == [70]
+    assert choose_frames(few, 1) == [70]
 
 
 def test_onsets_close_to_one_another_share_a_picture() -> None:
-    chosen = choose(bare(200, {50: "cross", 55: "cross", 58: "merge", 120: "cross"}), 4)
+    chosen = choose_frames(bare(200, {50: "cross", 55: "cross", 58: "merge", 120: "cross"}), 4)
     assert {58, 120} <= set(chosen)
     assert not {50, 55} & set(chosen)
 
 
 def test_the_part_of_the_world_where_people_are_is_shown(sequence: Sequence, truth: Truth) -> None:
     """With pillars, doors, stairs and service points, and not beyond the walls round it."""
-    from tracking.app.pictures.contact_sheet import _bounds
+    from tracking.app.pictures.contact_sheet import sheet_area
 
     wide = dataclasses.replace(sequence, scene=dataclasses.replace(sequence.scene, size=np.array([60.0, 40.0])))
-    low, high = _bounds(wide, truth)
+    low, high = sheet_area(wide, truth)
     np.testing.assert_allclose(high, truth.pos.max(axis=0) + 2)
-    low, high = _bounds(sequence, truth.replace(pos=np.clip(truth.pos, 0, sequence.scene.size)))
+    low, high = sheet_area(sequence, truth.replace(pos=np.clip(truth.pos, 0, sequence.scene.size)))
     assert (low >= -1).all()
     assert (high <= sequence.scene.size + 1).all()
 
 
 def test_a_ring_holds_all_whom_an_event_concerns(truth: Truth) -> None:
-    from tracking.app.pictures.contact_sheet import _around
+    from tracking.app.pictures.contact_sheet import event_ring
 
     merge = next(event for event in truth.events if event.kind == "merge")
     rows = truth.rows(merge.start)
-    centre, radius = _around(merge, truth.id[rows], truth.pos[rows])
+    centre, radius = event_ring(merge, truth.id[rows], truth.pos[rows])
     apart = np.linalg.norm(truth.pos[rows] - centre, axis=1)
     assert 0.5 < radius - apart[np.isin(truth.id[rows], merge.members)].max() < 1
 
@@ -81,7 +82,7 @@ def test_names_stand_clear_of_discs_and_of_one_another() -> None:
 
 def test_merges_and_splits_outrank_the_rest() -> None:
     events = dict.fromkeys(range(10, 100, 10), "form") | {5: "merge", 150: "split"}
-    assert {5, 150} <= set(choose(bare(200, events), 3))
+    assert {5, 150} <= set(choose_frames(bare(200, events), 3))
 
 
 @given(
@@ -90,7 +91,7 @@ def test_merges_and_splits_outrank_the_rest() -> None:
     starts=st.dictionaries(st.integers(1, 300), st.sampled_from(["merge", "split", "cross", "enter"])),
 )
 def test_frames_are_distinct_and_inside(length: int, frames: int, starts: dict[int, str]) -> None:
-    chosen = choose(bare(length, starts), frames)
+    chosen = choose_frames(bare(length, starts), frames)
     assert len(chosen) == len(set(chosen)) == min(frames, length)
     assert chosen[0] >= 1
     assert chosen[-1] <= length
@@ -103,12 +104,12 @@ def test_a_plan_puts_y_up_and_keeps_the_aspect() -> None:
 
 
 def test_people_are_drawn_where_they_are(sequence: Sequence, truth: Truth, tmp_path: Path) -> None:
-    from tracking.app.pictures.contact_sheet import HEAD, TITLE, WIDTH, _bounds
+    from tracking.app.pictures.contact_sheet import HEAD, TITLE, WIDTH, sheet_area
 
-    index = choose(truth, 1)[0]
-    path = sheet(sequence, tmp_path / "new" / "sheet.png", frames=1)
+    index = choose_frames(truth, 1)[0]
+    path = write_sheet(sequence, tmp_path / "new" / "sheet.png", frames=1)
     picture = cv2.imread(str(path))
-    low, high = _bounds(sequence, truth)
+    low, high = sheet_area(sequence, truth)
     scale = WIDTH / 2 / (high - low)[0]
     row = truth.rows(index).start + int(np.flatnonzero(truth.at(index).id == 7)[0])
     x, y = truth.pos[row] if truth.pos is not None else (0, 0)
@@ -119,28 +120,28 @@ def test_people_are_drawn_where_they_are(sequence: Sequence, truth: Truth, tmp_p
 
 @pytest.mark.parametrize("frames", [1, 3, 8, 11])
 def test_size_follows_the_number_of_frames(sequence: Sequence, tmp_path: Path, frames: int) -> None:
-    picture = cv2.imread(str(sheet(sequence, tmp_path / "sheet.png", frames=frames)))
+    picture = cv2.imread(str(write_sheet(sequence, tmp_path / "sheet.png", frames=frames)))
     assert picture.shape[1] == 10 + min(frames, 4) * 450
 
 
 def test_the_same_sequence_gives_the_same_bytes(sequence: Sequence, tmp_path: Path) -> None:
-    a, b = sheet(sequence, tmp_path / "a.png"), sheet(sequence, tmp_path / "b.png")
+    a, b = write_sheet(sequence, tmp_path / "a.png"), write_sheet(sequence, tmp_path / "b.png")
     assert a.read_bytes() == b.read_bytes()
 
 
 def test_boxes_alone_are_drawn_in_the_image(sequence: Sequence, truth: Truth, tmp_path: Path) -> None:
     boxes = Sequence("boxes", 10.0, truth.length, sequence.frames, lambda: truth.replace(pos=None, vel=None))
-    assert sheet(boxes, tmp_path / "boxes.png").stat().st_size > 5000
+    assert write_sheet(boxes, tmp_path / "boxes.png").stat().st_size > 5000
 
 
 def test_without_people_there_is_no_sheet(sequence: Sequence, tmp_path: Path) -> None:
     for load in (None, lambda: bare(10, {})):
         with pytest.raises(InputError, match="no labelled people"):
-            sheet(Sequence("none", 10.0, 10, sequence.frames, load), tmp_path / "none.png")
+            write_sheet(Sequence("none", 10.0, 10, sequence.frames, load), tmp_path / "none.png")
     assert not (tmp_path / "none.png").exists()
 
 
 def test_an_unwritable_place_is_one_clear_line(sequence: Sequence, tmp_path: Path) -> None:
     (tmp_path / "file").write_text("")
     with pytest.raises(InputError, match="choose another --out"):
-        sheet(sequence, tmp_path / "file" / "sheet.png", frames=1)
+        write_sheet(sequence, tmp_path / "file" / "sheet.png", frames=1)

@@ -15,7 +15,7 @@ from sim.scene.camera import project
 from sim.types import Detections, Frame, GroupEvent, Groups, Sequence, Tracks, Truth
 from tests.coded_pictures import SIZE, coded, number, sequence
 from tests.groups_as_wholes import wholes
-from tracking.app.pictures.overlay import _words, compose, overlay
+from tracking.app.pictures.overlay import banner_words, overlay_pictures, write_overlay
 from tracking.drawing.canvas import colour
 from tracking.drawing.layer_painting import LayerStyle
 from tracking.drawing.layers import layer_of_tracks
@@ -44,7 +44,7 @@ def frames_of(path: Path) -> list[np.ndarray]:
 def test_every_frame_in_its_slot(tmp_path: Path) -> None:
     tracks = [answer(k, {3: [40, 30, 10, 20]}) for k in range(1, 13)]
     steps: list[str] = []
-    path = overlay(sequence(12), tracks, tmp_path / "new" / "o.mp4", step=steps.append)
+    path = write_overlay(sequence(12), tracks, tmp_path / "new" / "o.mp4", step=steps.append)
     found = frames_of(path)
     assert [number(picture, STRIP, 2) for picture in found] == list(range(1, 13))
     assert found[0].shape == (STRIP + 2 * SIZE[1], 2 * SIZE[0], 3)
@@ -54,7 +54,7 @@ def test_every_frame_in_its_slot(tmp_path: Path) -> None:
 def test_boxes_are_where_they_belong() -> None:
     """At twice its size: the left edge of a box at u = 40 is drawn at 80, in the colour of its id, the id above it."""
     side = layer_of_tracks([answer(1, {3: [40, 30, 10, 20]})], None, None)
-    (picture,) = compose(sequence(1), [[(side, LayerStyle())]])
+    (picture,) = overlay_pictures(sequence(1), [[(side, LayerStyle())]])
     edges = np.argwhere(np.abs(picture[STRIP:].astype(int) - colour(3)).max(axis=2) < 12)
     box = edges[edges[:, 0] > 61]
     (_, left), (bottom, right) = box.min(axis=0), box.max(axis=0)
@@ -70,25 +70,25 @@ def test_the_truth_stands_beside_over_or_alone(tmp_path: Path) -> None:
     labelled = dataclasses.replace(sequence(3), load_truth=lambda: truth)
     tracks = [answer(k, {3: [40, 30, 10, 20]}) for k in range(1, 4)]
     wide = [
-        frames_of(overlay(labelled, given, tmp_path / "o.mp4", how))[0].shape[1]
+        frames_of(write_overlay(labelled, given, tmp_path / "o.mp4", how))[0].shape[1]
         for given, how in ((tracks, None), (tracks, "beside"), (tracks, "over"), (tracks, "only"), (None, None))
     ]
     assert wide == [166, 332, 166, 166, 166]
     for given, how, word in ((tracks, "over", "without labels"), (None, None, "neither tracks nor labels")):
         with pytest.raises(InputError, match=word):
-            overlay(sequence(3), given, tmp_path / "x.mp4", how)
+            write_overlay(sequence(3), given, tmp_path / "x.mp4", how)
     assert not (tmp_path / "x.mp4").exists()
 
 
 def test_a_sequence_without_pictures_is_refused(sequence: Sequence, tracks: list[Tracks], tmp_path: Path) -> None:
     with pytest.raises(InputError, match="without pictures"):
-        overlay(sequence, tracks, tmp_path / "o.mp4")
+        write_overlay(sequence, tracks, tmp_path / "o.mp4")
 
 
 def test_the_source_itself_is_not_replaced(tmp_path: Path) -> None:
-    path = overlay(sequence(3), [answer(1, {1: [1, 1, 5, 5]})], tmp_path / "o.mp4")
+    path = write_overlay(sequence(3), [answer(1, {1: [1, 1, 5, 5]})], tmp_path / "o.mp4")
     with pytest.raises(InputError, match="the source itself"):
-        overlay(sequence(3, path=path), [answer(1, {1: [1, 1, 5, 5]})], path)
+        write_overlay(sequence(3, path=path), [answer(1, {1: [1, 1, 5, 5]})], path)
 
 
 def test_what_a_frame_lacks_is_told() -> None:
@@ -102,7 +102,7 @@ def test_what_a_frame_lacks_is_told() -> None:
 
     case = dataclasses.replace(sequence(3), frames=frames, has_detections=True)
     side = layer_of_tracks([answer(k, {}) for k in (1, 2, 3)], None, None)
-    made = list(compose(case, [[(side, LayerStyle())]]))
+    made = list(overlay_pictures(case, [[(side, LayerStyle())]]))
     red = [(np.abs(p[:STRIP].astype(int) - colour(6)).max(axis=2) < 4).sum() > 50 for p in made]
     assert red == [False, True, True]
     assert [number(p, STRIP, 2) for p in made] == [1, 1, 3]
@@ -177,7 +177,7 @@ def test_a_group_has_its_extent_its_way_and_its_size() -> None:
     np.testing.assert_allclose((offset**2 / [9.0, 1.0]).sum(axis=1), 9.21, rtol=1e-6)
     np.testing.assert_allclose(region.motion, [[40, 30], [50, 30]])
     assert region.size == 3.04
-    (picture,) = compose(sequence(1), [[(side, LayerStyle())]])
+    (picture,) = overlay_pictures(sequence(1), [[(side, LayerStyle())]])
     drawn = coloured(picture, 4)
     drawn = drawn[drawn[:, 1] <= 30]  # above its name
     reach = 3 * np.sqrt(9.21)
@@ -208,7 +208,7 @@ def test_what_is_unknown_of_a_group_is_left_out() -> None:
         side = layer_of_tracks([given], None, None)
         (region,) = side.at(1).groups
         assert (len(region.hull), len(region.extent), np.isnan(region.size)) == (0, 0, True)
-        (picture,) = compose(sequence(1), [[(side, LayerStyle())]])
+        (picture,) = overlay_pictures(sequence(1), [[(side, LayerStyle())]])
         assert len(coloured(picture, 4)) > 20
 
 
@@ -219,4 +219,4 @@ def test_groups_that_are_tracked_are_counted_as_such() -> None:
 def overlay_words(tracks: list[Tracks]) -> str:
     case = sequence(1)
     side = layer_of_tracks(tracks, None, None)
-    return _words(case, next(iter(case)), [[(side, LayerStyle())]])
+    return banner_words(case, next(iter(case)), [[(side, LayerStyle())]])

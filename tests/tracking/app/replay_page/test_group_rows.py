@@ -15,7 +15,8 @@ from sim.types import Groups, Sequence, Tracks
 from tests.groups_as_wholes import wholes
 from tracking.app.replay_page import group_rows
 from tracking.app.replay_page.column_encoding import NIL
-from tracking.app.replay_page.page import payload, view
+from tracking.app.replay_page.page import write_page
+from tracking.app.replay_page.page_data import page_data
 
 
 def column(values: list[int]) -> np.ndarray:
@@ -41,7 +42,7 @@ def rows_of(side: dict) -> dict[str, np.ndarray]:
 @pytest.mark.parametrize("plane", ["ground", "image"])
 def test_groups_come_back(sequence: Sequence, plane: str) -> None:
     answers = wholes(sequence, plane)
-    side = json.loads(json.dumps(payload(sequence, answers)))["tracks"]
+    side = json.loads(json.dumps(page_data(sequence, answers)))["tracks"]
     rows, unit = rows_of(side), 1 / side["scale"]
     assert side["plane"] == plane
     for t in (answers[0], answers[70], answers[-1]):
@@ -65,7 +66,7 @@ def test_groups_come_back(sequence: Sequence, plane: str) -> None:
 
 def test_bars_and_links_of_groups(sequence: Sequence) -> None:
     """Their sizes are those estimated; what merges and splits joins bars of both sides."""
-    data = payload(sequence, wholes(sequence, "ground"))
+    data = page_data(sequence, wholes(sequence, "ground"))
     assert {bar[0]: (*bar[1:3], bar[4]) for bar in data["tracks"]["bars"]} == {
         1: (1, 160, 5), 2: (1, 53, 2), 3: (114, 160, 2),
     }  # fmt: skip
@@ -83,13 +84,13 @@ def test_what_a_tracker_of_groups_leaves_out(sequence: Sequence) -> None:
             groups=answers[2].groups.replace(size=np.full(2, np.nan), extent=np.full((2, 2, 2), np.nan))
         ),
     ]
-    rows = rows_of(payload(sequence, bare)["tracks"])
+    rows = rows_of(page_data(sequence, bare)["tracks"])
     np.testing.assert_array_equal(np.isnan(rows["size"]), rows["frame"] != 2)
     np.testing.assert_array_equal(np.isnan(rows["axes"][:, 0]), rows["frame"] != 2)
     assert [len(h) > 0 for h in rows["hull"]] == (rows["frame"] == 3).tolist()
     two, none = np.zeros((0, 2)), np.zeros(0, np.int64)
     empty = [Tracks(1, 0.0, "image", "group", none, none, two, two, np.zeros((0, 4, 4)), groups=Groups.none())]
-    side = payload(sequence, empty)["tracks"]
+    side = page_data(sequence, empty)["tracks"]
     assert (side["plane"], side["wholes"]["size"], side["bars"]) == ("image", [], [])
 
 
@@ -97,10 +98,10 @@ def test_the_page_shows_all_of_their_hulls(sequence: Sequence) -> None:
     """Where nothing but the tracks says how large the plan, or the picture, must be."""
     alone = Sequence("alone", 10.0, 160, lambda: iter(()))
     corners = np.concatenate([h for t in wholes(sequence, "ground") for h in t.groups.hull])
-    x0, y0, x1, y1 = payload(alone, wholes(sequence, "ground"))["bounds"]
+    x0, y0, x1, y1 = page_data(alone, wholes(sequence, "ground"))["bounds"]
     assert (corners >= [x0, y0]).all()
     assert (corners <= [x1, y1]).all()
-    data = payload(alone, wholes(sequence, "image"))
+    data = page_data(alone, wholes(sequence, "image"))
     corners = np.concatenate([h for t in wholes(sequence, "image") for h in t.groups.hull])
     assert data["bounds"] is None
     np.testing.assert_allclose(data["image"], np.ceil(corners.max(axis=0)))
@@ -110,8 +111,8 @@ def test_the_page_shows_all_of_their_hulls(sequence: Sequence) -> None:
 def test_thinned_hulls_are_nearly_the_same(places: list[tuple[float, float]]) -> None:
     """Never outside, no more than two steps of tolerance inside, in their order."""
     hull = footprint_hull(np.array(places))
-    less = group_rows.thin(hull, 0.02)
-    assert len(less) <= group_rows.MAX_HULL
+    less = group_rows.simplified(hull, 0.02)
+    assert len(less) <= group_rows.MAX_CORNERS
     assert {tuple(p) for p in less} <= {tuple(p) for p in hull}
     np.testing.assert_allclose(area(less), area(convex_hull(less)), rtol=1e-9)
     edge = np.roll(less, -1, axis=0) - less
@@ -123,7 +124,7 @@ def test_thinned_hulls_are_nearly_the_same(places: list[tuple[float, float]]) ->
 def test_a_hull_of_few_corners_stays() -> None:
     for n in range(4):
         corners = np.array([[0, 0], [1e-4, 0], [0, 1e-4]])[:n]
-        np.testing.assert_array_equal(group_rows.thin(corners, 1.0), corners)
+        np.testing.assert_array_equal(group_rows.simplified(corners, 1.0), corners)
 
 
 def test_a_long_recording_of_groups_stays_small(tmp_path) -> None:
@@ -140,11 +141,11 @@ def test_a_long_recording_of_groups_stays_small(tmp_path) -> None:
         groups = Groups(names, (), place.mean(axis=1), rng.normal(size=(10, 2)), extent, rng.normal(4, 0.2, 10), hull)
         answers.append(Tracks(k, k / 10, "ground", "group", names, names, groups.pos, groups.vel, cov, groups=groups))
     alone = Sequence("alone", 10.0, 1000, lambda: iter(()))
-    assert view(alone, answers, tmp_path / "page.html").stat().st_size < 1.1e6
+    assert write_page(alone, answers, tmp_path / "page.html").stat().st_size < 1.1e6
 
 
 def test_events_of_groups_are_told(sequence: Sequence) -> None:
-    events = payload(sequence, wholes(sequence, "ground"))["tracks"]["events"]
+    events = page_data(sequence, wholes(sequence, "ground"))["tracks"]["events"]
     assert [(e[0], list(e[4]), list(e[5]), e[6]) for e in events] == [
         ("merge", [1, 2], [1], ()), ("split", [1], [1, 3], ()),
     ]  # fmt: skip

@@ -12,12 +12,13 @@ import pytest
 from scenarios.errors import InputError
 from sim.types import Groups, Sequence, Tracks, Truth
 from tracking.app.replay_page import column_encoding
-from tracking.app.replay_page.page import payload, view
+from tracking.app.replay_page.page import write_page
+from tracking.app.replay_page.page_data import page_data
 
 NIL = column_encoding.NIL
 
 
-def page_data(page: str) -> dict:
+def data_of(page: str) -> dict:
     found = re.search(r'<script type="application/json" id="data">(.*?)</script>', page, re.DOTALL)
     assert found is not None
     return json.loads(found.group(1))
@@ -46,7 +47,7 @@ def decode(side: dict) -> dict[str, np.ndarray]:
 
 
 def test_truth_comes_back(sequence: Sequence, truth: Truth) -> None:
-    data = json.loads(json.dumps(payload(sequence, None)))
+    data = json.loads(json.dumps(page_data(sequence, None)))
     side = decode(data["truth"])
     order = np.lexsort((truth.frame, truth.id))
     np.testing.assert_array_equal(side["id"], truth.id[order])
@@ -65,7 +66,7 @@ def test_truth_comes_back(sequence: Sequence, truth: Truth) -> None:
 
 
 def test_tracks_come_back(sequence: Sequence, tracks: list[Tracks]) -> None:
-    side = decode(payload(sequence, tracks)["tracks"])
+    side = decode(page_data(sequence, tracks)["tracks"])
     for answer in (tracks[0], tracks[90], tracks[-1]):
         now = side["frame"] == answer.index
         order = np.argsort(answer.id)
@@ -73,9 +74,9 @@ def test_tracks_come_back(sequence: Sequence, tracks: list[Tracks]) -> None:
         np.testing.assert_array_equal(side["group"][now], answer.group[order])
         np.testing.assert_allclose(side["x"][now], answer.pos[order, 0], atol=0.0051)
         np.testing.assert_allclose(side["box"][now], answer.box[order], atol=0.26)
-    bars = payload(sequence, tracks)["tracks"]["bars"]
+    bars = page_data(sequence, tracks)["tracks"]["bars"]
     assert sorted(bar[0] for bar in bars) == [0, 7, 8]
-    assert payload(sequence, tracks)["tracks"]["links"] == [[54, 7, 0], [114, 0, 8]]
+    assert page_data(sequence, tracks)["tracks"]["links"] == [[54, 7, 0], [114, 0, 8]]
 
 
 def test_whoever_leaves_and_returns_has_two_stints() -> None:
@@ -85,35 +86,37 @@ def test_whoever_leaves_and_returns_has_two_stints() -> None:
 
 
 def test_detections_come_back(sequence: Sequence) -> None:
-    found = payload(sequence, None)["detections"]
+    found = page_data(sequence, None)["detections"]
     boxes = np.concatenate([f.detections.box for f in sequence if f.detections is not None])
     np.testing.assert_allclose(np.stack([column(c) for c in found["box"]], axis=1), boxes, atol=0.51)
     assert sum(n for _, n in found["frames"]) == len(boxes)
 
 
 def test_the_page_is_self_contained(sequence: Sequence, tracks: list[Tracks], tmp_path: Path) -> None:
-    path = view(sequence, tracks, tmp_path / "new" / "page.html", scores={"HOTA": 0.9, "FP": 7.0, "IDF1": float("nan")})
+    path = write_page(
+        sequence, tracks, tmp_path / "new" / "page.html", scores={"HOTA": 0.9, "FP": 7.0, "IDF1": float("nan")}
+    )
     page = path.read_text()
     assert "@@" not in page
     assert re.findall(r"(?:src|href)\s*=|url\(|@import|fetch\(|XMLHttpRequest", page) == []
     assert [u for u in re.findall(r"https?://[^\"'\s]+", page) if u != "http://www.w3.org/2000/svg"] == []
-    scores = [(key, value, family) for key, value, _, family in page_data(page)["scores"]]
+    scores = [(key, value, family) for key, value, _, family in data_of(page)["scores"]]
     assert scores == [("HOTA", "0.900", ""), ("HOTA", "0.900", "people"), ("FP", "7", "people")]
-    assert page_data(page)["name"] == "meeting"
+    assert data_of(page)["name"] == "meeting"
 
 
 def test_names_cannot_break_out(sequence: Sequence, tmp_path: Path) -> None:
     name = '</script><script>alert("x")</script><!-- @@DATA@@ \u2028'
     odd = Sequence(name, 10.0, 160, sequence.frames, sequence.load_truth)
-    page = view(odd, None, tmp_path / "page.html", title=name).read_text()
+    page = write_page(odd, None, tmp_path / "page.html", title=name).read_text()
     assert page.count("<script") == page.count("</script>") == 3
-    assert page_data(page)["name"] == name
+    assert data_of(page)["name"] == name
     assert "<title>&lt;/script&gt;" in page
 
 
 def test_without_ground_there_is_no_plan(sequence: Sequence, truth: Truth) -> None:
     boxes = Sequence("boxes", 10.0, None, sequence.frames, lambda: truth.replace(pos=None, vel=None))
-    data = payload(boxes, None)
+    data = page_data(boxes, None)
     assert data["bounds"] is None
     assert data["length"] == truth.length
     assert data["truth"]["plane"] == "image"
@@ -122,7 +125,7 @@ def test_without_ground_there_is_no_plan(sequence: Sequence, truth: Truth) -> No
 
 
 def test_without_boxes_there_is_no_image(sequence: Sequence, truth: Truth) -> None:
-    data = payload(Sequence("points", 2.5, 160, sequence.frames, lambda: truth.replace(box=None)), None)
+    data = page_data(Sequence("points", 2.5, 160, sequence.frames, lambda: truth.replace(box=None)), None)
     assert data["image"] is None
     assert data["truth"]["box"] == []
     low, high = truth.pos.min(axis=0) - 1, truth.pos.max(axis=0) + 1
@@ -147,15 +150,15 @@ def test_nobody_anywhere(sequence: Sequence) -> None:
         )
         for k in range(1, 6)
     ]
-    data = payload(Sequence("none", 10.0, 5, lambda: iter(()), lambda: empty), quiet)
+    data = page_data(Sequence("none", 10.0, 5, lambda: iter(()), lambda: empty), quiet)
     assert data["truth"]["x"] == data["tracks"]["x"] == []
     assert data["truth"]["bars"] == []
-    assert payload(Sequence("bare", 10.0, None, lambda: iter(())), None)["length"] == 1
+    assert page_data(Sequence("bare", 10.0, None, lambda: iter(())), None)["length"] == 1
 
 
 def test_a_track_without_box_in_one_frame_stays_without(sequence: Sequence, tracks: list[Tracks]) -> None:
     answers = [t.replace(box=None) if t.index == 3 else t for t in tracks]
-    side = decode(payload(sequence, answers)["tracks"])
+    side = decode(page_data(sequence, answers)["tracks"])
     assert np.isnan(side["box"][side["frame"] == 3]).all()
     assert np.isfinite(side["box"][side["frame"] != 3]).all()
 
@@ -168,11 +171,11 @@ def test_a_long_crowded_recording_stays_small(tmp_path: Path) -> None:
     flat = pos.reshape(-1, 2)
     box = np.c_[flat * 20, np.full((len(flat), 2), [18.0, 50.0])] + rng.normal(0, 1, (len(flat), 4))
     truth = Truth("big", 10.0, t, 50.0, frame, ids, np.full(len(flat), -1), flat, flat, box, np.ones(len(flat)))
-    path = view(Sequence("big", 10.0, t, lambda: iter(()), lambda: truth), None, tmp_path / "big.html")
+    path = write_page(Sequence("big", 10.0, t, lambda: iter(()), lambda: truth), None, tmp_path / "big.html")
     assert path.stat().st_size < 1.6e6
 
 
 def test_an_unwritable_place_is_one_clear_line(sequence: Sequence, tmp_path: Path) -> None:
     (tmp_path / "file").write_text("")
     with pytest.raises(InputError, match="choose another --out"):
-        view(sequence, None, tmp_path / "file" / "page.html")
+        write_page(sequence, None, tmp_path / "file" / "page.html")

@@ -13,25 +13,25 @@ import pytest
 from scenarios.errors import InputError
 from sim.io.source import open_source
 from tests.coded_pictures import SIZE, number, sequence
-from tracking.app.replay_page.page import view
-from tracking.app.replay_page.video import Film, film
+from tracking.app.replay_page.page import write_page
+from tracking.app.replay_page.video import PageVideo, page_video
 
 
-def shown(made: Film, folder: Path) -> list[tuple[float, int]]:
+def shown(made: PageVideo, folder: Path) -> list[tuple[float, int]]:
     """(time, number) of the video's frames, as a player decodes them."""
     import av
 
     path = folder / "decoded.mp4"
-    path.write_bytes(base64.b64decode(made.inside) if made.inside else (folder / made.source).read_bytes())
+    path.write_bytes(base64.b64decode(made.content) if made.content else (folder / made.address).read_bytes())
     with av.open(str(path)) as container:
         return [(float(f.time), number(f.to_ndarray(format="bgr24"))) for f in container.decode(video=0)]
 
 
 @pytest.mark.parametrize("fps", [10.0, 2.5, 30000 / 1001, 7.0])
 def test_each_frame_is_in_its_slot(tmp_path: Path, fps: float) -> None:
-    made = film(sequence(70, fps), tmp_path / "page.html")
+    made = page_video(sequence(70, fps), tmp_path / "page.html")
     assert made is not None
-    assert made.source == ""
+    assert made.address == ""
     assert made.fps == pytest.approx(fps, abs=1e-9)
     found = shown(made, tmp_path)
     assert [k for _, k in found] == list(range(1, 71))
@@ -40,46 +40,46 @@ def test_each_frame_is_in_its_slot(tmp_path: Path, fps: float) -> None:
 
 
 def test_a_lost_frame_keeps_its_slot_and_is_told(tmp_path: Path) -> None:
-    made = film(sequence(9, lost=(4, 5)), tmp_path / "page.html")
+    made = page_video(sequence(9, lost=(4, 5)), tmp_path / "page.html")
     assert made is not None
     assert made.lost == (4, 5)
     assert [k for _, k in shown(made, tmp_path)] == [1, 2, 3, 3, 3, 6, 7, 8, 9]
-    assert film(sequence(9, lost=(1,)), tmp_path / "page.html").lost == (1,)
+    assert page_video(sequence(9, lost=(1,)), tmp_path / "page.html").lost == (1,)
 
 
 def test_large_ones_stand_beside_the_page(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("tracking.app.replay_page.video.LARGE", 100)
-    made = film(sequence(5), tmp_path / "a page.html")
-    assert (made.source, made.inside) == ("a%20page.view.mp4", "")
+    made = page_video(sequence(5), tmp_path / "a page.html")
+    assert (made.address, made.content) == ("a%20page.view.mp4", "")
     assert (tmp_path / "a page.view.mp4").exists()
-    assert film(sequence(5), tmp_path / "b.html", "inside").source == ""
-    assert film(sequence(5), tmp_path / "b.html", "none") is None
+    assert page_video(sequence(5), tmp_path / "b.html", "inside").address == ""
+    assert page_video(sequence(5), tmp_path / "b.html", "none") is None
     assert sorted(p.name for p in tmp_path.iterdir()) == ["a page.view.mp4"]
 
 
 def test_neither_source_nor_overlay_is_replaced(tmp_path: Path) -> None:
     """README: `view --out replay.html` and `overlay --out replay.mp4`."""
-    made = film(sequence(5), tmp_path / "a.html", "beside")
+    made = page_video(sequence(5), tmp_path / "a.html", "beside")
     (tmp_path / "a.mp4").write_bytes(before := b"an overlay")
-    film(sequence(5), tmp_path / "a.html", "beside")
+    page_video(sequence(5), tmp_path / "a.html", "beside")
     assert (tmp_path / "a.mp4").read_bytes() == before
-    whole = (tmp_path / made.source).read_bytes()
-    (read,) = open_source(tmp_path / made.source)
+    whole = (tmp_path / made.address).read_bytes()
+    (read,) = open_source(tmp_path / made.address)
     with pytest.raises(InputError, match="the source itself"):
-        film(read, tmp_path / "a.html", "beside")
-    assert (tmp_path / made.source).read_bytes() == whole
+        page_video(read, tmp_path / "a.html", "beside")
+    assert (tmp_path / made.address).read_bytes() == whole
 
 
 def test_the_page_holds_the_video(tmp_path: Path) -> None:
     bare = sequence(5)
-    made = film(bare, tmp_path / "page.html")
-    page = view(bare, None, tmp_path / "page.html", film=made).read_text()
+    made = page_video(bare, tmp_path / "page.html")
+    page = write_page(bare, None, tmp_path / "page.html", video=made).read_text()
     (held,) = re.findall(r'<script type="text/plain" id="film">(.*?)</script>', page, re.DOTALL)
-    assert held == made.inside
+    assert held == made.content
     (data,) = re.findall(r'<script type="application/json" id="data">(.*?)</script>', page, re.DOTALL)
     facts = json.loads(data)
     assert facts["video"] == {"src": "", "fps": 10.0, "lost": []}
     assert facts["image"] == list(SIZE)
     assert json.loads(
-        re.findall(r'id="data">(.*?)</script>', view(bare, None, tmp_path / "x.html").read_text(), re.DOTALL)[0]
+        re.findall(r'id="data">(.*?)</script>', write_page(bare, None, tmp_path / "x.html").read_text(), re.DOTALL)[0]
     )["video"] is None  # fmt: skip

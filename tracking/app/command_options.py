@@ -1,0 +1,216 @@
+"""The options of each command as one frozen dataclass: every field is an option, with its type, default and help text.
+
+`options_from_dataclass` turns a dataclass into a Typer command. Commands with less than four options have none, and
+the options of `tune` are in `tune_options`. The module imports Typer only, so that `--help` stays quick.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Annotated, Literal
+
+import typer
+
+from tracking.app.shared_options import (
+    Calibration,
+    Cluster,
+    Detections,
+    Detector,
+    Fps,
+    Images,
+    Out,
+    Rule,
+    Scale,
+    Set,
+    Source,
+    Streams,
+    Tracker,
+    Tracks,
+    Workers,
+)
+
+
+@dataclass(frozen=True, kw_only=True)
+class ScenariosOptions:
+    """Options of `scenarios`. All are None, empty or False if absent: the command then lists scenarios and suites."""
+
+    name: Annotated[str | None, typer.Argument(help="Scenario, *.toml file or suite to explain.")] = None
+    settings: Set = field(default_factory=list)
+    out: Annotated[
+        Path | None, typer.Option("--out", metavar="FILE.svg", help="Write a drawing of plan and script.")
+    ] = None
+    schema: Annotated[bool, typer.Option("--schema", help="List every key of a scenario file.")] = False
+
+
+@dataclass(frozen=True, kw_only=True)
+class GenerateOptions:
+    """Options of `generate`."""
+
+    names: Annotated[list[str], typer.Argument(metavar="NAME…", help="Scenarios, *.toml files or suites.")]
+    seeds: Annotated[str, typer.Option("--seeds", metavar="A:B", help="Seeds from A to B - 1, or one seed.")]
+    out: Out
+    settings: Set = field(default_factory=list)
+    sensor: Detector = None
+    streams: Streams = "left"
+    images: Images = None
+    workers: Workers = 1
+    cluster: Cluster = None
+
+
+@dataclass(frozen=True, kw_only=True)
+class TrackOptions:
+    """Options of `track`."""
+
+    tracker: Tracker
+    source: Source
+    out: Out
+    params: Annotated[Path | None, typer.Option("--params", metavar="FILE.toml", help="The tracker's parameters.")] = (
+        None
+    )
+    settings: Set = field(default_factory=list)
+    detections: Detections = None
+    sensor: Detector = None
+    grouping: Rule = None
+    seed: Annotated[int, typer.Option("--seed", min=0, help="The tracker's seed.")] = 0
+    fps: Fps = None
+    px_per_m: Scale = None
+    camera: Calibration = None
+    background: Annotated[
+        str | None,
+        typer.Option("--background", metavar="first:N|spread:N", help="Frames a background model is trained on."),
+    ] = None
+
+
+@dataclass(frozen=True, kw_only=True)
+class ScoreOptions:
+    """Options of `score`."""
+
+    truth: Annotated[Path, typer.Argument(metavar="TRUTH", help="Labelled sequence or dataset.")]
+    tracks: Annotated[Path, typer.Argument(metavar="TRACKS", help="Output of `track`, or MOT text.")]
+    similarity: Annotated[
+        Literal["boxes", "ground", "image"] | None,
+        typer.Option(help="How true and tracked people are compared. Default: by what both sides have."),
+    ] = None
+    group_match: Annotated[
+        Literal["hull", "members"], typer.Option("--group-match", help="How true and estimated groups are compared.")
+    ] = "hull"
+    against: Annotated[
+        Path | None, typer.Option("--against", metavar="TRACKS", help="Other tracks, whose scores are subtracted.")
+    ] = None
+    blocks: Annotated[
+        int,
+        typer.Option(
+            "--blocks", min=0, metavar="N", help="Intervals for a single recording, by N draws of blocks of frames."
+        ),
+    ] = 0
+    fps: Fps = None
+    px_per_m: Scale = None
+
+
+@dataclass(frozen=True, kw_only=True)
+class FitSensorOptions:
+    """Options of `fit sensor`."""
+
+    sources: Annotated[list[Path], typer.Argument(metavar="SOURCE…", help="Recordings with gt and det, pooled.")]
+    out: Annotated[Path, typer.Option("--out", metavar="FILE.toml", help="File to write: a [sensor] table.")]
+    fps: Fps = None
+
+
+@dataclass(frozen=True, kw_only=True)
+class ReplayCommandOptions:
+    """Options of `replay`."""
+
+    source: Source
+    out: Out
+    camera: Annotated[
+        Path | None,
+        typer.Option(
+            "--camera", metavar="FILE.toml", help="Tables [camera], [sensor], [light], [picture]; each may be absent."
+        ),
+    ] = None
+    seeds: Annotated[
+        str,
+        typer.Option(
+            "--seeds", metavar="A:B", help="Seeds of bodies, looks and sensor. For real recordings from 20000 on."
+        ),
+    ] = "20000"
+    start: Annotated[float, typer.Option("--start", min=0.0, metavar="S", help="Second at which to begin.")] = 0.0
+    duration: Annotated[
+        float | None, typer.Option("--duration", metavar="S", help="Seconds to replay. Default: up to the end.")
+    ] = None
+    settings: Set = field(default_factory=list)
+    sensor: Detector = None
+    streams: Streams = "left"
+    images: Images = None
+    fps: Fps = None
+    calibration: Annotated[
+        Path | None,
+        typer.Option(
+            "--calibration",
+            metavar="FILE",
+            help="Calibration of a recording that has boxes only: camera.json or Tsai's XML.",
+        ),
+    ] = None
+
+
+@dataclass(frozen=True, kw_only=True)
+class ViewOptions:
+    """Options of `view`."""
+
+    source: Source
+    tracks: Tracks = None
+    out: Annotated[
+        Path, typer.Option("--out", metavar="FILE.html", help="Page to write; for several sequences, a folder.")
+    ]
+    video: Annotated[
+        Literal["auto", "inside", "beside", "none"],
+        typer.Option(help="Pictures inside the page, beside it as FILE.view.mp4, or none. auto: beside from 12 MB on."),
+    ] = "auto"
+    fps: Fps = None
+    px_per_m: Scale = None
+    camera: Calibration = None
+
+
+@dataclass(frozen=True, kw_only=True)
+class SheetOptions:
+    """Options of `sheet`."""
+
+    source: Source
+    out: Annotated[
+        Path, typer.Option("--out", metavar="FILE.png", help="Picture to write; for several sequences, a folder.")
+    ]
+    frames: Annotated[int, typer.Option("--frames", min=1, max=64, help="Number of frames to show.")] = 8
+    fps: Fps = None
+
+
+@dataclass(frozen=True, kw_only=True)
+class OverlayOptions:
+    """Options of `overlay`."""
+
+    source: Source
+    tracks: Tracks = None
+    out: Annotated[
+        Path, typer.Option("--out", metavar="FILE.mp4", help="Video to write; for several sequences, a folder.")
+    ]
+    truth: Annotated[
+        Literal["beside", "over", "only"] | None,
+        typer.Option(help="Draw the truth too: beside the tracks, over the same picture, or only the truth."),
+    ] = None
+    fps: Fps = None
+    px_per_m: Scale = None
+    camera: Calibration = None
+
+
+@dataclass(frozen=True, kw_only=True)
+class WebdatasetOptions:
+    """Options of `export webdataset`."""
+
+    folder: Annotated[Path, typer.Argument(metavar="DIR", help="A generated sequence or dataset.")]
+    out: Out
+    shard_size: Annotated[
+        str, typer.Option("--shard-size", metavar="SIZE", help="Largest size of a shard, as 500MB or 2GB.")
+    ] = "1GB"
+    samples: Annotated[
+        Literal["sequence", "frame"], typer.Option(help="A sample: a sequence with all its files, or a labelled frame.")
+    ] = "sequence"

@@ -1,0 +1,70 @@
+"""Chooses the frames that a contact sheet shows: the beginnings of events first, then frames that fill the gaps."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from sim.types import Ints, Truth
+
+SHOWN_KINDS = {"merge": 0, "split": 0, "cross": 1, "queue": 1, "form": 2, "dissolve": 2}
+"""Kinds of events that are shown, with their rank; events of rank 0 come first. Enter and leave are not shown."""
+
+CLOSE_SECONDS = 1.0
+"""s: events that begin within this time share a picture."""
+
+
+def is_close(frame: int, other: int, fps: float) -> bool:
+    """True if two frames are at most CLOSE_SECONDS apart."""
+    return abs(frame - other) <= CLOSE_SECONDS * fps
+
+
+def choose_frames(truth: Truth, count: int) -> list[int]:
+    """The indices of `count` frames in ascending order; every frame if the sequence has no more, at least one.
+
+    First frames of events are taken rank by rank, those less than a second from a frame taken before left out. If there
+    are more of one rank than there is room for, they are thinned evenly. The widest gaps are then halved until
+    `count` is reached, with preference for frames with many people.
+    """
+    count = max(1, min(count, truth.length))
+    chosen: list[int] = []
+    events = [event for event in truth.events or () if 1 <= event.start <= truth.length and event.kind in SHOWN_KINDS]
+    for rank in sorted(set(SHOWN_KINDS.values())):
+        starts = _apart({event.start for event in events if SHOWN_KINDS[event.kind] == rank}, chosen, truth.fps)
+        room = count - len(chosen)
+        chosen += starts if len(starts) <= room else [starts[k] for k in _evenly(len(starts), room)]
+    people = np.bincount(truth.frame, minlength=truth.length + 1)[1 : truth.length + 1]
+    while len(chosen) < count:
+        chosen.append(_in_widest_gap(chosen, people))
+    return sorted(chosen)
+
+
+def _apart(starts: set[int], chosen: list[int], fps: float) -> list[int]:
+    """The starts that are close neither to a chosen frame nor to an earlier start that was kept."""
+    kept: list[int] = []
+    for start in sorted(starts):
+        if not any(is_close(start, other, fps) for other in (*chosen, *kept)):
+            kept.append(start)
+    return kept
+
+
+def _evenly(n: int, k: int) -> list[int]:
+    """k of the indices 0 to n - 1, evenly spaced."""
+    return [round(place) for place in np.linspace(0, n - 1, k)] if k > 1 else [0][:k]
+
+
+def _in_widest_gap(chosen: list[int], people: Ints) -> int:
+    """The frame with most people in the middle half of the widest gap; of several, the nearest to the gap's middle.
+
+    people: (T,) counts by frame. Both ends of the sequence count as an eighth of its length further out, so that frames
+    near the ends are chosen, too. If no gap has room, the first frame that is not chosen.
+    """
+    length = len(people)
+    marks = np.array([1 - length // 8, *sorted(chosen), length + length // 8])
+    for k in np.argsort(-np.diff(marks), kind="stable"):
+        low, high = marks[k], marks[k + 1]
+        quarter = (high - low) // 4
+        inner = np.arange(max(low + quarter, low + 1, 1), min(high - quarter, high - 1, length) + 1)
+        if len(inner):
+            order = np.lexsort((np.abs(inner - (low + high) / 2), -people[inner - 1]))
+            return int(inner[order[0]])
+    return next(index for index in range(1, length + 1) if index not in chosen)

@@ -1,0 +1,187 @@
+"""The data that the replay page holds, as one JSON object: sequence, scene, camera, truth, tracks, detections, scores.
+
+Rows of people are encoded column by column (`person_rows`, `column_encoding`); decode.js decodes them.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from collections.abc import Sequence as SequenceOf
+from typing import Any
+
+import numpy as np
+
+from sim.types import Array, Camera, Scene, Sequence, Tracks, Truth
+from tracking.app.replay_page.column_encoding import Json, deltas
+from tracking.app.replay_page.person_rows import SCALE, PageRows, encode_rows, rows_of_tracks, rows_of_truth
+from tracking.drawing.plan_area import plan_area
+from tracking.run import grouped
+
+
+def page_data(sequence: Sequence, tracks: SequenceOf[Tracks] | None, scores: Mapping[str, float] | None = None) -> Json:
+    """All that the page shows except the video. An entry is None if the sequence does not have it.
+
+    tracks: None for the truth alone; groups and events that the tracker did not report are derived. scores: by key.
+    """
+    truth = sequence.truth
+    complete = None if tracks is None else grouped(tracks, sequence)
+    true = None if truth is None else rows_of_truth(truth)
+    tracked = None if complete is None else rows_of_tracks(complete)
+    detections = _detections(sequence)
+    both = [rows for rows in (true, tracked) if rows is not None]
+    return {
+        "name": sequence.name,
+        "tracker": _tracker(tracks),
+        "fps": sequence.fps,
+        "length": _length(sequence, both, detections),
+        "image": sequence.image_size or _image_size(both),
+        "bounds": _bounds(sequence, both),
+        "scene": scene_json(sequence.scene),
+        "camera": camera_json(sequence.camera),
+        "truth": None if true is None or truth is None else encode_rows(true, truth.events or ()),
+        "tracks": None
+        if tracked is None or complete is None
+        else encode_rows(tracked, [e for t in complete for e in t.events]),
+        "detections": detections,
+        "unlabelled": _unlabelled(truth),
+        "near": _near_strangers(truth),
+        "scores": _scores(scores or {}),
+    }
+
+
+def _scores(scores: Mapping[str, float]) -> list[list[str]]:
+    """[key, value, meaning, family] of each known score, after the same of the SHOWN scores with the family ""."""
+    from tracking.app.commands.score_tables import SHOWN, number
+    from tracking.scoring.catalogue import CATALOGUE
+
+    known = {key: number(key, scores[key]) for key in CATALOGUE if math.isfinite(scores.get(key, math.nan))}
+    few = [[key, known[key], CATALOGUE[key].meaning, ""] for key in SHOWN if key in known]
+    return few + [[key, text, CATALOGUE[key].meaning, CATALOGUE[key].family] for key, text in known.items()]
+
+
+def _tracker(tracks: SequenceOf[Tracks] | None) -> str:
+    info: Mapping[str, Any] = getattr(tracks, "info", {})
+    return str(info.get("tracker", "the tracker"))
+
+
+def _length(sequence: Sequence, both: list[PageRows], detections: Json | None) -> int:
+    """The sequence's number of frames, else the last frame with a person or detection; at least 1."""
+    if sequence.length is not None:
+        return max(sequence.length, 1)
+    last = [int(rows.frame.max()) for rows in both if len(rows.frame)]
+    detected = [int(detections["frames"][-1][0])] if detections else []
+    return max([1, *last, *detected])
+
+
+def _image_size(both: list[PageRows]) -> list[int] | None:
+    """Width and height in px that hold all boxes and all that was tracked in the image; None if there is neither."""
+    corners = [rows.box[:, :2] + rows.box[:, 2:] for rows in both]
+    corners += [points for rows in both if rows.plane == "image" for points in _points(rows)]
+    known = np.concatenate([np.zeros((0, 2)), *corners])
+    known = known[np.isfinite(known).all(axis=1)]
+    if not len(known):
+        return None
+    width, height = known.max(axis=0)
+    return [max(math.ceil(width), 16), max(math.ceil(height), 16)]
+
+
+def _bounds(sequence: Sequence, both: list[PageRows]) -> list[float] | None:
+    """x0, y0, x1, y1 of the plan in m; None without a scene and without people on the ground."""
+    points = [part for rows in both if rows.plane == "ground" for part in _points(rows)]
+    area = plan_area(sequence.scene, np.concatenate([np.zeros((0, 2)), *points]))
+    return None if area is None else [round(float(v), 2) for corner in area for v in corner]
+
+
+def _points(rows: PageRows) -> list[Array]:
+    """The rows' positions, and the corners of their hulls if the rows are groups."""
+    return [rows.pos, *(rows.groups.hull if rows.groups is not None else ())]
+
+
+def _unlabelled(truth: Truth | None) -> list[list[int]]:
+    """[first, last] of each stretch of frames without group labels."""
+    if truth is None or truth.labelled is None or truth.labelled.all():
+        return []
+    edge = np.flatnonzero(np.diff(np.r_[True, truth.labelled, True].astype(int)))
+    return [[int(a) + 1, int(b)] for a, b in edge.reshape(-1, 2)]
+
+
+def _near_strangers(truth: Truth | None) -> list[list[int]]:
+    """[first frame, last frame, id, id] of strangers who walk as if they were in one group."""
+    if truth is None or truth.near is None:
+        return []
+    near = truth.near
+    listed: list[list[int]] = np.stack([near.start, near.end, near.a, near.b], axis=1).tolist()
+    return listed
+
+
+def _detections(sequence: Sequence) -> Json | None:
+    """The detections of all frames: [frame, count] pairs, and columns of positions and boxes; None if there is none.
+
+    Positions are in cm on the ground and half px in the image, boxes in px.
+    """
+    if not sequence.has_detections:
+        return None
+    found = [
+        (f.index, f.detections)
+        for f in sequence.without_pictures()
+        if f.detections is not None and len(f.detections.pos)
+    ]
+    if not found:
+        return None
+    plane = found[0][1].plane
+    pos = np.concatenate([d.pos[:, :2] for _, d in found]) * SCALE[plane]
+    boxes = [d.box for _, d in found if d.box is not None]
+    box = np.concatenate(boxes) if len(boxes) == len(found) else None
+    return {
+        "plane": plane,
+        "scale": SCALE[plane],
+        "frames": [[index, len(d.pos)] for index, d in found],
+        "x": deltas(pos[:, 0]),
+        "y": deltas(pos[:, 1]),
+        "box": [] if box is None else [deltas(box[:, k]) for k in range(4)],
+    }
+
+
+def scene_json(scene: Scene | None) -> Json | None:
+    """The scene for the page, in m; None without a scene.
+
+    Walls and doors are x, y, x, y of their ends. Pillars are x, y, radius. Service points are x, y. Flights of stairs
+    are foot x, y, head x, y, width, rise, number of steps, landing.
+    """
+    if scene is None:
+        return None
+    return {
+        "size": _round(scene.size),
+        "walls": _round(scene.walls.reshape(-1, 4)),
+        "pillars": _round(scene.pillars),
+        "doors": _round(scene.doors.reshape(-1, 4)),
+        "service": _round(scene.service),
+        "stairs": [[*_round(s.foot), *_round(s.head), s.width, s.rise, s.steps, s.landing] for s in scene.stairs],
+        "wallHeight": scene.wall_height,
+        "pillarHeight": scene.pillar_height,
+    }
+
+
+def camera_json(camera: Camera | None) -> Json | None:
+    """The camera for the page, which projects ground and walls with it; None without a camera.
+
+    f: focal lengths, px. c: principal point, px. C: position, m. R: rotation. scale: px per m, None for a pinhole. k:
+    radial distortion.
+    """
+    if camera is None:
+        return None
+    return {
+        "kind": camera.kind,
+        "f": _round(camera.focal_px),
+        "c": _round(camera.centre_px),
+        "C": _round(camera.position, 4),
+        "R": _round(camera.rotation, 6),
+        "scale": None if math.isnan(camera.px_per_m) else camera.px_per_m,
+        "k": camera.radial,
+    }
+
+
+def _round(values: Any, digits: int = 3) -> list[Any]:
+    listed: list[Any] = np.round(np.asarray(values, float), digits).tolist()
+    return listed
