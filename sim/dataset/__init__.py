@@ -1,1 +1,1 @@
-"""Datasets on disk: many sequences generated from scenarios, or replayed from recordings."""
+"""Datasets on disk: many sequences, generated from scenarios or replayed from recordings."""

@@ -1,10 +1,9 @@
-"""Real trajectories as the motion of a scene of ours: real motion, perfect labels.
+"""Replay a recording: its people as the motion of a simulated sequence, so real motion with exact labels.
 
-`replay(source, view, seed)` takes the places that a recording's labels say, smooths and resamples them to the camera's
-rate (sim.dataset.trajectories), gives everybody a body drawn from the seed, and looks at them with the view's camera
-and
-sensor. Groups are those that the recording labels, as intent; when they come together and part is measured from the
-motion, as for simulated crowds. Of walls and obstacles nothing is known: there are none, unless the source is ours.
+The labelled positions are smoothed and resampled to the camera's frame rate (sim.dataset.trajectories). Each person
+gets a body drawn from the seed. The given camera and sensor then observe the motion like a simulated one. Groups are
+those that the recording labels; when they merge and split is measured from the motion. The scene has no walls and
+obstacles, unless the source is a simulated sequence with a scene.
 """
 
 from __future__ import annotations
@@ -27,14 +26,14 @@ from sim.scene.body import DEPTH_SHARE, SHOULDER_SHARE
 from sim.sequence import observe
 from sim.types import Array, Camera, Ints, Motion, Scene, Sequence, Truth
 
-MARGIN = 1.0  # m of ground round everybody
-LONGEST = 3600.0  # s, as of a scenario
-FLAT = ("caviar",)  # recordings whose image, divided by its scale, stands for the ground
+MARGIN = 1.0  # m of ground around all positions
+LONGEST = 3600.0  # s, the longest duration of a scenario
+FLAT = ("caviar",)  # recordings whose image, divided by its scale, is taken as the ground without a calibration
 
 
 @dataclass(frozen=True)
 class Cut:
-    """Which part of a recording: from `start` s on for `duration` s (None: to its end)."""
+    """The part of a recording to replay: from `start` s, for `duration` s; None means to its end."""
 
     start: float = 0.0
     duration: float | None = None
@@ -52,13 +51,15 @@ def replay(
     calibration: Camera | str | Path | None = None,
     streams: Iterable[str] = ("left",),
 ) -> Sequence:
-    """A recording's people before our camera: a labelled sequence like any other.
+    """Return a recording's people as a labelled sequence that our camera and sensor observe.
 
-    camera: an ObservationSpec, or a file of one (scenarios.schema.observation), None for the usual one.
-    calibration: of a recording that has
-    boxes only, to put their feet on the ground. streams: as for `simulate`. `sequence.source["origin"]` says whose
-    motion it is. InputError where a source has no places on the ground, several sequences, or nobody in the cut, and
-    where somebody is out of view.
+    source: a sequence, or the path of one. camera: what observes them (camera, sensor, light, picture), or its TOML
+    file; None for the default. seed: for bodies, looks and sensor. cut: the part to replay. calibration: camera of a
+    recording with boxes only, which maps their feet to the ground. streams: as for `simulate`. The result's
+    `source["origin"]` describes the recording.
+
+    Raises InputError if the source holds several sequences, no labelled people or no positions on the ground, if nobody
+    is in the cut, if the cut is outside the recording, or if people leave the view.
     """
     from sim.io.source import open_source
 
@@ -82,7 +83,10 @@ def resolve_replay(
     calibration: Camera | str | Path | None = None,
     streams: Iterable[str] = (),
 ) -> tuple[Sequence, ReplaySpec]:
-    """A replay and its resolved form, which stands for the scenario."""
+    """Return a replay, and its resolved specification, which takes the place of the scenario in files and hashes.
+
+    Arguments and errors are those of `replay`.
+    """
     truth = _labels(source)
     places = on_ground(truth, source, _calibrated(calibration, source))
     moving = _moving(places, truth, source, view.camera.fps, cut)
@@ -93,11 +97,11 @@ def resolve_replay(
     made = observe(view, motion if whole is None else motion.replace(scene=whole), people={}, streams=streams)
     if truth.labelled is None or not truth.labelled.any():
         made = replace(made, load_truth=_without_groups(made))
-    told = {**made.source, "kind": "replayed", "origin": origin.model_dump()}
+    described = {**made.source, "kind": "replayed", "origin": origin.model_dump()}
     form = ReplaySpec(
         name=motion.name, replay=origin, **{name: getattr(view, name) for name in ObservationSpec.model_fields}
     )
-    return replace(made, source=told), form
+    return replace(made, source=described), form
 
 
 def _labels(source: Sequence) -> Truth:
@@ -111,7 +115,12 @@ def _labels(source: Sequence) -> Truth:
 
 
 def on_ground(truth: Truth, source: Sequence, calibration: Camera | None = None) -> Array:
-    """(R, 2) m: where the rows of a truth are on the ground, nan where unknown; InputError where nothing says so."""
+    """Return the positions on the ground (R, 2) m of the rows of a truth, nan where unknown.
+
+    They come from the truth's own positions; else from the feet of its boxes with the calibration or the source's
+    camera; else, for recordings in FLAT, from the boxes' centres divided by the image scale, y up. Raises InputError if
+    none of these is known, or if a calibration is given for a truth with positions.
+    """
     if truth.pos is not None:
         if calibration is not None:
             raise InputError(
@@ -145,7 +154,7 @@ def _calibrated(calibration: Camera | str | Path | None, source: Sequence) -> Ca
 
 
 def _moving(places: Array, truth: Truth, source: Sequence, fps: float, cut: Cut) -> Trajectories:
-    """The cut's trajectories."""
+    """Return the trajectories of the cut at `fps`. Raises InputError if the cut is wrong or nobody is in it."""
     file, whole = source.source.get("path", source.name), (truth.length - 1) / truth.fps
     last = whole if cut.duration is None else min(whole, cut.start + cut.duration - 1 / fps)
     if not 0 <= cut.start <= last <= cut.start + LONGEST:
@@ -205,7 +214,7 @@ def _motion(moving: Trajectories, truth: Truth, name: str, fps: float, cut: Cut,
 
 
 def _intent(moving: Trajectories, truth: Truth, fps: float, cut: Cut) -> Ints:
-    """(T, P): the label nearest in time; who is alone has a number of his own; -1 absent."""
+    """Return the intent (T, P): the group label nearest in time, an own number for a person alone, -1 if absent."""
     t = cut.start + np.arange(len(moving.present)) / fps
     label = truth.group[nearest_row(truth.frame, truth.id, moving.id, truth.fps, t)]
     alone = int(truth.group.max(initial=0)) + 1 + np.arange(len(moving.id))
@@ -213,7 +222,7 @@ def _intent(moving: Trajectories, truth: Truth, fps: float, cut: Cut) -> Ints:
 
 
 def _heights(people: Ints, truth: Truth, seed: int) -> Array:
-    """(P,) m: as labelled, else drawn as for simulated crowds, keyed by the person."""
+    """Return body heights (P,) m: the first label of each person, else drawn as in simulated crowds, by seed and id."""
     from scenarios.schema.scenario import CrowdSpec
     from scenarios.schema.values import draw
 
@@ -225,14 +234,14 @@ def _heights(people: Ints, truth: Truth, seed: int) -> Array:
 
 
 def _name(name: str, cut: Cut) -> str:
-    """A scenario's kind of name: of the recording, and where in it the replay begins."""
+    """Return the replay's name: that of the recording with odd characters replaced, and the start of the cut."""
     clean = "".join(c if c.isalnum() or c in "_.-" else "-" for c in name)
     clean = clean if clean[:1].isalpha() else f"replay-{clean}"
     return f"{clean}-t{cut.start:g}" if cut.start else clean
 
 
 def _without_groups(sequence: Sequence) -> Callable[[], Truth]:
-    """Its truth where nobody has labelled groups: not labelled, which is another thing than none."""
+    """Return a loader of the truth with groups marked as not labelled, for a recording without group labels."""
 
     def truth() -> Truth:
         assert sequence.load_truth is not None

@@ -1,4 +1,4 @@
-"""Replays as a dataset on disk: every recording with every seed, each a sequence like those of `generate`."""
+"""Store replays as a dataset: every recording with every seed, each as a sequence folder as `generate` writes it."""
 
 from __future__ import annotations
 
@@ -26,7 +26,10 @@ Progress = Callable[[int, int, str], None]
 
 @dataclass(frozen=True)
 class ReplayOptions:
-    """What is alike for all replays of a dataset."""
+    """Options that all replays of a dataset share; `cut`, `calibration` and `streams` as for sim.replay.
+
+    view: camera, sensor, light and picture. images: file type of the pictures, "jpg", "png" or "mp4".
+    """
 
     view: ObservationSpec
     cut: Cut = WHOLE
@@ -36,24 +39,27 @@ class ReplayOptions:
 
 
 def store_replays(
-    sources: Iterable[Sequence], how: ReplayOptions, seeds: range, out: str | Path, progress: Progress | None = None
+    sources: Iterable[Sequence], options: ReplayOptions, seeds: range, out: str | Path, progress: Progress | None = None
 ) -> list[Path]:
-    """Make OUT/flockscope-<split>/<recording>-s<seed>/ of every source and seed, and OUT/seqmaps.
+    """Write OUT/flockscope-<split>/<recording>-s<seed>/ for every source and seed, and OUT/seqmaps.
 
-    Replays of recordings go to the splits that nothing is tuned on: seeds from 20,000. What is there already is kept.
-    InputError where seeds or names do not fit or a folder holds another sequence; see sim.dataset.replay for the rest.
+    Returns the folders, all seeds of the first source first. Stored replays with the same options are kept.
+    progress(replays done, replays in all, name of the last one) is called after each.
+
+    Raises InputError if seeds span two splits, if two recordings share a name, if a recording of real motion is given
+    with seeds below 20,000 (the tuning splits), or if a folder holds another sequence; otherwise as sim.replay.
     """
     recordings, split, root = list(sources), split_of(seeds), Path(out)
     _check(recordings, seeds, split)
     folder = root / f"flockscope-{split}"
-    how = replace(how, streams=tuple(check_streams(how.streams, how.images)))
+    options = replace(options, streams=tuple(check_streams(options.streams, options.images)))
     made: list[Path] = []
     with lock_folder(root):
         remove_partials(root, folder, root / "seqmaps")
         try:
             for recording in recordings:
                 for seed in seeds:
-                    made.append(_store(recording, how, seed, folder))
+                    made.append(_store(recording, options, seed, folder))
                     if progress is not None:
                         progress(len(made), len(recordings) * len(seeds), made[-1].name)
         finally:
@@ -70,24 +76,24 @@ def _check(recordings: list[Sequence], seeds: range, split: str) -> None:
     if split in TUNING_SPLITS and any(is_real(recording) for recording in recordings):
         raise InputError(
             place="--seeds", got=f"{seeds.start} ({split})", expected="seeds from 20000 (test) on, for real motion",
-            remedy="choose such: nothing is tuned on recordings",
+            remedy="choose other seeds: nothing is tuned on recordings",
         )  # fmt: skip
 
 
-def _store(recording: Sequence, how: ReplayOptions, seed: int, folder: Path) -> Path:
+def _store(recording: Sequence, options: ReplayOptions, seed: int, folder: Path) -> Path:
     sequence, form = resolve_replay(
-        recording, how.view, seed, cut=how.cut, calibration=how.calibration, streams=how.streams
+        recording, options.view, seed, cut=options.cut, calibration=options.calibration, streams=options.streams
     )  # fmt: skip
-    job = _job(form, seed, folder, how)
+    job = _job(form, seed, folder, options)
     if not is_stored(job):
         sequence_folder.write_sequence(
-            job.folder, replace(sequence, name=job.name), scenario=dump(form), seed=seed, streams=how.streams,
-            images=how.images, keep=lambda: is_stored(job),
+            job.folder, replace(sequence, name=job.name), scenario=dump(form), seed=seed, streams=options.streams,
+            images=options.images, keep=lambda: is_stored(job),
         )  # fmt: skip
     return job.folder
 
 
-def _job(form: ReplaySpec, seed: int, folder: Path, how: ReplayOptions) -> SequenceJob:
-    """The job that knows whether the folder holds this very replay; its resolved form stands for the scenario."""
+def _job(form: ReplaySpec, seed: int, folder: Path, options: ReplayOptions) -> SequenceJob:
+    """Return the job whose identity is this replay; its resolved specification takes the place of the scenario."""
     entry = Entry(form.name, cast(Any, form))
-    return SequenceJob(folder / f"{form.name}-s{seed:05d}", entry, seed, how.streams, how.images)
+    return SequenceJob(folder / f"{form.name}-s{seed:05d}", entry, seed, options.streams, options.images)

@@ -1,8 +1,9 @@
-"""Labelled places over time as smooth motion at another frame rate.
+"""Smooth labelled positions of people and resample them to another frame rate.
 
-Each stretch of a person's places becomes a smoothing spline f: the least Σ |place - f|² + (tau⁴ / dt) ∫ |f''|², which
-keeps what is slower than tau and leaves out the rest, the jitter of labels. tau is the shortest of TIMES with which
-99 % of the accelerations are at most LIMIT: what labels jump beyond that, nobody walks.
+Each gap-free segment of a person's positions y becomes the smoothing spline f that minimises
+Σ |y - f|² + (tau⁴ / dt) ∫ |f''|², with dt the time between labels. It keeps motion slower than tau and removes faster
+motion, that is, label jitter. tau is the smallest of TIMES for which the 99 % quantile of accelerations is at most
+LIMIT, since people do not walk with more; the largest of TIMES if none satisfies it.
 """
 
 from __future__ import annotations
@@ -14,14 +15,15 @@ import numpy as np
 
 from sim.types import Array, Bools, Ints
 
-TIMES = (0.05, 0.1, 0.15, 0.2, 0.3, 0.4, 0.6, 0.8, 1.0)  # s
+TIMES = (0.05, 0.1, 0.15, 0.2, 0.3, 0.4, 0.6, 0.8, 1.0)  # s, candidates for tau
 LIMIT = 2.5  # m/s²
-GAP = 2.0  # s: who is not labelled for longer was away
+GAP = 2.0  # s without label after which a person counts as absent
 
 
 @dataclass(frozen=True)
 class Trajectories:
-    """Places and velocities (T, P, 2), nan while absent; id (P,); present (T, P); smoothing: tau, s."""
+    """Resampled motion: pos (T, P, 2) m and vel (T, P, 2) m/s, nan while absent; id (P,); present (T, P); smoothing:
+    the chosen tau in s."""
 
     id: Ints
     pos: Array
@@ -35,9 +37,10 @@ Segment = tuple[int, Array, Curve, Curve]
 
 
 def resample(frame: Ints, id: Ints, pos: Array, rate: float, fps: float, first: float, last: float) -> Trajectories:
-    """The motion of rows (R,) at `rate` labels per second, at times first, first + 1/fps … up to last (s).
+    """Return the motion of labelled rows at times first, first + 1/fps, … up to last (s).
 
-    Who is labelled once only is left out, as is everybody who is not there in that time.
+    frame, id (R,), pos (R, 2) m: rows in any order. rate: label frames per second; frame 1 is time 0. Segments with a
+    single label are dropped, and people without a segment at any of those times.
     """
     t = first + np.arange(int(np.floor((last - first) * fps + 1e-6)) + 1) / fps
     for tau in TIMES:
@@ -59,7 +62,7 @@ def _inside(times: Array, t: Array) -> Bools:
 
 
 def _segments(frame: Ints, id: Ints, pos: Array, one: int, rate: float, tau: float) -> list[Segment]:
-    """A person's segments without a gap: id, times, and place and velocity as functions of time."""
+    """Return a person's gap-free segments: id, times of the labels, and position and velocity as functions of time."""
     from scipy.interpolate import CubicSpline
 
     rows = np.flatnonzero(id == one)
@@ -75,8 +78,9 @@ def _segments(frame: Ints, id: Ints, pos: Array, one: int, rate: float, tau: flo
 
 
 def smoothing_spline(t: Array, y: Array, weight: float) -> Array:
-    """Places (N, 2) of the natural cubic spline f at its knots t: the least Σ |y - f|² + weight ∫ |f''|².
+    """Return the smoothing spline f (N, 2) at its knots t (N,): the minimum of Σ |y - f|² + weight ∫ |f''|².
 
+    y (N, 2); fewer than 3 rows are returned unchanged. f is a natural cubic spline.
     Reinsch (1967): f = y - weight Q γ with (R + weight Qᵀ Q) γ = Qᵀ y, γ being f'' at the inner knots.
     """
     from scipy.linalg import solveh_banded
@@ -100,7 +104,7 @@ def smoothing_spline(t: Array, y: Array, weight: float) -> Array:
 
 
 def _acceleration(segments: list[Segment], fps: float) -> float:
-    """The 99 % quantile of accelerations, m/s², at `fps` instants per second."""
+    """Return the 99 % quantile of the segments' accelerations in m/s², sampled at `fps`; 0 without segments."""
     size = [np.zeros(1)]
     for _, times, _, velocity in segments:
         t = np.arange(times[0], times[-1], 1 / fps)
@@ -109,7 +113,10 @@ def _acceleration(segments: list[Segment], fps: float) -> float:
 
 
 def nearest_row(frame: Ints, id: Ints, people: Ints, rate: float, t: Array) -> Ints:
-    """(T, P) the row of each person whose label is nearest in time to t (T,)."""
+    """Return for each time t (T,) and person the row (T, P) of the label that is nearest in time.
+
+    frame, id (R,): the labels. people (P,): ids, each with a label. Of two equally near labels the earlier one counts.
+    """
     out = np.zeros((len(t), len(people)), np.int64)
     for column, one in enumerate(people):
         rows = np.flatnonzero(id == one)

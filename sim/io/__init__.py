@@ -1,1 +1,1 @@
-"""Reading and writing sequences: MOTChallenge, BIWI, CAVIAR, our own store, exports."""
+"""Reading and writing sequences: recordings in public formats, our own store, exports."""

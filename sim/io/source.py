@@ -1,4 +1,4 @@
-"""Whatever a command is given as SOURCE, as Sequences: one recording, or every sequence of a dataset."""
+"""Open what a user gives as SOURCE: recognise the format and return its Sequences. New readers are added here."""
 
 from __future__ import annotations
 
@@ -27,11 +27,14 @@ def open_source(
     images: bool = True,
     background: str | None = None,
 ) -> list[Sequence]:
-    """The Sequences of a path, a dataset's in the order of their paths.
+    """Return the Sequences of a path; those of a dataset sorted by path.
 
-    fps, px_per_m and camera (or its file) stand in for what a recording does not know; a generated sequence knows
-    and refuses them. images: let frames carry the pictures of a MOTChallenge folder. background: which frames a
-    background model is trained on, "first:N" or "spread:N" (spread:50 if nothing is said). InputError otherwise.
+    fps, px_per_m and camera (or the path of its file) replace what a recording lacks; None: unknown. images False
+    leaves out the pictures of MOTChallenge folders. background: frames for background models, "first:N" or "spread:N";
+    None: spread:50, or the stored empty frames of a generated sequence.
+
+    Raises InputError if the path holds no known format, a file is invalid, or an option is wrong or has no effect on
+    the format. Generated sequences reject fps, px_per_m and camera.
     """
     path = Path(path)
     for option, value in (("--fps", fps), ("--px-per-m", px_per_m)):
@@ -51,24 +54,27 @@ def open_source(
 
 
 def sequence_folders(path: Path, kind: str) -> list[Path]:
-    """The folders of sequences of a dataset or of one, all of a kind; InputError where there are none, or others."""
+    """Return the sequence folders at or below a path, sorted.
+
+    kind: "generated", "biwi" or "mot". Raises InputError if there is none, or one of another kind.
+    """
     found = _find(path, DEPTH) if path.is_dir() else []
     other = next((p for p in found if p.is_file() or _kind(p) != kind), None)
     if not found or other is not None:
-        got = "nothing of ours" if other is None else f"a recording, {other.name}"
+        got = "no sequences" if other is None else f"a recording, {other.name}"
         expected = f"a {kind} sequence or dataset"
         raise InputError(file=path, got=got, expected=expected, remedy="give what `flockscope generate` made")
     return found
 
 
 def split_and_name(folder: Path) -> str:
-    """<split>/<name> of a stored sequence, by which datasets call it."""
+    """Return <split>/<name>, the last two parts of a sequence folder's path; datasets name sequences so."""
     return "/".join(folder.absolute().parts[-2:])
 
 
 @dataclass(frozen=True)
 class RecordingOptions:
-    """What a user says about a recording; None: nothing."""
+    """The user's options for a recording; None: not given."""
 
     fps: float | None
     px_per_m: float | None
@@ -77,7 +83,7 @@ class RecordingOptions:
     background: BackgroundChoice | None
 
     def reject(self, path: Path, kind: str, why: str, *names: str) -> None:
-        """InputError for options that would be without effect."""
+        """Raise InputError if any of the options `names` is given: it has no effect on a source of this kind."""
         given = [f"--{name.replace('_', '-')}" for name in names if getattr(self, name) is not None]
         if given:
             remedy = f"leave {'it' if len(given) == 1 else 'them'} out: {why}"
@@ -111,7 +117,7 @@ def _kind(folder: Path) -> str | None:
 
 
 def _find(folder: Path, depth: int) -> list[Path]:
-    """Folders of sequences below (and videos and files of CAVIAR in) a folder, sorted."""
+    """Return sequence folders, videos and CAVIAR files at or below a folder, down to `depth` levels, sorted."""
     if _kind(folder) is not None:
         return [folder]
     if depth == 0:

@@ -1,1 +1,1 @@
-"""Stored datasets in other forms: COCO, WebDataset."""
+"""Exports of stored datasets: COCO, WebDataset."""

@@ -1,4 +1,4 @@
-"""Exports, made from stored sequences: COCO."""
+"""COCO export: one JSON file with the labelled boxes of every sequence."""
 
 from __future__ import annotations
 
@@ -21,11 +21,13 @@ PERSON = {"id": 1, "name": "person", "supercategory": "person"}
 
 
 def coco(source: str | Path, out: str | Path) -> Path:
-    """A COCO file of every sequence of a dataset with labelled boxes: one image per frame, one video per sequence.
+    """Write a COCO file with every sequence of a source that has labelled boxes, and return its path.
 
-    bbox is amodal and unclipped, [left, top, width, height] px; track_id and group_id (-1 alone) are those of the
-    truth, visibility its share. file_name is the frame's picture, or the video that holds it. info has the content hash
-    of a dataset of ours. The same dataset gives the same bytes.
+    Each frame is an image, each sequence a video. Annotations have bbox [left, top, width, height] px (amodal,
+    unclipped), track_id, group_id (-1 for alone) and visibility. file_name is the frame's picture or video, also where
+    none is stored. info has the content hash if all sequences are generated. The same dataset gives the same bytes.
+
+    Raises InputError if no sequence has labelled boxes, or `out` cannot be written.
     """
     sequences = [s for s in open_source(source, images=False) if s.truth is not None and s.truth.box is not None]
     if not sequences:
@@ -55,7 +57,7 @@ def _block(name: str, rows: Any) -> str:
 
 
 def _size(sequence: Sequence) -> dict[str, int]:
-    """Width and height in px; where nobody knows, what the boxes need."""
+    """Return width and height in px; for an unknown image size, the extent of the boxes."""
     if sequence.image_size is not None:
         return {"width": sequence.image_size[0], "height": sequence.image_size[1]}
     truth = sequence.truth

@@ -1,4 +1,4 @@
-"""The sample of frames that a background model is trained on: which frames of a recording, and in words."""
+"""The sample of a recording's frames on which a background model is trained: choosing the frames and reading them."""
 
 from __future__ import annotations
 
@@ -17,20 +17,27 @@ from sim.types import BACKGROUNDS, Image
 
 @dataclass(frozen=True)
 class BackgroundChoice:
-    """Which frames: the first `count`, or `count` spread over the recording; `asked` for, or taken by default."""
+    """Which frames the sample has: the first `count`, or `count` spread evenly over the recording.
+
+    asked: True if the user gave --background, False for the default.
+    """
 
     how: Literal["first", "spread"] = "spread"
     count: int = BACKGROUNDS
     asked: bool = False
 
     def __str__(self) -> str:
-        """In words, as run.json has it."""
+        """Return the text that run.json holds; "causal" means without frames that follow the tracked one."""
         if self.how == "first":
             return f"first {self.count} frames (causal from frame {self.count})"
         return f"{self.count} frames spread over the recording (not causal)"
 
     def of(self, length: int, path: Path) -> BackgroundChoice:
-        """The same for a recording so long: InputError where it is shorter than asked for, all of it by default."""
+        """Return the choice for a recording of `length` frames.
+
+        A default choice is reduced to all frames of a shorter recording. Raises InputError, naming `path`, if the user
+        asked for more frames than there are.
+        """
         if length >= self.count:
             return self
         if self.asked:
@@ -41,14 +48,14 @@ class BackgroundChoice:
         return replace(self, count=length)
 
     def indices(self, length: int) -> list[int]:
-        """The frames (1-based, ascending) of a recording so long."""
+        """Return the frames of the sample (1-based, ascending) for a recording of `length` frames."""
         if self.how == "first" or length <= self.count:
             return list(range(1, min(self.count, length) + 1))
         return [int((k + 0.5) * length / self.count) + 1 for k in range(self.count)]
 
 
 def parse_choice(text: str | None) -> BackgroundChoice:
-    """`first:N` or `spread:N`; None is spread:50, not asked for."""
+    """Parse --background, `first:N` or `spread:N`; None is the default, spread:50. Raises InputError otherwise."""
     if text is None:
         return BackgroundChoice()
     found = re.fullmatch(r"(first|spread):([0-9]{1,6})", text)
@@ -61,9 +68,10 @@ def parse_choice(text: str | None) -> BackgroundChoice:
 
 @dataclass(frozen=True)
 class BackgroundSample:
-    """A recording's sample: called, (K, H, W, 3); InputError where none of its pictures can be read.
+    """The sample of one recording; calling it reads the pictures.
 
-    pictures(frames): (frame, picture) of those of these frames that can be read.
+    length: frames of the recording. path: its name in errors. pictures(frames): a function that yields (frame, picture)
+    for those of the given frames that can be read.
     """
 
     choice: BackgroundChoice
@@ -72,7 +80,10 @@ class BackgroundSample:
     pictures: Callable[[list[int]], Iterable[tuple[int, Image]]]
 
     def __call__(self) -> Image:
-        """Read it."""
+        """Return the pictures (K, H, W, 3) BGR uint8; frames that cannot be read are left out.
+
+        Warns if a default sample covers the whole recording. Raises InputError if no picture can be read.
+        """
         wanted, count = self.choice.indices(self.length), 0
         for count, (_, picture) in enumerate(self.pictures(wanted), 1):  # no second copy: 0.3 GB at 1920×1080
             if count == 1:
@@ -80,8 +91,8 @@ class BackgroundSample:
             found[count - 1] = picture
         if not count:
             raise InputError(
-                file=self.path, got="no readable picture in the background sample", expected="one at least",
-                remedy="choose others: --background first:N or spread:N",
+                file=self.path, got="no readable picture in the background sample", expected="at least one",
+                remedy="choose other frames: --background first:N or spread:N",
             )  # fmt: skip
         if self.choice.count < BACKGROUNDS and not self.choice.asked:
             words = f"shorter than a background sample of {BACKGROUNDS} frames; all {self.length} are taken"

@@ -1,4 +1,4 @@
-"""Pictures of a recording: read from files, in their slots, all of one size."""
+"""Pictures of a recording as files in a folder: which file is which frame, reading them, gaps, and equal sizes."""
 
 from __future__ import annotations
 
@@ -17,20 +17,24 @@ from sim.types import Image
 
 SUFFIXES = (".jpg", ".jpeg", ".png", ".bmp", ".tif", ".tiff")
 Picture = TypeVar("Picture", bound=NDArray[Any])
-SPARSE = 100  # numbers in names that leave more than 99 of 100 out are no frames (time stamps)
+SPARSE = 100  # numbers in file names that use less than 1 of 100 values are time stamps, not frames
 
 
 def fill_gaps(pairs: Iterable[tuple[int, Image]], length: int | None, place: str) -> Iterator[Image | None]:
-    """A picture for each frame, None for those of `pairs` (frame, picture) that are not there; these are told once."""
-    shown, told = 0, False
+    """Yield a picture for each frame from 1 on; None for frames that `pairs` of (frame, picture), ascending, leave out.
+
+    length: number of frames, None for up to the last pair. The first missing frame is reported by a warning with the
+    recording's name `place`.
+    """
+    shown, warned = 0, False
     for number, picture in pairs:
         for lost in range(shown + 1, number):
-            told = told or _warn_lost(place, lost)
+            warned = warned or _warn_lost(place, lost)
             yield None
         shown = max(shown, number)
         yield picture
     for lost in range(shown + 1, (length or 0) + 1):
-        told = told or _warn_lost(place, lost)
+        warned = warned or _warn_lost(place, lost)
         yield None
 
 
@@ -41,12 +45,12 @@ def _warn_lost(place: str, frame: int) -> bool:
 
 
 def size_of(picture: NDArray[Any]) -> tuple[int, int]:
-    """Width and height."""
+    """Return (width, height) in px of a picture (H, W) or (H, W, 3)."""
     return picture.shape[1], picture.shape[0]
 
 
 def require_size(picture: Picture, size: tuple[int, int], path: Path, place: str = "") -> Picture:
-    """The picture; InputError where it is not of the recording's size."""
+    """Return the picture. Raises InputError if its (width, height) is not `size`."""
     if size_of(picture) != size:
         got, expected = "{}×{} px".format(*size_of(picture)), "{}×{} px like the first".format(*size)
         raise InputError(file=path, place=place, got=got, expected=expected, remedy="give pictures of one size")
@@ -54,9 +58,9 @@ def require_size(picture: Picture, size: tuple[int, int], path: Path, place: str
 
 
 def read_picture(path: Path) -> Image | None:
-    """(H, W, 3) BGR, None where the file is missing, cut off or no picture.
+    """Return a picture file as (H, W, 3) BGR uint8; None if it is missing, truncated or no picture.
 
-    Grey becomes BGR, 16 bits become the upper 8 of them (0 to 65535 is the full range), transparency is left out.
+    Grey pictures become BGR, 16-bit pictures keep their upper 8 bits, transparency is dropped.
     """
     import cv2
 
@@ -77,7 +81,10 @@ def read_picture(path: Path) -> Image | None:
 
 
 def is_complete(body: bytes) -> bool:
-    """Whether a JPEG or PNG goes on to its end; older decoders give half a picture, and libraries grumble on stderr."""
+    """Return False if a JPEG or PNG lacks its end mark, or if the file is empty.
+
+    Checked first because some decoders return half a picture of a truncated file, or print to stderr.
+    """
     if body.startswith(b"\xff\xd8"):
         return body.rfind(b"\xff\xd9") > body.rfind(b"\xff\xda") > 0
     return b"IEND" in body[-64:] if body.startswith(b"\x89PNG") else len(body) > 0
@@ -85,23 +92,27 @@ def is_complete(body: bytes) -> bool:
 
 @dataclass(frozen=True)
 class PictureFolder:
-    """Pictures by frame (1-based), and the last frame that their names speak of."""
+    """The picture files of a folder by frame (1-based)."""
 
     folder: Path
     files: dict[int, Path]
 
     @property
     def last(self) -> int:
-        """The highest frame."""
+        """The highest frame with a file; 0 without files."""
         return max(self.files, default=0)
 
     def first_size(self) -> tuple[int, int] | None:
-        """Size of the first picture that can be read, None where none can."""
+        """Return (width, height) of the first picture that can be read; None if none can."""
         found = (read_picture(path) for path in self.files.values())
         return next((size_of(picture) for picture in found if picture is not None), None)
 
     def read(self, frames: Iterable[int], size: tuple[int, int] | None) -> Iterator[tuple[int, Image]]:
-        """(frame, picture) of those that can be read; InputError where no file of the folder can, or sizes differ."""
+        """Yield (frame, picture) for those of `frames` whose picture can be read.
+
+        size: (width, height) of all pictures; None means that no file can be read. Raises InputError for None, and for
+        a picture of another size.
+        """
         if size is None:
             raise InputError(
                 file=self.folder, got=f"{len(self.files)} pictures, none of which can be read", expected="JPG or PNG",
@@ -114,10 +125,12 @@ class PictureFolder:
 
 
 def find_pictures(folder: Path, length: int | None, labelled: bool) -> PictureFolder:
-    """The pictures of a folder by the numbers that their names end with, by the order of names that have none.
+    """Return the picture files of a folder, with their frames.
 
-    Numbers are frames. They are counted from the lowest where that is 0, where they go beyond `length`, or where
-    nothing else speaks of frames (no `length`, not `labelled`).
+    The number at the end of a file's name is its frame. Numbers are shifted so that the lowest becomes 1 if the lowest
+    is 0, if the highest exceeds `length`, or if neither `length` nor labels (`labelled`) define frames. Files are
+    numbered by the order of their names instead if one has no number, if the rest of their names differs, or if the
+    numbers are SPARSE. A missing folder gives no files. Raises InputError if two files are the same frame.
     """
     found = sorted(p for p in folder.iterdir() if p.suffix.lower() in SUFFIXES) if folder.is_dir() else []
     numbers = [_number(path) for path in found]

@@ -1,4 +1,4 @@
-"""A sequence's pictures on their way to the disk, one by one: drawn, hashed as they are, encoded, written."""
+"""Write the picture streams of a sequence, one picture at a time: draw, hash the raw pixels, encode, write."""
 
 from __future__ import annotations
 
@@ -28,7 +28,10 @@ Facts = dict[str, dict[str, Any]]
 
 @dataclass(frozen=True)
 class WrittenPictures:
-    """What has been written: which streams, as what, the hash of each one's raw pixels, and its files' hashes."""
+    """What was written: the streams, their file type, the hash of each stream's raw pixels, and the files.
+
+    images: None if the streams leave no choice of file type. files: "sha256" and "bytes" of each file, by name.
+    """
 
     streams: tuple[str, ...] = ()
     images: str | None = None
@@ -40,7 +43,11 @@ NO_PICTURES = WrittenPictures()
 
 
 class StreamWriter:
-    """One stream: takes a picture at a time; `files` holds size and hash of what has been written."""
+    """Writes one stream as picture files or as one video; used as a context manager.
+
+    State: the hash of the raw pixels so far (`pixels`), the open video if there is one, and `files`, the hash and size
+    of each file that is complete.
+    """
 
     def __init__(self, folder: Path, stream: str, images: str, size: tuple[int, int], fps: float):
         self.stream, self.images, self.folder = stream, images, folder
@@ -50,7 +57,7 @@ class StreamWriter:
             self._open = write_video(folder / streams.file_name(stream, images, 1), size, fps)
 
     def add(self, picture: NDArray[Any]) -> None:
-        """The next picture: (H, W, 3) uint8, or (H, W) uint16 of an exact stream."""
+        """Write the next picture: (H, W, 3) BGR uint8, or (H, W) uint16 for the streams ids and disparity."""
         self.pixels.add(picture)
         if self._movie is not None:
             self._movie.add(picture)
@@ -74,7 +81,7 @@ class StreamWriter:
 
 
 def encoded(picture: NDArray[Any], kind: str) -> bytes:
-    """A picture as the bytes of a jpg or png."""
+    """Return a picture as the bytes of a file of type `kind`, "jpg" or "png"."""
     import cv2
 
     options = [cv2.IMWRITE_JPEG_QUALITY, JPG_QUALITY] if kind == "jpg" else []
@@ -84,7 +91,11 @@ def encoded(picture: NDArray[Any], kind: str) -> bytes:
 
 
 def write_pictures(folder: Path, sequence: Sequence, wanted: tuple[str, ...], images: str) -> WrittenPictures:
-    """Draw a sequence's streams into a folder; with them, where its pixels are known, who shows where (TABLE)."""
+    """Draw the streams `wanted` of a sequence into a folder, one picture in memory at a time; returns what was written.
+
+    If the sequence has exact pixels and truth, the table TABLE is written too. No streams write nothing. Raises
+    InputError if the sequence lacks a stream.
+    """
     if not wanted:
         return NO_PICTURES
     assert sequence.image_size is not None, "pictures have a size"
@@ -115,7 +126,7 @@ def _background(sequence: Sequence) -> Image:
 
 
 def _add(outputs: dict[str, StreamWriter], sequence: Sequence, frame: Frame, known: list[PixelTruth]) -> None:
-    """One frame to each stream."""
+    """Add one frame to each open stream, and its exact pixels without the images to `known`."""
     for name, picture in (("left", frame.image), ("right", frame.right)):
         if name in outputs:
             if picture is None:
@@ -137,13 +148,17 @@ def _add(outputs: dict[str, StreamWriter], sequence: Sequence, frame: Frame, kno
 
 def _missing(sequence: Sequence, stream: str) -> InputError:
     return InputError(
-        file=sequence.name, place=f"--streams {stream}", got="a sequence without it", expected="one that has it",
-        remedy="leave the stream out, or give its camera a baseline",
+        file=sequence.name, place=f"--streams {stream}", got="a sequence without it",
+        expected="a sequence with that stream", remedy="leave the stream out, or give its camera a baseline",
     )  # fmt: skip
 
 
 def pixel_table(truth: Truth, known: list[PixelTruth]) -> bytes:
-    """Who shows how much, where, and in which blob: one row per person and frame, in the order of truth.parquet."""
+    """Return the table of visible pixels as Parquet bytes: one row per person and frame, ordered as truth.parquet.
+
+    Columns: frame, id, visible_px, amodal_px, visibility_px (their ratio), box of the visible pixels, blob. Meanings as
+    in sim.types.PixelTruth.
+    """
 
     def joined(name: str) -> NDArray[Any]:
         return np.concatenate([getattr(pixels, name) for pixels in known])

@@ -1,4 +1,4 @@
-"""Pictures of a stored sequence, read when asked for and require_size against the manifest."""
+"""Read the pictures of a stored sequence one by one, each checked against the hash in the manifest."""
 
 from __future__ import annotations
 
@@ -24,23 +24,23 @@ from sim.types import Array, Image, Ints, PixelTruth
 
 @dataclass(frozen=True)
 class StoredPictures:
-    """The pictures of a sequence's folder, as its manifest tells."""
+    """The pictures of a sequence folder, described by its manifest."""
 
     folder: Path
     manifest: dict[str, Any]
 
     @property
     def streams(self) -> tuple[str, ...]:
-        """Those that are there."""
+        """The stored streams."""
         return tuple(self.manifest["streams"])
 
     @property
     def images(self) -> str:
-        """jpg, png or mp4."""
+        """File type of the pictures: "jpg", "png" or "mp4"."""
         return self.manifest.get("images") or "png"
 
     def body(self, name: str) -> bytes:
-        """A file's bytes; InputError where it is missing or not the one of the manifest."""
+        """Return the bytes of a file. Raises InputError if it is missing or its hash is not the manifest's."""
         path, facts = self.folder / name, self.manifest["files"].get(name)
         wanted = "a file that manifest.json names" if facts is None else f"the {facts['bytes']} bytes of manifest.json"
         try:
@@ -52,14 +52,18 @@ class StoredPictures:
         return body
 
     def one(self, stream: str, index: int) -> NDArray[Any]:
-        """The picture of one file: (H, W, 3) uint8, or (H, W) uint16 of an exact stream."""
+        """Return one picture of a stream that is stored as picture files; `index` from 1.
+
+        Shape (H, W, 3) BGR uint8, or (H, W) uint16 for the streams ids and disparity. Raises InputError if the file is
+        missing or altered, no picture, or of another size.
+        """
         import cv2
 
         name = streams.file_name(stream, self.images, index)
         mode = cv2.IMREAD_UNCHANGED if stream in streams.EXACT else cv2.IMREAD_COLOR
         picture = cv2.imdecode(np.frombuffer(self.body(name), np.uint8), mode)
         if picture is None or picture.dtype != (np.uint16 if stream in streams.EXACT else np.uint8):
-            raise InputError(file=self.folder / name, got="no readable picture", expected="one", remedy=REDO)
+            raise InputError(file=self.folder / name, got="no readable picture", expected="a picture", remedy=REDO)
         return require_size(picture, self._size, self.folder / name)
 
     @property
@@ -68,7 +72,10 @@ class StoredPictures:
         return width, height
 
     def all(self, stream: str, count: int, wanted: list[int] | None = None) -> Iterator[NDArray[Any]]:
-        """The pictures of a stream that has so many, in order; or those wanted (ascending)."""
+        """Yield the pictures of a stream in order, `count` in all, or only the numbers `wanted` (ascending, from 1).
+
+        Raises InputError as `one`, and if a video holds another number of pictures.
+        """
         if streams.suffix(stream, self.images) != "mp4":
             yield from (self.one(stream, k) for k in wanted or range(1, count + 1))
             return
@@ -83,15 +90,18 @@ class StoredPictures:
             raise InputError(file=path, got=f"{found} pictures", expected=count, remedy=REDO)
 
     def sample(self, wanted: list[int]) -> Iterable[tuple[int, Image]]:
-        """(frame, picture) of some frames of the left camera."""
+        """Return pairs (frame, picture) of the given frames (ascending) of the left camera, read while iterating."""
         return zip(wanted, self.all("left", self.manifest["sequence"]["length"], wanted), strict=True)
 
     def table(self) -> StoredTable:
-        """Who shows how much, where, and in which blob."""
+        """Return the table of visible pixels (picture_writer.pixel_table)."""
         return read_table(self.folder / TABLE)
 
     def pixel_loader(self) -> Callable[[int], PixelTruth]:
-        """A function from a frame to its exact pixels; disparities to 1/128 px."""
+        """Return a function that maps a frame to its PixelTruth, read from the streams ids and disparity.
+
+        Disparities are rounded to steps of 1/64 px, so they are off by 1/128 px at most; None if not stored.
+        """
 
         @cache
         def columns() -> tuple[Ints, Array, Array, Array, Ints]:

@@ -1,7 +1,8 @@
-"""Decoding a video file: its packets, when each is shown, and the pictures in their order, lost ones left out.
+"""Decode a video file: an index of its packets, and its pictures with their frame numbers.
 
-One thread: the same pictures on any machine. A frame's number is the rank of its time stamp where these can be trusted;
-else pictures are counted, a packet that cannot be decoded counting as one.
+Decoding uses one thread, so that every machine gets the same pictures. The number of a frame is the rank of its time
+stamp if the stamps can be trusted. Otherwise decoded pictures are counted, and a packet that cannot be decoded counts
+as one.
 """
 
 from __future__ import annotations
@@ -21,16 +22,20 @@ from sim.types import Array, Image
 
 COVER = "attached_pic"
 HIDDEN = ("vp8",)  # codecs with packets that are never shown
-BT601, NARROW = (2, 5, 6), (0, 1)  # libav's numbers of matrices (2: not said) and ranges (0: not said)
-EXACT = 2 | 0x2000 | 0x40000  # swscale's bilinear, full chroma, accurate rounding
+BT601, NARROW = (2, 5, 6), (0, 1)  # libav's numbers of colour matrices (2: unknown) and ranges (0: unknown)
+EXACT = 2 | 0x2000 | 0x40000  # swscale flags: bilinear, full chroma, accurate rounding
 REMEDY = "give a video that a player plays to its end"
 
 
 @dataclass(frozen=True)
 class PacketIndex:
-    """The packets of a video stream in the order of the file: when shown (units of time_base; None unknown), and
-    where groups begin that can be decoded by themselves. promised, seconds: what the header says, 0 = nothing.
-    broken: why reading ended before the file does, "" = it did not."""
+    """The packets of a video stream, in the order of the file.
+
+    stamps: when each is shown, in units of time_base (s), None if unknown. keys: True where a group of packets begins
+    that can be decoded by itself. rate: frames per second, promised: number of frames, seconds: duration, all by the
+    header and 0 if missing. broken: why reading stopped before the end of the file, "" if it did not. reorders: True if
+    packets are not stored in the order in which they are shown.
+    """
 
     stamps: tuple[int | None, ...]
     keys: tuple[bool, ...]
@@ -43,11 +48,15 @@ class PacketIndex:
     reorders: bool
 
     def times(self) -> Array:
-        """When frames are shown, in their order, s; those that are known."""
+        """Return the known times at which frames are shown, in s, ascending."""
         return np.array(sorted({s for s in self.stamps if s is not None}), float) * float(self.time_base)
 
     def ranks(self) -> dict[int, int] | None:
-        """Frame (1-based) by time stamp, or None where stamps do not tell."""
+        """Return the frame (1-based) of each time stamp.
+
+        None if the stamps cannot be trusted: one is missing or stands twice, they contradict `reorders`, or the codec
+        has packets that are never shown.
+        """
         known = [s for s in self.stamps if s is not None]
         ascending = known == sorted(known)
         if len(set(known)) < len(self.stamps) or (self.reorders and ascending) or self.codec in HIDDEN:
@@ -55,7 +64,7 @@ class PacketIndex:
         return {stamp: k for k, stamp in enumerate(sorted(known), 1)}
 
     def groups(self, wanted: set[int]) -> set[int] | None:
-        """Numbers of the groups that hold these frames, or None: all."""
+        """Return the numbers (from 1) of the packet groups that hold the frames `wanted`; None if unknown."""
         ranks = self.ranks()
         if ranks is None:
             return None
@@ -67,7 +76,10 @@ class PacketIndex:
 
 @contextmanager
 def open_stream(path: Path) -> Iterator[tuple[Any, Any]]:
-    """The container and its first video stream; InputError where there is none to be read."""
+    """Give (container, video stream) of a file for the length of the block; cover pictures are no video stream.
+
+    Raises InputError if the file is empty or no video, has no video stream, or uses an unknown codec.
+    """
     import av
 
     try:
@@ -78,12 +90,10 @@ def open_stream(path: Path) -> Iterator[tuple[Any, Any]]:
     with container:
         streams = [s for s in container.streams.video if COVER not in str(getattr(s, "disposition", "")).lower()]
         if not streams:
-            raise InputError(file=path, got="no video stream", expected="one", remedy=REMEDY)
+            raise InputError(file=path, got="no video stream", expected="a video stream", remedy=REMEDY)
         stream = streams[0]
         if stream.codec_context is None:
-            raise InputError(
-                file=path, got="a codec that is not known here", expected="H.264 or the like", remedy=REMEDY
-            )
+            raise InputError(file=path, got="an unknown codec", expected="H.264 or the like", remedy=REMEDY)
         stream.codec_context.thread_count = 1
         yield container, stream
 
@@ -93,7 +103,10 @@ def _reason(error: Exception) -> str:
 
 
 def index_packets(path: Path) -> PacketIndex:
-    """What the file holds, without decoding; one that breaks off ends there."""
+    """Read the packet index of a file without decoding; a damaged file is indexed up to the damage.
+
+    Raises InputError as open_stream.
+    """
     import av
 
     found, broken = [], ""
@@ -113,7 +126,7 @@ def index_packets(path: Path) -> PacketIndex:
 
 
 def _seconds(stream: Any) -> float:
-    """How long the header says the stream is, s; Matroska has it as a text, 00:00:11.429000000."""
+    """Return the stream's duration by the header in s, 0 if missing; Matroska writes it as 00:00:11.429000000."""
     if stream.duration is not None:
         return float(stream.duration * stream.time_base)
     found = re.fullmatch(r"(\d+):(\d\d):(\d\d(?:\.\d+)?)", stream.metadata.get("DURATION", ""))
@@ -121,7 +134,7 @@ def _seconds(stream: Any) -> float:
 
 
 def _demuxed(container: Any, stream: Any) -> Iterator[Any]:
-    """PacketIndex up to where `index_packets` ended."""
+    """Yield the packets up to the place where `index_packets` stopped."""
     import av
 
     packets = container.demux(stream)
@@ -136,7 +149,10 @@ def _demuxed(container: Any, stream: Any) -> Iterator[Any]:
 
 
 def decode_frames(path: Path, index: PacketIndex, wanted: list[int] | None = None) -> Iterator[tuple[int, Image]]:
-    """(frame, picture) in order, of all frames or of those wanted; what cannot be decoded is left out."""
+    """Yield (frame, picture (H, W, 3) BGR uint8) in order, of all frames or of those `wanted`.
+
+    Frames that cannot be decoded are left out. Raises InputError as open_stream.
+    """
     ranks, last, count = index.ranks(), max(wanted or [0]), 0
     some = None if wanted is None else set(wanted)
     groups = None if some is None else index.groups(some)
@@ -151,7 +167,7 @@ def decode_frames(path: Path, index: PacketIndex, wanted: list[int] | None = Non
 
 
 def _decoded(container: Any, stream: Any, groups: set[int] | None) -> Iterator[Any]:
-    """Frames, None for a packet that cannot be decoded; of these groups only."""
+    """Yield decoded frames, None for a packet that cannot be decoded; only packet groups in `groups` if given."""
     group, running = 0, False
     for packet in _demuxed(container, stream):
         group += packet.is_keyframe
@@ -175,10 +191,10 @@ def _decode_packet(stream: Any, packet: Any) -> list[Any]:
 
 
 def _picture(frame: Any) -> Image:
-    """(H, W, 3) BGR, upright.
+    """Return a decoded frame as (H, W, 3) BGR uint8, turned upright.
 
-    swscale's plain conversion darkens by one or two grey levels; its exact one takes ten times as long as OpenCV's,
-    which knows the usual form alone.
+    OpenCV converts the usual pixel format (yuv420p, BT.601, narrow range). Other formats go through swscale's exact
+    conversion, which takes ten times as long; its default one darkens by one or two grey levels.
     """
     import cv2
 

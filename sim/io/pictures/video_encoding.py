@@ -1,6 +1,6 @@
-"""Writing H.264 that browsers play and seek in: mp4, yuv420p, a key frame each second, the index in front.
+"""Write H.264 videos that browsers can play and seek: mp4, yuv420p, a key frame each second, the index in front.
 
-One thread and no dates: the same pictures give the same bytes.
+One thread is used and no date is written, so the same pictures give the same bytes.
 """
 
 from __future__ import annotations
@@ -16,25 +16,28 @@ import numpy as np
 from scenarios.errors import InputError
 from sim.types import Image
 
-QUALITY = 18  # x264's constant rate factor: hardly to be told from the original
+QUALITY = 18  # x264's constant rate factor: visually near the original
 BT601, NARROW = 6, 1  # libav's numbers of the colour matrix and range that OpenCV converts to
 
 
 def rate_of(fps: float) -> Fraction:
-    """Frames per second as containers have them."""
+    """Return frames per second as the fraction (denominator up to 1001) that containers store."""
     return Fraction(fps).limit_denominator(1001)
 
 
 @contextmanager
 def write_video(path: Path, size: tuple[int, int], fps: float, quality: int = QUALITY) -> Iterator[VideoWriter]:
-    """A video file of pictures of this size (width, height) to write; it is whole when left without an error."""
+    """Give a VideoWriter for pictures of `size` = (width, height) px; the file is complete after the block.
+
+    quality: x264's constant rate factor, lower is better. Raises InputError if width or height is odd.
+    """
     if size[0] % 2 or size[1] % 2:
         raise InputError(
             place="--images mp4", got="pictures of {}×{} px".format(*size), expected="an even width and height",
             remedy="take --images jpg or png, or another camera.image",
         )  # fmt: skip
-    # The file is ours, as libav keeps its own open where a video cannot be ended; and it is without Python code, which
-    # Ctrl-C would end unseen in a callback of libav.
+    # We open the file because libav leaves its own open if a video cannot be finished. It is unbuffered, since Ctrl-C
+    # would be lost inside a Python callback from libav.
     with path.open("wb", buffering=0) as file:
         made = VideoWriter(file, size, fps, quality)
         try:
@@ -45,7 +48,7 @@ def write_video(path: Path, size: tuple[int, int], fps: float, quality: int = QU
 
 
 class VideoWriter:
-    """A video that takes (H, W, 3) BGR pictures one after the other; see `movie`."""
+    """A video that is being written; made by `write_video`. State: libav's open container and stream."""
 
     def __init__(self, file: Any, size: tuple[int, int], fps: float, quality: int):
         import av
@@ -62,7 +65,7 @@ class VideoWriter:
         context.colorspace = context.color_primaries = context.color_trc = BT601
 
     def add(self, picture: Image) -> None:
-        """The next picture."""
+        """Append a picture (H, W, 3) BGR uint8 of the video's size."""
         import av
         import cv2
 
@@ -72,9 +75,9 @@ class VideoWriter:
         self._container.mux(self._stream.encode(frame))
 
     def end(self) -> None:
-        """Nothing comes any more."""
+        """Encode the frames that the encoder still holds; no picture may follow."""
         self._container.mux(self._stream.encode(None))
 
     def close(self) -> None:
-        """Write what is left, and where it lies."""
+        """Write the index and close the container."""
         self._container.close()

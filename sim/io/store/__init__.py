@@ -1,1 +1,1 @@
-"""The project's own files: one folder per sequence, and the tracks of a run."""
+"""Our own files: one folder per sequence, and the tracks of a run."""

@@ -1,4 +1,4 @@
-"""Camera and scene as JSON, exact to the last bit, and whatever a user gives as calibration of a recording."""
+"""camera.json and scene.json: a camera and a scene as JSON, read back equal to the last bit."""
 
 from __future__ import annotations
 
@@ -13,9 +13,12 @@ from sim.types import Array, Camera, Scene, Stairs
 
 
 def camera_document(camera: Camera) -> dict[str, Any]:
-    """camera.json: kind, image [width, height] px, focal_px, centre_px, position (3) m, rotation 3x3 (world to
-    camera), baseline m, px_per_m (null for a pinhole), radial where the lens distorts."""
-    bend = {"radial": camera.radial} if camera.radial else {}
+    """Return the content of camera.json.
+
+    Keys: format, kind, image [width, height] px, focal_px, centre_px, position (3) m, rotation 3x3 (world to camera),
+    baseline m, px_per_m (null if unknown, as for a pinhole), and radial unless it is 0.
+    """
+    distortion = {"radial": camera.radial} if camera.radial else {}
     return {
         "format": tables.FORMAT,
         "kind": camera.kind,
@@ -26,12 +29,12 @@ def camera_document(camera: Camera) -> dict[str, Any]:
         "rotation": camera.rotation.tolist(),
         "baseline": camera.baseline,
         "px_per_m": tables.nan_to_none(camera.px_per_m),
-        **bend,
+        **distortion,
     }
 
 
 def read_camera(path: Path) -> Camera:
-    """A camera.json; InputError where a key is missing or of the wrong shape."""
+    """Read a camera.json. Raises InputError if a key is missing, or its value has the wrong type, shape or size."""
     d = tables.read_json(path)
     kind = _key(path, d, "kind")
     if kind not in ("pinhole", "top"):
@@ -52,7 +55,11 @@ def read_camera(path: Path) -> Camera:
 
 
 def scene_document(scene: Scene) -> dict[str, Any]:
-    """scene.json: size, walls [[x1, y1], [x2, y2]], pillars [x, y, radius], doors, service, stairs; all in m."""
+    """Return the content of scene.json, all in m.
+
+    Keys: format, size [x, y], walls and doors [[x1, y1], [x2, y2]], pillars [x, y, radius], service [x, y], stairs
+    (foot, head, width, rise, steps, landing), wall_height, pillar_height.
+    """
     stairs = [
         {"foot": s.foot.tolist(), "head": s.head.tolist(), "width": s.width, "rise": s.rise, "steps": s.steps,
          "landing": s.landing}
@@ -64,7 +71,7 @@ def scene_document(scene: Scene) -> dict[str, Any]:
 
 
 def read_scene(path: Path) -> Scene:
-    """A scene.json; InputError where a key is missing or of the wrong shape."""
+    """Read a scene.json. Raises InputError if a key is missing, or its value has the wrong type or shape."""
     d = tables.read_json(path)
 
     def flight(k: int, s: dict[str, Any]) -> Stairs:
@@ -90,12 +97,15 @@ def read_scene(path: Path) -> Scene:
 
 def _key(path: Path, d: dict[str, Any], key: str) -> Any:
     if key not in d:
-        raise InputError(file=path, place=key, got="nothing", expected="a value", remedy="add the key")
+        raise InputError(file=path, place=key, got="no such key", expected="a value", remedy="add the key")
     return d[key]
 
 
 def _numbers(path: Path, d: dict[str, Any], key: str, shape: tuple[int, ...] | None) -> Array:
-    """The finite numbers under a key; shape -1 for any length, None for any shape."""
+    """Return the numbers of a key as float64. Raises InputError if missing, not finite, or of another shape.
+
+    shape: -1 in front for any length; None for any shape.
+    """
     value = _key(path, d, key)
     try:
         a = np.asarray(value, np.float64)

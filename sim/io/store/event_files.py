@@ -1,4 +1,4 @@
-"""events.json, near.csv and script.json."""
+"""Group events (events.json), hard negatives (near.csv) and the script's orders (script.json): to bytes and back."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ NEAR_COLUMNS = "start,end,a,b"
 
 
 def event_dict(event: GroupEvent) -> dict[str, Any]:
-    """An event for JSON; an unknown place is null."""
+    """Return an event as a JSON object; unknown coordinates of its place are null."""
     return {
         "kind": event.kind, "start": int(event.start), "end": int(event.end),
         "emitted": None if event.emitted is None else int(event.emitted),
@@ -27,12 +27,15 @@ def event_dict(event: GroupEvent) -> dict[str, Any]:
 
 
 def events_bytes(events: Iterable[GroupEvent]) -> bytes:
-    """events.json of a truth."""
+    """Return the events.json of a truth, as bytes."""
     return json_list("events", map(event_dict, events))
 
 
 def read_events(path: Path) -> list[tuple[GroupEvent, int | None]]:
-    """events.json: each event, and the frame of the tracker's answer that held it, if stored."""
+    """Read an events.json: pairs of an event and the frame whose tracks reported it, None if it is not stored.
+
+    Raises InputError if the file is no JSON object, or an event lacks a key, has an unknown kind or impossible frames.
+    """
     found = read_document(path).get("events")
     if not isinstance(found, list):
         raise InputError(file=path, place="events", got=type(found).__name__, expected="a list", remedy="correct it")
@@ -43,7 +46,7 @@ def _frame(path: Path, k: int, e: dict[str, Any]) -> int | None:
     try:
         return None if e.get("frame") is None else _whole(e["frame"])
     except TypeError as error:
-        raise _bad(path, k, f"frame {error}", "the frame of an answer, or none") from None
+        raise _bad(path, k, f"frame {error}", "a frame, or null") from None
 
 
 def _event(path: Path, k: int, e: Any) -> GroupEvent:
@@ -74,13 +77,13 @@ def _bad(path: Path, k: int, got: str, expected: str) -> InputError:
 
 
 def near_bytes(near: Near) -> bytes:
-    """near.csv: start,end,a,b."""
+    """Return near.csv, with columns start,end,a,b, as bytes."""
     rows = zip(near.start, near.end, near.a, near.b, strict=True)
     return "".join([NEAR_COLUMNS + "\n", *(f"{s},{e},{a},{b}\n" for s, e, a, b in rows)]).encode()
 
 
 def read_near(path: Path) -> Near:
-    """near.csv back."""
+    """Read a near.csv. Raises InputError if its header or a line is invalid."""
     lines = read_text(path).splitlines()
     if lines[:1] != [NEAR_COLUMNS]:
         raise InputError(
@@ -96,7 +99,11 @@ def read_near(path: Path) -> Near:
 
 
 def script_bytes(orders: Iterable[Order], fulfilled: Iterable[int | None]) -> bytes:
-    """script.json: the orders, and for each the position in events.json of the event that fulfilled it, or None."""
+    """Return script.json, as bytes.
+
+    orders: the script's orders. fulfilled: for each order the position in events.json of the event that fulfilled it,
+    or None; stored as the key "event".
+    """
     rows = (
         {"id": o.id, "kind": o.kind, "fired": o.fired, "before": o.before, "after": o.after, "event": event}
         for o, event in zip(orders, fulfilled, strict=True)
@@ -105,7 +112,7 @@ def script_bytes(orders: Iterable[Order], fulfilled: Iterable[int | None]) -> by
 
 
 def read_script(path: Path) -> tuple[Order, ...]:
-    """The orders of script.json."""
+    """Read the orders of a script.json. Raises InputError if an order lacks a key or has a wrong value."""
     found = read_document(path).get("orders")
     try:
         return tuple(

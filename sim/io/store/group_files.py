@@ -1,4 +1,4 @@
-"""Groups per frame: exact as Parquet, for reading as groups.csv with hulls as WKT."""
+"""Groups per frame as files: exact in groups.parquet, and as text in groups.csv with hulls as WKT polygons."""
 
 from __future__ import annotations
 
@@ -22,8 +22,11 @@ AXES = ("x", "y", "z")
 
 
 def groups_bytes(frames: Series[Groups | None], first: int, unit: str) -> bytes:
-    """groups.parquet of consecutive frames from `first`; unit "m" or "px". A frame of None is kept apart from one
-    without groups."""
+    """Return groups.parquet, as bytes, for consecutive frames from `first`.
+
+    unit: "m" or "px". A frame may be None (groups unknown), which is stored apart from a frame without groups. Columns:
+    frame, group, members, x, y, (z), vx, vy, (vz), extent_xx to extent_yy, size, hull (x1, y1, x2, …).
+    """
     known = [g for g in frames if g is not None]
     axes = AXES[: known[0].pos.shape[1]] if known else AXES[:2]
     counts = [0 if g is None else len(g.id) for g in frames]
@@ -47,7 +50,7 @@ def groups_bytes(frames: Series[Groups | None], first: int, unit: str) -> bytes:
 
 
 def _lists(rows: list[tuple[Any, ...]], ids: list[Ints], empty: NDArray[Any]) -> list[NDArray[Any]]:
-    """The lists of all groups, flattened; where a frame has none at all (unknown), an empty one for each group."""
+    """Return one flat array per group, over all frames; empty arrays for a frame that has no lists."""
     every = [item for row, id in zip(rows, ids, strict=True) for item in (row or (empty,) * len(id))]
     return [np.asarray(item, empty.dtype).ravel() for item in every]
 
@@ -57,7 +60,7 @@ def _stack(parts: list[Array], width: int) -> Array:
 
 
 def read_groups(table: StoredTable) -> list[Groups | None]:
-    """The groups of each frame, from groups.parquet."""
+    """Return the groups of each frame of a groups.parquet, None for a frame whose groups are unknown."""
     first, count = int(table.fact("first")), int(table.fact("frames"))
     missing, memberless = set(table.fact("missing")), set(table.fact("memberless"))
     axes = [a for a in AXES if table.has(a)]
@@ -76,18 +79,18 @@ def read_groups(table: StoredTable) -> list[Groups | None]:
 
 
 def wkt(hull: Array, digits: int) -> str:
-    """A closed ring as WKT."""
+    """Return a hull (V, 2) as a WKT polygon with `digits` decimals, "POLYGON EMPTY" without vertices."""
     points = [f"{x:.{digits}f} {y:.{digits}f}" for x, y in hull]
     return f"POLYGON (({', '.join([*points, points[0]])}))" if points else "POLYGON EMPTY"
 
 
 def parse_wkt(text: str) -> Array:
-    """(V, 2) vertices of a POLYGON without holes; ValueError for anything else."""
+    """Return the vertices (V, 2) of a WKT POLYGON, the first not repeated. Raises ValueError for other texts."""
     body = text.strip().removeprefix("POLYGON").strip()
     if body == "EMPTY":
         return np.zeros((0, 2))
     if not (text.strip().startswith("POLYGON") and body.startswith("((") and body.endswith("))")):
-        raise ValueError("no POLYGON ((…))")
+        raise ValueError("expected POLYGON ((…))")
     ring = np.array([[float(v) for v in point.split()] for point in body[2:-2].split(",")])
     if ring.ndim != 2 or ring.shape[1] != 2 or not np.isfinite(ring).all():
         raise ValueError("points are pairs of finite numbers")
@@ -95,7 +98,11 @@ def parse_wkt(text: str) -> Array:
 
 
 def groups_csv(ground: Series[Groups | None] | None, image: Series[Groups | None] | None, first: int = 1) -> bytes:
-    """groups.csv; x, y, hull in the plane of `ground` (3 digits), hull_px from `image` where given (2 digits)."""
+    """Return groups.csv, as bytes, for consecutive frames from `first`.
+
+    x, y, hull: of `ground`, in the plane of its tracks, 3 digits. hull_px: of the group with the same id in `image`, 2
+    digits; the column exists if `image` is given. Without `ground` x, y and hull are empty.
+    """
     text = io.StringIO()
     writer = csv.writer(text, lineterminator="\n")
     writer.writerow([*CSV_COLUMNS, *(["hull_px"] if image is not None else [])])
@@ -127,7 +134,11 @@ def _cell(value: float) -> str:
 
 
 def read_groups_csv(path: Path, length: int) -> list[Groups]:
-    """groups.csv, anybody's, as the groups of frames 1 … length; velocity 0, extent unknown."""
+    """Read a groups.csv, ours or another program's, as the groups of frames 1 to `length`.
+
+    Velocities are 0, extents nan. Further columns are ignored; hull, x, y and size may be empty. Raises InputError with
+    the line if a column is missing, a cell is invalid, a frame is outside, or a group stands twice in a frame.
+    """
     reader = csv.DictReader(io.StringIO(read_text(path)))
     wanted = [c for c in CSV_COLUMNS[:6] if c not in (reader.fieldnames or [])]
     if wanted:

@@ -1,7 +1,7 @@
-"""The manifest of a stored sequence: what makes it complete, and what it must be like.
+"""manifest.json, written last: a stored sequence is complete if and only if it has one.
 
-It names every file with its hash, the resolved scenario's hash, versions and the CPU's feature level, and no time, host
-or path: the same seed, scenario and versions give the same bytes.
+It holds the hash of every file, the identity of the sequence, versions and the CPU's instruction level. It holds no
+time, host or path, so the same seed, scenario and versions give the same bytes.
 """
 
 from __future__ import annotations
@@ -21,12 +21,16 @@ REDO = "run the same `flockscope generate` again"
 
 
 def is_sequence(folder: Path) -> bool:
-    """Whether a folder is, or was meant to be, a stored sequence of ours."""
+    """Return True if a folder is a stored sequence, also an incomplete one: it has a manifest.json or scenario.toml."""
     return (folder / MANIFEST).is_file() or (folder / "scenario.toml").is_file()
 
 
 def identity(scenario: str, seed: int, repeat: int, streams: Iterable[str] = (), images: str = "jpg") -> dict[str, Any]:
-    """What says that a stored sequence is the one asked for."""
+    """Return the manifest's fields that identify a sequence: formats, engine, seed, repeat, scenario_hash, pictures.
+
+    scenario: TOML text of the resolved scenario. streams, images: as in sim.io.store.streams; raises InputError for
+    unknown ones.
+    """
     wanted = check_streams(streams, images)
     return {
         "format": tables.FORMAT,
@@ -41,13 +45,13 @@ def identity(scenario: str, seed: int, repeat: int, streams: Iterable[str] = (),
 
 
 def with_hash(manifest: dict[str, Any]) -> dict[str, Any]:
-    """The manifest with the hash of all its other fields as `sha256`, so that none can change unnoticed."""
+    """Return the manifest with the field `sha256`, the canonical hash of all its other fields."""
     body = {key: value for key, value in manifest.items() if key != "sha256"}
     return {**body, "sha256": hashing.canonical_hash(body)}
 
 
 def read_manifest(folder: Path) -> dict[str, Any]:
-    """The manifest; InputError where it is missing, broken, altered or of another format."""
+    """Read a folder's manifest. Raises InputError if it is missing, invalid, altered or of another format."""
     path = folder / MANIFEST
     if not path.is_file():
         raise InputError(file=path, got="missing", expected="the manifest of a complete sequence", remedy=REDO)
@@ -66,7 +70,10 @@ def read_manifest(folder: Path) -> dict[str, Any]:
 
 
 def damaged_files(folder: Path, manifest: dict[str, Any], *, pictures: bool = True) -> Iterator[InputError]:
-    """Each file that is missing or not the one of the manifest; pictures may be taken at their size."""
+    """Yield an InputError for each file that is missing or whose hash differs from the manifest's.
+
+    pictures False: of pictures only the size is compared.
+    """
     for name, facts in manifest["files"].items():
         path = folder / name
         wanted = f"the file of {facts['bytes']} bytes that manifest.json names"

@@ -1,4 +1,4 @@
-"""Our own store: one folder per sequence, complete when its manifest.json is there, read back equal to the last bit."""
+"""Write and read our own format: one folder per sequence, read back equal to the last bit."""
 
 from __future__ import annotations
 
@@ -36,15 +36,18 @@ def write_sequence(
     images: str = "jpg",
     keep: Callable[[], bool] = lambda: False,
 ) -> Path:
-    """Store a sequence as `folder`, whole or not at all; `scenario` is the resolved scenario's TOML.
+    """Write a sequence as `folder`, complete or not at all, and return the folder.
 
-    streams: those of its pictures to store (sim.io.store.streams.STREAMS), images: as jpg, png or mp4. One picture at
-    a time
-    is in memory. keep: whether what another has written there meanwhile shall stay.
+    scenario: TOML text of the resolved scenario. streams: pictures to store (sim.io.store.streams.STREAMS). images:
+    their file type, "jpg", "png" or "mp4". One picture at a time is in memory. keep: if it returns True, a folder that
+    another process has written meanwhile stays.
+
+    Raises InputError if a stream is missing or unknown or the folder cannot be written, and WorkError if an order of
+    the script was not fulfilled or the disk is full.
     """
     wanted = check_streams(streams, images)
     with atomic.new_folder(folder, keep) as partial:
-        truth = sequence.truth  # a script that fails does so before a picture is drawn
+        truth = sequence.truth  # raises for a failed script before a picture is drawn
         assert truth is None or truth.length == sequence.length
         pictures = write_pictures(partial, sequence, wanted, images)
         files = sequence_files(sequence, scenario=scenario, seed=seed, repeat=repeat, pictures=pictures)
@@ -56,10 +59,13 @@ def write_sequence(
 def sequence_files(
     sequence: Sequence, *, scenario: str, seed: int, repeat: int = 0, pictures: WrittenPictures = NO_PICTURES
 ) -> dict[str, bytes]:
-    """All files of a sequence by name but its pictures, the manifest last."""
+    """Return all files of a sequence but its pictures: content by name, the manifest last.
+
+    pictures: what has been written of its pictures, for the manifest.
+    """
     frames = list(sequence.without_pictures())
     found = [f.detections for f in frames if f.detections is not None]
-    assert len(found) in (0, len(frames)), "a sensor answers every frame or none"
+    assert len(found) in (0, len(frames)), "a sensor gives detections for every frame or for none"
     files = {"scenario.toml": scenario.encode(), "seqinfo.ini": _seqinfo(sequence, len(frames), pictures)}
     if sequence.camera is not None:
         files["camera.json"] = tables.json_document(camera_document(sequence.camera))
@@ -106,7 +112,7 @@ def _manifest(
 
 
 def _seqinfo(sequence: Sequence, length: int, pictures: WrittenPictures) -> bytes:
-    """Without pictures of its own a sequence says what MOTChallenge's would be, so that their tools read it."""
+    """Return seqinfo.ini. Without JPG or PNG pictures it names img1 and .jpg, so that MOTChallenge tools accept it."""
     width, height = sequence.image_size or (0, 0)
     folder, _, name = file_name("left", "png" if pictures.images == "png" else "jpg", 1).partition("/")
     lines = [
@@ -121,9 +127,11 @@ def _seqinfo(sequence: Sequence, length: int, pictures: WrittenPictures) -> byte
 
 
 def open_sequence(folder: Path, *, background: BackgroundChoice | None = None) -> Sequence:
-    """A stored sequence, equal to the one written; InputError about the first file that is missing or altered.
+    """Return a stored sequence, equal to the one that was written.
 
-    Its pictures are checked when they are read. background: a sample of its frames instead of its own background.
+    background: sample of frames for background models, instead of the stored empty frames. Raises InputError if the
+    manifest is invalid, a file is missing or altered, or `background` is given for a sequence without left pictures.
+    Pictures are checked against their hash when they are read.
     """
     manifest = read_manifest(folder)
     for error in damaged_files(folder, manifest, pictures=False):
@@ -171,7 +179,7 @@ def open_sequence(folder: Path, *, background: BackgroundChoice | None = None) -
 def _background(
     pictures: StoredPictures, choice: BackgroundChoice | None, length: int
 ) -> tuple[Callable[[], Image] | None, dict[str, str]]:
-    """How to load the sample that was asked for, else the sequence's own, and what it is in words."""
+    """Return a loader of background pictures, None without any, and the entry for `Sequence.source` that names them."""
     if choice is not None:
         if "left" not in pictures.streams:
             got, remedy = "--background", "leave it out: it has none"
@@ -184,7 +192,7 @@ def _background(
 
 
 def _people(folder: Path, manifest: dict[str, Any]) -> dict[str, tuple[int, ...]]:
-    """Ids of the people of each group of the script, cast anew from the stored scenario and seed."""
+    """Return the ids of the people of each group of the script, computed again from the stored scenario and seed."""
     from scenarios import load
     from sim.sequence import named_people
 

@@ -1,7 +1,7 @@
-"""A tracker's answer as files: tracks.parquet (exact), tracks.txt and tracks.mot.txt (MOTChallenge), groups, events.
+"""The tracks of a run as files: tracks.parquet (exact), tracks.txt and tracks.mot.txt (MOTChallenge), groups, events.
 
-tracks.txt has 10 columns `frame,id,left,top,width,height,conf,x,y,z`: no box is -1,-1,-1,-1; the ground position is
-unknown iff z = -1. tracks.mot.txt is its first 7 columns: TrackEval takes column 8 for a class.
+tracks.txt has 10 columns `frame,id,left,top,width,height,conf,x,y,z`. A missing box is -1,-1,-1,-1; a z of -1 means
+that the ground position is unknown. tracks.mot.txt has the first 7 columns, because TrackEval reads column 8 as class.
 """
 
 from __future__ import annotations
@@ -37,10 +37,12 @@ def write_tracks(
     scene: Scene | None = None,
     info: dict[str, Any] | None = None,
 ) -> Path:
-    """Store the answers of consecutive frames in `folder`, run.json last; what an earlier run left is replaced.
+    """Write the tracks of consecutive frames into `folder`, run.json last, and return the folder.
 
-    A tracker on the ground without boxes gets, with a camera, those of upright people (run.json: boxes). scene: where
-    the ground's height stands, on which they do.
+    Files of an earlier run are replaced or deleted. camera: gives tracks of people on the ground without boxes the
+    boxes of upright people. scene: gives the height of the ground under them, 0 without. info: content of run.json,
+    to which "format" and "boxes" (track_boxes.box_source) are added. Raises InputError or WorkError if the folder
+    cannot be written.
     """
     folder = Path(folder)
     replace_files(folder, tracks_files(tracks, fps=fps, camera=camera, scene=scene, info=info), stale=NAMES)
@@ -55,7 +57,7 @@ def tracks_files(
     scene: Scene | None = None,
     info: dict[str, Any] | None = None,
 ) -> dict[str, bytes]:
-    """The files of `write_tracks` by name."""
+    """Return the files that `write_tracks` writes: content by name."""
     every = list(tracks)
     rows, boxes = _flatten(every, fps), box_source(every, camera)
     text_box, place = rows.box, None if rows.plane == "image" else with_ground_height(rows.pos, scene)
@@ -79,7 +81,7 @@ def tracks_files(
 
 @dataclass(frozen=True)
 class _Rows:
-    """All rows of all frames: box nan and boxless True where a frame has none."""
+    """The tracks of all frames, row by row; rows of a frame without boxes have box nan and boxless True."""
 
     plane: str
     unit: str
@@ -162,11 +164,13 @@ def _text(rows: _Rows, box: Array, place: Array | None, *, full: bool) -> bytes:
 
 
 def read_tracks(path: str | Path, *, fps: float | None = None, length: int | None = None) -> list[Tracks]:
-    """The tracks of a folder (or of one of its files), of anybody's MOTChallenge text, or of a Parquet table.
+    """Read the tracks of a folder that write_tracks wrote, of one of its files, or of another program's MOT text.
 
-    From text alone velocities are the chord over 0.5 s, covariances nan, and events and groups those of files beside
-    it; boxes that run.json says are projected are left out. fps is then needed (25 if absent), and `length` adds
-    empty frames at the end.
+    tracks.parquet is read if it exists. From text, velocities are differences over 0.5 s, covariances nan, and groups
+    and events those of groups.csv and events.json beside our own tracks.txt; boxes are left out if run.json says that
+    they were projected. fps (None: 25) and length apply to text only: `length` adds empty frames at the end.
+
+    Raises InputError if there are no tracks, a file is invalid, or an event's frame is outside the tracks.
     """
     path = Path(path)
     folder = path if path.is_dir() else path.parent
@@ -189,7 +193,7 @@ def read_tracks(path: str | Path, *, fps: float | None = None, length: int | Non
 
 
 def _boxes(path: Path) -> Any:
-    """Where the boxes of a tracks.txt come from, by the run.json beside it."""
+    """Return the value "boxes" of a run.json, None if missing."""
     return tables.read_document(path).get("boxes")
 
 
@@ -231,13 +235,13 @@ def _with_events(found: list[Tracks], folder: Path) -> list[Tracks]:
     if not path.is_file():
         return found
     first, last = (found[0].index, found[-1].index) if found else (1, 0)
-    held: dict[int, list[GroupEvent]] = {}
+    by_frame: dict[int, list[GroupEvent]] = {}
     for k, (event, frame) in enumerate(read_events(path)):
         at = next(index for index in (frame, event.emitted, event.end) if index is not None)
         if not first <= at <= last:
             raise InputError(
-                file=path, place=f"events[{k}]", got=f"an event said in frame {at}",
+                file=path, place=f"events[{k}]", got=f"an event reported in frame {at}",
                 expected=f"a frame from {first} to {last}, as the tracks have", remedy="correct the event",
             )  # fmt: skip
-        held.setdefault(at, []).append(event)
-    return [t.replace(events=tuple(held[t.index])) if t.index in held else t for t in found]
+        by_frame.setdefault(at, []).append(event)
+    return [t.replace(events=tuple(by_frame[t.index])) if t.index in by_frame else t for t in found]

@@ -1,4 +1,4 @@
-"""Anybody's MOTChallenge text, and groups.csv beside it, as Tracks."""
+"""Read tracks from MOTChallenge text of any program, and the groups.csv beside it."""
 
 from __future__ import annotations
 
@@ -15,9 +15,14 @@ from sim.types import Array, Plane, Tracks
 
 
 def read_track_text(path: Path, fps: float, length: int | None, *, projected: bool = False) -> list[Tracks]:
-    """Tracks of frames 1 … length; velocity the chord over 0.5 s, covariance nan, nobody in a group.
+    """Return the tracks of frames 1 to `length` (None: to the last frame in the file).
 
-    projected: the boxes were made of the ground positions and are no measurement, so they are left out.
+    Positions are on the ground if the file has them, else box centres in the image. Velocities are differences over
+    0.5 s, covariances nan, and everybody is alone. projected True leaves the boxes out, since they were computed from
+    the positions.
+
+    Raises InputError if a line is invalid, an id is negative or stands twice in a frame, only some lines have a ground
+    position, or the file has no row and `length` is None. Warns about a file without rows otherwise.
     """
     table = read_table(path, length=length, boxless=True)
     _reject_empty(table, length)
@@ -49,7 +54,7 @@ def read_track_text(path: Path, fps: float, length: int | None, *, projected: bo
 
 
 def _reject_empty(table: MotTable, length: int | None) -> None:
-    """A text without a row says nothing, also not how long it is: a tracker that saw nobody, or a file cut off."""
+    """Raise InputError for a file without rows if the length is unknown, else warn: it may have been truncated."""
     if len(table.frame):
         return
     if length is None:
@@ -58,13 +63,13 @@ def _reject_empty(table: MotTable, length: int | None) -> None:
 
 
 def _centres(table: MotTable) -> Array:
-    """Middles of the boxes, where no ground position is known."""
+    """Return the centres of the boxes (N, 2) px. Raises InputError if a row has none."""
     table.rows.reject(table.without_box(), "a box, or a ground position in every line", "complete the lines")
     return table.box[:, :2] + table.box[:, 2:] / 2
 
 
 def with_groups(found: list[Tracks], path: Path) -> list[Tracks]:
-    """The tracks with the groups of a groups.csv."""
+    """Return the tracks with the groups of a groups.csv; each member gets its group's id."""
     every = read_groups_csv(path, len(found))
     answers = []
     for tracks, groups in zip(found, every, strict=True):

@@ -21,7 +21,11 @@ SINGLE = (("z", "m"), ("heading", "rad"), ("height", "m"), ("truncation", "1"))
 
 
 def truth_files(truth: Truth) -> dict[str, bytes]:
-    """Everything under gt/: truth.parquet, groups, events, near, script and MOTChallenge's gt.txt."""
+    """Return the files under gt/: content by name.
+
+    Always truth.parquet and script.json; where the truth has them, gt.txt (MOTChallenge), groups.parquet,
+    groups_px.parquet, groups.csv, events.json and near.csv.
+    """
     files = {"gt/truth.parquet": _table(truth), "gt/script.json": script_bytes(truth.orders, _fulfilled(truth))}
     if truth.box is not None:
         files["gt/gt.txt"] = _mot_text(truth, truth.box)
@@ -39,7 +43,7 @@ def truth_files(truth: Truth) -> dict[str, bytes]:
 
 
 def _fulfilled(truth: Truth) -> list[int | None]:
-    """For each order the position of the event that fulfils it."""
+    """Return for each order the position of the event that fulfilled it, None without one."""
     if not truth.orders:
         return []
     from sim.truth.order_fulfilment import dense_groups, fulfilment
@@ -70,7 +74,7 @@ def _table(truth: Truth) -> bytes:
 
 
 def _spans(flags: Bools) -> list[list[int]]:
-    """First and last frame of each stretch of True."""
+    """Return [first frame, last frame] of each run of True in flags (T,)."""
     edges = np.flatnonzero(np.diff(np.concatenate([[False], flags, [False]]).astype(np.int8)))
     return [[int(a) + 1, int(b)] for a, b in edges.reshape(-1, 2)]
 
@@ -83,7 +87,7 @@ def _flags(spans: list[list[int]], length: int) -> Bools:
 
 
 def _mot_text(truth: Truth, box: Array) -> bytes:
-    """gt.txt, 9 columns; people without a finite box (behind the camera) have no row."""
+    """Return gt.txt with 9 columns; people without a finite box of positive size have no row."""
     lines = []
     rows = zip(truth.frame.tolist(), truth.id.tolist(), box.tolist(), truth.visibility.tolist(), strict=True)
     for frame, id, (left, top, width, height), visibility in rows:
@@ -94,7 +98,7 @@ def _mot_text(truth: Truth, box: Array) -> bytes:
 
 
 def read_truth(folder: Path) -> Truth:
-    """The truth of a stored sequence, equal to the one written."""
+    """Read the truth of a sequence folder, equal to the one written. Raises InputError if a file is invalid."""
     gt = folder / "gt"
     table = read_table(gt / "truth.parquet")
     length, labelled = int(table.fact("length")), table.fact("labelled")
@@ -137,9 +141,9 @@ def _groups(path: Path) -> tuple[Groups, ...] | None:
 
 
 def detection_files(detections: list[Detections], fps: float, scene: Scene | None = None) -> dict[str, bytes]:
-    """det/det.parquet (exact) and det/det.txt (10 columns) of the detections of frames 1, 2, …
+    """Return det/det.parquet (exact) and det/det.txt (MOT, 10 columns) for the detections of frames 1, 2, …, by name.
 
-    scene: where the ground's height stands that det.txt gives points on the ground as z; flat without one.
+    scene: gives the height of the ground, which is the z of ground points in det.txt; 0 without a scene.
     """
     plane, boxed, moving = _form(detections)
     axes = ("x", "y", "z")[: detections[0].pos.shape[1]] if detections else ("x", "y")
@@ -164,19 +168,19 @@ def detection_files(detections: list[Detections], fps: float, scene: Scene | Non
 
 
 def _form(detections: list[Detections]) -> tuple[str, bool, bool]:
-    """Plane, and whether boxes and velocities are there: the same in every frame of a sensor."""
+    """Return the plane, whether there are boxes, and whether there are velocities; equal in all frames."""
     forms = {(d.plane, d.box is not None, d.vel is not None) for d in detections}
     assert len(forms) <= 1, f"detections of one sequence differ in kind: {sorted(forms)}"
     return next(iter(forms), ("image", True, False))
 
 
 def scores_or_ones(score: Array, rows: int) -> Array:
-    """The scores, 1 each where a detector or tracker gives none."""
+    """Return the scores (N,) for `rows` = N rows; ones if the detector or tracker gives none."""
     return score if len(score) == rows else np.ones(rows)
 
 
 def with_ground_height(pos: Array, scene: Scene | None) -> Array:
-    """(N, 3) m of places (N, 2 or 3): those on the ground with the height it has there, 0 without a scene."""
+    """Return positions (N, 3) m: z is that of `pos`, else the height of the ground, 0 without a scene."""
     if pos.shape[1] == 3:
         return pos
     z = np.zeros(len(pos)) if scene is None else height_at(scene, pos)
@@ -194,7 +198,7 @@ def _det_text(frame: Any, box: Array | None, score: Array, ground: Array | None)
 
 
 def read_detections(path: Path) -> list[Detections]:
-    """det.parquet back: one Detections per frame."""
+    """Read a det.parquet: one Detections per frame. Raises InputError if the file is invalid."""
     table = read_table(path)
     axes = [a for a in ("x", "y", "z") if table.has(a)]
     pos, score, fps = table.floats(*axes), table.floats("score"), float(table.fact("fps"))

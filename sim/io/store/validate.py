@@ -1,4 +1,4 @@
-"""Checking a dataset: every file is the one of its manifest, every table parses, and they agree with one another."""
+"""Check a dataset: every file has the hash of its manifest, can be read, and agrees with the other files."""
 
 from __future__ import annotations
 
@@ -21,7 +21,10 @@ from sim.types import BACKGROUNDS, Detections, Groups, Truth
 
 
 def validate(folder: str | Path) -> list[FlockscopeError]:
-    """What is wrong with a sequence or a dataset of ours, in the order of paths; empty: nothing."""
+    """Return the problems of a generated sequence or dataset, sorted by path; empty if there are none.
+
+    Raises InputError if the folder does not exist or holds nothing of a dataset.
+    """
     folder = Path(folder)
     if not folder.is_dir():
         raise InputError(
@@ -37,7 +40,10 @@ def validate(folder: str | Path) -> list[FlockscopeError]:
 
 
 def content_hash(folder: str | Path) -> str:
-    """The hash of all content hashes of a dataset of ours, or of a sequence: what every export of it has too."""
+    """Return the dataset hash of a generated dataset or sequence; exports of it contain the same hash.
+
+    Raises InputError if it holds no sequences or a recording.
+    """
     found = {
         split_and_name(p): manifests.read_manifest(p)["content_hash"]
         for p in sequence_folders(Path(folder), "generated")
@@ -51,11 +57,11 @@ def _problem(path: Path, got: object, expected: object, place: str = "", remedy:
 
 def _left_behind(root: Path) -> Iterator[InputError]:
     for path in sorted(root.glob(f"**/{PARTIAL}*")):
-        yield _problem(path, "left by an interrupted run", "no such folder")
+        yield _problem(path, "left by an interrupted run", "no such file or folder")
 
 
 def _seqmaps(root: Path) -> Iterator[InputError]:
-    """Every split's seqmap names exactly the sequences that are there."""
+    """Yield a problem for each sequence that a split's seqmap or folder lacks."""
     base = root if (root / "seqmaps").is_dir() else root.parent
     for split in sorted(root.glob("flockscope-*")) if base == root else [root]:
         path = base / "seqmaps" / f"{split.name}.txt"
@@ -88,7 +94,7 @@ def _extra(folder: Path, manifest: dict[str, Any]) -> Iterator[InputError]:
 
 
 def _content(folder: Path, manifest: dict[str, Any]) -> Iterator[FlockscopeError]:
-    """The tables against one another, and the hashes anew."""
+    """Compare the files with each other, and recompute the hashes."""
     text = (folder / "scenario.toml").read_text(encoding="utf-8")
     if hashing.scenario_hash(text) != manifest["scenario_hash"]:
         yield _problem(folder / "scenario.toml", "another scenario", "the one of scenario_hash")
@@ -111,7 +117,7 @@ def _content(folder: Path, manifest: dict[str, Any]) -> Iterator[FlockscopeError
 
 
 def _pictures(folder: Path, manifest: dict[str, Any], length: int) -> Iterator[FlockscopeError]:
-    """Every picture is there, can be read and has its size; those kept exactly have the raw pixels that were drawn."""
+    """Yield a problem for pictures that are missing, unreadable, of another size, or PNGs with other pixels."""
     stored = StoredPictures(folder, manifest)
     named = {name for name in manifest["files"] if is_picture(name)}
     for stream in stored.streams:
@@ -147,7 +153,7 @@ def _truth(folder: Path, truth: Truth, length: int) -> Iterator[InputError]:
 
 
 def _text(path: Path, wanted: bytes) -> Iterator[InputError]:
-    """A text for reading says what the exact table beside it says: it is made anew and compared line by line."""
+    """Yield a problem at the first line where a text file differs from `wanted`, made from the exact table."""
     if not path.is_file():
         yield _problem(path, "missing", "the text of the exact table")
         return
@@ -159,14 +165,14 @@ def _text(path: Path, wanted: bytes) -> Iterator[InputError]:
 
 
 def _groups(path: Path, truth: Truth, groups: tuple[Groups, ...] | None) -> Iterator[InputError]:
-    """The members of each group are there in that frame and bear its id."""
+    """Yield a problem for the first frame with a group whose member is absent or has another group."""
     for index, some in enumerate(groups or (), 1):
         here = truth.rows(index)
         group_of = dict(zip(truth.id[here].tolist(), truth.group[here].tolist(), strict=True))
         for group, members in zip(some.id.tolist(), some.members, strict=True):
             if any(group_of.get(m) != group for m in members.tolist()):
                 got = f"group {group} of {members.tolist()}"
-                yield _problem(path, got, "members who bear it in truth.parquet", f"frame {index}")
+                yield _problem(path, got, "members with that group in truth.parquet", f"frame {index}")
                 return
 
 

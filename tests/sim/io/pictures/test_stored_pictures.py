@@ -281,7 +281,7 @@ def test_pixel_truth_of_nobody(tmp_path, make_pictured):
 
 
 def relisted(folder, change):
-    """The manifest with another list of files or other facts, with_hash anew."""
+    """The manifest with another list of files or other facts, its hash computed anew."""
     whole = manifest(folder)
     change(whole)
     (folder / "manifest.json").write_text(json.dumps(with_hash(whole)))
