@@ -188,7 +188,7 @@ def test_frames_of_videos_are_refused(tmp_path: Path, make_pictured: Callable[..
 def test_what_is_not_ours_is_refused(tmp_path: Path) -> None:
     (tmp_path / "mot" / "det").mkdir(parents=True)
     (tmp_path / "mot" / "det" / "det.txt").write_text("1,-1,0,0,4,6,1,-1,-1,-1\n")
-    for source, word in ((tmp_path / "mot", "a recording, mot"), (tmp_path / "no", "nothing of ours")):
+    for source, word in ((tmp_path / "mot", "a recording, mot"), (tmp_path / "no", "no sequences")):
         with pytest.raises(InputError, match=f"{word}.*flockscope generate"):
             webdataset(source, tmp_path / "out")
     assert not (tmp_path / "out").exists()
