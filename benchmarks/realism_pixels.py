@@ -23,7 +23,8 @@ from pathlib import Path
 import numpy as np
 from scipy.stats import wasserstein_distance
 
-from scenarios.schema.scenario import Light, Picture, Scenario
+from scenarios.schema.picture import Light, Picture
+from scenarios.schema.scenario import Scenario
 from sim.crowd.world import run
 from sim.render.renderer import stage
 from sim.scene.camera_placement import place_camera

@@ -29,7 +29,7 @@ from typing import Any
 import numpy as np
 
 from scenarios import sensor_settings
-from scenarios.loading.suites import lines
+from scenarios.loading.suites import read_entries
 from sim.io.files.atomic import write_file
 from sim.io.source import open_source
 from sim.types import Ints, Sequence, Tracks
@@ -107,7 +107,7 @@ def search(given: argparse.Namespace) -> None:
 def half_sensed(suite: Path, sensor: Path, out: Path) -> Path:
     """The suite with this detector in every second scene, the first one included."""
     rows = []
-    for k, line in enumerate(lines(suite)):
+    for k, line in enumerate(read_entries(suite)):
         settings = (*line.settings, *(sensor_settings(sensor) if k % 2 == 0 else ()))
         name, scenario, more = map(json.dumps, (line.name, line.scenario, settings))
         rows.append(f"  {{ name = {name}, scenario = {scenario}, set = {more} }},")

@@ -1,7 +1,7 @@
-"""The scripts: scenario files, their strict form, the catalogue and the suites. Imports nothing of ours.
+"""Scenario files: their keys, the catalogue, suites, loading and drawing. Imports neither `sim` nor `tracking`.
 
-`scenarios.load("cross")` is the whole of it; nothing heavy is imported before it is asked for. A detector's profile
-goes with it as `scenarios.load("cross", set=scenarios.sensor_settings("mine.toml"))`.
+`scenarios.load("cross")` loads a scenario. `scenarios.load("cross", set=scenarios.sensor_settings("mine.toml"))` loads
+it with the profile of a detector. Importing this package alone imports nothing heavy.
 """
 
 from __future__ import annotations

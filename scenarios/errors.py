@@ -1,4 +1,4 @@
-"""The two errors a user can meet, each one line: file, place, got, expected, remedy."""
+"""The two errors that users see: InputError and WorkError. Each is one line: file, place, got, expected, remedy."""
 
 from __future__ import annotations
 
@@ -6,10 +6,10 @@ from typing import ClassVar
 
 
 class FlockscopeError(Exception):
-    """An error for the user's eyes; `str()` is exactly one line.
+    """An error message for users; `str()` is exactly one line.
 
-    file: what was read or written ("" when nothing was); place: line, key, row or frame in it;
-    got, expected: what stands there and what should; remedy: what to do.
+    file: the file read or written, "" if there is none; place: the line, key, row or frame in it; got: what was found
+    there; expected: what should be there; remedy: what to do.
     """
 
     exit_code: ClassVar[int] = 1
@@ -20,14 +20,14 @@ class FlockscopeError(Exception):
         super().__init__(self.line())
 
     def line(self) -> str:
-        """The error as one line, empty parts left out."""
+        """Returns the error as one line; an empty file or place is left out."""
         where = ": ".join(part for part in (self.file, self.place) if part)
         text = f"{where}: " if where else ""
         text += f"got {self.got}; expected {self.expected}; {self.remedy}"
         return " ".join(text.split())
 
     def as_dict(self) -> dict[str, str]:
-        """The error object of `--json` (contract: Files)."""
+        """Returns the error object of `--json`: file, place, got, expected, remedy."""
         names = ("file", "place", "got", "expected", "remedy")
         return {name: getattr(self, name) for name in names}
 
@@ -36,13 +36,13 @@ class FlockscopeError(Exception):
 
 
 class InputError(FlockscopeError):
-    """Wrong input or usage: exit code 2."""
+    """Wrong input or usage. Exit code 2."""
 
     exit_code: ClassVar[int] = 2
 
 
 class WorkError(FlockscopeError):
-    """The work failed, or a check said no: exit code 1."""
+    """The work failed, or a check was not passed. Exit code 1."""
 
 
 def _rebuild(kind: type[FlockscopeError], parts: dict[str, str]) -> FlockscopeError:

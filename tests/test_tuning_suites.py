@@ -7,19 +7,19 @@ from pathlib import Path
 import pytest
 
 from scenarios.loading.resolve import resolve
-from scenarios.loading.suites import lines
+from scenarios.loading.suites import read_entries
 
 SUITES = Path(__file__).resolve().parents[1] / "benchmarks" / "tuning_suites"
 
 
 @pytest.mark.parametrize("path", sorted(SUITES.glob("*.toml")), ids=lambda path: path.stem)
 def test_each_can_be_read(path: Path) -> None:
-    assert [entry.name for entry in resolve(str(path))] == [line.name for line in lines(path)]
+    assert [entry.name for entry in resolve(str(path))] == [line.name for line in read_entries(path)]
 
 
 def test_labelled_scenes_are_those_of_groups_seen_by_labellers() -> None:
     """Everybody is seen at 2.5 frames/s, and nothing else is changed."""
-    groups, labelled = lines(SUITES / "groups.toml"), lines(SUITES / "labelled.toml")
+    groups, labelled = read_entries(SUITES / "groups.toml"), read_entries(SUITES / "labelled.toml")
     for plain, seen, entry in zip(groups, labelled, resolve(str(SUITES / "labelled.toml")), strict=True):
         sensor = [setting for setting in seen.settings if setting.startswith("sensor.")]
         assert (seen.name, seen.scenario, seen.settings) == (plain.name, plain.scenario, (*plain.settings, *sensor))

@@ -35,7 +35,7 @@ def perfect(truth: FrameTruth) -> Detections:
 def _sensed(truth: Truth, sequence: Sequence, sensor: Mapping[str, Any], seed: int) -> Iterator[Detections]:
     from pydantic import ValidationError
 
-    from scenarios.schema.scenario import Sensor
+    from scenarios.schema.sensor import Sensor
     from sim.detector.sense import sense
     from sim.scene.box_visibility import with_visibility
 

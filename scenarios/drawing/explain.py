@@ -1,4 +1,4 @@
-"""A scenario explained (`text`) and drawn as a plan with its script (`svg`), without simulating it."""
+"""Explains a scenario in words with a plan in characters (`text`), and draws plan and script as SVG (`svg`)."""
 
 from __future__ import annotations
 
@@ -12,13 +12,13 @@ from scenarios.drawing.routes import GroupRoute, OrderMark, group_routes, order_
 from scenarios.schema.scenario import Scenario
 
 COLOURS = ("#0072b2", "#d55e00", "#009e73", "#aa3377", "#8a6d00", "#3d6fd6", "#b2182b", "#4d7c0f", "#6a51a3", "#5c5c5c")
-"""Dark enough to read on white, apart from each other for colour-blind eyes."""
+"""Of groups: dark enough to read on white, and distinct for colour-blind readers."""
 
-ROW = 30.0
+ROW = 30.0  # px between the lines of groups in the drawing of the script
 
 
 def text(scenario: Scenario) -> str:
-    """What happens in a scenario, with a plan in characters."""
+    """Returns what happens in a scenario: setting, plan in characters, people, orders, sensor."""
     lines = [scenario.name, *([scenario.about] if scenario.about else []), "", *describe.setting(scenario), ""]
     lines += [character_plan(scenario), "", "People"]
     wide = max(len(group.id) for group in scenario.group)
@@ -30,13 +30,17 @@ def text(scenario: Scenario) -> str:
 
 
 def svg(scenario: Scenario) -> str:
-    """The plan, the starts with their spread, the ways, and the orders beneath as lines that join and fork."""
+    """Returns an SVG drawing of a scenario.
+
+    It has the plan with starts, ways and goals of all groups, and beneath it the script: one line for each group, which
+    joins and divides at the orders.
+    """
     plan = SvgPlan(scenario.world)
     ways, orders = group_routes(scenario), order_marks(scenario)
     colour = _colours(ways, orders)
-    body = [*plan.floor(), *plan.stands()]
+    body = [*plan.floor(), *plan.scene()]
     for course in ways:
-        body += plan.course(course, colour[course.id])
+        body += plan.route(course, colour[course.id])
     for mark in orders:
         body += plan.mark(mark, colour)
     for k, course in enumerate(ways):
@@ -57,7 +61,7 @@ def svg(scenario: Scenario) -> str:
 
 
 def _colours(ways: list[GroupRoute], orders: list[OrderMark]) -> dict[str, str]:
-    """A colour per group; the names that a `repeat` makes share theirs."""
+    """A colour for each group name; all groups of a `repeat` have the same one."""
     named: dict[str, str] = {}
     for course in ways:
         c = COLOURS[len(set(named.values())) % len(COLOURS)]
@@ -74,7 +78,7 @@ def _cut(words: str, length: int) -> str:
 def _script(
     ways: list[GroupRoute], orders: list[OrderMark], colour: dict[str, str], top: float
 ) -> tuple[list[str], float]:
-    """The orders as lines of groups that join and fork from left to right, then in words; and where it ends."""
+    """The drawing of the script, top to bottom: lines of groups, then the orders in words; and its lower end, px."""
     parts = [f'<text x="{MARGIN}" y="{top:.0f}" style="font-weight:700">Script</text>']
     rows, x0 = {course.id: k for k, course in enumerate(ways)}, MARGIN + 60
     step = min((WIDTH - 2 * MARGIN - 110) / max(len(orders), 1), 170)
@@ -116,9 +120,11 @@ ScriptLine = tuple[str, int, float, float, float]
 def _lines(
     rows: dict[str, int], row_of: dict[str, str], orders: list[OrderMark]
 ) -> tuple[list[ScriptLine], dict[int, list[int]]]:
-    """Lines (group, row, from order, to order, row at the end), and the rows that each order touches.
+    """The lines of groups, and by order number the rows that the order concerns.
 
-    One group of a `repeat` (row_of: its name → the repeat's) branches off; the line of the repeat goes on.
+    rows: row of each group; row_of: name of the `repeat` by name of each of its groups. A line is (group, row, order
+    where it starts, order where it ends, row at its end). One group of a `repeat` branches off; the line of the others
+    goes on.
     """
     since = dict.fromkeys(rows, 0.0)
     lines: list[ScriptLine] = []

@@ -1,4 +1,4 @@
-"""The plan of a scenario as SVG elements: ground, what stands on it, ways, starts, orders."""
+"""Draws the plan of a scenario as SVG elements: ground, walls and pillars, ways, starts, orders."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ text { font: 13px system-ui, sans-serif; fill: #1b1f24 } .small { font-size: 11.
 
 
 class SvgPlan:
-    """World metres to picture px (y up to y down); state: scale and offsets only."""
+    """Draws in world metres (y up) on a picture in px (y down). State: scale and offsets."""
 
     def __init__(self, world: WorldSpec) -> None:
         self.world = world
@@ -30,21 +30,21 @@ class SvgPlan:
         self.bottom = self.top + world.size[1] * self.scale + 20
 
     def __call__(self, at: XY) -> XY:
-        """A point of the picture, px."""
+        """Returns a point of the world as a point of the picture, px."""
         return self.left + at[0] * self.scale, self.top + (self.world.size[1] - at[1]) * self.scale
 
     def path(self, points: Iterable[XY], attributes: str) -> str:
-        """A line through points in m."""
+        """Returns a line through points of the world."""
         through = " ".join(f"{x:.1f},{y:.1f}" for x, y in map(self, points))
         return f'<polyline points="{through}" {attributes}/>'
 
     def label(self, at: XY, words: str, dx: float = 0, dy: float = 0, attributes: str = "") -> str:
-        """Words beside a point in m."""
+        """Returns words beside a point of the world; dx, dy: px."""
         x, y = self(at)
         return f'<text x="{x + dx:.1f}" y="{y + dy:.1f}" {attributes}>{escape(words)}</text>'
 
     def floor(self) -> list[str]:
-        """The ground with a line each metre (or each 5 m where it is large) and a scale."""
+        """Returns the ground with a line for each metre (each 5 m in worlds wider than 40 m) and its size in words."""
         width, depth = self.world.size
         (x0, y1), (x1, y0) = self((0, 0)), self((width, depth))
         step = 1.0 if width <= 40 else 5.0
@@ -59,8 +59,8 @@ class SvgPlan:
             self.label((0, 0), note, 0, 15, 'class="small"'),
         ]
 
-    def stands(self) -> list[str]:
-        """Stairs, walls, doors, pillars, service points."""
+    def scene(self) -> list[str]:
+        """Returns stairs, walls, doors, pillars and service points."""
         parts = [part for stairs in self.world.stairs for part in self._stairs(stairs)]
         parts += [self.path([wall[:2], wall[2:]], 'class="wall"') for wall in walls_without_doors(self.world)]
         parts += [self.label(door.at, "door", 0, -8, 'class="small" text-anchor="middle"') for door in self.world.doors]
@@ -91,13 +91,13 @@ class SvgPlan:
             self.label(stairs.head, words, 0, 4, 'class="small halo" text-anchor="middle"'),
         ]
 
-    def course(self, course: GroupRoute, colour: str) -> list[str]:
-        """The way of a group, and the goal."""
-        end = course.points[-1]
+    def route(self, route: GroupRoute, colour: str) -> list[str]:
+        """Returns the way of a group, its goal, and the range of the goal where it is drawn at random."""
+        end = route.points[-1]
         u, v = self(end)
         return [
-            *self._spread(end, course.spread[-1], colour),
-            self.path(course.points, f'class="way" stroke="{colour}" marker-end="url(#{colour[1:]})"'),
+            *self._spread(end, route.spread[-1], colour),
+            self.path(route.points, f'class="way" stroke="{colour}" marker-end="url(#{colour[1:]})"'),
             f'<circle cx="{u:.1f}" cy="{v:.1f}" r="7" fill="none" stroke="{colour}" stroke-width="1.6"/>',
         ]
 
@@ -111,10 +111,10 @@ class SvgPlan:
             f'fill="{colour}" opacity=".15"/>'
         ]
 
-    def start(self, course: GroupRoute, colour: str, lift: int = 0) -> list[str]:
-        """Bodies at the start, at most a dozen, with the group's name and size, `lift` lines further up."""
-        at, parts = course.points[0], self._spread(course.points[0], course.spread[0], colour)
-        n = min(max(round(course.people), 1), 12)
+    def start(self, route: GroupRoute, colour: str, lift: int = 0) -> list[str]:
+        """Returns the people at the start, at most 12, with the group's name and size; lift: text lines further up."""
+        at, parts = route.points[0], self._spread(route.points[0], route.spread[0], colour)
+        n = min(max(round(route.people), 1), 12)
         reach = 0.0 if n == 1 else 0.75 / (2 * math.sin(math.pi / n))
         for k in range(n):
             u, v = self(
@@ -122,13 +122,13 @@ class SvgPlan:
             )
             r = max(0.22 * self.scale, 3)
             parts.append(f'<circle cx="{u:.1f}" cy="{v:.1f}" r="{r:.1f}" fill="{colour}" stroke="#fff"/>')
-        words = course.id + (f" ×{course.repeat}" if course.repeat > 1 else "") + f" ({course.people:.2g})"
+        words = route.id + (f" ×{route.repeat}" if route.repeat > 1 else "") + f" ({route.people:.2g})"
         dy = -(reach + 0.22) * self.scale - 6 - 15 * lift
         parts.append(self.label(at, words, 0, dy, f'class="halo" text-anchor="middle" style="fill:{colour}"'))
         return parts
 
     def mark(self, mark: OrderMark, colour: dict[str, str]) -> list[str]:
-        """What an order opens: dashed ways, the slots of a queue."""
+        """Returns the ways that an order opens, dashed, and the places of a queue."""
         parts = []
         for arrow in mark.arrows:
             c = colour.get(arrow.id, colour[mark.before[0]])
@@ -144,7 +144,7 @@ class SvgPlan:
         return parts
 
     def numbers(self, orders: list[OrderMark]) -> list[str]:
-        """The orders' numbers where they happen; those at one place stand side by side."""
+        """Returns the numbers of the orders where they happen, side by side at the same place."""
         parts, used = [], dict[tuple[int, int], int]()
         for mark in orders:
             u, v = self(mark.at)
@@ -155,7 +155,7 @@ class SvgPlan:
 
 
 def badge(x: float, y: float, number: int) -> str:
-    """An order's number in a black disc at a point of the picture."""
+    """Returns the number of an order in a black disc at a point of the picture, px."""
     return (
         f'<circle cx="{x:.1f}" cy="{y:.1f}" r="10" fill="#1b1f24" stroke="#fff" stroke-width="1.5"/>'
         f'<text x="{x:.1f}" y="{y + 4.3:.1f}" text-anchor="middle" style="fill:#fff;font-weight:700">{number}</text>'
@@ -163,7 +163,7 @@ def badge(x: float, y: float, number: int) -> str:
 
 
 def marker(colour: str) -> str:
-    """The arrow head of a colour."""
+    """Returns the definition of the arrow head of a colour."""
     return (
         f'<marker id="{colour[1:]}" viewBox="0 0 8 8" refX="7" refY="4" markerWidth="9" markerHeight="9" '
         f'markerUnits="userSpaceOnUse" orient="auto"><path d="M0,0.5 L8,4 L0,7.5 z" fill="{colour}"/></marker>'

@@ -1,4 +1,4 @@
-"""A plan in characters: two columns stand for one row, so that it looks right in a terminal."""
+"""Draws the plan of a scenario in characters. Two columns are as wide as one row is high, as in most terminals."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ LEGEND = "A start of a   ◎ goal   · way   ① order   ○ queue   █ wall   
 
 
 class CharacterPlan:
-    """A grid of characters over the world; state: the characters. The y axis points up."""
+    """A grid of characters over the world, the y axis pointing up. State: the characters."""
 
     def __init__(self, size: XY, columns: int) -> None:
         self.scale = columns / size[0]
@@ -22,7 +22,7 @@ class CharacterPlan:
         self.cells = [[" "] * columns for _ in range(self.rows)]
 
     def put(self, at: XY, text: str, over: str = "") -> None:
-        """Text from a point rightwards; where `over` is given, only upon these characters."""
+        """Writes text to the right of a point, m; with `over`, only where one of these characters is."""
         column = min(max(int(at[0] * self.scale), 0), self.columns - len(text))
         row = min(max(int((self.size[1] - at[1]) / self.size[1] * self.rows), 0), self.rows - 1)
         for k, character in enumerate(text):
@@ -30,7 +30,9 @@ class CharacterPlan:
                 self.cells[row][column + k] = character
 
     def name(self, at: XY, text: str) -> None:
-        """A name at a point, in the nearest row where it covers nothing but ways."""
+        """Writes a name at a point, m, in the nearest of five rows where it covers only ways, else in the point's
+        own.
+        """
         column = min(max(int(at[0] * self.scale), 0), self.columns - len(text))
         step = self.size[1] / self.rows
         for shift in (0, -1, 1, -2, 2):
@@ -43,19 +45,19 @@ class CharacterPlan:
         self.put((at[0], y), text)
 
     def line(self, a: XY, b: XY, character: str, over: str = "", gap: float = 0.5) -> None:
-        """Characters along a segment, `gap` columns apart."""
+        """Writes characters along a segment, `gap` columns apart."""
         steps = max(int(math.dist(a, b) * self.scale / gap), 1)
         for k in range(steps + 1):
             self.put((a[0] + (b[0] - a[0]) * k / steps, a[1] + (b[1] - a[1]) * k / steps), character, over)
 
     def text(self) -> str:
-        """The framed drawing."""
+        """Returns the drawing with a frame."""
         rows = ["│" + "".join(row) + "│" for row in self.cells]
         return "\n".join(["┌" + "─" * self.columns + "┐", *rows, "└" + "─" * self.columns + "┘"])
 
 
 def character_plan(scenario: Scenario, columns: int = 64) -> str:
-    """The plan of a scenario and its legend."""
+    """Returns the plan of a scenario, `columns` characters wide, with its size and legend."""
     world = scenario.world
     plan = CharacterPlan(world.size, columns)
     _stairs(plan, scenario)

@@ -1,7 +1,7 @@
-"""Where a script takes its people, as far as it can be known before it is simulated: what a drawing needs.
+"""Finds the ways of groups and the places of orders, as far as they are known before the simulation, for drawings.
 
-Drawn values stand at their middle, with how far they may spread. Where nothing says where people meet, half-way is
-taken.
+A distribution is replaced by its mean and the range of its draws. Where groups meet, and where a group divides, is
+taken to be half-way.
 """
 
 from __future__ import annotations
@@ -15,12 +15,16 @@ from scenarios.schema.values import Distribution, Point, Value, bounds
 
 XY = tuple[float, float]
 SLOTS = 6
-"""Places of a queue that are drawn."""
+"""Greatest number of places of a queue that are drawn."""
 
 
 @dataclass(frozen=True)
 class GroupRoute:
-    """The way of one group (a `repeat` is one): start, via, goal in m, and the half spread of each in x and y."""
+    """The way of one entry of `group`.
+
+    points: start, via, goal, m; spread: half the range of each in x and y, m; people: mean number of people; repeat:
+    number of such groups.
+    """
 
     id: str
     points: tuple[XY, ...]
@@ -31,7 +35,7 @@ class GroupRoute:
 
 @dataclass(frozen=True)
 class Arrow:
-    """A way that an order opens: whose, and its points in m."""
+    """A way that an order opens: name of the group ("served" for groups after a queue) and points, m."""
 
     id: str
     points: tuple[XY, ...]
@@ -39,7 +43,11 @@ class Arrow:
 
 @dataclass(frozen=True)
 class OrderMark:
-    """An order on the plan: its number from 1, where it happens, the ways it opens, and the slots of a queue."""
+    """An order on the plan.
+
+    number: from 1; at: where it happens, m; before, after: names of its groups; arrows: the ways it opens; slots:
+    places of a queue, m.
+    """
 
     number: int
     event: ScriptOrder
@@ -51,7 +59,7 @@ class OrderMark:
 
 
 def middle(value: Value) -> float:
-    """The mean of a value, clip ignored unless it excludes the mean."""
+    """Returns the mean of a value without `clip`, or the bound of `clip` nearest to it if it lies outside."""
     if not isinstance(value, Distribution):
         return float(value)
     if value.normal is not None:
@@ -67,7 +75,11 @@ def middle(value: Value) -> float:
 
 
 def spread(value: Value) -> float:
-    """Half of the range in which nearly all draws lie: the bounds where there are any, else two standard deviations."""
+    """Returns half the width of the range in which nearly all draws lie; 0 for a number.
+
+    Half the distance between the bounds; for a normal distribution at most two standard deviations; without an upper
+    bound twice the mean.
+    """
     if not isinstance(value, Distribution):
         return 0.0
     low, high = bounds(value)
@@ -78,7 +90,7 @@ def spread(value: Value) -> float:
 
 
 def group_routes(scenario: Scenario) -> list[GroupRoute]:
-    """The ways of the groups of the first frame."""
+    """Returns the ways of all entries of `group`, in order."""
     made = []
     for group in scenario.group:
         points = (group.start, *group.via, group.goal)
@@ -88,7 +100,7 @@ def group_routes(scenario: Scenario) -> list[GroupRoute]:
 
 
 def order_marks(scenario: Scenario) -> list[OrderMark]:
-    """The orders, in the order of the file."""
+    """Returns the orders on the plan, in the order of the file."""
     places = {}
     for group in scenario.group:
         start, goal = _at(group.start), _at(group.goal)
@@ -105,7 +117,7 @@ def _mean(points: list[XY]) -> XY:
 
 
 def _mark(number: int, event: ScriptOrder, places: dict[str, tuple[XY, XY]], world: XY) -> OrderMark:
-    """One order; places (where from, where to of every group) move on with it."""
+    """One order on the plan; updates places: start and goal by group name."""
     if isinstance(event, MergeOrder):
         return _merge(number, event, places)
     if isinstance(event, SplitOrder):

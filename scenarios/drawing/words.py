@@ -1,4 +1,4 @@
-"""A scenario in words: values, people, orders with their triggers, camera and sensor."""
+"""Says in words what is in a scenario: values, people, orders with their triggers, camera and sensor."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ AT_GOAL = {"stand": "stand there", "leave": "leave", "walk": "walk on"}
 
 
 def number(value: Value, unit: str = "") -> str:
-    """A value as one would say it: `1.2 ± 0.1`, `0 to 5`, `3 on average`."""
+    """Returns a value in words: `1.2 ± 0.1`, `0 to 5`, `about 3`, `1 or 2`, with its unit and clip."""
     tail = f" {unit}" if unit else ""
     if not isinstance(value, Distribution):
         return f"{value:g}{tail}"
@@ -25,7 +25,7 @@ def number(value: Value, unit: str = "") -> str:
 
 
 def _choice(values: tuple[float, ...]) -> str:
-    """`1 or 2`; with their shares where some are likelier: `1 (67 %) or 2 (33 %)`."""
+    """`1 or 2`; `1 (67 %) or 2 (33 %)` where the probabilities differ."""
     times = {v: values.count(v) for v in values}
     if len(set(times.values())) == 1:
         return " or ".join(f"{v:g}" for v in times)
@@ -33,21 +33,21 @@ def _choice(values: tuple[float, ...]) -> str:
 
 
 def place(point: Point) -> str:
-    """A point: `(5, 3 to 4)`."""
+    """Returns a point in words: `(5, 3 to 4)`."""
     return f"({number(point[0])}, {number(point[1])})"
 
 
 def count(n: Value, one: str, many: str) -> str:
-    """`1 person`, `3 people`."""
+    """Returns a number with its noun: `1 person`, `3 people`."""
     return f"{number(n)} {one if n == 1 else many}"
 
 
 def setting(scenario: Scenario) -> list[str]:
-    """Duration, world and camera."""
+    """Returns three lines about duration, world and camera."""
     world, camera = scenario.world, scenario.camera
     things = {"wall": world.walls, "door": world.doors, "pillar": world.pillars, "flight of stairs": world.stairs}
     things["service point"] = world.service
-    held = [f"{len(rows)} {name}{'s' * (len(rows) > 1)}" for name, rows in things.items() if rows]
+    things_in_it = [f"{len(rows)} {name}{'s' * (len(rows) > 1)}" for name, rows in things.items() if rows]
     turned = [] if scenario.turn_deg == 0.0 else [f"turned by {number(scenario.turn_deg)}°"]
     turned += ["mirrored by a coin"] * scenario.mirror
     turned += [] if scenario.lead == 0.0 else [f"{number(scenario.lead, 's')} further on than it says"]
@@ -57,13 +57,14 @@ def setting(scenario: Scenario) -> list[str]:
         f"{scenario.duration:g} s after {scenario.warmup:g} s of warm-up; the script is {', '.join(turned)}"
         if turned
         else f"{scenario.duration:g} s after {scenario.warmup:g} s of warm-up",
-        f"world {world.size[0]:g} × {world.size[1]:g} m" + (": " + ", ".join(held) if held else ", empty"),
+        f"world {world.size[0]:g} × {world.size[1]:g} m"
+        + (": " + ", ".join(things_in_it) if things_in_it else ", empty"),
         f"camera {view}, {camera.image[0]} × {camera.image[1]} px, {camera.fps:g} frames/s{solved}",
     ]
 
 
 def people(group: GroupSpec) -> str:
-    """One group: who, from where to where, how fast."""
+    """Returns size, start, way, goal, speed and time of entry of a group in words."""
     words = [count(group.size, "person", "people")]
     words[0] = f"{group.repeat} groups of {words[0]}" if group.repeat > 1 else words[0]
     words.append(f"from {place(group.start)}")
@@ -76,7 +77,7 @@ def people(group: GroupSpec) -> str:
 
 
 def trigger(when: When) -> str:
-    """When an order fires."""
+    """Returns in words when an order fires."""
     if when.time is not None:
         text = f"at {number(when.time, 's')}"
     elif when.reach is not None:
@@ -90,7 +91,7 @@ def trigger(when: When) -> str:
 
 
 def order(event: ScriptOrder) -> str:
-    """What an order does."""
+    """Returns in words what an order does."""
     if isinstance(event, MergeOrder):
         goal = "to meet and stand" if isinstance(event.goal, str) else f"to {place(event.goal)}"
         return f"merge {' + '.join(event.groups)} → {event.into}, {goal}"
@@ -102,7 +103,7 @@ def order(event: ScriptOrder) -> str:
 
 
 def sensor(scenario: Scenario) -> list[str]:
-    """The point and box sensor."""
+    """Returns lines about the sensor: detection, false alarms, noise, visibility, artificial occlusions."""
     s = scenario.sensor
     edges = f"{s.noise_px:g} px on the edges of boxes" if s.box_noise is None else "in proportion to boxes"
     points = "points under their feet" if s.points == "foot" else f"{s.noise_m:g} m on points"

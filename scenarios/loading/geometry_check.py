@@ -1,4 +1,8 @@
-"""What can be seen to be wrong in a scenario before anything is simulated: geometry, names, lifetimes, sizes, times."""
+"""Checks a scenario before it is simulated: doors, sizes, times, hidden groups, places inside the world and clear of
+walls.
+
+`check` also runs the checks of the script (scenarios.loading.script_check).
+"""
 
 from __future__ import annotations
 
@@ -8,17 +12,17 @@ from pathlib import Path
 
 from scenarios.errors import InputError
 from scenarios.loading.script_check import QUEUE_PEOPLE, check_script, fail
-from scenarios.loading.toml_files import nearest
+from scenarios.loading.toml_files import did_you_mean
 from scenarios.schema.geometry import clearance, door_fits, queue_places
 from scenarios.schema.scenario import MergeOrder, QueueOrder, Scenario, SplitOrder, group_names
 from scenarios.schema.values import Point, bounds, fixed
 
 BODY = 0.2
-"""m: nobody's middle can be closer to a wall or pillar (the physics radius)."""
+"""m: least distance from a person's middle to a wall or pillar (the radius of a body in the physics)."""
 
 
 def check(scenario: Scenario, file: str | Path = "") -> None:
-    """InputError for the first thing that cannot work."""
+    """Raises InputError for the first thing in the scenario that cannot work."""
     try:
         _check_world(scenario)
         _check_groups(scenario)
@@ -30,22 +34,24 @@ def check(scenario: Scenario, file: str | Path = "") -> None:
 
 
 def _check_world(scenario: Scenario) -> None:
+    """Walls and stairs have a length; each door lies on one wall."""
     world = scenario.world
     for k, wall in enumerate(world.walls):
         if wall[:2] == wall[2:]:
             fail(f"world.walls.{k}", "a wall of no length", "two different ends", "move one end")
     for k, door in enumerate(world.doors):
         if not any(door_fits(door, wall) for wall in world.walls):
-            got = f"a door {door.width:g} m wide at {list(door.at)}, where no wall holds it"
+            got = f"a door {door.width:g} m wide at {list(door.at)}, which lies on no wall"
             fail(
                 f"world.doors.{k}", got, "an opening that lies on one wall", "move it onto a wall, or make it narrower"
             )
     for k, stairs in enumerate(world.stairs):
         if stairs.foot == stairs.head:
-            fail(f"world.stairs.{k}", "foot and head at one place", "a way up", "move one of them")
+            fail(f"world.stairs.{k}", "foot and head at one place", "two different places", "move one of them")
 
 
 def _check_groups(scenario: Scenario) -> None:
+    """Names are unique; sizes, speeds and times of entry are possible."""
     seen: set[str] = set()
     for group in scenario.group:
         for name in group_names(group):
@@ -64,6 +70,7 @@ def _check_groups(scenario: Scenario) -> None:
 
 
 def _check_sensor(scenario: Scenario) -> None:
+    """Artificial occlusions name groups of the script and end after they start."""
     known = [name for group in scenario.group for name in group_names(group)] + [
         name
         for event in scenario.event
@@ -72,16 +79,16 @@ def _check_sensor(scenario: Scenario) -> None:
     ]
     for k, hide in enumerate(scenario.sensor.hide):
         if hide.group is not None and hide.group not in known:
-            fail(f"sensor.hide.{k}.group", repr(hide.group), "a group of the script", nearest(hide.group, known))
+            fail(f"sensor.hide.{k}.group", repr(hide.group), "a group of the script", did_you_mean(hide.group, known))
         if hide.end <= hide.start:
             fail(f"sensor.hide.{k}", f"{hide.start:g} to {hide.end:g} s", "an end after its start", "swap them")
 
 
 def _check_points(scenario: Scenario) -> None:
-    """Places inside the world, and, where they are fixed, not in a wall or pillar.
+    """All places lie inside the world; places without a distribution are clear of walls and pillars.
 
-    A script that is turned is only checked where it is not (its places depend on the draw); a mirrored one is checked
-    on both sides.
+    A script with a turn is not checked, because its places depend on the draw. A script that may be mirrored is checked
+    both ways.
     """
     if bounds(scenario.turn_deg) != (0.0, 0.0):
         return
@@ -101,7 +108,10 @@ def _check_points(scenario: Scenario) -> None:
 
 
 def points(scenario: Scenario) -> Iterator[tuple[str, Point]]:
-    """Every place that people are sent to or start from, with its key; a queue's least slots each under its `at`."""
+    """Yields every place where people start or are sent, with its key.
+
+    Of a queue these are the first QUEUE_PEOPLE places, all with the key `at`.
+    """
     for group in scenario.group:
         yield f"group.{group.id}.start", group.start
         yield f"group.{group.id}.goal", group.goal

@@ -1,7 +1,9 @@
-"""`--set key=value` on a scenario's table: `camera.fps=25`, `group.a.size=3`, `group.0.size`, `world.size.0=20`.
+"""Applies `--set key=value` to a scenario's table: `camera.fps=25`, `group.a.size=3`, `group.0.size`,
+`world.size.0=20`.
 
-A step into an array is an index or an `id`. Values are TOML (`3`, `[8, 5]`, `{ uniform = [0, 5] }`, `"top"`); a bare
-word is taken as a string. A whole table set on a new id of an array (`group.x={ size = 2, … }`) is appended.
+A step into an array is an index from 0 or an `id`. Values are TOML (`3`, `[8, 5]`, `{ uniform = [0, 5] }`, `"top"`); a
+word without quotes is a string. The value replaces that of the key, also where it is a table; a table that replaces a
+row of an array keeps the row's id. A table set on a new id (`group.x={ size = 2, … }`) is appended to the array.
 """
 
 from __future__ import annotations
@@ -13,23 +15,26 @@ from collections.abc import Iterable
 from typing import Any
 
 from scenarios.errors import InputError
-from scenarios.loading.toml_files import Table, nearest
+from scenarios.loading.toml_files import Table, did_you_mean
 
 Path = tuple[str | int, ...]
 
 
-def apply(table: Table, settings: Iterable[str], file: object = "") -> tuple[Table, dict[Path, str]]:
-    """The table with every `key=value` set in turn, and what was set where (for error messages)."""
+def apply_settings(table: Table, settings: Iterable[str], file: object = "") -> tuple[Table, dict[Path, str]]:
+    """Returns a copy of the table with each `key=value` applied in turn, and the setting text by path of its key.
+
+    Raises InputError if a setting is not of the form key=value or its key leads into nothing.
+    """
     table = copy.deepcopy(table)
     places: dict[Path, str] = {}
     for text in settings:
-        key, value = parse(text)
+        key, value = parse_setting(text)
         places[_put(table, key, value, text, file)] = text
     return table, places
 
 
-def parse(text: str) -> tuple[list[str], Any]:
-    """`a.b=value` as its steps and its value."""
+def parse_setting(text: str) -> tuple[list[str], Any]:
+    """Returns the steps of the key and the value of `a.b=value`; raises InputError for any other form."""
     key, equals, value = text.partition("=")
     steps = key.strip().split(".")
     if not equals or not all(steps):
@@ -40,7 +45,9 @@ def parse(text: str) -> tuple[list[str], Any]:
 
 
 def parse_value(value: str, text: str) -> Any:
-    """A TOML value; a bare word is a string."""
+    """Returns a TOML value; a word without quotes is a string. text: the whole setting, for the InputError it
+    raises.
+    """
     try:
         table = tomllib.loads(f"value = {value}")
     except tomllib.TOMLDecodeError:
@@ -55,7 +62,7 @@ def parse_value(value: str, text: str) -> Any:
 
 
 def _put(table: Table, steps: list[str], value: Any, text: str, file: object) -> Path:
-    """Walks to the last step and sets it there; returns the path with array steps as indices."""
+    """Sets the value in the table; returns the path of its key, with ids replaced by indices."""
     here: Any = table
     path: list[str | int] = []
     while True:
@@ -84,7 +91,9 @@ def _put(table: Table, steps: list[str], value: Any, text: str, file: object) ->
 
 
 def _index(rows: list[Any], steps: list[str], value: Any, text: str, file: object) -> tuple[int, list[str]]:
-    """The index that the next steps mean, and the steps after it; ids may hold dots, the longest that fits is meant."""
+    """The index of the row that the next steps name, and the steps after them. Ids may have dots; the longest id
+    wins.
+    """
     if steps[0].isdigit() and int(steps[0]) < len(rows):
         return int(steps[0]), steps[1:]
     ids = [str(row["id"]) for row in rows if isinstance(row, dict) and "id" in row]
@@ -100,12 +109,12 @@ def _index(rows: list[Any], steps: list[str], value: Any, text: str, file: objec
         place=f"--set {text}",
         got=f"{steps[0]!r} in an array of {len(rows)}",
         expected="an index from 0 or an id" if ids else "an index from 0",
-        remedy=nearest(steps[0], ids or [str(k) for k in range(len(rows))]),
+        remedy=did_you_mean(steps[0], ids or [str(k) for k in range(len(rows))]),
     )
 
 
 def _with_id(rows: list[Any], index: int, value: Any) -> Any:
-    """A table that replaces a row keeps the row's id unless it brings its own."""
+    """The value; a table that replaces a row gets the row's id unless it has one."""
     if index < len(rows) and isinstance(value, dict) and isinstance(rows[index], dict) and "id" in rows[index]:
         return {"id": rows[index]["id"], **value}
     return value

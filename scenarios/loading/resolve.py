@@ -1,4 +1,4 @@
-"""From names and files to scenarios: `load` one, or `resolve` a file, scenario or suite into its entries."""
+"""Loads scenarios: `load` one by name or file, `resolve` a file, scenario or suite into its entries."""
 
 from __future__ import annotations
 
@@ -19,9 +19,10 @@ __all__ = ["Entry", "dump", "load", "load_observation", "names", "resolve", "sui
 
 @dataclass(frozen=True)
 class Entry:
-    """One sequence to make: its unique name, what to simulate, and the number of a suite's `repeat` (0: none).
+    """One sequence to make.
 
-    file: where the scenario stands, for messages.
+    name: unique; scenario: what to simulate; repeat: number of the copy from 1 where a suite's entry has `repeat`, else
+    0; file: the scenario's file, and the entry in a suite, for messages.
     """
 
     name: str
@@ -31,29 +32,35 @@ class Entry:
 
 
 def load(name_or_path: str | Path, set: Iterable[str] = ()) -> Scenario:
-    """The scenario of a catalogue name or a *.toml file, `extends` resolved and every `key=value` of `set` applied.
+    """Returns the scenario of a catalogue name or a *.toml file.
 
-    InputError (file, place, got, expected, remedy) where anything is wrong that can be seen without simulating.
+    `extends` is applied first, then each `key=value` of `set` in turn. Raises InputError for everything that can be
+    found wrong without simulating: an unknown name, a wrong key or value, a place in a wall, an order for a group that
+    does not exist.
     """
     path = toml_files.find(name_or_path)
     return _build(path, tuple(set))
 
 
 def load_observation(path: str | Path | None = None, set: Iterable[str] = ()) -> ObservationSpec:
-    """The view of a file (None: all defaults) with every `key=value` of `set` applied; InputError otherwise."""
+    """Returns camera, sensor, light and picture of a TOML file, with each `key=value` of `set` applied.
+
+    path: None for all defaults. Raises InputError if the file cannot be read or a key or value is wrong.
+    """
     if path is not None and not Path(path).is_file():
         raise InputError(
             file=path, got="no such file", expected="a TOML file with [camera]", remedy="check --camera"
         )  # fmt: skip
     file = Path(path) if path is not None else ""
-    table, places = overrides.apply({} if path is None else toml_files.parse(Path(path)), tuple(set), file)
+    table, places = overrides.apply_settings({} if path is None else toml_files.parse(Path(path)), tuple(set), file)
     return validate(table, file, places, model=ObservationSpec)
 
 
 def resolve(name: str, set: Iterable[str] = ()) -> list[Entry]:
-    """The entries of a *.toml file (scenario or suite), a scenario's name or a suite's; `suite:NAME` forces the suite.
+    """Returns the entries of a *.toml file (scenario or suite) or of a name in the catalogue.
 
-    `set` is applied to every entry, after the entry's own settings.
+    A name that is both a scenario's and a suite's means the scenario; `suite:NAME` means the suite. A scenario gives
+    one entry. `set` is applied to each entry, after the entry's own settings. Raises InputError as `load` does.
     """
     settings = tuple(set)
     if name.startswith("suite:"):
@@ -67,35 +74,37 @@ def resolve(name: str, set: Iterable[str] = ()) -> list[Entry]:
             return _entries(suites.find_suite(name), settings)
         known = names() + suite_names()
         raise InputError(
-            got=repr(name), expected="a scenario, a suite or a *.toml file", remedy=toml_files.nearest(name, known)
+            got=repr(name), expected="a scenario, a suite or a *.toml file", remedy=toml_files.did_you_mean(name, known)
         )
     scenario = load(name, settings)
     return [Entry(scenario.name, scenario, file=str(toml_files.find(name)))]
 
 
 def _entries(path: Path, settings: tuple[str, ...]) -> list[Entry]:
-    """Every entry loaded; a repeat shares one load, and each scenario bears its entry's name."""
+    """Loads all entries of a suite file. Copies of an entry share one load; each scenario gets its entry's name."""
     loaded: dict[tuple[str, tuple[str, ...]], Scenario] = {}
     entries = []
-    for line in suites.lines(path):
-        key = (line.scenario, line.settings)
+    for entry in suites.read_entries(path):
+        key = (entry.scenario, entry.settings)
         if key not in loaded:
-            loaded[key] = _load_line(line, path, settings)
-        scenario = loaded[key].model_copy(update={"name": line.name})
-        entries.append(Entry(line.name, scenario, line.repeat, f"{path}: entry {line.name}"))
+            loaded[key] = _load_entry(entry, path, settings)
+        scenario = loaded[key].model_copy(update={"name": entry.name})
+        entries.append(Entry(entry.name, scenario, entry.repeat, f"{path}: entry {entry.name}"))
     return entries
 
 
-def _load_line(line: suites.SuiteLine, path: Path, settings: tuple[str, ...]) -> Scenario:
+def _load_entry(entry: suites.SuiteEntry, path: Path, settings: tuple[str, ...]) -> Scenario:
+    """Loads the scenario of an entry; errors name the suite and the entry."""
     try:
-        return _build(toml_files.find(line.scenario, beside=path.parent), line.settings + settings)
+        return _build(toml_files.find(entry.scenario, beside=path.parent), entry.settings + settings)
     except InputError as error:
-        where = f"{path}: entry {line.name}" + (f": {error.file}" if error.file else "")
+        where = f"{path}: entry {entry.name}" + (f": {error.file}" if error.file else "")
         raise InputError(**{**error.as_dict(), "file": where}) from None
 
 
 def _build(path: Path, settings: tuple[str, ...]) -> Scenario:
-    table, places = overrides.apply(toml_files.read(path), settings, path)
+    """Reads, validates and checks the scenario of a file."""
+    table, places = overrides.apply_settings(toml_files.read(path), settings, path)
     scenario = validate(table, path, places, model=Scenario)
     check(scenario, path)
     return scenario

@@ -1,26 +1,32 @@
-"""The script of a scenario as it unfolds: which groups exist at each order, how large they are, when orders fire."""
+"""Checks the script of a scenario: each order concerns groups that exist then, in sizes that fit, within the
+duration.
+"""
 
 from __future__ import annotations
 
 from typing import NoReturn
 
 from scenarios.errors import InputError
-from scenarios.loading.toml_files import nearest
+from scenarios.loading.toml_files import did_you_mean
 from scenarios.schema.scenario import MergeOrder, QueueOrder, Scenario, ScriptOrder, SplitOrder, expand, group_names
 from scenarios.schema.values import bounds
 
 Size = tuple[float, float]
 QUEUE_PEOPLE = 3
-"""Fewer people in line are not measured as a queue."""
+"""Least number of people in a queue; sim.truth.queue_detection has the same number."""
 
 
 def fail(place: str, got: str, expected: str, remedy: str) -> NoReturn:
-    """Raises the InputError of a check; the file is added where it is known."""
+    """Raises the InputError of a check, without the file, which `check` adds."""
     raise InputError(place=place, got=got, expected=expected, remedy=remedy)
 
 
 def check_script(scenario: Scenario) -> None:
-    """Orders in the order of the file: they concern groups that then exist, in sizes that fit, within the duration."""
+    """Raises InputError for the first order of the script that cannot work.
+
+    Orders are taken in the order of the file. Each merge and split ends its groups and makes new ones, with the range
+    of sizes that follows.
+    """
     alive = {name: _people(bounds(group.size)) for group in scenario.group for name in group_names(group)}
     gone: dict[str, str] = {}
     orders: list[str] = []
@@ -34,6 +40,7 @@ def check_script(scenario: Scenario) -> None:
 
 
 def _people(size: Size) -> Size:
+    """The least and greatest number of people for the bounds of a `size`."""
     return max(1.0, float(round(size[0]))), size[1]
 
 
@@ -42,7 +49,12 @@ def _check_when(
 ) -> None:
     when = event.when
     if when.after is not None and when.after not in orders:
-        fail(f"{key}.when.after", repr(when.after), "an order that stands before this one", nearest(when.after, orders))
+        fail(
+            f"{key}.when.after",
+            repr(when.after),
+            "the id of an order before this one",
+            did_you_mean(when.after, orders),
+        )
     if when.reach is not None:
         _exists(when.reach.group, f"{key}.when.reach.group", alive, gone)
     delay = bounds(when.delay)[0]
@@ -54,14 +66,16 @@ def _check_when(
 
 
 def _exists(name: str, place: str, alive: dict[str, Size], gone: dict[str, str]) -> None:
+    """Raises InputError unless the group exists at this point of the script; gone: the order that ended each group."""
     if name in gone:
         expected = "a group that still exists: " + ", ".join(alive)
-        fail(place, f"{name!r}, which ended with {gone[name]!r}", expected, "name another, or move the order up")
+        fail(place, f"{name!r}, which ended with {gone[name]!r}", expected, "name another group, or move the order up")
     if name not in alive:
-        fail(place, repr(name), "a group that exists at this point of the script", nearest(name, list(alive)))
+        fail(place, repr(name), "a group that exists at this point of the script", did_you_mean(name, list(alive)))
 
 
-def _born(name: str, size: Size, place: str, alive: dict[str, Size], gone: dict[str, str]) -> None:
+def _add_group(name: str, size: Size, place: str, alive: dict[str, Size], gone: dict[str, str]) -> None:
+    """Adds a new group to `alive`; raises InputError if its name is taken."""
     if name in alive or name in gone:
         fail(place, f"{name!r}, which is another group's name", "a new name", "rename it")
     alive[name] = size
@@ -80,10 +94,10 @@ def _merge(event: MergeOrder, key: str, alive: dict[str, Size], gone: dict[str, 
     for k, name in enumerate(event.groups):
         _exists(name, f"{key}.groups.{k}", alive, gone)
         if name in event.groups[:k]:
-            fail(f"{key}.groups.{k}", f"{name!r} twice", "different groups", "take one out")
+            fail(f"{key}.groups.{k}", f"{name!r} twice", "different groups", "remove one")
     sizes = [alive.pop(name) for name in event.groups]
     gone.update(dict.fromkeys(event.groups, event.id))
-    _born(event.into, (sum(low for low, _ in sizes), sum(high for _, high in sizes)), f"{key}.into", alive, gone)
+    _add_group(event.into, (sum(low for low, _ in sizes), sum(high for _, high in sizes)), f"{key}.into", alive, gone)
 
 
 def _split(event: SplitOrder, key: str, alive: dict[str, Size], gone: dict[str, str]) -> None:
@@ -95,11 +109,11 @@ def _split(event: SplitOrder, key: str, alive: dict[str, Size], gone: dict[str, 
     has = f"{low:g} people" if low == high else f"{low:g} to {high:g} people"
     if sum(given) + open_parts > low or (not open_parts and not low == high == sum(given)):
         got = f"parts of {' + '.join(map(str, given + ['1 or more'] * open_parts))}"
-        fail(f"{key}.parts", got, f"parts of {event.group!r}, which has {has}", "leave a size out, or change one")
+        fail(f"{key}.parts", got, f"parts of {event.group!r}, which has {has}", "remove a size, or change one")
     rest = max(high - sum(given) - open_parts + 1, 1)
     for part in event.parts:
         size = (1.0, rest) if part.size is None else (float(part.size), float(part.size))
-        _born(part.id, size, f"{key}.parts.{part.id}", alive, gone)
+        _add_group(part.id, size, f"{key}.parts.{part.id}", alive, gone)
 
 
 def _queue(event: QueueOrder, key: str, alive: dict[str, Size], gone: dict[str, str]) -> None:
@@ -107,7 +121,12 @@ def _queue(event: QueueOrder, key: str, alive: dict[str, Size], gone: dict[str, 
     for k, pattern in enumerate(event.groups):
         found = expand(pattern, list(alive))
         if not found:
-            fail(f"{key}.groups.{k}", repr(pattern), "a pattern that fits a group", "groups: " + ", ".join(alive))
+            fail(
+                f"{key}.groups.{k}",
+                repr(pattern),
+                "a name or pattern of an existing group",
+                "groups: " + ", ".join(alive),
+            )
         for name in found:
             _exists(name, f"{key}.groups.{k}", alive, gone)
         queued += [name for name in found if name not in queued]

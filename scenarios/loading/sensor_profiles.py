@@ -1,7 +1,7 @@
-"""Files that hold a `[sensor]` table alone: a detector's profile, as `flockscope fit sensor` writes it.
+"""Reads and writes files with a `[sensor]` table alone: the profile of a detector, made by `flockscope fit sensor`.
 
-`sensor_settings(path)` gives it as `--set` takes it, so that whatever takes settings of a scenario takes a detector:
-`scenarios.load("street", set=scenarios.sensor_settings("mine.toml"))`.
+`sensor_settings(path)` returns the keys as settings, so every function that takes settings of a scenario takes a
+profile: `scenarios.load("street", set=scenarios.sensor_settings("mine.toml"))`.
 """
 
 from __future__ import annotations
@@ -19,24 +19,24 @@ from scenarios.schema.values import Model
 
 
 class SensorFile(Model):
-    """The whole file."""
+    """The content of a profile file."""
 
     schema_: Literal[1] = Field(1, alias="schema")
     sensor: Sensor
 
 
 def sensor_settings(path: str | Path) -> tuple[str, ...]:
-    """`sensor.key=value` for every key of the file; InputError where it is no sensor's table."""
+    """Returns `sensor.key=value` for each key of the file; raises InputError as `sensor_table` does."""
     return tuple(f"sensor.{key}={toml_value(v)}" for key, v in sensor_table(path).items())
 
 
 def sensor_table(path: str | Path) -> Table:
-    """The keys of the file's `[sensor]` that are given, checked."""
+    """Returns the keys given in the file's `[sensor]` table; raises InputError if the file or a value is wrong."""
     path = Path(path)
     if not path.is_file():
         raise InputError(
             file=path, got="no such file", expected="a file with a [sensor] table",
-            remedy="check the path, or write one with `flockscope fit sensor`",
+            remedy="check the path, or make one with `flockscope fit sensor`",
         )  # fmt: skip
     table = parse(path)
     validate(table, path, model=SensorFile)
@@ -45,7 +45,7 @@ def sensor_table(path: str | Path) -> Table:
 
 
 def dump_sensor(sensor: Sensor, about: str = "") -> str:
-    """The file of a sensor, every key that is there spelt out; about: comment lines above it."""
+    """Returns the text of a profile file with all keys of a sensor that are set; about: comment lines above them."""
     table = sensor.model_dump(mode="python", exclude_none=True)
     lines = [f"# {line}".rstrip() for line in about.splitlines()]
     rows = [f"{key} = {toml_value(v)}" for key, v in table.items() if key != "hide" or v]

@@ -1,10 +1,10 @@
-"""Suites: ordered lists of scenarios with settings, `suites/*.toml`.
+"""Reads suites: ordered lists of scenarios with settings, `suites/*.toml`.
 
     about = "what this suite is for"
     entry = [ { name = "cross-dense", scenario = "cross", set = ["group.a.size=5"], repeat = 3 }, … ]
 
-name: unique, the scenario's or its file's where absent; set: as `--set` takes it; repeat = n expands to name-1 …
-name-n, each with its number as a further random key (0 where there is no repeat).
+name: unique; absent: the scenario's name. scenario: a catalogue name or a *.toml file. set: settings as for `--set`.
+repeat = n makes the entries name-1 … name-n, whose numbers are one more key of their random streams.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from pathlib import Path
 from typing import Any
 
 from scenarios.errors import InputError
-from scenarios.loading.toml_files import SUITES, Table, nearest, parse, suite_names
+from scenarios.loading.toml_files import SUITES, Table, did_you_mean, parse, suite_names
 
 NAME = r"[A-Za-z][A-Za-z0-9_.-]*"
 KEYS = {"name": str, "scenario": str, "set": list, "repeat": int}
@@ -29,8 +29,8 @@ EXPECTED = {
 
 
 @dataclass(frozen=True)
-class SuiteLine:
-    """One expanded entry, not loaded yet."""
+class SuiteEntry:
+    """One entry of a suite, not loaded yet; repeat: number of the copy from 1, 0 where the entry has no `repeat`."""
 
     name: str
     scenario: str
@@ -39,55 +39,64 @@ class SuiteLine:
 
 
 def find_suite(name: str) -> Path:
-    """The file of a suite: a *.toml path or a name of the catalogue."""
+    """Returns the file of a suite, given a *.toml path or a name in the catalogue; raises InputError."""
     if name.endswith(".toml") and Path(name).is_file():
         return Path(name)
     if name in suite_names():
         return SUITES / f"{name}.toml"
-    raise InputError(got=repr(name), expected="a suite's name or file", remedy=nearest(name, suite_names()))
+    raise InputError(got=repr(name), expected="a suite's name or file", remedy=did_you_mean(name, suite_names()))
 
 
-def lines(path: Path) -> list[SuiteLine]:
-    """The expanded entries of a suite file, in its order."""
+def read_entries(path: Path) -> list[SuiteEntry]:
+    """Returns the entries of a suite file, in order, with each `repeat` expanded.
+
+    Raises InputError if the file has an unknown key, no entry, a wrong value, or two entries of one name.
+    """
     table = parse(path)
     for key in table.keys() - {"about", "entry"}:
         raise InputError(
-            file=path, place=key, got="unknown key", expected="about or entry", remedy=nearest(key, ["about", "entry"])
+            file=path,
+            place=key,
+            got="unknown key",
+            expected="about or entry",
+            remedy=did_you_mean(key, ["about", "entry"]),
         )
     entries = table.get("entry")
     if not isinstance(entries, list) or not entries:
         raise InputError(file=path, place="entry", got="no entry", expected="at least one", remedy="add one")
-    expanded = [line for k, entry in enumerate(entries) for line in _expand(entry, f"entry.{k}", path)]
+    expanded = [made for k, entry in enumerate(entries) for made in _expand(entry, f"entry.{k}", path)]
     seen: set[str] = set()
-    for line in expanded:
-        if line.name in seen:
+    for made in expanded:
+        if made.name in seen:
             raise InputError(
                 file=path,
                 place="entry",
-                got=f"two entries named {line.name!r}",
+                got=f"two entries named {made.name!r}",
                 expected="unique names",
                 remedy="rename one",
             )
-        seen.add(line.name)
+        seen.add(made.name)
     return expanded
 
 
 def about(path: Path) -> str:
-    """What the suite says about itself."""
+    """Returns the `about` text of a suite file; "" if it has none."""
     return str(parse(path).get("about", ""))
 
 
-def _expand(entry: Any, place: str, path: Path) -> Iterator[SuiteLine]:
+def _expand(entry: Any, place: str, path: Path) -> Iterator[SuiteEntry]:
+    """The entries that one row of the file stands for."""
     _check(entry, place, path)
     name = entry.get("name", Path(entry["scenario"]).stem)
     settings = tuple(entry.get("set", ()))
     if "repeat" not in entry:
-        yield SuiteLine(name, entry["scenario"], settings, 0)
+        yield SuiteEntry(name, entry["scenario"], settings, 0)
     for k in range(1, entry.get("repeat", 0) + 1):
-        yield SuiteLine(f"{name}-{k}", entry["scenario"], settings, k)
+        yield SuiteEntry(f"{name}-{k}", entry["scenario"], settings, k)
 
 
 def _check(entry: Table, place: str, path: Path) -> None:
+    """Raises InputError for the first thing wrong with an entry."""
     if not isinstance(entry, dict):
         raise InputError(file=path, place=place, got=repr(entry), expected="a table", remedy="write { scenario = … }")
     for key, value in entry.items():
@@ -97,7 +106,7 @@ def _check(entry: Table, place: str, path: Path) -> None:
                 place=f"{place}.{key}",
                 got="unknown key",
                 expected="a known key",
-                remedy=nearest(key, list(KEYS)),
+                remedy=did_you_mean(key, list(KEYS)),
             )
         good = isinstance(value, KEYS[key]) and not isinstance(value, bool)
         good = good and (key != "set" or all(isinstance(text, str) for text in value))

@@ -1,11 +1,16 @@
-"""Scenario files as plain tables: where they lie, TOML, `extends`, and the rule by which two tables merge.
+"""Reads and writes scenario files as plain tables: where they lie, TOML, `extends`, and how two tables are merged.
 
-A file that says `extends = "base.toml"` (relative to itself, else in the catalogue) is laid over its base:
+A file with `extends = "base.toml"` (relative to itself, else in the catalogue) is merged over its base:
 
-- tables merge key by key, everything else replaces;
-- arrays of tables with `id` (group, event, parts) merge by id: known ids merge, new ones are appended;
-- a distribution and a `when` are values, not tables: they replace whole;
-- `name` is not inherited.
+- a table is merged key by key with the table of the same key; an empty table changes nothing;
+- a distribution and a `when` replace the value of the base as a whole, though they are tables, too;
+- two lists of tables that all have an `id` (group, event, parts) are merged by id: rows with a known id are merged,
+other
+  rows are appended;
+- any other value replaces the value of the base;
+- `name` is not inherited: without one, a scenario has the name of its own file.
+
+`--set key=value` (scenarios.loading.overrides) differs: it replaces the value of the key, also where that is a table.
 """
 
 from __future__ import annotations
@@ -27,17 +32,17 @@ Table = dict[str, Any]
 
 
 def names() -> list[str]:
-    """The scenarios of the catalogue, sorted."""
+    """Returns the names of the scenarios in the catalogue, sorted."""
     return sorted(path.stem for path in CATALOGUE.glob("*.toml"))
 
 
 def suite_names() -> list[str]:
-    """The suites of the catalogue, sorted."""
+    """Returns the names of the suites in the catalogue, sorted."""
     return sorted(path.stem for path in SUITES.glob("*.toml"))
 
 
-def nearest(word: str, known: list[str]) -> str:
-    """Which of the known names may have been meant, as the remedy of an error."""
+def did_you_mean(word: str, known: list[str]) -> str:
+    """Returns the remedy of an error about an unknown name: the known names most like it, or all known names."""
     close = difflib.get_close_matches(word, known, n=3, cutoff=0.5)
     if close:
         return "did you mean " + " or ".join(repr(name) for name in close) + "?"
@@ -45,19 +50,25 @@ def nearest(word: str, known: list[str]) -> str:
 
 
 def closest(word: str, known: Iterable[str]) -> str:
-    """The known name that is most like a word, whatever their cases; "" where nothing is known."""
+    """Returns the known name most like a word, ignoring upper and lower case; "" if there are no known names."""
     names = {name.casefold(): name for name in known}
     return names[difflib.get_close_matches(word.casefold(), names, 1, 0.0)[0]] if names else ""
 
 
 def find(name: str | Path, beside: Path | None = None) -> Path:
-    """The file of a `*.toml` path (relative to the folder `beside`, else to the catalogue) or of a catalogue name."""
+    """Returns the file of a scenario.
+
+    name: a catalogue name, or a path that ends in .toml, relative to `beside` (the working folder if None), else to the
+    catalogue. Raises InputError if there is no such scenario or file.
+    """
     text = str(name)
     if not text.endswith(".toml"):
         path = CATALOGUE / f"{text}.toml"
         if text in names():
             return path
-        raise InputError(got=repr(text), expected="a scenario's name or a *.toml file", remedy=nearest(text, names()))
+        raise InputError(
+            got=repr(text), expected="the name of a scenario or a *.toml file", remedy=did_you_mean(text, names())
+        )
     for folder in (beside or Path(), CATALOGUE):
         if (folder / text).is_file():
             return folder / text
@@ -67,7 +78,7 @@ def find(name: str | Path, beside: Path | None = None) -> Path:
 
 
 def parse(path: Path) -> Table:
-    """One TOML file as it stands."""
+    """Returns the content of a TOML file. Raises InputError if it cannot be read, is not UTF-8 or is not TOML."""
     try:
         return tomllib.loads(path.read_bytes().decode())
     except tomllib.TOMLDecodeError as error:
@@ -77,7 +88,7 @@ def parse(path: Path) -> Table:
             place=place.rstrip(")"),
             got=message or str(error),
             expected="TOML",
-            remedy="correct the line; strings want quotes, tables inside a line want { }",
+            remedy="correct the line; strings need quotes, tables inside a line need { }",
         ) from None
     except UnicodeDecodeError as error:
         raise InputError(
@@ -85,33 +96,47 @@ def parse(path: Path) -> Table:
             place=f"byte {error.start}",
             got="bytes that are not UTF-8",
             expected="TOML",
-            remedy="save as UTF-8",
+            remedy="save the file as UTF-8",
         ) from None
     except OSError as error:
         raise InputError(
-            file=path, got=error.strerror or error, expected="a readable file", remedy="check path and rights"
+            file=path,
+            got=error.strerror or error,
+            expected="a readable file",
+            remedy="check the path and its permissions",
         ) from None
 
 
 def read(path: Path, chain: tuple[Path, ...] = ()) -> Table:
-    """One file with everything it extends merged in; `name` is the file's where it gives none."""
+    """Returns a file merged over all files it extends; `name` is the file's where it has none.
+
+    chain: the files that extend this one. Raises InputError if a file cannot be read, or if files extend each other in
+    a circle.
+    """
     chain = (*chain, path.resolve())
     table = parse(path)
     base = table.pop("extends", None)
     if base is None:
         return {**table, "name": table.get("name", path.stem)}
     if not isinstance(base, str):
-        raise InputError(file=path, place="extends", got=repr(base), expected="a file's name", remedy="quote it")
+        raise InputError(
+            file=path, place="extends", got=repr(base), expected="a file's name", remedy="put the name in quotes"
+        )
     base_path = _base(path, base)
     if base_path.resolve() in chain:
         circle = " → ".join(p.name for p in (*chain, base_path))
         raise InputError(
-            file=path, place="extends", got=circle, expected="an end of the chain", remedy="take one `extends` out"
+            file=path,
+            place="extends",
+            got=circle,
+            expected="files that do not extend each other in a circle",
+            remedy="remove one `extends`",
         )
     return {**merge(read(base_path, chain), table), "name": table.get("name", path.stem)}
 
 
 def _base(path: Path, base: str) -> Path:
+    """The file that `extends = base` in the file `path` means; raises InputError."""
     try:
         return find(base, beside=path.parent)
     except InputError as error:
@@ -121,7 +146,7 @@ def _base(path: Path, base: str) -> Path:
 
 
 def merge(below: Table, above: Table) -> Table:
-    """`above` laid over `below`, by the rule in this module's docstring; neither is changed."""
+    """Returns `above` merged over `below` by the rules in the module's docstring; changes neither."""
     merged = dict(below)
     for key, value in above.items():
         merged[key] = _merge_value(key, below.get(key), value)
@@ -137,6 +162,7 @@ def _merge_value(key: str, below: Any, above: Any) -> Any:
 
 
 def _is_value(key: str, table: Table) -> bool:
+    """True for a `when` and for a distribution, which replace the value of the base as a whole."""
     return key == "when" or (bool(table) and table.keys() <= DISTRIBUTION_KEYS)
 
 
@@ -156,13 +182,13 @@ def _merge_by_id(below: list[Table], above: list[Table]) -> list[Table]:
 
 
 class _Dumps(Protocol):
-    """A pydantic model; a protocol, because this module does without importing pydantic."""
+    """A pydantic model. A protocol, because this module must not import pydantic."""
 
     def model_dump(self, *, mode: str, by_alias: bool, exclude_none: bool) -> dict[str, Any]: ...
 
 
 def dump(scenario: _Dumps) -> str:
-    """The scenario, or another form of such tables, as TOML text."""
+    """Returns a scenario, or another model of tables, as TOML: all defaults included, the same bytes each time."""
     table = scenario.model_dump(mode="python", by_alias=True, exclude_none=True)
     flat = [(k, v) for k, v in table.items() if not _is_table(v) and not _is_rows(v)]
     blocks = [_lines(dict(flat))]
@@ -187,7 +213,7 @@ def _lines(table: dict[str, Any]) -> str:
 
 
 def toml_value(v: Any) -> str:
-    """A value as TOML, on one line."""
+    """Returns a value as TOML on one line."""
     if isinstance(v, bool):
         return str(v).lower()
     if isinstance(v, str):

@@ -1,4 +1,4 @@
-"""A plain table as a Scenario; what pydantic finds wrong becomes one clear line about the first problem."""
+"""Validates a plain table as a Scenario or another model, and reports the first problem in one clear line."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from pydantic import BaseModel, ValidationError
 
 from scenarios.errors import InputError
 from scenarios.loading.overrides import Path
-from scenarios.loading.toml_files import Table, nearest
+from scenarios.loading.toml_files import Table, did_you_mean
 from scenarios.schema.scenario import Scenario
 
 NUMBER = "a number, or a distribution such as { normal = [1.3, 0.2] }"
@@ -21,9 +21,10 @@ M = typing.TypeVar("M", bound=BaseModel)
 
 
 def validate(table: Table, file: object = "", places: dict[Path, str] | None = None, *, model: type[M]) -> M:
-    """The model (a Scenario, or a table of one) that a table is; InputError with file, key and expectation otherwise.
+    """Returns the table as a model: a Scenario or one of its tables.
 
-    places: see override.apply.
+    Raises InputError with the file, the key and what was expected there. places: the settings by path, as
+    overrides.apply_settings returns them; an error at such a path names the setting.
     """
     try:
         return model.model_validate(_tuples(table), strict=True)
@@ -32,7 +33,7 @@ def validate(table: Table, file: object = "", places: dict[Path, str] | None = N
 
 
 def _tuples(value: Any) -> Any:
-    """Arrays as tuples, which is what the strict form wants."""
+    """The table with tuples for lists, as pydantic's strict mode requires."""
     if isinstance(value, dict):
         return {key: _tuples(v) for key, v in value.items()}
     return tuple(_tuples(v) for v in value) if isinstance(value, list) else value
@@ -41,7 +42,10 @@ def _tuples(value: Any) -> Any:
 def translate(
     error: ValidationError, table: Table, file: object, places: dict[Path, str], model: type[BaseModel] = Scenario
 ) -> InputError:
-    """The error of the first problem; unknown keys come first, since they explain missing ones."""
+    """Returns the first problem as an InputError and says how many more there are.
+
+    Unknown keys come first, because a misspelt key explains a missing one.
+    """
     found = [e for e in error.errors() if _branch_fits(e["loc"], table)] or list(error.errors())
     first = min(found, key=lambda e: (e["type"] != "extra_forbidden", e["type"] == "too_short" and len(found) > 1))
     path = strip(first["loc"], table) + (("type",) if first["type"].startswith("union_tag") else ())
@@ -51,12 +55,12 @@ def translate(
 
 
 def strip(loc: tuple[int | str, ...], table: Table) -> Path:
-    """A pydantic location without the names of union branches, so that it is a path into the table."""
+    """Returns a pydantic location as a path into the table: without the names of union branches."""
     return tuple(step for step, _, is_tag in _walk(loc, table) if not is_tag)
 
 
 def _walk(loc: tuple[int | str, ...], table: Any) -> typing.Iterator[tuple[int | str, Any, bool]]:
-    """Every step of a location, the value it starts from, and whether it merely names a branch."""
+    """Yields each step of a location, the value it starts from, and True if it names a union branch only."""
     here = table
     for k, step in enumerate(loc):
         last = k == len(loc) - 1
@@ -71,11 +75,12 @@ def _walk(loc: tuple[int | str, ...], table: Any) -> typing.Iterator[tuple[int |
 
 
 def _is_branch(step: int | str) -> bool:
+    """True if a step is the name of a union branch of a value that may be a distribution."""
     return isinstance(step, str) and (step == "float" or "[" in step or step == "Distribution")
 
 
 def _branch_fits(loc: tuple[int | str, ...], table: Table) -> bool:
-    """Whether the branch of a union that complains is the one that was meant."""
+    """True if the union branch that an error is about is the one that fits the kind of the value."""
     for step, value, is_tag in _walk(loc, table):
         if not is_tag or not isinstance(step, str):
             continue
@@ -94,11 +99,11 @@ def _branch_fits(loc: tuple[int | str, ...], table: Table) -> bool:
 
 
 def _words(error: Any, path: Path, table: Table, model: type[BaseModel]) -> tuple[str, str, str]:
-    """got, expected, remedy of one pydantic error."""
+    """Returns got, expected and remedy of one pydantic error."""
     kind, message = error["type"], str(error["msg"])
     if kind == "extra_forbidden":
         known = known_keys(path[:-1], table, model)
-        return f"unknown key {str(path[-1])!r}", "a known key", nearest(str(path[-1]), known)
+        return f"unknown key {str(path[-1])!r}", "a known key", did_you_mean(str(path[-1]), known)
     got = _show(error["input"])
     if kind == "missing" and isinstance(path[-1], int):
         return got, f"at least {path[-1] + 1} numbers", "correct the list"
@@ -121,14 +126,15 @@ def _words(error: Any, path: Path, table: Table, model: type[BaseModel]) -> tupl
 
 
 def _expectation(message: str) -> str:
+    """What pydantic expected, in words for users."""
     for start in ("Input should be ", "Value error, "):
         message = message.removeprefix(start)
     message = re.sub(r"^.* exactly one of (.*), not \[.*\]$", r"exactly one of \1", message)
-    return message.replace("a valid tuple", "a list").replace("a valid dictionary or instance of", "a table for")
+    return re.sub(r"a valid dictionary or instance of \w+", "a table", message.replace("a valid tuple", "a list"))
 
 
 def _show(value: Any) -> str:
-    """The value as a user wrote it, cut to a line."""
+    """The value as a user wrote it, at most 80 characters."""
     if isinstance(value, tuple):
         return "[" + ", ".join(map(_show, value)) + "]"
     if isinstance(value, dict):
@@ -144,6 +150,7 @@ def _cut(text: str) -> str:
 
 
 def _place(path: Path, table: Table, places: dict[Path, str]) -> str:
+    """Where a path is set: the `--set` text that made it, else its key."""
     for n in range(len(path), 0, -1):
         if path[:n] in places:
             return f"--set {places[path[:n]]}"
@@ -151,7 +158,7 @@ def _place(path: Path, table: Table, places: dict[Path, str]) -> str:
 
 
 def spell(path: Path, table: Table) -> str:
-    """A path as `--set` takes it: rows of arrays by their id where they have one."""
+    """Returns a path as `--set` takes it, with the ids of rows that have one."""
     here: Any = table
     steps = []
     for step in path:
@@ -166,7 +173,7 @@ def spell(path: Path, table: Table) -> str:
 
 
 def known_keys(path: Path, table: Table, form: type[BaseModel] = Scenario) -> list[str]:
-    """The keys that the strict form knows at a place."""
+    """Returns the keys that a model knows at a path of a table; empty where the path leads to no table."""
     model: type[BaseModel] | None = form
     here: Any = table
     for step in path:
@@ -182,7 +189,7 @@ def known_keys(path: Path, table: Table, form: type[BaseModel] = Scenario) -> li
 
 
 def _event_keys(models: list[type[BaseModel]], path: Path, table: Table) -> list[str]:
-    """Inside `event`, whose rows are one of several models by their `type`."""
+    """The known keys inside a row of `event`, whose model follows from its `type`; the first model if that is wrong."""
     row = table["event"][path[1]]
     kind = next((m for m in models if row.get("type") in typing.get_args(m.model_fields["type"].annotation)), models[0])
     keys = kind
@@ -195,7 +202,7 @@ def _event_keys(models: list[type[BaseModel]], path: Path, table: Table) -> list
 
 
 def _models(annotation: Any) -> list[type[BaseModel]]:
-    """All models named inside a type annotation."""
+    """The models inside a type annotation."""
     if isinstance(annotation, type) and issubclass(annotation, BaseModel):
         return [annotation]
     return [model for inner in typing.get_args(annotation) for model in _models(inner)]

@@ -1,1 +1,1 @@
-"""The strict form of scenario files: pydantic models of a scenario, its sensor and its camera; SI units."""
+"""The keys of scenario files: pydantic models of a scenario, its world, camera, sensor and pictures; SI units."""

@@ -1,4 +1,4 @@
-"""The geometry of a plan: walls less their doors, distances to them, and the bounds of what a value may draw."""
+"""Geometry of a scenario's world: walls without their doors, distances from walls and pillars, places of queues."""
 
 from __future__ import annotations
 
@@ -9,11 +9,14 @@ from scenarios.schema.scenario import DoorSpec, QueueOrder, WorldSpec
 from scenarios.schema.values import Fixed
 
 Segment = tuple[float, float, float, float]
-DOOR_TOLERANCE = 0.05
+DOOR_TOLERANCE = 0.05  # m
 
 
 def along(wall: Segment, point: Fixed) -> Fixed:
-    """Where a point is beside a wall: metres along it from its first end, and metres off its line."""
+    """Returns where a point lies relative to a wall: metres along it from its first end, and metres from its line.
+
+    For a wall of length zero: 0 and the distance from it.
+    """
     x, y = point[0] - wall[0], point[1] - wall[1]
     length = math.dist(wall[:2], wall[2:])
     if length == 0:
@@ -23,14 +26,14 @@ def along(wall: Segment, point: Fixed) -> Fixed:
 
 
 def door_fits(door: DoorSpec, wall: Segment) -> bool:
-    """Whether the whole opening lies on this wall."""
+    """Returns True if the whole opening of a door lies on a wall, within DOOR_TOLERANCE of its line."""
     s, off = along(wall, door.at)
     length = math.dist(wall[:2], wall[2:])
     return off <= DOOR_TOLERANCE and door.width / 2 <= s + 1e-9 and s + door.width / 2 <= length + 1e-9
 
 
 def walls_without_doors(world: WorldSpec) -> Iterator[Segment]:
-    """The walls without their doors."""
+    """Yields the pieces of all walls that remain when the openings of the doors are cut out."""
     for wall in world.walls:
         length = math.dist(wall[:2], wall[2:])
         ex, ey = ((wall[2] - wall[0]) / length, (wall[3] - wall[1]) / length) if length else (0.0, 0.0)
@@ -44,7 +47,10 @@ def walls_without_doors(world: WorldSpec) -> Iterator[Segment]:
 
 
 def clearance(point: Fixed, world: WorldSpec) -> tuple[float, str]:
-    """Metres from a point to the nearest wall or pillar (negative inside a pillar), and what that is."""
+    """Returns the distance in m from a point to the nearest wall or pillar, and words for that obstacle.
+
+    Negative inside a pillar; inf and "nothing" where there is neither wall nor pillar.
+    """
     best = (math.inf, "nothing")
     for wall in walls_without_doors(world):
         s, off = along(wall, point)
@@ -56,7 +62,7 @@ def clearance(point: Fixed, world: WorldSpec) -> tuple[float, str]:
 
 
 def queue_places(event: QueueOrder, count: int) -> tuple[Fixed, ...]:
-    """The first places of a queue, head first."""
+    """Returns the first `count` places of a queue, m, head first."""
     angle = math.radians(event.direction_deg)
     (x, y), step = event.at, event.spacing
     return tuple((x + k * step * math.cos(angle), y + k * step * math.sin(angle)) for k in range(count))

@@ -1,10 +1,12 @@
-"""What looks at people who are already there: camera, sensor, light and picture, without a script (`replay`).
+"""The tables of a scenario that describe observation only: camera, sensor, light and picture, without a script.
 
-schema = 1                  # may be left out, as any of the tables
-[camera]                    # keys of each as in a scenario
-[sensor]
-[light]
-[picture]
+`flockscope replay` reads a file of these tables, all of which may be absent:
+
+    schema = 1
+    [camera]
+    [sensor]
+    [light]
+    [picture]
 """
 
 from __future__ import annotations
@@ -13,13 +15,14 @@ from typing import Literal
 
 from pydantic import Field
 
-from scenarios.schema.scenario import CameraSpec, Light, Picture
+from scenarios.schema.picture import Light, Picture
+from scenarios.schema.scenario import CameraSpec
 from scenarios.schema.sensor import Sensor
 from scenarios.schema.values import Model, NonNegative, Positive
 
 
 class ObservationSpec(Model):
-    """A scenario's tables of what looks on."""
+    """Camera, sensor, light and picture, with the keys that they have in a scenario."""
 
     schema_: Literal[1] = Field(1, alias="schema")
     camera: CameraSpec = CameraSpec()
@@ -29,11 +32,12 @@ class ObservationSpec(Model):
 
 
 class ReplayOrigin(Model):
-    """Whose motion a replay shows.
+    """The recording whose motion a replay shows.
 
-    real: a recording's, on which nothing is tuned. people: the recording's ids of persons 1, 2, … start, duration: the
-    part, s; smoothing: what is quicker, s, is taken for jitter of the labels; shift: our places minus the recording's,
-    m; motion: SHA-256 of its labelled places, ids and groups.
+    kind, name: of the recording; real: it shows real people, so nothing may be tuned on it; people: its ids of persons
+    1, 2, … of the replay; start, duration: the part replayed, s; smoothing: movements of the labels that are quicker
+    than this are removed as jitter, s; shift: positions in the replay minus those in the recording, m; motion: SHA-256
+    of its labelled positions, ids and groups.
     """
 
     kind: str
@@ -48,7 +52,7 @@ class ReplayOrigin(Model):
 
 
 class ReplaySpec(ObservationSpec):
-    """The resolved form of a replay: what its scenario.toml holds."""
+    """A replay with all defaults filled in: the content of its scenario.toml."""
 
     name: str
     replay: ReplayOrigin

@@ -1,7 +1,8 @@
-"""The strict form of a scenario file: frozen pydantic models, SI units, degrees.
+"""The keys of a scenario file, as frozen pydantic models. SI units; angles in degrees.
 
-Field descriptions are the documentation: `flockscope scenarios --schema` and docs/scenarios.md print them.
-A value may be a number or a distribution (scenarios.schema.values); all are drawn once per seed.
+`flockscope scenarios --schema` and docs/scenarios.md print the descriptions of the fields. A class whose subject has
+another class in `sim` ends in Spec. Where a value may be a number or a distribution (scenarios.schema.values), it is
+drawn once for each seed.
 """
 
 from __future__ import annotations
@@ -10,8 +11,8 @@ from typing import Annotated, Literal, Self
 
 from pydantic import Field, model_validator
 
-from scenarios.schema.sensor import Hide as Hide
-from scenarios.schema.sensor import Sensor as Sensor
+from scenarios.schema.picture import Light, Picture
+from scenarios.schema.sensor import Sensor
 from scenarios.schema.values import (
     Distribution,
     Fixed,
@@ -21,7 +22,6 @@ from scenarios.schema.values import (
     Pattern,
     Point,
     Positive,
-    Share,
     Value,
 )
 
@@ -31,141 +31,121 @@ SPACING = Distribution(normal=(0.75, 0.12), clip=(0.5, 1.2))
 
 
 class DoorSpec(Model):
-    """An opening in a wall."""
+    """A door: an opening in a wall."""
 
     at: Fixed = Field(description="middle of the opening, m; must lie on a wall")
     width: Positive = Field(1.2, description="m")
 
 
 class StairsSpec(Model):
-    """A flight of stairs: z rises from the line `foot` to `head`."""
+    """A flight of stairs; its height rises linearly from `foot` to `head`."""
 
     foot: Fixed = Field(description="middle of the lowest edge, m")
     head: Fixed = Field(description="middle of the highest edge, m")
-    width: Positive = Field(3.0, description="m across")
+    width: Positive = Field(3.0, description="width across, m")
     rise: float = Field(1.5, description="height of the head above the foot, m")
-    steps: Annotated[int, Field(ge=1)] = Field(10, description="number of steps, drawn and felt")
-    landing: NonNegative = Field(4.0, description="plateau behind the head, m")
+    steps: Annotated[int, Field(ge=1)] = Field(10, description="number of steps")
+    landing: NonNegative = Field(4.0, description="length of the level ground behind the head, m")
     slowdown: Annotated[float, Field(gt=0, le=1)] = Field(
         0.6, description="share of the walking speed kept on the stairs"
     )
 
 
 class WorldSpec(Model):
-    """What stands still."""
+    """The immobile parts of the scene: walls, pillars, stairs, doors, service points."""
 
     size: tuple[Positive, Positive] = Field((16.0, 10.0), description="extent in x and y, m")
-    walls: tuple[tuple[float, float, float, float], ...] = Field((), description="segments x1, y1, x2, y2, m")
-    pillars: tuple[tuple[float, float, Positive], ...] = Field((), description="x, y, radius, m")
+    walls: tuple[tuple[float, float, float, float], ...] = Field(
+        (), description="each wall: x1, y1, x2, y2 of its ends, m"
+    )
+    pillars: tuple[tuple[float, float, Positive], ...] = Field(
+        (), description="each pillar: x, y of its middle and radius, m"
+    )
     stairs: tuple[StairsSpec, ...] = Field((), description="flights of stairs")
     doors: tuple[DoorSpec, ...] = Field((), description="openings in walls")
     service: tuple[Fixed, ...] = Field((), description="service points (counters), m")
-    wall_height: Positive = Field(2.5, description="m")
-    pillar_height: Positive = Field(2.5, description="m")
+    wall_height: Positive = Field(2.5, description="height of the walls, m")
+    pillar_height: Positive = Field(2.5, description="height of the pillars, m")
 
 
 class CameraSpec(Model):
-    """Where the camera stands and what it delivers."""
+    """Place, direction and lens of the camera, size and rate of its images."""
 
     kind: Literal["pinhole", "top"] = Field("pinhole", description="perspective, or orthographic from above")
     image: tuple[Annotated[int, Field(ge=16, le=8192)], Annotated[int, Field(ge=16, le=8192)]] = Field(
-        (640, 480), description="width, height, px"
+        (640, 480), description="width and height of an image, px"
     )
     fps: Positive = Field(10.0, description="frames per second")
     focal_px: Positive = Field(500.0, description="focal length, px (pinhole)")
-    baseline: NonNegative = Field(0.12, description="distance of the right camera, m (pinhole)")
-    tilt_deg: Annotated[float, Field(ge=-30, le=90)] = Field(40.0, description="looks down by this; 90 = straight down")
+    baseline: NonNegative = Field(0.12, description="distance from the left to the right camera, m (pinhole)")
+    tilt_deg: Annotated[float, Field(ge=-30, le=90)] = Field(
+        40.0, description="angle by which the camera looks down; 90 = straight down"
+    )
     yaw_deg: float = Field(0.0, description="0 looks along +y, positive turns left")
-    px_per_m: Positive | None = Field(None, description="scale of kind top; solved where absent")
-    height: Positive | None = Field(None, description="height above the ground, m; solved where absent")
-    position: Fixed | None = Field(None, description="x, y, m; solved where absent")
-    crop: bool = Field(False, description="accept people who walk out of view")
-
-
-class LightSwitch(Model):
-    """The light changes at once: a lamp, a cloud."""
-
-    at: Value = Field(description="when, s")
-    gain: Value = Field(description="brightness from then on, times what it was; above 0")
-    ramp: NonNegative = Field(0.2, description="how long the change takes, s")
-
-
-class Light(Model):
-    """What falls on the scene, for pictures only."""
-
-    sun_azimuth_deg: Value = Field(
-        Distribution(uniform=(-180, 180)), description="where the light comes from; 0 = from +x, 90 = from +y"
+    px_per_m: Positive | None = Field(
+        None, description="scale, px per m (kind top); absent: chosen so that all people are in view"
     )
-    sun_elevation_deg: Value = Field(Distribution(uniform=(35, 60)), description="height of the sun above the ground")
-    shadow: Share = Field(0.3, description="how much darker the ground is in a cast shadow; 0 = no shadows")
-    penumbra: NonNegative = Field(0.05, description="width of a shadow's soft edge, m")
-    drift: NonNegative = Field(0.0, description="sd of slow changes of brightness, relative")
-    drift_time: Positive = Field(20.0, description="time constant of slow changes, s")
-    flicker: NonNegative = Field(0.0, description="sd of changes from frame to frame, relative")
-    cloud: Value = Field(0.0, description="sd of soft patches of brightness that pass over the ground, relative")
-    cloud_size: Positive = Field(8.0, description="size of these patches (correlation 0.6 so far apart), m")
-    cloud_speed: NonNegative = Field(1.0, description="how fast they pass, m/s")
-    switch: tuple[LightSwitch, ...] = Field((), description="sudden changes")
-
-
-class Picture(Model):
-    """What the camera makes of it, for pictures only."""
-
-    texture: Share = Field(0.5, description="contrast of the patterns on ground and walls")
-    noise: NonNegative = Field(
-        3.0, description="sd of the noise of each pixel and colour at grey level 128, grey levels"
+    height: Positive | None = Field(
+        None, description="height above the ground, m; absent: chosen so that all people are in view"
     )
-    shot: Share = Field(0.5, description="share of the noise's variance there that is in proportion to brightness")
-    blur_px: NonNegative = Field(0.6, description="sd of the blur, px")
-    jpeg: Annotated[int, Field(ge=0, le=100)] = Field(0, description="quality of lossy artefacts; 0 = none")
-    foliage: Value = Field(0.0, description="share of the image that plants cover, which wind moves; ground only")
-    sway_px: NonNegative = Field(1.5, description="sd of the plants' sway along each axis, px")
-    sway_time: Positive = Field(0.4, description="how long the sway stays alike (correlation 0.6), s")
+    position: Fixed | None = Field(
+        None, description="x, y of the camera, m; absent: chosen so that all people are in view"
+    )
+    crop: bool = Field(False, description="true accepts people who walk out of view; false makes that an error")
 
 
 class CrowdSpec(Model):
-    """How people walk; defaults are the measured ones (docs/realism.md)."""
+    """How people walk; the defaults are measured values (docs/realism.md)."""
 
-    free_speed: Value = Field(FREE_SPEED, description="walking speed of someone alone, m/s")
-    spacing: Value = Field(SPACING, description="distance of neighbours in a group, m")
+    free_speed: Value = Field(FREE_SPEED, description="walking speed of a person alone, m/s")
+    spacing: Value = Field(SPACING, description="distance between neighbours in a group, m")
     height: Value = Field(Distribution(normal=(1.70, 0.09), clip=(1.50, 1.95)), description="body height, m")
-    slowdown_per_member: NonNegative = Field(0.05, description="a group of n is slower by this times (n - 1), m/s")
+    slowdown_per_member: NonNegative = Field(
+        0.05, description="a group of n people is slower by this times (n - 1), m/s"
+    )
 
 
 class GroupSpec(Model):
-    """People who belong together from the start."""
+    """A group of people who belong together from the start; a person alone is a group of one."""
 
-    id: Name = Field(description="name in the script; repeat = n makes id-1 … id-n")
-    size: Value = Field(GROUP_SIZE, description="people; rounded")
-    start: Point = Field(description="middle of the group at the first frame or at `enter`, m")
-    goal: Point = Field(description="where to, m")
+    id: Name = Field(description="name in the script; repeat = n makes the groups id-1 … id-n")
+    size: Value = Field(GROUP_SIZE, description="number of people; rounded, at least 1")
+    start: Point = Field(description="middle of the group when it enters, m")
+    goal: Point = Field(description="point to which the group walks, m")
     via: tuple[Point, ...] = Field((), description="points to pass on the way")
-    speed: Value | None = Field(None, description="speed of the whole group, m/s; from its members where absent")
-    enter: Value = Field(0.0, description="s; 0 = present from the first frame")
-    at_goal: Literal["stand", "leave", "walk"] = Field(
-        "stand", description="stand: stay and converse; leave: out of the scene; walk: straight on"
+    speed: Value | None = Field(
+        None, description="speed of the whole group, m/s; absent: follows from its members' speeds"
     )
-    repeat: Annotated[int, Field(ge=1, le=5000)] = Field(1, description="so many groups, each drawn anew")
+    enter: Value = Field(0.0, description="time of entry, s; 0 = present from the first frame")
+    at_goal: Literal["stand", "leave", "walk"] = Field(
+        "stand",
+        description="at the goal: stand = stay in conversation, leave = leave the scene, walk = walk straight on",
+    )
+    repeat: Annotated[int, Field(ge=1, le=5000)] = Field(
+        1, description="number of such groups; each is drawn independently"
+    )
 
 
 class Reach(Model):
-    """A trigger: a group comes near a place."""
+    """A trigger: the middle of a group comes near a place."""
 
-    group: Name = Field(description="whose middle comes near")
-    at: Fixed | None = Field(None, description="m; the group's goal where absent")
-    radius: Positive = Field(1.0, description="m, from the group's middle")
+    group: Name = Field(description="name of the group")
+    at: Fixed | None = Field(None, description="the place, m; absent: the group's goal")
+    radius: Positive = Field(1.0, description="distance between the group's middle and the place, m")
 
 
 class When(Model):
-    """When an order fires: exactly one of time, reach, distance_lt, after; delay adds to any of them."""
+    """When an order fires: exactly one of time, reach, distance_lt, after, and a delay after it."""
 
-    time: Value | None = Field(None, description="s")
+    time: Value | None = Field(None, description="the order fires at this time, s")
     reach: Reach | None = None
     distance_lt: Positive | None = Field(
-        None, description="nearest members of the groups concerned closer than this, m"
+        None, description="the order fires when the nearest members of each two of its groups are closer than this, m"
     )
-    after: Name | None = Field(None, description="id of an order: when its rule has come true")
-    delay: Value = Field(0.0, description="s more")
+    after: Name | None = Field(
+        None, description="the order fires when the rule of the order with this id has come true"
+    )
+    delay: Value = Field(0.0, description="time between the trigger and the firing, s")
 
     @model_validator(mode="after")
     def _one_trigger(self) -> Self:
@@ -179,48 +159,55 @@ class SplitPart(Model):
     """One part of a group that splits."""
 
     id: Name = Field(description="name of the new group")
-    size: Annotated[int, Field(ge=1)] | None = Field(None, description="people; the rest, shared evenly, where absent")
-    goal: Point = Field(description="m")
+    size: Annotated[int, Field(ge=1)] | None = Field(
+        None, description="number of people; absent: an equal share of those left over"
+    )
+    goal: Point = Field(description="point to which the part walks, m")
     via: tuple[Point, ...] = Field((), description="points to pass on the way")
     at_goal: Literal["stand", "leave", "walk"] = Field("stand", description="as for groups")
 
 
 class MergeOrder(Model):
-    """Groups become one."""
+    """An order: groups become one."""
 
     id: Name = Field(description="name of the order")
-    type: Literal["merge"] = Field(description="groups become one")
-    groups: Annotated[tuple[Name, ...], Field(min_length=2)] = Field(description="who become one")
+    type: Literal["merge"] = Field(description="several groups become one")
+    groups: Annotated[tuple[Name, ...], Field(min_length=2)] = Field(description="names of the groups that become one")
     into: Name = Field(description="name of the new group")
-    goal: Point | Literal["meet"] = Field("meet", description='m; "meet": where they meet, to stand and converse')
+    goal: Point | Literal["meet"] = Field(
+        "meet",
+        description='point to which the new group walks, m; "meet": it stands in conversation where the groups meet',
+    )
     via: tuple[Point, ...] = Field((), description="points to pass on the way")
     at_goal: Literal["stand", "leave", "walk"] = Field("stand", description="as for groups")
     when: When
 
 
 class SplitOrder(Model):
-    """A group falls into parts."""
+    """An order: a group divides into parts."""
 
     id: Name = Field(description="name of the order")
-    type: Literal["split"] = Field(description="a group falls into parts")
-    group: Name = Field(description="which group parts")
+    type: Literal["split"] = Field(description="a group divides into parts")
+    group: Name = Field(description="name of the group that divides")
     parts: Annotated[tuple[SplitPart, ...], Field(min_length=2)]
     when: When
 
 
 class QueueOrder(Model):
-    """Groups line up, are served one group after the other, and walk on."""
+    """An order: groups line up at a point, are served one group after the other, and walk on."""
 
     id: Name = Field(description="name of the order")
     type: Literal["queue"] = Field(description="groups line up and are served one by one")
     groups: Annotated[tuple[Pattern, ...], Field(min_length=1)] = Field(
-        description="who lines up; `g-*` for all of a repeat"
+        description="names of the groups that line up; `g-*` stands for all groups whose name begins with `g-`"
     )
-    at: Fixed = Field(description="the head's place, m")
-    direction_deg: float = Field(0.0, description="from the head to the tail; 0 = +x, 90 = +y")
-    spacing: Annotated[float, Field(ge=0.5, le=1.4)] = Field(0.8, description="m")
-    service: Value = Field(Distribution(exponential=3.0), description="s per group")
-    goal: Point | None = Field(None, description="where the served walk to; their own goal where absent")
+    at: Fixed = Field(description="place of the first person in the queue, m")
+    direction_deg: float = Field(0.0, description="direction from the head to the tail of the queue; 0 = +x, 90 = +y")
+    spacing: Annotated[float, Field(ge=0.5, le=1.4)] = Field(
+        0.8, description="distance between neighbours in the queue, m"
+    )
+    service: Value = Field(Distribution(exponential=3.0), description="time for which each group is served, s")
+    goal: Point | None = Field(None, description="point to which groups walk after service, m; absent: their own goal")
     at_goal: Literal["stand", "leave", "walk"] = Field("leave", description="as for groups")
     when: When
 
@@ -229,20 +216,22 @@ ScriptOrder = Annotated[MergeOrder | SplitOrder | QueueOrder, Field(discriminato
 
 
 class Scenario(Model):
-    """A whole scenario. `extends` is resolved by scenarios.loading.resolve; what is stored is always the resolved
-    form.
-    """
+    """A whole scenario after `extends` (scenarios.loading.toml_files) has been applied: the form that is stored."""
 
-    schema_: Literal[1] = Field(alias="schema", description="version of this form")
-    name: Name = Field("scenario", description="name of sequences made from it; the file's name where absent")
-    about: str = Field("", description="one line: the phenomenon, and whose claim it tests")
+    schema_: Literal[1] = Field(alias="schema", description="version of the file format")
+    name: Name = Field("scenario", description="name of the sequences made from it; absent: the file's name")
+    about: str = Field("", description="one line: what happens, and whose claim it tests")
     duration: Annotated[float, Field(gt=0, le=3600)] = Field(20.0, description="recorded time, s")
     warmup: Annotated[float, Field(ge=0, le=60)] = Field(2.0, description="unrecorded time before the first frame, s")
-    turn_deg: Value = Field(0.0, description="turns the whole script (not walls) about the world's middle")
-    lead: Value = Field(
-        0.0, description="s; how much further on their way all who walk start (negative: back), one draw for all"
+    turn_deg: Value = Field(
+        0.0, description="angle by which the script, but not the world, is turned about the middle of the world"
     )
-    mirror: bool = Field(False, description="a coin decides whether the script is mirrored left to right")
+    lead: Value = Field(
+        0.0,
+        description="time by which all walking groups start further on along their way (negative: further "
+        "back), s; one draw for all",
+    )
+    mirror: bool = Field(False, description="true: with probability 0.5 the script is mirrored left to right")
     world: WorldSpec = WorldSpec()
     camera: CameraSpec = CameraSpec()
     sensor: Sensor = Sensor()
@@ -254,10 +243,10 @@ class Scenario(Model):
 
 
 def group_names(group: GroupSpec) -> list[str]:
-    """The names a `repeat` makes: id, or id-1 … id-n."""
+    """Returns the names of the groups that an entry makes: its id, or id-1 … id-n where `repeat` is n > 1."""
     return [group.id] if group.repeat == 1 else [f"{group.id}-{k + 1}" for k in range(group.repeat)]
 
 
 def expand(pattern: str, names: list[str]) -> list[str]:
-    """`g-*` as all names that begin with `g-`; any other name as itself."""
+    """Returns all names that begin with `g-` for the pattern `g-*`, and a name without `*` as it is."""
     return [n for n in names if n.startswith(pattern[:-1])] if pattern.endswith("*") else [pattern]

@@ -1,7 +1,7 @@
-"""The `[sensor]` table: how the detector behind det/det.txt errs.
+"""The `[sensor]` table: the errors of the synthetic detector that makes det/det.txt.
 
-The keys from `by_visibility` on are a detector's measured profile (`flockscope fit sensor`); they are absent where
-nothing was measured, and then do nothing.
+The keys from `by_visibility` on are the measured profile of a detector (`flockscope fit sensor`). They are absent where
+nothing was measured; the simpler keys above them then apply.
 """
 
 from __future__ import annotations
@@ -18,36 +18,44 @@ Spread = tuple[float, NonNegative]
 
 
 class Hide(Model):
-    """Artificial occlusion: nothing is detected of these people in this window."""
+    """Artificial occlusion: some people, or all, are not detected for a while."""
 
-    start: NonNegative = Field(description="s")
-    end: NonNegative = Field(description="s")
-    group: Name | None = Field(None, description="people of this script group; everybody where absent")
+    start: NonNegative = Field(description="start of the occlusion, s")
+    end: NonNegative = Field(description="end of the occlusion, s")
+    group: Name | None = Field(None, description="name of the group in the script; absent: all people")
 
 
 class Memory(Model):
-    """A part of an error that stays alike for a while."""
+    """A part of an error that changes slowly from frame to frame."""
 
-    share: Share = Field(description="of the error's variance")
-    time: Positive = Field(description="its correlation falls to 0.37 after so long, s")
+    share: Share = Field(description="share of the error's variance")
+    time: Positive = Field(description="time after which the correlation of this part is 0.37, s")
 
 
 Memories = tuple[Memory, ...]
 
 
 class BoxNoise(Model):
-    """Errors of boxes in proportion to their size: [mean, sd] each, in heights of the box."""
+    """Errors of boxes that are proportional to the box height: [mean, standard deviation] each."""
 
-    across: Spread = Field((0.0, 0.0), description="of the middle, to the right: mean, sd; box heights")
-    foot: Spread = Field((0.0, 0.0), description="of the lower edge, downwards: mean, sd; box heights")
-    top: Spread = Field((0.0, 0.0), description="of the upper edge, downwards: mean, sd; box heights")
-    width: Spread = Field((0.0, 0.0), description="of the width's logarithm: mean, sd")
-    occluded: NonNegative = Field(0.0, description="each sd times 1 + this times the hidden share")
+    across: Spread = Field(
+        (0.0, 0.0), description="error of the middle, to the right: mean, standard deviation; box heights"
+    )
+    foot: Spread = Field(
+        (0.0, 0.0), description="error of the lower edge, downwards: mean, standard deviation; box heights"
+    )
+    top: Spread = Field(
+        (0.0, 0.0), description="error of the upper edge, downwards: mean, standard deviation; box heights"
+    )
+    width: Spread = Field((0.0, 0.0), description="error of the logarithm of the width: mean, standard deviation")
+    occluded: NonNegative = Field(
+        0.0, description="each standard deviation is multiplied by 1 + this times the hidden share of the box"
+    )
     tails: Annotated[float, Field(ge=0, le=30)] = Field(
-        0.0, description="excess kurtosis: Student's t of 4 + 6 / this degrees of freedom; 0 = normal"
+        0.0, description="excess kurtosis k of the errors: Student's t with 4 + 6 / k degrees of freedom; 0 = normal"
     )
     memory: Memories | None = Field(
-        None, description="parts of these errors that stay alike; the rest is new each frame"
+        None, description="parts of these errors that change slowly; the rest is drawn anew in each frame"
     )
 
     @model_validator(mode="after")
@@ -57,50 +65,87 @@ class BoxNoise(Model):
 
 
 class FalseAlarms(Model):
-    """False alarms that stay for a while, some of them at people."""
+    """False alarms that last, some of them attached to people."""
 
-    life: NonNegative = Field(0.0, description="how long one stays (mean), s; 0 = a frame")
-    seen: Annotated[float, Field(gt=0, le=1)] = Field(1.0, description="chance of a frame to show one that stays")
-    near: Share = Field(0.0, description="share that sticks to a person: parts of bodies, doubles")
-    across: Spread = Field((0.0, 0.3), description="middle of those beside the person's: mean, sd; box heights")
-    foot: Spread = Field((0.0, 0.2), description="lower edge of those below the person's: mean, sd; box heights")
-    near_height: Spread = Field((0.0, 0.3), description="logarithm of their height over the person's: mean, sd")
-    height: Spread = Field((0.0, 0.2), description="of all others, over that of a person standing there; logarithm")
-    aspect: Spread = Field((-0.9, 0.2), description="logarithm of width over height, of all: mean, sd")
-    drift: NonNegative = Field(0.0, description="sd of the others' velocity along each axis, box heights per s")
-    jitter: NonNegative = Field(0.0, description="sd of each edge from frame to frame, box heights")
+    life: NonNegative = Field(0.0, description="mean life of a false alarm, s; 0 = one frame")
+    seen: Annotated[float, Field(gt=0, le=1)] = Field(
+        1.0, description="probability that a living false alarm is detected in a frame"
+    )
+    near: Share = Field(0.0, description="share of false alarms that move with a person (parts of a body, duplicates)")
+    across: Spread = Field(
+        (0.0, 0.3),
+        description="those at a person: middle relative to the person's middle: mean, standard deviation; box heights",
+    )
+    foot: Spread = Field(
+        (0.0, 0.2),
+        description="those at a person: lower edge below the person's lower edge: mean, standard deviation; "
+        "box heights",
+    )
+    near_height: Spread = Field(
+        (0.0, 0.3),
+        description="those at a person: logarithm of the height relative to the person's: mean, standard deviation",
+    )
+    height: Spread = Field(
+        (0.0, 0.2),
+        description="all others: logarithm of the height relative to that of a person standing there: mean, "
+        "standard deviation",
+    )
+    aspect: Spread = Field((-0.9, 0.2), description="all: logarithm of width / height: mean, standard deviation")
+    drift: NonNegative = Field(
+        0.0, description="all others: standard deviation of the velocity along each axis, box heights per s"
+    )
+    jitter: NonNegative = Field(
+        0.0, description="all: standard deviation of each edge from frame to frame, box heights"
+    )
     at: tuple[tuple[Share, Share], ...] | None = Field(
-        None, description="where the others' feet are: x, y from the ground's furthest row on; everywhere where absent"
+        None,
+        description="all others: possible foot points x, y as shares of image width and of the rows below the "
+        "ground's furthest row; absent: anywhere",
     )
 
 
 class Sensor(Model):
-    """The point and box sensor behind det/det.txt."""
+    """The synthetic detector that makes the points and boxes of det/det.txt."""
 
-    detect_prob: Share = Field(0.95, description="chance that a fully visible person of usual size is detected")
-    clutter_rate: NonNegative = Field(0.3, description="false alarms per frame, Poisson")
-    noise_px: NonNegative = Field(1.5, description="sd of each edge of a box, px")
-    noise_m: NonNegative = Field(0.05, description="sd of points on the ground, per axis, m")
-    box: Literal["visible", "amodal"] = Field("visible", description="visible: occlusion moves foot points")
-    occlusion_power: NonNegative = Field(1.0, description="detection chance times visibility to this power")
-    min_visibility: Share = Field(0.2, description="less visible people are never detected")
-    small_px: NonNegative = Field(12.0, description="box height at which detection is half as likely; 0 = no effect")
+    detect_prob: Share = Field(0.95, description="probability that a fully visible person of usual size is detected")
+    clutter_rate: NonNegative = Field(0.3, description="mean number of false alarms per frame (Poisson)")
+    noise_px: NonNegative = Field(1.5, description="standard deviation of each edge of a box, px")
+    noise_m: NonNegative = Field(0.05, description="standard deviation of points on the ground along each axis, m")
+    box: Literal["visible", "amodal"] = Field(
+        "visible",
+        description="visible: boxes of the visible parts, so that occlusion moves foot points; amodal: boxes "
+        "of whole people",
+    )
+    occlusion_power: NonNegative = Field(
+        1.0, description="the probability of detection is multiplied by the visibility to this power"
+    )
+    min_visibility: Share = Field(0.2, description="people who are less visible are never detected")
+    small_px: NonNegative = Field(
+        12.0, description="box height at which the probability of detection is halved, px; 0 = no effect"
+    )
     persistence: Share = Field(0.0, description="correlation of misses from frame to frame")
     hide: tuple[Hide, ...] = Field((), description="artificial occlusions")
     by_visibility: Curve | None = Field(
-        None, description="detection chance times this, at evenly spaced visibilities from 0 to 1; for occlusion_power"
+        None,
+        description="factors of the probability of detection at evenly spaced visibilities from 0 to 1; "
+        "replaces occlusion_power",
     )
     miss_memory: Memories | None = Field(
-        None, description="how alike a person's luck stays from frame to frame; for persistence"
+        None, description="parts of the misses of a person that change slowly; replaces persistence"
     )
-    box_noise: BoxNoise | None = Field(None, description="errors in proportion to the box; for noise_px")
+    box_noise: BoxNoise | None = Field(None, description="errors proportional to the box height; replaces noise_px")
     points: Literal["own", "foot"] | None = Field(
         None,
-        description="foot: points on the ground lie under the noisy box's lower edge; own: noise_m around the truth",
+        description="points on the ground: foot = below the lower edge of the noisy box, own = true position "
+        "with noise_m",
     )
-    false_alarms: FalseAlarms | None = Field(None, description="how clutter stays, where and how large it is")
-    true_scores: Curve | None = Field(None, description="evenly spaced quantiles of true detections' scores, 0 to 1")
-    false_scores: Curve | None = Field(None, description="evenly spaced quantiles of false alarms' scores, 0 to 1")
+    false_alarms: FalseAlarms | None = Field(None, description="life, places and sizes of false alarms")
+    true_scores: Curve | None = Field(
+        None, description="evenly spaced quantiles of the scores of true detections, 0 to 1"
+    )
+    false_scores: Curve | None = Field(
+        None, description="evenly spaced quantiles of the scores of false alarms, 0 to 1"
+    )
 
     @model_validator(mode="after")
     def _consistent(self) -> Self:
@@ -108,11 +153,12 @@ class Sensor(Model):
             raise ValueError("either miss_memory or persistence, not both")
         for scores in (self.true_scores, self.false_scores):
             if scores is not None and any(b < a for a, b in pairwise(scores)):
-                raise ValueError("quantiles that do not fall")
+                raise ValueError("quantiles that do not decrease")
         _check_shares(self.miss_memory)
         return self
 
 
 def _check_shares(memory: Memories | None) -> None:
+    """Raises ValueError if the shares add up to more than 1."""
     if sum(part.share for part in memory or ()) > 1 + 1e-9:
-        raise ValueError("shares of at most 1 together")
+        raise ValueError("shares whose sum is at most 1")

@@ -1,8 +1,9 @@
-"""Values that may be a number or a distribution, as scenario files write them.
+"""The kinds of values in a scenario file: numbers, names, points, distributions; and the base class of its tables.
 
-`1.2` · `{ normal = [1.34, 0.26], clip = [0.5, 2.2] }` · `{ uniform = [0, 5] }` · `{ exponential = 3.0 }` ·
-`{ poisson = 1.1, clip = [1, 6] }` · `{ choice = [-1, 1] }`. `clip` redraws until the value lies inside (both ends
-included), so that a clipped distribution has no spikes at its ends.
+A value is a number, such as `1.2`, or a distribution: `{ normal = [1.34, 0.26], clip = [0.5, 2.2] }` (mean, standard
+deviation), `{ uniform = [0, 5] }` (bounds), `{ exponential = 3.0 }` (mean), `{ poisson = 1.1, clip = [1, 6] }` (mean)
+or `{ choice = [-1, 1] }` (each entry with equal probability). `clip` draws again until the value lies between its
+bounds, both included.
 """
 
 from __future__ import annotations
@@ -24,13 +25,13 @@ Fixed = tuple[float, float]
 
 
 class Model(BaseModel):
-    """Frozen, strict about keys, no infinities."""
+    """Base class of all tables: frozen; unknown keys, infinite numbers and nan are errors."""
 
     model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False, populate_by_name=True)
 
 
 class Distribution(BaseModel):
-    """One of five distributions; exactly one key besides `clip`."""
+    """One of five distributions: exactly one of the keys besides `clip` is given."""
 
     model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
 
@@ -49,9 +50,9 @@ class Distribution(BaseModel):
                 f"a distribution has exactly one of normal, uniform, exponential, poisson, choice, not {kinds}"
             )
         if self.clip is not None and self.clip[0] > self.clip[1]:
-            raise ValueError("clip wants [low, high] with low <= high")
+            raise ValueError("clip = [low, high] with low <= high")
         if self.uniform is not None and self.uniform[0] > self.uniform[1]:
-            raise ValueError("uniform wants [low, high] with low <= high")
+            raise ValueError("uniform = [low, high] with low <= high")
         return self
 
     def _draw(self, rng: np.random.Generator) -> float:
@@ -67,7 +68,7 @@ class Distribution(BaseModel):
         return self.choice[int(rng.integers(len(self.choice)))]
 
     def draw(self, rng: np.random.Generator) -> float:
-        """One value; ValueError where `clip` leaves nothing in MAX_REDRAWS draws."""
+        """Returns one value. Raises ValueError if none of MAX_REDRAWS draws lies within `clip`."""
         for _ in range(MAX_REDRAWS):
             value = self._draw(rng)
             if self.clip is None or self.clip[0] <= value <= self.clip[1]:
@@ -80,12 +81,12 @@ Point = tuple[Value, Value]
 
 
 def draw(value: Value, rng: np.random.Generator) -> float:
-    """The number, or one draw of the distribution."""
+    """Returns the number, or one draw of the distribution."""
     return value.draw(rng) if isinstance(value, Distribution) else float(value)
 
 
 def bounds(value: Value) -> tuple[float, float]:
-    """The least and greatest number that a value can draw; infinite where nothing bounds it."""
+    """Returns the least and greatest number that a value can take; -inf or inf where there is no bound."""
     if not isinstance(value, Distribution):
         return float(value), float(value)
     if value.uniform is not None:
@@ -98,6 +99,6 @@ def bounds(value: Value) -> tuple[float, float]:
 
 
 def fixed(point: Point) -> tuple[float, float] | None:
-    """The point where it is two numbers, None where anything is drawn."""
+    """Returns the point if both coordinates are numbers, None if one is a distribution."""
     x, y = point
     return None if isinstance(x, Distribution) or isinstance(y, Distribution) else (float(x), float(y))

@@ -17,7 +17,7 @@ from sim.scene.raycast import GROUND, NOTHING, PILLAR, WALL, PixelRays, Solids, 
 from sim.types import Array, Camera, Ints, Motion
 
 if TYPE_CHECKING:
-    from scenarios.schema.scenario import Picture
+    from scenarios.schema.picture import Picture
     from sim.render.foliage import Foliage
 
 NODES = 16  # px between the places at which clouds and wind are asked for; linear between them

@@ -19,7 +19,7 @@ from sim.scene.raycast import pixel_rays, signed_scale, solids_of
 from sim.types import Camera, Scene
 
 if TYPE_CHECKING:
-    from scenarios.schema.scenario import Picture
+    from scenarios.schema.picture import Picture
 
 EVERY = 4  # px between the samples that decide where plants grow
 TOGETHER = 1.5  # m over which plants sway alike

@@ -18,7 +18,7 @@ from sim.rng import rng
 from sim.types import Array
 
 if TYPE_CHECKING:
-    from scenarios.schema.scenario import Light
+    from scenarios.schema.picture import Light
 
 SUN, DRIFT, FLICKER, SWITCH, CLOUD = range(5)  # keys of the role "light"
 

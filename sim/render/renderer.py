@@ -29,7 +29,7 @@ from sim.scene import camera as cameras
 from sim.types import BACKGROUNDS, Camera, Frame, Image, Motion, PixelTruth
 
 if TYPE_CHECKING:
-    from scenarios.schema.scenario import Light, Picture
+    from scenarios.schema.picture import Light, Picture
 
 LEFT, RIGHT = 0, 1
 
@@ -219,9 +219,9 @@ def stage(motion: Motion, camera: Camera, light: Light | None = None, picture: P
 
     InputError where the camera's lens distorts.
     """
-    from scenarios.schema import scenario
+    from scenarios.schema.picture import Light, Picture
 
-    return Stage(motion, camera, light or scenario.Light(), picture or scenario.Picture())
+    return Stage(motion, camera, light or Light(), picture or Picture())
 
 
 def render(

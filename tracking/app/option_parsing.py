@@ -91,9 +91,9 @@ def toml_values(texts: Iterable[str]) -> dict[str, Any]:
 
     Raises InputError for a value that is neither.
     """
-    from scenarios.loading.overrides import parse
+    from scenarios.loading.overrides import parse_setting
 
-    return {".".join(steps): value for steps, value in map(parse, texts)}
+    return {".".join(steps): value for steps, value in map(parse_setting, texts)}
 
 
 def output_file(out: Path, suffix: str) -> Path:

@@ -88,7 +88,7 @@ def _files(name: str) -> list[str]:
     bare = name.removeprefix("suite:")
     if bare != name or (bare in toml_files.suite_names() and bare not in toml_files.names()) or _is_suite(bare):
         path = suite.find_suite(bare)
-        return [str(toml_files.find(line.scenario, beside=path.parent).resolve()) for line in suite.lines(path)]
+        return [str(toml_files.find(line.scenario, beside=path.parent).resolve()) for line in suite.read_entries(path)]
     return [str(toml_files.find(bare).resolve())]
 
 

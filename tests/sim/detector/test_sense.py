@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from scenarios.errors import InputError
-from scenarios.schema.scenario import Hide, Sensor
+from scenarios.schema.sensor import Hide, Sensor
 from sim.detector.clutter import false_alarm_counts
 from sim.detector.sense import detection_probability, sense
 from sim.truth.label import bodies

@@ -7,7 +7,7 @@ import pytest
 from scipy.ndimage import binary_dilation, map_coordinates
 
 from scenarios.errors import InputError
-from scenarios.schema.scenario import Light, Picture
+from scenarios.schema.picture import Light, Picture
 from sim.hashing import canonical_hash
 from sim.render.camera_view import NODES
 from sim.render.illumination import illuminate

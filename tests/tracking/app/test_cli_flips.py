@@ -11,7 +11,7 @@ import pytest
 import typer
 
 from scenarios.errors import InputError
-from scenarios.loading.overrides import apply
+from scenarios.loading.overrides import apply_settings
 from scenarios.loading.validation import validate
 from scenarios.schema.scenario import Scenario
 from sim.io.store.sequence_folder import sequence_files
@@ -204,7 +204,7 @@ def output(settings: str, seed: int) -> dict[str, bytes] | str:
     from sim.crowd.world import run as simulate
     from sim.sequence import observe
 
-    table, places = apply({"name": "flip", **tomllib.loads(SCENE)}, settings.split(";") if settings else [])
+    table, places = apply_settings({"name": "flip", **tomllib.loads(SCENE)}, settings.split(";") if settings else [])
     try:
         scenario = validate(table, "flip.toml", places, model=Scenario)
         sequence = observe(scenario, simulate(scenario, seed), check=False)
@@ -254,7 +254,7 @@ def picture_scenario(settings: str):
     few = {**tomllib.loads(SCENE.partition("group = [")[0]), "name": "flip", "duration": 2.0}
     few |= {"group": [{"id": "a", "size": 3, "start": [4, 4], "goal": [12, 4]}]}
     few["camera"]["image"] = [160, 120]
-    table, places = apply(few, settings.split(";") if settings else [])
+    table, places = apply_settings(few, settings.split(";") if settings else [])
     return validate(table, "flip.toml", places, model=Scenario)
 
 
