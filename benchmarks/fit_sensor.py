@@ -26,9 +26,9 @@ from sim.io.source import open_source
 from sim.sequence import simulate
 from sim.types import Detections, Truth
 from sim.types import Sequence as Recording
-from tracking.fitting.matching import Matched, match, match_sequence
+from tracking.fitting.detection_matching import MatchedRecording, match, match_sequence
+from tracking.fitting.error_statistics import simulated_detections, statistics
 from tracking.fitting.sensor import fit
-from tracking.fitting.statistics import again, statistics
 
 RECORDINGS = ("mot/PETS09-S2L1-first200", "mot/TUD-Campus")
 SCENES = ("merge", "street")
@@ -37,7 +37,7 @@ SEEDS = range(SEED, SEED + 4)  # of scenes
 LOW, HIGH = 0.05, 0.95
 
 
-def part(recording: Recording, first: int, last: int, size: tuple[int, int]) -> Matched:
+def part(recording: Recording, first: int, last: int, size: tuple[int, int]) -> MatchedRecording:
     """Frames first … last of a recording, as one of its own."""
     truth = recording.truth
     assert truth is not None
@@ -53,11 +53,11 @@ def part(recording: Recording, first: int, last: int, size: tuple[int, int]) -> 
     return match(short, found, size, recording.camera)
 
 
-def table(second: Matched, profiles: dict[str, Sensor], draws: int) -> dict[str, dict[str, object]]:
+def table(second: MatchedRecording, profiles: dict[str, Sensor], draws: int) -> dict[str, dict[str, object]]:
     """Each statistic: `measured`, and by profile the mean and the limits of its draws."""
     rows: dict[str, dict[str, object]] = {name: {"measured": v} for name, v in statistics([second]).items()}
     for profile, sensor in profiles.items():
-        made = [statistics([again(second, sensor, SEED + k)]) for k in range(draws)]
+        made = [statistics([simulated_detections(second, sensor, SEED + k)]) for k in range(draws)]
         for name, row in rows.items():
             v = np.array([m[name] for m in made])
             v = v[np.isfinite(v)]

@@ -22,8 +22,8 @@ from sim.geometry.polygons import gap_pairs, pack
 from sim.truth.encounters import CROSS_GAP
 from sim.types import Array, Groups, Ints, Tracks, Truth
 from tracking.scoring.evaluation import labelled_frames, plane_of
-from tracking.scoring.groups import hull_pairs, matched, shared_members
-from tracking.scoring.rows import crowd, people_inside, true_people
+from tracking.scoring.group_scores import hull_pairs, matched_groups, shared_members
+from tracking.scoring.people_and_groups import group_rows, people_inside, true_people
 
 SECOND = 1.0
 NEVER = (2**31, 0)
@@ -94,17 +94,17 @@ class Match:
         assert groups is not None
         frames = labelled_frames(truth)
         people, index = true_people(truth, frames), np.flatnonzero(frames)
-        places = people.places("image" if image else "ground", "ground")
+        places = people.positions_on("image" if image else "ground", "ground")
         assert places is not None
-        true = crowd(index, [groups[f - 1] for f in index.tolist()], people.rows)
+        true = group_rows(index, [groups[f - 1] for f in index.tolist()], people.rows)
         told = [(t.index, t.groups) for t in tracks if frames[t.index] and t.groups is not None]
-        est = crowd(np.array([f for f, _ in told], np.int64), [g for _, g in told], people.rows)
+        est = group_rows(np.array([f for f, _ in told], np.int64), [g for _, g in told], people.rows)
         est = people_inside(est, people.rows, places, scale)
         est = est.keep(est.count != 1)
-        pairs = matched(true, est, hull_pairs(true, est))
+        pairs = matched_groups(true.pos, est.pos, hull_pairs(true, est))
         key = list(zip(true.rows.frame.tolist(), true.rows.id.tolist(), strict=True))
         self.id = {key[i]: g for i, g in zip(pairs.i.tolist(), est.rows.id[pairs.j].tolist(), strict=True)}
-        shared = shared_members(true, est, est.who, len(people.rows))
+        shared = shared_members(true, est, est.member, len(people.rows))
         i, j = np.divmod(shared.key, max(shared.width, 1))
         most = 2 * shared.count > true.count[i]
         self.held: dict[tuple[int, int], set[int]] = {}

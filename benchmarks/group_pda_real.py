@@ -25,9 +25,9 @@ from tracking.app.pictures.overlay import write_overlay
 from tracking.grouping.grouped_tracks import with_groups
 from tracking.run import track
 from tracking.scoring import evaluate
-from tracking.scoring.block_resampling import scorer
+from tracking.scoring.block_resampling import resampled_scorer
 from tracking.scoring.catalogue import CATALOGUE
-from tracking.scoring.rows import INSIDE
+from tracking.scoring.people_and_groups import INSIDE
 from tracking.stats import moving_blocks
 from tracking.tuning.grouping_episodes import people_as_tracks
 
@@ -85,7 +85,7 @@ def blocks(truth: Truth, answers: Sequence[Tracks], keys: Sequence[str]) -> list
     """Value, low and high of each score; counts have no interval (a drawn recording has other frames)."""
     every = list(CATALOGUE)
     at = [every.index(key) for key in keys]
-    draw = scorer(truth, answers, None, "hull")
+    draw = resampled_scorer(truth, answers, None, "hull")
 
     def score(places: Ints) -> Array:
         return draw(places)[at]

@@ -20,16 +20,17 @@ from pathlib import Path
 import numpy as np
 
 from sim.io.formats.mot_text import read_table
+from tracking.scoring.candidate_pairs import Pairs, box_pairs, point_pairs
 from tracking.scoring.clear import clear
+from tracking.scoring.evaluation import people_scores
 from tracking.scoring.hota import hota
 from tracking.scoring.identity import identity
-from tracking.scoring.individuals import scores
-from tracking.scoring.similarity import Pairs, Rows, box_pairs, point_pairs
+from tracking.scoring.rows import FrameRows
 
 REACH = 2.0  # m
 TOLERANCE = 1e-6
 RENAMED = {"TP": "CLR_TP", "FN": "CLR_FN", "FP": "CLR_FP"}
-Side = tuple[Rows, np.ndarray]
+Side = tuple[FrameRows, np.ndarray]
 
 
 def crowd(frames: int, people: int, r: np.random.Generator, grid: float = 0.0) -> tuple[Side, Side]:
@@ -49,10 +50,10 @@ def crowd(frames: int, people: int, r: np.random.Generator, grid: float = 0.0) -
         for side, i, pos in ((true, np.arange(people), place), (est, ids, told)):
             side.append((np.full(len(i), frame), i, np.round(pos / grid) * grid if grid else pos))
     stacked = [[np.concatenate(column) for column in zip(*side, strict=True)] for side in (true, est)]
-    return tuple((Rows(frame, ids), pos) for frame, ids, pos in stacked)
+    return tuple((FrameRows(frame, ids), pos) for frame, ids, pos in stacked)
 
 
-def table(rows: Rows, other: Rows, i: np.ndarray, j: np.ndarray, s: np.ndarray, frame: int) -> np.ndarray:
+def table(rows: FrameRows, other: FrameRows, i: np.ndarray, j: np.ndarray, s: np.ndarray, frame: int) -> np.ndarray:
     """Similarity of all rows of a frame, from pairs (i, j, s) of that frame."""
     first, other_first = np.searchsorted(rows.frame, frame), np.searchsorted(other.frame, frame)
     shape = np.searchsorted(rows.frame, frame + 1) - first, np.searchsorted(other.frame, frame + 1) - other_first
@@ -90,7 +91,7 @@ def families():
 def difference(pairs: Pairs, theirs: list[dict]) -> float:
     """The greatest difference of any score that both have."""
     found = {k: v for answer in theirs for k, v in answer.items()}
-    return max(abs(v - float(np.mean(found[RENAMED.get(k, k)]))) for k, v in scores(pairs).items())
+    return max(abs(v - float(np.mean(found[RENAMED.get(k, k)]))) for k, v in people_scores(pairs).items())
 
 
 def clocked(calls: dict, repeat: int) -> dict[str, float]:
@@ -111,7 +112,7 @@ def speed(args: argparse.Namespace) -> None:
     fresh = lambda: Pairs(pairs.true, pairs.est, pairs.i, pairs.j, pairs.s)  # noqa: E731  nothing kept from the last run
     best = clocked(
         {
-            "ours": lambda: scores(point_pairs(true, est, place, told, REACH)),
+            "ours": lambda: people_scores(point_pairs(true, est, place, told, REACH)),
             "TrackEval": lambda: [peer.eval_sequence(data) for peer in peers],
             "pairs": lambda: point_pairs(true, est, place, told, REACH),
             **{f.__name__: lambda f=f: f(fresh()) for f in (hota, clear, identity)},
@@ -129,7 +130,10 @@ def recordings(data: Path):
         gt, det = (read_table(folder / kind / f"{kind}.txt") for kind in ("gt", "det"))
         a, b = (np.argsort(t.frame, kind="stable") for t in (gt, det))
         number = np.arange(len(b)) - np.searchsorted(det.frame[b], det.frame[b])
-        yield folder.name, box_pairs(Rows(gt.frame[a], gt.id[a]), Rows(det.frame[b], number), gt.box[a], det.box[b])
+        yield (
+            folder.name,
+            box_pairs(FrameRows(gt.frame[a], gt.id[a]), FrameRows(det.frame[b], number), gt.box[a], det.box[b]),
+        )
 
 
 def main() -> int:

@@ -31,7 +31,7 @@ from tracking.config import Config
 from tracking.environment.episode_cache import Held
 from tracking.environment.episodes import streams_for
 from tracking.episode_source import Source, sources
-from tracking.objective import Judge
+from tracking.objective import ObjectiveScorer
 from tracking.parameter_space import decode, encode, space_of
 from tracking.prepare import PreparedTracker, prepare
 from tracking.stats import bootstrap, paired
@@ -93,7 +93,9 @@ def change(base: Config, config: Config) -> str:
     return ", ".join(f"{name}={b:.3g}" if isinstance(b, float) else f"{name}={b}" for (name, a), b in rows if a != b)
 
 
-def go(state: State, config: Config, frames: Sequence[Frame], ready: PreparedTracker, judge: Judge) -> State | None:
+def go(
+    state: State, config: Config, frames: Sequence[Frame], ready: PreparedTracker, judge: ObjectiveScorer
+) -> State | None:
     """The state after these frames with this config; None where the tracker refuses it there."""
     shared: list[Any] = [ready.context, ready.context.background, ready.context.camera]
     tracker = copy.deepcopy(state.tracker, {id(one): one for one in shared if one is not None})
@@ -106,7 +108,7 @@ def go(state: State, config: Config, frames: Sequence[Frame], ready: PreparedTra
     return State(tracker, there.history, answers, objective(there, judge, answers))
 
 
-def objective(ready: PreparedTracker, judge: Judge, answers: list[Tracks]) -> float:
+def objective(ready: PreparedTracker, judge: ObjectiveScorer, answers: list[Tracks]) -> float:
     """Of the frames so far; 0 where they hold nothing to score."""
     found = judge.scores(answers, ready.px_per_m(answers))["objective"]
     return found if np.isfinite(found) else 0.0

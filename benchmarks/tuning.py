@@ -38,7 +38,7 @@ from tracking.environment.episodes import Episode, Source
 from tracking.grouping.grouped_tracks import derive
 from tracking.grouping.link_rule import LinkRule
 from tracking.run import track
-from tracking.scoring.block_resampling import scorer
+from tracking.scoring.block_resampling import resampled_scorer
 from tracking.scoring.catalogue import CATALOGUE
 from tracking.stats import moving_blocks
 from tracking.tracker_registry import find
@@ -150,7 +150,7 @@ def compared(name: str, sequence: Sequence, mode: str, chosen: dict[str, Config]
     assert truth is not None
     every = list(CATALOGUE)
     at = [every.index(key) for key in KEYS[name]]
-    draws = {who: scorer(truth, answers(name, sequence, mode, c), None, "hull") for who, c in chosen.items()}
+    draws = {who: resampled_scorer(truth, answers(name, sequence, mode, c), None, "hull") for who, c in chosen.items()}
 
     def score(places: Ints) -> np.ndarray:
         values = {who: np.asarray(draw(places))[at] for who, draw in draws.items()}

@@ -16,7 +16,7 @@ from sim.types import Frame, Truth
 from tracking.episode_source import Source
 
 if TYPE_CHECKING:
-    from tracking.objective import Judge
+    from tracking.objective import ObjectiveScorer
 
 T = TypeVar("T")
 LIMIT = 256 * 2**20
@@ -50,11 +50,11 @@ class Held:
         return truth
 
     @cached_property
-    def judge(self) -> Judge:
+    def judge(self) -> ObjectiveScorer:
         """The truth, ready to score answers by."""
-        from tracking.objective import Judge
+        from tracking.objective import ObjectiveScorer
 
-        return Judge(self.truth)
+        return ObjectiveScorer(self.truth)
 
 
 def _remembered(make: Callable[[], T]) -> Callable[[], T]:

@@ -11,8 +11,8 @@ import numpy as np
 from scenarios.schema.sensor import BoxNoise
 from sim.detector.box_noise import box_errors
 from sim.types import Array
+from tracking.fitting.detection_matching import MatchedRecording
 from tracking.fitting.error_correlation import correlations, memory
-from tracking.fitting.matching import Matched
 
 GROWTH = np.concatenate([[0.0], np.geomspace(0.1, 6.0, 40)])  # values of `occluded` that are tried
 TAILS = (0.0, 0.25, 0.5, 1.0, 1.5, 2.0, 3.0, 4.0, 6.0, 9.0, 14.0, 20.0)
@@ -22,7 +22,7 @@ FEW = 20  # rows half hidden: with fewer, boxes are taken for those of the whole
 
 
 @dataclass(frozen=True)
-class Spread:
+class ErrorSpread:
     """Errors e = mean + sd (1 + occluded (1 - visibility)) n: mean, sd (4,), occluded, and the log likelihood."""
 
     mean: Array
@@ -31,7 +31,7 @@ class Spread:
     likelihood: float
 
 
-def fit_noise(recordings: Sequence[Matched]) -> tuple[Literal["visible", "amodal"], BoxNoise]:
+def fit_noise(recordings: Sequence[MatchedRecording]) -> tuple[Literal["visible", "amodal"], BoxNoise]:
     """Whether boxes are of the visible part or of the whole, and their errors against it."""
     kind: Literal["visible", "amodal"] = "visible" if _of_visible_part(recordings) else "amodal"
     best = _spread(recordings, kind)
@@ -66,7 +66,7 @@ def _tails(z: Array) -> float:
     return max(TAILS, key=likelihood)
 
 
-def _of_visible_part(recordings: Sequence[Matched]) -> bool:
+def _of_visible_part(recordings: Sequence[MatchedRecording]) -> bool:
     """Whether the edges of people half hidden are nearer to those of the visible part, the usual error taken off."""
     away: dict[str, list[Array]] = {"visible": [], "amodal": []}
     for m in recordings:
@@ -80,12 +80,12 @@ def _of_visible_part(recordings: Sequence[Matched]) -> bool:
     return len(both["visible"]) >= FEW and float(both["visible"].mean()) < float(both["amodal"].mean())
 
 
-def _errors(m: Matched, kind: str) -> Array:
+def _errors(m: MatchedRecording, kind: str) -> Array:
     """(H, 4) of the rows that were detected."""
     return box_errors(m.box[m.match[m.hit]], _true(m, kind))
 
 
-def _true(m: Matched, kind: str) -> Array:
+def _true(m: MatchedRecording, kind: str) -> Array:
     """(H, 4) boxes of that kind of the rows that were detected."""
     assert m.truth.box is not None
     true = m.truth.box
@@ -94,28 +94,28 @@ def _true(m: Matched, kind: str) -> Array:
     return true[m.hit]
 
 
-def _spread(recordings: Sequence[Matched], kind: str) -> Spread:
+def _spread(recordings: Sequence[MatchedRecording], kind: str) -> ErrorSpread:
     e = np.concatenate([_errors(m, kind) for m in recordings])
     hidden = np.concatenate([1.0 - m.truth.visibility[m.hit] for m in recordings])
     clear = hidden <= 1.0 - BARELY
     e, hidden = e[clear], hidden[clear]
     if not len(e):
-        return Spread(np.zeros(4), np.zeros(4), 0.0, 0.0)
+        return ErrorSpread(np.zeros(4), np.zeros(4), 0.0, 0.0)
     tried = GROWTH if (hidden > 1.0 - HALF[1]).sum() >= FEW else GROWTH[:1]
     return max((_of_growth(e, hidden, float(k)) for k in tried), key=lambda s: s.likelihood)
 
 
-def _of_growth(e: Array, hidden: Array, k: float) -> Spread:
+def _of_growth(e: Array, hidden: Array, k: float) -> ErrorSpread:
     growth = 1.0 + k * hidden
     weight = 1.0 / growth**2
     mean = weight @ e / weight.sum()
     sd = np.sqrt(np.mean((e - mean) ** 2 * weight[:, None], axis=0))
     near = np.mean(np.abs(e - mean) / growth[:, None], axis=0)  # Laplace's scale: what is far off tells little
     likelihood = -len(e) * float(np.log(np.maximum(near, 1e-6)).sum()) - 4 * float(np.log(growth).sum())
-    return Spread(mean, sd, k, likelihood)
+    return ErrorSpread(mean, sd, k, likelihood)
 
 
-def point_noise(recordings: Sequence[Matched]) -> float | None:
+def point_noise(recordings: Sequence[MatchedRecording]) -> float | None:
     """sd per axis of points on the ground, m; None where detections have none of their own."""
     errors = [
         m.pos[m.match[m.hit]] - m.truth.pos[m.hit] for m in recordings if m.pos is not None and m.truth.pos is not None

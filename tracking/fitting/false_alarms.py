@@ -15,7 +15,7 @@ import numpy as np
 from scenarios.schema.sensor import FalseAlarms
 from sim.detector.visible_ground import VisibleGround
 from sim.types import Array, Ints
-from tracking.fitting.matching import Matched, intersections, overlaps
+from tracking.fitting.detection_matching import MatchedRecording, intersections, overlaps
 
 LINK = 0.3  # overlap of one alarm with itself in the next frame it is seen
 PAUSE = 0.5  # s: unseen for longer, it is another one
@@ -27,10 +27,10 @@ PLACES = 32  # at most, of `at`
 
 
 @dataclass(frozen=True)
-class Chain:
+class AlarmTrack:
     """One false alarm of recording m: its detections in order; person: the id it is beside, -1 none."""
 
-    m: Matched
+    m: MatchedRecording
     rows: Ints
     person: int
 
@@ -45,9 +45,9 @@ class Chain:
         return self.m.box[self.rows]
 
 
-def fit_alarms(recordings: Sequence[Matched]) -> tuple[float, FalseAlarms | None]:
+def fit_alarms(recordings: Sequence[MatchedRecording]) -> tuple[float, FalseAlarms | None]:
     """False alarms per frame, and what they are like; None where there are too few to tell."""
-    chains = [chain for m in recordings for chain in linked(m)]
+    chains = [chain for m in recordings for chain in alarm_tracks(m)]
     frames = sum(m.truth.length for m in recordings)
     rate = sum(len(c.rows) for c in chains) / frames
     if len(chains) < FEW:
@@ -64,7 +64,7 @@ def fit_alarms(recordings: Sequence[Matched]) -> tuple[float, FalseAlarms | None
     return rate, FalseAlarms(**like)
 
 
-def linked(m: Matched) -> list[Chain]:
+def alarm_tracks(m: MatchedRecording) -> list[AlarmTrack]:
     """The alarms of a recording, in the order of their first detection."""
     pause = max(1, round(PAUSE * m.truth.fps))
     made: list[list[int]] = []
@@ -81,10 +81,10 @@ def linked(m: Matched) -> list[Chain]:
                 used.add(i)
                 taken.add(j)
         made += [[int(row)] for j, row in enumerate(here) if j not in taken]
-    return [Chain(m, np.array(rows), _person(m, rows)) for rows in made]
+    return [AlarmTrack(m, np.array(rows), _person(m, rows)) for rows in made]
 
 
-def _person(m: Matched, rows: list[int]) -> int:
+def _person(m: MatchedRecording, rows: list[int]) -> int:
     """Whom an alarm is beside, if people cover ON of its box in the median; -1 nobody.
 
     Of those it lies on nearly as much as on any, the one against whom it moves least.
@@ -109,7 +109,7 @@ def _person(m: Matched, rows: list[int]) -> int:
     return min(likely, key=lambda id: (float(np.std(offset[id], axis=0).sum()), -share[id]))
 
 
-def _life(recordings: Sequence[Matched], chains: Sequence[Chain]) -> tuple[float, float]:
+def _life(recordings: Sequence[MatchedRecording], chains: Sequence[AlarmTrack]) -> tuple[float, float]:
     """life s and seen, by how many alarms are seen again after so many frames."""
     lag, share, weight = [], [], []
     for m in recordings:
@@ -134,7 +134,7 @@ def _life(recordings: Sequence[Matched], chains: Sequence[Chain]) -> tuple[float
     return round(-1.0 / min(float(slope), -1.0 / 60.0), 3), round(float(np.exp(max(level, np.log(0.2)))), 4)
 
 
-def _weighted(values: Sequence[float], chains: Sequence[Chain]) -> tuple[float, float]:
+def _weighted(values: Sequence[float], chains: Sequence[AlarmTrack]) -> tuple[float, float]:
     """Middle and spread (median, half of the middle 68 %); chains that are seen often count for more, by the root.
 
     Not mean and sd: of alarms said to be beside somebody some are not, and the other way round.
@@ -145,11 +145,11 @@ def _weighted(values: Sequence[float], chains: Sequence[Chain]) -> tuple[float, 
     return round(float(middle), 4), round(float(high - low) / 2, 4)
 
 
-def _aspect(chains: Sequence[Chain]) -> tuple[float, float]:
+def _aspect(chains: Sequence[AlarmTrack]) -> tuple[float, float]:
     return _weighted([float(np.log(c.box[:, 2] / c.box[:, 3]).mean()) for c in chains], chains)
 
 
-def _jitter(chains: Sequence[Chain]) -> float:
+def _jitter(chains: Sequence[AlarmTrack]) -> float:
     """sd of edges in heights: of x_(t-1) - 2 x_t + x_(t+1), which knows no steady way, over sqrt 6; by its median."""
     bends = [np.zeros((0, 4))]
     for c in chains:
@@ -160,7 +160,7 @@ def _jitter(chains: Sequence[Chain]) -> float:
     return round(float(1.4826 * np.median(size) / np.sqrt(6.0)), 4) if len(size) else 0.0
 
 
-def _beside(chains: Sequence[Chain]) -> dict[str, tuple[float, float]]:
+def _beside(chains: Sequence[AlarmTrack]) -> dict[str, tuple[float, float]]:
     """Places and sizes against the persons they are beside."""
     rows = []
     for c in chains:
@@ -180,7 +180,7 @@ def _beside(chains: Sequence[Chain]) -> dict[str, tuple[float, float]]:
     }
 
 
-def _apart(chains: Sequence[Chain]) -> dict[str, object]:
+def _apart(chains: Sequence[AlarmTrack]) -> dict[str, object]:
     """Sizes against those of people standing there, places, and how fast they drift."""
     height, place, speed = [], [], []
     for c in chains:

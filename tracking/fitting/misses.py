@@ -14,8 +14,8 @@ import numpy as np
 
 from scenarios.schema.sensor import Memory
 from sim.types import Array, Bools
+from tracking.fitting.detection_matching import MatchedRecording
 from tracking.fitting.error_correlation import correlations, hidden_correlations, memory
-from tracking.fitting.matching import Matched
 
 NODES = 5
 SIZES = 16  # of `small` that are tried
@@ -24,7 +24,7 @@ GAIN = 4.0  # in log likelihood, per row that is new
 
 
 @dataclass(frozen=True)
-class Chance:
+class DetectionProbability:
     """The fitted chance to be detected: P, c (NODES,) with c[-1] = 1, small px (0: no effect)."""
 
     best: float
@@ -37,7 +37,7 @@ class Chance:
         return self.best * c * (np.minimum(1.0, height / (2 * self.small)) if self.small else 1.0)
 
 
-def fit_misses(recordings: Sequence[Matched]) -> tuple[Chance, tuple[Memory, ...]]:
+def fit_misses(recordings: Sequence[MatchedRecording]) -> tuple[DetectionProbability, tuple[Memory, ...]]:
     """The chance to be detected, and how long a person's luck lasts."""
     hit = np.concatenate([m.hit for m in recordings])
     visibility = np.concatenate([m.truth.visibility for m in recordings])
@@ -58,7 +58,7 @@ def fit_misses(recordings: Sequence[Matched]) -> tuple[Chance, tuple[Memory, ...
     return chosen, memory(lasting)
 
 
-def _heights(m: Matched) -> Array:
+def _heights(m: MatchedRecording) -> Array:
     """What decides on size: the boxes' heights, from above what sim.detector.sense takes for them."""
     assert m.truth.box is not None
     from sim.scene.body import SHOULDER_SHARE
@@ -68,7 +68,7 @@ def _heights(m: Matched) -> Array:
     return m.truth.box[:, 3]
 
 
-def _chance(hit: Bools, visibility: Array, height: Array, small: float) -> tuple[Chance, float]:
+def _chance(hit: Bools, visibility: Array, height: Array, small: float) -> tuple[DetectionProbability, float]:
     """The chance of greatest likelihood for a given `small`, and its log likelihood."""
     from scipy.optimize import minimize
 
@@ -89,10 +89,10 @@ def _chance(hit: Bools, visibility: Array, height: Array, small: float) -> tuple
 
     found = minimize(loss, np.array([2.0, 1.0, 0.5, 0.0, -1.0]), method="L-BFGS-B", bounds=[(-9.0, 9.0)] * NODES)
     c = curve(found.x)
-    return Chance(float(c[-1]), tuple(c / c[-1]), small), -float(found.fun)
+    return DetectionProbability(float(c[-1]), tuple(c / c[-1]), small), -float(found.fun)
 
 
-def _alike(recordings: Sequence[Matched], chance: Chance) -> float:
+def _alike(recordings: Sequence[MatchedRecording], chance: DetectionProbability) -> float:
     """How many rows say as much as one that is new: 1 + 2 Σ correlation of misses, up to the longest lag."""
     alike = []
     for m in recordings:

@@ -11,8 +11,8 @@ from scenarios.schema.sensor import Sensor
 from sim.types import Array
 from sim.types import Sequence as Recording
 from tracking.fitting.box_noise import fit_noise, point_noise
+from tracking.fitting.detection_matching import MatchedRecording, match_sequence
 from tracking.fitting.false_alarms import fit_alarms
-from tracking.fitting.matching import Matched, match_sequence
 from tracking.fitting.misses import fit_misses
 
 SCORES = 11  # quantiles
@@ -30,7 +30,7 @@ def fit_sensor(sequences: Iterable[Recording] | Recording) -> Sensor:
     return fit([match_sequence(s) for s in recordings])
 
 
-def fit(recordings: Sequence[Matched]) -> Sensor:
+def fit(recordings: Sequence[MatchedRecording]) -> Sensor:
     """The sensor of recordings whose detections are matched."""
     people, hits = sum(len(m.match) for m in recordings), sum(int(m.hit.sum()) for m in recordings)
     if people < LEAST or hits < LEAST // 2:

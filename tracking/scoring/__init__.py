@@ -1,6 +1,6 @@
-"""Scores of people, groups and events; imports numpy and scipy only."""
+"""Scores of people, groups and events; usable alone, with numpy and scipy only."""
 
-from tracking.scoring.arrays import score_arrays
 from tracking.scoring.evaluation import evaluate
+from tracking.scoring.user_arrays import score_arrays
 
 __all__ = ["evaluate", "score_arrays"]

@@ -1,4 +1,4 @@
-"""A recording put together from some of its own frames, for intervals by moving blocks (tracking.stats)."""
+"""Scores of a recording resampled from its own frames, for confidence intervals by moving blocks (tracking.stats)."""
 
 from __future__ import annotations
 
@@ -11,30 +11,37 @@ from sim.types import Array, Ints, Tracks, Truth
 from tracking.grouping.grouped_tracks import with_groups
 from tracking.scoring.catalogue import ALL, CATALOGUE, CORE
 from tracking.scoring.evaluation import Similarity, evaluate
-from tracking.scoring.groups import GroupMatch
+from tracking.scoring.group_scores import GroupMatch
 
 TIMELESS = np.array([score.family not in (CORE, "events") for score in ALL])
-"""Scores that frames in another order still have; events, and the core beside them, need time as it was."""
+"""Scores that are defined for frames in any order, one bool per catalogue entry: all but events and core scores."""
 
 
-def scorer(
+def resampled_scorer(
     truth: Truth, tracks: Sequence[Tracks], similarity: Similarity | None, group_match: GroupMatch
 ) -> Callable[[Ints], Array]:
-    """A function of places of frames from 0, some more than once: scores (K,) in the catalogue's order of the recording
-    made of these frames; nan for those that need time as it was. Groups are derived before, once."""
-    answers = {t.index: t for t in with_groups(tracks, truth.fps, truth.px_per_m)}
+    """Returns a function that scores a recording made of chosen frames.
 
-    def score(places: Ints) -> Array:
-        order = (places + 1).tolist()
-        told = [answers[old].replace(index=new) for new, old in enumerate(order, 1) if old in answers]
-        found = evaluate(drawn(truth, order), told, similarity=similarity, group_match=group_match)
+    Its argument holds frame indices from 0, in any order and with repetitions. It returns the scores (K,) in the order
+    of the catalogue. Scores of events and core scores are nan, because they need the original order. Groups are derived
+    once, from the original tracks.
+    """
+    original = {t.index: t for t in with_groups(tracks, truth.fps, truth.px_per_m)}
+
+    def score(indices: Ints) -> Array:
+        order = (indices + 1).tolist()
+        drawn = [original[old].replace(index=new) for new, old in enumerate(order, 1) if old in original]
+        found = evaluate(resampled_truth(truth, order), drawn, similarity=similarity, group_match=group_match)
         return np.where(TIMELESS, [found[key] for key in CATALOGUE], np.nan)
 
     return score
 
 
-def drawn(truth: Truth, order: Sequence[int]) -> Truth:
-    """The truth of these frames in this order, numbered anew; what time would be needed for is not labelled."""
+def resampled_truth(truth: Truth, order: Sequence[int]) -> Truth:
+    """Returns the truth of these frames in this order, renumbered from 1.
+
+    order: frame numbers from 1, repetitions allowed. Events are left out.
+    """
     rows = [truth.rows(old) for old in order]
     count = [r.stop - r.start for r in rows]
     place = np.fromiter(chain.from_iterable(range(r.start, r.stop) for r in rows), np.int64)

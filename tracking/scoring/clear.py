@@ -1,10 +1,12 @@
-"""CLEAR (Bernardin & Stiefelhagen 2008): misses, false ones and switches at a similarity of 0.5, as TrackEval has them.
+"""CLEAR MOT scores (MOTA, MOTP, switches, fragments) at similarity 0.5, equal to TrackEval.
 
-TrackEval gives a pair that was matched in the frame before a bonus of 1000 and takes the matching of greatest total.
-Kept pairs share no row and no column (they were matched) and outweigh any two rivals (at most 1 each), so all of them
-are in every best matching (tracking.scoring.matching); what remains to be matched is the pairs that share nothing with
-them. Pairs without rivals are matched whatever was before. So frames are followed one by one, but cheaply: few have
-anything left to solve. The frame before is the last one with somebody on both sides.
+Bernardin & Stiefelhagen (2008), "Evaluating Multiple Object Tracking Performance: The CLEAR MOT Metrics". Matches of
+the previous frame are kept. The previous frame is the last one with people on both sides.
+
+TrackEval adds a bonus of 1000 to pairs that were matched in the previous frame and takes the matching with the greatest
+total. Such kept pairs share no row and no column, and each outweighs any two rivals of at most 1. They are therefore in
+every best matching (tracking.scoring.matching), and only pairs that share nothing with them remain to be matched. Pairs
+without rivals are matched whatever happened before. Frames are processed in order, but few need a solver.
 """
 
 from __future__ import annotations
@@ -14,18 +16,21 @@ from itertools import pairwise
 import numpy as np
 
 from sim.types import Bools, Ints
+from tracking.scoring.candidate_pairs import EPS, FOUND, Pairs
 from tracking.scoring.matching import solve_frame
-from tracking.scoring.similarity import EPS, Pairs
 
-THRESHOLD = 0.5
-BONUS = 1000.0  # of a pair that was matched in the frame before
+BONUS = 1000.0  # added to the weight of a pair that was matched in the previous frame
 MOSTLY, LOST = 0.8, 0.2
-"""Shares of its frames above which a person is mostly tracked, below which mostly lost."""
+"""A person matched in more than 80 % of its frames is mostly tracked, in less than 20 % mostly lost."""
 
 
 def clear(pairs: Pairs) -> dict[str, float]:
-    """MOTA, MOTP, TP, FN, FP, IDSW, MT, PT, ML (people), Frag; MOTA is 0 where there is nobody true, or no answer."""
-    near = pairs.keep(pairs.s >= THRESHOLD - EPS)
+    """Returns MOTA, MOTP, TP, FN, FP, IDSW, MT, PT, ML and Frag; MT, PT and ML are numbers of true people.
+
+    MOTA = 1 - (FN + FP + IDSW) / true rows, or 0 if either side has no rows. MOTP is the mean similarity of the
+    matches, 0 without matches.
+    """
+    near = pairs.keep(pairs.s >= FOUND - EPS)
     turn = turns(pairs)
     near = near.keep(follow(near, turn))
     who, by, when = near.true_ids[1][near.i], near.est_ids[1][near.j], turn[near.frame]
@@ -51,17 +56,20 @@ def clear(pairs: Pairs) -> dict[str, float]:
 
 
 def turns(pairs: Pairs) -> Ints:
-    """For each frame number how many frames up to it have somebody on both sides."""
+    """Returns for each frame number 0 … last how many frames up to it have people on both sides, (F,)."""
     end = 1 + max((int(rows.frame[-1]) for rows in (pairs.true, pairs.est) if len(rows)), default=0)
     true, est = (np.bincount(rows.frame, minlength=end) > 0 for rows in (pairs.true, pairs.est))
     return np.cumsum(true & est)
 
 
 def follow(near: Pairs, turn: Ints) -> Bools:
-    """Which of the pairs (K,), all of them similar enough, are matched when matches of the frame before are kept."""
+    """Returns which pairs are matched, (K,) bool, when matches of the previous frame are kept.
+
+    near: pairs of similarity 0.5 or more; turn: from `turns`.
+    """
     i, j, frame = near.i, near.j, near.frame
     before = _before(near.links[2], turn[frame])
-    chosen = np.zeros(len(i) + 1, bool)  # one more, which those point at that have nothing before
+    chosen = np.zeros(len(i) + 1, bool)  # the last element stands for "no previous pair"
     chosen[:-1] = (np.bincount(i)[i] == 1) & (np.bincount(j)[j] == 1)
     taken_i, taken_j = np.zeros(len(near.true), bool), np.zeros(len(near.est), bool)
     rivals = np.flatnonzero(~chosen[:-1])
@@ -82,7 +90,7 @@ def follow(near: Pairs, turn: Ints) -> Bools:
 
 
 def _before(link: Ints, turn: Ints) -> Ints:
-    """For each pair (K,) the place of the one of the same two identities a turn before, or K."""
+    """Returns for each pair the index of the same two ids' pair in the previous frame, K if there is none: (K,)."""
     order = np.argsort(link, kind="stable")
     follows = (np.diff(link[order]) == 0) & (np.diff(turn[order]) == 1)
     before = np.full(len(link), len(link))

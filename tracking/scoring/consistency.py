@@ -1,9 +1,12 @@
-"""Does a filter know how wrong it is? NEES, NIS and whiteness of innovations (Bar-Shalom, Li & Kirubarajan 2001, 5.4).
+"""Consistency of a filter: NEES, NIS and whiteness of innovations.
 
-NEES is e' P^-1 e of an estimate's error e and covariance P, NIS is v' S^-1 v of an innovation v and its covariance S.
-In a filter that is right both are chi-square with n degrees of freedom, n being the length of e or v, and normalised
-innovations are white. NIS can lie in its band while the filter is wrong: errors that last (a gait, a limb in the blob)
-show in the autocorrelation only.
+Bar-Shalom, Li & Kirubarajan (2001), "Estimation with Applications to Tracking and Navigation", section 5.4. NEES is
+e' P^-1 e for an estimation error e with covariance P. NIS is v' S^-1 v for an innovation v with covariance S. For a
+consistent filter both follow a chi-square distribution with n degrees of freedom, n being the length of e or v, and the
+normalised innovations are white.
+
+NIS can lie within its band although the filter is wrong. Errors that persist over time (a person's gait, a limb that is
+part of the blob) show only in the autocorrelation.
 """
 
 from __future__ import annotations
@@ -12,28 +15,35 @@ import numpy as np
 
 from sim.types import Array
 
-LEVEL = 0.95
-LAGS = 5
+LEVEL = 0.95  # probability of the bands
+LAGS = 5  # frames
 
 
 def normalised(errors: Array, covariances: Array) -> Array:
-    """L^-1 e of errors (K, n), covariances (K, n, n) being L L': white, of variance 1, if the filter is right.
+    """Returns L^-1 e (K, n) for errors e (K, n) with covariances (K, n, n) = L L', L the Cholesky factor.
 
-    LinAlgError where a covariance is not positive definite.
+    For a consistent filter the components are uncorrelated with variance 1. Raises numpy.linalg.LinAlgError if a
+    covariance is not positive definite.
     """
     return np.asarray(np.linalg.solve(np.linalg.cholesky(covariances), errors[..., None])[..., 0])
 
 
 def normalised_square(errors: Array, covariances: Array) -> Array:
-    """e' C^-1 e (K,) of errors (K, n) and covariances (K, n, n): NEES of estimates, NIS of innovations."""
+    """Returns e' C^-1 e (K,) for errors (K, n) and covariances C (K, n, n).
+
+    This is NEES for estimation errors and NIS for innovations. Raises numpy.linalg.LinAlgError if a covariance is not
+    positive definite.
+    """
     return np.asarray(np.square(normalised(errors, covariances)).sum(axis=1))
 
 
 def mean_band(runs: int, dims: int, level: float = LEVEL) -> tuple[float, float]:
-    """Where the mean of NEES or NIS over independent runs lies with probability `level`: chi-square quantiles / runs.
+    """Returns the interval (low, high) that contains the mean of NEES or NIS over independent runs.
 
-    Frames of one run are not independent in NEES: take the mean over runs of one frame. NIS of one run may be taken
-    over its frames, where innovations are white.
+    runs: number of independent values in the mean; dims: n; level: probability of the interval. The limits are
+    chi-square quantiles with runs * dims degrees of freedom, divided by runs. NEES values of one run are not
+    independent over frames, so take the mean over runs at one frame. NIS values of one run may be averaged over frames
+    if the innovations are white.
     """
     from scipy.stats import chi2
 
@@ -42,9 +52,10 @@ def mean_band(runs: int, dims: int, level: float = LEVEL) -> tuple[float, float]
 
 
 def whiteness(innovations: Array, lags: int = LAGS) -> Array:
-    """Autocorrelation at lags 1 … of normalised innovations (T, n) of one track: nan where T is too short.
+    """Returns the autocorrelation r of one track's normalised innovations (T, n) at lags 1 … lags (frames), (lags,).
 
-    r(l) = sum v(t)' v(t + l) / (sum |v(t)|^2 sum |v(t + l)|^2)^1/2, both sums over the same T - l frames.
+    r(l) = sum v(t)' v(t + l) / (sum |v(t)|^2 sum |v(t + l)|^2)^1/2, all sums over the same T - l frames. It is nan at
+    lags of T or more and where a sum of squares is 0.
     """
     found = np.full(lags, np.nan)
     for lag in range(1, min(lags, len(innovations) - 1) + 1):
@@ -56,7 +67,10 @@ def whiteness(innovations: Array, lags: int = LAGS) -> Array:
 
 
 def whiteness_band(frames: int, dims: int, lag: int = 1, level: float = LEVEL) -> float:
-    """|r(lag)| of white innovations stays below this with probability `level`: normal, variance 1 / (n (T - lag))."""
+    """Returns the bound that |r(lag)| of white innovations stays below with probability `level`.
+
+    frames: T; dims: n. r is approximately normal with mean 0 and variance 1 / (n (T - lag)).
+    """
     from scipy.stats import norm
 
     return float(norm.ppf((1 + level) / 2) / np.sqrt(dims * (frames - lag)))

@@ -1,37 +1,53 @@
-"""Truth and tracks as scores: who is compared with whom, by what, in which frames."""
+"""All scores of a tracker against a truth: `evaluate`, and `Scorer`, which prepares one truth for many evaluations.
+
+This module decides what is compared (which frames, which similarity of people, which surface for groups). It calls the
+modules of the single scores and returns their results under the keys of the catalogue.
+"""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Literal
 
 import numpy as np
 
 from sim.types import Array, Bools, Tracks, Truth
 from tracking.grouping.grouped_tracks import with_groups
+from tracking.scoring.candidate_pairs import Pairs, box_pairs, point_pairs
 from tracking.scoring.catalogue import CATALOGUE
-from tracking.scoring.group_and_event_scores import Labelled, social_scores
-from tracking.scoring.groups import GroupMatch
-from tracking.scoring.individuals import scores as individual_scores
-from tracking.scoring.mapping import mapped
-from tracking.scoring.position_errors import REACH, place_scores
-from tracking.scoring.rows import People, Surface, tracked_people, true_people
-from tracking.scoring.similarity import Pairs, box_pairs, point_pairs
+from tracking.scoring.clear import clear
+from tracking.scoring.group_and_event_scores import ComparedSides, group_and_event_scores
+from tracking.scoring.group_scores import GroupMatch
+from tracking.scoring.hota import hota
+from tracking.scoring.identity import identity
+from tracking.scoring.matching import mapped_people
+from tracking.scoring.people_and_groups import (
+    PersonRows,
+    Surface,
+    TrueGroups,
+    tracked_people,
+    true_groups,
+    true_people,
+)
+from tracking.scoring.position_errors import REACH, position_scores
 
 Similarity = Literal["boxes", "ground", "image"]
+"""How two people are compared: IoU of boxes, or distance of positions on the ground or in the image."""
 
 
 class IncomparableError(ValueError):
-    """One side lacks what is to be compared."""
+    """The truth or the tracks lack the boxes or positions that are to be compared."""
 
 
 @dataclass(frozen=True, eq=False)
 class Scores(Mapping[str, float]):
-    """Scores by key, every key of the catalogue in its order; nan: not labelled, or nothing to divide by.
+    """Scores by key, with every key of the catalogue in its order.
 
-    similarity: by what people were compared; surface: where groups were; group_match: by what groups were matched.
+    nan: not labelled, not comparable, or a denominator of 0. similarity: how people were compared; surface: where
+    groups were compared; group_match: how groups were matched.
     """
 
     by_key: Mapping[str, float]
@@ -49,7 +65,7 @@ class Scores(Mapping[str, float]):
         return len(self.by_key)
 
     def __str__(self) -> str:
-        """The scores that are known, a line each."""
+        """Returns one line per score that is not nan."""
         return "\n".join(f"{key:28} {value:.4g}" for key, value in self.items() if not math.isnan(value))
 
 
@@ -61,95 +77,160 @@ def evaluate(
     group_match: GroupMatch = "hull",
     frames: int | range | None = None,
 ) -> Scores:
-    """Every score of the catalogue (docs/metrics.md); frames without an answer count as empty.
+    """Returns every score of the catalogue (docs/metrics.md).
 
-    similarity: of people, "boxes" (IoU), "ground" or "image" (max(0, 1 - d / 2 m)); where absent, boxes if both sides
-    have them, else the tracks' plane. group_match: groups are matched by the IoU of their "hull"s or the Jaccard index
-    of their "members". frames: score only frames up to this one, or these. Tracks without groups get them by the
-    baseline rule. IncomparableError where the truth, or the tracks, lack what is to be compared.
+    similarity: compares people by IoU ("boxes") or by max(0, 1 - d / 2 m) ("ground", "image"). None: boxes if both
+    sides have them, else the plane of the tracks. group_match: matches groups by IoU of their hulls ("hull") or Jaccard
+    index of their members ("members"). frames: a number n scores frames 1 … n, a range only its frames, None all
+    frames. A frame without tracks counts as empty. Tracks without groups get groups and events by the baseline rule.
+
+    Raises IncomparableError if boxes or positions to be compared are missing, and ValueError if an id occurs twice in
+    one frame.
     """
-    inside = chosen_frames(frames, truth.length)
-    given: Sequence[Tracks] = _answers(tracks, inside)
-    told = labelled_frames(truth) & inside
-    if told.any() and (truth.events is not None or any(t.groups is None for t in given)):
-        given = with_groups(given, truth.fps, truth.px_per_m)
-    answers = [t for t in given if inside[t.index]]
-    plane, chosen = plane_of(truth, answers), similarity or usual_similarity(truth, answers)
-    true, est = true_people(truth, inside), tracked_people(answers)
-    nobody = np.full(len(est.rows), -1, np.int64)
-    case = Labelled(truth, answers, told, true, est, nobody, "image" if plane == "image" else "ground")
-    found = dict.fromkeys(CATALOGUE, float("nan"))
-    if not any(t.unit == "group" for t in answers):
-        pairs = people_pairs(true, est, chosen, plane, truth.px_per_m)
-        case = replace(case, stands_for=mapped(pairs))
-        found |= individual_scores(pairs)
-        found |= place_scores(true, est, case.stands_for, case.surface, plane, case.scale, int(inside.sum()))
-    if told.any():
-        found |= social_scores(case, group_match)
-    found["objective"] = objective_of(found)
-    return Scores(found, chosen, case.surface, group_match)
+    return Scorer(truth).evaluate(tracks, similarity=similarity, group_match=group_match, frames=frames)
+
+
+class Scorer:
+    """Scores any number of trackers against one truth.
+
+    State: the truth, its labelled frames, and its people and groups as rows. Rows are built at first use and kept.
+    """
+
+    def __init__(self, truth: Truth) -> None:
+        self.truth = truth
+        self.labelled = labelled_frames(truth)
+        self._groups: dict[Surface, TrueGroups] = {}
+
+    @cached_property
+    def people(self) -> PersonRows:
+        """The true people of all frames."""
+        return true_people(self.truth, chosen_frames(None, self.truth.length))
+
+    def groups(self, surface: Surface) -> TrueGroups:
+        """Returns the true groups of all labelled frames, members as rows of `people`; there must be such a frame."""
+        if surface not in self._groups:
+            self._groups[surface] = true_groups(self.truth, self.labelled, self.people.rows, surface)
+        return self._groups[surface]
+
+    def sides(self, tracks: Sequence[Tracks], frames: Bools) -> ComparedSides:
+        """Returns both sides in the frames f where frames[f] is true, with nobody mapped; tracks: of these frames."""
+        kept = frames[self.people.rows.frame]
+        true = self.people if kept.all() else self.people.keep(kept)
+        est, plane = tracked_people(tracks), plane_of(self.truth, tracks)
+        nobody = np.full(len(est.rows), -1, np.int64)
+        return ComparedSides(self.truth, tracks, self.labelled & frames, true, est, nobody, plane)
+
+    def evaluate(
+        self,
+        tracks: Iterable[Tracks],
+        *,
+        similarity: Similarity | None = None,
+        group_match: GroupMatch = "hull",
+        frames: int | range | None = None,
+    ) -> Scores:
+        """Returns what the function `evaluate` returns for this truth; options and exceptions are the same."""
+        truth, inside = self.truth, chosen_frames(frames, self.truth.length)
+        given: Sequence[Tracks] = _in_order(tracks, inside)
+        labelled = bool((self.labelled & inside).any())
+        if labelled and (truth.events is not None or any(t.groups is None for t in given)):
+            given = with_groups(given, truth.fps, truth.px_per_m)
+        sides = self.sides([t for t in given if inside[t.index]], inside)
+        chosen = similarity or usual_similarity(truth, sides.tracks)
+        found = dict.fromkeys(CATALOGUE, float("nan"))
+        if not sides.groups_only:
+            pairs = people_pairs(sides, chosen)
+            sides = replace(sides, mapping=mapped_people(pairs))
+            found |= people_scores(pairs)
+            found |= position_scores(
+                sides.true, sides.est, sides.mapping, sides.surface, sides.plane, sides.scale, int(inside.sum())
+            )
+        if labelled:
+            groups = self.groups(sides.surface).in_frames(inside, inside[self.people.rows.frame])
+            found |= group_and_event_scores(sides, groups, group_match)
+        found["objective"] = objective_of(found)
+        return Scores(found, chosen, sides.surface, group_match)
 
 
 def chosen_frames(frames: int | range | None, length: int) -> Bools:
-    """Which of the frames 0 … length are meant (frame 0 never is)."""
+    """Returns which of the frames 0 … length are chosen, (length + 1,) bool; frame 0 never is.
+
+    frames: a number n chooses frames 1 … n, a range its frames between 1 and length, None all.
+    """
     inside = np.zeros(length + 1, bool)
-    wanted = range(1, length + 1) if frames is None else range(1, frames + 1) if isinstance(frames, int) else frames
-    inside[[f for f in wanted if 1 <= f <= length]] = True
+    if isinstance(frames, range):
+        inside[[f for f in frames if 1 <= f <= length]] = True
+    else:
+        inside[1 : 1 + (length if frames is None else max(frames, 0))] = True
     return inside
 
 
 def labelled_frames(truth: Truth) -> Bools:
-    """The frames 0 … length whose groups are labelled."""
+    """Returns which of the frames 0 … length have labelled groups, (length + 1,) bool."""
     if truth.groups is None and truth.groups_px is None:
         return np.zeros(truth.length + 1, bool)
     labelled = np.ones(truth.length, bool) if truth.labelled is None else truth.labelled
     return np.concatenate([[False], labelled])
 
 
-def _answers(tracks: Iterable[Tracks], inside: Bools) -> list[Tracks]:
-    """Answers in the order of frames, none after the last that counts: what is scored never looks ahead."""
+def _in_order(tracks: Iterable[Tracks], inside: Bools) -> list[Tracks]:
+    """Returns the tracks sorted by frame, up to the last chosen frame: later frames must not influence the scores."""
     last = int(np.flatnonzero(inside)[-1]) if inside.any() else 0
     by_frame = {t.index: t for t in tracks if 1 <= t.index <= last}
     return [by_frame[index] for index in sorted(by_frame)]
 
 
-def plane_of(truth: Truth, answers: Sequence[Tracks]) -> str:
-    """The plane of the answers; the truth's own where nothing was answered."""
+def plane_of(truth: Truth, tracks: Sequence[Tracks]) -> str:
+    """Returns the plane of the first tracks with people, else of the first tracks, else of the truth."""
     own = "image" if truth.pos is None else "ground"
-    return next((t.plane for t in answers if len(t.id)), answers[0].plane if answers else own)
+    return next((t.plane for t in tracks if len(t.id)), tracks[0].plane if tracks else own)
 
 
-def usual_similarity(truth: Truth, answers: Iterable[Tracks]) -> Similarity:
-    """Overlap of boxes where both sides have measured ones, else distance in the tracks' plane."""
-    some = [t for t in answers if len(t.id)]
+def usual_similarity(truth: Truth, tracks: Iterable[Tracks]) -> Similarity:
+    """Returns "boxes" if both sides have boxes, else "image" or "ground" by the plane of the tracks."""
+    some = [t for t in tracks if len(t.id)]
     if truth.box is not None and all(t.box is not None for t in some):
         return "boxes"
     return "image" if some and some[0].plane == "image" else "ground"
 
 
-def people_pairs(true: People, est: People, similarity: Similarity, plane: str, px_per_m: float) -> Pairs:
-    """Possible pairs of people by a similarity; plane: of the tracks' pos."""
+def people_pairs(sides: ComparedSides, similarity: Similarity) -> Pairs:
+    """Returns the candidate pairs of true and tracked people.
+
+    Raises IncomparableError if a side has people but not the boxes or positions to be compared.
+    """
+    true, est = sides.true, sides.est
     if similarity == "boxes":
         if true.box is None or est.box is None:
             raise IncomparableError("no boxes to compare: score on the ground")
         return box_pairs(true.rows, est.rows, true.box, est.box)
-    reach = REACH * px_per_m if similarity == "image" else REACH
-    ours, theirs = _places(true, similarity, "ground"), _places(est, similarity, plane)
-    return point_pairs(true.rows, est.rows, ours, theirs, reach)
+    reach = REACH * sides.truth.px_per_m if similarity == "image" else REACH
+    true_pos, est_pos = _positions(true, similarity, "ground"), _positions(est, similarity, sides.plane)
+    return point_pairs(true.rows, est.rows, true_pos, est_pos, reach)
 
 
-def _places(people: People, surface: Surface, plane: str) -> Array:
-    places = people.places(surface, plane)
-    if places is None and len(people.rows):
+def _positions(people: PersonRows, surface: Surface, plane: str) -> Array:
+    """Returns the positions (R, 2) on the surface. Raises IncomparableError if there are people without any."""
+    positions = people.positions_on(surface, plane)
+    if positions is None and len(people.rows):
         where, other = {
             "ground": ("on the ground", "boxes or in the image"),
             "image": ("in the image", "on the ground"),
         }[surface]
         raise IncomparableError(f"no positions {where} to compare: score {other}")
-    return np.zeros((0, 2)) if places is None else places
+    return np.zeros((0, 2)) if positions is None else positions
+
+
+def people_scores(pairs: Pairs) -> dict[str, float]:
+    """Returns the scores of HOTA, CLEAR and Identity; pairs of any similarity in (0, 1].
+
+    Raises ValueError if an id occurs twice in one frame.
+    """
+    pairs.true.require_unique_ids("truth")
+    pairs.est.require_unique_ids("tracks")
+    return {**hota(pairs), **clear(pairs), **identity(pairs)}
 
 
 def objective_of(found: Mapping[str, float]) -> float:
-    """Mean of HOTA and the groups' F1 by hulls, or the one that there is."""
+    """Returns the mean of HOTA and group_F1_hull, or the one that is not nan, or nan."""
     known = [v for v in (found["HOTA"], found["group_F1_hull"]) if v == v]
     return sum(known) / len(known) if known else float("nan")

@@ -1,7 +1,8 @@
-"""Scores of events: what a tracker told beside what happened, one to one, for each kind.
+"""Scores of events and of lineage: a tracker's events matched one to one to the true ones, kind by kind.
 
-Two events are the same if they are of one kind, start within 1 s of each other, and concern the same people (Jaccard
-index of at least 0.5) or, where a method knows no people, happen within 1.5 m. form counts as merge, dissolve as split.
+Two events match if their kind is equal, their starts are at most 1 s apart and their people agree: the Jaccard index of
+the members is at least 0.5. If a tracker names no people, the positions must be at most 1.5 m apart instead. `form`
+counts as merge and `dissolve` as split. Lineage: a matched merge or split is right if its parents and its children are.
 """
 
 from __future__ import annotations
@@ -16,110 +17,166 @@ from sim.types import Array
 KINDS = ("merge", "split", "cross", "queue", "enter", "leave")
 COUNTS_AS = {"form": "merge", "dissolve": "split"}
 HEADLINE = ("merge", "split")
-LATE = 1.0  # s between the starts
-ALIKE = 0.5  # Jaccard index of the people
-NEAR = 1.5  # m, without people
+LATE = 1.0  # s: greatest difference of the starts
+ALIKE = 0.5  # least Jaccard index of the members
+NEAR = 1.5  # m: greatest distance if no members are named
+SAME_PART = 0.5  # two parts are the same if their Jaccard index exceeds this; then no other part can be the same
 
-People = frozenset[int]
+PersonIds = frozenset[int]
 
 
 @dataclass(frozen=True, slots=True)
-class Part:
-    """Some of an event's people: true ids, and how many tracks beside them are nobody (or somebody twice)."""
+class EventMembers:
+    """People of an event, or of one group before or after it.
 
-    people: People
-    wrong: int = 0
+    people: their true ids; unmatched: how many further members are mapped to nobody, or to a person already listed.
+    """
 
-    def jaccard(self, other: Part) -> float:
-        """Share of all that both have; wrong ones are in no other part."""
+    people: PersonIds
+    unmatched: int = 0
+
+    def jaccard(self, other: EventMembers) -> float:
+        """Returns common people / all members of both; unmatched members are never common. 0 if both are empty."""
         common = len(self.people & other.people)
-        whole = len(self.people | other.people) + self.wrong + other.wrong
+        whole = len(self.people | other.people) + self.unmatched + other.unmatched
         return common / whole if whole else 0.0
 
 
 @dataclass(frozen=True, slots=True)
-class Told:
-    """An event in terms of true people. start, emitted: frames; members None where the method knows no people; pos in
-    the plane of both sides; parents, children: the parts before and after, None where unknown."""
+class ComparableEvent:
+    """An event in terms of true people, so that both sides can be compared.
+
+    start: frame; emitted: frame of the report, None in the truth; members: None if the tracker names no people; pos:
+    x, y in the unit of the comparison; parents, children: the groups (or single people) before and after the event,
+    None if unknown.
+    """
 
     kind: str
     start: int
     emitted: int | None
-    members: Part | None
+    members: EventMembers | None
     pos: tuple[float, float]
-    parents: tuple[Part, ...] | None = None
-    children: tuple[Part, ...] | None = None
+    parents: tuple[EventMembers, ...] | None = None
+    children: tuple[EventMembers, ...] | None = None
+
+    @property
+    def has_lineage(self) -> bool:
+        """True if both parents and children are known."""
+        return self.parents is not None and self.children is not None
 
 
 @dataclass(frozen=True, slots=True)
-class Pairing:
-    """Which true event (rows of `true`) is which told one, for one kind."""
+class MatchedEvents:
+    """All events of one kind on both sides; pairs: the matched ones, (true event, tracker's event)."""
 
     kind: str
-    true: Sequence[Told]
-    told: Sequence[Told]
-    pairs: Sequence[tuple[Told, Told]]
+    true: Sequence[ComparableEvent]
+    est: Sequence[ComparableEvent]
+    pairs: Sequence[tuple[ComparableEvent, ComparableEvent]]
 
 
-def pair_events(true: Sequence[Told], told: Sequence[Told], fps: float, scale: float) -> list[Pairing]:
-    """The events of both sides, kind by kind; scale: the plane's units per metre."""
+def match_events(
+    true: Sequence[ComparableEvent], est: Sequence[ComparableEvent], fps: float, scale: float
+) -> list[MatchedEvents]:
+    """Returns the matched events, one entry per kind of `KINDS`; scale: units of `pos` per metre.
+
+    Each matching has as many pairs as possible. Of several such matchings it is the one with the most similar pairs.
+    """
     found = []
     for kind in KINDS:
-        a, b = ([e for e in side if COUNTS_AS.get(e.kind, e.kind) == kind] for side in (true, told))
-        found.append(Pairing(kind, a, b, _one_to_one(a, b, _alike(a, b, fps, scale))))
+        a, b = ([e for e in side if COUNTS_AS.get(e.kind, e.kind) == kind] for side in (true, est))
+        found.append(MatchedEvents(kind, a, b, _one_to_one(a, b, _similarity(a, b, fps, scale))))
     return found
 
 
-def _alike(true: Sequence[Told], told: Sequence[Told], fps: float, scale: float) -> Array:
-    """How much alike each two are (N, M), 0: not the same event."""
-    starts = [np.array([e.start for e in side], float) for side in (true, told)]
+def _similarity(true: Sequence[ComparableEvent], est: Sequence[ComparableEvent], fps: float, scale: float) -> Array:
+    """Returns the similarity of each true and estimated event, (N, M); 0 if they do not match."""
+    starts = [np.array([e.start for e in side], float) for side in (true, est)]
     late = np.abs(starts[0][:, None] - starts[1][None]) / fps
-    alike = np.zeros(late.shape)
+    similarity = np.zeros(late.shape)
     for i, j in np.argwhere(late <= LATE + 1e-9).tolist():
-        a, b = true[i], told[j]
+        a, b = true[i], est[j]
         if a.members is not None and b.members is not None:
             s = a.members.jaccard(b.members)
-            alike[i, j] = s if s >= ALIKE - 1e-12 else 0.0
+            similarity[i, j] = s if s >= ALIKE - 1e-12 else 0.0
         else:
             d = float(np.hypot(a.pos[0] - b.pos[0], a.pos[1] - b.pos[1])) / scale
-            alike[i, j] = 1 - d / (2 * NEAR) if d <= NEAR + 1e-9 else 0.0
-    # Of two as much alike, the one that starts nearer.
-    return np.where(alike > 0, alike + (LATE - late) * 1e-3, 0.0)
+            similarity[i, j] = 1 - d / (2 * NEAR) if d <= NEAR + 1e-9 else 0.0
+    # Between equally similar events the one with the nearer start wins.
+    return np.where(similarity > 0, similarity + (LATE - late) * 1e-3, 0.0)
 
 
-def _one_to_one(true: Sequence[Told], told: Sequence[Told], alike: Array) -> list[tuple[Told, Told]]:
-    """As many pairs as there can be, of these the most alike."""
-    if not alike.any():
+def _one_to_one(
+    true: Sequence[ComparableEvent], est: Sequence[ComparableEvent], similarity: Array
+) -> list[tuple[ComparableEvent, ComparableEvent]]:
+    """Returns as many pairs of similarity above 0 as possible, with the greatest total similarity."""
+    if not similarity.any():
         return []
     from scipy.optimize import linear_sum_assignment
 
-    one_more = 2.0 * min(alike.shape)  # outweighs all likeness together
-    rows, columns = linear_sum_assignment(np.where(alike > 0, one_more + alike, 0.0), maximize=True)
-    return [(true[i], told[j]) for i, j in zip(rows.tolist(), columns.tolist(), strict=True) if alike[i, j] > 0]
+    one_more = 2.0 * min(similarity.shape)  # outweighs the total similarity of all pairs
+    rows, columns = linear_sum_assignment(np.where(similarity > 0, one_more + similarity, 0.0), maximize=True)
+    return [(true[i], est[j]) for i, j in zip(rows.tolist(), columns.tolist(), strict=True) if similarity[i, j] > 0]
 
 
-def event_scores(pairings: Sequence[Pairing], fps: float) -> dict[str, float]:
-    """Scores by kind, their headline (mean of merge and split) and latency; a kind that neither side has is nan."""
+def event_scores(matched: Sequence[MatchedEvents], fps: float) -> dict[str, float]:
+    """Returns F1, precision, recall, TP, FP, FN and latency of each kind, and the headline scores `event_…`.
+
+    Headline F1, precision and recall are means of those of merge and split that are not nan. Latency is the mean of
+    (emitted - true start) / fps over matched events, in seconds. A share is nan if its denominator is 0, a latency if
+    nothing matched.
+    """
     out: dict[str, float] = {}
-    for p in pairings:
-        hits, there, said = len(p.pairs), len(p.true), len(p.told)
-        late = [(b.emitted - a.start) / fps for a, b in p.pairs if b.emitted is not None]
+    for m in matched:
+        hits, n_true, n_est = len(m.pairs), len(m.true), len(m.est)
         out |= {
-            f"{p.kind}_F1": _share(2 * hits, there + said),
-            f"{p.kind}_precision": _share(hits, said),
-            f"{p.kind}_recall": _share(hits, there),
-            f"{p.kind}_TP": float(hits),
-            f"{p.kind}_FP": float(said - hits),
-            f"{p.kind}_FN": float(there - hits),
-            f"{p.kind}_latency": _mean(late),
+            f"{m.kind}_F1": _share(2 * hits, n_true + n_est),
+            f"{m.kind}_precision": _share(hits, n_est),
+            f"{m.kind}_recall": _share(hits, n_true),
+            f"{m.kind}_TP": float(hits),
+            f"{m.kind}_FP": float(n_est - hits),
+            f"{m.kind}_FN": float(n_true - hits),
+            f"{m.kind}_latency": _mean(_latencies([m], fps)),
         }
-    head = [p for p in pairings if p.kind in HEADLINE]
-    late = [(b.emitted - a.start) / fps for p in head for a, b in p.pairs if b.emitted is not None]
+    head = [m for m in matched if m.kind in HEADLINE]
     return {
-        **{f"event_{s}": _mean([out[f"{p.kind}_{s}"] for p in head]) for s in ("F1", "precision", "recall")},
-        "event_latency": _mean(late),
+        **{f"event_{s}": _mean([out[f"{m.kind}_{s}"] for m in head]) for s in ("F1", "precision", "recall")},
+        "event_latency": _mean(_latencies(head, fps)),
         **out,
     }
+
+
+def _latencies(matched: Sequence[MatchedEvents], fps: float) -> list[float]:
+    """Returns the delay of each matched report in seconds."""
+    return [(b.emitted - a.start) / fps for m in matched for a, b in m.pairs if b.emitted is not None]
+
+
+def lineage_scores(matched: Sequence[MatchedEvents]) -> dict[str, float]:
+    """Returns lineage_accuracy and lineage_accuracy_found, shares of true merges and splits with the right lineage.
+
+    The first divides by all true merges and splits, the second by the matched ones. True events without known parents
+    and children are left out (labels that never change say nothing about lineage). nan if no event is left.
+    """
+    head = [m for m in matched if m.kind in HEADLINE]
+    n_true = sum(event.has_lineage for m in head for event in m.true)
+    pairs = [(a, b) for m in head for a, b in m.pairs if a.has_lineage]
+    right = sum(_same_lineage(a, b) for a, b in pairs)
+    return {
+        "lineage_accuracy": right / n_true if n_true else float("nan"),
+        "lineage_accuracy_found": right / len(pairs) if pairs else float("nan"),
+    }
+
+
+def _same_lineage(true: ComparableEvent, est: ComparableEvent) -> bool:
+    """True if parents and children agree; False if either side's are unknown."""
+    if true.parents is None or true.children is None or est.parents is None or est.children is None:
+        return False
+    return _same_parts(true.parents, est.parents) and _same_parts(true.children, est.children)
+
+
+def _same_parts(true: Sequence[EventMembers], est: Sequence[EventMembers]) -> bool:
+    """True if both sides have equally many parts and each true part is the same as one estimated part."""
+    return len(true) == len(est) and all(any(a.jaccard(b) > SAME_PART for b in est) for a in true)
 
 
 def _share(part: float, whole: int) -> float:

@@ -1,4 +1,8 @@
-"""Events of both sides in terms of true people, so that they can be compared: who was concerned, who came from whom."""
+"""Converts events of the truth and of a tracker into `ComparableEvent`s, so that members on both sides are true people.
+
+`true_events` converts those of the truth, `tracked_events` those of a tracker that names members, `events_of_hulls`
+those of a tracker that names none. An event counts in the frame in which it starts.
+"""
 
 from __future__ import annotations
 
@@ -8,53 +12,56 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 import numpy as np
 
 from sim.types import Array, Bools, GroupEvent, Ints, Tracks
-from tracking.scoring.events import COUNTS_AS, HEADLINE, KINDS, LATE, Part, Told
-from tracking.scoring.row_lookup import Lives
-from tracking.scoring.rows import Crowd, People
-from tracking.scoring.similarity import Rows
+from tracking.scoring.events import COUNTS_AS, HEADLINE, KINDS, LATE, ComparableEvent, EventMembers
+from tracking.scoring.people_and_groups import GroupRows, PersonRows
+from tracking.scoring.rows import FrameRows, RowLookup
 
-HULLS = 2.0  # s before and after an event in which hulls tell who is in a group: the time of the merge rule
-CHANGES = frozenset(HEADLINE) | {kind for kind, as_ in COUNTS_AS.items() if as_ in HEADLINE}
+HULL_TIME = 2.0  # s before and after an event in which hulls decide who is in a group: the time of the merge rule
+CHANGES = frozenset(HEADLINE) | {kind for kind, counts_as in COUNTS_AS.items() if counts_as in HEADLINE}
 
 
 def true_events(
-    events: Iterable[GroupEvent], people: Rows, group: Ints, places: Array | None, frames: Bools
-) -> list[Told]:
-    """The truth's events that start in frames f with frames[f]; group (R,) of people.
+    events: Iterable[GroupEvent], people: PersonRows, positions: Array | None, frames: Bools
+) -> list[ComparableEvent]:
+    """Returns the truth's events of known kinds that start in a frame f where frames[f] is true.
 
-    places (R, 2): where people are in the plane compared, if that is not the events' own.
+    people: true people; positions (R, 2): theirs on the surface of comparison, None if `GroupEvent.pos` is on it
+    already. With positions, an event lies at the mean of its members at its start (nan if none is present). Parents are
+    the groups of the members one frame before the start, children those at the start. Both are None if the kind changes
+    no groups or if parents and children are equal.
     """
-    lives, label = Lives(people), _labels(group)
+    lookup, group = RowLookup(people.rows), _group_by_row(people.group)
 
-    def tell(event: GroupEvent) -> Told:
-        before = _by_label(event.members, lambda m: label[lives.last(m, event.start - 1, 0)])
-        after = _by_label(event.members, lambda m: label[lives.next(m, event.start, 0)])
-        pos = event.pos if places is None else _middle(event, lives, places)
-        members = Part(frozenset(event.members))
+    def comparable(event: GroupEvent) -> ComparableEvent:
+        before = _by_group(event.members, lambda m: group[lookup.last(m, event.start - 1, 0)])
+        after = _by_group(event.members, lambda m: group[lookup.next(m, event.start, 0)])
+        pos = event.pos if positions is None else _mean_position(event, lookup, positions)
+        members = EventMembers(frozenset(event.members))
         before, after = _by_kind(event, before, after)
-        if event.kind not in CHANGES or sorted(before) == sorted(after):  # the labels tell nothing
-            return Told(event.kind, event.start, None, members, pos)
-        parents, children = (tuple(Part(frozenset(part)) for part in parts) for parts in (before, after))
-        return Told(event.kind, event.start, None, members, pos, parents, children)
+        if event.kind not in CHANGES or sorted(before) == sorted(after):
+            return ComparableEvent(event.kind, event.start, None, members, pos)
+        parents, children = (tuple(EventMembers(frozenset(part)) for part in parts) for parts in (before, after))
+        return ComparableEvent(event.kind, event.start, None, members, pos, parents, children)
 
-    return [tell(event) for event in events if _counts(event, frames)]
+    return [comparable(event) for event in events if _counts(event, frames)]
 
 
 def _counts(event: GroupEvent, frames: Bools) -> bool:
+    """True if the kind is scored and the event starts in a frame to be scored."""
     known = event.kind in KINDS or event.kind in COUNTS_AS
     return known and 0 <= event.start < len(frames) and bool(frames[event.start])
 
 
-def _labels(group: Ints) -> list[int]:
-    """The group of each row, and -1 for the row -1, which is nobody's."""
+def _group_by_row(group: Ints) -> list[int]:
+    """Returns the group of each row with -1 appended, so that index -1 (no row) means no group."""
     return [*group.tolist(), -1]
 
 
-def _by_label(members: Sequence[int], label: Callable[[int], int]) -> list[list[int]]:
-    """Members by their group; who has none is alone."""
+def _by_group(members: Sequence[int], group: Callable[[int], int]) -> list[list[int]]:
+    """Returns the members as lists, one per group; a member without a group is a list of its own."""
     parts: dict[tuple[int, int], list[int]] = {}
     for m in members:
-        g = label(m)
+        g = group(m)
         parts.setdefault((g, -1) if g >= 0 else (-1, m), []).append(m)
     return list(parts.values())
 
@@ -62,101 +69,112 @@ def _by_label(members: Sequence[int], label: Callable[[int], int]) -> list[list[
 def _by_kind(
     event: GroupEvent, before: list[list[int]], after: list[list[int]]
 ) -> tuple[list[list[int]], list[list[int]]]:
-    """Parents and children. Labels for life are the same before and after: form and dissolve speak for themselves."""
+    """Returns parents and children, taken from the kind if the labels are the same before and after.
+
+    Then `form` makes one group of single people, and `dissolve` single people of one group. This is so in data whose
+    labels never change.
+    """
     if sorted(before) != sorted(after):
         return before, after
     one, alone = [list(event.members)], [[m] for m in event.members]
     return {"form": (alone, one), "dissolve": (one, alone)}.get(event.kind, (before, after))
 
 
-def _middle(event: GroupEvent, lives: Lives, places: Array) -> tuple[float, float]:
-    rows = [row for m in event.members if (row := lives.nearest(m, event.start, 0)) >= 0]
+def _mean_position(event: GroupEvent, lookup: RowLookup, positions: Array) -> tuple[float, float]:
+    """Returns the mean position of the members at the event's start, nan if none is present."""
+    rows = [row for m in event.members if (row := lookup.nearest(m, event.start, 0)) >= 0]
     if not rows:
         return float("nan"), float("nan")
-    x, y = places[rows].mean(axis=0)
+    x, y = positions[rows].mean(axis=0)
     return float(x), float(y)
 
 
-def told_events(
-    answers: Sequence[Tracks], people: People, stands_for: Ints, true: Rows, frames: Bools, fps: float
-) -> list[Told]:
-    """A tracker's events of people that start in frames f with frames[f]. stands_for (R,): the row of `true` that each
-    of `people` is mapped to, -1 nobody.
+def tracked_events(
+    tracks: Sequence[Tracks], people: PersonRows, mapping: Ints, true: FrameRows, frames: Bools, fps: float
+) -> list[ComparableEvent]:
+    """Returns a tracker's events with members, of known kinds, that start in a frame f where frames[f] is true.
 
-    A member is who they are mapped to at the event's start, or in the nearest frame within 1 s of it. Parents are the
-    groups of the frame before the one in which the tracker said so, children those of that frame; where they are the
-    same (it changed its groups first and said so later), parents are those of the frame before the start.
+    people: tracked people; mapping (R,): the row of `true` that each is mapped to, -1 none. A member becomes the person
+    it is mapped to at the event's start, or in the nearest frame within 1 s of it. A member that is never mapped in
+    this time, or to a person already listed, is unmatched. Parents are the groups of the members in the frame before
+    the report, children those in the frame of the report. If both are equal, parents are those of the frame before the
+    event's start.
     """
     reach = round(LATE * fps)
-    identified, lives, label = Lives(people.rows, stands_for >= 0), Lives(people.rows), _labels(people.group)
-    person = np.append(true.id, -1)[stands_for].tolist()
+    mapped, lookup, group = RowLookup(people.rows, mapping >= 0), RowLookup(people.rows), _group_by_row(people.group)
+    person = np.append(true.id, -1)[mapping].tolist()
 
-    def until(event: GroupEvent, frame: int) -> list[list[int]]:
-        return _by_label(event.members, lambda m: label[lives.last(m, frame, reach)])
+    def groups_until(event: GroupEvent, frame: int) -> list[list[int]]:
+        return _by_group(event.members, lambda m: group[lookup.last(m, frame, reach)])
 
-    def tell(event: GroupEvent, said: int) -> Told:
-        after = _by_label(event.members, lambda m: label[lives.next(m, said, reach)])
-        before = until(event, said - 1)
-        before = until(event, event.start - 1) if sorted(before) == sorted(after) else before
+    def comparable(event: GroupEvent, reported: int) -> ComparableEvent:
+        after = _by_group(event.members, lambda m: group[lookup.next(m, reported, reach)])
+        before = groups_until(event, reported - 1)
+        before = groups_until(event, event.start - 1) if sorted(before) == sorted(after) else before
         before, after = _by_kind(event, before, after)
-        rows = {m: identified.nearest(m, event.start, reach) for m in event.members}
+        rows = {m: mapped.nearest(m, event.start, reach) for m in event.members}
         known = {m: person[row] for m, row in rows.items() if row >= 0}
-        parents, children = (tuple(_part(p, known) for p in parts) for parts in (before, after))
-        return Told(event.kind, event.start, said, _part(event.members, known), event.pos, parents, children)
+        parents, children = (tuple(_true_members(p, known) for p in parts) for parts in (before, after))
+        members = _true_members(event.members, known)
+        return ComparableEvent(event.kind, event.start, reported, members, event.pos, parents, children)
 
-    return [tell(event, said) for event, said in _said(answers, frames) if event.members]
-
-
-def _part(members: Sequence[int], known: Mapping[int, int]) -> Part:
-    """These tracks as the people they are known to be."""
-    who = frozenset(known[m] for m in members if m in known)
-    return Part(who, len(members) - len(who))
+    return [comparable(event, reported) for event, reported in _reports(tracks, frames) if event.members]
 
 
-def told_without_people(
-    answers: Sequence[Tracks], groups: Crowd, true: Rows, frames: Bools, fps: float, people: bool
-) -> list[Told]:
-    """The events of a method that names no members: compared by their places, their parents and children by who is in
-    the hulls. groups: with rows of `true` for members. people: whether the method does name some elsewhere.
+def _true_members(members: Sequence[int], known: Mapping[int, int]) -> EventMembers:
+    """Returns the people that these tracks are mapped to; known: person of each mapped track."""
+    people = frozenset(known[m] for m in members if m in known)
+    return EventMembers(people, len(members) - len(people))
 
-    Parents are whom the hulls held in the 2 s before the event's start (before it was said, if one of them is younger),
-    children in the 2 s from when it was said.
+
+def events_of_hulls(
+    tracks: Sequence[Tracks], groups: GroupRows, true: FrameRows, frames: Bools, fps: float, without_members: bool
+) -> list[ComparableEvent]:
+    """Returns a tracker's events, of known kinds, that start in a frame f where frames[f] is true; members are None.
+
+    without_members: return only the events that name no members. groups: the tracker's, with rows of `true` as members
+    (`people_inside`). Parents and children are the people whom the hulls of the event's `before` and `after` groups
+    contain. Children are judged in the 2 s from the report on. Parents are judged in the 2 s before the event's start,
+    or before the report if a parent appears only at the start or later.
     """
-    span, who = round(HULLS * fps), true.id[groups.who]
+    span, person = round(HULL_TIME * fps), true.id[groups.member]
 
-    def tell(event: GroupEvent, said: int) -> Told:
-        end = event.start if _youngest(groups.rows, event.before) < event.start else said
-        parents = _held(groups, who, event.before, range(end - span, end))
-        children = _held(groups, who, event.after, range(said, said + span))
-        return Told(event.kind, event.start, said, None, event.pos, parents, children)
+    def comparable(event: GroupEvent, reported: int) -> ComparableEvent:
+        end = event.start if _last_appearance(groups.rows, event.before) < event.start else reported
+        parents = _contained(groups, person, event.before, range(end - span, end))
+        children = _contained(groups, person, event.after, range(reported, reported + span))
+        return ComparableEvent(event.kind, event.start, reported, None, event.pos, parents, children)
 
-    return [tell(event, said) for event, said in _said(answers, frames) if not (people and event.members)]
+    found = _reports(tracks, frames)
+    return [comparable(event, reported) for event, reported in found if not (without_members and event.members)]
 
 
-def _youngest(rows: Rows, ids: Sequence[int]) -> int:
-    """The first frame of the one that came last, 0 if none ever came; rows sorted by frame."""
+def _last_appearance(rows: FrameRows, ids: Sequence[int]) -> int:
+    """Returns the latest of the first frames of these ids, 0 if none has a row; rows sorted by frame."""
     frames = [rows.frame[rows.id == id] for id in ids]
     return max((int(own[0]) for own in frames if len(own)), default=0)
 
 
-def _held(groups: Crowd, who: Ints, names: Sequence[int], span: range) -> tuple[Part, ...]:
-    """Whom each of these groups held in these frames; who (K,): the true id of each member.
+def _contained(groups: GroupRows, person: Ints, ids: Sequence[int], span: range) -> tuple[EventMembers, ...]:
+    """Returns the people of each of these groups during a span of frames; person (K,): true id of each membership.
 
-    One picture does not tell: hulls of people who stand behind each other overlap in it. Everybody is in one group at
-    most, the one that held him in most frames (of two the lower id), if that was in more than half of its own.
+    A person belongs to the one group that contained the person in most frames (of equals the lowest id), and only if
+    these are more than half of the frames in which the group was reported. One frame is not enough, because the hulls
+    of people behind each other overlap in the image.
     """
     rows, now = groups.rows, (groups.rows.frame >= span.start) & (groups.rows.frame < span.stop)
-    told = Counter(rows.id[now].tolist())
-    held = now[groups.of]
-    pairs, times = np.unique(np.stack([who[held], rows.id[groups.of[held]]]), axis=1, return_counts=True)
-    holder: dict[int, tuple[int, int]] = {}  # of each person: in how many frames, and less its id
-    for person, group, n in zip(*pairs.tolist(), times.tolist(), strict=True):
-        holder[person] = max(holder.get(person, (0, 0)), (n, -group))
+    reported = Counter(rows.id[now].tolist())
+    inside = now[groups.of]
+    pairs, times = np.unique(np.stack([person[inside], rows.id[groups.of[inside]]]), axis=1, return_counts=True)
+    best: dict[int, tuple[int, int]] = {}  # person: (number of frames, minus the group's id)
+    for p, group, n in zip(*pairs.tolist(), times.tolist(), strict=True):
+        best[p] = max(best.get(p, (0, 0)), (n, -group))
     return tuple(
-        Part(frozenset(p for p, (n, less) in holder.items() if -less == name and 2 * n > told[name])) for name in names
+        EventMembers(frozenset(p for p, (n, minus) in best.items() if -minus == id and 2 * n > reported[id]))
+        for id in ids
     )
 
 
-def _said(answers: Sequence[Tracks], frames: Bools) -> list[tuple[GroupEvent, int]]:
-    """A tracker's events and the frame in which each was said: that of the answer it stands in, whatever it claims."""
-    return [(event, t.index) for t in answers for event in t.events if _counts(event, frames)]
+def _reports(tracks: Sequence[Tracks], frames: Bools) -> list[tuple[GroupEvent, int]]:
+    """Returns the events that count, with the frame of the `Tracks` that contains each, whatever its `emitted` is."""
+    return [(event, t.index) for t in tracks for event in t.events if _counts(event, frames)]

@@ -1,13 +1,13 @@
-"""GOSPA: the error of a set of places against another, with its parts: how far off, how many missed, how many false.
+"""GOSPA: a distance between a set of true and a set of estimated positions, with its three parts.
 
 Rahmathullah, García-Fernández & Svensson (2017), "Generalized optimal sub-pattern assignment metric", definition 1 with
-alpha = 2, as proposition 1 writes it: between true places x and estimated y of one frame, over all assignments theta of
-some of x to some of y, one to one,
+alpha = 2 in the form of proposition 1. For true positions x and estimated positions y of one frame, minimised over all
+one-to-one assignments theta of some x to some y:
 
     d(x, y)^p = min over theta of  sum over (i, j) in theta of |x_i - y_j|^p  +  c^p / 2 (|x| + |y| - 2 |theta|)
 
-c is the distance from which somebody counts as missed and a track as false rather than as one pair far apart. The three
-parts are the sum over pairs, c^p / 2 for each missed and c^p / 2 for each false.
+c is the cut-off distance. A pair farther apart than c counts as one missed person and one false track. The parts are
+localisation (the sum over pairs), missed (c^p / 2 per missed person) and false (c^p / 2 per false track).
 """
 
 from __future__ import annotations
@@ -15,17 +15,18 @@ from __future__ import annotations
 import numpy as np
 
 from sim.types import Array
+from tracking.scoring.candidate_pairs import Pairs
 from tracking.scoring.matching import match
-from tracking.scoring.similarity import Pairs
 
 POWER = 2.0
 
 
 def gospa(pairs: Pairs, cutoff: float, frames: int, power: float = POWER) -> dict[str, float]:
-    """GOSPA over `frames` frames, those with nobody on either side among them, and its parts, in the unit of cutoff.
+    """Returns GOSPA, GOSPA_localisation, GOSPA_missed and GOSPA_false over a sequence, in the unit of `cutoff`.
 
-    pairs: by place (point_pairs) with reach = cutoff. Power mean over frames, so that GOSPA^p = localisation^p +
-    missed^p + false^p; with p = 2 the RMS GOSPA. nan where there are no frames.
+    pairs: from `point_pairs` with reach = cutoff; frames: number of scored frames, empty ones included. Each value is
+    the p-th root of a mean over frames, p = power. So GOSPA^p = localisation^p + missed^p + false^p, and p = 2 gives
+    root mean squares. All values are nan if frames = 0.
     """
     if frames == 0:
         return dict.fromkeys(("GOSPA", "GOSPA_localisation", "GOSPA_missed", "GOSPA_false"), float("nan"))
@@ -35,7 +36,10 @@ def gospa(pairs: Pairs, cutoff: float, frames: int, power: float = POWER) -> dic
 
 
 def gospa_parts(pairs: Pairs, cutoff: float, power: float = POWER) -> Array:
-    """d^p of each frame number 0 … last as its parts, (F, 3): localisation, missed, false. pairs as for `gospa`."""
+    """Returns the parts of d^p for each frame number 0 … last, (F, 3): localisation, missed, false.
+
+    pairs, cutoff, power: as for `gospa`; `last` is the last frame that has a row on either side.
+    """
     end = 1 + max((int(rows.frame[-1]) for rows in (pairs.true, pairs.est) if len(rows)), default=-1)
     cost = (cutoff * (1 - pairs.s)) ** power
     frame = pairs.frame

@@ -1,4 +1,4 @@
-"""All scores that need labels of groups: groups (strict and core), pairwise membership, events, lineage."""
+"""Coordinates the scores that need labelled groups: groups (strict and core), pairwise membership, events, lineage."""
 
 from __future__ import annotations
 
@@ -8,134 +8,159 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from sim.types import Bools, Groups, Ints, Tracks, Truth
-from tracking.scoring.events import COUNTS_AS, HEADLINE, event_scores, pair_events
-from tracking.scoring.events_by_true_people import told_events, told_without_people, true_events
-from tracking.scoring.groups import Compared, GroupMatch, compare_groups, detection, group_scores, shared_members
-from tracking.scoring.lineage import lineage_scores
+from tracking.scoring.events import COUNTS_AS, HEADLINE, event_scores, lineage_scores, match_events
+from tracking.scoring.events_by_true_people import events_of_hulls, tracked_events, true_events
+from tracking.scoring.group_scores import (
+    GroupComparison,
+    GroupMatch,
+    compare_groups,
+    detection,
+    group_scores,
+    shared_members,
+)
 from tracking.scoring.pairwise_membership import pairwise_scores
-from tracking.scoring.rows import Crowd, People, Surface, crowd, people_inside
+from tracking.scoring.people_and_groups import (
+    GroupRows,
+    PersonRows,
+    Surface,
+    TrueGroups,
+    group_rows,
+    people_inside,
+)
 
-CORE = 1.0  # s round each true merge and split that the core leaves out
+CORE = 1.0  # s around the start of each true merge or split that the core scores leave out
 
 
 @dataclass(frozen=True, eq=False)
-class Labelled:
-    """What can be compared in the labelled frames f, frames[f]: the truth, a tracker's answers (those of other frames,
-    too: an event may be told there), both sides' people.
+class ComparedSides:
+    """The truth's and a tracker's data in the scored frames.
 
-    stands_for: the true row that each estimated person is mapped to, or -1; surface: where groups have their shapes.
+    frames (length + 1,): which of the scored frames have labelled groups. tracks: all scored frames, labelled or not
+    (an event may be reported in an unlabelled one). true, est: people of both sides. mapping (S,): row of `true` that
+    each row of `est` is mapped to, -1 none. plane: of the tracks' positions.
     """
 
     truth: Truth
-    answers: Sequence[Tracks]
+    tracks: Sequence[Tracks]
     frames: Bools
-    true: People
-    est: People
-    stands_for: Ints
-    surface: Surface
+    true: PersonRows
+    est: PersonRows
+    mapping: Ints
+    plane: str
+
+    @property
+    def surface(self) -> Surface:
+        """Where groups are compared: in the image if the tracks are in it, else on the ground."""
+        return "image" if self.plane == "image" else "ground"
 
     @property
     def scale(self) -> float:
         """Units of the surface per metre."""
         return self.truth.px_per_m if self.surface == "image" else 1.0
 
+    @property
+    def groups_only(self) -> bool:
+        """True if the tracker follows groups as wholes (unit "group") in some frame."""
+        return any(t.unit == "group" for t in self.tracks)
+
 
 @dataclass(frozen=True, eq=False)
-class Told:
-    """A tracker's groups, members being rows of the truth: all of them; those that count, and who their members stand
-    for (-1: nobody)."""
+class TrackedGroups:
+    """A tracker's groups in labelled frames.
 
-    every: Crowd
-    counted: Crowd
-    who: Ints
+    every: all groups, members as rows of the true people. counted: the groups that are scored. person (K,): row of the
+    true person of each membership of `counted`, -1 none.
+    """
+
+    every: GroupRows
+    counted: GroupRows
+    person: Ints
 
 
-def social_scores(case: Labelled, by: GroupMatch) -> dict[str, float]:
-    """Scores by key; those that the truth's labels do not allow are missing."""
-    ours, comparable = true_groups(case)
-    told = told_groups(case)
-    found = pairwise_scores(ours, told.counted, told.who)
-    shared = shared_members(ours, told.counted, told.who, len(case.true.rows))
-    if comparable:
-        compared = compare_groups(ours, told.counted, shared, "hull")
-        found["group_F1_hull"] = detection(compared, case.frames)["F1"]
+def group_and_event_scores(sides: ComparedSides, true: TrueGroups, by: GroupMatch) -> dict[str, float]:
+    """Returns the scores by key; true: groups in the frames of `sides`; by: how groups are matched.
+
+    Keys are missing where the truth lacks data: those matched by hulls if `true` is not comparable, those of events if
+    the truth has no events.
+    """
+    tracked = tracked_groups(sides)
+    found = pairwise_scores(true.groups, tracked.counted, tracked.person)
+    shared = shared_members(true.groups, tracked.counted, tracked.person, len(sides.true.rows))
+    if true.comparable:
+        compared = compare_groups(true.groups, tracked.counted, shared, "hull")
+        found["group_F1_hull"] = detection(compared, sides.frames)["F1"]
         if by == "hull":
-            found |= strict_and_core(case, compared)
+            found |= strict_and_core(sides, compared)
     if by == "members":
-        found |= strict_and_core(case, compare_groups(ours, told.counted, shared, "members"))
-    if case.truth.events is not None:
-        found |= _events(case, told)
+        found |= strict_and_core(sides, compare_groups(true.groups, tracked.counted, shared, "members"))
+    if sides.truth.events is not None:
+        found |= _event_scores(sides, tracked)
     return found
 
 
-def true_groups(case: Labelled) -> tuple[Crowd, bool]:
-    """The truth's groups, and whether their shapes are on the surface compared; else they have none."""
-    wanted, other = case.truth.groups, case.truth.groups_px
-    if case.surface == "image":
-        wanted, other = other, wanted
-    groups = other if wanted is None else wanted
-    assert groups is not None, "a frame is labelled where there are groups"
-    index = np.flatnonzero(case.frames)
-    found = crowd(index, [groups[f - 1] for f in index.tolist()], case.true.rows)
-    found = found.keep(found.count > 1)
-    return (found, True) if wanted is not None else (replace(found, pos=np.full_like(found.pos, np.nan)), False)
+def tracked_groups(sides: ComparedSides) -> TrackedGroups:
+    """Returns the tracker's groups in labelled frames.
 
-
-def told_groups(case: Labelled) -> Told:
-    """A tracker's groups of two or more. Where it names no members they are the true people in the hull: one person
-    inside is left out as one person alone is; a hull with nobody inside is false."""
-    answers = [t for t in case.answers if case.frames[t.index]]
-    frames = np.array([t.index for t in answers], np.int64)
-    every = crowd(frames, [t.groups or Groups.none() for t in answers], case.est.rows)
-    if any(t.unit == "group" for t in answers) or not len(every.of):
-        places = case.true.places(case.surface, "ground")
-        if places is not None:
-            every = people_inside(every, case.true.rows, places, case.scale)
+    If the tracker names members, groups of two or more members count. Otherwise the true people inside the hull are the
+    members. A hull with one person inside does not count, as a person alone is no group. A hull with nobody inside
+    counts, as a false group.
+    """
+    tracks = [t for t in sides.tracks if sides.frames[t.index]]
+    frames = np.array([t.index for t in tracks], np.int64)
+    every = group_rows(frames, [t.groups or Groups.none() for t in tracks], sides.est.rows)
+    if any(t.unit == "group" for t in tracks) or not len(every.of):
+        positions = sides.true.positions_on(sides.surface, "ground")
+        if positions is not None:
+            every = people_inside(every, sides.true.rows, positions, sides.scale)
         counted = every.keep(every.count != 1)
-        return Told(every, counted, counted.who)
+        return TrackedGroups(every, counted, counted.member)
     counted = every.keep(every.count > 1)
-    return Told(_in_truth(every, case.stands_for), counted, _stand_for(counted, case.stands_for))
+    person = _true_rows(every, sides.mapping)
+    mapped = replace(every, of=every.of[person >= 0], member=person[person >= 0])
+    return TrackedGroups(mapped, counted, _true_rows(counted, sides.mapping))
 
 
-def _stand_for(groups: Crowd, stands_for: Ints) -> Ints:
-    return np.where(groups.who >= 0, np.append(stands_for, -1)[groups.who], -1)
+def _true_rows(groups: GroupRows, mapping: Ints) -> Ints:
+    """Returns the true row that each member (a row of the tracked people) is mapped to, -1 none, (K,)."""
+    return np.where(groups.member >= 0, np.append(mapping, -1)[groups.member], -1)
 
 
-def _in_truth(groups: Crowd, stands_for: Ints) -> Crowd:
-    who = _stand_for(groups, stands_for)
-    return replace(groups, of=groups.of[who >= 0], who=who[who >= 0])
-
-
-def strict_and_core(case: Labelled, compared: Compared) -> dict[str, float]:
-    """Group scores over all labelled frames, and again (…_core) without those near a true merge or split."""
-    strict = group_scores(compared, case.frames)
-    core = group_scores(compared, case.frames & ~near_changes(case.truth))
+def strict_and_core(sides: ComparedSides, compared: GroupComparison) -> dict[str, float]:
+    """Returns the group scores over all labelled frames, and as …_core without frames near a true merge or split."""
+    strict = group_scores(compared, sides.frames)
+    core = group_scores(compared, sides.frames & ~near_changes(sides.truth))
     return {f"group_{k}": v for k, v in strict.items()} | {f"group_{k}_core": v for k, v in core.items()}
 
 
 def near_changes(truth: Truth) -> Bools:
-    """Frames 0 … length no more than 1 s from the start of a true merge or split."""
-    kinds = {*HEADLINE, *(kind for kind, as_ in COUNTS_AS.items() if as_ in HEADLINE)}
+    """Returns which of the frames 0 … length are at most 1 s from the start of a true merge or split, bool.
+
+    `form` and `dissolve` count as merge and split. Without events no frame is near one.
+    """
+    kinds = {*HEADLINE, *(kind for kind, counts_as in COUNTS_AS.items() if counts_as in HEADLINE)}
     starts = np.array([e.start for e in truth.events or () if e.kind in kinds], float)
     frame = np.arange(truth.length + 1)
     away = np.abs(frame[:, None] - starts[None]).min(axis=1, initial=np.inf)
     return np.asarray(away <= CORE * truth.fps + 1e-9)
 
 
-def _events(case: Labelled, told: Told) -> dict[str, float]:
-    """Scores of events. Crossings and queues are derived from people: of a method without any they are unknown unless
-    it tells such itself."""
-    truth, rows, frames = case.truth, case.true.rows, case.frames
+def _event_scores(sides: ComparedSides, tracked: TrackedGroups) -> dict[str, float]:
+    """Returns the scores of events and lineage.
+
+    Crossings and queues are derived from people. For a tracker of groups as wholes their scores are nan, unless it
+    reports events of this kind itself.
+    """
+    truth, rows, frames, fps = sides.truth, sides.true.rows, sides.frames, sides.truth.fps
     assert truth.events is not None
-    places = case.true.places("image", "ground") if case.surface == "image" else None
-    happened = true_events(truth.events, rows, case.true.group, places, frames)
-    by_people = not any(t.unit == "group" for t in case.answers)
-    said = told_without_people(case.answers, told.every, rows, frames, truth.fps, by_people)
-    if by_people:
-        said += told_events(case.answers, case.est, case.stands_for, rows, frames, truth.fps)
-    pairings = pair_events(happened, said, truth.fps, case.scale)
-    found = event_scores(pairings, truth.fps) | lineage_scores(pairings)
-    if by_people:
+    positions = sides.true.positions_on("image", "ground") if sides.surface == "image" else None
+    true = true_events(truth.events, sides.true, positions, frames)
+    names_members = not sides.groups_only
+    est = events_of_hulls(sides.tracks, tracked.every, rows, frames, fps, names_members)
+    if names_members:
+        est += tracked_events(sides.tracks, sides.est, sides.mapping, rows, frames, fps)
+    matched = match_events(true, est, fps, sides.scale)
+    found = event_scores(matched, fps) | lineage_scores(matched)
+    if names_members:
         return found
-    silent = {"cross", "queue"} - {event.kind for t in case.answers for event in t.events}
-    return {k: float("nan") if k.partition("_")[0] in silent else v for k, v in found.items()}
+    unreported = {"cross", "queue"} - {event.kind for t in sides.tracks for event in t.events}
+    return {k: float("nan") if k.partition("_")[0] in unreported else v for k, v in found.items()}

@@ -1,9 +1,11 @@
-"""HOTA (Luiten et al. 2021): detection and association at 19 thresholds of similarity, as TrackEval has them.
+"""HOTA: detection and association accuracy at 19 similarity thresholds, equal to TrackEval.
 
-One matching serves all thresholds: in each frame the greatest sum of A(i, j) s(i, j), where A is how well two
-identities align over the whole sequence. Of its pairs those with s >= alpha count. With TPA(c) the matches of the
-identities of match c, AssA = mean over c of TPA / (n_i + m_j - TPA), DetA = TP / (TP + FN + FP),
-HOTA = sqrt(DetA AssA).
+Luiten et al. (2021), "HOTA: A Higher Order Metric for Evaluating Multi-object Tracking". One matching serves all
+thresholds alpha. In each frame it maximises the sum of A(i, j) s(i, j), where s is the similarity of two rows and A the
+alignment of their two ids over the sequence. Matches with s >= alpha count as true positives (TP). For a match c of
+true id i and estimated id j, TPA(c) is the number of matches of these two ids, n_i and m_j their numbers of frames:
+
+    DetA = TP / (TP + FN + FP),  AssA = mean over c of TPA(c) / (n_i + m_j - TPA(c)),  HOTA = sqrt(DetA AssA)
 """
 
 from __future__ import annotations
@@ -11,25 +13,28 @@ from __future__ import annotations
 import numpy as np
 
 from sim.types import Array, Ints
+from tracking.scoring.candidate_pairs import EPS, Pairs
 from tracking.scoring.matching import match_as_table
-from tracking.scoring.similarity import EPS, Pairs
 
 ALPHAS = np.arange(0.05, 0.99, 0.05)
 
 
 def hota(pairs: Pairs) -> dict[str, float]:
-    """HOTA, DetA, AssA, DetRe, DetPr, AssRe, AssPr, LocA: means over thresholds; LocA is 1 where nothing matches."""
+    """Returns HOTA, DetA, AssA, DetRe, DetPr, AssRe, AssPr and LocA, each the mean over the thresholds `ALPHAS`.
+
+    At a threshold without matches LocA is 1 and all others are 0.
+    """
     return {name: float(curve.mean()) for name, curve in curves(pairs).items()}
 
 
 def curves(pairs: Pairs) -> dict[str, Array]:
-    """The same at each of ALPHAS, (19,) each."""
+    """Returns the same scores at each threshold of `ALPHAS`, (19,) each."""
     true_id, est_id, link = pairs.links
-    n = np.bincount(pairs.true_ids[1], minlength=len(pairs.true_ids[0]))[true_id]  # frames of the ids of each link
+    n = np.bincount(pairs.true_ids[1], minlength=len(pairs.true_ids[0]))[true_id]  # n_i of each link (pair of ids)
     m = np.bincount(pairs.est_ids[1], minlength=len(pairs.est_ids[0]))[est_id]
     chosen = match_as_table(pairs, alignment(pairs, n + m)[link] * pairs.s)
     s, link = pairs.s[chosen], link[chosen]
-    level = np.searchsorted(ALPHAS - EPS, s, side="right")  # of how many thresholds the match counts
+    level = np.searchsorted(ALPHAS - EPS, s, side="right")  # number of thresholds at which the match counts
     bins = len(ALPHAS) + 1
     together = np.bincount(link * bins + level, minlength=len(n) * bins).reshape(-1, bins)
     together = np.cumsum(together[:, :0:-1], axis=1)[:, ::-1]  # matches of each link at each threshold
@@ -55,8 +60,11 @@ def curves(pairs: Pairs) -> dict[str, Array]:
 
 
 def alignment(pairs: Pairs, frames: Ints) -> Array:
-    """How well the two identities of each link align over the sequence (U,): the Jaccard index of their frames, each
-    common frame counted by s(i, j) / (sum of row i + sum of column j - s(i, j)). frames: n_i + m_j of each link."""
+    """Returns the alignment A of each link, a pair of one true and one estimated id, (U,); links as in `Pairs.links`.
+
+    frames (U,): n_i + m_j of each link. A = C / (n_i + m_j - C). C is the sum over common frames of
+    s(i, j) / (sum of row i + sum of column j - s(i, j)), where the sums run over all similarities of that frame.
+    """
     i, j, s = pairs.i, pairs.j, pairs.s
     of_i = np.bincount(i, weights=s, minlength=len(pairs.true))
     of_j = np.bincount(j, weights=s, minlength=len(pairs.est))

@@ -1,23 +1,26 @@
-"""Identity scores (Ristani et al. 2016): the one assignment of identities over the whole sequence."""
+"""Identity scores (IDF1): one assignment of true to estimated ids for the whole sequence.
+
+Ristani et al. (2016), "Performance Measures and a Data Set for Multi-Target, Multi-Camera Tracking". Equal to
+TrackEval.
+"""
 
 from __future__ import annotations
 
 import numpy as np
 
+from tracking.scoring.candidate_pairs import FOUND, Pairs
 from tracking.scoring.matching import match
-from tracking.scoring.similarity import Pairs
-
-THRESHOLD = 0.5
 
 
 def identity(pairs: Pairs) -> dict[str, float]:
-    """IDF1, IDP, IDR, IDTP: identities matched one to one so that they share most frames with similarity >= 0.5.
+    """Returns IDF1, IDP, IDR and IDTP.
 
-    An identity left alone costs its frames, two matched ones those that they do not share: the cheapest assignment is
-    the matching with most shared frames, IDTP.
+    Ids are assigned one to one so that assigned ids share as many frames as possible with a similarity of 0.5 or more.
+    IDTP is the number of shared frames. IDP = IDTP / estimated rows, IDR = IDTP / true rows, and
+    IDF1 = 2 IDTP / (true rows + estimated rows). A score with a denominator of 0 is 0.
     """
     true_id, est_id, link = pairs.links
-    frames = np.bincount(link[pairs.s >= THRESHOLD], minlength=len(true_id)).astype(float)
+    frames = np.bincount(link[pairs.s >= FOUND], minlength=len(true_id)).astype(float)
     some = frames > 0
     true_id, est_id, frames = true_id[some], est_id[some], frames[some]
     found = float(frames[match(np.zeros_like(true_id), true_id, est_id, frames)].sum())

@@ -1,13 +1,16 @@
-"""One-to-one matching of greatest total weight in every frame of a sequence at once.
+"""One-to-one matching with the greatest total weight, in every frame of a sequence at once.
 
-A pair (i, j) that weighs at least as much as the best other pair of i and the best other pair of j together is in some
-best matching: put it into any matching, drop the at most two pairs it replaces, and the total has not fallen. Several
-such pairs that share no row and no column are in one best matching together, since exchanging one in leaves the others
-alone. So whole sequences are settled in a few passes over arrays; what is left (tangles) goes to scipy, frame by frame.
+`match` returns any best matching of each frame. `match_as_table` returns the one that scipy finds for the frame's whole
+table, as TrackEval does. `mapped_people` maps tracked people to true people.
 
-A pair that weighs more than those two is in every best matching. Scores that depend on which of several best matchings
-is taken settle only such pairs and leave frames with a tangle to scipy whole: there it chooses among equals as it does
-for TrackEval.
+A pair (i, j) is *settled* without a solver if its weight is at least the sum of two rivals: the best other pair of i
+and the best other pair of j. Such a pair is in some best matching, because it can replace at most these two. Settled
+pairs that share no row and no column are in one best matching together. A few passes over arrays therefore match most
+of a sequence, and scipy's `linear_sum_assignment` gets the rest, frame by frame.
+
+If the weight clearly exceeds the sum of both rivals, the pair is in *every* best matching. `match_as_table` settles
+only these pairs. It passes every frame with a pair left over to scipy as a whole, so that ties are broken as in
+TrackEval.
 """
 
 from __future__ import annotations
@@ -15,16 +18,17 @@ from __future__ import annotations
 import numpy as np
 
 from sim.types import Array, Bools, Ints
-from tracking.scoring.similarity import Pairs
+from tracking.scoring.candidate_pairs import EPS, FOUND, Pairs
 
-CLEARLY = 1 + 1e-9  # times as much is more, whatever the rounding
-WORTH = 0.2  # share of pairs that a pass must take off for another one: below, the solver is quicker
+CLEARLY = 1 + 1e-9  # factor by which a weight must exceed its rivals to be greater despite rounding
+WORTH = 0.2  # share of pairs that a pass must remove for another pass to be quicker than the solver
 
 
 def match(frame: Ints, i: Ints, j: Ints, weight: Array) -> Bools:
-    """Which of the K pairs are matched (K,): no i and no j twice, and the greatest sum of weight in each frame.
+    """Returns which of the K pairs are matched, (K,) bool: the greatest sum of weights in each frame.
 
-    frame, i sorted; i, j: rows, each of one frame; weight > 0. Which of several best matchings comes out is not said.
+    frame, i (K,): sorted; i, j (K,): row indices, each of one frame; weight (K,): above 0. Each i and each j is matched
+    at most once. Which of several best matchings is returned is unspecified.
     """
     chosen, left = _settle(i, j, weight, strict=False)
     chosen[left[_solved(frame[left], i[left], j[left], weight[left])]] = True
@@ -32,7 +36,10 @@ def match(frame: Ints, i: Ints, j: Ints, weight: Array) -> Bools:
 
 
 def match_as_table(pairs: Pairs, weight: Array) -> Bools:
-    """The same for all pairs; of several best matchings the one that scipy finds in the table of the frame's rows."""
+    """Returns which of the K pairs are matched, (K,) bool, breaking ties as TrackEval does; weight (K,): above 0.
+
+    Of several best matchings of a frame the result is the one that scipy finds in the table of all the frame's rows.
+    """
     chosen, left = _settle(pairs.i, pairs.j, weight, strict=True)
     frame = pairs.frame
     tangled = np.unique(frame[left])
@@ -43,7 +50,10 @@ def match_as_table(pairs: Pairs, weight: Array) -> Bools:
 
 
 def solve_frame(pairs: Pairs, start: int, end: int, weight: Array) -> Bools:
-    """The matching that scipy finds in one frame, whose pairs are start … end - 1: which of them it has."""
+    """Returns which of the pairs start … end - 1 scipy matches, (end - start,) bool.
+
+    These are all pairs of one frame, weight (end - start,) is theirs. Cells of the table without a pair weigh 0.
+    """
     from scipy.optimize import linear_sum_assignment
 
     i, j = pairs.i[start:end], pairs.j[start:end]
@@ -58,13 +68,13 @@ def solve_frame(pairs: Pairs, start: int, end: int, weight: Array) -> Bools:
 
 
 def _settle(i: Ints, j: Ints, weight: Array, strict: bool) -> tuple[Bools, Ints]:
-    """Pairs (K,) that are in a best matching (strict: in every one), and places of those that the rest is chosen of."""
+    """Returns the settled pairs (K,) bool, and the indices of the pairs that still compete."""
     chosen = np.zeros(len(i), bool)
     left = np.arange(len(i))
     while len(left):
         settled = _settled(i[left], j[left], weight[left], strict)
         chosen[left[settled]] = True
-        free = left[~touched(i[left], j[left], settled)]
+        free = left[~_touched(i[left], j[left], settled)]
         worth = len(left) - len(free) >= WORTH * len(left)
         left = free
         if not worth:
@@ -73,8 +83,10 @@ def _settle(i: Ints, j: Ints, weight: Array, strict: bool) -> tuple[Bools, Ints]
 
 
 def _settled(i: Ints, j: Ints, w: Array, strict: bool) -> Bools:
-    """Pairs, no two in one row or column, that weigh as much as the best rivals of their row and their column together
-    (strict: clearly more)."""
+    """Returns which pairs one pass settles, (K,) bool; no two share a row or a column.
+
+    Their weight is at least (strict: clearly more than) the sum of the best rivals in their row and in their column.
+    """
     best_i, rival_i = _leaders(i, w)
     best_j, rival_j = _leaders(j, w)
     candidate = np.flatnonzero((w >= best_i[i]) & (w >= best_j[j]))
@@ -82,7 +94,7 @@ def _settled(i: Ints, j: Ints, w: Array, strict: bool) -> Bools:
     candidate = candidate[w[candidate] > CLEARLY * rivals if strict else w[candidate] >= rivals]
     settled = np.zeros(len(w), bool)
     settled[candidate] = True
-    # Equal pairs of one row, alone in their columns (or the other way round), all pass: the first of them stays.
+    # Several equal pairs of one row, each alone in its column, all pass the test: keep the first. Columns likewise.
     for row, end in () if strict else ((i, len(best_i)), (j, len(best_j))):
         first = np.full(end, len(w))
         np.minimum.at(first, row[candidate], candidate)
@@ -91,7 +103,7 @@ def _settled(i: Ints, j: Ints, w: Array, strict: bool) -> Bools:
 
 
 def _leaders(row: Ints, w: Array) -> tuple[Array, Array]:
-    """Greatest weight of each row, and the greatest but for one pair that has it; 0 where there is none."""
+    """Returns the greatest and the second greatest weight of each row, 0 where the row has too few pairs."""
     n = int(row.max()) + 1
     best, second = np.zeros(n), np.zeros(n)
     np.maximum.at(best, row, w)
@@ -100,8 +112,8 @@ def _leaders(row: Ints, w: Array) -> tuple[Array, Array]:
     return best, np.where(np.bincount(row[leads], minlength=n) > 1, best, second)
 
 
-def touched(i: Ints, j: Ints, chosen: Bools) -> Bools:
-    """Pairs that have their row or their column in common with a chosen pair, or are chosen."""
+def _touched(i: Ints, j: Ints, chosen: Bools) -> Bools:
+    """Returns which pairs are chosen or share their row or column with a chosen pair, (K,) bool."""
     if len(i) == 0:
         return chosen
     taken_i, taken_j = np.zeros(int(i.max()) + 1, bool), np.zeros(int(j.max()) + 1, bool)
@@ -111,7 +123,7 @@ def touched(i: Ints, j: Ints, chosen: Bools) -> Bools:
 
 
 def _solved(frame: Ints, i: Ints, j: Ints, w: Array) -> Ints:
-    """Places of the pairs of a best matching, by scipy on one table per frame; absent pairs weigh 0."""
+    """Returns the indices of the pairs that scipy matches, one table per frame; cells without a pair weigh 0."""
     from scipy.optimize import linear_sum_assignment
 
     if len(w) == 0:
@@ -135,10 +147,23 @@ def _solved(frame: Ints, i: Ints, j: Ints, w: Array) -> Ints:
 
 
 def _local(row: Ints, which: Ints, frames: int) -> tuple[Ints, Ints]:
-    """Number of each pair's row among the rows of its frame (K,), and how many rows each frame has."""
+    """Returns the index of each pair's row within its frame (K,), and the number of such rows in each frame (F,)."""
     home = np.full(int(row.max()) + 1, -1)
     home[row] = which
     seen = home >= 0
     count = np.bincount(home[seen], minlength=frames)
     number = np.cumsum(seen) - 1
     return number[row] - (np.cumsum(count) - count)[which], count
+
+
+def mapped_people(pairs: Pairs, least: float = FOUND) -> Ints:
+    """Returns for each row of pairs.est the row of pairs.true that it is mapped to, -1 none: (S,) int64.
+
+    The mapping is the one-to-one matching of each frame with the greatest total similarity, using only pairs of
+    similarity `least` or more.
+    """
+    near = pairs.keep(pairs.s >= least - EPS)
+    chosen = match(near.true.frame[near.i], near.i, near.j, near.s)
+    mapped = np.full(len(pairs.est), -1, np.int64)
+    mapped[near.j[chosen]] = near.i[chosen]
+    return mapped

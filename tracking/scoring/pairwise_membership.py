@@ -1,44 +1,47 @@
-"""Pairwise membership: which two people of a frame are in one group, whatever the groups are called or shaped."""
+"""Pairwise membership: F1 over pairs of people who are in one group, independent of group ids and shapes."""
 
 from __future__ import annotations
 
 import numpy as np
 
 from sim.types import Array, Ints
-from tracking.scoring.groups import group_of
-from tracking.scoring.rows import Crowd
-from tracking.scoring.similarity import Rows, compare
+from tracking.scoring.candidate_pairs import compare
+from tracking.scoring.group_scores import group_of_person
+from tracking.scoring.people_and_groups import GroupRows
+from tracking.scoring.rows import FrameRows
 
 
-def pairwise_scores(true: Crowd, est: Crowd, stands_for: Ints) -> dict[str, float]:
-    """F1, precision, recall of pairs, those of all frames together.
+def pairwise_scores(true: GroupRows, est: GroupRows, person: Ints) -> dict[str, float]:
+    """Returns pairwise_F1, pairwise_precision and pairwise_recall over the pairs of all frames together.
 
-    stands_for: the true person's row of each of est's members, -1 unmapped: such pairs are false, and those of a true
-    person whom nobody stands for are missed.
+    person (K,): row of the true person that each membership of `est` is mapped to, -1 none. An estimated pair with an
+    unmapped member is false. A true pair with a person whom no track is mapped to is missed. A pair inside several
+    estimated groups counts once. A score whose denominator is 0 is nan.
     """
-    there = _pairs_in(true)
-    group = group_of(true, int(max(true.who.max(initial=-1), stands_for.max(initial=-1))) + 1)
+    n_true = _pairs_in(true)
+    group = group_of_person(true, int(max(true.member.max(initial=-1), person.max(initial=-1))) + 1)
     order = np.argsort(est.of, kind="stable")
-    person = stands_for[order]
-    inside = Rows(est.of[order], order)  # what lies in one "frame" here is in one group
+    mapped = person[order]
+    inside = FrameRows(est.of[order], order)  # the group takes the place of the frame
 
     def ordered(a: Ints, b: Ints) -> tuple[Ints, Array]:
-        kept = np.flatnonzero((person[a] >= 0) & (person[a] < person[b]))
+        kept = np.flatnonzero((mapped[a] >= 0) & (mapped[a] < mapped[b]))
         return kept, np.ones(len(kept))
 
     both = compare(inside, inside, ordered)
-    pairs = np.stack([person[both.i], person[both.j]])
-    distinct = np.unique(pairs, axis=1)  # groups without members may overlap: a pair inside both is one pair
-    said = _pairs_in(est) - (pairs.shape[1] - distinct.shape[1])
+    pairs = np.stack([mapped[both.i], mapped[both.j]])
+    distinct = np.unique(pairs, axis=1)  # hulls may overlap: a pair inside two of them is one pair
+    n_est = _pairs_in(est) - (pairs.shape[1] - distinct.shape[1])
     p, q = distinct
     hits = int(((group[p] >= 0) & (group[p] == group[q])).sum())
     return {
-        "pairwise_F1": 2 * hits / (there + said) if there + said else float("nan"),
-        "pairwise_precision": hits / said if said else float("nan"),
-        "pairwise_recall": hits / there if there else float("nan"),
+        "pairwise_F1": 2 * hits / (n_true + n_est) if n_true + n_est else float("nan"),
+        "pairwise_precision": hits / n_est if n_est else float("nan"),
+        "pairwise_recall": hits / n_true if n_true else float("nan"),
     }
 
 
-def _pairs_in(groups: Crowd) -> int:
+def _pairs_in(groups: GroupRows) -> int:
+    """Returns the number of pairs of members, summed over groups."""
     n = groups.count
     return int((n * (n - 1) // 2).sum())

@@ -1,29 +1,79 @@
-"""How far off people's places are, beside how like they are: RMSE of who is found, GOSPA of everybody."""
+"""Errors of positions, velocities and group extents: RMSE of mapped people, GOSPA, Wasserstein distance of extents.
+
+RMSE counts mapped people only. It rewards a tracker that drops difficult people, so read it together with GOSPA, which
+also counts missed people and false tracks.
+"""
 
 from __future__ import annotations
 
 import numpy as np
 
 from sim.types import Array, Ints
-from tracking.scoring.errors import people_errors
+from tracking.scoring.candidate_pairs import point_pairs
 from tracking.scoring.gospa import gospa
-from tracking.scoring.rows import People, Surface
-from tracking.scoring.similarity import point_pairs
+from tracking.scoring.people_and_groups import PersonRows, Surface
 
-REACH = 2.0  # m: places this far apart have similarity 0; GOSPA's cut-off
+REACH = 2.0  # m: distance from which the similarity of two positions is 0; also the cut-off of GOSPA
 
 
-def place_scores(
-    true: People, est: People, stands_for: Ints, surface: Surface, plane: str, scale: float, frames: int
+def position_scores(
+    true: PersonRows, est: PersonRows, mapping: Ints, surface: Surface, plane: str, scale: float, frames: int
 ) -> dict[str, float]:
-    """Errors by key, in the surface's unit; none where one side has no places on it.
+    """Returns RMSE_pos, RMSE_vel and the four GOSPA scores, lengths in the surface's unit (m or px).
 
-    stands_for: the true row of each estimated one, or -1; plane: of the tracks' pos; scale: units per metre; frames:
-    how many are scored. Velocities are compared on the ground.
+    mapping (S,): true row of each estimated row, -1 none; plane: of the tracks' positions; scale: units per metre;
+    frames: number of scored frames. RMSE_vel is nan in the image. The result is empty if one side has no positions on
+    the surface or if the scale is not finite.
     """
-    ours, theirs = true.places(surface, "ground"), est.places(surface, plane)
-    if ours is None or theirs is None or not np.isfinite(scale):
+    true_pos, est_pos = true.positions_on(surface, "ground"), est.positions_on(surface, plane)
+    if true_pos is None or est_pos is None or not np.isfinite(scale):
         return {}
     vel: tuple[Array | None, Array | None] = (true.vel, est.vel) if surface == "ground" else (None, None)
-    pairs = point_pairs(true.rows, est.rows, ours, theirs, REACH * scale)
-    return people_errors(stands_for, ours, theirs, *vel) | gospa(pairs, REACH * scale, frames)
+    pairs = point_pairs(true.rows, est.rows, true_pos, est_pos, REACH * scale)
+    return people_errors(mapping, true_pos, est_pos, *vel) | gospa(pairs, REACH * scale, frames)
+
+
+def people_errors(
+    mapping: Ints, true_pos: Array, est_pos: Array, true_vel: Array | None = None, est_vel: Array | None = None
+) -> dict[str, float]:
+    """Returns RMSE_pos and RMSE_vel over mapped people, in the units of the inputs.
+
+    mapping (S,): true row of each estimated row, -1 none (tracking.scoring.matching.mapped_people). true_pos, true_vel
+    (R, 2), est_pos, est_vel (S, 2): of one plane. A score is nan if no mapped person has both values.
+    """
+    j = np.flatnonzero(mapping >= 0)
+    i = mapping[j]
+    found = {"RMSE_pos": root_mean_square(est_pos[j] - true_pos[i]), "RMSE_vel": float("nan")}
+    if true_vel is not None and est_vel is not None:
+        found["RMSE_vel"] = root_mean_square(est_vel[j] - true_vel[i])
+    return found
+
+
+def root_mean_square(errors: Array) -> float:
+    """Returns the square root of the mean of |e|^2 over the rows e of errors (K, D).
+
+    Rows with a nan are left out. The result is nan if no row is left.
+    """
+    squares = np.square(errors).sum(axis=1)
+    squares = squares[np.isfinite(squares)]
+    return float(np.sqrt(squares.mean())) if len(squares) else float("nan")
+
+
+def gaussian_wasserstein(pos: Array, extent: Array, other_pos: Array, other_extent: Array) -> Array:
+    """Returns the 2-Wasserstein distances (K,) of K pairs of Gaussians, nan where an input is nan.
+
+    Means pos, other_pos (K, 2), covariances extent, other_extent (K, 2, 2). Givens & Shortt (1984):
+
+        d^2 = |m1 - m2|^2 + tr(S1 + S2 - 2 (S1^1/2 S2 S1^1/2)^1/2)
+
+    A symmetric 2 x 2 matrix M >= 0 has tr M^1/2 = (tr M + 2 (det M)^1/2)^1/2. Here tr M = tr(S1 S2) and
+    det M = det S1 det S2.
+    """
+    inner = np.einsum("kab,kba->k", extent, other_extent)
+    det = np.maximum(_det(extent), 0) * np.maximum(_det(other_extent), 0)
+    shape = np.trace(extent + other_extent, axis1=1, axis2=2) - 2 * np.sqrt(np.maximum(inner + 2 * np.sqrt(det), 0))
+    return np.asarray(np.sqrt(np.square(pos - other_pos).sum(axis=1) + np.maximum(shape, 0)))
+
+
+def _det(m: Array) -> Array:
+    return np.asarray(m[:, 0, 0] * m[:, 1, 1] - m[:, 0, 1] * m[:, 1, 0])

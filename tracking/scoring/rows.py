@@ -1,121 +1,64 @@
-"""Both sides of a comparison as rows: people and groups, of the truth and of a tracker, all frames at once."""
+"""Rows of people or groups, one per frame and id, and lookups of a row by frame and id."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
-from typing import Literal
+from bisect import bisect_left, bisect_right
+from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 
-from sim.geometry.polygons import edge_distance_pairs, gap_pairs, pack, pack_padded
-from sim.types import Array, Bools, Groups, Ints, Tracks, Truth
-from tracking.scoring.similarity import Rows, compare, numbered
+from sim.types import Bools, Ints
 
-Surface = Literal["ground", "image"]
-"""What group shapes are compared on: metres on the ground, or px."""
-
-INSIDE = 0.3  # m: a person so near a hull is in it, where a method names no members
+NO_ROWS = (0, 0)
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class People:
-    """R people in frames: group (R,) -1 alone; pos, vel (R, 2) in the side's own plane and box (R, 4), or None."""
+@dataclass(frozen=True, slots=True)
+class FrameRows:
+    """R people or groups, sorted by frame: frame (R,) int64 >= 0 and id (R,) int64.
 
-    rows: Rows
-    group: Ints
-    pos: Array | None
-    vel: Array | None
-    box: Array | None
-
-    def places(self, surface: Surface, plane: str) -> Array | None:
-        """(R, 2) on the ground or in the image (middles of the boxes, else of what is followed there), or None.
-
-        plane: what `pos` is in.
-        """
-        if surface == "image" and self.box is not None:
-            return self.box[:, :2] + self.box[:, 2:] / 2
-        own = "image" if plane == "image" else "ground"
-        return self.pos if own == surface else None
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Crowd:
-    """G groups in frames, sorted by frame: pos (G, 2), size (G,), extent (G, 2, 2), hull: polygons.
-
-    Members are K pairs: of (K,) the group's row, who (K,) the member's row among the people, -1 if not among them.
+    An id should occur once per frame. `require_unique_ids` checks it; the constructor does not.
     """
 
-    rows: Rows
-    pos: Array
-    size: Array
-    extent: Array
-    hull: tuple[Array, ...]
-    of: Ints
-    who: Ints
+    frame: Ints
+    id: Ints
 
     def __len__(self) -> int:
-        return len(self.rows)
+        return len(self.frame)
 
-    @property
-    def count(self) -> Ints:
-        """Members of each group (G,)."""
-        return np.bincount(self.of, minlength=len(self)).astype(np.int64)
+    def keep(self, mask: Bools | slice) -> FrameRows:
+        """Returns the rows that a boolean mask (R,) or a slice selects."""
+        return FrameRows(self.frame[mask], self.id[mask])
 
-    def keep(self, mask: Bools) -> Crowd:
-        """The groups where mask (G,) is true."""
-        place, kept = np.cumsum(mask) - 1, mask[self.of]
-        return Crowd(
-            self.rows.keep(mask), self.pos[mask], self.size[mask], self.extent[mask],
-            tuple(h for h, k in zip(self.hull, mask.tolist(), strict=True) if k),
-            place[self.of[kept]], self.who[kept],
-        )  # fmt: skip
-
-
-def true_people(truth: Truth, inside: Bools) -> People:
-    """The truth's people in the frames f with inside[f]."""
-    kept = inside[truth.frame]
-    rows = Rows(truth.frame[kept], truth.id[kept])
-    pos, vel, box = (None if a is None else a[kept] for a in (truth.pos, truth.vel, truth.box))
-    return People(rows, truth.group[kept], pos, vel, box)
+    def require_unique_ids(self, side: str) -> None:
+        """Raises ValueError if an id occurs twice in one frame. `side` ("truth", "tracks") begins the message."""
+        frame, number = self.frame, numbered(self.id)[1]
+        key = np.sort(frame * (int(number.max()) + 1 if len(number) else 1) + number)
+        if (key[1:] == key[:-1]).any():
+            order = np.lexsort((self.id, frame))
+            k = order[1:][(np.diff(frame[order]) == 0) & (np.diff(self.id[order]) == 0)][0]
+            raise ValueError(f"{side}: id {self.id[k]} is twice in frame {frame[k]}")
 
 
-def tracked_people(answers: Sequence[Tracks]) -> People:
-    """A tracker's people; answers sorted by frame. Boxes only where every answer with people has them."""
-    count = [len(t.id) for t in answers]
-    frame = np.repeat(np.array([t.index for t in answers], np.int64), count)
-    none = np.zeros(0, np.int64)
-    id, group = (np.concatenate([none, *(getattr(t, name) for t in answers)]) for name in ("id", "group"))
-    pos, vel = (
-        np.concatenate([np.zeros((0, 2)), *(getattr(t, name)[:, :2] for t in answers)]) for name in ("pos", "vel")
-    )
-    boxes = [t.box for t in answers if len(t.id)]
-    boxed = [b for b in boxes if b is not None]
-    box = np.concatenate([np.zeros((0, 4)), *boxed]) if len(boxed) == len(boxes) else None
-    return People(Rows(frame, id), group, pos, vel, box)
+def numbered(values: Ints) -> tuple[Ints, Ints]:
+    """Returns the distinct values in ascending order, (U,), and for each value its index among them, (N,).
+
+    Equals `numpy.unique(values, return_inverse=True)`, but counts instead of sorting where the range is small.
+    """
+    if len(values) == 0:
+        return np.zeros(0, np.int64), np.zeros(0, np.int64)
+    low, high = int(values.min()), int(values.max())
+    if high - low > 4 * len(values) + 1000:
+        distinct, place = np.unique(values, return_inverse=True)
+        return distinct, place.astype(np.int64)
+    seen = np.zeros(high - low + 1, bool)
+    seen[values - low] = True
+    place = np.cumsum(seen) - 1
+    return np.flatnonzero(seen) + low, place[values - low]
 
 
-def crowd(frames: Ints, groups: Sequence[Groups], people: Rows) -> Crowd:
-    """The groups of frames (F,), one Groups each; people: the rows in which members are looked up."""
-    count = [len(g.id) for g in groups]
-    none = np.zeros(0, np.int64)
-    rows = Rows(np.repeat(frames, count), np.concatenate([none, *(g.id for g in groups)]))
-    members = [m for g in groups for m in (g.members if len(g.members) else (none,) * len(g.id))]
-    of = np.repeat(np.arange(len(rows)), [len(m) for m in members])
-    who = find(people, Rows(rows.frame[of], np.concatenate([none, *members])))
-    return Crowd(
-        rows,
-        np.concatenate([np.zeros((0, 2)), *(g.pos[:, :2] for g in groups)]),
-        np.concatenate([np.zeros(0), *(g.size for g in groups)]),
-        np.concatenate([np.zeros((0, 2, 2)), *(g.extent for g in groups)]),
-        tuple(h for g in groups for h in (g.hull if len(g.hull) else (np.zeros((0, 2)),) * len(g.id))),
-        of,
-        who,
-    )
-
-
-def find(rows: Rows, wanted: Rows) -> Ints:
-    """The row of each wanted (frame, id), -1 where there is none."""
+def find_rows(rows: FrameRows, wanted: FrameRows) -> Ints:
+    """Returns for each wanted (frame, id) its index in `rows`, -1 if `rows` has none: int64, one per wanted row."""
     if not len(rows):
         return np.full(len(wanted), -1, np.int64)
     ids, place = numbered(rows.id)
@@ -128,18 +71,43 @@ def find(rows: Rows, wanted: Rows) -> Ints:
     return np.where(same, found, -1)
 
 
-def people_inside(groups: Crowd, people: Rows, places: Array, scale: float) -> Crowd:
-    """The groups with those people for members whose places (R, 2) lie in their hulls or within 0.3 m (times scale)."""
-    hulls, points = pack(groups.hull), pack_padded(places[:, None])
-    low, high = hulls.box[:, :2] - INSIDE * scale, hulls.box[:, 2:] + INSIDE * scale
+class RowLookup:
+    """Finds the row of one id that is last before, next after or nearest to a frame.
 
-    def inside(i: Ints, j: Ints) -> tuple[Ints, Array]:
-        near = np.flatnonzero((places[j] >= low[i]).all(axis=1) & (places[j] <= high[i]).all(axis=1))
-        i, j = i[near], j[near]
-        flat = hulls.area[i] <= 0  # two vertices or one: nothing can be inside, only near
-        gap = np.where(flat, edge_distance_pairs(hulls, points, i, j), gap_pairs(hulls, points, i, j))
-        kept = near[gap <= INSIDE * scale]
-        return kept, np.ones(len(kept))
+    State: row indices sorted by id and frame, their frames, and the range that each id occupies in both lists. They are
+    Python lists, because single lookups in lists are faster than in arrays.
+    """
 
-    members = compare(groups.rows, people, inside)
-    return replace(groups, of=members.i, who=members.j)
+    def __init__(self, rows: FrameRows, only: Bools | None = None) -> None:
+        """Indexes all rows, or those where `only` (R,) is true."""
+        chosen = np.arange(len(rows)) if only is None else np.flatnonzero(only)
+        ids, place = numbered(rows.id[chosen])
+        order = np.lexsort((rows.frame[chosen], place))
+        chosen = chosen[order]
+        self.row: list[int] = chosen.tolist()
+        self.frame: list[int] = rows.frame[chosen].tolist()
+        cuts = np.searchsorted(place[order], np.arange(len(ids) + 1)).tolist()
+        self.span = dict(zip(ids.tolist(), pairwise(cuts), strict=True))
+
+    def last(self, id: int, frame: int, reach: int) -> int:
+        """Returns the row of the latest frame in [frame - reach, frame]; -1 if the id has no row there."""
+        low, high = self.span.get(id, NO_ROWS)
+        at = bisect_right(self.frame, frame, low, high) - 1
+        return self.row[at] if at >= low and frame - self.frame[at] <= reach else -1
+
+    def next(self, id: int, frame: int, reach: int) -> int:
+        """Returns the row of the earliest frame in [frame, frame + reach]; -1 if the id has no row there."""
+        low, high = self.span.get(id, NO_ROWS)
+        at = bisect_left(self.frame, frame, low, high)
+        return self.row[at] if at < high and self.frame[at] - frame <= reach else -1
+
+    def nearest(self, id: int, frame: int, reach: int) -> int:
+        """Returns the row nearest in time and at most `reach` frames away, -1 if there is none.
+
+        Of two equally near rows the earlier one is returned.
+        """
+        low, high = self.span.get(id, NO_ROWS)
+        at = bisect_left(self.frame, frame, low, high)
+        if at > low and (at == high or frame - self.frame[at - 1] <= self.frame[at] - frame):
+            at -= 1
+        return self.row[at] if at < high and abs(self.frame[at] - frame) <= reach else -1

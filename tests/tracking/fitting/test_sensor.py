@@ -15,10 +15,10 @@ from scenarios.schema.sensor import BoxNoise, FalseAlarms, Memory, Sensor
 from sim.detector.sense import sense
 from sim.sequence import simulate
 from sim.types import Frame, Sequence, Truth
+from tracking.fitting.detection_matching import MatchedRecording, match, match_sequence
+from tracking.fitting.error_statistics import simulated_detections, statistics
 from tracking.fitting.false_alarms import fit_alarms
-from tracking.fitting.matching import Matched, match, match_sequence
 from tracking.fitting.sensor import fit, fit_sensor
-from tracking.fitting.statistics import again, statistics
 
 KNOWN = Sensor(
     detect_prob=0.85,
@@ -55,7 +55,7 @@ def scenes() -> tuple[tuple[Truth, Any], ...]:
     return tuple(made)
 
 
-def seen(sensor: Sensor, seed: int = 0) -> list[Matched]:
+def seen(sensor: Sensor, seed: int = 0) -> list[MatchedRecording]:
     return [
         match(truth, sense(truth, sensor, seed + k, camera, camera.image), camera.image, camera)
         for k, (truth, camera) in enumerate(scenes())
@@ -170,8 +170,8 @@ def test_who_never_errs_has_a_clean_profile() -> None:
 def test_synthetic_errors_look_like_those_they_were_fitted_to() -> None:
     """Statistics of new draws of the fitted sensor lie among those of new draws of the true one."""
     first = seen(KNOWN)[:2]
-    real = [statistics([again(m, KNOWN, 100 * k) for m in first]) for k in range(1, 4)]
-    made = [statistics([again(m, fitted(), 100 * k) for m in first]) for k in range(1, 4)]
+    real = [statistics([simulated_detections(m, KNOWN, 100 * k) for m in first]) for k in range(1, 4)]
+    made = [statistics([simulated_detections(m, fitted(), 100 * k) for m in first]) for k in range(1, 4)]
     for name in ("missed", "misses: mean run, s", "overlap, 50% quantile", "overlap, 10% quantile",
                  "false alarms per frame", "false alarms: at people", "error foot: sd"):  # fmt: skip
         a, b = np.array([r[name] for r in real]), np.array([m[name] for m in made])

@@ -11,7 +11,7 @@ from sim.types import Tracks
 from tests.hand_made import Scene, event, tracks, truth
 from tests.reference_social import event_hits
 from tracking.scoring import evaluate
-from tracking.scoring.events import Part, Told, event_scores, pair_events
+from tracking.scoring.events import ComparableEvent, EventMembers, event_scores, match_events
 
 FRAMES = 60
 CROWD = {p: (4.0 * p, 0.0) for p in range(1, 9)}  # far apart: everybody is who they are
@@ -69,7 +69,7 @@ def test_two_tracks_that_are_one_person_are_one():
 
 
 def test_an_event_is_told_once():
-    # Told twice: 1 hit, 1 false: F1 2/3. Two events and one told: F1 2/3, too, with a recall of 1/2.
+    # ComparableEvent twice: 1 hit, 1 false: F1 2/3. Two events and one told: F1 2/3, too, with a recall of 1/2.
     once, twice = [event("merge", 30, (1, 2))], [event("merge", k, (1, 2), emitted=k) for k in (28, 30)]
     found = scores(once, twice)
     assert (found["merge_F1"], found["merge_precision"], found["merge_recall"]) == (near(2 / 3), near(1 / 2), near(1))
@@ -265,9 +265,10 @@ def test_as_many_hits_as_there_can_be(seed):
 
     happened, said = [(s, people, 0) for s, people, _ in some(4)], some(4)
     true, told = (
-        [Told("merge", s, s, Part(people, wrong), (0.0, 0.0)) for s, people, wrong in side] for side in (happened, said)
+        [ComparableEvent("merge", s, s, EventMembers(people, wrong), (0.0, 0.0)) for s, people, wrong in side]
+        for side in (happened, said)
     )
-    found = event_scores(pair_events(true, told, 10.0, 1.0), 10.0)
+    found = event_scores(match_events(true, told, 10.0, 1.0), 10.0)
     assert found["merge_TP"] == event_hits(happened, said, 10.0)
 
 

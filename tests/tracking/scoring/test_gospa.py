@@ -7,12 +7,13 @@ from itertools import permutations
 import numpy as np
 import pytest
 
+from tracking.scoring.candidate_pairs import Pairs, point_pairs
 from tracking.scoring.gospa import gospa, gospa_parts
-from tracking.scoring.similarity import Pairs, Rows, point_pairs
+from tracking.scoring.rows import FrameRows
 
 
-def rows(*counts: int) -> Rows:
-    return Rows(np.repeat(np.arange(1, len(counts) + 1), counts), np.arange(sum(counts)))
+def rows(*counts: int) -> FrameRows:
+    return FrameRows(np.repeat(np.arange(1, len(counts) + 1), counts), np.arange(sum(counts)))
 
 
 def one_frame(x: np.ndarray, y: np.ndarray, cutoff: float) -> Pairs:

@@ -8,8 +8,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.optimize import linear_sum_assignment
 
-from tracking.scoring.matching import match, match_as_table
-from tracking.scoring.similarity import Pairs, matrix_pairs
+from tracking.scoring.candidate_pairs import Pairs, matrix_pairs, point_pairs
+from tracking.scoring.matching import mapped_people, match, match_as_table
+from tracking.scoring.rows import FrameRows
 
 EIGHTHS = st.sampled_from([0.0, 0.0, 0.0, 0.125, 0.25, 0.5, 0.5, 0.625, 1.0, 1.0])  # ties, and sums that tie
 ANY = st.one_of(EIGHTHS, st.floats(0, 1, allow_subnormal=False))
@@ -87,3 +88,37 @@ def test_nothing_to_match() -> None:
     pairs = pairs_of([np.zeros((3, 0)), np.zeros((2, 2))])
     assert match(pairs.frame, pairs.i, pairs.j, pairs.s).tolist() == []
     assert match_as_table(pairs, pairs.s).tolist() == []
+
+
+def test_the_total_counts_and_not_the_nearest_first() -> None:
+    pairs = matrix_pairs([[7, 8]], [[1, 2]], [np.array([[0.9, 0.8], [0.75, 0.0]])])
+    assert mapped_people(pairs).tolist() == [1, 0]  # 0.8 + 0.75 > 0.9
+
+
+def test_one_metre_is_near_enough_and_more_is_not() -> None:
+    rows = FrameRows(np.array([1, 2]), np.array([5, 5]))
+    there = np.array([[1.0, 0.0], [1.001, 0.0]])
+    assert mapped_people(point_pairs(rows, rows, np.zeros((2, 2)), there, 2.0)).tolist() == [0, -1]
+    assert mapped_people(point_pairs(rows, rows, np.zeros((2, 2)), there, 2.0), least=0.6).tolist() == [-1, -1]
+
+
+def test_mapping_of_nobody_on_either_side() -> None:
+    assert mapped_people(matrix_pairs([[], [3]], [[4], []], [np.zeros((0, 1)), np.zeros((1, 0))])).tolist() == [-1]
+    assert mapped_people(matrix_pairs([], [], [])).tolist() == []
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_mapping_equals_the_assignment_of_each_frame(seed: int) -> None:
+    r = np.random.default_rng(seed)
+    sizes = r.integers(0, 9, (12, 2))
+    similarity = [r.random((n, m)) * (r.random((n, m)) < 0.6) for n, m in sizes]
+    pairs = matrix_pairs([np.arange(n) for n, _ in sizes], [np.arange(m) for _, m in sizes], similarity)
+    expected: list[int] = []
+    for s, first in zip(similarity, np.cumsum(sizes[:, 0]) - sizes[:, 0], strict=True):
+        weight = np.where(s >= 0.5, s, 0.0)
+        who = np.full(s.shape[1], -1)
+        for i, j in zip(*linear_sum_assignment(weight, maximize=True), strict=True):
+            if weight[i, j] > 0:
+                who[j] = first + i
+        expected += who.tolist()
+    assert mapped_people(pairs).tolist() == expected

@@ -20,10 +20,10 @@ from tracking.app.stored_tracks import find_tracks, match_tracks
 from tracking.run import TrackingRun
 from tracking.run_info import input_summary
 from tracking.scoring import evaluate
-from tracking.scoring.block_resampling import scorer
+from tracking.scoring.block_resampling import resampled_scorer
 from tracking.scoring.catalogue import CATALOGUE
 from tracking.scoring.evaluation import IncomparableError, Similarity
-from tracking.scoring.groups import GroupMatch
+from tracking.scoring.group_scores import GroupMatch
 from tracking.stats import SURE, bootstrap, moving_blocks, paired
 
 INDICATIVE = f"intervals are indicative under {SURE:g} s: the recording lasts {{seconds:.4g}} s"
@@ -83,7 +83,7 @@ def _resampled_scorer(sequence: Sequence, tracks: Path, method: ComparisonMethod
     """A function from frames (drawn with repetition) of the recording to its scores, in the catalogue's order."""
     ((_, stored),) = match_tracks([sequence], find_tracks(tracks))
     assert sequence.truth is not None
-    return scorer(sequence.truth, stored.read(sequence), method.similarity, method.group_match)
+    return resampled_scorer(sequence.truth, stored.read(sequence), method.similarity, method.group_match)
 
 
 def _block_intervals(sequence: Sequence, draws: int, resampled: Callable[[Ints], Array], values: Array) -> Means:

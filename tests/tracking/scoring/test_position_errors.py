@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 from scipy.linalg import sqrtm
 
-from tracking.scoring.errors import gaussian_wasserstein, people_errors, rms
+from tracking.scoring.position_errors import gaussian_wasserstein, people_errors, root_mean_square
 
 
 def test_root_mean_square_of_lengths() -> None:
-    assert rms(np.array([[3.0, 4.0], [0.0, 1.0], [np.nan, 0.0]])) == pytest.approx(np.sqrt((25 + 1) / 2))
-    assert np.isnan(rms(np.zeros((0, 2))))
+    assert root_mean_square(np.array([[3.0, 4.0], [0.0, 1.0], [np.nan, 0.0]])) == pytest.approx(np.sqrt((25 + 1) / 2))
+    assert np.isnan(root_mean_square(np.zeros((0, 2))))
 
 
 def test_only_mapped_people_count() -> None:

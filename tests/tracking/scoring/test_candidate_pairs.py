@@ -6,17 +6,18 @@ import numpy as np
 import pytest
 
 from tests.reference_trackeval import box_similarity
-from tracking.scoring import similarity as module
-from tracking.scoring.similarity import Pairs, Rows, box_pairs, matrix_pairs, numbered, point_pairs
+from tracking.scoring import candidate_pairs as module
+from tracking.scoring.candidate_pairs import Pairs, box_pairs, matrix_pairs, point_pairs
+from tracking.scoring.rows import FrameRows, numbered
 
 
-def random_rows(r: np.random.Generator, frames: int = 12, most: int = 9) -> Rows:
+def random_rows(r: np.random.Generator, frames: int = 12, most: int = 9) -> FrameRows:
     counts = r.integers(0, most, frames)
     frame = np.repeat(np.arange(1, frames + 1), counts)
-    return Rows(frame, np.concatenate([np.zeros(0, int), *(r.permutation(20)[:n] for n in counts)]))
+    return FrameRows(frame, np.concatenate([np.zeros(0, int), *(r.permutation(20)[:n] for n in counts)]))
 
 
-def places(r: np.random.Generator, rows: Rows, broken: bool) -> np.ndarray:
+def places(r: np.random.Generator, rows: FrameRows, broken: bool) -> np.ndarray:
     pos = r.uniform(-5, 5, (len(rows), 2))
     if broken:
         pos[r.random(len(rows)) < 0.2, r.integers(2)] = np.nan
@@ -25,7 +26,7 @@ def places(r: np.random.Generator, rows: Rows, broken: bool) -> np.ndarray:
     return pos
 
 
-def boxes(r: np.random.Generator, rows: Rows, broken: bool) -> np.ndarray:
+def boxes(r: np.random.Generator, rows: FrameRows, broken: bool) -> np.ndarray:
     box = np.column_stack([r.uniform(-50, 300, (len(rows), 2)), r.uniform(1, 120, (len(rows), 2))])
     if broken:
         box[r.random(len(rows)) < 0.2, r.integers(4)] = np.nan
@@ -39,7 +40,7 @@ def as_dict(pairs: Pairs) -> dict[tuple[int, int], float]:
     return dict(zip(zip(pairs.i.tolist(), pairs.j.tolist(), strict=True), pairs.s.tolist(), strict=True))
 
 
-def expected(true: Rows, est: Rows, table: np.ndarray) -> dict[tuple[int, int], float]:
+def expected(true: FrameRows, est: FrameRows, table: np.ndarray) -> dict[tuple[int, int], float]:
     """table (R, S): the similarity of all rows."""
     same = true.frame[:, None] == est.frame[None]
     return {(i, j): table[i, j] for i, j in np.argwhere(same & (table > 1e-15)).tolist()}
@@ -72,7 +73,7 @@ def test_frames_stay_apart_where_all_stand_close(spread: float) -> None:
 
 
 def test_overlap_of_two_boxes() -> None:
-    one = Rows(np.array([1]), np.array([1]))
+    one = FrameRows(np.array([1]), np.array([1]))
     found = box_pairs(one, one, np.array([[0.0, 0, 4, 2]]), np.array([[2.0, 0, 4, 2]]))
     assert found.s == pytest.approx([4 / 12])
 
@@ -84,26 +85,12 @@ def test_part_of_the_frames(seed: int) -> None:
     a, b = places(r, true, False), places(r, est, False)
     whole = point_pairs(true, est, a, b, 4.0)
     mask = r.random(13) < 0.5
-    for part, kept in ((whole.in_frames(mask), mask), (whole.until(6), np.arange(13) <= 6)):
-        i, j = kept[true.frame], kept[est.frame]
+    for kept in (mask, np.arange(13) <= 6):
+        part, i, j = whole.in_frames(kept), kept[true.frame], kept[est.frame]
         alone = point_pairs(true.keep(i), est.keep(j), a[i], b[j], 4.0)
         assert as_dict(part) == as_dict(alone)
         assert part.true.id.tolist() == alone.true.id.tolist()
         assert part.est.frame.tolist() == alone.est.frame.tolist()
-
-
-@pytest.mark.parametrize("seed", range(5))
-def test_frames_drawn_again_and_again(seed: int) -> None:
-    r = np.random.default_rng(seed)
-    ids = [(r.permutation(9)[: r.integers(0, 6)], r.permutation(9)[: r.integers(0, 6)]) for _ in range(8)]
-    tables = [r.random((len(i), len(j))) * (r.random((len(i), len(j))) < 0.5) for i, j in ids]
-    drawn = r.integers(0, 8, 15)
-    found = matrix_pairs([i for i, _ in ids], [j for _, j in ids], tables).take(drawn)
-    again = matrix_pairs([ids[k][0] for k in drawn], [ids[k][1] for k in drawn], [tables[k] for k in drawn])
-    assert as_dict(found) == as_dict(again)
-    for side in ("true", "est"):
-        assert getattr(found, side).frame.tolist() == getattr(again, side).frame.tolist()
-        assert getattr(found, side).id.tolist() == getattr(again, side).id.tolist()
 
 
 def test_tables_of_each_frame() -> None:

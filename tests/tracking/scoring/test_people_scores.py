@@ -1,4 +1,4 @@
-"""Scores of individuals: equal to TrackEval on random and real cases, ties included; exactly 1 for the truth."""
+"""HOTA, CLEAR, Identity: equal to TrackEval on random and real cases, ties included; exactly 1 for the truth."""
 
 from __future__ import annotations
 
@@ -11,8 +11,9 @@ from sim.sequence import simulate
 from sim.types import Tracks
 from tests.reference_trackeval import box_similarity, trackeval_scores
 from tracking.scoring import evaluate
-from tracking.scoring.individuals import scores, scores_until
-from tracking.scoring.similarity import Rows, box_pairs, matrix_pairs, point_pairs
+from tracking.scoring.candidate_pairs import Pairs, box_pairs, matrix_pairs, point_pairs
+from tracking.scoring.evaluation import people_scores
+from tracking.scoring.rows import FrameRows
 from tracking.stats import draw_blocks, moving_blocks
 
 SEEDS = range(60)
@@ -33,7 +34,7 @@ def random_case(seed: int, values=None, crowd: int = 9):
 
 def assert_equal_to_trackeval(true, est, similarity, pairs=None) -> None:
     expected = trackeval_scores(true, est, similarity)
-    assert scores(pairs or matrix_pairs(true, est, similarity)) == pytest.approx(expected, abs=1e-9)
+    assert people_scores(pairs or matrix_pairs(true, est, similarity)) == pytest.approx(expected, abs=1e-9)
 
 
 @pytest.mark.parametrize("seed", SEEDS)
@@ -99,7 +100,7 @@ def test_equal_to_trackeval_on_real_boxes(shared_data, name: str, kind: str) -> 
     for f in frames:
         (i, a), (j, b) = ((ids[frame == f], box[frame == f]) for frame, ids, box in (truth, tracks))
         true.append(i), est.append(j), similarity.append(box_similarity(a, b))
-    pairs = box_pairs(Rows(*truth[:2]), Rows(*tracks[:2]), truth[2], tracks[2])
+    pairs = box_pairs(FrameRows(*truth[:2]), FrameRows(*tracks[:2]), truth[2], tracks[2])
     assert_equal_to_trackeval(true, est, similarity, pairs)
 
 
@@ -124,33 +125,48 @@ def test_numbers_of_ids_and_order_of_rows_change_nothing(seed: int) -> None:
     for i, j, s in zip(true, est, similarity, strict=True):
         a, b = r.permutation(len(i)), r.permutation(len(j))
         moved.append((other[i[a]], other[j[b]], s[a][:, b]))
-    assert scores(matrix_pairs(*zip(*moved, strict=True))) == pytest.approx(
-        scores(matrix_pairs(true, est, similarity)), abs=1e-12
+    assert people_scores(matrix_pairs(*zip(*moved, strict=True))) == pytest.approx(
+        people_scores(matrix_pairs(true, est, similarity)), abs=1e-12
     )
 
 
 @pytest.mark.parametrize("seed", range(10))
 def test_scores_of_every_beginning(seed: int) -> None:
     true, est, similarity = random_case(seed)
-    found = scores_until(matrix_pairs(true, est, similarity), range(len(true)))
-    for n, row in enumerate(found, start=1):
-        assert row == scores(matrix_pairs(true[:n], est[:n], similarity[:n]))
+    whole = matrix_pairs(true, est, similarity)
+    for n in range(1, len(true) + 1):
+        part = whole.in_frames(np.arange(len(true)) < n)
+        assert people_scores(part) == people_scores(matrix_pairs(true[:n], est[:n], similarity[:n]))
+
+
+def taken(pairs: Pairs, frames: np.ndarray) -> Pairs:
+    """The pairs of these frames, some perhaps repeated, as frames 0, 1, …"""
+
+    def rows_of(frame: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        found = [np.flatnonzero(frame == f) for f in frames]
+        return np.repeat(np.arange(len(frames)), [len(rows) for rows in found]), np.concatenate(found)
+
+    (at_true, i), (at_est, j), (at, k) = (rows_of(f) for f in (pairs.true.frame, pairs.est.frame, pairs.frame))
+    true, est = FrameRows(at_true, pairs.true.id[i]), FrameRows(at_est, pairs.est.id[j])
+    new_i = [np.flatnonzero((at_true == a) & (i == old))[0] for a, old in zip(at, pairs.i[k], strict=True)]
+    new_j = [np.flatnonzero((at_est == a) & (j == old))[0] for a, old in zip(at, pairs.j[k], strict=True)]
+    return Pairs(true, est, np.array(new_i, int), np.array(new_j, int), pairs.s[k])
 
 
 def test_interval_of_one_recording() -> None:
     """Two people; one is lost in the second half, the other is followed under two ids: between all right and worse."""
-    rows, half = Rows(np.repeat(np.arange(1, 201), 2), np.tile([1, 2], 200)), np.arange(400) < 200
+    rows, half = FrameRows(np.repeat(np.arange(1, 201), 2), np.tile([1, 2], 200)), np.arange(400) < 200
     kept = half | (rows.id == 2)
     places = np.column_stack([10.0 * rows.id, np.zeros(400)])
-    told = Rows(rows.frame[kept], np.where(half, rows.id, 3)[kept])
+    told = FrameRows(rows.frame[kept], np.where(half, rows.id, 3)[kept])
     pairs, keys = point_pairs(rows, told, places, places[kept], 2.0), ("HOTA", "MOTA", "IDF1", "AssA", "DetRe")
 
     def drawn(frames: np.ndarray) -> np.ndarray:
-        found = scores(pairs.take(frames + 1))
+        found = people_scores(taken(pairs, frames + 1))
         return np.array([found[key] for key in keys])
 
     value, low, high = moving_blocks(drawn, 200, 10.0, draws=200)
-    assert value == pytest.approx([scores(pairs)[key] for key in keys])
+    assert value == pytest.approx([people_scores(pairs)[key] for key in keys])
     assert (low <= value).all()  # IDF1 is at its lowest where half is right
     assert (value < high).all()
     r = np.random.default_rng(0)
@@ -160,9 +176,9 @@ def test_interval_of_one_recording() -> None:
 
 def test_an_id_twice_in_a_frame_is_refused() -> None:
     with pytest.raises(ValueError, match="truth: id 7 is twice in frame 1"):
-        scores(matrix_pairs([[7], [7, 8, 7]], [[], []], [np.zeros((1, 0)), np.zeros((3, 0))]))
+        people_scores(matrix_pairs([[7], [7, 8, 7]], [[], []], [np.zeros((1, 0)), np.zeros((3, 0))]))
     with pytest.raises(ValueError, match="tracks: id 2 is twice in frame 0"):
-        scores(matrix_pairs([[]], [[2, 2]], [np.zeros((0, 2))]))
+        people_scores(matrix_pairs([[]], [[2, 2]], [np.zeros((0, 2))]))
 
 
 @pytest.mark.parametrize("similarity", ["boxes", "ground", "image"])

@@ -9,9 +9,9 @@ import pytest
 
 from sim.io.source import open_source
 from sim.types import Detections, Truth
-from tracking.fitting.false_alarms import linked
-from tracking.fitting.matching import Matched, intersections, match, match_sequence, overlaps
-from tracking.fitting.statistics import miss_runs, statistics
+from tracking.fitting.detection_matching import MatchedRecording, intersections, match, match_sequence, overlaps
+from tracking.fitting.error_statistics import miss_runs, statistics
+from tracking.fitting.false_alarms import alarm_tracks
 
 
 def truth_of(boxes: dict[int, list[list[float] | None]]) -> Truth:
@@ -75,13 +75,13 @@ def test_what_motchallenge_leaves_out_is_no_false_alarm(tmp_path: Path) -> None:
     assert m.match.tolist() == [0]
 
 
-def alarmed(*frames: list[list[float]]) -> Matched:
+def alarmed(*frames: list[list[float]]) -> MatchedRecording:
     return match(truth_of({1: [HERE] * len(frames), 2: [THERE] * len(frames)}), found(*frames), SIZE)
 
 
 def test_alarms_are_linked_over_pauses_and_know_whom_they_are_at() -> None:
     part, far = [105.0, 105.0, 20.0, 30.0], [500.0, 300.0, 40.0, 100.0]
-    chains = linked(alarmed([HERE, part], [HERE, part, far], [HERE], [HERE, part], *[[HERE]] * 8, [HERE, part]))
+    chains = alarm_tracks(alarmed([HERE, part], [HERE, part, far], [HERE], [HERE, part], *[[HERE]] * 8, [HERE, part]))
     assert [c.frame.tolist() for c in chains] == [[1, 2, 4], [2], [13]]
     assert [c.person for c in chains] == [1, -1, 1]
 

@@ -1,4 +1,4 @@
-"""Scores of a user's own arrays: one row for each person and frame on either side, no files and no types of ours."""
+"""`score_arrays`: scores of your own arrays, one row per person and frame on each side, without files or our types."""
 
 from __future__ import annotations
 
@@ -12,10 +12,10 @@ from numpy.typing import ArrayLike
 from sim.types import Groups, Plane, Tracks, Truth
 from tracking.grouping.grouped_tracks import derive
 from tracking.scoring.evaluation import Scores, Similarity, evaluate
-from tracking.scoring.groups import GroupMatch
+from tracking.scoring.group_scores import GroupMatch
 
-COLUMNS = {"frame": (), "id": (), "pos": (2,), "box": (4,), "group": ()}
-PERSON_HEIGHT = 1.7  # m, what the median box stands for
+COLUMNS = {"frame": (), "id": (), "pos": (2,), "box": (4,), "group": ()}  # name: shape of one row
+PERSON_HEIGHT = 1.7  # m: assumed height of the median box
 
 Table = dict[str, Any]
 
@@ -29,29 +29,36 @@ def score_arrays(
     similarity: Similarity | None = None,
     group_match: GroupMatch = "hull",
 ) -> Scores:
-    """Every score of the catalogue, from two tables of columns with a row for each person in each frame.
+    """Returns every score of the catalogue for two tables of columns with R rows, one per person and frame.
 
-    frame (R,) from 1 on and id (R,), whole numbers; pos (R, 2) on the ground in m, or box (R, 4) left, top, width,
-    height in px, or both; group (R,), -1 alone, where known. Without groups in the truth only people are scored;
-    without groups in the tracks these get them by the baseline rule. Merges, splits, crossings and queues are measured
-    on both sides, from groups and places. px_per_m: of boxes alone; where absent their median height is 1.7 m.
-    ValueError for wrong input.
+    Columns: frame (R,), whole numbers from 1; id (R,), whole numbers; pos (R, 2), on the ground in m; box (R, 4): left,
+    top, width, height in px; group (R,), -1 alone. frame, id and one of pos and box are required. People are compared
+    on the ground if both tables have pos, else in the image.
+
+    Without a group column in the truth only people are scored. Without one in the tracks they get groups by the
+    baseline rule. Merges, splits, crossings and queues of both sides are derived from groups and positions.
+
+    fps: frames per second. px_per_m: pixels per metre, for boxes only; None takes the median height of the true boxes
+    for 1.7 m. similarity, group_match: as for `evaluate`.
+
+    Raises ValueError if a column is unknown, missing, of a wrong shape or not finite, if fps is not above 0, if both
+    tables lack a common kind of position, or if an id occurs twice in one frame.
     """
     if not (np.isfinite(fps) and fps > 0):
         raise ValueError(f"fps: got {fps}, expected a number above 0")
     true, est = _table(truth, "truth"), _table(tracks, "tracks")
-    sides = [side for side in (true, est) if len(side["frame"])]
-    plane: Plane = "ground" if all(side["pos"] is not None for side in sides) else "image"
-    if plane == "image" and any(side["box"] is None for side in sides):
+    filled = [table for table in (true, est) if len(table["frame"])]
+    plane: Plane = "ground" if all(table["pos"] is not None for table in filled) else "image"
+    if plane == "image" and any(table["box"] is None for table in filled):
         raise ValueError("got pos on one side and box on the other, expected one of them on both")
-    length = max((int(side["frame"][-1]) for side in sides), default=0)
+    length = max((int(table["frame"][-1]) for table in filled), default=0)
     scale = _scale(true["box"]) if px_per_m is None else px_per_m
-    made, answers = _truth(true, length, fps, scale, plane), _answers(est, length, fps, scale, plane)
-    return evaluate(made, answers, similarity=similarity, group_match=group_match)
+    made, tracks_of_frames = _truth(true, length, fps, scale, plane), _tracks(est, length, fps, scale, plane)
+    return evaluate(made, tracks_of_frames, similarity=similarity, group_match=group_match)
 
 
 def _table(columns: Mapping[str, ArrayLike], side: str) -> Table:
-    """The columns as arrays of the right kind, rows sorted by frame and id; None where there is none."""
+    """Returns the checked columns, rows sorted by frame and id; a missing column is None."""
     for name in columns:
         if name not in COLUMNS:
             raise ValueError(f"{side}: got the column {name!r}, expected some of {', '.join(COLUMNS)}")
@@ -69,6 +76,7 @@ def _table(columns: Mapping[str, ArrayLike], side: str) -> Table:
 
 
 def _column(given: ArrayLike, name: str, side: str) -> Any:
+    """Returns one column as float64 (pos, box) or int64 (others). Raises ValueError if it is invalid."""
     values, shape = np.asarray(given), COLUMNS[name]
     values = values if values.size else values.reshape(0, *shape)
     if values.shape[1:] != shape or values.ndim == 0:
@@ -84,22 +92,23 @@ def _column(given: ArrayLike, name: str, side: str) -> Any:
 
 
 def _scale(box: Any) -> float:
+    """Returns pixels per metre by the median height of the boxes, nan without boxes."""
     return float("nan") if box is None or not len(box) else float(np.median(box[:, 3])) / PERSON_HEIGHT
 
 
-def _answers(table: Table, length: int, fps: float, px_per_m: float, plane: Plane) -> list[Tracks]:
-    """The rows as tracks of frames 1 … length, with shapes and events of the groups that the column tells, if any."""
+def _tracks(table: Table, length: int, fps: float, px_per_m: float, plane: Plane) -> list[Tracks]:
+    """Returns the rows as tracks of frames 1 … length; with a group column, groups and events are derived from it."""
     box, group, rows = table["box"], table["group"], len(table["frame"])
     pos = table["pos"] if plane == "ground" else box[:, :2] + box[:, 2:] / 2
     label = np.full(rows, -1, np.int64) if group is None else group
-    nobody = Groups.none() if group is not None and (label < 0).all() else None
+    no_groups = Groups.none() if group is not None and (label < 0).all() else None
     cuts = np.searchsorted(table["frame"], np.arange(1, length + 2)).tolist()
 
     def at(index: int) -> Tracks:
         r, n = slice(cuts[index - 1], cuts[index]), cuts[index] - cuts[index - 1]
         return Tracks(
             index, (index - 1) / fps, plane, "person", table["id"][r], label[r], pos[r], np.full((n, 2), np.nan),
-            np.full((n, 4, 4), np.nan), None if box is None else box[r], np.ones(n), nobody,
+            np.full((n, 4, 4), np.nan), None if box is None else box[r], np.ones(n), no_groups,
         )  # fmt: skip
 
     found = [at(index) for index in range(1, length + 1)]
@@ -107,7 +116,7 @@ def _answers(table: Table, length: int, fps: float, px_per_m: float, plane: Plan
 
 
 def _truth(table: Table, length: int, fps: float, px_per_m: float, plane: Plane) -> Truth:
-    """The truth of a table; labelled where it has a group column."""
+    """Returns the rows as a truth; all frames are labelled if there is a group column, else none."""
     frame, group, rows = table["frame"], table["group"], len(table["frame"])
     truth = Truth(
         "arrays", fps, length, px_per_m, frame, table["id"], np.full(rows, -1) if group is None else group,
@@ -115,7 +124,7 @@ def _truth(table: Table, length: int, fps: float, px_per_m: float, plane: Plane)
     )  # fmt: skip
     if group is None:
         return truth
-    told = _answers(table, length, fps, px_per_m, plane)
-    groups = tuple(t.groups or Groups.none() for t in told)
-    events = tuple(replace(e, emitted=None) for t in told for e in t.events)
+    derived = _tracks(table, length, fps, px_per_m, plane)
+    groups = tuple(t.groups or Groups.none() for t in derived)
+    events = tuple(replace(e, emitted=None) for t in derived for e in t.events)
     return truth.replace(events=events, **{"groups" if plane == "ground" else "groups_px": groups})

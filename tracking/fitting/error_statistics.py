@@ -10,21 +10,21 @@ from scenarios.schema.sensor import Sensor
 from sim.detector.box_noise import box_errors
 from sim.detector.sense import sense
 from sim.types import Array, Ints
+from tracking.fitting.detection_matching import MatchedRecording, match
 from tracking.fitting.error_correlation import pairs_at
-from tracking.fitting.false_alarms import linked
-from tracking.fitting.matching import Matched, match
+from tracking.fitting.false_alarms import alarm_tracks
 
 VISIBILITIES = (0.0, 0.25, 0.5, 0.75, 0.95)
 LAGS = (0.2, 1.0)  # s
 
 
-def again(m: Matched, sensor: Sensor, seed: int) -> Matched:
+def simulated_detections(m: MatchedRecording, sensor: Sensor, seed: int) -> MatchedRecording:
     """The same people, seen by a sensor instead of the recording's detector."""
     found = sense(m.truth, sensor, seed, m.camera, m.size)
     return match(m.truth, found, m.size, m.camera)
 
 
-def statistics(recordings: Sequence[Matched]) -> dict[str, float]:
+def statistics(recordings: Sequence[MatchedRecording]) -> dict[str, float]:
     """Errors by name; shares of 1, nan where nothing of the kind was seen."""
     hit = np.concatenate([m.hit for m in recordings])
     visibility = np.concatenate([m.truth.visibility for m in recordings])
@@ -36,7 +36,7 @@ def statistics(recordings: Sequence[Matched]) -> dict[str, float]:
     found["misses: mean run, s"] = _mean(runs)
     found["misses in runs over 1 s"] = float(runs[runs > 1.0].sum() / runs.sum()) if len(runs) else float("nan")
     frames = sum(m.truth.length for m in recordings)
-    chains = [c for m in recordings for c in linked(m)]
+    chains = [c for m in recordings for c in alarm_tracks(m)]
     seen = np.array([len(c.rows) for c in chains], dtype=float)
     found["false alarms per frame"] = float(seen.sum()) / frames
     found["false alarms: at people"] = _weighted(np.array([c.person >= 0 for c in chains]), seen)
@@ -54,7 +54,7 @@ def statistics(recordings: Sequence[Matched]) -> dict[str, float]:
     return found
 
 
-def miss_runs(m: Matched) -> Ints:
+def miss_runs(m: MatchedRecording) -> Ints:
     """Lengths of stretches in which a person who is there is missed, frames."""
     lengths = []
     for id in np.unique(m.truth.id):
@@ -66,7 +66,7 @@ def miss_runs(m: Matched) -> Ints:
     return np.concatenate([np.zeros(0, np.int64), *lengths])
 
 
-def _of_boxes(m: Matched) -> tuple[Array, Array]:
+def _of_boxes(m: MatchedRecording) -> tuple[Array, Array]:
     """Overlaps (H,) and errors (H, 4) of detected people, against their whole boxes."""
     assert m.truth.box is not None
     true, box = m.truth.box[m.hit], m.box[m.match[m.hit]]
@@ -76,7 +76,7 @@ def _of_boxes(m: Matched) -> tuple[Array, Array]:
     return inner / (area - inner), box_errors(box, true)
 
 
-def _correlation(recordings: Sequence[Matched], e: Array, lag: float) -> float:
+def _correlation(recordings: Sequence[MatchedRecording], e: Array, lag: float) -> float:
     """Of the errors of one person so far apart, all four pooled."""
     total, count, first = 0.0, 0, 0
     mean, sd = e.mean(axis=0), np.maximum(e.std(axis=0), 1e-9)

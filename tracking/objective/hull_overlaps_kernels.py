@@ -1,7 +1,6 @@
-"""Compiled shapes of groups and their overlaps; the twins are sim.geometry.polygons, sim.geometry.footprints and
-tracking.grouping.group_labels.
+"""Compiled measures and overlaps of the groups' hulls. Exact versions: sim.geometry.polygons and tracking.scoring.
 
-Polygons stand one after the other in vertex (V, 2), counter-clockwise; polygon g is vertex[ends[g - 1] : ends[g]].
+Polygons follow each other in vertex (V, 2), counter-clockwise. Polygon g is vertex[ends[g - 1] : ends[g]].
 """
 
 from __future__ import annotations
@@ -11,111 +10,18 @@ from numba import njit
 
 
 @njit(cache=True)
-def partition(frame, column, length, people, memory, when, a, b, on):  # type: ignore[no-untyped-def]
-    """(R,) of each row the least column of those it is grouped with in its frame, -1 alone:
-    tracking.grouping.group_labels.label_people
-    without names. Rows sorted by frame (from 0); links: when, a, b, on (L,) sorted by `when`."""
-    linked = np.zeros((people, people), np.bool_)
-    seen = np.full(people, -memory - 2)
-    label, stack, size = np.empty(people, np.int64), np.empty(people, np.int64), np.zeros(people, np.int64)
-    out = np.full(len(frame), -1)
-    row, link = 0, 0
-    for t in range(length):
-        first = row
-        while row < len(frame) and frame[row] == t:
-            seen[column[row]] = t
-            row += 1
-        while link < len(when) and when[link] == t:
-            linked[a[link], b[link]] = linked[b[link], a[link]] = on[link]
-            link += 1
-        label[:] = -1
-        size[:] = 0
-        for k in range(first, row):
-            p = column[k]
-            if label[p] < 0:
-                _spread(p, linked, seen, t - memory, label, stack)
-            size[label[p]] += 1
-        for k in range(first, row):
-            if size[label[column[k]]] > 1:
-                out[k] = label[column[k]]
-    return out
-
-
-@njit(cache=True)
-def _spread(p, linked, seen, since, label, stack):  # type: ignore[no-untyped-def]
-    """Label everybody who is linked to p, or through others, and was seen lately, by p."""
-    stack[0], n, label[p] = p, 1, p
-    while n:
-        n -= 1
-        q = stack[n]
-        for r in range(len(seen)):
-            if linked[q, r] and label[r] < 0 and seen[r] >= since:
-                label[r] = p
-                stack[n] = r
-                n += 1
-
-
-@njit(cache=True)
-def footprints(pos, ends, disc):  # type: ignore[no-untyped-def]
-    """Hulls of groups of discs: places (R, 2) one group after the other, `disc` (S, 2) counter-clockwise from its
-    lowest vertex (the leftmost of those). Edges of the places' hull and of the disc, merged by direction."""
-    vertex, stop = np.empty((2 * len(pos) + len(disc) * len(ends), 2)), np.empty(len(ends), np.int64)
-    n, first = 0, 0
-    for g in range(len(ends)):
-        hull = _hull(pos[first : ends[g]])
-        i, j = 0, 0
-        while i < len(hull) or j < len(disc):
-            p, q = hull[i % len(hull)], disc[j % len(disc)]
-            vertex[n] = p + q
-            n += 1
-            u, v = hull[(i + 1) % len(hull)] - p, disc[(j + 1) % len(disc)] - q
-            turn = u[0] * v[1] - u[1] * v[0]
-            ahead = i < len(hull) and len(hull) > 1 and (j >= len(disc) or turn >= 0)
-            both = ahead and j < len(disc) and turn == 0 and u[0] * v[0] + u[1] * v[1] > 0
-            if ahead:
-                i += 1
-            if not ahead or both:
-                j += 1
-            if len(hull) == 1 and j >= len(disc):
-                i = 1
-        first = ends[g]
-        stop[g] = n
-    return vertex[:n].copy(), stop
-
-
-@njit(cache=True)
-def _hull(points):  # type: ignore[no-untyped-def]
-    """Convex hull counter-clockwise from the lowest point, the leftmost of those; points few."""
-    p = points.copy()
-    for i in range(1, len(p)):
-        k = i
-        while k > 0 and (p[k, 1] < p[k - 1, 1] or (p[k, 1] == p[k - 1, 1] and p[k, 0] < p[k - 1, 0])):
-            p[k, 0], p[k - 1, 0] = p[k - 1, 0], p[k, 0]
-            p[k, 1], p[k - 1, 1] = p[k - 1, 1], p[k, 1]
-            k -= 1
-    out, n = np.empty((2 * len(p) + 1, 2)), 0
-    for i in range(len(p)):
-        while n > 1 and _turn(out[n - 2], out[n - 1], p[i]) <= 0:
-            n -= 1
-        out[n] = p[i]
-        n += 1
-    base = n
-    for i in range(len(p) - 2, -1, -1):
-        while n > base and _turn(out[n - 2], out[n - 1], p[i]) <= 0:
-            n -= 1
-        out[n] = p[i]
-        n += 1
-    return out[: max(n - 1, 1)] if (out[0] != out[1]).any() or n < 2 else out[:1]
-
-
-@njit(cache=True)
 def _turn(a, b, c):  # type: ignore[no-untyped-def]
+    """Returns twice the signed area of the triangle a, b, c: above 0 for a left turn."""
     return (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0])
 
 
 @njit(cache=True)
 def measure(vertex, ends, slack):  # type: ignore[no-untyped-def]
-    """Area (G,), box (G, 4) low, high; regular (G,): with an area, and nowhere turning right by more than `slack`."""
+    """Returns area (G,), signed; box (G, 4) min x, min y, max x, max y; regular (G,).
+
+    regular: the area is positive and no turn is to the right by more than `slack` times the squared size of the box.
+    Without vertices the area is 0, the box nan and regular False.
+    """
     area, box, regular = np.zeros(len(ends)), np.full((len(ends), 4), np.nan), np.zeros(len(ends), np.bool_)
     first = 0
     for g in range(len(ends)):
@@ -139,8 +45,11 @@ def measure(vertex, ends, slack):  # type: ignore[no-untyped-def]
 
 @njit(cache=True)
 def candidates(frame_a, box_a, area_a, frame_b, box_b, area_b, least):  # type: ignore[no-untyped-def]
-    """(K,), (K,) rows of the same frame whose overlap may be `least`: no more is common than the smaller of two, and
-    than what their boxes share. Rows sorted by frame."""
+    """Returns the rows i (K,), j (K,) of the pairs of one frame whose IoU may reach `least`.
+
+    The common area is bounded by the smaller polygon and by the overlap of the boxes. frame_a, frame_b: sorted. The
+    result is sorted by i, then j.
+    """
     i, j, n = np.empty(len(frame_a) + 16, np.int64), np.empty(len(frame_a) + 16, np.int64), 0
     start = 0
     for p in range(len(frame_a)):
@@ -163,7 +72,7 @@ def candidates(frame_a, box_a, area_a, frame_b, box_b, area_b, least):  # type: 
 
 @njit(cache=True)
 def overlaps(vertex_a, ends_a, area_a, vertex_b, ends_b, area_b, i, j):  # type: ignore[no-untyped-def]
-    """(K,) intersection over union of convex polygons i of a and j of b: one is cut by each edge of the other."""
+    """Returns the IoU (K,) of the convex polygons i of a and j of b, by Sutherland-Hodgman clipping."""
     out = np.empty(len(i))
     longest = _longest(ends_a) + _longest(ends_b) + 2
     one, two = np.empty((longest, 2)), np.empty((longest, 2))
@@ -185,6 +94,7 @@ def overlaps(vertex_a, ends_a, area_a, vertex_b, ends_b, area_b, i, j):  # type:
 
 @njit(cache=True)
 def _longest(ends):  # type: ignore[no-untyped-def]
+    """Returns the greatest number of vertices of a polygon."""
     most, first = 0, 0
     for end in ends:
         most = max(most, end - first)
@@ -194,7 +104,7 @@ def _longest(ends):  # type: ignore[no-untyped-def]
 
 @njit(cache=True)
 def _cut(polygon, n, a, b, spare):  # type: ignore[no-untyped-def]
-    """Keep what of polygon[:n] lies left of the line from a to b; its new number of vertices."""
+    """Clips polygon[:n] in place to the left of the line from a to b; returns the new number of vertices."""
     dx, dy = b[0] - a[0], b[1] - a[1]
     outside = False
     for k in range(n):
@@ -221,10 +131,10 @@ def _cut(polygon, n, a, b, spare):  # type: ignore[no-untyped-def]
 
 @njit(cache=True)
 def inside(frame, vertex, ends, box, regular, people, place, reach, slack):  # type: ignore[no-untyped-def]
-    """How many people of its frame, 2 at most, are in each polygon or within `reach` of it (G,).
+    """Returns how many people of the frame are inside each polygon or within `reach` of it, at most 2, (G,).
 
-    -1 where that cannot be told: of a polygon that is not regular, and where somebody is within `slack` of `reach`.
-    people: frame of each place (R, 2); both sorted by frame.
+    -1: unsure, because the polygon is not regular or a person is within `slack` of `reach`. A polygon without vertices
+    has 0. frame (G,): of the polygons; people (R,): frame of each position in place (R, 2); both sorted.
     """
     count, start = np.zeros(len(frame), np.int64), 0
     for g in range(len(frame)):
@@ -250,7 +160,7 @@ def inside(frame, vertex, ends, box, regular, people, place, reach, slack):  # t
 
 @njit(cache=True)
 def _gap(p, x, y):  # type: ignore[no-untyped-def]
-    """From a place to a convex polygon, 0 inside."""
+    """Returns the distance of the point (x, y) from a convex polygon, 0 inside."""
     within, least = True, np.inf
     for k in range(len(p)):
         a, b = p[k], p[(k + 1) % len(p)]

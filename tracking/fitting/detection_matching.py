@@ -27,7 +27,7 @@ DISTRACTORS = (2, 7, 8, 12)  # of MOTChallenge: people on vehicles, static peopl
 
 
 @dataclass(frozen=True)
-class Matched:
+class MatchedRecording:
     """A recording: truth with visibilities, R rows, and M detections in the order of their frames.
 
     frame, score (M,), box (M, 4); pos (M, 2) where detections are points on the ground, else None. match (R,): the
@@ -60,7 +60,7 @@ class Matched:
         return slice(int(low), int(high))
 
 
-def match_sequence(sequence: Sequence) -> Matched:
+def match_sequence(sequence: Sequence) -> MatchedRecording:
     """A recording's labels against its detections; InputError where one of them, or their boxes, are missing."""
     file, truth = sequence.source.get("path", sequence.name), sequence.truth
     missing = (
@@ -86,7 +86,7 @@ def match(
     size: tuple[int, int] | None,
     camera: Camera | None = None,
     left_out: tuple[Ints, Array] | None = None,
-) -> Matched:
+) -> MatchedRecording:
     """Truth with boxes against detections with boxes, frame by frame; left_out: frames and boxes of what does not
     count, so that a detection there is no false alarm."""
     assert truth.box is not None
@@ -107,7 +107,7 @@ def match(
     number = np.cumsum(keep) - 1
     partner = np.where(partner >= 0, number[np.maximum(partner, 0)], -1) if len(box) else partner
     pos = None if pos is None else pos[keep]
-    return Matched(truth, size, camera, frame[keep], box[keep], score[keep], pos, partner, owner[keep])
+    return MatchedRecording(truth, size, camera, frame[keep], box[keep], score[keep], pos, partner, owner[keep])
 
 
 def _pairs(truth: Truth, frame: Ints, box: Array, usual: Array | None = None) -> tuple[Ints, Ints]:

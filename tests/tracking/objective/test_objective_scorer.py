@@ -1,0 +1,114 @@
+"""The objective by itself is the one of `evaluate`, whatever the tracker reports."""
+
+from __future__ import annotations
+
+import dataclasses
+
+import numpy as np
+import pytest
+
+from scenarios.loading.resolve import load
+from sim.sequence import simulate
+from sim.types import Groups
+from tracking.grouping.grouped_tracks import with_groups
+from tracking.objective import ObjectiveScorer
+from tracking.scoring import evaluate
+
+KEYS = ("objective", "HOTA", "group_F1_hull")
+
+
+@pytest.fixture(scope="module")
+def crowd():
+    return simulate(load("crowd", ["camera.fps=5", "duration=10", "sensor.clutter_rate=2"]), 3, 0, ())
+
+
+def same(found, expected):
+    assert [found[k] for k in KEYS] == pytest.approx([expected[k] for k in KEYS], abs=1e-12, nan_ok=True)
+
+
+def raw(name, sequence, **options):
+    """Answers without derived groups, and the scale."""
+    from tracking.prepare import prepare
+
+    ready = prepare(name, sequence, **options)
+    ready.reset(0)
+    made = [ready.step(frame) for frame in ready.frames()]
+    return made, ready.px_per_m(made)
+
+
+@pytest.mark.parametrize("name", ["blob", "group-pda"])
+@pytest.mark.parametrize("scenario", ["merge", "split", "queue", "party", "side-by-side"])
+def test_on_scenes(name, scenario):
+    sequence = simulate(load(scenario, ["camera.fps=5"]), 7, 0, ())
+    made, scale = raw(name, sequence)
+    scorer = ObjectiveScorer(sequence.truth)
+    for last in (1, 9, 30, len(made)):
+        answers = with_groups(made[:last], sequence.fps, scale)
+        same(scorer.scores(made[:last], scale), evaluate(sequence.truth, answers, frames=last))
+    assert 0 < scorer.scores(made, scale)["objective"] < 1
+
+
+@pytest.mark.parametrize("name", ["blob", "group-pda"])
+def test_in_a_crowd_with_false_alarms(name, crowd):
+    made, scale = raw(name, crowd)
+    same(ObjectiveScorer(crowd.truth).scores(made, scale), evaluate(crowd.truth, with_groups(made, crowd.fps, scale)))
+
+
+def test_in_the_image(crowd):
+    flat = dataclasses.replace(crowd, camera=None, px_per_m=40.0, load_truth=lambda: in_image(crowd.truth))
+    made, scale = raw("blob", flat)
+    assert made[5].plane == "image"
+    expected = evaluate(flat.truth, with_groups(made, flat.fps, scale))
+    same(ObjectiveScorer(flat.truth).scores(made, scale), expected)
+    assert expected["group_F1_hull"] > 0
+    unboxed = [t.replace(box=None) for t in made]
+    same(
+        ObjectiveScorer(flat.truth).scores(unboxed, scale), evaluate(flat.truth, with_groups(unboxed, flat.fps, scale))
+    )
+    same(
+        ObjectiveScorer(flat.truth).scores(unboxed, np.nan),
+        evaluate(flat.truth, with_groups(unboxed, flat.fps, np.nan)),
+    )
+
+
+def in_image(truth):
+    return dataclasses.replace(truth, px_per_m=40.0)
+
+
+def test_what_a_tracker_names_itself(crowd):
+    """Labels of its own, groups of its own, derived ones."""
+    made, scale = raw("blob", crowd)
+    labelled = [t.replace(group=np.where(t.id % 3 == 0, t.id // 9, -1)) for t in made]
+    derived = with_groups(made, crowd.fps, scale)
+    own = [t.replace(group=np.full(len(t.id), -1), derived=False, events=()) for t in derived]
+    scorer = ObjectiveScorer(crowd.truth)
+    for answers in (labelled, derived, own):
+        same(scorer.scores(answers, scale), evaluate(crowd.truth, with_groups(answers, crowd.fps, scale)))
+
+
+def test_wholes_of_every_shape(crowd):
+    """Hulls without vertices, of one or two, clockwise, not convex, on top of each other; no groups at all."""
+    made, scale = raw("group-pda", crowd)
+    rng = np.random.default_rng(4)
+
+    answers = []
+    for t in made:
+        g, hulls = t.groups, []
+        for h in g.hull:
+            star = np.concatenate([h, (h[:1] + h.mean(0)) / 2])
+            kinds = [h, h[:0], h[:1], h[:2], h[::-1], star, 2 * h - h.mean(0)]
+            hulls.append(kinds[rng.integers(len(kinds))])
+        answers.append(t.replace(groups=g.replace(hull=tuple(hulls))))
+    answers[3] = answers[3].replace(groups=None)
+    answers[4] = answers[4].replace(groups=Groups.none())
+    same(ObjectiveScorer(crowd.truth).scores(answers, scale), evaluate(crowd.truth, answers))
+
+
+def test_nothing_answered_and_nothing_labelled(crowd):
+    scorer = ObjectiveScorer(crowd.truth)
+    assert np.isnan(scorer.scores([], 1.0)["group_F1_hull"]) or scorer.scores([], 1.0)["group_F1_hull"] == 0
+    bare = dataclasses.replace(crowd.truth, groups=None, groups_px=None, events=None)
+    made, scale = raw("blob", crowd)
+    same(ObjectiveScorer(bare).scores(made, scale), evaluate(bare, made))
+    part = dataclasses.replace(crowd.truth, labelled=np.arange(crowd.truth.length) % 3 == 0)
+    same(ObjectiveScorer(part).scores(made, scale), evaluate(part, with_groups(made, crowd.fps, scale)))

@@ -1,0 +1,91 @@
+"""Outlines of the groups that the baseline rule derives from tracked people: shapes only, without ids and events.
+
+The groups are those of `tracking.grouping.grouped_tracks.derive`, in the same frames and with the same members. Links
+come from `find_links`; connected components and footprint hulls are compiled.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from sim.geometry.footprints import FOOTPRINT
+from sim.truth.merge_split_rules import frames_of
+from sim.types import Array, Bools, Ints, Tracks
+from tracking.grouping.link_rule import LinkRule, find_links
+from tracking.grouping.tracks_table import TracksTable, boxes_of_rows, tabulate
+from tracking.objective.hull_overlaps import GroupOutlines
+from tracking.scoring.rows import FrameRows
+
+FROM_LEFT = np.roll(FOOTPRINT, -int(FOOTPRINT[:, 0].argmin()), axis=0)
+"""The footprint polygon (16, 2) in m, from its leftmost vertex on."""
+
+
+def derived_outlines(tracks: Sequence[Tracks], fps: float, px_per_m: float, labelled: Bools) -> GroupOutlines:
+    """Returns the groups of two or more people in the frames f where labelled[f] is true.
+
+    tracks: not empty, of people, without `groups`. If any track has a group id, these ids define the groups, else the
+    baseline rule does. Hulls are drawn round boxes in the image if every track has one, else round footprints.
+    px_per_m: used only in the image. Raises InputError if the tracks are in the image and px_per_m is not above 0.
+    """
+    table = tabulate(tracks, fps, px_per_m, LinkRule())
+    order, first = _grouped_rows(table, _group_of_rows(table, fps), labelled)
+    pos = table.pos[order] * table.scale
+    ends = np.append(first[1:], len(order)) if len(first) else first
+    centre = np.add.reduceat(pos, first) / np.diff(first, append=len(order))[:, None] if len(first) else pos[:0]
+    box = boxes_of_rows(tracks)
+    vertex, ends = flat_footprint_hulls(pos, ends, table.scale) if box is None else _box_hulls(box[order], ends)
+    rows = FrameRows(table.frame[order][first] + 1, np.arange(len(first)))
+    return GroupOutlines.measured(rows, centre, vertex, ends)
+
+
+def _group_of_rows(table: TracksTable, fps: float) -> Ints:
+    """Returns a label (R,) that members of one group share within a frame, -1 alone."""
+    from tracking.objective import derived_outlines_kernels as kernels
+
+    if (table.group >= 0).any():
+        return table.group
+    rule = LinkRule()
+    links = find_links(table.frame, table.column, table.pos, table.vel, table.length, fps, rule)
+    label: Ints = kernels.connected_people(
+        table.frame, table.column, table.length, len(table.ids), frames_of(rule.memory, fps),
+        links.frame, links.a, links.b, links.on,
+    )  # fmt: skip
+    return label
+
+
+def _grouped_rows(table: TracksTable, group: Ints, labelled: Bools) -> tuple[Ints, Ints]:
+    """Returns the table rows of group members, group after group, and the index at which each group begins."""
+    order = np.lexsort((group, table.frame))
+    order = order[(group[order] >= 0) & labelled[table.frame[order] + 1]]
+    frame, label = table.frame[order], group[order]
+    new = np.diff(frame, prepend=-1).astype(bool) | np.diff(label, prepend=-1).astype(bool)
+    number = np.cumsum(new) - 1
+    several = np.bincount(number)[number] > 1 if len(order) else np.zeros(0, bool)
+    return order[several], np.flatnonzero(new[several])
+
+
+def flat_convex_hulls(points: Array, ends: Ints) -> tuple[Array, Ints]:
+    """Returns the convex hulls of point sets that end at `ends`: vertices (V, 2) and where each hull ends (G,)."""
+    from sim.geometry.hull_kernels import monotone_chains
+
+    begins = np.concatenate([np.zeros(1, np.int64), ends])
+    owner = np.repeat(np.arange(len(ends)), np.diff(begins))
+    hulls: tuple[Array, Ints] = monotone_chains(points[np.lexsort((points[:, 1], points[:, 0], owner))], begins)
+    return hulls
+
+
+def flat_footprint_hulls(pos: Array, ends: Ints, scale: float) -> tuple[Array, Ints]:
+    """Returns the hulls of the footprints of people at pos (M, 2); scale: units per metre."""
+    from tracking.objective import derived_outlines_kernels as kernels
+
+    hulls: tuple[Array, Ints] = kernels.minkowski_sums(*flat_convex_hulls(pos, ends), FROM_LEFT * scale)
+    return hulls
+
+
+def _box_hulls(box: Array, ends: Ints) -> tuple[Array, Ints]:
+    """Returns the hulls of the corners of boxes (M, 4) ltwh."""
+    left, top, wide, high = box.T
+    corners = np.stack([left, top, left + wide, top, left + wide, top + high, left, top + high], 1).reshape(-1, 2)
+    return flat_convex_hulls(corners, 4 * ends)

@@ -1,0 +1,86 @@
+"""Compiled connected components of linked people, and Minkowski sums of hulls with the footprint polygon."""
+
+from __future__ import annotations
+
+import numpy as np
+from numba import njit
+
+
+@njit(cache=True)
+def connected_people(frame, column, length, people, memory, when, a, b, on):  # type: ignore[no-untyped-def]
+    """Returns a label (R,) that connected people of a frame share, -1 for a person who is alone.
+
+    The groups are those of tracking.grouping.group_labels.label_people, without its ids. The label is the least column
+    of the connected people. frame (R,) from 0, sorted; column (R,); length: number of frames; people: number of
+    columns; memory: frames for which a missed person still connects others. Links switch on or off in frame when (L,),
+    sorted, between the columns a and b.
+    """
+    linked = np.zeros((people, people), np.bool_)
+    seen = np.full(people, -memory - 2)
+    label, stack, size = np.empty(people, np.int64), np.empty(people, np.int64), np.zeros(people, np.int64)
+    out = np.full(len(frame), -1)
+    row, link = 0, 0
+    for t in range(length):
+        first = row
+        while row < len(frame) and frame[row] == t:
+            seen[column[row]] = t
+            row += 1
+        while link < len(when) and when[link] == t:
+            linked[a[link], b[link]] = linked[b[link], a[link]] = on[link]
+            link += 1
+        label[:] = -1
+        size[:] = 0
+        for k in range(first, row):
+            p = column[k]
+            if label[p] < 0:
+                _spread(p, linked, seen, t - memory, label, stack)
+            size[label[p]] += 1
+        for k in range(first, row):
+            if size[label[column[k]]] > 1:
+                out[k] = label[column[k]]
+    return out
+
+
+@njit(cache=True)
+def _spread(p, linked, seen, since, label, stack):  # type: ignore[no-untyped-def]
+    """Sets the label p for all people connected to p, directly or through others, and seen since a frame."""
+    stack[0], n, label[p] = p, 1, p
+    while n:
+        n -= 1
+        q = stack[n]
+        for r in range(len(seen)):
+            if linked[q, r] and label[r] < 0 and seen[r] >= since:
+                label[r] = p
+                stack[n] = r
+                n += 1
+
+
+@njit(cache=True)
+def minkowski_sums(vertex, ends, polygon):  # type: ignore[no-untyped-def]
+    """Returns the sums of G convex hulls and one convex polygon: vertices (V, 2), and where each sum ends (G,).
+
+    Hull g is vertex[ends[g - 1] : ends[g]]. Hulls and `polygon` (S, 2) are counter-clockwise from their leftmost
+    vertex, the lowest of several. The edges of both are merged by direction. A sum may repeat vertices.
+    """
+    out, stop = np.empty((2 * len(vertex) + len(polygon) * len(ends), 2)), np.empty(len(ends), np.int64)
+    n, first = 0, 0
+    for g in range(len(ends)):
+        hull = vertex[first : ends[g]]
+        i, j = 0, 0
+        while i < len(hull) or j < len(polygon):
+            p, q = hull[i % len(hull)], polygon[j % len(polygon)]
+            out[n] = p + q
+            n += 1
+            u, v = hull[(i + 1) % len(hull)] - p, polygon[(j + 1) % len(polygon)] - q
+            turn = u[0] * v[1] - u[1] * v[0]
+            ahead = i < len(hull) and len(hull) > 1 and (j >= len(polygon) or turn >= 0)
+            both = ahead and j < len(polygon) and turn == 0 and u[0] * v[0] + u[1] * v[1] > 0
+            if ahead:
+                i += 1
+            if not ahead or both:
+                j += 1
+            if len(hull) == 1 and j >= len(polygon):
+                i = 1
+        first = ends[g]
+        stop[g] = n
+    return out[:n].copy(), stop

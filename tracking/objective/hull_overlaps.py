@@ -1,0 +1,109 @@
+"""Fast overlaps of group hulls: candidate pairs of an IoU of 0.5 or more, and the number of people inside each hull.
+
+Compiled kernels are exact up to rounding. Whenever rounding could change the outcome, the value is recomputed by the
+functions of tracking.scoring: where a hull has several partners, where an IoU is within `NEAR` of 0.5, where a person
+is within `NEAR` of the limit, and where a reported hull is not convex, clockwise or without area.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from sim.types import Array, Bools, Ints
+from tracking.scoring.candidate_pairs import FOUND, Pairs
+from tracking.scoring.group_scores import hull_iou
+from tracking.scoring.people_and_groups import INSIDE, GroupRows, people_inside
+from tracking.scoring.rows import FrameRows
+
+NEAR = 1e-6  # an IoU this near 0.5, or a distance this near the limit (as a share of it), is recomputed exactly
+FLAT = 1e-12  # share of a polygon's squared size: a right turn smaller than this is a rounding error
+
+
+@dataclass(frozen=True, eq=False)
+class GroupOutlines:
+    """G groups in frames, sorted by frame, with their hulls in flat arrays.
+
+    pos (G, 2): centres. Polygon g is vertex[ends[g - 1] : ends[g]], counter-clockwise; vertex (V, 2), ends (G,). area
+    (G,): signed. box (G, 4): min x, min y, max x, max y, nan without vertices. regular (G,): True if the polygon has a
+    positive area and is convex.
+    """
+
+    rows: FrameRows
+    pos: Array
+    vertex: Array
+    ends: Ints
+    area: Array
+    box: Array
+    regular: Bools
+
+    @classmethod
+    def measured(cls, rows: FrameRows, pos: Array, vertex: Array, ends: Ints) -> GroupOutlines:
+        """Returns the outlines with areas, boxes and regularity computed."""
+        from tracking.objective import hull_overlaps_kernels as kernels
+
+        vertex = np.ascontiguousarray(vertex, float)
+        return cls(rows, pos, vertex, ends, *kernels.measure(vertex, ends, FLAT))
+
+    @classmethod
+    def of(cls, groups: GroupRows) -> GroupOutlines:
+        """Returns the outlines of groups."""
+        ends = np.cumsum(np.array([len(h) for h in groups.hull], np.int64))
+        return cls.measured(groups.rows, groups.pos, np.concatenate([np.zeros((0, 2)), *groups.hull]), ends)
+
+    def __len__(self) -> int:
+        return len(self.rows)
+
+    def until(self, last: int) -> GroupOutlines:
+        """Returns the groups of the frames up to `last`."""
+        n = slice(int(np.searchsorted(self.rows.frame, last, side="right")))
+        return GroupOutlines(
+            self.rows.keep(n), self.pos[n], self.vertex, self.ends[n], self.area[n], self.box[n], self.regular[n]
+        )
+
+    def polygons(self, groups: Ints) -> list[Array]:
+        """Returns the polygons (V, 2) of these groups."""
+        return [self.vertex[self.ends[g - 1] if g else 0 : self.ends[g]] for g in groups.tolist()]
+
+
+def found_pairs(true: GroupOutlines, est: GroupOutlines) -> Pairs:
+    """Returns the pairs of groups of one frame that may have an IoU of 0.5 or more, with their IoU as similarity.
+
+    Pairs well below 0.5 are left out. An IoU is exact where it decides about 0.5 or competes with another pair of the
+    same group; elsewhere it may differ from the exact value by rounding.
+    """
+    from tracking.objective import hull_overlaps_kernels as kernels
+
+    i, j = kernels.candidates(
+        true.rows.frame, true.box, true.area, est.rows.frame, est.box, est.area, FOUND - NEAR
+    )  # fmt: skip
+    s = kernels.overlaps(true.vertex, true.ends, true.area, est.vertex, est.ends, est.area, i, j)
+    irregular = ~(true.regular[i] & est.regular[j])
+    kept = irregular | (s >= FOUND - NEAR)
+    i, j, s, irregular = i[kept], j[kept], s[kept], irregular[kept]
+    rivals = (np.bincount(i, minlength=1)[i] > 1) | (np.bincount(j, minlength=1)[j] > 1)
+    unsure = np.flatnonzero(rivals | irregular | (s <= FOUND + NEAR))
+    if len(unsure):
+        (a, of_a), (b, of_b) = (np.unique(rows[unsure], return_inverse=True) for rows in (i, j))
+        s[unsure] = hull_iou(true.polygons(a), est.polygons(b))(of_a, of_b)
+    return Pairs(true.rows, est.rows, i, j, s)
+
+
+def count_inside(outlines: GroupOutlines, groups: GroupRows, people: FrameRows, positions: Array, scale: float) -> Ints:
+    """Returns how many people are inside each hull or within 0.3 m of it, (G,); 2 stands for two or more.
+
+    outlines, groups: the same groups twice; positions (R, 2): of `people`, in the unit of the hulls; scale: this unit
+    per metre.
+    """
+    from tracking.objective import hull_overlaps_kernels as kernels
+
+    reach = INSIDE * scale
+    count = kernels.inside(
+        outlines.rows.frame, outlines.vertex, outlines.ends, outlines.box, outlines.regular, people.frame,
+        np.ascontiguousarray(positions), reach, NEAR * reach,
+    )  # fmt: skip
+    unsure = count < 0
+    if unsure.any():
+        count[unsure] = people_inside(groups.keep(unsure), people, positions, scale).count
+    return np.asarray(np.minimum(count, 2))

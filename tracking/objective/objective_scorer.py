@@ -1,0 +1,93 @@
+"""`ObjectiveScorer`: HOTA, group_F1_hull and their mean, for tuning and rewards that score one truth again and again.
+
+The numbers are those of `tracking.scoring.evaluate`. The truth's side comes from the same `Scorer` and is prepared
+once. Pairs of people, HOTA and the matching of groups are functions of tracking.scoring. Only three steps are replaced
+by compiled ones: shapes of derived groups (`derived_outlines`), overlaps of hulls and people inside hulls
+(`hull_overlaps`). Where rounding could change a result, the exact functions of tracking.scoring decide.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from sim.types import Tracks, Truth
+from tracking.grouping.grouped_tracks import with_groups
+from tracking.objective.derived_outlines import derived_outlines
+from tracking.objective.hull_overlaps import GroupOutlines, count_inside, found_pairs
+from tracking.scoring.candidate_pairs import FOUND
+from tracking.scoring.evaluation import Scorer, chosen_frames, objective_of, people_pairs, usual_similarity
+from tracking.scoring.group_and_event_scores import ComparedSides, tracked_groups
+from tracking.scoring.group_scores import f1, matched_groups
+from tracking.scoring.hota import hota
+from tracking.scoring.people_and_groups import Surface, bare_groups, hulls_of
+from tracking.scoring.rows import FrameRows
+
+
+class ObjectiveScorer:
+    """Computes the objective of any number of trackers against one truth.
+
+    State: a `Scorer` of the truth, and the outlines of the true groups on each surface asked for so far.
+    """
+
+    def __init__(self, truth: Truth) -> None:
+        self.scorer = Scorer(truth)
+        self._outlines: dict[Surface, GroupOutlines | None] = {}
+
+    def scores(self, tracks: Sequence[Tracks], px_per_m: float) -> dict[str, float]:
+        """Returns HOTA, group_F1_hull and objective of the frames 1 … last, the frame of the last tracks.
+
+        tracks: sorted by frame; px_per_m: scale for deriving groups in the image, nan takes the truth's. The result
+        equals `evaluate(truth, with_groups(tracks, fps, px_per_m), frames=last)` under these keys. A score is nan where
+        it is nan there.
+        """
+        truth, last = self.scorer.truth, tracks[-1].index if tracks else 0
+        sides = self.scorer.sides(tracks, chosen_frames(last, truth.length))
+        found = {"HOTA": float("nan"), "group_F1_hull": float("nan")}
+        if not sides.groups_only:
+            found["HOTA"] = hota(people_pairs(sides, usual_similarity(truth, tracks)))["HOTA"]
+        true = self._true_outlines(sides.surface) if sides.frames.any() else None
+        if true is not None:
+            true, est = true.until(last), _tracked_outlines(sides, px_per_m)
+            matched = matched_groups(true.pos, est.pos, found_pairs(true, est), FOUND)
+            found["group_F1_hull"] = f1(len(matched.i), len(true), len(est))
+        return {**found, "objective": objective_of(found)}
+
+    def _true_outlines(self, surface: Surface) -> GroupOutlines | None:
+        """Returns the outlines of all true groups, None if the truth has no shapes on the surface."""
+        if surface not in self._outlines:
+            true = self.scorer.groups(surface)
+            self._outlines[surface] = GroupOutlines.of(true.groups) if true.comparable else None
+        return self._outlines[surface]
+
+
+def _tracked_outlines(sides: ComparedSides, px_per_m: float) -> GroupOutlines:
+    """Returns the outlines of the tracker's scored groups; groups are derived if the tracker reports none."""
+    tracks, fps = sides.tracks, sides.truth.fps
+    px_per_m = px_per_m if np.isfinite(px_per_m) else sides.truth.px_per_m
+    if not tracks:
+        return GroupOutlines.of(tracked_groups(sides).counted)
+    if all(t.unit == "group" for t in tracks):
+        return _whole_outlines(sides)
+    people_only = not any(t.unit == "group" or t.derived or t.groups is not None for t in tracks)
+    if people_only and (tracks[0].plane != "image" or px_per_m > 0):
+        return derived_outlines(tracks, fps, px_per_m, sides.frames)
+    return GroupOutlines.of(tracked_groups(replace(sides, tracks=with_groups(tracks, fps, px_per_m))).counted)
+
+
+def _whole_outlines(sides: ComparedSides) -> GroupOutlines:
+    """Returns the outlines of groups tracked as wholes, without those that have exactly one person inside."""
+    reported = [(t.index, t.groups) for t in sides.tracks if sides.frames[t.index] and t.groups is not None]
+    frame = np.repeat(np.array([index for index, _ in reported], np.int64), [len(g.id) for _, g in reported])
+    pos = np.concatenate([np.zeros((0, 2)), *(g.pos[:, :2] for _, g in reported)])
+    groups = bare_groups(
+        FrameRows(frame, np.arange(len(frame))), pos, tuple(h for _, g in reported for h in hulls_of(g))
+    )
+    positions = sides.true.positions_on(sides.surface, "ground")
+    if positions is None:
+        return GroupOutlines.of(groups.keep(groups.count != 1))
+    outlines = GroupOutlines.of(groups)
+    count = count_inside(outlines, groups, sides.true.rows, positions, sides.scale)
+    return outlines if (count != 1).all() else GroupOutlines.of(groups.keep(count != 1))

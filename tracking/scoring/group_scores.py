@@ -1,0 +1,260 @@
+"""Scores of groups: one-to-one matching in every frame by hulls or by members, then detection and tracking scores.
+
+Detection (1-FP, 1-FN, GDSR) follows Bazzani, Cristani & Murino (2012), "Decentralized Particle Filter for Joint
+Individual-Group Tracking"; MOTP and MOTA follow Bernardin & Stiefelhagen (2008). Sums run over labelled frames. A score
+whose denominator is 0 is nan.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+
+from sim.geometry.polygons import iou_pairs, pack
+from sim.types import Array, Bools, Ints
+from tracking.scoring.candidate_pairs import EPS, FOUND, Pairs, compare
+from tracking.scoring.hota import hota
+from tracking.scoring.matching import match
+from tracking.scoring.people_and_groups import GroupRows
+from tracking.scoring.position_errors import gaussian_wasserstein
+
+GroupMatch = Literal["hull", "members"]
+CORRECT = (3, 5)  # 3/5 of the members must be common for a group to be correct; integers avoid rounding
+TIE = 1e-9  # weight of closeness in a matching: decides between equal similarities only
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class SharedMembers:
+    """Number of people that each pair of a true and an estimated group has in common.
+
+    key (K,): true row * width + estimated row, sorted; count (K,): common people, above 0; width: number of estimated
+    groups. A pair that is not listed has no common people.
+    """
+
+    key: Ints
+    count: Ints
+    width: int
+
+    def of(self, i: Ints, j: Ints) -> Ints:
+        """Returns the number of common people of true rows i (P,) and estimated rows j (P,), (P,)."""
+        if not len(self.key):
+            return np.zeros(len(i), np.int64)
+        sought = i * self.width + j
+        place = np.minimum(np.searchsorted(self.key, sought), len(self.key) - 1)
+        return np.where(self.key[place] == sought, self.count[place], 0)
+
+
+def shared_members(true: GroupRows, est: GroupRows, person: Ints, people: int) -> SharedMembers:
+    """Returns the common members of true and estimated groups.
+
+    person (K,): row of the true person that each membership of `est` is mapped to, -1 none; people: number of rows of
+    true people.
+    """
+    i = group_of_person(true, people)[person]  # -1 selects the last element, which is -1
+    known = i >= 0
+    key, count = np.unique(i[known] * len(est) + est.of[known], return_counts=True)
+    return SharedMembers(key, count, len(est))
+
+
+def group_of_person(groups: GroupRows, people: int) -> Ints:
+    """Returns the group row of each person row, -1 in no group; shape (people + 1,), the last element is always -1."""
+    group = np.full(people + 1, -1, np.int64)
+    known = groups.member >= 0
+    group[groups.member[known]] = groups.of[known]
+    return group
+
+
+def hull_iou(true: Sequence[Array], est: Sequence[Array]) -> Callable[[Ints, Ints], Array]:
+    """Returns a function of indices i, j (K,): the intersection over union (K,) of polygons true[i] and est[j].
+
+    true, est: convex polygons (V, 2), counter-clockwise. They are prepared once, here.
+    """
+    width = max(map(len, (*true, *est)), default=1)
+    a, b = pack(true, width), pack(est, width)
+    return lambda i, j: iou_pairs(a, b, i, j)
+
+
+def hull_pairs(true: GroupRows, est: GroupRows) -> Pairs:
+    """Returns the pairs of groups with overlapping hulls, with their intersection over union as similarity."""
+    iou = hull_iou(true.hull, est.hull)
+
+    def similarity(i: Ints, j: Ints) -> tuple[Ints, Array]:
+        s = iou(i, j)
+        some = np.flatnonzero(s > EPS)
+        return some, s[some]
+
+    return compare(true.rows, est.rows, similarity)
+
+
+def member_pairs(true: GroupRows, est: GroupRows, shared: SharedMembers) -> Pairs:
+    """Returns the pairs of groups with common members, with the Jaccard index as similarity.
+
+    An estimated member who is mapped to nobody counts as wrong.
+    """
+    n, m = true.count, est.count
+
+    def similarity(i: Ints, j: Ints) -> tuple[Ints, Array]:
+        common = shared.of(i, j)
+        some = np.flatnonzero(common)
+        return some, common[some] / (n[i[some]] + m[j[some]] - common[some])
+
+    return compare(true.rows, est.rows, similarity)
+
+
+def matched_groups(true_pos: Array, est_pos: Array, pairs: Pairs, least: float = 0.0) -> Pairs:
+    """Returns the one-to-one matching of each frame with the greatest total similarity among pairs of at least `least`.
+
+    true_pos (G, 2), est_pos (H, 2): centres of the groups in the rows of `pairs`. Jaccard indices are often equal. Of
+    several best matchings the one with the nearer centres is returned, so the order of groups has no influence.
+    """
+    near = pairs.keep(pairs.s >= least - EPS)
+    apart = np.hypot(*(true_pos[near.i] - est_pos[near.j]).T)
+    closeness = np.nan_to_num(1 / (1 + apart), nan=0.0)
+    return near.keep(match(near.frame, near.i, near.j, near.s + TIE * closeness))
+
+
+@dataclass(frozen=True, eq=False)
+class GroupComparison:
+    """True and estimated groups with their matchings.
+
+    pairs: all candidate pairs; chosen: the matching of all; found: the matching of those of similarity 0.5 or more.
+    nearest (G,): distance of each true group to the group matched by distance alone, nan if it has none.
+    """
+
+    true: GroupRows
+    est: GroupRows
+    shared: SharedMembers
+    pairs: Pairs
+    chosen: Pairs
+    found: Pairs
+    nearest: Array
+
+
+def compare_groups(true: GroupRows, est: GroupRows, shared: SharedMembers, by: GroupMatch) -> GroupComparison:
+    """Returns the comparison by IoU of hulls ("hull") or Jaccard index of members ("members")."""
+    pairs = hull_pairs(true, est) if by == "hull" else member_pairs(true, est, shared)
+    chosen, found = (matched_groups(true.pos, est.pos, pairs, least) for least in (0.0, FOUND))
+    return GroupComparison(true, est, shared, pairs, chosen, found, nearest_distances(true, est))
+
+
+def nearest_distances(true: GroupRows, est: GroupRows) -> Array:
+    """Returns the distance (G,) of each true group to the estimated group it is matched with by distance.
+
+    Each frame's matching has as many pairs as possible and then the least total distance. nan: not matched.
+    """
+
+    def distance(i: Ints, j: Ints) -> tuple[Ints, Array]:
+        d = np.hypot(*(true.pos[i] - est.pos[j]).T)
+        known = np.flatnonzero(np.isfinite(d))
+        return known, d[known]
+
+    pairs = compare(true.rows, est.rows, distance)
+    far = 2 * float(pairs.s.max(initial=0.0)) + 1  # makes one more pair worth more than any saved distance
+    kept = match(pairs.frame, pairs.i, pairs.j, far * len(true) - pairs.s) if len(pairs.s) else np.zeros(0, bool)
+    out = np.full(len(true), np.nan)
+    out[pairs.i[kept]] = pairs.s[kept]
+    return out
+
+
+def group_scores(compared: GroupComparison, frames: Bools) -> dict[str, float]:
+    """Returns the group scores of the frames f where frames[f] is true; keys as in the catalogue without "group_".
+
+    The keys of HOTA are missing if there is no group on either side.
+    """
+    true, est, chosen = compared.true, compared.est, compared.chosen
+    kept = frames[true.rows.frame[chosen.i]]
+    i, j = chosen.i[kept], chosen.j[kept]
+    n_true, n_est, hits = int(frames[true.rows.frame].sum()), int(frames[est.rows.frame].sum()), len(i)
+    misses, false = n_true - hits, n_est - hits
+    switches = count_switches(true.rows.frame[i], true.rows.id[i], est.rows.id[j])
+    right, pure = _correct(compared, i, j)
+    distance = np.hypot(*(true.pos[i] - est.pos[j]).T)
+    return {
+        "1-FP": _share(n_true - false, n_true),
+        "1-FN": _share(n_true - misses, n_true),
+        **_by_frame(compared, frames, i),
+        "GDSR": _share(int(right.sum()), n_true),
+        "GDSR2": _share(int(pure.sum()), n_true),
+        "MOTP": _mean(distance),
+        "MSE": _mean(distance**2),
+        "MOTP_ungated": _mean(compared.nearest[frames[true.rows.frame]]),
+        "MOTA": _share(n_true - misses - false - switches, n_true),
+        "IDSW": float(switches),
+        "TP": float(hits),
+        "FP": float(false),
+        "FN": float(misses),
+        **detection(compared, frames),
+        **(hota(compared.pairs.in_frames(frames)) if n_true + n_est else {}),
+        "size_error": _mean(np.abs(_sizes(true)[i] - _sizes(est)[j])),
+        "extent_error": _mean(gaussian_wasserstein(true.pos[i], true.extent[i], est.pos[j], est.extent[j])),
+    }
+
+
+def _share(part: float, whole: int) -> float:
+    return part / whole if whole else float("nan")
+
+
+def _mean(values: Array) -> float:
+    """Returns the mean of the finite values, nan without any."""
+    known = values[np.isfinite(values)]
+    return float(known.mean()) if len(known) else float("nan")
+
+
+def _correct(compared: GroupComparison, i: Ints, j: Ints) -> tuple[Bools, Bools]:
+    """Returns two masks of the matches (i, j): correct for GDSR, and correct for GDSR2 as well.
+
+    GDSR wants 60 % of the true members in the estimated group. GDSR2 also wants 60 % of the estimated members to be
+    among the true ones.
+    """
+    common = compared.shared.of(i, j)
+    part, whole = CORRECT
+    right = whole * common >= part * compared.true.count[i]
+    pure = right & (whole * common >= part * compared.est.count[j])
+    return right, pure
+
+
+def _by_frame(compared: GroupComparison, frames: Bools, i: Ints) -> dict[str, float]:
+    """Returns 1-FP_frames and 1-FN_frames: 1 - the mean over frames of false (missed) / max(true groups, 1).
+
+    i: true rows of the matches. The paper leaves open whether it means these or the ratios of sums.
+    """
+    size = len(frames)
+    n, m = (np.bincount(side.rows.frame, minlength=size)[frames] for side in (compared.true, compared.est))
+    hits = np.bincount(compared.true.rows.frame[i], minlength=size)[frames]
+    if not len(n):
+        return {"1-FP_frames": float("nan"), "1-FN_frames": float("nan")}
+    return {
+        "1-FP_frames": float(1 - ((m - hits) / np.maximum(n, 1)).mean()),
+        "1-FN_frames": float(1 - ((n - hits) / np.maximum(n, 1)).mean()),
+    }
+
+
+def count_switches(frame: Ints, true: Ints, est: Ints) -> int:
+    """Returns how often a true id is matched with a different estimated id than in its previous match.
+
+    frame, true, est (K,): frame, true id and estimated id of each match.
+    """
+    order = np.lexsort((frame, true))
+    t, e = true[order], est[order]
+    return int(((t[1:] == t[:-1]) & (e[1:] != e[:-1])).sum())
+
+
+def detection(compared: GroupComparison, frames: Bools) -> dict[str, float]:
+    """Returns F1, precision and recall at similarity 0.5 over the frames f where frames[f] is true."""
+    f = compared.found
+    hits = int(frames[f.true.frame[f.i]].sum())
+    n_true, n_est = (int(frames[side.rows.frame].sum()) for side in (compared.true, compared.est))
+    return {"F1": f1(hits, n_true, n_est), "precision": _share(hits, n_est), "recall": _share(hits, n_true)}
+
+
+def f1(hits: int, n_true: int, n_est: int) -> float:
+    """Returns 2 hits / (true + estimated groups), nan without groups."""
+    return _share(2 * hits, n_true + n_est)
+
+
+def _sizes(groups: GroupRows) -> Array:
+    """Returns the number of people in each group, (G,): the reported size, else the number of members."""
+    return np.where(np.isfinite(groups.size), groups.size, groups.count)

@@ -1,0 +1,207 @@
+"""People and groups of the truth or of a tracker as rows of arrays, all frames together.
+
+`true_people`, `tracked_people` and `group_rows` build the rows from `Truth`, `Tracks` and `Groups`. `people_inside`
+finds the members of groups that are reported as hulls only.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Literal
+
+import numpy as np
+
+from sim.geometry.polygons import edge_distance_pairs, gap_pairs, pack, pack_padded
+from sim.types import Array, Bools, Groups, Ints, Tracks, Truth
+from tracking.scoring.candidate_pairs import compare
+from tracking.scoring.rows import FrameRows, find_rows
+
+Surface = Literal["ground", "image"]
+"""Where groups are compared: on the ground in m, or in the image in px."""
+
+INSIDE = 0.3  # m: a person at most this far from a hull is a member, where a tracker names no members
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class PersonRows:
+    """R rows, one per person and frame.
+
+    group (R,): group id, -1 alone. pos (R, 2), vel (R, 2): position and velocity in the plane of this side's data. box
+    (R, 4): left, top, width, height in px. pos, vel or box is None if this side has no such data.
+    """
+
+    rows: FrameRows
+    group: Ints
+    pos: Array | None
+    vel: Array | None
+    box: Array | None
+
+    def keep(self, mask: Bools | slice) -> PersonRows:
+        """Returns the rows that a boolean mask (R,) or a slice selects."""
+        pos, vel, box = (None if a is None else a[mask] for a in (self.pos, self.vel, self.box))
+        return PersonRows(self.rows.keep(mask), self.group[mask], pos, vel, box)
+
+    def positions_on(self, surface: Surface, plane: str) -> Array | None:
+        """Returns the positions (R, 2) on a surface, None if they are unknown there.
+
+        plane: the plane of `pos` ("ground", "space" or "image"). On the surface "image" the centre of the box is
+        returned where boxes are known, else `pos` if its plane is "image". On "ground" `pos` is returned unless its
+        plane is "image".
+        """
+        if surface == "image" and self.box is not None:
+            return self.box[:, :2] + self.box[:, 2:] / 2
+        own = "image" if plane == "image" else "ground"
+        return self.pos if own == surface else None
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class GroupRows:
+    """G rows, one per group and frame, sorted by frame, and K memberships.
+
+    pos (G, 2): centre. size (G,): number of people as reported, nan unknown. extent (G, 2, 2): covariance of the shape,
+    nan unknown. hull: G polygons (V, 2), (0, 2) unknown. pos, extent and hull have the unit of the surface. Membership
+    k says that the person in row member[k] (-1: not among the people) belongs to the group in row of[k].
+    """
+
+    rows: FrameRows
+    pos: Array
+    size: Array
+    extent: Array
+    hull: tuple[Array, ...]
+    of: Ints
+    member: Ints
+
+    def __len__(self) -> int:
+        return len(self.rows)
+
+    @property
+    def count(self) -> Ints:
+        """Number of memberships of each group, (G,)."""
+        return np.bincount(self.of, minlength=len(self)).astype(np.int64)
+
+    def keep(self, mask: Bools) -> GroupRows:
+        """Returns the groups where mask (G,) is true, with their memberships."""
+        place, kept = np.cumsum(mask) - 1, mask[self.of]
+        return GroupRows(
+            self.rows.keep(mask), self.pos[mask], self.size[mask], self.extent[mask],
+            tuple(h for h, k in zip(self.hull, mask.tolist(), strict=True) if k),
+            place[self.of[kept]], self.member[kept],
+        )  # fmt: skip
+
+
+def true_people(truth: Truth, frames: Bools) -> PersonRows:
+    """Returns the truth's people in the frames f where frames[f] is true; frames (length + 1,)."""
+    every = PersonRows(FrameRows(truth.frame, truth.id), truth.group, truth.pos, truth.vel, truth.box)
+    return every.keep(frames[truth.frame])
+
+
+def tracked_people(tracks: Sequence[Tracks]) -> PersonRows:
+    """Returns a tracker's people. `tracks` is sorted by frame.
+
+    pos and vel keep x and y only. box is None if any frame with people lacks boxes.
+    """
+    count = [len(t.id) for t in tracks]
+    frame = np.repeat(np.array([t.index for t in tracks], np.int64), count)
+    none = np.zeros(0, np.int64)
+    id, group = (np.concatenate([none, *(getattr(t, name) for t in tracks)]) for name in ("id", "group"))
+    pos, vel = (
+        np.concatenate([np.zeros((0, 2)), *(getattr(t, name)[:, :2] for t in tracks)]) for name in ("pos", "vel")
+    )
+    boxes = [t.box for t in tracks if len(t.id)]
+    boxed = [b for b in boxes if b is not None]
+    box = np.concatenate([np.zeros((0, 4)), *boxed]) if len(boxed) == len(boxes) else None
+    return PersonRows(FrameRows(frame, id), group, pos, vel, box)
+
+
+def group_rows(frames: Ints, groups: Sequence[Groups], people: FrameRows) -> GroupRows:
+    """Returns the groups of frames (F,), one `Groups` per frame.
+
+    Members are looked up in `people` by frame and id. A member who has no row there gets -1.
+    """
+    count = [len(g.id) for g in groups]
+    none = np.zeros(0, np.int64)
+    rows = FrameRows(np.repeat(frames, count), np.concatenate([none, *(g.id for g in groups)]))
+    members = [m for g in groups for m in (g.members if len(g.members) else (none,) * len(g.id))]
+    of = np.repeat(np.arange(len(rows)), [len(m) for m in members])
+    member = find_rows(people, FrameRows(rows.frame[of], np.concatenate([none, *members])))
+    return GroupRows(
+        rows,
+        np.concatenate([np.zeros((0, 2)), *(g.pos[:, :2] for g in groups)]),
+        np.concatenate([np.zeros(0), *(g.size for g in groups)]),
+        np.concatenate([np.zeros((0, 2, 2)), *(g.extent for g in groups)]),
+        tuple(h for g in groups for h in hulls_of(g)),
+        of,
+        member,
+    )
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class TrueGroups:
+    """The truth's groups of two or more people in labelled frames.
+
+    comparable: True if the truth has group shapes on the surface. Otherwise all centres are nan, and hulls and extents
+    belong to the other surface.
+    """
+
+    groups: GroupRows
+    comparable: bool
+
+    def in_frames(self, frames: Bools, people: Bools) -> TrueGroups:
+        """Returns the groups of the frames f where frames[f] is true, members renumbered.
+
+        people (R,): which rows of the true people are kept; those of the kept frames must be among them.
+        """
+        groups = self.groups.keep(frames[self.groups.rows.frame])
+        number = np.append(np.cumsum(people) - 1, -1)  # the last element keeps -1, an unknown member
+        return TrueGroups(replace(groups, member=number[groups.member]), self.comparable)
+
+
+def true_groups(truth: Truth, labelled: Bools, people: FrameRows, surface: Surface) -> TrueGroups:
+    """Returns the truth's groups in the frames f where labelled[f] is true.
+
+    labelled (length + 1,); people: rows in which members are looked up. The truth must have groups on one surface.
+    """
+    wanted, other = truth.groups, truth.groups_px
+    if surface == "image":
+        wanted, other = other, wanted
+    groups = other if wanted is None else wanted
+    assert groups is not None, "a labelled frame has groups on some surface"
+    index = np.flatnonzero(labelled)
+    found = group_rows(index, [groups[f - 1] for f in index.tolist()], people)
+    found = found.keep(found.count > 1)
+    if wanted is None:
+        found = replace(found, pos=np.full_like(found.pos, np.nan))
+    return TrueGroups(found, wanted is not None)
+
+
+def hulls_of(groups: Groups) -> tuple[Array, ...]:
+    """Returns one polygon per group; without hulls each is empty, (0, 2)."""
+    return groups.hull if len(groups.hull) else (np.zeros((0, 2)),) * len(groups.id)
+
+
+def bare_groups(rows: FrameRows, pos: Array, hull: tuple[Array, ...]) -> GroupRows:
+    """Returns groups with centre and hull only: no members, size 0, extent 0."""
+    n, nobody = len(rows), np.zeros(0, np.int64)
+    return GroupRows(rows, pos, np.zeros(n), np.zeros((n, 2, 2)), hull, nobody, nobody)
+
+
+def people_inside(groups: GroupRows, people: FrameRows, positions: Array, scale: float) -> GroupRows:
+    """Returns the groups with new members: the people of the frame inside the hull or at most 0.3 m from it.
+
+    positions (R, 2): of `people`, in the unit of the hulls; scale: this unit per metre. One person may become a member
+    of several groups. A group without a hull gets no members.
+    """
+    hulls, points = pack(groups.hull), pack_padded(positions[:, None])
+    low, high = hulls.box[:, :2] - INSIDE * scale, hulls.box[:, 2:] + INSIDE * scale
+
+    def inside(i: Ints, j: Ints) -> tuple[Ints, Array]:
+        near = np.flatnonzero((positions[j] >= low[i]).all(axis=1) & (positions[j] <= high[i]).all(axis=1))
+        i, j = i[near], j[near]
+        flat = hulls.area[i] <= 0  # a hull of one or two vertices contains no point: only distance counts
+        gap = np.where(flat, edge_distance_pairs(hulls, points, i, j), gap_pairs(hulls, points, i, j))
+        kept = near[gap <= INSIDE * scale]
+        return kept, np.ones(len(kept))
+
+    members = compare(groups.rows, people, inside)
+    return replace(groups, of=members.i, member=members.j)
