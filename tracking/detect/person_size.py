@@ -1,11 +1,14 @@
-"""How large a person is where: box height and width at every foot point of the image (ours).
+"""The size of a person in the image: height and width of a person's box at every foot point (ours).
 
-With a camera: the box of an upright person of mean build (1.7 m) standing there, turned either way. Without: learned
-from lone blobs, h = a + b v over the row v of their lower edge, as a pinhole without roll has it: of many lines the one
-on which most heights agree, then least squares of relative errors among those within WIDTH of it (a blob of several
-people, or of a part, is an outlier); widths are a share of it. Votes prefer the slope SLOPE, since blobs of one row say
-nothing about it. A learned size is `reliable` once enough lone blobs agree.
-From straight above everybody is the same ellipse, turned as he walks: measured are a blob's axes, not its box's sides.
+Three sources:
+- A pinhole camera. The box of an upright person of 1.7 m and mean build that stands at the foot point, averaged over
+  four headings.
+- A camera straight above. Everybody is the same ellipse, turned with the heading; its axes are used instead of the box.
+- No camera. Learned from lone blobs (blobs that may be one person each): the height is a line h = a + b v over the row
+  v of the foot, as in a pinhole without roll; the width is SLIM times the height. The line is the one of many on which
+  most heights agree, refined by least squares of relative errors. So blobs of several people or of parts of people are
+  outliers. Votes prefer the slope SLOPE, as blobs at one row contain no information about it.
+In all three cases height and width are then multiplied by factors on which most lone blobs agree.
 """
 
 from __future__ import annotations
@@ -16,95 +19,108 @@ from sim.scene.body import PERSON_HEIGHT
 from sim.types import Array, Bools, Camera, Context
 from tracking.detect import person_size_kernels as kernels
 
-SLIM = 0.36  # width over height of a walking person's box, the prior of what is learned
-STOUT = 2.0  # by how much the width over height of a blob that may be somebody alone differs at most
-UNLIKE = 1.4  # by how much his height differs at most from what a camera leads to expect
+SLIM = 0.36  # width over height of a walking person's box: the first guess without a camera
+ASPECT_FACTOR = 2.0  # largest factor between a lone blob's width over height and the expected one
+HEIGHT_FACTOR = 1.4  # largest factor between a lone blob's height and the one that a camera leads to expect
 KEPT = 400  # lone blobs remembered
-ENOUGH = 12  # lone blobs that make a learned size reliable ...
-AGREE = 0.3  # ... where they are this share of all
-RENEW = 0.05  # share of new ones from which on the line is drawn anew
-LEVELS = np.geomspace(0.65, 1.55, 19)  # of the median height, and
-SLOPES = np.linspace(0.0, 2.4, 17)  # growth per row, times the middle row: where the densest heights are looked for
-SLOPE, DOUBT = 0.7, 0.02  # a slope to expect, and the share of votes that unit distance from it costs
-WIDTH = 0.12  # relative deviation within which heights agree
-FACTORS = np.array([0.9, 0.6]), np.array([1.1, 1.25])  # least and most by which people are higher and wider
-NARROW = 0.7  # of the votes for the most frequent width, what a smaller one needs to be taken instead
-PRIOR = 2.0  # people who count for the factors 1
-EATEN = 1.3  # px of a person's height, at the head, that blur and cleaning leave out: median of rendered scenes
-LOOSE = 1.0, 1.1  # height and width of a person's box over those of the box round the ellipse of his pixels: a prior
-SMALLEST = 12.0  # px: people less high than this cannot be told from noise,
-FLAT = 6.0  # ... and from above people less wide
-SHORT, TALL, THIN, WIDE = 0.8, 1.25, 0.5, 1.6  # of a person's height and width: a blob within is one person
-PART = 0.6  # SHORT from above, where what is as small can only be part of one, half his colours the shadow's
+ENOUGH = 12  # a learned size is reliable if at least so many lone blobs agree ...
+AGREE_SHARE = 0.3  # ... and at least this share of all
+REFIT_SHARE = 0.05  # share of new lone blobs from which on line and factors are computed anew
+LEVELS = np.geomspace(0.65, 1.55, 19)  # heights at the middle row, of the median height, and
+SLOPES = np.linspace(0.0, 2.4, 17)  # relative growth of the height from row 0 to the middle row: lines that are tried
+SLOPE, SLOPE_COST = 0.7, 0.02  # expected slope, and the share of votes that a squared distance of 1 from it costs
+AGREEMENT = 0.12  # two sizes agree if they differ by at most this share
+FACTORS = np.array([0.9, 0.6]), np.array([1.1, 1.25])  # least and largest factors of height and width
+NARROWER_SHARE = 0.7  # a smaller width wins over the most frequent one if it has this share of its votes
+PRIOR_COUNT = 2.0  # lone blobs that the factor 1 counts for
+CLEANED_AWAY = 1.3  # px of a person's height that blur and cleaning remove at the head: median over rendered scenes
+BOX_OVER_ELLIPSE = 1.0, 1.1  # height and width of a person's box over those of the box round the person's ellipse
+SMALLEST = 12.0  # px: a person less high cannot be distinguished from noise;
+SMALLEST_FROM_ABOVE = 6.0  # px: from straight above a person whose longer axis is shorter
+SHORT, TALL, THIN, WIDE = 0.8, 1.25, 0.5, 1.6  # limits of one person's height and width relative to the expected ones
+SHORT_FROM_ABOVE = 0.6  # SHORT from straight above, where half of a person can have the colour of a shadow
 STEP = 8  # px between the nodes of a camera's table
-MARGIN = 0.25  # of the image, beyond which no foot is looked for
+MARGIN = 0.25  # the table reaches so far beyond the image, in image sizes
+HEADINGS = np.radians([0.0, 45.0, 90.0, 135.0])  # rad, over which a camera's boxes are averaged
 
 
 class PersonSize:
-    """State: a camera's table (2, V, U) of heights and widths, or the line through the lone blobs seen; px.
+    """State:
 
-    seen (K, 4): these blobs' foot u, v, height, width. factor (2,): how much higher and wider than expected they are.
-    excess (K, 2): their height and width over those of the box round their ellipse; loose (2,): the median.
-    line: a, b. agreed: how many heights agree. unused: blobs seen since the last fit.
-    flat (2,): from straight above height and width are the axes of a person's ellipse, px, instead; else None.
+    table (2, V, U)         with a pinhole camera: height and width at the nodes of a grid, px; else None
+    axes_above (2,)         from straight above: longer and shorter axis of a person's ellipse, px; else None
+    lone (K, 4)             the last lone blobs: foot u, v, height, width, px (from above: the axes)
+    since_fit               number of lone blobs since the last fit
+    line                    a (px), b of h = a + b v; used without a camera
+    factor (2,)             height and width of the lone blobs over the expected ones
+    agreed                  number of lone blobs whose heights agree with the line and the factor
+    box_ratios (K, 2)       height and width of the lone blobs' boxes over those of the boxes round their ellipses
+    box_over_ellipse (2,)   their median
     """
 
     def __init__(self, context: Context) -> None:
         self.table: Array | None = None
-        self.flat: Array | None = None
-        self.seen = np.zeros((0, 4))  # u, v, h, w of lone blobs
-        self.unused = 0
-        self.excess, self.loose = np.zeros((0, 2)), np.array(LOOSE)
+        self.axes_above: Array | None = None
+        self.lone = np.zeros((0, 4))
+        self.since_fit = 0
+        self.box_ratios, self.box_over_ellipse = np.zeros((0, 2)), np.array(BOX_OVER_ELLIPSE)
         self.line, self.factor, self.agreed = (float("nan"), 0.0), np.ones(2), 0
         if context.camera is not None and context.camera.kind == "top":
-            self.flat, self.loose = _from_above(context.camera), np.ones(2)
+            self.axes_above, self.box_over_ellipse = _axes_from_above(context.camera), np.ones(2)
         elif context.camera is not None:
             self.low = -MARGIN * np.array(context.camera.image, float)
             self.table = _table(context.camera, self.low)
 
     @property
     def reliable(self) -> bool:
-        """May this decide how many people a blob holds?"""
-        return self.told or self.agreed >= max(ENOUGH, AGREE * len(self.seen))
+        """True if the size may decide how many people a blob holds: with a camera, or if enough lone blobs agree."""
+        return self.from_camera or self.agreed >= max(ENOUGH, AGREE_SHARE * len(self.lone))
 
     @property
-    def told(self) -> bool:
-        """Does a camera tell how large people are?"""
+    def from_camera(self) -> bool:
+        """True if the context has a camera."""
         return self.table is not None or self.above
 
     @property
     def above(self) -> bool:
-        """Is the camera straight above?"""
-        return self.flat is not None
+        """True if the camera is straight above."""
+        return self.axes_above is not None
 
     def at(self, foot: Array) -> Array:
-        """(N, 2) height and width in px of a person whose box stands on the image points `foot` (N, 2); nan unknown.
+        """Returns height and width (N, 2), px, of the box of a person who stands at image points `foot` (N, 2) u, v.
 
-        From above that of a disc, the box of a person turned by 45 degrees.
+        nan where the size is unknown or too small. From above it is the box of a person turned by 45 degrees.
         """
-        size = self._known(foot)
+        size = self._expected(foot)
         return np.sqrt(np.square(size).mean(1, keepdims=True) * np.ones(2)) if self.above else size
 
     def axes(self, foot: Array) -> Array:
-        """(N, 2) px: height and width of the ellipse of a person's pixels; from above its axes, the longer first."""
-        return self._known(foot) if self.above else self._known(foot) / self.loose
+        """Returns height and width (N, 2), px, of the ellipse of a person at `foot` (N, 2); nan where unknown.
 
-    def _known(self, foot: Array) -> Array:
-        size = self._first_guess(foot) * self.factor
-        return np.where(size[:, :1] >= (FLAT if self.above else SMALLEST), size, np.nan)
+        From above: the axes of the ellipse, the longer first.
+        """
+        return self._expected(foot) if self.above else self._expected(foot) / self.box_over_ellipse
 
-    def one(self, box: Array, ellipse: Array) -> Bools:
-        """(M,) are these blobs, boxes ltwh (M, 4) and ellipses (M, 5), of one person's size?"""
+    def _expected(self, foot: Array) -> Array:
+        """Returns height and width (N, 2), from above the axes, with the learned factors; nan where too small."""
+        size = self._unscaled(foot) * self.factor
+        return np.where(size[:, :1] >= (SMALLEST_FROM_ABOVE if self.above else SMALLEST), size, np.nan)
+
+    def one_person(self, box: Array, ellipse: Array) -> Bools:
+        """Returns True for each blob (M,) of one person's size; False where the size is unknown.
+
+        box (M, 4) ltwh; ellipse (M, 5). From above the ellipse's axes are compared, else the box's sides.
+        """
         size = ellipse[:, 2:4] if self.above else box[:, :1:-1]
         with np.errstate(invalid="ignore"):
-            tall, wide = (size / self._known(_feet(box))).T
-            return np.asarray(
-                (tall >= (PART if self.above else SHORT)) & (tall <= TALL) & (wide >= THIN) & (wide <= WIDE)
-            )
+            tall, wide = (size / self._expected(_feet(box))).T
+            short = SHORT_FROM_ABOVE if self.above else SHORT
+            return np.asarray((tall >= short) & (tall <= TALL) & (wide >= THIN) & (wide <= WIDE))
 
-    def _first_guess(self, foot: Array) -> Array:
-        if self.flat is not None:
-            return np.tile(self.flat, (len(foot), 1))
+    def _unscaled(self, foot: Array) -> Array:
+        """Returns height and width (N, 2), from above the axes, by the camera or the line, without the factors."""
+        if self.axes_above is not None:
+            return np.tile(self.axes_above, (len(foot), 1))
         if self.table is not None:
             return kernels.look_up(self.table, (foot - self.low) / STEP)
         height = self.line[0] + self.line[1] * foot[:, 1]
@@ -112,55 +128,67 @@ class PersonSize:
 
     @property
     def px_per_m(self) -> float:
-        """Scale of the image: the median height of the lone blobs seen / 1.7 m; nan without any."""
-        return float(np.median(self.seen[:, 2])) / PERSON_HEIGHT if len(self.seen) else float("nan")
+        """Scale of the image: the median height of the lone blobs over 1.7 m; nan without lone blobs."""
+        return float(np.median(self.lone[:, 2])) / PERSON_HEIGHT if len(self.lone) else float("nan")
 
     def learn(self, box: Array, ellipse: Array, whole: Bools) -> None:
-        """Add the blobs (M, 4) ltwh, (M, 5), that may be somebody alone; `whole` (M,): away from the image's edge."""
+        """Learn from those of the blobs that may be one person: whole, of a person's proportions, not too small.
+
+        box (M, 4) ltwh; ellipse (M, 5); whole (M,): False for a blob that must not be used. With a camera the height
+        must be plausible, too.
+        """
         foot, size = _feet(box), ellipse[:, 2:4] if self.above else box[:, :1:-1]
-        expected = np.divide(*self._first_guess(foot).T[::-1]) if self.told else SLIM
+        expected = np.divide(*self._unscaled(foot).T[::-1]) if self.from_camera else SLIM
         with np.errstate(invalid="ignore"):
-            slim = np.abs(np.log(size[:, 1] / size[:, 0] / expected)) <= np.log(STOUT)
-        good = whole & slim & (size[:, 0] >= (FLAT if self.above else SMALLEST)) & self._likely(foot, size)
+            slim = np.abs(np.log(size[:, 1] / size[:, 0] / expected)) <= np.log(ASPECT_FACTOR)
+        large = size[:, 0] >= (SMALLEST_FROM_ABOVE if self.above else SMALLEST)
+        good = whole & slim & large & self._plausible_height(foot, size)
         if not good.any():
             return
         size, foot = size[good], foot[good]
         if not self.above:
-            size = size + np.array([EATEN, 0.0])
+            size = size + np.array([CLEANED_AWAY, 0.0])
             round_ellipse = upright(ellipse[good, :4], ellipse[good, 4])[:, 2:]
-            self.excess = np.concatenate([self.excess, size / round_ellipse])[-KEPT:]
-            self.loose = np.median(np.concatenate([self.excess, np.tile(LOOSE, (ENOUGH, 1))]), 0)
+            self.box_ratios = np.concatenate([self.box_ratios, size / round_ellipse])[-KEPT:]
+            prior = np.tile(BOX_OVER_ELLIPSE, (ENOUGH, 1))
+            self.box_over_ellipse = np.median(np.concatenate([self.box_ratios, prior]), 0)
         new = np.concatenate([foot, size], 1)
-        self.seen, self.unused = np.concatenate([self.seen, new])[-KEPT:], self.unused + len(new)
-        if self.unused >= RENEW * len(self.seen):
-            self.unused = 0
+        self.lone, self.since_fit = np.concatenate([self.lone, new])[-KEPT:], self.since_fit + len(new)
+        if self.since_fit >= REFIT_SHARE * len(self.lone):
+            self.since_fit = 0
             self._fit()
 
-    def _likely(self, foot: Array, size: Array) -> Bools:
-        """(M,) are these as high as somebody may be of whom a camera tells how high? Specks are nobody."""
-        if not self.told:
+    def _plausible_height(self, foot: Array, size: Array) -> Bools:
+        """Returns True for each blob (M,) whose height is within HEIGHT_FACTOR of the camera's, or if there is none."""
+        if not self.from_camera:
             return np.ones(len(size), bool)
         with np.errstate(invalid="ignore"):
-            off = np.abs(np.log(size[:, 0] / self._first_guess(foot)[:, 0]))
-        return np.asarray(off <= np.log(UNLIKE))
+            off = np.abs(np.log(size[:, 0] / self._unscaled(foot)[:, 0]))
+        return np.asarray(off <= np.log(HEIGHT_FACTOR))
 
     def _fit(self) -> None:
-        """Where most heights agree: the line, if there is no camera, and the factors of height and width."""
-        foot, height = self.seen[:, :2], self.seen[:, 2]
+        """Compute the line, if there is no camera, and the factors from the remembered lone blobs.
+
+        A blob weighs more the higher it is, and less the more lone blobs were seen at its place.
+        """
+        foot, height = self.lone[:, :2], self.lone[:, 2]
         typical = float(np.median(height))
-        count = height / typical / _crowding(foot / typical)
-        if not self.told:
-            self.line = _line(foot[:, 1], height, count)
-        ratio = self.seen[:, 2:] / np.maximum(self._first_guess(foot), 1.0)
+        weight = height / typical / _crowding(foot / typical)
+        if not self.from_camera:
+            self.line = _line(foot[:, 1], height, weight)
+        ratio = self.lone[:, 2:] / np.maximum(self._unscaled(foot), 1.0)
         known = np.isfinite(ratio).all(1)
-        ratio, count = ratio[known], count[known]
-        tall, agreed = _densest(ratio[:, 0], count)
-        wide, _ = _densest(ratio[agreed, 1], count[agreed], NARROW)
+        ratio, weight = ratio[known], weight[known]
+        tall, agreed = _densest(ratio[:, 0], weight)
+        wide, _ = _densest(ratio[agreed, 1], weight[agreed], NARROWER_SHARE)
         self.agreed, self.factor = int(agreed.sum()), np.clip([tall, wide], *FACTORS)
 
 
 def upright(place: Array, angle: Array) -> Array:
-    """(N, 4) box x, y, h, w round ellipses of centre and axes `place` (N, 4), the first at `angle` (N,) rad."""
+    """Returns the bounding boxes x, y, h, w (N, 4) of ellipses, centred.
+
+    place (N, 4): centre x, y and two full axes; angle (N,): direction of the first axis, rad, from the abscissa.
+    """
     box, c, s = place.copy(), np.square(np.cos(angle)), np.square(np.sin(angle))
     first, second = np.square(place[:, 2]), np.square(place[:, 3])
     box[:, 2], box[:, 3] = np.sqrt(first * s + second * c), np.sqrt(first * c + second * s)
@@ -168,50 +196,65 @@ def upright(place: Array, angle: Array) -> Array:
 
 
 def _feet(box: Array) -> Array:
-    """(M, 2) where boxes ltwh stand."""
+    """Returns the middle of the lower edge (M, 2) u, v of boxes ltwh (M, 4)."""
     return np.stack([box[:, 0] + box[:, 2] / 2, box[:, 1] + box[:, 3]], 1)
 
 
-def _densest(value: Array, count: Array, least: float = 1.0) -> tuple[float, Bools]:
-    """The value (N,) within relative WIDTH of which most counts lie, PRIOR more at 1; which ones (N,) lie there.
+def _densest(value: Array, weight: Array, least: float = 1.0) -> tuple[float, Bools]:
+    """Returns the weighted mean of the values (N,) that agree with the most popular one, and which values these are
+    (N,).
 
-    least: the smallest value that has this share of the most (one person is narrower than two).
+    The most popular value has the largest weight within AGREEMENT of it. The value 1 has the weight PRIOR_COUNT in
+    advance. least < 1: instead the smallest value with this share of the largest weight (one person is narrower than
+    two).
     """
-    value, count = np.append(value, 1.0), np.append(count, PRIOR)
-    near = np.abs(value / np.maximum(value[:, None], 1e-9) - 1) <= WIDTH
-    votes = near @ count
+    value, weight = np.append(value, 1.0), np.append(weight, PRIOR_COUNT)
+    near = np.abs(value / np.maximum(value[:, None], 1e-9) - 1) <= AGREEMENT
+    votes = near @ weight
     enough = np.flatnonzero(votes >= least * votes.max())
     members = near[enough[int(value[enough].argmin())]] if least < 1 else near[int(votes.argmax())]
-    return float(np.average(value[members], weights=count[members])), members[:-1]
+    return float(np.average(value[members], weights=weight[members])), members[:-1]
 
 
-def _line(v: Array, h: Array, count: Array) -> tuple[float, float]:
-    """h = a + b v where most heights agree: the best of many lines, then least squares among those that agree."""
+def _line(v: Array, h: Array, weight: Array) -> tuple[float, float]:
+    """Returns a (px) and b of the line h = a + b v on which most heights agree.
+
+    v, h, weight (N,): rows of the feet, heights, weights. The best of LEVELS x SLOPES lines is refined three times by
+    least squares of relative errors among the heights that agree with it; a weak prior holds its slope.
+    """
     middle, typical = max(float(np.median(v)), 1.0), float(np.median(h))
     at = v / middle - 1
     level, slope = (a.ravel() for a in np.meshgrid(LEVELS, SLOPES))
     off = h / typical / np.maximum(level[:, None] * (1 + slope[:, None] * at), 0.05) - 1
-    votes = np.maximum(1 - np.square(off / WIDTH), 0) @ count - DOUBT * count.sum() * np.square(slope - SLOPE)
+    cost = SLOPE_COST * weight.sum() * np.square(slope - SLOPE)
+    votes = np.maximum(1 - np.square(off / AGREEMENT), 0) @ weight - cost
     best = int(votes.argmax())
     line = first = typical * level[best] * np.array([1.0, slope[best]])
-    tie = np.diag([0.0, 0.01]) * count.sum()
+    tie = np.diag([0.0, 0.01]) * weight.sum()
     for _ in range(3):
         fit = np.maximum(line[0] + line[1] * at, 1.0)
-        weight = count * (np.abs(h / fit - 1) <= WIDTH) * np.square(typical / fit)
+        w = weight * (np.abs(h / fit - 1) <= AGREEMENT) * np.square(typical / fit)
         x = np.stack([np.ones_like(at), at])
-        line = np.linalg.solve((x * weight) @ x.T + tie, (x * weight) @ h + tie @ first)
+        line = np.linalg.solve((x * w) @ x.T + tie, (x * w) @ h + tie @ first)
     return float(line[0] - line[1]), float(line[1] / middle)
 
 
 def _crowding(place: Array) -> Array:
-    """(N,) how many of the places (N, 2), in person heights, share a cell: who stands still counts once."""
+    """Returns how many of the places (N, 2), in person heights, lie in the same cell, (N,).
+
+    With the weight 1 / crowding a person who stands still counts about once.
+    """
     cell = np.floor(4 * place).astype(np.int64)
     _, which, count = np.unique(cell[:, 0] * 100_003 + cell[:, 1], return_inverse=True, return_counts=True)
     return np.asarray(count[which], float)
 
 
 def _table(camera: Camera, low: Array) -> Array:
-    """(2, V, U) height and width at nodes STEP px apart from `low` on; nan where nobody can stand."""
+    """Returns height and width (2, V, U), px, of a person's box at nodes STEP px apart from `low` (2,) u, v on.
+
+    nan where nobody can stand. The ground point is not at the box's lower edge unless seen from the side, so it is
+    corrected twice.
+    """
     from sim.scene.body import person_boxes
     from sim.scene.camera import to_ground
 
@@ -219,26 +262,21 @@ def _table(camera: Camera, low: Array) -> Array:
     u, v = np.meshgrid(low[0] + STEP * np.arange(size[0]), low[1] + STEP * np.arange(size[1]))
     foot = np.stack([u.ravel(), v.ravel()], 1)
     found, aim = np.full((len(foot), 2), np.nan), foot.copy()
-    for _ in range(3):  # the ground point is where the box's lower edge is only if seen from the side
+    for _ in range(3):
         ground = to_ground(camera, aim)
         seen = np.isfinite(ground).all(1)
         if not seen.any():
             break
         place = np.column_stack([ground[seen], np.zeros(int(seen.sum()))])
-        turned = [
-            person_boxes(camera, place, np.full(len(place), a), np.full(len(place), PERSON_HEIGHT)) for a in _TURNS
-        ]
-        box = np.mean(turned, 0)
+        tall = np.full(len(place), PERSON_HEIGHT)
+        box = np.mean([person_boxes(camera, place, np.full(len(place), a), tall) for a in HEADINGS], 0)
         found[seen] = box[:, :1:-1]
         aim[seen] += np.nan_to_num(foot[seen] - _feet(box))
     return np.asarray(found.T.reshape(2, size[1], size[0]))
 
 
-def _from_above(camera: Camera) -> Array:
-    """(2,) longer and shorter axis of a person, px."""
+def _axes_from_above(camera: Camera) -> Array:
+    """Returns the longer and the shorter axis (2,) of a person, px."""
     from sim.scene.body import person_boxes
 
     return np.sort(person_boxes(camera, np.zeros((1, 3)), np.zeros(1), np.array([PERSON_HEIGHT]))[0, 2:])[::-1]
-
-
-_TURNS = np.radians([0.0, 45.0, 90.0, 135.0])

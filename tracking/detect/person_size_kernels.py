@@ -10,12 +10,14 @@ from sim.types import Array
 
 @njit(cache=True)
 def look_up(table: Array, at: Array) -> Array:
-    """(N, C) bilinear values of a table (C, V, U) at nodes' coordinates (u, v) (N, 2), clamped to its ends in u
-    and v; a coordinate that is no number counts as 0."""
+    """Returns bilinear values (N, C) of a table (C, V, U) at `at` (N, 2): u, v in units of the grid.
+
+    A coordinate outside the table is moved to its edge; nan counts as 0.
+    """
     last_u, last_v = table.shape[2] - 1.001, table.shape[1] - 1.001
     found = np.empty((len(at), table.shape[0]))
     for n in range(len(at)):
-        x, y = within(at[n, 0], last_u), within(at[n, 1], last_v)
+        x, y = clamped(at[n, 0], last_u), clamped(at[n, 1], last_v)
         u, v = int(x), int(y)
         a, b = x - u, y - v
         for c in range(table.shape[0]):
@@ -26,6 +28,6 @@ def look_up(table: Array, at: Array) -> Array:
 
 
 @njit(cache=True)
-def within(x: float, last: float) -> float:
-    """x clamped to 0 ... last; 0 where it is no number."""
+def clamped(x: float, last: float) -> float:
+    """Returns x limited to the range from 0 to `last`; 0 if x is nan."""
     return min(max(x, 0.0), last) if x == x else 0.0

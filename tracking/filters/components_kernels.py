@@ -1,10 +1,10 @@
-"""Kernels of tracking.filters.components: linked points in a grid of cells, one by one, and ellipses joined to closure.
+"""Kernels of tracking.filters.components: linked points by a grid of cells, and regions joined until none overlap.
 
-The grid's cells have the diagonal `link`, so that points of one cell are linked; others can only be linked with the 20
-cells around. A new point is compared with the points of those neighbours that are not of its component yet and whose
-bounding box is near enough; at the first one found the components are joined, and so are their moments.
-Rows of sums: weight N, mean x, y, and N times the covariance xx, xy, yy; joined without raw sums, which would cancel.
-Slow twins: tests/reference_components.py.
+The diagonal of a cell is `link`, so that points of one cell are linked, and other points can be linked only from the 20
+cells around. A new point is compared with the points of those cells that are not of its component yet and whose
+bounding box is near enough. At the first linked point the two components are joined, and so are their moments.
+Columns of `sums` (K, 6): weight N, mean x, y, and N times the covariance xx, xy, yy. Moments are joined without raw
+sums, in which precision would cancel. Slow twins: tests/reference_components.py.
 """
 
 from __future__ import annotations
@@ -17,13 +17,20 @@ from sim.types import Array, Bools, Ints
 from tracking.filters.ellipse_overlap_kernels import overlap
 
 AROUND = 20
+"""Cells round a cell from which points can be linked with its points."""
 WEIGHT, X, Y, XX, XY, YY = range(6)
-FAR = 2.0**40  # cells from the first point: the grid's numbers stay whole numbers
+"""Columns of `sums`."""
+MEAN_X, MEAN_Y, A_XX, A_XY, A_YY = range(5)
+"""Slots of `shape`: an ellipse (y - mean)' A^-1 (y - mean) <= 1."""
+VISITS, COMPONENTS = range(2)
+"""Slots of `work`: cells and points compared so far; number of components."""
+FAR = 2.0**40
+"""Cells from the first point beyond which a point is moved nearer, so that cell numbers fit in int64."""
 
 
 @njit(cache=True)
 def cells(points: Array, link: float) -> tuple[Ints, Ints]:
-    """(M,) the cell of each point, 0, 1, …, and (C, 20) the cells around each, -1 where nobody is."""
+    """Returns the cell of each point (M,), 0, 1, …, and the 20 cells around each cell (C, 20), -1 for an empty one."""
     m = len(points)
     side = link / np.sqrt(2.0) * (1 - 1e-12)
     place = np.empty((m, 2), np.int64)
@@ -53,14 +60,17 @@ def cells(points: Array, link: float) -> tuple[Ints, Ints]:
 
 @njit(cache=True)
 def _sorted(place: Ints) -> Ints:
-    """The order of places (M, 2) by x, then y."""
+    """Returns the indices (M,) that sort places (M, 2) by x, then y; equal places keep their order."""
     by_y = np.argsort(place[:, 1], kind="mergesort")
     return by_y[np.argsort(place[by_y, 0], kind="mergesort")]
 
 
 @njit(cache=True)
 def _find(place: Ints, first: Ints, count: int, x: int, y: int) -> int:
-    """The cell at x, y, or -1."""
+    """Returns the number of the cell at x, y by bisection, or -1 if it is empty.
+
+    place (M, 2): cell of each point; first (C,): a point of each cell, in sorted order; count: C.
+    """
     low, high = 0, count
     while low < high:
         middle = (low + high) // 2
@@ -79,17 +89,18 @@ def insert(
     k: int, points: Array, weight: float, link: float, cell: Ints, around: Ints,
     parent: Ints, head: Ints, after: Ints, box: Array, sums: Array, work: Ints,
 ) -> None:  # fmt: skip
-    """Add point k to the components: G_0(Y + {y}) from G_0(Y) (4.2.1).
+    """Add point k to the components, in place: G_0(Y + {y}) from G_0(Y) (4.2.1).
 
-    parent (M,): trees of points; head (C,), after (M,): the points of each cell as a list; box (C, 4): their bounds;
-    sums (M, 6): of each component, at its root; work (2,): cells and points looked at, components.
+    cell, around: from `cells`. Changed: parent (M,), the union-find forest of the points; head (C,) and after (M,), the
+    first point of each cell and the next one of each point, -1 at the end; box (C, 4), bounds of each cell's points:
+    least x, y, largest x, y; sums (M, 6), moments of each component, at its root; work (2,).
     """
     c = cell[k]
     x, y = points[k, 0], points[k, 1]
     parent[k] = k
     sums[k, WEIGHT], sums[k, X], sums[k, Y] = weight, x, y
     sums[k, XX], sums[k, XY], sums[k, YY] = 0.0, 0.0, 0.0
-    work[1] += 1
+    work[COMPONENTS] += 1
     if head[c] >= 0:
         _join(parent, sums, k, head[c], work)
         box[c, 0], box[c, 1] = min(box[c, 0], x), min(box[c, 1], y)
@@ -101,7 +112,7 @@ def insert(
         other = around[c, n]
         if other < 0 or head[other] < 0:
             continue
-        work[0] += 1
+        work[VISITS] += 1
         if find_root(parent, head[other]) == find_root(parent, k):
             continue
         gap_x = max(box[other, 0] - x, x - box[other, 2], 0.0)
@@ -110,7 +121,7 @@ def insert(
             continue
         p = head[other]
         while p >= 0:
-            work[0] += 1
+            work[VISITS] += 1
             if (points[p, 0] - x) ** 2 + (points[p, 1] - y) ** 2 <= link * link:
                 _join(parent, sums, k, p, work)
                 break
@@ -119,19 +130,19 @@ def insert(
 
 @njit(cache=True)
 def _join(parent: Ints, sums: Array, a: int, b: int, work: Ints) -> None:
-    """Join the components of a and b under the older root, so that roots depend on the order of points alone."""
+    """Join the components of points a and b under the older root, so that roots depend only on the order of points."""
     a, b = find_root(parent, a), find_root(parent, b)
     if a == b:
         return
     low, high = min(a, b), max(a, b)
     parent[high] = low
     pool(sums[low], sums[high])
-    work[1] -= 1
+    work[COMPONENTS] -= 1
 
 
 @njit(cache=True)
 def pool(into: Array, other: Array) -> None:
-    """The moments (6,) of two sets of points as those of their union, in place: (3.1), the N / N form of it."""
+    """Change the moments `into` (6,) of a set of points to those of its union with another set (3.1, with 1/N)."""
     n = into[WEIGHT] + other[WEIGHT]
     share = other[WEIGHT] / n
     dx, dy = other[X] - into[X], other[Y] - into[Y]
@@ -146,7 +157,7 @@ def pool(into: Array, other: Array) -> None:
 
 @njit(cache=True)
 def components(points: Array, weights: Array, link: float) -> tuple[Ints, Array]:
-    """G_0 (3.3): (M,) the component of each point, in the order of their first points, and their sums (K, 6)."""
+    """Returns G_0 (3.3): the component of each point (M,), in the order of first points, and the sums (K, 6)."""
     m = len(points)
     parent, sums = np.empty(m, np.int64), np.empty((m, 6))
     label, count = np.empty(m, np.int64), 0
@@ -170,10 +181,11 @@ def components(points: Array, weights: Array, link: float) -> tuple[Ints, Array]
 
 @njit(cache=True)
 def closure(sums: Array, gate: float, prior: Array, strength: float) -> Ints:
-    """(K,) which of K components with `sums` (K, 6) are one by G_x (3.1), in the order of their first ones.
+    """Returns G_x (3.1) of K components: for each the index of the first component it is joined with, (K,).
 
-    Components whose regions overlap, also through others, are joined, then the joined ones, until no two overlap:
-    one pass is not closed, as a joined region may reach one that none of its parts did. prior (3,), strength: of `fit`.
+    sums (K, 6). Components whose regions overlap, directly or through others, are joined. Then the joined components
+    are compared, until no two overlap: a joined region may overlap one that none of its parts did. prior (3,),
+    strength: see `fit`.
     """
     k = len(sums)
     label = np.arange(k)
@@ -181,7 +193,7 @@ def closure(sums: Array, gate: float, prior: Array, strength: float) -> Ints:
         return label
     pooled, shape = sums.copy(), np.empty((k, 5))
     alive = np.ones(k, np.bool_)
-    fresh = np.ones(k, np.bool_)  # only pairs with one that has changed need a look
+    fresh = np.ones(k, np.bool_)  # only pairs with a changed component are compared again
     changed = True
     while changed:
         changed = False
@@ -192,8 +204,8 @@ def closure(sums: Array, gate: float, prior: Array, strength: float) -> Ints:
         for i in range(k):
             for j in range(i):
                 if alive[i] and alive[j] and (fresh[i] or fresh[j]) and find_root(tree, i) != find_root(tree, j):
-                    dx, dy = shape[j, 0] - shape[i, 0], shape[j, 1] - shape[i, 1]
-                    a, b = shape[i, 2:], shape[j, 2:]
+                    dx, dy = shape[j, MEAN_X] - shape[i, MEAN_X], shape[j, MEAN_Y] - shape[i, MEAN_Y]
+                    a, b = shape[i, A_XX:], shape[j, A_XX:]
                     if overlap(dx, dy, a[0], a[1], a[2], b[0], b[1], b[2]):
                         p, q = find_root(tree, i), find_root(tree, j)
                         tree[max(p, q)] = min(p, q)
@@ -210,22 +222,26 @@ def closure(sums: Array, gate: float, prior: Array, strength: float) -> Ints:
 
 @njit(cache=True)
 def fit(sums: Array, gate: float, prior: Array, strength: float, shape: Array) -> None:
-    """shape (5,): mean x, y, and gate times the covariance xx, xy, yy shrunk towards `prior`:
-    (N S + n0 S0) / (N + n0), S the 1/N covariance, N the weight."""
-    shape[0], shape[1] = sums[X], sums[Y]
+    """Write the search region of a component with `sums` (6,) into `shape` (5,): see the slots above.
+
+    A is gate times the shrunk covariance (N S + n0 S0) / (N + n0), N the weight, S the covariance with 1/N, S0 the
+    `prior` (3,) xx, xy, yy, n0 the `strength`.
+    """
+    shape[MEAN_X], shape[MEAN_Y] = sums[X], sums[Y]
     scale = gate / (sums[WEIGHT] + strength)
-    shape[2] = scale * (sums[XX] + strength * prior[0])
-    shape[3] = scale * (sums[XY] + strength * prior[1])
-    shape[4] = scale * (sums[YY] + strength * prior[2])
+    shape[A_XX] = scale * (sums[XX] + strength * prior[0])
+    shape[A_XY] = scale * (sums[XY] + strength * prior[1])
+    shape[A_YY] = scale * (sums[YY] + strength * prior[2])
 
 
 @njit(cache=True)
 def prefixes(
     points: Array, weights: Array, start: int, link: float, gate: float, prior: Array, strength: float, least: float
 ) -> tuple[Bools, int]:
-    """Which of the first `start`, start + 1, … M points are one group, |G_y| = 1 (M - start + 1,), and the work done.
+    """Returns whether the first start, start + 1, … M points are one group, |G_y| = 1, (M - start + 1,), and the work.
 
-    Components of less weight than `least` are no parts, and of such alone there is no group.
+    Components of less weight than `least` are left out; if all are, the points are no group. The work is the number of
+    comparisons, for tests of the cost.
     """
     m = len(points)
     one = np.zeros(m - start + 1, np.bool_)
@@ -235,30 +251,33 @@ def prefixes(
     parent, sums = np.empty(m, np.int64), np.empty((m, 6))
     head, after, box = np.full(len(around), -1), np.full(m, -1), np.empty((len(around), 4))
     work = np.zeros(2, np.int64)
-    tops, some = np.empty(m, np.int64), 0  # the roots of components so far
+    tops, some = np.empty(m, np.int64), 0  # roots of the components so far
     part = np.empty((m, 6))
     for k in range(m):
         insert(k, points, weights[k], link, cell, around, parent, head, after, box, sums, work)
         tops[some] = k
         some += 1
-        if work[1] < some:
+        if work[COMPONENTS] < some:
             kept = 0
             for n in range(some):
                 if parent[tops[n]] == tops[n]:
                     tops[kept] = tops[n]
                     kept += 1
-            work[0] += some
+            work[VISITS] += some
             some = kept
         if k + 1 >= start:
             one[k + 1 - start] = _whole(sums, tops[:some], part, gate, prior, strength, least, work)
-    return one, work[0]
+    return one, work[VISITS]
 
 
 @njit(cache=True)
 def _whole(
     sums: Array, tops: Ints, part: Array, gate: float, prior: Array, strength: float, least: float, work: Ints
 ) -> bool:
-    """Are the components with these roots one group?"""
+    """Returns True if the components with roots `tops` are one group; components lighter than `least` are left out.
+
+    part (M, 6) is working space.
+    """
     if len(tops) == 1:
         return bool(sums[tops[0], WEIGHT] >= least)
     count = 0
@@ -266,7 +285,7 @@ def _whole(
         if sums[tops[n], WEIGHT] >= least:
             part[count] = sums[tops[n]]
             count += 1
-    work[0] += len(tops) + count * count
+    work[VISITS] += len(tops) + count * count
     if count < 2:
         return count == 1
     return bool(closure(part[:count], gate, prior, strength).max() == 0)

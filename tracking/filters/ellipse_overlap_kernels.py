@@ -1,7 +1,6 @@
-"""Kernel of tracking.filters.components: do two filled ellipses have a point in common? Twin:
-tests/reference_components.py.
+"""Kernels of tracking.filters.components: do two filled ellipses have a common point? (Gilitschenski & Hanebeck 2012)
 
-Numbers of a 2x2 covariance come as xx, xy, yy.
+Twin: tests/reference_components.py. A 2x2 covariance is given by its entries xx, xy, yy.
 """
 
 from __future__ import annotations
@@ -14,15 +13,19 @@ from numba import njit
 from sim.types import Array, Bools
 
 STEPS = 60
+"""Most bisections; two ellipses that are still undecided touch, and count as overlapping."""
 
 
 @njit(cache=True)
 def overlap(dx: float, dy: float, axx: float, axy: float, ayy: float, bxx: float, bxy: float, byy: float) -> bool:
-    """Whether {y' A^-1 y <= 1} and {(y - d)' B^-1 (y - d) <= 1} meet; A, B positive definite.
+    """Returns True if the ellipses y' A^-1 y <= 1 and (y - d)' B^-1 (y - d) <= 1 have a common point.
 
-    They are disjoint iff f(s) = d' (A / (1 - s) + B / s)^-1 d > 1 for some s in (0, 1) (Gilitschenski & Hanebeck 2012).
-    In coordinates where B = I and A = diag(l1, l2), f(s) = sum of s (1 - s) d_i^2 / (1 + s (l_i - 1)). It is concave:
-    its tangents at both ends of the bracket bound the maximum.
+    dx, dy: d, the distance of the centres. A and B must be positive definite.
+
+    The ellipses are disjoint if and only if f(s) = d' (A / (1 - s) + B / s)^-1 d > 1 for some s in (0, 1)
+    (Gilitschenski & Hanebeck 2012). In coordinates with B = I and A = diag(l1, l2), f(s) = sum of s (1 - s) d_i^2 / (1
+    + s (l_i - 1)). As f is concave, its tangents at both ends of a bracket bound its maximum; the bracket is halved
+    until the sign of f - 1 is known.
     """
     l11 = sqrt(bxx)  # B = L L'
     l21 = bxy / l11
@@ -65,7 +68,7 @@ def overlap(dx: float, dy: float, axx: float, axy: float, ayy: float, bxx: float
 
 @njit(cache=True)
 def overlaps(mean: Array, shape: Array) -> Bools:
-    """(G, G) `overlap` of all with all; shape (G, 2, 2)."""
+    """Returns `overlap` of each two of G ellipses, (G, G); mean (G, 2), shape (G, 2, 2): the matrices A."""
     count = len(mean)
     found = np.ones((count, count), np.bool_)
     for i in range(count):

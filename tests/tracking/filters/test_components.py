@@ -206,7 +206,7 @@ def test_a_group_moved_is_a_group(points, x, y) -> None:
 
 
 def work(points, least=0.0, start=1):
-    return kernels.prefixes(points, np.ones(len(points)), start, LINK, 9.21, RULE.three, 3.0, least)[1]
+    return kernels.prefixes(points, np.ones(len(points)), start, LINK, 9.21, RULE.prior_entries, 3.0, least)[1]
 
 
 def outwards(points):

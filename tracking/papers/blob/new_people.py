@@ -1,9 +1,9 @@
-"""Who is new in the foreground that no track explains, and how many they are: for `blob` from pixels (ours).
+"""New people in the foreground that no track explains, and how many they are: for `blob` from pixels (ours).
 
-A region left over is tried with 1, 2, ... templates of the size that a person has there, side by side to begin with,
-each where its columns reach down to (from above: in a row along the region's longer axis), then moved in turn to where
-they explain most. The number is the one whose templates together explain most, each costing `support` of a whole
-person; none may have less.
+Each unexplained region is tried with 1, 2, … templates of a person's size at its place. They start side by side, each
+where its columns of the region reach down to (from straight above: in a row along the region's longer axis). Then they
+move in turn to where they explain most (person_template). The number is chosen whose templates together explain most,
+where each template costs `support` of a whole person. No template may have less support than that.
 """
 
 from __future__ import annotations
@@ -11,20 +11,23 @@ from __future__ import annotations
 import numpy as np
 
 from sim.types import Array, Ints
-from tracking.detect import blobs as detect
+from tracking.detect import blobs
 from tracking.detect.person_size import SLIM, SMALLEST, PersonSize
 from tracking.papers.blob import new_people_kernels as kernels
 from tracking.papers.blob.person_template import ELLIPSE, ExplainedForeground
 
-LEAST = 0.3  # of a person's area: a smaller region is nobody
-MOST = 6  # people found in one region and frame
-ROAM = 0.25  # of a person's height, the deviation of a first guess
-EVIDENCE = 1000.0  # nats of full support: so many that a first guess holds nobody back
+LEAST = 0.3  # a region smaller than this share of a person's area is ignored
+MOST = 6  # most people found in one region in a frame
+ROAM = 0.25  # standard deviation of a first guess, of a person's height
+EVIDENCE = 1000.0  # log-likelihood of full support: so large that the first guess hardly restrains a template
 
 
 def find_new_people(scene: ExplainedForeground, size: PersonSize, support: float) -> Array:
-    """(K, 4) templates of new people, painted; `support` is what each needs."""
-    found = detect.find(scene.unexplained(), LEAST * SMALLEST**2 * SLIM * ELLIPSE)
+    """Returns the templates (K, 4) x, foot, h, w of new people, and paints them into `scene`.
+
+    support: least support of each. A region where a person's size is unknown has no new people.
+    """
+    found = blobs.find(scene.unexplained(), LEAST * SMALLEST**2 * SLIM * ELLIPSE)
     box = found.box
     h, w = size.at(np.stack([box[:, 0] + box[:, 2] / 2, box[:, 1] + box[:, 3]], 1)).T
     person = ELLIPSE * h * w
@@ -37,7 +40,11 @@ def find_new_people(scene: ExplainedForeground, size: PersonSize, support: float
 
 
 def _in_region(scene: ExplainedForeground, guesses: Array, person: float, support: float) -> Array:
-    """(K, 4) as many of a region's newcomers as explain most, out of guesses for 1, 2, ... of them, painted."""
+    """Returns the templates (K, 4) of the number of people that explains a region best, and paints them.
+
+    guesses (1 + 2 + …, 4): first places for 1, 2, … people; those from the first with an unknown size on are left out.
+    person: area of a person, px.
+    """
     known = np.asarray(np.isfinite(guesses).all(1))
     sure = len(known) if known.all() else int(known.argmin())
     most = int((np.sqrt(8 * sure + 1) - 1) / 2)  # 1 + 2 + ... + most <= sure
@@ -46,8 +53,11 @@ def _in_region(scene: ExplainedForeground, guesses: Array, person: float, suppor
     return kernels.fit_new_people(scene.foreground, scene.cover, guesses, most, person, support, spread, EVIDENCE)
 
 
-def _guesses(found: detect.Blobs, rows: Ints, most: Ints, size: PersonSize) -> list[Array]:
-    """For each of these regions (1 + 2 + ... + most, 4) templates: 1, 2, ... `most` that share its pixels evenly."""
+def _guesses(found: blobs.Blobs, rows: Ints, most: Ints, size: PersonSize) -> list[Array]:
+    """Returns for each of the regions `rows` first places (1 + 2 + … + most, 4) of 1, 2, … `most` people.
+
+    The people of one number share the region's pixels evenly.
+    """
     if size.above:
         return [_from_above(found, row, n, size) for row, n in zip(rows.tolist(), most.tolist(), strict=True)]
     box = found.box.astype(int)
@@ -56,8 +66,11 @@ def _guesses(found: detect.Blobs, rows: Ints, most: Ints, size: PersonSize) -> l
     return np.split(np.column_stack([stand, size.at(stand)]), np.cumsum([len(f) for f in feet])[:-1])
 
 
-def _from_above(found: detect.Blobs, row: int, most: int, size: PersonSize) -> Array:
-    """The same along the longer axis of a region's pixels, each template in the middle of as many."""
+def _from_above(found: blobs.Blobs, row: int, most: int, size: PersonSize) -> Array:
+    """Returns first places (1 + 2 + … + most, 4) along the longer axis of one region, seen from straight above.
+
+    Each template is centred on its share of the pixels.
+    """
     left, top, wide, high = found.box[row].astype(int)
     at = np.argwhere(found.label[top : top + high, left : left + wide] == row + 1)[:, ::-1] + (left, top) + 0.5
     axis = np.linalg.eigh(np.cov(at.T))[1][:, -1]

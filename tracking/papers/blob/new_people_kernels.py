@@ -1,4 +1,7 @@
-"""Kernels of tracking.papers.blob.new_people: where guesses stand, and how many templates explain most."""
+"""Kernels of tracking.papers.blob.new_people: first guesses of places, and the number of templates that explains most.
+
+Twins: tests/reference_templates.py; templates, foreground and cover as in person_template_kernels.
+"""
 
 from __future__ import annotations
 
@@ -7,18 +10,23 @@ import numpy as np
 from sim.types import Array, Bools, Ints
 from tracking.detect.blobs import Labels
 from tracking.papers.blob import person_template_kernels as kernels
-from tracking.papers.blob import person_template_search_kernels as moves
+from tracking.papers.blob import person_template_search_kernels as search
 from tracking.papers.blob.person_template_kernels import Cover, kernel
 
-LOWEST = 0.98  # quantile of a part's rows: where it stands
-REACH = moves.MOST_STEPS + moves.SWEEPS * moves.FINE_STEPS  # coarse steps that settle takes, and some to spare
-ROUNDING = 1e-9
+LOWEST = 0.98  # quantile of the rows of a part's pixels at which its foot is guessed
+REACH = (
+    search.MOST_STEPS + search.SWEEPS * search.FINE_STEPS
+)  # most coarse steps that fit_places moves a template, and some more
+ROUNDING = 1e-9  # added to an upper bound, so that rounding excludes nothing
 
 
 @kernel
 def part_feet(label: Labels, which: int, box: Ints, most: int) -> Array:
-    """(1 + 2 + … + most, 2) where parts of the region `which` of labels (H, W) stand, box ltwh: for each number of
-    parts up to `most` the region's columns, with as many pixels each, left to right; their mean x and lower end."""
+    """Returns where the parts of a region stand, (1 + 2 + … + most, 2): x and foot of the 1, 2, … `most` parts.
+
+    The region has label `which` in label (H, W) and the box ltwh (4,). It is cut into parts of as many pixels each,
+    from left to right. x is the mean of a part's columns, foot the quantile LOWEST of its rows.
+    """
     left, top, wide, high = box
     per_row = np.zeros(high, np.int64)
     pixels = 0
@@ -45,7 +53,7 @@ def part_feet(label: Labels, which: int, box: Ints, most: int) -> Array:
 
 @kernel
 def quantile(counts: Ints, n: int, q: float, least: int) -> float:
-    """The quantile q of n whole numbers of which counts[k] are least + k, linear between neighbours as numpy's."""
+    """Returns the quantile q, as numpy.quantile, of n whole numbers of which counts[k] are equal to least + k."""
     place = q * (n - 1)
     low = int(place)
     below, above, passed = -1, -1, 0
@@ -71,9 +79,13 @@ def fit_new_people(
     spread: Array,
     nats: float,
 ) -> Array:
-    """(K, 4) the templates that explain most for their number, painted: of 1, 2, … `most`, settled from their guesses
-    (1 + 2 + … + most, 4), each number's after the other; each costs `support` of a person's area, and needs as much of
-    its own. spread, nats: as settle has them. Numbers too great to be worth more are not tried."""
+    """Returns the templates (K, 4) of the best number of people, 0 to `most`, and paints them.
+
+    guesses (1 + 2 + … + most, 4): first places for 1, 2, … people, one number after the other; from there fit_places
+    moves them, with `spread` (one row per guess) and `nats` of evidence. The best number has the largest joint support,
+    less `support` for each person, in units of a person's area `person`, px. Each template must have `support` of its
+    own. Numbers that cannot be better than the best so far are not tried.
+    """
     best, worth = np.zeros((0, 4)), 0.0
     first, bound = 0, unexplained_within_reach(foreground, cover, guesses) / person + ROUNDING
     for count in range(1, most + 1):
@@ -81,7 +93,7 @@ def fit_new_people(
             break
         one, far = guesses[first : first + count], spread[first : first + count]
         first += count
-        at = moves.fit_places(foreground, cover, one, far, nats)
+        at = search.fit_places(foreground, cover, one, far, nats)
         alone = kernels.supports(foreground, cover, at, 1)
         kernels.paint_all(cover, at, -1)
         value = joint_support(foreground, cover, at) / person - count * support
@@ -93,11 +105,11 @@ def fit_new_people(
 
 @kernel
 def unexplained_within_reach(foreground: Bools, cover: Cover, guesses: Array) -> int:
-    """Uncovered foreground pixels in the box that holds these templates wherever settle may take them."""
+    """Returns the number of uncovered foreground pixels in the box that holds the templates wherever they can move."""
     low, high, left, right = np.inf, -np.inf, np.inf, -np.inf
     for k in range(len(guesses)):
         x, foot, h, w = guesses[k]
-        far = REACH * max(h / moves.STEPS_PER_HEIGHT, 1.0)
+        far = REACH * max(h / search.STEPS_PER_HEIGHT, 1.0)
         low, high = min(low, foot - h - far), max(high, foot + far)
         left, right = min(left, x - w / 2 - far), max(right, x + w / 2 + far)
     found = 0
@@ -109,7 +121,7 @@ def unexplained_within_reach(foreground: Bools, cover: Cover, guesses: Array) ->
 
 @kernel
 def joint_support(foreground: Bools, cover: Cover, templates: Array) -> float:
-    """Sum of what pixels are worth that these templates cover; none of them is painted."""
+    """Returns the sum over the pixels that templates (K, 4) cover, in foreground pixels; they must not be painted."""
     total = 0.0
     for k in range(len(templates)):
         part = kernels.support(foreground, cover, templates[k], 0)

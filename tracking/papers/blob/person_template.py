@@ -1,13 +1,13 @@
-"""TrackedEllipses as templates over a foreground mask: which places of how many people explain it best (ours).
+"""People as templates over a foreground mask: where a given number of people explain the foreground best (ours).
 
-A template is an upright ellipse in a box: x (its middle), foot (lower edge), h, w in px. Every foreground pixel that
-some template covers counts 1, every background pixel against 1/2, once however many templates cover it: so who is
-partly hidden is measured by what shows of him, and a gap in the mask (a lamp post, camouflage) costs less than a second
-person. Moving one template while the others rest needs sums over its rows only
-(tracking.papers.blob.person_template_search_kernels).
-
-    support  of a template = (sum over the pixels that it alone covers) / its area in the image, at most 1
-    settle   each in turn to the place of largest evidence * support - d^2 / 2, d from where it was expected
+A template is an upright ellipse in a box x (its middle), foot (row of the lower edge), h, w, px. A pixel that at least
+one template covers counts 1 if it is foreground and -1/2 if it is background, however many templates cover it. So a
+partly hidden person is measured by the visible part, and a gap in the mask (a lamp post, clothes in the background's
+colour) costs less than a second person.
+    support       of a template: the sum over the pixels that it alone covers, divided by its area; at most 1
+    fit_places    each template in turn moves to the place of largest evidence * support - d^2 / 2, d^2 the squared
+                  distance from its expected place in standard deviations
+While one template moves and the others stay, only sums over its own rows are needed (person_template_search_kernels).
 """
 
 from __future__ import annotations
@@ -17,55 +17,63 @@ import numpy as np
 from sim.types import Array, Bools, Ints
 from tracking.detect.blobs import Labels
 from tracking.papers.blob import person_template_kernels as kernels
-from tracking.papers.blob import person_template_search_kernels as moves
+from tracking.papers.blob import person_template_search_kernels as search
 from tracking.papers.blob.person_template_kernels import ELLIPSE as ELLIPSE
 
 
 class ExplainedForeground:
-    """One frame's foreground (H, W). State: cover (H, W), templates painted over each pixel, EXPLAINED more where it is
-    explained already."""
+    """One frame's foreground, and what explains it.
+
+    State: foreground (H, W). cover (H, W) int16: the number of templates painted over each pixel, plus
+    kernels.EXPLAINED where a blob of one person explains the pixel.
+    """
 
     def __init__(self, foreground: Bools) -> None:
         self.foreground = foreground
         self.cover: kernels.Cover = np.zeros(foreground.shape, np.int16)
 
     def mark_explained(self, label: Labels, rows: Ints) -> None:
-        """The regions row + 1 of labels (H, W) are explained: nobody is measured by them."""
+        """Mark the blobs `rows` (K,) as explained: templates get no support from their pixels.
+
+        label (H, W): row + 1 of the blob of each pixel, 0 for none.
+        """
         which = np.zeros(int(rows.max(initial=-1)) + 2, bool)
         which[rows + 1] = True
         kernels.mark_explained(self.cover, label, which)
 
     def unexplained(self) -> Bools:
-        """(H, W) the foreground that nothing explains."""
+        """Returns the foreground (H, W) that no template covers and no blob explains."""
         return np.asarray(self.foreground & (self.cover == 0))
 
     def fit_places(self, templates: Array, spread: Array, evidence: float) -> Array:
-        """Places (K, 4) of all templates together, near people (low feet) first; painted when done.
+        """Returns the templates (K, 4) at the places where they explain most together; paints them.
 
-        spread (K, 2): standard deviation px of each one's expected x and foot; evidence: nats for full support.
+        Templates with low feet (near people) move first. spread (K, 2): standard deviation, px, of the expected x and
+        foot. evidence: log-likelihood of full support.
         """
-        return moves.fit_places(self.foreground, self.cover, templates, spread, evidence)
+        return search.fit_places(self.foreground, self.cover, templates, spread, evidence)
 
     def prune(self, templates: Array, least: float, *, pieces: bool = False) -> Ints:
-        """Rows of painted templates with support `least` when those with too little are taken away, the weakest first.
+        """Returns the rows of painted templates that have enough support, and erases the others, the weakest first.
 
-        pieces: how much of what could be seen of somebody is foreground, so that a piece of him is enough, wherever the
-        rest has gone: foreground over the pixels that no other template covers, if these are BARE of his own or more.
-        Of two on one person either has less, and so goes.
+        The support of the remaining templates is computed anew after each removal. `least`: the support needed.
+        pieces: compare instead the share of foreground among the pixels that the template alone covers, so that a
+        visible piece of a person is enough; 0 if these are less than kernels.BARE of the template. Of two templates on
+        one person either share is low, and one template is erased.
         """
         return np.flatnonzero(kernels.prune(self.foreground, self.cover, templates, least, pieces))
 
     def support(self, templates: Array) -> Array:
-        """(K,) support of painted templates, each by the pixels that no other covers."""
+        """Returns the support (K,) of painted templates, each from the pixels that no other template covers."""
         return kernels.supports(self.foreground, self.cover, templates, 1)
 
     def visible_share(self, templates: Array) -> Array:
-        """(K,) share of each template that none of these with a lower foot, and nothing explained, covers."""
+        """Returns the share (K,) of each template that no template with a lower foot and no explained blob covers."""
         return kernels.visible_share(self.cover, templates)
 
 
 def template_mask(shape: tuple[int, ...], templates: Array) -> Bools:
-    """(H, W) the pixels that templates (K, 4) cover."""
+    """Returns an (H, W) mask, True where one of the templates (K, 4) covers a pixel; `shape` is (H, W)."""
     cover = np.zeros(shape, np.int16)
     kernels.paint_all(cover, templates, 1)
     return cover > 0

@@ -1,9 +1,9 @@
-"""Kernels of tracking.papers.blob.person_template: sums over upright ellipses, row by row;
-twins: tests/reference_templates.
+"""Kernels of tracking.papers.blob.person_template: sums over upright ellipses, row by row.
 
-A template is an ellipse filling a box of h x w px that stands on the row `foot` at column x. `foreground` (H, W) bool:
-the frame, `cover` (H, W) the number of templates painted over each pixel, EXPLAINED more where it is explained already.
-Worth is counted in halves of a foreground pixel, so that all sums are of whole numbers and exact in any order.
+Twins: tests/reference_templates.py. A template (4,) is x, foot, h, w, px: an ellipse that fills a box of h x w px round
+column x with its lower edge at row `foot`. foreground (H, W) bool. cover (H, W) int16: the number of templates painted
+over each pixel, plus EXPLAINED where a blob of one person explains the pixel. Sums count in halves of a foreground
+pixel: they are whole numbers, and exact in any order.
 """
 
 from __future__ import annotations
@@ -16,38 +16,41 @@ from sim.types import Array, Bools, Ints
 from tracking.detect.blobs import Labels
 
 Cover = NDArray[np.int16]
-HALVES, EMPTY = 2, -1  # what a foreground pixel is worth and a background pixel costs
-EXPLAINED = 1000
+HALVES, EMPTY = 2, -1  # halves that a covered foreground pixel and a covered background pixel count
+EXPLAINED = 1000  # added to the cover of an explained pixel; more than the number of templates in a frame
 ELLIPSE = np.pi / 4  # share of its box that an ellipse fills
-LEAST_INSIDE = 0.3  # a template further out of the image than this counts as so large
-BARE = 0.1  # share of a template that no other covers below which he is hidden, not seen
+LEAST_INSIDE = 0.3  # a template of which a smaller share is inside the image counts as if this share were
+BARE = 0.1  # a template of which less than this share is free of others is hidden: it has no piece support
 
 kernel = njit(cache=True, error_model="numpy")
 
 
 @kernel
 def column_range(x: float, half: float, width: int) -> tuple[int, int]:
-    """Columns whose middle lies within `half` of x, clipped to the image: left, right (excluded)."""
+    """Returns first column and last column + 1 of the image's pixels whose centre is within `half` px of x."""
     left, right = int(np.ceil(x - half - 0.5)), int(np.floor(x + half - 0.5)) + 1
     return min(max(left, 0), width), min(max(right, 0), width)
 
 
 @kernel
 def half_width(row: int, foot: float, h: float, w: float) -> float:
-    """Half the ellipse's width in the middle of a row; negative outside."""
+    """Returns half the ellipse's width, px, at the centre of a row; -1 outside the ellipse."""
     t = 2 * (row + 0.5 - foot) / h + 1
     return 0.5 * w * np.sqrt(1 - t * t) if abs(t) < 1 else -1.0
 
 
 @kernel
 def row_range(foot: float, h: float, high: int) -> tuple[int, int]:
-    """Rows in which a template may have pixels: first, last + 1."""
+    """Returns the first row and last row + 1 in which a template can have pixels; `high`: rows of the image."""
     return max(int(foot - h), 0), min(int(foot) + 1, high)
 
 
 @kernel
 def area(template: Array, high: int, wide: int) -> float:
-    """px of a template inside the image."""
+    """Returns the area of a template, px, inside an image of high x wide px; at least LEAST_INSIDE of the whole.
+
+    The share inside is that of the template's box.
+    """
     x, foot, h, w = template
     across = min(x + w / 2, wide) - max(x - w / 2, 0.0)
     down = min(foot, high) - max(foot - h, 0.0)
@@ -56,7 +59,7 @@ def area(template: Array, high: int, wide: int) -> float:
 
 @kernel
 def paint(cover: Cover, template: Array, more: int) -> None:
-    """Add `more` to the pixels of a template."""
+    """Add `more` to the cover of a template's pixels."""
     x, foot, h, w = template
     low, high = row_range(foot, h, cover.shape[0])
     for row in range(low, high):
@@ -69,14 +72,14 @@ def paint(cover: Cover, template: Array, more: int) -> None:
 
 @kernel
 def paint_all(cover: Cover, templates: Array, more: int) -> None:
-    """Add `more` to the pixels of templates (K, 4), for each of them."""
+    """Add `more` to the cover of the pixels of each of the templates (K, 4)."""
     for k in range(len(templates)):
         paint(cover, templates[k], more)
 
 
 @kernel
 def mark_explained(cover: Cover, label: Labels, which: Bools) -> None:
-    """Add EXPLAINED to the pixels whose label k has which[k]; labels beyond have not."""
+    """Add EXPLAINED to the cover of each pixel whose label k > 0 has which[k]; a label beyond `which` has not."""
     for row in range(cover.shape[0]):
         for column in range(cover.shape[1]):
             k = label[row, column]
@@ -86,7 +89,7 @@ def mark_explained(cover: Cover, label: Labels, which: Bools) -> None:
 
 @kernel
 def count_pixels(foreground: Bools, cover: Cover, template: Array, covered: int) -> tuple[int, int]:
-    """PixelUpdater of a template that so many templates cover, and those of them that are foreground."""
+    """Returns the number of a template's pixels whose cover is `covered`, and how many of these are foreground."""
     x, foot, h, w = template
     low, high = row_range(foot, h, cover.shape[0])
     bare, seen = 0, 0
@@ -103,7 +106,10 @@ def count_pixels(foreground: Bools, cover: Cover, template: Array, covered: int)
 
 @kernel
 def support(foreground: Bools, cover: Cover, template: Array, covered: int) -> float:
-    """Support of a template by the pixels that so many cover: 0 if it is not painted, 1 if it is."""
+    """Returns the support of a template from the pixels whose cover is `covered`.
+
+    covered: 1 for a painted template, 0 for one that is not painted. The support is at most 1 and may be negative.
+    """
     bare, seen = count_pixels(foreground, cover, template, covered)
     halves = HALVES * seen + EMPTY * (bare - seen)
     return halves / HALVES / area(template, cover.shape[0], cover.shape[1])
@@ -111,7 +117,7 @@ def support(foreground: Bools, cover: Cover, template: Array, covered: int) -> f
 
 @kernel
 def supports(foreground: Bools, cover: Cover, templates: Array, covered: int) -> Array:
-    """(K,) support of each of the templates (K, 4)."""
+    """Returns the `support` (K,) of each of the templates (K, 4)."""
     found = np.zeros(len(templates))
     for k in range(len(templates)):
         found[k] = support(foreground, cover, templates[k], covered)
@@ -120,7 +126,10 @@ def supports(foreground: Bools, cover: Cover, templates: Array, covered: int) ->
 
 @kernel
 def piece_support(foreground: Bools, cover: Cover, template: Array) -> float:
-    """Share of foreground in the pixels of a painted template that no other covers; 0 where these are few."""
+    """Returns the share of foreground among the pixels that a painted template alone covers.
+
+    0 if these are less than BARE of the template's area.
+    """
     bare, seen = count_pixels(foreground, cover, template, 1)
     whole = area(template, cover.shape[0], cover.shape[1])
     return seen / whole / (bare / whole) if bare / whole >= BARE else 0.0
@@ -128,7 +137,7 @@ def piece_support(foreground: Bools, cover: Cover, template: Array) -> float:
 
 @kernel
 def piece_supports(foreground: Bools, cover: Cover, templates: Array) -> Array:
-    """(K,) the same of each of the templates (K, 4)."""
+    """Returns the `piece_support` (K,) of each of the templates (K, 4)."""
     found = np.zeros(len(templates))
     for k in range(len(templates)):
         found[k] = piece_support(foreground, cover, templates[k])
@@ -137,7 +146,7 @@ def piece_supports(foreground: Bools, cover: Cover, templates: Array) -> Array:
 
 @kernel
 def near_first(templates: Array) -> Ints:
-    """(K,) rows of templates, near people (low feet) first; these are few."""
+    """Returns the rows (K,) of templates sorted by feet, the lowest in the image (nearest) first; insertion sort."""
     order = np.arange(len(templates))
     for k in range(1, len(order)):
         while k > 0 and templates[order[k], 1] > templates[order[k - 1], 1]:
@@ -148,7 +157,7 @@ def near_first(templates: Array) -> Ints:
 
 @kernel
 def visible_share(cover: Cover, templates: Array) -> Array:
-    """(K,) share of each template that none of these with a lower foot, and nothing explained, covers."""
+    """Returns the share (K,) of each template that no template with a lower foot and no explained pixel covers."""
     hidden = np.zeros(cover.shape, np.bool_)
     share = np.zeros(len(templates))
     for k in near_first(templates):
@@ -168,7 +177,10 @@ def visible_share(cover: Cover, templates: Array) -> Array:
 
 @kernel
 def prune(foreground: Bools, cover: Cover, templates: Array, least: float, by_pieces: bool) -> Bools:
-    """(K,) which painted templates have `least` when the others are taken away, the weakest first."""
+    """Returns True for each painted template (K,) that stays; erases the others from `cover`.
+
+    The weakest template is erased until the weakest has `least`: of support, or of piece support if `by_pieces`.
+    """
     stays = np.ones(len(templates), np.bool_)
     worth = piece_supports(foreground, cover, templates) if by_pieces else supports(foreground, cover, templates, 1)
     while stays.any():
@@ -188,6 +200,6 @@ def prune(foreground: Bools, cover: Cover, templates: Array, least: float, by_pi
 
 @kernel
 def boxes_touch(one: Array, other: Array) -> bool:
-    """Do the boxes of two templates touch?"""
+    """Returns True if the boxes of two templates are at most 1 px apart in both directions."""
     aside = abs(one[0] - other[0]) <= (one[3] + other[3]) / 2 + 1
     return bool(aside and one[1] - one[2] <= other[1] + 1 and other[1] - other[2] <= one[1] + 1)

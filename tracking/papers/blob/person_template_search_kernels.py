@@ -1,7 +1,8 @@
-"""Kernels of tracking.papers.blob.person_template: where templates explain most; twins: tests/reference_templates.
+"""Kernels of tracking.papers.blob.person_template: the search for the places where templates explain most.
 
-A template is moved on a grid round its place while the others rest. Its rows' sums, in halves of a foreground pixel,
-are differences of the image rows' running sums, so that a place costs one difference per row.
+Twins: tests/reference_templates.py; templates, foreground and cover as in person_template_kernels. A template moves on
+a grid round its place while the others stay. The sum over one of its rows is a difference of the image row's running
+sum, so that a place costs one difference per row.
 """
 
 from __future__ import annotations
@@ -24,15 +25,15 @@ from tracking.papers.blob.person_template_kernels import (
 )
 
 Whole = NDArray[np.int32]
-STEPS_PER_HEIGHT = 24  # of the coarse grid, whose steps are 1 px at least; the fine grid's are half as long
-MOST_STEPS = 8  # either way on the coarse grid, which reaches as far as 2.5 standard deviations
-FINE_STEPS = 2  # either way on the fine grid
-SWEEPS = 3  # over all templates: one coarse, the others fine
+STEPS_PER_HEIGHT = 24  # a coarse step is the template's height over this, but at least 1 px; a fine step is half of it
+MOST_STEPS = 8  # most steps in each direction of the coarse grid, which reaches up to 2.5 standard deviations
+FINE_STEPS = 2  # steps in each direction of the fine grid, and fewest of the coarse grid
+SWEEPS = 3  # most sweeps over all templates: the first on the coarse grid, the others on the fine grid
 
 
 @kernel
 def column_range_within(x: float, half: float, low: np.int32, high: np.int32) -> tuple[np.int32, np.int32]:
-    """As `span`, but within the columns low..high and counted from low; both ends are equal where there are none."""
+    """Returns `column_range` within columns low to high - 1, counted from low; equal ends if there is no column."""
     left, right = np.int32(np.ceil(x - half - 0.5)), np.int32(np.floor(x + half - 0.5)) + np.int32(1)
     left = min(max(left, low), high)
     return left - low, min(max(right, left), high) - low
@@ -40,8 +41,11 @@ def column_range_within(x: float, half: float, low: np.int32, high: np.int32) ->
 
 @kernel
 def worth_when_moved(foreground: Bools, cover: Cover, template: Array, steps: int, step: float) -> Whole:
-    """(2 steps + 1, 2 steps + 1) what uncovered pixels of the template are worth, in halves, when it is moved by
-    multiples of step (rows: down). Each of its rows takes one difference of the image row's running sum."""
+    """Returns the sum over the template's uncovered pixels, in halves, at each place of a grid.
+
+    Shape (2 steps + 1, 2 steps + 1): rows are moves down, columns moves to the right, by multiples of `step` px from
+    -steps to steps. Uncovered pixels have cover 0. The template must not be painted.
+    """
     x, foot, h, w = template
     reach = steps * step
     low, high = max(int(foot - h - reach) - 1, 0), min(int(foot + reach) + 2, cover.shape[0])
@@ -68,7 +72,7 @@ def worth_when_moved(foreground: Bools, cover: Cover, template: Array, steps: in
 
 @kernel
 def row_sums(foreground: Bools, cover: Cover) -> Whole:
-    """(H, W + 1) sums along rows of what uncovered pixels are worth, in halves."""
+    """Returns running sums along the rows, (H, W + 1), of the uncovered pixels in halves."""
     sums = np.empty((cover.shape[0], cover.shape[1] + 1), np.int32)
     for row in range(cover.shape[0]):
         total = 0
@@ -84,7 +88,11 @@ def row_sums(foreground: Bools, cover: Cover) -> Whole:
 def best_place(
     foreground: Bools, cover: Cover, at: Array, expected: Array, spread: Array, evidence: float, fine: bool
 ) -> tuple[float, float]:
-    """The best x, foot round `at` of a template that is not painted: evidence * support - d^2 / 2, see settle."""
+    """Returns x and foot on the grid round template `at` (4,) with the largest evidence * support - d^2 / 2.
+
+    The template must not be painted. expected (4,): its expected place, spread (2,): see `fit_places`. fine: use the
+    fine grid. Returns the place of `at` unless another one is better.
+    """
     step, steps = max(at[2] / STEPS_PER_HEIGHT, 1.0), FINE_STEPS
     if fine:
         step /= 2
@@ -107,9 +115,11 @@ def best_place(
 
 @kernel
 def fit_places(foreground: Bools, cover: Cover, templates: Array, spread: Array, evidence: float) -> Array:
-    """(K, 4) templates where they explain most, near ones first, each while the others rest; painted when done.
+    """Returns the templates (K, 4) at the places where they explain most, and paints them.
 
-    spread (K, 2): standard deviation px of each one's expected x and foot; evidence: nats for full support.
+    Each template in turn moves to its best place while the others stay, those with low feet first, in at most SWEEPS
+    sweeps. spread (K, 2): standard deviation, px, of the expected x and foot, which `templates` hold. evidence:
+    log-likelihood of full support.
     """
     found, order = templates.copy(), near_first(templates)
     paint_all(cover, found, 1)

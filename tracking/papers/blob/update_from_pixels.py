@@ -178,16 +178,16 @@ class PixelUpdater:
     def _lone_people(self, found: Blobs, expected: Array) -> Bools:
         """Returns True for each blob (M,) of one person's size that the image's edge does not cut and in which at most
         one confirmed track is expected; expected (N, 4) centred boxes."""
-        one = self.size.one(found.box, found.ellipse)
+        one = self.size.one_person(found.box, found.ellipse)
         return np.asarray(one & ~found.cut() & ~self._several_expected(found.box, expected))
 
     def _person_boxes(self, upright: Array) -> Array:
         """Returns the centred boxes (N, 4) of people whose ellipses have these bounding boxes (N, 4)."""
-        return np.concatenate([upright[:, :2], upright[:, 2:] * self.size.loose], 1)
+        return np.concatenate([upright[:, :2], upright[:, 2:] * self.size.box_over_ellipse], 1)
 
     def _person_ellipses(self, box: Array) -> Array:
         """Returns the ellipses (N, 5) x, y, h, w, theta of upright people in these centred boxes (N, 4)."""
-        return box_geometry.inscribed_ellipses(np.concatenate([box[:, :2], box[:, 2:] / self.size.loose], 1))
+        return box_geometry.inscribed_ellipses(np.concatenate([box[:, :2], box[:, 2:] / self.size.box_over_ellipse], 1))
 
     def _several_expected(self, box: Array, expected: Array) -> Bools:
         """Returns True for each blob (M,) in which two or more confirmed tracks are expected.

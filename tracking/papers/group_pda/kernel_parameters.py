@@ -51,7 +51,7 @@ def make_rules(
     constraint = Constraint(link, c.gate / cut, cut * prior, c.spread_weight, least)
     numbers = np.zeros(kernels.OTHERS + 1)
     numbers[kernels.GATE], numbers[kernels.LINK] = constraint.gate, link
-    numbers[kernels.PRIOR_XX : kernels.PRIOR_YY + 1] = constraint.three
+    numbers[kernels.PRIOR_XX : kernels.PRIOR_YY + 1] = constraint.prior_entries
     numbers[kernels.STRENGTH], numbers[kernels.LEAST] = c.spread_weight, constraint.least
     numbers[kernels.NOISE], numbers[kernels.COUNT], numbers[kernels.SHARE] = noise, c.count_noise, c.count_share
     looks = 1 + c.carry_time * fps  # frames in one of which a member must be measured to be there

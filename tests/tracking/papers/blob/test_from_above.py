@@ -101,5 +101,5 @@ def test_expected_from_above_is_a_turned_ellipse():
     assert size.at(np.zeros((1, 2)))[0] == pytest.approx(np.full(2, np.sqrt(np.square(axes).mean())))
     for heading in (0.0, 0.8, 1.6):
         lying = np.array([[50.0, 50, *axes, heading]])
-        assert size.one(box(40.0, 50, 50, heading)[None], lying)[0]
-        assert not size.one(box(40.0, 50, 50, heading)[None], lying * [1, 1, 1.5, 1, 1])[0]
+        assert size.one_person(box(40.0, 50, 50, heading)[None], lying)[0]
+        assert not size.one_person(box(40.0, 50, 50, heading)[None], lying * [1, 1, 1.5, 1, 1])[0]
