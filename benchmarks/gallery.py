@@ -12,7 +12,7 @@ import numpy as np
 
 from scenarios.loading.resolve import load
 from sim.crowd.world import run
-from sim.render.renderer import Stage, stage
+from sim.render.renderer import Renderer, make_renderer
 from sim.scene.camera_placement import place_camera
 
 SHOWN = (
@@ -27,14 +27,14 @@ SHOWN = (
 SEED, QUALITY = 40_001, 82
 
 
-def made(name: str) -> Stage:
+def made(name: str) -> Renderer:
     above = ["camera.kind=top"] if name == "mixed" else []
     scenario = load(name, above)
     motion = run(scenario, SEED)
-    return stage(motion, place_camera(scenario.camera, motion), scenario.light, scenario.picture)
+    return make_renderer(motion, place_camera(scenario.camera, motion), scenario.light, scenario.picture)
 
 
-def truth(shown: Stage, index: int) -> np.ndarray:
+def truth(shown: Renderer, index: int) -> np.ndarray:
     """Left half: who is where, in colours; right half: disparity, dark where it is unknown."""
     pixels = shown.pixels(index, disparity=True)
     assert pixels.disparity is not None

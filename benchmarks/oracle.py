@@ -19,7 +19,7 @@ import numpy as np
 
 from scenarios.loading.resolve import load, names
 from sim.crowd.world import run
-from sim.render.renderer import Stage, stage
+from sim.render.renderer import Renderer, make_renderer
 from sim.scene.camera_placement import place_camera
 from sim.truth.label import bodies
 from sim.types import Camera, Motion
@@ -37,7 +37,7 @@ def halved(camera: Camera) -> Camera:
 def exactness(motion: Motion, camera: Camera, index: int) -> tuple[float, float, float]:
     """Wrong ids, wrong validity (each in 100,000 pixels), largest difference of disparities but for 10."""
     paired = camera.kind == "pinhole" and camera.baseline > 0
-    found, wanted = stage(motion, camera).pixels(index, disparity=paired), slow.look(camera, motion, index)
+    found, wanted = make_renderer(motion, camera).pixels(index, disparity=paired), slow.look(camera, motion, index)
     wrong = 1e5 * float((found.ids != wanted.ids).mean())
     if not paired:
         return wrong, np.nan, np.nan
@@ -48,7 +48,7 @@ def exactness(motion: Motion, camera: Camera, index: int) -> tuple[float, float,
     return wrong, validity, float(np.sort(off[np.isfinite(off)])[-11])
 
 
-def against_geometry(made: Stage, step: int) -> tuple[np.ndarray, float]:
+def against_geometry(made: Renderer, step: int) -> tuple[np.ndarray, float]:
     """visibility - visibility_px of all people asked, and the largest difference of a box's edge."""
     truth, size = bodies(made.motion, made.camera), np.array(made.camera.image)
     assert truth.box is not None
@@ -81,7 +81,7 @@ def main() -> None:
         motion = run(scenario, args.seed)
         camera = place_camera(scenario.camera, motion)
         wrong = exactness(motion, halved(camera), len(motion.present) // 2)
-        off, edge = against_geometry(stage(motion, camera), args.step)
+        off, edge = against_geometry(make_renderer(motion, camera), args.step)
         every.append(off)
         size = np.abs(off)
         print(

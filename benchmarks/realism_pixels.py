@@ -26,7 +26,7 @@ from scipy.stats import wasserstein_distance
 from scenarios.schema.picture import Light, Picture
 from scenarios.schema.scenario import Scenario
 from sim.crowd.world import run
-from sim.render.renderer import stage
+from sim.render.renderer import make_renderer
 from sim.scene.camera_placement import place_camera
 from sim.truth.label import bodies
 
@@ -78,7 +78,7 @@ def ours(seed: int, picture: Picture, light: Light | None = None, frames: int = 
     scenario = Scenario.model_validate(keys)
     motion = run(scenario, seed)
     camera = place_camera(scenario.camera, motion)
-    made, truth = stage(motion, camera, light or scenario.light, picture), bodies(motion, camera)
+    made, truth = make_renderer(motion, camera, light or scenario.light, picture), bodies(motion, camera)
     assert truth.box is not None
     boxes = [b[np.isfinite(b).all(axis=1)] for b in (truth.box[truth.rows(k + 1)] for k in range(frames))]
     return Film(np.stack([made.frame(k + 1) for k in range(frames)]), boxes)

@@ -18,20 +18,20 @@ import numpy as np
 
 from scenarios.schema.scenario import Scenario
 from sim.crowd.world import run
-from sim.render import people_shadow_kernels, renderer
-from sim.render.renderer import Stage, stage
+from sim.render import people_kernels, renderer, shadows_kernels
+from sim.render.renderer import Renderer, make_renderer
 from sim.scene.camera_placement import place_camera
 
 STRETCH = 10
 
 
-def street(people: int) -> Stage:
+def street(people: int) -> Renderer:
     """So many people who walk about alone, seen as a scenario's default camera sees them."""
     place = [{"uniform": [1, 15]}, {"uniform": [1, 9]}]
     group = [{"id": "g", "size": 1, "start": place, "goal": place, "repeat": people}]
     scenario = Scenario.model_validate({"schema": 1, "group": group, "duration": 10.0, "camera": {"crop": True}})
     motion = run(scenario, 1)
-    return stage(motion, place_camera(scenario.camera, motion), scenario.light, scenario.picture)
+    return make_renderer(motion, place_camera(scenario.camera, motion), scenario.light, scenario.picture)
 
 
 def rate(draw: Callable[[int], object], frames: int) -> float:
@@ -46,26 +46,26 @@ def rate(draw: Callable[[int], object], frames: int) -> float:
     return STRETCH / best
 
 
-ASKED: dict[str, Callable[[Stage], Callable[[int], object]]] = {
+ASKED: dict[str, Callable[[Renderer], Callable[[int], object]]] = {
     "left": lambda s: s.frame,
-    "left, ids, truth": lambda s: lambda i: s.both(i, pixels=True),
-    "left, ids, truth, disparity": lambda s: lambda i: s.both(i, pixels=True, disparity=True),
-    "left, right": lambda s: lambda i: s.both(i, right=True),
-    "left, right, ids, truth, disparity": lambda s: lambda i: s.both(i, right=True, pixels=True, disparity=True),
+    "left, ids, truth": lambda s: lambda i: s.draw(i, pixels=True),
+    "left, ids, truth, disparity": lambda s: lambda i: s.draw(i, pixels=True, disparity=True),
+    "left, right": lambda s: lambda i: s.draw(i, right=True),
+    "left, right, ids, truth, disparity": lambda s: lambda i: s.draw(i, right=True, pixels=True, disparity=True),
     "ids, truth": lambda s: s.pixels,
     "empty": lambda s: lambda i: s.background(i % 50),
 }
 PARTS = (
-    ("places, outlines", renderer.Stretch, ("__init__", "crowd", "sight")),
-    ("shadows", people_shadow_kernels, ("shadows",)),
-    ("people", people_shadow_kernels, ("people",)),
-    ("blur, light, noise", renderer.Stage, ("_finish",)),
+    ("places, outlines", renderer.FrameBatch, ("__init__", "people", "in_view")),
+    ("shadows", shadows_kernels, ("draw_shadows",)),
+    ("people", people_kernels, ("draw_people",)),
+    ("blur, light, noise", renderer.Renderer, ("_finish",)),
     ("truth of pixels", renderer, ("pixel_truth",)),
-    ("disparity", renderer.Stage, ("_disparities",)),
+    ("disparity", renderer, ("frame_disparities",)),
 )
 
 
-def profile(made: Stage, frames: int) -> dict[str, float]:
+def profile(made: Renderer, frames: int) -> dict[str, float]:
     """Milliseconds per frame of each part, all of the left view being asked for; `rest` is copies and the like."""
     spent: dict[str, float] = {}
     kept = []
@@ -83,7 +83,7 @@ def profile(made: Stage, frames: int) -> dict[str, float]:
             setattr(owner, name, timed)
     start = time.process_time()
     for k in range(frames):
-        made.both(1 + k % 100, pixels=True, disparity=True)
+        made.draw(1 + k % 100, pixels=True, disparity=True)
     whole = 1e3 * (time.process_time() - start) / frames
     for owner, name, call in kept:
         setattr(owner, name, call)
@@ -96,7 +96,7 @@ def main() -> None:
     frames = parser.parse_args().frames
     stages = {n: street(n) for n in (20, 100)}
     for n, made in stages.items():
-        shown = made.both(1, right=True, pixels=True, disparity=True).pixels
+        shown = made.draw(1, right=True, pixels=True, disparity=True).pixels
         assert shown is not None
         print(f"{n} people: {np.median(shown.amodal_px[shown.amodal_px > 0]):.0f} px each (median)")
     print(
@@ -111,7 +111,7 @@ def main() -> None:
         print(f"{name:36}" + "".join(f"{part[name]:8.2f}" for part in parts))
     start = time.process_time()
     made = street(20)
-    _ = made.left_view.blurred, made.left_view.geometry, made._atlas, made._noise
+    _ = made.left_view.blurred_canvas, made.left_view.geometry, made._atlas, made._noise
     print(f"\na stage with its left view: {1e3 * (time.process_time() - start):.0f} ms with the world's own time")
 
 

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from scenarios.errors import InputError
-from sim.render.renderer import Rendered, Stage, stage
+from sim.render.renderer import RenderedFrame, Renderer, make_renderer
 from sim.scene.camera import px_per_m_at_centre
 from sim.scene.camera_placement import place_camera
 from sim.truth.label import bodies, label
@@ -95,7 +95,7 @@ def observe(
 
     def frames() -> Iterator[Frame]:
         for d in detections():
-            made = Rendered() if drawn is None else drawn.draw(d.index)
+            made = RenderedFrame() if drawn is None else drawn.draw(d.index)
             yield Frame(d.index, d.t, made.image, made.right, d)
 
     def truth() -> Truth:
@@ -136,17 +136,17 @@ class _Pictures:
     State: the exact pixels of the frame that was drawn last, because they are usually read next.
     """
 
-    def __init__(self, stage: Stage, streams: frozenset[str]) -> None:
-        self.stage, self.streams = stage, streams
+    def __init__(self, renderer: Renderer, streams: frozenset[str]) -> None:
+        self.renderer, self.streams = renderer, streams
         self.has_image, self.has_right = "left" in streams, "right" in streams
         self._last: tuple[int, PixelTruth | None] = (0, None)
 
-    def draw(self, index: int) -> Rendered:
+    def draw(self, index: int) -> RenderedFrame:
         """Draw a frame: its pictures by the requested streams, and its exact pixels if "ids" or "disparity" is one."""
         if not self.has_image:
-            return Rendered(right=self.stage.right(index) if self.has_right else None)
+            return RenderedFrame(right=self.renderer.right(index) if self.has_right else None)
         labels = not self.streams.isdisjoint({"ids", "disparity"})
-        made = self.stage.both(index, right=self.has_right, pixels=labels, disparity="disparity" in self.streams)
+        made = self.renderer.draw(index, right=self.has_right, pixels=labels, disparity="disparity" in self.streams)
         self._last = index, made.pixels
         return made
 
@@ -155,11 +155,11 @@ class _Pictures:
         last, known = self._last
         if known is not None and last == index:
             return known
-        return self.stage.pixels(index, disparity="disparity" in self.streams)
+        return self.renderer.pixels(index, disparity="disparity" in self.streams)
 
     def background(self) -> Image:
         """Return pictures of the empty scene, (BACKGROUNDS, H, W, 3) BGR uint8."""
-        return np.stack([self.stage.background(k) for k in range(BACKGROUNDS)])
+        return np.stack([self.renderer.background(k) for k in range(BACKGROUNDS)])
 
 
 def _pictures(
@@ -173,7 +173,7 @@ def _pictures(
         )  # fmt: skip
     if not wanted:
         return None
-    made = stage(motion, camera, scenario.light, scenario.picture)
+    made = make_renderer(motion, camera, scenario.light, scenario.picture)
     if not wanted.isdisjoint({"right", "disparity"}):
         made.check_pair()
     return _Pictures(made, wanted)

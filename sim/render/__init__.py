@@ -1,1 +1,1 @@
-"""Pictures of a motion: background, people, shadows, light, noise, and the truth of each pixel."""
+"""Drawing of images: the empty scene, people, shadows, light, blur and noise, and the exact truth of pixels."""

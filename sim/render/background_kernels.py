@@ -1,43 +1,57 @@
-"""Compiled: the empty scene as a camera sees it, ray by ray: colours, light, depth and places of all pixels."""
+"""Compiled painting of the empty scene, ray by ray: colours, light, depth and place of each pixel."""
 
 from __future__ import annotations
 
 import numpy as np
 from numba import njit
 
-from sim.render.texture_kernels import COS, SIN, grain, overgrown, seen, slabs, smooth
-from sim.scene.raycast import GROUND, NOTHING, PILLAR, RISER, TREAD, WALL
+from sim.render.texture_kernels import COS, SIN, contrast_kept, grain, plant_cover, slabs, value_noise
+from sim.scene.raycast import (
+    GROUND,
+    HIT_INDEX,
+    HIT_KIND,
+    HIT_PLACE,
+    HIT_SLOTS,
+    NORMAL_X,
+    NOTHING,
+    PILLAR,
+    RISER,
+    TREAD,
+    WALL,
+)
 from sim.scene.raycast_kernels import at_pixel, first_hit
 
 GREY, GRASS, BRICK, STONE, STEP, SKY = range(6)  # rows of the palette
+CONTRAST, SLAB_WIDTH, PLANT_KEY, PLANT_LEVEL = range(4)  # slots of `style`: the last is inf without plants
+POINT, NORMAL, SPARE, BLOCKED = range(4)  # rows of the scratch `more`
 
 
 @njit(cache=True)
 def _tint(base, brightness, warmth, out):  # type: ignore[no-untyped-def]
-    """A palette colour (BGR) made brighter and warmer by these shares."""
+    """Set out (3,) to a palette colour (BGR) made brighter and warmer by these shares."""
     out[0] = base[0] * max(0.0, 1 + brightness - warmth)
     out[1] = base[1] * max(0.0, 1 + brightness)
     out[2] = base[2] * max(0.0, 1 + brightness + warmth)
 
 
 @njit(cache=True)
-def _ground(x, y, size, footprint, look, palette, key, out):  # type: ignore[no-untyped-def]
-    """Paving inside the world, grass outside, with a ragged border, bushes and long grass over both.
+def _ground(x, y, size, footprint, style, palette, key, out):  # type: ignore[no-untyped-def]
+    """Set out (3,) to the colour of the ground at (x, y) m: paving inside the world, grass outside, plants over both.
 
-    look: contrast of patterns, width of slabs in m (0 = asphalt), key and level of plants. Returns whether it is grass,
-    and how far it is overgrown.
+    Returns whether it is grass, and the share covered by plants. The border of the paving is ragged.
     """
-    contrast, slab = look[0], look[1]
-    outside = max(max(-x, x - size[0]), max(-y, y - size[1])) - 1.0 + 0.3 * smooth(x, y, key + 90)
-    patches = smooth(0.31 * x, 0.31 * y, key + 20) + 0.6 * smooth(0.9 * x + 7.3, 0.9 * y, key + 21)
-    warmth = contrast * 0.06 * smooth(0.5 * x, 0.5 * y + 3.1, key + 22)
+    contrast, slab = style[CONTRAST], style[SLAB_WIDTH]
+    outside = max(max(-x, x - size[0]), max(-y, y - size[1])) - 1.0 + 0.3 * value_noise(x, y, key + 90)
+    patches = value_noise(0.31 * x, 0.31 * y, key + 20) + 0.6 * value_noise(0.9 * x + 7.3, 0.9 * y, key + 21)
+    warmth = contrast * 0.06 * value_noise(0.5 * x, 0.5 * y + 3.1, key + 22)
     fine = grain(x, y, key, footprint, 0.4)
     if outside > 0:
         _tint(palette[GRASS], contrast * (0.4 * fine + 0.16 * patches), warmth, out)
     else:
         tile = slabs(x, y, slab, 0.6 * slab, 0.012, key + 40, footprint) if slab > 0 else 0.0
         _tint(palette[GREY], contrast * (0.26 * fine + 0.1 * patches + 0.16 * tile), warmth, out)
-    plants = overgrown(x, y, size, int(look[2]), look[3], footprint) if look[3] < np.inf else 0.0
+    level = style[PLANT_LEVEL]
+    plants = plant_cover(x, y, size, int(style[PLANT_KEY]), level, footprint) if level < np.inf else 0.0
     if plants > 0.0:
         turned = grain(COS * x - SIN * y, SIN * x + COS * y, key + 50, footprint, 0.3)
         leaves = 0.85 - 0.3 * contrast + 1.3 * contrast * turned
@@ -48,11 +62,11 @@ def _ground(x, y, size, footprint, look, palette, key, out):  # type: ignore[no-
 
 @njit(cache=True)
 def _upright(kind, along, z, footprint, contrast, palette, key, out):  # type: ignore[no-untyped-def]
-    """Walls in bricks with a skirting, pillars and steps in stone."""
+    """Set out (3,) to the colour of a wall (bricks with a skirting), or of a pillar or step (stone)."""
     fine = grain(along, z, key + 60, footprint, 0.6)
     if kind == WALL:
         tile = slabs(along, z, 0.5, 0.25, 0.012, key + 61, footprint)
-        low = 0.35 * seen(0.3, footprint) if z < 0.12 else 0.0
+        low = 0.35 * contrast_kept(0.3, footprint) if z < 0.12 else 0.0
         _tint(palette[BRICK], contrast * (0.3 * fine + 0.22 * tile) - low, contrast * 0.05 * tile, out)
     else:
         row = STONE if kind == PILLAR else STEP
@@ -62,74 +76,79 @@ def _upright(kind, along, z, footprint, contrast, palette, key, out):  # type: i
 
 @njit(cache=True)
 def _sky(d, key, palette, out):  # type: ignore[no-untyped-def]
-    """Clouded sky: brighter towards the horizon."""
+    """Set out (3,) to the colour of the sky in direction d: clouded, brighter towards the horizon."""
     length = np.sqrt(d[0] * d[0] + d[1] * d[1] + d[2] * d[2])
     up = max(d[2] / length, 0.0)
     x, y = d[0] / (d[2] + 0.1 * length), d[1] / (d[2] + 0.1 * length)
-    cloud = smooth(0.4 * x, 0.4 * y, key + 80) + 0.5 * smooth(x, y, key + 81)
+    cloud = value_noise(0.4 * x, 0.4 * y, key + 80) + 0.5 * value_noise(x, y, key + 81)
     _tint(palette[SKY], 0.08 * cloud - 0.15 * up, -0.12 * up, out)
 
 
 @njit(cache=True)
-def _sunlit(point, normal, sun, penumbra, still, spare, hit):  # type: ignore[no-untyped-def]
-    """Share of four points across the penumbra before which nothing stands in the sun."""
-    if len(still.walls) + len(still.pillars) + len(still.flights) == 0:
+def _sunlit(point, normal, sun, penumbra, solids, spare, hit):  # type: ignore[no-untyped-def]
+    """Return the share, out of four points across the penumbra, from which no solid thing hides the sun."""
+    if len(solids.walls) + len(solids.pillars) + len(solids.flights) == 0:
         return 1.0
     share = 0.0
     for k in range(4):
         spare[0] = point[0] + 1e-4 * normal[0] + penumbra * ((k % 2) - 0.5) * 0.7
         spare[1] = point[1] + 1e-4 * normal[1] + penumbra * ((k // 2) - 0.5) * 0.7
         spare[2] = point[2] + 1e-4 * normal[2]
-        if np.isinf(first_hit(spare, sun, still, hit)):
+        if np.isinf(first_hit(spare, sun, solids, hit)):
             share += 0.25
     return share
 
 
 @njit(cache=True)
-def depths(origin, direction, still, depth, kind, place):  # type: ignore[no-untyped-def]
-    """Through the middle of each pixel: depth (inf = sky), what is met, and where (x, y, z)."""
+def trace_pixels(origin, direction, solids, depth, kind, place):  # type: ignore[no-untyped-def]
+    """Set depth (H, W), kind (H, W) and place (H, W, 3) to what each pixel's centre shows; see `PixelGeometry`.
+
+    origin, direction (3, 3): of PixelRays. The place of sky is 1e9.
+    """
     height, width = depth.shape
-    o, d, hit = np.empty(3), np.empty(3), np.empty(6)
+    o, d, hit = np.empty(3), np.empty(3), np.empty(HIT_SLOTS)
     for v in range(height):
         for u in range(width):
             at_pixel(origin, u + 0.5, v + 0.5, o)
             at_pixel(direction, u + 0.5, v + 0.5, d)
-            t = first_hit(o, d, still, hit)
-            depth[v, u], kind[v, u] = t, int(hit[0])
+            t = first_hit(o, d, solids, hit)
+            depth[v, u], kind[v, u] = t, int(hit[HIT_KIND])
             for k in range(3):
                 place[v, u, k] = o[k] + t * d[k] if t < 1e9 else 1e9
 
 
 @njit(cache=True)
-def _seen(x, y, rays, focal, sun, shadow, penumbra, still, size, look, palette, key, o, d, hit, more, out):  # type: ignore[no-untyped-def]
-    """Colour out (3,) through the point (x, y) of the image; returns the shares of direct sun and of plants in it,
-    and a number that is the same for all of one surface, lit alike.
+def _point_colour(  # type: ignore[no-untyped-def]
+    x, y, rays, scale, sun, shadow, penumbra, solids, size, style, palette, key, o, d, hit, more, out
+):
+    """Set out (3,) to the colour seen through the image point (x, y).
 
-    o, d, hit, more (4, 6): scratch.
+    Returns the share of direct sun in its light, the share covered by plants, and a number that is equal for points of
+    one surface lit alike. o, d, hit, more (4, 6): scratch; the other arguments as for `paint_pixels`.
     """
     at_pixel(rays[0], x, y, o)
     at_pixel(rays[1], x, y, d)
-    t = first_hit(o, d, still, hit)
-    kind = int(hit[0])
+    t = first_hit(o, d, solids, hit)
+    kind = int(hit[HIT_KIND])
     if kind == NOTHING:
         _sky(d, key, palette, out)
         return 0.0, 0.0, 0
-    point, normal, spare, blocked = more[0], more[1], more[2], more[3]
+    point, normal, spare, blocked = more[POINT], more[NORMAL], more[SPARE], more[BLOCKED]
     for k in range(3):
-        point[k], normal[k] = o[k] + t * d[k], hit[1 + k]
+        point[k], normal[k] = o[k] + t * d[k], hit[NORMAL_X + k]
     slope = abs(d[0] * normal[0] + d[1] * normal[1] + d[2] * normal[2])
     slope /= np.sqrt(d[0] * d[0] + d[1] * d[1] + d[2] * d[2])
-    distance = t if focal > 0 else 1.0
-    footprint = distance / abs(focal) / np.sqrt(max(slope, 0.02))
-    index, grass, plants = int(hit[4]), False, 0.0
+    distance = t if scale > 0 else 1.0
+    footprint = distance / abs(scale) / np.sqrt(max(slope, 0.02))
+    index, grass, plants = int(hit[HIT_INDEX]), False, 0.0
     if kind == GROUND:
-        grass, plants = _ground(point[0], point[1], size, footprint, look, palette, key, out)
+        grass, plants = _ground(point[0], point[1], size, footprint, style, palette, key, out)
     elif kind == TREAD:
-        _upright(kind, point[0], point[1], footprint, look[0], palette, key + 7 * index, out)
+        _upright(kind, point[0], point[1], footprint, style[CONTRAST], palette, key + 7 * index, out)
     else:
-        _upright(kind, hit[5], point[2], footprint, look[0], palette, key + 7 * index + 1, out)
+        _upright(kind, hit[HIT_PLACE], point[2], footprint, style[CONTRAST], palette, key + 7 * index + 1, out)
     facing = max(0.0, normal[0] * sun[0] + normal[1] * sun[1] + normal[2] * sun[2]) / max(sun[2], 0.3)
-    lit = _sunlit(point, normal, sun, penumbra, still, spare, blocked) if shadow > 0 and facing > 0 else 0.0
+    lit = _sunlit(point, normal, sun, penumbra, solids, spare, blocked) if shadow > 0 and facing > 0 else 0.0
     sunlight = shadow * facing * lit
     light = (1 - shadow) * (0.85 + 0.15 * normal[2]) + sunlight
     haze = 1 - np.exp(-max(distance - 25.0, 0.0) / 120.0)
@@ -141,21 +160,24 @@ def _seen(x, y, rays, focal, sun, shadow, penumbra, still, size, look, palette, 
 
 
 @njit(cache=True)
-def colours(rays, focal, sun, shadow, penumbra, still, size, look, palette, key, colour, direct, plants):  # type: ignore[no-untyped-def]
-    """Lit colours (H, W, 3), the share of direct sun in them (H, W), the share of each pixel that is overgrown (H, W).
+def paint_pixels(  # type: ignore[no-untyped-def]
+    rays, scale, sun, shadow, penumbra, solids, size, style, palette, key, colour, direct, plants
+):
+    """Set colour (H, W, 3), direct (H, W) and plants (H, W) of the empty scene; see `background.EmptyScene`.
 
-    One ray through the middle of a pixel, as patterns are no finer than pixels; the mean of 2 x 2 where surfaces meet.
-    rays: origin and direction (3, 3); focal: px per m at depth 1 m, negative: px per m anywhere; still: of `nearest`;
-    look: see `_ground`.
+    A pixel takes the ray through its centre, as patterns are no finer than pixels. Where surfaces meet, it takes the
+    mean of 2 x 2 rays. rays: origin and direction (3, 3) of PixelRays; scale: see `raycast.signed_scale`; sun (3,):
+    unit vector to the sun; shadow: its share of the light; penumbra m; size (2,) m: of the world; style (4,): slots
+    CONTRAST … PLANT_LEVEL; palette (6, 3): rows GREY … SKY; key: of the random patterns.
     """
     height, width = direct.shape
-    o, d, hit, more, c = np.empty(3), np.empty(3), np.empty(6), np.empty((4, 6)), np.empty(3)
+    o, d, hit, more, c = np.empty(3), np.empty(3), np.empty(HIT_SLOTS), np.empty((4, HIT_SLOTS)), np.empty(3)
     surface = np.empty((height, width), np.int64)
     for v in range(height):
         for u in range(width):
             x, y = u + 0.5, v + 0.5
-            direct[v, u], plants[v, u], surface[v, u] = _seen(
-                x, y, rays, focal, sun, shadow, penumbra, still, size, look, palette, key, o, d, hit, more, c
+            direct[v, u], plants[v, u], surface[v, u] = _point_colour(
+                x, y, rays, scale, sun, shadow, penumbra, solids, size, style, palette, key, o, d, hit, more, c
             )  # fmt: skip
             for k in range(3):
                 colour[v, u, k] = c[k]
@@ -172,8 +194,8 @@ def colours(rays, focal, sun, shadow, penumbra, still, size, look, palette, key,
             colour[v, u], direct[v, u], plants[v, u] = 0.0, 0.0, 0.0
             for sub in range(4):
                 x, y = u + 0.25 + 0.5 * (sub % 2), v + 0.25 + 0.5 * (sub // 2)
-                sunny, green, _ = _seen(
-                    x, y, rays, focal, sun, shadow, penumbra, still, size, look, palette, key, o, d, hit, more, c
+                sunny, green, _ = _point_colour(
+                    x, y, rays, scale, sun, shadow, penumbra, solids, size, style, palette, key, o, d, hit, more, c
                 )  # fmt: skip
                 direct[v, u] += 0.25 * sunny
                 plants[v, u] += 0.25 * green

@@ -1,7 +1,8 @@
 """Bushes and long grass: where on the ground they grow, and how far wind moves them at any moment.
 
-They are flat: part of the plate, with its depth, hiding nobody. What moves is their picture. Wind is a field over the
-ground (sim.render.random_fields), so both cameras of a pair see one sway, and gusts make all of it stronger and weaker.
+Plants are flat: a part of the empty scene's image, with the ground's depth, which hides nobody. Only their image moves.
+Wind is a field over the ground (`sim.render.random_fields`), so both cameras of a pair see the same sway. Gusts make
+all sway stronger and weaker over time.
 """
 
 from __future__ import annotations
@@ -13,7 +14,7 @@ import numpy as np
 
 from scenarios.errors import InputError
 from scenarios.schema.values import draw
-from sim.render.random_fields import Waves, relaxing, swaying
+from sim.render.random_fields import PlaneWaves, oscillation, uniform_drift
 from sim.rng import rng
 from sim.scene.raycast import pixel_rays, signed_scale, solids_of
 from sim.types import Camera, Scene
@@ -21,31 +22,35 @@ from sim.types import Camera, Scene
 if TYPE_CHECKING:
     from scenarios.schema.picture import Picture
 
-EVERY = 4  # px between the samples that decide where plants grow
-TOGETHER = 1.5  # m over which plants sway alike
-GUST, LULL = 0.5, 3.0  # sd of the logarithm of the wind's strength, and its time constant, s
-PLACE, ACROSS, DOWN, STRENGTH = range(4)  # keys of the role "wind"
+SAMPLE_STEP = 4  # px between the samples that decide where plants grow
+SWAY_LENGTH = 1.5  # m: correlation length of the sway
+GUST, LULL = 0.5, 3.0  # standard deviation of the logarithm of the wind's strength, and its time constant in s
+PLACE, ACROSS, DOWN, STRENGTH = range(4)  # keys of the random role "wind"
 
 
 @dataclass(frozen=True, eq=False)
 class Foliage:
-    """key: of the pattern that says where plants grow; level: they do where it is higher; sway: px across and down."""
+    """The plants of a sequence.
+
+    key: of the pattern `texture_kernels.plant_pattern`; level: plants grow where the pattern is above it. sway: px
+    across and px down at a strength of 1. gusts: logarithm of the wind's strength.
+    """
 
     key: int
     level: float
-    sway: tuple[Waves, Waves]
-    gusts: Waves
+    sway: tuple[PlaneWaves, PlaneWaves]
+    gusts: PlaneWaves
 
     def strength(self, t: float) -> float:
-        """The wind's at time t, s; its mean square is 1."""
-        return float(np.exp(self.gusts.at(t) - GUST**2))
+        """Return the wind's strength at time t (s); its mean square over time is 1."""
+        return float(np.exp(self.gusts.at_origin(t) - GUST**2))
 
 
-def grow(picture: Picture, camera: Camera, scene: Scene, seed: int, repeat: int = 0) -> Foliage | None:
-    """The plants of this seed, None without any; they cover the wanted share of this camera's image, as far as the
-    ground that it sees near enough goes, preferably outside the world.
+def grow_plants(picture: Picture, camera: Camera, scene: Scene, seed: int, repeat: int = 0) -> Foliage | None:
+    """Return the plants of this seed; None if their share is 0, or if no ground in view is near enough to show leaves.
 
-    InputError where the share drawn is not one.
+    `picture.foliage` gives the share of this camera's image that plants cover. They cover less if less ground is near
+    enough. Places outside the world are preferred. Raises InputError if the drawn share is not between 0 and 1.
     """
     source = rng(seed, "wind", PLACE, repeat=repeat)
     share = draw(picture.foliage, source)
@@ -56,21 +61,23 @@ def grow(picture: Picture, camera: Camera, scene: Scene, seed: int, repeat: int 
         )  # fmt: skip
     if share == 0:
         return None
-    from sim.render.foliage_kernels import survey
+    from sim.render.foliage_kernels import sample_plants
 
     key = int(source.integers(1 << 20))
     width, height = camera.image
-    pattern, near = np.empty((2, -(-height // EVERY), -(-width // EVERY)))
+    pattern, cover = np.empty((2, -(-height // SAMPLE_STEP), -(-width // SAMPLE_STEP)))
     rays, size = pixel_rays(camera), np.array(scene.size, dtype=float)
-    survey((rays.origin, rays.direction), signed_scale(camera), EVERY, solids_of(scene), size, key, pattern, near)
+    sample_plants(
+        (rays.origin, rays.direction), signed_scale(camera), SAMPLE_STEP, solids_of(scene), size, key, pattern, cover
+    )
     order = np.argsort(-pattern, axis=None, kind="stable")
-    covered = np.cumsum(near.ravel()[order])
+    covered = np.cumsum(cover.ravel()[order])
     if covered[-1] == 0:
         return None
-    last = min(int(np.searchsorted(covered, share * near.size)), int(np.isfinite(pattern).sum()) - 1)
+    last = min(int(np.searchsorted(covered, share * cover.size)), int(np.isfinite(pattern).sum()) - 1)
     across, down = (
-        swaying(rng(seed, "wind", k, repeat=repeat), picture.sway_px, TOGETHER, picture.sway_time)
+        oscillation(rng(seed, "wind", k, repeat=repeat), picture.sway_px, SWAY_LENGTH, picture.sway_time)
         for k in (ACROSS, DOWN)
     )
-    gusts = relaxing(rng(seed, "wind", STRENGTH, repeat=repeat), GUST, LULL)
+    gusts = uniform_drift(rng(seed, "wind", STRENGTH, repeat=repeat), GUST, LULL)
     return Foliage(key, float(pattern.ravel()[order[last]]), (across, down), gusts)

@@ -1,39 +1,43 @@
-"""Compiled: where plants grow in an image, and their sway from moment to moment."""
+"""Compiled loops of `sim.render.foliage`: where plants can grow in an image, and their sway in one frame."""
 
 from __future__ import annotations
 
 import numpy as np
 from numba import njit
 
-from sim.render.people_shadow_kernels import touch
-from sim.render.texture_kernels import overgrown, wild
-from sim.scene.raycast import GROUND
+from sim.render.canvas import RUN_END, RUN_FIRST, RUN_ROW
+from sim.render.canvas_kernels import mark_dirty
+from sim.render.texture_kernels import plant_cover, plant_pattern
+from sim.scene.raycast import GROUND, HIT_KIND, HIT_SLOTS
 from sim.scene.raycast_kernels import at_pixel, first_hit
 
 
 @njit(cache=True)
-def survey(rays, focal, every, still, size, key, pattern, share):  # type: ignore[no-untyped-def]
-    """Of every `every`-th pixel: the pattern of plants (sim.render.texture_kernels.wild) on level ground, -inf
-    elsewhere, and
-    the share of it that plants would cover if they grew everywhere: 0 where leaves are too far away to show."""
-    o, d, hit = np.empty(3), np.empty(3), np.empty(6)
+def sample_plants(rays, scale, step, solids, size, key, pattern, cover):  # type: ignore[no-untyped-def]
+    """Sample the plant pattern at every `step`-th pixel of an image.
+
+    Sets pattern (J, I): `plant_pattern` on level ground, -inf elsewhere; and cover (J, I): share of the pixel that
+    plants would cover if they grew everywhere, 0 where leaves are too far away to show. rays: origin and direction
+    (3, 3); scale: see `raycast.signed_scale`; size (2,) m: of the world.
+    """
+    o, d, hit = np.empty(3), np.empty(3), np.empty(HIT_SLOTS)
     for j in range(pattern.shape[0]):
         for i in range(pattern.shape[1]):
-            at_pixel(rays[0], (i + 0.5) * every, (j + 0.5) * every, o)
-            at_pixel(rays[1], (i + 0.5) * every, (j + 0.5) * every, d)
-            t = first_hit(o, d, still, hit)
-            pattern[j, i], share[j, i] = -np.inf, 0.0
-            if int(hit[0]) == GROUND:
+            at_pixel(rays[0], (i + 0.5) * step, (j + 0.5) * step, o)
+            at_pixel(rays[1], (i + 0.5) * step, (j + 0.5) * step, d)
+            t = first_hit(o, d, solids, hit)
+            pattern[j, i], cover[j, i] = -np.inf, 0.0
+            if int(hit[HIT_KIND]) == GROUND:
                 slope = abs(d[2]) / np.sqrt(d[0] * d[0] + d[1] * d[1] + d[2] * d[2])
-                footprint = (t if focal > 0 else 1.0) / abs(focal) / np.sqrt(max(slope, 0.02))
+                footprint = (t if scale > 0 else 1.0) / abs(scale) / np.sqrt(max(slope, 0.02))
                 x, y = o[0] + t * d[0], o[1] + t * d[1]
-                pattern[j, i] = wild(x, y, size, key)
-                share[j, i] = overgrown(x, y, size, key, -np.inf, footprint)
+                pattern[j, i] = plant_pattern(x, y, size, key)
+                cover[j, i] = plant_cover(x, y, size, key, -np.inf, footprint)
 
 
 @njit(cache=True)
-def _between(nodes, x, y, k):  # type: ignore[no-untyped-def]
-    """nodes (K, J, I), of which k is asked for, at column x and row y of its grid, linearly."""
+def _interpolate(nodes, x, y, k):  # type: ignore[no-untyped-def]
+    """Return nodes[k] (J, I) of nodes (K, J, I), bilinear at column x and row y of the grid."""
     i, j = min(int(x), nodes.shape[2] - 2), min(int(y), nodes.shape[1] - 2)
     a, b = x - i, y - j
     low = nodes[k, j, i] * (1 - a) + nodes[k, j, i + 1] * a
@@ -41,24 +45,25 @@ def _between(nodes, x, y, k):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True)
-def sway(plate, share, spans, nodes, step, canvas, dirty, margin):  # type: ignore[no-untyped-def]
-    """Show plants where wind has moved them: canvas (H, W, 3) at p is the plate at p - share(p) * wind(p).
+def sway(empty, share, runs, nodes, step, colour, dirty, margin):  # type: ignore[no-untyped-def]
+    """Draw plants where wind has moved them: colour (H, W, 3) at pixel p is `empty` at p - share(p) * wind(p).
 
-    share (H, W): of each pixel that moves; spans (S, 3): row, first column, last + 1 of what moves; nodes (2, J, I):
-    the wind, px across and down, at every `step`-th pixel; dirty: tiles touched, with a margin.
+    empty (H, W, 3): canvas of the empty scene. share (H, W): share of each pixel that shows plants. runs (S, 3): row,
+    first column, last column + 1 of the pixels that show plants. nodes (2, J, I): wind, px across and down, at every
+    `step`-th pixel. dirty: tiles, marked `margin` px round the runs.
     """
     height, width = share.shape
-    for s in range(len(spans)):
-        v, left, right = spans[s, 0], spans[s, 1], spans[s, 2]
+    for s in range(len(runs)):
+        v, left, right = runs[s, RUN_ROW], runs[s, RUN_FIRST], runs[s, RUN_END]
         for u in range(left, right):
             column, row = (u + 0.5) / step, (v + 0.5) / step
-            x = u - share[v, u] * _between(nodes, column, row, 0)
-            y = v - share[v, u] * _between(nodes, column, row, 1)
+            x = u - share[v, u] * _interpolate(nodes, column, row, 0)
+            y = v - share[v, u] * _interpolate(nodes, column, row, 1)
             x, y = min(max(x, 0.0), width - 1.001), min(max(y, 0.0), height - 1.001)
             i, j = int(x), int(y)
             a, b = np.float32(x - i), np.float32(y - j)
             for k in range(3):
-                low = plate[j, i, k] + a * np.float32(plate[j, i + 1, k] - plate[j, i, k])
-                high = plate[j + 1, i, k] + a * np.float32(plate[j + 1, i + 1, k] - plate[j + 1, i, k])
-                canvas[v, u, k] = np.int16(low + b * (high - low))
-        touch(dirty, v, left, right, margin, height, width)
+                low = empty[j, i, k] + a * np.float32(empty[j, i + 1, k] - empty[j, i, k])
+                high = empty[j + 1, i, k] + a * np.float32(empty[j + 1, i + 1, k] - empty[j + 1, i, k])
+                colour[v, u, k] = np.int16(low + b * (high - low))
+        mark_dirty(dirty, v, left, right, margin, height, width)

@@ -1,52 +1,61 @@
-"""People of a stretch of frames and how a view sees them: arrays made for all at once, cut frame by frame."""
+"""The people of a batch of frames, as each view sees them: computed for all frames at once, cut frame by frame."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 
-from sim.render.camera_view import View, sunlit
+from sim.render.camera_view import CameraView
 from sim.render.illumination import Illumination
-from sim.render.silhouettes import Cast, Crowd, Shadows, cast, crowd, cut, shadows
+from sim.render.people import DrawnPeople, ProjectedPeople, people_of_frames, project_people, take_rows
+from sim.render.shadows import PeopleShadows, people_shadows, sunlit_shares
 from sim.types import Array, Motion
 
-FRAMES = 16
+FRAMES = 16  # frames of a batch
 
 
 @dataclass(frozen=True, eq=False)
-class Sight:
-    """One view of the people of a frame: outlines, shadows (None without), share of the sun (N, 3) on each."""
+class PeopleInView:
+    """People as one view sees them: projected; shadows, None if the light casts none; sunlit (N, 3), the share of the
+    sun at feet, waist and head."""
 
-    cast: Cast
-    shadows: Shadows | None
+    projected: ProjectedPeople
+    shadows: PeopleShadows | None
     sunlit: Array
 
 
-class Stretch:
-    """Frames first … first + FRAMES - 1 of a motion; views are added when they are first asked for."""
+class FrameBatch:
+    """The people of FRAMES consecutive frames of a Motion, among them frame `index` (from 1 on).
+
+    State: all people of the batch, and what each view sees of them, computed when first asked for.
+    """
 
     def __init__(self, motion: Motion, light: Illumination, index: int) -> None:
         self.first = index - (index - 1) % FRAMES
         self.light = light
         last = min(self.first + FRAMES, len(motion.present) + 1)
-        self.people, self.starts = crowd(motion, self.first, last)
-        self._sights: dict[int, Sight] = {}
+        self._people, self._starts = people_of_frames(motion, self.first, last)
+        self._views: dict[int, PeopleInView] = {}
 
-    def rows(self, index: int) -> slice:
-        """Rows of a frame."""
+    def __contains__(self, index: int) -> bool:
+        return index in range(self.first, self.first + FRAMES)
+
+    def _rows(self, index: int) -> slice:
         k = index - self.first
-        return slice(int(self.starts[k]), int(self.starts[k + 1]))
+        return slice(int(self._starts[k]), int(self._starts[k + 1]))
 
-    def crowd(self, index: int) -> Crowd:
-        """The people of a frame."""
-        return cut(self.people, self.rows(index))
+    def people(self, index: int) -> DrawnPeople:
+        """Return the people of frame `index`."""
+        return take_rows(self._people, self._rows(index))
 
-    def sight(self, view: View, side: int, index: int) -> Sight:
-        """They as one view (of this side, always the same) sees them."""
-        if side not in self._sights:
-            light, people = self.light, self.people
-            fall = shadows(view.camera, people, light.sun, light.penumbra, view.level) if light.shadow > 0 else None
-            lit = sunlit(view.solids, people, light.sun)
-            self._sights[side] = Sight(cast(view.camera, view.rays, people), fall, lit)
-        whole, rows = self._sights[side], self.rows(index)
-        fall = None if whole.shadows is None else cut(whole.shadows, rows)
-        return Sight(cut(whole.cast, rows), fall, whole.sunlit[rows])
+    def in_view(self, view: CameraView, side: int, index: int) -> PeopleInView:
+        """Return the people of frame `index` as a view sees them; `side` must always name the same view."""
+        if side not in self._views:
+            light, people = self.light, self._people
+            shadows = None
+            if light.shadow > 0:
+                shadows = people_shadows(view.camera, people, light.sun, light.penumbra, view.level)
+            lit = sunlit_shares(view.solids, people, light.sun)
+            self._views[side] = PeopleInView(project_people(view.camera, view.rays, people), shadows, lit)
+        whole, rows = self._views[side], self._rows(index)
+        shadows = None if whole.shadows is None else take_rows(whole.shadows, rows)
+        return PeopleInView(take_rows(whole.projected, rows), shadows, whole.sunlit[rows])

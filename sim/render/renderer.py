@@ -1,10 +1,8 @@
-"""Pictures of a Motion: each a pure function of the frame's index, drawn when asked for.
+"""Images and pixel truth of a Motion; each a pure function of the frame's index, drawn when asked for.
 
-A Stage holds what is the same in all frames: the plate of each view (sim.render.background), clothes, light, noise. A
-frame is the
-plate, its plants moved by wind, darkened by shadows, people over it by depth (sim.render.people_shadow_kernels),
-blurred, times the
-brightness of its moment, with noise, and at last lossy artefacts.
+A frame starts from the empty scene (`sim.render.background`). Wind moves its plants, shadows darken it, and people are
+drawn over it by depth. The result is blurred, multiplied by the brightness of the moment, given noise and, if the
+scenario wants it, compressed as JPEG.
 """
 
 from __future__ import annotations
@@ -17,14 +15,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from scenarios.errors import InputError
-from sim.render.camera_view import NODES, Easel, View, blur_weights
-from sim.render.clothing import wear
-from sim.render.foliage import Foliage, grow
-from sim.render.frame_batch import FRAMES, Stretch
-from sim.render.illumination import Illumination, illuminate
-from sim.render.image_noise import offsets, pool
+from sim.render.blur_noise import blur_weights, noise_offsets, noise_pool
+from sim.render.camera_view import NODE_STEP, CameraView
+from sim.render.canvas import UNIT, Canvas
+from sim.render.clothing import clothing_atlas
+from sim.render.disparity import empty_scene_disparities, frame_disparities
+from sim.render.foliage import Foliage, grow_plants
+from sim.render.frame_batch import FrameBatch, PeopleInView
+from sim.render.illumination import Illumination, draw_illumination
+from sim.render.people import DrawnPeople
 from sim.render.pixel_truth import pixel_truth
-from sim.render.silhouettes import Cast, Crowd
 from sim.scene import camera as cameras
 from sim.types import BACKGROUNDS, Camera, Frame, Image, Motion, PixelTruth
 
@@ -35,44 +35,48 @@ LEFT, RIGHT = 0, 1
 
 
 @dataclass(frozen=True, eq=False)
-class Rendered:
-    """What was asked of one frame."""
+class RenderedFrame:
+    """The parts of one frame that were asked for; None for the others."""
 
     image: Image | None = None
     right: Image | None = None
     pixels: PixelTruth | None = None
 
 
-class Stage:
-    """All that is the same in every frame, made when first needed; and where people are in the stretch drawn last."""
+class Renderer:
+    """Draws the frames of one Motion as one camera, or a stereo pair, sees them.
+
+    State: everything that is the same in all frames, computed when first needed; and the batch of frames drawn last.
+    """
 
     def __init__(self, motion: Motion, camera: Camera, light: Light, picture: Picture) -> None:
         if camera.radial != 0:
             raise InputError(
                 place="camera.radial", got=f"{camera.radial:g}", expected="0: a lens that does not distort",
-                remedy="render with the camera's ideal twin (radial 0)",
+                remedy="render with the same camera and radial 0",
             )  # fmt: skip
         self.motion, self.camera, self.light, self.picture = motion, camera, light, picture
-        self._last: Stretch | None = None
+        self._last_batch: FrameBatch | None = None
 
     @cached_property
     def illumination(self) -> Illumination:
         """The light of this seed."""
-        return illuminate(self.light, self.motion.seed, self.motion.repeat)
+        return draw_illumination(self.light, self.motion.seed, self.motion.repeat)
 
     @cached_property
-    def left_view(self) -> View:
-        """What the camera itself sees of the empty scene."""
-        return View(self.camera, self.motion, self.illumination, self.picture, self._plants)
+    def left_view(self) -> CameraView:
+        """The empty scene as the camera itself sees it."""
+        return CameraView(self.camera, self.motion, self.illumination, self.picture, self._plants)
 
     @cached_property
-    def right_view(self) -> View:
-        """What the right camera of the pair sees; InputError where there is none."""
+    def right_view(self) -> CameraView:
+        """The empty scene as the right camera of the pair sees it; raises InputError if there is no right camera."""
         self.check_pair()
-        return View(cameras.right_camera(self.camera), self.motion, self.illumination, self.picture, self._plants)
+        right = cameras.right_camera(self.camera)
+        return CameraView(right, self.motion, self.illumination, self.picture, self._plants)
 
     def check_pair(self) -> None:
-        """InputError where there is no right camera."""
+        """Raise InputError if there is no right camera: kind "top", or a baseline of 0."""
         if not self.camera.baseline > 0 or self.camera.kind != "pinhole":
             raise InputError(
                 place="camera.baseline", got=f"{self.camera.kind}, baseline {self.camera.baseline:g}",
@@ -81,151 +85,182 @@ class Stage:
 
     @cached_property
     def _plants(self) -> Foliage | None:
-        return grow(self.picture, self.camera, self.motion.scene, self.motion.seed, self.motion.repeat)
+        return grow_plants(self.picture, self.camera, self.motion.scene, self.motion.seed, self.motion.repeat)
 
     @cached_property
     def _atlas(self) -> NDArray[np.uint8]:
-        return wear(self.motion.present.shape[1], self.motion.seed, self.motion.repeat)
+        return clothing_atlas(self.motion.present.shape[1], self.motion.seed, self.motion.repeat)
 
     @cached_property
     def _noise(self) -> NDArray[np.int16]:
-        from sim.render.people_shadow_kernels import UNIT
-
-        return pool(self.picture.noise, UNIT)
+        return noise_pool(self.picture.noise, UNIT)
 
     @cached_property
     def _weights(self) -> NDArray[np.float32]:
         return blur_weights(self.picture.blur_px)
 
+    @property
+    def _margin(self) -> int:
+        """How far the blur reaches, px."""
+        return len(self._weights) // 2
+
     @cached_property
-    def _known(self) -> NDArray[np.float64]:
-        return self.left_view.disparities(self.right_view)
+    def _empty_disparities(self) -> NDArray[np.float64]:
+        return empty_scene_disparities(self.left_view, self.right_view)
 
     def frame(self, index: int) -> Image:
-        """The picture of frame `index`."""
+        """Return the image (H, W, 3) BGR of frame `index`, from 1 on."""
         return self._draw(index, LEFT, shade=True, label=False)[0]
 
     def right(self, index: int) -> Image:
-        """The right camera's."""
+        """Return the right camera's image of frame `index`; raises InputError if there is no right camera."""
         return self._draw(index, RIGHT, shade=True, label=False)[0]
 
     def pixels(self, index: int, *, disparity: bool = False) -> PixelTruth:
-        """Who shows where in frame `index`, and how far away."""
+        """Return the pixel truth of frame `index`; with disparities if asked for, which need a right camera."""
         truth = self._draw(index, LEFT, shade=False, label=True, disparity=disparity)[1]
         assert truth is not None
         return truth
 
-    def both(self, index: int, *, right: bool = False, pixels: bool = False, disparity: bool = False) -> Rendered:
-        """The picture with more of the same frame, nothing drawn twice; disparity: in `pixels`."""
+    def draw(self, index: int, *, right: bool = False, pixels: bool = False, disparity: bool = False) -> RenderedFrame:
+        """Return the image of frame `index` and the parts asked for, without drawing anything twice.
+
+        right: the right camera's image. pixels: the pixel truth. disparity: disparities in the pixel truth; no effect
+        without `pixels`. Raises InputError if `right` or disparities are asked for and there is no right camera.
+        """
         image, truth = self._draw(index, LEFT, shade=True, label=pixels, disparity=disparity and pixels)
-        return Rendered(image, self.right(index) if right else None, truth)
+        return RenderedFrame(image, self.right(index) if right else None, truth)
 
     def background(self, k: int) -> Image:
-        """Empty frame k = 0 … BACKGROUNDS - 1, at t = (k - BACKGROUNDS) / fps."""
+        """Return image k = 0 … BACKGROUNDS - 1 of the scene without people, at t = (k - BACKGROUNDS) / fps."""
         view, index = self.left_view, k - BACKGROUNDS + 1
-        easel = self._easel(view, index)
-        image = self._finish(view, easel, index, LEFT)
-        view.give_back(easel)
+        canvas = self._moved_canvas(view, index)
+        image = self._finish(view, canvas, index, LEFT)
+        view.return_canvas(canvas)
         return image
 
     def _time(self, index: int) -> float:
         return (index - 1) / self.motion.fps
 
-    def _stretch(self, index: int) -> Stretch:
-        if self._last is None or index not in range(self._last.first, self._last.first + FRAMES):
-            self._last = Stretch(self.motion, self.illumination, index)
-        return self._last
+    def _batch(self, index: int) -> FrameBatch:
+        if self._last_batch is None or index not in self._last_batch:
+            self._last_batch = FrameBatch(self.motion, self.illumination, index)
+        return self._last_batch
 
-    def _easel(self, view: View, index: int) -> Easel:
-        """The scene without people to paint on, its plants moved."""
-        easel = view.easel()
+    def _moved_canvas(self, view: CameraView, index: int) -> Canvas:
+        """A canvas of the empty scene with its plants where the wind of this frame moves them."""
+        canvas = view.take_canvas()
         if view.plants is not None:
             from sim.render.foliage_kernels import sway
 
-            wind, margin = view.wind(self._time(index)), len(self._weights) // 2
-            sway(view.canvas, view.plate.plants, view.moving, wind, NODES, easel.canvas, easel.dirty, margin)
-        return easel
+            sway(
+                view.empty_canvas, view.empty_scene.plants, view.plant_runs, view.wind(self._time(index)), NODE_STEP,
+                canvas.colour, canvas.dirty, self._margin,
+            )  # fmt: skip
+        return canvas
 
     def _draw(
         self, index: int, side: int, *, shade: bool, label: bool, disparity: bool = False
     ) -> tuple[Image, PixelTruth | None]:
-        """Picture (nothing in it unless `shade`) and, with `label`, truth of one view of one frame."""
-        from sim.render import people_shadow_kernels as kernels
-
-        view, stretch, light = self.right_view if side else self.left_view, self._stretch(index), self.illumination
-        people, sight = stretch.crowd(index), stretch.sight(view, side, index)
-        here, margin, fall = sight.cast, len(self._weights) // 2, sight.shadows
-        easel = self._easel(view, index) if shade else view.easel()
-        if shade and fall is not None:
-            kernels.shadows(
-                view.geometry.place, view.plate.direct, fall.outlined.boxes, view.level, fall.outlined.middle,
-                fall.outlined.inverse, people.shapes.centre, fall.shape, light.sun, fall.softness, easel.taken,
-                easel.canvas, easel.dirty, margin,
-            )  # fmt: skip
+        """The image of one view of a frame (empty unless `shade`) and, with `label`, its pixel truth."""
+        view, batch = self.right_view if side else self.left_view, self._batch(index)
+        people, seen = batch.people(index), batch.in_view(view, side, index)
+        canvas = self._moved_canvas(view, index) if shade else view.take_canvas()
+        if shade:
+            self._draw_shadows(view, canvas, people, seen)
         ids = view.empty_ids() if label else np.zeros((0, 0), np.int64)
         amodal = np.zeros(len(people.id), np.int64)
-        kernels.people(
-            np.argsort(here.near[:, 0], kind="stable"), here.start, here.step, people.half, here.outlined.middle,
-            here.outlined.inverse, here.outlined.boxes, people.id, people.turn @ light.sun, light.shadow,
-            sight.sunlit, people.id - 1, self._atlas, shade, label, easel.depth, ids, easel.canvas, easel.dirty,
-            margin, amodal,
-        )  # fmt: skip
-        image = self._finish(view, easel, index, side) if shade else np.zeros((0, 0, 3), np.uint8)
+        self._draw_people(canvas, people, seen, ids, amodal, shade=shade, label=label)
+        image = self._finish(view, canvas, index, side) if shade else np.zeros((0, 0, 3), np.uint8)
         truth = None
         if label:
-            apart = self._disparities(easel.depth, ids, here, people, index) if disparity else None
-            truth = pixel_truth(ids, here.outlined.boxes, people.id, amodal, apart)
-        view.give_back(easel)
+            found = None
+            if disparity:
+                other = batch.in_view(self.right_view, RIGHT, index).projected
+                found = frame_disparities(
+                    self._empty_disparities, self.right_view, canvas, ids, people, seen.projected, other
+                )
+            truth = pixel_truth(ids, seen.projected.outlines.bounds, people.id, amodal, found)
+        view.return_canvas(canvas)
         return image, truth
 
-    def _finish(self, view: View, easel: Easel, index: int, side: int) -> Image:
-        from sim.render.blur_noise_kernels import finish
+    def _draw_shadows(self, view: CameraView, canvas: Canvas, people: DrawnPeople, seen: PeopleInView) -> None:
+        from sim.render.shadows_kernels import draw_shadows
+
+        fall = seen.shadows
+        if fall is None:
+            return
+        draw_shadows(
+            view.geometry.place, view.empty_scene.direct, fall.outlines.bounds, view.level, fall.outlines.middle,
+            fall.outlines.inverse, people.shapes.centre, fall.shape, self.illumination.sun, fall.softness,
+            canvas.shaded, canvas.colour, canvas.dirty, self._margin,
+        )  # fmt: skip
+
+    def _draw_people(
+        self,
+        canvas: Canvas,
+        people: DrawnPeople,
+        seen: PeopleInView,
+        ids: NDArray[np.int64],
+        amodal: NDArray[np.int64],
+        *,
+        shade: bool,
+        label: bool,
+    ) -> None:
+        """Draw people on a canvas (with `shade`), and set ids (H, W) and amodal (N,) (with `label`)."""
+        from sim.render.people_kernels import draw_people
+
+        here, light = seen.projected, self.illumination
+        draw_people(
+            np.argsort(here.nearest_depth[:, 0], kind="stable"), here.start, here.step, people.half,
+            here.outlines.middle, here.outlines.inverse, here.outlines.bounds, people.id, people.turn @ light.sun,
+            light.shadow, seen.sunlit, people.id - 1, self._atlas, shade, label, canvas.depth, ids, canvas.colour,
+            canvas.dirty, self._margin, amodal,
+        )  # fmt: skip
+
+    def _finish(self, view: CameraView, canvas: Canvas, index: int, side: int) -> Image:
+        """The image of a canvas: blurred, lit, with noise and, if wanted, the artefacts of JPEG."""
+        from sim.render.blur_noise_kernels import finish_image
 
         image = np.empty((view.height, view.width, 3), np.uint8)
         number = index + BACKGROUNDS
         bright = view.brightness(self._time(index), number)
-        rows = offsets(view.height, self.motion.seed, side, number, self.motion.repeat)
+        offsets = noise_offsets(view.height, self.motion.seed, side, number, self.motion.repeat)
         flat = view.height, 3 * view.width
-        finish(
-            easel.canvas.reshape(flat), view.blurred.reshape(flat), easel.dirty, self._weights, bright, NODES,
-            self._noise, np.float32(self.picture.shot), rows, image.reshape(flat),
+        finish_image(
+            canvas.colour.reshape(flat), view.blurred_canvas.reshape(flat), canvas.dirty, self._weights, bright,
+            NODE_STEP, self._noise, np.float32(self.picture.shot), offsets, image.reshape(flat),
         )  # fmt: skip
-        return _lossy(image, self.picture.jpeg) if self.picture.jpeg else image
-
-    def _disparities(
-        self, depth: NDArray[np.float32], ids: NDArray[np.int64], here: Cast, people: Crowd, index: int
-    ) -> NDArray[np.float64]:
-        from sim.render.pixel_truth_kernels import disparities
-
-        other, apart = self.right_view, self._known.copy()
-        there = self._stretch(index).sight(other, RIGHT, index).cast
-        disparities(
-            depth, ids, here.outlined.boxes, people.id, self.camera.focal_px[0] * self.camera.baseline, there.start,
-            there.step, there.outlined.middle, there.outlined.inverse, there.near, other.geometry.depth,
-            other.rays.origin, other.rays.direction, other.solids, apart,
-        )  # fmt: skip
-        return apart
+        return _compressed(image, self.picture.jpeg) if self.picture.jpeg else image
 
 
-def _lossy(image: Image, quality: int) -> Image:
+def _compressed(image: Image, quality: int) -> Image:
+    """The image after JPEG compression with this quality, 1 to 100."""
     import cv2
 
     code = cv2.imencode(".jpg", image, [cv2.IMWRITE_JPEG_QUALITY, quality])[1]
     return np.asarray(cv2.imdecode(code, cv2.IMREAD_COLOR), np.uint8)
 
 
-def stage(motion: Motion, camera: Camera, light: Light | None = None, picture: Picture | None = None) -> Stage:
-    """What draws this motion as this camera sees it; light and picture are a scenario's, its defaults where absent.
+def make_renderer(
+    motion: Motion, camera: Camera, light: Light | None = None, picture: Picture | None = None
+) -> Renderer:
+    """Return a Renderer of a Motion as this camera sees it; light and picture as in a scenario, defaults if None.
 
-    InputError where the camera's lens distorts.
+    Raises InputError if the camera's lens distorts. Impossible values of light and picture raise InputError when the
+    first frame is drawn.
     """
     from scenarios.schema.picture import Light, Picture
 
-    return Stage(motion, camera, light or Light(), picture or Picture())
+    return Renderer(motion, camera, light or Light(), picture or Picture())
 
 
 def render(
     motion: Motion, camera: Camera, index: int, light: Light | None = None, picture: Picture | None = None
 ) -> Frame:
-    """One frame with its picture; for many, make a `stage` and keep it."""
-    return Frame(index, (index - 1) / motion.fps, stage(motion, camera, light, picture).frame(index))
+    """Return frame `index` (from 1 on) with its image, without detections; arguments and errors as `make_renderer`.
+
+    For many frames, keep one `make_renderer`.
+    """
+    image = make_renderer(motion, camera, light, picture).frame(index)
+    return Frame(index, (index - 1) / motion.fps, image)

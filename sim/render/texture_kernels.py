@@ -1,7 +1,9 @@
-"""Compiled patterns of ground and walls: noise on integer lattices that repeat nowhere, at several scales.
+"""Compiled patterns of ground, walls and plants: value noise on integer lattices, at several scales, without
+repetition.
 
-A lattice point's value is a hash of its indices, so a pattern is a pure function of place: both cameras of a pair see
-the same. Scales finer than twice a pixel's footprint are left out, or they would flicker and differ between the views.
+The value of a lattice point is a hash of its indices. A pattern is therefore a pure function of place, and both cameras
+of a pair see the same pattern. Scales finer than twice a pixel's footprint are left out: they would flicker and differ
+between the views. A footprint is the size of a pixel on the surface, in m.
 """
 
 from __future__ import annotations
@@ -10,13 +12,13 @@ import numpy as np
 from numba import njit
 
 MASK = 0xFFFFFFFF
-FINER = 0.45  # wavelength of one octave of grain over that of the one before
-COS, SIN = np.cos(0.7), np.sin(0.7)  # each is turned against the one before
+FINER = 0.45  # wavelength of an octave of grain over that of the octave before
+COS, SIN = np.cos(0.7), np.sin(0.7)  # each octave is turned against the one before
 
 
 @njit(cache=True)
-def lattice(i, j, key):  # type: ignore[no-untyped-def]
-    """A number in [-1, 1) for each pair of integers: multiply-and-shift mixing of 32 bits."""
+def lattice_value(i, j, key):  # type: ignore[no-untyped-def]
+    """Return a number in [-1, 1) for each pair of integers and key, by multiply-and-shift hashing of 32 bits."""
     h = (i * 0x9E3779B1 + j * 0x85EBCA77 + key * 0xC2B2AE3D) & MASK
     h = ((h ^ (h >> 15)) * 0x2C1B3C6D) & MASK
     h = ((h ^ (h >> 12)) * 0x297A2D39) & MASK
@@ -24,32 +26,35 @@ def lattice(i, j, key):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True)
-def smooth(x, y, key):  # type: ignore[no-untyped-def]
-    """Value noise of unit wavelength, continuous in value and slope; sd about 0.4."""
+def value_noise(x, y, key):  # type: ignore[no-untyped-def]
+    """Return value noise of unit wavelength at (x, y): in [-1, 1), continuous in value and slope, sd about 0.4."""
     i, j = int(np.floor(x)), int(np.floor(y))
     a, b = x - i, y - j
     a, b = a * a * (3 - 2 * a), b * b * (3 - 2 * b)
-    low = lattice(i, j, key) * (1 - a) + lattice(i + 1, j, key) * a
-    high = lattice(i, j + 1, key) * (1 - a) + lattice(i + 1, j + 1, key) * a
+    low = lattice_value(i, j, key) * (1 - a) + lattice_value(i + 1, j, key) * a
+    high = lattice_value(i, j + 1, key) * (1 - a) + lattice_value(i + 1, j + 1, key) * a
     return low * (1 - b) + high * b
 
 
 @njit(cache=True)
-def seen(wavelength, footprint):  # type: ignore[no-untyped-def]
-    """How much of a pattern survives pixels of this footprint (m): none below two pixels a wave, all above five."""
+def contrast_kept(wavelength, footprint):  # type: ignore[no-untyped-def]
+    """Return the share of a pattern's contrast that pixels of this footprint keep.
+
+    0 below two pixels per wavelength, 1 above five, linear between.
+    """
     return min(max((wavelength / footprint - 2.0) / 3.0, 0.0), 1.0)
 
 
 @njit(cache=True)
 def grain(x, y, key, footprint, coarsest):  # type: ignore[no-untyped-def]
-    """Noise with equal contrast at each scale from `coarsest` m down to the pixel's; sd about 0.5."""
+    """Return noise at (x, y) m, sd about 0.5, with equal contrast at each scale from `coarsest` m down to the pixel."""
     total, wavelength = 0.0, coarsest
     x, y = x / coarsest, y / coarsest
     for octave in range(9):
-        share = seen(wavelength, footprint)
+        share = contrast_kept(wavelength, footprint)
         if share == 0.0:
             break
-        total += share * smooth(x, y, key + octave)
+        total += share * value_noise(x, y, key + octave)
         wavelength *= FINER
         x, y = (COS * x - SIN * y) / FINER, (SIN * x + COS * y) / FINER
     return total * 0.7
@@ -57,29 +62,37 @@ def grain(x, y, key, footprint, coarsest):  # type: ignore[no-untyped-def]
 
 @njit(cache=True)
 def slabs(x, y, width, depth, joint, key, footprint):  # type: ignore[no-untyped-def]
-    """Slabs in a running bond: each with its own brightness in [-1, 1], its joints dark (-1.5)."""
+    """Return the brightness at (x, y) m of slabs in a running bond: in [-1, 1] by slab, down to -1.5 in the joints.
+
+    width, depth, joint: of slabs and joints, m. Every second row is shifted by half a slab.
+    """
     row = np.floor(y / depth)
     shift = (int(row) % 2) * 0.5 * width
     column = np.floor((x - shift) / width)
-    own = lattice(int(column), int(row), key) * seen(min(width, depth), footprint)
+    own = lattice_value(int(column), int(row), key) * contrast_kept(min(width, depth), footprint)
     u, v = x - shift - column * width, y - row * depth
     edge = min(min(u, width - u), min(v, depth - v))
     soft = max(joint, 0.7 * footprint)  # a joint narrower than a pixel is drawn wider and fainter
-    dark = max(0.0, 1.0 - edge / soft) * min(joint / soft, 1.0) * seen(min(width, depth), footprint)
+    dark = max(0.0, 1.0 - edge / soft) * min(joint / soft, 1.0) * contrast_kept(min(width, depth), footprint)
     return own * (1 - dark) - 1.5 * dark
 
 
 @njit(cache=True)
-def wild(x, y, size, key):  # type: ignore[no-untyped-def]
-    """A pattern over the ground: plants grow where it is high, first outside the world of this size (m)."""
+def plant_pattern(x, y, size, key):  # type: ignore[no-untyped-def]
+    """Return the pattern at (x, y) m that decides where plants grow: where it is above a level.
+
+    size (2,) m: of the world. The pattern is higher outside the world, so that plants grow there first.
+    """
     outside = max(max(-x, x - size[0]), max(-y, y - size[1]))
-    patches = smooth(0.4 * x, 0.4 * y, key) + 0.5 * smooth(1.1 * x, 1.1 * y, key + 1)
+    patches = value_noise(0.4 * x, 0.4 * y, key) + 0.5 * value_noise(1.1 * x, 1.1 * y, key + 1)
     return patches + min(max(outside, -1.0), 1.0)
 
 
 @njit(cache=True)
-def overgrown(x, y, size, key, level, footprint):  # type: ignore[no-untyped-def]
-    """Share of a pixel of this footprint (m) that shows plants, which grow where `wild` is above `level`; leaves that
-    are finer than pixels are not drawn."""
-    near = min(max(2.0 * seen(0.3, footprint) - 0.5, 0.0), 1.0)
-    return near * min(max((wild(x, y, size, key) - level) / 0.1 + 0.5, 0.0), 1.0)
+def plant_cover(x, y, size, key, level, footprint):  # type: ignore[no-untyped-def]
+    """Return the share of a pixel at (x, y) m that shows plants, which grow where `plant_pattern` is above `level`.
+
+    0 where the footprint is so large that leaves are finer than pixels.
+    """
+    near = min(max(2.0 * contrast_kept(0.3, footprint) - 0.5, 0.0), 1.0)
+    return near * min(max((plant_pattern(x, y, size, key) - level) / 0.1 + 0.5, 0.0), 1.0)

@@ -1,4 +1,4 @@
-"""Pictures against a slow renderer, and the promises of a Stage."""
+"""Pictures against a slow renderer, and the promises of a Renderer."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from scenarios.errors import InputError
 from scenarios.schema.picture import Light, LightSwitch, Picture
 from sim.hashing import canonical_hash
 from sim.render.pixel_truth import amodal_mask, modal_mask
-from sim.render.renderer import BACKGROUNDS, render, stage
+from sim.render.renderer import BACKGROUNDS, make_renderer, render
 from sim.truth.label import bodies
 from sim.types import Camera, Motion, Scene, Stairs
 from tests import reference_render as slow
@@ -49,7 +49,7 @@ def motion_in(scene: Scene, people: int = 14) -> Motion:
 @pytest.mark.parametrize("view", VIEWS)
 def test_ids_masks_and_counts_are_those_of_a_slow_renderer(view: str, scene: str) -> None:
     motion, camera = motion_in(SCENES[scene]), VIEWS[view]
-    seen, pixels = slow.look(camera, motion, 5), stage(motion, camera).pixels(5)
+    seen, pixels = slow.look(camera, motion, 5), make_renderer(motion, camera).pixels(5)
     assert (seen.ids > 0).sum() > 300  # the oracle sees somebody
     assert (pixels.ids != seen.ids).sum() <= 2  # a ray that grazes two things
     ids = np.flatnonzero(motion.present[4]) + 1
@@ -70,7 +70,7 @@ def test_ids_masks_and_counts_are_those_of_a_slow_renderer(view: str, scene: str
 @pytest.mark.parametrize("view", ["high", "low", "turned"])
 def test_disparities_are_those_of_a_slow_renderer(view: str, scene: str) -> None:
     motion, camera = motion_in(SCENES[scene]), VIEWS[view]
-    wanted, found = slow.disparity(camera, motion, 5), stage(motion, camera).pixels(5, disparity=True).disparity
+    wanted, found = slow.disparity(camera, motion, 5), make_renderer(motion, camera).pixels(5, disparity=True).disparity
     assert found is not None
     assert np.isnan(wanted).sum() > 100
     both = np.isfinite(wanted) & np.isfinite(found)
@@ -83,7 +83,7 @@ def test_disparities_are_those_of_a_slow_renderer(view: str, scene: str) -> None
 def test_people_closer_than_a_step_hide_each_other_surface_by_surface() -> None:
     start = np.array([8.0, 5.0]) + 0.2 * np.stack([np.cos(np.arange(9) * 0.7), np.sin(np.arange(9) * 1.9)], axis=1)
     motion, camera = walkers(start, np.full((9, 2), 0.1), frames=2), small(pinhole(30.0, at=(8.0, 0.5, 3.5)))
-    seen, pixels = slow.look(camera, motion, 1), stage(motion, camera).pixels(1)
+    seen, pixels = slow.look(camera, motion, 1), make_renderer(motion, camera).pixels(1)
     assert len(np.unique(seen.ids)) > 6
     assert (pixels.ids != seen.ids).sum() <= 2
 
@@ -92,7 +92,7 @@ def test_blobs_are_connected_regions() -> None:
     import cv2
 
     motion = motion_in(BUILT, 25)
-    pixels = stage(motion, VIEWS["low"]).pixels(5)
+    pixels = make_renderer(motion, VIEWS["low"]).pixels(5)
     _, label = cv2.connectedComponents((pixels.ids > 0).astype(np.uint8), connectivity=8)
     ids = np.flatnonzero(motion.present[4]) + 1
     regions = {int(i): set(label[pixels.ids == i].tolist()) for i in ids}
@@ -108,11 +108,11 @@ def test_blobs_are_connected_regions() -> None:
 @pytest.mark.parametrize("view", ["high", "above"])
 def test_shadows_fall_where_somebody_stands_before_the_sun(view: str) -> None:
     motion, camera = motion_in(BARE), VIEWS[view]
-    made = stage(motion, camera, Light(shadow=0.5, penumbra=0.0), SHARP)
+    made = make_renderer(motion, camera, Light(shadow=0.5, penumbra=0.0), SHARP)
     seen, sun = slow.look(camera, motion, 5), made.illumination.sun
     shadow = slow.in_shadow(seen.place, motion, 5, sun) & (seen.ids == 0) & np.isfinite(seen.depth)
     ground = (seen.ids == 0) & ~shadow
-    empty = np.clip(made.left_view.plate.colour, 0, 255)
+    empty = np.clip(made.left_view.empty_scene.colour, 0, 255)
     ratio = made.frame(5).astype(float).sum(2) / empty.sum(2)
     assert shadow.sum() > 200
     assert (np.abs(ratio[shadow] - 0.5) > 0.03).mean() < 0.01
@@ -121,8 +121,10 @@ def test_shadows_fall_where_somebody_stands_before_the_sun(view: str) -> None:
 
 def test_a_penumbra_is_soft_and_as_dark_on_the_whole() -> None:
     motion, camera = motion_in(BARE, 5), VIEWS["high"]
-    hard, soft = (stage(motion, camera, Light(shadow=0.5, penumbra=p), SHARP).frame(5).astype(float) for p in (0, 0.2))
-    plate = stage(motion, camera, Light(shadow=0.5), SHARP).left_view.plate.colour
+    hard, soft = (
+        make_renderer(motion, camera, Light(shadow=0.5, penumbra=p), SHARP).frame(5).astype(float) for p in (0, 0.2)
+    )
+    plate = make_renderer(motion, camera, Light(shadow=0.5), SHARP).left_view.empty_scene.colour
     share = [(1 - image.sum(2) / plate.sum(2)) for image in (hard, soft)]
     partly = [((s > 0.08) & (s < 0.42)).sum() for s in share]
     assert partly[1] > 2 * partly[0]
@@ -130,12 +132,12 @@ def test_a_penumbra_is_soft_and_as_dark_on_the_whole() -> None:
 
 def test_walls_and_pillars_cast_shadows_and_stairs_show_steps() -> None:
     motion, camera = motion_in(BUILT, 1), VIEWS["high"]
-    made = stage(motion, camera, Light(shadow=0.5, sun_azimuth_deg=20.0, sun_elevation_deg=40.0), SHARP)
+    made = make_renderer(motion, camera, Light(shadow=0.5, sun_azimuth_deg=20.0, sun_elevation_deg=40.0), SHARP)
     o = made.left_view.geometry.place.reshape(-1, 3).astype(float)
     sun = made.illumination.sun
     blocked = np.isfinite(slow.still(o + 0.01 * sun, np.tile(sun, (len(o), 1)), BUILT)[0]).reshape(120, 160)
     ground = made.left_view.geometry.kind == 1
-    direct = made.left_view.plate.direct
+    direct = made.left_view.empty_scene.direct
     assert (blocked & ground).sum() > 300
     assert direct[blocked & ground].mean() < 0.15
     assert direct[~blocked & ground].mean() > 0.45
@@ -145,8 +147,8 @@ def test_frames_are_pure_functions_of_their_index() -> None:
     motion, camera = motion_in(BUILT), VIEWS["high"]
     light = Light(drift=0.1, flicker=0.02, cloud=0.1, switch=(LightSwitch(at=0.5, gain=0.7),))
     picture = Picture(jpeg=80, foliage=0.1)
-    one, two = (stage(motion, camera, light, picture) for _ in range(2))
-    forwards = [one.both(i, right=True, pixels=True, disparity=True) for i in range(1, 5)]
+    one, two = (make_renderer(motion, camera, light, picture) for _ in range(2))
+    forwards = [one.draw(i, right=True, pixels=True, disparity=True) for i in range(1, 5)]
     for i in (3, 1, 4, 2):
         other = forwards[i - 1]
         assert np.array_equal(two.frame(i), other.image)
@@ -160,7 +162,7 @@ def test_frames_are_pure_functions_of_their_index() -> None:
 def test_one_person_more_changes_nobody_else() -> None:
     whole = motion_in(BARE, 7)
     without = whole.replace(present=whole.present & (np.arange(7) < 6))
-    few, many = (stage(m, VIEWS["high"], Light(shadow=0), SHARP) for m in (without, whole))
+    few, many = (make_renderer(m, VIEWS["high"], Light(shadow=0), SHARP) for m in (without, whole))
     others = many.pixels(3).ids != 7
     assert (~others).sum() > 20
     assert np.array_equal(few.frame(3)[others], many.frame(3)[others])
@@ -169,7 +171,7 @@ def test_one_person_more_changes_nobody_else() -> None:
 def test_a_person_changes_no_frame_in_which_it_is_not() -> None:
     whole = motion_in(BARE, 6)
     gone = whole.replace(present=whole.present & (np.arange(12)[:, None] < 6))
-    late, all_along = stage(gone, VIEWS["high"]), stage(whole, VIEWS["high"])
+    late, all_along = make_renderer(gone, VIEWS["high"]), make_renderer(whole, VIEWS["high"])
     assert np.array_equal(late.frame(6), all_along.frame(6))
     assert late.pixels(7).visible_px.shape == (0,)
     assert not late.pixels(7).ids.any()
@@ -177,7 +179,7 @@ def test_a_person_changes_no_frame_in_which_it_is_not() -> None:
 
 def test_noise_is_normal_independent_and_the_same_in_empty_frames() -> None:
     motion, camera = motion_in(BARE, 3), small(pinhole(60.0))
-    made = stage(motion, camera, Light(), Picture(noise=4.0, shot=0.0, texture=0.0))
+    made = make_renderer(motion, camera, Light(), Picture(noise=4.0, shot=0.0, texture=0.0))
     empty = np.stack([made.background(k) for k in range(BACKGROUNDS)]).astype(float)
     noise = empty - empty.mean(axis=0)
     assert noise.std() == pytest.approx(4.0 * np.sqrt(1 - 1 / BACKGROUNDS), rel=0.02)
@@ -187,34 +189,34 @@ def test_noise_is_normal_independent_and_the_same_in_empty_frames() -> None:
         assert abs((noise * shifted).mean()) < 0.02 * noise.var()
     assert abs((flat[1:] * flat[:-1]).mean()) < 0.03 * noise.var()
     assert np.percentile(np.abs(noise), 99.7) == pytest.approx(3 * 4.0, rel=0.05)
-    right = stage(motion, camera, Light(), Picture(noise=4.0)).right(4).astype(float)
-    left = stage(motion, camera, Light(), Picture(noise=4.0)).frame(4).astype(float)
-    clean = stage(motion, camera, Light(), Picture(noise=0.0))
+    right = make_renderer(motion, camera, Light(), Picture(noise=4.0)).right(4).astype(float)
+    left = make_renderer(motion, camera, Light(), Picture(noise=4.0)).frame(4).astype(float)
+    clean = make_renderer(motion, camera, Light(), Picture(noise=0.0))
     a, b = left - clean.frame(4), right - clean.right(4)
     assert abs((a * b).mean()) < 0.03 * a.std() * b.std()
 
 
 def test_light_changes_as_it_is_told() -> None:
     motion, camera = motion_in(BARE, 3), VIEWS["high"]
-    steady = stage(motion, camera, Light(), SHARP)
-    switched = stage(motion, camera, Light(switch=(LightSwitch(at=0.5, gain=0.6, ramp=0.2),)), SHARP)
+    steady = make_renderer(motion, camera, Light(), SHARP)
+    switched = make_renderer(motion, camera, Light(switch=(LightSwitch(at=0.5, gain=0.6, ramp=0.2),)), SHARP)
     share = [switched.frame(i).mean() / steady.frame(i).mean() for i in (1, 6, 7, 8, 12)]
     assert share == pytest.approx([1, 1, np.sqrt(0.6), 0.6, 0.6], abs=0.01)
     assert np.array_equal(switched.background(49), steady.background(49))
 
 
 def test_drift_has_its_sd_and_time_constant() -> None:
-    from sim.render.illumination import illuminate
+    from sim.render.illumination import draw_illumination
 
     t = np.linspace(0, 40, 81)
     log = np.array(
-        [[np.log(illuminate(Light(drift=0.1, drift_time=8.0), s).gain(x, 1)) for x in t] for s in range(300)]
+        [[np.log(draw_illumination(Light(drift=0.1, drift_time=8.0), s).gain(x, 1)) for x in t] for s in range(300)]
     )
     assert log.std() == pytest.approx(0.1, rel=0.06)
     assert log.mean() == pytest.approx(0.0, abs=0.01)
     lag = (log[:, 16:] * log[:, :-16]).mean() / log.var()  # 8 s apart
     assert lag == pytest.approx(np.exp(-1), abs=0.08)
-    flickering = [np.log(illuminate(Light(flicker=0.05), 1).gain(0.0, k)) for k in range(400)]
+    flickering = [np.log(draw_illumination(Light(flicker=0.05), 1).gain(0.0, k)) for k in range(400)]
     assert np.std(flickering) == pytest.approx(0.05, rel=0.12)
 
 
@@ -222,14 +224,14 @@ def test_blur_spreads_what_is_sharp_the_same_everywhere() -> None:
     import cv2
 
     motion, camera = motion_in(BUILT), VIEWS["high"]
-    sharp, soft = (stage(motion, camera, Light(), Picture(noise=0, blur_px=b)).frame(3) for b in (0.0, 1.2))
+    sharp, soft = (make_renderer(motion, camera, Light(), Picture(noise=0, blur_px=b)).frame(3) for b in (0.0, 1.2))
     wanted = cv2.GaussianBlur(sharp, (9, 9), 1.2, borderType=cv2.BORDER_REPLICATE)
     assert np.abs(wanted.astype(float) - soft).max() <= 1.5
 
 
 def test_both_cameras_see_the_same_surfaces() -> None:
     motion, camera = motion_in(BUILT), VIEWS["high"]
-    made = stage(motion, camera, Light(), SHARP)
+    made = make_renderer(motion, camera, Light(), SHARP)
     left, right, d = made.frame(3), made.right(3), made.pixels(3, disparity=True).disparity
     assert d is not None
     v, u = np.nonzero(np.isfinite(d))
@@ -247,8 +249,8 @@ def test_a_matcher_finds_the_true_disparity() -> None:
 
     motion = crowd(3, people=14, frames=3)
     camera = pinhole(40.0).replace(baseline=0.3)
-    made = stage(motion, camera, Light(), Picture())
-    shown = made.both(2, right=True, pixels=True, disparity=True)
+    made = make_renderer(motion, camera, Light(), Picture())
+    shown = made.draw(2, right=True, pixels=True, disparity=True)
     assert shown.pixels is not None
     assert shown.pixels.disparity is not None
     matcher = cv2.StereoSGBM_create(0, 48, 5, 8 * 75, 32 * 75, 1, 31, 5, 0, 0)
@@ -264,7 +266,7 @@ def test_a_matcher_finds_the_true_disparity() -> None:
 
 def test_textures_repeat_nowhere() -> None:
     motion, camera = motion_in(BARE, 1), above()
-    image = stage(motion, camera, Light(shadow=0), SHARP).frame(1).astype(float).mean(axis=2)
+    image = make_renderer(motion, camera, Light(shadow=0), SHARP).frame(1).astype(float).mean(axis=2)
     image -= image.mean()
     spectrum = np.abs(np.fft.fft2(image)) ** 2
     alike = np.fft.ifft2(spectrum).real / spectrum.mean()
@@ -276,7 +278,7 @@ def test_textures_repeat_nowhere() -> None:
 @pytest.mark.parametrize("scene", SCENES)
 def test_geometric_visibility_is_that_of_the_pixels(scene: str) -> None:
     motion, camera = crowd(5, people=14, frames=3, scene=SCENES[scene]), pinhole(25.0, at=(8.0, -6.0, 4.5))
-    truth, pixels = bodies(motion, camera), stage(motion, camera).pixels(2)
+    truth, pixels = bodies(motion, camera), make_renderer(motion, camera).pixels(2)
     here = truth.rows(2)
     assert truth.box is not None
     assert np.abs(truth.visibility[here] - pixels.visibility).max() < 0.06
@@ -291,40 +293,40 @@ def test_stairs_hide_people_in_geometry_as_in_pixels(rise: float) -> None:
     x, y = np.meshgrid(np.linspace(5.0, 11.5, 9), [3.8, 5.0, 6.0, 7.0, 8.2, 9.0])  # before, on and behind the flight
     motion = walkers(np.column_stack([x.ravel(), y.ravel()]), np.full((x.size, 2), 0.3), frames=2, scene=scene)
     camera = pinhole(15.0, at=(8.0, -5.0, 3.2))
-    truth, pixels = bodies(motion, camera), stage(motion, camera).pixels(1)
+    truth, pixels = bodies(motion, camera), make_renderer(motion, camera).pixels(1)
     off = truth.visibility[truth.rows(1)] - pixels.visibility
     assert np.abs(off).max() < 0.06
-    alone = stage(motion.replace(scene=BARE), camera).pixels(1)
+    alone = make_renderer(motion.replace(scene=BARE), camera).pixels(1)
     assert (pixels.visible_px < 0.7 * alone.visible_px).sum() >= 3  # they do hide somebody
 
 
 def test_what_cannot_be_drawn_is_refused() -> None:
     motion = motion_in(BARE, 2)
     with pytest.raises(InputError, match="radial"):
-        stage(motion, VIEWS["high"].replace(radial=0.1))
+        make_renderer(motion, VIEWS["high"].replace(radial=0.1))
     with pytest.raises(InputError, match="baseline"):
-        stage(motion, VIEWS["high"].replace(baseline=0.0)).right(1)
+        make_renderer(motion, VIEWS["high"].replace(baseline=0.0)).right(1)
     with pytest.raises(InputError, match="baseline"):
-        stage(motion, VIEWS["above"].replace(baseline=0.1)).right(1)
+        make_renderer(motion, VIEWS["above"].replace(baseline=0.1)).right(1)
     with pytest.raises(InputError, match="sun_elevation_deg"):
-        stage(motion, VIEWS["high"], Light(sun_elevation_deg=-5.0)).frame(1)
+        make_renderer(motion, VIEWS["high"], Light(sun_elevation_deg=-5.0)).frame(1)
     with pytest.raises(InputError, match="gain"):
-        stage(motion, VIEWS["high"], Light(switch=(LightSwitch(at=1.0, gain=-1.0),))).frame(1)
+        make_renderer(motion, VIEWS["high"], Light(switch=(LightSwitch(at=1.0, gain=-1.0),))).frame(1)
 
 
 def test_nobody_behind_the_camera_and_no_people_at_all() -> None:
     motion = motion_in(BARE, 5)
     behind = small(pinhole(20.0, at=(8.0, 12.0, 3.0)))
-    pixels = stage(motion, behind).pixels(1)
+    pixels = make_renderer(motion, behind).pixels(1)
     assert not (pixels.ids > 0).any()
     assert pixels.amodal_px.tolist() == [0.0] * 5
     assert pixels.blob.tolist() == [-1] * 5
     nobody = crowd(0, people=0, frames=2)
-    assert stage(nobody, VIEWS["high"]).both(1, pixels=True, right=True, disparity=True).pixels is not None
+    assert make_renderer(nobody, VIEWS["high"]).draw(1, pixels=True, right=True, disparity=True).pixels is not None
 
 
 def test_sky_is_above_the_horizon_and_has_no_disparity() -> None:
-    made = stage(motion_in(BARE, 2), small(pinhole(5.0, at=(8.0, -6.0, 2.0))))
+    made = make_renderer(motion_in(BARE, 2), small(pinhole(5.0, at=(8.0, -6.0, 2.0))))
     pixels = made.pixels(1, disparity=True)
     assert pixels.disparity is not None
     assert np.isnan(pixels.disparity[0]).all()

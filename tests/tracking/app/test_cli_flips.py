@@ -260,12 +260,14 @@ def picture_scenario(settings: str):
 
 @pytest.mark.parametrize("key", PICTURES)
 def test_a_key_changes_pictures_and_only_those(key):
-    from sim.render.renderer import stage
+    from sim.render.renderer import make_renderer
 
     before, after = (picture_scenario(settings) for settings in PICTURES[key])
     assert before.model_dump(exclude={"light", "picture"}) == after.model_dump(exclude={"light", "picture"})
     bare = {} if key in ("picture.noise", "picture.shot") else {"noise": 0.0}
-    a, b = (stage(*three_people(), s.light, s.picture.model_copy(update=bare)).frame(3) for s in (before, after))
+    a, b = (
+        make_renderer(*three_people(), s.light, s.picture.model_copy(update=bare)).frame(3) for s in (before, after)
+    )
     assert (a != b).any()
 
 

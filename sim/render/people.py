@@ -1,0 +1,114 @@
+"""People as the drawing kernels take them: rays in the axes of each body part, outlines in the image, pixel bounds."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, fields
+from typing import TypeVar
+
+import numpy as np
+
+from sim.scene.body import Ellipsoids, Outlines, bodies_at, half_axes, outlines, packed_inverse
+from sim.scene.raycast import PixelRays
+from sim.types import Array, Camera, Ints, Motion
+
+T = TypeVar("T")
+
+
+@dataclass(frozen=True, eq=False)
+class DrawnPeople:
+    """N people of one frame, or of several frames one after the other.
+
+    id (N,); pos3 (N, 3) m: feet; height (N,) m; shapes: ellipsoids; half (N, 2, 3) m: half axes of body and head; turn
+    (N, 3, 3): rotation from the world to a person's own axes across (to the right), along the heading, up.
+    """
+
+    id: Ints
+    pos3: Array
+    height: Array
+    shapes: Ellipsoids
+    half: Array
+    turn: Array
+
+
+@dataclass(frozen=True, eq=False)
+class ImageOutlines:
+    """Ellipses of N people in the image, two each (body, head).
+
+    middle (N, 2, 2) px; inverse (N, 2, 3): packed inverse shapes, see `body.packed_inverse`; bounds (N, 4): first row,
+    last row + 1, first column, last column + 1 of the pixels that both ellipses may cover.
+    """
+
+    middle: Array
+    inverse: Array
+    bounds: Ints
+
+
+@dataclass(frozen=True, eq=False)
+class ProjectedPeople:
+    """N people as one camera sees them.
+
+    start, step (N, 2, 3, 3): origins and directions of pixel rays in the axes of each part, where the part is a ball of
+    radius 1. outlines: of body and head. nearest_depth (N, 2) m: no point of the part is nearer.
+    """
+
+    start: Array
+    step: Array
+    outlines: ImageOutlines
+    nearest_depth: Array
+
+
+def people_of_frames(motion: Motion, first: int, last: int) -> tuple[DrawnPeople, Ints]:
+    """Return the people of frames first … last - 1 (from 1 on), one frame after the other.
+
+    Also returns the row at which each frame begins, and the number of rows at the end.
+    """
+    present = motion.present[first - 1 : last - 1]
+    t, p = np.nonzero(present)
+    pos3, shapes = bodies_at(motion, t + first - 1, p)
+    heading = motion.heading[t + first - 1, p]
+    c, s = np.cos(heading), np.sin(heading)
+    turn = np.zeros((len(p), 3, 3))
+    turn[:, 0, 0], turn[:, 0, 1], turn[:, 1, 0], turn[:, 1, 1], turn[:, 2, 2] = s, -c, c, s, 1.0
+    half = half_axes(motion.height[p], motion.width[p], motion.depth[p])
+    people = DrawnPeople(p + 1, pos3, motion.height[p], shapes, half, turn)
+    return people, np.concatenate([[0], np.cumsum(present.sum(axis=1))])
+
+
+def take_rows(value: T, rows: slice) -> T:
+    """Return a dataclass with these rows of all its arrays, those of nested dataclasses included."""
+    kept = {
+        f.name: v[rows] if isinstance(v := getattr(value, f.name), np.ndarray) else take_rows(v, rows)
+        for f in fields(value)  # type: ignore[arg-type]
+    }
+    return type(value)(**kept)
+
+
+def project_people(camera: Camera, rays: PixelRays, people: DrawnPeople) -> ProjectedPeople:
+    """Return these people as this camera, with these pixel rays, sees them."""
+    to_ball = people.turn[:, None] / people.half[..., None]
+    start = to_ball @ rays.origin
+    start[..., 2] -= np.einsum("npij,npj->npi", to_ball, people.shapes.centre)
+    forward = camera.rotation[2]
+    depth = (people.shapes.centre - camera.position) @ forward
+    nearest = depth - np.sqrt(np.einsum("i,npij,j->np", forward, people.shapes.shape, forward))
+    return ProjectedPeople(
+        start, to_ball @ rays.direction, image_outlines(camera, outlines(camera, people.shapes)), nearest
+    )
+
+
+def image_outlines(camera: Camera, ellipses: Outlines) -> ImageOutlines:
+    """Return outlines ready for the kernels; the bounds of a nan outline are empty."""
+    half = np.sqrt(np.diagonal(ellipses.shape, axis1=2, axis2=3))
+    bounds = pixel_bounds(camera, (ellipses.centre - half).min(axis=1), (ellipses.centre + half).max(axis=1))
+    return ImageOutlines(ellipses.centre, packed_inverse(ellipses.shape), bounds)
+
+
+def pixel_bounds(camera: Camera, low: Array, high: Array) -> Ints:
+    """Return the bounds (N, 4) of the pixels touched by boxes from low (N, 2) to high (N, 2) px, clipped to the image.
+
+    Columns: first row, last row + 1, first column, last column + 1. Empty for a nan box.
+    """
+    size = np.array(camera.image, dtype=float)
+    low, high = (np.clip(np.nan_to_num(edge), 0, size) for edge in (low, high))
+    edges = np.stack([np.floor(low[:, 1]), np.ceil(high[:, 1]), np.floor(low[:, 0]), np.ceil(high[:, 0])], axis=1)
+    return edges.astype(np.int64)

@@ -1,0 +1,154 @@
+"""Compiled drawing of people on a canvas, row by row of their outlines. The tests hold a slow twin.
+
+A body part is a ball of radius 1 in its own axes (across, along, up, each over its half axis). There the ray of pixel
+(u, v) is q = P (u, v, 1) + t D (u, v, 1). It meets the ball at the smaller root t of |q| = 1, which is the depth along
+the camera's axis; the nearest t is drawn. Only pixels inside the part's outline (`sim.scene.body.outlines`) are tested.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numba import njit
+
+from sim.render.canvas import END_ROW, FIRST_ROW, MOST, UNIT
+from sim.render.canvas_kernels import mark_dirty, outline_columns
+from sim.render.clothing_kernels import ROUND, UP
+from sim.scene.body import BODY_PART, HEAD_PART
+
+P_AT_0, P_PER_COLUMN, D_AT_0, D_PER_COLUMN = range(4)  # columns of `ray`, its rows being the part's own axes
+X, Y, Z = range(3)
+FEET, WAIST, HEAD = range(3)  # columns of `sunlit`
+
+
+@njit(cache=True, error_model="numpy")
+def _row_of_rays(i, e, v, start, step, ray):  # type: ignore[no-untyped-def]
+    """Set ray (3, 4) to the rays of image row v in the axes of part e of person i."""
+    for k in range(3):
+        ray[k, P_AT_0] = start[i, e, k, 1] * (v + 0.5) + start[i, e, k, 2]
+        ray[k, P_PER_COLUMN] = start[i, e, k, 0]
+        ray[k, D_AT_0] = step[i, e, k, 1] * (v + 0.5) + step[i, e, k, 2]
+        ray[k, D_PER_COLUMN] = step[i, e, k, 0]
+
+
+@njit(cache=True, error_model="numpy")
+def _hit_depths(ray, left, many, t):  # type: ignore[no-untyped-def]
+    """Set t (many,) to the depths at which the rays of a row's pixels, from column `left` on, meet the ball."""
+    px0, px1, dx0, dx1 = ray[X, P_AT_0], ray[X, P_PER_COLUMN], ray[X, D_AT_0], ray[X, D_PER_COLUMN]
+    py0, py1, dy0, dy1 = ray[Y, P_AT_0], ray[Y, P_PER_COLUMN], ray[Y, D_AT_0], ray[Y, D_PER_COLUMN]
+    pz0, pz1, dz0, dz1 = ray[Z, P_AT_0], ray[Z, P_PER_COLUMN], ray[Z, D_AT_0], ray[Z, D_PER_COLUMN]
+    for k in range(many):
+        x = left + k + 0.5
+        px, dx = px1 * x + px0, dx1 * x + dx0
+        py, dy = py1 * x + py0, dy1 * x + dy0
+        pz, dz = pz1 * x + pz0, dz1 * x + dz0
+        a, b = dx * dx + dy * dy + dz * dz, px * dx + py * dy + pz * dz
+        root = b * b - a * (px * px + py * py + pz * pz - 1.0)
+        t[k] = (-b - np.sqrt(root if root > 0.0 else 0.0)) / a
+
+
+@njit(cache=True, error_model="numpy")
+def _texture_and_light(  # type: ignore[no-untyped-def]
+    ray, left, many, t, half, sun, shadow, sunlit, head, place, across, up, light
+):
+    """Set where on a texture page the points at depths t (many,) are, and how they are lit.
+
+    place (many,): index of the lower left of four texels, in the page; across, up (many,), 0 to 1: how far beyond that
+    texel the point is. light (many,): brightness times UNIT. half (3,) m: half axes; sun (3,): in own axes; shadow: the
+    sun's share of the light; sunlit (3,): share of the sun at feet, waist and head; head: True for a head. Numbers are
+    float32, exact to 1e-4 of a page.
+    """
+    f = np.float32
+    px0, px1 = f(ray[X, P_AT_0]), f(ray[X, P_PER_COLUMN])
+    dx0, dx1 = f(ray[X, D_AT_0]), f(ray[X, D_PER_COLUMN])
+    py0, py1 = f(ray[Y, P_AT_0]), f(ray[Y, P_PER_COLUMN])
+    dy0, dy1 = f(ray[Y, D_AT_0]), f(ray[Y, D_PER_COLUMN])
+    pz0, pz1 = f(ray[Z, P_AT_0]), f(ray[Z, P_PER_COLUMN])
+    dz0, dz1 = f(ray[Z, D_AT_0]), f(ray[Z, D_PER_COLUMN])
+    h0, h1, h2 = f(1.0 / half[0]), f(1.0 / half[1]), f(1.0 / half[2])
+    low_sun = shadow / max(sun[2], 0.3)
+    s0, s1, s2 = f(sun[0] * low_sun), f(sun[1] * low_sun), f(sun[2] * low_sun)
+    waist, above, below = f(sunlit[WAIST]), f(sunlit[HEAD] - sunlit[WAIST]), f(sunlit[FEET] - sunlit[WAIST])
+    sky, zero, one = f(UNIT * (1.0 - shadow)), f(0.0), f(1.0)
+    for k in range(many):
+        x, depth = f(left + k) + f(0.5), f(t[k])
+        qx = px1 * x + px0 + depth * (dx1 * x + dx0)
+        qy = py1 * x + py0 + depth * (dy1 * x + dy0)
+        qz = pz1 * x + pz0 + depth * (dz1 * x + dz0)
+        nx, ny, nz = qx * h0, qy * h1, qz * h2
+        size = one / np.sqrt(nx * nx + ny * ny + nz * nz)
+        facing = nx * s0 + ny * s1 + nz * s2
+        facing = (facing if facing > zero else zero) * size
+        high = one if head else qz
+        facing *= waist + (above * high if high > zero else -below * high)
+        light[k] = sky * (f(0.8) + f(0.2) * nz * size) + f(UNIT) * facing
+        share = qx / (abs(qx) + abs(qy) + f(1e-12))
+        x = (one - share if qy >= zero else f(3.0) + share) * f(0.25 * ROUND) - f(0.5)
+        x = x if x >= zero else x + f(ROUND)
+        y = (qz + one) * f(0.5 * UP) - f(0.5)
+        y = min(max(y, zero), f(UP - 1.001))
+        i, j = np.int32(x), np.int32(y)
+        across[k], up[k] = x - f(i), y - f(j)
+        place[k] = j * np.int32(ROUND + 1) + i
+
+
+@njit(cache=True, error_model="numpy")
+def draw_people(  # type: ignore[no-untyped-def]
+    order, start, step, half, middle, inverse, bounds, id, sun, shadow, sunlit, pages, atlas,
+    shade, label, depth, ids, colour, dirty, margin, amodal,
+):  # fmt: skip
+    """Draw people by depth, in this `order`; from near to far is fastest, the result does not depend on it.
+
+    start, step (N, 2, 3, 3): P and D of each part. half (N, 2, 3) m. middle (N, 2, 2), inverse (N, 2, 3), bounds (N,
+    4): see `people.ImageOutlines`. id (N,). sun (N, 3): unit vector to the sun in each person's axes. shadow: the sun's
+    share of the light. sunlit (N, 3): share of the sun at feet, waist and head. pages (N,): pages of the atlas (P, 2,
+    texels), see `clothing.clothing_atlas`. depth (H, W): on entry that of the empty scene, on return that of
+    everything. Changed tiles, with a margin in px, are marked in dirty. With `label`, ids (H, W) gets the person's id
+    where a person is visible, and amodal (N,) is raised by the pixels of each silhouette in the image. With `shade`,
+    colour (H, W, 3) is drawn. Light is the sky's, more from above than from the side, and the sun's by Lambert's law.
+    """
+    height, width = depth.shape
+    t, ray = np.empty(width), np.empty((3, 4))
+    place, one = np.empty(width, np.int32), np.float32(1.0)
+    across, up, light = np.empty(width, np.float32), np.empty(width, np.float32), np.empty(width, np.float32)
+    for i in order:
+        for e in range(2):
+            page = atlas[pages[i], e]
+            for v in range(bounds[i, FIRST_ROW], bounds[i, END_ROW]):
+                low, high = outline_columns(v, i, e, middle, inverse, width)
+                if low == high:
+                    continue
+                if label:
+                    amodal[i] += high - low
+                    if e == HEAD_PART:  # pixels of the body were counted before
+                        other, last = outline_columns(v, i, BODY_PART, middle, inverse, width)
+                        amodal[i] -= max(0, min(last, high) - max(other, low))
+                _row_of_rays(i, e, v, start, step, ray)
+                _hit_depths(ray, low, high - low, t)
+                shown = 0
+                for u in range(low, high):
+                    near = t[u - low]
+                    if near <= 0.0 or near >= depth[v, u]:
+                        t[u - low] = -1.0
+                        continue
+                    shown += 1
+                    depth[v, u] = near
+                    if label:
+                        ids[v, u] = id[i]
+                if shown == 0:
+                    continue
+                mark_dirty(dirty, v, low, high, margin, height, width)
+                if not shade:
+                    continue
+                head = e == HEAD_PART
+                _texture_and_light(
+                    ray, low, high - low, t, half[i, e], sun[i], shadow, sunlit[i], head, place, across, up, light
+                )  # fmt: skip
+                for u in range(low, high):
+                    n = u - low
+                    if t[n] > 0.0:
+                        a, b, here, beneath = across[n], up[n], 3 * place[n], 3 * (place[n] + ROUND + 1)
+                        for k in range(3):
+                            first = np.float32(page[here + k]) * (one - a) + np.float32(page[here + 3 + k]) * a
+                            second = np.float32(page[beneath + k]) * (one - a) + np.float32(page[beneath + 3 + k]) * a
+                            c = (first * (one - b) + second * b) * light[n]
+                            colour[v, u, k] = np.int16(np.int32(min(c, np.float32(MOST))))

@@ -1,0 +1,85 @@
+"""Shadows: where people's shadows fall in an image, and how much of the sun solid things leave to each person."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from sim.render.people import DrawnPeople, ImageOutlines, image_outlines, pixel_bounds
+from sim.scene.body import Ellipsoids, outlines, packed_inverse
+from sim.scene.camera import project
+from sim.scene.raycast import HIT_SLOTS, Solids
+from sim.types import Array, Camera, Ints
+
+LIT_HEIGHTS = (0.12, 0.5, 0.95)  # of the height: feet (they stand a step deep in drawn stairs), waist, head
+
+
+@dataclass(frozen=True, eq=False)
+class PeopleShadows:
+    """Shadows of N people, one of the body and one of the head.
+
+    shape (N, 2, 3): packed inverse of P S Pᵀ, see `people_shadows`. softness (N, 2): half the penumbra over the mean
+    radius. outlines: of the shadows in the image.
+    """
+
+    shape: Array
+    softness: Array
+    outlines: ImageOutlines
+
+
+def people_shadows(camera: Camera, people: DrawnPeople, sun: Array, penumbra: float, level: bool) -> PeopleShadows:
+    """Return the shadows of people in the image of a camera.
+
+    Ellipsoid (c, S), lit along the unit vector s to the sun, casts on the plane at height z an ellipse with centre
+    c - s (c_z - z)/s_z and shape P S Pᵀ, where P = I - s e_zᵀ/s_z. penumbra: width of the soft edge, m. level: True if
+    shadows can fall on level ground only. Else the bounds also cover walls and stairs up to the height of the head.
+    """
+    along = np.eye(3) - np.outer(sun / sun[2], [0.0, 0.0, 1.0])
+    shape = along @ people.shapes.shape @ along.T
+    radius = np.linalg.det(shape[..., :2, :2]) ** 0.25
+    softness = 0.5 * penumbra / radius
+    foot = people.pos3[:, None, 2]
+    middle = people.shapes.centre - sun / sun[2] * (people.shapes.centre[..., 2] - foot)[..., None]
+    flat = shape * ((1 + softness) ** 2)[..., None, None]
+    found = image_outlines(camera, outlines(camera, Ellipsoids(middle, flat)))
+    if not level:
+        found = ImageOutlines(found.middle, found.inverse, _bounds_up_to_head(camera, people, sun, flat))
+    return PeopleShadows(packed_inverse(shape[..., :2, :2]), softness, found)
+
+
+def _bounds_up_to_head(camera: Camera, people: DrawnPeople, sun: Array, flat: Array) -> Ints:
+    """Bounds (N, 4) of all pixels on which a shadow can fall, from the lower of feet and z = 0 up to the head.
+
+    The whole image for a person whose shadow may reach behind the camera.
+    """
+    half = np.sqrt(np.diagonal(flat, axis1=2, axis2=3))[..., :2]
+    low_z, high_z = np.minimum(people.pos3[:, 2], 0.0), people.pos3[:, 2] + people.height
+    corners = []
+    for z in (low_z, high_z):
+        middle = (
+            people.shapes.centre[..., :2] - sun[:2] / sun[2] * (people.shapes.centre[..., 2] - z[:, None])[..., None]
+        )
+        for side in ((-1, -1), (-1, 1), (1, -1), (1, 1)):
+            here = middle + half * side
+            corners.append(np.concatenate([here, np.broadcast_to(z[:, None, None], (*here.shape[:2], 1))], axis=2))
+    uv = project(camera, np.stack(corners, axis=1).reshape(-1, 3))[0].reshape(len(people.id), 16, 2)
+    behind = np.asarray(np.isnan(uv).any(axis=(1, 2)))[:, None]
+    return pixel_bounds(camera, np.where(behind, 0.0, uv.min(axis=1)), np.where(behind, camera.image, uv.max(axis=1)))
+
+
+def sunlit_shares(solids: Solids, people: DrawnPeople, sun: Array) -> Array:
+    """Return the share of the sun, 0 or 1, that solid things leave to each person's feet, waist and head, (N, 3).
+
+    sun (3,): unit vector to the sun.
+    """
+    lit = np.ones((len(people.id), 3))
+    if not any(len(part) for part in solids if isinstance(part, np.ndarray)):
+        return lit
+    from sim.scene.raycast_kernels import first_hit
+
+    hit = np.empty(HIT_SLOTS)
+    for row, place, height in zip(lit, people.pos3, people.height, strict=True):
+        for k, up in enumerate(LIT_HEIGHTS):
+            row[k] = float(np.isinf(first_hit(place + np.array([0.0, 0.0, up * height]), sun, solids, hit)))
+    return lit
