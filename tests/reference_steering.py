@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from sim.crowd.forces import Steering
+from sim.crowd.forces import AVOIDED, COUNT, GROUP, MEAN_VX, MEAN_VY, MEAN_X, MEAN_Y, QUEUE, RADIUS, Steering
 from sim.types import Array, Ints
 
 
@@ -32,9 +32,9 @@ def between_people(state: Array, tag: Ints, s: Steering) -> Array:
             distance = np.linalg.norm(d)
             if i == j or distance >= s.person_range:
                 continue
-            if tag[i, 0] == tag[j, 0]:
+            if tag[i, GROUP] == tag[j, GROUP]:
                 reach, strength = s.separation_range, s.separation
-            elif tag[i, 2] >= 0 and tag[i, 2] == tag[j, 2]:
+            elif tag[i, QUEUE] >= 0 and tag[i, QUEUE] == tag[j, QUEUE]:
                 reach, strength = 0.5, s.separation
             elif distance < 2 * s.person_radius:
                 reach, strength = 2 * s.person_radius, s.shove
@@ -46,17 +46,20 @@ def between_people(state: Array, tag: Ints, s: Steering) -> Array:
     return out
 
 
-def between_groups(now: Array, s: Steering) -> Array:
-    """Acceleration of each group as a whole, (G, 2), `now` as in sim.crowd.forces; the larger of two yields less."""
-    out = np.zeros((len(now), 2))
-    for a in range(len(now)):
-        for b in range(len(now)):
-            d, w = now[a, 1:3] - now[b, 1:3], now[a, 3:5] - now[b, 3:5]
-            alone = now[a, 0] == now[b, 0] == 1
-            if a == b or alone or not now[a, 9] or not now[b, 9] or np.linalg.norm(d) > s.group_range:
+def between_groups(status: Array, s: Steering) -> Array:
+    """Acceleration of each group as a whole, (G, 2), `status` as in sim.crowd.forces; the larger of two yields less."""
+    out = np.zeros((len(status), 2))
+    for a in range(len(status)):
+        for b in range(len(status)):
+            d, w = (
+                status[a, MEAN_X : MEAN_Y + 1] - status[b, MEAN_X : MEAN_Y + 1],
+                status[a, MEAN_VX : MEAN_VY + 1] - status[b, MEAN_VX : MEAN_VY + 1],
+            )
+            alone = status[a, COUNT] == status[b, COUNT] == 1
+            if a == b or alone or not status[a, AVOIDED] or not status[b, AVOIDED] or np.linalg.norm(d) > s.group_range:
                 continue
-            radius = now[a, 5] + now[b, 5] + 2 * s.person_radius
-            share = 2 * now[b, 0] / (now[a, 0] + now[b, 0])
+            radius = status[a, RADIUS] + status[b, RADIUS] + 2 * s.person_radius
+            share = 2 * status[b, COUNT] / (status[a, COUNT] + status[b, COUNT])
             out[a] += share * power_law(d, w, radius, s.avoid_group, s.avoid_time, s.avoid_max)
     return out
 

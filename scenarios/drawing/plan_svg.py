@@ -74,6 +74,7 @@ class SvgPlan:
         return parts
 
     def _stairs(self, stairs: StairsSpec) -> list[str]:
+        """A flight of stairs with its steps, landing and rise."""
         (fx, fy), (hx, hy) = stairs.foot, stairs.head
         length = math.dist(stairs.foot, stairs.head)
         ex, ey = (hx - fx) / length, (hy - fy) / length
@@ -102,6 +103,7 @@ class SvgPlan:
         ]
 
     def _spread(self, at: XY, half: XY, colour: str) -> list[str]:
+        """A rectangle over the range of a place that is drawn at random; nothing for a fixed place."""
         if half == (0, 0):
             return []
         u, v = self(at)

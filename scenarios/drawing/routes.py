@@ -128,6 +128,7 @@ def _mark(number: int, event: ScriptOrder, places: dict[str, tuple[XY, XY]], wor
 
 
 def _merge(number: int, event: MergeOrder, places: dict[str, tuple[XY, XY]]) -> OrderMark:
+    """A merge: half-way between the starts and goals of its groups."""
     ways = [places.pop(name) for name in event.groups]
     meeting = _mean([_mean([start, goal]) for start, goal in ways])
     goal = meeting if isinstance(event.goal, str) else _at(event.goal)
@@ -137,6 +138,7 @@ def _merge(number: int, event: MergeOrder, places: dict[str, tuple[XY, XY]]) -> 
 
 
 def _split(number: int, event: SplitOrder, places: dict[str, tuple[XY, XY]]) -> OrderMark:
+    """A split: half-way between the start and goal of its group."""
     start, goal = places.pop(event.group)
     at = _mean([start, goal])
     arrows = [Arrow(part.id, (at, *map(_at, part.via), _at(part.goal))) for part in event.parts]
@@ -145,6 +147,7 @@ def _split(number: int, event: SplitOrder, places: dict[str, tuple[XY, XY]]) -> 
 
 
 def _served(event: QueueOrder, names: tuple[str, ...], places: dict[str, tuple[XY, XY]]) -> tuple[Arrow, ...]:
+    """The way of groups after a queue; none where they go to their own goals."""
     if event.goal is None:
         return ()
     goal = _at(event.goal)

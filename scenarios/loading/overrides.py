@@ -17,16 +17,16 @@ from typing import Any
 from scenarios.errors import InputError
 from scenarios.loading.toml_files import Table, did_you_mean
 
-Path = tuple[str | int, ...]
+KeyPath = tuple[str | int, ...]
 
 
-def apply_settings(table: Table, settings: Iterable[str], file: object = "") -> tuple[Table, dict[Path, str]]:
+def apply_settings(table: Table, settings: Iterable[str], file: object = "") -> tuple[Table, dict[KeyPath, str]]:
     """Returns a copy of the table with each `key=value` applied in turn, and the setting text by path of its key.
 
     Raises InputError if a setting is not of the form key=value or its key leads into nothing.
     """
     table = copy.deepcopy(table)
-    places: dict[Path, str] = {}
+    places: dict[KeyPath, str] = {}
     for text in settings:
         key, value = parse_setting(text)
         places[_put(table, key, value, text, file)] = text
@@ -61,7 +61,7 @@ def parse_value(value: str, text: str) -> Any:
     return table["value"]
 
 
-def _put(table: Table, steps: list[str], value: Any, text: str, file: object) -> Path:
+def _put(table: Table, steps: list[str], value: Any, text: str, file: object) -> KeyPath:
     """Sets the value in the table; returns the path of its key, with ids replaced by indices."""
     here: Any = table
     path: list[str | int] = []

@@ -11,7 +11,7 @@ from scenarios.loading.toml_files import did_you_mean
 from scenarios.schema.scenario import MergeOrder, QueueOrder, Scenario, ScriptOrder, SplitOrder, expand, group_names
 from scenarios.schema.values import bounds
 
-Size = tuple[float, float]
+SizeRange = tuple[float, float]
 QUEUE_PEOPLE = 3
 """Least number of people in a queue; sim.truth.queue_detection has the same number."""
 
@@ -39,14 +39,15 @@ def check_script(scenario: Scenario) -> None:
         orders.append(event.id)
 
 
-def _people(size: Size) -> Size:
+def _people(size: SizeRange) -> SizeRange:
     """The least and greatest number of people for the bounds of a `size`."""
     return max(1.0, float(round(size[0]))), size[1]
 
 
 def _check_when(
-    event: ScriptOrder, key: str, orders: list[str], alive: dict[str, Size], gone: dict[str, str], duration: float
+    event: ScriptOrder, key: str, orders: list[str], alive: dict[str, SizeRange], gone: dict[str, str], duration: float
 ) -> None:
+    """Raises InputError for a trigger that cannot be met within the duration, or names what does not exist."""
     when = event.when
     if when.after is not None and when.after not in orders:
         fail(
@@ -65,7 +66,7 @@ def _check_when(
         fail(f"{key}.when", f"{first:g} s at the earliest", f"before the end, {duration:g} s", "fire it earlier")
 
 
-def _exists(name: str, place: str, alive: dict[str, Size], gone: dict[str, str]) -> None:
+def _exists(name: str, place: str, alive: dict[str, SizeRange], gone: dict[str, str]) -> None:
     """Raises InputError unless the group exists at this point of the script; gone: the order that ended each group."""
     if name in gone:
         expected = "a group that still exists: " + ", ".join(alive)
@@ -74,14 +75,14 @@ def _exists(name: str, place: str, alive: dict[str, Size], gone: dict[str, str])
         fail(place, repr(name), "a group that exists at this point of the script", did_you_mean(name, list(alive)))
 
 
-def _add_group(name: str, size: Size, place: str, alive: dict[str, Size], gone: dict[str, str]) -> None:
+def _add_group(name: str, size: SizeRange, place: str, alive: dict[str, SizeRange], gone: dict[str, str]) -> None:
     """Adds a new group to `alive`; raises InputError if its name is taken."""
     if name in alive or name in gone:
         fail(place, f"{name!r}, which is another group's name", "a new name", "rename it")
     alive[name] = size
 
 
-def _apply(event: ScriptOrder, key: str, alive: dict[str, Size], gone: dict[str, str]) -> None:
+def _apply(event: ScriptOrder, key: str, alive: dict[str, SizeRange], gone: dict[str, str]) -> None:
     if isinstance(event, MergeOrder):
         _merge(event, key, alive, gone)
     elif isinstance(event, SplitOrder):
@@ -90,7 +91,8 @@ def _apply(event: ScriptOrder, key: str, alive: dict[str, Size], gone: dict[str,
         _queue(event, key, alive, gone)
 
 
-def _merge(event: MergeOrder, key: str, alive: dict[str, Size], gone: dict[str, str]) -> None:
+def _merge(event: MergeOrder, key: str, alive: dict[str, SizeRange], gone: dict[str, str]) -> None:
+    """Checks a merge: at least two different existing groups become a new one."""
     for k, name in enumerate(event.groups):
         _exists(name, f"{key}.groups.{k}", alive, gone)
         if name in event.groups[:k]:
@@ -100,7 +102,8 @@ def _merge(event: MergeOrder, key: str, alive: dict[str, Size], gone: dict[str, 
     _add_group(event.into, (sum(low for low, _ in sizes), sum(high for _, high in sizes)), f"{key}.into", alive, gone)
 
 
-def _split(event: SplitOrder, key: str, alive: dict[str, Size], gone: dict[str, str]) -> None:
+def _split(event: SplitOrder, key: str, alive: dict[str, SizeRange], gone: dict[str, str]) -> None:
+    """Checks a split: the sizes of the parts fit the size of the group."""
     _exists(event.group, f"{key}.group", alive, gone)
     low, high = alive.pop(event.group)
     gone[event.group] = event.id
@@ -116,7 +119,8 @@ def _split(event: SplitOrder, key: str, alive: dict[str, Size], gone: dict[str, 
         _add_group(part.id, size, f"{key}.parts.{part.id}", alive, gone)
 
 
-def _queue(event: QueueOrder, key: str, alive: dict[str, Size], gone: dict[str, str]) -> None:
+def _queue(event: QueueOrder, key: str, alive: dict[str, SizeRange], gone: dict[str, str]) -> None:
+    """Checks a queue: its groups exist and can have QUEUE_PEOPLE people."""
     queued: list[str] = []
     for k, pattern in enumerate(event.groups):
         found = expand(pattern, list(alive))

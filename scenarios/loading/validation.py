@@ -9,7 +9,7 @@ from typing import Any
 from pydantic import BaseModel, ValidationError
 
 from scenarios.errors import InputError
-from scenarios.loading.overrides import Path
+from scenarios.loading.overrides import KeyPath
 from scenarios.loading.toml_files import Table, did_you_mean
 from scenarios.schema.scenario import Scenario
 
@@ -20,7 +20,7 @@ NAME = "a name: a letter, then letters, digits, '_', '.' or '-'"
 M = typing.TypeVar("M", bound=BaseModel)
 
 
-def validate(table: Table, file: object = "", places: dict[Path, str] | None = None, *, model: type[M]) -> M:
+def validate(table: Table, file: object = "", places: dict[KeyPath, str] | None = None, *, model: type[M]) -> M:
     """Returns the table as a model: a Scenario or one of its tables.
 
     Raises InputError with the file, the key and what was expected there. places: the settings by path, as
@@ -29,7 +29,7 @@ def validate(table: Table, file: object = "", places: dict[Path, str] | None = N
     try:
         return model.model_validate(_tuples(table), strict=True)
     except ValidationError as error:
-        raise translate(error, table, file, places or {}, model) from None
+        raise input_error(error, table, file, places or {}, model) from None
 
 
 def _tuples(value: Any) -> Any:
@@ -39,8 +39,8 @@ def _tuples(value: Any) -> Any:
     return tuple(_tuples(v) for v in value) if isinstance(value, list) else value
 
 
-def translate(
-    error: ValidationError, table: Table, file: object, places: dict[Path, str], model: type[BaseModel] = Scenario
+def input_error(
+    error: ValidationError, table: Table, file: object, places: dict[KeyPath, str], model: type[BaseModel] = Scenario
 ) -> InputError:
     """Returns the first problem as an InputError and says how many more there are.
 
@@ -48,13 +48,13 @@ def translate(
     """
     found = [e for e in error.errors() if _branch_fits(e["loc"], table)] or list(error.errors())
     first = min(found, key=lambda e: (e["type"] != "extra_forbidden", e["type"] == "too_short" and len(found) > 1))
-    path = strip(first["loc"], table) + (("type",) if first["type"].startswith("union_tag") else ())
+    path = table_path(first["loc"], table) + (("type",) if first["type"].startswith("union_tag") else ())
     got, expected, remedy = _words(first, path, table, model)
     more = f" ({len(found) - 1} more problem{'s' * (len(found) > 2)})" if len(found) > 1 else ""
     return InputError(file=file, place=_place(path, table, places), got=got, expected=expected, remedy=remedy + more)
 
 
-def strip(loc: tuple[int | str, ...], table: Table) -> Path:
+def table_path(loc: tuple[int | str, ...], table: Table) -> KeyPath:
     """Returns a pydantic location as a path into the table: without the names of union branches."""
     return tuple(step for step, _, is_tag in _walk(loc, table) if not is_tag)
 
@@ -98,7 +98,7 @@ def _branch_fits(loc: tuple[int | str, ...], table: Table) -> bool:
     return True
 
 
-def _words(error: Any, path: Path, table: Table, model: type[BaseModel]) -> tuple[str, str, str]:
+def _words(error: Any, path: KeyPath, table: Table, model: type[BaseModel]) -> tuple[str, str, str]:
     """Returns got, expected and remedy of one pydantic error."""
     kind, message = error["type"], str(error["msg"])
     if kind == "extra_forbidden":
@@ -149,15 +149,15 @@ def _cut(text: str) -> str:
     return text if len(text) <= 80 else text[:77] + "…"
 
 
-def _place(path: Path, table: Table, places: dict[Path, str]) -> str:
+def _place(path: KeyPath, table: Table, places: dict[KeyPath, str]) -> str:
     """Where a path is set: the `--set` text that made it, else its key."""
     for n in range(len(path), 0, -1):
         if path[:n] in places:
             return f"--set {places[path[:n]]}"
-    return spell(path, table)
+    return key_text(path, table)
 
 
-def spell(path: Path, table: Table) -> str:
+def key_text(path: KeyPath, table: Table) -> str:
     """Returns a path as `--set` takes it, with the ids of rows that have one."""
     here: Any = table
     steps = []
@@ -172,7 +172,7 @@ def spell(path: Path, table: Table) -> str:
     return ".".join(steps)
 
 
-def known_keys(path: Path, table: Table, form: type[BaseModel] = Scenario) -> list[str]:
+def known_keys(path: KeyPath, table: Table, form: type[BaseModel] = Scenario) -> list[str]:
     """Returns the keys that a model knows at a path of a table; empty where the path leads to no table."""
     model: type[BaseModel] | None = form
     here: Any = table
@@ -188,7 +188,7 @@ def known_keys(path: Path, table: Table, form: type[BaseModel] = Scenario) -> li
     return [] if model is None else [f.alias or n for n, f in model.model_fields.items()]
 
 
-def _event_keys(models: list[type[BaseModel]], path: Path, table: Table) -> list[str]:
+def _event_keys(models: list[type[BaseModel]], path: KeyPath, table: Table) -> list[str]:
     """The known keys inside a row of `event`, whose model follows from its `type`; the first model if that is wrong."""
     row = table["event"][path[1]]
     kind = next((m for m in models if row.get("type") in typing.get_args(m.model_fields["type"].annotation)), models[0])

@@ -6,13 +6,13 @@ import math
 from collections.abc import Iterator
 
 from scenarios.schema.scenario import DoorSpec, QueueOrder, WorldSpec
-from scenarios.schema.values import Fixed
+from scenarios.schema.values import FixedPoint
 
-Segment = tuple[float, float, float, float]
+WallSegment = tuple[float, float, float, float]
 DOOR_TOLERANCE = 0.05  # m
 
 
-def along(wall: Segment, point: Fixed) -> Fixed:
+def along(wall: WallSegment, point: FixedPoint) -> FixedPoint:
     """Returns where a point lies relative to a wall: metres along it from its first end, and metres from its line.
 
     For a wall of length zero: 0 and the distance from it.
@@ -25,14 +25,14 @@ def along(wall: Segment, point: Fixed) -> Fixed:
     return x * ex + y * ey, abs(x * ey - y * ex)
 
 
-def door_fits(door: DoorSpec, wall: Segment) -> bool:
+def door_fits(door: DoorSpec, wall: WallSegment) -> bool:
     """Returns True if the whole opening of a door lies on a wall, within DOOR_TOLERANCE of its line."""
     s, off = along(wall, door.at)
     length = math.dist(wall[:2], wall[2:])
     return off <= DOOR_TOLERANCE and door.width / 2 <= s + 1e-9 and s + door.width / 2 <= length + 1e-9
 
 
-def walls_without_doors(world: WorldSpec) -> Iterator[Segment]:
+def walls_without_doors(world: WorldSpec) -> Iterator[WallSegment]:
     """Yields the pieces of all walls that remain when the openings of the doors are cut out."""
     for wall in world.walls:
         length = math.dist(wall[:2], wall[2:])
@@ -46,7 +46,7 @@ def walls_without_doors(world: WorldSpec) -> Iterator[Segment]:
             start = s + half
 
 
-def clearance(point: Fixed, world: WorldSpec) -> tuple[float, str]:
+def clearance(point: FixedPoint, world: WorldSpec) -> tuple[float, str]:
     """Returns the distance in m from a point to the nearest wall or pillar, and words for that obstacle.
 
     Negative inside a pillar; inf and "nothing" where there is neither wall nor pillar.
@@ -61,7 +61,7 @@ def clearance(point: Fixed, world: WorldSpec) -> tuple[float, str]:
     return best
 
 
-def queue_places(event: QueueOrder, count: int) -> tuple[Fixed, ...]:
+def queue_places(event: QueueOrder, count: int) -> tuple[FixedPoint, ...]:
     """Returns the first `count` places of a queue, m, head first."""
     angle = math.radians(event.direction_deg)
     (x, y), step = event.at, event.spacing

@@ -15,7 +15,7 @@ from scenarios.schema.picture import Light, Picture
 from scenarios.schema.sensor import Sensor
 from scenarios.schema.values import (
     Distribution,
-    Fixed,
+    FixedPoint,
     Model,
     Name,
     NonNegative,
@@ -33,15 +33,15 @@ SPACING = Distribution(normal=(0.75, 0.12), clip=(0.5, 1.2))
 class DoorSpec(Model):
     """A door: an opening in a wall."""
 
-    at: Fixed = Field(description="middle of the opening, m; must lie on a wall")
+    at: FixedPoint = Field(description="middle of the opening, m; must lie on a wall")
     width: Positive = Field(1.2, description="m")
 
 
 class StairsSpec(Model):
     """A flight of stairs; its height rises linearly from `foot` to `head`."""
 
-    foot: Fixed = Field(description="middle of the lowest edge, m")
-    head: Fixed = Field(description="middle of the highest edge, m")
+    foot: FixedPoint = Field(description="middle of the lowest edge, m")
+    head: FixedPoint = Field(description="middle of the highest edge, m")
     width: Positive = Field(3.0, description="width across, m")
     rise: float = Field(1.5, description="height of the head above the foot, m")
     steps: Annotated[int, Field(ge=1)] = Field(10, description="number of steps")
@@ -63,7 +63,7 @@ class WorldSpec(Model):
     )
     stairs: tuple[StairsSpec, ...] = Field((), description="flights of stairs")
     doors: tuple[DoorSpec, ...] = Field((), description="openings in walls")
-    service: tuple[Fixed, ...] = Field((), description="service points (counters), m")
+    service: tuple[FixedPoint, ...] = Field((), description="service points (counters), m")
     wall_height: Positive = Field(2.5, description="height of the walls, m")
     pillar_height: Positive = Field(2.5, description="height of the pillars, m")
 
@@ -88,7 +88,7 @@ class CameraSpec(Model):
     height: Positive | None = Field(
         None, description="height above the ground, m; absent: chosen so that all people are in view"
     )
-    position: Fixed | None = Field(
+    position: FixedPoint | None = Field(
         None, description="x, y of the camera, m; absent: chosen so that all people are in view"
     )
     crop: bool = Field(False, description="true accepts people who walk out of view; false makes that an error")
@@ -130,7 +130,7 @@ class Reach(Model):
     """A trigger: the middle of a group comes near a place."""
 
     group: Name = Field(description="name of the group")
-    at: Fixed | None = Field(None, description="the place, m; absent: the group's goal")
+    at: FixedPoint | None = Field(None, description="the place, m; absent: the group's goal")
     radius: Positive = Field(1.0, description="distance between the group's middle and the place, m")
 
 
@@ -149,6 +149,7 @@ class When(Model):
 
     @model_validator(mode="after")
     def _one_trigger(self) -> Self:
+        """Raises ValueError unless exactly one trigger is given."""
         given = [name for name in ("time", "reach", "distance_lt", "after") if getattr(self, name) is not None]
         if len(given) != 1:
             raise ValueError(f"`when` has exactly one of time, reach, distance_lt, after, not {given}")
@@ -201,7 +202,7 @@ class QueueOrder(Model):
     groups: Annotated[tuple[Pattern, ...], Field(min_length=1)] = Field(
         description="names of the groups that line up; `g-*` stands for all groups whose name begins with `g-`"
     )
-    at: Fixed = Field(description="place of the first person in the queue, m")
+    at: FixedPoint = Field(description="place of the first person in the queue, m")
     direction_deg: float = Field(0.0, description="direction from the head to the tail of the queue; 0 = +x, 90 = +y")
     spacing: Annotated[float, Field(ge=0.5, le=1.4)] = Field(
         0.8, description="distance between neighbours in the queue, m"

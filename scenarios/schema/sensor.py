@@ -14,7 +14,7 @@ from pydantic import Field, model_validator
 from scenarios.schema.values import Model, Name, NonNegative, Positive, Share
 
 Curve = Annotated[tuple[Share, ...], Field(min_length=2)]
-Spread = tuple[float, NonNegative]
+MeanAndSd = tuple[float, NonNegative]
 
 
 class Hide(Model):
@@ -38,16 +38,16 @@ Memories = tuple[Memory, ...]
 class BoxNoise(Model):
     """Errors of boxes that are proportional to the box height: [mean, standard deviation] each."""
 
-    across: Spread = Field(
+    across: MeanAndSd = Field(
         (0.0, 0.0), description="error of the middle, to the right: mean, standard deviation; box heights"
     )
-    foot: Spread = Field(
+    foot: MeanAndSd = Field(
         (0.0, 0.0), description="error of the lower edge, downwards: mean, standard deviation; box heights"
     )
-    top: Spread = Field(
+    top: MeanAndSd = Field(
         (0.0, 0.0), description="error of the upper edge, downwards: mean, standard deviation; box heights"
     )
-    width: Spread = Field((0.0, 0.0), description="error of the logarithm of the width: mean, standard deviation")
+    width: MeanAndSd = Field((0.0, 0.0), description="error of the logarithm of the width: mean, standard deviation")
     occluded: NonNegative = Field(
         0.0, description="each standard deviation is multiplied by 1 + this times the hidden share of the box"
     )
@@ -72,25 +72,25 @@ class FalseAlarms(Model):
         1.0, description="probability that a living false alarm is detected in a frame"
     )
     near: Share = Field(0.0, description="share of false alarms that move with a person (parts of a body, duplicates)")
-    across: Spread = Field(
+    across: MeanAndSd = Field(
         (0.0, 0.3),
         description="those at a person: middle relative to the person's middle: mean, standard deviation; box heights",
     )
-    foot: Spread = Field(
+    foot: MeanAndSd = Field(
         (0.0, 0.2),
         description="those at a person: lower edge below the person's lower edge: mean, standard deviation; "
         "box heights",
     )
-    near_height: Spread = Field(
+    near_height: MeanAndSd = Field(
         (0.0, 0.3),
         description="those at a person: logarithm of the height relative to the person's: mean, standard deviation",
     )
-    height: Spread = Field(
+    height: MeanAndSd = Field(
         (0.0, 0.2),
         description="all others: logarithm of the height relative to that of a person standing there: mean, "
         "standard deviation",
     )
-    aspect: Spread = Field((-0.9, 0.2), description="all: logarithm of width / height: mean, standard deviation")
+    aspect: MeanAndSd = Field((-0.9, 0.2), description="all: logarithm of width / height: mean, standard deviation")
     drift: NonNegative = Field(
         0.0, description="all others: standard deviation of the velocity along each axis, box heights per s"
     )
@@ -149,6 +149,7 @@ class Sensor(Model):
 
     @model_validator(mode="after")
     def _consistent(self) -> Self:
+        """Raises ValueError if keys exclude each other, quantiles decrease, or shares add up to more than 1."""
         if self.miss_memory is not None and self.persistence:
             raise ValueError("either miss_memory or persistence, not both")
         for scores in (self.true_scores, self.false_scores):

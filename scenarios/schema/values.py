@@ -21,7 +21,7 @@ NonNegative = Annotated[float, Field(ge=0)]
 Share = Annotated[float, Field(ge=0, le=1)]
 Name = Annotated[str, Field(pattern=r"^[A-Za-z][A-Za-z0-9_.-]*$")]
 Pattern = Annotated[str, Field(pattern=r"^[A-Za-z][A-Za-z0-9_.-]*\*?$")]
-Fixed = tuple[float, float]
+FixedPoint = tuple[float, float]
 
 
 class Model(BaseModel):
@@ -44,6 +44,7 @@ class Distribution(BaseModel):
 
     @model_validator(mode="after")
     def _one_kind(self) -> Self:
+        """Raises ValueError unless exactly one kind is given and all bounds are in order."""
         kinds = [name for name in ("normal", "uniform", "exponential", "poisson", "choice") if getattr(self, name)]
         if len(kinds) != 1:
             raise ValueError(
@@ -56,6 +57,7 @@ class Distribution(BaseModel):
         return self
 
     def _draw(self, rng: np.random.Generator) -> float:
+        """One draw, without `clip`."""
         if self.normal is not None:
             return float(rng.normal(*self.normal))
         if self.uniform is not None:

@@ -41,6 +41,7 @@ class OrderExecution:
         return rng(self.seed, role, *keys, repeat=self.repeat)
 
     def _pending(self, order: MergeOrder | SplitOrder | QueueOrder, k: int) -> PendingOrder:
+        """The k-th order, with its delay and time drawn."""
         when = order.when
         time = np.inf if when.time is None else draw(when.time, self._rng("event", k, 1))
         at = None if when.reach is None or when.reach.at is None else self.placement.point(np.array(when.reach.at))

@@ -56,6 +56,7 @@ class PendingOrder:
         return self.met_at is not None and t >= self.met_at + self.delay - EPS
 
     def _is_met(self, t: float, state: Array, groups: GroupState, names: list[str], come_true: set[str]) -> bool:
+        """True if the trigger is met at time t; names: of the groups concerned."""
         when = self.order.when
         if when.time is not None:
             return t >= self.time - EPS

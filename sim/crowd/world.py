@@ -152,6 +152,7 @@ class World:
         self.groups.waypoint[self.columns] = self.people.tag[:, WAYPOINT]
 
     def _blown_up(self) -> WorkError:
+        """The error of a motion that is not finite."""
         return WorkError(
             file=self.scenario.name,
             place=f"seed {self.seed}",
@@ -199,12 +200,14 @@ class World:
         return not blocked(group.pos, back, self.scene.walls).any() and not len(self.scene.pillars)
 
     def _has_room(self, group: EnteringGroup) -> bool:
+        """True if all people present are at least ENTRY_GAP body radii from where the group enters."""
         if not len(self.state):
             return True
         d = np.linalg.norm(group.pos[:, None] - self.state[None, :, :2], axis=2)
         return bool(d.min() > ENTRY_GAP * BODY_RADIUS)
 
     def _body(self, pos: Array, velocity: Array) -> pymunk.Body:
+        """Adds a person at pos (2,), m, with velocity (2,), m/s, to the space."""
         body = pymunk.Body(1.0, float("inf"))
         body.position = float(pos[0]), float(pos[1])
         body.velocity = float(velocity[0]), float(velocity[1])
@@ -234,6 +237,7 @@ class World:
         self.groups.fill(self.people, self.columns)
 
     def _motion(self, record: Array, intent: Any) -> Motion:
+        """The Motion of the recorded states (T, P, 4) and group indices (T, P)."""
         height = np.array([m.height for m in self.members])
         pos, vel = record[:, :, :2], record[:, :, 2:]
         present = np.isfinite(pos[:, :, 0])
@@ -257,6 +261,7 @@ class World:
 
 
 def _obstacles(scene: Scene, scenario: Scenario) -> Obstacles:
+    """Walls, pillars and stairs as the kernels take them."""
     stairs = np.zeros((len(scene.stairs), 7))
     for row, s, spec in zip(stairs, scene.stairs, scenario.world.stairs, strict=True):
         along = s.head - s.foot
@@ -266,6 +271,7 @@ def _obstacles(scene: Scene, scenario: Scenario) -> Obstacles:
 
 
 def _space(scene: Scene) -> pymunk.Space:
+    """A physics space with the walls and pillars of a scene."""
     space = pymunk.Space()
     space.collision_slop = 0.005
     for wall in scene.walls:

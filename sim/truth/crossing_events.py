@@ -10,7 +10,15 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from sim.truth.encounters import Encounters, GroupPath, GroupRows, encounters, group_paths, group_rows, net_crossings
+from sim.truth.encounters import (
+    Encounters,
+    GroupPath,
+    MembersByFrame,
+    encounters,
+    group_paths,
+    members_by_frame,
+    net_crossings,
+)
 from sim.truth.merge_split_rules import frames_of, mean_of_present
 from sim.truth.proximity import runs
 from sim.types import Array, Bools, GroupEvent, Ints
@@ -36,7 +44,7 @@ def crossings(pos: Array, vel: Array, present: Bools, group: Ints, fps: float) -
     """
     there = present & np.isfinite(pos).all(axis=2)
     places, label = np.where(there[..., None], pos, np.nan), np.where(there, group, -1)
-    rows = group_rows(label)
+    rows = members_by_frame(label)
     met = encounters(places, rows, fps)
     found: list[GroupEvent] = []
     for some in _portions(met, len(pos), frames_of(SAME_BEFORE, fps)):
@@ -50,7 +58,9 @@ def _portions(met: Encounters, frames: int, margin: int) -> Iterator[Encounters]
     return (met[total // ROWS == k] for k in np.unique(total // ROWS))
 
 
-def _crossed(pos: Array, vel: Array, group: Ints, rows: GroupRows, met: Encounters, margin: int) -> list[GroupEvent]:
+def _crossed(
+    pos: Array, vel: Array, group: Ints, rows: MembersByFrame, met: Encounters, margin: int
+) -> list[GroupEvent]:
     """The events of those encounters that are crossings; margin: SAME_BEFORE in frames."""
     low, high = np.maximum(met.first - margin, 0), np.minimum(met.last + margin + 1, len(pos))
     k, frame = runs(low, high)

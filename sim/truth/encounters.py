@@ -36,7 +36,7 @@ class Encounters:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class GroupRows:
+class MembersByFrame:
     """The members of each group in each frame: G rows, one for each group and frame, sorted by (frame, group id).
 
     t (G,): frame from 0; name (G,): group id; key (G,): t * width + name, ascending, for look-ups; first, count (G,):
@@ -68,7 +68,7 @@ class GroupRows:
         return self.person[first[0] : first[0] + count[0]]
 
 
-def group_rows(group: Ints) -> GroupRows:
+def members_by_frame(group: Ints) -> MembersByFrame:
     """Returns the members of all groups from group ids (T, P), -1 = alone or absent."""
     t, person = np.nonzero(group >= 0)
     order = np.lexsort((person, group[t, person], t))
@@ -76,10 +76,10 @@ def group_rows(group: Ints) -> GroupRows:
     name = group[t, person]
     first = np.flatnonzero((np.diff(t, prepend=-1) != 0) | (np.diff(name, prepend=-1) != 0))
     t, name, width = t[first], name[first], int(name.max(initial=0)) + 1
-    return GroupRows(t, name, t * width + name, width, first, np.diff(np.append(first, len(person))), person)
+    return MembersByFrame(t, name, t * width + name, width, first, np.diff(np.append(first, len(person))), person)
 
 
-def encounters(pos: Array, rows: GroupRows, fps: float) -> Encounters:
+def encounters(pos: Array, rows: MembersByFrame, fps: float) -> Encounters:
     """Returns all encounters of groups of two or more people; pos (T, P, 2): m."""
     if not len(rows.t):
         return Encounters(rows.t, rows.t, rows.t, rows.t)
@@ -132,7 +132,7 @@ class GroupPath:
 
 
 def group_paths(
-    pos: Array, vel: Array, group: Ints, rows: GroupRows, name: Ints, met: Ints, encounter: Ints, frame: Ints
+    pos: Array, vel: Array, group: Ints, rows: MembersByFrame, name: Ints, met: Ints, encounter: Ints, frame: Ints
 ) -> GroupPath:
     """Returns the paths of groups `name` (E,), with the members they had in frames `met` (E,).
 

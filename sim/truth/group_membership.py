@@ -151,6 +151,7 @@ class _RuleTimes:
         return self._known[key]
 
     def _measure(self, rule: Rule, a: Ints, b: Ints, t: int) -> Ints:
+        """Frames from t on from which the rule holds between columns a and b for `hold` frames."""
         motion = self.motion
         both = motion.present[t:, a].any(axis=1) & motion.present[t:, b].any(axis=1)
         ends = np.flatnonzero(both)

@@ -1,8 +1,11 @@
 import numpy as np
 import pytest
 
+from scenarios.loading import geometry_check, script_check
 from scenarios.loading.resolve import load
+from sim.crowd import forces_avoidance_kernels, population
 from sim.crowd.world import run
+from sim.truth import queue_detection
 from sim.truth.crossing_events import crossings
 from sim.truth.queue_detection import detect_queues, queues
 
@@ -272,3 +275,9 @@ def test_nobody():
     alone = np.zeros((20, 1, 2))
     assert crossings(alone, alone, alone[..., 0] == 0, np.full((20, 1), -1), FPS) == []
     assert queues(alone, alone, alone[..., 0] == 0, np.full(alone.shape[:2], -1), FPS) == []
+
+
+def test_facts_of_scenarios_and_truth_agree():
+    """`scenarios` cannot import `sim`: what its checks know of queues and bodies stands there once more."""
+    assert script_check.QUEUE_PEOPLE == queue_detection.QUEUE_PEOPLE
+    assert geometry_check.BODY == population.BODY_RADIUS == forces_avoidance_kernels.BODY

@@ -4,7 +4,7 @@ import numpy as np
 
 from sim.geometry.footprints import footprint_hull
 from sim.geometry.polygons import polygon_gap
-from sim.truth.encounters import encounters, group_rows, net_crossings
+from sim.truth.encounters import encounters, members_by_frame, net_crossings
 
 
 def cut(a, b):
@@ -52,7 +52,7 @@ def test_encounters_are_the_frames_in_which_hulls_are_near():
     pos = np.abs(way % 8 - 4)[:, [0, 0, 1, 1, 2, 3, 3]] + r.uniform(-0.6, 0.6, (7, 2))
     group = np.tile([4, 4, 2, 2, -1, 9, 9], (200, 1))
     group[80:90, 3] = -1  # group 2 is one alone, hence none
-    met = encounters(pos, group_rows(group), fps=10.0)
+    met = encounters(pos, members_by_frame(group), fps=10.0)
     for names in ((2, 4), (2, 9), (4, 9)):
         near = []
         for t in range(200):
