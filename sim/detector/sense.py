@@ -132,12 +132,15 @@ def _correlate(u: Array, first: int, sensor: Sensor, fps: float, seed: int, id: 
 
 
 def detection_probability(truth: Truth, sensor: Sensor, camera: Camera | None = None) -> Array:
-    """Return the probability (R,) that each row of the truth is detected, `sensor.hide` not considered."""
+    """Return the probability (R,) that each row of the truth is detected, `sensor.hide` not considered.
+
+    Size is the box's height or, seen from above (camera of kind "top"), the larger side of the box over SHOULDER_SHARE.
+    Without boxes, size has no effect. nan sizes count as 0.
+    """
     visible = truth.visibility
     p = sensor.detect_prob * _visibility_factor(visible, sensor)
     if sensor.small_px and truth.box is not None:
         from_above = camera is not None and camera.kind == "top"
-        # Seen from above, size is the height from the side of a person with this shoulder width.
         size = truth.box[:, 2:].max(axis=1) / SHOULDER_SHARE if from_above else truth.box[:, 3]
         p = p * np.minimum(1.0, np.nan_to_num(size) / (2 * sensor.small_px))
     return np.asarray(np.where(visible >= sensor.min_visibility, p, 0.0))

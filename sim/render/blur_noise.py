@@ -51,6 +51,6 @@ def _offsets_of_frames(rows: int, seed: int, side: int, draw: int, repeat: int) 
 def noise_offsets(rows: int, seed: int, side: int, frame: int, repeat: int = 0) -> Ints:
     """Return where in the pool each row (rows,) of a frame's noise begins.
 
-    side: 0 the left camera, 1 the right one. frame: a number from 0 on, empty background frames included.
+    side: 0 the left camera, 1 the right one. frame: number of the frame, background frames included.
     """
     return np.asarray(_offsets_of_frames(rows, seed, side, frame // FRAMES_PER_DRAW, repeat)[frame % FRAMES_PER_DRAW])

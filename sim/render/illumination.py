@@ -46,8 +46,8 @@ class Illumination:
     def gain(self, t: float, key: int) -> float:
         """Return the brightness at time t (s), clouds left out; about 1 before any switch.
 
-        key: number of the frame, from 0 on, that names the stream of its flicker. The logarithm of a switch's gain
-        rises linearly from its start to its end.
+        key: number of the frame, background frames included; it names the random stream of the flicker. The logarithm
+        of a switch's gain rises linearly from its start to its end.
         """
         log = self.drift.at_origin(t)
         if self.flicker > 0:

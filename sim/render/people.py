@@ -35,7 +35,7 @@ class ImageOutlines:
     """Ellipses of N people in the image, two each (body, head).
 
     middle (N, 2, 2) px; inverse (N, 2, 3): packed inverse shapes, see `body.packed_inverse`; bounds (N, 4): first row,
-    last row + 1, first column, last column + 1 of the pixels that both ellipses may cover.
+    last row + 1, first column, last column + 1 of the pixels that either ellipse may cover.
     """
 
     middle: Array

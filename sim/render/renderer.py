@@ -36,7 +36,7 @@ LEFT, RIGHT = 0, 1
 
 @dataclass(frozen=True, eq=False)
 class RenderedFrame:
-    """The parts of one frame that were asked for; None for the others."""
+    """The requested parts of one frame: image and right (H, W, 3) BGR uint8, pixels; None for a part not requested."""
 
     image: Image | None = None
     right: Image | None = None
@@ -117,7 +117,10 @@ class Renderer:
         return self._draw(index, RIGHT, shade=True, label=False)[0]
 
     def pixels(self, index: int, *, disparity: bool = False) -> PixelTruth:
-        """Return the pixel truth of frame `index`; with disparities if asked for, which need a right camera."""
+        """Return the pixel truth of frame `index`, with disparities if `disparity` is True.
+
+        Raises InputError if disparities are asked for and there is no right camera.
+        """
         truth = self._draw(index, LEFT, shade=False, label=True, disparity=disparity)[1]
         assert truth is not None
         return truth

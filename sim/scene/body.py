@@ -51,8 +51,10 @@ class Ellipsoids:
 
 @dataclass(frozen=True)
 class Outlines:
-    """Silhouettes of N people, two ellipses each: centre (N, 2, 2) px, shape (N, 2, 2, 2) px². The second axis is body,
-    head. All nan for a person who is not wholly in front of the camera."""
+    """Silhouettes of N people, two ellipses each: centre (N, 2, 2) px, shape (N, 2, 2, 2) px².
+
+    The second axis is body, head. An ellipse is nan if its ellipsoid is not wholly in front of the camera.
+    """
 
     centre: Array
     shape: Array

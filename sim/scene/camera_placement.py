@@ -31,9 +31,9 @@ def place_camera(spec: CameraSpec, motion: Motion) -> Camera:
     """Return the camera of a scenario, with height, position and scale (px_per_m, kind "top") solved if not given.
 
     All bodies of all frames are in view, as large as possible. With `crop`, only bodies on the world's own ground are
-    fitted, and others may leave the view. Without bodies to fit, four standard people in the world's corners are.
-    Raises InputError, naming the first person out of view, if the given values leave a body out of view and `crop` is
-    false.
+    fitted, and others may leave the view. Without bodies to fit, four standard people in the world's corners are
+    fitted. Raises InputError, naming the first person out of view, if the given values leave a body out of view and
+    `crop` is false.
     """
     everybody = recorded_bodies(motion)
     aimed = _bodies_to_fit(everybody, motion, spec.crop)

@@ -192,7 +192,7 @@ TEXT_ONLY = {"schema", "about", "group[].id", "event[](merge).into", "event[](sp
 
 
 PROFILE = ("box_noise.", "false_alarms.", "miss_memory[].", "by_visibility", "points", "true_scores", "false_scores")
-"""Of `sensor`: a detector's measured errors. What each does: tests/sim/test_{sensors,box_noise,ghosts,lasting}.py."""
+"""Of `sensor`: a detector's measured errors. What each does: tests/sim/detector."""
 
 
 @cache
