@@ -83,7 +83,7 @@ Point = tuple[Value, Value]
 
 
 def draw(value: Value, rng: np.random.Generator) -> float:
-    """Returns the number, or one draw of the distribution."""
+    """Returns the number, or one draw of the distribution; raises ValueError as `Distribution.draw` does."""
     return value.draw(rng) if isinstance(value, Distribution) else float(value)
 
 

@@ -37,7 +37,8 @@ def _power_law(dx, dy, wx, wy, radius, strength, horizon, cap):  # type: ignore[
 
     d = own position - other position, w = own velocity - other velocity. Minus the gradient of strength exp(-tau /
     horizon) / tau² over the relative position, tau being the time to collision (Karamouzas 2014, eq. 2-3), at most
-    `cap` long. Zero where no collision lies ahead within 4 horizon. *Ours*: tau is at least 0.05 s.
+    `cap` long. Zero where no collision lies ahead within 4 horizon, and where the discs overlap already. *Ours*: tau is
+    at least 0.05 s.
     """
     a = wx * wx + wy * wy
     c = dx * dx + dy * dy - radius * radius
