@@ -1,8 +1,9 @@
-"""Kernels of `group-pda`: search regions, and the masses and estimates of a group's associations.
+"""Kernels of `group-pda`: search regions, and the update of each group by its associations and their masses.
 
-Gennari & Hager (2004), section 4. Points are (M, 2), weights (M,) the people that each stands for (1, or a pixel's
-share). A group's state is x (4,) = xi, v with P (4, 4), extent Sigma (2, 2) and size N in people. Slow twins:
-tests/reference_group_pda.py.
+Gennari & Hager (2004), section 4. Points are (M, 2); weights (M,) are the people that each point stands for: 1, or the
+share of a person that a pixel is. A group's state is x (4,) = xi, v with covariance P (4, 4), extent Sigma (2, 2) and
+size N in people. Lengths are in the unit of the points. Symmetric 2 x 2 matrices are stored as (3,) = xx, xy, yy.
+Face: tracking.papers.group_pda.association; masses: association_mass_kernels. Slow twins: tests/reference_group_pda.py.
 """
 
 from __future__ import annotations
@@ -12,20 +13,40 @@ from numba import njit
 
 from sim.types import Array, Bools, Ints
 from tracking.filters.components_kernels import WEIGHT, components, prefixes
+from tracking.papers.group_pda.association_mass_kernels import (
+    COUNT_SD,
+    COUNT_SHARE,
+    FREEZE_SHARE,
+    GATE,
+    GATE_FACTOR,
+    KEEP_EXTENT,
+    KEEP_SIZE,
+    LEAST_WEIGHT,
+    LINK,
+    PRIOR_WEIGHT,
+    PRIOR_XX,
+    PRIOR_YY,
+    TAKE_ALL,
+    centroid_noise,
+    log_count,
+    log_density,
+    log_miss,
+    running_moments,
+)  # fmt: skip
 
 NOTHING, NULL, MEASURED = range(3)
-(GATE, LINK, PRIOR_XX, PRIOR_XY, PRIOR_YY, STRENGTH, LEAST, NOISE, COUNT, SHARE, DETECT, MISS, FREEZE, KEEP_EXTENT,
- KEEP_SIZE, CUT, REDRAWN, ALL, OTHERS) = range(19)  # fmt: skip
-"""Rows of `rules`: see tracking.papers.group_pda.kernel_parameters."""
-NEWCOMERS = 0.02
-"""Probability that the number of people has nothing to do with what it was."""
+"""State of a group after `associate`: no point is the group's; no association is feasible; it was measured."""
+
+INNOVATION_X, INNOVATION_Y, S_XX, S_XY, S_YY, MISS_MASS = range(6)
+"""Columns of the report (G, 6) of `associate`: innovation and its covariance, normalised mass of the miss."""
 
 
 @njit(cache=True)
 def search(points: Array, x: Array, P: Array, extent: Array, noise: float, wider: Array, gate: float) -> Array:
-    """(G, M) squared Mahalanobis distances, inf outside the search regions (2.2).
+    """Return squared Mahalanobis distances (G, M) of the points from the groups, inf outside the search region (2.2).
 
-    Departure: by Sigma + H P H' + noise I, as the centroid is not known exactly; wider (G,) is added to the variances.
+    The region is d^2 < gate. Departure: the covariance is Sigma + (H P H' + (noise + wider) I), because the centroid is
+    uncertain. noise: variance of a point; wider (G,): further variance of each group.
     """
     d2 = np.full((len(x), len(points)), np.inf)
     for g in range(len(x)):
@@ -44,8 +65,11 @@ def search(points: Array, x: Array, P: Array, extent: Array, noise: float, wider
 
 
 @njit(cache=True)
-def near(place: Array, points: Array, reach: float) -> Bools:
-    """(K,) whether one of the points (M, 2) is no further than reach from each place (K, 2); outwards along x."""
+def any_within(place: Array, points: Array, reach: float) -> Bools:
+    """Return flags (K,): True if any of the points (M, 2) is at most `reach` from the place (K, 2).
+
+    The points are looked at outwards along x.
+    """
     order = np.argsort(points[:, 0])
     x = points[order, 0]
     found, most = np.zeros(len(place), np.bool_), reach * reach
@@ -69,166 +93,111 @@ def near(place: Array, points: Array, reach: float) -> Bools:
 
 @njit(cache=True)
 def associate(
-    points: Array, weights: Array, d2: Array, looks: Array, own: Ints, hits: Ints,
-    x: Array, P: Array, extent: Array, size: Array, hold: Bools, rules: Array,
+    points: Array, weights: Array, d2: Array, log_ratio: Array, owner: Ints, claimants: Ints,
+    x: Array, P: Array, extent: Array, size: Array, rest: Bools, rules: Array,
 ) -> tuple[Ints, Bools, Array]:  # fmt: skip
-    """Update the groups x (G, 4), P, extent (G, 2, 2), size (G,) in place by their points (4.1 to 4.3).
+    """Update the groups x (G, 4), P (G, 4, 4), extent (G, 2, 2), size (G,) in place by the points (4.1 to 4.3).
 
-    d2 (G, M) from `search`; own (M,): the group that an unclaimed point is attached to, or -1; hits (M,): in how many
-    regions each point lies; looks (G, M): what a point's colour adds to the log mass of an association, per person, or
-    (G, 0) without colours; hold (G,): whose extent and size rest. Returns (G,) NOTHING in the region but noise, or
-    nothing that is the group's; NULL (no association is feasible) or MEASURED; (G, M) the points of the likeliest
-    association; (G, 6) its innovation y and S (xx, xy, yy) and the mass of the miss.
+    d2 (G, M): from `search`. log_ratio (G, M): what a point adds to the log mass per person by its colour, or (G, 0)
+    without colours. owner (M,): the row of the only group that may have the point outside its region, or -1.
+    claimants (M,): number of groups that may have the point. rest (G,): groups whose extent and size must not change.
+
+    Returns the state (G,) of each group, the points (G, M) of its likeliest association, and the report (G, 6).
+    - NOTHING: the group has no points, only noise, or the miss is likelier than all associations together. No points
+      are chosen. The group is updated by the mixture if it has a feasible association.
+    - NULL: it has points, more than noise, but no feasible association. All its points are chosen; it is not updated.
+    - MEASURED: else.
     """
     groups, m = d2.shape
     state, chosen = np.zeros(groups, np.int64), np.zeros((groups, m), np.bool_)
-    told = np.zeros((groups, 6))
+    report = np.zeros((groups, 6))
     for g in range(groups):
-        order, start = _claims(d2[g], looks[g], own, hits, g)
+        order, start = _ordered_points(d2[g], log_ratio[g], owner, claimants, g)
         if len(order) == 0:
             continue
-        some, people = points[order], weights[order]
-        if rules[ALL] > 0:
+        mine, people = points[order], weights[order]
+        if rules[TAKE_ALL] > 0:
             start = len(order)
             feasible = np.ones(1, np.bool_)
         else:
             prior = rules[PRIOR_XX : PRIOR_YY + 1]
-            feasible = prefixes(some, people, start, rules[LINK], rules[GATE], prior, rules[STRENGTH], rules[LEAST])[0]
+            feasible = prefixes(
+                mine, people, start, rules[LINK], rules[GATE], prior, rules[PRIOR_WEIGHT], rules[LEAST_WEIGHT]
+            )[0]
         if not feasible.any():
-            if components(some, people, rules[LINK])[1][:, WEIGHT].max() >= rules[LEAST]:
+            if components(mine, people, rules[LINK])[1][:, WEIGHT].max() >= rules[LEAST_WEIGHT]:
                 state[g], chosen[g, order] = NULL, True
             continue
-        look = looks[g][order] * people if looks.shape[1] else np.zeros(len(order))
+        colour = log_ratio[g][order] * people if log_ratio.shape[1] else np.zeros(len(order))
         best = _estimate(
-            some, people, look, start, feasible, x[g], P[g], extent[g], size[g : g + 1], hold[g], rules, told[g]
+            mine, people, colour, start, feasible, x[g], P[g], extent[g], size[g : g + 1], rest[g], rules, report[g]
         )
         state[g] = MEASURED if best >= 0 else NOTHING
         if best >= 0:
             chosen[g, order[: start + best]] = True
-    return state, chosen, told
+    return state, chosen, report
 
 
 @njit(cache=True)
-def _claims(d2: Array, look: Array, own: Ints, hits: Ints, g: int) -> tuple[Ints, int]:
-    """The points in a group's region: unshared ones, then the shared ones by their distance (4.1), in colours as well;
-    how many are unshared."""
-    inside = np.flatnonzero((d2 < np.inf) | (own == g))
-    shared = hits[inside] > 1
+def _ordered_points(d2: Array, log_ratio: Array, owner: Ints, claimants: Ints, g: int) -> tuple[Ints, int]:
+    """The points of group g: first the unshared ones, then the shared ones by distance less colour evidence (4.1).
+
+    Also the number of unshared ones.
+    """
+    inside = np.flatnonzero((d2 < np.inf) | (owner == g))
+    shared = claimants[inside] > 1
     mine, others = inside[~shared], inside[shared]
     order = np.empty(len(inside), np.int64)
     order[: len(mine)] = mine
-    far = d2[others] - 2 * look[others] if len(look) else d2[others]
-    order[len(mine) :] = others[np.argsort(far, kind="mergesort")]
+    distance = d2[others] - 2 * log_ratio[others] if len(log_ratio) else d2[others]
+    order[len(mine) :] = others[np.argsort(distance, kind="mergesort")]
     return order, len(mine)
 
 
 @njit(cache=True)
 def _estimate(
-    points: Array, weights: Array, look: Array, start: int, feasible: Bools,
-    x: Array, P: Array, extent: Array, size: Array, hold: bool, rules: Array, told: Array,
+    points: Array, weights: Array, colour: Array, start: int, feasible: Bools,
+    x: Array, P: Array, extent: Array, size: Array, rest: bool, rules: Array, report: Array,
 ) -> int:  # fmt: skip
-    """Update one group in place by its associations, the first start, start + 1, … points; the likeliest one's number
-    of shared points, or -1 where that is the miss."""
-    people, mean, cov = _running(points, weights, x[0], x[1], start)
+    """Update one group in place by its associations: the first start, start + 1, … of its ordered points.
+
+    feasible (J,): which associations satisfy the group constraint (m_g, 4.1). Returns the number of shared points in
+    the likeliest association, or -1 if the miss has the larger mass.
+    """
+    people, mean, cov = running_moments(points, weights, x[0], x[1], start)
     S = np.empty((len(people), 3))
     log_mass = np.full(len(people), -np.inf)
     unit = weights.mean()  # people that one point stands for: makes m_N a mass of numbers of points
-    alike = np.concatenate((np.zeros(1), np.cumsum(look[start:])))
-    width = rules[COUNT] ** 2 + (rules[SHARE] * size[0]) ** 2  # sigma_n^2
+    evidence = np.concatenate((np.zeros(1), np.cumsum(colour[start:])))
+    width = rules[COUNT_SD] ** 2 + (rules[COUNT_SHARE] * size[0]) ** 2  # sigma_n^2
     for j in range(len(people)):
         if feasible[j] and people[j] > 0:
-            R = _centroid_noise(people[j], cov[j], extent, size[0], rules)
+            R = centroid_noise(people[j], cov[j], extent, size[0], rules)
             S[j, 0], S[j, 1], S[j, 2] = P[0, 0] + R[0], P[0, 1] + R[1], P[1, 1] + R[2]
-            m_d = _log_density(mean[j, 0], mean[j, 1], S[j])
-            log_mass[j] = m_d + _log_count(people[j], size[0], width) + np.log(unit) + alike[j]  # (4.2), m_g = 1
-    log_miss = _log_miss(points, weights, start, extent, P, size[0], rules)
-    top = max(log_mass.max(), log_miss)
-    beta, miss = np.exp(log_mass - top), np.exp(log_miss - top)
+            m_d = log_density(mean[j, 0], mean[j, 1], S[j])
+            log_mass[j] = m_d + log_count(people[j], size[0], width) + np.log(unit) + evidence[j]  # (4.2), m_g = 1
+    log_m_miss = log_miss(points, weights, start, extent, P, size[0], rules)
+    top = max(log_mass.max(), log_m_miss)
+    beta, miss = np.exp(log_mass - top), np.exp(log_m_miss - top)
     total = beta.sum() + miss
     beta, miss = beta / total, miss / total
     best = int(np.argmax(beta))
-    told[0], told[1], told[2:5], told[5] = mean[best, 0], mean[best, 1], S[best], miss
-    calm = weights[start:].sum() <= rules[FREEZE] * size[0]
+    report[INNOVATION_X], report[INNOVATION_Y] = mean[best, 0], mean[best, 1]
+    report[S_XX : S_YY + 1], report[MISS_MASS] = S[best], miss
+    few_shared = weights[start:].sum() <= rules[FREEZE_SHARE] * size[0]
     _mix(beta, miss, mean, S, x, P)
-    if calm and not hold:
+    if few_shared and not rest:
         _adapt(beta, people, cov, extent, size, rules)
     return best if beta.sum() > miss else -1
 
 
 @njit(cache=True)
-def _running(points: Array, weights: Array, x: float, y: float, start: int) -> tuple[Array, Array, Array]:
-    """People (J,), centroid relative to (x, y) (J, 2) and 1/N covariance (J, 3) of the first start, start + 1, …
-    points, each from the one before (4.2.1)."""
-    count = len(points) - start + 1
-    people, mean, cov = np.zeros(count), np.zeros((count, 2)), np.zeros((count, 3))
-    n = sx = sy = sxx = sxy = syy = 0.0
-    for k in range(len(points) + 1):
-        if k >= start and n > 0:
-            j = k - start
-            u, v = sx / n, sy / n
-            people[j], mean[j, 0], mean[j, 1] = n, u, v
-            cov[j, 0], cov[j, 1], cov[j, 2] = max(sxx / n - u * u, 0.0), sxy / n - u * v, max(syy / n - v * v, 0.0)
-        if k < len(points):
-            w, u, v = weights[k], points[k, 0] - x, points[k, 1] - y
-            n, sx, sy = n + w, sx + w * u, sy + w * v
-            sxx, sxy, syy = sxx + w * u * u, sxy + w * u * v, syy + w * v * v
-    return people, mean, cov
-
-
-@njit(cache=True)
-def _log_count(people: float, size: float, width: float) -> float:
-    """log m_N, per person: Gaussian about N with the variance `width`; ours: with tails, as people who are linked to a
-    group come all at once."""
-    gauss = np.exp(-0.5 * (people - size) ** 2 / width) / np.sqrt(2 * np.pi * width)
-    return float(np.log((1 - NEWCOMERS) * gauss + NEWCOMERS / (size + people + 1)))
-
-
-@njit(cache=True)
-def _centroid_noise(seen: float, cov: Array, extent: Array, size: float, rules: Array) -> tuple[float, float, float]:
-    """R (xx, xy, yy) of the centroid of `seen` people out of those that are there.
-
-    Members who keep their places: r^2 / m + (1 - m / n) Sigma n / (n - 1) / m, drawn without replacement (ours); if
-    more are seen than there are, the other way round, with the covariance cov (3,) of those who are seen; n - 1 is 1
-    at least from points, as a size between one and two is a doubt about which, and from pixels what it is; or
-    (2.1) read literally, drawn anew in each frame: Sigma / m. Sigma is of measured places: r^2 is in it.
-    """
-    noise = rules[NOISE] ** 2  # the extent is that of measured places, so it has this noise already
-    if rules[REDRAWN] > 0:
-        return extent[0, 0] / seen, extent[0, 1] / seen, extent[1, 1] / seen
-    there = size / rules[DETECT]
-    if seen > there:  # some are strangers: the group is drawn out of them
-        strange = (seen - there) / max(seen - 1, 1.0) / max(there, 1.0)
-        own = noise / max(there, 1.0)
-        return own + strange * cov[0], strange * cov[1], own + strange * cov[2]
-    m = max(seen, min(1.0, there))
-    unseen = (there - m) / max(there - 1, rules[OTHERS]) / m if there > 1 else 0.0
-    xx, yy = max(extent[0, 0] - noise, 0.0), max(extent[1, 1] - noise, 0.0)
-    return noise / m + unseen * xx, unseen * extent[0, 1], noise / m + unseen * yy
-
-
-@njit(cache=True)
-def _log_density(dx: float, dy: float, S: Array) -> float:
-    """log N((dx, dy); 0, S): m_d."""
-    area = S[0] * S[2] - S[1] * S[1]
-    d2 = (S[2] * dx * dx - 2 * S[1] * dx * dy + S[0] * dy * dy) / area
-    return float(-0.5 * (d2 + np.log(area)) - np.log(2 * np.pi))
-
-
-@njit(cache=True)
-def _log_miss(points: Array, weights: Array, start: int, extent: Array, P: Array, size: float, rules: Array) -> float:
-    """Log mass of the association that nothing is the group's: its points are anywhere in the region, and the unshared
-    ones any number up to twice the group's."""
-    if rules[MISS] <= 0:
-        return -np.inf
-    xx, yy, xy = extent[0, 0] + P[0, 0], extent[1, 1] + P[1, 1], extent[0, 1] + P[0, 1]
-    area = np.pi * rules[GATE] * np.sqrt(max(xx * yy - xy * xy, 1e-300))
-    strangers = np.log(weights.mean() / (2 * size + 1)) if start > 0 else 0.0
-    return float(np.log(rules[MISS] / (1 - rules[MISS])) - np.log(area) + strangers)
-
-
-@njit(cache=True)
 def _mix(beta: Array, miss: float, mean: Array, S: Array, x: Array, P: Array) -> None:
-    """x and P over all associations, each with its gain: x = sum beta_j x_j, P = sum beta_j (P_j + spread) (4.3)."""
+    """Mix the conditional estimates (4.3) in place: x = sum beta_j x_j, P = sum beta_j (P_j + spread of x_j about x).
+
+    beta (J,) and miss: normalised masses; mean (J, 2): innovations; S (J, 3): their covariances. Each association has
+    its own gain; the miss leaves the prediction.
+    """
     shift, spread, less = np.zeros(4), np.zeros((4, 4)), np.zeros((4, 4))
     step = np.empty(4)
     gain = np.empty((4, 2))
@@ -256,21 +225,24 @@ def _mix(beta: Array, miss: float, mean: Array, S: Array, x: Array, P: Array) ->
 
 @njit(cache=True)
 def _adapt(beta: Array, people: Array, cov: Array, extent: Array, size: Array, rules: Array) -> None:
-    """Sigma and N, each the mean of (2.4) over the associations; what the region's edge cut off is put back, and the
-    covariance of few people shrunk (both ours)."""
-    move, count = np.zeros(3), 0.0
+    """Update extent and size in place by (2.4), as means over the associations; the miss leaves them as they are.
+
+    Departures: covariances of few people are shrunk to the prior, and divided by GATE_FACTOR to restore what the edge
+    of the search region cuts off.
+    """
+    target, count = np.zeros(3), 0.0
     total = beta.sum()
     for j in range(len(beta)):
         if beta[j] > 0:
             n, share = people[j], beta[j]
             for a in range(3):
-                whole = n * cov[j, a] + rules[STRENGTH] * rules[PRIOR_XX + a]
-                move[a] += share * whole / (n + rules[STRENGTH]) / rules[CUT]
+                total_cov = n * cov[j, a] + rules[PRIOR_WEIGHT] * rules[PRIOR_XX + a]
+                target[a] += share * total_cov / (n + rules[PRIOR_WEIGHT]) / rules[GATE_FACTOR]
             count += share * n
-    keep = rules[KEEP_EXTENT] + (1 - rules[KEEP_EXTENT]) * (1 - total)  # a miss leaves them as they are
-    extent[0, 0] = keep * extent[0, 0] + (1 - rules[KEEP_EXTENT]) * move[0]
-    extent[0, 1] = keep * extent[0, 1] + (1 - rules[KEEP_EXTENT]) * move[1]
+    keep = rules[KEEP_EXTENT] + (1 - rules[KEEP_EXTENT]) * (1 - total)
+    extent[0, 0] = keep * extent[0, 0] + (1 - rules[KEEP_EXTENT]) * target[0]
+    extent[0, 1] = keep * extent[0, 1] + (1 - rules[KEEP_EXTENT]) * target[1]
     extent[1, 0] = extent[0, 1]
-    extent[1, 1] = keep * extent[1, 1] + (1 - rules[KEEP_EXTENT]) * move[2]
+    extent[1, 1] = keep * extent[1, 1] + (1 - rules[KEEP_EXTENT]) * target[2]
     keep = rules[KEEP_SIZE] + (1 - rules[KEEP_SIZE]) * (1 - total)
     size[0] = keep * size[0] + (1 - rules[KEEP_SIZE]) * count

@@ -1,8 +1,9 @@
-"""Colours as a further mass of `group-pda`'s associations (6, future work; the form is ours), from pixels.
+"""Colours as a further mass of `group-pda`'s associations, from pixels only (6, future work; the form is ours).
 
-A group's look is a histogram of the colours of its unshared points. A shared point of colour c speaks for group g with
-log p(c | g) - log p(c | the others that may have it), in which the looks are smoothed histograms; an association has
-the sum over its shared points, each counted as the share of a person that it is, as neighbours are coloured alike.
+Each group has a histogram of the colours of its unshared points. A shared point of colour c adds
+log p(c | g) - log p(c | the other groups that may have the point) to the log mass of group g's associations, where p
+comes from the smoothed histograms. It counts as the share of a person that the point stands for, because neighbouring
+pixels have like colours.
 """
 
 from __future__ import annotations
@@ -10,42 +11,56 @@ from __future__ import annotations
 import numpy as np
 
 from sim.types import Array, Bools, Image, Ints
-from tracking.papers.group_pda.group_bank import Bank
-from tracking.papers.group_pda.kernel_parameters import COLOURS, Rules
+from tracking.papers.group_pda.group_bank import GroupBank
+from tracking.papers.group_pda.scaled_parameters import COLOUR_BINS, ScaledParameters
 
 LEVELS = 4
-"""Per channel; COLOURS is its cube."""
-SMOOTH = 0.05
-"""People of every colour that are added to a look."""
+"""Levels of each of the three channels: LEVELS cubed is COLOUR_BINS."""
+SMOOTHING = 0.05
+"""People, spread evenly over all bins, that are added to a histogram."""
 
 
-def colours(image: Image, points: Array) -> Ints:
-    """(M,) the colour, 0 … COLOURS - 1, of the pixels at points (M, 2)."""
+def colour_bins(image: Image, points: Array) -> Ints:
+    """Return the colour histogram bin (M,), 0 to COLOUR_BINS - 1, of the pixel at each point (M, 2) in px.
+
+    image (H, W, 3) uint8.
+    """
     u, v = points.astype(np.int64).T
     level = image[v, u].astype(np.int64) * LEVELS // 256
     return np.asarray(level @ np.array([1, LEVELS, LEVELS**2]))
 
 
-def speaks(bank: Bank, d2: Array, colour: Ints) -> Array:
-    """(G, M) how much a shared point's colour speaks for each group that may have it; 0 elsewhere."""
-    spoken, may = np.zeros(d2.shape), np.isfinite(d2)
+def colour_log_ratio(bank: GroupBank, d2: Array, bins: Ints) -> Array:
+    """Return log p(c | g) - log p(c | other groups) (G, M) of each point's colour; 0 for points that are not shared.
+
+    d2 (G, M): inf where a group may not have a point. bins (M,): the points' colours. The probability of the other
+    groups is the mean over those that may have the point.
+    """
+    ratio, may = np.zeros(d2.shape), np.isfinite(d2)
     count = may.sum(0)
     shared = np.flatnonzero(count > 1)
     if not len(shared):
-        return spoken
-    look = (bank.look + SMOOTH / COLOURS) / (bank.look.sum(1, keepdims=True) + SMOOTH)
+        return ratio
+    smooth = (bank.colour_hist + SMOOTHING / COLOUR_BINS) / (bank.colour_hist.sum(1, keepdims=True) + SMOOTHING)
     may = may[:, shared]
-    p = np.where(may, look[:, colour[shared]], 0.0)
+    p = np.where(may, smooth[:, bins[shared]], 0.0)
     others = np.where(may, (p.sum(0) - p) / (count[shared] - 1), 1.0)
-    spoken[:, shared] = np.log(np.where(may, p, 1.0)) - np.log(others)
-    return spoken
+    ratio[:, shared] = np.log(np.where(may, p, 1.0)) - np.log(others)
+    return ratio
 
 
-def learn(bank: Bank, chosen: Bools, hits: Ints, colour: Ints, weights: Array, rules: Rules) -> None:
-    """The groups' looks, from those of their points (G, M) that no other may have, forgotten like the extent."""
-    keep = np.exp(-rules.dt / rules.config.extent_time)
+def update_histograms(
+    bank: GroupBank, chosen: Bools, claimants: Ints, bins: Ints, weights: Array, scaled: ScaledParameters
+) -> None:
+    """Update the groups' colour histograms by their points that no other group may have.
+
+    chosen (G, M): each group's points; claimants (M,): number of groups that may have a point; bins (M,): its colour;
+    weights (M,): its people. The old histogram decays with `extent_time`, the first one is taken as it is.
+    """
+    keep = np.exp(-scaled.dt / scaled.config.extent_time)
     for row in np.flatnonzero(chosen.any(1)).tolist():
-        mine = chosen[row] & (hits < 2)
+        mine = chosen[row] & (claimants < 2)
         if mine.any():
-            new = np.bincount(colour[mine], weights[mine], COLOURS)
-            bank.look[row] = keep * bank.look[row] + (1 - keep) * new if bank.look[row].any() else new
+            new = np.bincount(bins[mine], weights[mine], COLOUR_BINS)
+            old = bank.colour_hist[row]
+            bank.colour_hist[row] = keep * old + (1 - keep) * new if old.any() else new

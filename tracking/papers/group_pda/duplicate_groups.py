@@ -1,7 +1,7 @@
-"""Two groups of `group-pda` on the points of one: the one with less of its own is lost (ours).
+"""Two groups of `group-pda` that follow the same people: the one with fewer people of its own becomes lost (ours).
 
-Where groups share points, each is measured by all of them, so a group that has left, or is hidden, would follow another
-for ever. For a while that is right: who is hidden comes out again.
+Groups that share points are each measured by all of them. Without this rule a group that is hidden or has left would
+follow another one for ever. For `coast_time` that is allowed, as hidden people come out again.
 """
 
 from __future__ import annotations
@@ -12,44 +12,53 @@ import numpy as np
 
 from sim.types import Array, Ints
 from tracking.filters.components import regions_overlap
-from tracking.papers.group_pda.group_bank import Bank
-from tracking.papers.group_pda.kernel_parameters import Rules
+from tracking.papers.group_pda.group_bank import GroupBank
+from tracking.papers.group_pda.scaled_parameters import ScaledParameters
 
-DOUBLE = 0.55
-"""Share of two groups that must be measured: else they may be one and the same, a hidden one on another's points."""
-
-
-def doubtful(bank: Bank, i: int, j: int) -> bool:
-    """Are so few people measured of two groups that they may be one?"""
-    return bool(DOUBLE * (bank.size[i] + bank.size[j]) > bank.own[i] + bank.own[j])
+LEAST_MEASURED = 0.55
+"""Two groups may be one and the same if a smaller share of their people together is measured."""
 
 
-class Doubles:
-    """State: for how long each two groups that lie on each other were doubtful, s, less the time they were not."""
+def may_be_one(bank: GroupBank, i: int, j: int) -> bool:
+    """Return True if so few people of the groups in rows i and j are measured that the two may be one group."""
+    return bool(LEAST_MEASURED * (bank.size[i] + bank.size[j]) > bank.own_people[i] + bank.own_people[j])
+
+
+class DuplicateGroups:
+    """State: for each pair of group ids whose regions overlap, a clock in s.
+
+    The clock goes forward in frames in which the two may be one and back in the others; at 0 it is dropped.
+    """
 
     def __init__(self) -> None:
         self.clock: dict[tuple[int, int], float] = {}
 
-    def step(self, bank: Bank, rules: Rules, t: float) -> None:
-        """Lose one of each two groups that were doubtful for `coast_time`: it claims nothing until it is back."""
-        rows = np.flatnonzero(bank.named & (bank.seen >= t))
-        met = {(int(bank.id[i]), int(bank.id[j])): (i, j) for i, j in _on_each_other(bank, rows, rules.config.gate)}
+    def step(self, bank: GroupBank, scaled: ScaledParameters, t: float) -> None:
+        """Make one group of each pair lost whose clock has passed `coast_time`.
+
+        It is the one with the smaller share of people of its own, then the younger one. A lost group claims no points
+        until it is recaptured.
+        """
+        rows = np.flatnonzero(bank.confirmed & (bank.last_seen >= t))
+        pairs = {(int(bank.id[i]), int(bank.id[j])): (i, j) for i, j in _overlapping(bank, rows, scaled.config.gate)}
         clock = {}
-        for ids, (i, j) in met.items():
-            clock[ids] = self.clock.get(ids, 0.0) + (rules.dt if doubtful(bank, i, j) else -rules.dt)
+        for ids, (i, j) in pairs.items():
+            clock[ids] = self.clock.get(ids, 0.0) + (scaled.dt if may_be_one(bank, i, j) else -scaled.dt)
         self.clock = {ids: s for ids, s in clock.items() if s > 0}
-        for ids in [ids for ids, s in self.clock.items() if s > rules.config.coast_time + 1e-9]:
-            less = _less(bank, *met[ids])
-            bank.seen[less] = min(bank.seen[less], t - max(rules.config.coast_time, rules.dt) - 1e-6)
-            self.clock = {pair: s for pair, s in self.clock.items() if bank.id[less] not in pair}
+        for ids in [ids for ids, s in self.clock.items() if s > scaled.config.coast_time + 1e-9]:
+            row = _with_fewer_own(bank, *pairs[ids])
+            lost_at = t - max(scaled.config.coast_time, scaled.dt) - 1e-6
+            bank.last_seen[row] = min(bank.last_seen[row], lost_at)
+            self.clock = {pair: s for pair, s in self.clock.items() if bank.id[row] not in pair}
 
 
-def _on_each_other(bank: Bank, rows: Ints, gate: float) -> Iterator[tuple[int, int]]:
+def _overlapping(bank: GroupBank, rows: Ints, gate: float) -> Iterator[tuple[int, int]]:
+    """Pairs of rows whose search regions overlap."""
     near = regions_overlap(bank.x[rows, :2], bank.extent[rows], gate)
     return ((int(rows[i]), int(rows[j])) for i, j in np.argwhere(np.triu(near, 1)).tolist())
 
 
-def _less(bank: Bank, i: int, j: int) -> int:
-    """The row of the one that has less of its own; then the younger."""
-    share: Array = bank.own[[i, j]] / bank.size[[i, j]]
-    return min((i, j), key=lambda row: (share[0] if row == i else share[1], -bank.born[row], -bank.id[row]))
+def _with_fewer_own(bank: GroupBank, i: int, j: int) -> int:
+    """The row, i or j, with the smaller share of people of its own; if equal, the younger, then the larger id."""
+    share: Array = bank.own_people[[i, j]] / bank.size[[i, j]]
+    return min((i, j), key=lambda row: (share[0] if row == i else share[1], -bank.first_seen[row], -bank.id[row]))

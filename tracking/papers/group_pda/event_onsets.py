@@ -1,78 +1,102 @@
-"""When it began: onsets of merges and splits, looked at afterwards (ours).
+"""Onsets of merges and splits of `group-pda`: when an event that is known now began (ours).
 
-A split is known when its parts have long been apart, a merge when velocities have settled in the filters. What a group
-was then is known better now: chords through the centroids before and after do not lag, and of a group that fell into
-parts it can be told whose its earlier points were. Distances are on the ground (depth is foreshortened in an image).
+A split is known when its parts have long been apart, a merge when the filters' velocities have settled. Afterwards the
+onset can be measured better: from chords through earlier and later centroids, which do not lag, and from the group's
+earlier points, divided among the parts. Distances are metres on the ground (in an image depth is stretched to it).
+The distances and velocities of the truth's rules come from sim.truth.merge_split_rules.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
+from sim.truth.merge_split_rules import MERGE_DISTANCE, SPLIT_DISTANCE, SPLIT_VELOCITY
 from sim.types import Array
 
-MEETING, LEAVING = 0.7, 0.4
-"""s before and after, over which a velocity is a chord: whole groups turn slowly, and bodies hide each other as they
-meet; a part leaves at once."""
-ALIKE = 1.2
-"""Of the velocities that may differ: chords across a meeting are still those of before in part."""
-APART, FAR_APART, PARTING = 1.5, 2.5, 0.7
-"""m between the nearest, with and without velocities that differ by so many m/s, from which on parts of a group count
-as apart (docs/formats.md, split)."""
+MERGE_CHORD, SPLIT_CHORD = 0.7, 0.4
+"""s before and after a moment over which a velocity is a chord. For a merge it is longer, as whole groups turn slowly
+and bodies hide each other; a part leaves at once."""
+MERGE_CHORD_MARGIN = 1.2
+"""Factor on the velocity at which groups merge: a chord across the onset still contains motion from before it."""
 REACH = 1.1
-"""From the middle of people in a row to the last one, in standard deviations: 1 for two, 1.2 for three."""
+"""Distance of the last person in a row from its middle, in standard deviations: 1 for two people, 1.2 for three."""
+
+
+class PairMoment(NamedTuple):
+    """Two groups at one time t, in s.
+
+    difference (2,): of their centroids, m on the ground. middle (2,): point half-way between the centroids, in the unit
+    of the points. gap: distance of their nearest people, m.
+    """
+
+    t: float
+    difference: Array
+    middle: Array
+    gap: float
 
 
 @dataclass
-class Encounter:
-    """Two groups near each other: since when they have been equally fast, too (inf: they are not), and how they stood
-    to each other, (time, difference of centroids on the ground, middle between them, distance of the nearest people).
+class PairHistory:
+    """Two groups that are near each other.
+
+    alike_since: time in s since which they have also had like velocities; inf if they have unlike ones now. moments:
+    the pair in the last seconds, oldest first.
     """
 
-    since: float
-    path: list[tuple[float, Array, Array, float]]
+    alike_since: float
+    moments: list[PairMoment]
 
-    def onset(self, speed: float) -> tuple[float, Array]:
-        """When they became near and equally fast, and where; speed: by which groups that merge may differ."""
-        t, d = np.array([p[0] for p in self.path]), np.array([p[1] for p in self.path])
-        fast = (chords(t, d, MEETING) > ALIKE * speed) & (t <= self.since)
-        fast |= np.array([p[3] for p in self.path]) > APART
-        k = min(int(np.flatnonzero(fast)[-1]) + 1 if fast.any() else 0, len(t) - 1)
-        return float(t[k]), self.path[k][2]
+    def merge_onset(self, merge_velocity: float) -> tuple[float, Array]:
+        """Return when, in s, the groups came to be near with like velocities, and where (2,), in the points' unit.
+
+        It is the moment after the last one in which the gap was above 1.5 m, or the chord's velocity difference was
+        above 1.2 merge_velocity (in m/s) at a time before `alike_since`.
+        """
+        t, d = np.array([m.t for m in self.moments]), np.array([m.difference for m in self.moments])
+        before = (chords(t, d, MERGE_CHORD) > MERGE_CHORD_MARGIN * merge_velocity) & (t <= self.alike_since)
+        before |= np.array([m.gap for m in self.moments]) > MERGE_DISTANCE
+        k = min(int(np.flatnonzero(before)[-1]) + 1 if before.any() else 0, len(t) - 1)
+        return float(t[k]), self.moments[k].middle
 
 
-def chords(t: Array, d: Array, half: float, *, whole: bool = False) -> Array:
-    """(K,) speeds over `half` s before and after each of the times t (K,), one frame at least, of places d (K, 2).
+def chords(t: Array, d: Array, half: float, *, full_length: bool = False) -> Array:
+    """Return speeds (K,) of the positions d (K, 2) at the times t (K,): chords from `half` s before to `half` s after.
 
-    At the ends chords are shorter, and so noisier; whole: they are as long as elsewhere, but not about their times.
+    A chord spans at least one frame to each side if there is one. At both ends of the series chords are shorter. With
+    full_length they are as long there as elsewhere, but not centred on their times.
     """
     k, middle = np.arange(len(t)), t
-    if whole:
+    if full_length:
         middle = np.clip(t, min(t[0] + half, t[-1]), max(t[-1] - half, t[0]))
     first = np.minimum(np.searchsorted(t, middle - half - 1e-9), np.maximum(k - 1, 0))
     last = np.maximum(np.searchsorted(t, middle + half + 1e-9) - 1, np.minimum(k + 1, len(t) - 1))
     return np.asarray(np.hypot(*(d[last] - d[first]).T) / np.maximum(t[last] - t[first], 1e-9))
 
 
-def parting(
-    past: list[tuple[float, Array]], parts: list[Array], ground: Array, person: Array, since: float
+def split_onset(
+    recent: list[tuple[float, Array]], parts: list[Array], metres_per_unit: Array, body_cov: Array, known: float
 ) -> tuple[float, Array]:
-    """When a group whose points were `past` began to fall into two sets of points, and where it was.
+    """Return when, in s, a group began to fall into two parts, and its centroid (2,) at that time.
 
-    Back from `since`, the points of each moment go to the nearer of the two middles, which follow them; the nearest
-    people of the parts are taken to have been as much nearer than the middles as they are now. person (2, 2): the
-    covariance of one person's points.
+    recent: (time, points (K, 2)) of the group, oldest first. parts: the points of both parts, now.
+    metres_per_unit (2,): as in ScaledParameters. body_cov (2, 2): covariance of one person's points. known: time in s
+    at which the split is known.
+    Going back from `known`, each moment's points are divided between the two centroids, which follow them. The nearest
+    people of the parts are taken to be nearer than the centroids by the same distance as now. The onset is the moment
+    after the last one in which the parts were together by the split rule (1.5 m; 2.5 m if slower than 0.7 m/s).
+    Without two earlier moments the onset is `known`.
     """
-    before = [(t, y * ground) for t, y in past if t <= since + 1e-9]
+    before = [(t, y * metres_per_unit) for t, y in recent if t <= known + 1e-9]
     if len(before) < 2:
-        t, y = before[0] if before else (since, parts[0] * ground)
-        return since, y.mean(0) / ground
-    middle = np.array([p.mean(0) for p in parts]) * ground
+        t, y = before[0] if before else (known, parts[0] * metres_per_unit)
+        return known, y.mean(0) / metres_per_unit
+    middle = np.array([p.mean(0) for p in parts]) * metres_per_unit
     way = middle[1] - middle[0]
-    way = ground * way / max(float(np.hypot(*way)), 1e-9)
-    spread = [max(float(way @ (np.cov(p.T, bias=True) - person) @ way), 0.0) if len(p) > 1 else 0.0 for p in parts]
+    way = metres_per_unit * way / max(float(np.hypot(*way)), 1e-9)
+    spread = [max(float(way @ (np.cov(p.T, bias=True) - body_cov) @ way), 0.0) if len(p) > 1 else 0.0 for p in parts]
     reach = REACH * float(np.sqrt(spread).sum())
     times, apart = [], []
     for t, y in reversed(before):
@@ -82,6 +106,7 @@ def parting(
         apart.append(middle[1] - middle[0])
     when, d = np.array(times[::-1]), np.array(apart[::-1])
     gap = np.hypot(*d.T) - reach
-    together = (gap <= APART) | ((gap <= FAR_APART) & (chords(when, d, LEAVING, whole=True) < PARTING))
+    slow = chords(when, d, SPLIT_CHORD, full_length=True) < SPLIT_VELOCITY
+    together = (gap <= MERGE_DISTANCE) | ((gap <= SPLIT_DISTANCE) & slow)
     k = min(int(np.flatnonzero(together)[-1]) + 1 if together.any() else 0, len(when) - 1)
-    return float(when[k]), before[k][1].mean(0) / ground
+    return float(when[k]), before[k][1].mean(0) / metres_per_unit

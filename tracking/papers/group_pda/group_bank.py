@@ -1,34 +1,62 @@
-"""The groups that `group-pda` follows: their states as arrays, birth, merging, splitting, loss.
+"""The groups that `group-pda` follows: their states as arrays, their prediction, and newborn groups from points.
 
-A group is tentative until it was measured for `confirm_time`, then it has an id and is told. It coasts where it is not
-measured, is lost after `coast_time` (it then claims nothing, waiting for a newborn to take its id back), and dies after
-`recapture_time`. null: the length of its spell without a feasible association, which every good frame shortens.
+A group is *tentative* until it has been measured for `confirm_time`; then it is *confirmed* and gets an id. Without a
+measurement it *coasts*. After `coast_time` it is *lost*: it claims no points, but a newborn group may take its id back
+until `recapture_time` is over.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass, fields
+from typing import NamedTuple
 
 import numpy as np
 
 from sim.types import Array, Bools, Ints
-from tracking.papers.group_pda import association_kernels as kernels
-from tracking.papers.group_pda.kernel_parameters import Rules
+from tracking.papers.group_pda import association_mass_kernels as kernels
+from tracking.papers.group_pda.scaled_parameters import ScaledParameters
 
-UNNAMED = -1
-LISTS = ("places", "past")
+NO_ID = -1
+"""Id of a tentative group."""
+LISTS = ("members", "recent_points")
+"""Fields of GroupBank that are lists, not arrays."""
+
+
+class MemberPlaces(NamedTuple):
+    """Where a group's K members were measured last: their points, or, from pixels, the convex hull of the points.
+
+    offset (K, 2) from the centroid; last_seen (K,) s; known (K,): True if a member was there before, too.
+    """
+
+    offset: Array
+    last_seen: Array
+    known: Bools
+
+
+class GroupIds:
+    """Fresh group ids, from 1. State: the next one."""
+
+    def __init__(self) -> None:
+        self.next = 1
+
+    def new(self) -> int:
+        """Return an id that was never returned before."""
+        self.next += 1
+        return self.next - 1
 
 
 @dataclass
-class Bank:
-    """G groups. State of each:
+class GroupBank:
+    """The state of G groups, a row each. Lengths are in the unit of the points, times in s.
 
-    x (G, 4) xi, v; P (G, 4, 4); extent (G, 2, 2) Sigma; size (G,) N, people. id (G,), UNNAMED tentative. born, seen
-    (G,): s, first and last measurement; measured (G,): s in all; null (G,): s without a feasible association. own (G,):
-    people in this frame who are nearer to no other group. parent (G,): id of the group that a tentative one left, or
-    UNNAMED, and origin (G, 2), where. look (G, C): people by colour, C = 0 where none are looked at. places: of each
-    its points (K, 2) relative to xi, when each was measured last (K,), s, and whether it was there before, too (K,).
-    past: of each its points of the last seconds, (time, points).
+    x (G, 4): centroid xi and velocity v, in order x, y, vx, vy; P (G, 4, 4) their covariance.
+    extent (G, 2, 2): Sigma, covariance of the members' positions about the centroid; size (G,): N, people.
+    id (G,): NO_ID for a tentative group. first_seen, last_seen (G,): times of first and last measurement.
+    measured_time (G,): total time measured. null_time (G,): time without a feasible association, see `association`.
+    own_people (G,): people measured in this frame who are nearer to no other group.
+    parent (G,): id of the group that a tentative group has left, or NO_ID; origin (G, 2): where it left it.
+    colour_hist (G, C): people by colour; C = 0 without colours. members: of each group. recent_points: of each group,
+    (time, points (K, 2)) of the last seconds.
     """
 
     x: Array
@@ -36,116 +64,89 @@ class Bank:
     extent: Array
     size: Array
     id: Ints
-    born: Array
-    seen: Array
-    measured: Array
-    null: Array
-    own: Array
+    first_seen: Array
+    last_seen: Array
+    measured_time: Array
+    null_time: Array
+    own_people: Array
     parent: Ints
     origin: Array
-    look: Array
-    places: list[tuple[Array, Array, Bools]]
-    past: list[list[tuple[float, Array]]]
+    colour_hist: Array
+    members: list[MemberPlaces]
+    recent_points: list[list[tuple[float, Array]]]
 
     @classmethod
-    def empty(cls, colours: int = 0) -> Bank:
-        """No groups, of so many colours."""
+    def empty(cls, colour_bins: int = 0) -> GroupBank:
+        """Return a bank without groups."""
         none, ids, two = np.zeros(0), np.zeros(0, np.int64), np.zeros((0, 2))
         four = np.zeros((0, 4))
         return cls(
             four, np.zeros((0, 4, 4)), np.zeros((0, 2, 2)), none, ids, none, none, none, none, none, ids, two,
-            np.zeros((0, colours)), [], [],
+            np.zeros((0, colour_bins)), [], [],
         )  # fmt: skip
 
     def __len__(self) -> int:
         return len(self.id)
 
     @property
-    def named(self) -> Bools:
-        """(G,) not tentative."""
-        return np.asarray(self.id != UNNAMED)
+    def confirmed(self) -> Bools:
+        """Flags (G,): True for groups with an id."""
+        return np.asarray(self.id != NO_ID)
+
+    def positions(self, row: int) -> Array:
+        """Return the positions (K, 2) of a group's members, moved along with its centroid."""
+        return self.members[row].offset + self.x[row, :2]
 
     def keep(self, kept: Bools) -> None:
-        """Drop the others."""
+        """Remove the rows that are False in kept (G,)."""
         for f in fields(self):
             value = getattr(self, f.name)
             new = [v for v, k in zip(value, kept, strict=True) if k] if f.name in LISTS else value[kept]
             setattr(self, f.name, new)
 
-    def add(self, other: Bank) -> None:
-        """Take in more groups, behind these."""
+    def remove(self, row: int) -> None:
+        """Remove one row."""
+        self.keep(np.arange(len(self)) != row)
+
+    def add(self, other: GroupBank) -> None:
+        """Append the rows of another bank."""
         for f in fields(self):
             a, b = getattr(self, f.name), getattr(other, f.name)
             setattr(self, f.name, a + b if f.name in LISTS else np.concatenate([a, b]))
 
-    def predict(self, rules: Rules) -> None:
-        """x = F x, P = F P F' + Q (2.3)."""
-        self.x = self.x @ rules.F.T
-        self.P = rules.F @ self.P @ rules.F.T + rules.Q
+    def predict(self, scaled: ScaledParameters) -> None:
+        """Predict all groups to the next frame: x = F x, P = F P F' + Q (2.3)."""
+        self.x = self.x @ scaled.F.T
+        self.P = scaled.F @ self.P @ scaled.F.T + scaled.Q
 
 
-def newborn(points: Array, weights: Array, group: Ints, rules: Rules, t: float) -> Bank:
-    """Tentative groups out of measurements (3.3): sample mean, covariance and number of each, at rest.
+def newborn(points: Array, weights: Array, group: Ints, scaled: ScaledParameters, t: float) -> GroupBank:
+    """Return a bank of tentative groups made from points alone (3.3), with velocity 0.
 
-    group (M,): 0, 1, … or -1 for none.
+    points (M, 2); weights (M,): people that each point stands for; group (M,): 0, 1, … or -1 for no group; t: s.
+    Centroid and size are the weighted mean and sum. The extent is the covariance, shrunk towards the prior and divided
+    by the gate factor (both ours). The bank is empty if no point has a group.
     """
     count = int(group.max(initial=-1)) + 1
     if not count:
-        return Bank.empty(rules.colours)
+        return GroupBank.empty(scaled.colour_bins)
     inside = group >= 0
     g, y, w = group[inside], points[inside], weights[inside]
     people = np.asarray(np.bincount(g, w, count), float)
     mean = np.stack([np.bincount(g, w * y[:, a], count) for a in range(2)], 1) / people[:, None]
     d = y - mean[g]
-    prior, strength, c = rules.constraint.prior, rules.constraint.strength, rules.config
+    prior, strength, c = scaled.constraint.prior, scaled.constraint.strength, scaled.config
     square = np.stack([np.bincount(g, w * d[:, a] * d[:, b], count) for a in range(2) for b in range(2)], 1)
     extent = (square.reshape(-1, 2, 2) + strength * prior) / (people + strength)[:, None, None]
-    extent /= rules.numbers[kernels.CUT]
+    extent /= scaled.kernel_rules[kernels.GATE_FACTOR]
     P = np.zeros((count, 4, 4))
-    P[:, [0, 1], [0, 1]] = (rules.noise**2 / np.maximum(people, 1e-3))[:, None] + rules.noise**2
-    P[:, [2, 3], [2, 3]] = (rules.scale * c.speed_prior) ** 2
+    P[:, [0, 1], [0, 1]] = (scaled.point_sd**2 / np.maximum(people, 1e-3))[:, None] + scaled.point_sd**2
+    P[:, [2, 3], [2, 3]] = (scaled.scale * c.speed_prior) ** 2
     many = np.bincount(g, minlength=count).tolist()
-    places = [(d[g == k], np.full(n, t), np.zeros(n, bool)) for k, n in enumerate(many)]
-    nil, now = np.zeros(count), np.full(count, t)
-    return Bank(
-        np.hstack([mean, np.zeros((count, 2))]), P, extent, people, np.full(count, UNNAMED),
-        now, now.copy(), nil + rules.dt, nil, people.copy(), np.full(count, UNNAMED), mean.copy(),
-        np.zeros((count, rules.colours)), places, [[] for _ in range(count)],
-    )  # fmt: skip
-
-
-def children(parent: Bank, row: int, points: Array, weights: Array, group: Ints, rules: Rules, t: float) -> Bank:
-    """The groups into which one splits: newborn from its points; ours: with its velocity and age."""
-    c = rules.config
-    made = newborn(points, weights, group, rules, t)
-    made.born[:], made.measured[:] = parent.born[row], parent.measured[row]
-    made.look[:] = parent.look[row]
-    if parent.id[row] == UNNAMED:
-        made.parent[:], made.origin[:] = parent.parent[row], parent.origin[row]
-    if c.inherit_velocity:
-        made.x[:, 2:] = parent.x[row, 2:]
-        made.P[:, 2:, 2:] = parent.P[row, 2:, 2:] + (rules.scale * c.split_speed) ** 2 * np.eye(2)
-    return made
-
-
-def merged(bank: Bank, rows: Ints) -> Bank:
-    """One group out of several (3.1): means by size, extents with the spread of the centroids.
-
-    P is that of a weighted mean of independent centroids, sum w^2 P_i: their spread is the group's extent, no error.
-    """
-    size = np.asarray(bank.size[rows].sum())
-    w = bank.size[rows] / size
-    x = w @ bank.x[rows]
-    d = bank.x[rows, :2] - x[:2]
-    extent = np.einsum("k,kij->ij", w, bank.extent[rows] + d[:, :, None] * d[:, None, :])
-    P = np.einsum("k,kij->ij", w * w, bank.P[rows])
-    heir = rows[np.lexsort((bank.id[rows], bank.born[rows], -np.rint(bank.size[rows])))[0]]  # most people, the older
-    moved = [(y + bank.x[r, :2] - x[:2], seen, known) for r in rows.tolist() for y, seen, known in (bank.places[r],)]
-    y, seen, known = zip(*moved, strict=True)
-    places = (np.concatenate(y), np.concatenate(seen), np.concatenate(known))
-    one = slice(heir, heir + 1)
-    return Bank(
-        x[None], P[None], extent[None], size[None].copy(), bank.id[one], bank.born[rows].min(keepdims=True),
-        bank.seen[rows].max(keepdims=True), bank.measured[rows].max(keepdims=True), np.zeros(1), size[None],
-        np.full(1, UNNAMED), x[None, :2].copy(), bank.look[rows].sum(0, keepdims=True), [places], [[]],
+    members = [MemberPlaces(d[g == k], np.full(n, t), np.zeros(n, bool)) for k, n in enumerate(many)]
+    zero, now = np.zeros(count), np.full(count, t)
+    return GroupBank(
+        np.hstack([mean, np.zeros((count, 2))]), P, extent, people, np.full(count, NO_ID),
+        now, now.copy(), zero + scaled.dt, zero, people.copy(), np.full(count, NO_ID), mean.copy(),
+        np.zeros((count, scaled.colour_bins)), members, [[] for _ in range(count)],
     )  # fmt: skip

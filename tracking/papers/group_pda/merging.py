@@ -1,160 +1,213 @@
-"""Merging of `group-pda`'s groups (3.1, 3.2): who is near whom, how fast, since when.
+"""Merging of `group-pda`'s groups (3.1, 3.2): which are near with like velocities, for how long, and their union.
 
-Departures: tracking.papers.group_pda.tracker.
+The relation R_x holds for two groups whose search regions overlap and whose velocities are alike; G_x are the connected
+components. Departures: the velocity test is a physical difference (`merge_velocity`), R_x must hold for `merge_time`,
+and only groups whose velocity is known well take part (see `GroupMerging.step`).
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
 from sim.geometry.polygons import polygon_gap
+from sim.truth.merge_split_rules import SPLIT_DISTANCE
 from sim.types import Array, Bools, Ints
 from tracking.filters.components import regions_overlap
-from tracking.papers.group_pda.association_kernels import CUT, near
-from tracking.papers.group_pda.duplicate_groups import doubtful
-from tracking.papers.group_pda.event_onsets import FAR_APART, REACH, Encounter
-from tracking.papers.group_pda.group_bank import UNNAMED, Bank, merged
-from tracking.papers.group_pda.kernel_parameters import Rules
+from tracking.grouping.link_rule import ARRIVAL
+from tracking.papers.group_pda.association_kernels import any_within
+from tracking.papers.group_pda.association_mass_kernels import GATE_FACTOR
+from tracking.papers.group_pda.duplicate_groups import may_be_one
+from tracking.papers.group_pda.event_onsets import REACH, PairHistory, PairMoment
+from tracking.papers.group_pda.group_bank import NO_ID, GroupBank, MemberPlaces
+from tracking.papers.group_pda.report import BankEvent
+from tracking.papers.group_pda.scaled_parameters import ScaledParameters
 
-ARRIVAL = 1.0
-"""s: a group that another joins so soon after it came has arrived, as in tracking.grouping.link_rule."""
-LONGEST = 5.0
-"""s that is looked back at most."""
-MARGIN = 0.9
-"""Of gamma: groups merge a little nearer than they split, as their extents are noisy."""
-OWN = 0.2
-"""Share of a group that must be nearer to it than to any other for its velocity to be its own."""
+HISTORY_TIME = 5.0
+"""s of a pair's past that are kept."""
+GATE_MARGIN = 0.9
+"""Factor on gamma for merging: groups merge at a smaller distance than they split, as their extents are noisy."""
+LEAST_OWN = 0.2
+"""Share of a group's people that must be nearer to no other group for its velocity to count as its own."""
 PATIENCE = 1.5
-"""s that an encounter outlasts without a look at both groups."""
+"""s for which the history of a pair is kept while one of the groups cannot merge."""
+
+Pair = tuple[int, int]
+"""Ids of two groups, the smaller first."""
 
 
-@dataclass(frozen=True)
-class Change:
-    """kind of GroupEvent; since, s: when it began; ids before and after; pos (2,)."""
+class NearPair(NamedTuple):
+    """Two groups whose regions overlap or whose points are linked in this frame.
 
-    kind: str
-    since: float
-    before: tuple[int, ...]
-    after: tuple[int, ...]
-    pos: tuple[float, float]
+    alike: their velocities are alike and, from pixels, their people are not far apart.
+    """
+
+    ids: Pair
+    alike: bool
+    moment: PairMoment
 
 
-class Merging:
-    """Merging (3.1, 3.2) on updated states. State: the encounters of each two groups."""
+class GroupMerging:
+    """State: the history of each pair of groups that are near each other."""
 
     def __init__(self) -> None:
-        self.met: dict[tuple[int, int], Encounter] = {}
+        self.histories: dict[Pair, PairHistory] = {}
 
-    def step(self, bank: Bank, rules: Rules, t: float) -> Iterator[Change]:
-        """Merge groups for which that has been so for `merge_time`; one that joins soon after it came has entered.
+    def step(self, bank: GroupBank, scaled: ScaledParameters, t: float) -> Iterator[BankEvent]:
+        """Merge the groups for which R_x has held for `merge_time`; yield their events. The states are updated ones.
 
-        Only those do that have an id, were measured in this frame, some of them by points that are nearer to no other
-        group, and are in no spell: the others' velocities are ignorance, or another's.
+        A group takes part if it is confirmed, was measured in this frame, has no `null_time`, and enough of its people
+        are nearer to no other group: else its velocity is unknown or another group's. An event is a merge, or an enter
+        if at most one of the groups was there for more than 1 s before the onset and is no child of another group.
         """
-        able = np.flatnonzero(bank.named & (bank.seen >= t) & (bank.null <= 0) & (bank.own >= OWN * bank.size))
-        near = {pair: self._went_on(pair, slow, (t, d, m, gap)) for pair, slow, d, m, gap in _near(bank, able, rules)}
-        unsure = {int(g) for g in bank.id[bank.named]} - set(bank.id[able].tolist())
-        kept = {p: m for p, m in self.met.items() if unsure & set(p) and t - m.path[-1][0] <= PATIENCE}
-        self.met = near | kept
-        due = [p for p, met in near.items() if t - met.since >= rules.config.merge_time - 1e-9]
+        able = np.flatnonzero(
+            bank.confirmed & (bank.last_seen >= t) & (bank.null_time <= 0) & (bank.own_people >= LEAST_OWN * bank.size)
+        )
+        near = {pair.ids: self._extended(pair) for pair in _near_pairs(bank, able, scaled, t)}
+        unable = {int(g) for g in bank.id[bank.confirmed]} - set(bank.id[able].tolist())
+        kept = {p: h for p, h in self.histories.items() if unable & set(p) and t - h.moments[-1].t <= PATIENCE}
+        self.histories = near | kept
+        due = [p for p, history in near.items() if t - history.alike_since >= scaled.config.merge_time - 1e-9]
         for ids in _connected(due):
             rows = np.flatnonzero(np.isin(bank.id, ids))
-            since, place = min(
-                (self.met[p].onset(rules.config.merge_velocity) for p in due if p[0] in ids), key=lambda found: found[0]
+            onset, place = min(
+                (self.histories[p].merge_onset(scaled.config.merge_velocity) for p in due if p[0] in ids),
+                key=lambda found: found[0],
             )
-            one = merged(bank, rows)
-            here = bank.id[rows][(since - bank.born[rows] > ARRIVAL) | (bank.parent[rows] != UNNAMED)]
+            union = merged(bank, rows)
+            present = bank.id[rows][(onset - bank.first_seen[rows] > ARRIVAL) | (bank.parent[rows] != NO_ID)]
             keep = np.ones(len(bank), bool)
             keep[rows] = False
             bank.keep(keep)
-            bank.add(one)
-            bank.parent[np.isin(bank.parent, ids)] = one.id[0]
-            self._hand_on(ids, int(one.id[0]), bank, rules)
-            kind = "merge" if len(here) > 1 else "enter"
-            yield Change(kind, since, tuple(sorted(ids)), (int(one.id[0]),), tuple(place.tolist()))
+            bank.add(union)
+            heir = int(union.id[0])
+            bank.parent[np.isin(bank.parent, ids)] = heir
+            self._pass_on(ids, heir, bank, scaled)
+            kind = "merge" if len(present) > 1 else "enter"
+            yield BankEvent(kind, onset, tuple(sorted(ids)), (heir,), tuple(place.tolist()))
 
-    def _hand_on(self, ids: list[int], heir: int, bank: Bank, rules: Rules) -> None:
-        """What those that merged had with others is the heir's, ways shifted so that they do not jump."""
-        met = {p: one for p, one in self.met.items() if not set(p) & set(ids)}
-        for p, one in self.met.items():
+    def _pass_on(self, ids: list[int], heir: int, bank: GroupBank, scaled: ScaledParameters) -> None:
+        """Give the histories of the merged groups with other groups to the heir.
+
+        The differences of centroids are shifted, so that they do not jump. Of two histories with the same group, the
+        one that has been alike for longer is kept.
+        """
+        histories = {p: h for p, h in self.histories.items() if not set(p) & set(ids)}
+        for p, history in self.histories.items():
             others = set(p) - set(ids)
             if len(others) != 1:
                 continue
             pair = (min(heir, *others), max(heir, *others))
             a, b = (bank.x[np.flatnonzero(bank.id == id)[0], :2] for id in pair)
             turn = 1 if (p[0] in others) == (pair[0] in others) else -1
-            shift = (b - a) * rules.ground - turn * one.path[-1][1]
-            path = [(t, turn * d + shift, place, gap) for t, d, place, gap in one.path]
-            if pair not in met or one.since < met[pair].since:
-                met[pair] = Encounter(one.since, path)
-        self.met = met
+            shift = (b - a) * scaled.metres_per_unit - turn * history.moments[-1].difference
+            moments = [PairMoment(m.t, turn * m.difference + shift, m.middle, m.gap) for m in history.moments]
+            if pair not in histories or history.alike_since < histories[pair].alike_since:
+                histories[pair] = PairHistory(history.alike_since, moments)
+        self.histories = histories
 
-    def _went_on(self, pair: tuple[int, int], slow: bool, now: tuple[float, Array, Array, float]) -> Encounter:
-        before = self.met.get(pair, Encounter(np.inf, []))
-        path = [p for p in before.path if p[0] > now[0] - LONGEST]
-        return Encounter(min(before.since, now[0]) if slow else np.inf, [*path, now])
+    def _extended(self, pair: NearPair) -> PairHistory:
+        """The pair's history with this frame's moment added."""
+        before, now = self.histories.get(pair.ids, PairHistory(np.inf, [])), pair.moment
+        moments = [m for m in before.moments if m.t > now.t - HISTORY_TIME]
+        return PairHistory(min(before.alike_since, now.t) if pair.alike else np.inf, [*moments, now])
 
 
-def _near(bank: Bank, rows: Ints, rules: Rules) -> Iterator[tuple[tuple[int, int], bool, Array, Array, float]]:
-    """R_x: ids of each two groups whose search regions overlap, whether their velocities differ by no more than
-    allowed (from pixels: and they are not far apart on the ground), the difference of their centroids on the ground,
-    the middle between them, the nearest people's distance."""
-    close = regions_overlap(bank.x[rows, :2], bank.extent[rows], MARGIN * rules.config.gate)
-    close |= _touching(bank, rows, rules)
-    v = bank.x[rows, 2:] * rules.ground
-    var = np.einsum("gaa,a->g", bank.P[rows, 2:, 2:], np.square(rules.ground)) / 2
-    most = rules.config.merge_velocity + rules.config.merge_doubt * np.sqrt(var[:, None] + var)
-    slow = np.hypot(*(v[:, None] - v[None]).transpose(2, 0, 1)) <= most
+def merged(bank: GroupBank, rows: Ints) -> GroupBank:
+    """Return a bank with the union (3.1) of the groups in `rows`.
+
+    Centroid and velocity are means weighted by size, the extent contains the spread of the centroids. P is that of a
+    weighted mean of independent centroids, sum w^2 P_i (ours): the spread of the centroids is no estimation error.
+    The group with most people, then the oldest, gives the id.
+    """
+    size = np.asarray(bank.size[rows].sum())
+    w = bank.size[rows] / size
+    x = w @ bank.x[rows]
+    d = bank.x[rows, :2] - x[:2]
+    extent = np.einsum("k,kij->ij", w, bank.extent[rows] + d[:, :, None] * d[:, None, :])
+    P = np.einsum("k,kij->ij", w * w, bank.P[rows])
+    heir = rows[np.lexsort((bank.id[rows], bank.first_seen[rows], -np.rint(bank.size[rows])))[0]]
+    members = [bank.members[r] for r in rows.tolist()]
+    offset = np.concatenate([bank.positions(r) - x[:2] for r in rows.tolist()])
+    last_seen, known = (np.concatenate([getattr(m, name) for m in members]) for name in ("last_seen", "known"))
+    one = slice(heir, heir + 1)
+    return GroupBank(
+        x[None], P[None], extent[None], size[None].copy(), bank.id[one], bank.first_seen[rows].min(keepdims=True),
+        bank.last_seen[rows].max(keepdims=True), bank.measured_time[rows].max(keepdims=True), np.zeros(1), size[None],
+        np.full(1, NO_ID), x[None, :2].copy(), bank.colour_hist[rows].sum(0, keepdims=True),
+        [MemberPlaces(offset, last_seen, known)], [[]],
+    )  # fmt: skip
+
+
+def _near_pairs(bank: GroupBank, rows: Ints, scaled: ScaledParameters, t: float) -> Iterator[NearPair]:
+    """The pairs of groups in `rows` whose search regions overlap or whose points are linked.
+
+    From points, pairs that may be one group are left out. From pixels they are not, as bodies hide each other.
+    """
+    close = regions_overlap(bank.x[rows, :2], bank.extent[rows], GATE_MARGIN * scaled.config.gate)
+    close |= _linked(bank, rows, scaled)
+    v = bank.x[rows, 2:] * scaled.metres_per_unit
+    var = np.einsum("gaa,a->g", bank.P[rows, 2:, 2:], np.square(scaled.metres_per_unit)) / 2
+    most = scaled.config.merge_velocity + scaled.config.merge_doubt * np.sqrt(var[:, None] + var)
+    alike = np.hypot(*(v[:, None] - v[None]).transpose(2, 0, 1)) <= most
     for i, j in np.argwhere(np.triu(close, 1)).tolist():
-        if doubtful(bank, rows[i], rows[j]) and not rules.pixels:  # bodies hide each other in an image
+        if may_be_one(bank, rows[i], rows[j]) and not scaled.from_pixels:
             continue
         i, j = sorted((i, j), key=lambda k: bank.id[rows[k]])
         a, b = bank.x[rows[i], :2], bank.x[rows[j], :2]
-        d = (b - a) * rules.ground
-        gap = _gap(bank, rows[i], rows[j], d, rules)
-        together = bool(slow[i, j]) and not (rules.pixels and gap > FAR_APART)  # bodies cover the ground behind them
-        yield (int(bank.id[rows[i]]), int(bank.id[rows[j]])), together, d, (a + b) / 2, gap
+        d = (b - a) * scaled.metres_per_unit
+        gap = _gap(bank, rows[i], rows[j], d, scaled)
+        far = scaled.from_pixels and gap > SPLIT_DISTANCE  # regions overlap, as bodies cover the ground behind them
+        ids = (int(bank.id[rows[i]]), int(bank.id[rows[j]]))
+        yield NearPair(ids, bool(alike[i, j]) and not far, PairMoment(t, d, (a + b) / 2, gap))
 
 
-def _gap(bank: Bank, a: int, b: int, d: Array, rules: Rules) -> float:
-    """Distance of the nearest people of two groups, m: of the nearest points, or, as pixels are parts of bodies, of the
-    centroids, d apart, less how far people are about them."""
-    if not rules.pixels:
-        here, there = (bank.places[k][0] + bank.x[k, :2] for k in (a, b))
-        return float(np.hypot(*((here[:, None] - there) * rules.ground).T).min())
-    return float(np.hypot(*d)) - REACH * sum(_spread(bank, k, d, rules) for k in (a, b))
+def _gap(bank: GroupBank, a: int, b: int, d: Array, scaled: ScaledParameters) -> float:
+    """Distance, m, of the nearest people of the groups in rows a and b; d (2,): difference of their centroids, m.
+
+    From points it is that of the nearest members' places. From pixels, which are parts of bodies, it is the distance of
+    the centroids less how far people stand from them in this direction.
+    """
+    if not scaled.from_pixels:
+        here, there = (bank.positions(k) for k in (a, b))
+        return float(np.hypot(*((here[:, None] - there) * scaled.metres_per_unit).T).min())
+    return float(np.hypot(*d)) - REACH * sum(_people_sd(bank, k, d, scaled) for k in (a, b))
 
 
-def _spread(bank: Bank, row: int, way: Array, rules: Rules) -> float:
-    """Standard deviation, m, of a group's people along a way on the ground: their extent without what it was shrunk to,
-    and without that of one body."""
-    n, n0 = bank.size[row], rules.constraint.strength
-    people = ((n + n0) * rules.numbers[CUT] * bank.extent[row] - n0 * rules.constraint.prior) / n - rules.body
-    along = rules.ground * way / max(float(np.hypot(*way)), 1e-9)
+def _people_sd(bank: GroupBank, row: int, way: Array, scaled: ScaledParameters) -> float:
+    """Standard deviation, m, of the positions of a group's people along the direction `way` on the ground.
+
+    It is that of the extent without the prior that it was shrunk to and without the extent of one body.
+    """
+    n, n0 = bank.size[row], scaled.constraint.strength
+    factor = scaled.kernel_rules[GATE_FACTOR]
+    people = ((n + n0) * factor * bank.extent[row] - n0 * scaled.constraint.prior) / n - scaled.body_cov
+    along = scaled.metres_per_unit * way / max(float(np.hypot(*way)), 1e-9)
     return float(np.sqrt(max(along @ people @ along, 0.0)))
 
 
-def _touching(bank: Bank, rows: Ints, rules: Rules) -> Bools:
-    """(K, K) which groups have points that are linked (ours: regions, whose extents rest while points are shared, may
-    be late)."""
+def _linked(bank: GroupBank, rows: Ints, scaled: ScaledParameters) -> Bools:
+    """Flags (K, K): the groups have points, or from pixels hulls, within the link distance of each other (ours).
+
+    This finds near groups whose extents lag because they rest while points are shared.
+    """
     found = np.eye(len(rows), dtype=bool)
-    place = [bank.places[r][0] + bank.x[r, :2] for r in rows.tolist()]
+    place, link = [bank.positions(r) for r in rows.tolist()], scaled.constraint.link
     low, high = (np.array([f(p, axis=0) for p in place]).reshape(-1, 2) for f in (np.min, np.max))
     gap = np.maximum(low[:, None] - high, low - high[:, None]).max(2, initial=-np.inf)
-    for i, j in np.argwhere(np.triu(gap <= rules.constraint.link, 1)).tolist():
-        if rules.pixels:
+    for i, j in np.argwhere(np.triu(gap <= link, 1)).tolist():
+        if scaled.from_pixels:
             d = polygon_gap(place[i], place[j]) if min(len(place[i]), len(place[j])) > 2 else gap[i, j]
-            found[i, j] = found[j, i] = d <= rules.constraint.link
+            found[i, j] = found[j, i] = d <= link
         else:
-            found[i, j] = found[j, i] = near(place[i], place[j], rules.constraint.link).any()
+            found[i, j] = found[j, i] = any_within(place[i], place[j], link).any()
     return found
 
 
-def _connected(pairs: list[tuple[int, int]]) -> list[list[int]]:
-    """Connected components of a graph, G_x."""
+def _connected(pairs: list[Pair]) -> list[list[int]]:
+    """The connected components of the graph with these edges, as sorted lists of ids (G_x)."""
     parts: list[set[int]] = []
     for pair in pairs:
         touched = [p for p in parts if p & set(pair)]

@@ -1,45 +1,78 @@
-"""What `group-pda` tells: groups with hulls, and events."""
+"""What `group-pda` reports in a frame: the confirmed groups with their hulls, and the events."""
 
 from __future__ import annotations
+
+from dataclasses import dataclass
 
 import numpy as np
 
 from sim.geometry.hull_kernels import convex_hulls
 from sim.types import Array, GroupEvent, Groups, Plane, Tracks
-from tracking.papers.group_pda import association_kernels as kernels
-from tracking.papers.group_pda.group_bank import Bank
-from tracking.papers.group_pda.kernel_parameters import Rules
-from tracking.papers.group_pda.merging import Change
+from tracking.papers.group_pda import association_mass_kernels as kernels
+from tracking.papers.group_pda.group_bank import GroupBank
+from tracking.papers.group_pda.scaled_parameters import ScaledParameters
 
 
-def tracks(
-    bank: Bank, changes: list[Change], rules: Rules, index: int, t: float, plane: Plane, fps: float, outline: Array
-) -> Tracks:
-    """The groups that have an id and were measured lately; outline (V, 2): of what stands at a place."""
-    rows = np.flatnonzero(bank.named & (t - bank.seen <= rules.config.report_coast + 1e-9))
+@dataclass(frozen=True)
+class BankEvent:
+    """A change of the set of confirmed groups.
+
+    kind: merge, split, enter or leave, as in GroupEvent. onset: s, when it began. before, after: ids of the groups
+    concerned. pos: x, y in the unit of the points.
+    """
+
+    kind: str
+    onset: float
+    before: tuple[int, ...]
+    after: tuple[int, ...]
+    pos: tuple[float, float]
+
+
+@dataclass(frozen=True)
+class ReportFrame:
+    """The frame that is reported. index: from 1; t: s.
+
+    outline (V, 2): a polygon round the origin that stands for what covers the ground or the image about one member's
+    place: a footprint, a usual box, or a cell of the pixel grid.
+    """
+
+    index: int
+    t: float
+    plane: Plane
+    fps: float
+    outline: Array
+
+
+def report_tracks(bank: GroupBank, events: list[BankEvent], scaled: ScaledParameters, frame: ReportFrame) -> Tracks:
+    """Return Tracks, unit "group", of the confirmed groups that were measured within `report_coast` s, by id.
+
+    The reported size is N divided by the probability that a member is measured. Hulls go round the outlines of all
+    members' places. An event's start is its onset, its end and `emitted` are this frame; it has no members.
+    """
+    rows = np.flatnonzero(bank.confirmed & (frame.t - bank.last_seen <= scaled.config.report_coast + 1e-9))
     rows = rows[np.argsort(bank.id[rows])]
     id, x = bank.id[rows], bank.x[rows]
-    places = [bank.places[r][0] + bank.x[r, :2] for r in rows.tolist()]
     groups = Groups(
         id,
         tuple(np.zeros(0, np.int64) for _ in rows),
         x[:, :2],
         x[:, 2:],
         bank.extent[rows],
-        bank.size[rows] / rules.numbers[kernels.DETECT],
-        _hulls(places, outline),
+        bank.size[rows] / scaled.kernel_rules[kernels.DETECT_PROB],
+        _hulls([bank.positions(r) for r in rows.tolist()], frame.outline),
     )
     return Tracks(
-        index, t, plane, "group", id, id.copy(), x[:, :2].copy(), x[:, 2:].copy(), bank.P[rows],
-        None, np.ones(len(rows)), groups, tuple(_event(c, index, t, fps) for c in changes),
+        frame.index, frame.t, frame.plane, "group", id, id.copy(), x[:, :2].copy(), x[:, 2:].copy(), bank.P[rows],
+        None, np.ones(len(rows)), groups, tuple(_group_event(e, frame) for e in events),
     )  # fmt: skip
 
 
 def _hulls(places: list[Array], outline: Array) -> tuple[Array, ...]:
-    """Convex hulls of an outline (V, 2) round each group's places (K, 2): round those on their own hull."""
+    """Convex hulls of the outline (V, 2) moved to each group's places (K, 2)."""
+    # The places on their own hull suffice, and are few.
     return convex_hulls([(corner[:, None] + outline).reshape(-1, 2) for corner in convex_hulls(places)])
 
 
-def _event(change: Change, index: int, t: float, fps: float) -> GroupEvent:
-    start = min(max(index - round((t - change.since) * fps), 1), index)
-    return GroupEvent(change.kind, start, index, index, change.before, change.after, (), change.pos)
+def _group_event(event: BankEvent, frame: ReportFrame) -> GroupEvent:
+    start = min(max(frame.index - round((frame.t - event.onset) * frame.fps), 1), frame.index)
+    return GroupEvent(event.kind, start, frame.index, frame.index, event.before, event.after, (), event.pos)

@@ -14,12 +14,13 @@ from scipy.stats import chi2
 from tests import reference_group_pda as reference
 from tracking.filters.components import Constraint
 from tracking.papers.group_pda import association_kernels as kernels
-from tracking.papers.group_pda import split_birth_loss as changes
-from tracking.papers.group_pda.association_kernels import near
+from tracking.papers.group_pda.association_kernels import any_within
+from tracking.papers.group_pda.association_mass_kernels import centroid_noise
 from tracking.papers.group_pda.config import GroupPdaConfig
-from tracking.papers.group_pda.group_bank import Bank, merged, newborn
-from tracking.papers.group_pda.kernel_parameters import make_rules, truncation
-from tracking.papers.group_pda.merging import Merging
+from tracking.papers.group_pda.group_bank import GroupBank, GroupIds, MemberPlaces, newborn
+from tracking.papers.group_pda.merging import GroupMerging, merged
+from tracking.papers.group_pda.scaled_parameters import gate_factor, scale_parameters
+from tracking.papers.group_pda.splitting import split
 
 STATES = ["nothing", "null", "measured"]
 PLAIN = reference.Rules(
@@ -149,7 +150,7 @@ def kalman(x, P, F, Q):
 def test_one_group_that_shares_nothing_is_a_kalman_filter(seed: int, redrawn: bool) -> None:
     """E1: x, P are filterpy's on the centroid, extent and size those of (2.4)."""
     r = np.random.default_rng(seed)
-    made = make_rules(GroupPdaConfig(), 10.0, 1.0)
+    made = scale_parameters(GroupPdaConfig(), 10.0, 1.0)
     rules = replace(PLAIN, redrawn=redrawn, correct=False)
     x, P, extent, size = random_groups(r, 1)
     f = kalman(x[0], P[0], made.F, made.Q)
@@ -256,17 +257,17 @@ def test_a_narrow_gate_collapses() -> None:
     assert settled(3.0, False)[0] < 0.01
 
 
-def test_truncation() -> None:
+def test_gate_factor() -> None:
     for gate in (1.0, 3.0, 6.0, 9.21, 20.0):
-        assert truncation(gate) == pytest.approx(reference.truncation(gate), rel=1e-12)
+        assert gate_factor(gate) == pytest.approx(reference.truncation(gate), rel=1e-12)
     points = gaussian(100_000)
     inside = points[np.square(points).sum(1) < 6.0]
-    assert np.var(inside, axis=0) == pytest.approx(truncation(6.0), rel=1e-3)
+    assert np.var(inside, axis=0) == pytest.approx(gate_factor(6.0), rel=1e-3)
 
 
 def noise_of(seen, extent, size, rules, cov=None):
     own = np.full(3, np.nan) if cov is None else np.array([cov[0, 0], cov[0, 1], cov[1, 1]])
-    xx, xy, yy = kernels._centroid_noise(float(seen), own, extent, float(size), rules.numbers)
+    xx, xy, yy = centroid_noise(float(seen), own, extent, float(size), rules.numbers)
     return np.array([[xx, xy], [xy, yy]])
 
 
@@ -315,14 +316,13 @@ def test_centroid_with_strangers() -> None:
 
 def bank(**given):
     """Groups, of which only some things are said."""
-    n, made = len(given["size"]), Bank.empty()
-    for f in fields(Bank):
+    n, made = len(given["size"]), GroupBank.empty()
+    for f in fields(GroupBank):
         none = getattr(made, f.name)
         nil = [[] for _ in range(n)] if isinstance(none, list) else np.zeros((n, *none.shape[1:]), none.dtype)
         setattr(made, f.name, given.get(f.name, nil))
-    return replace(
-        made, id=np.arange(n), places=given.get("places", [(np.zeros((1, 2)), np.zeros(1), np.ones(1, bool))] * n)
-    )
+    one_place = MemberPlaces(np.zeros((1, 2)), np.zeros(1), np.ones(1, bool))
+    return replace(made, id=np.arange(n), members=given.get("members", [one_place] * n))
 
 
 def samples(r, count):
@@ -332,13 +332,13 @@ def samples(r, count):
     x = np.hstack([mean, r.normal(size=(count, 2))])
     extent = np.array([np.cov(y.T, bias=True).reshape(2, 2) for y in points])
     P = np.array([positive(r, 4) for _ in range(count)])
-    places = [
-        (y - m, np.full(len(y), float(k)), np.ones(len(y), bool))
+    members = [
+        MemberPlaces(y - m, np.full(len(y), float(k)), np.ones(len(y), bool))
         for k, (y, m) in enumerate(zip(points, mean, strict=True))
     ]
     size = np.array([float(len(y)) for y in points])
     born = r.permutation(count).astype(float)
-    return points, bank(x=x, P=P, extent=extent, size=size, born=born, places=places)
+    return points, bank(x=x, P=P, extent=extent, size=size, first_seen=born, members=members)
 
 
 @pytest.mark.parametrize("seed", range(20))
@@ -351,7 +351,7 @@ def test_merging_pools_moments(seed: int) -> None:
     np.testing.assert_allclose(one.x[0, 2:], np.average(groups.x[:, 2:], axis=0, weights=groups.size), atol=1e-12)
     np.testing.assert_allclose(one.extent[0], np.cov(union.T, bias=True), rtol=1e-12, atol=1e-12)
     assert one.size[0] == len(union)
-    place, seen, _ = one.places[0]
+    place, seen, _ = one.members[0]
     np.testing.assert_allclose(place + one.x[0, :2], union, atol=1e-12)
     assert np.array_equal(seen, np.repeat(np.arange(4.0), [len(y) for y in points]))
 
@@ -368,7 +368,7 @@ def test_merging_in_any_order(seed: int) -> None:
     for again in (other, step):
         for name in ("x", "P", "extent", "size"):
             np.testing.assert_allclose(getattr(again, name), getattr(one, name), rtol=1e-12, atol=1e-12)
-        assert again.born[0] == one.born[0] == 0
+        assert again.first_seen[0] == one.first_seen[0] == 0
     assert other.id[0] == one.id[0]
     assert groups.size[one.id[0]] == groups.size.max()
 
@@ -400,17 +400,17 @@ def test_what_split_does_not_merge_in_the_same_frame(pixels: bool) -> None:
     for seed in range(100):
         r = np.random.default_rng(seed)
         person = np.diag([0.05, 0.2]) if pixels else None
-        rules = make_rules(GroupPdaConfig(merge_time=0.0), 10.0, 1.0, person)
+        rules = scale_parameters(GroupPdaConfig(merge_time=0.0), 10.0, 1.0, person)
         points = r.uniform(0, 9, (int(r.integers(2, 9)), 2))
         if pixels:
             points = np.concatenate([p + r.normal(0, [0.1, 0.3], (40, 2)) for p in points])
         weights = np.full(len(points), 1 / 40 if pixels else 1.0)
         one = newborn(points, weights, np.zeros(len(points), np.int64), rules, 1.0)
-        one.id[:], names = 0, changes.Names()
-        split = changes.split(one, 0, points, weights, rules, 1.0, names)
-        splits += split is not None
-        assert split is None or len(one) == len(split.after) > 1
-        assert not list(Merging().step(one, rules, 1.0)), seed
+        one.id[:], ids = 0, GroupIds()
+        found = split(one, 0, points, weights, rules, 1.0, ids)
+        splits += found is not None
+        assert found is None or len(one) == len(found.after) > 1
+        assert not list(GroupMerging().step(one, rules, 1.0)), seed
     assert splits > 50
 
 
@@ -420,4 +420,4 @@ def test_near_is_that_of_all_pairs(seed: int) -> None:
     place, points = (np.round(r.uniform(0, 5, (int(r.integers(0, 20)), 2)), 1) for _ in range(2))
     reach = float(r.choice([0.05, 0.5, 2.0]))
     squared = np.square(place[:, None] - points).sum(2) <= reach**2
-    np.testing.assert_array_equal(near(place, points, reach), squared.any(1))
+    np.testing.assert_array_equal(any_within(place, points, reach), squared.any(1))

@@ -202,7 +202,7 @@ def test_one_who_walks_fast_out_of_the_region_is_split_off(ranks: int, seed: int
     for k in range(80):
         made.append(noisy([block(2, ranks), np.array([[0.9 + 1.6 * max(k - 40, 0) / FPS, 0.0]])], r))
     spells: list[float] = []
-    told = track(made, watch=lambda t, _: spells.append(float(t.bank.null.max(initial=0))))
+    told = track(made, watch=lambda t, _: spells.append(float(t.bank.null_time.max(initial=0))))
     assert max(spells) < GroupPdaConfig().split_time
     ((kind, start, before, after),) = changes(told)
     assert (kind, before, after) == ("split", (1,), (1, 2))

@@ -1,0 +1,154 @@
+"""Data association of `group-pda`: which points a group may have (gate, attachment), and its update by them (4).
+
+Order in a frame: `gated_distances`, `attached`, `claimed` (then tracking.papers.group_pda.missed_members adds missed
+members), `associate`. The masses and the update are in association_kernels and association_mass_kernels.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from sim.types import Array, Bools, Ints
+from tracking.filters.components import linked
+from tracking.papers.group_pda import association_kernels as kernels
+from tracking.papers.group_pda.group_bank import GroupBank
+from tracking.papers.group_pda.scaled_parameters import ScaledParameters
+
+FASTEST = 2.0
+"""m/s: nobody walks faster than this relative to a group."""
+
+
+@dataclass(frozen=True)
+class PointClaims:
+    """Which of M points each of G groups may have. Rows of the bank stand for groups.
+
+    points (M, 2); weights (M,): people that each stands for; last_seen (M,) s: when it was measured; d2 (G, M): squared
+    Mahalanobis distances, inf outside the regions; owner (M,): row of the one group that may have the point although it
+    is in no region, or -1; claimants (M,): number of groups that may have the point.
+    """
+
+    points: Array
+    weights: Array
+    last_seen: Array
+    d2: Array
+    owner: Ints
+    claimants: Ints
+
+
+@dataclass(frozen=True)
+class Associated:
+    """The result of `associate`.
+
+    chosen (G, M): points of each group's likeliest association, which groups may share; exclusive (G, M): the same with
+    each point at one group only. innovation: (id, y (2,), S (2, 2)) of each confirmed group that was measured: the
+    innovation of its likeliest association and its covariance.
+    """
+
+    chosen: Bools
+    exclusive: Bools
+    innovation: list[tuple[int, Array, Array]]
+
+
+def gated_distances(bank: GroupBank, points: Array, scaled: ScaledParameters, t: float) -> Array:
+    """Return squared Mahalanobis distances (G, M) of the points (M, 2), inf outside a group's search region (2.2).
+
+    Lost groups have no region. Tentative groups have no points that lie in a confirmed group's region. The region of a
+    group without feasible associations widens at `split_speed`.
+    """
+    config = scaled.config
+    lost = bank.confirmed & (t - bank.last_seen > max(config.coast_time, scaled.dt) + 1e-9)
+    wider = np.square(scaled.scale * config.split_speed * bank.null_time)
+    d2 = kernels.search(points, bank.x, bank.P, bank.extent, scaled.point_sd**2, wider, config.gate)
+    d2[lost] = np.inf
+    tentative = ~bank.confirmed
+    if tentative.any():
+        claimed_by_confirmed = np.isfinite(d2[~tentative]).any(0)
+        d2[np.ix_(tentative, claimed_by_confirmed)] = np.inf
+    return d2
+
+
+def attached(points: Array, d2: Array, bank: GroupBank, scaled: ScaledParameters) -> Ints:
+    """Return for each point (M,) the row of the group that it is attached to, or -1 (ours).
+
+    A point in no region is attached to a group if it is linked (R_0), directly or through others, to a point in the
+    group's region; of several groups, to the one whose point is nearest. From points, a confirmed group takes only
+    points within walking distance of its members: the others are newcomers or false alarms.
+    """
+    link, owner = scaled.constraint.link, np.full(len(points), -1)
+    taken = np.isfinite(d2).any(0) if len(d2) else np.zeros(len(points), bool)
+    if taken.all() or not taken.any():
+        return owner
+    label = linked(points, link)
+    free = np.flatnonzero(~taken & np.isin(label, label[taken]))
+    for part in np.unique(label[free]).tolist():
+        mine, theirs = free[label[free] == part], np.flatnonzero(taken & (label == part))
+        nearest_group = d2[:, theirs].argmin(0)
+        if len(np.unique(nearest_group)) == 1:
+            owner[mine] = nearest_group[0]
+            continue
+        apart = np.square(points[mine][:, None] - points[theirs]).sum(2)
+        owner[mine] = nearest_group[apart.argmin(1)]
+    if not scaled.from_pixels:
+        for row in np.unique(owner[owner >= 0]).tolist():
+            mine = np.flatnonzero(owner == row)
+            if bank.confirmed[row]:
+                reach = float(walking_reach(scaled, np.array(scaled.dt)))
+                owner[mine[~kernels.any_within(points[mine], bank.positions(row), reach)]] = -1
+    return owner
+
+
+def walking_reach(scaled: ScaledParameters, elapsed: Array) -> Array:
+    """Return how far (K,) a member may be from its predicted place, `elapsed` (K,) s after its last measurement.
+
+    Times shorter than a frame count as one frame.
+    """
+    return np.asarray(scaled.scale * FASTEST * np.maximum(elapsed, scaled.dt) + 3 * scaled.point_sd)
+
+
+def claimed(points: Array, weights: Array, d2: Array, owner: Ints, t: float) -> PointClaims:
+    """Return the claims on the points of frame time t. owner (M,): from `attached`, or -1 for all points."""
+    claimants = np.where(owner >= 0, 1, np.isfinite(d2).sum(0))
+    return PointClaims(points, weights, np.full(len(points), t), d2, owner, claimants)
+
+
+def associate(bank: GroupBank, claims: PointClaims, log_ratio: Array, scaled: ScaledParameters, t: float) -> Associated:
+    """Update the groups of the bank by their associations (4.1 to 4.3) and return the points that they have.
+
+    log_ratio (G, M): of the points' colours (tracking.papers.group_pda.colour), or (G, 0) without colours.
+    A group counts as measured if its association has a point of this frame. `null_time` grows by a frame for a group
+    without feasible associations, and shrinks by a frame, down to 0, for a measured one.
+    """
+    weighted = scaled.config.appearance * log_ratio
+    state, chosen, report = kernels.associate(
+        claims.points, claims.weights, claims.d2, weighted, claims.owner, claims.claimants,
+        bank.x, bank.P, bank.extent, bank.size, bank.null_time > 0, scaled.kernel_rules,
+    )  # fmt: skip
+    has_new_point = (chosen & (claims.last_seen >= t)).any(1)  # more than missed members
+    measured, null = (state == kernels.MEASURED) & has_new_point, state == kernels.NULL
+    bank.last_seen[measured | null] = t
+    bank.measured_time[measured] += scaled.dt
+    shorter = np.maximum(bank.null_time - scaled.dt * measured, 0.0)
+    bank.null_time = np.where(null, bank.null_time + scaled.dt, shorter)
+    mean = report[:, [kernels.INNOVATION_X, kernels.INNOVATION_Y]]
+    S = report[:, [kernels.S_XX, kernels.S_XY, kernels.S_XY, kernels.S_YY]].reshape(-1, 2, 2)
+    innovation = [
+        (int(bank.id[g]), mean[g].copy(), S[g].copy()) for g in np.flatnonzero(measured & bank.confirmed).tolist()
+    ]
+    exclusive = chosen & nearest_claims(chosen, claims.d2, log_ratio)
+    bank.own_people = exclusive @ claims.weights
+    return Associated(chosen, exclusive, innovation)
+
+
+def nearest_claims(claimed: Bools, d2: Array, log_ratio: Array) -> Bools:
+    """Return the claims (G, M) with each point at one group only: the nearest of those that claim it.
+
+    d2 (G, M): squared distances from the centroids; the colours' log_ratio (G, M), or (G, 0), counts twice against it.
+    """
+    one, shared = claimed.copy(), np.flatnonzero(claimed.sum(0) > 1)
+    if len(shared):
+        distance = d2[:, shared] - 2 * log_ratio[:, shared] if log_ratio.shape[1] else d2[:, shared]
+        nearest = np.where(claimed[:, shared], distance, np.inf).argmin(0)
+        one[:, shared] = np.arange(len(claimed))[:, None] == nearest
+    return one

@@ -1,0 +1,110 @@
+"""Kernels of `group-pda`: the parts of an association's mass (4.2), and the noise of a measured centroid.
+
+m_d is `log_density` of the centroid with S = H P H' + R, where R is `centroid_noise`; m_N is `log_count`; m_g is 1 for
+a feasible association. `log_miss` is the mass of the miss hypothesis. The module association_kernels puts them
+together. Symmetric 2 x 2 matrices are stored as (3,) = xx, xy, yy. The slots of the array `rules` are named here.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numba import njit
+
+from sim.types import Array
+
+(GATE, LINK, PRIOR_XX, PRIOR_XY, PRIOR_YY, PRIOR_WEIGHT, LEAST_WEIGHT, POINT_SD, COUNT_SD, COUNT_SHARE, DETECT_PROB,
+ MISS_PROB, FREEZE_SHARE, KEEP_EXTENT, KEEP_SIZE, GATE_FACTOR, REDRAWN, TAKE_ALL, LEAST_OTHERS) = range(19)  # fmt: skip
+RULES = 19
+"""Slots of the array `rules`, RULES in all; tracking.papers.group_pda.scaled_parameters fills them.
+
+GATE: squared Mahalanobis radius in the group constraint. LINK: 2 r of R_0. PRIOR_XX, _XY, _YY: covariance that extents
+are shrunk to, with the weight PRIOR_WEIGHT in people. LEAST_WEIGHT: people below which a component is noise. POINT_SD:
+standard deviation of one person's measured position. COUNT_SD (people), COUNT_SHARE: sigma_n^2 = COUNT_SD^2 +
+(COUNT_SHARE N)^2. DETECT_PROB: probability that a member is among the points. MISS_PROB: prior probability of the miss
+hypothesis, 0 without it. FREEZE_SHARE: share of N in shared points above which extent and size rest. KEEP_EXTENT,
+KEEP_SIZE: alpha_s, alpha_N of (2.4) per frame. GATE_FACTOR: share of its covariance that a Gaussian keeps inside the
+gate. REDRAWN: 1 if members are drawn anew in each frame. TAKE_ALL: 1 if a group takes all points in its region (5.2.1).
+LEAST_OTHERS: lower bound of n - 1 in the variance of a mean drawn without replacement.
+"""
+
+NEWCOMERS = 0.02
+"""Probability that a group's number of people does not depend on its number before."""
+
+
+@njit(cache=True)
+def running_moments(points: Array, weights: Array, x: float, y: float, start: int) -> tuple[Array, Array, Array]:
+    """Return people (J,), centroid (J, 2) relative to (x, y) and 1/N covariance (J, 3) of each association's points.
+
+    Association j has the first start + j points. Its sums come from those of the one before (4.2.1).
+    """
+    count = len(points) - start + 1
+    people, mean, cov = np.zeros(count), np.zeros((count, 2)), np.zeros((count, 3))
+    n = sx = sy = sxx = sxy = syy = 0.0
+    for k in range(len(points) + 1):
+        if k >= start and n > 0:
+            j = k - start
+            u, v = sx / n, sy / n
+            people[j], mean[j, 0], mean[j, 1] = n, u, v
+            cov[j, 0], cov[j, 1], cov[j, 2] = max(sxx / n - u * u, 0.0), sxy / n - u * v, max(syy / n - v * v, 0.0)
+        if k < len(points):
+            w, u, v = weights[k], points[k, 0] - x, points[k, 1] - y
+            n, sx, sy = n + w, sx + w * u, sy + w * v
+            sxx, sxy, syy = sxx + w * u * u, sxy + w * u * v, syy + w * v * v
+    return people, mean, cov
+
+
+@njit(cache=True)
+def log_count(people: float, size: float, width: float) -> float:
+    """Return log m_N of (4.2), density per person: a Gaussian about N with variance `width`.
+
+    Departure: a small uniform part gives it tails, because people who join a group come all at once.
+    """
+    gauss = np.exp(-0.5 * (people - size) ** 2 / width) / np.sqrt(2 * np.pi * width)
+    return float(np.log((1 - NEWCOMERS) * gauss + NEWCOMERS / (size + people + 1)))
+
+
+@njit(cache=True)
+def centroid_noise(seen: float, cov: Array, extent: Array, size: float, rules: Array) -> tuple[float, float, float]:
+    """Return R (xx, xy, yy), the covariance of the centroid of m = `seen` people about that of all n people there.
+
+    n = size / DETECT_PROB. cov (3,): covariance of the seen people.
+    - REDRAWN, (2.1) read literally: Sigma / m.
+    - Members keep their places (ours): r^2 / m + (1 - m / n) n / (n - 1) Sigma / m, the variance of a mean of m drawn
+      out of n without replacement, with Sigma less r^2.
+    - More are seen than are there: the same with the roles exchanged and `cov` for Sigma.
+    n - 1 is at least LEAST_OTHERS: 1 from points, where a size between one and two means doubt about which of the two.
+    """
+    noise = rules[POINT_SD] ** 2  # Sigma is the covariance of measured positions, so it contains this variance
+    if rules[REDRAWN] > 0:
+        return extent[0, 0] / seen, extent[0, 1] / seen, extent[1, 1] / seen
+    there = size / rules[DETECT_PROB]
+    if seen > there:  # some seen people are strangers: the members are drawn out of the seen
+        strange = (seen - there) / max(seen - 1, 1.0) / max(there, 1.0)
+        own = noise / max(there, 1.0)
+        return own + strange * cov[0], strange * cov[1], own + strange * cov[2]
+    m = max(seen, min(1.0, there))
+    unseen = (there - m) / max(there - 1, rules[LEAST_OTHERS]) / m if there > 1 else 0.0
+    xx, yy = max(extent[0, 0] - noise, 0.0), max(extent[1, 1] - noise, 0.0)
+    return noise / m + unseen * xx, unseen * extent[0, 1], noise / m + unseen * yy
+
+
+@njit(cache=True)
+def log_density(dx: float, dy: float, S: Array) -> float:
+    """Return log m_d of (4.2): log N((dx, dy); 0, S), per unit of area. S (3,)."""
+    area = S[0] * S[2] - S[1] * S[1]
+    d2 = (S[2] * dx * dx - 2 * S[1] * dx * dy + S[0] * dy * dy) / area
+    return float(-0.5 * (d2 + np.log(area)) - np.log(2 * np.pi))
+
+
+@njit(cache=True)
+def log_miss(points: Array, weights: Array, start: int, extent: Array, P: Array, size: float, rules: Array) -> float:
+    """Return the log mass of the miss hypothesis (ours): no point is the group's; -inf without the hypothesis.
+
+    The points' centroid is uniform over the region. The number of the unshared points is uniform up to twice the size.
+    """
+    if rules[MISS_PROB] <= 0:
+        return -np.inf
+    xx, yy, xy = extent[0, 0] + P[0, 0], extent[1, 1] + P[1, 1], extent[0, 1] + P[0, 1]
+    area = np.pi * rules[GATE] * np.sqrt(max(xx * yy - xy * xy, 1e-300))
+    strangers = np.log(weights.mean() / (2 * size + 1)) if start > 0 else 0.0
+    return float(np.log(rules[MISS_PROB] / (1 - rules[MISS_PROB])) - np.log(area) + strangers)

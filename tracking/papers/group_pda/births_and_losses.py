@@ -1,0 +1,141 @@
+"""Births, confirmation, recapture and loss of `group-pda`'s groups: how a group's life begins and ends.
+
+Each function changes the bank in place. Events of confirmed groups are returned as `BankEvent`s.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+
+from sim.types import Array, Bools, Ints
+from tracking.filters.components import partition
+from tracking.papers.group_pda.association import walking_reach
+from tracking.papers.group_pda.group_bank import NO_ID, GroupBank, GroupIds, newborn
+from tracking.papers.group_pda.report import BankEvent
+from tracking.papers.group_pda.scaled_parameters import ScaledParameters
+
+RECAPTURE_GATE = 13.28
+"""99 % quantile of chi-square with 4 degrees of freedom."""
+
+
+@dataclass(frozen=True)
+class ExpectedMembers:
+    """Where K members of confirmed groups should be: place (K, 2), reach (K,) how far from there they may be, and the
+    id of their group (K,)."""
+
+    place: Array
+    reach: Array
+    group: Ints
+
+
+def expected_members(bank: GroupBank, scaled: ScaledParameters, t: float) -> ExpectedMembers:
+    """Return the expected members of the confirmed groups that were measured within `carry_time`, or a frame."""
+    recent = t - bank.last_seen <= max(scaled.config.carry_time, scaled.dt) + 1e-9
+    rows = np.flatnonzero(bank.confirmed & recent).tolist()
+    places = [bank.positions(r) for r in rows]
+    last_seen = np.concatenate([np.zeros(0), *(bank.members[r].last_seen for r in rows)])
+    group = np.repeat(bank.id[rows], [len(p) for p in places])
+    place = np.concatenate([np.zeros((0, 2)), *places])
+    return ExpectedMembers(place, walking_reach(scaled, t - last_seen), group)
+
+
+def add_newborns(
+    bank: GroupBank, points: Array, weights: Array, expected: ExpectedMembers, scaled: ScaledParameters, t: float
+) -> None:
+    """Append the tentative groups that the unclaimed points (M, 2) form under G_y (3.3).
+
+    expected: the members before the groups were updated. A newborn group within their reach is the child of the nearest
+    member's group (ours).
+    """
+    if not len(points):
+        return
+    group = partition(points, weights, scaled.constraint)
+    born = newborn(points, weights, group, scaled, t)
+    for k in range(len(born) if len(expected.place) else 0):
+        d2 = np.square(points[group == k][:, None] - expected.place).sum(2).min(0)
+        d2[d2 > expected.reach**2] = np.inf
+        row = np.flatnonzero(bank.id == expected.group[d2.argmin()])
+        if len(row) and np.isfinite(d2.min()):
+            _set_parent(born, k, bank, int(row[0]), scaled)
+    bank.add(born)
+
+
+def _set_parent(born: GroupBank, k: int, bank: GroupBank, row: int, scaled: ScaledParameters) -> None:
+    """Make newborn group k a child of the group in `row`, with its velocity if `inherit_velocity` is set.
+
+    Its origin is the common centroid of both.
+    """
+    share = bank.size[row] / (bank.size[row] + born.size[k])
+    born.parent[k] = bank.id[row]
+    born.origin[k] = share * bank.x[row, :2] + (1 - share) * born.x[k, :2]
+    if scaled.config.inherit_velocity:
+        born.x[k, 2:] = bank.x[row, 2:]
+        born.P[k, 2:, 2:] = bank.P[row, 2:, 2:] + (scaled.scale * scaled.config.split_speed) ** 2 * np.eye(2)
+
+
+def confirm(bank: GroupBank, scaled: ScaledParameters, t: float, ids: GroupIds) -> Iterator[BankEvent]:
+    """Give ids to tentative groups that were measured for longer than `confirm_time`; yield their events.
+
+    A group that fits an unmeasured confirmed group takes over its id, without an event; the old row becomes tentative
+    and is dropped. Any other group gets a fresh id, with a split if its parent still exists, else an enter.
+    """
+    c = scaled.config
+    new = np.flatnonzero(~bank.confirmed & (bank.measured_time > c.confirm_time + 1e-9))
+    old = np.flatnonzero(bank.confirmed & (bank.last_seen < t)) if c.recapture else new[:0]
+    recaptured = dict(_recaptured(bank, new, old, scaled)) if len(new) and len(old) else {}
+    for row in new.tolist():
+        place = tuple(bank.x[row, :2].tolist())
+        if row in recaptured:
+            lost = recaptured[row]
+            bank.id[row], bank.first_seen[row] = bank.id[lost], bank.first_seen[lost]
+            bank.id[lost], bank.last_seen[lost] = NO_ID, -np.inf
+        else:
+            bank.id[row] = ids.new()
+            id, parent = int(bank.id[row]), int(bank.parent[row])
+            if parent != NO_ID and (bank.id == parent).any():
+                place = tuple(bank.origin[row].tolist())
+                yield BankEvent("split", float(bank.first_seen[row]), (parent,), tuple(sorted((parent, id))), place)
+            else:
+                yield BankEvent("enter", float(bank.first_seen[row]), (), (id,), place)
+
+
+def _recaptured(bank: GroupBank, new: Ints, old: Ints, scaled: ScaledParameters) -> Iterator[tuple[int, int]]:
+    """Pairs (row of a new group, row of an unmeasured old group) that are the same group, nearest first.
+
+    The new state lies in the old group's predicted region of position and velocity, the velocities differ by no more
+    than `merge_velocity` and a standard deviation, and the old group was not measured after the new one's birth. No row
+    occurs twice.
+    """
+    d = bank.x[new][:, None] - bank.x[old]
+    S = bank.P[new][:, None] + bank.P[old]
+    S[..., :2, :2] += bank.extent[old]
+    d2 = np.einsum("nki,nki->nk", d, np.linalg.solve(S, d[..., None])[..., 0])
+    metres = scaled.metres_per_unit
+    speed_sd = np.sqrt(np.einsum("nkaa,a->nk", S[..., 2:, 2:], np.square(metres)) / 2)
+    alike = np.hypot(*np.moveaxis(d[..., 2:] * metres, 2, 0)) <= scaled.config.merge_velocity + speed_sd
+    gone = bank.last_seen[old] < bank.first_seen[new][:, None]
+    d2 = np.where(alike & gone & (d2 <= RECAPTURE_GATE), d2, np.inf)
+    while np.isfinite(d2).any():
+        i, j = np.unravel_index(int(d2.argmin()), d2.shape)
+        yield int(new[i]), int(old[j])
+        d2[i], d2[:, j] = np.inf, np.inf
+
+
+def remove_lost(bank: GroupBank, scaled: ScaledParameters, t: float) -> Iterator[BankEvent]:
+    """Remove the groups that were not measured for too long; yield a leave event for each confirmed one.
+
+    Too long is `confirm_time` for a tentative group, `coast_time` for a confirmed one, or `recapture_time` if that is
+    longer and recapture is on. The event's onset and position are those of the last measurement.
+    """
+    c = scaled.config
+    patience = np.where(bank.confirmed, max(c.coast_time, c.recapture_time if c.recapture else 0.0), c.confirm_time)
+    dead: Bools = t - bank.last_seen > patience + 1e-9
+    for row in np.flatnonzero(dead & bank.confirmed).tolist():
+        last_seen = float(bank.last_seen[row])
+        place = bank.x[row, :2] - (t - last_seen) * bank.x[row, 2:]
+        yield BankEvent("leave", last_seen, (int(bank.id[row]),), (), tuple(place.tolist()))
+    if dead.any():
+        bank.keep(~dead)

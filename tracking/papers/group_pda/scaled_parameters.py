@@ -1,0 +1,109 @@
+"""The parameters of `group-pda` in the unit of the points (m or px) and per frame, with the `rules` of the kernels."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from sim.types import Array
+from tracking.filters.components import Constraint
+from tracking.papers.group_pda import association_mass_kernels as kernels
+from tracking.papers.group_pda.config import GroupPdaConfig
+
+COLOUR_BINS = 64
+"""Bins of a group's colour histogram (tracking.papers.group_pda.colour)."""
+
+
+@dataclass(frozen=True)
+class ScaledParameters:
+    """Lengths are in the unit of the points: m on the ground, px in the image.
+
+    dt: s between frames. scale: units per metre. constraint: of the group constraint G_y (3.3). point_sd: standard
+    deviation of one person's measured position. kernel_rules (RULES,): the array `rules` of the kernels. F, Q (4, 4) of
+    (2.3). from_pixels: the points are foreground pixels, not people. metres_per_unit (2,): metres on the ground per
+    unit along x and along y (depth in an image). body_cov (2, 2): covariance of one person's pixels, 0 from points.
+    colour_bins: bins of colour histograms, 0 if colours are not used.
+    """
+
+    config: GroupPdaConfig
+    dt: float
+    scale: float
+    constraint: Constraint
+    point_sd: float
+    kernel_rules: Array
+    F: Array
+    Q: Array
+    from_pixels: bool
+    metres_per_unit: Array
+    body_cov: Array
+    colour_bins: int
+
+
+def scale_parameters(
+    config: GroupPdaConfig, fps: float, scale: float, body_cov: Array | None = None, sine_tilt: float = 1.0
+) -> ScaledParameters:
+    """Return the parameters for a frame rate and a scale in units per metre.
+
+    body_cov (2, 2): covariance of one person's pixels in px^2; None if the points are people.
+    sine_tilt: sine of the camera's tilt, the factor by which lengths in depth are shortened in the image.
+    """
+    c, dt, pixels = config, 1 / fps, body_cov is not None
+    point_sd = scale * (c.pixel_noise if pixels else c.point_noise)
+    prior = (scale * c.person_spread) ** 2 * np.eye(2) if body_cov is None else body_cov
+    link = 2 * scale * (c.pixel_radius if pixels else c.radius)
+    factor = gate_factor(c.gate) if c.gate_correction else 1.0
+    # Every extent is (sample covariance shrunk towards `prior`) / factor. G_y must use the same extents: otherwise
+    # groups that it separates would be merged again.
+    constraint = Constraint(link, c.gate / factor, factor * prior, c.spread_weight, c.least_people if pixels else 0.0)
+    F = np.eye(4)
+    F[0, 2] = F[1, 3] = dt
+    block = np.array([[dt**4 / 4, dt**3 / 2], [dt**3 / 2, dt**2]])
+    return ScaledParameters(
+        config=config,
+        dt=dt,
+        scale=scale,
+        constraint=constraint,
+        point_sd=point_sd,
+        kernel_rules=_kernel_rules(c, fps, constraint, point_sd, factor, pixels),
+        F=F,
+        Q=np.kron(block, np.eye(2)) * (scale * c.accel_noise) ** 2 / dt,
+        from_pixels=pixels,
+        metres_per_unit=np.array([1, 1 / sine_tilt]) / scale,
+        body_cov=np.zeros((2, 2)) if body_cov is None else body_cov,
+        colour_bins=COLOUR_BINS if pixels and c.appearance > 0 else 0,
+    )
+
+
+def _kernel_rules(
+    c: GroupPdaConfig, fps: float, constraint: Constraint, point_sd: float, factor: float, pixels: bool
+) -> Array:
+    """The array `rules` of the kernels; its slots are explained in association_mass_kernels."""
+    rules = np.zeros(kernels.RULES)
+    rules[kernels.GATE], rules[kernels.LINK] = constraint.gate, constraint.link
+    rules[kernels.PRIOR_XX : kernels.PRIOR_YY + 1] = constraint.prior_entries
+    rules[kernels.PRIOR_WEIGHT], rules[kernels.LEAST_WEIGHT] = c.spread_weight, constraint.least
+    rules[kernels.POINT_SD] = point_sd
+    rules[kernels.COUNT_SD], rules[kernels.COUNT_SHARE] = c.count_noise, c.count_share
+    looks = 1 + c.carry_time * fps  # a member counts as present if measured in one of these frames
+    rules[kernels.DETECT_PROB] = 1.0 if pixels else 1 - (1 - c.detect_prob) ** looks
+    rules[kernels.MISS_PROB] = c.miss_prob if c.miss else 0.0
+    rules[kernels.FREEZE_SHARE] = c.freeze_share if c.freeze else np.inf
+    dt = 1 / fps
+    rules[kernels.KEEP_EXTENT], rules[kernels.KEEP_SIZE] = np.exp(-dt / np.array([c.extent_time, c.size_time]))
+    rules[kernels.GATE_FACTOR] = factor
+    rules[kernels.REDRAWN] = c.centroid_noise == "redrawn"
+    rules[kernels.TAKE_ALL] = c.association == "none"
+    rules[kernels.LEAST_OTHERS] = 1e-9 if pixels else 1.0
+    if rules[kernels.TAKE_ALL]:
+        rules[kernels.MISS_PROB], rules[kernels.FREEZE_SHARE] = 0.0, np.inf
+    return rules
+
+
+def gate_factor(gate: float) -> float:
+    """Return c: Gaussian points in the plane that lie within the gate have c times the covariance of all points.
+
+    c = F_chi2,4(gate) / F_chi2,2(gate), where gate is the squared Mahalanobis radius.
+    """
+    tail = np.exp(-gate / 2)
+    return float((1 - tail * (1 + gate / 2)) / (1 - tail))

@@ -1,0 +1,66 @@
+"""Splitting of `group-pda`'s groups (3.3): a group without feasible associations falls into those of its points."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from sim.types import Array, Ints
+from tracking.filters.components import partition
+from tracking.papers.group_pda.event_onsets import split_onset
+from tracking.papers.group_pda.group_bank import NO_ID, GroupBank, GroupIds, newborn
+from tracking.papers.group_pda.missed_members import thinned
+from tracking.papers.group_pda.report import BankEvent
+from tracking.papers.group_pda.scaled_parameters import ScaledParameters
+
+
+def split(
+    bank: GroupBank, row: int, points: Array, weights: Array, scaled: ScaledParameters, t: float, ids: GroupIds
+) -> BankEvent | None:
+    """Replace the group in `row` by those that its points (M, 2) form under G_y; return the event of a confirmed group.
+
+    - Several groups: they are appended to the bank in place of the old one. The largest (then the one nearest to the
+      old centroid) keeps the id, the others get fresh ids. The event is a split.
+    - One group: it stays, and its `null_time` ends. None is returned.
+    - No group, only noise: it is removed. The event is a leave.
+    None is returned for a tentative group.
+    """
+    group = partition(points, weights, scaled.constraint)
+    confirmed = bank.id[row] != NO_ID
+    if group.max(initial=-1) < 1:
+        bank.null_time[row] = 0.0
+        if group.max(initial=-1) == 0:
+            return None
+        leave = BankEvent("leave", t, (int(bank.id[row]),), (), tuple(bank.x[row, :2].tolist()))
+        bank.remove(row)
+        return leave if confirmed else None
+    parts = children(bank, row, points, weights, group, scaled, t)
+    away = np.hypot(*(parts.x[:, :2] - bank.x[row, :2]).T)
+    largest, other = np.lexsort((parts.x[:, 1], parts.x[:, 0], away, -parts.size))[:2].tolist()
+    if confirmed:
+        parts.id[:] = [bank.id[row] if k == largest else ids.new() for k in range(len(parts))]
+    two = [thinned(points[group == k]) for k in (largest, other)]
+    onset, place = split_onset(bank.recent_points[row], two, scaled.metres_per_unit, scaled.body_cov, t)
+    event = BankEvent("split", onset, (int(bank.id[row]),), tuple(sorted(parts.id.tolist())), tuple(place.tolist()))
+    bank.remove(row)
+    bank.add(parts)
+    return event if confirmed else None
+
+
+def children(
+    bank: GroupBank, row: int, points: Array, weights: Array, group: Ints, scaled: ScaledParameters, t: float
+) -> GroupBank:
+    """Return a bank of the groups into which the group in `row` splits; group (M,) of each point, -1 none.
+
+    They are newborn from their points. Departures: they keep the parent's age and colours, and, with
+    `inherit_velocity`, its velocity, with `split_speed` as further standard deviation.
+    """
+    c = scaled.config
+    parts = newborn(points, weights, group, scaled, t)
+    parts.first_seen[:], parts.measured_time[:] = bank.first_seen[row], bank.measured_time[row]
+    parts.colour_hist[:] = bank.colour_hist[row]
+    if bank.id[row] == NO_ID:
+        parts.parent[:], parts.origin[:] = bank.parent[row], bank.origin[row]
+    if c.inherit_velocity:
+        parts.x[:, 2:] = bank.x[row, 2:]
+        parts.P[:, 2:, 2:] = bank.P[row, 2:, 2:] + (scaled.scale * c.split_speed) ** 2 * np.eye(2)
+    return parts
