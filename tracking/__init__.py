@@ -1,14 +1,15 @@
-"""From frames to scores: detectors, trackers, grouping, scoring, the commands.
+"""From frames to scores: detectors, trackers, grouping, scoring, tuning, the commands.
 
-`tracking.track(tracker, sequence)` and `tracking.evaluate(truth, tracks)` are the whole of it, `tracking.tune(tracker,
-suite)` a search around them; nothing heavy is imported before it is asked for.
+`tracking.track(tracker, sequence)` returns a run's tracks, `tracking.evaluate(truth, tracks)` their scores, and
+`tracking.tune(tracker, suite)` searches parameters over both. Each is imported when it is first used.
+`import tracking` also registers the Gymnasium environment (tracking.gymnasium_registration).
 """
 
 from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from tracking.gymnasium_registration import announce
+from tracking.gymnasium_registration import register_when_imported
 
 if TYPE_CHECKING:
     from tracking.run import track
@@ -17,7 +18,7 @@ if TYPE_CHECKING:
 
 __all__ = ["evaluate", "track", "tune"]
 
-announce()
+register_when_imported()
 
 _HOME = {"evaluate": "tracking.scoring", "track": "tracking.run", "tune": "tracking.tuning"}
 

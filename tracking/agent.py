@@ -27,7 +27,7 @@ from sim.types import Array, Context, Detections, Frame, Tracker, Tracks
 from tracking import image_scale
 from tracking.config import Config, Value
 from tracking.environment.observation import NAMES, Observer
-from tracking.parameter_space import Space, begun, decode, encode
+from tracking.parameter_space import Space, decode, decode_and_build, encode
 from tracking.tracker_registry import config_class, find
 
 OWN = ("grouped", "group_size", "merges", "splits")
@@ -140,7 +140,7 @@ class Adaptive:
             return tracker
 
         self.inner: Any
-        _, self.inner = begun(policy.space, policy.point(None), policy.base, begin)
+        _, self.inner = decode_and_build(policy.space, policy.point(None), policy.base, begin)
         self.observer, self.answers = Observer(context.fps), list[Tracks]()
 
     @property

@@ -1,8 +1,8 @@
-"""How a tracker declares its parameters: one frozen dataclass, from which space, files and docs are derived.
+"""How a tracker declares its parameters: a frozen dataclass, from which search space, files and docs table are derived.
 
-A field is declared as `gate: float = param(0.99, (0.9, 0.9999), "probability", "share of ...")`. Parameters hold
-seconds, metres and rates, never frame counts. The search space of `tune`, the action space of the environment (fields
-that are `online`: they may change between two frames) and the table in the docs are read from the declarations.
+A field is declared as `gate: float = param(0.99, (0.9, 0.9999), "probability", "share of ...")`. Parameters are
+seconds, metres and rates, never frame counts. The search space of `tune`, the action space of the environment and the
+table in the docs are read from the declarations.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ import tomllib
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, ClassVar, Literal, Self
+from typing import Any, ClassVar, Literal, Self, TypedDict, Unpack
 
 from scenarios.errors import InputError
 from scenarios.loading.toml_files import closest
@@ -21,15 +21,15 @@ from scenarios.loading.toml_files import closest
 Scale = Literal["linear", "log", "int", "categorical"]
 Value = float | int | str | bool
 FROZEN = Path(__file__).parent / "frozen"
+"""Folder of the first defaults of each tracker, NAME.toml."""
 
 
 @dataclass(frozen=True)
 class Param:
-    """One declared parameter: default, unit, meaning, and low..high or choices.
+    """One declared parameter.
 
-    before: of a parameter younger than the frozen first defaults, the value that leaves a tracker as it was without it.
-    sees: "pixels" or "points" of one that says something only where the tracker is given these; a search over other
-    detections leaves it alone.
+    low, high: range, both ends allowed; choices: the allowed values if scale is "categorical". online, tunable, before,
+    sees: see ParamUse.
     """
 
     name: str
@@ -47,14 +47,17 @@ class Param:
 
     @property
     def expected(self) -> str:
-        """What may stand here, in words."""
+        """The allowed values in words, for error messages."""
         if self.scale == "categorical":
             return "one of " + ", ".join(str(c) for c in self.choices)
         kind = "an integer" if self.scale == "int" else "a number"
         return f"{kind} from {self.low:g} to {self.high:g}"
 
     def check(self, value: object, file: object = "") -> Value:
-        """The value in the parameter's own type, or InputError."""
+        """Return the value as float, or as int if scale is "int"; a choice is returned as it is.
+
+        Raises InputError, naming `file`, if the value has a wrong type, is out of range or is no choice.
+        """
         if self.scale == "categorical":
             if any(type(value) is type(c) and value == c for c in self.choices):
                 return value  # type: ignore[return-value]
@@ -67,7 +70,7 @@ class Param:
         raise InputError(file=file, place=self.name, got=repr(value), expected=self.expected, remedy=remedy)
 
     def parse(self, text: str) -> Value:
-        """The value written as `text`, or InputError."""
+        """Return the value that `text` stands for. Raises InputError if it stands for no allowed value."""
         for choice in self.choices:
             if text == str(choice) or (isinstance(choice, bool) and text.lower() == str(choice).lower()):
                 return choice
@@ -77,28 +80,45 @@ class Param:
             return self.check(text)
 
 
+class ParamUse(TypedDict, total=False):
+    """Optional keywords of `param`: where and when the parameter is used.
+
+    online: True (default) if it may change between two frames. tunable: True (default) if searches may change it.
+    before: for a parameter that is missing in the frozen first defaults, the value with which the tracker behaves as it
+    did then. sees: "pixels" or "points" if it has an effect only with these; searches over others leave it out.
+    """
+
+    online: bool
+    tunable: bool
+    before: Value | None
+    sees: Literal["", "pixels", "points"]
+
+
 def param(
     default: Value,
     values: tuple[Any, ...],
     unit: str,
     meaning: str,
     scale: Scale = "linear",
-    *,
-    online: bool = True,
-    tunable: bool = True,
-    before: Value | None = None,
-    sees: Literal["", "pixels", "points"] = "",
+    **use: Unpack[ParamUse],
 ) -> Any:
-    """A dataclass field that is a parameter; `values` is (low, high), or the choices of a categorical one."""
-    ends = {"choices": values} if scale == "categorical" else {"low": values[0], "high": values[1]}
-    spec = {"default": default, "unit": unit, "meaning": meaning, "scale": scale, **ends}
-    spec |= {"online": online, "tunable": tunable, "before": before, "sees": sees}
-    return dataclasses.field(default=default, metadata={"param": spec})
+    """Return a dataclass field that declares a parameter.
+
+    values: (low, high), or the choices if scale is "categorical". unit, meaning: for the docs. scale: how a search
+    moves: "linear" or "log" for numbers, "int" for whole numbers.
+    """
+    categorical = scale == "categorical"
+    low, high = (float("-inf"), float("inf")) if categorical else values
+    declared = Param("", default, unit, meaning, scale, low, high, values if categorical else (), **use)
+    return dataclasses.field(default=default, metadata={"param": declared})
 
 
 @dataclass(frozen=True)
 class Config:
-    """Base of all tracker configs; a subclass sets `tracker` and declares its parameters."""
+    """Base class of configs. A subclass is a frozen dataclass that sets `tracker` and declares its parameters.
+
+    Raises InputError when created with a value that is not allowed or if `check` refuses the values together.
+    """
 
     tracker: ClassVar[str] = ""
 
@@ -108,22 +128,22 @@ class Config:
         self.check()
 
     def check(self) -> None:
-        """Conditions between parameters (a subclass overrides); InputError when broken."""
+        """Raise InputError if the parameters contradict each other; a subclass overrides this."""
 
     @classmethod
     def params(cls) -> dict[str, Param]:
-        """All declared parameters by name, in order."""
+        """Return all declared parameters by name, in order."""
         found = [f for f in dataclasses.fields(cls) if "param" in f.metadata]
-        return {f.name: Param(name=f.name, **f.metadata["param"]) for f in found}
+        return {f.name: dataclasses.replace(f.metadata["param"], name=f.name) for f in found}
 
     @classmethod
     def space(cls, *, online: bool = False) -> tuple[Param, ...]:
-        """The search space: tunable parameters; with `online`, those that may change between frames."""
+        """Return the tunable parameters; with `online` only those of them that may change between two frames."""
         return tuple(p for p in cls.params().values() if p.tunable and (p.online or not online))
 
     @classmethod
     def known(cls, name: str, file: object = "") -> Param:
-        """The parameter of this name; InputError with the nearest known name."""
+        """Return the parameter of this name. Raises InputError with the nearest known name if there is none."""
         declared = cls.params()
         if name in declared:
             return declared[name]
@@ -132,19 +152,25 @@ class Config:
 
     @classmethod
     def from_dict(cls, values: Mapping[str, object], file: object = "") -> Self:
-        """The config with these values, the rest at their defaults."""
+        """Return the config with these values and defaults for the others.
+
+        Raises InputError, naming `file`, for unknown names and values that are not allowed.
+        """
         return cls(**{name: cls.known(name, file).check(value, file) for name, value in values.items()})
 
     @classmethod
     def from_toml(cls, path: str | Path) -> Self:
-        """Read `tracker = "name"` (optional) and the table [params]; what the file leaves out has its default."""
+        """Return the config in a TOML file: optional `tracker = "name"` and a table [params]; the rest has its default.
+
+        Raises InputError if the file cannot be read, is of another tracker, or has wrong keys or values.
+        """
         return cls.from_dict(cls._values(path), path)
 
     @classmethod
     def frozen(cls) -> Self:
-        """The defaults as they were first written, tracking/frozen/NAME.toml, against which tuning is judged.
+        """Return the first defaults of the tracker, from tracking/frozen/NAME.toml, against which tuning is judged.
 
-        Parameters that came later have their `before`; those that the config inherits, their default.
+        A parameter that the file lacks has its `before` if the class declares it, and its default if it is inherited.
         """
         path = FROZEN / f"{cls.tracker}.toml"
         first = cls._values(path)
@@ -155,6 +181,7 @@ class Config:
 
     @classmethod
     def _values(cls, path: str | Path) -> dict[str, object]:
+        """The table [params] of a file, unchecked; InputError if the file is no parameter file of this tracker."""
         text = _read(path)
         try:
             content = tomllib.loads(text)
@@ -171,7 +198,10 @@ class Config:
         return values
 
     def with_set(self, *assignments: str) -> Self:
-        """A copy with `name=value` assignments applied; `tracker.name=value` means the same."""
+        """Return a copy with assignments `name=value`, or `tracker.name=value`, applied.
+
+        Raises InputError for an assignment without "=", an unknown name or a value that is not allowed.
+        """
         changes: dict[str, Any] = {}
         for assignment in assignments:
             name, sign, text = assignment.removeprefix("tracker.").partition("=")
@@ -182,28 +212,30 @@ class Config:
         return dataclasses.replace(self, **changes)
 
     def as_dict(self) -> dict[str, Value]:
-        """Parameter values by name."""
+        """Return the parameters' values by name."""
         return {name: getattr(self, name) for name in self.params()}
 
     def to_toml(self) -> str:
-        """A file that `from_toml` reads back equal."""
+        """Return the text of a TOML file from which `from_toml` reads an equal config."""
         lines = [f"{name} = {_toml(value)}" for name, value in self.as_dict().items()]
         return "\n".join([f'tracker = "{self.tracker}"', "", "[params]", *lines, ""])
 
     @classmethod
     def table(cls) -> str:
-        """The parameters as a Markdown table for the docs."""
+        """Return the parameters as a Markdown table for the docs."""
         rows = [_row(p) for p in cls.params().values()]
         return "\n".join(["| parameter | default | range | unit | meaning |", "|---|---|---|---|---|", *rows, ""])
 
 
 def _row(p: Param) -> str:
+    """A parameter's row of the Markdown table."""
     span = ", ".join(f"`{c}`" for c in p.choices) if p.choices else f"{p.low:g} to {p.high:g}"
     note = " (log)" if p.scale == "log" else ""
     return f"| `{p.name}` | {p.default} | {span}{note} | {p.unit} | {p.meaning} |"
 
 
 def _toml(value: Value) -> str:
+    """A value as TOML."""
     if isinstance(value, bool):
         return str(value).lower()
     return f'"{value}"' if isinstance(value, str) else repr(value)

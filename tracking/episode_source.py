@@ -1,4 +1,7 @@
-"""What episodes are played on: a scenario with a seed, a stored or real sequence, a Sequence in memory."""
+"""The sequences that episodes are played on: scenarios with seeds, stored or real recordings, sequences in memory.
+
+`sources` turns the names, files or sequences that a user gives into `Source`s; `Source.open` makes or reads one.
+"""
 
 from __future__ import annotations
 
@@ -15,12 +18,15 @@ from sim.types import Sequence
 if TYPE_CHECKING:
     from scenarios.loading.resolve import Entry
 
-What = str | Path | Sequence | Iterable["str | Path | Sequence | Source"]
+SourceSpec = str | Path | Sequence | Iterable["str | Path | Sequence | Source"]
 
 
 @dataclass(frozen=True, eq=False)
 class Source:
-    """One sequence to play on: an entry and its seed, or a path, or a Sequence (which alone cannot be pickled)."""
+    """One sequence to play on: a scenario entry with its seed, or a path, or a Sequence in memory.
+
+    Exactly one of entry, path and sequence is set. A source with a Sequence in memory cannot be pickled.
+    """
 
     name: str
     seed: int = 0
@@ -30,7 +36,7 @@ class Source:
 
     @cached_property
     def key(self) -> tuple[object, ...]:
-        """Equal for sources of the same sequence."""
+        """A key that is equal for sources of the same sequence: by scenario content and seed, by path, or by object."""
         if self.entry is not None:
             content = self.entry.scenario.model_dump_json()
             return self.name, self.seed, self.entry.repeat, hashlib.sha256(content.encode()).hexdigest()
@@ -38,7 +44,7 @@ class Source:
 
     @property
     def simulated(self) -> bool:
-        """Is it made from a scenario?"""
+        """True if the sequence is simulated from a scenario."""
         return self.entry is not None
 
     @property
@@ -48,8 +54,11 @@ class Source:
         return self.open().fps if camera is None else camera.fps
 
     def open(self, streams: Iterable[str] = ()) -> Sequence:
-        """The sequence; streams: of the pictures that are drawn where it is simulated, of others "left" lets them be
-        read."""
+        """Return the sequence.
+
+        streams: the picture streams to draw if it is simulated. If it is stored, pictures are read if "left" is in it.
+        A sequence in memory is returned as it is.
+        """
         if self.sequence is not None:
             return self.sequence
         if self.entry is not None:
@@ -61,12 +70,14 @@ class Source:
         return open_source(self.path, images="left" in streams)[0]
 
 
-def sources(what: What | Source, seeds: Iterable[int] = range(10), set: Iterable[str] = ()) -> tuple[Source, ...]:
-    """The sources of a suite's or scenario's name, of a TOML file, of a folder, dataset or recording, of Sequences, of
-    sources themselves, or of a list of such, in order; a scenario with each of the seeds in turn.
+def sources(what: SourceSpec | Source, seeds: Iterable[int] = range(10), set: Iterable[str] = ()) -> tuple[Source, ...]:
+    """Return the sources that `what` stands for, in order.
 
-    set: `key=value` settings of scenarios. InputError where there is nothing of that name, and for settings or seeds
-    without a scenario to apply them to.
+    what: a suite's or scenario's name, a TOML file, a folder, dataset or recording, a Sequence, a Source, or a list of
+    these. A scenario gives one source for each of the seeds.
+    set: `key=value` settings for the scenarios.
+    Raises InputError if a name is unknown, `seeds` is no iterable, `set` is a single string, there is no source at all,
+    or there are settings but no scenario.
     """
     if isinstance(what, str | Path | Sequence | Source):
         what = (what,)
@@ -76,7 +87,7 @@ def sources(what: What | Source, seeds: Iterable[int] = range(10), set: Iterable
     if isinstance(set, str):
         raise InputError(place="set", got=repr(set), expected='a list of "key=value"', remedy=f"write [{set!r}]")
     numbers, settings = tuple(seeds), tuple(set)
-    found = tuple(source for one in what for source in _of(one, numbers, settings))
+    found = tuple(source for item in what for source in _sources_of(item, numbers, settings))
     if not found:
         raise InputError(place="sources", got="none", expected="at least one", remedy="give a suite, or seeds")
     if settings and not any(source.simulated for source in found):
@@ -85,21 +96,24 @@ def sources(what: What | Source, seeds: Iterable[int] = range(10), set: Iterable
     return found
 
 
-def _of(what: str | Path | Sequence | Source, seeds: tuple[int, ...], settings: tuple[str, ...]) -> list[Source]:
-    if isinstance(what, Source):
-        return [what]
-    if isinstance(what, Sequence):
-        return [Source(what.name, int(what.source.get("seed", 0)), sequence=what)]
+def _sources_of(
+    item: str | Path | Sequence | Source, seeds: tuple[int, ...], settings: tuple[str, ...]
+) -> list[Source]:
+    if isinstance(item, Source):
+        return [item]
+    if isinstance(item, Sequence):
+        return [Source(item.name, int(item.source.get("seed", 0)), sequence=item)]
     from scenarios.loading.resolve import names, resolve, suite_names
 
-    text = str(what)
+    text = str(item)
     known = text.endswith(".toml") or text.startswith("suite:") or text in (*names(), *suite_names())
-    if not known and Path(what).exists():
-        return _stored(Path(what))
+    if not known and Path(item).exists():
+        return _stored(Path(item))
     return [Source(e.name, seed, entry=e) for e in resolve(text, settings) for seed in seeds]
 
 
 def _stored(path: Path) -> list[Source]:
+    """The sources of all sequences in a folder, dataset or recording."""
     from sim.io.source import open_source
 
     found = open_source(path, images=False)

@@ -1,6 +1,7 @@
-"""Making `flockscope/Tuning-v0` known to Gymnasium without importing Gymnasium, which takes longer than all of ours.
+"""Registration of the environment `flockscope/Tuning-v0` without an import of Gymnasium, which is slow.
 
-Where it is there already the environment is registered at once, else in the moment in which it has been imported.
+If Gymnasium is imported already, the environment is registered at once. Else an import hook registers it as soon as
+somebody imports Gymnasium.
 """
 
 from __future__ import annotations
@@ -15,12 +16,12 @@ ID = "flockscope/Tuning-v0"
 LIBRARY = "gymnasium"
 
 
-def announce() -> None:
-    """Register the environment now or as soon as there is something to register it with; once, however often asked."""
+def register_when_imported() -> None:
+    """Register the environment now, or when Gymnasium is imported. Further calls have no effect."""
     if hasattr(sys.modules.get(LIBRARY), "register"):
         _register()
-    elif not any(isinstance(finder, _Waiting) for finder in sys.meta_path):
-        sys.meta_path.insert(0, _Waiting())
+    elif not any(isinstance(finder, _RegisteringFinder) for finder in sys.meta_path):
+        sys.meta_path.insert(0, _RegisteringFinder())
 
 
 def _register() -> None:
@@ -30,15 +31,15 @@ def _register() -> None:
         gymnasium.register(ID, entry_point="tracking.environment.env:TuningEnv")
 
 
-class _Waiting(MetaPathFinder):
-    """Finds nothing itself: when the library is looked for, what will load it is told to register afterwards."""
+class _RegisteringFinder(MetaPathFinder):
+    """Import hook: makes the loader of Gymnasium register the environment after loading. It finds no modules itself."""
 
     def find_spec(
         self, fullname: str, path: Sequence[str] | None = None, target: ModuleType | None = None
     ) -> ModuleSpec | None:
         if fullname != LIBRARY:
             return None
-        others = [finder for finder in sys.meta_path if not isinstance(finder, _Waiting)]
+        others = [finder for finder in sys.meta_path if not isinstance(finder, _RegisteringFinder)]
         specs = (finder.find_spec(fullname, path, target) for finder in others)
         spec = next((found for found in specs if found is not None), None)
         if spec is None or spec.loader is None:

@@ -1,11 +1,13 @@
-"""Configs as points of a cube: each parameter of a search space in [-1, 1], log, whole and categorical ones too.
+"""A tracker's parameters as a vector in [-1, 1]^P, for a search or an action, and back: `encode` and `decode`.
+
+With a parameter's coordinate a, its range low … high and its value v:
 
     linear       v = low + (a + 1)/2 (high - low)
     log          v = low (high / low)^((a + 1)/2)
-    int          low … high share [-1, 1] in equal parts; a whole number's own point is the middle of its part
+    int          the whole numbers low … high divide [-1, 1] into equal parts; v is encoded as the middle of its part
     categorical  the same with the choices in their order
 
-Agents and samplers that know nothing of units move in this cube; `tracking.environment.env` acts through it.
+The environment's actions (tracking.environment.env) and the tuning samplers are such vectors.
 """
 
 from __future__ import annotations
@@ -25,29 +27,32 @@ from tracking.config import Config, Param, Value
 T = TypeVar("T")
 Space = tuple[Param, ...]
 HALVINGS = 6
-"""How often the way back to an allowed config is halved."""
+"""Bisections on the line from an allowed config to one that is not."""
 
 
 def space_of(kind: type[Config], mode: DetectionMode | None = None, *, online: bool = False) -> Space:
-    """The parameters of a config to search where a tracker is given pictures ("image") or detections (others): without
-    those that say nothing of these. online: those only that may change between frames."""
-    blind = {"image": "points", None: None}.get(mode, "pixels")
-    return tuple(p for p in kind.space(online=online) if p.sees == "" or p.sees != blind)
+    """Return the tunable parameters of a config class that have an effect in this detection mode.
+
+    Mode "image" leaves out parameters for points, "file" and "truth" those for pixels, None leaves out none.
+    online: only parameters that may change between two frames.
+    """
+    without_effect = {"image": "points", None: None}.get(mode, "pixels")
+    return tuple(p for p in kind.space(online=online) if p.sees == "" or p.sees != without_effect)
 
 
 def encode(space: Space, config: Config) -> Array:
-    """The point (P,) in [-1, 1] that stands for the config's values of these parameters."""
-    return np.array([_inward(p, getattr(config, p.name)) for p in space])
+    """Return the vector (P,) in [-1, 1] of the config's values of the parameters in `space`, in their order."""
+    return np.array([_to_unit(p, getattr(config, p.name)) for p in space])
 
 
 def decode(
     space: Space, action: ArrayLike, base: Config, allowed: Callable[[Config], object] = lambda config: None
 ) -> Config:
-    """The config at a point (P,), clipped to [-1, 1]; what is not in the space stays as in `base`.
+    """Return the config at the vector `action` (P,), which is clipped to [-1, 1]; other parameters are those of `base`.
 
-    Some points are no config: its own `check`, or `allowed`, raises InputError. They are drawn back on the straight
-    line to the point of `base`, which must be one, to the farthest of 2^-6 steps found by bisection that is allowed.
-    InputError where the action has another shape, or is not finite.
+    A config is not allowed if its own `check` or `allowed` raises InputError. Then six bisections look for an allowed
+    config on the line from `base`, which must be allowed, to the action, and the farthest one found is returned.
+    Raises InputError if the action has another shape or is not finite.
     """
     point = _point(action, len(space))
     found = _attempt(space, point, base, allowed)
@@ -61,12 +66,15 @@ def decode(
     return best
 
 
-def begun(space: Space, action: ArrayLike, base: Config, begin: Callable[[Config], T]) -> tuple[Config, T]:
-    """The config at a point (P,), drawn back where `begin` refuses it too, and what `begin` made of it."""
+def decode_and_build(space: Space, action: ArrayLike, base: Config, build: Callable[[Config], T]) -> tuple[Config, T]:
+    """Return the config at the vector `action` (P,) and the result of `build` for it.
+
+    As `decode`, where a config for which `build` raises InputError is not allowed.
+    """
     made: dict[Config, T] = {}
 
     def attempt(config: Config) -> None:
-        made[config] = begin(config)
+        made[config] = build(config)
 
     config = decode(space, action, base, attempt)
     if config not in made:
@@ -75,8 +83,8 @@ def begun(space: Space, action: ArrayLike, base: Config, begin: Callable[[Config
 
 
 def _attempt(space: Space, point: Array, base: Config, allowed: Callable[[Config], object]) -> Config | None:
-    """The config at a point, or None where there is none."""
-    values = {p.name: _outward(p, float(a)) for p, a in zip(space, point, strict=True)}
+    """The config at a vector (P,), or None if it is not allowed."""
+    values = {p.name: _from_unit(p, float(a)) for p, a in zip(space, point, strict=True)}
     try:
         config = dataclasses.replace(base, **values)
         allowed(config)
@@ -86,6 +94,7 @@ def _attempt(space: Space, point: Array, base: Config, allowed: Callable[[Config
 
 
 def _point(action: ArrayLike, size: int) -> Array:
+    """The action as a vector (size,), clipped to [-1, 1]."""
     point = np.asarray(action, float)
     if point.shape != (size,) or not np.isfinite(point).all():
         got = f"shape {point.shape}" if point.shape != (size,) else "NaN or infinity"
@@ -94,7 +103,8 @@ def _point(action: ArrayLike, size: int) -> Array:
     return np.asarray(np.clip(point, -1.0, 1.0))
 
 
-def _inward(p: Param, value: Value) -> float:
+def _to_unit(p: Param, value: Value) -> float:
+    """The coordinate in [-1, 1] of a parameter's value."""
     if p.scale == "categorical":
         return _middle(p.choices.index(value), len(p.choices))
     assert isinstance(value, int | float)
@@ -106,7 +116,8 @@ def _inward(p: Param, value: Value) -> float:
     return 2 * (value - p.low) / (p.high - p.low) - 1
 
 
-def _outward(p: Param, a: float) -> Value:
+def _from_unit(p: Param, a: float) -> Value:
+    """The value of a parameter at a coordinate in [-1, 1]."""
     share = (a + 1) / 2
     if p.scale == "categorical":
         return p.choices[_part(share, len(p.choices))]
@@ -118,15 +129,16 @@ def _outward(p: Param, a: float) -> Value:
 
 
 def _whole(p: Param) -> tuple[int, int]:
-    """The first whole number of a range, and how many there are."""
+    """The first whole number of a parameter's range, and the count of whole numbers in it."""
     first = math.ceil(p.low)
     return first, math.floor(p.high) - first + 1
 
 
 def _middle(k: int, count: int) -> float:
-    """The middle of part k of [-1, 1] in `count` equal parts."""
+    """The middle of part k, from 0, of [-1, 1] divided into `count` equal parts."""
     return (2 * k + 1) / count - 1
 
 
 def _part(share: float, count: int) -> int:
+    """The index of the part, of `count` equal ones, that contains `share` of [0, 1]."""
     return min(int(share * count), count - 1)

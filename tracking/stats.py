@@ -1,7 +1,7 @@
-"""How sure a figure is: bootstrap over sequences and of differences, shares, one recording in moving blocks.
+"""Confidence intervals of scores: bootstrap over sequences, paired differences, shares, moving blocks of one recording.
 
-Frames of a recording resemble their neighbours, so they are never drawn one by one: whole sequences are, or blocks of
-frames. Every interval is of 95 % and the same whenever it is asked for.
+Neighbouring frames are alike, so single frames are never resampled: whole sequences are, or blocks of frames. All
+intervals are 95 % intervals. The random numbers are fixed, so that the same input gives the same interval.
 """
 
 from __future__ import annotations
@@ -14,17 +14,24 @@ import numpy as np
 from sim.types import Array, Ints
 
 DRAWS = 2000
+"""Bootstrap samples."""
 LEVEL = 0.95
-NORMAL = 1.959963984540054  # the standard normal stays within +- this with probability LEVEL
-SHORTEST_BLOCK = 1.0  # s
-BLOCKS = 20  # a recording is drawn in at most so many
-SURE = 60.0  # s: the interval of a shorter recording is indicative only
+"""Confidence level of all intervals."""
+NORMAL = 1.959963984540054
+"""A standard normal variable lies within +- NORMAL with probability LEVEL."""
+SHORTEST_BLOCK = 1.0
+"""s: least length of a moving block."""
+BLOCKS = 20
+"""A resampled recording consists of at most so many blocks."""
+SURE = 60.0
+"""s: the interval of a shorter recording is only indicative."""
 
 
 def bootstrap(values: Array, draws: int = DRAWS) -> tuple[Array, Array, Array]:
-    """Mean, low and high (K,) of percentile intervals over sequences, values (S, K); nan rows of a column are left out.
+    """Return mean, low and high end (K,) each of percentile intervals over S sequences; values (S, K).
 
-    Several runs of one sequence (filter seeds) are to be averaged before. Fewer than two sequences: nan for the ends.
+    nan is left out, for each column by itself. The ends of a column with fewer than two numbers are nan; without any
+    number the mean is nan, too. Average several runs of one sequence (tracker seeds) before the call.
     """
     count, columns = values.shape
     known = np.isfinite(values)
@@ -41,12 +48,18 @@ def bootstrap(values: Array, draws: int = DRAWS) -> tuple[Array, Array, Array]:
 
 
 def paired(first: Array, second: Array, draws: int = DRAWS) -> tuple[Array, Array, Array]:
-    """Mean, low and high (K,) of second - first over the same sequences, (S, K) each; pairs with a nan are left out."""
+    """Return mean, low and high end (K,) each of second - first over the same S sequences; both (S, K).
+
+    Pairs with a nan are left out.
+    """
     return bootstrap(second - first, draws)
 
 
 def wilson(hits: int, count: int) -> tuple[float, float, float]:
-    """Share, low and high of `hits` out of `count` (Wilson 1927): where (share - p)^2 <= z^2 p (1 - p) / count."""
+    """Return the share of `hits` out of `count` and the low and high end of its interval (Wilson 1927).
+
+    The interval holds all p with (share - p)^2 <= z^2 p (1 - p) / count. If count is 0: nan, 0 and 1.
+    """
     if count == 0:
         return float("nan"), 0.0, 1.0
     share, z2 = hits / count, NORMAL**2 / count
@@ -58,10 +71,11 @@ def wilson(hits: int, count: int) -> tuple[float, float, float]:
 def moving_blocks(
     score: Callable[[Ints], Array], frames: int, fps: float, draws: int = DRAWS
 ) -> tuple[Array, Array, Array]:
-    """Scores of one recording and their low and high ends (K,), frames drawn in moving blocks (Künsch 1989).
+    """Return the scores of one recording and the low and high ends of their intervals, (K,) each.
 
-    score: takes places of frames 0 … frames - 1, some more than once, and gives scores (K,), nan where there is none.
-    Under SURE seconds the ends are indicative. Differences: let score give them, of both trackers in the same frames.
+    Frames are resampled in moving blocks (Künsch 1989). score: takes indices (N,) of frames, from 0, some more than
+    once, and returns scores (K,), nan where undefined. For an interval of a difference let it return the difference of
+    two trackers in the same frames. The ends are nan where all samples are nan. Under SURE seconds they are indicative.
     """
     whole = np.asarray(score(np.arange(frames)), float)
     r = np.random.default_rng(0)
@@ -74,16 +88,17 @@ def moving_blocks(
 
 
 def block_length(frames: int, fps: float) -> int:
-    """Frames of a block: at least a second and a twentieth of the recording, at most all of it."""
+    """Return the frames of a block: the longer of 1 s and a twentieth of the recording, but at most all frames."""
     return min(frames, max(1, ceil(SHORTEST_BLOCK * fps), ceil(frames / BLOCKS)))
 
 
 def draw_blocks(frames: int, block: int, r: np.random.Generator) -> Ints:
-    """Places of frames (frames,): blocks of neighbours from random starts, the last one cut off."""
+    """Return indices (frames,) of frames: blocks of `block` consecutive frames from random starts, the last one cut."""
     starts = r.integers(0, frames - block + 1, -(-frames // block))
     return np.asarray((starts[:, None] + np.arange(block)).ravel()[:frames])
 
 
 def _ends(drawn: Array) -> Array:
+    """Low and high end (2,) of the interval of these samples."""
     tail = (1 - LEVEL) / 2
     return np.asarray(np.quantile(drawn, (tail, 1 - tail)))

@@ -1,4 +1,4 @@
-"""Detections made from labels: perfect, or degraded by a sensor's overrides (`--detections truth`)."""
+"""Detections made from the labels, for `--detections truth`: perfect, or degraded by sensor settings."""
 
 from __future__ import annotations
 
@@ -10,12 +10,18 @@ import numpy as np
 from scenarios.errors import InputError
 from sim.types import Detections, FrameTruth, Sequence, Truth
 
-PERFECT = {"detect_prob": 1.0, "clutter_rate": 0.0, "noise_px": 0.0, "noise_m": 0.0, "box": "amodal"}
-ALWAYS = {"occlusion_power": 0.0, "min_visibility": 0.0, "small_px": 0.0}
+_PERFECT_SENSOR = {"detect_prob": 1.0, "clutter_rate": 0.0, "noise_px": 0.0, "noise_m": 0.0, "box": "amodal"}
+_SEES_ALL = {"occlusion_power": 0.0, "min_visibility": 0.0, "small_px": 0.0}
+"""Settings by which hidden and small people are detected as well as others."""
 
 
 def from_truth(sequence: Sequence, sensor: Mapping[str, Any], seed: int) -> Iterator[Detections]:
-    """Detections of every labelled frame in order; `sensor` overrides start from perfect sight, keys as in [sensor]."""
+    """Return an iterator over the detections of a labelled sequence, one for each frame in order.
+
+    sensor: settings with the keys of a scenario's [sensor]; those left out have the value of a perfect sensor. Empty:
+    the labels themselves. seed: of the sensor's random numbers.
+    Raises InputError if a key is unknown, a value is wrong, or a group that is to be hidden is not in the script.
+    """
     truth = sequence.truth
     assert truth is not None, "the mode was chosen for a source with labels"
     if not sensor:
@@ -24,7 +30,11 @@ def from_truth(sequence: Sequence, sensor: Mapping[str, Any], seed: int) -> Iter
 
 
 def perfect(truth: FrameTruth) -> Detections:
-    """The labels themselves: on the ground where positions are known, else the boxes' centres; no velocities."""
+    """Return the labels of a frame as detections with score 1 and no velocities.
+
+    They are in the plane "ground" at the labelled positions, with the labelled boxes if there are any. Without
+    positions they are in the plane "image", at the centres of the boxes.
+    """
     score = np.ones(len(truth.id))
     if truth.pos is not None:
         return Detections(truth.index, truth.t, "ground", truth.pos, None, truth.box, score)
@@ -33,6 +43,7 @@ def perfect(truth: FrameTruth) -> Detections:
 
 
 def _sensed(truth: Truth, sequence: Sequence, sensor: Mapping[str, Any], seed: int) -> Iterator[Detections]:
+    """The detections of a sensor with these settings."""
     from pydantic import ValidationError
 
     from scenarios.schema.sensor import Sensor
@@ -40,7 +51,7 @@ def _sensed(truth: Truth, sequence: Sequence, sensor: Mapping[str, Any], seed: i
     from sim.scene.box_visibility import with_visibility
 
     try:
-        spec = Sensor.model_validate({**PERFECT, **ALWAYS, **sensor})
+        spec = Sensor.model_validate({**_PERFECT_SENSOR, **_SEES_ALL, **sensor})
     except ValidationError as error:
         first = error.errors()[0]
         place = ".".join(["sensor", *map(str, first["loc"])])
@@ -48,6 +59,6 @@ def _sensed(truth: Truth, sequence: Sequence, sensor: Mapping[str, Any], seed: i
         raise InputError(place=place, got=first["input"], expected=expected, remedy="see docs/formats.md") from None
     if spec.box == "visible" or spec.by_visibility or spec.occlusion_power or spec.min_visibility:
         truth = with_visibility(truth, sequence.image_size)
-    by_name, cast = any(hide.group is not None for hide in spec.hide), sequence.load_people
-    people = cast() if by_name and cast is not None else {}
+    hides_groups, load_people = any(hide.group is not None for hide in spec.hide), sequence.load_people
+    people = load_people() if hides_groups and load_people is not None else {}
     return iter(sense(truth, spec, seed, sequence.camera, sequence.image_size, people=people))

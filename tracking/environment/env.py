@@ -25,8 +25,8 @@ from tracking.detection_mode import choose_mode
 from tracking.environment.episode_cache import LIMIT, Cache
 from tracking.environment.episodes import AnyTracker, Rollout, streams_for
 from tracking.environment.observation import NAMES, Observer
-from tracking.episode_source import Source, What, sources
-from tracking.parameter_space import Space, begun, decode, encode, space_of
+from tracking.episode_source import Source, SourceSpec, sources
+from tracking.parameter_space import Space, decode, decode_and_build, encode, space_of
 from tracking.prepare import Params, config_of
 from tracking.tracker_registry import checked, config_class, find
 
@@ -53,7 +53,7 @@ class TuningEnv(gymnasium.Env[Floats, Floats]):
     def __init__(
         self,
         tracker: AnyTracker,
-        suite: What | Source = "quick",
+        suite: SourceSpec | Source = "quick",
         *,
         seeds: Iterable[int] = range(100),
         set: Iterable[str] = (),
@@ -141,7 +141,9 @@ class TuningEnv(gymnasium.Env[Floats, Floats]):
         if self._observer is None:
             raise InputError(place="step", got="no episode", expected="one that was begun", remedy="call reset() first")
         if self.decision_every is None:
-            self.config, rollout = begun(self.space, action, self.base, lambda c: self._begun(c, self.source))
+            self.config, rollout = decode_and_build(
+                self.space, action, self.base, lambda c: self._begun(c, self.source)
+            )
             self.rollout = rollout
             whole = self._track(None)
         else:
