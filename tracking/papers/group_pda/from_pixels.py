@@ -1,4 +1,7 @@
-"""From a picture to the points of `group-pda`: foreground pixels on a grid, each a share of a person (ours)."""
+"""From a picture to the points of `group-pda`: foreground pixels on a grid, each a share of a person (ours).
+
+The foreground comes from tracking.detect.foreground.
+"""
 
 from __future__ import annotations
 
@@ -11,15 +14,19 @@ from tracking.detect.person_size import PersonSize
 from tracking.image_scale import required
 from tracking.papers.group_pda.config import GroupPdaConfig
 
-SLIM = 0.3
-"""Width over height of a person seen from the side: where no camera tells."""
-LEAST_STEEP = 0.2
-"""A view nearly along the ground tells next to nothing of depth."""
+WIDTH_PER_HEIGHT = 0.3
+"""Width over height of a person in the image if there is no camera."""
+LEAST_SINE_TILT = 0.2
+"""Lower bound of `sine_tilt`: in a view along the ground depth cannot be measured."""
 
 
-class Pixels:
-    """State: the foreground pipeline. scale: px per m, the context's or learned from lone blobs of its background
-    sample; step: grid step, px; person (2,): width and height of a person in the image, px."""
+class ForegroundPoints:
+    """State: the foreground pipeline with its background model.
+
+    scale: px per metre, the context's or learned from lone people in its background sample. step: px between the grid's
+    points. person (2,): width and height of a person in the image, px.
+    Raises InputError if the scale is neither known nor learned.
+    """
 
     def __init__(self, config: GroupPdaConfig, context: Context) -> None:
         assert context.background is not None
@@ -31,25 +38,26 @@ class Pixels:
         self.person = _person(context.camera, self.scale)
 
     def follow(self, config: GroupPdaConfig) -> None:
-        """Take on a config; background and scale stay as learned."""
+        """Use another config from now on. The background model and the scale stay as they are."""
         self.config = config
         self.foreground.follow(config, config.most_foreground)
         self.step = max(1, round(config.grid * self.scale))
 
     @property
-    def share(self) -> float:
-        """How much of a person a grid point is: cell / area of an ellipse of his size."""
+    def people_per_point(self) -> float:
+        """The people that one grid point stands for: the area of a grid cell over that of a person's ellipse."""
         return float(self.step**2 / (np.pi / 4 * self.person.prod()))
 
     @property
-    def spread(self) -> Array:
-        """(2, 2) covariance of one person's pixels: a filled ellipse has a quarter of its semi-axes' squares."""
+    def body_cov(self) -> Array:
+        """Covariance (2, 2), px^2, of one person's pixels: those of a filled ellipse, its semi-axes squared over 4."""
         return np.asarray(np.eye(2) * np.square(self.person / 4), np.float64)
 
     def points(self, image: Image, outlines: list[Array]) -> Array | None:
-        """(M, 2) px centres of the grid's cells that are foreground; None where there is more than there can be.
+        """Return the grid points (M, 2) in px that are foreground; None if more is foreground than `most_foreground`.
 
-        What lies in the groups' outlines (V, 2) stays out of the background, however long they stand.
+        outlines: points (V, 2) in px round each group. The background model learns from the picture except inside their
+        convex hulls, so that people who stand still do not become background.
         """
         seen = self.foreground.segment(image)
         self.foreground.adapt(seen, convex_areas(self.foreground.shape, outlines))
@@ -57,19 +65,22 @@ class Pixels:
 
 
 def grid_points(mask: Bools, step: int) -> Array:
-    """(M, 2) u, v of the foreground pixels in the middle of the cells of a grid."""
+    """Return u, v (M, 2) in px of the centres of the foreground pixels on a grid of every `step`-th pixel.
+
+    mask (H, W): True for foreground.
+    """
     first = step // 2
     v, u = np.nonzero(mask[first::step, first::step])
     return np.asarray(np.stack([u, v], 1) * float(step) + (first + 0.5), np.float64)
 
 
-def steepness(camera: Camera | None) -> float:
-    """Sine of the camera's tilt at the image's middle: how much of a length in depth shows; 1 without a camera."""
-    return 1.0 if camera is None else float(max(-camera.rotation[2, 2], LEAST_STEEP))
+def sine_tilt(camera: Camera | None) -> float:
+    """Return the sine of the camera's tilt, by which depth is shortened: at least 0.2; 1 without a camera."""
+    return 1.0 if camera is None else float(max(-camera.rotation[2, 2], LEAST_SINE_TILT))
 
 
 def _learned(foreground: Foreground, context: Context) -> float:
-    """px per m by the lone blobs of the background sample; nan where nobody was alone in it."""
+    """The scale, px per m, by people who are alone in the background sample; nan if there are none."""
     assert context.background is not None
     size = PersonSize(context)
     foreground.learn_person_size(size, context.background)
@@ -77,14 +88,18 @@ def _learned(foreground: Foreground, context: Context) -> float:
 
 
 def _person(camera: Camera | None, scale: float) -> Array:
+    """Width and height (2,) in px of a person: the mean box at the image's centre over directions, or by the scale.
+
+    The scale, px per m, is used without a camera and if the image's centre is above the horizon.
+    """
     if camera is None:
-        return scale * PERSON_HEIGHT * np.array([SLIM, 1.0])
+        return scale * PERSON_HEIGHT * np.array([WIDTH_PER_HEIGHT, 1.0])
     from sim.scene.body import person_boxes
     from sim.scene.camera import to_ground
 
     middle = to_ground(camera, np.array([camera.image], float) / 2)
     turns = np.radians([0.0, 45.0, 90.0, 135.0])
-    if not np.isfinite(middle).all():  # above the horizon
+    if not np.isfinite(middle).all():
         return _person(None, scale)
     place = np.column_stack([np.repeat(middle, len(turns), 0), np.zeros(len(turns))])
     return np.asarray(person_boxes(camera, place, turns, np.full(len(turns), PERSON_HEIGHT))[:, 2:].mean(0))

@@ -68,7 +68,7 @@ from tracking.papers.group_pda.births_and_losses import add_newborns, confirm, e
 from tracking.papers.group_pda.colour import colour_bins, colour_log_ratio, update_histograms
 from tracking.papers.group_pda.config import GroupPdaConfig
 from tracking.papers.group_pda.duplicate_groups import DuplicateGroups
-from tracking.papers.group_pda.from_pixels import Pixels, steepness
+from tracking.papers.group_pda.from_pixels import ForegroundPoints, sine_tilt
 from tracking.papers.group_pda.group_bank import GroupBank, GroupIds
 from tracking.papers.group_pda.merging import GroupMerging
 from tracking.papers.group_pda.missed_members import remember, with_missed_members
@@ -102,7 +102,7 @@ class GroupPda:
         self.context = context
         self.bank, self.ids = GroupBank.empty(), GroupIds()
         self.merging, self.duplicates = GroupMerging(), DuplicateGroups()
-        self.pixels = None if context.background is None else Pixels(self.config, context)
+        self.pixels = None if context.background is None else ForegroundPoints(self.config, context)
         if self.pixels is not None:
             self.context = context.replace(px_per_m=self.pixels.scale)
         self.scaled: ScaledParameters | None = None
@@ -152,7 +152,7 @@ class GroupPda:
             found = None if frame.image is None else self.pixels.points(frame.image, self.outlines())
             if found is not None and frame.image is not None and self.config.appearance > 0:
                 self.colours = colour_bins(frame.image, found)
-            return found, np.full(0 if found is None else len(found), self.pixels.share)
+            return found, np.full(0 if found is None else len(found), self.pixels.people_per_point)
         if detections is None:
             return None, np.zeros(0)
         self.plane = "image" if detections.plane == "image" else "ground"
@@ -188,11 +188,11 @@ class GroupPda:
             return self.scaled
         if self.pixels is not None:
             p, scale = self.pixels, self.context.px_per_m
-            sine = steepness(self.context.camera)
-            self.scaled = scale_parameters(self.config, self.context.fps, scale, p.spread, sine)
+            sine = sine_tilt(self.context.camera)
+            self.scaled = scale_parameters(self.config, self.context.fps, scale, p.body_cov, sine)
             return self.scaled
         scale = required(self.context.px_per_m) if self.plane == "image" else 1.0
-        sine = steepness(self.context.camera) if self.plane == "image" else 1.0
+        sine = sine_tilt(self.context.camera) if self.plane == "image" else 1.0
         self.scaled = scale_parameters(self.config, self.context.fps, scale, sine_tilt=sine)
         return self.scaled
 
