@@ -1,4 +1,4 @@
-"""The catalogue of scores: what every key means, its unit and range, and which way is better.
+"""The catalogue of scores: key, unit, range, which direction is better, meaning and source of every score.
 
 `python -m tracking.scoring.catalogue` prints the table of docs/metrics.md.
 """
@@ -19,8 +19,11 @@ CORE = "groups, core"
 
 @dataclass(frozen=True)
 class Score:
-    """One key. unit: "1" for a share, "m | px" where it is the plane's; low, high: its range; family: its table;
-    source: who defined it, "" for flockscope."""
+    """One score.
+
+    unit: "1" for a share, "m | px" for a length in the unit of the plane. low, high: range. better: the direction that
+    is better. family: group of scores that are shown together. source: the paper that defines it, "" for flockscope.
+    """
 
     key: str
     family: str
@@ -33,7 +36,10 @@ class Score:
 
     @property
     def best(self) -> float:
-        """What the truth itself would have as tracks; nan where that depends on it (counts of hits)."""
+        """The value of a perfect tracker: `high` if higher is better, 0 if lower is better.
+
+        nan if the range has no upper end (numbers of hits) or if neither direction is better.
+        """
         value = {"higher": self.high, "lower": 0.0, "neither": inf}[self.better]
         return value if value < inf else float("nan")
 
@@ -55,81 +61,129 @@ def _from(source: str, *scores: Score) -> tuple[Score, ...]:
 
 
 OBJECTIVE = (
-    _share("objective", "objective", "mean of HOTA and group_F1_hull, or the one that is known: reward and tuning"),
+    _share(
+        "objective",
+        "objective",
+        "mean of HOTA and group_F1_hull, or the one of the two that is known; used for tuning and as reward",
+    ),
 )
 
 HOTA = _from(
     "Luiten et al. 2021",
     _share("HOTA", "people", "geometric mean of DetA and AssA, mean over 19 thresholds of similarity"),
-    _share("DetA", "people", "found people / all true or estimated people, mean over thresholds"),
-    _share("AssA", "people", "how much of both identities' lives each match explains, mean over thresholds"),
-    _share("DetRe", "people", "found / true people"),
-    _share("DetPr", "people", "found / estimated people"),
-    _share("AssRe", "people", "share of the true life that a match's pair of identities has in common"),
-    _share("AssPr", "people", "share of the track's life that a match's pair of identities has in common"),
-    _share("LocA", "people", "mean similarity of matches; 1 without any, as TrackEval has it"),
+    _share("DetA", "people", "TP / (TP + FN + FP), mean over thresholds"),
+    _share(
+        "AssA",
+        "people",
+        "mean over matches of: matches of the two ids / frames of either id, mean over thresholds",
+    ),
+    _share("DetRe", "people", "matched / true people, mean over thresholds"),
+    _share("DetPr", "people", "matched / estimated people, mean over thresholds"),
+    _share(
+        "AssRe",
+        "people",
+        "mean over matches of: matches of the two ids / frames of the true id, mean over thresholds",
+    ),
+    _share(
+        "AssPr",
+        "people",
+        "mean over matches of: matches of the two ids / frames of the track, mean over thresholds",
+    ),
+    _share(
+        "LocA",
+        "people",
+        "mean similarity of matches, mean over thresholds; 1 at a threshold without matches, as in TrackEval",
+    ),
 )
 
 CLEAR = _from(
     "Bernardin & Stiefelhagen 2008",
     _share("MOTA", "people", "1 - (FN + FP + IDSW) / true people, at similarity 0.5", -inf),
-    _share("MOTP", "people", "mean similarity of the matches of CLEAR (0.5 and more)"),
-    _count("TP", "people", "people found at similarity 0.5", "higher"),
-    _count("FN", "people", "people not found"),
-    _count("FP", "people", "estimated people that are nobody"),
-    _count("IDSW", "people", "a true person is matched with another track than the last time"),
-    _count("MT", "people", "true people found in more than 80 % of their frames", "higher"),
-    _count("PT", "people", "… in 20 to 80 %", "neither"),
-    _count("ML", "people", "… in less than 20 %"),
-    _count("Frag", "people", "a true person is found again after not being found"),
+    _share("MOTP", "people", "mean similarity of the matches of CLEAR (similarity 0.5 or more)"),
+    _count("TP", "people", "people matched at similarity 0.5, summed over frames", "higher"),
+    _count("FN", "people", "true people without a match, summed over frames"),
+    _count("FP", "people", "estimated people without a match, summed over frames"),
+    _count(
+        "IDSW", "people", "identity switches: a true person is matched with another track than in its previous match"
+    ),
+    _count("MT", "people", "mostly tracked: true people matched in more than 80 % of their frames", "higher"),
+    _count("PT", "people", "partly tracked: true people matched in 20 to 80 % of their frames", "neither"),
+    _count("ML", "people", "mostly lost: true people matched in less than 20 % of their frames"),
+    _count("Frag", "people", "fragments: a true person is matched again after frames without a match"),
 )
 
 IDENTITY = _from(
     "Ristani et al. 2016",
-    _share("IDF1", "people", "2 IDTP / (true + estimated people), identities assigned once for all"),
-    _share("IDP", "people", "share of estimated people under the right identity"),
-    _share("IDR", "people", "share of true people under the right identity"),
-    _count("IDTP", "people", "estimated people under the right identity", "higher"),
+    _share("IDF1", "people", "2 IDTP / (true + estimated people)"),
+    _share("IDP", "people", "IDTP / estimated people"),
+    _share("IDR", "people", "IDTP / true people"),
+    _count(
+        "IDTP",
+        "people",
+        "matches of the best one-to-one assignment of true ids to tracks for the whole sequence, at similarity 0.5",
+        "higher",
+    ),
 )
 
 ERRORS = (
-    _length("RMSE_pos", "errors", "root mean square error of the places of people who are found (0.5 and more)"),
-    _length("RMSE_vel", "errors", "… of their velocities, on the ground", "m/s"),
+    _length("RMSE_pos", "errors", "root mean square error of positions, of people mapped at similarity 0.5 or more"),
+    _length("RMSE_vel", "errors", "root mean square error of velocities on the ground, of the same people", "m/s"),
     *_from(
         "Rahmathullah et al. 2017",
-        _length("GOSPA", "errors", "RMS over frames of GOSPA, cut-off 2 m: who is far off, missed and false"),
-        _length("GOSPA_localisation", "errors", "its part of who is far off: GOSPA² is the sum of its parts' squares"),
-        _length("GOSPA_missed", "errors", "its part of missed people"),
-        _length("GOSPA_false", "errors", "its part of false people"),
+        _length(
+            "GOSPA",
+            "errors",
+            "root mean square over frames of GOSPA with a cut-off of 2 m: localisation errors, missed and false people",
+        ),
+        _length(
+            "GOSPA_localisation",
+            "errors",
+            "the part of localisation errors; GOSPA² is the sum of the squares of the three parts",
+        ),
+        _length("GOSPA_missed", "errors", "the part of missed people"),
+        _length("GOSPA_false", "errors", "the part of false people"),
     ),
 )
 
 GROUPS = (
     *_from(
         "Bazzani et al. 2012",
-        _share("group_1-FP", "groups", "1 - false / true groups, sums over frames", -inf),
-        _share("group_1-FN", "groups", "1 - missed / true groups, sums over frames"),
+        _share("group_1-FP", "groups", "1 - false / true groups, both summed over frames", -inf),
+        _share("group_1-FN", "groups", "1 - missed / true groups, both summed over frames"),
         _share("group_1-FP_frames", "groups", "1 - mean over frames of false / max(true groups, 1)", -inf),
         _share("group_1-FN_frames", "groups", "1 - mean over frames of missed / max(true groups, 1)"),
-        _share("group_GDSR", "groups", "share of true groups that are matched with 60 % of their members inside"),
+        _share(
+            "group_GDSR", "groups", "share of true groups whose matched group contains at least 60 % of their members"
+        ),
     ),
-    _share("group_GDSR2", "groups", "… and 60 % of the estimated members right, so that one giant group is none"),
+    _share(
+        "group_GDSR2",
+        "groups",
+        "the same, if also at least 60 % of the estimated members are right; one giant group fails this",
+    ),
     *_from(
         "Bernardin & Stiefelhagen 2008",
-        _length("group_MOTP", "groups", "mean distance of matched groups' middles"),
+        _length("group_MOTP", "groups", "mean distance between the centres of matched groups"),
         _length("group_MSE", "groups", "mean square of that distance", "m² | px²"),
-        _length("group_MOTP_ungated", "groups", "mean distance when groups are matched by distance alone, however far"),
+        _length(
+            "group_MOTP_ungated", "groups", "mean distance if groups are matched by distance alone, however far apart"
+        ),
         _share("group_MOTA", "groups", "1 - (FN + FP + IDSW) / true groups", -inf),
-        _count("group_IDSW", "groups", "a true group is matched with another estimated id than the last time"),
-        _count("group_TP", "groups", "matched groups", "higher"),
-        _count("group_FP", "groups", "estimated groups without a match"),
-        _count("group_FN", "groups", "true groups without a match"),
+        _count("group_IDSW", "groups", "a true group is matched with another estimated id than in its previous match"),
+        _count("group_TP", "groups", "matched groups, summed over frames", "higher"),
+        _count("group_FP", "groups", "estimated groups without a match, summed over frames"),
+        _count("group_FN", "groups", "true groups without a match, summed over frames"),
     ),
-    _share("group_F1", "groups", "2 found / (true + estimated groups), found at similarity 0.5"),
+    _share("group_F1", "groups", "2 found / (true + estimated groups); found: matched at similarity 0.5 or more"),
     _share("group_precision", "groups", "found / estimated groups"),
     _share("group_recall", "groups", "found / true groups"),
     *(
-        replace(score, key=f"group_{score.key}", family="groups", meaning=f"{score.key} of groups, same similarity")
+        replace(
+            score,
+            key=f"group_{score.key}",
+            family="groups",
+            meaning=f"{score.key} of groups, by the similarity by which groups are matched",
+        )
         for score in HOTA
     ),
     Score(
@@ -139,43 +193,71 @@ GROUPS = (
         0.0,
         inf,
         "lower",
-        "mean difference of estimated and true size, without sign",
+        "mean absolute difference between estimated and true number of people, of matched groups",
     ),
     *_from(
         "Givens & Shortt 1984",
-        _length("group_extent_error", "groups", "mean Wasserstein distance of matches, Gaussians of middle and extent"),
+        _length(
+            "group_extent_error",
+            "groups",
+            "mean 2-Wasserstein distance of matched groups, taken as Gaussians with centre and extent",
+        ),
     ),
 )
 
 MEMBERS = (
-    _share("group_F1_hull", "members", "group_F1 by hulls, whatever groups are matched by: half of the objective"),
-    _share("pairwise_F1", "members", "2 right / (true + estimated) pairs of people in one group"),
-    _share("pairwise_precision", "members", "right / estimated pairs; a pair with a track that is nobody is false"),
-    _share("pairwise_recall", "members", "right / true pairs; a pair with a person nobody stands for is missed"),
+    _share(
+        "group_F1_hull",
+        "members",
+        "group_F1 by IoU of hulls, also if groups are matched by members; part of the objective",
+    ),
+    _share(
+        "pairwise_F1", "members", "2 right / (true + estimated pairs); a pair is two people of one frame in one group"
+    ),
+    _share("pairwise_precision", "members", "right / estimated pairs; a pair with a track mapped to nobody is false"),
+    _share("pairwise_recall", "members", "right / true pairs; a pair with a person no track is mapped to is missed"),
 )
 
 LINEAGE = (
-    _share("lineage_accuracy", "events", "share of true merges and splits told with the right parents and children"),
-    _share("lineage_accuracy_found", "events", "the same share of those found"),
+    _share(
+        "lineage_accuracy",
+        "events",
+        "share of true merges and splits that are matched and have the right parents and children",
+    ),
+    _share(
+        "lineage_accuracy_found",
+        "events",
+        "share of the matched merges and splits that have the right parents and children",
+    ),
 )
 
 
 def _of_events(name: str, what: str) -> Iterable[Score]:
-    yield _share(f"{name}_F1", "events", f"2 hits / (true + told) {what}")
-    yield _share(f"{name}_precision", "events", f"hits / told {what}")
-    yield _share(f"{name}_recall", "events", f"hits / true {what}")
+    """Yields the scores of one kind of event; name: prefix of the keys, what: the events in words."""
+    yield _share(f"{name}_F1", "events", f"2 matched / (true + reported) {what}")
+    yield _share(f"{name}_precision", "events", f"matched / reported {what}")
+    yield _share(f"{name}_recall", "events", f"matched / true {what}")
     if name != "event":
-        yield _count(f"{name}_TP", "events", f"{what} told rightly", "higher")
-        yield _count(f"{name}_FP", "events", f"{what} told that did not happen")
-        yield _count(f"{name}_FN", "events", f"{what} not told")
-    yield Score(f"{name}_latency", "events", "s", -1.0, inf, "lower", f"mean from true start to telling of {what}")
+        yield _count(f"{name}_TP", "events", f"matched {what}", "higher")
+        yield _count(f"{name}_FP", "events", f"reported {what} without a match")
+        yield _count(f"{name}_FN", "events", f"true {what} without a match")
+    yield Score(
+        f"{name}_latency",
+        "events",
+        "s",
+        -1.0,
+        inf,
+        "lower",
+        f"mean time from the true start to the report, of matched {what}",
+    )
 
 
 def _headline(score: Score) -> Score:
+    """Returns the score of `event` with the meaning of a mean of merges and splits."""
     if score.key == "event_latency":
-        return replace(score, meaning="mean from true start to telling of merges and splits")
+        return replace(score, meaning="mean time from the true start to the report, of matched merges and splits")
     name = score.key.removeprefix("event_")
-    return replace(score, meaning=f"mean of merge_{name} and split_{name}, of the one where only one is known")
+    return replace(score, meaning=f"mean of merge_{name} and split_{name}, or the one of the two that is known")
 
 
 def _plural(kind: str) -> str:
@@ -183,7 +265,12 @@ def _plural(kind: str) -> str:
 
 
 def _core(score: Score) -> Score:
-    return replace(score, key=f"{score.key}_core", family=CORE, meaning=f"{score.key} of the core")
+    return replace(
+        score,
+        key=f"{score.key}_core",
+        family=CORE,
+        meaning=f"{score.key} without frames up to 1 s before or after the start of a true merge or split",
+    )
 
 
 ALL = (
@@ -201,11 +288,11 @@ ALL = (
 )
 
 CATALOGUE = MappingProxyType({score.key: score for score in ALL})
-"""Every score by key, in the order in which they are shown."""
+"""Every score by key, in display order."""
 
 
 def table() -> str:
-    """The catalogue in Markdown, family by family; the core's keys are those of the groups with `_core` behind."""
+    """Returns the catalogue as a Markdown table, without the core scores, whose keys end in `_core`."""
     lines = ["| key | unit | range | better | meaning | source |", "| --- | --- | --- | --- | --- | --- |"]
     for score in ALL:
         if score.family != CORE:
