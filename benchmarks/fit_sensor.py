@@ -26,9 +26,9 @@ from sim.io.source import open_source
 from sim.sequence import simulate
 from sim.types import Detections, Truth
 from sim.types import Sequence as Recording
-from tracking.fitting.detection_matching import MatchedRecording, match, match_sequence
-from tracking.fitting.error_statistics import simulated_detections, statistics
-from tracking.fitting.sensor import fit
+from tracking.fitting.detection_matching import MatchedRecording, match_detections, match_sequence
+from tracking.fitting.error_statistics import error_statistics, simulated_detections
+from tracking.fitting.sensor import fit_matched
 
 RECORDINGS = ("mot/PETS09-S2L1-first200", "mot/TUD-Campus")
 SCENES = ("merge", "street")
@@ -50,14 +50,14 @@ def part(recording: Recording, first: int, last: int, size: tuple[int, int]) -> 
     for frame in recording.without_pictures():
         if first <= frame.index <= last and frame.detections is not None:
             found.append(frame.detections.replace(index=frame.index - first + 1))
-    return match(short, found, size, recording.camera)
+    return match_detections(short, found, size, recording.camera)
 
 
 def table(second: MatchedRecording, profiles: dict[str, Sensor], draws: int) -> dict[str, dict[str, object]]:
     """Each statistic: `measured`, and by profile the mean and the limits of its draws."""
-    rows: dict[str, dict[str, object]] = {name: {"measured": v} for name, v in statistics([second]).items()}
+    rows: dict[str, dict[str, object]] = {name: {"measured": v} for name, v in error_statistics([second]).items()}
     for profile, sensor in profiles.items():
-        made = [statistics([simulated_detections(second, sensor, SEED + k)]) for k in range(draws)]
+        made = [error_statistics([simulated_detections(second, sensor, SEED + k)]) for k in range(draws)]
         for name, row in rows.items():
             v = np.array([m[name] for m in made])
             v = v[np.isfinite(v)]
@@ -87,7 +87,7 @@ def on_scenes(fitted: dict[str, Sensor]) -> None:
         for name, sensor in {**fitted, "default": Sensor()}.items():
             scenario = load(scene).model_copy(update={"sensor": sensor})
             found = [match_sequence(simulate(scenario, seed, streams=())) for seed in SEEDS]
-            overlap = np.mean([statistics([m])["overlap, 50% quantile"] for m in found])
+            overlap = np.mean([error_statistics([m])["overlap, 50% quantile"] for m in found])
             off = np.concatenate([m.pos[m.match[m.hit]] - m.truth.pos[m.hit] for m in found])  # type: ignore[index]
             far = "  ".join(f"{q:.2f}" for q in np.quantile(np.linalg.norm(off, axis=1), (0.5, 0.9, 0.99)))
             print(f"{scene:8} {name:22} {overlap:15.2f}   {far}")
@@ -103,7 +103,7 @@ def main() -> None:
     warnings.simplefilter("ignore")  # the frame rate of TUD-Campus, which says none
     recordings = {Path(name).name: open_source(args.data / name, images=False)[0] for name in RECORDINGS}
     whole = {name: match_sequence(r) for name, r in recordings.items()}
-    fitted = {name: fit([m]) for name, m in whole.items()}
+    fitted = {name: fit_matched([m]) for name, m in whole.items()}
     result = {}
     for name, recording in recordings.items():
         length, size = recording.length, whole[name].size
@@ -111,7 +111,7 @@ def main() -> None:
         middle = length // 2
         other = next(sensor for key, sensor in fitted.items() if key != name)
         profiles = {
-            "held out": fit([part(recording, 1, middle, size)]),
+            "held out": fit_matched([part(recording, 1, middle, size)]),
             "same": fitted[name],
             "other": other,
             "default": Sensor(),

@@ -135,10 +135,9 @@ class Rollout:
 
     def _every_score(self, px_per_m: float) -> Mapping[str, float]:
         from tracking.grouping.grouped_tracks import with_groups
-        from tracking.scoring.evaluation import evaluate
 
         answers = with_groups(self.answers, self.ready.context.fps, px_per_m) if self.answers else ()
-        return evaluate(self.truth, answers, frames=len(self.answers))
+        return self.held.judge.scorer.evaluate(answers, frames=len(self.answers))
 
 
 def streams_for(tracker: AnyTracker, detections: DetectionMode | None) -> tuple[str, ...]:

@@ -1,1 +1,1 @@
-"""Tables learned from recordings: so far a detector's profile (`flockscope fit sensor`)."""
+"""Fits a detector's profile, the `[sensor]` table, to labelled recordings (`flockscope fit sensor`)."""

@@ -1,4 +1,8 @@
-"""How far boxes are off: bias and spread in proportion to the box, more when half hidden, and how long it lasts."""
+"""Fits the errors of detected boxes: mean and standard deviation, growth with occlusion, tails, and memory over time.
+
+Errors are the four of `sim.detector.box_noise.box_errors`: middle, foot and top in box heights, and the logarithm of
+the width. Their standard deviation is sd (1 + occluded (1 - visibility)).
+"""
 
 from __future__ import annotations
 
@@ -12,18 +16,18 @@ from scenarios.schema.sensor import BoxNoise
 from sim.detector.box_noise import box_errors
 from sim.types import Array
 from tracking.fitting.detection_matching import MatchedRecording
-from tracking.fitting.error_correlation import correlations, memory
+from tracking.fitting.error_correlation import correlations, fit_memory
 
-GROWTH = np.concatenate([[0.0], np.geomspace(0.1, 6.0, 40)])  # values of `occluded` that are tried
-TAILS = (0.0, 0.25, 0.5, 1.0, 1.5, 2.0, 3.0, 4.0, 6.0, 9.0, 14.0, 20.0)
-HALF = (0.3, 0.9)  # visibilities between which a row tells the visible part from the whole
-BARELY = 0.25  # visibility: of who shows less the nearest box is often another's, and no error of his own
-FEW = 20  # rows half hidden: with fewer, boxes are taken for those of the whole, and errors for alike
+GROWTH = np.concatenate([[0.0], np.geomspace(0.1, 6.0, 40)])  # values of `occluded` to choose from
+TAILS = (0.0, 0.25, 0.5, 1.0, 1.5, 2.0, 3.0, 4.0, 6.0, 9.0, 14.0, 20.0)  # excess kurtoses to choose from
+HALF = (0.3, 0.9)  # a row counts as half hidden if its visibility is between these
+BARELY = 0.25  # visibility: rows below it are left out, as their nearest box often belongs to someone else
+FEW = 20  # with fewer half hidden rows, boxes are taken as amodal and errors as independent of visibility
 
 
 @dataclass(frozen=True)
 class ErrorSpread:
-    """Errors e = mean + sd (1 + occluded (1 - visibility)) n: mean, sd (4,), occluded, and the log likelihood."""
+    """Errors mean + sd (1 + occluded (1 - visibility)) n, n of variance 1; mean, sd (4,); likelihood: its logarithm."""
 
     mean: Array
     sd: Array
@@ -31,29 +35,29 @@ class ErrorSpread:
     likelihood: float
 
 
-def fit_noise(recordings: Sequence[MatchedRecording]) -> tuple[Literal["visible", "amodal"], BoxNoise]:
-    """Whether boxes are of the visible part or of the whole, and their errors against it."""
+def fit_box_noise(recordings: Sequence[MatchedRecording]) -> tuple[Literal["visible", "amodal"], BoxNoise]:
+    """Returns whether boxes enclose the visible part or the whole person, and their errors against that."""
     kind: Literal["visible", "amodal"] = "visible" if _of_visible_part(recordings) else "amodal"
-    best = _spread(recordings, kind)
-    lasting, seen = [], []
+    best = _fit_spread(recordings, kind)
+    correlated, standardised = [], []
     for m in recordings:
         z = np.full((len(m.truth.id), 4), np.nan)
         growth = 1.0 + best.occluded * (1.0 - m.truth.visibility[m.hit])
         z[m.hit] = (_errors(m, kind) - best.mean) / np.maximum(best.sd * growth[:, None], 1e-9)
-        lasting.append(correlations(m.truth, z, m.hit))
-        seen.append(z[m.hit])
+        correlated.append(correlations(m.truth, z, m.hit))
+        standardised.append(z[m.hit])
     pairs = [(round(float(a), 4), round(float(b), 4)) for a, b in zip(best.mean, best.sd, strict=True)]
     across, foot, top, width = pairs
     grown = round(best.occluded, 3)
-    parts = memory(lasting) if best.sd.max() > 1e-6 else ()
+    parts = fit_memory(correlated) if best.sd.max() > 1e-6 else ()
     return kind, BoxNoise(
-        across=across, foot=foot, top=top, width=width, occluded=grown, tails=_tails(np.concatenate(seen)),
+        across=across, foot=foot, top=top, width=width, occluded=grown, tails=_tails(np.concatenate(standardised)),
         memory=parts or None,
     )  # fmt: skip
 
 
 def _tails(z: Array) -> float:
-    """The excess kurtosis of the likeliest Student's t of unit variance, out of TAILS; 0 the normal."""
+    """Returns the likeliest excess kurtosis of `TAILS` for Student-t errors z of variance 1; 0 means normal errors."""
     from scipy.special import gammaln
 
     def likelihood(tails: float) -> float:
@@ -67,7 +71,11 @@ def _tails(z: Array) -> float:
 
 
 def _of_visible_part(recordings: Sequence[MatchedRecording]) -> bool:
-    """Whether the edges of people half hidden are nearer to those of the visible part, the usual error taken off."""
+    """True if the boxes of half hidden people are nearer to their visible part than to their whole box.
+
+    Middle, foot and top are compared, after subtracting the median error of people in full view. False if there are
+    fewer than `FEW` half hidden rows.
+    """
     away: dict[str, list[Array]] = {"visible": [], "amodal": []}
     for m in recordings:
         visibility = m.truth.visibility[m.hit]
@@ -81,12 +89,12 @@ def _of_visible_part(recordings: Sequence[MatchedRecording]) -> bool:
 
 
 def _errors(m: MatchedRecording, kind: str) -> Array:
-    """(H, 4) of the rows that were detected."""
+    """Returns the errors (H, 4) of the H detected rows against their boxes of this kind."""
     return box_errors(m.box[m.match[m.hit]], _true(m, kind))
 
 
 def _true(m: MatchedRecording, kind: str) -> Array:
-    """(H, 4) boxes of that kind of the rows that were detected."""
+    """Returns the labelled boxes (H, 4) of the H detected rows: of the visible part where known, or of the whole."""
     assert m.truth.box is not None
     true = m.truth.box
     if kind == "visible" and m.truth.visible_box is not None:
@@ -94,7 +102,8 @@ def _true(m: MatchedRecording, kind: str) -> Array:
     return true[m.hit]
 
 
-def _spread(recordings: Sequence[MatchedRecording], kind: str) -> ErrorSpread:
+def _fit_spread(recordings: Sequence[MatchedRecording], kind: str) -> ErrorSpread:
+    """Returns the likeliest spread over the values of `GROWTH`; all 0 without usable rows."""
     e = np.concatenate([_errors(m, kind) for m in recordings])
     hidden = np.concatenate([1.0 - m.truth.visibility[m.hit] for m in recordings])
     clear = hidden <= 1.0 - BARELY
@@ -102,21 +111,29 @@ def _spread(recordings: Sequence[MatchedRecording], kind: str) -> ErrorSpread:
     if not len(e):
         return ErrorSpread(np.zeros(4), np.zeros(4), 0.0, 0.0)
     tried = GROWTH if (hidden > 1.0 - HALF[1]).sum() >= FEW else GROWTH[:1]
-    return max((_of_growth(e, hidden, float(k)) for k in tried), key=lambda s: s.likelihood)
+    return max((_spread_of_growth(e, hidden, float(k)) for k in tried), key=lambda s: s.likelihood)
 
 
-def _of_growth(e: Array, hidden: Array, k: float) -> ErrorSpread:
+def _spread_of_growth(e: Array, hidden: Array, k: float) -> ErrorSpread:
+    """Returns the spread of errors e (H, 4) if `occluded` is k; hidden (H,): 1 - visibility.
+
+    mean and sd are weighted moments. The likelihood is that of a Laplace distribution, which large errors influence
+    little.
+    """
     growth = 1.0 + k * hidden
     weight = 1.0 / growth**2
     mean = weight @ e / weight.sum()
     sd = np.sqrt(np.mean((e - mean) ** 2 * weight[:, None], axis=0))
-    near = np.mean(np.abs(e - mean) / growth[:, None], axis=0)  # Laplace's scale: what is far off tells little
+    near = np.mean(np.abs(e - mean) / growth[:, None], axis=0)  # scale of the Laplace distribution
     likelihood = -len(e) * float(np.log(np.maximum(near, 1e-6)).sum()) - 4 * float(np.log(growth).sum())
     return ErrorSpread(mean, sd, k, likelihood)
 
 
-def point_noise(recordings: Sequence[MatchedRecording]) -> float | None:
-    """sd per axis of points on the ground, m; None where detections have none of their own."""
+def fit_point_noise(recordings: Sequence[MatchedRecording]) -> float | None:
+    """Returns the standard deviation per axis, in m, of the detections' own positions on the ground.
+
+    None if the detections have no positions or no labelled row with a position is detected.
+    """
     errors = [
         m.pos[m.match[m.hit]] - m.truth.pos[m.hit] for m in recordings if m.pos is not None and m.truth.pos is not None
     ]

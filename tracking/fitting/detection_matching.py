@@ -1,8 +1,9 @@
-"""Which detection is of which labelled person: what every part of a detector's profile is measured on.
+"""Matches a recording's detections to its labelled people: the data that a detector's profile is fitted to.
 
-Detections and people of a frame are matched one to one by the greatest sum of overlaps (intersection over union, with
-the whole box or with its visible part, whichever is more) of at least GATE. A detector whose boxes are all too wide or
-too high would lose matches by that alone, so its usual error is taken off before a second, final matching.
+In each frame detections and people are matched one to one, with the greatest sum of overlaps of at least `GATE`. An
+overlap is the IoU with the whole box or with the box of the visible part, whichever is greater. A detector whose boxes
+are all too wide or too high would lose matches by this alone. So the median error of a first matching is applied to the
+labelled boxes, and the matching is repeated.
 """
 
 from __future__ import annotations
@@ -21,17 +22,18 @@ from sim.scene.box_visibility import image_size_of_boxes, with_visibility
 from sim.types import Array, Bools, Camera, Detections, Ints, Sequence, Truth
 from tracking.filters.assignment import optimal
 
-GATE = 0.3
-IGNORED = 0.5  # overlap with a row that MOTChallenge leaves out of scoring
-DISTRACTORS = (2, 7, 8, 12)  # of MOTChallenge: people on vehicles, static people, distractors, reflections
+GATE = 0.3  # least overlap of a match
+IGNORED = 0.5  # least overlap of an unmatched detection with an unscored box for the detection to be dropped
+DISTRACTORS = (2, 7, 8, 12)  # MOTChallenge classes: people on vehicles, static people, distractors, reflections
 
 
 @dataclass(frozen=True)
 class MatchedRecording:
-    """A recording: truth with visibilities, R rows, and M detections in the order of their frames.
+    """A recording with R labelled rows (people in frames) and M detections, sorted by frame, matched to each other.
 
-    frame, score (M,), box (M, 4); pos (M, 2) where detections are points on the ground, else None. match (R,): the
-    detection of each person, -1 missed; owner (M,): the row of each detection, -1 false alarm.
+    truth: with boxes and visibilities; size: image width and height in px. frame, score (M,), box (M, 4) ltwh px: of
+    the detections. pos (M, 2): their positions on the ground in m, None if they have none. match (R,): index of the
+    detection of each labelled row, -1 missed. owner (M,): labelled row of each detection, -1 false alarm.
     """
 
     truth: Truth
@@ -46,22 +48,25 @@ class MatchedRecording:
 
     @property
     def hit(self) -> Bools:
-        """(R,) who was detected."""
+        """True for each labelled row that is detected, (R,)."""
         return np.asarray(self.match >= 0)
 
     @property
     def false(self) -> Bools:
-        """(M,) which detections are of nobody."""
+        """True for each detection that is a false alarm, (M,)."""
         return np.asarray(self.owner < 0)
 
     def rows(self, index: int) -> slice:
-        """Detections of frame `index`."""
+        """Returns the slice of the detections of frame `index`."""
         low, high = np.searchsorted(self.frame, (index, index + 1))
         return slice(int(low), int(high))
 
 
 def match_sequence(sequence: Sequence) -> MatchedRecording:
-    """A recording's labels against its detections; InputError where one of them, or their boxes, are missing."""
+    """Returns the matched labels and detections of a recording.
+
+    Raises InputError if labelled people, detections, or the boxes of either are missing.
+    """
     file, truth = sequence.source.get("path", sequence.name), sequence.truth
     missing = (
         ("no labelled people", truth is None or not len(truth.id)),
@@ -77,18 +82,21 @@ def match_sequence(sequence: Sequence) -> MatchedRecording:
         got = "detections without boxes" if any(len(d.pos) for d in found) else "no detection in any frame"
         raise InputError(file=file, got=got, expected="a detector's boxes", remedy="give its boxes in det/det.txt")
     assert truth is not None
-    return match(truth, found, sequence.image_size, sequence.camera, _left_out(sequence))
+    return match_detections(truth, found, sequence.image_size, sequence.camera, _left_out(sequence))
 
 
-def match(
+def match_detections(
     truth: Truth,
     found: SequenceOf[Detections],
     size: tuple[int, int] | None,
     camera: Camera | None = None,
     left_out: tuple[Ints, Array] | None = None,
 ) -> MatchedRecording:
-    """Truth with boxes against detections with boxes, frame by frame; left_out: frames and boxes of what does not
-    count, so that a detection there is no false alarm."""
+    """Returns the matched labels and detections; both must have boxes.
+
+    size: image width and height in px; None takes the extent of all boxes. left_out: frames and boxes (ltwh px) of
+    labelled rows that are not scored. A detection that covers one of them is dropped unless it matches a person.
+    """
     assert truth.box is not None
     box = np.concatenate([np.zeros((0, 4)), *(d.box for d in found if d.box is not None)])
     frame = np.concatenate([np.zeros(0, np.int64), *(np.full(len(d.pos), d.index) for d in found)])
@@ -111,7 +119,10 @@ def match(
 
 
 def _pairs(truth: Truth, frame: Ints, box: Array, usual: Array | None = None) -> tuple[Ints, Ints]:
-    """Rows of the truth and of the detections that belong together; usual: errors (4,) that all boxes have."""
+    """Returns the matched pairs as indices of labelled rows (K,) and of detections (K,).
+
+    usual (4,): errors, as `box_errors` defines them, that are applied to the labelled boxes first; None applies none.
+    """
     assert truth.box is not None
     whole = truth.box
     part = whole if truth.visible_box is None else np.where(np.isfinite(truth.visible_box), truth.visible_box, whole)
@@ -123,39 +134,42 @@ def _pairs(truth: Truth, frame: Ints, box: Array, usual: Array | None = None) ->
         r = truth.rows(index)
         low, high = np.searchsorted(frame, (index, index + 1))
         if r.stop > r.start and high > low:
-            cost = 1.0 - np.maximum(overlaps(whole[r], box[low:high]), overlaps(part[r], box[low:high]))
+            cost = 1.0 - np.maximum(box_iou(whole[r], box[low:high]), box_iou(part[r], box[low:high]))
             i, j = optimal(cost, 1.0 - GATE)
             rows.append(i + r.start)
             columns.append(j + low)
     return np.concatenate(rows), np.concatenate(columns)
 
 
-def overlaps(a: Array, b: Array) -> Array:
-    """(N, M) intersection over union of boxes (N, 4), (M, 4) ltwh; 0 where a box is unknown."""
-    inner = intersections(a, b)
+def box_iou(a: Array, b: Array) -> Array:
+    """Returns the intersection over union (N, M) of boxes a (N, 4) and b (M, 4) ltwh, 0 where a box is nan."""
+    inner = box_intersections(a, b)
     area = (a[:, 2] * a[:, 3])[:, None] + (b[:, 2] * b[:, 3])[None]
     return np.nan_to_num(inner / (area - inner))
 
 
-def intersections(a: Array, b: Array) -> Array:
-    """(N, M) areas that boxes (N, 4), (M, 4) ltwh have in common, px²."""
+def box_intersections(a: Array, b: Array) -> Array:
+    """Returns the common areas (N, M) in px² of boxes a (N, 4) and b (M, 4) ltwh px."""
     low = np.maximum(a[:, None, :2], b[None, :, :2])
     high = np.minimum(a[:, None, :2] + a[:, None, 2:], b[None, :, :2] + b[None, :, 2:])
     return np.asarray(np.prod(np.clip(high - low, 0.0, None), axis=2))
 
 
 def _covered(frame: Ints, box: Array, out_frame: Ints, out_box: Array) -> Bools:
-    """Which detections lie on a box that does not count."""
+    """Returns which detections overlap an unscored box of their frame by `IGNORED` or more, (M,) bool."""
     covered = np.zeros(len(box), bool)
     for index in np.unique(out_frame):
         here, there = np.flatnonzero(frame == index), out_frame == index
         if len(here):
-            covered[here] = (overlaps(box[here], out_box[there]) >= IGNORED).any(axis=1)
+            covered[here] = (box_iou(box[here], out_box[there]) >= IGNORED).any(axis=1)
     return covered
 
 
 def _left_out(sequence: Sequence) -> tuple[Ints, Array] | None:
-    """Frames and boxes of gt.txt that MOTChallenge's own scoring leaves out."""
+    """Returns frames and boxes of the rows of gt/gt.txt that MOTChallenge does not score.
+
+    These are the rows with flag 0 or a class of `DISTRACTORS`. None if the source is no MOT folder with such columns.
+    """
     path = Path(str(sequence.source.get("path", ""))) / "gt" / "gt.txt"
     if sequence.source.get("kind") != "mot" or not path.is_file():
         return None

@@ -1,8 +1,9 @@
-"""How alike an error stays: correlations over time, and the sum of exponentials that gives them.
+"""Correlation of a detector's errors over time, and the sum of exponentials that fits it.
 
-A row's error at two frames of the same person; lags from one frame to REACH seconds, evenly in their logarithm.
-Of yes-or-no errors (misses) the correlation is that of the normal numbers behind them (tetrachoric): the rho with
-which as many pairs are missed in both frames as were.
+The correlation at a lag is that of two errors of one person, this lag apart. Lags go from one frame to `REACH` seconds,
+evenly spaced in their logarithm. For misses, which are yes or no, it is the tetrachoric correlation: a miss occurs
+where a standard normal number is below a threshold, and rho is the correlation of two such numbers that gives the
+observed number of pairs with both missed.
 """
 
 from __future__ import annotations
@@ -16,25 +17,29 @@ import numpy as np
 from scenarios.schema.sensor import Memory
 from sim.types import Array, Bools, Ints, Truth
 
-REACH = 10.0  # s
-LAGS = 14
-TIMES = np.geomspace(0.05, 2 * REACH, 26)  # s, of the exponentials tried, up to twice the longest lag
-LEAST = 0.03  # of the variance: smaller parts are left out
-PAIRS = 12000  # of a lag that are looked at
-FEW = 20  # pairs: a lag with fewer tells nothing
+REACH = 10.0  # s: longest lag
+LAGS = 14  # number of lags, before equal ones are merged
+TIMES = np.geomspace(0.05, 2 * REACH, 26)  # s: time constants that are tried, up to twice the longest lag
+LEAST = 0.03  # share of the variance: smaller parts are left out
+PAIRS = 12000  # about this many pairs of a lag are used
+FEW = 20  # a lag with fewer pairs is left out
 
 
 @dataclass(frozen=True)
 class Correlations:
-    """Lags (K,) s, correlations (K,) and the number of pairs (K,) behind each."""
+    """Correlations rho (K,) at K lags (K,) in s; pairs (K,): number of pairs of errors behind each."""
 
     lag: Array
     rho: Array
     pairs: Array
 
 
-def pairs_at(truth: Truth, keep: Bools) -> list[tuple[float, Ints, Ints]]:
-    """Lags in s, with rows i and j of the same person so far apart; of the rows that `keep` names."""
+def pairs_by_lag(truth: Truth, keep: Bools) -> list[tuple[float, Ints, Ints]]:
+    """Returns for each lag: the lag in s, and the labelled rows i (P,) and j (P,) of one person, j this lag after i.
+
+    keep (R,): which rows are used. Lags with fewer than `FEW` pairs are left out. Of more than `PAIRS` pairs a regular
+    selection is returned.
+    """
     rows = np.flatnonzero(keep)
     people, column = np.unique(truth.id[rows], return_inverse=True)
     row_of = np.full((len(people), truth.length + 1), -1, np.int64)
@@ -51,30 +56,37 @@ def pairs_at(truth: Truth, keep: Bools) -> list[tuple[float, Ints, Ints]]:
 
 
 def correlations(truth: Truth, z: Array, keep: Bools) -> Correlations:
-    """Of standardised errors z (R, D), all columns together, in the rows that `keep` names."""
-    rows = [(lag, float((z[i] * z[j]).mean()), len(i)) for lag, i, j in pairs_at(truth, keep)]
+    """Returns the correlations of errors z (R, D) with mean 0 and variance 1, pooled over the D columns.
+
+    keep (R,): which rows are used; z may be nan in the others.
+    """
+    rows = [(lag, float((z[i] * z[j]).mean()), len(i)) for lag, i, j in pairs_by_lag(truth, keep)]
     return _table(rows)
 
 
-def hidden_correlations(truth: Truth, missed: Bools, p_miss: Array) -> Correlations:
-    """Of the normal numbers behind misses (R,), whose chances are p_miss (R,)."""
+def miss_correlations(truth: Truth, missed: Bools, p_miss: Array) -> Correlations:
+    """Returns the tetrachoric correlations of misses; missed (R,) bool, p_miss (R,): their probabilities."""
     from scipy.special import ndtri
 
     threshold = ndtri(np.clip(p_miss, 1e-3, 1.0 - 1e-3))
     rows = []
-    for lag, i, j in pairs_at(truth, np.ones(len(missed), bool)):
+    for lag, i, j in pairs_by_lag(truth, np.ones(len(missed), bool)):
         both = float((missed[i] & missed[j]).sum())
-        rows.append((lag, _rho(threshold[i], threshold[j], both), len(i)))
+        rows.append((lag, _tetrachoric(threshold[i], threshold[j], both), len(i)))
     return _table(rows)
 
 
 def _table(rows: list[tuple[float, float, int]]) -> Correlations:
+    """Returns rows of lag, correlation and number of pairs as arrays."""
     a = np.array(rows, dtype=float).reshape(-1, 3)
     return Correlations(a[:, 0], a[:, 1], a[:, 2])
 
 
-def together(a: Array, b: Array, rho: float) -> Array:
-    """P(x < a, y < b) of standard normals with correlation rho, |rho| < 1: Φ(a) Φ(b) + ∫₀^asin(rho) … dθ / 2π."""
+def bivariate_normal_cdf(a: Array, b: Array, rho: float) -> Array:
+    """Returns P(x < a, y < b) for standard normals x, y with correlation rho, |rho| < 1; a, b and the result (P,).
+
+    Φ(a) Φ(b) + 1 / 2π ∫ exp(-(a² + b² - 2 a b sin θ) / (2 cos² θ)) dθ from 0 to asin(rho), by 16 Gauss-Legendre nodes.
+    """
     from scipy.special import ndtr
 
     nodes, weights = np.polynomial.legendre.leggauss(16)
@@ -83,21 +95,27 @@ def together(a: Array, b: Array, rho: float) -> Array:
     return np.asarray(ndtr(a) * ndtr(b) + np.exp(power) @ weights * (0.25 * np.arcsin(rho) / np.pi))
 
 
-def _rho(a: Array, b: Array, both: float) -> float:
+def _tetrachoric(a: Array, b: Array, both: float) -> float:
+    """Returns the rho in [-0.5, 0.995] with which the expected number of pairs below thresholds a, b is `both`."""
     from scipy.optimize import brentq
 
     low, high = -0.5, 0.995
 
     def short(rho: float) -> float:
-        return float(together(a, b, rho).sum()) - both
+        return float(bivariate_normal_cdf(a, b, rho).sum()) - both
 
     if short(low) >= 0.0 or short(high) <= 0.0:
         return low if short(low) >= 0.0 else high
     return float(brentq(short, low, high, xtol=1e-4))
 
 
-def memory(found: Sequence[Correlations]) -> tuple[Memory, ...]:
-    """At most two exponentials, their shares from 0 and of at most 1 together, nearest to the correlations."""
+def fit_memory(found: Sequence[Correlations]) -> tuple[Memory, ...]:
+    """Returns at most two parts of an error's memory whose sum of exponentials is nearest to the correlations.
+
+    It minimises the squared distance, weighted by the numbers of pairs. Shares are at least 0 and at most 1 in total. A
+    part with a share below `LEAST` is left out. The result is () without correlations, or if no exponential is nearer
+    than 0.
+    """
     lag, rho, pairs = (np.concatenate([getattr(c, name) for c in found] or [[]]) for name in ("lag", "rho", "pairs"))
     if not len(lag):
         return ()
@@ -116,7 +134,7 @@ def memory(found: Sequence[Correlations]) -> tuple[Memory, ...]:
 
 
 def _shares(curves: Array, target: Array) -> Array:
-    """Least squares with shares of at least 0 and at most 1 together."""
+    """Returns the least-squares shares of one or two curves (K, 1 or 2), at least 0 and at most 1 in total."""
     from scipy.optimize import nnls
 
     share = nnls(curves, target)[0]

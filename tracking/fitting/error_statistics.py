@@ -1,4 +1,4 @@
-"""A detector's errors in numbers, to lay synthetic ones beside real ones: misses, runs, false alarms, overlaps."""
+"""Statistics of a detector's errors (misses, false alarms, boxes, scores), to compare a simulated with a real one."""
 
 from __future__ import annotations
 
@@ -10,22 +10,25 @@ from scenarios.schema.sensor import Sensor
 from sim.detector.box_noise import box_errors
 from sim.detector.sense import sense
 from sim.types import Array, Ints
-from tracking.fitting.detection_matching import MatchedRecording, match
-from tracking.fitting.error_correlation import pairs_at
+from tracking.fitting.detection_matching import MatchedRecording, match_detections
+from tracking.fitting.error_correlation import pairs_by_lag
 from tracking.fitting.false_alarms import alarm_tracks
 
-VISIBILITIES = (0.0, 0.25, 0.5, 0.75, 0.95)
-LAGS = (0.2, 1.0)  # s
+VISIBILITIES = (0.0, 0.25, 0.5, 0.75, 0.95)  # lower limits of the intervals for the share of misses
+LAGS = (0.2, 1.0)  # s: lags of the error correlation
 
 
 def simulated_detections(m: MatchedRecording, sensor: Sensor, seed: int) -> MatchedRecording:
-    """The same people, seen by a sensor instead of the recording's detector."""
+    """Returns the recording with its detections replaced by those of a simulated sensor; seed: of its random draws."""
     found = sense(m.truth, sensor, seed, m.camera, m.size)
-    return match(m.truth, found, m.size, m.camera)
+    return match_detections(m.truth, found, m.size, m.camera)
 
 
-def statistics(recordings: Sequence[MatchedRecording]) -> dict[str, float]:
-    """Errors by name; shares of 1, nan where nothing of the kind was seen."""
+def error_statistics(recordings: Sequence[MatchedRecording]) -> dict[str, float]:
+    """Returns the statistics by name, all recordings pooled; nan where nothing was observed.
+
+    Shares lie between 0 and 1, times are in s, errors of boxes in box heights (of the width: its logarithm).
+    """
     hit = np.concatenate([m.hit for m in recordings])
     visibility = np.concatenate([m.truth.visibility for m in recordings])
     found: dict[str, float] = {"missed": 1.0 - float(hit.mean())}
@@ -36,12 +39,14 @@ def statistics(recordings: Sequence[MatchedRecording]) -> dict[str, float]:
     found["misses: mean run, s"] = _mean(runs)
     found["misses in runs over 1 s"] = float(runs[runs > 1.0].sum() / runs.sum()) if len(runs) else float("nan")
     frames = sum(m.truth.length for m in recordings)
-    chains = [c for m in recordings for c in alarm_tracks(m)]
-    seen = np.array([len(c.rows) for c in chains], dtype=float)
+    alarms = [track for m in recordings for track in alarm_tracks(m)]
+    seen = np.array([len(a.rows) for a in alarms], dtype=float)
     found["false alarms per frame"] = float(seen.sum()) / frames
-    found["false alarms: at people"] = _weighted(np.array([c.person >= 0 for c in chains]), seen)
-    found["false alarms: mean stay, s"] = _mean(np.array([np.ptp(c.frame) + 1 for c in chains]) / _fps(chains))
-    overlap, errors = zip(*(_of_boxes(m) for m in recordings), strict=True)
+    found["false alarms: at people"] = _weighted(np.array([a.person >= 0 for a in alarms]), seen)
+    found["false alarms: mean stay, s"] = _mean(
+        np.array([(np.ptp(a.frame) + 1) / a.recording.truth.fps for a in alarms])
+    )
+    overlap, errors = zip(*(_iou_and_errors(m) for m in recordings), strict=True)
     for q in (0.1, 0.5, 0.9):
         found[f"overlap, {q:.0%} quantile"] = _quantile(np.concatenate(overlap), q)
     e = np.concatenate(errors)
@@ -55,7 +60,7 @@ def statistics(recordings: Sequence[MatchedRecording]) -> dict[str, float]:
 
 
 def miss_runs(m: MatchedRecording) -> Ints:
-    """Lengths of stretches in which a person who is there is missed, frames."""
+    """Returns the length in frames of each run of frames in which a labelled person is present and missed."""
     lengths = []
     for id in np.unique(m.truth.id):
         rows = np.flatnonzero(m.truth.id == id)
@@ -66,8 +71,8 @@ def miss_runs(m: MatchedRecording) -> Ints:
     return np.concatenate([np.zeros(0, np.int64), *lengths])
 
 
-def _of_boxes(m: MatchedRecording) -> tuple[Array, Array]:
-    """Overlaps (H,) and errors (H, 4) of detected people, against their whole boxes."""
+def _iou_and_errors(m: MatchedRecording) -> tuple[Array, Array]:
+    """Returns IoU (H,) and errors (H, 4) of the H detected rows against their whole boxes."""
     assert m.truth.box is not None
     true, box = m.truth.box[m.hit], m.box[m.match[m.hit]]
     low, high = np.maximum(true[:, :2], box[:, :2]), np.minimum(true[:, :2] + true[:, 2:], box[:, :2] + box[:, 2:])
@@ -77,21 +82,20 @@ def _of_boxes(m: MatchedRecording) -> tuple[Array, Array]:
 
 
 def _correlation(recordings: Sequence[MatchedRecording], e: Array, lag: float) -> float:
-    """Of the errors of one person so far apart, all four pooled."""
+    """Returns the correlation of one person's errors about `lag` s apart, nan without any.
+
+    e: the errors of all recordings, one after the other. The four kinds of error are pooled.
+    """
     total, count, first = 0.0, 0, 0
     mean, sd = e.mean(axis=0), np.maximum(e.std(axis=0), 1e-9)
     for m in recordings:
         z = np.full((len(m.truth.id), 4), np.nan)
         z[m.hit] = (e[first : first + int(m.hit.sum())] - mean) / sd
         first += int(m.hit.sum())
-        near = [(i, j) for there, i, j in pairs_at(m.truth, m.hit) if abs(there - lag) <= 0.5 * lag]
+        near = [(i, j) for there, i, j in pairs_by_lag(m.truth, m.hit) if abs(there - lag) <= 0.5 * lag]
         total += sum(float((z[i] * z[j]).sum()) for i, j in near)
         count += sum(4 * len(i) for i, _ in near)
     return total / count if count else float("nan")
-
-
-def _fps(chains: Sequence[object]) -> Array:
-    return np.array([c.m.truth.fps for c in chains])  # type: ignore[attr-defined]
 
 
 def _mean(a: Array) -> float:

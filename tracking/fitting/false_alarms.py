@@ -1,8 +1,8 @@
-"""False alarms: how many, how long each stays, at people or elsewhere, of what size.
+"""Fits false alarms: how many, how long each lasts, whether it moves with a person, and its position and size.
 
-Unmatched boxes of neighbouring frames that overlap are one alarm (a chain). Of those seen in a frame the share that is
-seen again n frames later is seen · exp(-n / (fps life)): a line in its logarithm gives both. A chain that mostly lies
-on people is beside the one it lies on most; all others stand or drift on their own.
+Unmatched detections are linked over time to alarm tracks. Of the alarms detected in a frame, the share detected again n
+frames later is seen · exp(-n / (fps life)). A line fitted to the logarithm of this share gives both parameters. An
+alarm that mostly lies on people belongs to one person; all others stand or drift on their own.
 """
 
 from __future__ import annotations
@@ -15,79 +15,89 @@ import numpy as np
 from scenarios.schema.sensor import FalseAlarms
 from sim.detector.visible_ground import VisibleGround
 from sim.types import Array, Ints
-from tracking.fitting.detection_matching import MatchedRecording, intersections, overlaps
+from tracking.fitting.detection_matching import MatchedRecording, box_intersections, box_iou
 
-LINK = 0.3  # overlap of one alarm with itself in the next frame it is seen
-PAUSE = 0.5  # s: unseen for longer, it is another one
-AGAIN = 1.5  # s: lags that tell the life
-ON = 0.5  # share of an alarm's box that lies on people, in the median, if it is beside one
-NEARLY = 0.6  # of the greatest such share: who has less is not the one
-FEW = 5  # chains: fewer tell nothing about their kind
-PLACES = 32  # at most, of `at`
+LINK = 0.3  # least IoU of two successive detections of one alarm
+PAUSE = 0.5  # s: an alarm that is not detected for longer ends
+AGAIN = 1.5  # s: longest lag used for the mean life
+LEAST_AGAIN = 0.05  # with smaller shares of alarms detected again, every alarm lasts one frame
+LONGEST = 60.0  # s: greatest mean life
+ON = 0.5  # an alarm belongs to a person if people cover this share of its box, in the median over its detections
+NEARLY = 0.6  # share of the greatest covered area: people with less are no candidates for the alarm's person
+FEW = 5  # with fewer alarm tracks of a kind, nothing is fitted for this kind
+PLACES = 32  # greatest number of foot points in `at`
 
 
 @dataclass(frozen=True)
 class AlarmTrack:
-    """One false alarm of recording m: its detections in order; person: the id it is beside, -1 none."""
+    """One false alarm over time.
 
-    m: MatchedRecording
+    recording: where it occurred; rows (L,): its detections, in order; person: id of the person it belongs to, -1 none.
+    """
+
+    recording: MatchedRecording
     rows: Ints
     person: int
 
     @property
     def frame(self) -> Ints:
-        """Of each of its detections."""
-        return self.m.frame[self.rows]
+        """Frame of each detection, (L,)."""
+        return self.recording.frame[self.rows]
 
     @property
     def box(self) -> Array:
-        """(L, 4)."""
-        return self.m.box[self.rows]
+        """Box of each detection, (L, 4) ltwh px."""
+        return self.recording.box[self.rows]
 
 
-def fit_alarms(recordings: Sequence[MatchedRecording]) -> tuple[float, FalseAlarms | None]:
-    """False alarms per frame, and what they are like; None where there are too few to tell."""
-    chains = [chain for m in recordings for chain in alarm_tracks(m)]
+def fit_false_alarms(recordings: Sequence[MatchedRecording]) -> tuple[float, FalseAlarms | None]:
+    """Returns the number of false alarms per frame, and their profile, None if there are fewer than `FEW` alarms."""
+    tracks = [track for m in recordings for track in alarm_tracks(m)]
     frames = sum(m.truth.length for m in recordings)
-    rate = sum(len(c.rows) for c in chains) / frames
-    if len(chains) < FEW:
+    rate = sum(len(t.rows) for t in tracks) / frames
+    if len(tracks) < FEW:
         return rate, None
-    life, seen = _life(recordings, chains)
-    beside = [c for c in chains if c.person >= 0]
-    apart = [c for c in chains if c.person < 0]
-    near = sum(len(c.rows) for c in beside) / sum(len(c.rows) for c in chains)
-    like = {"life": life, "seen": seen, "near": round(near, 4), "aspect": _aspect(chains), "jitter": _jitter(chains)}
-    if len(beside) >= FEW:
-        like |= _beside(beside)
-    if len(apart) >= FEW:
-        like |= _apart(apart)
-    return rate, FalseAlarms(**like)
+    life, seen = _life_and_seen(recordings, tracks)
+    at_people = [t for t in tracks if t.person >= 0]
+    elsewhere = [t for t in tracks if t.person < 0]
+    near = sum(len(t.rows) for t in at_people) / sum(len(t.rows) for t in tracks)
+    found = {"life": life, "seen": seen, "near": round(near, 4), "aspect": _aspect(tracks), "jitter": _jitter(tracks)}
+    if len(at_people) >= FEW:
+        found |= _fit_at_people(at_people)
+    if len(elsewhere) >= FEW:
+        found |= _fit_elsewhere(elsewhere)
+    return rate, FalseAlarms(**found)
 
 
 def alarm_tracks(m: MatchedRecording) -> list[AlarmTrack]:
-    """The alarms of a recording, in the order of their first detection."""
+    """Returns the false alarms of a recording as tracks, in the order of their first detection.
+
+    In each frame unmatched detections continue the open tracks, greatest IoU first, if it is at least `LINK`. The
+    others begin new tracks.
+    """
     pause = max(1, round(PAUSE * m.truth.fps))
-    made: list[list[int]] = []
+    found: list[list[int]] = []
     for index in np.unique(m.frame[m.false]).tolist():
-        open_ = [c for c in made if m.frame[c[-1]] >= index - pause]
+        open_ = [rows for rows in found if m.frame[rows[-1]] >= index - pause]
         here = np.flatnonzero(m.false & (m.frame == index))
-        like = overlaps(m.box[[c[-1] for c in open_]], m.box[here]) if open_ else np.zeros((0, len(here)))
-        taken: set[int] = set()
+        iou = box_iou(m.box[[rows[-1] for rows in open_]], m.box[here]) if open_ else np.zeros((0, len(here)))
+        used_tracks: set[int] = set()
         used: set[int] = set()
-        for flat in np.argsort(-like, axis=None, kind="stable"):
+        for flat in np.argsort(-iou, axis=None, kind="stable"):
             i, j = divmod(int(flat), len(here))
-            if like[i, j] >= LINK and i not in used and j not in taken:
+            if iou[i, j] >= LINK and i not in used_tracks and j not in used:
                 open_[i].append(int(here[j]))
-                used.add(i)
-                taken.add(j)
-        made += [[int(row)] for j, row in enumerate(here) if j not in taken]
-    return [AlarmTrack(m, np.array(rows), _person(m, rows)) for rows in made]
+                used_tracks.add(i)
+                used.add(j)
+        found += [[int(row)] for j, row in enumerate(here) if j not in used]
+    return [AlarmTrack(m, np.array(rows), _person_of_alarm(m, rows)) for rows in found]
 
 
-def _person(m: MatchedRecording, rows: list[int]) -> int:
-    """Whom an alarm is beside, if people cover ON of its box in the median; -1 nobody.
+def _person_of_alarm(m: MatchedRecording, rows: list[int]) -> int:
+    """Returns the id of the person that an alarm belongs to, -1 none.
 
-    Of those it lies on nearly as much as on any, the one against whom it moves least.
+    People must cover the share `ON` of its box, in the median over its detections. Candidates cover at least `NEARLY`
+    of what the person who covers most does. The candidate with the steadiest offset to the alarm is chosen.
     """
     assert m.truth.box is not None
     share: dict[int, float] = {}
@@ -96,7 +106,7 @@ def _person(m: MatchedRecording, rows: list[int]) -> int:
     for row in rows:
         r = m.truth.rows(int(m.frame[row]))
         box, people = m.box[row : row + 1], m.truth.box[r]
-        on = intersections(box, people)[0] / (box[0, 2] * box[0, 3])
+        on = box_intersections(box, people)[0] / (box[0, 2] * box[0, 3])
         covered.append(float(on.sum()))
         away = (box[0, :2] + box[0, 2:] * [0.5, 1.0] - people[:, :2] - people[:, 2:] * [0.5, 1.0]) / people[:, 3:]
         for k in np.flatnonzero(on > 0):
@@ -105,98 +115,110 @@ def _person(m: MatchedRecording, rows: list[int]) -> int:
             offset.setdefault(id, []).append(away[k])
     if not share or np.median(covered) < ON:
         return -1
-    likely = [id for id, s in share.items() if s >= NEARLY * max(share.values())]
-    return min(likely, key=lambda id: (float(np.std(offset[id], axis=0).sum()), -share[id]))
+    candidates = [id for id, s in share.items() if s >= NEARLY * max(share.values())]
+    return min(candidates, key=lambda id: (float(np.std(offset[id], axis=0).sum()), -share[id]))
 
 
-def _life(recordings: Sequence[MatchedRecording], chains: Sequence[AlarmTrack]) -> tuple[float, float]:
-    """life s and seen, by how many alarms are seen again after so many frames."""
+def _life_and_seen(recordings: Sequence[MatchedRecording], tracks: Sequence[AlarmTrack]) -> tuple[float, float]:
+    """Returns the mean life of a false alarm in s, and the probability that a living one is detected in a frame.
+
+    (0, 1) if less than `LEAST_AGAIN` of the alarms are detected again after any lag. With one lag only, `seen` is 1.
+    The life is at most `LONGEST`, and `seen` at least 0.2.
+    """
     lag, share, weight = [], [], []
     for m in recordings:
-        mine = [set(c.frame.tolist()) for c in chains if c.m is m]
+        frames_of_tracks = [set(t.frame.tolist()) for t in tracks if t.recording is m]
         for n in range(1, max(2, round(AGAIN * m.truth.fps))):
-            before = [(f, c) for c in mine for f in c if f + n <= m.truth.length]
-            again = sum(f + n in c for f, c in before)
+            before = [(f, frames) for frames in frames_of_tracks for f in frames if f + n <= m.truth.length]
+            again = sum(f + n in frames for f, frames in before)
             if again:
                 lag.append(n / m.truth.fps)
                 share.append(again / len(before))
                 weight.append(again)
-    if not lag or max(share) < 0.05:
+    if not lag or max(share) < LEAST_AGAIN:
         return 0.0, 1.0
     if len(lag) == 1:
         return round(float(-lag[0] / np.log(min(share[0], 0.98))), 3), 1.0
     slope, level = np.polyfit(lag, np.log(share), 1, w=np.sqrt(weight))
-    if slope > -1.0 / 60.0:
-        slope, level = -1.0 / 60.0, float(np.average(np.log(share), weights=weight))
-    if level > 0.0:  # seen whenever it is there
+    if slope > -1.0 / LONGEST:
+        slope, level = -1.0 / LONGEST, float(np.average(np.log(share), weights=weight))
+    if level > 0.0:  # seen would exceed 1: fit a line through the origin
         w = np.array(weight) * np.array(lag)
         slope, level = float(w @ np.log(share) / (w @ np.array(lag))), 0.0
-    return round(-1.0 / min(float(slope), -1.0 / 60.0), 3), round(float(np.exp(max(level, np.log(0.2)))), 4)
+    return round(-1.0 / min(float(slope), -1.0 / LONGEST), 3), round(float(np.exp(max(level, np.log(0.2)))), 4)
 
 
-def _weighted(values: Sequence[float], chains: Sequence[AlarmTrack]) -> tuple[float, float]:
-    """Middle and spread (median, half of the middle 68 %); chains that are seen often count for more, by the root.
+def _robust_spread(values: Sequence[float], tracks: Sequence[AlarmTrack]) -> tuple[float, float]:
+    """Returns the weighted median and half the width of the middle 68 %, in place of mean and standard deviation.
 
-    Not mean and sd: of alarms said to be beside somebody some are not, and the other way round.
+    values: one per track. The weight of a track is the root of its number of detections. Quantiles are used because
+    some alarms are assigned to a person wrongly.
     """
     order = np.argsort(values, kind="stable")
-    w, v = np.sqrt([len(c.rows) for c in chains])[order], np.array(values)[order]
+    w, v = np.sqrt([len(t.rows) for t in tracks])[order], np.array(values)[order]
     low, middle, high = np.interp((0.16, 0.5, 0.84), (np.cumsum(w) - w / 2) / w.sum(), v)
     return round(float(middle), 4), round(float(high - low) / 2, 4)
 
 
-def _aspect(chains: Sequence[AlarmTrack]) -> tuple[float, float]:
-    return _weighted([float(np.log(c.box[:, 2] / c.box[:, 3]).mean()) for c in chains], chains)
+def _aspect(tracks: Sequence[AlarmTrack]) -> tuple[float, float]:
+    """Returns median and spread of the logarithm of width / height."""
+    return _robust_spread([float(np.log(t.box[:, 2] / t.box[:, 3]).mean()) for t in tracks], tracks)
 
 
-def _jitter(chains: Sequence[AlarmTrack]) -> float:
-    """sd of edges in heights: of x_(t-1) - 2 x_t + x_(t+1), which knows no steady way, over sqrt 6; by its median."""
-    bends = [np.zeros((0, 4))]
-    for c in chains:
-        edges = np.concatenate([c.box[:, :2], c.box[:, :2] + c.box[:, 2:]], axis=1) / c.box[:, 3].mean()
-        steady = (np.diff(c.frame)[1:] == 1) & (np.diff(c.frame)[:-1] == 1)
-        bends.append(np.diff(edges, n=2, axis=0)[steady])
-    size = np.abs(np.concatenate(bends))
+def _jitter(tracks: Sequence[AlarmTrack]) -> float:
+    """Returns the standard deviation of an edge from frame to frame, in box heights; 0 without three frames in a row.
+
+    It is estimated from second differences x(t-1) - 2 x(t) + x(t+1), which steady motion leaves at 0: 1.4826 times
+    their median absolute value, divided by sqrt 6.
+    """
+    second_differences = [np.zeros((0, 4))]
+    for t in tracks:
+        edges = np.concatenate([t.box[:, :2], t.box[:, :2] + t.box[:, 2:]], axis=1) / t.box[:, 3].mean()
+        steady = (np.diff(t.frame)[1:] == 1) & (np.diff(t.frame)[:-1] == 1)
+        second_differences.append(np.diff(edges, n=2, axis=0)[steady])
+    size = np.abs(np.concatenate(second_differences))
     return round(float(1.4826 * np.median(size) / np.sqrt(6.0)), 4) if len(size) else 0.0
 
 
-def _beside(chains: Sequence[AlarmTrack]) -> dict[str, tuple[float, float]]:
-    """Places and sizes against the persons they are beside."""
+def _fit_at_people(tracks: Sequence[AlarmTrack]) -> dict[str, tuple[float, float]]:
+    """Returns across, foot and near_height of `FalseAlarms`: median and spread relative to the alarm's person."""
     rows = []
-    for c in chains:
-        truth = c.m.truth
+    for t in tracks:
+        truth = t.recording.truth
         assert truth.box is not None
-        mine = np.flatnonzero(truth.id == c.person)
-        at = np.searchsorted(truth.frame[mine], c.frame)
-        there = (at < len(mine)) & (truth.frame[mine[np.minimum(at, len(mine) - 1)]] == c.frame)
-        who, box = truth.box[mine[at[there]]], c.box[there]
-        h = who[:, 3]
-        across = (box[:, 0] + box[:, 2] / 2 - who[:, 0] - who[:, 2] / 2) / h
-        foot = (box[:, 1] + box[:, 3] - who[:, 1] - h) / h
+        own = np.flatnonzero(truth.id == t.person)
+        at = np.searchsorted(truth.frame[own], t.frame)
+        present = (at < len(own)) & (truth.frame[own[np.minimum(at, len(own) - 1)]] == t.frame)
+        person, box = truth.box[own[at[present]]], t.box[present]
+        h = person[:, 3]
+        across = (box[:, 0] + box[:, 2] / 2 - person[:, 0] - person[:, 2] / 2) / h
+        foot = (box[:, 1] + box[:, 3] - person[:, 1] - h) / h
         rows.append((across.mean(), foot.mean(), np.log(box[:, 3] / h).mean()))
     columns = np.array(rows, dtype=float).T
-    return {
-        name: _weighted(list(v), chains) for name, v in zip(("across", "foot", "near_height"), columns, strict=True)
-    }
+    names = ("across", "foot", "near_height")
+    return {name: _robust_spread(list(v), tracks) for name, v in zip(names, columns, strict=True)}
 
 
-def _apart(chains: Sequence[AlarmTrack]) -> dict[str, object]:
-    """Sizes against those of people standing there, places, and how fast they drift."""
-    height, place, speed = [], [], []
-    for c in chains:
-        ground = VisibleGround(c.m.truth, c.m.camera, np.array(c.m.size, dtype=float))
-        middle, foot = c.box[:, 0] + c.box[:, 2] / 2, c.box[:, 1] + c.box[:, 3]
+def _fit_elsewhere(tracks: Sequence[AlarmTrack]) -> dict[str, object]:
+    """Returns height, drift and at of `FalseAlarms`; the drift uses tracks of four or more detections only.
+
+    height: median and spread of the logarithm of the height relative to a person standing there.
+    """
+    height, place, velocity = [], [], []
+    for t in tracks:
+        ground = VisibleGround(t.recording.truth, t.recording.camera, np.array(t.recording.size, dtype=float))
+        middle, foot = t.box[:, 0] + t.box[:, 2] / 2, t.box[:, 1] + t.box[:, 3]
         usual = [max(ground.usual_height(float(u), float(v)), 1.0) for u, v in zip(middle, foot, strict=True)]
-        height.append(float(np.log(c.box[:, 3] / usual).mean()))
+        height.append(float(np.log(t.box[:, 3] / usual).mean()))
         span = np.maximum(ground.high - ground.low, 1.0)
         place += [
             tuple(np.clip((np.array([u, v]) - ground.low) / span, 0, 1)) for u, v in zip(middle, foot, strict=True)
         ]
-        seconds = (c.frame[-1] - c.frame[0]) / c.m.truth.fps
-        if len(c.rows) >= 4:
-            ways = np.array([middle[-1] - middle[0], foot[-1] - foot[0]]) / (c.box[:, 3].mean() * seconds)
-            speed.append(ways)
-    drift = float(np.sqrt(np.mean(np.square(speed)))) if speed else 0.0
+        seconds = (t.frame[-1] - t.frame[0]) / t.recording.truth.fps
+        if len(t.rows) >= 4:
+            way = np.array([middle[-1] - middle[0], foot[-1] - foot[0]])
+            velocity.append(way / (t.box[:, 3].mean() * seconds))
+    drift = float(np.sqrt(np.mean(np.square(velocity)))) if velocity else 0.0
     chosen = np.unique(np.round(np.linspace(0, len(place) - 1, min(PLACES, len(place)))).astype(int))
     at = tuple((round(float(place[k][0]), 3), round(float(place[k][1]), 3)) for k in chosen)
-    return {"height": _weighted(height, chains), "drift": round(drift, 4), "at": at}
+    return {"height": _robust_spread(height, tracks), "drift": round(drift, 4), "at": at}

@@ -1,8 +1,9 @@
-"""Who is missed: by visibility and size, and for how long.
+"""Fits the probability of detection, by visibility and box height, and how long misses persist.
 
-p = P · c(visibility) · min(1, height / (2 small)), c rising piecewise linearly to 1 over evenly spaced visibilities, by
-the greatest likelihood. A person's luck lasts, so that neighbouring rows say little that is new: `small` is kept only
-if the likelihood gains more than rows as alike as these give by chance.
+p = P · c(visibility) · min(1, height / (2 small)). c is piecewise linear over `NODES` evenly spaced visibilities and
+rises to c(1) = 1. P and c have the greatest likelihood for each candidate of `small`. Misses of one person persist, so
+successive rows carry little new information. `small` is therefore used only if the log likelihood gains more than
+`GAIN` times the number of rows that carry as much information as one independent row.
 """
 
 from __future__ import annotations
@@ -15,51 +16,55 @@ import numpy as np
 from scenarios.schema.sensor import Memory
 from sim.types import Array, Bools
 from tracking.fitting.detection_matching import MatchedRecording
-from tracking.fitting.error_correlation import correlations, hidden_correlations, memory
+from tracking.fitting.error_correlation import correlations, fit_memory, miss_correlations
 
 NODES = 5
-SIZES = 16  # of `small` that are tried
-PRIOR = 2.0  # rows' worth of belief at each node that the chance goes with the visibility
-GAIN = 4.0  # in log likelihood, per row that is new
+SIZES = 16  # number of candidates of `small`
+PRIOR = 2.0  # weight, in rows per node, of the prior that c equals the visibility
+GAIN = 4.0  # gain in log likelihood per independent row that `small` needs
+FEW_MISSES = 10  # with fewer misses in all, no memory is fitted
 
 
 @dataclass(frozen=True)
 class DetectionProbability:
-    """The fitted chance to be detected: P, c (NODES,) with c[-1] = 1, small px (0: no effect)."""
+    """Probability of detection: best is P, curve the values c (NODES,) with c[-1] = 1, small in px (0: no effect)."""
 
     best: float
     curve: tuple[float, ...]
     small: float
 
     def at(self, visibility: Array, height: Array) -> Array:
-        """(R,)."""
+        """Returns the probabilities (R,) at visibility (R,) and box height (R,) in px."""
         c = np.interp(visibility, np.linspace(0.0, 1.0, NODES), self.curve)
         return self.best * c * (np.minimum(1.0, height / (2 * self.small)) if self.small else 1.0)
 
 
 def fit_misses(recordings: Sequence[MatchedRecording]) -> tuple[DetectionProbability, tuple[Memory, ...]]:
-    """The chance to be detected, and how long a person's luck lasts."""
+    """Returns the probability of detection, and the parts of misses that change slowly over time.
+
+    The second result is () if there are fewer than `FEW_MISSES` misses or no correlation.
+    """
     hit = np.concatenate([m.hit for m in recordings])
     visibility = np.concatenate([m.truth.visibility for m in recordings])
     height = np.concatenate([_heights(m) for m in recordings])
-    plain, likelihood = _chance(hit, visibility, height, 0.0)
-    gain = GAIN * _alike(recordings, plain)
+    plain, likelihood = _fit_probability(hit, visibility, height, 0.0)
+    gain = GAIN * _rows_per_independent_row(recordings, plain)
     chosen = plain
     least, most = np.quantile(height, (0.01, 0.9)) / 2
     for small in np.geomspace(least, most, SIZES).round(1):
-        other, better = _chance(hit, visibility, height, float(small))
+        other, better = _fit_probability(hit, visibility, height, float(small))
         if better > likelihood + gain:
             chosen, likelihood, gain = other, better, 0.0
-    if (~hit).sum() < 10:
+    if (~hit).sum() < FEW_MISSES:
         return chosen, ()
-    lasting = [
-        hidden_correlations(m.truth, ~m.hit, 1.0 - chosen.at(m.truth.visibility, _heights(m))) for m in recordings
+    correlated = [
+        miss_correlations(m.truth, ~m.hit, 1.0 - chosen.at(m.truth.visibility, _heights(m))) for m in recordings
     ]
-    return chosen, memory(lasting)
+    return chosen, fit_memory(correlated)
 
 
 def _heights(m: MatchedRecording) -> Array:
-    """What decides on size: the boxes' heights, from above what sim.detector.sense takes for them."""
+    """Returns the heights (R,) in px that decide on detection; seen from above, the longer side / SHOULDER_SHARE."""
     assert m.truth.box is not None
     from sim.scene.body import SHOULDER_SHARE
 
@@ -68,8 +73,8 @@ def _heights(m: MatchedRecording) -> Array:
     return m.truth.box[:, 3]
 
 
-def _chance(hit: Bools, visibility: Array, height: Array, small: float) -> tuple[DetectionProbability, float]:
-    """The chance of greatest likelihood for a given `small`, and its log likelihood."""
+def _fit_probability(hit: Bools, visibility: Array, height: Array, small: float) -> tuple[DetectionProbability, float]:
+    """Returns the likeliest probability for a given `small` (px), and its log likelihood, prior included."""
     from scipy.optimize import minimize
 
     levels = np.linspace(0.0, 1.0, NODES)
@@ -92,13 +97,17 @@ def _chance(hit: Bools, visibility: Array, height: Array, small: float) -> tuple
     return DetectionProbability(float(c[-1]), tuple(c / c[-1]), small), -float(found.fun)
 
 
-def _alike(recordings: Sequence[MatchedRecording], chance: DetectionProbability) -> float:
-    """How many rows say as much as one that is new: 1 + 2 Σ correlation of misses, up to the longest lag."""
-    alike = []
+def _rows_per_independent_row(recordings: Sequence[MatchedRecording], probability: DetectionProbability) -> float:
+    """Returns how many rows carry as much information as one independent row, at least 1.
+
+    It is 1 + 2 Σ rho over the lags in frames, rho being the correlation of misses. The greatest of all recordings.
+    """
+    found = []
     for m in recordings:
-        p = chance.at(m.truth.visibility, _heights(m))
+        p = probability.at(m.truth.visibility, _heights(m))
         z = (m.hit - p) / np.sqrt(np.maximum(p * (1.0 - p), 1e-3))
-        found = correlations(m.truth, z[:, None], np.ones(len(z), bool))
-        if len(found.lag):
-            alike.append(1.0 + 2.0 * m.truth.fps * float(np.trapezoid(np.clip(found.rho, 0.0, 1.0), found.lag)))
-    return max(alike, default=1.0)
+        over_time = correlations(m.truth, z[:, None], np.ones(len(z), bool))
+        if len(over_time.lag):
+            area = float(np.trapezoid(np.clip(over_time.rho, 0.0, 1.0), over_time.lag))
+            found.append(1.0 + 2.0 * m.truth.fps * area)
+    return max(found, default=1.0)

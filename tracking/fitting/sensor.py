@@ -1,4 +1,4 @@
-"""`fit_sensor`: a detector's whole profile, from its detections on labelled recordings to a `[sensor]` table."""
+"""`fit_sensor`: fits the whole profile of a detector, a `[sensor]` table, to its detections on labelled recordings."""
 
 from __future__ import annotations
 
@@ -10,28 +10,28 @@ from scenarios.errors import InputError
 from scenarios.schema.sensor import Sensor
 from sim.types import Array
 from sim.types import Sequence as Recording
-from tracking.fitting.box_noise import fit_noise, point_noise
+from tracking.fitting.box_noise import fit_box_noise, fit_point_noise
 from tracking.fitting.detection_matching import MatchedRecording, match_sequence
-from tracking.fitting.false_alarms import fit_alarms
+from tracking.fitting.false_alarms import fit_false_alarms
 from tracking.fitting.misses import fit_misses
 
-SCORES = 11  # quantiles
-LEAST = 50  # labelled people (rows): fewer are no profile
-FEW_SCORES = 20
+SCORES = 11  # number of quantiles of the scores, evenly spaced from 0 to 1
+LEAST = 50  # least number of labelled rows
+FEW_SCORES = 20  # with fewer scores, no quantiles are given
 
 
 def fit_sensor(sequences: Iterable[Recording] | Recording) -> Sensor:
-    """The sensor that errs as the detector did on these recordings, all pooled.
+    """Returns the sensor whose errors are like those of the detector on these recordings, pooled.
 
-    InputError where one of them has no labels, no detections or no boxes, and where hardly anybody is labelled or
-    detected.
+    Raises InputError if a recording lacks labels, detections or boxes. Raises InputError if there are fewer than 50
+    labelled rows (people in frames) or fewer than 25 of them are detected.
     """
     recordings = [sequences] if isinstance(sequences, Recording) else list(sequences)
-    return fit([match_sequence(s) for s in recordings])
+    return fit_matched([match_sequence(s) for s in recordings])
 
 
-def fit(recordings: Sequence[MatchedRecording]) -> Sensor:
-    """The sensor of recordings whose detections are matched."""
+def fit_matched(recordings: Sequence[MatchedRecording]) -> Sensor:
+    """Returns the sensor of recordings whose detections are matched; raises InputError if there are too few rows."""
     people, hits = sum(len(m.match) for m in recordings), sum(int(m.hit.sum()) for m in recordings)
     if people < LEAST or hits < LEAST // 2:
         name = recordings[0].truth.name if recordings else "fit sensor"
@@ -40,24 +40,24 @@ def fit(recordings: Sequence[MatchedRecording]) -> Sensor:
             expected=f"at least {LEAST} and {LEAST // 2}, of all frames together",
             remedy="give more frames, or check that gt and det are of the same recording",
         )  # fmt: skip
-    chance, luck = fit_misses(recordings)
-    kind, noise = fit_noise(recordings)
-    rate, alarms = fit_alarms(recordings)
-    own = point_noise(recordings)
+    detection, miss_memory = fit_misses(recordings)
+    kind, noise = fit_box_noise(recordings)
+    rate, alarms = fit_false_alarms(recordings)
+    own = fit_point_noise(recordings)
     height = float(np.median(np.concatenate([m.truth.box[:, 3] for m in recordings if m.truth.box is not None])))
     edges = height * float(np.sqrt(np.mean(np.square([noise.foot[1], noise.top[1], noise.across[1]]))))
     true = np.concatenate([m.score[m.match[m.hit]] for m in recordings])
     false = np.concatenate([m.score[m.false] for m in recordings])
     return Sensor(
-        detect_prob=_digits(chance.best),
+        detect_prob=_digits(detection.best),
         clutter_rate=_digits(rate),
         noise_px=_digits(edges),
         noise_m=Sensor().noise_m if own is None else _digits(own),
         box=kind,
         min_visibility=0.0,
-        small_px=chance.small,
-        by_visibility=tuple(_digits(c) for c in chance.curve),
-        miss_memory=luck or None,
+        small_px=detection.small,
+        by_visibility=tuple(_digits(c) for c in detection.curve),
+        miss_memory=miss_memory or None,
         box_noise=noise,
         points="foot" if own is None else "own",
         false_alarms=alarms,
@@ -67,10 +67,12 @@ def fit(recordings: Sequence[MatchedRecording]) -> Sensor:
 
 
 def _digits(x: float) -> float:
+    """Returns x rounded to four significant digits."""
     return float(f"{x:.4g}")
 
 
 def _quantiles(score: Array) -> tuple[float, ...] | None:
+    """Returns `SCORES` quantiles from 0 to 1, None if there are fewer than `FEW_SCORES` scores."""
     if len(score) < FEW_SCORES:
         return None
     return tuple(round(float(q), 4) for q in np.quantile(score, np.linspace(0.0, 1.0, SCORES)))

@@ -9,8 +9,14 @@ import pytest
 
 from sim.io.source import open_source
 from sim.types import Detections, Truth
-from tracking.fitting.detection_matching import MatchedRecording, intersections, match, match_sequence, overlaps
-from tracking.fitting.error_statistics import miss_runs, statistics
+from tracking.fitting.detection_matching import (
+    MatchedRecording,
+    box_intersections,
+    box_iou,
+    match_detections,
+    match_sequence,
+)
+from tracking.fitting.error_statistics import error_statistics, miss_runs
 from tracking.fitting.false_alarms import alarm_tracks
 
 
@@ -38,13 +44,13 @@ SIZE = (640, 480)
 
 def test_overlaps_by_hand() -> None:
     a, b = np.array([[0.0, 0.0, 10.0, 10.0]]), np.array([[5.0, 5.0, 10.0, 10.0], [20.0, 0.0, 5.0, 5.0], [0, 0, 10, 10]])
-    assert intersections(a, b).tolist() == [[25.0, 0.0, 100.0]]
-    assert overlaps(a, b) == pytest.approx(np.array([[25 / 175, 0.0, 1.0]]))
+    assert box_intersections(a, b).tolist() == [[25.0, 0.0, 100.0]]
+    assert box_iou(a, b) == pytest.approx(np.array([[25 / 175, 0.0, 1.0]]))
 
 
 def test_hits_misses_and_false_alarms() -> None:
     truth = truth_of({1: [HERE, HERE, None], 2: [THERE, THERE, THERE]})
-    m = match(truth, found([HERE], [THERE, [500.0, 300.0, 40.0, 100.0]], []), SIZE)
+    m = match_detections(truth, found([HERE], [THERE, [500.0, 300.0, 40.0, 100.0]], []), SIZE)
     assert m.hit.tolist() == [True, False, False, True, False]  # frames 1 (1, 2), 2 (1, 2), 3 (2)
     assert m.owner.tolist() == [0, 3, -1]
     assert miss_runs(m).tolist() == [1, 1, 1]
@@ -52,12 +58,12 @@ def test_hits_misses_and_false_alarms() -> None:
 
 def test_boxes_that_are_all_too_wide_are_matched_all_the_same() -> None:
     wide = [60.0, 60.0, 120.0, 180.0]  # overlap 4000 / 21600 = 0.19
-    m = match(truth_of({1: [HERE] * 6, 2: [THERE] * 6}), found(*[[wide, THERE]] * 6), SIZE)
+    m = match_detections(truth_of({1: [HERE] * 6, 2: [THERE] * 6}), found(*[[wide, THERE]] * 6), SIZE)
     assert not m.hit[m.truth.id == 1].any()  # one of two: not usual
     near = [90.0, 80.0, 70.0, 130.0]  # overlap 0.44, off by the same for everybody
     both = [near, [290.0, 80.0, 70.0, 130.0]]
     far = [75.0, 65.0, 85.0, 165.0]  # 0.29 as it is, more once what all are off by is taken off
-    m = match(truth_of({1: [HERE] * 6, 2: [THERE] * 6}), found(*[both] * 5, [far, both[1]]), SIZE)
+    m = match_detections(truth_of({1: [HERE] * 6, 2: [THERE] * 6}), found(*[both] * 5, [far, both[1]]), SIZE)
     assert m.hit.all()
 
 
@@ -76,7 +82,7 @@ def test_what_motchallenge_leaves_out_is_no_false_alarm(tmp_path: Path) -> None:
 
 
 def alarmed(*frames: list[list[float]]) -> MatchedRecording:
-    return match(truth_of({1: [HERE] * len(frames), 2: [THERE] * len(frames)}), found(*frames), SIZE)
+    return match_detections(truth_of({1: [HERE] * len(frames), 2: [THERE] * len(frames)}), found(*frames), SIZE)
 
 
 def test_alarms_are_linked_over_pauses_and_know_whom_they_are_at() -> None:
@@ -88,7 +94,7 @@ def test_alarms_are_linked_over_pauses_and_know_whom_they_are_at() -> None:
 
 def test_statistics_by_hand() -> None:
     m = alarmed([HERE, THERE], [HERE], [HERE], [HERE, THERE, [500.0, 300.0, 40.0, 100.0]])
-    said = statistics([m])
+    said = error_statistics([m])
     assert said["missed"] == pytest.approx(0.25)
     assert said["misses: mean run, s"] == pytest.approx(0.2)
     assert said["false alarms per frame"] == pytest.approx(0.25)

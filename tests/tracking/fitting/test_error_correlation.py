@@ -8,7 +8,13 @@ from scipy.stats import multivariate_normal
 from scenarios.schema.sensor import Memory
 from sim.detector.correlated_noise import correlated_normals
 from sim.types import Truth
-from tracking.fitting.error_correlation import Correlations, correlations, hidden_correlations, memory, together
+from tracking.fitting.error_correlation import (
+    Correlations,
+    bivariate_normal_cdf,
+    correlations,
+    fit_memory,
+    miss_correlations,
+)
 
 
 def people(count: int = 30, frames: int = 300) -> Truth:
@@ -30,7 +36,7 @@ def drawn(truth: Truth, parts: list[Memory]) -> np.ndarray:
 def test_two_normals_together(rho: float) -> None:
     a, b = np.array([-1.0, 0.3, 2.0, 0.0]), np.array([-0.5, 0.3, -1.0, 0.0])
     law = multivariate_normal([0.0, 0.0], [[1.0, rho], [rho, 1.0]])
-    assert together(a, b, rho) == pytest.approx(law.cdf(np.stack([a, b], axis=1)), abs=2e-4)
+    assert bivariate_normal_cdf(a, b, rho) == pytest.approx(law.cdf(np.stack([a, b], axis=1)), abs=2e-4)
 
 
 PARTS = [Memory(share=0.4, time=0.3), Memory(share=0.4, time=4.0)]
@@ -47,7 +53,7 @@ def test_correlations_of_errors_and_of_what_is_behind_misses() -> None:
     assert seen.lag[0] == pytest.approx(0.1)
     assert seen.rho == pytest.approx(wanted(seen.lag), abs=0.08)
     p_miss = np.where(truth.id % 2 == 0, 0.15, 0.4)  # the chance differs from person to person, the memory does not
-    behind = hidden_correlations(truth, ndtr(z[:, 0]) < p_miss, p_miss)
+    behind = miss_correlations(truth, ndtr(z[:, 0]) < p_miss, p_miss)
     assert behind.rho == pytest.approx(wanted(behind.lag), abs=0.12)
 
 
@@ -59,7 +65,7 @@ def test_only_rows_that_are_meant_count() -> None:
 
 def test_exponentials_come_back() -> None:
     lag = np.geomspace(0.1, 10.0, 14)
-    found = memory([Correlations(lag, wanted(lag), np.full(14, 1000.0))])
+    found = fit_memory([Correlations(lag, wanted(lag), np.full(14, 1000.0))])
     at = np.array([0.1, 0.5, 2.0, 8.0])
     assert sum(m.share * np.exp(-at / m.time) for m in found) == pytest.approx(wanted(at), abs=0.01)
     assert sum(m.share for m in found) <= 1.0
@@ -67,14 +73,14 @@ def test_exponentials_come_back() -> None:
 
 def test_shares_stay_below_one_and_noise_has_no_memory() -> None:
     lag = np.geomspace(0.1, 10.0, 14)
-    found = memory([Correlations(lag, np.full(14, 1.2), np.full(14, 1000.0))])
+    found = fit_memory([Correlations(lag, np.full(14, 1.2), np.full(14, 1000.0))])
     assert sum(m.share for m in found) == pytest.approx(1.0, abs=1e-6)
     noise = np.random.default_rng(0).normal(0, 0.01, 14)
-    assert sum(m.share for m in memory([Correlations(lag, noise, np.full(14, 1000.0))])) < 0.05
-    assert memory([]) == ()
-    assert memory([Correlations(np.zeros(0), np.zeros(0), np.zeros(0))]) == ()
+    assert sum(m.share for m in fit_memory([Correlations(lag, noise, np.full(14, 1000.0))])) < 0.05
+    assert fit_memory([]) == ()
+    assert fit_memory([Correlations(np.zeros(0), np.zeros(0), np.zeros(0))]) == ()
 
 
 def test_a_short_recording_says_nothing_of_long_times() -> None:
     lag = np.array([0.1, 0.2, 0.4])
-    assert all(m.time <= 0.8 for m in memory([Correlations(lag, np.full(3, 0.9), np.full(3, 100.0))]))
+    assert all(m.time <= 0.8 for m in fit_memory([Correlations(lag, np.full(3, 0.9), np.full(3, 100.0))]))

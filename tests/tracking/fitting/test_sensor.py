@@ -15,10 +15,10 @@ from scenarios.schema.sensor import BoxNoise, FalseAlarms, Memory, Sensor
 from sim.detector.sense import sense
 from sim.sequence import simulate
 from sim.types import Frame, Sequence, Truth
-from tracking.fitting.detection_matching import MatchedRecording, match, match_sequence
-from tracking.fitting.error_statistics import simulated_detections, statistics
-from tracking.fitting.false_alarms import fit_alarms
-from tracking.fitting.sensor import fit, fit_sensor
+from tracking.fitting.detection_matching import MatchedRecording, match_detections, match_sequence
+from tracking.fitting.error_statistics import error_statistics, simulated_detections
+from tracking.fitting.false_alarms import fit_false_alarms
+from tracking.fitting.sensor import fit_matched, fit_sensor
 
 KNOWN = Sensor(
     detect_prob=0.85,
@@ -57,14 +57,14 @@ def scenes() -> tuple[tuple[Truth, Any], ...]:
 
 def seen(sensor: Sensor, seed: int = 0) -> list[MatchedRecording]:
     return [
-        match(truth, sense(truth, sensor, seed + k, camera, camera.image), camera.image, camera)
+        match_detections(truth, sense(truth, sensor, seed + k, camera, camera.image), camera.image, camera)
         for k, (truth, camera) in enumerate(scenes())
     ]
 
 
 @cache
 def fitted() -> Sensor:
-    return fit(seen(KNOWN))
+    return fit_matched(seen(KNOWN))
 
 
 def near(found: Any, wanted: Any, absolute: float) -> None:
@@ -102,7 +102,7 @@ def test_noise_comes_back() -> None:
 
 def test_false_alarms_come_back() -> None:
     busy = KNOWN.model_copy(update={"clutter_rate": 4.0})
-    rate, found = fit_alarms(seen(busy, seed=50))
+    rate, found = fit_false_alarms(seen(busy, seed=50))
     alone = seen(busy.model_copy(update={"detect_prob": 0.0}), seed=50)  # the same alarms, nobody detected
     known = KNOWN.false_alarms
     assert found is not None
@@ -120,7 +120,7 @@ def test_false_alarms_come_back() -> None:
 
 def test_places_of_false_alarms_come_back() -> None:
     left = KNOWN.false_alarms.model_copy(update={"near": 0.0, "at": ((0.2, 0.3), (0.3, 0.7)), "drift": 0.0})
-    found = fit_alarms(seen(KNOWN.model_copy(update={"false_alarms": left})))[1]
+    found = fit_false_alarms(seen(KNOWN.model_copy(update={"false_alarms": left})))[1]
     assert found is not None
     assert found.at is not None
     near(np.mean([x for x, _ in found.at]), 0.25, 0.04)
@@ -143,7 +143,7 @@ def test_small_people_and_tails_and_visible_parts_are_told() -> None:
     noise = BoxNoise(foot=(0.0, 0.05), top=(0.0, 0.05), across=(0.0, 0.03), width=(0.0, 0.1), tails=6.0)
     other = Sensor(detect_prob=0.95, clutter_rate=0.0, box="visible", small_px=small, min_visibility=0.0,
                    by_visibility=(0.3, 0.5, 0.7, 0.9, 1.0), box_noise=noise)  # fmt: skip
-    found = fit(seen(other))
+    found = fit_matched(seen(other))
     assert found.small_px == pytest.approx(small, rel=0.25)
     assert found.box == "visible"
     assert found.box_noise is not None
@@ -155,7 +155,7 @@ def test_small_people_and_tails_and_visible_parts_are_told() -> None:
 def test_who_never_errs_has_a_clean_profile() -> None:
     perfect = Sensor(detect_prob=1.0, clutter_rate=0.0, noise_px=0.0, noise_m=0.0, box="amodal", occlusion_power=0.0,
                      min_visibility=0.0, small_px=0.0)  # fmt: skip
-    found = fit(seen(perfect))
+    found = fit_matched(seen(perfect))
     assert found.detect_prob > 0.999
     assert min(found.by_visibility or (0.0,)) > 0.97
     assert found.clutter_rate == 0.0
@@ -170,8 +170,8 @@ def test_who_never_errs_has_a_clean_profile() -> None:
 def test_synthetic_errors_look_like_those_they_were_fitted_to() -> None:
     """Statistics of new draws of the fitted sensor lie among those of new draws of the true one."""
     first = seen(KNOWN)[:2]
-    real = [statistics([simulated_detections(m, KNOWN, 100 * k) for m in first]) for k in range(1, 4)]
-    made = [statistics([simulated_detections(m, fitted(), 100 * k) for m in first]) for k in range(1, 4)]
+    real = [error_statistics([simulated_detections(m, KNOWN, 100 * k) for m in first]) for k in range(1, 4)]
+    made = [error_statistics([simulated_detections(m, fitted(), 100 * k) for m in first]) for k in range(1, 4)]
     for name in ("missed", "misses: mean run, s", "overlap, 50% quantile", "overlap, 10% quantile",
                  "false alarms per frame", "false alarms: at people", "error foot: sd"):  # fmt: skip
         a, b = np.array([r[name] for r in real]), np.array([m[name] for m in made])

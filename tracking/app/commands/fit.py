@@ -31,15 +31,15 @@ def fit_sensor(options: FitSensorOptions) -> CommandResult:
     from scenarios.loading.sensor_profiles import dump_sensor
     from sim.io.files.atomic import write_file
     from tracking.fitting.detection_matching import match_sequence
-    from tracking.fitting.error_statistics import simulated_detections, statistics
-    from tracking.fitting.sensor import fit
+    from tracking.fitting.error_statistics import error_statistics, simulated_detections
+    from tracking.fitting.sensor import fit_matched
 
     out = option_parsing.output_file(options.out, ".toml")
     recordings = _open(options.sources, options.fps)
     matched = [match_sequence(recording) for recording in recordings]
-    profile = fit(matched)
-    measured = statistics(matched)
-    per_seed = [statistics([simulated_detections(m, profile, seed) for m in matched]) for seed in CHECK_SEEDS]
+    profile = fit_matched(matched)
+    measured = error_statistics(matched)
+    per_seed = [error_statistics([simulated_detections(m, profile, seed) for m in matched]) for seed in CHECK_SEEDS]
     simulated = {name: _mean([drawn[name] for drawn in per_seed]) for name in measured}
     people = sum(len(m.match) for m in matched)
     names = ", ".join(recording.name for recording in recordings)
