@@ -31,12 +31,6 @@ SCORING = (
 LIGHT = ("cv2", "pymunk", "numba", "pyarrow", "pydantic", "filterpy", "av", "gymnasium")
 """What scoring, and all of ours that it imports, may not."""
 
-KNOWN_CIRCLES: tuple[frozenset[str], ...] = (
-    frozenset({"sim.scene.camera", "sim.scene.viewpoint"}),
-    frozenset({"sim.detector.clutter", "sim.detector.persistent_clutter", "sim.detector.sense"}),
-)
-"""Import circles that are still there. Break them and take them away from here; none is ever added."""
-
 TRUTH = ("Truth", "FrameTruth", "truth", "load_truth")
 LEGACY = (
     "seed",
@@ -220,7 +214,7 @@ def test_circles_are_found():
 def test_no_import_circles():
     """Imports inside functions count; imports for the type checker alone do not."""
     found = circles({name: run_time_imports(name) for name in modules()})
-    assert [circle for circle in found if not any(set(circle) <= known for known in KNOWN_CIRCLES)] == []
+    assert found == []
 
 
 def test_workers_and_sequences_stand_below_files():

@@ -109,7 +109,7 @@ def _labels(source: Sequence) -> Truth:
     if truth is None or not len(truth.id):
         raise InputError(
             file=source.source.get("path", source.name), got="no labelled people", expected="trajectories",
-            remedy="give a BIWI folder, a CAVIAR file, a MOTChallenge folder with gt, or a sequence of ours",
+            remedy="give a BIWI folder, a CAVIAR file, a MOTChallenge folder with gt, or a generated sequence",
         )  # fmt: skip
     return truth
 

@@ -43,7 +43,9 @@ PROFILE_SAFE = (
 
 @contextmanager
 def cluster_workers(address: str, workers: int = 1) -> Iterator[RunItems]:
-    """Give the RunItems of the cluster whose scheduler listens at `address`; at least `workers` items are under way.
+    """Give the RunItems of the cluster whose scheduler listens at `address`.
+
+    As many items are under way as the cluster has worker threads, and `workers` at the least.
 
     Raises InputError if the address is malformed or dask.distributed is not installed, WorkError if no scheduler
     answers. A lost connection, or a worker that cannot take part, raises WorkError while results are read.

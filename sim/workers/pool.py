@@ -18,7 +18,7 @@ def process_pool(workers: int) -> Iterator[RunItems]:
     """Give the RunItems of `workers` spawned processes for the length of the block.
 
     The block sets THREAD_VARIABLES to 1 in this process, so that its children inherit them, and restores them at its
-    end. The end of the block terminates the processes, also in the middle of a call. Raises nothing itself.
+    end. The end of the block terminates the processes, also in the middle of a call.
     """
     before = {name: os.environ.get(name) for name in THREAD_VARIABLES}
     os.environ.update(dict.fromkeys(THREAD_VARIABLES, "1"))

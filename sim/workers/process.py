@@ -20,7 +20,7 @@ EXIT_TIMEOUT = 5.0  # s that a terminated process has to exit before it is kille
 
 
 class RemoteTraceback(Exception):
-    """The text of a traceback from a worker; stands as the cause of the exception that is raised here."""
+    """The text of a traceback from a worker; it is the cause of the exception that is raised here."""
 
     def __str__(self) -> str:
         return f"\n{self.args[0]}"

@@ -107,7 +107,7 @@ def open_folder(
         expected = "a row in gt.txt or det.txt, a picture, or seqLength in seqinfo.ini"
         raise InputError(file=path, got="nothing that tells its length", expected=expected, remedy="complete it")
     seen = pictures.first_size() if images else None
-    size = _agreed(ini, info.image_size, seen)
+    size = _picture_size(ini, info.image_size, seen)
     if background is not None and not pictures.files:
         got, remedy = "--background", "leave it out: it has none"
         raise InputError(file=path, got=got, expected="none for a recording without pictures", remedy=remedy)
@@ -135,14 +135,14 @@ def open_folder(
     )  # fmt: skip
 
 
-def _agreed(ini: Path, said: tuple[int, int] | None, seen: tuple[int, int] | None) -> tuple[int, int] | None:
+def _picture_size(ini: Path, stated: tuple[int, int] | None, seen: tuple[int, int] | None) -> tuple[int, int] | None:
     """Return the picture size by seqinfo.ini or the pictures, None if unknown. Raises InputError if they differ."""
-    if said is not None and seen is not None and said != seen:
+    if stated is not None and seen is not None and stated != seen:
         raise InputError(
-            file=ini, place="imWidth, imHeight", got="{} × {}".format(*said),
+            file=ini, place="imWidth, imHeight", got="{} × {}".format(*stated),
             expected="{} × {}, the size of the pictures".format(*seen), remedy="correct it, or restore the pictures",
         )  # fmt: skip
-    return said or seen
+    return stated or seen
 
 
 def open_text(
@@ -158,17 +158,17 @@ def open_text(
     if not len(found.frame):
         raise InputError(file=path, got="no row", expected="people or detections", remedy="check the file")
     length = int(found.frame.max(initial=0))
-    nobody = bool((found.id == -1).all())
+    only_detections = bool((found.id == -1).all())
 
     def frames() -> Iterator[Frame]:
         for index in range(1, length + 1):
-            here = found.at(index, rate) if nobody else None
+            here = found.at(index, rate) if only_detections else None
             yield Frame(index, (index - 1) / rate, detections=here)
 
     return Sequence(
         name=path.stem, fps=rate, length=length, frames=frames,
-        load_truth=None if nobody else lambda: mot_text.read_truth(path, path.stem, rate, length, scale),
-        camera=camera, px_per_m=scale, has_detections=nobody, source={"kind": "mot text", "path": str(path)},
+        load_truth=None if only_detections else lambda: mot_text.read_truth(path, path.stem, rate, length, scale),
+        camera=camera, px_per_m=scale, has_detections=only_detections, source={"kind": "mot text", "path": str(path)},
     )  # fmt: skip
 
 

@@ -28,14 +28,14 @@ def validate(folder: str | Path) -> list[FlockscopeError]:
     folder = Path(folder)
     if not folder.is_dir():
         raise InputError(
-            file=folder, got="no folder", expected="a dataset or sequence of ours", remedy="check the path"
+            file=folder, got="no folder", expected="a generated dataset or sequence", remedy="check the path"
         )
     if manifests.is_sequence(folder):
         return _sequence(folder)
     found = [*_left_behind(folder), *_seqmaps(folder)]
     sequences = sorted(p for p in folder.glob("**/") if manifests.is_sequence(p) and PARTIAL not in str(p))
     if not sequences and not found:
-        raise InputError(file=folder, got="no sequences", expected="a dataset of ours", remedy="check the path")
+        raise InputError(file=folder, got="no sequences", expected="a generated dataset", remedy="check the path")
     return found + [problem for p in sequences for problem in _sequence(p)]
 
 
