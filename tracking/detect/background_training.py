@@ -42,6 +42,8 @@ CLEAN = 6.0
 """Sigmas: a pixel with any frame beyond was covered by something; all its frames are left out of the thresholds."""
 WIDEST = 20.0
 """Grey levels: a pixel whose first sigma is larger has no background (`valid` is False)."""
+FEWEST_CLEAN = 0.05
+"""Thresholds are taken from the clean pixels if these have at least this share of the values of all inliers."""
 BINS, SPAN = 4000, 20.0
 """Number of bins of the histograms, which reach from -SPAN to SPAN; values beyond are counted in the end bins."""
 
@@ -87,8 +89,8 @@ def train(sample: Image, rate: float, follow_gain: bool) -> Trained:
             expected="a still camera; from this sample no background can be learned",
             remedy="give a sample of the empty scene, or detections instead of pixels",
         )
-    enough = counts[1, 1].sum() >= 0.05 * counts[0, 1].sum()
-    counts = counts[1 if enough else 0].copy()
+    clean, inliers = (counts[which, kernels.CHROMATICITY].sum() for which in (kernels.CLEAN_PIXELS, kernels.INLIERS))
+    counts = counts[kernels.CLEAN_PIXELS if clean >= FEWEST_CLEAN * inliers else kernels.INLIERS].copy()
     return Trained(mean, sigma, s, b, valid, thresholds(counts, rate), counts)
 
 
@@ -125,7 +127,8 @@ def thresholds(counts: Ints, rate: float) -> tuple[float, float, float]:
     edges = np.linspace(-SPAN, SPAN, BINS + 1)
     shares = [np.concatenate([[0], np.cumsum(c)]) / max(c.sum(), 1) for c in counts]
     low, high, most = (
-        float(np.interp(p, share, edges)) for p, share in ((1 - rate, shares[0]), (rate, shares[0]), (rate, shares[1]))
+        float(np.interp(p, shares[which], edges))
+        for p, which in ((1 - rate, kernels.BRIGHTNESS), (rate, kernels.BRIGHTNESS), (rate, kernels.CHROMATICITY))
     )
     normal = NormalDist().inv_cdf(rate)
     return max(most, math.sqrt(-math.log(1 - rate))), min(low, -normal), max(high, normal)

@@ -11,6 +11,11 @@ from numba import njit
 from sim.types import Array, Bools, Image, Ints
 from tracking.detect.background_kernels import Floats
 
+INLIERS, CLEAN_PIXELS = range(2)
+"""First axis of `counts`: all inliers, or all frames of the pixels that nothing covered."""
+BRIGHTNESS, CHROMATICITY = range(2)
+"""Second axis of `counts`: the normalised distortions."""
+
 
 @njit(cache=True, error_model="numpy")
 def sort(values: Floats) -> None:
@@ -154,8 +159,8 @@ def learn(
                 i = int((alpha[t] / sa + span) / (2 * span) * number)
                 j = int((cd[t] / sb + span) / (2 * span) * number)
                 if inlier[t]:
-                    counts[0, 0, min(max(i, 0), number - 1)] += 1
-                    counts[0, 1, min(max(j, 0), number - 1)] += 1
+                    counts[INLIERS, BRIGHTNESS, min(max(i, 0), number - 1)] += 1
+                    counts[INLIERS, CHROMATICITY, min(max(j, 0), number - 1)] += 1
                 if clean:
-                    counts[1, 0, min(max(i, 0), number - 1)] += 1
-                    counts[1, 1, min(max(j, 0), number - 1)] += 1
+                    counts[CLEAN_PIXELS, BRIGHTNESS, min(max(i, 0), number - 1)] += 1
+                    counts[CLEAN_PIXELS, CHROMATICITY, min(max(j, 0), number - 1)] += 1

@@ -14,6 +14,12 @@ from sim.geometry.union_find_kernels import find_root
 from sim.types import Array, Bools, Ints
 
 Labels = NDArray[np.int32]
+ROW, FIRST, END = range(3)
+"""Columns of `runs`; END is the last column + 1."""
+LEFT, TOP, RIGHT, BOTTOM = range(4)
+"""Columns of `corners`; RIGHT and BOTTOM are the last column and row + 1."""
+XX, XY, YY = range(3)
+"""Columns of `spread`: variance of the columns, covariance, variance of the rows."""
 
 
 @njit(cache=True)
@@ -35,7 +41,7 @@ def runs(mask: Bools) -> Labels:
                 first = at
                 while at < end and pixels[at] != 0:
                     at += 1
-                found[n, 0], found[n, 1], found[n, 2] = row, first - row * wide, at - row * wide
+                found[n, ROW], found[n, FIRST], found[n, END] = row, first - row * wide, at - row * wide
                 n += 1
     return found[:n].copy()
 
@@ -50,10 +56,10 @@ def connect(runs: Labels) -> tuple[Ints, int]:
     above = 0
     for k in range(len(runs)):
         row, first, end = runs[k]
-        while runs[above, 0] < row - 1 or (runs[above, 0] == row - 1 and runs[above, 2] < first):
+        while runs[above, ROW] < row - 1 or (runs[above, ROW] == row - 1 and runs[above, END] < first):
             above += 1
         other = above
-        while runs[other, 0] == row - 1 and runs[other, 1] <= end:
+        while runs[other, ROW] == row - 1 and runs[other, FIRST] <= end:
             a, b = find_root(parent, k), find_root(parent, other)
             parent[max(a, b)] = min(a, b)
             other += 1
@@ -76,10 +82,10 @@ def extents(runs: Labels, region: Ints, count: int) -> tuple[Ints, Ints]:
         row, first, end = runs[k]
         m = region[k]
         if area[m] == 0:
-            corners[m, 0], corners[m, 1] = first, row
+            corners[m, LEFT], corners[m, TOP] = first, row
         area[m] += end - first
-        corners[m, 0], corners[m, 2] = min(corners[m, 0], first), max(corners[m, 2], end)
-        corners[m, 3] = row + 1
+        corners[m, LEFT], corners[m, RIGHT] = min(corners[m, LEFT], first), max(corners[m, RIGHT], end)
+        corners[m, BOTTOM] = row + 1
     return area, corners
 
 
@@ -104,11 +110,11 @@ def moments(runs: Labels, region: Ints, area: Ints) -> tuple[Array, Array]:
         m = region[k]
         if m >= 0:
             y = row - centre[m, 1]
-            xx, xy, yy = spread[m, 0], spread[m, 1], spread[m, 2]
+            xx, xy, yy = spread[m, XX], spread[m, XY], spread[m, YY]
             for column in range(first, end):
                 x = column - centre[m, 0]
                 xx, xy, yy = xx + x * x, xy + x * y, yy + y * y
-            spread[m, 0], spread[m, 1], spread[m, 2] = xx, xy, yy
+            spread[m, XX], spread[m, XY], spread[m, YY] = xx, xy, yy
     return centre, spread / area.reshape(-1, 1)
 
 
@@ -117,4 +123,4 @@ def write_labels(runs: Labels, region: Ints, label: Labels) -> None:
     """Write region + 1 into the pixels of each run in `label` (H, W); runs with a negative region are left out."""
     for k in range(len(runs)):
         if region[k] >= 0:
-            label[runs[k, 0], runs[k, 1] : runs[k, 2]] = region[k] + 1
+            label[runs[k, ROW], runs[k, FIRST] : runs[k, END]] = region[k] + 1

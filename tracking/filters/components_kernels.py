@@ -22,6 +22,8 @@ WEIGHT, X, Y, XX, XY, YY = range(6)
 """Columns of `sums`."""
 MEAN_X, MEAN_Y, A_XX, A_XY, A_YY = range(5)
 """Slots of `shape`: an ellipse (y - mean)' A^-1 (y - mean) <= 1."""
+LOW_X, LOW_Y, HIGH_X, HIGH_Y = range(4)
+"""Columns of `box`."""
 VISITS, COMPONENTS = range(2)
 """Slots of `work`: cells and points compared so far; number of components."""
 FAR = 2.0**40
@@ -103,10 +105,10 @@ def insert(
     work[COMPONENTS] += 1
     if head[c] >= 0:
         _join(parent, sums, k, head[c], work)
-        box[c, 0], box[c, 1] = min(box[c, 0], x), min(box[c, 1], y)
-        box[c, 2], box[c, 3] = max(box[c, 2], x), max(box[c, 3], y)
+        box[c, LOW_X], box[c, LOW_Y] = min(box[c, LOW_X], x), min(box[c, LOW_Y], y)
+        box[c, HIGH_X], box[c, HIGH_Y] = max(box[c, HIGH_X], x), max(box[c, HIGH_Y], y)
     else:
-        box[c, 0], box[c, 1], box[c, 2], box[c, 3] = x, y, x, y
+        box[c, LOW_X], box[c, LOW_Y], box[c, HIGH_X], box[c, HIGH_Y] = x, y, x, y
     after[k], head[c] = head[c], k
     for n in range(AROUND):
         other = around[c, n]
@@ -115,8 +117,8 @@ def insert(
         work[VISITS] += 1
         if find_root(parent, head[other]) == find_root(parent, k):
             continue
-        gap_x = max(box[other, 0] - x, x - box[other, 2], 0.0)
-        gap_y = max(box[other, 1] - y, y - box[other, 3], 0.0)
+        gap_x = max(box[other, LOW_X] - x, x - box[other, HIGH_X], 0.0)
+        gap_y = max(box[other, LOW_Y] - y, y - box[other, HIGH_Y], 0.0)
         if gap_x * gap_x + gap_y * gap_y > link * link:
             continue
         p = head[other]

@@ -40,7 +40,7 @@ class TrackedEllipses(TrackedPeople):
     def predict(self) -> None:
         """Predict all tracks one frame ahead (eqs 1, 2); the direction stays, its variance grows."""
         kalman.predict(self.nominal, self.dynamics.dt, self.q)
-        self.angle[1] += self.angle_var_per_step
+        self.angle[kalman.DIRECTION_VAR] += self.angle_var_per_step
         super().predict()
 
     def compute_rho(self) -> Array:
@@ -49,7 +49,7 @@ class TrackedEllipses(TrackedPeople):
 
     def upright_boxes(self) -> Array:
         """Returns the bounding boxes x, y, h, w (N, 4) px of the ellipses; centred."""
-        return upright(self.bank[kalman.PLACE], self.angle[0])
+        return upright(self.bank[kalman.PLACE], self.angle[kalman.DIRECTION])
 
     def keep_only(self, rows: Ints) -> None:
         """Delete all tracks but `rows`."""
@@ -72,8 +72,8 @@ class TrackedEllipses(TrackedPeople):
         z (M,): directions, rad; angle_var (M,): their variances, rad^2. The part of a direction that is not
         `kalman.directed` is 0.
         """
-        s = self.angle[1][:, None] + angle_var
-        turn = kalman.angle_innovation(z, self.angle[0][:, None])
+        s = self.angle[kalman.DIRECTION_VAR][:, None] + angle_var
+        turn = kalman.angle_innovation(z, self.angle[kalman.DIRECTION][:, None])
         return np.where(kalman.directed(angle_var), turn * turn / s, 0.0)
 
     def update(self, rows: Ints, z: Array, noise: Array, angle_var: Array) -> Array:

@@ -16,6 +16,8 @@ from sim.types import Array, Bools, Ints
 from tracking.detect.blobs import Labels
 
 Cover = NDArray[np.int16]
+X, FOOT, HEIGHT, WIDTH = range(4)
+"""Slots of a template."""
 HALVES, EMPTY = 2, -1  # halves that a covered foreground pixel and a covered background pixel count
 EXPLAINED = 1000  # added to the cover of an explained pixel; more than the number of templates in a frame
 ELLIPSE = np.pi / 4  # share of its box that an ellipse fills
@@ -149,7 +151,7 @@ def near_first(templates: Array) -> Ints:
     """Returns the rows (K,) of templates sorted by feet, the lowest in the image (nearest) first; insertion sort."""
     order = np.arange(len(templates))
     for k in range(1, len(order)):
-        while k > 0 and templates[order[k], 1] > templates[order[k - 1], 1]:
+        while k > 0 and templates[order[k], FOOT] > templates[order[k - 1], FOOT]:
             order[k], order[k - 1] = order[k - 1], order[k]
             k -= 1
     return order
@@ -201,5 +203,6 @@ def prune(foreground: Bools, cover: Cover, templates: Array, least: float, by_pi
 @kernel
 def boxes_touch(one: Array, other: Array) -> bool:
     """Returns True if the boxes of two templates are at most 1 px apart in both directions."""
-    aside = abs(one[0] - other[0]) <= (one[3] + other[3]) / 2 + 1
-    return bool(aside and one[1] - one[2] <= other[1] + 1 and other[1] - other[2] <= one[1] + 1)
+    aside = abs(one[X] - other[X]) <= (one[WIDTH] + other[WIDTH]) / 2 + 1
+    top, other_top = one[FOOT] - one[HEIGHT], other[FOOT] - other[HEIGHT]
+    return bool(aside and top <= other[FOOT] + 1 and other_top <= one[FOOT] + 1)

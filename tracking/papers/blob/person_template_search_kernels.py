@@ -13,8 +13,11 @@ from numpy.typing import NDArray
 from sim.types import Array, Bools
 from tracking.papers.blob.person_template_kernels import (
     EMPTY,
+    FOOT,
     HALVES,
+    HEIGHT,
     Cover,
+    X,
     area,
     half_width,
     kernel,
@@ -93,7 +96,7 @@ def best_place(
     The template must not be painted. expected (4,): its expected place, spread (2,): see `fit_places`. fine: use the
     fine grid. Returns the place of `at` unless another one is better.
     """
-    step, steps = max(at[2] / STEPS_PER_HEIGHT, 1.0), FINE_STEPS
+    step, steps = max(at[HEIGHT] / STEPS_PER_HEIGHT, 1.0), FINE_STEPS
     if fine:
         step /= 2
     else:
@@ -102,15 +105,15 @@ def best_place(
     whole = area(at, cover.shape[0], cover.shape[1])
     best, right, down = -np.inf, 0.0, 0.0
     for i in range(2 * steps + 1):
-        v = (at[1] - expected[1] + (i - steps) * step) / spread[1]
+        v = (at[FOOT] - expected[FOOT] + (i - steps) * step) / spread[1]
         for j in range(2 * steps + 1):
-            u = (at[0] - expected[0] + (j - steps) * step) / spread[0]
+            u = (at[X] - expected[X] + (j - steps) * step) / spread[0]
             value = evidence * (halves[i, j] / HALVES) / whole - (u * u + v * v) / 2
             if value > best:
                 best, right, down = value, (j - steps) * step, (i - steps) * step
             if i == steps and j == steps:
                 here = value
-    return (at[0] + right, at[1] + down) if best > here else (at[0], at[1])
+    return (at[X] + right, at[FOOT] + down) if best > here else (at[X], at[FOOT])
 
 
 @kernel
@@ -128,8 +131,8 @@ def fit_places(foreground: Bools, cover: Cover, templates: Array, spread: Array,
         for k in order:
             paint(cover, found[k], -1)
             x, foot = best_place(foreground, cover, found[k], templates[k], spread[k], evidence, sweep > 0)
-            any_moved |= x != found[k, 0] or foot != found[k, 1]
-            found[k, 0], found[k, 1] = x, foot
+            any_moved |= x != found[k, X] or foot != found[k, FOOT]
+            found[k, X], found[k, FOOT] = x, foot
             paint(cover, found[k], 1)
         if not any_moved:
             break

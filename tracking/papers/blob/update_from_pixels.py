@@ -83,6 +83,7 @@ class PixelUpdater:
         self._set(config)
 
     def _set(self, config: BlobConfig) -> None:
+        """Compute the gates and the noise of the direction from the config."""
         from scipy.special import chdtri
 
         self.config = config

@@ -1,0 +1,93 @@
+"""The pipeline of all trackers from pixels: plausible frames, protected places, scale, person blobs, either model."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from sim.types import Context
+from tests import painted
+from tests.painted import TALL
+from tracking.detect import blobs
+from tracking.detect.background import Background, fused_foreground
+from tracking.detect.background_settings import BackgroundSettings
+from tracking.detect.foreground import ASSUMED_HEIGHT, Foreground, convex_areas
+from tracking.detect.mog2 import Mog2
+from tracking.detect.person_size import PersonSize
+
+SCALE, PERSON = TALL / 1.7, (160.0, 180.0, TALL)
+
+
+def context(scale=SCALE, people=()):
+    sample = painted.sample(np.random.default_rng(0), 28, people)
+    return Context(painted.FPS, scale, image_size=(painted.WIDE, painted.HIGH), background=sample)
+
+
+def made(scale=SCALE, *, most=0.6, segmentation="horprasert", people=(), **settings):
+    return Foreground(context(scale, people), BackgroundSettings(**settings), most, segmentation)
+
+
+def picture(*people, seed=1):
+    return painted.picture(people, np.random.default_rng(seed))
+
+
+def test_a_segmented_picture_is_the_cleaned_foreground_of_the_models_classes():
+    pipeline = made()
+    seen = pipeline.segment(picture(PERSON))
+    alone = Background(context().background, painted.FPS, BackgroundSettings())
+    classes = alone.classify(picture(PERSON))
+    assert np.array_equal(seen.classes, classes)
+    assert np.array_equal(seen.mask, blobs.clean(fused_foreground(classes), SCALE))
+    assert seen.plausible
+    assert seen.mask[int(180 - TALL / 2), 160]
+
+
+@pytest.mark.parametrize("segmentation", ["horprasert", "mog2"])
+def test_either_model_finds_the_person(segmentation):
+    pipeline = made(segmentation=segmentation, dark=0.4, background_time=7.0)
+    found = pipeline.person_blobs(pipeline.segment(picture(PERSON)).mask)
+    assert len(found) == 1
+    assert found.ellipse[0, :2] == pytest.approx([160, 180 - TALL / 2], abs=4)
+    assert isinstance(pipeline.model, Mog2) == (segmentation == "mog2")
+    pipeline.follow(BackgroundSettings(dark=0.2, background_time=9.0), 0.01)
+    assert pipeline.model.settings.background_time == 9.0
+    assert getattr(pipeline.model.settings, "shadow", 0.2) == 0.2
+    assert not pipeline.segment(picture(PERSON)).plausible
+
+
+def test_a_picture_with_more_foreground_than_people_can_cover_is_implausible():
+    share = np.mean(made().segment(picture(PERSON)).mask)
+    assert made(most=share).segment(picture(PERSON)).plausible
+    assert not made(most=share * 0.99).segment(picture(PERSON)).plausible
+
+
+def test_protected_places_are_not_learned():
+    quick = {"background_time": 1.0, "foreground_time": 1.0}
+    kept, learned = made(**quick), made(**quick)
+    everywhere, nowhere = np.ones(kept.shape, bool), np.zeros(kept.shape, bool)
+    for k in range(60):
+        for pipeline, protected in ((kept, everywhere), (learned, nowhere)):
+            pipeline.adapt(pipeline.segment(picture(PERSON, seed=k)), protected)
+    assert len(kept.person_blobs(kept.segment(picture(PERSON)).mask)) == 1
+    assert not learned.segment(picture(PERSON)).mask.any()
+
+
+@pytest.mark.parametrize("unknown", [np.nan, 0.0])
+def test_an_unknown_scale_is_guessed_from_the_images_height(unknown):
+    assert made(unknown).scale == painted.HIGH / ASSUMED_HEIGHT
+    assert made(50.0).scale == 50.0
+
+
+def test_the_sample_shows_how_large_people_are():
+    shown = context(np.nan, painted.spread())
+    size = PersonSize(shown)
+    Foreground(shown, BackgroundSettings(), 0.6).learn_person_size(size, shown.background)
+    assert size.px_per_m == pytest.approx(SCALE, rel=0.06)
+
+
+def test_convex_areas_are_the_hulls_insides():
+    square = np.array([[10.0, 20], [30, 20], [30, 40], [10, 40], [20, 30]])
+    mask = convex_areas((60, 50), [square, square + np.array([5.0, 0])])
+    assert mask.sum() == 21 * 26
+    assert mask[20:41, 10:36].all()
+    assert not convex_areas((60, 50), []).any()
