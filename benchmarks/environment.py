@@ -34,8 +34,8 @@ import numpy as np
 import tracking  # noqa: F401  (registers the environment)
 from benchmarks.blob_vs_peers import write_mot
 from sim.io.store.truth_files import truth_files
-from tracking.environment.episode_cache import Held
-from tracking.environment.episodes import Cache, Rollout, Source, play, sources
+from tracking.environment.episode_cache import OpenedSource
+from tracking.environment.episodes import Rollout, Source, SourceCache, play, sources
 from tracking.environment.observation import Observer
 from tracking.prepare import PreparedTracker, prepare
 from tracking.tracker_registry import names
@@ -58,9 +58,9 @@ def best(run: Callable[[], Any], rounds: int, clock: Callable[[], float] = time.
     return min(found)
 
 
-def track_alone(tracker: str, held: Held) -> None:
+def track_alone(tracker: str, opened: OpenedSource) -> None:
     """The tracker on the same detections, and nothing else."""
-    ready = prepare(tracker, held.sequence)
+    ready = prepare(tracker, opened.sequence)
     ready.reset(0)
     for frame in ready.frames():
         ready.step(frame)
@@ -88,8 +88,8 @@ def peer_trial(python: str, flat: tuple[Source, ...], rounds: int) -> None:
 
 def trial(rounds: int, peer: str | None) -> bool:
     """Print the figures of a trial; are they within the limits?"""
-    chosen, cache = sources("crowd", range(4), PEOPLE), Cache()
-    truths = [cache.hold(source).truth for source in chosen]
+    chosen, cache = sources("crowd", range(4), PEOPLE), SourceCache()
+    truths = [cache.open(source).truth for source in chosen]
     people = np.mean([len(t.frame) / t.length for t in truths])
     print(f"\ntrial: {len(chosen)} x {truths[0].length} frames, {people:.1f} people on average; CPU seconds")
     print("| tracker | tracking | trial | ratio |\n|---|---|---|---|")
@@ -98,7 +98,7 @@ def trial(rounds: int, peer: str | None) -> bool:
     good = True
     for tracker, title, some in rows:
         calls = [
-            (partial(track_alone, tracker, cache.hold(one)), partial(play, tracker, one, cache=cache)) for one in some
+            (partial(track_alone, tracker, cache.open(one)), partial(play, tracker, one, cache=cache)) for one in some
         ]
         times = np.full((len(some), 2, rounds), np.inf)
         for k in range(rounds):  # in turn: others share the machine
@@ -167,8 +167,8 @@ def measured(env: gymnasium.Env[Any, Any], rounds: int) -> tuple[float, int, lis
     with (
         mock.patch.object(PreparedTracker, "step", timed(0, PreparedTracker.step)),
         mock.patch.object(Rollout, "scores", timed(1, Rollout.scores)),
-        mock.patch.object(Observer, "see", timed(2, Observer.see)),
-        mock.patch.object(Observer, "look", timed(2, Observer.look)),
+        mock.patch.object(Observer, "add", timed(2, Observer.add)),
+        mock.patch.object(Observer, "statistics", timed(2, Observer.statistics)),
     ):
         begun = time.process_time()
         count = sum(episode(env) for _ in range(8 * rounds))
@@ -197,7 +197,7 @@ def vector(name: str, every: int | None, mode: str, rounds: int) -> float:
 def memory() -> bool:
     """Print what is held while 60 sequences are played under a small limit; does it stay there?"""
     limit = 4 * 2**20
-    cache, found = Cache(limit), []
+    cache, found = SourceCache(limit), []
     for k, source in enumerate(sources("crowd", range(60), PEOPLE), 1):
         play("blob", source, cache=cache)
         if k in (1, 10, 20, 40, 60):

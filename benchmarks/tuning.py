@@ -44,9 +44,10 @@ from tracking.stats import moving_blocks
 from tracking.tracker_registry import find
 from tracking.tuning import tune
 from tracking.tuning.grouping_episodes import people_as_tracks
-from tracking.tuning.search_plan import plan
-from tracking.tuning.study import opened
-from tracking.tuning.trials import search as search_trials
+from tracking.tuning.options import TuneOptions
+from tracking.tuning.search_plan import search_plan
+from tracking.tuning.study import open_study
+from tracking.tuning.trials import run_trials
 
 SUITES = Path(__file__).parent / "tuning_suites"
 DRAWS = 200
@@ -178,7 +179,7 @@ def answers(name: str, sequence: Sequence, mode: str, config: Config) -> list[Tr
 
 def overhead(given: argparse.Namespace) -> None:
     """CPU milliseconds of a trial of 16 episodes that cost nothing: asking, testing, storing."""
-    made = plan("blob", "crossing", given.trials or 200, check=None)
+    made = search_plan(TuneOptions(tracker="blob", suite="crossing", trials=given.trials or 200, check=None))
     r = np.random.default_rng(0)
 
     def play(sources: list[Source], values: dict[str, Any], every: bool) -> Iterator[Episode]:
@@ -189,9 +190,9 @@ def overhead(given: argparse.Namespace) -> None:
     for kind in ("memory", "journal"):
         with tempfile.TemporaryDirectory() as folder:
             begun = time.process_time()
-            with opened(made, None if kind == "memory" else Path(folder) / "journal", "x") as study:
-                search_trials(study, play, lambda done, total, what: None)
-            print(f"{kind}: {1000 * (time.process_time() - begun) / made.trials:.1f} ms")
+            with open_study(made, None if kind == "memory" else Path(folder) / "journal", "x") as study:
+                run_trials(study, play, lambda done, total, what: None)
+            print(f"{kind}: {1000 * (time.process_time() - begun) / made.options.trials:.1f} ms")
 
 
 def workers(given: argparse.Namespace) -> None:

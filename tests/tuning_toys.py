@@ -5,6 +5,9 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
+from tracking.tuning.options import TuneOptions
+from tracking.tuning.search_plan import SearchPlan, search_plan
+
 TOY = f"{Path(__file__).parent / 'toy_tracker.py'}:Toy"
 SCENE = """
 schema = 1
@@ -26,8 +29,13 @@ def write_scenes(folder: Path) -> tuple[str, str]:
     return str(folder / "one.toml"), str(folder / "two.toml")
 
 
-def wishes(folder: Path, **more: Any) -> dict[str, Any]:
+def tune_arguments(folder: Path, **more: Any) -> dict[str, Any]:
     """Arguments of `tune` for a small search on scenes in `folder`."""
     one, two = write_scenes(folder)
     seeds = {"seeds": range(5), "validation": range(10_000, 10_004), "test": range(20_000, 20_006)}
     return {"tracker": TOY, "suite": one, "check": two, "trials": 12, "objective": "HOTA", **seeds, **more}
+
+
+def toy_plan(folder: Path, **more: Any) -> SearchPlan:
+    """The plan of the same search."""
+    return search_plan(TuneOptions(**tune_arguments(folder, **more)))

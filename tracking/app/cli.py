@@ -23,9 +23,9 @@ from tracking.app.command_options import (
     WebdatasetOptions,
 )
 from tracking.app.command_result import INTERRUPTED, CommandResult
+from tracking.app.commands.tune import tune
 from tracking.app.options_from_dataclass import options_from
 from tracking.app.shared_options import Json, Out
-from tracking.app.tune_options import tune
 
 app = typer.Typer(
     add_completion=False,

@@ -1,15 +1,17 @@
-"""`flockscope/Tuning-v0`: a tracker's parameters as actions, statistics of its run as observations (Gymnasium).
+"""The Gymnasium environment `flockscope/Tuning-v0`: actions set a tracker's parameters, the score is the reward.
 
-An episode is a sequence, tracked from the first frame to the last. An action sets the parameters to be searched, each
-in [-1, 1] (tracking.parameter_space): once, before the first frame (decision_every=None, one step long), or those that
-may
-change between frames every so many frames. The reward of a step is S(frames so far) - S(frames before), S being the
-objective of `tracking.evaluate` and 0 for no frames: rewards sum to the objective. Registered by `import tracking`.
+An episode tracks one sequence from the first frame to the last. An action sets the parameters to search, each in
+[-1, 1] (tracking.parameter_space). With decision_every=None one action before the first frame sets them all, and the
+episode is one step long. Else an action sets those that may change between frames, every `decision_every` frames.
+Observations are statistics of the run. The reward of a step is S(frames so far) - S(frames before it), where S is the
+objective of `tracking.evaluate` and 0 for no frames; so the rewards sum to the objective. `import tracking` registers
+the environment.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field
 from typing import Any, Literal, cast, get_args
 
 import gymnasium
@@ -22,206 +24,228 @@ from scenarios.loading.toml_files import closest
 from sim.types import DetectionMode, Image, Tracker
 from tracking.config import Config
 from tracking.detection_mode import choose_mode
-from tracking.environment.episode_cache import LIMIT, Cache
+from tracking.environment.episode_cache import DEFAULT_LIMIT, SourceCache
 from tracking.environment.episodes import AnyTracker, Rollout, streams_for
 from tracking.environment.observation import NAMES, Observer
 from tracking.episode_source import Source, SourceSpec, sources
+from tracking.keyword_options import documented, from_keywords, option
 from tracking.parameter_space import Space, decode, decode_and_build, encode, space_of
 from tracking.prepare import Params, config_of
 from tracking.tracker_registry import checked, config_class, find
 
 METADATA: dict[str, Any] = {"render_modes": ["rgb_array"], "render_fps": 10}
-SEEN = ("statistics", "parameters", "none")
-OPTIONS = ("scenario", "seed", "params")
+OBSERVATIONS = ("statistics", "parameters", "none")
+RESET_OPTIONS = ("scenario", "seed", "params")
 Observation = Literal["statistics", "parameters", "none"]
 Floats = NDArray[np.float32]
 
 
-class TuningEnv(gymnasium.Env[Floats, Floats]):
-    """The environment. State: the sources, some of them opened; of the episode: source, parameters, rollout, score.
+@dataclass(frozen=True, kw_only=True)
+class TuningEnvOptions:
+    """The keyword arguments of the environment. Raises InputError if a choice is unknown."""
 
-    tracker: a registered one, "file.py:Class", "module:Class" or a class. suite: a suite, a scenario, a TOML file, a
-    folder of stored sequences, a Sequence, or a list of these: scenarios with each of `seeds`, and with the settings
-    `set`. detections: as for `tracking.track`. params: what an episode begins with. decision_every: frames between two
-    actions, None: one action for the whole episode. observation: "statistics", "parameters" (these, and where the
-    parameters are in [-1, 1]) or "none" (a 0). cache: bytes of motions and detections that are kept for further
-    episodes. tracker_seed: for trackers that draw.
+    tracker: AnyTracker = field(metadata=option('Registered name, "file.py:Class", "module:Class" or a class.'))
+    suite: SourceSpec | Source = field(
+        default="quick",
+        metadata=option("Suite, scenario, TOML file, stored sequences, recording, Sequence, or a list of these."),
+    )
+    seeds: Iterable[int] = field(default=range(100), metadata=option("Seeds that scenarios are simulated with."))
+    set: Iterable[str] = field(default=(), metadata=option('Settings "key=value" of the scenarios.'))
+    detections: DetectionMode | None = field(
+        default=None, metadata=option("Input of the tracker, the same in all episodes.")
+    )
+    params: Params = field(
+        default=None, metadata=option("Parameters that an episode begins with; the tracker's defaults if None.")
+    )
+    decision_every: int | None = field(
+        default=None, metadata=option("Frames between two actions; None: one action per episode.")
+    )
+    observation: Observation = field(
+        default="statistics",
+        metadata=option('"statistics"; "parameters" adds the parameters in [-1, 1]; "none" is a single 0.'),
+    )
+    cache: int = field(
+        default=DEFAULT_LIMIT, metadata=option("Bytes of sequences that are kept for later episodes.", low=0)
+    )
+    tracker_seed: int = field(default=0, metadata=option("Seed of trackers that use random numbers."))
+    render_mode: str | None = field(default=None, metadata=option('"rgb_array" or None.'))
+
+    def __post_init__(self) -> None:
+        _check_choice("observation", self.observation, OBSERVATIONS)
+        _check_choice("detections", self.detections, (None, *get_args(DetectionMode)))
+        _check_choice("render_mode", self.render_mode, (None, *METADATA["render_modes"]))
+
+
+class TuningEnv(gymnasium.Env[Floats, Floats]):
+    """The environment. State: the sources and their cache; of the episode: source, config, rollout, observer, score.
+
+    Keyword arguments are the fields of TuningEnvOptions. Raises InputError if an argument is unknown or wrong, if the
+    tracker has no parameters to search, and if a source cannot provide the detections.
     """
 
     metadata = METADATA
 
-    def __init__(
-        self,
-        tracker: AnyTracker,
-        suite: SourceSpec | Source = "quick",
-        *,
-        seeds: Iterable[int] = range(100),
-        set: Iterable[str] = (),
-        detections: DetectionMode | None = None,
-        params: Params = None,
-        decision_every: int | None = None,
-        observation: Observation = "statistics",
-        cache: int = LIMIT,
-        tracker_seed: int = 0,
-        render_mode: str | None = None,
-    ) -> None:
+    @documented(TuningEnvOptions, positional=2)
+    def __init__(self, tracker: AnyTracker, suite: SourceSpec | Source = "quick", **options: Any) -> None:
+        """Makes the environment; the first episode begins with `reset`."""
+        given = from_keywords(TuningEnvOptions, "TuningEnv", {"tracker": tracker, "suite": suite, **options})
         self.tracker: type[Tracker] = find(tracker) if isinstance(tracker, str) else checked(tracker, str(tracker))
-        self.tracker_seed, self.decision_every = tracker_seed, decision_every
-        _one_of("observation", observation, SEEN)
-        _one_of("detections", detections, (None, *get_args(DetectionMode)))
-        _one_of("render_mode", render_mode, (None, *METADATA["render_modes"]))
-        self.render_mode, self.observation = render_mode, observation
-        self.kind = config_class(self.tracker, self.tracker.__name__)
-        self.defaults = config_of(self.kind, params)
-        self.sources = sources(suite, seeds, set)
-        self.mode = _mode(self.tracker, self.sources, detections)
-        self.space: Space = _space(self.kind, self.mode, decision_every)
-        self.cache = Cache(cache)
-        count, low = len(NAMES), np.r_[np.zeros(len(NAMES)), -np.ones(len(self.space))].astype(np.float32)
-        size = {"statistics": count, "parameters": len(low), "none": 1}[observation]
-        self.observation_space = Box(low[:size], np.ones(size, np.float32))
+        self.tracker_seed, self.decision_every = given.tracker_seed, given.decision_every
+        self.render_mode, self.observation = given.render_mode, given.observation
+        self.config_class = config_class(self.tracker, self.tracker.__name__)
+        self.defaults = config_of(self.config_class, given.params)
+        self.sources = sources(given.suite, given.seeds, given.set)
+        self.mode = _detection_mode(self.tracker, self.sources, given.detections)
+        self.space: Space = _action_parameters(self.config_class, self.mode, given.decision_every)
+        self.cache = SourceCache(given.cache)
+        lowest = np.r_[np.zeros(len(NAMES)), -np.ones(len(self.space))].astype(np.float32)
+        size = {"statistics": len(NAMES), "parameters": len(lowest), "none": 1}[given.observation]
+        self.observation_space = Box(lowest[:size], np.ones(size, np.float32))
         self.action_space = Box(-1.0, 1.0, (len(self.space),), np.float32)
         self.source, self.base = self.sources[0], self.defaults
         self.metadata = self._metadata(self.source.fps)
-        self._forget()
+        self._clear_episode()
 
     @property
     def parameter_names(self) -> tuple[str, ...]:
-        """What each number of an action sets."""
+        """The name of the parameter that each number of an action sets."""
         return tuple(p.name for p in self.space)
 
     @property
     def observation_names(self) -> tuple[str, ...]:
-        """What each number of an observation is."""
+        """The name of each number of an observation: statistics, then parameters; "nothing" for "none"."""
         names = {"statistics": NAMES, "parameters": (*NAMES, *self.parameter_names), "none": ("nothing",)}
         return names[self.observation]
 
     def _metadata(self, fps: float) -> dict[str, Any]:
-        """A video of pictures, one per action, takes as long as what it shows."""
+        """Metadata by which a video with one picture per action runs at the speed of the sequence."""
         return {**METADATA, "render_fps": max(round(fps / (self.decision_every or 1)), 1)}
 
-    def _forget(self) -> None:
-        """No episode."""
+    def _clear_episode(self) -> None:
         self.rollout: Rollout | None = None
         self._observer: Observer | None = None
         self.config, self.score, self.scores, self.refused = self.base, 0.0, dict[str, float](), ""
 
     def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> tuple[Floats, dict[str, Any]]:
-        """Begin an episode on a source that the env's own generator draws.
+        """Begins an episode on a source that the env's own generator draws; returns observation and info.
 
-        options: "scenario" and "seed" leave only sources of this name and seed to be drawn from; "params": what this
-        episode begins with. InputError for others, for parameters that the tracker refuses, and for a source that
-        cannot be scored.
+        seed: reseeds the generator. options: "scenario" and "seed" restrict the draw to sources of this name and seed;
+        "params" are the parameters that the episode begins with. Raises InputError if an option is unknown, if no
+        source fits, if the tracker refuses the parameters, or if the source has no labels; the running episode then
+        goes on.
         """
         super().reset(seed=seed)
         options = options or {}
         for name in options:
-            _one_of("options", name, OPTIONS)
-        base = self.defaults if options.get("params") is None else config_of(self.kind, options["params"])
-        source = self._drawn(options)
-        held = self.cache.hold(source, streams_for(self.tracker, self.mode))
-        assert held.truth is not None
-        rollout = None if self.decision_every is None else self._begun(base, source)
-        if rollout is not None and not hasattr(rollout.ready.tracker, "config"):
+            _check_choice("options", name, RESET_OPTIONS)
+        base = self.defaults if options.get("params") is None else config_of(self.config_class, options["params"])
+        source = self._draw_source(options)
+        opened = self.cache.open(source, streams_for(self.tracker, self.mode))
+        assert opened.truth is not None
+        rollout = None if self.decision_every is None else self._rollout(base, source)
+        if rollout is not None and not hasattr(rollout.prepared.tracker, "config"):
             expected, remedy = "a tracker that keeps its config as `config`", "see docs/tuning.md, Environment"
             raise InputError(place="decision_every", got=self.tracker.__name__, expected=expected, remedy=remedy)
         self.source, self.base = source, base
-        self._forget()
-        self.rollout, self._observer = rollout, Observer(held.sequence.fps)
-        self.metadata = self._metadata(held.sequence.fps)
-        return self._observed(), self._info()
+        self._clear_episode()
+        self.rollout, self._observer = rollout, Observer(opened.sequence.fps)
+        self.metadata = self._metadata(opened.sequence.fps)
+        return self._observe(), self._info()
 
     def step(self, action: Any) -> tuple[Floats, float, bool, bool, dict[str, Any]]:
-        """Set the parameters and track on: to the end, or `decision_every` frames.
+        """Sets the parameters and tracks on, to the end or for `decision_every` frames.
 
-        Parameters that are no config are drawn back towards those that the episode began with
-        (tracking.parameter_space.decode);
-        those that the tracker refuses between frames leave it with the ones before, and `info["refused"]` says why.
+        Returns observation, reward, True at the end of the sequence, False (never truncated), and info. action: (P,)
+        numbers, clipped to [-1, 1]. A point whose config is refused is moved towards the parameters that the episode
+        began with (tracking.parameter_space.decode). If the tracker refuses a config between frames it keeps the one
+        before, and `info["refused"]` holds the error. Raises InputError before `reset`, if the action has another
+        shape or is not finite, and if the tracker fails for another reason.
         """
         if self._observer is None:
             raise InputError(place="step", got="no episode", expected="one that was begun", remedy="call reset() first")
         if self.decision_every is None:
             self.config, rollout = decode_and_build(
-                self.space, action, self.base, lambda c: self._begun(c, self.source)
+                self.space, action, self.base, lambda c: self._rollout(c, self.source)
             )
             self.rollout = rollout
-            whole = self._track(None)
+            terminated = self._advance(None)
         else:
             assert self.rollout is not None
-            whole = self._track_on(decode(self.space, action, self.base))
-        self.scores = self.rollout.scores() if self.rollout.answers else {}
+            terminated = self._advance_with(decode(self.space, action, self.base))
+        self.scores = self.rollout.scores() if self.rollout.tracks else {}
         before, self.score = self.score, self.scores.get("objective", 0.0)
-        return self._observed(), self.score - before, whole, False, self._info()
+        return self._observe(), self.score - before, terminated, False, self._info()
 
-    def _begun(self, config: Config, source: Source) -> Rollout:
+    def _rollout(self, config: Config, source: Source) -> Rollout:
         return Rollout(
             self.tracker, source, config, detections=self.mode, tracker_seed=self.tracker_seed, cache=self.cache
         )
 
-    def _track(self, upto: int | None) -> bool:
-        """Track on; is this the end?"""
+    def _advance(self, upto: int | None) -> bool:
+        """Tracks to frame `upto` or to the last one; True if the sequence has ended."""
         assert self.rollout is not None
-        for frame, answer in self.rollout.advance(upto):
+        for frame, tracks in self.rollout.advance(upto):
             if self.observation != "none":
                 assert self._observer is not None
-                self._observer.see(frame, answer)
-        done = len(self.rollout.answers)
+                self._observer.add(frame, tracks)
+        done = len(self.rollout.tracks)
         return done == self.rollout.length or upto is None or done < upto
 
-    def _track_on(self, config: Config) -> bool:
-        """Track `decision_every` frames with these parameters; with those before where the tracker refuses them."""
+    def _advance_with(self, config: Config) -> bool:
+        """Tracks `decision_every` frames with this config, or with the one before if the tracker refuses it."""
         assert self.rollout is not None
         assert self.decision_every is not None
-        upto = len(self.rollout.answers) + self.decision_every
-        tracker = cast(Any, self.rollout.ready.tracker)
+        upto = len(self.rollout.tracks) + self.decision_every
+        tracker = cast(Any, self.rollout.prepared.tracker)
         before, self.refused = self.config, ""
         self.config = tracker.config = config
         try:
-            return self._track(upto)
+            return self._advance(upto)
         except InputError as error:
             if before is config:
                 raise
             self.config = tracker.config = before
             self.refused = str(error)
-            return self._track(upto)
+            return self._advance(upto)
 
     def render(self) -> Image | None:
-        """The last frame with what is tracked in it, RGB; None without a render_mode."""
+        """Returns the last frame with detections and tracks drawn on it, (H, W, 3) RGB; None without a render_mode."""
         if self.render_mode is None:
             return None
-        from tracking.environment.picture import picture
+        from tracking.environment.picture import episode_picture
 
-        return picture(self.cache.hold(self.source, streams_for(self.tracker, self.mode)), self.rollout, self.score)
+        opened = self.cache.open(self.source, streams_for(self.tracker, self.mode))
+        return episode_picture(opened, self.rollout, self.score)
 
     def close(self) -> None:
-        """Let go of what is held."""
-        self._forget()
-        self.cache = Cache(self.cache.limit)
+        """Ends the episode and empties the cache."""
+        self._clear_episode()
+        self.cache = SourceCache(self.cache.limit)
 
-    def _drawn(self, options: Mapping[str, Any]) -> Source:
+    def _draw_source(self, options: Mapping[str, Any]) -> Source:
         name, seed = options.get("scenario"), options.get("seed")
-        fits = [s for s in self.sources if name in (None, s.name) and seed in (None, s.seed)]
-        if not fits:
+        fitting = [s for s in self.sources if name in (None, s.name) and seed in (None, s.seed)]
+        if not fitting:
             names, seeds = sorted({s.name for s in self.sources}), sorted({s.seed for s in self.sources})
             expected = f"one of {', '.join(names)}, with a seed from {seeds[0]} to {seeds[-1]}"
             raise InputError(place="options", got=f"{name}, {seed}", expected=expected, remedy="correct the options")
-        return fits[int(self.np_random.integers(len(fits)))]
+        return fitting[int(self.np_random.integers(len(fitting)))]
 
-    def _observed(self) -> Floats:
+    def _observe(self) -> Floats:
         if self.observation == "none":
             return np.zeros(1, np.float32)
         assert self._observer is not None
-        scale = float("nan") if self.rollout is None else self.rollout.ready.px_per_m(self.rollout.answers)
-        seen = self._observer.look(scale)
+        scale = float("nan") if self.rollout is None else self.rollout.prepared.px_per_m(self.rollout.tracks)
+        statistics = self._observer.statistics(scale)
         if self.observation == "statistics":
-            return seen
-        return np.concatenate([seen, encode(self.space, self.config).astype(np.float32)])
+            return statistics
+        return np.concatenate([statistics, encode(self.space, self.config).astype(np.float32)])
 
     def _info(self) -> dict[str, Any]:
         return {
             "scenario": self.source.name,
             "seed": self.source.seed,
-            "frame": 0 if self.rollout is None else len(self.rollout.answers),
+            "frame": 0 if self.rollout is None else len(self.rollout.tracks),
             "objective": self.score,
             "scores": dict(self.scores),
             "names": self.parameter_names,
@@ -230,20 +254,24 @@ class TuningEnv(gymnasium.Env[Floats, Floats]):
         }
 
 
-def _mode(tracker: type[Tracker], among: Iterable[Source], asked: DetectionMode | None) -> DetectionMode:
-    """The detections of all episodes, so that all have the same parameters: those of the first that is not simulated;
-    InputError where another one has none of the kind."""
+def _detection_mode(tracker: type[Tracker], among: Iterable[Source], wanted: DetectionMode | None) -> DetectionMode:
+    """The detections of all episodes; the same for all, so that all have the same parameters.
+
+    If none are wanted, the first recording decides; without recordings "image" or "file", by what the tracker takes.
+    InputError if a recording does not have these detections.
+    """
     among = tuple(among)
     for source in among:
         if not source.simulated:
-            asked = choose_mode(tracker.needs, source.open(("left",)), asked)
+            wanted = choose_mode(tracker.needs, source.open(("left",)), wanted)
     if any(source.simulated for source in among):
-        asked = asked or ("image" if streams_for(tracker, None) else "file")
-    assert asked is not None
-    return asked
+        wanted = wanted or ("image" if streams_for(tracker, None) else "file")
+    assert wanted is not None
+    return wanted
 
 
-def _space(kind: type[Config], mode: DetectionMode, every: int | None) -> Space:
+def _action_parameters(kind: type[Config], mode: DetectionMode, every: int | None) -> Space:
+    """The parameters that an action sets; InputError if there are none, or `every` is no number of frames."""
     if every is not None and (not isinstance(every, int | np.integer) or isinstance(every, bool) or every < 1):
         got, expected = repr(every), "a number of frames, 1 or more, or None"
         raise InputError(place="decision_every", got=got, expected=expected, remedy="correct it")
@@ -255,8 +283,9 @@ def _space(kind: type[Config], mode: DetectionMode, every: int | None) -> Space:
     return space
 
 
-def _one_of(place: str, got: object, known: Iterable[object]) -> None:
+def _check_choice(place: str, got: object, known: Iterable[object]) -> None:
+    """InputError if the value is not among the known ones."""
     known = tuple(known)
     if got not in known:
-        remedy = f"did you mean {closest(str(got), map(str, known))}?" if known else "leave it out"
+        remedy = f"did you mean {closest(str(got), map(str, known))}?" if known else "remove it"
         raise InputError(place=place, got=repr(got), expected=f"one of {', '.join(map(str, known))}", remedy=remedy)

@@ -1,4 +1,4 @@
-"""What is kept between episodes on the same sources: motions, truths, detections; bounded by bytes."""
+"""Keeps opened sequences between episodes on the same sources: motions, truths, detections; bounded by bytes."""
 
 from __future__ import annotations
 
@@ -19,30 +19,35 @@ if TYPE_CHECKING:
     from tracking.objective import ObjectiveScorer
 
 T = TypeVar("T")
-LIMIT = 256 * 2**20
-COUNTS = 2
-"""Times that a source's bytes are counted; after that it holds what it will hold."""
+DEFAULT_LIMIT = 256 * 2**20
+"""Bytes that a SourceCache keeps by default."""
+TIMES_COUNTED = 2
+"""How often the bytes of a source are counted; after that it holds all that it will hold."""
 
 
-class Held:
-    """A source that was opened. State: its sequence, detections in memory; truth and background once asked for."""
+class OpenedSource:
+    """A source whose sequence is open. State: the sequence; once used, its detections, truth and background.
+
+    streams: the pictures that are drawn if the source is simulated ("left", "right", "background").
+    """
 
     def __init__(self, source: Source, streams: tuple[str, ...] = ()) -> None:
         self.source, self._opened = source, source.open(streams)
         opened = self._opened
-        made = _remembered(lambda: tuple(opened.without_pictures()))
+        frames_once = _computed_once(lambda: tuple(opened.without_pictures()))
 
-        def bare() -> Iterator[Frame]:
-            return iter(made())
+        def frames_without_pictures() -> Iterator[Frame]:
+            return iter(frames_once())
 
         pictures = opened.has_images or opened.has_right
-        self.sequence = replace(opened, bare=bare, frames=opened.frames if pictures else bare)
+        frames = opened.frames if pictures else frames_without_pictures
+        self.sequence = replace(opened, bare=frames_without_pictures, frames=frames)
         if opened.load_background is not None:
-            self.sequence = replace(self.sequence, load_background=_remembered(opened.load_background))
+            self.sequence = replace(self.sequence, load_background=_computed_once(opened.load_background))
 
     @cached_property
     def truth(self) -> Truth:
-        """What is true; InputError where nothing is labelled."""
+        """The truth of the sequence. Raises InputError if the sequence has no labels."""
         truth = self._opened.truth
         if truth is None:
             remedy = "give a sequence with labels: there is nothing to score by"
@@ -51,79 +56,80 @@ class Held:
 
     @cached_property
     def judge(self) -> ObjectiveScorer:
-        """The truth, ready to score answers by."""
+        """Scores tracks against the truth of the sequence; built on first use."""
         from tracking.objective import ObjectiveScorer
 
         return ObjectiveScorer(self.truth)
 
 
-def _remembered(make: Callable[[], T]) -> Callable[[], T]:
-    """What `make` makes, made once and kept where `array_bytes` finds it."""
+def _computed_once(compute: Callable[[], T]) -> Callable[[], T]:
+    """A function that calls `compute` once and keeps its result where `array_bytes` finds it."""
     kept: list[T] = []
 
-    def again() -> T:
+    def first_result() -> T:
         if not kept:
-            kept.append(make())
+            kept.append(compute())
         return kept[0]
 
-    return again
+    return first_result
 
 
-class Cache:
-    """Opened sources, the least recently used dropped first. State: those held, and their bytes.
+class SourceCache:
+    """Opened sources; the least recently used one is dropped first. State: the opened sources and their bytes.
 
-    limit: bytes of arrays that all together may hold; the one in use is held whatever its size. Bytes are counted when
-    another source is asked for, the first times: by then it is known what the last one came to hold.
+    limit: bytes of arrays that all opened sources may hold together; the source in use is kept whatever its size. The
+    bytes of a source are counted when the next source is opened, and again after its second use. Raises InputError if
+    `limit` is negative.
     """
 
-    def __init__(self, limit: int = LIMIT) -> None:
+    def __init__(self, limit: int = DEFAULT_LIMIT) -> None:
         if limit < 0:
             raise InputError(place="cache", got=limit, expected="bytes, 0 or more", remedy="correct it")
         self.limit = limit
-        self._held: OrderedDict[tuple[object, ...], Held] = OrderedDict()
+        self._opened: OrderedDict[tuple[object, ...], OpenedSource] = OrderedDict()
         self._bytes: dict[tuple[object, ...], int] = {}
         self._counted: Counter[tuple[object, ...]] = Counter()
 
     def __len__(self) -> int:
-        return len(self._held)
+        return len(self._opened)
 
     @property
     def bytes(self) -> int:
-        """Bytes of the arrays held."""
+        """Bytes of the arrays that the opened sources hold now."""
         self._counted.clear()
         self._count_last()
         return sum(self._bytes.values())
 
-    def hold(self, source: Source, streams: tuple[str, ...] = ()) -> Held:
-        """The source, opened now or before with these pictures."""
+    def open(self, source: Source, streams: tuple[str, ...] = ()) -> OpenedSource:
+        """Returns the source, opened now or earlier with the same `streams`."""
         key = (*source.key, streams)
-        if self._held and next(reversed(self._held)) == key:
-            return self._held[key]
+        if self._opened and next(reversed(self._opened)) == key:
+            return self._opened[key]
         self._count_last()
-        if key in self._held:
-            self._held.move_to_end(key)
-            return self._held[key]
+        if key in self._opened:
+            self._opened.move_to_end(key)
+            return self._opened[key]
         self._make_room()
-        self._held[key] = Held(source, streams)
-        return self._held[key]
+        self._opened[key] = OpenedSource(source, streams)
+        return self._opened[key]
 
     def _count_last(self) -> None:
-        key = next(reversed(self._held), None)
-        if key is not None and self._counted[key] < COUNTS:
+        key = next(reversed(self._opened), None)
+        if key is not None and self._counted[key] < TIMES_COUNTED:
             self._counted[key] += 1
-            self._bytes[key] = array_bytes(self._held[key])
+            self._bytes[key] = array_bytes(self._opened[key])
 
     def _make_room(self) -> None:
-        while self._held and sum(self._bytes.values()) > self.limit:
-            key, _ = self._held.popitem(last=False)
+        while self._opened and sum(self._bytes.values()) > self.limit:
+            key, _ = self._opened.popitem(last=False)
             del self._bytes[key], self._counted[key]
 
 
-def array_bytes(thing: object) -> int:
-    """Bytes of all arrays that can be reached from here, each counted once."""
+def array_bytes(root: object) -> int:
+    """Returns the bytes of all arrays that can be reached from an object; each array counts once."""
     arrays: dict[int, int] = {}
     seen: set[int] = set()
-    waiting: list[Any] = [thing]
+    waiting: list[Any] = [root]
     while waiting:
         one = waiting.pop()
         if id(one) in seen:
@@ -139,7 +145,7 @@ def array_bytes(thing: object) -> int:
 
 
 def _parts(one: Any) -> list[Any]:
-    """What a container, one of our objects, or a function with what it closes over, leads to."""
+    """The objects inside a container, an object of ours, or the closure of a function."""
     if isinstance(one, tuple | list):
         return list(one)
     if isinstance(one, dict):

@@ -1,7 +1,6 @@
-"""Whole episodes for searches and agents: a tracker with its parameters on a source, and the objective it reaches.
+"""Whole episodes for searches: a tracker with its parameters plays a source and is scored.
 
-`sources(...)` says what is to be played on, `play(...)` plays one; a `Cache` makes the next episode on the same source
-cheap. `Rollout` is an episode frame by frame.
+`play` plays an episode at once, `Rollout` frame by frame. With a `SourceCache` later episodes on a source are cheap.
 """
 
 from __future__ import annotations
@@ -11,19 +10,23 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 
 from sim.types import DetectionMode, Frame, Sequence, Tracker, Tracks, Truth
-from tracking.environment.episode_cache import Cache, Held
+from tracking.environment.episode_cache import OpenedSource, SourceCache
 from tracking.episode_source import Source, sources
 from tracking.prepare import Params, prepare
 
-__all__ = ["Cache", "Episode", "Rollout", "Source", "play", "sources", "streams_for"]
+__all__ = ["Episode", "Rollout", "Source", "SourceCache", "play", "sources", "streams_for"]
 
 AnyTracker = str | type[Tracker]
 
 
 @dataclass(frozen=True)
 class Episode:
-    """What came of an episode: objective (nan: nothing to score), the known scores that it is made of, by key of the
-    catalogue; frames played; seconds in the tracker, and in grouping and scoring its answers."""
+    """The result of an episode.
+
+    name, seed: of the source; objective: nan if there is nothing to score; scores: by key of the catalogue, without
+    those that are nan; frames: number played; seconds_tracking: time in the tracker; seconds_scoring: time for groups
+    and scores.
+    """
 
     name: str
     seed: int
@@ -41,16 +44,16 @@ def play(
     *,
     detections: DetectionMode | None = None,
     tracker_seed: int = 0,
-    cache: Cache | None = None,
+    cache: SourceCache | None = None,
     upto: int | None = None,
     every_score: bool = False,
 ) -> Episode:
-    """One episode, from the first frame to the last, or to `upto`.
+    """Plays one episode, from the first frame to the last or to frame `upto`, and returns its result.
 
-    tracker, config, detections: as for `tracking.track`, but that a simulated source is drawn only where "image" is
-    asked for, or the tracker takes nothing else. The objective is exactly that of
-    `tracking.evaluate(sequence.truth, tracking.track(…))`, up to that frame. every_score: compute the whole catalogue.
-    Errors are those of `tracking.track`, and InputError for a source without labels.
+    tracker, config, detections: as for `tracking.track`. A simulated source is drawn as pictures only if `detections`
+    is "image" or the tracker takes neither boxes nor points. The objective equals that of
+    `tracking.evaluate(sequence.truth, tracking.track(…))` up to that frame. every_score: compute the whole catalogue.
+    Raises the errors of `tracking.track`, and InputError if the source has no labels.
     """
     rollout = Rollout(tracker, source, config, detections=detections, tracker_seed=tracker_seed, cache=cache)
     for _ in rollout.advance(upto):
@@ -59,7 +62,10 @@ def play(
 
 
 class Rollout:
-    """An episode frame by frame. State: the tracker, its answers so far, the last frame, the seconds spent."""
+    """An episode that is played frame by frame; the arguments are those of `play`.
+
+    State: the prepared tracker, the tracks of the frames so far, the last frame, the seconds spent.
+    """
 
     def __init__(
         self,
@@ -69,79 +75,85 @@ class Rollout:
         *,
         detections: DetectionMode | None = None,
         tracker_seed: int = 0,
-        cache: Cache | None = None,
+        cache: SourceCache | None = None,
     ) -> None:
         self.source = source
         streams = streams_for(tracker, detections)
-        self.held: Held = Held(source, streams) if cache is None else cache.hold(source, streams)
-        self.truth: Truth = self.held.truth
-        self.ready = prepare(tracker, self.sequence, params=config, detections=detections, seed=tracker_seed)
-        self.answers: list[Tracks] = []
+        self.opened: OpenedSource = OpenedSource(source, streams) if cache is None else cache.open(source, streams)
+        self.truth: Truth = self.opened.truth
+        self.prepared = prepare(tracker, self.sequence, params=config, detections=detections, seed=tracker_seed)
+        self.tracks: list[Tracks] = []
         self.seconds_tracking = self.seconds_scoring = 0.0
-        begun = time.perf_counter()
-        self.ready.reset(tracker_seed)
-        self.seconds_tracking += time.perf_counter() - begun
-        self._frames = self.ready.frames()
+        start = time.perf_counter()
+        self.prepared.reset(tracker_seed)
+        self.seconds_tracking += time.perf_counter() - start
+        self._frames = self.prepared.frames()
         self._next: Frame | None = None
         self.last: Frame | None = None
 
     @property
     def sequence(self) -> Sequence:
-        """What is played on."""
-        return self.held.sequence
+        """The sequence that is played."""
+        return self.opened.sequence
 
     @property
     def length(self) -> int:
-        """Frames of the whole episode."""
+        """Number of frames of the whole episode."""
         return self.truth.length
 
     def advance(self, upto: int | None = None) -> Iterator[tuple[Frame, Tracks]]:
-        """Play on, to the frame `upto` or to the last: each frame as the tracker was given it, and its answer.
+        """Plays to frame `upto` or to the last one; yields each frame as the tracker got it, and the tracker's tracks.
 
-        After an error of the tracker's the same frame comes again.
+        After an error of the tracker the next call begins with the same frame.
         """
         last = self.length if upto is None else min(upto, self.length)
-        while len(self.answers) < last:
+        while len(self.tracks) < last:
             self._next = frame = self._next or next(self._frames, None)
             if frame is None:
                 return
-            begun = time.perf_counter()
-            answer = self.ready.step(frame)
-            self.seconds_tracking += time.perf_counter() - begun
-            self.answers.append(answer)
+            start = time.perf_counter()
+            tracks = self.prepared.step(frame)
+            self.seconds_tracking += time.perf_counter() - start
+            self.tracks.append(tracks)
             self._next, self.last = None, frame
-            yield frame, answer
+            yield frame, tracks
 
     def episode(self, every_score: bool = False) -> Episode:
-        """What has come of it so far."""
+        """Returns the result of the frames so far. every_score: compute the whole catalogue."""
         scores = self.scores(every_score)
         return Episode(
             self.source.name,
             self.source.seed,
             scores.get("objective", float("nan")),
             scores,
-            len(self.answers),
+            len(self.tracks),
             self.seconds_tracking,
             self.seconds_scoring,
         )
 
     def scores(self, every: bool = False) -> dict[str, float]:
-        """The known scores of the frames so far, by key: the objective and what it is the mean of, or all."""
-        begun = time.perf_counter()
-        px_per_m = self.ready.px_per_m(self.answers)
-        found = self._every_score(px_per_m) if every else self.held.judge.scores(self.answers, px_per_m)
-        self.seconds_scoring += time.perf_counter() - begun
+        """Returns the scores of the frames so far by key, without those that are nan.
+
+        every: the whole catalogue; else the objective and the scores that it is the mean of.
+        """
+        start = time.perf_counter()
+        px_per_m = self.prepared.px_per_m(self.tracks)
+        found = self._every_score(px_per_m) if every else self.opened.judge.scores(self.tracks, px_per_m)
+        self.seconds_scoring += time.perf_counter() - start
         return {key: value for key, value in found.items() if value == value}
 
     def _every_score(self, px_per_m: float) -> Mapping[str, float]:
         from tracking.grouping.grouped_tracks import with_groups
 
-        answers = with_groups(self.answers, self.ready.context.fps, px_per_m) if self.answers else ()
-        return self.held.judge.scorer.evaluate(answers, frames=len(self.answers))
+        tracks = with_groups(self.tracks, self.prepared.context.fps, px_per_m) if self.tracks else ()
+        return self.opened.judge.scorer.evaluate(tracks, frames=len(self.tracks))
 
 
 def streams_for(tracker: AnyTracker, detections: DetectionMode | None) -> tuple[str, ...]:
-    """The pictures that a simulated sequence must have for this tracker, () none."""
+    """Returns the pictures that a simulated sequence needs for this tracker, () if it needs none.
+
+    They are needed if `detections` is "image", or is None and the tracker takes neither boxes nor points.
+    """
     from tracking.tracker_registry import find
 
     needs = set((find(tracker) if isinstance(tracker, str) else tracker).needs)

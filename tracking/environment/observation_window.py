@@ -1,4 +1,7 @@
-"""A few frames of answers and detections as rows, in metres: who is who from frame to frame, what lies near what."""
+"""Tracks and detections of a few frames as rows of arrays, in metres, and the matches between them.
+
+The rows are what tracking.environment.observation computes its statistics from. Nothing here knows the truth.
+"""
 
 from __future__ import annotations
 
@@ -9,17 +12,21 @@ import numpy as np
 
 from sim.types import Array, Bools, Detections, Ints, Tracks
 
-APART = 1e6
-"""m between frames, where the third coordinate keeps them apart."""
+FRAME_DISTANCE = 1e6
+"""Distance between frames in the third coordinate of the search trees, m; it keeps frames apart."""
 REACH = 1.0
-"""m: a detection so near to where a track was expected is taken for its own."""
-WIDE = 2.0
-"""Standard deviations of its extent by which a group's reach is wider."""
+"""Greatest distance between the expected position of a track and a detection that belongs to it, m."""
+EXTENT_SIGMAS = 2.0
+"""Standard deviations of its extent that are added to the reach of a group."""
 
 
 @dataclass(frozen=True, eq=False)
-class Rows:
-    """R answers: frame (R,) counted from 0, id (R,), pos, vel (R, 2), cov (R, 2, 2) of pos, reach (R,); metres."""
+class TrackRows:
+    """R reported track states, frame by frame.
+
+    frame: (R,) counted from 0; id: (R,); pos: (R, 2) m; vel: (R, 2) m/s, 0 if unknown; cov: (R, 2, 2) covariance of the
+    position, m²; reach: (R,) distance within which detections belong to the track, m.
+    """
 
     frame: Ints
     id: Ints
@@ -33,9 +40,12 @@ class Rows:
 
 
 @dataclass(frozen=True, eq=False)
-class Found:
-    """D detections: frame (D,) counted as those of the answers, pos (D, 2) m, score (D,); frames: those that have any
-    detections at all, empty ones included; first: the frame of the first answer."""
+class DetectionRows:
+    """D detections, frame by frame.
+
+    frame: (D,) counted like the frames of the TrackRows; pos: (D, 2) m; score: (D,); frames: the frames whose
+    detections are known, frames without a detection included; first: the first frame of the window.
+    """
 
     frame: Ints
     pos: Array
@@ -47,74 +57,84 @@ class Found:
         return len(self.frame)
 
     def neighbours(self, reach: float) -> float:
-        """How many others of the same frame are so near, mean."""
+        """Returns the mean number of other detections of the same frame within `reach` m of a detection, 0 if none."""
         if not len(self):
             return 0.0
         tree = _tree(self.pos, self.frame)
         return float((tree.count_neighbors(tree, reach) - len(self)) / len(self))
 
 
-def rows(answers: Sequence[Tracks], scale: float) -> Rows:
-    """Answers one after the other; scale: units of their plane per metre."""
-    frame = np.repeat(np.arange(len(answers)), [len(t.id) for t in answers])
-    id = np.concatenate([np.zeros(0, np.int64), *(t.id for t in answers)])
+def track_rows(tracks: Sequence[Tracks], scale: float) -> TrackRows:
+    """Returns the tracks of consecutive frames as rows. scale: units of their plane per metre."""
+    frame = np.repeat(np.arange(len(tracks)), [len(t.id) for t in tracks])
+    id = np.concatenate([np.zeros(0, np.int64), *(t.id for t in tracks)])
     pos, vel = (
-        np.concatenate([np.zeros((0, 2)), *(getattr(t, name)[:, :2] for t in answers)]) / scale
+        np.concatenate([np.zeros((0, 2)), *(getattr(t, name)[:, :2] for t in tracks)]) / scale
         for name in ("pos", "vel")
     )
-    cov = np.concatenate([np.zeros((0, 2, 2)), *(t.cov[:, :2, :2] for t in answers)]) / scale**2
-    return Rows(frame, id, pos, np.nan_to_num(vel), cov, np.concatenate([np.zeros(0), *(map(_reach, answers))]))
+    cov = np.concatenate([np.zeros((0, 2, 2)), *(t.cov[:, :2, :2] for t in tracks)]) / scale**2
+    return TrackRows(frame, id, pos, np.nan_to_num(vel), cov, np.concatenate([np.zeros(0), *(map(_reach, tracks))]))
 
 
 def _reach(t: Tracks) -> Array:
-    """(N,) m from a track's place within which detections are its own: wider by the extent of a group."""
-    wide = np.full(len(t.id), REACH)
+    """(N,) m, REACH for a person, more for a group by EXTENT_SIGMAS times the root mean square of its extent."""
+    reach = np.full(len(t.id), REACH)
     if t.unit != "group" or t.groups is None or not len(t.groups.id):
-        return wide
+        return reach
     spread = np.sqrt(np.maximum(np.trace(t.groups.extent, axis1=1, axis2=2) / 2, 0.0))
-    of = dict(zip(t.groups.id.tolist(), np.nan_to_num(spread).tolist(), strict=True))
-    return wide + WIDE * np.array([of.get(i, 0.0) for i in t.id.tolist()])
+    by_id = dict(zip(t.groups.id.tolist(), np.nan_to_num(spread).tolist(), strict=True))
+    return reach + EXTENT_SIGMAS * np.array([by_id.get(i, 0.0) for i in t.id.tolist()])
 
 
-def found(detections: Sequence[Detections | None], plane: str, scale: float, first: int) -> Found:
-    """The detections of frames first, first + 1, …; those in another plane than the tracks' are left out."""
-    some = [(first + k, d) for k, d in enumerate(detections) if d is not None and (d.plane == plane or not len(d.pos))]
-    frame = np.repeat([f for f, _ in some], [len(d.pos) for _, d in some]).astype(np.int64)
-    pos = np.concatenate([np.zeros((0, 2)), *(d.pos[:, :2] for _, d in some)]) / scale
-    score = [d.score if len(d.score) else np.ones(len(d.pos)) for _, d in some]
-    return Found(frame, pos, np.concatenate([np.zeros(0), *score]), tuple(f for f, _ in some), first)
+def detection_rows(detections: Sequence[Detections | None], plane: str, scale: float, first: int) -> DetectionRows:
+    """Returns the detections of frames first, first + 1, … as rows.
+
+    Frames without detections (None), or with detections in another plane than `plane`, are left out. A detection
+    without score has score 1. scale: units of the plane per metre.
+    """
+    known = [(first + k, d) for k, d in enumerate(detections) if d is not None and (d.plane == plane or not len(d.pos))]
+    frame = np.repeat([f for f, _ in known], [len(d.pos) for _, d in known]).astype(np.int64)
+    pos = np.concatenate([np.zeros((0, 2)), *(d.pos[:, :2] for _, d in known)]) / scale
+    score = [d.score if len(d.score) else np.ones(len(d.pos)) for _, d in known]
+    return DetectionRows(frame, pos, np.concatenate([np.zeros(0), *score]), tuple(f for f, _ in known), first)
 
 
-def steps(own: Rows) -> tuple[Ints, Ints]:
-    """(K,), (K,) rows of the same track in a frame and in the next one."""
-    order = np.lexsort((own.frame, own.id))
+def consecutive_rows(rows: TrackRows) -> tuple[Ints, Ints]:
+    """Returns the pairs of rows of the same track in consecutive frames: earlier rows (K,), later rows (K,)."""
+    order = np.lexsort((rows.frame, rows.id))
     a, b = order[:-1], order[1:]
-    same: Bools = (own.id[a] == own.id[b]) & (own.frame[a] + 1 == own.frame[b])
+    same: Bools = (rows.id[a] == rows.id[b]) & (rows.frame[a] + 1 == rows.frame[b])
     return a[same], b[same]
 
 
-def near_ones(pos: Array, frame: Ints) -> Array:
-    """(N,) distances to the nearest other place of the same frame; of those who are not alone."""
+def nearest_distances(pos: Array, frame: Ints) -> Array:
+    """Returns the distance from each position (N, 2) to the nearest other one of the same frame, m.
+
+    Positions that are alone in their frame (N,) are left out, so the result may be shorter than N.
+    """
     if len(pos) < 2:
         return np.zeros(0)
-    away = _tree(pos, frame).query(_apart(pos, frame), k=2)[0][:, 1]
-    return np.asarray(away[away < APART / 2])
+    distance = _tree(pos, frame).query(_with_frame(pos, frame), k=2)[0][:, 1]
+    return np.asarray(distance[distance < FRAME_DISTANCE / 2])
 
 
-def assigned(expected: Array, frame: Ints, reach: Array, seen: Found) -> Ints:
-    """(D,) the nearest expected place (N, 2) of each detection's frame, -1 where none is within its reach (N,)."""
-    if not len(expected) or not len(seen):
-        return np.full(len(seen), -1)
-    away, owner = _tree(expected, frame).query(_apart(seen.pos, seen.frame))
-    return np.where(away <= reach[owner], owner, -1)
+def nearest_expected(expected: Array, frame: Ints, reach: Array, detections: DetectionRows) -> Ints:
+    """Returns for each detection (D,) the index of the nearest expected position (N, 2) of its frame.
+
+    It is -1 if that position is farther away than its `reach` (N,), m, or if there is none. frame: (N,).
+    """
+    if not len(expected) or not len(detections):
+        return np.full(len(detections), -1)
+    distance, nearest = _tree(expected, frame).query(_with_frame(detections.pos, detections.frame))
+    return np.where(distance <= reach[nearest], nearest, -1)
 
 
-def _apart(pos: Array, frame: Ints) -> Array:
-    """(N, 3) places that are far from each other where their frames differ."""
-    return np.column_stack([pos, frame * APART])
+def _with_frame(pos: Array, frame: Ints) -> Array:
+    """(N, 3) positions with a third coordinate that keeps frames apart."""
+    return np.column_stack([pos, frame * FRAME_DISTANCE])
 
 
 def _tree(pos: Array, frame: Ints):  # type: ignore[no-untyped-def]
     from scipy.spatial import cKDTree
 
-    return cKDTree(_apart(pos, frame))
+    return cKDTree(_with_frame(pos, frame))

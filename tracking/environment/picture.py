@@ -1,4 +1,4 @@
-"""What the environment shows: the last picture, or a plan of the ground, with detections, tracks and their past."""
+"""The picture that the environment renders: the last frame, or a plan of the ground, with detections and tracks."""
 
 from __future__ import annotations
 
@@ -9,69 +9,70 @@ from tracking.drawing.canvas import FLOOR, THING, TRAIL_SECONDS, Canvas
 from tracking.drawing.layer_painting import draw_banner, draw_captions, letter_size, paint_layer
 from tracking.drawing.layers import Layer, layer_of_tracks, plan_layer_of_tracks
 from tracking.drawing.plan_view import draw_scene
-from tracking.environment.episode_cache import Held
+from tracking.environment.episode_cache import OpenedSource
 from tracking.environment.episodes import Rollout
 
 SIZE = (480, 640)
-"""px, height and width, of a plan."""
+"""Height and width of a plan, px."""
 STRIP = 32
-"""px, height of the line of facts."""
+"""Height of the text line above the picture, px."""
 LETTER = 0.5
+"""Font scale of the text line."""
 
 
-def picture(held: Held, rollout: Rollout | None, score: float) -> Image:
-    """(H, W, 3) RGB of even height and width: the frame answered last, or what stands still before the first."""
-    frame, answers = (None, []) if rollout is None else (rollout.last, rollout.answers)
-    view = _view(held, frame, answers)
+def episode_picture(opened: OpenedSource, rollout: Rollout | None, score: float) -> Image:
+    """Returns the last tracked frame with its detections and tracks, (H, W, 3) RGB uint8, height and width even.
+
+    Before the first frame, and without a rollout, only the scene or an empty picture is drawn. A text line above shows
+    source, seed, number of frames and `score`.
+    """
+    frame, tracks = (None, []) if rollout is None else (rollout.last, rollout.tracks)
+    canvas = _canvas(opened, frame, tracks)
     if frame is not None:
-        if frame.detections is not None and not _on_picture(frame):
-            _dots(view, frame.detections, answers[-1].plane)
-        side = _side(held, answers, view)
-        paint_layer(view, side, frame.index, held.sequence.fps)
-        draw_captions(view.image, side, frame.index, held.sequence.fps, letter_size(view))
-    strip = np.zeros((STRIP, view.image.shape[1], 3), np.uint8)
-    source, done = held.source, len(answers)
-    words = f"{source.name} {source.seed}   frame {done} of {held.truth.length}   objective {score:.3f}"
+        if frame.detections is not None and frame.image is None:
+            _draw_detections(canvas, frame.detections, tracks[-1].plane)
+        layer = _layer(opened, tracks, canvas)
+        paint_layer(canvas, layer, frame.index, opened.sequence.fps)
+        draw_captions(canvas.image, layer, frame.index, opened.sequence.fps, letter_size(canvas))
+    strip = np.zeros((STRIP, canvas.image.shape[1], 3), np.uint8)
+    source, done = opened.source, len(tracks)
+    words = f"{source.name} {source.seed}   frame {done} of {opened.truth.length}   objective {score:.3f}"
     draw_banner(strip, words, [], LETTER)
-    whole = np.concatenate([strip, view.image])
-    tall, wide = (n - n % 2 for n in whole.shape[:2])
-    return np.ascontiguousarray(whole[:tall, :wide, ::-1])
+    whole = np.concatenate([strip, canvas.image])
+    height, width = (n - n % 2 for n in whole.shape[:2])
+    return np.ascontiguousarray(whole[:height, :width, ::-1])
 
 
-def _on_picture(frame: Frame | None) -> bool:
-    return frame is not None and frame.image is not None
-
-
-def _view(held: Held, frame: Frame | None, answers: list[Tracks]) -> Canvas:
-    """A canvas with what stands still, and how the world is mapped to it."""
-    sequence = held.sequence
+def _canvas(opened: OpenedSource, frame: Frame | None, tracks: list[Tracks]) -> Canvas:
+    """The frame's image, or a plan of the scene, or an empty image if neither pictures nor ground positions exist."""
+    sequence = opened.sequence
     if sequence.has_images and sequence.image_size is not None:
         shown = None if frame is None else frame.image
         empty = np.full((*sequence.image_size[::-1], 3), THING, np.uint8)
-        canvas = empty if shown is None else np.array(shown, np.uint8)
-        return Canvas(canvas, 1.0, np.zeros(2), np.array(sequence.image_size, float), upwards=False)
-    canvas = np.full((*SIZE, 3), FLOOR, np.uint8)
-    if _flat(held, answers):
-        low, high = _bounds(held)
-        view = Canvas.fit(canvas, low, high, upwards=True)
-        draw_scene(view, sequence.scene)
-        return view
-    size = np.array(sequence.image_size, float) if sequence.image_size is not None else _bounds(held)[1]
-    return Canvas.fit(canvas, np.zeros(2), size, upwards=False)
+        image = empty if shown is None else np.array(shown, np.uint8)
+        return Canvas(image, 1.0, np.zeros(2), np.array(sequence.image_size, float), upwards=False)
+    image = np.full((*SIZE, 3), FLOOR, np.uint8)
+    if _on_ground(opened, tracks):
+        low, high = _bounds(opened)
+        plan = Canvas.fit(image, low, high, upwards=True)
+        draw_scene(plan, sequence.scene)
+        return plan
+    size = np.array(sequence.image_size, float) if sequence.image_size is not None else _bounds(opened)[1]
+    return Canvas.fit(image, np.zeros(2), size, upwards=False)
 
 
-def _flat(held: Held, answers: list[Tracks]) -> bool:
-    """Are places metres on the ground?"""
-    return answers[-1].plane != "image" if answers else held.truth.pos is not None
+def _on_ground(opened: OpenedSource, tracks: list[Tracks]) -> bool:
+    """True if the tracks lie on the ground; before the first frame, if the truth does."""
+    return tracks[-1].plane != "image" if tracks else opened.truth.pos is not None
 
 
-def _bounds(held: Held) -> tuple[Array, Array]:
-    """Where people are: the scene, else all that is detected, or labelled where nothing is."""
-    scene = held.sequence.scene
+def _bounds(opened: OpenedSource) -> tuple[Array, Array]:
+    """The least and greatest coordinates of the scene; without a scene, of all detections, else of all labels."""
+    scene = opened.sequence.scene
     if scene is not None:
         return np.zeros(2), scene.size
-    places = [f.detections.pos[:, :2] for f in held.sequence.without_pictures() if f.detections is not None]
-    truth = held.truth
+    places = [f.detections.pos[:, :2] for f in opened.sequence.without_pictures() if f.detections is not None]
+    truth = opened.truth
     if not sum(map(len, places)):
         places = [truth.pos] if truth.pos is not None else [truth.box[:, :2]] if truth.box is not None else []
     found = np.concatenate([np.zeros((0, 2)), *places])
@@ -80,16 +81,16 @@ def _bounds(held: Held) -> tuple[Array, Array]:
     return found.min(axis=0) - 1, found.max(axis=0) + 1
 
 
-def _dots(view: Canvas, detections: Detections, plane: str) -> None:
-    """Small grey discs where something was detected."""
+def _draw_detections(canvas: Canvas, detections: Detections, plane: str) -> None:
+    """Draws small grey discs; detections in the image are not drawn on a plan."""
     if detections.plane == plane or detections.plane != "image" != plane:
         for at in detections.pos[:, :2]:
-            view.disc(at, 2.5, THING)
+            canvas.disc(at, 2.5, THING)
 
 
-def _side(held: Held, answers: list[Tracks], view: Canvas) -> Layer:
-    """The answers of the last seconds as marks in the view's unit."""
-    recent = answers[-round(TRAIL_SECONDS * held.sequence.fps) - 1 :]
-    if view.upwards:
+def _layer(opened: OpenedSource, tracks: list[Tracks], canvas: Canvas) -> Layer:
+    """The marks of the last seconds of tracks, in the coordinates of the canvas."""
+    recent = tracks[-round(TRAIL_SECONDS * opened.sequence.fps) - 1 :]
+    if canvas.upwards:
         return plan_layer_of_tracks(recent)
-    return layer_of_tracks(recent, held.sequence.camera, held.sequence.scene)
+    return layer_of_tracks(recent, opened.sequence.camera, opened.sequence.scene)

@@ -1,4 +1,7 @@
-"""What is tuned for: scores of the catalogue, each in its own direction, and speed; one number for many episodes."""
+"""The goals of a search: scores of the catalogue, each with the direction that is better, and speed.
+
+A goal turns one episode into one number, and many episodes into one mean.
+"""
 
 from __future__ import annotations
 
@@ -10,58 +13,60 @@ from scenarios.loading.toml_files import closest
 from tracking.environment.episodes import Episode
 
 SPEED = "frames/s"
-"""Frames per second in the tracker; the one goal that is not the same every time."""
+"""Key of the tracker's speed. It is the only goal that differs between two runs of the same episode."""
 
-ALWAYS = ("objective", "HOTA", "group_F1_hull")
-"""Keys that an episode has without computing the whole catalogue."""
+FAST_KEYS = ("objective", "HOTA", "group_F1_hull")
+"""Scores that every episode has; other scores need the whole catalogue to be computed."""
 
 
 @dataclass(frozen=True)
 class Goal:
-    """A score and whether more of it is better."""
+    """One score to improve. key: its name in the catalogue, or SPEED; higher: True if greater values are better."""
 
     key: str
     higher: bool = True
 
     def of(self, episode: Episode) -> float:
-        """What one episode reached; nan where it is not known (nothing to divide by)."""
+        """Returns the score of one episode, nan if the episode does not have it; of SPEED frames per second."""
         if self.key == SPEED:
             return episode.frames / episode.seconds_tracking if episode.seconds_tracking else float("nan")
         return episode.scores.get(self.key, float("nan"))
 
     def mean(self, episodes: Sequence[Episode]) -> float:
-        """What many reached: the mean of those where it is known, nan if of none; frames over seconds for speed."""
+        """Returns the mean over the episodes that have the score, nan if none has; of SPEED all frames per second."""
         if self.key == SPEED:
             seconds = sum(e.seconds_tracking for e in episodes)
             return sum(e.frames for e in episodes) / seconds if seconds else float("nan")
-        return mean(self.of(e) for e in episodes)
+        return finite_mean(self.of(e) for e in episodes)
 
     def gain(self, before: float, after: float) -> float:
-        """How much better the second is."""
+        """Returns by how much `after` is better than `before`, negative if it is worse."""
         return after - before if self.higher else before - after
 
 
-def mean(values: Iterable[float]) -> float:
-    """The mean of the known ones, nan if there are none."""
+def finite_mean(values: Iterable[float]) -> float:
+    """Returns the mean of the values that are not nan, nan if there are none."""
     known = [v for v in values if v == v]
     return sum(known) / len(known) if known else float("nan")
 
 
-def goals(keys: Iterable[str]) -> tuple[Goal, ...]:
-    """The goals of these keys; InputError for an unknown one, for one of which neither way is better, for a double."""
+def goals_of(keys: Iterable[str]) -> tuple[Goal, ...]:
+    """Returns one goal per key, in the order given; the direction comes from the catalogue.
+
+    Raises InputError if there is no key, if a key is unknown or given twice, and if its score has no better direction.
+    """
     from tracking.scoring.catalogue import CATALOGUE
 
     found: list[Goal] = []
-    able = [SPEED, *(key for key, score in CATALOGUE.items() if score.better != "neither")]
+    allowed = [SPEED, *(key for key, score in CATALOGUE.items() if score.better != "neither")]
     for key in keys:
-        if key not in able:
-            remedy = f"did you mean {closest(key, able)}? docs/metrics.md lists them"
-            raise InputError(
-                place="--objective", got=key, expected=f"a score with a better side, or {SPEED}", remedy=remedy
-            )
+        if key not in allowed:
+            remedy = f"did you mean {closest(key, allowed)}? docs/metrics.md lists them"
+            expected = f"a score with a better direction, or {SPEED}"
+            raise InputError(place="--objective", got=key, expected=expected, remedy=remedy)
         if key in [goal.key for goal in found]:
-            raise InputError(place="--objective", got=f"{key} twice", expected="each once", remedy="leave one out")
+            raise InputError(place="--objective", got=f"{key} twice", expected="each once", remedy="remove one")
         found.append(Goal(key, key == SPEED or CATALOGUE[key].better == "higher"))
     if not found:
-        raise InputError(place="--objective", got="none", expected="a score", remedy="leave the option out")
+        raise InputError(place="--objective", got="none", expected="a score", remedy="remove the option")
     return tuple(found)

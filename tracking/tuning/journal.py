@@ -1,10 +1,12 @@
-"""The file in which a study lives, for several processes at once, any of which may be killed at any moment.
+"""The file that holds a study, for several processes at once, any of which may be killed at any time.
 
-Optuna's journal, but for three things. Locks are the system's own (fcntl) on bytes of FILE.locks, so that a process
-that dies lets go of what it held and others see that its trial has been left: byte 0 while a trial is taken up, byte 1
-while a line is written, byte 2 + n while trial n is played. A last line that was not written to its end is cut off
-before the next is added. Lines are not flushed to the disk one by one: what a process has written outlives it, if not
-a power cut, and a trial writes dozens.
+Optuna's journal with three differences:
+
+- Locks are system locks (fcntl) on bytes of FILE.locks: byte 0 while a trial is chosen, byte 1 while lines are written,
+  byte 2 + n while trial n is played. The system releases the locks of a process that dies, so other processes see that
+  its trial was abandoned.
+- An incomplete last line is removed before the next line is written.
+- Lines are not flushed to the disk one by one. They survive a killed process but not a power cut.
 """
 
 from __future__ import annotations
@@ -18,20 +20,23 @@ from typing import Any
 
 from optuna.storages.journal import JournalFileBackend
 
-LOCKS = ".locks"
-TAKING, WRITING, FIRST = 0, 1, 2
+SUFFIX = ".locks"
+"""What the name of the lock file adds to the name of the journal."""
+CHOOSING, WRITING, FIRST_TRIAL = 0, 1, 2
+"""Bytes of the lock file."""
 HEAD = b'{"op_code":'
+"""How every journal begins."""
 
 
-class Locks:
-    """Locks on bytes of a file. State: the file, open as long as this lives (closing it would let go of all)."""
+class TrialLocks:
+    """Locks on bytes of a file. State: the open file, whose closing releases every lock."""
 
     def __init__(self, path: Path) -> None:
         self._file = os.open(path, os.O_RDWR | os.O_CREAT, 0o644)
 
     @contextmanager
-    def holding(self, byte: int) -> Iterator[None]:
-        """Have a byte alone, waiting for whoever has it."""
+    def locked(self, byte: int) -> Iterator[None]:
+        """Holds the lock on a byte for the time of the context; waits until it is free."""
         import fcntl
 
         fcntl.lockf(self._file, fcntl.LOCK_EX, 1, byte)
@@ -41,66 +46,66 @@ class Locks:
             fcntl.lockf(self._file, fcntl.LOCK_UN, 1, byte)
 
     @contextmanager
-    def taking(self) -> Iterator[None]:
-        """While trials are looked through and one is taken up."""
-        with self.holding(TAKING):
+    def choosing(self) -> Iterator[None]:
+        """Holds the lock under which a trial is chosen, for the time of the context."""
+        with self.locked(CHOOSING):
             yield
 
-    def play(self, number: int) -> None:
-        """This process is at trial `number`, until `leave`."""
+    def hold_trial(self, number: int) -> None:
+        """Locks trial `number` for this process until `release_trial`; waits until the lock is free."""
         import fcntl
 
-        fcntl.lockf(self._file, fcntl.LOCK_EX, 1, FIRST + number)
+        fcntl.lockf(self._file, fcntl.LOCK_EX, 1, FIRST_TRIAL + number)
 
-    def leave(self, number: int) -> None:
-        """It is no more."""
+    def release_trial(self, number: int) -> None:
+        """Releases the lock on trial `number`."""
         import fcntl
 
-        fcntl.lockf(self._file, fcntl.LOCK_UN, 1, FIRST + number)
+        fcntl.lockf(self._file, fcntl.LOCK_UN, 1, FIRST_TRIAL + number)
 
-    def left(self, number: int) -> bool:
-        """Is no other process at this trial?"""
+    def is_abandoned(self, number: int) -> bool:
+        """Returns True if no other process holds the lock on trial `number`; releases this process's own lock on it."""
         import fcntl
 
         try:
-            fcntl.lockf(self._file, fcntl.LOCK_EX | fcntl.LOCK_NB, 1, FIRST + number)
+            fcntl.lockf(self._file, fcntl.LOCK_EX | fcntl.LOCK_NB, 1, FIRST_TRIAL + number)
         except OSError:
             return False
-        fcntl.lockf(self._file, fcntl.LOCK_UN, 1, FIRST + number)
+        fcntl.lockf(self._file, fcntl.LOCK_UN, 1, FIRST_TRIAL + number)
         return True
 
     def close(self) -> None:
-        """Let go of all."""
+        """Closes the file and so releases every lock."""
         os.close(self._file)
 
 
-class Journal(JournalFileBackend):
-    """A journal that is written under `locks`."""
+class LockedJournal(JournalFileBackend):
+    """Optuna's journal file, written under `locks`. Raises ValueError if the file is not a journal of Optuna."""
 
-    def __init__(self, path: Path, locks: Locks) -> None:
+    def __init__(self, path: Path, locks: TrialLocks) -> None:
         self._path, self._locks = path, locks
         super().__init__(str(path))
-        with locks.holding(WRITING):
-            self._check()
-            self._whole()
+        with locks.locked(WRITING):
+            self._check_head()
+            self._remove_incomplete_line()
 
     def append_logs(self, logs: list[dict[str, Any]]) -> None:
-        """Add lines."""
+        """Appends one JSON line per log."""
         text = "".join(json.dumps(log, separators=(",", ":")) + "\n" for log in logs)
-        with self._locks.holding(WRITING):
-            self._whole()
+        with self._locks.locked(WRITING):
+            self._remove_incomplete_line()
             with open(self._path, "ab") as file:
                 file.write(text.encode())
 
-    def _check(self) -> None:
-        """ValueError where the file is something else, of which nothing may be cut off."""
+    def _check_head(self) -> None:
+        """ValueError if the file is something else, of which nothing may be removed."""
         with open(self._path, "rb") as file:
             head = file.read(len(HEAD))
         if not HEAD.startswith(head):
             raise ValueError("no journal of Optuna")
 
-    def _whole(self) -> None:
-        """Cut off a line that has no end."""
+    def _remove_incomplete_line(self) -> None:
+        """Removes a last line without line end."""
         with open(self._path, "r+b") as file:
             size = file.seek(0, os.SEEK_END)
             if size == 0:

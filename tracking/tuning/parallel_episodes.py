@@ -1,7 +1,7 @@
-"""Episodes of a search, played here, by other processes or elsewhere; answers come in the order of the questions.
+"""Plays the episodes of a search: in this process, in several processes, or on a cluster.
 
-Workers play episodes, not trials: what is asked next depends on answers alone, never on who was quick, so that a
-search finds the same with any number of them.
+Results come in the order of the sources. Workers play episodes, not trials: what is tried next depends on results and
+never on the time they took, so a search finds the same with any number of workers.
 """
 
 from __future__ import annotations
@@ -14,16 +14,16 @@ from typing import Any
 
 from scenarios.errors import FlockscopeError, InputError, WorkError
 from sim.types import DetectionMode, Tracker
-from tracking.environment.episodes import Cache, Episode, Source
-from tracking.tuning.tuned_tracker import Subject, subject_of
+from tracking.environment.episodes import Episode, Source, SourceCache
+from tracking.tuning.tuned_tracker import TunedTracker, tuned_tracker
 
-HELD = 512 * 2**20
-"""Bytes of sequences that each process holds."""
+CACHE_BYTES = 512 * 2**20
+"""Bytes of sequences that each process keeps for later episodes."""
 
 
 @dataclass(frozen=True)
-class Job:
-    """One episode to play."""
+class EpisodeTask:
+    """One episode to play. values: the parameters; code: hash of the tracker's file where the search runs."""
 
     tracker: str | type[Tracker]
     source: Source
@@ -33,54 +33,62 @@ class Job:
     code: str
 
 
-Answer = Episode | FlockscopeError
-Play = Callable[[Sequence[Source], dict[str, Any], bool], Generator[Answer, None, None]]
+EpisodeOrError = Episode | FlockscopeError
+PlayEpisodes = Callable[[Sequence[Source], dict[str, Any], bool], Generator[EpisodeOrError, None, None]]
+"""play(sources, values, every_score) yields one result per source: the episode, or the error of these parameters."""
 
 
 @contextmanager
-def players(
-    subject: Subject, detections: DetectionMode, workers: int = 1, cluster: str | None = None
-) -> Iterator[Play]:
-    """play(sources, values, every_score): an answer for each source in turn, an error where there is no episode.
+def episode_player(
+    tracker: TunedTracker, detections: DetectionMode, workers: int = 1, cluster: str | None = None
+) -> Iterator[PlayEpisodes]:
+    """Opens the workers for the time of the context and returns the function that plays episodes.
 
-    Once its taker stops nothing more is begun.
+    workers: number of processes, 1 for this process; cluster: address of a dask scheduler. When the taker of the
+    results stops, no further episode is begun. Raises InputError if a class is to be played by other processes, and
+    WorkError from the function if workers are lost.
     """
     from sim.workers.start import results_in_order, start_workers
 
-    if isinstance(subject.tracker, type) and (workers > 1 or cluster):
+    if isinstance(tracker.tracker, type) and (workers > 1 or cluster):
         remedy = "give file.py:Class or module:Class, or one worker"
         raise InputError(place="--workers", got="a class", expected="a name that workers can look up", remedy=remedy)
     with start_workers(workers, cluster) as run:
-        alone, held = workers == 1 and cluster is None, Cache(HELD)
+        in_this_process, source_cache = workers == 1 and cluster is None, SourceCache(CACHE_BYTES)
 
-        def play(sources: Sequence[Source], values: dict[str, Any], every: bool) -> Generator[Answer, None, None]:
-            jobs = [Job(subject.tracker, s, values, detections, every, subject.code) for s in sources]
-            if alone:
-                yield from (_attempt(job, subject, held) for job in jobs)
+        def play(
+            sources: Sequence[Source], values: dict[str, Any], every_score: bool
+        ) -> Generator[EpisodeOrError, None, None]:
+            tasks = [EpisodeTask(tracker.tracker, s, values, detections, every_score, tracker.code) for s in sources]
+            if in_this_process:
+                yield from (_attempt(task, tracker, source_cache) for task in tasks)
             else:
-                yield from results_in_order(run, play_job, jobs)
+                yield from results_in_order(run, play_task, tasks)
 
         yield play
 
 
-def play_job(job: Job) -> Answer:
-    """Play an episode in a worker, which keeps what it opened; WorkError where its tracker is another one."""
-    return _attempt(job, *_kept(job.tracker, job.code))
+def play_task(task: EpisodeTask) -> EpisodeOrError:
+    """Plays an episode in a worker, which keeps its sources for later episodes.
+
+    Returns the episode, or the error that the parameters cause. Raises WorkError if the worker's tracker file differs.
+    """
+    return _attempt(task, *_tracker_and_cache(task.tracker, task.code))
 
 
 @cache
-def _kept(tracker: str | type[Tracker], code: str) -> tuple[Subject, Cache]:
-    subject = subject_of(tracker)
-    if subject.code != code:
+def _tracker_and_cache(name: str | type[Tracker], code: str) -> tuple[TunedTracker, SourceCache]:
+    tracker = tuned_tracker(name)
+    if tracker.code != code:
         raise WorkError(
-            place="tracker", got=f"another {subject.name} in a worker", expected="the file as it is here",
+            place="tracker", got=f"another {tracker.name} in a worker", expected="the file as it is here",
             remedy="put the same file there, and start the workers anew",
         )  # fmt: skip
-    return subject, Cache(HELD)
+    return tracker, SourceCache(CACHE_BYTES)
 
 
-def _attempt(job: Job, subject: Subject, held: Cache) -> Answer:
+def _attempt(task: EpisodeTask, tracker: TunedTracker, source_cache: SourceCache) -> EpisodeOrError:
     try:
-        return subject.play(job.source, job.values, job.detections, held, job.every_score)
+        return tracker.play(task.source, task.values, task.detections, source_cache, task.every_score)
     except FlockscopeError as error:
         return error

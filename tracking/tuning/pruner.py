@@ -1,8 +1,9 @@
-"""When a trial is given up: once it surely loses to the best one on the scenes that both were played on.
+"""Stops a trial early when it surely loses to the best trial on the scenes that both were played on.
 
-Wilcoxon's signed-rank test (1945), one-sided, as in Optuna's WilcoxonPruner, but with exact probabilities whatever is
-tied: parameters that change nothing in most scenes give zeros and ties, for which scipy draws permutations, and a test
-then takes longer than an episode. Testing again after each scene, p is no error rate of the whole trial.
+Wilcoxon's signed-rank test (1945), one-sided, as in Optuna's WilcoxonPruner. *Ours*: p-values are exact with ties and
+zeros, too. Parameters that change nothing in most scenes give zeros and ties; scipy then draws permutations, which
+takes longer than an episode (figures: CONTRIBUTING.md). The test is repeated after each scene, so p is not the error
+rate of a whole trial.
 """
 
 from __future__ import annotations
@@ -14,39 +15,45 @@ import optuna
 from optuna.pruners import BasePruner
 from optuna.trial import FrozenTrial
 
-LEAST = 2  # scenes
+LEAST_SCENES = 2
 
 
-class SignedRank(BasePruner):
-    """Gives up a trial that reports, by the number of the scene as its step, surely worse values than the best one."""
+class SignedRankPruner(BasePruner):
+    """Prunes a trial if its values are surely worse than those of the best trial.
+
+    p: a trial is pruned at p-values below this. Values are reported with the number of the scene as step.
+    """
 
     def __init__(self, p: float) -> None:
         self.p = p
 
     def prune(self, study: optuna.Study, trial: FrozenTrial) -> bool:
-        """Whether the trial is to be given up; never before there is a best one."""
+        """Returns True if the trial is to be pruned: p-value below p, and a worse mean on the common scenes.
+
+        False as long as no trial is complete or fewer than two scenes are common.
+        """
         try:
             best = study.best_trial.intermediate_values
         except ValueError:
             return False
         sign = 1.0 if study.direction == optuna.study.StudyDirection.MAXIMIZE else -1.0
         gains = [sign * (v - best[k]) for k, v in trial.intermediate_values.items() if k in best]
-        return len(gains) >= LEAST and sum(gains) < 0 and chance(gains) < self.p
+        return len(gains) >= LEAST_SCENES and sum(gains) < 0 and signed_rank_p_value(gains) < self.p
 
 
-def chance(gains: Sequence[float]) -> float:
-    """The probability of a sum of positive ranks no greater than this one's, were each sign a coin's throw.
+def signed_rank_p_value(gains: Sequence[float]) -> float:
+    """Returns the probability of a sum of positive ranks no greater than observed if every sign were random.
 
-    Ranks are of the absolute values, those of equal ones averaged; zeros have their ranks and no sign.
+    Ranks are those of the absolute values, averaged over equal values. Zeros take part in the ranking and have no sign.
     """
     d = np.asarray(gains, float)
     _, place, count = np.unique(np.abs(d), return_inverse=True, return_counts=True)
     last = np.cumsum(count)
-    doubled = (2 * last - count + 1)[place]  # twice the mean rank: whole
-    free = doubled[d != 0]
-    ways = np.zeros(int(free.sum()) + 1)
+    doubled = (2 * last - count + 1)[place]  # twice the mean rank, which is an integer
+    signed = doubled[d != 0]
+    ways = np.zeros(int(signed.sum()) + 1)
     ways[0] = 1.0
-    for rank in free:
+    for rank in signed:
         ways[rank:] = (ways[rank:] + ways[:-rank]) / 2
         ways[:rank] /= 2
     return float(ways[: int(doubled[d > 0].sum()) + 1].sum())

@@ -1,6 +1,6 @@
-"""What a search found, and the files that say so: parameters as TOML, all figures as JSON, plots beside them.
+"""The result of a search and its files: parameters as TOML, all figures as JSON, plots as SVG.
 
-No file holds a time, a host or a path: the same search writes the same bytes.
+No file holds a time, a host or a folder: the same search writes the same bytes.
 """
 
 from __future__ import annotations
@@ -12,44 +12,36 @@ from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any
 
+from sim.io.files.atomic import write_file
 from tracking.config import Config
-from tracking.tuning.judge import Candidate, Comparison
-from tracking.tuning.search_plan import Plan, text
+from tracking.tuning.comparison import Candidate, Comparison, TrialRecord
+from tracking.tuning.plots import history_plot, importance_plot, pareto_plot
+from tracking.tuning.search_plan import SearchPlan, seeds_text
 
-VERSIONS = ("flockscope", "optuna", "numpy", "scipy", "numba")
+PACKAGES = ("flockscope", "optuna", "numpy", "scipy", "numba")
+"""Packages whose versions are written into the files."""
 LONG = 40
-"""Characters of a setting that are told."""
+"""Characters of a setting that the text shows."""
 MANY = 4
-"""Settings of a sensor that are told one by one."""
+"""Greatest number of sensor settings that the text shows one by one."""
 
 
 @dataclass(frozen=True)
-class Trial:
-    """A trial as plots and tables show it: its values by goal (of one that was given up, an estimate), its parameters,
-    the training episodes it was played on, and why it could not be."""
-
-    number: int
-    values: tuple[float, ...]
-    params: dict[str, Any]
-    episodes: int
-    pruned: bool = False
-    error: str = ""
-
-
-@dataclass(frozen=True)
-class Tuned:
+class TuningResult:
     """The result of `tracking.tune`.
 
-    config: the winner, and default what it is compared with; front: of several goals, all that none beats; importance:
-    of each parameter in training, shares; comparisons: what was gained on test scenes; taken_back: what the best had
-    changed in vain; validation: what the default and the winner reach there.
+    config: the winner; candidates: the defaults and the best trials, with their values on the validation scenes; front:
+    with several goals the candidates that no other dominates; trials: all finished ones; importance: share of each
+    parameter in the training values; comparisons: winner and defaults on the test scenes; taken_back: parameters that
+    the best trial changed and the winner does not; validation: values of defaults and winner by goal on the validation
+    scenes; notes: remarks for the reader; study: name of the study.
     """
 
-    plan: Plan = field(repr=False)
+    plan: SearchPlan = field(repr=False)
     config: Config
     front: tuple[Candidate, ...] = field(repr=False)
     candidates: tuple[Candidate, ...] = field(repr=False)
-    trials: tuple[Trial, ...] = field(repr=False)
+    trials: tuple[TrialRecord, ...] = field(repr=False)
     importance: Mapping[str, float] = field(repr=False)
     comparisons: tuple[Comparison, ...] = ()
     taken_back: tuple[str, ...] = ()
@@ -59,76 +51,86 @@ class Tuned:
 
     @property
     def default(self) -> Config:
-        """What the winner is compared with: the tracker's defaults, and what was set."""
+        """What the winner is compared with: the defaults of the tracker, with the values that `set` fixed."""
         return self.plan.base
 
     @property
     def changed(self) -> dict[str, tuple[Any, Any]]:
-        """What the winner changed: default and new value by name."""
+        """The default and the new value of every parameter that the winner changed, by name."""
         old, new = self.default.as_dict(), self.config.as_dict()
         return {name: (old[name], new[name]) for name in new if old[name] != new[name]}
 
     @property
     def pruned(self) -> int:
-        """Trials that were given up before their last training scene."""
+        """Number of trials that were stopped before their last training scene."""
         return sum(trial.pruned for trial in self.trials)
 
     @property
     def episodes(self) -> int:
-        """Training episodes that were played, in trials that had a value."""
+        """Number of training episodes that were played, without those of impossible trials."""
         return sum(trial.episodes for trial in self.trials)
 
     @property
     def impossible(self) -> int:
-        """Trials whose parameters the tracker refused."""
+        """Number of trials whose parameters the tracker refused or failed with."""
         return sum(bool(trial.error) for trial in self.trials)
 
     def __str__(self) -> str:
-        """What was gained, in lines."""
+        """The lines of `lines()` as one text."""
         return "\n".join(self.lines())
 
-    def lines(self, one: Candidate | None = None) -> list[str]:
-        """What was done and what came of it, or of one of a front; training scores are not among it."""
-        plan = self.plan
+    def lines(self, chosen: Candidate | None = None) -> list[str]:
+        """Returns lines of text: settings, counts, validation values, and the comparisons and notes on the winner.
+
+        With `chosen`, a candidate of the front, its validation values instead of the comparisons. Training values are
+        never shown, as the search has optimised them.
+        """
+        plan, seeds = self.plan, self.plan.seeds
         names = ", ".join(goal.key for goal in plan.goals)
         every = len(self.trials) * len(plan.training)
-        given_up = f"{self.pruned} given up early, {self.impossible} impossible"
-        told = [
-            f"{plan.tracker} tuned on {plan.scenes}, detections {plan.detections}, for {names}",
-            f"{len(self.trials)} trials, {self.episodes} of {every} episodes played, {given_up}; "
-            f"training seeds {text(plan.seeds)}, validation {text(plan.validation)}, test {text(plan.test)}",
+        counts = f"{self.pruned} given up early, {self.impossible} impossible"
+        lines = [
+            f"{plan.tracker_name} tuned on {plan.suite_name}, detections {plan.detections}, for {names}",
+            f"{len(self.trials)} trials, {self.episodes} of {every} episodes played, {counts}; "
+            f"training seeds {seeds_text(seeds.training)}, validation {seeds_text(seeds.validation)}, "
+            f"test {seeds_text(seeds.test)}",
         ]
-        if plan.settings:
-            told.append("scenes with " + ", ".join(_told(plan.settings)))
-        before, after = self.validation if one is None else (self.validation[0], one.validation)
+        if plan.scene_settings:
+            lines.append("scenes with " + ", ".join(_short_settings(plan.scene_settings)))
+        before, after = self.validation if chosen is None else (self.validation[0], chosen.validation)
         for goal, a, b in zip(plan.goals, before, after, strict=True):
-            told.append(f"validation: {goal.key} {a:.4f} → {b:.4f} (chosen by it: no result)")
-        if one is not None:
-            return [*told, f"one of {len(self.front)} that no other trial beats by all goals"]
-        told += [c.line() for c in self.comparisons]
-        return [*told, *self.notes]
+            lines.append(f"validation: {goal.key} {a:.4f} → {b:.4f} (chosen by it: no result)")
+        if chosen is not None:
+            return [*lines, f"one of {len(self.front)} that no other trial beats by all goals"]
+        lines += [c.line() for c in self.comparisons]
+        return [*lines, *self.notes]
 
-    def to_toml(self, one: Candidate | None = None) -> str:
-        """A file that `flockscope track --params` reads: the winner's, or one's of a front."""
-        chosen = self.config if one is None else one.config
+    def to_toml(self, chosen: Candidate | None = None) -> str:
+        """Returns the parameters of the winner, or of a candidate of the front, as `track --params` reads them.
+
+        Comments hold the lines of `lines(chosen)`, the versions of the packages, and the default of changed parameters.
+        """
+        config = self.config if chosen is None else chosen.config
         old = self.default.as_dict()
         lines = []
-        for line in chosen.to_toml().splitlines():
+        for line in config.to_toml().splitlines():
             name = line.partition(" = ")[0]
-            moved = name in old and chosen.as_dict().get(name) != old[name]
+            moved = name in old and config.as_dict().get(name) != old[name]
             lines.append(f"{line}  # default {old[name]}" if moved else line)
-        about = [*self.lines(one), "versions: " + ", ".join(f"{name} {of}" for name, of in versions().items())]
-        return "\n".join([*(f"# {line}" for line in about), *lines, ""])
+        packages = ", ".join(f"{name} {version}" for name, version in versions().items())
+        comments = [*self.lines(chosen), f"versions: {packages}"]
+        return "\n".join([*(f"# {comment}" for comment in comments), *lines, ""])
 
     def as_dict(self) -> dict[str, Any]:
-        """All figures, as JSON takes them."""
-        plan = self.plan
+        """Returns all figures as nested dicts and lists for JSON; a figure that is not known is nan."""
+        plan, seeds = self.plan, self.plan.seeds
         return {
             "settings": plan.identity()
             | {
-                "trials": plan.trials, "validation": text(plan.validation), "test": text(plan.test),
-                "check": list(plan.testing)[1] if plan.check else None, "check_test": text(plan.check_test),
-                "set": list(plan.settings),
+                "trials": plan.options.trials, "validation": seeds_text(seeds.validation),
+                "test": seeds_text(seeds.test),
+                "check": list(plan.tests)[1] if plan.check else None, "check_test": seeds_text(seeds.check),
+                "set": list(plan.scene_settings),
             },
             "counts": {
                 "trials": len(self.trials), "episodes": self.episodes, "pruned": self.pruned,
@@ -150,13 +152,12 @@ class Tuned:
         }  # fmt: skip
 
     def write(self, path: str | Path) -> list[Path]:
-        """The parameters to `path`, and beside it all figures (.json) and the plots (.history.svg, .importance.svg);
-        of several goals each of the front (.front-1.toml …) and .front.svg. What was written."""
-        from sim.io.files.atomic import write_file
-        from tracking.tuning.plots import plots
+        """Writes the parameters to `path`, the figures (.json) and the plots (.svg) beside it; returns the paths.
 
+        With several goals each candidate of the front gets a file, too (.front-1.toml …, best first goal first).
+        """
         target = Path(path)
-        files = {".json": json.dumps(_plain(self.as_dict()), indent=1, allow_nan=False) + "\n", **plots(self)}
+        files = {".json": json.dumps(_without_nan(self.as_dict()), indent=1, allow_nan=False) + "\n", **self.plots()}
         if len(self.plan.goals) > 1:
             files |= {f".front-{k}.toml": self.to_toml(c) for k, c in enumerate(self.front, 1)}
         for suffix, content in files.items():
@@ -164,20 +165,29 @@ class Tuned:
         write_file(target, self.to_toml().encode())
         return [target, *(target.with_suffix(suffix) for suffix in files)]
 
+    def plots(self) -> dict[str, str]:
+        """Returns the plots that have something to show, as SVG text by file suffix."""
+        plots = {".history.svg": history_plot(self.plan, self.trials)}
+        if any(self.importance.values()):
+            plots[".importance.svg"] = importance_plot(self.plan, self.importance, self.config)
+        if len(self.plan.goals) > 1:
+            plots[".front.svg"] = pareto_plot(self.plan, self.candidates, self.front)
+        return plots
 
-def _candidate(one: Candidate) -> dict[str, Any]:
+
+def _candidate(candidate: Candidate) -> dict[str, Any]:
     return {
-        "trial": one.trial, "training": list(one.training), "validation": list(one.validation),
-        "params": one.config.as_dict(),
+        "trial": candidate.trial, "training": list(candidate.training), "validation": list(candidate.validation),
+        "params": candidate.config.as_dict(),
     }  # fmt: skip
 
 
 def versions() -> dict[str, str]:
-    """Of what the figures depend on."""
+    """Returns the versions of PACKAGES by name, "unknown" if a package is not installed."""
     from importlib.metadata import PackageNotFoundError, version
 
     found = {}
-    for name in VERSIONS:
+    for name in PACKAGES:
         try:
             found[name] = version(name)
         except PackageNotFoundError:
@@ -185,17 +195,17 @@ def versions() -> dict[str, str]:
     return found
 
 
-def _plain(value: Any) -> Any:
-    """NaN and infinity as null, which JSON lacks."""
+def _without_nan(value: Any) -> Any:
+    """The value with None for nan and infinity, which JSON does not have."""
     if isinstance(value, dict):
-        return {key: _plain(v) for key, v in value.items()}
+        return {key: _without_nan(v) for key, v in value.items()}
     if isinstance(value, list | tuple):
-        return [_plain(v) for v in value]
+        return [_without_nan(v) for v in value]
     return None if isinstance(value, float) and not math.isfinite(value) else value
 
 
-def _told(settings: Sequence[str]) -> Iterator[str]:
-    """Settings in words: long values, and a detector's profile, stand in the JSON file."""
+def _short_settings(settings: Sequence[str]) -> Iterator[str]:
+    """Settings for the text: long values are cut, and many sensor settings become their number."""
     sensor = [setting for setting in settings if setting.startswith("sensor.")]
     profile = len(sensor) > MANY
     if profile:

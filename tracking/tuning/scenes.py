@@ -1,4 +1,8 @@
-"""Which scenes a search may use for what: seeds of ranges that never meet, suites that share nothing, no recordings."""
+"""Which scenes a search may use for what.
+
+Training, validation and test seeds come from ranges that do not overlap. The second test suite shares no scenario with
+the suite that is tuned on. Recordings are refused.
+"""
 
 from __future__ import annotations
 
@@ -6,44 +10,46 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from scenarios.errors import InputError
-from scenarios.loading import suites as suite
-from scenarios.loading import toml_files
+from scenarios.loading import suites, toml_files
 from sim.dataset.splits import SPLITS, split_of
 from tracking.environment.episodes import Source, sources
-
-Scenes = str | Path | Sequence[str | Path]
-"""A suite, a scenario, a TOML file, or a list of these."""
+from tracking.tuning.options import Scenes
 
 EPISODES = {"train": 16, "val": 48, "test": 100}
-"""How many episodes default seeds make, at least."""
+"""Least number of episodes that the default seeds of each split make."""
 
-LEAST = 2
-"""Seeds of each scene, at least, where nothing is said."""
+LEAST_SEEDS = 2
+"""Least number of default seeds of each scene."""
 
 OPTION = {"train": "--seeds", "val": "--validation", "test": "--test"}
 WORD = {"train": "training", "val": "validation", "test": "test"}
-UNUSED = ("friends-meet", "crossing")
-"""Suites to check on: the first that shares no scenario with what was tuned on."""
+CHECK_SUITES = ("friends-meet", "crossing")
+"""Candidates for the default of --check, in order of preference."""
 
 
-def named(suite: Scenes) -> tuple[str, ...]:
-    """One name or several as several."""
+def suite_names(suite: Scenes) -> tuple[str, ...]:
+    """Returns the names of suites, scenarios or files as texts; a single name becomes a tuple of one."""
     return (str(suite),) if isinstance(suite, str | Path) else tuple(map(str, suite))
 
 
 def chosen_seeds(seeds: range | None, split: str, scenes: int) -> range:
-    """The seeds, if all are of the split; where nothing is said the split's first, enough for EPISODES."""
+    """Returns the seeds, or the default of the split if they are None.
+
+    split: "train", "val" or "test". scenes: number of scenes that each seed is played with. The default begins at the
+    first seed of the split and makes at least EPISODES[split] episodes, with at least LEAST_SEEDS seeds. Raises
+    InputError if `seeds` is no range, is empty, or reaches out of the range of the split.
+    """
     low, high = next((low, high) for name, low, high in SPLITS if name == split)
     if seeds is None:
-        return range(low, low + max(LEAST, -(-EPISODES[split] // scenes)))
+        return range(low, low + max(LEAST_SEEDS, -(-EPISODES[split] // scenes)))
     if not isinstance(seeds, range):
         got, remedy = repr(seeds), f"write for example range({low}, {low + 4})"
         raise InputError(place=OPTION[split], got=got, expected="a range of seeds", remedy=remedy)
     try:
-        good = split_of(seeds) == split
+        allowed = split_of(seeds) == split
     except InputError:
-        good = False
-    if not good:
+        allowed = False
+    if not allowed:
         raise InputError(
             place=OPTION[split], got=f"{seeds.start}:{seeds.stop}",
             expected=f"{WORD[split]} seeds, out of {low}:{high}",
@@ -52,14 +58,18 @@ def chosen_seeds(seeds: range | None, split: str, scenes: int) -> range:
     return seeds
 
 
-def scenes(names: Sequence[str], settings: Sequence[str], option: str) -> int:
-    """How many scenes these suites, scenarios or files make; InputError for a recording, and where there is nothing."""
+def count_scenes(names: Sequence[str], settings: Sequence[str], option: str) -> int:
+    """Returns the number of scenes that the suites, scenarios and files contain.
+
+    settings: "key=value" overrides of every scene. option: the option that the error messages name. Raises InputError
+    if a name is a recording or stored data, is unknown, or contains no scene, and if a setting does not fit.
+    """
     for name in names:
-        if not name.endswith(".toml") and not _known(name) and Path(name).exists():
+        if not name.endswith(".toml") and not _is_known(name) and Path(name).exists():
             raise InputError(
                 file=name, place=option, got="a recording or stored data",
                 expected="scenes to simulate: nothing is tuned on what was recorded",
-                remedy="give a suite or scenario; `flockscope fit sensor` lets it err like a recording's detector",
+                remedy="give a suite or scenario; `flockscope fit sensor` imitates the detector of a recording",
             )  # fmt: skip
     try:
         return len(sources(list(names), (0,), tuple(settings)))
@@ -67,28 +77,28 @@ def scenes(names: Sequence[str], settings: Sequence[str], option: str) -> int:
         raise error if error.place else InputError(**{**error.as_dict(), "place": option}) from None
 
 
-def of(names: Sequence[str], seeds: range, settings: Sequence[str]) -> tuple[Source, ...]:
-    """Every scene with every seed."""
+def episode_sources(names: Sequence[str], seeds: range, settings: Sequence[str]) -> tuple[Source, ...]:
+    """Returns one source for every scene of the suites with every seed. settings: "key=value" overrides."""
     return sources(list(names), seeds, tuple(settings))
 
 
-def unused(names: Sequence[str]) -> str | None:
-    """A suite that shares no scenario with these, None if there is none."""
-    return next((suite for suite in UNUSED if not shared(names, (suite,))), None)
+def default_check_suite(names: Sequence[str]) -> str | None:
+    """Returns the first of CHECK_SUITES that shares no scenario with the suites `names`, None if there is none."""
+    return next((suite for suite in CHECK_SUITES if not shared_scenarios(names, (suite,))), None)
 
 
-def shared(names: Sequence[str], others: Sequence[str]) -> list[str]:
-    """Scenarios that both are made of, sorted."""
+def shared_scenarios(names: Sequence[str], others: Sequence[str]) -> list[str]:
+    """Returns the names of the scenarios that both lists of suites, scenarios and files contain, sorted."""
     common = {file for name in names for file in _files(name)} & {file for name in others for file in _files(name)}
     return sorted(Path(file).stem for file in common)
 
 
 def _files(name: str) -> list[str]:
-    """The files of the scenarios that a scenario's, a suite's or a file's name stands for."""
+    """The scenario files that the name of a suite, a scenario or a file refers to."""
     bare = name.removeprefix("suite:")
     if bare != name or (bare in toml_files.suite_names() and bare not in toml_files.names()) or _is_suite(bare):
-        path = suite.find_suite(bare)
-        return [str(toml_files.find(line.scenario, beside=path.parent).resolve()) for line in suite.read_entries(path)]
+        path = suites.find_suite(bare)
+        return [str(toml_files.find(line.scenario, beside=path.parent).resolve()) for line in suites.read_entries(path)]
     return [str(toml_files.find(bare).resolve())]
 
 
@@ -96,5 +106,5 @@ def _is_suite(name: str) -> bool:
     return name.endswith(".toml") and "entry" in toml_files.parse(toml_files.find(name))
 
 
-def _known(name: str) -> bool:
+def _is_known(name: str) -> bool:
     return name.startswith("suite:") or name in (*toml_files.names(), *toml_files.suite_names())

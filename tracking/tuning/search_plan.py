@@ -1,7 +1,7 @@
-"""What a search is about, checked before anything is played: tracker, space, scenes, goals.
+"""The plan of a search, checked before anything is played: tracker, parameters to search, scenes, goals.
 
-Training scenes guide the search, validation scenes choose among its best, test scenes (and a suite that was not used)
-say what was gained.
+Training scenes guide the search. Validation scenes choose among its best trials. Test scenes, and a second suite that
+was not tuned on, measure the gain.
 """
 
 from __future__ import annotations
@@ -15,198 +15,198 @@ from pathlib import Path
 from typing import Any
 
 from scenarios.errors import InputError
-from sim.types import DetectionMode, Tracker
+from sim.types import DetectionMode
 from sim.versions import runtime
 from tracking.config import Config, Param, Value
 from tracking.environment.episodes import Source
-from tracking.tuning import scenes
-from tracking.tuning.goals import ALWAYS, SPEED, Goal, goals
-from tracking.tuning.tuned_tracker import Subject, subject_of
+from tracking.tuning.goals import FAST_KEYS, SPEED, Goal, goals_of
+from tracking.tuning.options import TuneOptions
+from tracking.tuning.scenes import (
+    chosen_seeds,
+    count_scenes,
+    default_check_suite,
+    episode_sources,
+    shared_scenarios,
+    suite_names,
+)
+from tracking.tuning.tuned_tracker import TunedTracker, tuned_tracker
 
 
 @dataclass(frozen=True)
-class Plan:
-    """A search. base: the defaults, and what was set; space: what is searched; check: a suite that was not used."""
+class SearchSeeds:
+    """The seeds of every scene: of the suite that is tuned on, and for tests of the second suite."""
 
-    subject: Subject
+    training: range
+    validation: range
+    test: range
+    check: range
+
+
+@dataclass(frozen=True)
+class SearchPlan:
+    """A search whose options fit together.
+
+    tracker: what is tuned; base: its config with the values that `--set` fixed; space: the parameters to search; suite:
+    what is tuned on; check: a second suite to test on, or None; scene_settings: "key=value" overrides of the scenes.
+    """
+
+    options: TuneOptions
+    tracker: TunedTracker
     base: Config
     space: tuple[Param, ...]
     suite: tuple[str, ...]
     check: str | None
-    seeds: range
-    validation: range
-    test: range
-    check_test: range
+    seeds: SearchSeeds
     goals: tuple[Goal, ...]
     detections: DetectionMode
-    settings: tuple[str, ...]
-    trials: int
-    prune: float
-    finalists: int
-    seed: int
+    scene_settings: tuple[str, ...]
 
     @property
-    def tracker(self) -> str:
-        """What the tracker is called, without the folder it lies in."""
-        return self.subject.name.rpartition("/")[2]
+    def tracker_name(self) -> str:
+        """The name of the tracker, without the folder of its file."""
+        return self.tracker.name.rpartition("/")[2]
 
     @property
-    def scenes(self) -> str:
-        """What the scenes are called, likewise."""
-        return ", ".join(map(_bare, self.suite))
+    def suite_name(self) -> str:
+        """The names of the suites that are tuned on, without folders."""
+        return ", ".join(map(_without_folder, self.suite))
 
     @property
     def defaults(self) -> dict[str, Value]:
-        """The first trial."""
+        """The values of the first trial by parameter name."""
         return {p.name: getattr(self.base, p.name) for p in self.space}
 
+    @property
+    def needs_every_score(self) -> bool:
+        """True if a goal needs the whole catalogue of scores to be computed."""
+        return any(goal.key not in (*FAST_KEYS, SPEED) for goal in self.goals)
+
     def config(self, values: dict[str, Any]) -> Config:
-        """The config of a trial; InputError where its own check refuses these values together."""
+        """Returns the base config with these values. Raises InputError if the config refuses them together."""
         return type(self.base).from_dict({**self.base.as_dict(), **values})
 
     @cached_property
     def training(self) -> tuple[Source, ...]:
-        """Episodes of a trial."""
-        return scenes.of(self.suite, self.seeds, self.settings)
+        """The sources of the episodes of each trial."""
+        return episode_sources(self.suite, self.seeds.training, self.scene_settings)
 
     @cached_property
-    def validating(self) -> tuple[Source, ...]:
-        """Episodes by which the best are judged once more."""
-        return scenes.of(self.suite, self.validation, self.settings)
+    def validation(self) -> tuple[Source, ...]:
+        """The sources of the episodes that choose among the best trials."""
+        return episode_sources(self.suite, self.seeds.validation, self.scene_settings)
 
     @cached_property
-    def testing(self) -> dict[str, tuple[Source, ...]]:
-        """Episodes by which the winner is judged, by what they are called."""
-        found = {self.scenes: scenes.of(self.suite, self.test, self.settings)}
+    def tests(self) -> dict[str, tuple[Source, ...]]:
+        """The sources of the episodes that measure the gain, by the name of the suite.
+
+        The second suite keeps its own scenes; only `sensor.` settings apply to it.
+        """
+        found = {self.suite_name: episode_sources(self.suite, self.seeds.test, self.scene_settings)}
         if self.check is not None:
-            sensor = [text for text in self.settings if text.startswith("sensor.")]
-            found[_bare(self.check)] = scenes.of((self.check,), self.check_test, sensor)
+            sensor = [setting for setting in self.scene_settings if setting.startswith("sensor.")]
+            found[_without_folder(self.check)] = episode_sources((self.check,), self.seeds.check, sensor)
         return found
 
     def identity(self) -> dict[str, Any]:
-        """What makes a trial's value what it is: a study goes on under the same only."""
+        """Returns everything that the value of a trial depends on; a study is resumed only if this is the same."""
         return {
-            "tracker": self.tracker,
-            "code": self.subject.code,
+            "tracker": self.tracker_name,
+            "code": self.tracker.code,
             "versions": _digest(version for name, version in runtime().items() if name != "cpu"),
-            "suite": self.scenes,
-            "seeds": text(self.seeds),
+            "suite": self.suite_name,
+            "seeds": seeds_text(self.seeds.training),
             "motions": _digest(source.key for source in self.training),
             "detections": self.detections,
             "objective": ", ".join(goal.key for goal in self.goals),
             "searched": ", ".join(p.name for p in self.space),
             "ranges": _digest(repr(p) for p in self.space),
             "fixed": _digest(self.base.as_dict().items()),
-            "prune": self.prune,
-            "seed": self.seed,
+            "prune": self.options.prune,
+            "seed": self.options.seed,
         }
 
 
-def plan(
-    tracker: str | type[Tracker],
-    suite: scenes.Scenes,
-    trials: int,
-    *,
-    seeds: range | None = None,
-    validation: range | None = None,
-    test: range | None = None,
-    check: str | None = "",
-    objective: str | Iterable[str] = (),
-    detections: DetectionMode | None = None,
-    only: Iterable[str] = (),
-    set: Iterable[str] = (),
-    prune: float = 0.1,
-    finalists: int = 5,
-    seed: int = 0,
-) -> Plan:
-    """The plan of these wishes (`tracking.tune` explains them), the rest by default; InputError where one cannot be."""
-    _positive(trials, prune, finalists, seed)
-    subject = subject_of(tracker)
-    own, settings = _sorted_settings(set)
-    names = scenes.named(suite)
-    count = scenes.scenes(names, settings, "--suite")
-    other = scenes.unused(names) if check == "" else check
-    several = _check_suite(names, other)
-    base, mode = subject.config_class().with_set(*own), detections or subject.detections
-    if mode != "file" and any(setting.startswith("sensor.") for setting in settings):
-        remedy = "leave the sensor out, or add --detections file"
-        raise InputError(place="--sensor, --set sensor", got=f"--detections {mode}", expected="file", remedy=remedy)
-    made = Plan(
-        subject, base, _space(base, own, tuple(only), mode), names, other,
-        scenes.chosen_seeds(seeds, "train", count), scenes.chosen_seeds(validation, "val", count),
-        scenes.chosen_seeds(test, "test", count), scenes.chosen_seeds(test, "test", several),
-        goals([objective] if isinstance(objective, str) else tuple(objective) or (subject.objective,)),
-        mode, settings, trials, prune, finalists, seed,
-    )  # fmt: skip
-    subject.accept(made.training[0], made.detections)
-    return made
+def search_plan(options: TuneOptions) -> SearchPlan:
+    """Returns the plan that follows from the options, with defaults for everything they leave open.
+
+    Raises InputError if the tracker, a parameter, a suite, a seed or a score is unknown or not allowed, if the options
+    contradict each other, and if the tracker cannot work with the detections.
+    """
+    tracker = tuned_tracker(options.tracker)
+    fixed, scene_settings = _split_settings(options.set)
+    suite = suite_names(options.suite)
+    scenes = count_scenes(suite, scene_settings, "--suite")
+    check = default_check_suite(suite) if options.check == "" else options.check
+    check_scenes = _count_check_scenes(suite, check)
+    base, detections = tracker.config_class().with_set(*fixed), options.detections or tracker.detections
+    if detections != "file" and any(setting.startswith("sensor.") for setting in scene_settings):
+        remedy = "remove the sensor, or add --detections file"
+        raise InputError(
+            place="--sensor, --set sensor", got=f"--detections {detections}", expected="file", remedy=remedy
+        )
+    space = _space(base, fixed, tuple(options.only), detections)
+    seeds = SearchSeeds(
+        chosen_seeds(options.seeds, "train", scenes),
+        chosen_seeds(options.validation, "val", scenes),
+        chosen_seeds(options.test, "test", scenes),
+        chosen_seeds(options.test, "test", check_scenes),
+    )
+    keys = (options.objective,) if isinstance(options.objective, str) else tuple(options.objective)
+    goals = goals_of(keys or (tracker.objective,))
+    plan = SearchPlan(options, tracker, base, space, suite, check, seeds, goals, detections, scene_settings)
+    tracker.check_input(plan.training[0], detections)
+    return plan
 
 
-def every_score(plan: Plan) -> bool:
-    """Must the whole catalogue be computed to know what the goals are about?"""
-    return any(goal.key not in (*ALWAYS, SPEED) for goal in plan.goals)
-
-
-def text(seeds: range) -> str:
-    """Seeds as `--seeds` takes them."""
+def seeds_text(seeds: range) -> str:
+    """Returns the seeds as "first:last + 1", as the option `--seeds` takes them."""
     return f"{seeds.start}:{seeds.stop}"
 
 
-def _positive(trials: int, prune: float, finalists: int, seed: int) -> None:
-    for place, value, good, expected in (
-        ("--trials", trials, trials >= 1, "1 or more"),
-        ("--prune", prune, 0 <= prune < 1, "a probability, 0 (never) or more and under 1"),
-        ("--finalists", finalists, finalists >= 1, "1 or more"),
-        ("--seed", seed, seed >= 0, "0 or more"),
-    ):
-        if not good:
-            raise InputError(place=place, got=value, expected=expected, remedy="correct it")
-
-
-def _sorted_settings(settings: Iterable[str]) -> tuple[list[str], tuple[str, ...]]:
-    """Settings of the tracker, and of the scenes (`scenario.` taken away, `sensor.` being a part of them)."""
-    own, scenes = [], []
+def _split_settings(settings: Iterable[str]) -> tuple[list[str], tuple[str, ...]]:
+    """The settings of the tracker, and those of the scenes without the prefix `scenario.`."""
+    tracker, scenes = [], []
     for setting in settings:
         key, _, value = setting.partition("=")
         if key.strip().startswith(("scenario.", "sensor.")):
             scenes.append(f"{key.strip().removeprefix('scenario.')}={value}")
         else:
-            own.append(setting.strip())
-    return own, tuple(scenes)
+            tracker.append(setting.strip())
+    return tracker, tuple(scenes)
 
 
-def _check_suite(names: Sequence[str], other: str | None) -> int:
-    """How many scenes the suite to check on has; InputError where it shares some with what is tuned on."""
-    if other is None:
+def _count_check_scenes(suite: Sequence[str], check: str | None) -> int:
+    """The number of scenes of the second suite, 1 if there is none; InputError if it shares a scenario."""
+    if check is None:
         return 1
-    count = scenes.scenes((other,), (), "--check")
-    common = scenes.shared(names, (other,))
+    count = count_scenes((check,), (), "--check")
+    common = shared_scenarios(suite, (check,))
     if common:
-        got = f"{other}, which has {', '.join(common)} of {', '.join(names)}"
+        got = f"{check}, which has {', '.join(common)} of {', '.join(suite)}"
         remedy = "choose another suite, or --check none"
         raise InputError(place="--check", got=got, expected="scenes that are not tuned on", remedy=remedy)
     return count
 
 
-def _space(base: Config, fixed: Sequence[str], only: tuple[str, ...], mode: DetectionMode) -> tuple[Param, ...]:
-    """The tunable parameters that were not set and say something about such detections, or those of `only`."""
-    held = {setting.removeprefix("tracker.").partition("=")[0].strip() for setting in fixed}
-    idle = "points" if mode == "image" else "pixels"
+def _space(base: Config, settings: Sequence[str], only: tuple[str, ...], mode: DetectionMode) -> tuple[Param, ...]:
+    """The parameters to search: tunable, not fixed, with an effect on this input, and in `only` unless it is empty."""
+    fixed = {setting.removeprefix("tracker.").partition("=")[0].strip() for setting in settings}
+    unused = "points" if mode == "image" else "pixels"
     for name in only:
         param = base.known(name, "--only")
-        reason = "set" if name in held else "not tunable" if not param.tunable else ""
-        reason = reason or (f"about {idle} alone" if param.sees == idle else "")
+        reason = "set" if name in fixed else "not tunable" if not param.tunable else ""
+        reason = reason or (f"about {unused} alone" if param.sees == unused else "")
         if reason:
-            got, remedy = f"{name}, which is {reason}", "leave it out"
-            raise InputError(place="--only", got=got, expected="parameters to search", remedy=remedy)
-    found = tuple(p for p in base.space() if p.name in only or not (only or p.name in held or p.sees == idle))
+            got, expected = f"{name}, which is {reason}", "parameters to search"
+            raise InputError(place="--only", got=got, expected=expected, remedy="remove it")
+    found = tuple(p for p in base.space() if p.name in only or not (only or p.name in fixed or p.sees == unused))
     if not found:
-        got = "all of them set" if held else f"{type(base).__name__}, which declares none"
+        got = "all of them set" if fixed else f"{type(base).__name__}, which declares none"
         raise InputError(place="tracker", got=got, expected="parameters to search", remedy="leave one free")
     return found
 
 
-def _bare(name: str) -> str:
+def _without_folder(name: str) -> str:
     return Path(name).name if name.endswith(".toml") else name
 
 

@@ -1,12 +1,11 @@
-"""The study: Optuna's search over a plan's space, in a storage of its own, resumable, shared by processes."""
+"""The study: Optuna's record of all trials in a storage, which a search can resume and several processes can share."""
 
 from __future__ import annotations
 
 import warnings
 from collections.abc import Iterator, Sequence
-from contextlib import contextmanager, nullcontext
+from contextlib import AbstractContextManager, contextmanager, nullcontext
 from pathlib import Path
-from typing import Any
 from urllib.parse import urlparse
 
 import optuna
@@ -14,134 +13,143 @@ from optuna.storages import BaseStorage
 from optuna.trial import FrozenTrial, TrialState
 
 from scenarios.errors import InputError
+from tracking.tuning.comparison import TrialRecord
 from tracking.tuning.goals import Goal
-from tracking.tuning.journal import LOCKS, Journal, Locks
-from tracking.tuning.pruner import SignedRank
-from tracking.tuning.result import Trial
-from tracking.tuning.sampler import AGAIN, ERROR, PRUNED, Sampler, distribution, slot
-from tracking.tuning.search_plan import Plan
+from tracking.tuning.journal import SUFFIX, LockedJournal, TrialLocks
+from tracking.tuning.pruner import SignedRankPruner
+from tracking.tuning.sampler import AGAIN, ERROR, PRUNED, HillClimbingSampler, distribution, place_in_search
+from tracking.tuning.search_plan import SearchPlan
 
 SETTINGS = "settings"
-"""The attribute of a study that says what it is about."""
+"""Attribute of a study that holds the identity of its plan."""
 
-DONE = (TrialState.COMPLETE, TrialState.PRUNED)
+FINISHED = (TrialState.COMPLETE, TrialState.PRUNED)
+"""States of a finished trial. PRUNED means impossible parameters; one stopped early is COMPLETE with an estimate."""
 
 
-class Study:
-    """A study that is open. State: Optuna's study; the locks by which processes share its journal, if it has one."""
+class SearchStudy:
+    """An open study. State: Optuna's study, and the locks by which processes share its journal, None without them.
 
-    def __init__(self, plan: Plan, study: optuna.Study, locks: Locks | None, place: object = None) -> None:
+    Raises InputError if the study in the storage is about another search. The first trial is the defaults.
+    """
+
+    def __init__(self, plan: SearchPlan, study: optuna.Study, locks: TrialLocks | None, storage: object = None) -> None:
         self.plan, self.optuna, self._locks = plan, study, locks
         self._space = {p.name: distribution(p) for p in plan.space}
-        with self._taking():
-            _same(plan, study, place)
+        with self._choosing():
+            _check_identity(plan, study, storage)
             if SETTINGS not in study.user_attrs:
                 study.set_user_attr(SETTINGS, plan.identity())
             if not study.get_trials(deepcopy=False):
                 study.enqueue_trial(dict(plan.defaults))
 
     def trials(self) -> list[FrozenTrial]:
-        """All trials, those given up on in the middle too."""
+        """Returns all trials by number, those running, waiting and abandoned included."""
         return self.optuna.get_trials(deepcopy=False)
 
     def finished(self) -> list[FrozenTrial]:
-        """Those that were played to their end, or pruned."""
-        return [t for t in self.trials() if t.state in DONE]
+        """Returns the finished trials: complete, pruned or impossible."""
+        return [t for t in self.trials() if t.state in FINISHED]
 
-    def ask(self, desperate: bool = False) -> optuna.Trial | None:
-        """The next trial to play, None where as many are finished or being played as are wanted.
+    def ask(self, retry_unfinished: bool = False) -> optuna.Trial | None:
+        """Returns the next trial to play; None if as many as planned are finished or running.
 
-        Trials whose process has died come first. Where that cannot be known (no journal), all that are not finished
-        count as being played by others, or, `desperate`, as left.
+        With a journal, an abandoned trial is repeated first. Without one it is not known which trials are abandoned:
+        running ones count as played by others, or, with `retry_unfinished`, as abandoned.
         """
-        with self._taking():
+        with self._choosing():
             for t in self.trials():
-                if t.state == TrialState.RUNNING and (desperate if self._locks is None else self._locks.left(t.number)):
-                    self._again(t)
-            taken = [t for t in self.trials() if t.state in (*DONE, TrialState.RUNNING)]
-            if len(taken) >= self.plan.trials:
+                if t.state == TrialState.RUNNING and (
+                    retry_unfinished if self._locks is None else self._locks.is_abandoned(t.number)
+                ):
+                    self._repeat(t)
+            taken = [t for t in self.trials() if t.state in (*FINISHED, TrialState.RUNNING)]
+            if len(taken) >= self.plan.options.trials:
                 return None
-            asked = self.optuna.ask(self._space)
+            trial = self.optuna.ask(self._space)
             if self._locks is not None:
-                self._locks.play(asked.number)
-            return asked
+                self._locks.hold_trial(trial.number)
+            return trial
 
-    def tell(self, asked: optuna.Trial, values: Sequence[float] | None) -> None:
-        """What came of it; None: these parameters cannot be."""
+    def tell(self, trial: optuna.Trial, values: Sequence[float] | None) -> None:
+        """Stores the values of a trial, one per goal; None means that its parameters are impossible."""
         state = TrialState.PRUNED if values is None else TrialState.COMPLETE
-        self.optuna.tell(asked, values, state, skip_if_finished=True)
+        self.optuna.tell(trial, values, state, skip_if_finished=True)
         if self._locks is not None:
-            self._locks.leave(asked.number)
+            self._locks.release_trial(trial.number)
 
-    def slot(self, asked: optuna.Trial) -> int:
-        """Its place in the search; 0: the defaults."""
+    def place(self, trial: optuna.Trial) -> int:
+        """Returns the place of a trial in the search, 0 for the defaults."""
         trials = self.trials()
-        return slot(trials, trials[asked.number])
+        return place_in_search(trials, trials[trial.number])
 
-    def told(self) -> list[Trial]:
-        """The finished trials, by their places in the search, which a trial that was done again keeps."""
-        every = self.trials()
-        return sorted((self._told(t, slot(every, t)) for t in self.finished()), key=lambda t: t.number)
+    def records(self) -> list[TrialRecord]:
+        """Returns the finished trials in the order of the search; a repeated trial has the place of its first try."""
+        trials = self.trials()
+        return sorted((self._record(t, place_in_search(trials, t)) for t in self.finished()), key=lambda r: r.number)
 
-    def _told(self, t: FrozenTrial, place: int) -> Trial:
-        said = t.user_attrs
-        if ERROR in said:
-            return Trial(place, (), dict(t.params), 0, error=said[ERROR])
-        episodes = said.get(PRUNED, len(self.plan.training))
-        return Trial(place, tuple(t.values or ()), dict(t.params), episodes, PRUNED in said)
+    def _record(self, t: FrozenTrial, place: int) -> TrialRecord:
+        if ERROR in t.user_attrs:
+            return TrialRecord(place, (), dict(t.params), 0, error=t.user_attrs[ERROR])
+        episodes = t.user_attrs.get(PRUNED, len(self.plan.training))
+        return TrialRecord(place, tuple(t.values or ()), dict(t.params), episodes, PRUNED in t.user_attrs)
 
     def best(self) -> set[int]:
-        """The places of those trials that no other one beats by all goals."""
-        every = self.trials()
-        return {slot(every, t) for t in self.optuna.best_trials}
+        """Returns the places of the best trial, or, with several goals, of the trials of the Pareto front."""
+        trials = self.trials()
+        return {place_in_search(trials, t) for t in self.optuna.best_trials}
 
     def importance(self) -> dict[str, float]:
-        """How much each parameter decided about the first goal in training (PED-ANOVA), shares, greatest first."""
+        """Returns the share of each parameter in the first goal's training values (PED-ANOVA), greatest first.
+
+        All shares are 0 if fewer than two trials have values, or all values are equal.
+        """
         from optuna.importance import get_param_importances
 
         names = [p.name for p in self.plan.space]
-        known = [t.values[0] for t in self.told() if t.values]
+        known = [t.values[0] for t in self.records() if t.values]
         if len(known) < 2 or min(known) == max(known):
             return dict.fromkeys(names, 0.0)
-        sign = -1 if self.plan.goals[0].higher else 1  # it asks what makes a target low, and warns of that
+        sign = -1 if self.plan.goals[0].higher else 1  # PED-ANOVA explains low values, and warns about a custom target
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", UserWarning)
             return dict(get_param_importances(self.optuna, params=names, target=lambda t: sign * t.values[0]))
 
     @property
-    def shared(self) -> bool:
-        """Can it be known whether others are still at work?"""
+    def knows_running_trials(self) -> bool:
+        """True if it is known which running trials other processes still play, as it is with a journal."""
         return self._locks is not None
 
-    def _taking(self) -> Any:
-        return nullcontext() if self._locks is None else self._locks.taking()
+    def _choosing(self) -> AbstractContextManager[None]:
+        return nullcontext() if self._locks is None else self._locks.choosing()
 
-    def _again(self, left: FrozenTrial) -> None:
-        """Put a trial that was left back in the queue, in the place that it had."""
-        number = left.user_attrs.get(AGAIN, left.number)
-        waiting = [t for t in self.trials() if t.user_attrs.get(AGAIN) == number and t.number > left.number]
-        if not waiting:
-            values = {**left.system_attrs.get("fixed_params", {}), **left.params}
+    def _repeat(self, abandoned: FrozenTrial) -> None:
+        """Puts an abandoned trial back in the queue with its parameters and place, and marks it as failed."""
+        number = abandoned.user_attrs.get(AGAIN, abandoned.number)
+        repeated = any(t.user_attrs.get(AGAIN) == number and t.number > abandoned.number for t in self.trials())
+        if not repeated:
+            values = {**abandoned.system_attrs.get("fixed_params", {}), **abandoned.params}
             self.optuna.enqueue_trial(values, user_attrs={AGAIN: number})
-        self.optuna.tell(left.number, state=TrialState.FAIL, skip_if_finished=True)
+        self.optuna.tell(abandoned.number, state=TrialState.FAIL, skip_if_finished=True)
 
 
 @contextmanager
-def opened(plan: Plan, storage: str | Path | None, name: str) -> Iterator[Study]:
-    """The study of that name: in a journal file, at the URL of another of Optuna's storages, or (None) in memory.
+def open_study(plan: SearchPlan, storage: str | Path | None, name: str) -> Iterator[SearchStudy]:
+    """Opens or creates the study `name` for the time of the context.
 
-    InputError where the storage cannot be used, or holds a study of this name that is about something else.
+    storage: a journal file, the URL of an Optuna storage, or None for memory. Raises InputError if the storage cannot
+    be used, or holds a study of this name that is about another search.
     """
-    with _quiet():
+    with _quiet_optuna():
         place = storage if storage is None or "://" in str(storage) else Path(storage)
-        locks = _locks(place) if isinstance(place, Path) else None
+        locks = _trial_locks(place) if isinstance(place, Path) else None
         try:
-            store = _store(place, locks)
-            found = optuna.create_study(
-                storage=store, study_name=name, load_if_exists=True, sampler=Sampler(plan),
-                pruner=_pruner(plan), directions=[_direction(goal) for goal in plan.goals],
+            study = optuna.create_study(
+                storage=_optuna_storage(place, locks), study_name=name, load_if_exists=True,
+                sampler=HillClimbingSampler(plan), pruner=_pruner(plan),
+                directions=[_direction(goal) for goal in plan.goals],
             )  # fmt: skip
-            yield Study(plan, found, locks, storage)
+            yield SearchStudy(plan, study, locks, storage)
         finally:
             if locks is not None:
                 locks.close()
@@ -151,46 +159,49 @@ def _direction(goal: Goal) -> optuna.study.StudyDirection:
     return optuna.study.StudyDirection.MAXIMIZE if goal.higher else optuna.study.StudyDirection.MINIMIZE
 
 
-def _pruner(plan: Plan) -> optuna.pruners.BasePruner:
-    if plan.prune == 0 or len(plan.goals) > 1:
+def _pruner(plan: SearchPlan) -> optuna.pruners.BasePruner:
+    if plan.options.prune == 0 or len(plan.goals) > 1:
         return optuna.pruners.NopPruner()
-    return SignedRank(plan.prune)
+    return SignedRankPruner(plan.options.prune)
 
 
-def _same(plan: Plan, found: optuna.Study, storage: object) -> None:
-    """InputError where the study is about something else."""
-    mine, its = plan.identity(), found.user_attrs.get(SETTINGS)
-    if its is None and not found.get_trials(deepcopy=False):
+def _check_identity(plan: SearchPlan, study: optuna.Study, storage: object) -> None:
+    """InputError if the study was begun with other settings; a study without trials and settings fits every plan."""
+    mine, stored = plan.identity(), study.user_attrs.get(SETTINGS)
+    if stored is None and not study.get_trials(deepcopy=False):
         return
-    its = its or {}
-    different = [key for key in mine if its.get(key) != mine[key]]
+    stored = stored or {}
+    different = [key for key in mine if stored.get(key) != mine[key]]
     if different:
         key = different[0]
         raise InputError(
-            file=storage, place=f"study {found.study_name}", got=f"another search: {', '.join(different)} differ",
-            expected=f"{key} {its.get(key)}, not {mine[key]}",
+            file=storage, place=f"study {study.study_name}", got=f"another search: {', '.join(different)} differ",
+            expected=f"{key} {stored.get(key)}, not {mine[key]}",
             remedy="choose another --out or --study, or repeat the command that began it",
         )  # fmt: skip
 
 
-def _locks(path: Path) -> Locks | None:
-    """The locks of a journal, None where the system has no such thing."""
+def _trial_locks(journal: Path) -> TrialLocks | None:
+    """The locks of a journal file, None if the system has no fcntl."""
     try:
         import fcntl  # noqa: F401
     except ImportError:
         return None
-    path.parent.mkdir(parents=True, exist_ok=True)
-    return Locks(path.with_name(path.name + LOCKS))
+    journal.parent.mkdir(parents=True, exist_ok=True)
+    return TrialLocks(journal.with_name(journal.name + SUFFIX))
 
 
-def _store(place: str | Path | None, locks: Locks | None) -> BaseStorage | str | None:
+def _optuna_storage(place: str | Path | None, locks: TrialLocks | None) -> BaseStorage | str | None:
+    """Optuna's storage for a journal file, a URL or (None) memory; InputError if Optuna cannot open it."""
     from optuna.storages import GrpcStorageProxy, JournalStorage
     from optuna.storages.journal import JournalFileBackend, JournalFileOpenLock, JournalRedisBackend
 
     try:
         if isinstance(place, Path):
             lock = JournalFileOpenLock(str(place))
-            return JournalStorage(Journal(place, locks) if locks else JournalFileBackend(str(place), lock_obj=lock))
+            return JournalStorage(
+                LockedJournal(place, locks) if locks else JournalFileBackend(str(place), lock_obj=lock)
+            )
         if place is not None and place.startswith("redis"):
             return JournalStorage(JournalRedisBackend(place))
         if place is not None and place.startswith("grpc://"):
@@ -201,13 +212,13 @@ def _store(place: str | Path | None, locks: Locks | None) -> BaseStorage | str |
         raise
     except Exception as error:
         got = f"{type(error).__name__}: {error}".partition("\n")[0]
-        expected = "a journal file, or the URL of a storage that Optuna knows, its driver installed"
+        expected = "a journal file, or the URL of a storage that Optuna knows, with its driver installed"
         raise InputError(file=place, place="--storage", got=got, expected=expected, remedy="check it") from error
 
 
 @contextmanager
-def _quiet() -> Iterator[None]:
-    """Optuna's own messages and its warnings of what is experimental."""
+def _quiet_optuna() -> Iterator[None]:
+    """Silences Optuna's messages and its warnings about experimental features, for the time of the context."""
     level = optuna.logging.get_verbosity()
     optuna.logging.set_verbosity(optuna.logging.ERROR)
     try:

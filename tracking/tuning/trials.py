@@ -1,4 +1,4 @@
-"""The search itself: one trial after another, each played on the training scenes until it is clear that it loses."""
+"""The loop of a search: one trial after the other, each played on the training scenes until it surely loses."""
 
 from __future__ import annotations
 
@@ -12,95 +12,103 @@ from optuna.exceptions import UpdateFinishedTrialError
 
 from scenarios.errors import FlockscopeError, InputError
 from tracking.environment.episodes import Episode
-from tracking.tuning.goals import Goal, mean
-from tracking.tuning.parallel_episodes import Play
+from tracking.tuning.goals import Goal, finite_mean
+from tracking.tuning.parallel_episodes import PlayEpisodes
 from tracking.tuning.sampler import ERROR, PRUNED
-from tracking.tuning.search_plan import Plan, every_score
-from tracking.tuning.study import Study
+from tracking.tuning.search_plan import SearchPlan
+from tracking.tuning.study import SearchStudy
 
-PAUSE = 0.5  # s between looks at whether others have finished
-TINY = 1e-12  # by so much at least is a trial that was given up behind the best
+PAUSE = 0.5
+"""Seconds between two looks at whether other processes have finished."""
+
+LEAST_LOSS = 1e-12
+"""Least difference between the best value and the estimate of a pruned trial."""
 
 Progress = Callable[[int, int, str], None]
 
 
-def search(study: Study, play: Play, progress: Progress) -> None:
-    """Play trials until as many as the plan wants are finished, here or by other processes."""
-    desperate = False
+def run_trials(study: SearchStudy, play: PlayEpisodes, progress: Progress) -> None:
+    """Plays trials until the study has as many finished ones as planned, by this process or by others.
+
+    progress: called before each trial as progress(finished, planned, text). Raises the error of the defaults if they
+    cannot be played, InputError if no training scene has a score for a goal with them, and every error of the workers.
+    """
+    retry_unfinished, planned = False, study.plan.options.trials
     while True:
-        progress(len(study.finished()), study.plan.trials, _so_far(study))
-        asked = study.ask(desperate)
-        if asked is not None:
-            _play(study, asked, play)
-        elif len(study.finished()) >= study.plan.trials:
+        progress(len(study.finished()), planned, _best_so_far(study))
+        trial = study.ask(retry_unfinished)
+        if trial is not None:
+            _play_trial(study, trial, play)
+        elif len(study.finished()) >= planned:
             return
-        elif study.shared:
+        elif study.knows_running_trials:
             time.sleep(PAUSE)
         else:
-            desperate = True
+            retry_unfinished = True
 
 
-def _so_far(study: Study) -> str:
-    """The best training value, in words: a sign of life, no result."""
+def _best_so_far(study: SearchStudy) -> str:
+    """The best training value as a text for the progress bar, "" if there is none or there are several goals."""
     known = len(study.plan.goals) == 1 and any(t.value is not None for t in study.finished())
     return f"(best in training {study.optuna.best_value:.4f})" if known else ""
 
 
-def _play(study: Study, asked: optuna.Trial, play: Play) -> None:
-    """One trial; an error of the defaults is raised, an error of other ones means that these parameters cannot be.
+def _play_trial(study: SearchStudy, trial: optuna.Trial, play: PlayEpisodes) -> None:
+    """Plays one trial and stores its values; an error means impossible parameters, and is raised for the defaults.
 
-    Errors of who plays end the search: the trial stays as it is, to be played again by whoever goes on. Where others
-    took it as left, it is theirs.
+    An error that `play` raises comes from the workers. It ends the search and leaves the trial unfinished. If another
+    process has finished the trial in the meantime, its values stay.
     """
     with suppress(UpdateFinishedTrialError):
-        found = _values(study, asked, play)
-        if isinstance(found, FlockscopeError):
-            if study.slot(asked) == 0:
-                raise found
-            asked.set_user_attr(ERROR, found.line())
-        study.tell(asked, None if isinstance(found, FlockscopeError) else found)
+        values = _trial_values(study, trial, play)
+        if isinstance(values, FlockscopeError):
+            if study.place(trial) == 0:
+                raise values
+            trial.set_user_attr(ERROR, values.line())
+        study.tell(trial, None if isinstance(values, FlockscopeError) else values)
 
 
-def _values(study: Study, asked: optuna.Trial, play: Play) -> list[float] | FlockscopeError:
-    """What the trial reached by each goal; where it was given up, what it would probably have reached; or the error by
-    which these parameters cannot be."""
+def _trial_values(study: SearchStudy, trial: optuna.Trial, play: PlayEpisodes) -> list[float] | FlockscopeError:
+    """The value of a trial by each goal, an estimate if it is pruned; or the error of its parameters."""
     plan, played = study.plan, dict[int, Episode]()
     try:
-        config = plan.config(asked.params).as_dict()
+        config = plan.config(trial.params).as_dict()
     except FlockscopeError as error:
         return error
-    # In an order of its own, so that trials are not given up by the same few scenes.
-    order = np.random.default_rng([plan.seed, study.slot(asked)]).permutation(len(plan.training)).tolist()
-    with closing(play([plan.training[k] for k in order], config, every_score(plan))) as answers:
-        for at, answer in zip(order, answers, strict=True):
-            if isinstance(answer, FlockscopeError):
-                return answer
-            played[at] = answer
-            if _hopeless(asked, at, answer, plan) and len(played) < len(order):
-                asked.set_user_attr(PRUNED, len(played))
+    # Each trial has an order of its own, so that no few scenes decide about all trials.
+    order = np.random.default_rng([plan.options.seed, study.place(trial)]).permutation(len(plan.training)).tolist()
+    with closing(play([plan.training[k] for k in order], config, plan.needs_every_score)) as results:
+        for k, result in zip(order, results, strict=True):
+            if isinstance(result, FlockscopeError):
+                return result
+            played[k] = result
+            if _should_prune(trial, k, result, plan) and len(played) < len(order):
+                trial.set_user_attr(PRUNED, len(played))
                 return [_estimate(study.optuna.best_trial, plan.goals[0], played)]
-    found = [goal.mean([played[k] for k in sorted(played)]) for goal in plan.goals]
-    unknown = [goal.key for goal, value in zip(plan.goals, found, strict=True) if value != value]
+    values = [goal.mean([played[k] for k in sorted(played)]) for goal in plan.goals]
+    unknown = [goal.key for goal, value in zip(plan.goals, values, strict=True) if value != value]
     if unknown:
         got, remedy = f"{unknown[0]} unknown in every training scene", "choose another score, suite or tracker"
-        return InputError(place="--objective", got=got, expected="scenes that it is about", remedy=remedy)
-    return found
+        return InputError(place="--objective", got=got, expected="scenes that have this score", remedy=remedy)
+    return values
 
 
-def _hopeless(asked: optuna.Trial, at: int, episode: Episode, plan: Plan) -> bool:
-    """Report an episode and ask whether to give up; never where there are several goals."""
+def _should_prune(trial: optuna.Trial, scene: int, episode: Episode, plan: SearchPlan) -> bool:
+    """Reports an episode to the pruner; False if there are several goals or the score is unknown."""
     value = plan.goals[0].of(episode)
     if len(plan.goals) > 1 or value != value:
         return False
-    asked.report(value, at)
-    return asked.should_prune()
+    trial.report(value, scene)
+    return trial.should_prune()
 
 
 def _estimate(best: optuna.trial.FrozenTrial, goal: Goal, played: dict[int, Episode]) -> float:
-    """The value of the best trial less what this one lost to it on the same scenes, which is nearer to the truth than
-    the mean of those that happened to come first."""
+    """The value of the best trial less the mean loss to it on the same scenes.
+
+    The mean of a few scenes depends much on which scenes came first; the paired loss does not.
+    """
     assert best.value is not None
     pairs = [(goal.of(e), best.intermediate_values[k]) for k, e in played.items() if k in best.intermediate_values]
-    gain = mean(goal.gain(theirs, own) for own, theirs in pairs)
-    gain = min(gain, -TINY) if gain == gain else -TINY
+    gain = finite_mean(goal.gain(theirs, own) for own, theirs in pairs)
+    gain = min(gain, -LEAST_LOSS) if gain == gain else -LEAST_LOSS
     return best.value + gain if goal.higher else best.value - gain

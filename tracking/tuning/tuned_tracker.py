@@ -1,4 +1,4 @@
-"""What is tuned: a tracker, by name, file or class; or the baseline rule of groups, by the name `grouping`."""
+"""What a search tunes: a tracker given by name, file or class, or the baseline rule of groups, named `grouping`."""
 
 from __future__ import annotations
 
@@ -8,16 +8,20 @@ from typing import Any
 from scenarios.errors import InputError
 from sim.types import DetectionMode, Tracker
 from tracking.config import Config
-from tracking.environment.episodes import Cache, Episode, Source, play, streams_for
+from tracking.environment.episodes import Episode, Source, SourceCache, play, streams_for
 from tracking.grouping.link_rule import LinkRule
 
 RULE = LinkRule.tracker
 
 
 @dataclass(frozen=True)
-class Subject:
-    """A tracker with parameters: as `tracking.track` takes it, what it is called, its config's class, what it needs, a
-    hash of the file that it is from."""
+class TunedTracker:
+    """A tracker with parameters, or the baseline rule of groups.
+
+    tracker: as `tracking.track` takes it; name: for messages and files; config_class: declares its parameters; needs:
+    the inputs that it needs; code: hash of the file that defines the tracker,
+    "" if there is none.
+    """
 
     tracker: str | type[Tracker]
     name: str
@@ -27,32 +31,35 @@ class Subject:
 
     @property
     def objective(self) -> str:
-        """What it is tuned for where nothing is said."""
+        """Key of the score that it is tuned for by default: "pairwise_F1" for the rule of groups, else "objective"."""
         return "pairwise_F1" if self.name == RULE else "objective"
 
     @property
     def detections(self) -> DetectionMode:
-        """What it is given where nothing is said: no pictures unless it takes nothing else, as they cost most; the
-        rule of groups people who are who they are."""
+        """Its input by default: "truth" for the rule, "file" if it takes boxes or points, else "image"."""
         if self.name == RULE:
             return "truth"
         return "file" if {"boxes", "points"} & {*self.needs} else "image"
 
-    def accept(self, source: Source, detections: DetectionMode) -> None:
-        """InputError where it cannot work on such a source."""
+    def check_input(self, source: Source, detections: DetectionMode) -> None:
+        """Raises InputError if it cannot work on this source with these detections."""
         from tracking.detection_mode import choose_mode
 
         if self.name == RULE:
             if detections != "truth":
-                remedy = "leave the option out: the rule is tuned on people whose identity is known"
+                remedy = "remove the option: the rule is tuned on people whose identity is known"
                 raise InputError(place="--detections", got=detections, expected="truth", remedy=remedy)
             return
         choose_mode(self.needs, source.open(streams_for(self.tracker, detections)), detections)
 
     def play(
-        self, source: Source, values: dict[str, Any], detections: DetectionMode, cache: Cache, every_score: bool
+        self, source: Source, values: dict[str, Any], detections: DetectionMode, cache: SourceCache, every_score: bool
     ) -> Episode:
-        """One episode with these parameters; a tracker that draws does so by the source's seed."""
+        """Returns one episode with the parameters `values`; the tracker's own seed is the seed of the source.
+
+        every_score: compute the whole catalogue. Raises InputError if the tracker refuses the parameters, and
+        WorkError if it fails with them.
+        """
         if self.name == RULE:
             from tracking.tuning.grouping_episodes import play_rule
 
@@ -63,12 +70,15 @@ class Subject:
         )  # fmt: skip
 
 
-def subject_of(tracker: str | type[Tracker]) -> Subject:
-    """The subject of this name, file or class; InputError where it is no tracker or has no parameters."""
+def tuned_tracker(tracker: str | type[Tracker]) -> TunedTracker:
+    """Returns what is to be tuned under this name, file or class; `grouping` is the baseline rule of groups.
+
+    Raises InputError if it is no tracker, or declares no parameters.
+    """
     from tracking.tracker_registry import checked, code_hash, config_class, find
 
     if tracker == RULE:
-        return Subject(RULE, RULE, LinkRule, ("points", "boxes"))
-    named = tracker if isinstance(tracker, str) else getattr(tracker, "__name__", str(tracker))
-    found: Any = find(tracker) if isinstance(tracker, str) else checked(tracker, named)
-    return Subject(tracker, named, config_class(found, named), tuple(found.needs), code_hash(found))
+        return TunedTracker(RULE, RULE, LinkRule, ("points", "boxes"))
+    name = tracker if isinstance(tracker, str) else getattr(tracker, "__name__", str(tracker))
+    found: Any = find(tracker) if isinstance(tracker, str) else checked(tracker, name)
+    return TunedTracker(tracker, name, config_class(found, name), tuple(found.needs), code_hash(found))

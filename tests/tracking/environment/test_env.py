@@ -21,7 +21,7 @@ from sim.sequence import simulate
 from sim.types import Truth
 from tests.toy_tracker import Toy
 from tracking.config import Config, param
-from tracking.environment.env import SEEN, TuningEnv
+from tracking.environment.env import OBSERVATIONS, TuningEnv
 from tracking.environment.observation import NAMES
 from tracking.parameter_space import decode, encode
 from tracking.tracker_registry import names
@@ -52,7 +52,7 @@ def played(env, actions=None, **reset):
 
 
 @pytest.mark.parametrize("every", [None, 10])
-@pytest.mark.parametrize("observation", SEEN)
+@pytest.mark.parametrize("observation", OBSERVATIONS)
 @pytest.mark.parametrize("tracker", [*names(), TOY])
 def test_gymnasium_checks_it_without_a_warning(tracker, observation, every):
     env = make(tracker, decision_every=every, observation=observation)
@@ -226,7 +226,7 @@ def test_from_pixels_detections_that_came_with_the_pictures_are_not_there():
     """Neither for the tracker nor in what is observed: blob's tracks and a camera's sensor are both on the ground."""
     tiny = ["camera.fps=5", "duration=2", "camera.image=[320,240]"]
     env = make("blob", "cross", set=tiny, detections="image", decision_every=5)
-    held = env.unwrapped.cache.hold(env.unwrapped.sources[0], ("left",))
+    held = env.unwrapped.cache.open(env.unwrapped.sources[0], ("left",))
     assert any(len(frame.detections.pos) for frame in held.sequence)
     seen, _, _ = played(env, seed=1)
     assert env.unwrapped.rollout.last.detections is None

@@ -9,29 +9,29 @@ import numpy as np
 import pytest
 
 from scenarios.errors import InputError
-from tracking.environment.episode_cache import Cache, array_bytes
+from tracking.environment.episode_cache import SourceCache, array_bytes
 from tracking.environment.episodes import play, sources
 
 SOURCES = sources("cross", range(4), ["camera.fps=5", "duration=4"])
 
 
 def test_the_same_source_is_opened_once():
-    cache = Cache()
-    first = cache.hold(SOURCES[0])
-    assert cache.hold(SOURCES[1]) is not first
-    assert cache.hold(SOURCES[0]) is first
-    assert cache.hold(SOURCES[0], ("left",)) is not first
+    cache = SourceCache()
+    first = cache.open(SOURCES[0])
+    assert cache.open(SOURCES[1]) is not first
+    assert cache.open(SOURCES[0]) is first
+    assert cache.open(SOURCES[0], ("left",)) is not first
     assert len(cache) == 3
 
 
 def test_it_is_bounded_and_drops_what_was_used_longest_ago():
-    cache = Cache()
+    cache = SourceCache()
     for source in SOURCES[:2]:
         play("blob", source, cache=cache)
     cache.limit = cache.bytes
-    first = cache.hold(SOURCES[0])
+    first = cache.open(SOURCES[0])
     play("blob", SOURCES[2], cache=cache)
-    assert cache.hold(SOURCES[0]) is first
+    assert cache.open(SOURCES[0]) is first
     before = len(cache)
     for source in SOURCES * 3:
         play("blob", source, cache=cache)
@@ -40,12 +40,12 @@ def test_it_is_bounded_and_drops_what_was_used_longest_ago():
 
 
 def test_without_room_only_the_last_stays():
-    cache = Cache(0)
+    cache = SourceCache(0)
     for source in SOURCES:
         play("blob", source, cache=cache)
     assert len(cache) == 1
     with pytest.raises(InputError, match="bytes"):
-        Cache(-1)
+        SourceCache(-1)
 
 
 def test_bytes_of_arrays():
@@ -59,8 +59,8 @@ def test_bytes_of_arrays():
 
 
 def test_bytes_of_a_held_source_are_those_of_motion_truth_and_detections():
-    cache = Cache()
-    held = cache.hold(SOURCES[0])
+    cache = SourceCache()
+    held = cache.open(SOURCES[0])
     motion = sum(a.nbytes for a in (held.truth.pos, held.truth.vel))
     before = cache.bytes
     play("blob", SOURCES[0], cache=cache)
@@ -69,19 +69,19 @@ def test_bytes_of_a_held_source_are_those_of_motion_truth_and_detections():
 
 def test_the_sample_of_the_background_counts():
     small = sources("cross", [1], ["camera.fps=5", "duration=1", "camera.image=[80,60]"])[0]
-    cache = Cache()
+    cache = SourceCache()
     play("group-pda", small, detections="image", cache=cache)
     assert cache.bytes > 50 * 80 * 60 * 3
-    before = cache.hold(small, ("left", "background")).sequence.background()
-    assert before is cache.hold(small, ("left", "background")).sequence.background()
+    before = cache.open(small, ("left", "background")).sequence.background()
+    assert before is cache.open(small, ("left", "background")).sequence.background()
 
 
 def test_what_is_dropped_is_gone():
 
-    cache = Cache(0)
+    cache = SourceCache(0)
     gc.disable()
     try:
-        first = weakref.ref(cache.hold(SOURCES[0]))
+        first = weakref.ref(cache.open(SOURCES[0]))
         play("blob", SOURCES[0], cache=cache)
         play("blob", SOURCES[1], cache=cache)
         assert first() is None

@@ -10,7 +10,7 @@ import tracking
 from scenarios.errors import InputError
 from scenarios.loading.resolve import load
 from sim.sequence import simulate
-from tracking.environment.episodes import Cache, Rollout, play, sources, streams_for
+from tracking.environment.episodes import Rollout, SourceCache, play, sources, streams_for
 from tracking.tracker_registry import names
 
 SHORT = ["camera.fps=5", "duration=8"]
@@ -19,7 +19,7 @@ CROSS = sources("cross", [3], SHORT)[0]
 
 @pytest.fixture(scope="module")
 def cache():
-    return Cache()
+    return SourceCache()
 
 
 @pytest.mark.parametrize("mode", ["file", "truth", "image"])

@@ -34,8 +34,8 @@ def looked(pairs, px_per_m=float("nan"), observer=None):
     """Values before squashing, by name."""
     observer = observer or Observer(FPS)
     for one, answer in pairs:
-        observer.see(one, answer)
-    seen = dict(zip(NAMES, observer.look(px_per_m).tolist(), strict=True))
+        observer.add(one, answer)
+    seen = dict(zip(NAMES, observer.statistics(px_per_m).tolist(), strict=True))
     halves = {s.name: s.half for s in STATISTICS}
     return {k: v if halves[k] is None else halves[k] * v / (1 - v) for k, v in seen.items()}
 
@@ -138,7 +138,7 @@ def test_pictures():
 
 def test_nothing_at_all():
     observer = Observer(FPS)
-    assert not observer.look(float("nan")).any()
+    assert not observer.statistics(float("nan")).any()
     empty = [(frame(k), tracks(k, [])) for k in (1, 2, 3)]
     seen = looked(empty)
     assert {k for k, v in seen.items() if v} == {"time", "seen"}
@@ -150,9 +150,9 @@ def test_bounds_and_kind():
     for k in range(1, 40):
         n, m = rng.integers(0, 6, 2)
         answer = tracks(k, rng.normal(0, 5, (n, 2)), rng.normal(0, 50, 2), ids=rng.choice(20, n, replace=False))
-        observer.see(frame(k, rng.normal(0, 5, (m, 2)), score=rng.uniform(0, 1, m)), answer)
+        observer.add(frame(k, rng.normal(0, 5, (m, 2)), score=rng.uniform(0, 1, m)), answer)
         if k % 7 == 0:
-            seen = observer.look(40.0)
+            seen = observer.statistics(40.0)
             assert seen.dtype == np.float32
             assert seen.shape == (len(STATISTICS),)
             assert ((seen >= 0) & (seen <= 1)).all()

@@ -41,7 +41,7 @@ def test_a_plan_with_what_is_tracked(tracker):
     assert all(p.shape == (512, 640, 3) and p.dtype == np.uint8 and p.flags.c_contiguous for p in pictures)
     assert of_colour(pictures[0], FLOOR) > 0.5 * 512 * 640
     assert not np.array_equal(pictures[1][32:], pictures[2][32:])
-    ids = made.rollout.answers[-1].id.tolist()
+    ids = made.rollout.tracks[-1].id.tolist()
     assert ids
     assert all(of_colour(pictures[-1], colour(k)) > of_colour(pictures[0], colour(k)) for k in ids)
 
@@ -50,7 +50,7 @@ def test_places_are_where_they_belong():
     """Everybody's ring stands round his place: x to the right, y upwards."""
     made = env()
     picture = stepped(made, 4)[-1]
-    answer, size = made.rollout.answers[-1], made.rollout.sequence.scene.size
+    answer, size = made.rollout.tracks[-1], made.rollout.sequence.scene.size
     scale = min(640 / size[0], 480 / size[1])
     for id, (x, y) in zip(answer.id.tolist(), answer.pos.tolist(), strict=True):
         u = 320 + (x - size[0] / 2) * scale

@@ -8,7 +8,7 @@ import pytest
 
 from scenarios.errors import InputError
 from tracking.environment.episodes import Episode
-from tracking.tuning.goals import SPEED, Goal, goals, mean
+from tracking.tuning.goals import SPEED, Goal, finite_mean, goals_of
 
 
 def episode(seconds: float = 1.0, frames: int = 10, **scores: float) -> Episode:
@@ -16,7 +16,7 @@ def episode(seconds: float = 1.0, frames: int = 10, **scores: float) -> Episode:
 
 
 def test_directions_come_from_the_catalogue():
-    assert goals(["HOTA", "GOSPA", SPEED]) == (Goal("HOTA"), Goal("GOSPA", False), Goal(SPEED))
+    assert goals_of(["HOTA", "GOSPA", SPEED]) == (Goal("HOTA"), Goal("GOSPA", False), Goal(SPEED))
 
 
 def test_gain_is_positive_where_the_second_is_better():
@@ -28,7 +28,7 @@ def test_unknown_scores_are_left_out_of_the_mean():
     goal = Goal("event_F1")
     assert goal.mean([episode(event_F1=0.5), episode(), episode(event_F1=1.0)]) == 0.75
     assert math.isnan(goal.mean([episode()]))
-    assert math.isnan(mean([]))
+    assert math.isnan(finite_mean([]))
 
 
 def test_speed_is_frames_over_seconds_of_all():
@@ -48,5 +48,5 @@ def test_speed_is_frames_over_seconds_of_all():
 )
 def test_wrong_keys_are_one_line(keys, words):
     with pytest.raises(InputError, match=words) as caught:
-        goals(keys)
+        goals_of(keys)
     assert "--objective" in str(caught.value)

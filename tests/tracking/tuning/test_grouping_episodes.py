@@ -10,13 +10,20 @@ import pytest
 from sim.rng import rng
 from tests.tuning_toys import write_scenes
 from tracking.app.cli import run
-from tracking.environment.episodes import Cache, sources
+from tracking.environment.episodes import SourceCache, sources
 from tracking.grouping.grouped_tracks import derive
 from tracking.grouping.link_rule import LinkRule
 from tracking.run import track
 from tracking.scoring import evaluate
 from tracking.tuning import tune
-from tracking.tuning.grouping_episodes import FILMED, SURVEYED, Labels, as_labelled, people_as_tracks, play_rule
+from tracking.tuning.grouping_episodes import (
+    FILMED,
+    SURVEYED,
+    LabelErrors,
+    people_as_tracks,
+    play_rule,
+    with_label_errors,
+)
 
 
 @pytest.fixture
@@ -36,9 +43,9 @@ def test_the_people_are_perfect_and_their_groups_unknown(source):
 def test_an_episode_is_what_evaluate_says(tmp_path, seed):
     (source,) = sources(write_scenes(tmp_path)[0], (seed,))
     truth, rule = source.open().truth, LinkRule(near=1.0)
-    found = play_rule(source, rule, Cache())
+    found = play_rule(source, rule, SourceCache())
     labels = FILMED if seed % 2 else SURVEYED
-    people = people_as_tracks(as_labelled(truth, labels, seed))
+    people = people_as_tracks(with_label_errors(truth, labels, seed))
     factor = labels.scale ** rng(seed, "label").uniform(-1, 1)
     assert (factor == 1) == (seed == 4)
     scores = evaluate(truth, derive(people, truth.fps, truth.px_per_m * factor, rule))
@@ -50,8 +57,8 @@ def test_an_episode_is_what_evaluate_says(tmp_path, seed):
 def test_labels_err_for_a_while_and_do_not_change_who_is_there():
     source = sources("crossing", (0,))[0]
     truth = source.open().truth
-    for labels in (Labels(0.06, 0.3, filmed=True), SURVEYED):
-        found = as_labelled(truth, labels, 7)
+    for labels in (LabelErrors(0.06, 0.3, filmed=True), SURVEYED):
+        found = with_label_errors(truth, labels, 7)
         assert (found.vel is None) == (found.pos is None) == labels.filmed
         assert found.frame.tobytes() + found.id.tobytes() == truth.frame.tobytes() + truth.id.tobytes()
         error = (found.box - truth.box)[:, :2] / truth.px_per_m if labels.filmed else found.pos - truth.pos
@@ -60,7 +67,7 @@ def test_labels_err_for_a_while_and_do_not_change_who_is_there():
         own = error[truth.id == truth.id[0]]
         stay = np.exp(-1 / (truth.fps * labels.time))
         assert np.corrcoef(own[1:, 0], own[:-1, 0])[0, 1] == pytest.approx(stay, abs=0.2)
-        again = [as_labelled(truth, labels, seed) for seed in (7, 8)]
+        again = [with_label_errors(truth, labels, seed) for seed in (7, 8)]
         same, other = (told.box if labels.filmed else told.pos for told in again)
         here = found.box if labels.filmed else found.pos
         assert same.tobytes() == here.tobytes()
@@ -85,15 +92,15 @@ def test_one_person_more_moves_nobody_elses_errors():
         "visible_box",
     )
     fewer = truth.replace(**{name: a[others] for name in rows if (a := getattr(truth, name)) is not None})
-    every, rest = (as_labelled(t, SURVEYED, 7).pos for t in (truth, fewer))
+    every, rest = (with_label_errors(t, SURVEYED, 7).pos for t in (truth, fewer))
     assert every[others].tobytes() == rest.tobytes()
-    assert as_labelled(truth, SURVEYED, 7, repeat=2).pos.tobytes() != every.tobytes()
+    assert with_label_errors(truth, SURVEYED, 7, repeat=2).pos.tobytes() != every.tobytes()
 
 
 def test_filmed_people_are_grouped_in_the_image():
     """Boxes alone, at one scale: those who walk behind each other look nearer than they are."""
     truth = sources("crossing", (0,))[0].open().truth
-    answers = people_as_tracks(as_labelled(truth, FILMED, 1))
+    answers = people_as_tracks(with_label_errors(truth, FILMED, 1))
     assert {t.plane for t in answers} == {"image"}
     assert all(np.isnan(t.vel).all() for t in answers)
     assert evaluate(truth, derive(answers, truth.fps, truth.px_per_m)).surface == "image"
@@ -101,8 +108,8 @@ def test_filmed_people_are_grouped_in_the_image():
 
 def test_a_rule_that_links_nobody_scores_nothing(source):
     """The pair walks 0.75 m apart: at half a metre nobody is together."""
-    assert play_rule(source, LinkRule(), Cache()).scores["pairwise_F1"] > 0.5
-    assert play_rule(source, LinkRule(near=0.5), Cache()).scores["pairwise_F1"] == 0.0
+    assert play_rule(source, LinkRule(), SourceCache()).scores["pairwise_F1"] > 0.5
+    assert play_rule(source, LinkRule(near=0.5), SourceCache()).scores["pairwise_F1"] == 0.0
 
 
 def test_the_rule_is_tuned_like_a_tracker(tmp_path):

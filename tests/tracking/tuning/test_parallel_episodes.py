@@ -9,17 +9,17 @@ import pytest
 from scenarios.errors import WorkError
 from tests.tuning_toys import TOY, write_scenes
 from tracking.environment.episodes import sources
-from tracking.tuning.parallel_episodes import Job, play_job
-from tracking.tuning.tuned_tracker import subject_of
+from tracking.tuning.parallel_episodes import EpisodeTask, play_task
+from tracking.tuning.tuned_tracker import tuned_tracker
 
 
 def test_a_worker_whose_tracker_is_another_one_ends_it_all(tmp_path: Path) -> None:
     """An answer would be taken for one about the parameters."""
     (source,) = sources(write_scenes(tmp_path)[0], (1,))
-    same, other = (Job(TOY, source, {}, "file", False, code) for code in (subject_of(TOY).code, "another"))
-    assert play_job(same).frames == 20
+    same, other = (EpisodeTask(TOY, source, {}, "file", False, code) for code in (tuned_tracker(TOY).code, "another"))
+    assert play_task(same).frames == 20
     with pytest.raises(WorkError, match=r"another .*toy_tracker.py:Toy in a worker; .* start the workers anew"):
-        play_job(other)
+        play_task(other)
 
 
 def test_trackers_that_draw_do_so_by_the_source(tmp_path: Path) -> None:
@@ -31,7 +31,7 @@ def test_trackers_that_draw_do_so_by_the_source(tmp_path: Path) -> None:
     name = f"{tmp_path / 'lucky.py'}:Toy"
     for source in sources(write_scenes(tmp_path)[0], (5, 9)):
         own, fixed = (
-            play_job(Job(name, source, {}, "file", True, subject_of(name).code)),
-            play_job(Job(TOY, source, {"skip": source.seed % 5}, "file", True, subject_of(TOY).code)),
+            play_task(EpisodeTask(name, source, {}, "file", True, tuned_tracker(name).code)),
+            play_task(EpisodeTask(TOY, source, {"skip": source.seed % 5}, "file", True, tuned_tracker(TOY).code)),
         )
         assert own.scores == fixed.scores

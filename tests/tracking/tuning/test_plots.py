@@ -9,26 +9,27 @@ from xml.etree import ElementTree
 import pytest
 
 from tests.toy_tracker import ToyConfig
-from tests.tuning_toys import wishes
+from tests.tuning_toys import toy_plan
+from tracking.tuning.comparison import Candidate, TrialRecord
 from tracking.tuning.goals import Goal
-from tracking.tuning.judge import Candidate
-from tracking.tuning.plots import BLUE, ORANGE, Axes, plots, ticks
-from tracking.tuning.result import Trial, Tuned
-from tracking.tuning.search_plan import plan
+from tracking.tuning.plots import BLUE, ORANGE, Axes, ticks
+from tracking.tuning.result import TuningResult
 
 SVG = "{http://www.w3.org/2000/svg}"
 DEFAULTS = {"reach": 0.1, "skip": 0, "colour": "red", "forbidden": 0.0}
 
 
 @pytest.fixture
-def found(tmp_path) -> Tuned:
-    made = plan(**wishes(tmp_path))
+def found(tmp_path) -> TuningResult:
+    made = toy_plan(tmp_path)
     values = [0.5, 0.4, 0.6, -9.0, 0.55, 0.7]
-    trials = [Trial(k, (v,), DEFAULTS if k == 0 else {"reach": v}, 5, pruned=v < 0) for k, v in enumerate(values)]
-    trials.append(Trial(6, (), {"reach": 1.0}, 0, error="no"))
+    trials = [TrialRecord(k, (v,), DEFAULTS if k == 0 else {"reach": v}, 5, pruned=v < 0) for k, v in enumerate(values)]
+    trials.append(TrialRecord(6, (), {"reach": 1.0}, 0, error="no"))
     importance = {"reach": 0.7, "skip": 0.3, "colour": 0.0, "forbidden": 0.0}
     candidate = Candidate(5, ToyConfig(reach=1.0), (0.7,), (0.65,))
-    return Tuned(made, ToyConfig(reach=1.0), (), (candidate,), tuple(trials), importance, validation=((0.5,), (0.65,)))
+    return TuningResult(
+        made, ToyConfig(reach=1.0), (), (candidate,), tuple(trials), importance, validation=((0.5,), (0.65,))
+    )
 
 
 def dots(text: str, radius: str = "3.5") -> list[tuple[float, float, str]]:
@@ -39,7 +40,7 @@ def dots(text: str, radius: str = "3.5") -> list[tuple[float, float, str]]:
 
 def test_history_shows_what_was_played(found):
     """Six trials; one far below is a tick at the edge, as it would flatten the rest."""
-    text = plots(found)[".history.svg"]
+    text = found.plots()[".history.svg"]
     shown = dots(text)
     assert len(shown) == 5
     assert "1 far below: ticks" in text
@@ -53,21 +54,21 @@ def test_history_shows_what_was_played(found):
 
 def test_trials_given_up_are_hollow(found):
     near = tuple(replace(t, values=(0.45,)) if t.pruned else t for t in found.trials)
-    shown = dots(plots(replace(found, trials=near))[".history.svg"])
+    shown = dots(replace(found, trials=near).plots()[".history.svg"])
     assert [fill for _, _, fill in shown].count("#fff") == 1
 
 
 def test_importance_has_a_bar_for_each_parameter(found):
-    bars = [r.attrib for r in ElementTree.fromstring(plots(found)[".importance.svg"]).iter(f"{SVG}rect")][1:]
+    bars = [r.attrib for r in ElementTree.fromstring(found.plots()[".importance.svg"]).iter(f"{SVG}rect")][1:]
     assert [b["fill"] for b in bars] == [ORANGE, BLUE, BLUE, BLUE]
     assert float(bars[0]["width"]) / float(bars[1]["width"]) == pytest.approx(7 / 3, rel=1e-3)
-    assert "0.1 → 1 m" in plots(found)[".importance.svg"]
+    assert "0.1 → 1 m" in found.plots()[".importance.svg"]
 
 
 def test_nothing_to_show_is_not_drawn(found):
-    assert set(plots(replace(found, importance=dict.fromkeys(DEFAULTS, 0.0)))) == {".history.svg"}
+    assert set(replace(found, importance=dict.fromkeys(DEFAULTS, 0.0)).plots()) == {".history.svg"}
     one = replace(found, trials=found.trials[:1])
-    assert len(dots(plots(one)[".history.svg"])) == 1
+    assert len(dots(one.plots()[".history.svg"])) == 1
 
 
 def test_front_is_drawn_for_two_goals(found):
@@ -76,7 +77,7 @@ def test_front_is_drawn_for_two_goals(found):
     points = [(0.5, 2.0), (0.7, 3.0), (0.4, 4.0)]
     three = [Candidate(k, config, (), p) for k, (config, p) in enumerate(zip(configs, points, strict=True))]
     two = replace(found, plan=made, candidates=tuple(three), front=tuple(three[:2]))
-    text = plots(two)[".front.svg"]
+    text = two.plots()[".front.svg"]
     assert [fill for _, _, fill in dots(text)] == [ORANGE, ORANGE, BLUE]
     assert "defaults" in text
 
@@ -94,7 +95,7 @@ def test_ticks_are_round_and_inside(low, high):
 
 def test_axes_put_the_corners_where_they_belong():
     axes = Axes((0.0, 2.0), (1.0, 3.0))
-    (u0, v0), (u1, v1) = axes.at(0.0, 1.0), axes.at(2.0, 3.0)
+    (u0, v0), (u1, v1) = axes.to_page(0.0, 1.0), axes.to_page(2.0, 3.0)
     assert u0 < u1
     assert v0 > v1
-    assert axes.at(1.0, 2.0) == ((u0 + u1) / 2, (v0 + v1) / 2)
+    assert axes.to_page(1.0, 2.0) == ((u0 + u1) / 2, (v0 + v1) / 2)

@@ -9,14 +9,14 @@ import optuna
 import pytest
 from scipy.stats import rankdata, wilcoxon
 
-from tracking.tuning.pruner import SignedRank, chance
+from tracking.tuning.pruner import SignedRankPruner, signed_rank_p_value
 
 
 @pytest.mark.parametrize("seed", range(8))
 def test_without_ties_it_is_scipys(seed):
     r = np.random.default_rng(seed)
     gains = r.normal(-0.3, 1.0, 3 + seed)
-    assert chance(gains) == pytest.approx(wilcoxon(gains, alternative="less", method="exact").pvalue)
+    assert signed_rank_p_value(gains) == pytest.approx(wilcoxon(gains, alternative="less", method="exact").pvalue)
 
 
 @pytest.mark.parametrize("seed", range(8))
@@ -25,19 +25,19 @@ def test_with_ties_and_zeros_it_counts_all_signs(seed):
     ranks = rankdata(np.abs(d))
     free = ranks[d != 0]
     sums = [np.dot(signs, free) for signs in product((0, 1), repeat=len(free))]
-    assert chance(d) == pytest.approx(np.mean(np.array(sums) <= ranks[d > 0].sum() + 1e-9))
+    assert signed_rank_p_value(d) == pytest.approx(np.mean(np.array(sums) <= ranks[d > 0].sum() + 1e-9))
 
 
 def test_limits():
-    assert chance([0.0] * 5) == 1.0
-    assert chance([-1.0] * 4) == 1 / 16
-    assert chance([1.0] * 4) == 1.0
-    assert chance([-1.0] * 200) < 1e-50
+    assert signed_rank_p_value([0.0] * 5) == 1.0
+    assert signed_rank_p_value([-1.0] * 4) == 1 / 16
+    assert signed_rank_p_value([1.0] * 4) == 1.0
+    assert signed_rank_p_value([-1.0] * 200) < 1e-50
 
 
 def test_only_what_both_played_counts():
     """The best trial wins where both were; where it was not played, nothing is known."""
-    study = optuna.create_study(direction="maximize", pruner=SignedRank(0.1))
+    study = optuna.create_study(direction="maximize", pruner=SignedRankPruner(0.1))
     first = study.ask()
     for k in range(6):
         first.report(0.5, k)
@@ -56,11 +56,11 @@ def test_only_what_both_played_counts():
 
 def test_who_wins_on_the_whole_is_not_given_up():
     """Many small losses, one great gain: the mean is what is tuned for."""
-    study = optuna.create_study(direction="minimize", pruner=SignedRank(0.1))
+    study = optuna.create_study(direction="minimize", pruner=SignedRankPruner(0.1))
     first, second = study.ask(), study.ask()
     for k in range(12):
         first.report(0.5, k)
         second.report(0.51 if k else 0.0, k)
     study.tell(first, 0.5)
-    assert chance([-0.01] * 11 + [0.5]) < 0.1
+    assert signed_rank_p_value([-0.01] * 11 + [0.5]) < 0.1
     assert not second.should_prune()

@@ -5,9 +5,8 @@ from __future__ import annotations
 import pytest
 
 from scenarios.errors import InputError
-from tests.tuning_toys import wishes, write_scenes
+from tests.tuning_toys import toy_plan, write_scenes
 from tracking.tuning import scenes
-from tracking.tuning.search_plan import plan
 
 
 @pytest.mark.parametrize(
@@ -39,18 +38,18 @@ def test_default_seeds_make_enough_episodes(split, count, expected):
 )
 def test_seeds_of_another_range_are_refused(tmp_path, option, seeds):
     with pytest.raises(InputError, match=f"--{option}.*kept apart") as caught:
-        plan(**wishes(tmp_path, **{option: seeds}))
+        toy_plan(tmp_path, **{option: seeds})
     assert "\n" not in str(caught.value)
 
 
 def test_one_number_is_no_range(tmp_path):
     with pytest.raises(InputError, match=r"--seeds: got 5; expected a range of seeds; .* range\(0, 4\)"):
-        plan(**wishes(tmp_path, seeds=5))
+        toy_plan(tmp_path, seeds=5)
 
 
 def test_the_three_sets_share_no_source(tmp_path):
-    made = plan(**wishes(tmp_path))
-    sets = [made.training, made.validating, *made.testing.values()]
+    made = toy_plan(tmp_path)
+    sets = [made.training, made.validation, *made.tests.values()]
     keys = [source.key for sources in sets for source in sources]
     assert len(set(keys)) == len(keys) == 5 + 4 + 6 + 6
 
@@ -61,19 +60,19 @@ def test_a_recording_is_never_tuned_on(tmp_path):
     (folder / "gt" / "gt.txt").write_text("1,1,0,0,5,5,1,1,1\n")
     for option in ("suite", "check"):
         with pytest.raises(InputError, match="nothing is tuned on what was recorded") as caught:
-            plan(**wishes(tmp_path, **{option: str(folder)}))
+            toy_plan(tmp_path, **{option: str(folder)})
         assert f"--{option}" in str(caught.value)
 
 
 def test_real_recordings_are_never_tuned_on(tmp_path, shared_data):
     for name in ("mot/TUD-Campus", "biwi/seq_hotel", "caviar/mwt1gt.xml"):
         with pytest.raises(InputError, match="nothing is tuned on what was recorded"):
-            plan(**wishes(tmp_path, suite=str(shared_data / name)))
+            toy_plan(tmp_path, suite=str(shared_data / name))
 
 
 def test_unknown_scenes_are_named(tmp_path):
     with pytest.raises(InputError, match="crossing") as caught:
-        plan(**wishes(tmp_path, suite="crosing"))
+        toy_plan(tmp_path, suite="crosing")
     assert "--suite" in str(caught.value)
 
 
@@ -87,23 +86,24 @@ def test_unknown_scenes_are_named(tmp_path):
     ],
 )
 def test_the_usual_check_shares_nothing(names, expected):
-    assert scenes.unused(names) == expected
+    assert scenes.default_check_suite(names) == expected
 
 
 def test_a_check_that_shares_a_scenario_is_refused(tmp_path):
-    assert scenes.shared(["standard"], ["crossing"]) == ["cross", "cross-same-speed", "pass-by", "side-by-side"]
+    shared = scenes.shared_scenarios(["standard"], ["crossing"])
+    assert shared == ["cross", "cross-same-speed", "pass-by", "side-by-side"]
     one, _ = write_scenes(tmp_path)
     (tmp_path / "all.toml").write_text('about = "all"\nentry = [{ scenario = "one.toml" }, { scenario = "two.toml" }]')
     with pytest.raises(InputError, match=r"all\.toml, which has one of"):
-        plan(**wishes(tmp_path, check=str(tmp_path / "all.toml")))
-    assert plan(**wishes(tmp_path, check=None)).check is None
-    assert scenes.shared([one], [one]) == ["one"]
+        toy_plan(tmp_path, check=str(tmp_path / "all.toml"))
+    assert toy_plan(tmp_path, check=None).check is None
+    assert scenes.shared_scenarios([one], [one]) == ["one"]
 
 
 def test_settings_reach_the_scenes(tmp_path):
-    made = plan(**wishes(tmp_path, set=["scenario.duration=5", "sensor.detect_prob=0.5", "tracker.skip=2"]))
-    assert {s.entry.scenario.duration for s in (*made.training, *made.validating)} == {5.0}
-    unused = made.testing["two.toml"][0].entry.scenario
+    made = toy_plan(tmp_path, set=["scenario.duration=5", "sensor.detect_prob=0.5", "tracker.skip=2"])
+    assert {s.entry.scenario.duration for s in (*made.training, *made.validation)} == {5.0}
+    unused = made.tests["two.toml"][0].entry.scenario
     assert (unused.duration, unused.sensor.detect_prob) == (4.0, 0.5), "the detector is the same everywhere"
     assert made.base.skip == 2
     assert "skip" not in made.defaults
@@ -111,7 +111,7 @@ def test_settings_reach_the_scenes(tmp_path):
 
 def test_scene_with_a_wrong_setting(tmp_path):
     with pytest.raises(InputError, match="duratoin"):
-        plan(**wishes(tmp_path, set=["scenario.duratoin=5"]))
+        toy_plan(tmp_path, set=["scenario.duratoin=5"])
 
 
 @pytest.mark.parametrize(
@@ -128,18 +128,18 @@ def test_scene_with_a_wrong_setting(tmp_path):
         ({"detections": "image"}, "--detections"),
         ({"tracker": "tests/fake_tracker.py:Nearest"}, "a tracker with parameters"),
         ({"tracker": "blobb"}, "did you mean blob"),
-        ({"set": ["sensor.detect_prob=0.5"], "detections": "truth"}, "leave the sensor out"),
+        ({"set": ["sensor.detect_prob=0.5"], "detections": "truth"}, "remove the sensor"),
         ({"tracker": "grouping", "detections": "file"}, "whose identity is known"),
         ({"set": [f"{name}=0.1" for name in ("reach", "skip", "colour", "forbidden")]}, "skip|colour"),
     ],
 )
-def test_wrong_wishes_are_one_line(tmp_path, change, words):
+def test_wrong_options_are_one_line(tmp_path, change, words):
     with pytest.raises(InputError, match=words) as caught:
-        plan(**wishes(tmp_path, **change))
+        toy_plan(tmp_path, **change)
     assert "\n" not in str(caught.value)
 
 
 def test_everything_set_leaves_nothing_to_search(tmp_path):
     fixed = ["reach=1", "skip=0", "colour=red", "forbidden=0"]
     with pytest.raises(InputError, match="all of them set"):
-        plan(**wishes(tmp_path, set=fixed))
+        toy_plan(tmp_path, set=fixed)

@@ -15,18 +15,17 @@ from optuna.trial import TrialState
 
 from scenarios.errors import InputError
 from sim.versions import runtime
-from tests.tuning_toys import wishes
+from tests.tuning_toys import toy_plan
 from tracking.grouping.link_rule import LinkRule
 from tracking.papers.blob.config import BlobConfig
 from tracking.papers.group_pda.config import GroupPdaConfig
-from tracking.tuning.journal import Journal, Locks
-from tracking.tuning.sampler import distribution, slot
-from tracking.tuning.search_plan import plan
-from tracking.tuning.study import DONE, opened
+from tracking.tuning.journal import LockedJournal, TrialLocks
+from tracking.tuning.sampler import distribution, place_in_search
+from tracking.tuning.study import FINISHED, open_study
 
 
 def test_distributions_are_the_declarations(tmp_path):
-    space = {p.name: distribution(p) for p in plan(**wishes(tmp_path)).space}
+    space = {p.name: distribution(p) for p in toy_plan(tmp_path).space}
     assert space == {
         "reach": FloatDistribution(0.05, 5.0, log=True),
         "skip": IntDistribution(0, 4),
@@ -49,7 +48,7 @@ def test_every_default_can_be_tried(kind):
 
 
 def tried(folder, count: int, **more) -> list[dict]:
-    with opened(plan(**wishes(folder, trials=count, **more)), None, "x") as study:
+    with open_study(toy_plan(folder, trials=count, **more), None, "x") as study:
         while (asked := study.ask()) is not None:
             possible = asked.params["forbidden"] <= 0.5
             study.tell(asked, [asked.params["reach"] - asked.params["skip"]] if possible else None)
@@ -63,7 +62,7 @@ def test_what_is_tried_follows_from_the_seed(tmp_path):
 
 def test_a_trial_moves_few_parameters_of_the_best(tmp_path):
     """The defaults, then three changes on the mean; every fourth trial later is TPE's and changes them all."""
-    with opened(plan(**wishes(tmp_path, tracker="blob", trials=24)), None, "x") as study:
+    with open_study(toy_plan(tmp_path, tracker="blob", trials=24), None, "x") as study:
         while (asked := study.ask()) is not None:
             study.tell(asked, [0.5 if asked.number == 0 else 0.4])
         first, *others = (t.params for t in study.finished())
@@ -81,60 +80,60 @@ def test_the_search_learns(tmp_path):
 
 
 def test_no_more_than_wanted(tmp_path):
-    with opened(plan(**wishes(tmp_path, trials=2)), None, "x") as study:
+    with open_study(toy_plan(tmp_path, trials=2), None, "x") as study:
         assert [study.ask() is not None for _ in range(3)] == [True, True, False]
         study.tell(study.optuna.trials[0].number, None)
         assert [t.state for t in study.finished()] == [TrialState.PRUNED]
 
 
 def test_a_trial_done_again_keeps_its_place(tmp_path):
-    made = plan(**wishes(tmp_path, trials=3))
-    with opened(made, tmp_path / "j", "x") as study:
+    made = toy_plan(tmp_path, trials=3)
+    with open_study(made, tmp_path / "j", "x") as study:
         study.tell(study.ask(), [0.1])
         left = study.ask()
-    with opened(made, tmp_path / "j", "x") as study:
+    with open_study(made, tmp_path / "j", "x") as study:
         again = study.ask()
         assert again.params == left.params
-        assert study.slot(again) == 1
+        assert study.place(again) == 1
         study.tell(again, [0.2])
         fresh = study.ask()
-        assert (fresh.number, study.slot(fresh)) == (3, 2)
+        assert (fresh.number, study.place(fresh)) == (3, 2)
         study.tell(fresh, [0.3])
         assert study.ask() is None
-        assert [t.number for t in study.told()] == [0, 1, 2]
+        assert [t.number for t in study.records()] == [0, 1, 2]
         assert [t.state.name for t in study.trials()] == ["COMPLETE", "FAIL", "COMPLETE", "COMPLETE"]
-        assert [slot(study.trials(), t) for t in study.trials()] == [0, 1, 1, 2]
+        assert [place_in_search(study.trials(), t) for t in study.trials()] == [0, 1, 1, 2]
 
 
 def test_killed_between_two_lines(tmp_path):
     """However much of the journal was written: the study opens, and ends with as many trials as are wanted."""
-    made = plan(**wishes(tmp_path, trials=2))
-    with opened(made, tmp_path / "whole", "x") as study:
+    made = toy_plan(tmp_path, trials=2)
+    with open_study(made, tmp_path / "whole", "x") as study:
         while (asked := study.ask()) is not None:
             study.tell(asked, [0.5])
     text = (tmp_path / "whole").read_bytes()
     for k in range(0, len(text), 97):
         path = tmp_path / f"cut-{k}"
         path.write_bytes(text[:k])
-        with opened(made, path, "x") as study:
+        with open_study(made, path, "x") as study:
             while (asked := study.ask()) is not None:
                 study.tell(asked, [0.5])
-            told = study.told()
+            told = study.records()
             assert len(told) == 2, k
             assert told[0].params == made.defaults
-            assert sum(t.state in DONE for t in study.trials()) == 2
+            assert sum(t.state in FINISHED for t in study.trials()) == 2
 
 
 def test_a_half_line_is_cut_off(tmp_path):
-    path, locks = tmp_path / "j", Locks(tmp_path / "j.locks")
-    Journal(path, locks).append_logs([{"op_code": 1}])
+    path, locks = tmp_path / "j", TrialLocks(tmp_path / "j.locks")
+    LockedJournal(path, locks).append_logs([{"op_code": 1}])
     with path.open("ab") as file:
         file.write(b'{"b"')
-    journal = Journal(path, locks)
+    journal = LockedJournal(path, locks)
     journal.append_logs([{"op_code": 2}])
     assert list(journal.read_logs(0)) == [{"op_code": 1}, {"op_code": 2}]
     path.write_bytes(b'{"op_c')
-    assert list(Journal(path, locks).read_logs(0)) == []
+    assert list(LockedJournal(path, locks).read_logs(0)) == []
     locks.close()
 
 
@@ -142,7 +141,7 @@ def test_a_half_line_is_cut_off(tmp_path):
 def test_another_file_is_left_as_it_is(tmp_path, content):
     path = tmp_path / "precious"
     path.write_bytes(content)
-    with pytest.raises(InputError, match="no journal") as caught, opened(plan(**wishes(tmp_path)), path, "x"):
+    with pytest.raises(InputError, match="no journal") as caught, open_study(toy_plan(tmp_path), path, "x"):
         pass
     assert "--storage" in str(caught.value)
     assert path.read_bytes() == content
@@ -151,32 +150,32 @@ def test_another_file_is_left_as_it_is(tmp_path, content):
 def test_a_lock_lives_as_long_as_its_process(tmp_path):
     path = tmp_path / "locks"
     hold = (
-        "import sys; from pathlib import Path; from tracking.tuning.journal import Locks\n"
-        "locks = Locks(Path(sys.argv[1])); locks.play(7); print('held', flush=True); sys.stdin.read()"
+        "import sys; from pathlib import Path; from tracking.tuning.journal import TrialLocks\n"
+        "locks = TrialLocks(Path(sys.argv[1])); locks.hold_trial(7); print('held', flush=True); sys.stdin.read()"
     )
     other = subprocess.Popen(
         [sys.executable, "-c", hold, str(path)], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True,
         env={**os.environ, "PYTHONPATH": str(Path(__file__).resolve().parents[3])},
     )  # fmt: skip
     assert other.stdout.readline() == "held\n"
-    locks = Locks(path)
-    assert not locks.left(7)
-    assert locks.left(8)
+    locks = TrialLocks(path)
+    assert not locks.is_abandoned(7)
+    assert locks.is_abandoned(8)
     other.kill()
     other.communicate()
-    assert locks.left(7)
+    assert locks.is_abandoned(7)
     locks.close()
 
 
 def test_optuna_is_as_loud_as_before(tmp_path):
     before = optuna.logging.get_verbosity()
-    with opened(plan(**wishes(tmp_path)), None, "x"):
+    with open_study(toy_plan(tmp_path), None, "x"):
         pass
     assert optuna.logging.get_verbosity() == before
 
 
 def test_importance_finds_what_matters(tmp_path):
-    with opened(plan(**wishes(tmp_path, trials=40, objective="GOSPA")), None, "x") as study:
+    with open_study(toy_plan(tmp_path, trials=40, objective="GOSPA"), None, "x") as study:
         assert set(study.importance().values()) == {0.0}
         while (asked := study.ask()) is not None:
             study.tell(asked, [asked.params["skip"]])
@@ -187,30 +186,30 @@ def test_importance_finds_what_matters(tmp_path):
 
 def test_settings_are_compared_when_they_are_stored(tmp_path, monkeypatch):
     """Of two commands with different settings that begin at once the later one is told so."""
-    mine, theirs = (plan(**wishes(tmp_path, objective=key)) for key in ("MOTA", "HOTA"))
+    mine, theirs = (toy_plan(tmp_path, objective=key) for key in ("MOTA", "HOTA"))
     others = []
 
     def meanwhile(param):
         if not others:
             others.append(1)
-            with opened(theirs, tmp_path / "j", "x"):
+            with open_study(theirs, tmp_path / "j", "x"):
                 pass
         return distribution(param)
 
     monkeypatch.setattr("tracking.tuning.study.distribution", meanwhile)
-    with pytest.raises(InputError, match="another search: objective differ"), opened(mine, tmp_path / "j", "x"):
+    with pytest.raises(InputError, match="another search: objective differ"), open_study(mine, tmp_path / "j", "x"):
         pass
 
 
 @pytest.mark.parametrize("what", ["sources", "numpy"])
 def test_a_study_is_of_one_version(tmp_path, monkeypatch, what):
-    made = plan(**wishes(tmp_path))
-    with opened(made, tmp_path / "j", "x") as study:
+    made = toy_plan(tmp_path)
+    with open_study(made, tmp_path / "j", "x") as study:
         study.tell(study.ask(), [0.1])
     other = {**runtime(), "cpu": "another"}
     monkeypatch.setattr("tracking.tuning.search_plan.runtime", lambda: other)
-    with opened(made, tmp_path / "j", "x") as study:
+    with open_study(made, tmp_path / "j", "x") as study:
         assert len(study.finished()) == 1, "what workers of a cluster may not differ in, going on may"
     other[what] = "another"
-    with pytest.raises(InputError, match="another search: versions differ"), opened(made, tmp_path / "j", "x"):
+    with pytest.raises(InputError, match="another search: versions differ"), open_study(made, tmp_path / "j", "x"):
         pass

@@ -5,11 +5,10 @@ from __future__ import annotations
 import pytest
 
 from scenarios.errors import InputError, WorkError
-from tests.tuning_toys import wishes
+from tests.tuning_toys import toy_plan
 from tracking.environment.episodes import Episode
-from tracking.tuning.search_plan import plan
-from tracking.tuning.study import opened
-from tracking.tuning.trials import search
+from tracking.tuning.study import open_study
+from tracking.tuning.trials import run_trials
 
 
 class Game:
@@ -31,11 +30,11 @@ class Game:
 
 
 def played(tmp_path, game=None, **more):
-    given = wishes(tmp_path, **{"seeds": range(12), "trials": 12, "only": ["skip"], **more})
+    made = toy_plan(tmp_path, **{"seeds": range(12), "trials": 12, "only": ["skip"], **more})
     told = []
-    with opened(plan(**given), None, "x") as study:
-        search(study, game or Game(), lambda *now: told.append(now))
-        return study.told(), told
+    with open_study(made, None, "x") as study:
+        run_trials(study, game or Game(), lambda *now: told.append(now))
+        return study.records(), told
 
 
 @pytest.mark.parametrize(("objective", "better"), [("HOTA", max), ("GOSPA", min)])
@@ -107,15 +106,15 @@ def test_progress_is_told(tmp_path):
 
 def test_errors_of_who_plays_say_nothing_of_the_parameters(tmp_path):
     """The search ends; going on plays the trial that was interrupted again, and finds what it would have found."""
-    made = plan(**wishes(tmp_path, seeds=range(12), trials=6, only=["skip"]))
-    with opened(made, tmp_path / "j", "x") as study, pytest.raises(WorkError, match="a worker that died"):
-        search(study, Game(dies=20), lambda *now: None)
-    with opened(made, tmp_path / "j", "x") as study:
+    made = toy_plan(tmp_path, seeds=range(12), trials=6, only=["skip"])
+    with open_study(made, tmp_path / "j", "x") as study, pytest.raises(WorkError, match="a worker that died"):
+        run_trials(study, Game(dies=20), lambda *now: None)
+    with open_study(made, tmp_path / "j", "x") as study:
         begun = study.trials()
         assert [t.state.name for t in begun][-1] == "RUNNING"
-        assert 0 < len(study.told()) < len(begun)
-        search(study, Game(), lambda *now: None)
-        found = study.told()
+        assert 0 < len(study.records()) < len(begun)
+        run_trials(study, Game(), lambda *now: None)
+        found = study.records()
     undisturbed, _ = played(tmp_path, trials=6)
     assert found == undisturbed
     assert not any(t.error for t in found)
@@ -123,18 +122,18 @@ def test_errors_of_who_plays_say_nothing_of_the_parameters(tmp_path):
 
 def test_a_trial_that_others_took_as_left_is_theirs(tmp_path):
     """Without a journal nobody knows who is at work: of two processes one may play what the other is at, too."""
-    made, url = plan(**wishes(tmp_path, seeds=range(12), trials=2, only=["skip"])), f"sqlite:///{tmp_path}/s.db"
+    made, url = toy_plan(tmp_path, seeds=range(12), trials=2, only=["skip"]), f"sqlite:///{tmp_path}/s.db"
 
     def interrupted(sources, values, every):
         for k, answer in enumerate(Game()(sources, values, every)):
             if k == 5 and not others:
-                with opened(made, url, "x") as other:
-                    others.append(other.ask(desperate=True))
-                    search(other, Game(), lambda *now: None)
+                with open_study(made, url, "x") as other:
+                    others.append(other.ask(retry_unfinished=True))
+                    run_trials(other, Game(), lambda *now: None)
             yield answer
 
     others = []
-    with opened(made, url, "x") as study:
-        search(study, interrupted, lambda *now: None)
-        assert len(study.told()) >= 2
-        assert not any(t.error for t in study.told())
+    with open_study(made, url, "x") as study:
+        run_trials(study, interrupted, lambda *now: None)
+        assert len(study.records()) >= 2
+        assert not any(t.error for t in study.records())

@@ -1,67 +1,84 @@
-"""`flockscope tune`: search a tracker's parameters on simulated scenes, and say what was gained on others."""
+"""The command `flockscope tune`: its options follow from tracking.tuning.options, and it prints what was gained."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import MISSING, Field, field, fields, make_dataclass
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any, Literal
 
-from sim.types import DetectionMode
+import typer
+
 from tracking.app import option_parsing
 from tracking.app.command_result import CommandResult
+from tracking.app.options_from_dataclass import options_from
 from tracking.app.progress import ProgressMeter
+from tracking.app.shared_options import Cluster, Detector, Set, Workers
+from tracking.tuning.options import TuneOptions
 
-NONE = "none"
-
-
-@dataclass(frozen=True)
-class Wishes:
-    """The options of the command, as they were written."""
-
-    tracker: str
-    suite: Sequence[str]
-    trials: int
-    out: Path
-    seeds: str | None = None
-    validation: str | None = None
-    test: str | None = None
-    check: str | None = None
-    objective: Sequence[str] = ()
-    detections: DetectionMode | None = None
-    settings: Sequence[str] = ()
-    only: str | None = None
-    sensor: Path | None = None
+SHARED = {"set": Set, "workers": Workers, "cluster": Cluster}
+"""Options that other commands have, too."""
+TYPES = {"tracker": str, "suite": list[str], "out": Path, "detections": Literal["image", "truth", "file"] | None}
+"""Types on the command line that do not follow from the default."""
+REQUIRED = ("out", "trials")
+"""Options that `tracking.tune` has defaults for and the command has not."""
+COMMA_SEPARATED = ("only",)
+SEEDS = ("seeds", "validation", "test")
+NO_CHECK = "none"
 
 
-def tune(wishes: Wishes, **search_options: Any) -> CommandResult:
-    """Search, judge, write; what was gained as text and data. search_options: as `tracking.tune` takes them."""
+def _command_field(option: Field[Any]) -> tuple[str, Any, Any]:
+    """Name, annotation and default of the option on the command line, for `make_dataclass`."""
+    default = MISSING if option.name in REQUIRED else option.default
+    text = default is None or default == "" or option.name in COMMA_SEPARATED
+    several = isinstance(default, tuple) and not text
+    if option.name in SHARED:
+        annotation = SHARED[option.name]
+    else:
+        kind: Any = str | None if text else list[str] if several else type(option.default)
+        parameter: Any = typer.Argument if option.name == "tracker" else typer.Option
+        flag = () if option.name == "tracker" else (f"--{option.name}",)
+        shown = parameter(*flag, metavar=option.metadata["metavar"], help=option.metadata["help"])
+        annotation = Annotated[TYPES.get(option.name, kind), shown]
+    if default is MISSING:
+        return option.name, annotation, field()
+    return option.name, annotation, field(default_factory=list) if several else field(default=None if text else default)
+
+
+def _command_fields() -> list[tuple[str, Any, Any]]:
+    """The fields of TuneOptions that the command line has, and `--sensor` after `--set`."""
+    found = [_command_field(option) for option in fields(TuneOptions) if option.name != "progress"]
+    after = [name for name, *_ in found].index("set") + 1
+    return [*found[:after], ("sensor", Detector, field(default=None)), *found[after:]]
+
+
+CommandLine: Any = make_dataclass("CommandLine", _command_fields(), frozen=True, kw_only=True)
+
+
+@options_from(CommandLine)
+def tune(options: Any) -> CommandResult:
+    """Search a tracker's parameters on simulated scenes; measure the gain on others."""
     from tracking.tuning import tune as search
 
-    found = option_parsing.settings(wishes.settings, "tracker", option_parsing.SUBJECTS)
-    texts = [*option_parsing.sensor_settings(wishes.sensor), *(f"{subject}.{text}" for subject, text in found)]
-    check = {None: "", NONE: None}.get(wishes.check, wishes.check)
-    only = tuple(word.strip() for word in (wishes.only or "").split(",") if word.strip())
-    with ProgressMeter("tune", wishes.trials) as meter:
-        result = search(
-            wishes.tracker, wishes.suite, wishes.trials, out=wishes.out, check=check, set=texts, only=only,
-            objective=wishes.objective, detections=wishes.detections, progress=meter.update,
-            seeds=_seeds("--seeds", wishes.seeds), validation=_seeds("--validation", wishes.validation),
-            test=_seeds("--test", wishes.test), **search_options,
-        )  # fmt: skip
+    given = {f.name: getattr(options, f.name) for f in fields(options)}
+    sensor = option_parsing.sensor_settings(given.pop("sensor"))
+    settings = option_parsing.settings(options.set, "tracker", option_parsing.SUBJECTS)
+    given["set"] = [*sensor, *(f"{subject}.{text}" for subject, text in settings)]
+    given["check"] = {None: "", NO_CHECK: None}.get(options.check, options.check)
+    for name in COMMA_SEPARATED:
+        given[name] = tuple(word.strip() for word in (given[name] or "").split(",") if word.strip())
+    for name in SEEDS:
+        given[name] = None if given[name] is None else option_parsing.seeds(given[name], f"--{name}")
+    with ProgressMeter("tune", options.trials) as meter:
+        result = search(**given, progress=meter.update)
     params = type(result.config).params()
     changed = [
-        f"{name}: {_shown(old)} → {_shown(new)} {params[name].unit}".rstrip()
+        f"{name}: {_short(old)} → {_short(new)} {params[name].unit}".rstrip()
         for name, (old, new) in result.changed.items()
     ]
-    told = "\n".join([*result.lines(), *changed, f"{wishes.out}, all figures and plots beside it"])
-    return CommandResult({**result.as_dict(), "file": wishes.out}, told)
+    text = "\n".join([*result.lines(), *changed, f"{options.out}, all figures and plots beside it"])
+    return CommandResult({**result.as_dict(), "file": options.out}, text)
 
 
-def _shown(value: Any) -> str:
-    """A value in four figures; the file has all."""
+def _short(value: Any) -> str:
+    """The value as text, a float with four digits; the file has all digits."""
     return f"{value:.4g}" if isinstance(value, float) else str(value)
-
-
-def _seeds(option: str, text: str | None) -> range | None:
-    return None if text is None else option_parsing.seeds(text, option)

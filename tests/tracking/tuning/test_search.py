@@ -15,20 +15,19 @@ import pytest
 from scenarios.errors import FlockscopeError, InputError
 from tests.loopback import loopback
 from tests.toy_tracker import Toy, ToyConfig
-from tests.tuning_toys import TOY, wishes, write_scenes
+from tests.tuning_toys import TOY, toy_plan, tune_arguments, write_scenes
 from tracking.tuning import tune
-from tracking.tuning.parallel_episodes import players
+from tracking.tuning.parallel_episodes import episode_player
 from tracking.tuning.sampler import AGAIN
-from tracking.tuning.search_plan import plan
-from tracking.tuning.study import DONE, opened
-from tracking.tuning.trials import search
+from tracking.tuning.study import FINISHED, open_study
+from tracking.tuning.trials import run_trials
 
 ROOT = Path(__file__).resolve().parents[3]
 KILLED_AT = """
 import os, signal, sys
 from pathlib import Path
 import tracking.tuning.parallel_episodes as work
-from tests.tuning_toys import wishes
+from tests.tuning_toys import toy_plan, tune_arguments
 from tracking.tuning import tune
 played, attempt = 0, work._attempt
 def counted(*given):
@@ -39,7 +38,7 @@ def counted(*given):
     return attempt(*given)
 work._attempt = counted
 folder = Path(sys.argv[1])
-tune(**wishes(folder), out=folder / sys.argv[3], storage=folder / "study.journal", study="toy")
+tune(**tune_arguments(folder), out=folder / sys.argv[3], storage=folder / "study.journal", study="toy")
 """
 
 
@@ -56,7 +55,7 @@ def contents(folder: Path) -> dict[str, bytes]:
 @pytest.fixture(scope="module")
 def found(tmp_path_factory):
     folder = tmp_path_factory.mktemp("found")
-    return tune(**wishes(folder), out=folder / "toy.toml"), folder
+    return tune(**tune_arguments(folder), out=folder / "toy.toml"), folder
 
 
 def test_it_finds_what_is_wrong(found):
@@ -123,26 +122,26 @@ def test_the_same_again_and_with_two_workers(found, tmp_path):
     for k, workers in enumerate((1, 2)):
         out = tmp_path / str(k)
         out.mkdir()
-        tune(**wishes(tmp_path, workers=workers), out=out / "toy.toml")
+        tune(**tune_arguments(tmp_path, workers=workers), out=out / "toy.toml")
         assert contents(out) == contents(found[1])
-    tune(**wishes(tmp_path)).write(tmp_path / "toy.toml")
+    tune(**tune_arguments(tmp_path)).write(tmp_path / "toy.toml")
     assert contents(tmp_path) == contents(found[1])
 
 
 def test_the_same_on_a_cluster(tmp_path):
     """Two workers elsewhere: the same bytes as here."""
     small = {"trials": 4, "check": None, "only": ["reach"]}
-    tune(**wishes(tmp_path, **small), out=tmp_path / "toy.toml")
+    tune(**tune_arguments(tmp_path, **small), out=tmp_path / "toy.toml")
     here = contents(tmp_path)
     for path in tmp_path.glob("toy.*"):
         path.unlink()
     with loopback(tmp_path) as cluster:
-        tune(**wishes(tmp_path, cluster=cluster.address, **small), out=tmp_path / "toy.toml")
+        tune(**tune_arguments(tmp_path, cluster=cluster.address, **small), out=tmp_path / "toy.toml")
     assert contents(tmp_path) == here
 
 
 def test_another_seed_searches_elsewhere(found, tmp_path):
-    other = tune(**wishes(tmp_path, seed=1, check=None, trials=4))
+    other = tune(**tune_arguments(tmp_path, seed=1, check=None, trials=4))
     assert [t.params for t in other.trials[1:]] != [t.params for t in found[0].trials[1:4]]
 
 
@@ -154,11 +153,11 @@ def test_killed_and_gone_on(found, tmp_path, at):
     with journal.open("ab") as file:
         file.write(b'{"op_code":5,"worker')
     assert not (tmp_path / "toy.toml").exists()
-    tune(**wishes(tmp_path), out=tmp_path / "toy.toml", storage=journal, study="toy")
+    tune(**tune_arguments(tmp_path), out=tmp_path / "toy.toml", storage=journal, study="toy")
     assert contents(tmp_path) == contents(found[1])
-    with opened(plan(**wishes(tmp_path)), journal, "toy") as study:
+    with open_study(toy_plan(tmp_path), journal, "toy") as study:
         assert len(study.finished()) == 12
-        left = [t for t in study.trials() if t.state not in DONE]
+        left = [t for t in study.trials() if t.state not in FINISHED]
         assert len(left) == 1
         assert [t.user_attrs[AGAIN] for t in study.trials() if AGAIN in t.user_attrs] == [left[0].number]
 
@@ -166,7 +165,7 @@ def test_killed_and_gone_on(found, tmp_path, at):
 def test_more_trials_go_on_where_it_ended(found):
     folder = found[1]
     journal = (folder / "toy.journal").read_bytes()
-    more = tune(**wishes(folder, trials=14, check=None), storage=folder / "toy.journal", study="toy")
+    more = tune(**tune_arguments(folder, trials=14, check=None), storage=folder / "toy.journal", study="toy")
     assert len(more.trials) == 14
     assert more.trials[:12] == found[0].trials
     (folder / "toy.journal").write_bytes(journal)
@@ -174,27 +173,30 @@ def test_more_trials_go_on_where_it_ended(found):
 
 def test_two_processes_share_a_journal(tmp_path):
     """The other one does all that this one is not at, and waits for it."""
-    made = plan(**wishes(tmp_path))
-    with opened(made, tmp_path / "study.journal", "toy") as study, players(made.subject, made.detections) as play:
+    made = toy_plan(tmp_path)
+    with (
+        open_study(made, tmp_path / "study.journal", "toy") as study,
+        episode_player(made.tracker, made.detections) as play,
+    ):
         mine = study.ask()
         assert mine is not None
         other = in_another_process(tmp_path, -1)
-        while len(study.finished()) < made.trials - 1:
+        while len(study.finished()) < made.options.trials - 1:
             assert other.poll() is None
         study.tell(mine, [0.0])
-        search(study, play, lambda done, total, what: None)
+        run_trials(study, play, lambda done, total, what: None)
         assert other.wait(120) == 0
         numbers = [t.number for t in study.finished()]
-    assert numbers == list(range(made.trials))
+    assert numbers == list(range(made.options.trials))
     assert (tmp_path / "toy.toml").is_file()
 
 
 def test_a_trial_of_another_process_is_not_taken_away(tmp_path):
     """Nor by a third one, which asks while it is played."""
-    made = plan(**wishes(tmp_path, trials=2, only=["reach"]))
-    with opened(made, tmp_path / "study.journal", "toy") as study:
+    made = toy_plan(tmp_path, trials=2, only=["reach"])
+    with open_study(made, tmp_path / "study.journal", "toy") as study:
         assert study.ask() is not None
-        script = KILLED_AT.replace("tune(**wishes(folder), out", "tune(**wishes(folder, trials=2, only=['reach']), out")
+        script = KILLED_AT.replace("tune_arguments(folder)", "tune_arguments(folder, trials=2, only=['reach'])")
         line = [sys.executable, "-c", script, str(tmp_path), "3", "toy.toml"]
         assert subprocess.run(line, cwd=ROOT, check=False).returncode == -signal.SIGKILL
         states = [t.state.name for t in study.trials()]
@@ -203,10 +205,10 @@ def test_a_trial_of_another_process_is_not_taken_away(tmp_path):
 
 def test_a_study_in_a_database_goes_on_too(tmp_path):
     """Who is at work cannot be known there: what was begun is done again when nothing else is left."""
-    made, url = plan(**wishes(tmp_path, trials=3)), f"sqlite:///{tmp_path / 'studies.db'}"
-    with opened(made, url, "toy") as study:
+    made, url = toy_plan(tmp_path, trials=3), f"sqlite:///{tmp_path / 'studies.db'}"
+    with open_study(made, url, "toy") as study:
         assert study.ask() is not None
-    found = tune(**wishes(tmp_path, trials=3), storage=url, study="toy")
+    found = tune(**tune_arguments(tmp_path, trials=3), storage=url, study="toy")
     assert len(found.trials) == 3
     assert any(t.params == made.defaults for t in found.trials)
 
@@ -225,14 +227,14 @@ def test_a_study_in_a_database_goes_on_too(tmp_path):
 def test_a_study_about_something_else_is_refused(found, change, word):
     folder = found[1]
     with pytest.raises(InputError, match=f"{word}.* differ") as caught:
-        tune(**wishes(folder, **change), storage=folder / "toy.journal", study="toy")
+        tune(**tune_arguments(folder, **change), storage=folder / "toy.journal", study="toy")
     assert "\n" not in str(caught.value)
 
 
 def test_another_version_of_a_tracker_is_another_search(tmp_path):
     code = Path(TOY.rpartition(":")[0]).read_text()
     (tmp_path / "mine.py").write_text(code)
-    given = wishes(tmp_path, tracker=f"{tmp_path / 'mine.py'}:Toy", trials=1, check=None)
+    given = tune_arguments(tmp_path, tracker=f"{tmp_path / 'mine.py'}:Toy", trials=1, check=None)
     tune(**given, out=tmp_path / "toy.toml")
     (tmp_path / "mine.py").write_text(code + "# another\n")
     with pytest.raises(InputError, match="code differ"):
@@ -241,7 +243,7 @@ def test_another_version_of_a_tracker_is_another_search(tmp_path):
 
 def test_several_goals_give_a_front(tmp_path):
     """Accuracy against the number of people left out, which is 1 - recall: no one is best in both."""
-    given = wishes(tmp_path, objective=("DetRe", "DetPr"), trials=8)
+    given = tune_arguments(tmp_path, objective=("DetRe", "DetPr"), trials=8)
     found = tune(**given, out=tmp_path / "toy.toml")
     assert found.front
     assert found.pruned == 0
@@ -258,21 +260,21 @@ def test_several_goals_give_a_front(tmp_path):
 
 
 def test_speed_is_a_goal(tmp_path):
-    found = tune(**wishes(tmp_path, objective=("HOTA", "frames/s"), trials=3, check=None))
+    found = tune(**tune_arguments(tmp_path, objective=("HOTA", "frames/s"), trials=3, check=None))
     assert all(t.values[1] > 1 for t in found.trials if not t.error)
     assert {c.key for c in found.comparisons} >= {"HOTA", "frames/s"} or not found.changed
 
 
 def test_a_class_and_its_own_parameters(tmp_path):
-    found = tune(**wishes(tmp_path, tracker=Toy, trials=3, check=None, only=["reach"], set=["skip=1"]))
+    found = tune(**tune_arguments(tmp_path, tracker=Toy, trials=3, check=None, only=["reach"], set=["skip=1"]))
     assert set(found.trials[0].params) == {"reach"}
     assert found.config.skip == found.default.skip == 1
     with pytest.raises(InputError, match="a name that workers can look up"):
-        tune(**wishes(tmp_path, tracker=Toy, workers=2))
+        tune(**tune_arguments(tmp_path, tracker=Toy, workers=2))
 
 
 def test_where_nothing_is_better_the_defaults_stay(tmp_path):
-    found = tune(**wishes(tmp_path, only=["colour"], trials=3))
+    found = tune(**tune_arguments(tmp_path, only=["colour"], trials=3))
     assert found.config == found.default
     assert found.comparisons == ()
     assert "the defaults stay" in str(found)
@@ -281,9 +283,9 @@ def test_where_nothing_is_better_the_defaults_stay(tmp_path):
 def test_long_settings_are_told_short_and_stored_whole(tmp_path):
     long = "sensor.by_visibility=[0.1, 0.2, 0.3, 0.4, 0.5, 0.6]"
     many = ["sensor.detect_prob=0.9", "sensor.noise_m=0.1", "sensor.noise_px=2.0", "sensor.persistence=0.1", long]
-    profile = str(tune(**wishes(tmp_path, trials=1, set=["scenario.duration=2", *many])))
+    profile = str(tune(**tune_arguments(tmp_path, trials=1, set=["scenario.duration=2", *many])))
     assert "\nscenes with a detector of 5 settings, duration=2\n" in profile
-    given = wishes(tmp_path, trials=1, set=[long, "scenario.duration=2"], out=tmp_path / "found.toml")
+    given = tune_arguments(tmp_path, trials=1, set=[long, "scenario.duration=2"], out=tmp_path / "found.toml")
     (told,) = (line for line in str(tune(**given)).splitlines() if line.startswith("scenes with"))
     assert "duration=2" in told
     assert "sensor.by_visibility=[" in told
@@ -297,25 +299,25 @@ def test_an_error_of_the_defaults_is_raised(tmp_path):
         Path(TOY.rpartition(":")[0]).read_text().replace("pos = detections", "pos = nothing + detections")
     )
     with pytest.raises(FlockscopeError, match="nothing"):
-        tune(**wishes(tmp_path, tracker=f"{broken}:Toy"))
+        tune(**tune_arguments(tmp_path, tracker=f"{broken}:Toy"))
 
 
 def test_without_optuna_one_line_says_what_to_install(tmp_path, monkeypatch):
     monkeypatch.setitem(sys.modules, "optuna", None)
     with pytest.raises(InputError, match=r'pip install "flockscope\[tune\]"') as caught:
-        tune(**wishes(tmp_path))
+        tune(**tune_arguments(tmp_path))
     assert "\n" not in str(caught.value)
 
 
 @pytest.mark.parametrize("name", ["toy.json", "toy"])
 def test_out_is_a_toml_file(tmp_path, name):
     with pytest.raises(InputError, match=r"\.toml"):
-        tune(**wishes(tmp_path), out=tmp_path / name)
+        tune(**tune_arguments(tmp_path), out=tmp_path / name)
     write_scenes(tmp_path)
 
 
 def test_a_storage_that_is_none(tmp_path):
     for url in ("nonsense://x", f"sqlite:////proc/{tmp_path.name}/x.db"):
         with pytest.raises(InputError, match="--storage") as caught:
-            tune(**wishes(tmp_path), storage=url)
+            tune(**tune_arguments(tmp_path), storage=url)
         assert "\n" not in str(caught.value)

@@ -1,0 +1,110 @@
+"""Finished trials, the candidates among them, and paired comparisons of their scores with those of the defaults."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from tracking.config import Config
+from tracking.environment.episodes import Episode
+from tracking.stats import paired
+from tracking.tuning.goals import Goal
+
+
+@dataclass(frozen=True)
+class TrialRecord:
+    """A finished trial, for plots and tables.
+
+    number: its place in the search, 0 for the defaults; values: one per goal, an estimate if the trial was pruned,
+    empty if its parameters are impossible; episodes: training episodes played; error: why its parameters are
+    impossible, "" if they are possible.
+    """
+
+    number: int
+    values: tuple[float, ...]
+    params: dict[str, Any]
+    episodes: int
+    pruned: bool = False
+    error: str = ""
+
+
+@dataclass(frozen=True)
+class Comparison:
+    """One score of the defaults and of a tuned config on the same sequences.
+
+    scenes: the name of the suite; higher: True if greater values are better; before, after: means of the defaults and
+    of the config over the sequences where both have the score; difference: mean of after - before; low, high: its 95 %
+    interval; sequences: how many there are.
+    """
+
+    scenes: str
+    key: str
+    higher: bool
+    before: float
+    after: float
+    difference: float
+    low: float
+    high: float
+    sequences: int
+
+    @property
+    def verdict(self) -> str:
+        """ "better", "worse", or "no sure difference" if the interval contains 0 or is not known."""
+        if not (self.low > 0 or self.high < 0):
+            return "no sure difference"
+        return "better" if (self.difference > 0) == self.higher else "worse"
+
+    def line(self) -> str:
+        """Returns the comparison as one line of text."""
+        ends = f"[{self.low:+.4f}, {self.high:+.4f}]"
+        change = f"{self.before:.4f} → {self.after:.4f}, {self.difference:+.4f} {ends}"
+        return f"{self.scenes}: {self.key} {change}, {self.sequences} sequences: {self.verdict}"
+
+
+@dataclass(frozen=True)
+class Candidate:
+    """A config that was good in training.
+
+    trial: number of its trial; training, validation: its values by goal on the training and validation scenes, empty
+    if not played; gain: its first goal compared with that of the defaults on the validation scenes.
+    """
+
+    trial: int
+    config: Config
+    training: tuple[float, ...]
+    validation: tuple[float, ...] = ()
+    gain: Comparison | None = None
+
+
+def compare_episodes(scenes: str, goal: Goal, before: Sequence[Episode], after: Sequence[Episode]) -> Comparison | None:
+    """Returns the paired comparison of a goal on the same sequences in the same order.
+
+    Sequences where either side lacks the score are left out; None if that leaves no sequence.
+    """
+    a, b = (np.array([goal.of(e) for e in episodes]) for episodes in (before, after))
+    known = np.isfinite(a) & np.isfinite(b)
+    if not known.any():
+        return None
+    a, b = a[known][:, None], b[known][:, None]
+    difference, low, high = (float(end[0]) for end in paired(a, b))
+    return Comparison(
+        scenes, goal.key, goal.higher, float(a.mean()), float(b.mean()), difference, low, high, int(known.sum())
+    )
+
+
+def pareto_front(candidates: Sequence[Candidate], goals: Sequence[Goal]) -> list[Candidate]:
+    """Returns the candidates that no other candidate dominates on the validation scenes, best first goal first.
+
+    A candidate dominates another if it is no worse in any goal and better in one. Of candidates with equal values the
+    first stays.
+    """
+
+    def dominates(one: Candidate, other: Candidate) -> bool:
+        gains = [g.gain(b, a) for g, a, b in zip(goals, one.validation, other.validation, strict=True)]
+        return min(gains) >= 0 and max(gains) > 0
+
+    kept = {c.validation: c for c in reversed(candidates) if not any(dominates(other, c) for other in candidates)}
+    return sorted(kept.values(), key=lambda c: goals[0].gain(c.validation[0], 0.0))

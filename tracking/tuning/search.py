@@ -1,0 +1,148 @@
+"""The whole search of `tracking.tune`: plan, trials on training scenes, choice on validation scenes, test, files.
+
+    found = tracking.tune("blob", "crossing", trials=100)
+    print(found)                       # the gain on test scenes, and on a suite that was not tuned on
+    found.write("blob.toml")
+    tracks = tracking.track("blob", sequence, params=found.config)
+
+docs/tuning.md describes the method and what may be concluded from its results.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import partial
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from scenarios.errors import InputError
+from sim.types import Tracker
+from tracking.keyword_options import documented, from_keywords
+from tracking.tuning.comparison import Candidate, TrialRecord, pareto_front
+from tracking.tuning.goals import Goal
+from tracking.tuning.held_out_evaluation import HeldOutEvaluator, stored_in_study
+from tracking.tuning.options import Scenes, TuneOptions
+from tracking.tuning.parallel_episodes import PlayEpisodes, episode_player
+from tracking.tuning.result import TuningResult
+from tracking.tuning.search_plan import SearchPlan, search_plan
+
+if TYPE_CHECKING:
+    from tracking.tuning.study import SearchStudy
+
+JOURNAL = ".journal"
+"""Suffix of the journal beside `--out`."""
+
+
+@documented(TuneOptions, positional=3)
+def tune(tracker: str | type[Tracker], suite: Scenes, trials: int = TuneOptions.trials, **options: Any) -> TuningResult:
+    """Returns the parameters that a search found on simulated scenes, and what they gain on other scenes.
+
+    The tracker plays whole episodes. The same call resumes a search that was interrupted, if `out` or `storage` is
+    given. A class as tracker needs workers=1. Raises InputError before anything is played if an option is unknown or
+    wrong, if options contradict each other, if a study in the storage is about another search, and if Optuna is not
+    installed. Errors that the tracker raises with the default parameters are raised.
+    """
+    given = {"tracker": tracker, "suite": suite, "trials": trials, **options}
+    return _search(from_keywords(TuneOptions, "tracking.tune", given))
+
+
+def _search(options: TuneOptions) -> TuningResult:
+    _check_optuna()
+    from tracking.tuning.study import open_study
+    from tracking.tuning.trials import run_trials
+
+    plan = search_plan(options)
+    progress = options.progress or (lambda finished, trials, text: None)
+    target = None if options.out is None else _checked_target(Path(options.out))
+    storage = options.storage if options.storage is not None or target is None else target.with_suffix(JOURNAL)
+    name = options.study or (target.stem if target is not None else "flockscope")
+    with (
+        open_study(plan, storage, name) as study,
+        episode_player(plan.tracker, plan.detections, options.workers, options.cluster) as play,
+    ):
+        run_trials(study, play, progress)
+        report = partial(progress, options.trials, options.trials)
+        found = _evaluated(plan, study, stored_in_study(study, play), report)
+    if target is not None:
+        found.write(target)
+    return found
+
+
+def _check_optuna() -> None:
+    """InputError if the search library is not installed."""
+    try:
+        import optuna  # noqa: F401
+    except ImportError:
+        remedy = 'install the extra: pip install "flockscope[tune]"'
+        raise InputError(place="tune", got="no optuna", expected="the package optuna", remedy=remedy) from None
+
+
+def _checked_target(out: Path) -> Path:
+    """The file for the result; InputError if its name does not end in .toml or it is a folder."""
+    if out.suffix != ".toml" or out.is_dir():
+        remedy = "choose a name that ends in .toml"
+        raise InputError(file=out, place="--out", got=out.name, expected="a file, *.toml", remedy=remedy)
+    return out
+
+
+def _evaluated(plan: SearchPlan, study: SearchStudy, play: PlayEpisodes, report: Callable[[str], None]) -> TuningResult:
+    """The winner of a finished study: chosen and simplified on validation scenes, then compared on test scenes."""
+    evaluator = HeldOutEvaluator(plan, play, report)
+    candidates = evaluator.validated(_candidates(plan, study))
+    importance = study.importance()
+    default, several, goal = candidates[0], len(plan.goals) > 1, plan.goals[0]
+    front = pareto_front(candidates, plan.goals) if several else []
+    better = [c for c in candidates if c.gain is not None and c.gain.verdict == "better"]
+    best = front[0] if several else max([default, *better], key=lambda c: goal.gain(0.0, c.validation[0]))
+    config, values = best.config, best.validation
+    if not several and best is not default:
+        least_first = sorted(importance, key=lambda name: importance[name])
+        config, value = evaluator.simplified(best.config, best.validation[0], least_first)
+        values = (value,)
+    old, best_values, new = plan.base.as_dict(), best.config.as_dict(), config.as_dict()
+    taken_back = [name for name in best_values if best_values[name] != old[name] and new[name] == old[name]]
+    comparisons, notes = evaluator.compared(config) if config != plan.base else ([], _why_defaults(candidates, goal))
+    return TuningResult(
+        plan, config, tuple(front), tuple(candidates), tuple(study.records()), importance, tuple(comparisons),
+        tuple(taken_back), (default.validation, values), tuple(notes), study.optuna.study_name,
+    )  # fmt: skip
+
+
+def _why_defaults(candidates: list[Candidate], goal: Goal) -> list[str]:
+    """One line that says why the defaults are the result."""
+    gains = [c.gain for c in candidates[1:] if c.gain is not None]
+    if not gains:
+        return ["the defaults stay: no trial was better in training"]
+    best = max(gains, key=lambda c: goal.gain(c.before, c.after))
+    if best.sequences < 2:
+        return ["the defaults stay: one validation scene says nothing of others; give more --validation seeds"]
+    ends = f"{best.difference:+.4f} [{best.low:+.4f}, {best.high:+.4f}], {best.sequences} sequences"
+    return [f"the defaults stay: nothing is surely better on the validation scenes; at best {goal.key} {ends}"]
+
+
+def _candidates(plan: SearchPlan, study: SearchStudy) -> list[Candidate]:
+    """The defaults, and the best unpruned trials in training; no config twice.
+
+    With several goals the trials come from the Pareto front of training, spread over it.
+    """
+    played = [t for t in study.records() if not t.pruned and not t.error]
+    defaults, goal = next(t for t in played if t.params == plan.defaults), plan.goals[0]
+    if len(plan.goals) > 1:
+        best = study.best()
+        played = [t for t in played if t.number in best]
+    finalists = plan.options.finalists
+    ranked = sorted(played, key=lambda t: goal.gain(t.values[0], 0.0))
+    ranked = _spread(ranked, finalists) if len(plan.goals) > 1 else ranked
+    found = [Candidate(defaults.number, plan.base, defaults.values)]
+    for trial in ranked:
+        config = plan.config(trial.params)
+        if len(found) <= finalists and config not in [c.config for c in found]:
+            found.append(Candidate(trial.number, config, trial.values))
+    return found
+
+
+def _spread(ranked: list[TrialRecord], count: int) -> list[TrialRecord]:
+    """`count` of the trials at even distances from the first to the last; all if there are no more than `count`."""
+    if len(ranked) <= count:
+        return ranked
+    return [ranked[round(k * (len(ranked) - 1) / max(count - 1, 1))] for k in range(count)]
