@@ -195,7 +195,9 @@ class OverlayOptions:
     ]
     truth: Annotated[
         Literal["beside", "over", "only"] | None,
-        typer.Option(help="Draw the truth too: beside the tracks, over the same picture, or only the truth."),
+        typer.Option(
+            help="Draw the truth: beside the tracks, over the same picture, or only it. Without TRACKS always only it."
+        ),
     ] = None
     fps: Fps = None
     px_per_m: Scale = None
@@ -209,7 +211,10 @@ class WebdatasetOptions:
     folder: Annotated[Path, typer.Argument(metavar="DIR", help="A generated sequence or dataset.")]
     out: Out
     shard_size: Annotated[
-        str, typer.Option("--shard-size", metavar="SIZE", help="Largest size of a shard, as 500MB or 2GB.")
+        str,
+        typer.Option(
+            "--shard-size", metavar="SIZE", help="Largest shard, as 500MB or 2GB; a larger sequence has its own."
+        ),
     ] = "1GB"
     samples: Annotated[
         Literal["sequence", "frame"], typer.Option(help="A sample: a sequence with all its files, or a labelled frame.")

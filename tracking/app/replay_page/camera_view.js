@@ -1,24 +1,24 @@
-// The world as the camera sees it: places as px, the ground's lines, walls and pillars.
+// Projects the world into the image: points, the ground's grid, walls and pillars.
 
-// World to image as sim.scene.camera has it; null behind the camera.
+// The px of a point in the world, as sim.scene.camera computes them; null if the camera cannot see it.
 function project(x, y, z) {
   const { kind, f, c, C, R, scale, k } = data.camera;
   const p = [x - C[0], y - C[1], z - C[2]];
   const [a, b, d] = R.map(r => r[0] * p[0] + r[1] * p[1] + r[2] * p[2]);
   if (kind === "top") return [a * scale + c[0], b * scale + c[1]];
   if (d < 0.05) return null;
-  const bend = bent(Math.hypot(a, b) / d, k);
+  const bend = distortion(Math.hypot(a, b) / d, k);
   return Number.isNaN(bend) ? null : [(bend * f[0] * a) / d + c[0], (bend * f[1] * b) / d + c[1]];
 }
 
-// By how much a lens of radial distortion k draws in what an ideal one shows at distance q (sim.scene.lens).
-function bent(q, k) {
+// The factor by which a lens of radial distortion k moves a point at distance q of an ideal image (sim.scene.lens).
+function distortion(q, k) {
   if (!k || !q) return 1;
   const root = Math.sqrt(3 * Math.abs(k)), arc = 1.5 * q * root;
   return ((k > 0 ? Math.sinh(Math.asinh(arc) / 3) : Math.sin(Math.asin(arc) / 3)) * 2) / (root * q);
 }
 
-// The ground's height, as sim.scene.terrain has it: 0 but for stairs.
+// The height of the ground in m, as sim.scene.terrain computes it: 0 except on stairs.
 function heightAt(x, y) {
   let height = 0;
   for (const [fx, fy, hx, hy, width, rise, n, landing] of (data.scene || { stairs: [] }).stairs) {
@@ -41,7 +41,7 @@ function worldLine(ctx, scale, from, to) {
   }
 }
 
-function groundLines({ ctx, scale }) {
+function drawGround({ ctx, scale }) {
   const [x0, y0, x1, y1] = data.scene ? [0, 0, ...data.scene.size] : data.bounds || [0, 0, 0, 0];
   const step = x1 - x0 > 40 ? 5 : 1;
   ctx.strokeStyle = theme.grid;
@@ -64,6 +64,6 @@ function groundLines({ ctx, scale }) {
 function fillWorld(ctx, scale, corners) {
   const points = corners.map(p => project(...p)).filter(Boolean).map(p => p.map(v => v * scale));
   if (points.length < corners.length) return;
-  polygonPath(ctx, convex(points));
+  polygonPath(ctx, convexHull(points));
   ctx.fill();
 }

@@ -1,9 +1,9 @@
-// Decodes the embedded columns (person_rows.py) into typed arrays, and finds the rows of a frame.
+// Decodes the page's data (page_data.py, person_rows.py) into typed arrays, and finds the rows of a frame.
 
 const NIL = -99999;
 const data = JSON.parse(document.getElementById("data").textContent);
 
-function sums(deltas, scale) {
+function decodeSums(deltas, scale) {
   const out = new Float32Array(deltas.length);
   let total = 0;
   for (let k = 0; k < deltas.length; k++) {
@@ -13,7 +13,7 @@ function sums(deltas, scale) {
   return out;
 }
 
-function runs(pairs, n) {
+function decodeRuns(pairs, n) {
   const out = new Int32Array(n);
   for (let k = 0, at = 0; k < pairs.length; k += 2) {
     out.fill(pairs[k], at, at + pairs[k + 1]);
@@ -22,7 +22,7 @@ function runs(pairs, n) {
   return out;
 }
 
-// Rows in order of frames: rows of frame f are order[offset[f]] … order[offset[f + 1] - 1].
+// A function from a frame to the indices of its rows. Rows of frame f are order[offset[f]] … order[offset[f + 1] - 1].
 function byFrame(frame, length) {
   const offset = new Int32Array(length + 3), order = new Int32Array(frame.length);
   for (const f of frame) offset[f + 1]++;
@@ -45,38 +45,39 @@ function decodeSide(raw, name) {
       first[row] = begin;
     }
   }
-  const box = raw.box.length ? raw.box.map(column => sums(column, 2)) : null;
+  const box = raw.box.length ? raw.box.map(column => decodeSums(column, 2)) : null;
   const events = raw.events.map(([kind, start, end, emitted, before, after, members, pos]) =>
     ({ kind, start, end, emitted, before, after, members, pos, side: name }));
   return {
     name, n, id, frame, first, box, events,
     plane: raw.plane,
-    x: sums(raw.x, raw.scale),
-    y: sums(raw.y, raw.scale),
-    angle: sums(raw.a, 180 / Math.PI),
-    group: runs(raw.group, n),
-    visible: runs(raw.vis, n),
-    wholes: decodeWholes(raw),
+    x: decodeSums(raw.x, raw.scale),
+    y: decodeSums(raw.y, raw.scale),
+    angle: decodeSums(raw.a, 180 / Math.PI),
+    group: decodeRuns(raw.group, n),
+    visible: decodeRuns(raw.vis, n),
+    groupRows: decodeGroupRows(raw),
     bars: raw.bars.map(([id, start, end, lane, size]) => ({ id, start, end, lane, size })),
     links: raw.links.map(([frame, a, b]) => ({ frame, a, b })),
     rows: byFrame(frame, data.length),
   };
 }
 
-// More of each row where the rows are groups: size, speed, ellipse (two standard deviations, direction), hull; or null.
-function decodeWholes({ wholes, plane, scale }) {
+// For rows that are groups: size, speed, ellipse (long and short standard deviation, direction) and hull of each row.
+// null if the rows are people.
+function decodeGroupRows({ wholes, plane, scale }) {
   if (!wholes) return null;
   const [long, wide, turn] = wholes.ellipse;
   return {
-    size: sums(wholes.size, 10),
-    speed: sums(wholes.speed, plane === "image" ? 1 : 10),
-    long: sums(long, scale), wide: sums(wide, scale), turn: sums(turn, 180 / Math.PI),
-    hull: wholes.hull.map(steps => corners(steps, scale)),
+    size: decodeSums(wholes.size, 10),
+    speed: decodeSums(wholes.speed, plane === "image" ? 1 : 10),
+    long: decodeSums(long, scale), wide: decodeSums(wide, scale), turn: decodeSums(turn, 180 / Math.PI),
+    hull: wholes.hull.map(steps => decodeCorners(steps, scale)),
   };
 }
 
-// The first corner and the steps to the others as [[x, y], …].
-function corners(steps, scale) {
+// The first corner and the steps to each next corner as [[x, y], …].
+function decodeCorners(steps, scale) {
   const list = [];
   for (let k = 0, x = 0, y = 0; k < steps.length; k += 2) {
     x += steps[k];
@@ -94,11 +95,11 @@ function decodeDetections(raw) {
     frame.fill(index, row, row + count);
     row += count;
   }
-  const box = raw.box.length ? raw.box.map(column => sums(column, 1)) : null;
-  return { plane: raw.plane, x: sums(raw.x, raw.scale), y: sums(raw.y, raw.scale), box, rows: byFrame(frame, data.length) };
+  const box = raw.box.length ? raw.box.map(column => decodeSums(column, 1)) : null;
+  return { plane: raw.plane, x: decodeSums(raw.x, raw.scale), y: decodeSums(raw.y, raw.scale), box, rows: byFrame(frame, data.length) };
 }
 
-// Groups of a frame: id → rows of its members, those with two or more people (any, where a row is a whole group).
+// The groups of a frame as id → rows of its members. Groups of one person are left out; rows that are groups are kept.
 function groupsAt(side, frame) {
   const groups = new Map();
   for (const row of side.rows(frame)) {
@@ -106,7 +107,7 @@ function groupsAt(side, frame) {
     if (!groups.has(side.group[row])) groups.set(side.group[row], []);
     groups.get(side.group[row]).push(row);
   }
-  if (!side.wholes) for (const [id, rows] of groups) if (rows.length < 2) groups.delete(id);
+  if (!side.groupRows) for (const [id, rows] of groups) if (rows.length < 2) groups.delete(id);
   return groups;
 }
 

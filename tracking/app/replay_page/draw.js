@@ -1,7 +1,7 @@
-// Colours, shapes and text that both pictures share.
+// Colours, shapes and labels that plan and image share.
 
 const darkQuery = matchMedia("(prefers-color-scheme: dark)");
-// Apart from each other for colour-blind eyes; the two rows keep a contrast of 3 : 1 or more on their grounds.
+// Colour-blind readers can tell them apart; their contrast to the background is 3 : 1 or more.
 const COLOURS = {
   light: ["#0072b2", "#b84a00", "#00805e", "#a33a7a", "#6a51a3", "#8a6d00", "#b2182b", "#20708c", "#4d7c0f", "#7a4a2a"],
   dark: ["#56b4e9", "#f0963c", "#2fc79a", "#e58fc0", "#b3a1f0", "#e0c341", "#ff7b72", "#7fd4e8", "#a3d15c", "#d6a07a"],
@@ -26,8 +26,8 @@ function rowColour(side, row, by) {
   return colourOf(by === "group" ? side.group[row] : side.id[row]);
 }
 
-// Convex hull of [x, y] points, in the turning sense that canvas arcs take as increasing angle.
-function convex(points) {
+// Convex hull of [x, y] points, in the order that canvas arcs take as increasing angle.
+function convexHull(points) {
   const sorted = points.slice().sort((a, b) => a[0] - b[0] || a[1] - b[1]);
   if (sorted.length < 3) return sorted;
   const half = list => {
@@ -46,9 +46,9 @@ function turn(a, b, c) {
   return (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0]);
 }
 
-// The hull of discs of radius r around the points, as a path.
+// Makes the hull of discs of radius r round the points the current path.
 function roundedPath(ctx, points, r) {
-  const hull = convex(points), n = hull.length;
+  const hull = convexHull(points), n = hull.length;
   ctx.beginPath();
   if (n < 2) {
     if (n) ctx.arc(hull[0][0], hull[0][1], r, 0, 2 * Math.PI);
@@ -90,14 +90,15 @@ function label(ctx, text, x, y, colour, bold, slanted) {
   ctx.fillText(text, x, y);
 }
 
-// A name at whichever of some places (middles, the best first) covers the least of what is `taken` (boxes).
-function name(ctx, taken, text, spots, colour, slanted, bold) {
+// Writes a label at one of several centres, the preferred first: the one that covers least of the boxes in `taken`.
+// spots: takes the label's half width and half height and returns the centres.
+function placeLabel(ctx, taken, text, spots, colour, slanted, bold) {
   ctx.font = font(bold, slanted);
   const half = [ctx.measureText(text).width / 2 + 1, bold ? 7 : 6];
   let best = null, least = Infinity;
   for (const [x, y] of spots(half)) {
     const box = [x - half[0], y - half[1], x + half[0], y + half[1]];
-    const covered = taken.reduce((sum, other) => sum + shared(box, other), 0);
+    const covered = taken.reduce((sum, other) => sum + overlapArea(box, other), 0);
     if (covered < least) [best, least] = [box, covered];
     if (!least) break;
   }
@@ -105,34 +106,34 @@ function name(ctx, taken, text, spots, colour, slanted, bold) {
   label(ctx, text, best[0] + half[0], best[3] - 2, colour, bold, slanted);
 }
 
-function shared(a, b) {
+function overlapArea(a, b) {
   return Math.max(Math.min(a[2], b[2]) - Math.max(a[0], b[0]), 0) * Math.max(Math.min(a[3], b[3]) - Math.max(a[1], b[1]), 0);
 }
 
-// Fills and outlines the current path as the region of a group; what is tracked is dashed, what is true is not.
-function region(ctx, colour, tracked, rimmed) {
+// Fills and outlines the current path as the region of a group: dashed if tracked, solid if true.
+function drawRegion(ctx, colour, tracked, rimmed) {
   ctx.globalAlpha = tracked ? 0.06 : 0.14;
   ctx.fillStyle = colour;
   ctx.fill();
   ctx.globalAlpha = 1;
   ctx.setLineDash(tracked ? [7, 5] : []);
   ctx.lineWidth = tracked ? 2.2 : 1.6;
-  if (rimmed) rimPath(ctx);
+  if (rimmed) strokeRim(ctx);
   ctx.strokeStyle = colour;
   ctx.stroke();
   ctx.setLineDash([]);
 }
 
-// A light edge under the current path, for colours on pictures.
-function rimPath(ctx) {
+// Strokes a light edge under the current path, so that colours stand out on pictures.
+function strokeRim(ctx) {
   ctx.strokeStyle = theme.halo;
   ctx.lineWidth += 2;
   ctx.stroke();
   ctx.lineWidth -= 2;
 }
 
-// Sizes the canvas to its place on the page and gives a context in CSS px.
-function prepare(canvas, aspect) {
+// Sizes the canvas to its place on the page; returns its context, width and height in CSS px.
+function prepareCanvas(canvas, aspect) {
   const width = canvas.clientWidth, height = Math.max(Math.round(width * aspect), 60), dpr = devicePixelRatio || 1;
   if (canvas.width !== Math.round(width * dpr) || canvas.height !== Math.round(height * dpr)) {
     canvas.style.height = `${height}px`;
@@ -145,8 +146,8 @@ function prepare(canvas, aspect) {
   return [ctx, width, height];
 }
 
-// One picture with everything, or one per side where they are to stand beside each other.
-function panes(shown, beside) {
+// The sides of each pane: all in one pane, or one pane per side if two sides are shown side by side.
+function splitPanes(shown, beside) {
   return beside && shown.length === 2 ? shown.map(side => [side]) : [shown];
 }
 

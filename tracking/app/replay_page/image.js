@@ -1,32 +1,33 @@
-// The image plane: true, tracked and detected boxes, over the video, or else the ground and walls that the camera sees.
+// Draws the image: true, tracked and detected boxes over the video; without a video, over the projected ground and walls.
 
 function drawImage(canvas, frame, options) {
   const [imageWidth, imageHeight] = data.image;
-  const parts = panes(sides.filter(side => options[side.name]), options.beside);
-  const [ctx, width, height] = prepare(canvas, imageHeight / imageWidth / parts.length);
+  const parts = splitPanes(sides.filter(side => options[side.name]), options.beside);
+  const [ctx, width, height] = prepareCanvas(canvas, imageHeight / imageWidth / parts.length);
   const w = width / parts.length, scale = w / imageWidth;
   parts.forEach((shown, k) => {
     const title = parts.length > 1 ? shown[0].name : "";
     inPane(ctx, k * w, 0, w, height, title, () => {
-      const pictured = Boolean(film) && options.video && film.draw(ctx, w, height);
-      imagePane({ ctx, width: w, height, scale, frame, options, pictured, taken: [] }, shown);
+      const overPicture = Boolean(player) && options.video && player.draw(ctx, w, height);
+      imagePane({ ctx, width: w, height, scale, frame, options, overPicture, taken: [] }, shown);
     });
   });
 }
 
 function imagePane(pane, shown) {
-  if (data.camera && !pane.pictured) groundLines(pane);
-  if (film && film.lost.has(pane.frame)) label(pane.ctx, "lost frame: no picture", 90, 22, theme.found, true);
-  const people = shown.filter(side => !side.wholes);
-  const wholes = shown.filter(side => side.wholes).map(side => [side, toImage(side, pane.scale)]).filter(([, map]) => map);
-  if (pane.options.hulls) for (const side of people) imageHulls(pane, side);
-  for (const [side, map] of wholes) drawWholes(pane, side, map);
-  if (pane.options.detections && found) imageDetections(pane);
-  for (const side of people) imageBoxes(pane, side);
-  if (pane.options.ids) for (const [side, map] of wholes) nameWholes(pane, side, map);
+  if (data.camera && !pane.overPicture) drawGround(pane);
+  if (player && player.lost.has(pane.frame)) label(pane.ctx, "lost frame: no picture", 90, 22, theme.found, true);
+  const people = shown.filter(side => !side.groupRows);
+  const wholeGroups = shown.filter(side => side.groupRows).map(side => [side, toImage(side, pane.scale)]).filter(([, map]) => map);
+  if (pane.options.hulls) for (const side of people) drawImageHulls(pane, side);
+  for (const [side, map] of wholeGroups) drawWholeGroups(pane, side, map);
+  if (pane.options.detections && found) drawImageDetections(pane);
+  for (const side of people) drawImageBoxes(pane, side);
+  if (pane.options.ids) for (const [side, map] of wholeGroups) drawWholeGroupIds(pane, side, map);
 }
 
-// Places in a side's plane as px of the pane, where the camera tells; a place may be null, behind it.
+// A function from x, y in a side's plane to px of the pane, or to null for a point that the camera cannot see.
+// null if a camera is needed and there is none.
 function toImage(side, scale) {
   if (side.plane === "image") return (x, y) => [x * scale, y * scale];
   if (!data.camera) return null;
@@ -42,7 +43,7 @@ function boxOf(source, row, scale) {
   return Number.isNaN(box[0]) ? null : box;
 }
 
-function imageBoxes({ ctx, scale, frame, options, pictured, taken }, side) {
+function drawImageBoxes({ ctx, scale, frame, options, overPicture, taken }, side) {
   const rows = side.rows(frame), tracked = side.name === "tracks";
   const ids = options.ids && rows.length <= MANY;
   for (const row of rows) {
@@ -53,16 +54,16 @@ function imageBoxes({ ctx, scale, frame, options, pictured, taken }, side) {
     if (box) {
       const hidden = !tracked && side.visible[row] <= 2;
       if (hidden) ctx.setLineDash([1, 3]);
-      if (pictured && !hidden) rim(ctx, box, colour);
+      if (overPicture && !hidden) strokeBoxRim(ctx, box, colour);
       ctx.strokeRect(...box);
-      ctx.globalAlpha = tracked || pictured ? 0 : 0.1;
+      ctx.globalAlpha = tracked || overPicture ? 0 : 0.1;
       ctx.fillStyle = colour;
       ctx.fillRect(...box);
       ctx.globalAlpha = 1;
       const y = tracked ? box[1] + box[3] + 8 : box[1] - 8, away = tracked ? 12 : -12;
       const places = [0.5, 0, 1].map(share => [box[0] + share * box[2], y]);
       const spots = () => [...places, ...places.map(([x]) => [x, y + away])];
-      if (ids) name(ctx, taken, side.id[row], spots, colour, tracked);
+      if (ids) placeLabel(ctx, taken, side.id[row], spots, colour, tracked);
     } else if (side.plane === "image") {
       ctx.beginPath();
       ctx.arc(side.x[row] * scale, side.y[row] * scale, 6, 0, 2 * Math.PI);
@@ -73,8 +74,8 @@ function imageBoxes({ ctx, scale, frame, options, pictured, taken }, side) {
   ctx.setLineDash([]);
 }
 
-// A light edge, for colours on pictures.
-function rim(ctx, box, colour) {
+// Strokes a light edge under a box, so that its colour stands out on pictures.
+function strokeBoxRim(ctx, box, colour) {
   ctx.strokeStyle = theme.halo;
   ctx.lineWidth += 2;
   ctx.strokeRect(...box);
@@ -82,7 +83,7 @@ function rim(ctx, box, colour) {
   ctx.lineWidth -= 2;
 }
 
-function imageHulls({ ctx, scale, frame, options, taken }, side) {
+function drawImageHulls({ ctx, scale, frame, options, taken }, side) {
   const tracked = side.name === "tracks";
   for (const [id, rows] of groupsAt(side, frame)) {
     const points = [];
@@ -93,7 +94,7 @@ function imageHulls({ ctx, scale, frame, options, taken }, side) {
     }
     if (!points.length) continue;
     roundedPath(ctx, points, tracked ? 8 : 5);
-    region(ctx, colourOf(id), tracked);
+    drawRegion(ctx, colourOf(id), tracked);
     if (!options.ids) continue;
     const x = points.reduce((a, p) => a + p[0], 0) / points.length;
     const y = tracked ? Math.max(...points.map(p => p[1])) + 24 : Math.min(...points.map(p => p[1])) - 18;
@@ -102,7 +103,7 @@ function imageHulls({ ctx, scale, frame, options, taken }, side) {
   }
 }
 
-function imageDetections({ ctx, scale, frame }) {
+function drawImageDetections({ ctx, scale, frame }) {
   ctx.strokeStyle = theme.found;
   ctx.lineWidth = 1;
   ctx.setLineDash([2, 2]);

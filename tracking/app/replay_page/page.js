@@ -1,14 +1,14 @@
-// The page: its state, controls, keys, and what it says about the shown frame.
+// The page: its state, its controls and keys, and the texts about the shown frame.
 
 const $ = id => document.getElementById(id);
 const state = { frame: 1, playing: false, speed: 1, clock: 0, then: 0 };
 const options = { truth: true, tracks: true, detections: false, hulls: true, ellipses: true, trails: true, ids: true, near: true, beside: false, video: true, by: "person" };
-const film = makeFilm(data.video, pictured);
+const player = makePlayer(data.video, onVideoChange);
 const TOGGLES = [
   ["truth", "Truth", "t", truth], ["tracks", "Tracks", "k", tracks], ["beside", "Side by side", "b", truth && tracks],
   ["detections", "Detections", "d", found], ["hulls", "Groups", "h", true],
-  ["ellipses", "Extents", "e", tracks && tracks.wholes], ["trails", "Trails", "l", hasPlan || (tracks && tracks.wholes)],
-  ["video", "Video", "v", film], ["ids", "Ids", "i", true], ["near", "Near strangers", "s", data.near.length],
+  ["ellipses", "Extents", "e", tracks && tracks.groupRows], ["trails", "Trails", "l", hasPlan || (tracks && tracks.groupRows)],
+  ["video", "Video", "v", player], ["ids", "Ids", "i", true], ["near", "Near strangers", "s", data.near.length],
 ];
 const SPEEDS = [0.1, 0.25, 0.5, 1, 2, 4, 8];
 const KEYS = [
@@ -33,40 +33,40 @@ function show() {
   $("seek").value = frame;
   $("seek").setAttribute("aria-valuetext", `frame ${frame}, ${seconds(frame).toFixed(1)} seconds`);
   $("clock").value = `${frame} / ${data.length} · ${seconds(frame).toFixed(2)} s`;
-  facts(frame);
+  showFacts(frame);
 }
 
-// The image follows the video, whose frame may come a moment after it was asked for.
+// The image shows the video's frame, which may arrive a moment after it was wanted.
 function showImage() {
   if (!hasImage) return;
-  if (rolling() && !(state.playing && film.plays)) film.want(state.frame);
-  drawImage($("image"), rolling() && film.frame ? film.frame : state.frame, options);
+  if (videoShown() && !(state.playing && player.canPlay)) player.seek(state.frame);
+  drawImage($("image"), videoShown() && player.frame ? player.frame : state.frame, options);
 }
 
-function rolling() {
-  return Boolean(film) && film.able && options.video;
+function videoShown() {
+  return Boolean(player) && player.works && options.video;
 }
 
-// The video shows another frame, or cannot be shown.
-function pictured() {
-  if (film.failed) {
+// The video shows another frame, or cannot be played.
+function onVideoChange() {
+  if (player.failed) {
     $("image-note").textContent = `the video cannot be played here${data.video.src ? `: ${data.video.src}` : ""}`;
-    film.failed = false;
+    player.failed = false;
     if (state.playing) play(true);
     return show();
   }
-  if (!state.playing || !film.plays) return showImage();
-  state.frame = film.frame;
+  if (!state.playing || !player.canPlay) return showImage();
+  state.frame = player.frame;
   show();
   if (state.frame >= data.length) play(false);
 }
 
-function facts(frame) {
+function showFacts(frame) {
   const rows = [["frame", `${frame} of ${data.length}, ${seconds(frame).toFixed(2)} s`]];
   for (const side of sides) {
-    if (!side.wholes) rows.push([`${WORDS[side.name]} people`, side.rows(frame).length]);
-    const groups = side.wholes
-      ? [...side.rows(frame)].map(row => wholeWords(side, row))
+    if (!side.groupRows) rows.push([`${WORDS[side.name]} people`, side.rows(frame).length]);
+    const groups = side.groupRows
+      ? [...side.rows(frame)].map(row => groupWords(side, row))
       : [...groupsAt(side, frame)].map(([id, members]) =>
         `${side.name === "tracks" ? "T" : "G"}${id} (${members.map(row => side.id[row]).join(", ")})`);
     const none = side === truth && data.unlabelled.some(([a, b]) => a <= frame && frame <= b) ? "not labelled" : "none";
@@ -89,20 +89,20 @@ function play(on) {
   state.playing = on;
   $("play").querySelector("path").setAttribute("d", on ? "M3 2h4v12H3z M9 2h4v12H9z" : "M4 2v12l10-6z");
   $("play").setAttribute("aria-label", on ? "Pause" : "Play");
-  if (!on) return film && film.pause();
+  if (!on) return player && player.pause();
   if (state.frame >= data.length) {
     state.playing = false; // so that the video goes back as well
     seekTo(1);
     state.playing = true;
   }
-  if (rolling() && film.plays) return film.play(state.speed);
+  if (videoShown() && player.canPlay) return player.play(state.speed);
   state.clock = state.frame;
   state.then = performance.now();
   requestAnimationFrame(tick);
 }
 
 function tick(now) {
-  if (!state.playing || (rolling() && film.plays)) return;
+  if (!state.playing || (videoShown() && player.canPlay)) return;
   state.clock += ((now - state.then) / 1000) * data.fps * state.speed;
   state.then = now;
   const frame = Math.floor(state.clock);
@@ -130,11 +130,11 @@ function speed(change) {
   const next = SPEEDS[Math.min(Math.max(SPEEDS.indexOf(state.speed) + change, 0), SPEEDS.length - 1)];
   state.speed = next;
   $("speed").value = next;
-  hasten();
+  applySpeed();
 }
 
-function hasten() {
-  if (film) film.video.playbackRate = state.speed;
+function applySpeed() {
+  if (player) player.video.playbackRate = state.speed;
 }
 
 function toggle(name) {
@@ -171,7 +171,7 @@ function onKey(event) {
 function buildHead() {
   const about = [`${data.length} frames, ${data.fps} per second, ${seconds(data.length).toFixed(1)} s`];
   if (truth) about.push(`${new Set(truth.id).size} true people`);
-  if (tracks) about.push(`${new Set(tracks.id).size} ${tracks.wholes ? "groups" : "people"} by ${data.tracker}`);
+  if (tracks) about.push(`${new Set(tracks.id).size} ${tracks.groupRows ? "groups" : "people"} by ${data.tracker}`);
   $("about").textContent = about.join(" · ");
   buildScores();
   $("plan-note").textContent = hasPlan && tracks && truth ? planNote() : "";
@@ -183,7 +183,7 @@ function buildHead() {
 function planNote() {
   const flat = [[truth, "true"], [tracks, "tracked"]].find(([side]) => side.plane === "image");
   if (flat) return `${flat[1]} in the image only`;
-  return tracks.wholes ? "true: bodies, solid · tracked: dashed"
+  return tracks.groupRows ? "true: bodies, solid · tracked: dashed"
     : "true: bodies, solid, ids upright · tracked: rings, dashed, ids slanted";
 }
 
@@ -244,7 +244,7 @@ function layOut() {
   chooseTheme();
   line = timeline($("timeline"), Math.max($("timeline").clientWidth, 320), jump);
   legend($("legend"));
-  wholesKey($("wholes-key"));
+  wholeGroupsKey($("groups-key"));
   show();
 }
 
@@ -256,7 +256,7 @@ function listen() {
   $("seek").addEventListener("input", () => jump($("seek").valueAsNumber));
   $("speed").addEventListener("change", () => {
     state.speed = Number($("speed").value);
-    hasten();
+    applySpeed();
   });
   $("help-button").addEventListener("click", () => $("help").showModal());
   const drag = event => {
@@ -277,15 +277,15 @@ function listen() {
 }
 
 // FILE.html#57 shows frame 57.
-function fromAddress() {
+function seekToAddress() {
   const frame = Number(location.hash.slice(1));
   if (frame >= 1) jump(frame);
 }
 
-if (film) $("under").append(film.video);
+if (player) $("under").append(player.video);
 buildHead();
 buildControls();
 layOut();
 listen();
-fromAddress();
-addEventListener("hashchange", fromAddress);
+seekToAddress();
+addEventListener("hashchange", seekToAddress);

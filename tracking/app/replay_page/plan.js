@@ -1,4 +1,4 @@
-// The plan: ground in metres, what stands on it, people from above, groups, tracks.
+// Draws the plan: the ground with its objects, people from above, groups, tracks, detections.
 
 const BODY = { shoulder: 0.24, depth: 0.13, head: 0.1, footprint: 0.25, track: 0.36 };
 const MANY = 80;
@@ -6,10 +6,10 @@ const MANY = 80;
 function drawPlan(canvas, frame, options) {
   const [x0, y0, x1, y1] = data.bounds;
   const there = sides.filter(side => options[side.name]);
-  const parts = panes(there.filter(side => side.plane === "ground"), options.beside);
+  const parts = splitPanes(there.filter(side => side.plane === "ground"), options.beside);
   const own = Math.min(Math.max((y1 - y0) / (x1 - x0), 0.35), 1.1);
-  const aspect = (hasImage ? data.image[1] / data.image[0] : own) / panes(there, options.beside).length;
-  const [ctx, width, height] = prepare(canvas, aspect);
+  const aspect = (hasImage ? data.image[1] / data.image[0] : own) / splitPanes(there, options.beside).length;
+  const [ctx, width, height] = prepareCanvas(canvas, aspect);
   const w = width / parts.length;
   parts.forEach((shown, k) => {
     const title = parts.length > 1 ? shown[0].name : "";
@@ -24,22 +24,22 @@ function planPane(ctx, width, height, shown, frame, options) {
   const map = (x, y) => [left + (x - x0) * scale, top + (y1 - y) * scale];
   ctx.fillStyle = theme.ground;
   ctx.fillRect(0, 0, width, height);
-  grid(ctx, map, scale, [x0 - left / scale, y0 - top / scale, x1 + left / scale, y1 + top / scale]);
-  if (data.scene) scene(ctx, map, scale);
+  drawGrid(ctx, map, scale, [x0 - left / scale, y0 - top / scale, x1 + left / scale, y1 + top / scale]);
+  if (data.scene) drawScene(ctx, map, scale);
   const plan = { ctx, map, width, height, scale, frame, options, taken: [] };
-  const people = shown.filter(side => !side.wholes), wholes = shown.filter(side => side.wholes);
-  if (options.hulls) for (const side of people) planHulls(plan, side);
-  for (const side of wholes) drawWholes(plan, side, map);
-  if (options.near && truth && shown.includes(truth)) nearLines(plan);
-  if (options.trails) for (const side of people) trails(plan, side, map);
-  if (options.detections && found && found.plane !== "image") planDetections(plan);
-  for (const side of people) planPeople(plan, side);
-  if (options.ids) planNames(plan, people.filter(side => side.rows(frame).length <= MANY));
-  if (options.ids) for (const side of wholes) nameWholes(plan, side, map);
+  const people = shown.filter(side => !side.groupRows), wholeGroups = shown.filter(side => side.groupRows);
+  if (options.hulls) for (const side of people) drawPlanHulls(plan, side);
+  for (const side of wholeGroups) drawWholeGroups(plan, side, map);
+  if (options.near && truth && shown.includes(truth)) drawNearStrangers(plan);
+  if (options.trails) for (const side of people) drawTrails(plan, side, map);
+  if (options.detections && found && found.plane !== "image") drawPlanDetections(plan);
+  for (const side of people) drawPlanPeople(plan, side);
+  if (options.ids) drawPersonIds(plan, people.filter(side => side.rows(frame).length <= MANY));
+  if (options.ids) for (const side of wholeGroups) drawWholeGroupIds(plan, side, map);
 }
 
-// Lines over all that the pane shows, and a scale in its corner.
-function grid(ctx, map, scale, [x0, y0, x1, y1]) {
+// Grid lines over the whole pane, and a scale in its corner.
+function drawGrid(ctx, map, scale, [x0, y0, x1, y1]) {
   const step = scale > 14 ? 1 : scale > 4 ? 5 : 10;
   ctx.strokeStyle = theme.grid;
   ctx.lineWidth = 1;
@@ -53,13 +53,13 @@ function grid(ctx, map, scale, [x0, y0, x1, y1]) {
   label(ctx, `${bar} m`, u + 8 + (bar * scale) / 2, v - 13, theme.thing);
 }
 
-function scene(ctx, map, scale) {
+function drawScene(ctx, map, scale) {
   const { size, walls, pillars, doors, service, stairs } = data.scene;
   ctx.lineWidth = 1;
   ctx.strokeStyle = theme.thing;
   polygonPath(ctx, [map(0, 0), map(size[0], 0), map(size[0], size[1]), map(0, size[1])]);
   ctx.stroke();
-  for (const flight of stairs) steps(ctx, map, flight);
+  for (const flight of stairs) drawStairs(ctx, map, flight);
   ctx.strokeStyle = theme.wall;
   ctx.lineWidth = Math.max(0.1 * scale, 3);
   for (const [a, b, c, d] of walls) strokeLine(ctx, [map(a, b), map(c, d)]);
@@ -88,7 +88,7 @@ function scene(ctx, map, scale) {
   }
 }
 
-function steps(ctx, map, [fx, fy, hx, hy, width, , count, landing]) {
+function drawStairs(ctx, map, [fx, fy, hx, hy, width, , count, landing]) {
   const length = Math.hypot(hx - fx, hy - fy), ex = (hx - fx) / length, ey = (hy - fy) / length;
   const across = s => [map(fx + ex * s - ey * width / 2, fy + ey * s + ex * width / 2), map(fx + ex * s + ey * width / 2, fy + ey * s - ex * width / 2)];
   ctx.fillStyle = theme.floor;
@@ -97,17 +97,17 @@ function steps(ctx, map, [fx, fy, hx, hy, width, , count, landing]) {
   for (let k = 0; k <= count; k++) strokeLine(ctx, across((length * k) / count));
 }
 
-function place(plan, side, row) {
+function positionOf(plan, side, row) {
   return plan.map(side.x[row], side.y[row]);
 }
 
-function planHulls(plan, side) {
+function drawPlanHulls(plan, side) {
   const { ctx, scale } = plan, tracked = side.name === "tracks";
   for (const [id, rows] of groupsAt(side, plan.frame)) {
-    const points = rows.map(row => place(plan, side, row)).filter(p => !Number.isNaN(p[0]));
+    const points = rows.map(row => positionOf(plan, side, row)).filter(p => !Number.isNaN(p[0]));
     if (!points.length) continue;
     roundedPath(ctx, points, Math.max((tracked ? 0.4 : BODY.footprint + 0.05) * scale, 7));
-    region(ctx, colourOf(id), tracked);
+    drawRegion(ctx, colourOf(id), tracked);
     if (!plan.options.ids) continue;
     const mid = points.reduce((a, p) => a + p[0], 0) / points.length;
     const edge = tracked ? Math.max(...points.map(p => p[1])) + 0.45 * scale + 15 : Math.min(...points.map(p => p[1])) - 0.35 * scale - 7;
@@ -116,8 +116,8 @@ function planHulls(plan, side) {
   }
 }
 
-// Where everybody of a side was in the last seconds; map: places to px.
-function trails(pane, side, map) {
+// Where each person or group of a side was during the last 3 s. map: x, y to px.
+function drawTrails(pane, side, map) {
   const { ctx } = pane, reach = Math.round(3 * data.fps), tracked = side.name === "tracks";
   ctx.lineCap = "round";
   ctx.lineWidth = tracked ? 1.4 : 2;
@@ -133,7 +133,7 @@ function trails(pane, side, map) {
   ctx.setLineDash([]);
 }
 
-function nearLines(plan) {
+function drawNearStrangers(plan) {
   const { ctx } = plan, rowOf = new Map();
   for (const row of truth.rows(plan.frame)) rowOf.set(truth.id[row], row);
   ctx.strokeStyle = theme.thing;
@@ -141,12 +141,12 @@ function nearLines(plan) {
   ctx.setLineDash([1, 4]);
   for (const [start, end, a, b] of data.near) {
     if (plan.frame < start || plan.frame > end || !rowOf.has(a) || !rowOf.has(b)) continue;
-    strokeLine(ctx, [place(plan, truth, rowOf.get(a)), place(plan, truth, rowOf.get(b))]);
+    strokeLine(ctx, [positionOf(plan, truth, rowOf.get(a)), positionOf(plan, truth, rowOf.get(b))]);
   }
   ctx.setLineDash([]);
 }
 
-function planDetections(plan) {
+function drawPlanDetections(plan) {
   const { ctx } = plan;
   ctx.strokeStyle = theme.found;
   ctx.lineWidth = 1.3;
@@ -157,35 +157,35 @@ function planDetections(plan) {
   }
 }
 
-function planPeople(plan, side) {
+function drawPlanPeople(plan, side) {
   for (const row of side.rows(plan.frame)) {
-    const at = place(plan, side, row);
+    const at = positionOf(plan, side, row);
     if (Number.isNaN(at[0])) continue;
     const colour = rowColour(side, row, plan.options.by);
-    if (side.name === "truth") body(plan, side, row, at, colour);
-    else ring(plan, side, row, at, colour);
+    if (side.name === "truth") drawBody(plan, side, row, at, colour);
+    else drawRing(plan, side, row, at, colour);
   }
 }
 
-const ROUND = [[1, 1], [1, -1], [-1, 1], [-1, -1], [0, 1], [1, 0], [-1, 0], [0, -1]];
+const LABEL_DIRECTIONS = [[1, 1], [1, -1], [-1, 1], [-1, -1], [0, 1], [1, 0], [-1, 0], [0, -1]];
 
-// Ids beside bodies and rings, true upright and tracked slanted, clear of one another where there is room.
-function planNames(plan, shown) {
+// Ids beside bodies and rings: true ones upright, tracked ones slanted, each where it covers least.
+function drawPersonIds(plan, shown) {
   const r = Math.max(BODY.shoulder * plan.scale, 6), here = [];
-  for (const side of shown) for (const row of side.rows(plan.frame)) here.push([side, row, place(plan, side, row)]);
+  for (const side of shown) for (const row of side.rows(plan.frame)) here.push([side, row, positionOf(plan, side, row)]);
   const seen = here.filter(([, , at]) => !Number.isNaN(at[0]));
   for (const [, , [u, v]] of seen) plan.taken.push([u - r, v - r, u + r, v + r]);
   for (const [side, row, [u, v]] of seen) {
     const tracked = side.name === "tracks", sign = tracked ? -1 : 1;
-    const spots = half => ROUND.map(([p, q]) => {
+    const spots = half => LABEL_DIRECTIONS.map(([p, q]) => {
       const near = p && q ? 0.75 * r : r + 1;
       return [u + sign * p * (near + half[0]), v + sign * q * (near + half[1])];
     });
-    name(plan.ctx, plan.taken, side.id[row], spots, rowColour(side, row, plan.options.by), tracked);
+    placeLabel(plan.ctx, plan.taken, side.id[row], spots, rowColour(side, row, plan.options.by), tracked);
   }
 }
 
-function body({ ctx, scale }, side, row, [u, v], colour) {
+function drawBody({ ctx, scale }, side, row, [u, v], colour) {
   const unit = Math.max(scale, 22), angle = side.angle[row], known = !Number.isNaN(angle);
   ctx.save();
   ctx.translate(u, v);
@@ -213,7 +213,7 @@ function body({ ctx, scale }, side, row, [u, v], colour) {
   ctx.restore();
 }
 
-function ring({ ctx, scale }, side, row, [u, v], colour) {
+function drawRing({ ctx, scale }, side, row, [u, v], colour) {
   const r = Math.max(BODY.track * scale, 6), angle = side.angle[row];
   ctx.strokeStyle = colour;
   ctx.lineWidth = 2;

@@ -1,4 +1,4 @@
-// The timeline: lanes of events, true and tracked, and the lineage of group ids as bars that join and fork.
+// Draws the timeline: true and tracked events in lanes, and group ids as bars that are linked by merges and splits.
 
 const KINDS = {
   merge: { colour: 0, shape: "M-5,-5 L5,-5 L0,5 Z", word: "merge" },
@@ -29,23 +29,23 @@ function eventWords(event) {
   };
   const ids = event.before.length || event.after.length ? ` ${list(event.before) || "–"} → ${list(event.after) || "–"}` : "";
   const who = event.members.length ? `; people ${event.members.slice(0, 12).join(", ")}${event.members.length > 12 ? " …" : ""}` : "";
-  const said = event.emitted === null ? "" : `; said at frame ${event.emitted}`;
-  return `${event.kind}${ids}${who}${said}`;
+  const reported = event.emitted === null ? "" : `; reported in frame ${event.emitted}`;
+  return `${event.kind}${ids}${who}${reported}`;
 }
 
 function seconds(frame) {
   return (frame - 1) / data.fps;
 }
 
-// Builds the picture for a width and returns how to move its playhead and how a place on it becomes a frame.
+// Draws the timeline into `box`. Returns `move` (puts the playhead at a frame) and `frameAt` (the frame at an x in px).
 function timeline(box, width, seekTo) {
   const svg = element("svg", { role: "img", "aria-label": "Timeline of events and groups; seek with the slider or by clicking" });
   const span = Math.max(width - GUTTER - 14, 50), last = Math.max(data.length - 1, 1);
   const x = frame => GUTTER + ((frame - 1) / last) * span;
-  let y = axis(svg, x, width);
-  for (const [a, b] of data.unlabelled) shade(svg, x(a), x(b + 1));
-  for (const side of sides) y = eventLane(svg, side, x, y, seekTo);
-  for (const side of sides) y = lineage(svg, side, x, y, seekTo);
+  let y = drawAxis(svg, x, width);
+  for (const [a, b] of data.unlabelled) drawUnlabelled(svg, x(a), x(b + 1));
+  for (const side of sides) y = drawEvents(svg, side, x, y, seekTo);
+  for (const side of sides) y = drawGroupBars(svg, side, x, y, seekTo);
   svg.setAttribute("viewBox", `0 0 ${width} ${y + 4}`);
   svg.setAttribute("height", y + 4);
   for (const rect of svg.querySelectorAll(".shade")) rect.setAttribute("height", y - 18);
@@ -62,7 +62,7 @@ function timeline(box, width, seekTo) {
   };
 }
 
-function axis(svg, x, width) {
+function drawAxis(svg, x, width) {
   const total = seconds(data.length), steps = [0.5, 1, 2, 5, 10, 20, 30, 60, 120, 300, 600, 1800, 3600];
   const step = steps.find(s => total / s <= Math.max((width - GUTTER) / 70, 2)) || 7200;
   for (let t = 0; t <= total + 1e-9; t += step) {
@@ -73,18 +73,18 @@ function axis(svg, x, width) {
   return 20;
 }
 
-function shade(svg, from, to) {
+function drawUnlabelled(svg, from, to) {
   const rect = element("rect", { class: "shade", x: from, y: 18, width: Math.max(to - from, 1), fill: theme.thing, opacity: 0.18 }, svg);
   element("title", {}, rect, "groups are not labelled here");
 }
 
-function heading(svg, y, text) {
+function drawHeading(svg, y, text) {
   element("text", { x: GUTTER - 10, y: y + 11, "text-anchor": "end" }, svg, text);
 }
 
-// Markers that would overlap stand below each other.
-function eventLane(svg, side, x, y, seekTo) {
-  heading(svg, y, `${WORDS[side.name]} events`);
+// Markers that would overlap are put in different lanes.
+function drawEvents(svg, side, x, y, seekTo) {
+  drawHeading(svg, y, `${WORDS[side.name]} events`);
   const ends = [];
   for (const event of side.events.slice().sort((a, b) => a.start - b.start)) {
     const u = x(event.start), kind = KINDS[event.kind] || KINDS.form;
@@ -103,9 +103,9 @@ function eventLane(svg, side, x, y, seekTo) {
   return y + Math.max(ends.length, 1) * LANE + 5;
 }
 
-function lineage(svg, side, x, y, seekTo) {
+function drawGroupBars(svg, side, x, y, seekTo) {
   if (!side.bars.length) return y;
-  heading(svg, y, `${WORDS[side.name]} groups`);
+  drawHeading(svg, y, `${WORDS[side.name]} groups`);
   const middle = bar => y + 3 + bar.lane * (BAR + 5) + BAR / 2;
   const alive = (id, frame) => side.bars.find(bar => bar.id === id && bar.start - 1 <= frame && bar.end + 1 >= frame)
     || side.bars.filter(bar => bar.id === id).sort((p, q) => Math.abs(p.start - frame) - Math.abs(q.start - frame))[0];
@@ -122,7 +122,7 @@ function lineage(svg, side, x, y, seekTo) {
     element("rect", { x: from, y: middle(bar) - BAR / 2, width: wide, height: BAR, rx: 4, fill: colour, "fill-opacity": tracked ? (bar.size < 2 ? 0.12 : 0.35) : 0.9, stroke: colour, "stroke-dasharray": tracked ? "4 3" : "none" }, group);
     const name = `${tracked ? "T" : "G"}${bar.id}`;
     if (wide > 8 * name.length + 6) element("text", { x: from + 5, y: middle(bar) + 4, "font-size": 11, "font-weight": 650, fill: tracked ? theme.ink : theme.halo, style: "pointer-events:none" }, group, name);
-    element("title", {}, group, `${name}: ${seconds(bar.start).toFixed(1)} to ${seconds(bar.end).toFixed(1)} s, up to ${side.wholes ? "≈" : ""}${bar.size} people`);
+    element("title", {}, group, `${name}: ${seconds(bar.start).toFixed(1)} to ${seconds(bar.end).toFixed(1)} s, up to ${side.groupRows ? "≈" : ""}${bar.size} people`);
     group.addEventListener("dblclick", () => seekTo(bar.start));
   }
   return y + Math.max(...side.bars.map(bar => bar.lane + 1)) * (BAR + 5) + 8;

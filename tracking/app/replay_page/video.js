@@ -1,19 +1,20 @@
-// The video under the boxes: which frame it shows, and how to make it show another.
+// The video under the boxes: shows a frame, plays, and reports which frame it shows.
 //
-// Boxes are drawn for the frame that is seen, never for another. A picture taken out of the video carries its own time,
-// also while it plays; browsers allow that for a video inside the page. One beside it is played by seeking.
+// Boxes are drawn for the frame that the video shows. A picture taken out of the video carries its own time, also while
+// it plays; browsers allow that for a video inside the page only. A video beside the page is played by seeking.
 
-const MIDDLE = 0.5; // of a frame: where seeking aims
+const MIDDLE = 0.5; // seeking aims at the middle of a frame
 
-function makeFilm(raw, changed) {
+// onChange is called when the video shows another frame, or cannot be played.
+function makePlayer(raw, onChange) {
   if (!raw) return null;
   const video = document.createElement("video");
-  const film = { video, frame: 0, able: true, failed: false, plays: false, lost: new Set(raw.lost), want, play, pause, draw };
-  const tells = "requestVideoFrameCallback" in video;
+  const player = { video, frame: 0, works: true, failed: false, canPlay: false, lost: new Set(raw.lost), seek, play, pause, draw };
+  const reportsFrames = "requestVideoFrameCallback" in video;
   let wanted = 0, picture = null;
 
-  // The picture and its frame; `time` is what the browser said of it.
-  function arrived(time) {
+  // Takes the picture that the video shows and finds its frame; `time` is used if no picture can be taken.
+  function takePicture(time) {
     let taken = null;
     try {
       taken = new VideoFrame(video);
@@ -22,24 +23,24 @@ function makeFilm(raw, changed) {
     }
     if (picture) picture.close();
     picture = taken;
-    film.plays = Boolean(taken) && tells;
-    film.frame = frameAt(taken ? taken.timestamp / 1e6 : time);
-    changed();
+    player.canPlay = Boolean(taken) && reportsFrames;
+    player.frame = frameAt(taken ? taken.timestamp / 1e6 : time);
+    onChange();
   }
 
   function frameAt(time) {
     return Math.min(Math.max(Math.round(time * raw.fps) + 1, 1), data.length);
   }
 
-  function told(_, { mediaTime }) {
-    arrived(mediaTime);
-    video.requestVideoFrameCallback(told);
+  function onVideoFrame(_, { mediaTime }) {
+    takePicture(mediaTime);
+    video.requestVideoFrameCallback(onVideoFrame);
   }
 
-  // Seeks are made one after the other, the last one asked for at the end.
-  function want(frame) {
+  // One seek at a time: while one is under way, only the last wanted frame is kept.
+  function seek(frame) {
     wanted = frame;
-    if (!film.able || video.seeking || video.readyState < 1 || frame === film.frame) return;
+    if (!player.works || video.seeking || video.readyState < 1 || frame === player.frame) return;
     video.currentTime = (frame - 1 + MIDDLE) / raw.fps;
   }
 
@@ -50,35 +51,35 @@ function makeFilm(raw, changed) {
 
   function pause() {
     video.pause();
-    wanted = film.frame;
+    wanted = player.frame;
   }
 
-  // The picture, less the row or column that was added to make its size even; false where there is none yet.
+  // Draws the picture without the row or column that makes its size even; false if there is none yet.
   function draw(ctx, width, height) {
-    if (!film.frame || (!picture && video.readyState < 2)) return false;
+    if (!player.frame || (!picture && video.readyState < 2)) return false;
     ctx.drawImage(picture || video, 0, 0, ...data.image, 0, 0, width, height);
     return true;
   }
 
-  function sought() {
-    arrived(video.currentTime - MIDDLE / raw.fps);
-    if (video.paused && wanted && wanted !== film.frame) want(wanted);
+  function onSeeked() {
+    takePicture(video.currentTime - MIDDLE / raw.fps);
+    if (video.paused && wanted && wanted !== player.frame) seek(wanted);
   }
 
-  video.addEventListener("loadeddata", () => (wanted > 1 ? want(wanted) : arrived(0)));
-  video.addEventListener("seeked", sought);
+  video.addEventListener("loadeddata", () => (wanted > 1 ? seek(wanted) : takePicture(0)));
+  video.addEventListener("seeked", onSeeked);
   video.addEventListener("error", () => {
-    film.able = false;
-    film.failed = true;
-    changed();
+    player.works = false;
+    player.failed = true;
+    onChange();
   });
-  if (tells) video.requestVideoFrameCallback(told);
-  Object.assign(video, { muted: true, playsInline: true, preload: "auto", src: raw.src || inside() });
-  return film;
+  if (reportsFrames) video.requestVideoFrameCallback(onVideoFrame);
+  Object.assign(video, { muted: true, playsInline: true, preload: "auto", src: raw.src || embeddedVideo() });
+  return player;
 }
 
-// The video that the page itself holds, as something that can be sought in.
-function inside() {
+// The address of the video inside the page, in a form that can be sought in.
+function embeddedVideo() {
   const holder = document.getElementById("film"), text = atob(holder.textContent);
   holder.remove();
   const bytes = Uint8Array.from(text, letter => letter.charCodeAt(0));

@@ -1,69 +1,69 @@
-// Groups that a tracker follows as wholes: hull, ellipse of its extent, velocity, trail, id and size, on the plan and in
-// the image. `map` takes places in the side's plane to px of the pane, or to null where they cannot be seen.
+// Draws groups of a tracker that reports groups without people: hull, extent, motion, trail, id and size, on the plan and
+// in the image. `map` takes x, y in the side's plane to px of the pane, or to null where the camera cannot see them.
 
-const WIDE = Math.sqrt(9.21); // standard deviations: d'E⁻¹d ≤ 9.21 holds 99 % of a plane's normal distribution
-const ROUNDS = 48;
+const SIGMA_99 = Math.sqrt(9.21); // standard deviations: d'E⁻¹d ≤ 9.21 holds 99 % of a normal distribution in the plane
+const ELLIPSE_POINTS = 48;
 
-function drawWholes(pane, side, map) {
-  if (pane.options.trails) trails(pane, side, map);
+function drawWholeGroups(pane, side, map) {
+  if (pane.options.trails) drawTrails(pane, side, map);
   for (const row of side.rows(pane.frame)) {
     const colour = colourOf(side.id[row]);
-    if (pane.options.ellipses) extentOf(pane, side, row, map, colour);
-    if (pane.options.hulls) wholeHull(pane, side, row, map, colour);
-    wayOfWhole(pane, side, row, map, colour);
+    if (pane.options.ellipses) drawExtent(pane, side, row, map, colour);
+    if (pane.options.hulls) drawGroupHull(pane, side, row, map, colour);
+    drawMotion(pane, side, row, map, colour);
   }
 }
 
-// All of some places as px, or none where one cannot be seen.
-function seen(places, map) {
+// The places [x, y] as px; [] if one of them cannot be seen.
+function mapAll(places, map) {
   const points = places.map(([x, y]) => map(x, y));
   return points.every(p => p && !Number.isNaN(p[0])) ? points : [];
 }
 
-function hullOf(side, row, map) {
-  return seen(side.wholes.hull[row], map);
+function hullPoints(side, row, map) {
+  return mapAll(side.groupRows.hull[row], map);
 }
 
-// d'E⁻¹d = 9.21 round a group's place, as a polygon.
-function ringOf(side, row, map) {
-  const { long, wide, turn } = side.wholes, c = Math.cos(turn[row]), s = Math.sin(turn[row]);
-  return seen(Array.from({ length: ROUNDS }, (_, k) => {
-    const t = (2 * Math.PI * k) / ROUNDS, a = WIDE * long[row] * Math.cos(t), b = WIDE * wide[row] * Math.sin(t);
+// The ellipse d'E⁻¹d = 9.21 round a group's centre, as a polygon in px.
+function extentPoints(side, row, map) {
+  const { long, wide, turn } = side.groupRows, c = Math.cos(turn[row]), s = Math.sin(turn[row]);
+  return mapAll(Array.from({ length: ELLIPSE_POINTS }, (_, k) => {
+    const t = (2 * Math.PI * k) / ELLIPSE_POINTS, a = SIGMA_99 * long[row] * Math.cos(t), b = SIGMA_99 * wide[row] * Math.sin(t);
     return [side.x[row] + c * a - s * b, side.y[row] + s * a + c * b];
   }), map);
 }
 
-function extentOf({ ctx, pictured }, side, row, map, colour) {
-  const points = ringOf(side, row, map);
+function drawExtent({ ctx, overPicture }, side, row, map, colour) {
+  const points = extentPoints(side, row, map);
   if (!points.length) return;
   polygonPath(ctx, points);
-  extentLine(ctx);
-  if (pictured) {
+  setExtentLine(ctx);
+  if (overPicture) {
     ctx.lineWidth += 0.6;
-    rimPath(ctx);
+    strokeRim(ctx);
   }
   ctx.strokeStyle = colour;
   ctx.stroke();
   ctx.setLineDash([]);
 }
 
-function extentLine(ctx) {
+function setExtentLine(ctx) {
   ctx.lineCap = "round";
   ctx.lineWidth = 1.8;
   ctx.setLineDash([0.1, 5]);
 }
 
-function wholeHull({ ctx, pictured }, side, row, map, colour) {
-  const points = hullOf(side, row, map);
+function drawGroupHull({ ctx, overPicture }, side, row, map, colour) {
+  const points = hullPoints(side, row, map);
   if (!points.length) return;
   ctx.lineCap = "butt";
   polygonPath(ctx, points);
-  region(ctx, colour, true, pictured);
+  drawRegion(ctx, colour, true, overPicture);
 }
 
-// A group's place, and an arrow to where it is in a second.
-function wayOfWhole({ ctx, pictured }, side, row, map, colour) {
-  const x = side.x[row], y = side.y[row], angle = side.angle[row], speed = side.wholes.speed[row];
+// A disc at a group's centre, and an arrow to where the centre is in one second.
+function drawMotion({ ctx, overPicture }, side, row, map, colour) {
+  const x = side.x[row], y = side.y[row], angle = side.angle[row], speed = side.groupRows.speed[row];
   const known = !Number.isNaN(angle) && !Number.isNaN(speed);
   const [at, to] = [map(x, y), known ? map(x + speed * Math.cos(angle), y + speed * Math.sin(angle)) : null];
   if (!at || Number.isNaN(at[0])) return;
@@ -71,13 +71,13 @@ function wayOfWhole({ ctx, pictured }, side, row, map, colour) {
   ctx.lineWidth = 2;
   ctx.beginPath();
   if (to) arrowPath(ctx, at, to);
-  if (pictured) rimPath(ctx);
+  if (overPicture) strokeRim(ctx);
   ctx.strokeStyle = colour;
   ctx.stroke();
   ctx.beginPath();
   ctx.arc(...at, 3.2, 0, 2 * Math.PI);
   ctx.lineWidth = 1;
-  if (pictured) rimPath(ctx);
+  if (overPicture) strokeRim(ctx);
   ctx.fillStyle = colour;
   ctx.fill();
 }
@@ -92,17 +92,17 @@ function arrowPath(ctx, [u, v], [p, q]) {
   }
 }
 
-function wholeWords(side, row) {
-  const size = side.wholes.size[row];
+function groupWords(side, row) {
+  const size = side.groupRows.size[row];
   return `T${side.id[row]}${Number.isNaN(size) ? "" : ` ≈${Math.round(size * 10) / 10}`}`;
 }
 
-// Ids with sizes under hulls, or beside them where there is more room.
-function nameWholes(pane, side, map) {
+// Ids with sizes: of eight places round the hull, each takes the one that covers least.
+function drawWholeGroupIds(pane, side, map) {
   const rows = side.rows(pane.frame), { hulls, ellipses } = pane.options;
   if (rows.length > MANY) return;
   for (const row of rows) {
-    const shapes = [hulls ? hullOf(side, row, map) : [], hulls || !ellipses ? [] : ringOf(side, row, map)];
+    const shapes = [hulls ? hullPoints(side, row, map) : [], hulls || !ellipses ? [] : extentPoints(side, row, map)];
     const at = map(side.x[row], side.y[row]);
     if (!at || Number.isNaN(at[0])) continue;
     const points = [...shapes.flat(), [at[0] - 5, at[1] - 5], [at[0] + 5, at[1] + 5]];
@@ -112,28 +112,28 @@ function nameWholes(pane, side, map) {
     const spots = ([w, h]) => [
       [middle, bottom + h + 4], [middle, top - h - 4], [right + w + 4, level], [left - w - 4, level],
       [right + w, bottom + h], [left - w, bottom + h], [right + w, top - h], [left - w, top - h],
-    ].map(([x, y]) => [within(x, w, pane.width), within(y, h, pane.height)]);
-    name(pane.ctx, pane.taken, wholeWords(side, row), spots, colourOf(side.id[row]), false, true);
+    ].map(([x, y]) => [clampTo(x, w, pane.width), clampTo(y, h, pane.height)]);
+    placeLabel(pane.ctx, pane.taken, groupWords(side, row), spots, colourOf(side.id[row]), false, true);
   }
 }
 
-// The place nearest to x at which something of half width w lies inside.
-function within(x, w, width) {
+// The coordinate nearest to x at which something of half width w lies inside 0 to width.
+function clampTo(x, w, width) {
   return Math.min(Math.max(x, w), width - w);
 }
 
-// What the marks of groups mean; nothing where none are tracked as wholes.
-function wholesKey(box) {
-  if (!(tracks && tracks.wholes)) return;
+// The key to the marks of groups; empty unless the tracker reports groups without people.
+function wholeGroupsKey(box) {
+  if (!(tracks && tracks.groupRows)) return;
   const marks = [
-    ["hull of its points", ctx => { polygonPath(ctx, [[3, 16], [10, 2], [36, 2], [45, 16]]); region(ctx, theme.ink, true); }],
-    ["where 99 % of it is, by its extent (d² ≤ 9.21)", ctx => {
+    ["hull of its points", ctx => { polygonPath(ctx, [[3, 16], [10, 2], [36, 2], [45, 16]]); drawRegion(ctx, theme.ink, true); }],
+    ["extent: holds 99 % of the group (d² ≤ 9.21)", ctx => {
       ctx.beginPath();
       ctx.ellipse(24, 9, 20, 7.5, 0, 0, 2 * Math.PI);
-      extentLine(ctx);
+      setExtentLine(ctx);
       ctx.stroke();
     }],
-    ["middle, and where it will be in 1 s", ctx => {
+    ["centre, and where it will be in 1 s", ctx => {
       ctx.lineWidth = 2;
       ctx.beginPath();
       arrowPath(ctx, [6, 9], [40, 9]);
@@ -142,12 +142,12 @@ function wholesKey(box) {
       ctx.arc(6, 9, 3.2, 0, 2 * Math.PI);
       ctx.fill();
     }],
-    ["id and estimated people", ctx => label(ctx, "T4 ≈3", 24, 14, theme.ink, true)],
+    ["id and estimated number of people", ctx => label(ctx, "T4 ≈3", 24, 14, theme.ink, true)],
   ];
-  box.replaceChildren(tag("span", "Tracked groups:"), ...marks.map(([words, draw]) => swatch(words, draw)));
+  box.replaceChildren(tag("span", "Tracked groups:"), ...marks.map(([words, draw]) => keyItem(words, draw)));
 }
 
-function swatch(words, draw) {
+function keyItem(words, draw) {
   const item = document.createElement("span"), canvas = document.createElement("canvas"), dpr = devicePixelRatio || 1;
   [canvas.width, canvas.height] = [48 * dpr, 18 * dpr];
   const ctx = canvas.getContext("2d");

@@ -44,8 +44,8 @@ def test_groups(sequence: Sequence, plane: str) -> None:
     """Place, ellipse, hull and words of every row of a frame."""
     answers = wholes(sequence, plane)
     shown = """[...tracks.rows(60)].map(row => [tracks.id[row], [tracks.x[row], tracks.y[row]],
-        ringOf(tracks, row, (x, y) => [x, y]), tracks.wholes.hull[row], tracks.wholes.speed[row],
-        wholeWords(tracks, row)])"""
+        extentPoints(tracks, row, (x, y) => [x, y]), tracks.groupRows.hull[row], tracks.groupRows.speed[row],
+        groupWords(tracks, row)])"""
     rows = ran(page_data(sequence, answers), ("decode.js", "whole_groups.js"), shown)
     now, near = answers[59], {"atol": 0.05 if plane == "ground" else 3.0}
     assert [row[0] for row in rows] == now.id.tolist()
