@@ -232,7 +232,10 @@ def is_whole(name: str, out: Path) -> bool:
 
 @pytest.mark.parametrize("name", [name for name in WRITING if name != "demo"])
 def test_ctrl_c_at_many_moments(name, place, capsys):
-    """130 or done, and never anything half-written, from the third call of ours on (run, carry_out: the first)."""
+    """130 or done, and never anything half-written, from the third call of ours on.
+
+    The first two are run and run_command.
+    """
     end, line = length(name, place), words(COMMANDS[name][0], place)
     for stop in {3, *range(5, end, max(end // 6, 1)), end - 8, end - 5, end - 2}:
         with Calls(stop):

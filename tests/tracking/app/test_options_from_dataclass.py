@@ -10,7 +10,7 @@ import pytest
 import typer
 
 from tracking.app.command_result import CommandResult
-from tracking.app.command_runner import carry_out
+from tracking.app.command_runner import run_command
 from tracking.app.options_from_dataclass import options_from
 
 
@@ -46,26 +46,26 @@ def app() -> typer.Typer:
 
 
 def test_the_command_gets_one_instance_with_the_defaults(app, capsys):
-    assert carry_out(app, ["fruit", "apple", "--out", "x"]) == 0
+    assert run_command(app, ["fruit", "apple", "--out", "x"]) == 0
     assert capsys.readouterr().out.strip() == repr(FruitOptions(name="apple", out=Path("x")))
 
 
 def test_every_option_arrives_and_lists_start_empty_each_time(app, capsys):
     given = ["fruit", "apple", "--out", "x", "--colour", "red", "--count", "5", "--set", "a=1", "--set", "b=2"]
-    assert carry_out(app, given) == 0
+    assert run_command(app, given) == 0
     expected = FruitOptions(name="apple", colour="red", out=Path("x"), count=5, settings=["a=1", "b=2"])
     assert capsys.readouterr().out.strip() == repr(expected)
-    assert carry_out(app, ["fruit", "apple", "--out", "x"]) == 0
+    assert run_command(app, ["fruit", "apple", "--out", "x"]) == 0
     assert capsys.readouterr().out.strip() == repr(FruitOptions(name="apple", out=Path("x")))
 
 
 def test_json_needs_no_field(app, capsys):
-    assert carry_out(app, ["fruit", "apple", "--out", "x", "--json"]) == 0
+    assert run_command(app, ["fruit", "apple", "--out", "x", "--json"]) == 0
     assert capsys.readouterr().out.strip() == '{"status": "ok"}'
 
 
 def test_help_lists_options_in_the_order_of_the_fields(app, capsys):
-    assert carry_out(app, ["fruit", "--help"]) == 0
+    assert run_command(app, ["fruit", "--help"]) == 0
     text = capsys.readouterr().out
     assert "Sell fruit." in text
     places = [text.index(word) for word in ("Which fruit.", "--colour C", "--out", "--count", "--set K=V", "--json")]
@@ -78,5 +78,5 @@ def test_help_lists_options_in_the_order_of_the_fields(app, capsys):
     [(["apple"], "--out"), (["--out", "x"], "NAME"), (["apple", "--out", "x", "--count", "0"], "--count")],
 )
 def test_missing_and_wrong_options_are_usage_errors(app, more, words, capsys):
-    assert carry_out(app, ["fruit", *more]) == 2
+    assert run_command(app, ["fruit", *more]) == 2
     assert words in capsys.readouterr().err
