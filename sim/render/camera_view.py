@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from sim.render.background import EmptyScene, PixelGeometry, paint_empty_scene, trace_geometry
 from sim.render.blur_noise import blur_weights
-from sim.render.canvas import MOST, TILE_H, TILE_W, UNIT, Canvas
+from sim.render.canvas import MOST, TILE_H, TILE_W, UNIT, FrameCanvas
 from sim.render.foliage import Foliage
 from sim.render.illumination import Illumination
 from sim.render.random_fields import SampledField
@@ -37,17 +37,17 @@ class CameraView:
         self.width, self.height = camera.image
         self.rays: PixelRays = pixel_rays(camera)
         self.solids: Solids = solids_of(motion.scene)
-        self._spare: list[Canvas] = []
+        self._spare: list[FrameCanvas] = []
 
-    def take_canvas(self) -> Canvas:
+    def take_canvas(self) -> FrameCanvas:
         """Return a canvas that shows the empty scene: one that was returned, or a new one."""
         if self._spare:
             return self._spare.pop()
         size = self.height, self.width
         dirty = np.zeros((-(-self.height // TILE_H), -(-self.width // TILE_W)), np.uint8)
-        return Canvas(self.empty_canvas.copy(), self.geometry.depth.copy(), np.zeros(size, np.uint8), dirty)
+        return FrameCanvas(self.empty_canvas.copy(), self.geometry.depth.copy(), np.zeros(size, np.uint8), dirty)
 
-    def return_canvas(self, canvas: Canvas) -> None:
+    def return_canvas(self, canvas: FrameCanvas) -> None:
         """Restore a canvas to the empty scene, and keep it for the next frame."""
         from sim.render.canvas_kernels import restore
 

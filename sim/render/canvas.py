@@ -20,7 +20,7 @@ RUN_ROW, RUN_FIRST, RUN_END = range(3)  # columns of runs of pixels: row, first 
 
 
 @dataclass(frozen=True, eq=False)
-class Canvas:
+class FrameCanvas:
     """What one frame of one view is drawn on; at first the empty scene.
 
     colour (H, W, 3) int16: grey levels times UNIT. depth (H, W) float32 m. shaded (H, W) uint8: 255 times the share of

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from sim.render.camera_view import CameraView
-from sim.render.canvas import Canvas
+from sim.render.canvas import FrameCanvas
 from sim.render.people import DrawnPeople, ProjectedPeople
 from sim.types import Array, Ints
 
@@ -25,7 +25,7 @@ def empty_scene_disparities(left: CameraView, right: CameraView) -> Array:
 def frame_disparities(
     empty: Array,
     right: CameraView,
-    canvas: Canvas,
+    canvas: FrameCanvas,
     ids: Ints,
     people: DrawnPeople,
     in_left: ProjectedPeople,

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from scenarios.errors import InputError
 from sim.render.blur_noise import blur_weights, noise_offsets, noise_pool
 from sim.render.camera_view import NODE_STEP, CameraView
-from sim.render.canvas import UNIT, Canvas
+from sim.render.canvas import UNIT, FrameCanvas
 from sim.render.clothing import clothing_atlas
 from sim.render.disparity import empty_scene_disparities, frame_disparities
 from sim.render.foliage import Foliage, grow_plants
@@ -150,7 +150,7 @@ class Renderer:
             self._last_batch = FrameBatch(self.motion, self.illumination, index)
         return self._last_batch
 
-    def _moved_canvas(self, view: CameraView, index: int) -> Canvas:
+    def _moved_canvas(self, view: CameraView, index: int) -> FrameCanvas:
         """A canvas of the empty scene with its plants where the wind of this frame moves them."""
         canvas = view.take_canvas()
         if view.plants is not None:
@@ -187,7 +187,7 @@ class Renderer:
         view.return_canvas(canvas)
         return image, truth
 
-    def _draw_shadows(self, view: CameraView, canvas: Canvas, people: DrawnPeople, seen: PeopleInView) -> None:
+    def _draw_shadows(self, view: CameraView, canvas: FrameCanvas, people: DrawnPeople, seen: PeopleInView) -> None:
         from sim.render.shadows_kernels import draw_shadows
 
         fall = seen.shadows
@@ -201,7 +201,7 @@ class Renderer:
 
     def _draw_people(
         self,
-        canvas: Canvas,
+        canvas: FrameCanvas,
         people: DrawnPeople,
         seen: PeopleInView,
         ids: NDArray[np.int64],
@@ -221,7 +221,7 @@ class Renderer:
             canvas.dirty, self._margin, amodal,
         )  # fmt: skip
 
-    def _finish(self, view: CameraView, canvas: Canvas, index: int, side: int) -> Image:
+    def _finish(self, view: CameraView, canvas: FrameCanvas, index: int, side: int) -> Image:
         """The image of a canvas: blurred, lit, with noise and, if wanted, the artefacts of JPEG."""
         from sim.render.blur_noise_kernels import finish_image
 
