@@ -1,7 +1,8 @@
 """A bank of Kalman filters in arrays: constant velocity in each coordinate, and a random-walk direction.
 
 The model is filterpy's: kinematics of order 1 (`filterpy.common.kinematic_kf`, constant velocity) driven by
-`filterpy.common.Q_discrete_white_noise`, a white acceleration of standard deviation sigma held over a step dt. A bank
+`filterpy.common.Q_discrete_white_noise`, a white acceleration of standard deviation sigma held over a step dt. filterpy
+is imported where a model is made, as its import takes 0.65 s. A bank
 is equal to as many `filterpy.kalman.KalmanFilter` to 1e-9, and faster.
 
 Each of D measured coordinates (for example x, y, h, w) has a filter of its own with state x = (place, rate), A = [[1,
@@ -43,6 +44,18 @@ def white_acceleration(dt: float, sigma: Array | float) -> Array:
     unit = Q_discrete_white_noise(2, dt)
     q = np.square(np.asarray(sigma, float))
     return np.stack([q * unit[0, 0], q * unit[0, 1], q * unit[1, 1]])
+
+
+def constant_velocity(dt: float, axes: int) -> tuple[Array, Array]:
+    """Returns A and Q, (2 D, 2 D) each, of D = `axes` coordinates with a white acceleration of standard deviation 1.
+
+    The state is all places, then all rates: filterpy's kinematics of order 1 and Q_discrete_white_noise, with
+    order_by_dim=False. dt: s.
+    """
+    from filterpy.common import Q_discrete_white_noise, kinematic_kf
+
+    A = kinematic_kf(axes, 1, dt, order_by_dim=False).F
+    return A, Q_discrete_white_noise(2, dt, block_size=axes, order_by_dim=False)
 
 
 def born(place: Array, var: Array | float, rate_var: Array | float) -> Array:

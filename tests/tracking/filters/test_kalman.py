@@ -25,6 +25,23 @@ def test_process_noise_is_filterpys():
     assert np.allclose(q, [expected[0, 0], expected[0, 1], expected[1, 1]], rtol=1e-14)
 
 
+@pytest.mark.parametrize("dt", [0.04, 1 / 7, 0.4])
+def test_constant_velocity_by_hand(dt):
+    """To the last bit: filterpy's factors 0.25 and 0.5 are powers of two."""
+    A, Q = kalman.constant_velocity(dt, 2)
+    expected, block = np.eye(4), np.array([[dt**4 / 4, dt**3 / 2], [dt**3 / 2, dt**2]])
+    expected[0, 2] = expected[1, 3] = dt
+    assert np.array_equal(A, expected)
+    assert np.array_equal(Q, np.kron(block, np.eye(2)))
+
+
+@pytest.mark.parametrize("sigma", [0.3, 7.0])
+def test_entries_of_q_by_hand(sigma):
+    for dt in (0.04, 1 / 7, 0.4):
+        expected = [sigma**2 * dt**4 / 4, sigma**2 * dt**3 / 2, sigma**2 * dt**2]
+        assert kalman.white_acceleration(dt, sigma).tolist() == expected
+
+
 @pytest.mark.parametrize("seed", range(12))
 def test_bank_equals_filterpy_over_random_misses(seed):
     r = np.random.default_rng(seed)

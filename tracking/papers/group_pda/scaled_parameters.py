@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from sim.types import Array
+from tracking.filters import kalman
 from tracking.filters.components import Constraint
 from tracking.papers.group_pda import association_mass_kernels as kernels
 from tracking.papers.group_pda.config import GroupPdaConfig
@@ -56,9 +57,7 @@ def scale_parameters(
     # Every extent is (sample covariance shrunk towards `prior`) / factor. G_y must use the same extents: otherwise
     # groups that it separates would be merged again.
     constraint = Constraint(link, c.gate / factor, factor * prior, c.spread_weight, c.least_people if pixels else 0.0)
-    F = np.eye(4)
-    F[0, 2] = F[1, 3] = dt
-    block = np.array([[dt**4 / 4, dt**3 / 2], [dt**3 / 2, dt**2]])
+    F, Q = kalman.constant_velocity(dt, 2)
     return ScaledParameters(
         config=config,
         dt=dt,
@@ -67,7 +66,7 @@ def scale_parameters(
         point_sd=point_sd,
         kernel_rules=_kernel_rules(c, fps, constraint, point_sd, factor, pixels),
         F=F,
-        Q=np.kron(block, np.eye(2)) * (scale * c.accel_noise) ** 2 / dt,
+        Q=Q * (scale * c.accel_noise) ** 2 / dt,
         from_pixels=pixels,
         metres_per_unit=np.array([1, 1 / sine_tilt]) / scale,
         body_cov=np.zeros((2, 2)) if body_cov is None else body_cov,
