@@ -19,7 +19,7 @@ LAGS = (0.2, 1.0)  # s: lags of the error correlation
 
 
 def simulated_detections(m: MatchedRecording, sensor: Sensor, seed: int) -> MatchedRecording:
-    """Returns the recording with its detections replaced by those of a simulated sensor; seed: of its random draws."""
+    """Returns the recording with its detections replaced by a simulated sensor's; seed: of the random draws."""
     found = sense(m.truth, sensor, seed, m.camera, m.size)
     return match_detections(m.truth, found, m.size, m.camera)
 

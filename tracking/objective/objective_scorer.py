@@ -1,6 +1,6 @@
 """`ObjectiveScorer`: HOTA, group_F1_hull and their mean, for tuning and rewards that score one truth again and again.
 
-The numbers are those of `tracking.scoring.evaluate`. The truth's side comes from the same `Scorer` and is prepared
+The scores equal those of `tracking.scoring.evaluate`. The truth's side comes from the same `Scorer` and is prepared
 once. Pairs of people, HOTA and the matching of groups are functions of tracking.scoring. Only three steps are replaced
 by compiled ones: shapes of derived groups (`derived_outlines`), overlaps of hulls and people inside hulls
 (`hull_overlaps`). Where rounding could change a result, the exact functions of tracking.scoring decide.

@@ -107,13 +107,19 @@ class Scorer:
         return true_people(self.truth, chosen_frames(None, self.truth.length))
 
     def groups(self, surface: Surface) -> TrueGroups:
-        """Returns the true groups of all labelled frames, members as rows of `people`; there must be such a frame."""
+        """Returns the true groups of all labelled frames, members as rows of `people`.
+
+        At least one frame must be labelled.
+        """
         if surface not in self._groups:
             self._groups[surface] = true_groups(self.truth, self.labelled, self.people.rows, surface)
         return self._groups[surface]
 
     def sides(self, tracks: Sequence[Tracks], frames: Bools) -> ComparedSides:
-        """Returns both sides in the frames f where frames[f] is true, with nobody mapped; tracks: of these frames."""
+        """Returns both sides in the frames f where frames[f] is true.
+
+        tracks: of these frames, sorted. The mapping of people is -1 for all of them.
+        """
         kept = frames[self.people.rows.frame]
         true = self.people if kept.all() else self.people.keep(kept)
         est, plane = tracked_people(tracks), plane_of(self.truth, tracks)

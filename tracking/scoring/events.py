@@ -13,6 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from sim.types import Array
+from tracking.scoring.group_scores import ratio
 
 KINDS = ("merge", "split", "cross", "queue", "enter", "leave")
 COUNTS_AS = {"form": "merge", "dissolve": "split"}
@@ -130,9 +131,9 @@ def event_scores(matched: Sequence[MatchedEvents], fps: float) -> dict[str, floa
     for m in matched:
         hits, n_true, n_est = len(m.pairs), len(m.true), len(m.est)
         out |= {
-            f"{m.kind}_F1": _share(2 * hits, n_true + n_est),
-            f"{m.kind}_precision": _share(hits, n_est),
-            f"{m.kind}_recall": _share(hits, n_true),
+            f"{m.kind}_F1": ratio(2 * hits, n_true + n_est),
+            f"{m.kind}_precision": ratio(hits, n_est),
+            f"{m.kind}_recall": ratio(hits, n_true),
             f"{m.kind}_TP": float(hits),
             f"{m.kind}_FP": float(n_est - hits),
             f"{m.kind}_FN": float(n_true - hits),
@@ -162,8 +163,8 @@ def lineage_scores(matched: Sequence[MatchedEvents]) -> dict[str, float]:
     pairs = [(a, b) for m in head for a, b in m.pairs if a.has_lineage]
     right = sum(_same_lineage(a, b) for a, b in pairs)
     return {
-        "lineage_accuracy": right / n_true if n_true else float("nan"),
-        "lineage_accuracy_found": right / len(pairs) if pairs else float("nan"),
+        "lineage_accuracy": ratio(right, n_true),
+        "lineage_accuracy_found": ratio(right, len(pairs)),
     }
 
 
@@ -179,10 +180,7 @@ def _same_parts(true: Sequence[EventMembers], est: Sequence[EventMembers]) -> bo
     return len(true) == len(est) and all(any(a.jaccard(b) > SAME_PART for b in est) for a in true)
 
 
-def _share(part: float, whole: int) -> float:
-    return part / whole if whole else float("nan")
-
-
 def _mean(values: Sequence[float]) -> float:
+    """Returns the mean of the values that are not nan, nan without any."""
     known = [v for v in values if v == v]
     return sum(known) / len(known) if known else float("nan")

@@ -1,7 +1,7 @@
 """Converts events of the truth and of a tracker into `ComparableEvent`s, so that members on both sides are true people.
 
-`true_events` converts those of the truth, `tracked_events` those of a tracker that names members, `events_of_hulls`
-those of a tracker that names none. An event counts in the frame in which it starts.
+`true_events` converts events of the truth, `tracked_events` those that a tracker reports with members,
+`events_of_hulls` events that name no members. An event belongs to the frame in which it starts.
 """
 
 from __future__ import annotations
@@ -27,8 +27,8 @@ def true_events(
 
     people: true people; positions (R, 2): theirs on the surface of comparison, None if `GroupEvent.pos` is on it
     already. With positions, an event lies at the mean of its members at its start (nan if none is present). Parents are
-    the groups of the members one frame before the start, children those at the start. Both are None if the kind changes
-    no groups or if parents and children are equal.
+    the groups of the members one frame before the start, children are the groups at the start. Both are None if the
+    kind changes no groups or if parents and children are equal.
     """
     lookup, group = RowLookup(people.rows), _group_by_row(people.group)
 

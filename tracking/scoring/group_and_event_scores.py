@@ -80,7 +80,7 @@ class TrackedGroups:
 def group_and_event_scores(sides: ComparedSides, true: TrueGroups, by: GroupMatch) -> dict[str, float]:
     """Returns the scores by key; true: groups in the frames of `sides`; by: how groups are matched.
 
-    Keys are missing where the truth lacks data: those matched by hulls if `true` is not comparable, those of events if
+    Keys are missing if the truth lacks data: scores by hulls if `true` is not comparable, scores of events if
     the truth has no events.
     """
     tracked = tracked_groups(sides)

@@ -120,7 +120,8 @@ def matched_groups(true_pos: Array, est_pos: Array, pairs: Pairs, least: float =
 class GroupComparison:
     """True and estimated groups with their matchings.
 
-    pairs: all candidate pairs; chosen: the matching of all; found: the matching of those of similarity 0.5 or more.
+    pairs: all candidate pairs; chosen: the matching of all pairs; found: the matching of pairs of similarity 0.5 or
+    more.
     nearest (G,): distance of each true group to the group matched by distance alone, nan if it has none.
     """
 
@@ -173,15 +174,15 @@ def group_scores(compared: GroupComparison, frames: Bools) -> dict[str, float]:
     right, pure = _correct(compared, i, j)
     distance = np.hypot(*(true.pos[i] - est.pos[j]).T)
     return {
-        "1-FP": _share(n_true - false, n_true),
-        "1-FN": _share(n_true - misses, n_true),
+        "1-FP": ratio(n_true - false, n_true),
+        "1-FN": ratio(n_true - misses, n_true),
         **_by_frame(compared, frames, i),
-        "GDSR": _share(int(right.sum()), n_true),
-        "GDSR2": _share(int(pure.sum()), n_true),
+        "GDSR": ratio(int(right.sum()), n_true),
+        "GDSR2": ratio(int(pure.sum()), n_true),
         "MOTP": _mean(distance),
         "MSE": _mean(distance**2),
         "MOTP_ungated": _mean(compared.nearest[frames[true.rows.frame]]),
-        "MOTA": _share(n_true - misses - false - switches, n_true),
+        "MOTA": ratio(n_true - misses - false - switches, n_true),
         "IDSW": float(switches),
         "TP": float(hits),
         "FP": float(false),
@@ -193,7 +194,8 @@ def group_scores(compared: GroupComparison, frames: Bools) -> dict[str, float]:
     }
 
 
-def _share(part: float, whole: int) -> float:
+def ratio(part: float, whole: int) -> float:
+    """Returns part / whole, nan if whole is 0."""
     return part / whole if whole else float("nan")
 
 
@@ -247,12 +249,12 @@ def detection(compared: GroupComparison, frames: Bools) -> dict[str, float]:
     f = compared.found
     hits = int(frames[f.true.frame[f.i]].sum())
     n_true, n_est = (int(frames[side.rows.frame].sum()) for side in (compared.true, compared.est))
-    return {"F1": f1(hits, n_true, n_est), "precision": _share(hits, n_est), "recall": _share(hits, n_true)}
+    return {"F1": f1(hits, n_true, n_est), "precision": ratio(hits, n_est), "recall": ratio(hits, n_true)}
 
 
 def f1(hits: int, n_true: int, n_est: int) -> float:
     """Returns 2 hits / (true + estimated groups), nan without groups."""
-    return _share(2 * hits, n_true + n_est)
+    return ratio(2 * hits, n_true + n_est)
 
 
 def _sizes(groups: GroupRows) -> Array:

@@ -6,7 +6,7 @@ import numpy as np
 
 from sim.types import Array, Ints
 from tracking.scoring.candidate_pairs import compare
-from tracking.scoring.group_scores import group_of_person
+from tracking.scoring.group_scores import f1, group_of_person, ratio
 from tracking.scoring.people_and_groups import GroupRows
 from tracking.scoring.rows import FrameRows
 
@@ -35,9 +35,9 @@ def pairwise_scores(true: GroupRows, est: GroupRows, person: Ints) -> dict[str, 
     p, q = distinct
     hits = int(((group[p] >= 0) & (group[p] == group[q])).sum())
     return {
-        "pairwise_F1": 2 * hits / (n_true + n_est) if n_true + n_est else float("nan"),
-        "pairwise_precision": hits / n_est if n_est else float("nan"),
-        "pairwise_recall": hits / n_true if n_true else float("nan"),
+        "pairwise_F1": f1(hits, n_true, n_est),
+        "pairwise_precision": ratio(hits, n_est),
+        "pairwise_recall": ratio(hits, n_true),
     }
 
 
