@@ -1,7 +1,7 @@
 """The options of each command as one frozen dataclass: every field is an option, with its type, default and help text.
 
-`options_from_dataclass` turns a dataclass into a Typer command. Commands with less than four options have none, and
-the options of `tune` are in `tune_options`. The module imports Typer only, so that `--help` stays quick.
+`options_from_dataclass` turns a dataclass into a Typer command. Commands with less than four options have none;
+those of `tune` follow from `tracking.tuning.options`. The module imports Typer only, so that `--help` stays quick.
 """
 
 from __future__ import annotations

@@ -101,7 +101,10 @@ def _usage(error: Any) -> InputError:
 
 
 def _print(result: CommandResult, as_json: bool) -> int:
-    """Prints the result and returns its exit code. A closed pipe is no error; a full disk is, and returns 1."""
+    """Prints the result and returns its exit code. A closed pipe is no error.
+
+    Any other failure to write, as a full disk, is printed on stderr, and 1 is returned.
+    """
     try:
         return print_result(result, as_json)
     except OSError as error:

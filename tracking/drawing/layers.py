@@ -130,8 +130,8 @@ def layer_of_truth(truth: Truth) -> Layer:
 def layer_of_tracks(tracks: SequenceOf[Tracks], camera: Camera | None, scene: Scene | None) -> Layer:
     """A tracker's layer over pictures, in px.
 
-    Tracks on the ground are projected through `camera`; people without boxes get the box of an upright person. Without
-    a camera their places are unknown. scene: gives the ground's height; None: the ground is flat.
+    Ellipses and groups of tracks on the ground are projected through `camera`, and people without boxes get the box of
+    an upright person. Without a camera only people's own boxes are known. scene: gives the ground's height; None: 0.
     """
     frames = {t.index: _marks_in_picture(t, camera, scene) for t in tracks}
     return Layer("tracked", "T", frames, _emitted(tracks))

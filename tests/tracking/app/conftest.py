@@ -1,4 +1,4 @@
-"""A hand-made sequence: 3 + 2 people meet, walk together and part, one stranger passes, one stands alone."""
+"""A hand-made sequence: groups of 3 and 2 people merge and split, a stranger passes, another person stands alone."""
 
 from __future__ import annotations
 

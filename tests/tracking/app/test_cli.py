@@ -135,17 +135,17 @@ def words(line: str, place: Place) -> list[str]:
     return [word.format(**place.__dict__) for word in line.split()]
 
 
-def said(capsys, code: int, as_json: bool) -> None:
+def check_output(capsys, code: int, as_json: bool) -> None:
     """What a command printed: exactly one object on stdout, or an error as exactly one line on stderr."""
     printed = capsys.readouterr()
-    told = printed.err.splitlines()
+    shown = printed.err.splitlines()
     if not as_json:
         assert bool(printed.out) == (code == 0)
-        assert len(told) == (code != 0), told
-        assert all(line.startswith("interrupted: " if code == 130 else "error: ") for line in told)
+        assert len(shown) == (code != 0), shown
+        assert all(line.startswith("interrupted: " if code == 130 else "error: ") for line in shown)
         return
     answer = json.loads(printed.out)
-    assert not told
+    assert not shown
     assert answer["status"] == {0: "ok", 1: "failed", 2: "refused", 130: "interrupted"}[code]
     assert ("error" in answer) == (code != 0)
     if code:
@@ -203,7 +203,7 @@ def test_command(name, state, as_json, place, capsys):
     with Calls(stop) if stop > 0 else nullcontext():
         code = run(line)
     assert code == {"good": 0, "bad": 2, "interrupted": 130}[state]
-    said(capsys, code, as_json)
+    check_output(capsys, code, as_json)
     assert not list(place.out.parent.rglob(".partial-*"))
     if state != "good":
         assert not place.out.exists() or is_whole(name, place.out), list(place.out.rglob("*"))
@@ -256,7 +256,7 @@ def test_interrupted_and_full_disk_while_writing(name, error, code, as_json, pla
         monkeypatch.setattr(os, function, _raise(error))
     assert run(words(COMMANDS[name][0], place) + ["--json"] * as_json) == code
     monkeypatch.undo()
-    said(capsys, code, as_json)
+    check_output(capsys, code, as_json)
     left = [] if name != "tune" else ["toy.journal", "toy.journal.locks"]
     assert sorted(p.name for p in place.out.rglob("*")) == left
 
@@ -331,10 +331,10 @@ def test_what_a_tracker_prints_is_not_in_the_object(place, tmp_path, capsys):
 def test_an_unwritable_out_is_named_as_given(place, line, folder, capsys):
     line %= folder
     assert run(words(line, place)) == 2
-    told = capsys.readouterr().err
-    assert told.startswith(f"error: {words(line, place)[-1]}: ")
-    assert ".partial" not in told
-    assert len(told.splitlines()) == 1
+    shown = capsys.readouterr().err
+    assert shown.startswith(f"error: {words(line, place)[-1]}: ")
+    assert ".partial" not in shown
+    assert len(shown.splitlines()) == 1
 
 
 def test_one_warning_for_many_recordings(tmp_path, capsys):
@@ -370,8 +370,8 @@ def test_a_tracker_on_the_ground_is_scored_there_from_text_alone(place, tmp_path
     write_tracks(tmp_path / "t", answers, fps=sequence.fps, info={"sequence": sequence.name}, **seen)
     (tmp_path / "t" / "tracks.parquet").unlink()
     assert run(["score", str(place.one), str(tmp_path / "t"), "--json"]) == 0
-    (told,) = json.loads(capsys.readouterr().out)["sequences"]
-    assert (told["similarity"], told["HOTA"], told["MOTA"]) == ("ground", 1.0, 1.0)
+    (shown,) = json.loads(capsys.readouterr().out)["sequences"]
+    assert (shown["similarity"], shown["HOTA"], shown["MOTA"]) == ("ground", 1.0, 1.0)
 
 
 def test_a_family_of_commands_alone_is_refused(capsys):
@@ -395,7 +395,7 @@ def test_ctrl_c_that_became_another_error(place, capsys, monkeypatch):
 
     monkeypatch.setattr("sim.io.export.coco.coco", load)
     assert run(words(COMMANDS["export coco"][0], place)) == 130
-    said(capsys, 130, as_json=False)
+    check_output(capsys, 130, as_json=False)
 
 
 def test_a_bug_is_one_line_and_shown_whole_when_asked_for(place, capsys, monkeypatch):

@@ -70,7 +70,7 @@ def made(tmp_path_factory) -> Path:
 
 
 def refused(line: list[str], capsys, code: int = 2) -> str:
-    """The one line on stderr, which --json says too."""
+    """Runs a command that must fail; returns its one line on stderr, after checking that --json has the same error."""
     capsys.readouterr()
     assert run(line) == code
     printed = capsys.readouterr()
@@ -92,8 +92,8 @@ def test_wrong_scenarios(name, tmp_path, capsys):
     scene, out = tmp_path / "scene.toml", tmp_path / "out"
     scene.write_text(text)
     for line in (["scenarios", str(scene)], ["generate", str(scene), "--seeds", "0:3", "--out", str(out)]):
-        said = refused(line, capsys)
-        assert all(word in said for word in [str(scene), *words]), said
+        output = refused(line, capsys)
+        assert all(word in output for word in [str(scene), *words]), output
     assert not out.exists()
 
 
@@ -130,11 +130,11 @@ WORLDS = {
 @pytest.mark.parametrize("name", WORLDS)
 def test_what_only_a_simulation_can_tell(name, tmp_path, capsys):
     """The scenario's file and the seed are named, and nothing is written."""
-    text, code, said = WORLDS[name]
+    text, code, output = WORLDS[name]
     scene, out = tmp_path / "scene.toml", tmp_path / "out"
     scene.write_text(f"schema = 1\n{text}")
     line = refused(["generate", str(scene), "--seeds", "0:2", "--out", str(out)], capsys, code)
-    assert all(word in line for word in [f"{scene}: ", "(seed 0)", "scene-s00001", *said]), line
+    assert all(word in line for word in [f"{scene}: ", "(seed 0)", "scene-s00001", *output]), line
     assert not out.exists()
 
 
@@ -277,8 +277,8 @@ def test_wrong_mot_text(name, tmp_path, capsys):
     for path, good in ((gt, tracks), (tracks, gt)):
         path.write_bytes(text.encode("latin-1"))
         good.write_text(ROWS if good == gt else ROWS.replace(",1,1,1\n", ",1\n"))
-        said = refused(["score", str(sequence), str(tracks)], capsys)
-        assert all(word in said for word in [str(path), *words]), said
+        output = refused(["score", str(sequence), str(tracks)], capsys)
+        assert all(word in output for word in [str(path), *words]), output
     gt.write_bytes(text.encode("latin-1"))
     for line in (
         ["track", "blob", str(sequence), "--detections", "truth", "--out", str(out)],
@@ -286,8 +286,8 @@ def test_wrong_mot_text(name, tmp_path, capsys):
         ["sheet", str(sequence), "--out", str(out / "sheet.png")],
         ["export", "coco", str(sequence), "--out", str(out / "coco.json")],
     ):
-        said = refused(line, capsys)
-        assert all(word in said for word in [str(gt), *words]), said
+        output = refused(line, capsys)
+        assert all(word in output for word in [str(gt), *words]), output
     assert not out.exists()
 
 
@@ -298,8 +298,8 @@ def test_tracks_cut_short(name, made, tmp_path, capsys):
     (path,) = tracks.rglob(name)
     path.write_bytes(path.read_bytes()[:-20])
     for line in (["score"], ["view", "--out", str(tmp_path / "page.html")]):
-        said = refused([line[0], str(made / "data"), str(tracks), *line[1:]], capsys)
-        assert str(path) in said
+        output = refused([line[0], str(made / "data"), str(tracks), *line[1:]], capsys)
+        assert str(path) in output
     assert not (tmp_path / "page.html").exists()
 
 
@@ -357,9 +357,9 @@ def disk(folder: Path, options: str) -> Iterator[Path]:
 def test_a_disk_that_cannot_be_written(made, tmp_path, capsys):
     with disk(tmp_path / "disk", "ro") as root:
         for line in writers(made, root / "out"):
-            said = refused(line, capsys)
-            assert "Read-only" in said, said
-            assert str(root) in said, said
+            output = refused(line, capsys)
+            assert "Read-only" in output, output
+            assert str(root) in output, output
 
 
 def test_a_full_disk(made, tmp_path, capsys):
@@ -371,7 +371,7 @@ def test_a_full_disk(made, tmp_path, capsys):
 
 
 def test_a_full_disk_or_nobody_behind_stdout(made):
-    """The answer is lost, and said so; a reader who has seen enough is no error."""
+    """A result that cannot be written is an error; a closed pipe is not."""
     line = [sys.executable, "-m", "tracking.app.cli", "validate", str(made / "data")]
     with Path("/dev/full").open("w") as full:
         done = subprocess.run(line, stdout=full, stderr=subprocess.PIPE, text=True, check=False, cwd=ROOT)
@@ -400,9 +400,9 @@ def test_a_sequence_without_its_tracks_is_named(made, tmp_path, capsys):
     (tmp_path / "t" / "scene-s40000").rename(tmp_path / "t" / "other")
     run_json = tmp_path / "t" / "other" / "run.json"
     run_json.write_text(run_json.read_text().replace("scene-s40000", "other"))
-    said = refused(["score", str(made / "data"), str(tmp_path / "t")], capsys)
-    assert "scene-s40000" in said
-    assert "other" in said
+    output = refused(["score", str(made / "data"), str(tmp_path / "t")], capsys)
+    assert "scene-s40000" in output
+    assert "other" in output
 
 
 def test_nothing_labelled(tmp_path, capsys):
@@ -419,8 +419,8 @@ def test_nothing_labelled(tmp_path, capsys):
 
 def test_recordings_only_options_are_refused_for_generated_ones(made, tmp_path, capsys):
     for option in (["--fps", "5"], ["--px-per-m", "30"], ["--camera", str(next(made.rglob("camera.json")))]):
-        said = refused(["track", "blob", str(made / "data"), "--out", str(tmp_path / "t"), *option], capsys)
-        assert option[0] in said
+        output = refused(["track", "blob", str(made / "data"), "--out", str(tmp_path / "t"), *option], capsys)
+        assert option[0] in output
 
 
 def test_options_without_effect_are_refused_for_recordings(made, tmp_path, capsys):
@@ -438,6 +438,6 @@ def test_points_for_a_tracker_of_boxes(tmp_path, capsys):
     """Said before a frame is read."""
     (tmp_path / "det.txt").write_text("1,-1,-1,-1,-1,-1,0.9,2,3,0\n")
     line = ["track", "blob", str(tmp_path / "det.txt"), "--fps", "10", "--out", str(tmp_path / "t")]
-    said = refused(line, capsys)
-    assert "points alone" in said
-    assert "boxes" in said
+    output = refused(line, capsys)
+    assert "points alone" in output
+    assert "boxes" in output

@@ -510,7 +510,7 @@ def test_an_option_changes_the_output(key, made, tmp_path, capsys):
         files = {
             str(p.relative_to(out)): p.read_bytes() for p in out.rglob("*") if p.is_file() and p.name != "run.json"
         }
-        said = "".join(capsys.readouterr())
-        assert files or said, line
-        seen.append((files, "" if files else said))
+        output = "".join(capsys.readouterr())
+        assert files or output, line
+        seen.append((files, "" if files else output))
     assert seen[0] != seen[1]

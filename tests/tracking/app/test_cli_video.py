@@ -74,9 +74,9 @@ def test_a_broken_recording_is_one_line(name, as_json, tmp_path, capsys):
     line = ["track", "blob", str(make(tmp_path)), "--fps", "10", "--px-per-m", "20", "--out", str(out)]
     assert run(line + ["--json"] * as_json) == 2
     printed = capsys.readouterr()
-    told = [text for text in printed.err.splitlines() if not text.startswith("warning: ")]
-    assert len(told) == (0 if as_json else 1)
-    error = ": ".join(json.loads(printed.out)["error"].values()) if as_json else told[0]
+    shown = [text for text in printed.err.splitlines() if not text.startswith("warning: ")]
+    assert len(shown) == (0 if as_json else 1)
+    error = ": ".join(json.loads(printed.out)["error"].values()) if as_json else shown[0]
     assert all(word in error for word in expected), error
     assert not out.exists()
 
@@ -101,12 +101,12 @@ def test_strange_pictures_are_pictures(name, tmp_path, capsys):
     line = ["track", "blob", str(make(tmp_path)), "--fps", "10", "--px-per-m", "20", "--out", str(tmp_path / "out")]
     assert run([*line, "--json"]) == 0
     printed = capsys.readouterr()
-    (told,) = json.loads(printed.out)["runs"]
-    assert told["detections"] == "image"
-    assert not told["causal"]
+    (shown,) = json.loads(printed.out)["runs"]
+    assert shown["detections"] == "image"
+    assert not shown["causal"]
     assert any(part in printed.err for part in word.split("|"))
     if not word:
-        assert told["frames"] == 60
+        assert shown["frames"] == 60
     for command in (["sheet"], ["view"], ["overlay"]):
         tracks = [] if command == ["sheet"] else [str(tmp_path / "out")]
         source, suffix = line[2], {"sheet": "png", "view": "html", "overlay": "mp4"}[command[0]]
@@ -124,9 +124,9 @@ def test_which_background_is_told(tmp_path, capsys):
     ):
         out = tmp_path / "out"
         assert run(["track", "blob", path, "--px-per-m", "20", "--out", str(out), *option]) == 0
-        told = json.loads((out / "run.json").read_text())
-        assert (told["background"], told["causal_from"], told["detections"]) == (words, begins, "image")
-        assert told["causal"] == (begins is not None)
+        shown = json.loads((out / "run.json").read_text())
+        assert (shown["background"], shown["causal_from"], shown["detections"]) == (words, begins, "image")
+        assert shown["causal"] == (begins is not None)
         assert words in capsys.readouterr().out
 
 

@@ -1,4 +1,4 @@
-"""What README.md says can be typed as it stands; only seeds, trials and frames per second are fewer."""
+"""Runs the commands of README.md as they are written, with fewer seeds and trials and less frames per second."""
 
 from __future__ import annotations
 

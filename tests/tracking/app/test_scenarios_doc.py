@@ -1,4 +1,4 @@
-"""docs/scenarios.md says what is true: its example loads, it lists the catalogue and every key."""
+"""docs/scenarios.md is correct: its example loads, and it lists the catalogue and every key."""
 
 from __future__ import annotations
 

@@ -51,7 +51,9 @@ class TrackerSetup:
 
 
 def track(options: TrackOptions) -> CommandResult:
-    """Tracks every sequence of the source; stores tracks in --out, or for several sequences in a folder of it for each.
+    """Tracks every sequence of the source and stores the tracks; returns a line for each run.
+
+    The tracks of a source that is one sequence go to --out, those of a dataset's sequences to --out/<sequence name>.
 
     Raises InputError before the first frame if an option is wrong, if the tracker cannot work on one of the sequences,
     or if two sequences have the same name.

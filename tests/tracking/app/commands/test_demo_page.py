@@ -17,8 +17,8 @@ from tracking.scoring import evaluate
 @pytest.fixture
 def rows(sequence: Sequence, tracks: list[Tracks]) -> dict[str, SequenceScores]:
     """What a tracker of people and one of groups get for the same scene."""
-    said = {"people": tracks, "groups": wholes(sequence, "ground")}
-    return {name: SequenceScores("meeting", evaluate(sequence.truth, answers)) for name, answers in said.items()}
+    output = {"people": tracks, "groups": wholes(sequence, "ground")}
+    return {name: SequenceScores("meeting", evaluate(sequence.truth, answers)) for name, answers in output.items()}
 
 
 def tables(text: str) -> list[list[list[str]]]:

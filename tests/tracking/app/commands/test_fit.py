@@ -28,10 +28,10 @@ def made(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 def test_fit_generate_and_track_with_it(made: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     profile = tmp_path / "mine.toml"
-    said = answer(capsys, "fit", "sensor", made, made, "--out", profile)
-    assert said["code"] == 0
-    assert said["measured"]["missed"] == pytest.approx(said["drawn"]["missed"], abs=0.05)  # type: ignore[index]
-    assert load("merge", set=sensor_settings(profile)).sensor.detect_prob == said["sensor"]["detect_prob"]  # type: ignore[index]
+    output = answer(capsys, "fit", "sensor", made, made, "--out", profile)
+    assert output["code"] == 0
+    assert output["measured"]["missed"] == pytest.approx(output["drawn"]["missed"], abs=0.05)  # type: ignore[index]
+    assert load("merge", set=sensor_settings(profile)).sensor.detect_prob == output["sensor"]["detect_prob"]  # type: ignore[index]
     out = tmp_path / "data"
     words = ["generate", "merge", "--seeds", "0", "--streams", "none", "--sensor", profile, "--out", out]
     assert answer(capsys, *words, "--set", "sensor.clutter_rate=0.0")["code"] == 0
@@ -53,12 +53,12 @@ def test_real_detectors(shared_data: Path, tmp_path: Path, capsys: pytest.Captur
     """Boxes of PETS that are a third too wide, false alarms that stay; several recordings pooled."""
     profile = tmp_path / "pets.toml"
     folder = shared_data / "mot" / "PETS09-S2L1-first200"
-    said = answer(capsys, "fit", "sensor", folder, "--out", profile)
-    assert said["sensor"]["box_noise"]["width"][0] == pytest.approx(0.27, abs=0.05)  # type: ignore[index]
-    assert said["sensor"]["false_alarms"]["life"] > 0.5  # type: ignore[index]
+    output = answer(capsys, "fit", "sensor", folder, "--out", profile)
+    assert output["sensor"]["box_noise"]["width"][0] == pytest.approx(0.27, abs=0.05)  # type: ignore[index]
+    assert output["sensor"]["false_alarms"]["life"] > 0.5  # type: ignore[index]
     # Eight people whose luck lasts for seconds: the share that a draw misses spreads by 0.08.
     for name, error in (("missed", 0.09), ("overlap, 50% quantile", 0.03), ("error foot: sd", 0.01)):
-        assert said["measured"][name] == pytest.approx(said["drawn"][name], abs=error)  # type: ignore[index]
+        assert output["measured"][name] == pytest.approx(output["drawn"][name], abs=error)  # type: ignore[index]
     both = answer(capsys, "fit", "sensor", folder, shared_data / "mot/TUD-Campus", "--out", profile)
     assert both["code"] == 0
     tracked = answer(
@@ -80,7 +80,7 @@ def test_wrong_input_is_one_line(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch,
 ) -> None:  # fmt: skip
     monkeypatch.chdir(tmp_path)
-    said = answer(capsys, *[str(made) if word == "DATA" else word for word in words])
-    assert said["code"] == 2
-    assert place in said["error"]["place"]  # type: ignore[index]
-    assert got in said["error"]["got"]  # type: ignore[index]
+    output = answer(capsys, *[str(made) if word == "DATA" else word for word in words])
+    assert output["code"] == 2
+    assert place in output["error"]["place"]  # type: ignore[index]
+    assert got in output["error"]["got"]  # type: ignore[index]

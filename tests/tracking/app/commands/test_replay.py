@@ -73,8 +73,8 @@ def test_wrong_input_is_one_line(
 ) -> None:  # fmt: skip
     monkeypatch.chdir(tmp_path)
     (tmp_path / "bad.toml").write_text("[world]\nsize = [3, 3]\n")
-    said = answer(capsys, "replay", walk, *words, "--out", tmp_path / "o")
-    assert said["code"] == 2
-    assert place in said["error"]["place"]  # type: ignore[index]
-    assert got in said["error"]["got"]  # type: ignore[index]
+    output = answer(capsys, "replay", walk, *words, "--out", tmp_path / "o")
+    assert output["code"] == 2
+    assert place in output["error"]["place"]  # type: ignore[index]
+    assert got in output["error"]["got"]  # type: ignore[index]
     assert not (tmp_path / "o").exists()

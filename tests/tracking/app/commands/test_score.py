@@ -1,4 +1,4 @@
-"""`flockscope score`: the numbers of evaluate from files, groups matched as asked, differences in pairs, tables."""
+"""`flockscope score`: scores from files equal those of evaluate; group matching, paired differences, tables."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ from tracking.stats import bootstrap
 
 @pytest.fixture(scope="module")
 def made(tmp_path_factory) -> Path:
-    """Two seeds of a scene with a merge; blob's answers to what its sensor says, and to the truth."""
+    """Two seeds of a scene with a merge; blob's tracks from its sensor's detections, and from the truth."""
     folder = tmp_path_factory.mktemp("score")
     line = ["generate", "merge", "--seeds", "3:5", "--streams", "none", "--out", str(folder / "data")]
     assert run(line) == 0
@@ -73,7 +73,7 @@ def test_files_are_memory_for_groups_as_wholes(made: Path, scene: Sequence, tmp_
 
 
 def test_tables_of_a_tracker_of_groups(made: Path, scene: Sequence, tmp_path: Path, capsys) -> None:
-    """No table of people; the objective stands with the groups."""
+    """There is no table of people; the objective is in the table of groups."""
     folder = tmp_path / "merge-s00003"
     write_tracks(folder, wholes(scene, "ground"), fps=scene.fps)
     capsys.readouterr()
@@ -190,25 +190,25 @@ def test_blocks_are_for_a_single_recording(made: Path, capsys) -> None:
 def test_tables(made: Path, capsys) -> None:
     capsys.readouterr()
     assert run(["score", str(made / "data"), str(made / "file"), "--against", str(made / "truth")]) == 0
-    said = capsys.readouterr().out
+    output = capsys.readouterr().out
     for words in (
         "groups, strict", "groups, core", "members and events", "people compared by overlap (IoU) of boxes",
         "groups compared by overlap (IoU) of hulls, on the ground, m", "in pairs over 2 sequences (fewer than 100",
     ):  # fmt: skip
-        assert words in said
-    assert max(map(len, said.splitlines())) <= 160
+        assert words in output
+    assert max(map(len, output.splitlines())) <= 160
 
 
 def test_groups_that_are_not_labelled_are_no_zeros(made: Path, capsys) -> None:
     gt = made / "data" / "flockscope-train" / "merge-s00003" / "gt" / "gt.txt"
-    told = made / "file" / "merge-s00003" / "tracks.mot.txt"
-    found = scored(capsys, gt, told, "--fps", "10")["sequences"][0]
+    shown = made / "file" / "merge-s00003" / "tracks.mot.txt"
+    found = scored(capsys, gt, shown, "--fps", "10")["sequences"][0]
     assert found["HOTA"] > 0.5
     assert {found[key] for key in CATALOGUE if key.startswith(("group", "pairwise", "merge", "event"))} == {None}
-    assert run(["score", str(gt), str(told), "--fps", "10"]) == 0
-    said = capsys.readouterr().out
-    assert "groups are not labelled" in said
-    assert "strict" not in said
+    assert run(["score", str(gt), str(shown), "--fps", "10"]) == 0
+    output = capsys.readouterr().out
+    assert "groups are not labelled" in output
+    assert "strict" not in output
 
 
 def test_other_tracks_must_be_there(made: Path, capsys) -> None:

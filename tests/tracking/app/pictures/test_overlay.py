@@ -92,7 +92,7 @@ def test_the_source_itself_is_not_replaced(tmp_path: Path) -> None:
 
 
 def test_what_a_frame_lacks_is_told() -> None:
-    """In red, at the right of the strip; the picture before stands still."""
+    """A label in red at the right of the banner; the picture before is shown again."""
 
     def frames():
         found = Detections(1, 0.0, "image", np.zeros((1, 2)), box=np.ones((1, 4)), score=np.ones(1))
@@ -138,8 +138,8 @@ def test_groups_without_people_show_their_hulls() -> None:
     square = np.array([[10.0, 10], [30, 10], [30, 30], [10, 30]])
     one, two = np.array([4]), np.zeros((1, 2))
     groups = Groups(one, (np.zeros(0, np.int64),), two, two, np.zeros((1, 2, 2)), np.array([3.0]), (square,))
-    said = Tracks(1, 0.0, "image", "group", one, one, two, two, np.full((1, 4, 4), np.nan), groups=groups)
-    (region,) = layer_of_tracks([said], None, None).at(1).groups
+    output = Tracks(1, 0.0, "image", "group", one, one, two, two, np.full((1, 4, 4), np.nan), groups=groups)
+    (region,) = layer_of_tracks([output], None, None).at(1).groups
     assert (region.id, region.size) == (4, 3.0)
     np.testing.assert_array_equal(region.hull, square)
 

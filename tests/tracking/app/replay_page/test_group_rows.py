@@ -95,7 +95,7 @@ def test_what_a_tracker_of_groups_leaves_out(sequence: Sequence) -> None:
 
 
 def test_the_page_shows_all_of_their_hulls(sequence: Sequence) -> None:
-    """Where nothing but the tracks says how large the plan, or the picture, must be."""
+    """The sizes of plan and image follow from the tracks alone."""
     alone = Sequence("alone", 10.0, 160, lambda: iter(()))
     corners = np.concatenate([h for t in wholes(sequence, "ground") for h in t.groups.hull])
     x0, y0, x1, y1 = page_data(alone, wholes(sequence, "ground"))["bounds"]

@@ -49,13 +49,13 @@ def test_bars_of_a_lane_never_overlap(spans: list[tuple[int, int]]) -> None:
 
 
 def test_links_join_and_fork() -> None:
-    def event(kind: str, before: tuple[int, ...], after: tuple[int, ...], said: int | None = None) -> GroupEvent:
-        return GroupEvent(kind, 10, 12, said, before, after, (), (0.0, 0.0))
+    def event(kind: str, before: tuple[int, ...], after: tuple[int, ...], emitted: int | None = None) -> GroupEvent:
+        return GroupEvent(kind, 10, 12, emitted, before, after, (), (0.0, 0.0))
 
     made = links(
         [
             event("merge", (-1, 1, 2), (1,)),
-            event("split", (1,), (1, 3), said=14),
+            event("split", (1,), (1, 3), emitted=14),
             event("cross", (1, 2), (1, 2)),
             event("form", (-1, -1), (4,)),
         ]

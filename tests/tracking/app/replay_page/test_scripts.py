@@ -1,4 +1,4 @@
-"""What the page's own scripts make of its data: groups as they were told, the ground where the camera sees it."""
+"""The page's scripts, run by node: they decode groups as reported, and project the ground as the camera does."""
 
 from __future__ import annotations
 
