@@ -1,4 +1,4 @@
-# `make demo` and `make test` make the environment from constraints.txt, then run. Another Python: make PYTHON=python3.13
+# `make demo`, `make test` and `make test-slow` make the environment from constraints.txt, then run. Another Python: make PYTHON=python3.13
 
 SUPPORTED := import sys; sys.exit(not (3, 11) <= sys.version_info[:2] <= (3, 13))
 PYTHON ?= $(shell for p in python3.12 python3.13 python3.11 python3 python; do \
@@ -9,13 +9,16 @@ ENVIRONMENT := $(VENV)/made-from-constraints
 DEMO ?=
 TESTS ?=
 
-.PHONY: demo test lint types clean
+.PHONY: demo test test-slow lint types clean
 
 demo: $(ENVIRONMENT)
 	$(BIN)/flockscope demo $(DEMO)
 
 test: $(ENVIRONMENT)
-	$(BIN)/python -m pytest -q -n auto $(TESTS)
+	$(BIN)/python -m pytest -q -n auto -m "not slow" $(TESTS)
+
+test-slow: $(ENVIRONMENT)
+	$(BIN)/python -m pytest -q -n auto -m slow $(TESTS)
 
 lint: $(ENVIRONMENT)
 	$(BIN)/ruff check .

@@ -1,4 +1,4 @@
-"""Fixtures shared by all tests: where real recordings lie, and one thread per library."""
+"""Fixtures shared by all tests: where real recordings lie, one thread per library, which tests are slow."""
 
 from __future__ import annotations
 
@@ -18,3 +18,10 @@ def shared_data() -> Path:
     if not root.is_dir():
         pytest.skip(f"real recordings are not here: {root} (set FLOCKSCOPE_DATA)")
     return root
+
+
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Mark the tests on real recordings as slow (`make test-slow`)."""
+    for item in items:
+        if "shared_data" in getattr(item, "fixturenames", ()):
+            item.add_marker(pytest.mark.slow)

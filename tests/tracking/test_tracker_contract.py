@@ -19,7 +19,7 @@ from scenarios.loading.resolve import load
 from scenarios.loading.toml_files import names as scenario_names
 from sim.sequence import simulate
 from sim.types import Frame, Sequence, Tracks, Truth
-from tracking.run import Prepared, prepare
+from tracking.prepare import PreparedTracker, prepare
 from tracking.tracker_registry import find, names
 
 FPS = 5
@@ -46,9 +46,9 @@ def cut(scenario: str, mode: str, length: int) -> Sequence:
     return replace(sequence, frames=lambda: iter(frames[:length]), bare=None, length=length)
 
 
-def run(ready: Prepared) -> list[Tracks]:
+def run(ready: PreparedTracker) -> list[Tracks]:
     ready.reset(0)
-    return [ready.answer(frame) for frame in ready.frames()]
+    return [ready.step(frame) for frame in ready.frames()]
 
 
 def arrays(value: Any) -> Iterator[np.ndarray]:
@@ -68,7 +68,7 @@ def content(tracks: list[Tracks]) -> list[bytes]:
     return [b"".join(a.tobytes() for a in arrays(t)) + repr([repr(e) for e in t.events]).encode() for t in tracks]
 
 
-@pytest.mark.parametrize("mode", LENGTHS)
+@pytest.mark.parametrize("mode", ["file", pytest.param("image", marks=pytest.mark.slow)])
 @pytest.mark.parametrize("tracker", names())
 @pytest.mark.parametrize("scenario", scenario_names())
 def test_contract(scenario: str, tracker: str, mode: str) -> None:

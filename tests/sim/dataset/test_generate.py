@@ -259,6 +259,7 @@ def test_two_workers_make_the_same_bytes(tmp_path, whole):
     assert validate(tmp_path / "out") == []
 
 
+@pytest.mark.slow
 def test_workers_do_not_outlive_a_killed_parent(tmp_path):
     """Reading the pipes ends only when the last process that holds them is gone."""
     done = run_program(tmp_path, tmp_path / "out", 2, kill_after=-1)
@@ -267,6 +268,7 @@ def test_workers_do_not_outlive_a_killed_parent(tmp_path):
     assert validate(tmp_path / "out") == []
 
 
+@pytest.mark.slow
 def test_the_work_of_a_killed_worker_is_done_by_another(tmp_path, whole):
     done = run_program(tmp_path, tmp_path / "out", 2, kill_after=-2)
     assert done.returncode == 0, done.stderr.decode()
@@ -274,6 +276,7 @@ def test_the_work_of_a_killed_worker_is_done_by_another(tmp_path, whole):
     assert content(tmp_path / "out") == whole
 
 
+@pytest.mark.slow
 def test_a_sequence_that_kills_its_workers_fails_alone(tmp_path, whole):
     done = run_program(tmp_path, tmp_path / "out", 2, kill_after=-3)
     assert done.returncode == 1
@@ -284,6 +287,7 @@ def test_a_sequence_that_kills_its_workers_fails_alone(tmp_path, whole):
     assert validate(tmp_path / "out") == []
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kill_after", [1, 14, 20, 33])
 def test_killed_in_the_middle_and_resumed(tmp_path, whole, kill_after):
     assert run_program(tmp_path, tmp_path / "out", 1, kill_after).returncode == -signal.SIGKILL
@@ -308,6 +312,7 @@ def small_disk(tmp_path):
     subprocess.run(["umount", folder], check=True)
 
 
+@pytest.mark.slow
 def test_a_disk_fills_up_under_two_workers(tmp_path, whole, small_disk):
     folder, may = small_disk
     done = run_program(tmp_path, folder / "out", 2)

@@ -21,6 +21,8 @@ from sim.io.store.validate import validate
 from sim.workers.start import WorkerOptions
 from tests.loopback import Loopback, loopback
 
+pytestmark = pytest.mark.slow
+
 FAKES = Path(__file__).resolve().parents[1] / "io" / "conftest.py"
 SCENARIO = Scenario.model_validate({"schema": 1, "group": [{"id": "a", "start": [1, 1], "goal": [2, 2]}]})
 ENTRIES = [Entry("x", SCENARIO), Entry("y-1", SCENARIO, 1)]

@@ -95,6 +95,7 @@ def simulate(monkeypatch):
     return module
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("images", ["jpg", "mp4"])
 def test_any_number_of_workers_and_kills_make_the_same_bytes(tmp_path, images):
     done = run(tmp_path, tmp_path / "one", 1, images)

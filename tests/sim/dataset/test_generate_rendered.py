@@ -15,6 +15,8 @@ from sim.io.store.validate import validate
 from sim.sequence import simulate
 from sim.workers.start import WorkerOptions
 
+pytestmark = pytest.mark.slow
+
 ALL = ("left", "right", "disparity", "ids")
 SCENARIO = Scenario.model_validate(
     {

@@ -7,9 +7,13 @@ import subprocess
 import sys
 from pathlib import Path
 
+import pytest
+
 from scenarios.loading.resolve import resolve
 from sim.dataset.generate import generate
 from sim.io.store.validate import validate
+
+pytestmark = pytest.mark.slow
 
 ROOT = Path(__file__).resolve().parents[3]
 SCENE = """

@@ -21,6 +21,8 @@ from sim.workers.start import start_workers
 from tests.errands import complain, fall, process, profiled, refuse, root_of, tell_and_wait
 from tests.loopback import Loopback, loopback
 
+pytestmark = pytest.mark.slow
+
 pytest.importorskip("distributed", reason="the extra [cluster] is not installed")
 
 

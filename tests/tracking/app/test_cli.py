@@ -193,8 +193,8 @@ def length(name: str, place: Place) -> int:
 
 
 @pytest.mark.parametrize("as_json", [False, True], ids=["text", "json"])
-@pytest.mark.parametrize("state", ["good", "bad", "interrupted"])
-@pytest.mark.parametrize("name", COMMANDS)
+@pytest.mark.parametrize("state", ["good", "bad", pytest.param("interrupted", marks=pytest.mark.slow)])
+@pytest.mark.parametrize("name", [pytest.param(n, marks=[pytest.mark.slow] * (n == "demo")) for n in COMMANDS])
 def test_command(name, state, as_json, place, capsys):
     """Codes 0, 2 and 130; one line or one object; what is written is whole, or nothing is."""
     line = words(COMMANDS[name][state == "bad"], place) + ["--json"] * as_json
@@ -230,6 +230,7 @@ def is_whole(name: str, out: Path) -> bool:
     )
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", [name for name in WRITING if name != "demo"])
 def test_ctrl_c_at_many_moments(name, place, capsys):
     """130 or done, and never anything half-written, from the third call of ours on.
@@ -245,6 +246,7 @@ def test_ctrl_c_at_many_moments(name, place, capsys):
         shutil.rmtree(place.out, ignore_errors=True)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("as_json", [False, True], ids=["text", "json"])
 @pytest.mark.parametrize(
     ("error", "code"), [(KeyboardInterrupt(), 130), (OSError(errno.ENOSPC, "No space left on device"), 1)]
@@ -411,6 +413,7 @@ def test_a_bug_is_one_line_and_shown_whole_when_asked_for(place, capsys, monkeyp
     assert isinstance(caught.value.__cause__, KeyError)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("workers", [1, 2])
 def test_ctrl_c_in_a_real_process(place, workers):
     """SIGINT in the middle of `generate`: 130, one object, and whatever is there is whole."""
@@ -434,6 +437,7 @@ def test_ctrl_c_in_a_real_process(place, workers):
     assert all(run(["validate", str(p)]) == 0 for p in sequences)
 
 
+@pytest.mark.slow
 def test_a_full_disk_of_its_own(place, tmp_path):
     """A file system of 200 kB: exit code 1, one line, and every sequence there is whole."""
     disk = tmp_path / "disk"

@@ -354,6 +354,7 @@ def disk(folder: Path, options: str) -> Iterator[Path]:
         subprocess.run(["umount", folder], check=True)
 
 
+@pytest.mark.slow
 def test_a_disk_that_cannot_be_written(made, tmp_path, capsys):
     with disk(tmp_path / "disk", "ro") as root:
         for line in writers(made, root / "out"):
@@ -362,6 +363,7 @@ def test_a_disk_that_cannot_be_written(made, tmp_path, capsys):
             assert str(root) in output, output
 
 
+@pytest.mark.slow
 def test_a_full_disk(made, tmp_path, capsys):
     with disk(tmp_path / "disk", "size=4k") as root:
         (root / "full").write_bytes(bytes(4096))
@@ -370,6 +372,7 @@ def test_a_full_disk(made, tmp_path, capsys):
             assert sorted(root.iterdir()) == [root / "full"], line
 
 
+@pytest.mark.slow
 def test_a_full_disk_or_nobody_behind_stdout(made):
     """A result that cannot be written is an error; a closed pipe is not."""
     line = [sys.executable, "-m", "tracking.app.cli", "validate", str(made / "data")]

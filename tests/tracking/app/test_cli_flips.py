@@ -20,6 +20,8 @@ from tracking import track, tracker_registry
 from tracking.app.cli import app, run
 from tracking.app.commands.scenario_keys import list_keys
 
+pytestmark = pytest.mark.slow
+
 ROOT = Path(__file__).resolve().parents[3]
 FAKE = f"{ROOT / 'tests' / 'fake_tracker.py'}:Nearest"
 SCENE = """

@@ -24,6 +24,7 @@ def blocks(language: str) -> list[str]:
     return [body for kind, body in found if kind == language]
 
 
+@pytest.mark.slow
 def test_commands(tmp_path, monkeypatch, capsys):
     """In their order, in an empty folder."""
     monkeypatch.chdir(tmp_path)
@@ -42,6 +43,7 @@ def test_commands(tmp_path, monkeypatch, capsys):
         assert (tmp_path / made).is_file()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("code", blocks("python"), ids=["a scene", "own arrays"])
 def test_python(code, tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)

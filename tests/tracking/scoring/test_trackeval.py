@@ -41,6 +41,7 @@ def theirs(gt: Path, trackers: Path, sequences: dict[str, int], **config) -> dic
     return found
 
 
+@pytest.mark.slow
 def test_a_generated_dataset(tmp_path: Path, capsys) -> None:
     assert run(["generate", "merge", "clutter", "--seeds", "5:7", "--out", str(tmp_path / "data")]) == 0
     data = tmp_path / "data" / "flockscope-train"

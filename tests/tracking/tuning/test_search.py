@@ -117,6 +117,7 @@ def test_all_figures_are_stored(found):
     assert stored["changed"]["reach"] == {"default": 0.1, "tuned": found[0].config.reach}
 
 
+@pytest.mark.slow
 def test_the_same_again_and_with_two_workers(found, tmp_path):
     """One worker, two workers, a study in memory or on disk: the same bytes."""
     for k, workers in enumerate((1, 2)):
@@ -128,6 +129,7 @@ def test_the_same_again_and_with_two_workers(found, tmp_path):
     assert contents(tmp_path) == contents(found[1])
 
 
+@pytest.mark.slow
 def test_the_same_on_a_cluster(tmp_path):
     """Two workers elsewhere: the same bytes as here."""
     small = {"trials": 4, "check": None, "only": ["reach"]}
@@ -145,6 +147,7 @@ def test_another_seed_searches_elsewhere(found, tmp_path):
     assert [t.params for t in other.trials[1:]] != [t.params for t in found[0].trials[1:4]]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("at", [3, 17])
 def test_killed_and_gone_on(found, tmp_path, at):
     """SIGKILL in the first trial, in a later one; the journal's last line half-written; the same bytes in the end."""
@@ -171,6 +174,7 @@ def test_more_trials_go_on_where_it_ended(found):
     (folder / "toy.journal").write_bytes(journal)
 
 
+@pytest.mark.slow
 def test_two_processes_share_a_journal(tmp_path):
     """The other one does all that this one is not at, and waits for it."""
     made = toy_plan(tmp_path)
@@ -191,6 +195,7 @@ def test_two_processes_share_a_journal(tmp_path):
     assert (tmp_path / "toy.toml").is_file()
 
 
+@pytest.mark.slow
 def test_a_trial_of_another_process_is_not_taken_away(tmp_path):
     """Nor by a third one, which asks while it is played."""
     made = toy_plan(tmp_path, trials=2, only=["reach"])
@@ -203,6 +208,7 @@ def test_a_trial_of_another_process_is_not_taken_away(tmp_path):
     assert states == ["RUNNING", "RUNNING"]
 
 
+@pytest.mark.slow
 def test_a_study_in_a_database_goes_on_too(tmp_path):
     """Who is at work cannot be known there: what was begun is done again when nothing else is left."""
     made, url = toy_plan(tmp_path, trials=3), f"sqlite:///{tmp_path / 'studies.db'}"

@@ -120,6 +120,7 @@ def test_errors_of_who_plays_say_nothing_of_the_parameters(tmp_path):
     assert not any(t.error for t in found)
 
 
+@pytest.mark.slow
 def test_a_trial_that_others_took_as_left_is_theirs(tmp_path):
     """Without a journal nobody knows who is at work: of two processes one may play what the other is at, too."""
     made, url = toy_plan(tmp_path, seeds=range(12), trials=2, only=["skip"]), f"sqlite:///{tmp_path}/s.db"

@@ -112,6 +112,7 @@ def test_no_mean_over_what_trackers_saw_differently(made: Path, tmp_path: Path, 
     assert against["mean"] == against["means"][0]["mean"]
 
 
+@pytest.mark.slow
 def test_files_are_memory_from_pixels(tmp_path: Path, capsys) -> None:
     """Through pictures without loss."""
     settings = ["camera.fps=5", "camera.image=[320,240]"]
@@ -151,6 +152,7 @@ def test_differences_are_taken_sequence_by_sequence(made: Path, capsys) -> None:
     assert {v for d in same.values() for v in d.values()} <= {0.0, None}
 
 
+@pytest.mark.slow
 def test_blocks_of_a_single_recording(made: Path, capsys) -> None:
     one = made / "data" / "flockscope-train" / "merge-s00003"
     found = scored(capsys, one, made / "truth", "--against", made / "file", "--blocks", "20")
