@@ -44,212 +44,178 @@ class Score:
         return value if value < inf else float("nan")
 
 
-def _share(key: str, family: str, meaning: str, low: float = 0.0) -> Score:
-    return Score(key, family, "1", low, 1.0, "higher", meaning)
+def _share(key: str, meaning: str, low: float = 0.0) -> Score:
+    return Score(key, "", "1", low, 1.0, "higher", meaning)
 
 
-def _count(key: str, family: str, meaning: str, better: Better = "lower") -> Score:
-    return Score(key, family, "count", 0.0, inf, better, meaning)
+def _count(key: str, meaning: str, better: Better = "lower") -> Score:
+    return Score(key, "", "count", 0.0, inf, better, meaning)
 
 
-def _length(key: str, family: str, meaning: str, unit: str = "m | px") -> Score:
-    return Score(key, family, unit, 0.0, inf, "lower", meaning)
+def _length(key: str, meaning: str, unit: str = "m | px") -> Score:
+    return Score(key, "", unit, 0.0, inf, "lower", meaning)
+
+
+def _family(family: str, *scores: Score) -> tuple[Score, ...]:
+    return tuple(replace(score, family=family) for score in scores)
 
 
 def _from(source: str, *scores: Score) -> tuple[Score, ...]:
     return tuple(replace(score, source=source) for score in scores)
 
 
-OBJECTIVE = (
+OBJECTIVE = _family(
+    "objective",
     _share(
-        "objective",
         "objective",
         "mean of HOTA and group_F1_hull, or the one of the two that is known; used for tuning and as reward",
     ),
 )
 
-HOTA = _from(
-    "Luiten et al. 2021",
-    _share("HOTA", "people", "geometric mean of DetA and AssA, mean over 19 thresholds of similarity"),
-    _share("DetA", "people", "TP / (TP + FN + FP), mean over thresholds"),
-    _share(
-        "AssA",
-        "people",
-        "mean over matches of: matches of the two ids / frames of either id, mean over thresholds",
-    ),
-    _share("DetRe", "people", "matched / true people, mean over thresholds"),
-    _share("DetPr", "people", "matched / estimated people, mean over thresholds"),
-    _share(
-        "AssRe",
-        "people",
-        "mean over matches of: matches of the two ids / frames of the true id, mean over thresholds",
-    ),
-    _share(
-        "AssPr",
-        "people",
-        "mean over matches of: matches of the two ids / frames of the track, mean over thresholds",
-    ),
-    _share(
-        "LocA",
-        "people",
-        "mean similarity of matches, mean over thresholds; 1 at a threshold without matches, as in TrackEval",
+HOTA = _family(
+    "people",
+    *_from(
+        "Luiten et al. 2021",
+        _share("HOTA", "geometric mean of DetA and AssA, mean over 19 thresholds of similarity"),
+        _share("DetA", "TP / (TP + FN + FP), mean over thresholds"),
+        _share("AssA", "mean over matches of: matches of the two ids / frames of either id, mean over thresholds"),
+        _share("DetRe", "matched / true people, mean over thresholds"),
+        _share("DetPr", "matched / estimated people, mean over thresholds"),
+        _share("AssRe", "mean over matches of: matches of the two ids / frames of the true id, mean over thresholds"),
+        _share("AssPr", "mean over matches of: matches of the two ids / frames of the track, mean over thresholds"),
+        _share(
+            "LocA",
+            "mean similarity of matches, mean over thresholds; 1 at a threshold without matches, as in TrackEval",
+        ),
     ),
 )
 
-CLEAR = _from(
-    "Bernardin & Stiefelhagen 2008",
-    _share("MOTA", "people", "1 - (FN + FP + IDSW) / true people, at similarity 0.5", -inf),
-    _share("MOTP", "people", "mean similarity of the matches of CLEAR (similarity 0.5 or more)"),
-    _count("TP", "people", "people matched at similarity 0.5, summed over frames", "higher"),
-    _count("FN", "people", "true people without a match, summed over frames"),
-    _count("FP", "people", "estimated people without a match, summed over frames"),
-    _count(
-        "IDSW", "people", "identity switches: a true person is matched with another track than in its previous match"
-    ),
-    _count("MT", "people", "mostly tracked: true people matched in more than 80 % of their frames", "higher"),
-    _count("PT", "people", "partly tracked: true people matched in 20 to 80 % of their frames", "neither"),
-    _count("ML", "people", "mostly lost: true people matched in less than 20 % of their frames"),
-    _count("Frag", "people", "fragments: a true person is matched again after frames without a match"),
-)
-
-IDENTITY = _from(
-    "Ristani et al. 2016",
-    _share("IDF1", "people", "2 IDTP / (true + estimated people)"),
-    _share("IDP", "people", "IDTP / estimated people"),
-    _share("IDR", "people", "IDTP / true people"),
-    _count(
-        "IDTP",
-        "people",
-        "matches of the best one-to-one assignment of true ids to tracks for the whole sequence, at similarity 0.5",
-        "higher",
+CLEAR = _family(
+    "people",
+    *_from(
+        "Bernardin & Stiefelhagen 2008",
+        _share("MOTA", "1 - (FN + FP + IDSW) / true people, at similarity 0.5", -inf),
+        _share("MOTP", "mean similarity of the matches of CLEAR (similarity 0.5 or more)"),
+        _count("TP", "people matched at similarity 0.5, summed over frames", "higher"),
+        _count("FN", "true people without a match, summed over frames"),
+        _count("FP", "estimated people without a match, summed over frames"),
+        _count("IDSW", "identity switches: a true person is matched with another track than in its previous match"),
+        _count("MT", "mostly tracked: true people matched in more than 80 % of their frames", "higher"),
+        _count("PT", "partly tracked: true people matched in 20 to 80 % of their frames", "neither"),
+        _count("ML", "mostly lost: true people matched in less than 20 % of their frames"),
+        _count("Frag", "fragments: a true person is matched again after frames without a match"),
     ),
 )
 
-ERRORS = (
-    _length("RMSE_pos", "errors", "root mean square error of positions, of people mapped at similarity 0.5 or more"),
-    _length("RMSE_vel", "errors", "root mean square error of velocities on the ground, of the same people", "m/s"),
+IDENTITY = _family(
+    "people",
+    *_from(
+        "Ristani et al. 2016",
+        _share("IDF1", "2 IDTP / (true + estimated people)"),
+        _share("IDP", "IDTP / estimated people"),
+        _share("IDR", "IDTP / true people"),
+        _count(
+            "IDTP",
+            "matches of the best one-to-one assignment of true ids to tracks for the whole sequence, at similarity 0.5",
+            "higher",
+        ),
+    ),
+)
+
+ERRORS = _family(
+    "errors",
+    _length("RMSE_pos", "root mean square error of positions, of people mapped at similarity 0.5 or more"),
+    _length("RMSE_vel", "root mean square error of velocities on the ground, of the same people", "m/s"),
     *_from(
         "Rahmathullah et al. 2017",
         _length(
             "GOSPA",
-            "errors",
             "root mean square over frames of GOSPA with a cut-off of 2 m: localisation errors, missed and false people",
         ),
         _length(
-            "GOSPA_localisation",
-            "errors",
-            "the part of localisation errors; GOSPA² is the sum of the squares of the three parts",
+            "GOSPA_localisation", "the part of localisation errors; GOSPA² is the sum of the squares of the three parts"
         ),
-        _length("GOSPA_missed", "errors", "the part of missed people"),
-        _length("GOSPA_false", "errors", "the part of false people"),
+        _length("GOSPA_missed", "the part of missed people"),
+        _length("GOSPA_false", "the part of false people"),
     ),
 )
 
-GROUPS = (
+GROUPS = _family(
+    "groups",
     *_from(
         "Bazzani et al. 2012",
-        _share("group_1-FP", "groups", "1 - false / true groups, both summed over frames", -inf),
-        _share("group_1-FN", "groups", "1 - missed / true groups, both summed over frames"),
-        _share("group_1-FP_frames", "groups", "1 - mean over frames of false / max(true groups, 1)", -inf),
-        _share("group_1-FN_frames", "groups", "1 - mean over frames of missed / max(true groups, 1)"),
-        _share(
-            "group_GDSR", "groups", "share of true groups whose matched group contains at least 60 % of their members"
-        ),
+        _share("group_1-FP", "1 - false / true groups, both summed over frames", -inf),
+        _share("group_1-FN", "1 - missed / true groups, both summed over frames"),
+        _share("group_1-FP_frames", "1 - mean over frames of false / max(true groups, 1)", -inf),
+        _share("group_1-FN_frames", "1 - mean over frames of missed / max(true groups, 1)"),
+        _share("group_GDSR", "share of true groups whose matched group contains at least 60 % of their members"),
     ),
     _share(
-        "group_GDSR2",
-        "groups",
-        "the same, if also at least 60 % of the estimated members are right; one giant group fails this",
+        "group_GDSR2", "the same, if also at least 60 % of the estimated members are right; one giant group fails this"
     ),
     *_from(
         "Bernardin & Stiefelhagen 2008",
-        _length("group_MOTP", "groups", "mean distance between the centres of matched groups"),
-        _length("group_MSE", "groups", "mean square of that distance", "m² | px²"),
-        _length(
-            "group_MOTP_ungated", "groups", "mean distance if groups are matched by distance alone, however far apart"
-        ),
-        _share("group_MOTA", "groups", "1 - (FN + FP + IDSW) / true groups", -inf),
-        _count("group_IDSW", "groups", "a true group is matched with another estimated id than in its previous match"),
-        _count("group_TP", "groups", "matched groups, summed over frames", "higher"),
-        _count("group_FP", "groups", "estimated groups without a match, summed over frames"),
-        _count("group_FN", "groups", "true groups without a match, summed over frames"),
+        _length("group_MOTP", "mean distance between the centres of matched groups"),
+        _length("group_MSE", "mean square of that distance", "m² | px²"),
+        _length("group_MOTP_ungated", "mean distance if groups are matched by distance alone, however far apart"),
+        _share("group_MOTA", "1 - (FN + FP + IDSW) / true groups", -inf),
+        _count("group_IDSW", "a true group is matched with another estimated id than in its previous match"),
+        _count("group_TP", "matched groups, summed over frames", "higher"),
+        _count("group_FP", "estimated groups without a match, summed over frames"),
+        _count("group_FN", "true groups without a match, summed over frames"),
     ),
-    _share("group_F1", "groups", "2 found / (true + estimated groups); found: matched at similarity 0.5 or more"),
-    _share("group_precision", "groups", "found / estimated groups"),
-    _share("group_recall", "groups", "found / true groups"),
+    _share("group_F1", "2 found / (true + estimated groups); found: matched at similarity 0.5 or more"),
+    _share("group_precision", "found / estimated groups"),
+    _share("group_recall", "found / true groups"),
     *(
         replace(
             score,
             key=f"group_{score.key}",
-            family="groups",
             meaning=f"{score.key} of groups, by the similarity by which groups are matched",
         )
         for score in HOTA
     ),
-    Score(
+    _length(
         "group_size_error",
-        "groups",
-        "people",
-        0.0,
-        inf,
-        "lower",
         "mean absolute difference between estimated and true number of people, of matched groups",
+        "people",
     ),
     *_from(
         "Givens & Shortt 1984",
         _length(
             "group_extent_error",
-            "groups",
             "mean 2-Wasserstein distance of matched groups, taken as Gaussians with centre and extent",
         ),
     ),
 )
 
-MEMBERS = (
-    _share(
-        "group_F1_hull",
-        "members",
-        "group_F1 by IoU of hulls, also if groups are matched by members; part of the objective",
-    ),
-    _share(
-        "pairwise_F1", "members", "2 right / (true + estimated pairs); a pair is two people of one frame in one group"
-    ),
-    _share("pairwise_precision", "members", "right / estimated pairs; a pair with a track mapped to nobody is false"),
-    _share("pairwise_recall", "members", "right / true pairs; a pair with a person no track is mapped to is missed"),
+MEMBERS = _family(
+    "members",
+    _share("group_F1_hull", "group_F1 by IoU of hulls, also if groups are matched by members; part of the objective"),
+    _share("pairwise_F1", "2 right / (true + estimated pairs); a pair is two people of one frame in one group"),
+    _share("pairwise_precision", "right / estimated pairs; a pair with a track mapped to nobody is false"),
+    _share("pairwise_recall", "right / true pairs; a pair with a person no track is mapped to is missed"),
 )
 
 LINEAGE = (
     _share(
-        "lineage_accuracy",
-        "events",
-        "share of true merges and splits that are matched and have the right parents and children",
+        "lineage_accuracy", "share of true merges and splits that are matched and have the right parents and children"
     ),
-    _share(
-        "lineage_accuracy_found",
-        "events",
-        "share of the matched merges and splits that have the right parents and children",
-    ),
+    _share("lineage_accuracy_found", "share of the matched merges and splits that have the right parents and children"),
 )
 
 
 def _of_events(name: str, what: str) -> Iterable[Score]:
     """Yields the scores of one kind of event; name: prefix of the keys, what: the events in words."""
-    yield _share(f"{name}_F1", "events", f"2 matched / (true + reported) {what}")
-    yield _share(f"{name}_precision", "events", f"matched / reported {what}")
-    yield _share(f"{name}_recall", "events", f"matched / true {what}")
+    yield _share(f"{name}_F1", f"2 matched / (true + reported) {what}")
+    yield _share(f"{name}_precision", f"matched / reported {what}")
+    yield _share(f"{name}_recall", f"matched / true {what}")
     if name != "event":
-        yield _count(f"{name}_TP", "events", f"matched {what}", "higher")
-        yield _count(f"{name}_FP", "events", f"reported {what} without a match")
-        yield _count(f"{name}_FN", "events", f"true {what} without a match")
-    yield Score(
-        f"{name}_latency",
-        "events",
-        "s",
-        -1.0,
-        inf,
-        "lower",
-        f"mean time from the true start to the report, of matched {what}",
-    )
+        yield _count(f"{name}_TP", f"matched {what}", "higher")
+        yield _count(f"{name}_FP", f"reported {what} without a match")
+        yield _count(f"{name}_FN", f"true {what} without a match")
+    latency = f"mean time from the true start to the report, of matched {what}"
+    yield replace(_length(f"{name}_latency", latency, "s"), low=-1.0)
 
 
 def _headline(score: Score) -> Score:
@@ -282,9 +248,12 @@ ALL = (
     *GROUPS,
     *map(_core, GROUPS),
     *MEMBERS,
-    *map(_headline, _of_events("event", " and ".join(map(_plural, HEADLINE)))),
-    *(score for kind in KINDS for score in _of_events(kind, _plural(kind))),
-    *LINEAGE,
+    *_family(
+        "events",
+        *map(_headline, _of_events("event", " and ".join(map(_plural, HEADLINE)))),
+        *(score for kind in KINDS for score in _of_events(kind, _plural(kind))),
+        *LINEAGE,
+    ),
 )
 
 CATALOGUE = MappingProxyType({score.key: score for score in ALL})
