@@ -1,4 +1,4 @@
-"""Nearest neighbours with parameters that a search can find: what is worst about the defaults is known."""
+"""A nearest-neighbour tracker for tests of tuning. Its default `reach` is far too short; a search should find that."""
 
 from __future__ import annotations
 
@@ -14,24 +14,24 @@ from tracking.config import Config, param
 
 @dataclass(frozen=True)
 class ToyConfig(Config):
-    """`reach` is far too short: everybody is somebody new in every frame."""
+    """With the default `reach` every detection starts a new track in every frame."""
 
     tracker: ClassVar[str] = "toy"
 
-    reach: float = param(0.1, (0.05, 5.0), "m", "nobody goes further in a frame", "log")
-    skip: int = param(0, (0, 4), "people", "so many are left out", "int")
-    colour: str = param("red", ("red", "green"), "", "nothing depends on it", "categorical")
-    forbidden: float = param(0.0, (0.0, 1.0), "", "must stay under a half")
-    steps: float = param(1.0, (0.0, 2.0), "", "of a detector in pictures", sees="pixels")
+    reach: float = param(0.1, (0.05, 5.0), "m", "greatest step of a person between frames", "log")
+    skip: int = param(0, (0, 4), "people", "number of detections that are ignored", "int")
+    colour: str = param("red", ("red", "green"), "", "has no effect", "categorical")
+    forbidden: float = param(0.0, (0.0, 1.0), "", "must stay below 0.5")
+    steps: float = param(1.0, (0.0, 2.0), "", "has no effect; for a detector in pictures", sees="pixels")
 
     def check(self) -> None:
-        """Not everything is allowed."""
+        """Refuses values of `forbidden` above 0.5."""
         if self.forbidden > 0.5:
             raise InputError(place="forbidden", got=self.forbidden, expected="under 0.5", remedy="take less")
 
 
 class Toy:
-    """State: the last place and id of everybody seen in the frame before, and the next free id."""
+    """State: positions and ids of the tracks of the last frame, and the next free id."""
 
     needs = ("points", "boxes")
     config_class = ToyConfig

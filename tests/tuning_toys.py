@@ -1,4 +1,4 @@
-"""Two scenes of a few people and a search on them that takes a second, for tests of tuning."""
+"""Two scenes with three people and a search on them that takes a second, for tests of tuning."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ group = [
 
 
 def write_scenes(folder: Path) -> tuple[str, str]:
-    """One to tune on, and one that is not used."""
+    """Write a scene to tune on and one to test on; return both paths."""
     for name, goal in (("one", "7"), ("two", "6")):
         (folder / f"{name}.toml").write_text(SCENE % goal)
     return str(folder / "one.toml"), str(folder / "two.toml")

@@ -69,7 +69,7 @@ class HeldOutEvaluator:
         goal = self.plan.goals[0]
         changed = [name for name in order if getattr(config, name) != self.plan.defaults[name]]
         for k, name in enumerate(changed):
-            self.report(f"taking back what brings nothing, {k + 1} of {len(changed)}")
+            self.report(f"resetting changes without gain, {k + 1} of {len(changed)}")
             try:
                 simpler = type(config).from_dict({**config.as_dict(), name: self.plan.defaults[name]})
             except FlockscopeError:

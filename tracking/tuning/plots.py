@@ -71,7 +71,7 @@ def history_plot(plan: SearchPlan, records: Sequence[TrialRecord]) -> str:
     values = [t.values[0] for t in trials]
     axes = Axes(_range([0, *(t.number for t in trials)], 0.02), _clipped_range(values, [t.values[0] for t in unpruned]))
     inside = [t for t in trials if axes.y[0] <= t.values[0] <= axes.y[1]]
-    body = axes.elements("trial", f"{goal.key}, training scenes (chosen from: no result)")
+    body = axes.elements("trial", f"{goal.key}, training scenes (optimised: no result)")
     if default is not None:
         (u0, v), (u1, _) = axes.to_page(axes.x[0], default), axes.to_page(axes.x[1], default)
         body += [f'<path d="M{u0:.1f} {v:.1f}H{u1:.1f}" stroke="{PALE}" stroke-dasharray="5 4"/>']
@@ -83,7 +83,7 @@ def history_plot(plan: SearchPlan, records: Sequence[TrialRecord]) -> str:
             u, v = axes.to_page(t.number, edge)
             body += [f'<path d="M{u:.1f} {v - 4:.1f}v8" stroke="{BLUE}"/>']
     outside = len(trials) - len(inside)
-    legend = [(BLUE, "played to the end"), ("hollow", "given up early, estimated"), (ORANGE, "best so far")]
+    legend = [(BLUE, "played to the end"), ("hollow", "pruned, estimated"), (ORANGE, "best so far")]
     legend += [("dashes", "defaults")] if default is not None else []
     note = f"; {outside} far below: ticks" if goal.higher else f"; {outside} far above: ticks"
     return _page(f"{_title(plan)}: {len(records)} trials" + (note if outside else ""), body, legend)
@@ -106,7 +106,7 @@ def importance_plot(plan: SearchPlan, importance: Mapping[str, float], config: C
         change = f"{_short(old)} → {_short(new)}" if changed else f"{_short(old)}"
         unit = next(p.unit for p in plan.space if p.name == name)
         body += [_text(WIDTH - 12, y + 13, f"{change} {unit}".rstrip(), "end", INK if changed else PALE)]
-    title = f"{_title(plan)}: what decided about {plan.goals[0].key} in training (PED-ANOVA)"
+    title = f"{_title(plan)}: importance for {plan.goals[0].key} in training (PED-ANOVA)"
     legend = [(ORANGE, "changed by the winner"), (BLUE, "left at its default")]
     return _page(title, body, legend, BARS_TOP + BAR_ROW * len(ranked) + 16)
 
@@ -124,7 +124,7 @@ def pareto_plot(plan: SearchPlan, candidates: Sequence[Candidate], front: Sequen
         body += [_dot(u, v, ORANGE if c in front else BLUE)]
         name = "defaults" if c.config == plan.base else f"trial {c.trial}"
         body += [_text(u - 8, v - 6, name, "end", PALE) if u > WIDTH / 2 else _text(u + 8, v - 6, name, fill=PALE)]
-    legend = [(ORANGE, "front: no other is better in all"), (BLUE, "beaten")]
+    legend = [(ORANGE, "Pareto front"), (BLUE, "dominated")]
     return _page(f"{_title(plan)}: {one.key} and {two.key}", body, legend)
 
 
