@@ -1,4 +1,4 @@
-"""docs/scenarios.md is correct: its example loads, and it lists the catalogue and every key."""
+"""docs/reference/scenario-files.md is correct: its example loads, and it lists the catalogue and every key."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from pathlib import Path
 from scenarios.loading.resolve import load, names, suite_names
 from tracking.app.commands.scenario_keys import list_keys
 
-DOC = (Path(__file__).resolve().parents[3] / "docs" / "scenarios.md").read_text(encoding="utf-8")
+DOC = (Path(__file__).resolve().parents[3] / "docs" / "reference" / "scenario-files.md").read_text(encoding="utf-8")
 
 
 def test_example(tmp_path: Path) -> None:
@@ -21,6 +21,7 @@ def test_example(tmp_path: Path) -> None:
 def test_catalogue() -> None:
     rows = re.findall(r"^\| `([a-z-]+)` \|", DOC, re.MULTILINE)
     assert rows == names()
+    assert all(f"| `{name}` | {load(name).about} |" in DOC for name in rows)
     assert all(f"`{name}`" in DOC for name in suite_names())
 
 
