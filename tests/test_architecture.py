@@ -270,3 +270,28 @@ def test_classes_share_no_mutable_state(name):
         if isinstance(node, ast.ClassDef):
             values = [s.value for s in node.body if isinstance(s, ast.Assign | ast.AnnAssign) and s.value is not None]
             assert not any(isinstance(v, ast.List | ast.Dict | ast.Set) for v in values), node.name
+
+
+MOST_ARGUMENTS = 8
+
+
+def arguments(function: ast.FunctionDef) -> int:
+    given = function.args
+    names = [a.arg for a in (*given.posonlyargs, *given.args, *given.kwonlyargs)]
+    return len(names) - (names[:1] in (["self"], ["cls"]))
+
+
+@pytest.mark.parametrize("name", [name for name in modules() if not name.endswith("_kernels")])
+def test_functions_take_few_arguments(name):
+    """Kernels excepted: numba takes arrays one by one."""
+    functions = [node for node in ast.walk(tree(name)) if isinstance(node, ast.FunctionDef)]
+    assert [f.name for f in functions if arguments(f) > MOST_ARGUMENTS] == []
+
+
+def test_public_class_names_are_unique():
+    homes: dict[str, list[str]] = {}
+    for name in modules():
+        for node in ast.walk(tree(name)):
+            if isinstance(node, ast.ClassDef) and not node.name.startswith("_"):
+                homes.setdefault(node.name, []).append(name)
+    assert {name: found for name, found in homes.items() if len(found) > 1} == {}

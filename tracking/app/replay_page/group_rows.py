@@ -23,7 +23,7 @@ SPEED_SCALE = {"ground": 10, "image": 1}
 
 
 @dataclass(frozen=True, eq=False)
-class GroupRows:
+class PageGroupRows:
     """R groups, one per row; nan where unknown.
 
     hull: R polygons (V, 2), without vertices where unknown. extent: (R, 2, 2), the covariance of where the group's
@@ -36,12 +36,12 @@ class GroupRows:
     speed: Array
 
 
-def rows_of_groups(tracks: SequenceOf[Tracks]) -> GroupRows:
+def rows_of_groups(tracks: SequenceOf[Tracks]) -> PageGroupRows:
     """The groups of all rows of `tracks`, in their order. A row that its frame's `groups` lacks is unknown."""
     rows = [row for t in tracks for row in _rows(t)]
     speed = [np.hypot(t.vel[:, 0], t.vel[:, 1]) for t in tracks]
     extent, size = [row[1] for row in rows], [row[2] for row in rows]
-    return GroupRows(
+    return PageGroupRows(
         tuple(row[0] for row in rows),
         np.array(extent).reshape(-1, 2, 2),
         np.array(size, float),
@@ -57,7 +57,7 @@ def _rows(tracks: Tracks) -> list[tuple[Array, Array, float]]:
     return [known.get(name, (no_hull, np.full((2, 2), np.nan), math.nan)) for name in tracks.id.tolist()]
 
 
-def encode_groups(rows: GroupRows, order: Ints, plane: str, scale: int) -> dict[str, Any]:
+def encode_groups(rows: PageGroupRows, order: Ints, plane: str, scale: int) -> dict[str, Any]:
     """The rows in the order `order` as encoded columns; scale: encoded steps per m or px.
 
     size: in tenths. speed: by SPEED_SCALE. ellipse: long and short standard deviation, and direction in degrees. hull:

@@ -17,7 +17,7 @@ import numpy as np
 from sim.types import Array, GroupEvent, Ints, Tracks, Truth
 from tracking.app.replay_page import group_rows
 from tracking.app.replay_page.column_encoding import Json, deltas, run_lengths, stints
-from tracking.app.replay_page.group_rows import GroupRows
+from tracking.app.replay_page.group_rows import PageGroupRows
 from tracking.app.replay_page.group_timeline import Bar, bars, links
 
 SCALE = {"ground": 100, "space": 100, "image": 2}
@@ -44,7 +44,7 @@ class PageRows:
     angle: Array
     box: Array
     visibility: Array
-    groups: GroupRows | None = None
+    groups: PageGroupRows | None = None
 
 
 def rows_of_truth(truth: Truth) -> PageRows:
