@@ -1,6 +1,6 @@
 """The catalogue of scores: key, unit, range, which direction is better, meaning and source of every score.
 
-`python -m tracking.scoring.catalogue` prints the table of docs/metrics.md.
+`python -m tracking.scoring.catalogue` prints the table of docs/reference/metrics.md.
 """
 
 from __future__ import annotations

@@ -77,7 +77,7 @@ def evaluate(
     group_match: GroupMatch = "hull",
     frames: int | range | None = None,
 ) -> Scores:
-    """Returns every score of the catalogue (docs/metrics.md).
+    """Returns every score of the catalogue (docs/reference/metrics.md).
 
     similarity: compares people by IoU ("boxes") or by max(0, 1 - d / 2 m) ("ground", "image"). None: boxes if both
     sides have them, else the plane of the tracks. group_match: matches groups by IoU of their hulls ("hull") or Jaccard

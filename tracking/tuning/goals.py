@@ -61,7 +61,7 @@ def goals_of(keys: Iterable[str]) -> tuple[Goal, ...]:
     allowed = [SPEED, *(key for key, score in CATALOGUE.items() if score.better != "neither")]
     for key in keys:
         if key not in allowed:
-            remedy = f"did you mean {closest(key, allowed)}? docs/metrics.md lists them"
+            remedy = f"did you mean {closest(key, allowed)}? docs/reference/metrics.md lists them"
             expected = f"a score with a better direction, or {SPEED}"
             raise InputError(place="--objective", got=key, expected=expected, remedy=remedy)
         if key in [goal.key for goal in found]:

@@ -1,4 +1,4 @@
-"""The catalogue of scores, docs/metrics.md and what evaluate returns say the same; see also test_evaluation."""
+"""The catalogue of scores, docs/reference/metrics.md and what evaluate returns agree; see also test_evaluation."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from tracking.scoring import evaluate
 from tracking.scoring.catalogue import ALL, CATALOGUE, CORE, table
 
 ROOT = Path(__file__).resolve().parents[3]
-PAGE = ROOT / "docs" / "metrics.md"
+PAGE = ROOT / "docs" / "reference" / "metrics.md"
 TWO = {1: (0.0, 0.0), 2: (1.0, 0.0)}
 
 

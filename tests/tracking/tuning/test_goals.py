@@ -43,7 +43,7 @@ def test_speed_is_frames_over_seconds_of_all():
         (["hota"], "did you mean HOTA"),
         (["HOTA", "HOTA"], "HOTA twice"),
         ([], "got none"),
-        (["fps"], "docs/metrics.md"),
+        (["fps"], "docs/reference/metrics.md"),
     ],
 )
 def test_wrong_keys_are_one_line(keys, words):

@@ -1,0 +1,19 @@
+"""The pages of docs/reference hold the tables of parameters that the configs print."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from tracking.config import Config
+from tracking.grouping.link_rule import LinkRule
+
+REFERENCE = Path(__file__).resolve().parents[2] / "docs" / "reference"
+
+
+@pytest.mark.parametrize(("config", "page"), [(LinkRule, "grouping.md")])
+def test_the_page_holds_the_table(config: type[Config], page: str) -> None:
+    assert config.table() in (REFERENCE / page).read_text(encoding="utf-8"), (
+        f"put {config.__name__}.table() into {page}"
+    )
