@@ -1,4 +1,4 @@
-"""The parameters of `group-pda`, and the numbers of its kernels that follow from them at a frame rate and a scale."""
+"""The parameters of `group-pda`. Lengths are metres; tracking.papers.group_pda.scaled_parameters converts them."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from tracking.detect.background_settings import BackgroundSettings
 
 @dataclass(frozen=True)
 class GroupPdaConfig(BackgroundSettings):
-    """Search regions, masses, group constraint, merging, splitting and output of `group-pda`. Lengths are metres."""
+    """Search regions, masses, group constraint, merging, splitting, reporting and foreground of `group-pda`."""
 
     tracker: ClassVar[str] = "group-pda"
 
@@ -20,66 +20,78 @@ class GroupPdaConfig(BackgroundSettings):
         0.52,
         (0.1, 2.0),
         "m",
-        "from points: r of a point's region, those within 2 r are linked (R_0, 3.3)",
+        "from points: r of the region round a point; points nearer than 2 r are linked (R_0, 3.3)",
         sees="points",
     )
     person_spread: float = param(
         0.25,
         (0.05, 1.0),
         "m",
-        "from points: standard deviation that the extent of few people is shrunk to (ours)",
+        "from points: standard deviation of the prior that extents are shrunk to (ours)",
         "log",
         sees="points",
     )
-    spread_weight: float = param(3.0, (0.1, 20.0), "people", "how many people that extent counts for (ours)", "log")
+    spread_weight: float = param(3.0, (0.1, 20.0), "people", "weight of that prior, in people (ours)", "log")
     accel_noise: float = param(
-        0.5, (0.05, 5.0), "m/s^1.5", "white acceleration of the centroid, per root second", "log"
+        0.5, (0.05, 5.0), "m/s^1.5", "standard deviation of the centroid's white acceleration, per root second", "log"
     )
     point_noise: float = param(
         0.06,
         (0.005, 1.0),
         "m",
-        "from points: standard deviation of one person's measured place, sensor and gait",
+        "from points: standard deviation of one person's measured position, from sensor and gait",
         "log",
         sees="points",
     )
-    speed_prior: float = param(1.3, (0.1, 5.0), "m/s", "standard deviation of a newborn's velocity", "log")
+    speed_prior: float = param(1.3, (0.1, 5.0), "m/s", "standard deviation of a newborn group's velocity", "log")
     extent_time: float = param(1.0, (0.05, 20.0), "s", "time constant of the extent, alpha_s of (2.4)", "log")
     size_time: float = param(1.0, (0.05, 20.0), "s", "time constant of the number of people, alpha_N of (2.4)", "log")
-    count_noise: float = param(0.5, (0.05, 5.0), "people", "sigma_n of m_N: part that does not grow with N", "log")
-    count_share: float = param(0.15, (0.01, 1.0), "share", "sigma_n of m_N: part that grows with N (ours)", "log")
+    count_noise: float = param(0.5, (0.05, 5.0), "people", "sigma_n of m_N: the part that does not grow with N", "log")
+    count_share: float = param(
+        0.15, (0.01, 1.0), "share", "sigma_n of m_N: the part that grows with N, per N (ours)", "log"
+    )
     detect_prob: float = param(
         0.95,
         (0.3, 1.0),
         "probability",
-        "from points: that a member is measured; he is carried after that",
+        "from points: that a member is measured in a frame",
         sees="points",
     )
-    miss_prob: float = param(0.02, (0.0, 0.5), "probability", "of the miss hypothesis before any measurement (ours)")
+    miss_prob: float = param(0.02, (0.0, 0.5), "probability", "prior probability of the miss hypothesis (ours)")
 
     association: str = param(
-        "pda", ("pda", "none"), "", "masses of associations (4.2), or all points in the region (5.2.1)", "categorical"
+        "pda",
+        ("pda", "none"),
+        "",
+        "pda: associations by their masses (4.2); none: all points in the region (5.2.1)",
+        "categorical",
     )
-    miss: bool = param(True, (True, False), "", "an explicit hypothesis that nothing is the group's", "categorical")
-    freeze: bool = param(True, (True, False), "", "extent and size rest while points are shared (ours)", "categorical")
+    miss: bool = param(True, (True, False), "", "use a hypothesis that no point is the group's (ours)", "categorical")
+    freeze: bool = param(
+        True, (True, False), "", "extent and size do not change while many points are shared (ours)", "categorical"
+    )
     freeze_share: float = param(
-        0.1, (0.0, 1.0), "share", "of the group's size, shared points from which on they rest (ours)"
+        0.1, (0.0, 1.0), "share", "shared points per group size above which extent and size do not change (ours)"
     )
     gate_correction: bool = param(
-        True, (True, False), "", "undo what the region's edge cuts from the extent (ours)", "categorical"
+        True,
+        (True, False),
+        "",
+        "restore the part of the extent that the edge of the region cuts off (ours)",
+        "categorical",
     )
     centroid_noise: str = param(
         "people",
         ("people", "redrawn"),
         "",
-        "R of the centroid: members keep their places and some are not seen (ours), or are drawn anew each frame (2.1)",
+        "R of the centroid; people: members keep their places, some are not seen (ours); redrawn: as in (2.1)",
         "categorical",
     )
     attach: bool = param(
         True,
         (True, False),
         "",
-        "points in no region, but linked to a group's points, are its own (ours)",
+        "points in no region that are linked to a group's points belong to the group (ours)",
         "categorical",
     )
 
@@ -87,29 +99,32 @@ class GroupPdaConfig(BackgroundSettings):
         0.5,
         (0.0, 5.0),
         "",
-        "from pixels: weight of colours among the masses (6, future work; ours)",
+        "from pixels: weight of colours in the log masses (6, future work; ours)",
         before=0.0,
         sees="pixels",
     )
 
     merge_velocity: float = param(
-        0.5, (0.05, 3.0), "m/s", "greatest difference of velocities at which groups merge (ours: SR_v made physical)"
+        0.5, (0.05, 3.0), "m/s", "largest difference of velocities at which groups merge (ours, in place of SR_v)"
     )
     merge_doubt: float = param(
-        0.0, (0.0, 1.0), "", "standard deviations of the difference by which that is widened (ours)", before=0.0
+        0.0, (0.0, 1.0), "", "standard deviations of the difference that are added to merge_velocity (ours)", before=0.0
     )
-    merge_time: float = param(0.5, (0.0, 3.0), "s", "for so long groups must be near and equally fast to merge (ours)")
+    merge_time: float = param(
+        0.5, (0.0, 3.0), "s", "time for which groups must be near with like velocities before they merge (ours)"
+    )
     split_time: float = param(
         0.5,
         (0.0, 3.0),
         "s",
-        "spell without a feasible association, less the good frames in it, after which a group splits",
+        "time without a feasible association, less the measured frames in it, after which a group splits",
     )
     split_speed: float = param(
         0.5,
         (0.0, 3.0),
         "m/s",
-        "standard deviation of a child's velocity about its parent's; the region widens so fast in a spell (ours)",
+        "standard deviation of a child's velocity about its parent's, and speed at which a group's region widens "
+        "while it has no feasible association (ours)",
     )
     inherit_velocity: bool = param(
         True, (True, False), "", "children of a split start with their parent's velocity (ours)", "categorical"
@@ -118,23 +133,29 @@ class GroupPdaConfig(BackgroundSettings):
         0.3,
         (0.0, 3.0),
         "s",
-        "a new group is told once it was measured for so long, and dies if it is not for so long (ours)",
+        "a new group is confirmed after so long with measurements and removed after so long without (ours)",
     )
     coast_time: float = param(
-        1.5, (0.0, 10.0), "s", "after so long without measurement a group claims nothing any more (ours)"
+        1.5, (0.0, 10.0), "s", "time without a measurement after which a group is lost and claims no points (ours)"
     )
     recapture: bool = param(
-        True, (True, False), "", "a newborn where a lost group should be takes its id back (ours)", "categorical"
+        True,
+        (True, False),
+        "",
+        "a newborn group that fits a group not measured now takes its id over (ours)",
+        "categorical",
     )
     recapture_time: float = param(
-        3.0, (0.0, 10.0), "s", "for so long after its last measurement a lost group waits (ours)"
+        3.0, (0.0, 10.0), "s", "time after the last measurement for which a lost group's id can be taken over (ours)"
     )
-    report_coast: float = param(0.5, (0.0, 5.0), "s", "for so long after its last measurement a group is told (ours)")
+    report_coast: float = param(
+        0.5, (0.0, 5.0), "s", "time after the last measurement for which a group is reported (ours)"
+    )
     carry_time: float = param(
         0.9,
         (0.0, 3.0),
         "s",
-        "from points: a member not measured is carried along for so long (ours)",
+        "from points: time for which a missed member stands in at its predicted place (ours)",
         before=0.0,
         sees="points",
     )
@@ -142,29 +163,29 @@ class GroupPdaConfig(BackgroundSettings):
         0.37,
         (0.05, 2.0),
         "m",
-        "from points: a member is measured if a point is so near his place (ours)",
+        "from points: a member is measured if a point is within this distance of its predicted place (ours)",
         before=0.4,
         sees="points",
     )
 
-    grid: float = param(
-        0.1, (0.02, 1.0), "m", "from pixels: step of the grid of foreground points", "log", sees="pixels"
+    grid: float = param(0.1, (0.02, 1.0), "m", "from pixels: distance of the grid's points", "log", sees="pixels")
+    pixel_radius: float = param(
+        0.55, (0.05, 2.0), "m", "from pixels: r of the region round a point (R_0, 3.3)", sees="pixels"
     )
-    pixel_radius: float = param(0.55, (0.05, 2.0), "m", "from pixels: r of a point's region", sees="pixels")
     pixel_noise: float = param(
-        0.12, (0.005, 1.0), "m", "from pixels: jitter of one silhouette's centroid", "log", sees="pixels"
+        0.12, (0.005, 1.0), "m", "from pixels: standard deviation of one silhouette's centroid", "log", sees="pixels"
     )
     least_people: float = param(
         0.25,
         (0.0, 2.0),
         "people",
-        "from pixels: components of less foreground are noise (bounds the work, ours)",
+        "from pixels: components with less foreground are noise (ours)",
         sees="pixels",
     )
     most_foreground: float = param(
         0.6,
         (0.05, 1.0),
         "share",
-        "from pixels: a frame with more foreground tells nothing: lights, camera (ours)",
+        "from pixels: a frame with a larger share of foreground is ignored (ours)",
         sees="pixels",
     )
