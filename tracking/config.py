@@ -171,6 +171,7 @@ class Config:
         """Return the first defaults of the tracker, from tracking/frozen/NAME.toml, against which tuning is judged.
 
         A parameter that the file lacks has its `before` if the class declares it, and its default if it is inherited.
+        Raises AssertionError if a declared one has no `before`, and InputError if the file is missing or wrong.
         """
         path = FROZEN / f"{cls.tracker}.toml"
         first = cls._values(path)

@@ -27,16 +27,16 @@ def runs_own_detector(needs: tuple[str, ...], sequence: Sequence) -> bool:
     return ("pixels" in needs and sequence.has_images) or ("stereo" in needs and sequence.has_right)
 
 
-def choose_mode(needs: tuple[str, ...], sequence: Sequence, asked: DetectionMode | None) -> DetectionMode:
-    """Return `asked` if that mode can work; if it is None, the first of image, file, truth that can.
+def choose_mode(needs: tuple[str, ...], sequence: Sequence, requested: DetectionMode | None) -> DetectionMode:
+    """Return `requested` if that mode can work; if it is None, the first of image, file, truth that can.
 
-    Raises InputError, naming the tracker's needs and what the sequence has, if the asked mode or every mode fails.
+    Raises InputError, naming the tracker's needs and what the sequence has, if the requested mode or every mode fails.
     """
     able = [mode for mode in ("image", "file", "truth") if _works(mode, needs, sequence)]
-    if asked in able or (asked is None and able):
-        return asked or able[0]  # type: ignore[return-value]
+    if requested in able or (requested is None and able):
+        return requested or able[0]  # type: ignore[return-value]
     got = f"a tracker that needs {' or '.join(needs)}, and {sequence.name} with {_contents(sequence)}"
-    expected = f"--detections {asked}" if asked else "detections of some kind"
+    expected = f"--detections {requested}" if requested else "detections of some kind"
     remedy = f"try --detections {able[0]}" if able else "take another tracker or source"
     raise InputError(place="--detections", got=got, expected=f"what {expected} needs", remedy=remedy)
 

@@ -13,7 +13,7 @@ from sim.types import Sequence, Tracks
 from tracking.prepare import PreparedTracker
 
 SENSOR_SETTINGS_SHOWN = 6
-"""`input_summary` shows at most so many sensor settings; run.json holds all of them."""
+"""Most sensor settings that `input_summary` shows; run.json holds all of them."""
 
 
 @dataclass(frozen=True)

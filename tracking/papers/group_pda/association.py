@@ -1,4 +1,4 @@
-"""Data association of `group-pda`: which points a group may have (gate, attachment), and its update by them (4).
+"""Data association of `group-pda`: which points a group may have (gate, attachment), and its update by them (sec. 4).
 
 Order in a frame: `gated_distances`, `attached`, `claimed` (then tracking.papers.group_pda.missed_members adds missed
 members), `associate`. The masses and the update are in association_kernels and association_mass_kernels.
@@ -52,7 +52,7 @@ class Associated:
 
 
 def gated_distances(bank: GroupBank, points: Array, scaled: ScaledParameters, t: float) -> Array:
-    """Return squared Mahalanobis distances (G, M) of the points (M, 2), inf outside a group's search region (2.2).
+    """Return squared Mahalanobis distances (G, M) of the points (M, 2), inf outside a group's search region (eq. 2.2).
 
     Lost groups have no region. Tentative groups have no points that lie in a confirmed group's region. The region of a
     group without feasible associations widens at `split_speed`.
@@ -114,7 +114,7 @@ def claimed(points: Array, weights: Array, d2: Array, owner: Ints, t: float) -> 
 
 
 def associate(bank: GroupBank, claims: PointClaims, log_ratio: Array, scaled: ScaledParameters, t: float) -> Associated:
-    """Update the groups of the bank by their associations (4.1 to 4.3) and return the points that they have.
+    """Update the groups of the bank by their associations (sec. 4.1 to 4.3) and return the points that they have.
 
     log_ratio (G, M): of the points' colours (tracking.papers.group_pda.colour), or (G, 0) without colours.
     A group counts as measured if its association has a point of this frame. `null_time` grows by a frame for a group

@@ -43,7 +43,7 @@ INNOVATION_X, INNOVATION_Y, S_XX, S_XY, S_YY, MISS_MASS = range(6)
 
 @njit(cache=True)
 def search(points: Array, x: Array, P: Array, extent: Array, noise: float, wider: Array, gate: float) -> Array:
-    """Return squared Mahalanobis distances (G, M) of the points from the groups, inf outside the search region (2.2).
+    """Return squared Mahalanobis distances (G, M) of points from groups, inf outside the search region (eq. 2.2).
 
     The region is d^2 < gate. Departure: the covariance is Sigma + (H P H' + (noise + wider) I), because the centroid is
     uncertain. noise: variance of a point; wider (G,): further variance of each group.
@@ -96,14 +96,14 @@ def associate(
     points: Array, weights: Array, d2: Array, log_ratio: Array, owner: Ints, claimants: Ints,
     x: Array, P: Array, extent: Array, size: Array, rest: Bools, rules: Array,
 ) -> tuple[Ints, Bools, Array]:  # fmt: skip
-    """Update the groups x (G, 4), P (G, 4, 4), extent (G, 2, 2), size (G,) in place by the points (4.1 to 4.3).
+    """Update the groups x (G, 4), P (G, 4, 4), extent (G, 2, 2), size (G,) in place by the points (sec. 4.1 to 4.3).
 
     d2 (G, M): from `search`. log_ratio (G, M): what a point adds to the log mass per person by its colour, or (G, 0)
     without colours. owner (M,): the row of the only group that may have the point outside its region, or -1.
     claimants (M,): number of groups that may have the point. rest (G,): groups whose extent and size must not change.
 
     Returns the state (G,) of each group, the points (G, M) of its likeliest association, and the report (G, 6).
-    - NOTHING: the group has no points, only noise, or the miss is likelier than all associations together. No points
+    - NOTHING: the group has no points, only noise, or the miss has at least the mass of all associations. No points
       are chosen. The group is updated by the mixture if it has a feasible association.
     - NULL: it has points, more than noise, but no feasible association. All its points are chosen; it is not updated.
     - MEASURED: else.
@@ -140,7 +140,7 @@ def associate(
 
 @njit(cache=True)
 def _ordered_points(d2: Array, log_ratio: Array, owner: Ints, claimants: Ints, g: int) -> tuple[Ints, int]:
-    """The points of group g: first the unshared ones, then the shared ones by distance less colour evidence (4.1).
+    """The points of group g: first the unshared ones, then the shared ones by distance less colour evidence (sec. 4.1).
 
     Also the number of unshared ones.
     """
@@ -161,8 +161,8 @@ def _estimate(
 ) -> int:  # fmt: skip
     """Update one group in place by its associations: the first start, start + 1, … of its ordered points.
 
-    feasible (J,): which associations satisfy the group constraint (m_g, 4.1). Returns the number of shared points in
-    the likeliest association, or -1 if the miss has the larger mass.
+    feasible (J,): which associations satisfy the group constraint (m_g, eq. 4.1). Returns the number of shared points
+    in the likeliest association, or -1 if the miss has at least the mass of all associations together.
     """
     people, mean, cov = running_moments(points, weights, x[0], x[1], start)
     S = np.empty((len(people), 3))
@@ -175,7 +175,7 @@ def _estimate(
             R = centroid_noise(people[j], cov[j], extent, size[0], rules)
             S[j, 0], S[j, 1], S[j, 2] = P[0, 0] + R[0], P[0, 1] + R[1], P[1, 1] + R[2]
             m_d = log_density(mean[j, 0], mean[j, 1], S[j])
-            log_mass[j] = m_d + log_count(people[j], size[0], width) + np.log(unit) + evidence[j]  # (4.2), m_g = 1
+            log_mass[j] = m_d + log_count(people[j], size[0], width) + np.log(unit) + evidence[j]  # eq. 4.2, m_g = 1
     log_m_miss = log_miss(points, weights, start, extent, P, size[0], rules)
     top = max(log_mass.max(), log_m_miss)
     beta, miss = np.exp(log_mass - top), np.exp(log_m_miss - top)
@@ -193,7 +193,7 @@ def _estimate(
 
 @njit(cache=True)
 def _mix(beta: Array, miss: float, mean: Array, S: Array, x: Array, P: Array) -> None:
-    """Mix the conditional estimates (4.3) in place: x = sum beta_j x_j, P = sum beta_j (P_j + spread of x_j about x).
+    """Mix the conditional estimates (sec. 4.3) in place: x = sum beta_j x_j, P = sum beta_j (P_j + spread of x_j).
 
     beta (J,) and miss: normalised masses; mean (J, 2): innovations; S (J, 3): their covariances. Each association has
     its own gain; the miss leaves the prediction.
@@ -225,7 +225,7 @@ def _mix(beta: Array, miss: float, mean: Array, S: Array, x: Array, P: Array) ->
 
 @njit(cache=True)
 def _adapt(beta: Array, people: Array, cov: Array, extent: Array, size: Array, rules: Array) -> None:
-    """Update extent and size in place by (2.4), as means over the associations; the miss leaves them as they are.
+    """Update extent and size in place by eq. 2.4, as means over the associations; the miss leaves them as they are.
 
     Departures: covariances of few people are shrunk to the prior, and divided by GATE_FACTOR to restore what the edge
     of the search region cuts off.

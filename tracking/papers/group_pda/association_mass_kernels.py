@@ -1,4 +1,4 @@
-"""Kernels of `group-pda`: the parts of an association's mass (4.2), and the noise of a measured centroid.
+"""Kernels of `group-pda`: the parts of an association's mass (eq. 4.2), and the noise of a measured centroid.
 
 m_d is `log_density` of the centroid with S = H P H' + R, where R is `centroid_noise`; m_N is `log_count`; m_g is 1 for
 a feasible association. `log_miss` is the mass of the miss hypothesis. The module association_kernels puts them
@@ -22,9 +22,9 @@ are shrunk to, with the weight PRIOR_WEIGHT in people. LEAST_WEIGHT: people belo
 standard deviation of one person's measured position. COUNT_SD (people), COUNT_SHARE: sigma_n^2 = COUNT_SD^2 +
 (COUNT_SHARE N)^2. DETECT_PROB: probability that a member is among the points. MISS_PROB: prior probability of the miss
 hypothesis, 0 without it. FREEZE_SHARE: share of N in shared points above which extent and size rest. KEEP_EXTENT,
-KEEP_SIZE: alpha_s, alpha_N of (2.4) per frame. GATE_FACTOR: share of its covariance that a Gaussian keeps inside the
-gate. REDRAWN: 1 if members are drawn anew in each frame. TAKE_ALL: 1 if a group takes all points in its region (5.2.1).
-LEAST_OTHERS: lower bound of n - 1 in the variance of a mean drawn without replacement.
+KEEP_SIZE: alpha_s, alpha_N of eq. 2.4 per frame. GATE_FACTOR: share of its covariance that a Gaussian keeps inside the
+gate. REDRAWN: 1 if members are drawn anew in each frame. TAKE_ALL: 1 if a group takes all points in its region (sec.
+5.2.1). LEAST_OTHERS: lower bound of n - 1 in the variance of a mean drawn without replacement.
 """
 
 NEWCOMERS = 0.02
@@ -35,7 +35,7 @@ NEWCOMERS = 0.02
 def running_moments(points: Array, weights: Array, x: float, y: float, start: int) -> tuple[Array, Array, Array]:
     """Return people (J,), centroid (J, 2) relative to (x, y) and 1/N covariance (J, 3) of each association's points.
 
-    Association j has the first start + j points. Its sums come from those of the one before (4.2.1).
+    Association j has the first start + j points. Its sums come from those of the one before (sec. 4.2.1).
     """
     count = len(points) - start + 1
     people, mean, cov = np.zeros(count), np.zeros((count, 2)), np.zeros((count, 3))
@@ -55,7 +55,7 @@ def running_moments(points: Array, weights: Array, x: float, y: float, start: in
 
 @njit(cache=True)
 def log_count(people: float, size: float, width: float) -> float:
-    """Return log m_N of (4.2), density per person: a Gaussian about N with variance `width`.
+    """Return log m_N (sec. 4.2), the density per person: a Gaussian about N with variance `width`.
 
     Departure: a small uniform part gives it tails, because people who join a group come all at once.
     """
@@ -68,7 +68,7 @@ def centroid_noise(seen: float, cov: Array, extent: Array, size: float, rules: A
     """Return R (xx, xy, yy), the covariance of the centroid of m = `seen` people about that of all n people there.
 
     n = size / DETECT_PROB. cov (3,): covariance of the seen people.
-    - REDRAWN, (2.1) read literally: Sigma / m.
+    - REDRAWN, eq. 2.1 read literally: Sigma / m.
     - Members keep their places (ours): r^2 / m + (1 - m / n) n / (n - 1) Sigma / m, the variance of a mean of m drawn
       out of n without replacement, with Sigma less r^2.
     - More are seen than are there: the same with the roles exchanged and `cov` for Sigma.
@@ -90,7 +90,7 @@ def centroid_noise(seen: float, cov: Array, extent: Array, size: float, rules: A
 
 @njit(cache=True)
 def log_density(dx: float, dy: float, S: Array) -> float:
-    """Return log m_d of (4.2): log N((dx, dy); 0, S), per unit of area. S (3,)."""
+    """Return log m_d (sec. 4.2): log N((dx, dy); 0, S), per unit of area. S (3,)."""
     area = S[0] * S[2] - S[1] * S[1]
     d2 = (S[2] * dx * dx - 2 * S[1] * dx * dy + S[0] * dy * dy) / area
     return float(-0.5 * (d2 + np.log(area)) - np.log(2 * np.pi))

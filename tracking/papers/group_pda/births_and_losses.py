@@ -32,7 +32,7 @@ class ExpectedMembers:
 
 
 def expected_members(bank: GroupBank, scaled: ScaledParameters, t: float) -> ExpectedMembers:
-    """Return the expected members of the confirmed groups that were measured within `carry_time`, or a frame."""
+    """Return the expected members of the confirmed groups that were measured in the last `carry_time` s or frame."""
     recent = t - bank.last_seen <= max(scaled.config.carry_time, scaled.dt) + 1e-9
     rows = np.flatnonzero(bank.confirmed & recent).tolist()
     places = [bank.positions(r) for r in rows]
@@ -45,7 +45,7 @@ def expected_members(bank: GroupBank, scaled: ScaledParameters, t: float) -> Exp
 def add_newborns(
     bank: GroupBank, points: Array, weights: Array, expected: ExpectedMembers, scaled: ScaledParameters, t: float
 ) -> None:
-    """Append the tentative groups that the unclaimed points (M, 2) form under G_y (3.3).
+    """Append the tentative groups that the unclaimed points (M, 2) form under G_y (sec. 3.3).
 
     expected: the members before the groups were updated. A newborn group within their reach is the child of the nearest
     member's group (ours).

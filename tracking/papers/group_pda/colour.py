@@ -1,4 +1,4 @@
-"""Colours as a further mass of `group-pda`'s associations, from pixels only (6, future work; the form is ours).
+"""Colours as a further mass of `group-pda`'s associations, from pixels only (future work of sec. 6; the form is ours).
 
 Each group has a histogram of the colours of its unshared points. A shared point of colour c adds
 log p(c | g) - log p(c | the other groups that may have the point) to the log mass of group g's associations, where p

@@ -15,12 +15,12 @@ class GroupPdaConfig(BackgroundSettings):
 
     tracker: ClassVar[str] = "group-pda"
 
-    gate: float = param(9.21, (6.0, 20.0), "", "gamma: squared Mahalanobis radius of the search region (2.2)")
+    gate: float = param(9.21, (6.0, 20.0), "", "gamma: squared Mahalanobis radius of the search region (eq. 2.2)")
     radius: float = param(
         0.52,
         (0.1, 2.0),
         "m",
-        "from points: r of the region round a point; points nearer than 2 r are linked (R_0, 3.3)",
+        "from points: r of the region round a point; points nearer than 2 r are linked (R_0, sec. 3.3)",
         sees="points",
     )
     person_spread: float = param(
@@ -44,8 +44,8 @@ class GroupPdaConfig(BackgroundSettings):
         sees="points",
     )
     speed_prior: float = param(1.3, (0.1, 5.0), "m/s", "standard deviation of a newborn group's velocity", "log")
-    extent_time: float = param(1.0, (0.05, 20.0), "s", "time constant of the extent, alpha_s of (2.4)", "log")
-    size_time: float = param(1.0, (0.05, 20.0), "s", "time constant of the number of people, alpha_N of (2.4)", "log")
+    extent_time: float = param(1.0, (0.05, 20.0), "s", "time constant of the extent, alpha_s of eq. 2.4", "log")
+    size_time: float = param(1.0, (0.05, 20.0), "s", "time constant of the number of people, alpha_N of eq. 2.4", "log")
     count_noise: float = param(0.5, (0.05, 5.0), "people", "sigma_n of m_N: the part that does not grow with N", "log")
     count_share: float = param(
         0.15, (0.01, 1.0), "share", "sigma_n of m_N: the part that grows with N, per N (ours)", "log"
@@ -63,7 +63,7 @@ class GroupPdaConfig(BackgroundSettings):
         "pda",
         ("pda", "none"),
         "",
-        "pda: associations by their masses (4.2); none: all points in the region (5.2.1)",
+        "pda: associations by their masses (sec. 4.2); none: all points in the region (sec. 5.2.1)",
         "categorical",
     )
     miss: bool = param(True, (True, False), "", "use a hypothesis that no point is the group's (ours)", "categorical")
@@ -84,7 +84,7 @@ class GroupPdaConfig(BackgroundSettings):
         "people",
         ("people", "redrawn"),
         "",
-        "R of the centroid; people: members keep their places, some are not seen (ours); redrawn: as in (2.1)",
+        "R of the centroid; people: members keep their places, some are not seen (ours); redrawn: as in eq. 2.1",
         "categorical",
     )
     attach: bool = param(
@@ -99,7 +99,7 @@ class GroupPdaConfig(BackgroundSettings):
         0.5,
         (0.0, 5.0),
         "",
-        "from pixels: weight of colours in the log masses (6, future work; ours)",
+        "from pixels: weight of colours in the log masses (future work of sec. 6; ours)",
         before=0.0,
         sees="pixels",
     )
@@ -170,7 +170,7 @@ class GroupPdaConfig(BackgroundSettings):
 
     grid: float = param(0.1, (0.02, 1.0), "m", "from pixels: distance of the grid's points", "log", sees="pixels")
     pixel_radius: float = param(
-        0.55, (0.05, 2.0), "m", "from pixels: r of the region round a point (R_0, 3.3)", sees="pixels"
+        0.55, (0.05, 2.0), "m", "from pixels: r of the region round a point (R_0, sec. 3.3)", sees="pixels"
     )
     pixel_noise: float = param(
         0.12, (0.005, 1.0), "m", "from pixels: standard deviation of one silhouette's centroid", "log", sees="pixels"

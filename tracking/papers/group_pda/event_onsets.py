@@ -53,7 +53,7 @@ class PairHistory:
         """Return when, in s, the groups came to be near with like velocities, and where (2,), in the points' unit.
 
         It is the moment after the last one in which the gap was above 1.5 m, or the chord's velocity difference was
-        above 1.2 merge_velocity (in m/s) at a time before `alike_since`.
+        above 1.2 merge_velocity (in m/s) at a time up to `alike_since`.
         """
         t, d = np.array([m.t for m in self.moments]), np.array([m.difference for m in self.moments])
         before = (chords(t, d, MERGE_CHORD) > MERGE_CHORD_MARGIN * merge_velocity) & (t <= self.alike_since)

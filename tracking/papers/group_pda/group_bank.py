@@ -25,7 +25,7 @@ LISTS = ("members", "recent_points")
 class MemberPlaces(NamedTuple):
     """Where a group's K members were measured last: their points, or, from pixels, the convex hull of the points.
 
-    offset (K, 2) from the centroid; last_seen (K,) s; known (K,): True if a member was there before, too.
+    offset (K, 2) from the centroid; last_seen (K,) s; known (K,): see `remember` in missed_members.
     """
 
     offset: Array
@@ -115,13 +115,13 @@ class GroupBank:
             setattr(self, f.name, a + b if f.name in LISTS else np.concatenate([a, b]))
 
     def predict(self, scaled: ScaledParameters) -> None:
-        """Predict all groups to the next frame: x = F x, P = F P F' + Q (2.3)."""
+        """Predict all groups to the next frame: x = F x, P = F P F' + Q (eq. 2.3)."""
         self.x = self.x @ scaled.F.T
         self.P = scaled.F @ self.P @ scaled.F.T + scaled.Q
 
 
 def newborn(points: Array, weights: Array, group: Ints, scaled: ScaledParameters, t: float) -> GroupBank:
-    """Return a bank of tentative groups made from points alone (3.3), with velocity 0.
+    """Return a bank of tentative groups made from points alone (sec. 3.3), with velocity 0.
 
     points (M, 2); weights (M,): people that each point stands for; group (M,): 0, 1, … or -1 for no group; t: s.
     Centroid and size are the weighted mean and sum. The extent is the covariance, shrunk towards the prior and divided

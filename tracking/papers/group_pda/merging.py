@@ -1,4 +1,4 @@
-"""Merging of `group-pda`'s groups (3.1, 3.2): which are near with like velocities, for how long, and their union.
+"""Merging of `group-pda`'s groups (sec. 3.1, 3.2): which are near with like velocities, for how long, and their union.
 
 The relation R_x holds for two groups whose search regions overlap and whose velocities are alike; G_x are the connected
 components. Departures: the velocity test is a physical difference (`merge_velocity`), R_x must hold for `merge_time`,
@@ -59,8 +59,9 @@ class GroupMerging:
         """Merge the groups for which R_x has held for `merge_time`; yield their events. The states are updated ones.
 
         A group takes part if it is confirmed, was measured in this frame, has no `null_time`, and enough of its people
-        are nearer to no other group: else its velocity is unknown or another group's. An event is a merge, or an enter
-        if at most one of the groups was there for more than 1 s before the onset and is no child of another group.
+        are nearer to no other group: else its velocity is unknown or another group's. An event is a merge if
+        at least two of the groups were there for more than 1 s before the onset or are children of another group. Else
+        it is an enter.
         """
         able = np.flatnonzero(
             bank.confirmed & (bank.last_seen >= t) & (bank.null_time <= 0) & (bank.own_people >= LEAST_OWN * bank.size)
@@ -116,7 +117,7 @@ class GroupMerging:
 
 
 def merged(bank: GroupBank, rows: Ints) -> GroupBank:
-    """Return a bank with the union (3.1) of the groups in `rows`.
+    """Return a bank with the union (eq. 3.1) of the groups in `rows`.
 
     Centroid and velocity are means weighted by size, the extent contains the spread of the centroids. P is that of a
     weighted mean of independent centroids, sum w^2 P_i (ours): the spread of the centroids is no estimation error.

@@ -44,8 +44,8 @@ def with_missed_members(claims: PointClaims, bank: GroupBank, scaled: ScaledPara
 def missed_members(bank: GroupBank, points: Array, scaled: ScaledParameters, t: float) -> tuple[Array, Ints, Array]:
     """Return the places (K, 2), rows of the bank (K,) and last measurements (K,) in s of the members missed at time t.
 
-    A member is missed if no point (M, 2) is within `carry_reach` of its predicted place. Only members that had been
-    measured twice running, and within the last `carry_time`, count. There are none from pixels.
+    A member is missed if no point (M, 2) is within `carry_reach` of its predicted place. Only `known`
+    members that were measured within the last `carry_time` count. There are none from pixels.
     """
     c, recent = scaled.config, []
     if c.carry_time > 0 and not scaled.from_pixels:
@@ -64,8 +64,8 @@ def missed_members(bank: GroupBank, points: Array, scaled: ScaledParameters, t: 
 def remember(bank: GroupBank, claims: PointClaims, exclusive: Bools, scaled: ScaledParameters, t: float) -> None:
     """Store each group's points of this frame, exclusive (G, M), as its members and recent points.
 
-    A group without points keeps its old ones. From points, a member is `known` if an old member was within
-    `carry_reach` of it.
+    A group without points keeps its old ones. A member is `known` if, relative to the centroid, one of the group's
+    previous members was within `carry_reach` of it; from pixels all are.
     """
     for row in np.flatnonzero(exclusive.any(1)).tolist():
         mine, last_seen = claims.points[exclusive[row]], claims.last_seen[exclusive[row]]

@@ -20,9 +20,9 @@ COLOUR_BINS = 64
 class ScaledParameters:
     """Lengths are in the unit of the points: m on the ground, px in the image.
 
-    dt: s between frames. scale: units per metre. constraint: of the group constraint G_y (3.3). point_sd: standard
+    dt: s between frames. scale: units per metre. constraint: of the group constraint G_y (sec. 3.3). point_sd: standard
     deviation of one person's measured position. kernel_rules (RULES,): the array `rules` of the kernels. F, Q (4, 4) of
-    (2.3). from_pixels: the points are foreground pixels, not people. metres_per_unit (2,): metres on the ground per
+    eq. 2.3. from_pixels: the points are foreground pixels, not people. metres_per_unit (2,): metres on the ground per
     unit along x and along y (depth in an image). body_cov (2, 2): covariance of one person's pixels, 0 from points.
     colour_bins: bins of colour histograms, 0 if colours are not used.
     """

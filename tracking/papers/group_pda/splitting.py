@@ -1,4 +1,4 @@
-"""Splitting of `group-pda`'s groups (3.3): a group without feasible associations falls into those of its points."""
+"""Splitting of `group-pda`'s groups (sec. 3.3): a group without feasible associations falls apart."""
 
 from __future__ import annotations
 

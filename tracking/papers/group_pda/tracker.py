@@ -2,16 +2,19 @@
 
 Gennari & Hager, "Probabilistic data association methods in visual tracking of groups", CVPR 2004. A group's state is
 (xi, v, Sigma, N): centroid xi and velocity v, together x with covariance P; extent Sigma of the members' positions;
-number of people N. The steps of a frame (Fig. 1), with equation or section and the code:
+number of people N. The steps of a frame (Fig. 1), with their equation (eq.) or section (sec.) and the module:
 
-    predict    x = F x, P = F P F' + Q                                            (2.3)       group_bank
-    gate       {y : (y - xi)' S^-1 (y - xi) < gamma}                              (2.2)       association_kernels.search
-    associate  theta_j: the unshared points and the j nearest shared ones, all j  (4.1)       association_kernels
-    masses     m_tot = m_d m_N m_g: centroid, number, constraint |G_y| = 1        (4.1, 4.2)  association_mass_kernels
-    update     x, P, Sigma, N as means over the associations                      (2.4, 4.3)  association_kernels
-    split      a group whose associations all had m_g = 0 for some time           (3.3, 4.2)  splitting
-    merge      groups with overlapping regions and like velocities                (3.1, 3.2)  merging
-    birth      unclaimed points, grouped by G_y                                   (3.3)       births_and_losses
+    predict    x = F x, P = F P F' + Q                                 eq. 2.3            group_bank
+    gate       {y : (y - xi)' S^-1 (y - xi) < gamma}                   eq. 2.2            association
+    associate  theta_j: unshared points and the j nearest shared ones  sec. 4.1           association_kernels
+    masses     m_tot = m_d m_N m_g; m_g = 1 if |G_y| = 1, else 0       eq. 4.1, 4.2       association_mass_kernels
+    update     x, P, Sigma, N as means over the associations           eq. 2.4, sec. 4.3  association_kernels
+    split      a group whose associations all have m_g = 0             sec. 3.3, 4.2      splitting
+    merge      R_x: overlapping regions and like velocities            sec. 3.1           merging
+               x, Sigma, N of the union                                eq. 3.1            merging
+    birth      unclaimed points, grouped by G_y                        sec. 3.3           births_and_losses
+
+The grouping functions G_0, G_x, G_y of points (sec. 3.3, 4.2.1) are in tracking.filters.components.
 
 Departures, all ours.
 
@@ -25,7 +28,7 @@ Search region and update:
 - Sigma and N rest while many points are shared and while no association is feasible.
 - Attached points: a point in no region that is linked to a group's points is the group's. Missed members: from points,
   a member that is not measured stands in at its predicted place for a while.
-- Colours are a further mass, from pixels (6, future work).
+- Colours are a further mass, from pixels (future work of sec. 6).
 
 Splitting and merging:
 - A split needs `split_time` without a feasible association; measured frames shorten that time, they do not end it.
@@ -42,7 +45,7 @@ Reporting:
 - Onsets of merges and splits are measured afterwards. In an image seen at an angle, depth counts for more px than
   it shows.
 
-association="none" is the paper's 5.2.1: a group takes all points in its region, with attached points and missed
+association="none" is the paper's sec. 5.2.1: a group takes all points in its region, with attached points and missed
 members. There are no masses, no miss hypothesis and no time without feasible associations, so that a group only splits
 when people walk out of its region.
 """
@@ -197,7 +200,7 @@ class GroupPda:
         return self.scaled
 
     def _measure(self, points: Array, weights: Array, scaled: ScaledParameters, t: float) -> list[BankEvent]:
-        """Gate, associate and update (4), split, and make newborn groups (3.3); the events of splits."""
+        """Gate, associate and update (sec. 4), split, and make newborn groups (sec. 3.3); the events of splits."""
         bank = self.bank
         d2 = gated_distances(bank, points, scaled, t)
         owner = attached(points, d2, bank, scaled) if self.config.attach else np.full(len(points), -1)
