@@ -121,7 +121,7 @@ def test_hiding_a_group_by_its_name(tmp_path):
         for frame in feed:
             there = set(live.truth.at(frame.index).id) - (set(people["a"]) if 1.0 <= frame.t < 2.0 else set())
             assert len(frame.detections.pos) == len(there)
-    with pytest.raises(InputError, match=r"sensor\.hide\.0\.group: got 'x'; expected one of the script's groups \(a, "):
+    with pytest.raises(InputError, match=r"sensor\.hide\.0\.group: got 'x'; expected a group of the script \(a, "):
         prepare("blob", live, detections="truth", sensor={"hide": [{"start": 1, "end": 2, "group": "x"}]})
     with pytest.raises(InputError, match="none is known here"):
         prepare(
