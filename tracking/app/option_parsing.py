@@ -33,6 +33,7 @@ def settings(texts: Iterable[str], default: str, subjects: Iterable[str]) -> lis
 
 
 def _setting(text: str, default: str, subjects: tuple[str, ...]) -> tuple[str, str]:
+    """(subject, "key=value") of one text."""
     key, equals, value = text.partition("=")
     if not equals or not key.strip():
         raise InputError(

@@ -61,6 +61,7 @@ def find_tracks(path: Path) -> list[StoredTracks]:
 
 
 def _below(folder: Path, depth: int) -> list[StoredTracks]:
+    """The stored tracks in a folder and in `depth` levels of folders below it; hidden folders are left out."""
     if any((folder / name).is_file() for name in TRACK_FILES):
         info = _run_info(folder / "run.json")
         return [StoredTracks(str(info.get("sequence", folder.name)), folder, info)]

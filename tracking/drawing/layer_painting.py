@@ -149,6 +149,7 @@ def _paint_ellipse(canvas: Canvas, ring: Array, ink: Colour) -> None:
 
 
 def _paint_ids(canvas: Canvas, layer: Layer, index: int) -> None:
+    """People's ids at the upper left corners of their boxes, or at their points without a box."""
     marks = layer.at(index)
     if len(marks.id) > MANY or marks.whole_groups:
         return

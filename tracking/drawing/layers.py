@@ -143,10 +143,12 @@ def plan_layer_of_tracks(tracks: SequenceOf[Tracks]) -> Layer:
 
 
 def _emitted(tracks: SequenceOf[Tracks]) -> tuple[tuple[int, GroupEvent], ...]:
+    """Each event with the frame in which it was emitted, or with its first frame if that is unknown."""
     return tuple((e.start if e.emitted is None else e.emitted, e) for t in tracks for e in t.events)
 
 
 def _marks_in_picture(t: Tracks, camera: Camera | None, scene: Scene | None) -> FrameMarks:
+    """The marks of one frame's tracks in px. Trails follow the feet, or the position in the image without a box."""
     if t.unit == "group":
         return _whole_groups_in_picture(t, camera, scene)
     n = len(t.id)
@@ -168,6 +170,7 @@ def _whole_groups_in_picture(t: Tracks, camera: Camera | None, scene: Scene | No
 
 
 def _marks_on_plan(t: Tracks) -> FrameMarks:
+    """The marks of one frame's tracks in m, without boxes. Trails follow the positions."""
     n, groups, at = len(t.id), t.groups or Groups.none(), t.pos[:, :2]
     if t.unit == "group":
         marks = _whole_groups(t, lambda points: points[:, :2])

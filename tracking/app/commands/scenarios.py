@@ -61,6 +61,7 @@ def explain(name: str, settings: list[str], drawing: Path | None) -> CommandResu
 
 
 def _is_suite(name: str) -> bool:
+    """True for a suite's file, for "suite:NAME", and for every name that is no scenario."""
     if name.endswith(".toml"):
         return not name.startswith("suite:") and "entry" in toml_files.parse(toml_files.find(name))
     return name.startswith("suite:") or name not in names()

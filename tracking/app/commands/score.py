@@ -100,6 +100,7 @@ def _block_intervals(sequence: Sequence, draws: int, resampled: Callable[[Ints],
 
 
 def _score_all(sequences: list[Sequence], tracks: Path, method: ComparisonMethod) -> list[SequenceScores]:
+    """The scores of every sequence with its tracks at or below the path `tracks`."""
     matched = match_tracks(sequences, find_tracks(tracks))
     rows = []
     with ProgressMeter("score", len(matched)) as meter:
@@ -139,6 +140,7 @@ def _by_detections(rows: list[SequenceScores]) -> list[list[SequenceScores]]:
 
 
 def _givens(rows: list[SequenceScores]) -> list[str]:
+    """The different detections that trackers got, in order of first appearance."""
     return list(dict.fromkeys(row.given for row in rows))
 
 
@@ -188,5 +190,6 @@ def _values(rows: list[SequenceScores]) -> Array:
 
 
 def _by_key(ends: tuple[Array, Array, Array]) -> Means:
+    """Means of (mean, low, high), each (K,) in the catalogue's order."""
     columns = zip(CATALOGUE, *(end.tolist() for end in ends), strict=True)
     return {key: {"mean": mean, "low": low, "high": high} for key, mean, low, high in columns}

@@ -116,6 +116,8 @@ def _with_title(title: str, table: Any) -> Any:
 
 
 def _comparison_lines(rows: list[SequenceScores], people: bool, groups: bool) -> list[str]:
+    """What people and groups were compared by, or that they are not tracked or not labelled."""
+
     def each(words: dict[str, str], name: str) -> str:
         return ", ".join(words[kind] for kind in dict.fromkeys(getattr(row.scores, name) for row in rows))
 

@@ -102,6 +102,7 @@ def _write_each(
 
 
 def _files(sequences: list[Sequence], out: Path, suffix: str) -> list[Path]:
+    """The file for each sequence. Raises InputError for one file for several sequences, or a wrong suffix."""
     if len(sequences) == 1:
         return [option_parsing.output_file(out, suffix)]
     if out.suffix.lower() == suffix:
