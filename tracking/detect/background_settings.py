@@ -22,7 +22,7 @@ class BackgroundSettings(Config):
         0.9995,
         (0.9, 0.999999),
         "probability",
-        "share of the training sample's background pixels that each threshold leaves background",
+        "from pixels: share of the training sample's background pixels that each threshold leaves background",
         "log",
         sees="pixels",
     )
@@ -30,14 +30,14 @@ class BackgroundSettings(Config):
         0.5,
         (0.0, 1.0),
         "",
-        "brightness relative to the background: a darker pixel below it is dark foreground, above it shadow",
+        "from pixels: relative brightness; a darkened pixel below it is dark foreground, above it shadow",
         sees="pixels",
     )
     bright: float = param(
         1.3,
         (1.0, 100.0),
         "",
-        "brightness relative to the background: a brighter pixel above it is foreground, below it highlight (ours)",
+        "from pixels: relative brightness; a brightened pixel above it is foreground, below it highlight (ours)",
         "log",
         sees="pixels",
     )
@@ -45,7 +45,7 @@ class BackgroundSettings(Config):
         20.0,
         (1.0, 1e6),
         "s",
-        "time constant with which pixels classified as background adapt (ours)",
+        "from pixels: time constant with which pixels classified as background adapt (ours)",
         "log",
         sees="pixels",
     )
@@ -53,7 +53,7 @@ class BackgroundSettings(Config):
         200.0,
         (1.0, 1e9),
         "s",
-        "time constant with which all other pixels adapt, except protected ones (ours)",
+        "from pixels: time constant with which all other pixels adapt, except protected ones (ours)",
         "log",
         sees="pixels",
     )
@@ -61,7 +61,7 @@ class BackgroundSettings(Config):
         "global",
         ("global", "none"),
         "",
-        "global: each frame's brightness is estimated per colour channel and corrected (ours); none: it is not",
+        "from pixels: global: the brightness of each frame is estimated and corrected per colour (ours); none: not so",
         "categorical",
         sees="pixels",
         online=False,

@@ -39,7 +39,7 @@ class LinkRule(Config):
         0.8,
         (0.3, 1.0),
         "share",
-        "of the frames of the last `window` with both seen: a pair near and alike in so many or more is linked",
+        "a pair is linked if it was near and moved alike in this share of the frames of `window` with both seen",
     )
     window: float = param(HOLD_TIME, (0.2, 6.0), "s", "time over which the share is counted")
     acquaintance: float = param(
@@ -48,20 +48,20 @@ class LinkRule(Config):
         "s",
         "least time within the window in which both must have been seen before they can be linked",
     )
-    apart: float = param(SPLIT_DISTANCE, (0.5, 5.0), "m", "a pair further than this is apart")
+    apart: float = param(SPLIT_DISTANCE, (0.5, 5.0), "m", "a pair farther than this is apart")
     patience: float = param(HOLD_TIME, (0.1, 6.0), "s", "time apart after which a link breaks")
     idle: float = param(
         0.0,
         (0.0, 1.0),
         "m/s",
-        "a pair that are both slower than this is not near; 0: standing people can be linked",
+        "two people who are both slower than this are not near; 0: standing people can be linked",
         before=0.0,
     )
     diverge: float = param(
         NEVER,
         (0.2, NEVER),
         "m/s",
-        "a pair beyond `near` whose velocities differ by more is apart, too; 10: never",
+        "a pair farther than `near` whose velocities differ by more than this is apart, too; 10: never",
         "log",
         before=NEVER,
     )
@@ -71,9 +71,9 @@ class LinkRule(Config):
         "s",
         "time over which velocities are taken as chords of positions; 0: the tracker's own velocities",
     )
-    memory: float = param(1.0, (0.0, 5.0), "s", "time for which a member who is not seen stays in the group")
+    memory: float = param(1.0, (0.0, 5.0), "s", "time for which a member that is missed stays in the group")
     arrival: float = param(
-        ARRIVAL, (0.0, 5.0), "s", "a link that began so soon after a track's first frame is no merge"
+        ARRIVAL, (0.0, 5.0), "s", "a link that began within this time of a track's first frame is no merge"
     )
 
 

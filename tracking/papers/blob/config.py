@@ -44,11 +44,14 @@ class BlobConfig(BackgroundSettings):
         0.9,
         (0.01, 0.999999),
         "probability",
-        "gate of a measured track inside which a free measurement starts no track (ours)",
+        "as `gate`, of a track that is measured: an unassociated box inside this gate starts no track (ours)",
     )
-    confirm_ratio: float = param(1.5, (1.01, 2.0), "", "rho at or below which a track is confirmed")
+    confirm_ratio: float = param(1.5, (1.01, 2.0), "", "a track is confirmed at or below this value of rho")
     confirm_gate: float = param(
-        0.99, (0.1, 0.999999), "probability", "gate in which the confirming measurement must lie"
+        0.99,
+        (0.1, 0.999999),
+        "probability",
+        "share of a track's own measurements that the gate of the confirming measurement holds",
     )
     coast_time: float = param(
         1.5, (0.0, 10.0), "s", "a confirmed track is deleted after this time without measurement, from the steady state"
@@ -60,10 +63,10 @@ class BlobConfig(BackgroundSettings):
         3.0,
         (0.0, 20.0),
         "s",
-        "coast_time, if longer, of a track whose miss is explained: hidden, or merged with others in one box (ours)",
+        "replaces coast_time, if longer, for a track that is hidden or merged with others in one box (ours)",
     )
     score_start: float = param(0.5, (0.0, 1.0), "score", "least score of a detection that starts a track")
-    score_continue: float = param(0.1, (0.0, 1.0), "score", "least score of a detection that continues one")
+    score_continue: float = param(0.1, (0.0, 1.0), "score", "least score of a detection that updates a track")
     report_delay: float = param(
         0.1, (0.0, 5.0), "s", "a tentative track is reported from this age on, in frames in which it is measured"
     )
@@ -77,14 +80,14 @@ class BlobConfig(BackgroundSettings):
         0.7,
         (0.0, 10.0),
         "s",
-        "report_coast, if longer, of a track whose miss is explained: hidden, or merged with others",
+        "replaces report_coast, if longer, for a track that is hidden or merged with others in one box (ours)",
         before=0.0,
     )
     report_credit: float = param(
         0.33,
         (0.0, 10.0),
         "",
-        "a missed track is reported for at most this share of the time in which it was measured",
+        "a missed track is reported for at most this share of the time in which it was measured (ours)",
         before=1.0,
     )
 
@@ -111,7 +114,7 @@ class BlobConfig(BackgroundSettings):
         10.0,
         (1.0, 500.0),
         "nats",
-        "from pixels: log-likelihood of a template's full support, against d^2 / 2 of its place (ours)",
+        "from pixels: log-likelihood of a template with full support; d^2 / 2 of its place is subtracted (ours)",
         "log",
         before=10.0,
         sees="pixels",
@@ -120,7 +123,7 @@ class BlobConfig(BackgroundSettings):
         0.3,
         (0.02, 0.8),
         "share",
-        "from pixels: least foreground in the part of a confirmed track's template that no other covers (ours)",
+        "from pixels: least foreground share in the part of a confirmed track's template that no other covers (ours)",
         before=0.3,
         sees="pixels",
     )
@@ -136,7 +139,7 @@ class BlobConfig(BackgroundSettings):
         0.15,
         (0.01, 5.0),
         "m",
-        "from pixels: standard deviation of people's axes about those expected at their place (ours)",
+        "from pixels: standard deviation of people's sizes about the size expected at their place (ours)",
         "log",
         before=0.15,
         sees="pixels",
@@ -145,7 +148,7 @@ class BlobConfig(BackgroundSettings):
         8.0,
         (0.5, 45.0),
         "deg",
-        "from pixels: standard deviation of a measured direction, beside that of the blob's moments",
+        "from pixels: standard deviation of a measured direction, in addition to that of the blob's moments",
         "log",
         before=8.0,
         sees="pixels",
@@ -163,7 +166,7 @@ class BlobConfig(BackgroundSettings):
         0.6,
         (0.05, 1.0),
         "share",
-        "from pixels: a frame with a larger share of foreground is not measured: light switched, camera moved (ours)",
+        "from pixels: a frame with a larger share of foreground is not measured (ours)",
         before=0.6,
         sees="pixels",
     )
