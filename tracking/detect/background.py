@@ -14,9 +14,9 @@ Classes, tested in the order of Gonzalez et al., 3.2:
 Eqs 5, 6, 9, 10 are in background_kernels, eqs 3, 4, 7, 8 in background_training_kernels.
 
 Departures (ours; all of them: docs/reference/foreground.md). `dark` is a limit of alpha instead of a normalised
-threshold, and a pixel within the noise is never dark foreground. `bright` is a limit of alpha, too. The model adapts, and follows the
-gain of each frame. If all frames of the sample are grey (R = G = B), chromaticity is not available: every darker pixel
-is dark foreground and every brighter one is foreground.
+threshold, and a pixel within the noise is never dark foreground. `bright` is a limit of alpha, too. The model adapts,
+and follows the gain of each frame. If all frames of the sample are grey (R = G = B), chromaticity is not available:
+every darker pixel is dark foreground and every brighter one is foreground.
 """
 
 from __future__ import annotations
