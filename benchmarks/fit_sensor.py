@@ -1,25 +1,25 @@
 """Synthetic errors beside real ones: a detector's profile fitted on one half of a recording, judged on the other.
 
-    PYTHONPATH=. python benchmarks/fit_sensor.py [--data FOLDER] [--draws 20] [--json FILE]    or $FLOCKSCOPE_DATA
+    python -m benchmarks.fit_sensor [--data FOLDER] [--draws 20] [--json FILE]
 
-For each recording with gt and det (PETS09-S2L1-first200, TUD-Campus): `measured` is the real detector on the second
-half; `drawn` is the fitted sensor on the same people there, mean and 5 to 95 % of the draws, with the profile of the
-first half (`held out`), of the whole (`same`), of the other recording (`other`), and without any profile (`default`,
-[sensor] as it is). `outside` counts the rows whose measured value lies outside those 5 to 95 %. Then the profiles of
-the wholes on simulated scenes: overlap of boxes, and how far points on the ground are off.
+For each recording with gt and det (PETS09-S2L1-first200, TUD-Campus), on the second half: `measured` is the real
+detector; the other columns are mean and 5 to 95 % of --draws simulated detectors on the same people, with the profile
+fitted on the first half (`held out`), on the whole recording (`same`), on the other recording (`other`), and without a
+profile (`default`, [sensor] of a scenario without keys). `outside` counts the rows whose measured value lies outside
+these 5 to 95 %. Last table: the profiles of the whole recordings on simulated scenes, overlap of boxes and distance of
+points on the ground from the true position, m.
 """
 
 from __future__ import annotations
 
-import argparse
 import json
-import os
 import warnings
 from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
 
+from benchmarks.support.options import CAMPUS, PETS, add_data, new_parser
 from scenarios.loading.resolve import load
 from scenarios.schema.sensor import Sensor
 from sim.io.source import open_source
@@ -30,15 +30,15 @@ from tracking.fitting.detection_matching import MatchedRecording, match_detectio
 from tracking.fitting.error_statistics import error_statistics, simulated_detections
 from tracking.fitting.sensor import fit_matched
 
-RECORDINGS = ("mot/PETS09-S2L1-first200", "mot/TUD-Campus")
+RECORDINGS = (PETS, CAMPUS)
 SCENES = ("merge", "street")
 SEED = 30_000
-SEEDS = range(SEED, SEED + 4)  # of scenes
+SCENE_SEEDS = range(SEED, SEED + 4)
 LOW, HIGH = 0.05, 0.95
 
 
 def part(recording: Recording, first: int, last: int, size: tuple[int, int]) -> MatchedRecording:
-    """Frames first … last of a recording, as one of its own."""
+    """Returns frames `first` to `last` of a recording as a recording of its own; size: of the image, px."""
     truth = recording.truth
     assert truth is not None
     rows = (truth.frame >= first) & (truth.frame <= last)
@@ -53,8 +53,8 @@ def part(recording: Recording, first: int, last: int, size: tuple[int, int]) -> 
     return match_detections(short, found, size, recording.camera)
 
 
-def table(second: MatchedRecording, profiles: dict[str, Sensor], draws: int) -> dict[str, dict[str, object]]:
-    """Each statistic: `measured`, and by profile the mean and the limits of its draws."""
+def drawn_statistics(second: MatchedRecording, profiles: dict[str, Sensor], draws: int) -> dict[str, dict[str, object]]:
+    """Returns each statistic as measured, and by profile the mean, low and high end of its draws."""
     rows: dict[str, dict[str, object]] = {name: {"measured": v} for name, v in error_statistics([second]).items()}
     for profile, sensor in profiles.items():
         made = [error_statistics([simulated_detections(second, sensor, SEED + k)]) for k in range(draws)]
@@ -65,28 +65,28 @@ def table(second: MatchedRecording, profiles: dict[str, Sensor], draws: int) -> 
     return rows
 
 
-def show(name: str, rows: dict[str, dict[str, object]], profiles: Sequence[str]) -> None:
+def print_statistics(name: str, rows: dict[str, dict[str, object]], profiles: Sequence[str]) -> None:
     wide = max(map(len, rows))
     print(f"\n{name}\n{'':<{wide}}  measured" + "".join(f"  {p:>22}" for p in profiles))
     outside = dict.fromkeys(profiles, 0)
     for key, row in rows.items():
         measured = row["measured"]
-        words = ""
+        cells = ""
         for p in profiles:
             mean, low, high = row[p]  # type: ignore[misc]
-            words += f"  {mean:6.3f} ({low:6.3f} to {high:6.3f})"
+            cells += f"  {mean:6.3f} ({low:6.3f} to {high:6.3f})"
             outside[p] += bool(np.isfinite([measured, mean]).all() and not low <= measured <= high)
-        print(f"{key:<{wide}}  {measured:8.3f}{words}")
+        print(f"{key:<{wide}}  {measured:8.3f}{cells}")
     print(f"{f'outside, of {len(rows)}':<{wide}}  {'':8}" + "".join(f"  {outside[p]:>22}" for p in profiles))
 
 
-def on_scenes(fitted: dict[str, Sensor]) -> None:
-    """How a profile comes out on our people: overlaps with their boxes, errors of points on the ground."""
+def print_scenes(fitted: dict[str, Sensor]) -> None:
+    """Prints what a profile gives on simulated scenes: overlaps with true boxes, errors of points on the ground."""
     print("\nscene    profile                overlap, median   points off, m: 50, 90, 99 %")
     for scene in SCENES:
         for name, sensor in {**fitted, "default": Sensor()}.items():
             scenario = load(scene).model_copy(update={"sensor": sensor})
-            found = [match_sequence(simulate(scenario, seed, streams=())) for seed in SEEDS]
+            found = [match_sequence(simulate(scenario, seed, streams=())) for seed in SCENE_SEEDS]
             overlap = np.mean([error_statistics([m])["overlap, 50% quantile"] for m in found])
             off = np.concatenate([m.pos[m.match[m.hit]] - m.truth.pos[m.hit] for m in found])  # type: ignore[index]
             far = "  ".join(f"{q:.2f}" for q in np.quantile(np.linalg.norm(off, axis=1), (0.5, 0.9, 0.99)))
@@ -94,13 +94,12 @@ def on_scenes(fitted: dict[str, Sensor]) -> None:
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    default = Path(__file__).resolve().parents[2] / "shared" / "data"
-    parser.add_argument("--data", type=Path, default=Path(os.environ.get("FLOCKSCOPE_DATA", default)))
+    parser = new_parser(__doc__)
+    add_data(parser)
     parser.add_argument("--draws", type=int, default=20)
-    parser.add_argument("--json", type=Path)
+    parser.add_argument("--json", type=Path, help="writes the statistics")
     args = parser.parse_args()
-    warnings.simplefilter("ignore")  # the frame rate of TUD-Campus, which says none
+    warnings.simplefilter("ignore")  # TUD-Campus states no frame rate
     recordings = {Path(name).name: open_source(args.data / name, images=False)[0] for name in RECORDINGS}
     whole = {name: match_sequence(r) for name, r in recordings.items()}
     fitted = {name: fit_matched([m]) for name, m in whole.items()}
@@ -116,10 +115,10 @@ def main() -> None:
             "other": other,
             "default": Sensor(),
         }
-        rows = table(part(recording, middle + 1, length, size), profiles, args.draws)
-        show(f"{name}: frames {middle + 1} to {length}", rows, list(profiles))
+        rows = drawn_statistics(part(recording, middle + 1, length, size), profiles, args.draws)
+        print_statistics(f"{name}: frames {middle + 1} to {length}", rows, list(profiles))
         result[name] = rows
-    on_scenes(fitted)
+    print_scenes(fitted)
     if args.json:
         args.json.write_text(json.dumps(result, indent=1), encoding="utf-8")
 

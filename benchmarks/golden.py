@@ -1,23 +1,23 @@
-"""Golden truth hashes: one per scenario and environment, in tests/sim/golden.json; they guard `sim.hashing.ENGINE`.
+"""Golden truth hashes, one per scenario and environment, in tests/sim/golden.json; they guard `sim.hashing.ENGINE`.
 
-    PYTHONPATH=. python benchmarks/golden.py            compare; exit code 1 where one is not as kept
-    PYTHONPATH=. python benchmarks/golden.py --write    keep what is made now, for this environment
+    python -m benchmarks.golden            compare; exit code 1 if a hash differs from the file's, or is missing
+    python -m benchmarks.golden --write    write the present hashes of this environment into the file
 
-The last bits of a truth depend on CPU level, C library and versions (numpy, scipy, numba, LLVM, pymunk), so hashes are
-kept by environment; elsewhere nothing is compared, and another environment adds its own by `--write`. A hash also bears
-its scenario's: an edited scenario is told from a changed engine. `--write` refuses another truth of the same scenario
-under the same ENGINE: raise the number first; all hashes of the old number then go.
+The last bits of a truth depend on CPU level, C library and versions (numpy, scipy, numba, LLVM, pymunk). Therefore
+hashes are kept per environment: in a new environment --write adds its hashes. Each hash of a truth stands beside that
+of its scenario, so that an edited scenario is told apart from a changed engine. --write refuses a different truth of
+the same scenario under the same ENGINE: raise the number first. All hashes of the old number are then dropped.
 """
 
 from __future__ import annotations
 
-import argparse
 import json
 import platform
 from importlib import metadata
 from pathlib import Path
 from typing import Any
 
+from benchmarks.support.options import new_parser
 from scenarios.loading.resolve import dump, load, names
 from sim.hashing import ENGINE, scenario_hash, truth_hash
 from sim.sequence import simulate
@@ -26,24 +26,25 @@ from sim.versions import cpu_level
 FILE = Path(__file__).resolve().parents[1] / "tests" / "sim" / "golden.json"
 LIBRARIES = ("numpy", "scipy", "numba", "llvmlite", "pymunk")
 SEED = 40_000
-WRITE = "PYTHONPATH=. python benchmarks/golden.py --write"
+WRITE = "python -m benchmarks.golden --write"
+Hashes = dict[str, str]
 
 
 def environment() -> str:
-    """What the last bits of a truth depend on."""
+    """Returns what the last bits of a truth depend on, as one text."""
     libc = "-".join(platform.libc_ver()) or "unknown libc"
     versions = [f"{name} {metadata.version(name)}" for name in LIBRARIES]
     return ", ".join([platform.system(), cpu_level(), libc, *versions])
 
 
-def kept() -> dict[str, Any]:
-    """What the file holds; nothing where there is none."""
+def golden_file() -> dict[str, Any]:
+    """Returns the content of the file; without a file, the same keys without hashes."""
     empty = {"engine": ENGINE, "seed": SEED, "environments": {}}
     return json.loads(FILE.read_text(encoding="utf-8")) if FILE.is_file() else empty
 
 
-def made(name: str) -> dict[str, str]:
-    """Hashes of a scenario of the catalogue and of its truth, as they are now."""
+def present_hashes(name: str) -> Hashes:
+    """Returns the hashes of a scenario of the catalogue and of its truth, by "scenario" and "truth"."""
     scenario = load(name)
     text = dump(scenario)
     return {
@@ -52,8 +53,8 @@ def made(name: str) -> dict[str, str]:
     }
 
 
-def difference(name: str, golden: dict[str, str] | None, now: dict[str, str]) -> str:
-    """What is not as it was, and what to do; empty: nothing."""
+def difference(name: str, golden: Hashes | None, now: Hashes) -> str:
+    """Returns how the present hashes of a scenario differ from the golden ones and what to do; "" if they are equal."""
     if golden is None:
         return f"{name}: no golden hash yet; {WRITE}"
     if golden["scenario"] != now["scenario"]:
@@ -64,16 +65,16 @@ def difference(name: str, golden: dict[str, str] | None, now: dict[str, str]) ->
 
 
 def main() -> int:
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--write", action="store_true", help="keep what is made now")
+    parser = new_parser(__doc__)
+    parser.add_argument("--write", action="store_true", help="write the present hashes of this environment")
     args = parser.parse_args()
-    file, here = kept(), environment()
+    file, here = golden_file(), environment()
     if file["engine"] != ENGINE:
         file = {"engine": ENGINE, "seed": SEED, "environments": {}}
     golden = file["environments"].get(here, {})
-    now = {name: made(name) for name in names()}
+    now = {name: present_hashes(name) for name in names()}
     found = [text for name in now if (text := difference(name, golden.get(name), now[name]))]
-    print(here, *(found or ["all as kept"]), sep="\n")
+    print(here, *(found or ["all hashes equal the golden ones"]), sep="\n")
     if not args.write:
         return 1 if found else 0
     if any("ENGINE" in text for text in found):

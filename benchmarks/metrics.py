@@ -1,11 +1,15 @@
-"""HOTA, CLEAR and Identity of people against TrackEval, in one run: how fast, and whether the same.
+"""Scores of people beside TrackEval (equal? how fast?), and how long all scores of groups take.
 
-    python benchmarks/metrics.py [--frames 1000] [--people 30] [--repeat 7] [--cases 200] [--data ../shared/data]
+    python -m benchmarks.metrics trackeval [--frames 1000] [--people 30] [--rounds 7] [--cases 200] [--data FOLDER]
+    python -m benchmarks.metrics groups [--frames 1000] [--people 30] [--rounds 5]
 
-A crowd that is missed, falsely told and confused is scored by both in turn, the best of some runs each: ours with the
-search for who is near whom, TrackEval from tables of similarity it is given. Then random crowds, every other one on
-a coarse grid (ties), and the detections and true boxes of real recordings, where they are. Exit code 1 where a score
-differs by more than 1e-6.
+trackeval: HOTA, CLEAR and Identity of a random crowd with misses, false alarms and changed ids are computed by both in
+turn; the best wall time of each counts. Ours includes the search for pairs of near people; TrackEval gets tables of
+similarity that were made before. Then random crowds, every other one on a coarse grid (equal distances), and the
+detections and true boxes of real recordings under --data, if there are any, are scored by both. Printed: the greatest
+difference of any score, for each kind of crowd and each recording. Exit code 1 above TOLERANCE.
+groups: people in groups of three, tracks with errors of all kinds. Columns: least CPU and wall seconds of `evaluate`,
+by what is scored; the first row is the scores of people alone on the same frames.
 """
 
 from __future__ import annotations
@@ -13,13 +17,20 @@ from __future__ import annotations
 import argparse
 import contextlib
 import io
-import time
+from collections.abc import Callable, Iterator
 from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
 
+from benchmarks.support.options import add_data, new_parser
+from benchmarks.support.tables import head, row
+from benchmarks.support.timing import best_in_turn, best_times
 from sim.io.formats.mot_text import read_table
+from sim.truth.group_hulls import groups_over_time
+from sim.types import Groups, Tracks, Truth
+from tracking.grouping.grouped_tracks import with_groups
+from tracking.scoring import evaluate
 from tracking.scoring.candidate_pairs import Pairs, box_pairs, point_pairs
 from tracking.scoring.clear import clear
 from tracking.scoring.evaluation import people_scores
@@ -29,12 +40,17 @@ from tracking.scoring.rows import FrameRows
 
 REACH = 2.0  # m
 TOLERANCE = 1e-6
+FPS = 10.0
 RENAMED = {"TP": "CLR_TP", "FN": "CLR_FN", "FP": "CLR_FP"}
 Side = tuple[FrameRows, np.ndarray]
 
 
 def crowd(frames: int, people: int, r: np.random.Generator, grid: float = 0.0) -> tuple[Side, Side]:
-    """People who wander in 16 m x 10 m; tracks miss one in ten, tell 3 too many and change ids. grid: m, or 0."""
+    """Returns true people and tracks: rows and positions (N, 2), m, of people who wander in 16 m x 10 m.
+
+    Tracks miss one person in ten, add 3 false ones per frame and change ids. grid: positions are rounded to it, m; 0:
+    they are not.
+    """
     place, velocity = r.uniform(0, (16, 10), (people, 2)), r.normal(0, 0.1, (people, 2))
     number, fresh = np.arange(people), people
     true, est = [], []
@@ -45,25 +61,25 @@ def crowd(frames: int, people: int, r: np.random.Generator, grid: float = 0.0) -
         number[changed] = np.arange(fresh, fresh + len(changed))
         fresh += len(changed) + 3
         seen = r.random(people) < 0.9
-        told = np.concatenate([place[seen] + r.normal(0, 0.2, (seen.sum(), 2)), r.uniform(0, (16, 10), (3, 2))])
+        found = np.concatenate([place[seen] + r.normal(0, 0.2, (seen.sum(), 2)), r.uniform(0, (16, 10), (3, 2))])
         ids = np.concatenate([number[seen], np.arange(fresh - 3, fresh)])
-        for side, i, pos in ((true, np.arange(people), place), (est, ids, told)):
+        for side, i, pos in ((true, np.arange(people), place), (est, ids, found)):
             side.append((np.full(len(i), frame), i, np.round(pos / grid) * grid if grid else pos))
     stacked = [[np.concatenate(column) for column in zip(*side, strict=True)] for side in (true, est)]
     return tuple((FrameRows(frame, ids), pos) for frame, ids, pos in stacked)
 
 
-def table(rows: FrameRows, other: FrameRows, i: np.ndarray, j: np.ndarray, s: np.ndarray, frame: int) -> np.ndarray:
-    """Similarity of all rows of a frame, from pairs (i, j, s) of that frame."""
-    first, other_first = np.searchsorted(rows.frame, frame), np.searchsorted(other.frame, frame)
-    shape = np.searchsorted(rows.frame, frame + 1) - first, np.searchsorted(other.frame, frame + 1) - other_first
-    found = np.zeros(shape)
-    found[i - first, j - other_first] = s
+def similarity_table(pairs: Pairs, part: slice, frame: int) -> np.ndarray:
+    """Returns the similarities of all rows of a frame (true, estimated); part: the pairs of that frame."""
+    first, other_first = (np.searchsorted(rows.frame, frame) for rows in (pairs.true, pairs.est))
+    ends = (np.searchsorted(rows.frame, frame + 1) for rows in (pairs.true, pairs.est))
+    found = np.zeros((next(ends) - first, next(ends) - other_first))
+    found[pairs.i[part] - first, pairs.j[part] - other_first] = pairs.s[part]
     return found
 
 
-def given(pairs: Pairs) -> dict:
-    """What TrackEval wants of one sequence: tables are filled from all possible pairs, before any clock starts."""
+def trackeval_input(pairs: Pairs) -> dict:
+    """Returns what TrackEval's metrics take of one sequence."""
     frames = np.arange(1, 1 + max(rows.frame.max(initial=0) for rows in (pairs.true, pairs.est)))
     cuts = np.searchsorted(pairs.frame, np.append(frames, len(frames) + 1))
     parts = [slice(a, b) for a, b in pairwise(cuts)]
@@ -71,90 +87,131 @@ def given(pairs: Pairs) -> dict:
     return {
         "gt_ids": [true[pairs.true.frame == f] for f in frames],
         "tracker_ids": [est[pairs.est.frame == f] for f in frames],
-        "similarity_scores": [
-            table(pairs.true, pairs.est, pairs.i[p], pairs.j[p], pairs.s[p], f)
-            for f, p in zip(frames, parts, strict=True)
-        ],
+        "similarity_scores": [similarity_table(pairs, p, f) for f, p in zip(frames, parts, strict=True)],
         "num_gt_ids": len(true_ids), "num_tracker_ids": len(est_ids), "num_timesteps": len(frames),
         "num_gt_dets": len(true), "num_tracker_dets": len(est),
     }  # fmt: skip
 
 
-def families():
-    """TrackEval's three."""
-    with contextlib.redirect_stdout(io.StringIO()):  # it says which of its other benchmarks miss a package
+def trackeval_metrics() -> tuple:
+    """Returns TrackEval's HOTA, CLEAR and Identity."""
+    with contextlib.redirect_stdout(io.StringIO()):  # it prints which packages of its other benchmarks are missing
         from trackeval import metrics
     quiet = {"THRESHOLD": 0.5, "PRINT_CONFIG": False}
     return metrics.HOTA(), metrics.CLEAR(quiet), metrics.Identity(quiet)
 
 
-def difference(pairs: Pairs, theirs: list[dict]) -> float:
-    """The greatest difference of any score that both have."""
-    found = {k: v for answer in theirs for k, v in answer.items()}
+def greatest_difference(pairs: Pairs) -> float:
+    """Returns the greatest difference of any score that both compute."""
+    data = trackeval_input(pairs)
+    found = {k: v for peer in trackeval_metrics() for k, v in peer.eval_sequence(data).items()}
     return max(abs(v - float(np.mean(found[RENAMED.get(k, k)]))) for k, v in people_scores(pairs).items())
 
 
-def clocked(calls: dict, repeat: int) -> dict[str, float]:
-    """The best time of each call (s), all of them in turn."""
-    best = dict.fromkeys(calls, np.inf)
-    for _ in range(repeat):
-        for name, call in calls.items():
-            start = time.perf_counter()
-            call()
-            best[name] = min(best[name], time.perf_counter() - start)
-    return best
-
-
-def speed(args: argparse.Namespace) -> None:
-    (true, place), (est, told) = crowd(args.frames, args.people, np.random.default_rng(0))
-    pairs = point_pairs(true, est, place, told, REACH)
-    data, peers = given(pairs), families()
-    fresh = lambda: Pairs(pairs.true, pairs.est, pairs.i, pairs.j, pairs.s)  # noqa: E731  nothing kept from the last run
-    best = clocked(
-        {
-            "ours": lambda: people_scores(point_pairs(true, est, place, told, REACH)),
-            "TrackEval": lambda: [peer.eval_sequence(data) for peer in peers],
-            "pairs": lambda: point_pairs(true, est, place, told, REACH),
-            **{f.__name__: lambda f=f: f(fresh()) for f in (hota, clear, identity)},
-        },
-        args.repeat,
-    )
+def print_speed(frames: int, people: int, rounds: int) -> None:
+    (true, place), (est, found) = crowd(frames, people, np.random.default_rng(0))
+    pairs = point_pairs(true, est, place, found, REACH)
+    data, peers = trackeval_input(pairs), trackeval_metrics()
+    fresh = lambda: Pairs(pairs.true, pairs.est, pairs.i, pairs.j, pairs.s)  # noqa: E731  without cached values
+    works = {
+        "ours": lambda: people_scores(point_pairs(true, est, place, found, REACH)),
+        "TrackEval": lambda: [peer.eval_sequence(data) for peer in peers],
+        "pairs": lambda: point_pairs(true, est, place, found, REACH),
+        **{f.__name__: lambda f=f: f(fresh()) for f in (hota, clear, identity)},
+    }
+    best = best_in_turn(works, rounds)
     parts = ", ".join(f"{name} {1000 * best[name]:.1f}" for name in ("pairs", "hota", "clear", "identity"))
-    print(f"{args.frames} frames x {args.people} people: {best['ours']:.3f} s ({parts} ms);", end=" ")
+    print(f"{frames} frames x {people} people: {best['ours']:.3f} s ({parts} ms);", end=" ")
     print(f"TrackEval {best['TrackEval']:.3f} s: {best['TrackEval'] / best['ours']:.1f} times as long")
 
 
-def recordings(data: Path):
-    """Name and pairs of real boxes: detections as tracks, numbered anew in each frame."""
+def recordings(data: Path) -> Iterator[tuple[str, Pairs]]:
+    """Yields name and pairs of boxes of each recording: its detections stand for tracks, numbered anew per frame."""
     for folder in sorted(p for p in data.glob("mot/*") if (p / "det" / "det.txt").is_file()):
         gt, det = (read_table(folder / kind / f"{kind}.txt") for kind in ("gt", "det"))
         a, b = (np.argsort(t.frame, kind="stable") for t in (gt, det))
-        number = np.arange(len(b)) - np.searchsorted(det.frame[b], det.frame[b])
-        yield (
-            folder.name,
-            box_pairs(FrameRows(gt.frame[a], gt.id[a]), FrameRows(det.frame[b], number), gt.box[a], det.box[b]),
-        )
+        numbers = np.arange(len(b)) - np.searchsorted(det.frame[b], det.frame[b])
+        true, est = FrameRows(gt.frame[a], gt.id[a]), FrameRows(det.frame[b], numbers)
+        yield folder.name, box_pairs(true, est, gt.box[a], det.box[b])
 
 
-def main() -> int:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    for name, value in (("frames", 1000), ("people", 30), ("repeat", 7), ("cases", 200)):
-        parser.add_argument(f"--{name}", type=int, default=value)
-    parser.add_argument("--data", type=Path, default=Path("../shared/data"))
-    args = parser.parse_args()
-    speed(args)
-    peers, worst = families(), {}
+def trackeval(args: argparse.Namespace) -> int:
+    print_speed(args.frames, args.people, args.rounds or 7)
+    worst: dict[str, float] = {}
     for seed in range(args.cases):
         r = np.random.default_rng(seed)
-        (true, place), (est, told) = crowd(int(r.integers(1, 60)), int(r.integers(1, 25)), r, grid=seed % 2 / 2)
-        pairs = point_pairs(true, est, place, told, REACH)
+        (true, place), (est, found) = crowd(int(r.integers(1, 60)), int(r.integers(1, 25)), r, grid=seed % 2 / 2)
         kind = f"{(args.cases + 1 - seed % 2) // 2} crowds" + (" on a grid" if seed % 2 else "")
-        worst[kind] = max(worst.get(kind, 0.0), difference(pairs, [p.eval_sequence(given(pairs)) for p in peers]))
-    for name, pairs in recordings(args.data):
-        worst[name] = difference(pairs, [p.eval_sequence(given(pairs)) for p in peers])
+        worst[kind] = max(worst.get(kind, 0.0), greatest_difference(point_pairs(true, est, place, found, REACH)))
+    worst |= {name: greatest_difference(pairs) for name, pairs in recordings(args.data)}
     for kind, value in worst.items():
         print(f"{kind}: greatest difference from TrackEval {value:.1e}")
     return int(max(worst.values(), default=0.0) > TOLERANCE)
+
+
+def grouped_scene(frames: int, people: int) -> tuple[Truth, list[Tracks]]:
+    """Groups of three that stroll over 20 m by 20 m, and tracks 0.2 m off, one in twenty in another's group."""
+    r = np.random.default_rng(0)
+    name = np.arange(people) // 3
+    middle = r.uniform(0, 20, (people // 3 + 1, 2)) + np.cumsum(r.normal(0, 0.1, (frames, people // 3 + 1, 2)), axis=0)
+    pos = (middle[:, name] + r.uniform(-0.6, 0.6, (people, 2))).reshape(-1, 2)
+    frame, id = np.repeat(np.arange(1, frames + 1), people), np.tile(np.arange(1, people + 1), frames)
+    group, vel = np.tile(name + 1, frames), np.zeros_like(pos)
+    estimated = np.where(r.random(len(group)) < 0.05, r.integers(1, name[-1] + 2, len(group)), group)
+    seen = pos + r.normal(0, 0.2, pos.shape)
+    hulls = [tuple(groups_over_time(frame, id, g, p, vel, 1, frames)) for g, p in ((group, pos), (estimated, seen))]
+    truth = Truth(
+        "speed", FPS, frames, 40.0, frame, id, group, pos, vel, None, np.ones(len(id)), groups=hulls[0],
+        labelled=np.ones(frames, bool), events=(),
+    )  # fmt: skip
+    zero, cov, one = np.zeros((people, 2)), np.zeros((people, 4, 4)), np.ones(people)
+    rows = [slice(k * people, (k + 1) * people) for k in range(frames)]
+    return truth, [
+        Tracks(k, k / FPS, "ground", "person", id[r], estimated[r], seen[r], zero, cov, None, one, hulls[1][k - 1])
+        for k, r in enumerate(rows, 1)
+    ]
+
+
+def groups_only(t: Tracks) -> Tracks:
+    """Returns the answer as of a method that reports groups without members."""
+    g = t.groups
+    assert g is not None
+    n = len(g.id)
+    none = tuple(np.zeros(0, np.int64) for _ in range(n))
+    bare = Groups(g.id, none, g.pos, g.vel, g.extent, np.full(n, np.nan), g.hull)
+    cov = np.zeros((n, 4, 4))
+    return Tracks(t.index, t.t, t.plane, "group", g.id, g.id, g.pos, g.vel, cov, None, np.ones(n), bare)
+
+
+def groups(args: argparse.Namespace) -> int:
+    truth, tracks = grouped_scene(args.frames, args.people)
+    derived = with_groups(tracks, FPS, 1.0)
+    unlabelled, bare = truth.replace(groups=None, labelled=None, events=None), [groups_only(t) for t in tracks]
+    perfect = [t.replace(pos=truth.at(t.index).pos, groups=truth.at(t.index).groups) for t in tracks]
+    cases: dict[str, Callable[[], object]] = {
+        "people alone": lambda: evaluate(unlabelled, tracks),
+        "all, groups by hulls": lambda: evaluate(truth, derived),
+        "all, groups by members": lambda: evaluate(truth, derived, group_match="members"),
+        "all, events derived as well": lambda: evaluate(truth, tracks),
+        "all, hulls of the truth": lambda: evaluate(truth, perfect),
+        "a method without members": lambda: evaluate(truth, bare),
+    }
+    head([f"{args.frames} frames, {args.people} people", "CPU s", "wall s"])
+    for name, work in cases.items():
+        row([name, *(f"{seconds:.3f}" for seconds in best_times(work, args.rounds or 5))])
+    return 0
+
+
+def main() -> int:
+    parser = new_parser(__doc__)
+    parser.add_argument("mode", choices=["trackeval", "groups"])
+    parser.add_argument("--frames", type=int, default=1000)
+    parser.add_argument("--people", type=int, default=30)
+    parser.add_argument("--rounds", type=int, help="runs of which the best counts")
+    parser.add_argument("--cases", type=int, default=200, help="trackeval: random crowds")
+    add_data(parser)
+    args = parser.parse_args()
+    return {"trackeval": trackeval, "groups": groups}[args.mode](args)
 
 
 if __name__ == "__main__":

@@ -1,25 +1,37 @@
-"""How people walk here, beside the literature and beside seq_hotel: the table of docs/realism.md.
+"""How people walk here beside the literature and a recording, and how close replays are to their recordings.
 
-    PYTHONPATH=. python benchmarks/realism.py [../shared/data/biwi/seq_hotel] [--seeds 0:40] [--scenarios street …]
+    python -m benchmarks.realism walking [--seeds 0:40]
+    python -m benchmarks.realism recording [--data FOLDER] [--seeds 0:40] [--scenarios street …]
+    python -m benchmarks.realism replays [--data FOLDER]
 
-Groups are measured alone on open ground, 4 s and more after the start. Recording and scenarios are both sampled at
-2.5 fps with velocities by central differences; speeds are those of people who walk (> 0.3 m/s), the closest approach is
-the least distance of two strangers who come within 3 m, accelerations are compared at their 99 % quantile.
+walking: free speeds, speeds and shapes of groups that walk alone on open ground, measured from 4 s after the start.
+recording: seq_hotel (BIWI) and scenarios of the catalogue, sampled at 2.5 frames/s with velocities by central
+differences. Printed for each: quantiles (5, 25, 50, 75, 95 %) of the speeds of people who walk (> 0.3 m/s) and of the
+closest approach, the least distance of two people of different groups who come within 3 m; then Wasserstein distances
+to the recording in speed and closest approach, and the ratio of the 99 % quantiles of the acceleration.
+replays: whole recordings replayed at 10 frames/s. `off`: distance of the replay from the labelled position at the time
+of the label (50, 99 %, m). Speeds (50, 99 %, m/s) and accelerations (99 %, m/s²) of the recording are differences of
+its labels at its own rate, those of the replay at 10 frames/s. Events are measured on the labels and on the replay.
 """
 
 from __future__ import annotations
 
-import argparse
+import time
+from collections import Counter
 from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
 from scipy.stats import wasserstein_distance
 
+from benchmarks.support.options import HOTEL, PETS, WALK_TOGETHER, add_data, add_seeds, new_parser
 from scenarios.loading.resolve import load, names
+from scenarios.schema.observation import ObservationSpec
 from scenarios.schema.scenario import Scenario
 from sim.crowd.world import run
+from sim.dataset.replay import on_ground, replay
 from sim.io.source import open_source
-from sim.types import Array, Bools, Ints, Motion
+from sim.types import Array, Bools, Ints, Motion, Sequence, Truth
 
 STEP = 0.4  # s
 WALKING = 0.3  # m/s
@@ -29,29 +41,32 @@ OPEN_GROUND = {"schema": 1, "duration": 9.0, "warmup": 4.0, "world": {"size": [6
 
 
 @dataclass(frozen=True)
-class Walk:
-    """A group that walks along +x: speed (S,) of each seed; places (S, T, n, 2) ahead and to the left of its middle."""
+class GroupWalk:
+    """A group that walks along +x, by seed.
+
+    speed (S,), m/s; places (S, T, n, 2): each member relative to the mean position of the group, m: ahead, to the left.
+    """
 
     speed: Array
     places: Array
 
 
-def alone(size: int, seeds: range) -> Walk:
-    """A group of `size` alone on open ground."""
+def walk_alone(size: int, seeds: range) -> GroupWalk:
+    """Returns the walks of a group of `size` people alone on open ground."""
     pos = np.stack([alone_motion(size, seed).pos for seed in seeds])
     middle = pos.mean(axis=2)
     way = np.linalg.norm(middle[:, -1] - middle[:, 0], axis=1)
-    return Walk(way / ((pos.shape[1] - 1) / 10), pos - middle[:, :, None])
+    return GroupWalk(way / ((pos.shape[1] - 1) / 10), pos - middle[:, :, None])
 
 
 def alone_motion(size: int, seed: int) -> Motion:
-    """A group of `size` alone on open ground walks along +x."""
+    """Returns the motion of a group of `size` people that walks along +x alone on open ground."""
     group = {"id": "a", "size": size, "start": [20, 10], "goal": [40, 10], "at_goal": "walk"}
     return run(Scenario.model_validate({**OPEN_GROUND, "group": [group]}), seed)
 
 
 def free_speeds(seeds: range) -> Array:
-    """Speeds of people who walk alone, twenty each seed, metres apart."""
+    """Returns the speeds, m/s, of people who walk alone: twenty per seed, on lanes 10 m apart."""
     group = {"id": "a", "size": 1, "start": [20, 5], "goal": [40, 5], "at_goal": "walk"}
     lanes = [{**group, "id": f"a{k}", "start": [20, 5 + 10 * k], "goal": [40, 5 + 10 * k]} for k in range(20)]
     scenario = Scenario.model_validate({**OPEN_GROUND, "world": {"size": [60, 210]}, "group": lanes})
@@ -59,34 +74,40 @@ def free_speeds(seeds: range) -> Array:
     return np.asarray(np.linalg.norm(pos[:, -1] - pos[:, 0], axis=-1).ravel() / ((pos.shape[1] - 1) / 10))
 
 
-def neighbours(walk: Walk) -> Array:
-    """Distance of each member to the nearest other, all seeds and frames."""
+def neighbours(walk: GroupWalk) -> Array:
+    """Returns the distance, m, of each member to its nearest fellow member, for all seeds and frames."""
     d = np.linalg.norm(walk.places[:, :, :, None] - walk.places[:, :, None], axis=-1)
     d[..., np.arange(d.shape[-1]), np.arange(d.shape[-1])] = np.inf
     return np.asarray(d.min(axis=-1).ravel())
 
 
-def abreast(walk: Walk) -> Array:
-    """Angle (degrees) between the line through a pair and the direction of walking: 90 is abreast."""
+def abreast(walk: GroupWalk) -> Array:
+    """Returns the angle, degrees, between the line through a pair and its direction of walking; 90 is abreast."""
     d = np.abs(walk.places[:, :, 0] - walk.places[:, :, 1])
     return np.asarray(np.degrees(np.arctan2(d[..., 1], d[..., 0])).ravel())
 
 
-def middle_behind(walk: Walk) -> Array:
-    """How far (m) the middle one of a triad walks behind the other two, per seed."""
+def middle_behind(walk: GroupWalk) -> Array:
+    """Returns how far, m, the middle member of a triad walks behind the mean of the other two, per seed."""
     order = np.argsort(walk.places[..., 1], axis=2)
     ahead = np.take_along_axis(walk.places[..., 0], order, axis=2).mean(axis=1)
     return np.asarray((ahead[:, 0] + ahead[:, 2]) / 2 - ahead[:, 1])
 
 
-def rows(walk: Walk) -> Array:
-    """Number of rows of each seed's group: steps of more than 0.4 m in how far ahead its members walk on average."""
+def rows(walk: GroupWalk) -> Array:
+    """Returns the number of rows in which the group walks, per seed.
+
+    A new row begins where two successive members differ by more than 0.4 m in how far ahead they walk on average.
+    """
     ahead = np.sort(walk.places[..., 0].mean(axis=1), axis=1)
     return np.asarray((np.diff(ahead, axis=1) > 0.4).sum(axis=1) + 1)
 
 
-def through(size: int, seeds: range) -> Bools:
-    """Whether a stranger who comes towards a group of `size`, up to 0.5 m off its middle, goes between two."""
+def passes_through(size: int, seeds: range) -> Bools:
+    """Returns, per seed, True if a stranger who walks towards a group of `size` people passes between two of them.
+
+    The stranger starts up to 0.5 m to the side of the line through the middle of the group.
+    """
     found = []
     for seed in seeds:
         off = float(np.random.default_rng(seed).uniform(-0.5, 0.5))
@@ -98,7 +119,7 @@ def through(size: int, seeds: range) -> Bools:
 
 
 def passes_between(pos: Array) -> bool:
-    """Whether the last of pos (T, P, 2) had some of the others to the left and some to the right when passing each."""
+    """Returns True if the last person of pos (T, P, 2) passed some of the others on the left and some on the right."""
     away = pos[:, :-1] - pos[:, -1:]
     passing = [int(np.argmin(np.abs(x))) for x in away[..., 0].T]
     sides = np.array([away[t, k, 1] > 0 for k, t in enumerate(passing)])
@@ -106,7 +127,10 @@ def passes_between(pos: Array) -> bool:
 
 
 def statistics(pos: Array, label: Ints) -> tuple[Array, Array, Array]:
-    """Speeds of walkers, closest approaches of strangers, accelerations; pos (T, P, 2) at 2.5 fps, label (T, P)."""
+    """Returns speeds of people who walk (m/s), closest approaches of strangers (m), and accelerations (m/s²).
+
+    pos (T, P, 2) at 2.5 frames/s, nan where absent; label (T, P): group, negative for people alone.
+    """
     vel = (pos[2:] - pos[:-2]) / (2 * STEP)
     speed = np.linalg.norm(vel, axis=2).ravel()
     acceleration = np.linalg.norm(np.diff(vel, axis=0) / STEP, axis=2).ravel()
@@ -120,8 +144,8 @@ def statistics(pos: Array, label: Ints) -> tuple[Array, Array, Array]:
     return speed[speed > WALKING], close[close < MEETING], acceleration[np.isfinite(acceleration)]
 
 
-def recording(folder: str) -> tuple[Array, Array, Array]:
-    """The statistics of a BIWI folder."""
+def recording_statistics(folder: str) -> tuple[Array, Array, Array]:
+    """Returns the statistics of the labels in a BIWI folder."""
     truth = open_source(folder)[0].truth
     assert truth is not None
     assert truth.pos is not None
@@ -133,8 +157,8 @@ def recording(folder: str) -> tuple[Array, Array, Array]:
     return statistics(pos, label)
 
 
-def simulated(name: str, seeds: range) -> tuple[Array, Array, Array]:
-    """The pooled statistics of a scenario."""
+def scenario_statistics(name: str, seeds: range) -> tuple[Array, Array, Array]:
+    """Returns the statistics of a scenario, all seeds together."""
     parts = []
     for seed in seeds:
         motion = run(load(name), seed)
@@ -144,18 +168,20 @@ def simulated(name: str, seeds: range) -> tuple[Array, Array, Array]:
     return speed, closest, acceleration
 
 
-def beside(mine: tuple[Array, Array, Array], real: tuple[Array, Array, Array]) -> tuple[float, float, float]:
-    """Wasserstein distances in speed (m/s) and closest approach (m); ratio of the 99 % accelerations."""
+def distances(mine: tuple[Array, Array, Array], real: tuple[Array, Array, Array]) -> tuple[float, float, float]:
+    """Returns Wasserstein distances in speed (m/s) and closest approach (m), and the ratio of the 99 % accelerations.
+
+    The second distance is nan if nobody approached a stranger.
+    """
     near = wasserstein_distance(mine[1], real[1]) if len(mine[1]) else np.nan
     ratio = np.quantile(mine[2], 0.99) / np.quantile(real[2], 0.99)
     return float(wasserstein_distance(mine[0], real[0])), float(near), float(ratio)
 
 
-def print_habits(seeds: range) -> None:
-    """The rows about single people and groups."""
+def walking(seeds: range) -> None:
     speed = free_speeds(range(seeds.start, seeds.start + max(1, len(seeds) // 4)))
     print(f"walking alone: {speed.mean():.2f} ± {speed.std():.2f} m/s ({len(speed)} people)")
-    walks = {n: alone(n, seeds) for n in range(1, 7)}
+    walks = {n: walk_alone(n, seeds) for n in range(1, 7)}
     means = [walks[n].speed.mean() for n in walks]
     print("speed of groups of 1 to 6: " + ", ".join(f"{m:.2f}" for m in means) + " m/s")
     print(f"    each member slows a group by {-np.polyfit(list(walks), means, 1)[0]:.3f} m/s")
@@ -166,31 +192,87 @@ def print_habits(seeds: range) -> None:
     print(f"triads: middle {np.median(behind):.2f} m behind (median), in {np.mean(behind > 0):.0%} behind")
     print(f"rows of groups of 4, 5, 6: {', '.join(f'{rows(walks[n]).mean():.2f}' for n in (4, 5, 6))} (mean)")
     for n in (2, 3, 4):
-        print(f"strangers who pass through a group of {n}: {through(n, seeds).mean():.0%} of {len(seeds)}")
+        print(f"strangers who pass through a group of {n}: {passes_through(n, seeds).mean():.0%} of {len(seeds)}")
 
 
-def print_beside(folder: str, scenarios: list[str], seeds: range) -> None:
-    """The rows of the recording and of each scenario."""
-    real = recording(folder)
+def recording(folder: Path, scenarios: list[str], seeds: range) -> None:
+    real = recording_statistics(str(folder))
     for name in ("seq_hotel", *scenarios):
-        mine = real if name == "seq_hotel" else simulated(name, seeds)
-        w, near, ratio = beside(mine, real)
+        mine = real if name == "seq_hotel" else scenario_statistics(name, seeds)
+        speed, closest, ratio = distances(mine, real)
         print(f"{name}: speed {np.quantile(mine[0], QUANTILES).round(2)}, ", end="")
         if len(mine[1]):
             print(f"closest {np.quantile(mine[1], QUANTILES).round(2)}, ", end="")
-        print(f"W {w:.2f} m/s, {near:.2f} m, acceleration x {ratio:.2f}", flush=True)
+        print(f"W {speed:.2f} m/s, {closest:.2f} m, acceleration x {ratio:.2f}", flush=True)
+
+
+def label_distances(source: Sequence, made: Sequence) -> Array:
+    """Returns the distances, m, between labels and replay at the labels that fall on a frame of the replay."""
+    labels, truth, origin = source.truth, made.truth, made.source["origin"]
+    assert labels is not None
+    assert truth is not None
+    assert truth.pos is not None
+    places = on_ground(labels, source) + origin["shift"]
+    person = {one: k + 1 for k, one in enumerate(origin["people"])}
+    at = (labels.frame - 1) / labels.fps * truth.fps
+    row = {(f, i): k for k, (f, i) in enumerate(zip(truth.frame.tolist(), truth.id.tolist(), strict=True))}
+    pairs = [
+        (k, row[key])
+        for k, (t, one) in enumerate(zip(at, labels.id.tolist(), strict=True))
+        if abs(t - round(t)) < 1e-6 and (key := (round(t) + 1, person.get(one, 0))) in row
+    ]
+    a, b = np.array(pairs).T
+    return np.linalg.norm(places[a] - truth.pos[b], axis=1)
+
+
+def speeds_and_accelerations(frame: Array, id: Array, pos: Array, fps: float) -> tuple[Array, Array]:
+    """Returns speeds (m/s) and accelerations (m/s²) by differences of neighbouring frames."""
+    speeds, accelerations = [], []
+    for one in np.unique(id):
+        f, p = frame[id == one], pos[id == one]
+        v, near = np.diff(p, axis=0) * fps, np.diff(f) == 1
+        speeds.append(np.linalg.norm(v[near], axis=1))
+        accelerations.append(np.linalg.norm(np.diff(v, axis=0)[near[1:] & near[:-1]], axis=1) * fps)
+    return np.concatenate(speeds), np.concatenate(accelerations)
+
+
+def event_counts(truth: Truth) -> str:
+    if truth.events is None:
+        return "not labelled"
+    return ", ".join(f"{n} {kind}" for kind, n in sorted(Counter(e.kind for e in truth.events).items()))
+
+
+def replays(data: Path) -> None:
+    for name in (HOTEL, WALK_TOGETHER, PETS):
+        source, begun = open_source(data / name, images=False)[0], time.perf_counter()
+        made = replay(source, ObservationSpec(), streams=())
+        labels, truth = source.truth, made.truth
+        spent, origin = time.perf_counter() - begun, made.source["origin"]
+        assert labels is not None
+        assert truth is not None
+        assert truth.pos is not None
+        off = np.quantile(label_distances(source, made), (0.5, 0.99))
+        print(f"\n{name}: {made.length} frames, {len(origin['people'])} people, {spent:.1f} s to make")
+        print(f"  smoothing {origin['smoothing']:g} s, off {off[0]:.3f}, {off[1]:.3f} m")
+        for some, pos, what in ((labels, on_ground(labels, source), "recording"), (truth, truth.pos, "replay")):
+            speed, acceleration = speeds_and_accelerations(some.frame, some.id, pos, some.fps)
+            q = (*np.quantile(speed, (0.5, 0.99)), np.quantile(acceleration, 0.99))
+            print(f"  {what:9}  speed {q[0]:.2f}, {q[1]:.2f} m/s, acceleration {q[2]:.2f} m/s²; {event_counts(some)}")
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("recording", nargs="?", help="a BIWI folder to compare with")
-    parser.add_argument("--scenarios", nargs="*", default=names())
-    parser.add_argument("--seeds", default="0:40")
-    arguments = parser.parse_args()
-    first, last = map(int, arguments.seeds.split(":"))
-    print_habits(range(first, last))
-    if arguments.recording is not None:
-        print_beside(arguments.recording, arguments.scenarios, range(first, last))
+    parser = new_parser(__doc__)
+    parser.add_argument("mode", choices=["walking", "recording", "replays"])
+    add_seeds(parser, "0:40")
+    parser.add_argument("--scenarios", nargs="*", default=names(), help="recording: scenarios to compare")
+    add_data(parser)
+    args = parser.parse_args()
+    if args.mode == "walking":
+        walking(args.seeds)
+    elif args.mode == "recording":
+        recording(args.data / HOTEL, args.scenarios, args.seeds)
+    else:
+        replays(args.data)
 
 
 if __name__ == "__main__":

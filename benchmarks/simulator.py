@@ -1,16 +1,17 @@
 """Steps per CPU second of the simulator beside JuPedSim, in the same open square with walls, at the same time step.
 
-    PYTHONPATH=. python benchmarks/simulator.py --peer-python PYTHON [--rounds 5] [--people 21 99 999]
+    python -m benchmarks.simulator --peer-python PYTHON [--rounds 5] [--people 21 99 999]
 
-Ours: groups of three with goals across the square (0.2 people per m²), all forces, script, physics, and the state read
-after every step; JuPedSim: the same starts and goals for each alone, its fastest model, positions read every step. Each
-round times both in turn; the median ratio counts. The peer's interpreter needs `jupedsim` and nothing of ours.
-Last column: our time over that of `pymunk.Space.step` alone in the same motion (aim: 2). Building scenes is left out.
+Ours: groups of three with goals across the square (0.2 people per m²), all forces, script and physics; the state is
+read after every step. JuPedSim: the same starts and goals for each person alone, its fastest model, positions read
+after every step. Its interpreter PYTHON needs `jupedsim` and nothing of ours (benchmarks/peers/run_jupedsim.py).
+Columns: median steps per CPU second of both, the median ratio of the rounds and its range, and our time divided by that
+of `pymunk.Space.step` alone on the same motion (aim: 2). Each round times both in turn; making the scene is not timed.
+Exit code 1 if a median ratio is below MUST.
 """
 
 from __future__ import annotations
 
-import argparse
 import json
 import math
 import subprocess
@@ -22,6 +23,8 @@ import numpy as np
 import pymunk
 import pymunk.batch
 
+from benchmarks.support.options import new_parser
+from benchmarks.support.tables import head, row
 from scenarios.schema.scenario import Scenario
 from sim.crowd.forces import Steering
 from sim.crowd.world import WRITE, World
@@ -35,7 +38,7 @@ MUST, AIM = 2.0, 3.0
 
 
 def scenario(people: int, seed: int = 0) -> Scenario:
-    """Groups of three on a jittered grid, each on its way to the point opposite."""
+    """Returns a scenario of groups of three on a jittered grid, each walking to the opposite point of the square."""
     r, side = np.random.default_rng(seed), math.sqrt(people / DENSITY)
     k = math.ceil(math.sqrt(people / 3))
     grid = np.stack(np.meshgrid(*2 * [(np.arange(k) + 0.5) / k * side]), -1).reshape(-1, 2)
@@ -53,32 +56,32 @@ def scenario(people: int, seed: int = 0) -> Scenario:
 
 
 class RecordingSpace(pymunk.Space):
-    """A space that remembers the forces it was given."""
+    """A space that records the forces of each step in `forces`. State: `force`, the array that the world writes."""
 
     def step(self, dt: float) -> None:
-        """As pymunk's, after a look at the forces."""
+        """Records a copy of the forces, then does the step of pymunk."""
         self.forces.append(self.force.copy())
         super().step(dt)
 
 
 def episodes(people: int) -> int:
-    """How often the same is done in one measurement."""
+    """Returns how many equal episodes one measurement has."""
     return max(1, MOST // people)
 
 
-def entered(people: int) -> tuple[World, Iterator]:
-    """A world with everybody in it, and its further frames."""
+def populated_world(people: int) -> tuple[World, Iterator]:
+    """Returns a world after its first frame, in which everybody is present, and its further frames."""
     world = World(scenario(people), 0, 0, Steering())
     frames = world.frames(round(SECONDS * world.fps))
     next(frames)
     return world, frames
 
 
-def ours(people: int) -> float:
-    """Steps per CPU second."""
+def our_rate(people: int) -> float:
+    """Returns the steps per CPU second of our simulator."""
     steps, seconds = 0, 0.0
     for _ in range(episodes(people)):
-        world, frames = entered(people)
+        world, frames = populated_world(people)
         begin = time.process_time()
         count = sum(len(state) == people for state, _ in frames)
         seconds += time.process_time() - begin
@@ -86,15 +89,18 @@ def ours(people: int) -> float:
     return steps / seconds
 
 
-def physics(people: int) -> float:
-    """Steps per CPU second of `Space.step` alone: the same forces, with and without steps."""
-    world, frames = entered(people)
+def physics_rate(people: int) -> float:
+    """Returns the steps per CPU second of `Space.step` alone.
+
+    The recorded forces are applied again with and without steps; the difference of the times counts.
+    """
+    world, frames = populated_world(people)
     world.space.__class__, world.space.forces, world.space.force = RecordingSpace, [], world.force
     for _ in frames:
         pass
     seconds = {True: 0.0, False: 0.0}
     for stepping in list(seconds) * episodes(people):
-        again, _ = entered(people)
+        again, _ = populated_world(people)
         begin = time.process_time()
         for force in world.space.forces:
             again.force[:] = force
@@ -105,14 +111,14 @@ def physics(people: int) -> float:
     return episodes(people) * len(world.space.forces) / (seconds[True] - seconds[False])
 
 
-def layout(people: int) -> str:
-    """What the peer is given: the same people, each on his own way."""
+def peer_input(people: int) -> str:
+    """Returns the same people as JSON for the peer, each with a start, goal and speed of their own."""
     world = World(scenario(people), 0, 0, Steering())
     scene = {"start": [], "goal": [], "speed": []}
-    for party in world.entering:
-        for member, pos in zip(party.members, party.pos.tolist(), strict=True):
+    for group in world.entering:
+        for member, pos in zip(group.members, group.pos.tolist(), strict=True):
             scene["start"].append(pos)
-            scene["goal"].append((np.array(pos) - party.start + party.goal).tolist())
+            scene["goal"].append((np.array(pos) - group.start + group.goal).tolist())
             scene["speed"].append(member.free_speed)
     size = float(world.scene.size[0])
     steps = round(SECONDS / world.dt)
@@ -120,33 +126,32 @@ def layout(people: int) -> str:
     return json.dumps({**scene, **more})
 
 
-def peer(python: str, scene: str) -> float:
-    """The same of JuPedSim."""
+def peer_rate(python: str, scene: str) -> float:
+    """Returns the steps per CPU second of JuPedSim."""
     answer = subprocess.run([python, RUNNER], input=scene, capture_output=True, text=True, check=True)
-    said = json.loads(answer.stdout.splitlines()[-1])
-    return float(said["steps"] / said["seconds"])
+    found = json.loads(answer.stdout.splitlines()[-1])
+    return float(found["steps"] / found["seconds"])
 
 
 def main() -> int:
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser = new_parser(__doc__)
     parser.add_argument("--peer-python", required=True, help="interpreter of an environment with jupedsim")
     parser.add_argument("--people", nargs="+", type=int, default=[21, 99, 999])
     parser.add_argument("--rounds", type=int, default=5)
     args = parser.parse_args()
-    ours(21)  # compiles the kernels
-    print("| people | ours, steps per CPU s | JuPedSim | ratio (range) | time / Space.step |\n|---|---|---|---|---|")
+    our_rate(21)  # compiles the kernels
+    head(["people", "ours, steps per CPU s", "JuPedSim", "ratio (range)", "time / Space.step"])
     good = True
     for people in args.people:
-        scene, rates = layout(people), []
+        scene, rates = peer_input(people), []
         for _ in range(args.rounds):
-            rates.append([ours(people), peer(args.peer_python, scene), physics(people)])
+            rates.append([our_rate(people), peer_rate(args.peer_python, scene), physics_rate(people)])
         mine, theirs, engine = np.array(rates).T
         ratio = mine / theirs
-        print(
-            f"| {people} | {np.median(mine):.0f} | {np.median(theirs):.0f} "
-            f"| {np.median(ratio):.1f} ({ratio.min():.1f}-{ratio.max():.1f}) | {np.median(engine / mine):.1f} |",
-            flush=True,
-        )
+        row(
+            [str(people), f"{np.median(mine):.0f}", f"{np.median(theirs):.0f}",
+             f"{np.median(ratio):.1f} ({ratio.min():.1f}-{ratio.max():.1f})", f"{np.median(engine / mine):.1f}"]
+        )  # fmt: skip
         good &= bool(np.median(ratio) >= MUST)
     print(f"must be {MUST:g} each, aim {AIM:g}: {'reached' if good else 'MISSED'}")
     return 0 if good else 1

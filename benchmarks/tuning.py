@@ -1,24 +1,24 @@
 """Tuning by search: what it gains on scenes that were not searched, and on recordings that nothing was tuned on.
 
-    PYTHONPATH=. python benchmarks/tuning.py search [blob] [group-pda] [grouping] --out FOLDER [--trials N] …
-    PYTHONPATH=. python benchmarks/tuning.py real --out FOLDER [--data FOLDER]       after `search`
-    PYTHONPATH=. python benchmarks/tuning.py workers|overhead
+    python -m benchmarks.tuning search [blob] [group-pda] [grouping] --out FOLDER [--trials N] …
+    python -m benchmarks.tuning real [blob] [group-pda] [grouping] --out FOLDER [--data FOLDER]       after `search`
+    python -m benchmarks.tuning workers|overhead [--trials N]
 
-search: on the suites of benchmarks/tuning_suites (or --suite), training seeds; default → tuned on test seeds, and on
-friends-meet or crossing, which share no scenario with them. A search that was interrupted goes on. --sensor: detections
-err as this profile says (`flockscope fit sensor`), with --half in every second scene, for trackers of boxes.
-real: first defaults (tracking/frozen), present defaults and what `search` found, on recordings: `blob` on PETS09-S2L1
-(200 frames) and TUD-Campus from their det/det.txt, HOTA; on seq_hotel and CAVIAR Meet_WalkTogether1, from labelled
-people, `group-pda` by group scores and the rule of groups by pairwise F1; of several goals the whole front. Intervals
-by moving blocks, of the value and of the difference to the present defaults.
-workers: seconds of one search by 1 and 2 processes. overhead: what a trial costs beside its episodes.
+search: on the suites of benchmarks/tuning_suites (or --suite), training seeds. Printed: defaults and tuned parameters
+on test seeds, and on friends-meet or crossing, which share no scenario with the suites. An interrupted search continues
+when it is started again. --sensor: detections err as this profile says (`flockscope fit sensor`), with --half in every
+second scene; for trackers of boxes.
+real: first defaults (tracking/frozen), present defaults and the parameters that `search` found, on recordings: `blob`
+on PETS09-S2L1 (200 frames) and TUD-Campus from their det/det.txt; `group-pda` and the baseline grouping rule on
+seq_hotel and CAVIAR Meet_WalkTogether1 from labelled people. With several objectives the whole front is compared.
+Intervals are by moving blocks, of the differences from the present defaults.
+workers: wall seconds of one search by 1 and 2 processes. overhead: CPU ms of a trial beside its episodes.
 """
 
 from __future__ import annotations
 
 import argparse
 import json
-import os
 import tempfile
 import time
 from collections.abc import Callable, Iterator
@@ -28,6 +28,7 @@ from typing import Any
 
 import numpy as np
 
+from benchmarks.support.options import CAMPUS, HOTEL, PETS, WALK_TOGETHER, add_data, new_parser
 from scenarios import sensor_settings
 from scenarios.loading.suites import read_entries
 from sim.io.files.atomic import write_file
@@ -55,13 +56,13 @@ DRAWS = 200
 
 @dataclass(frozen=True)
 class Search:
-    """What is searched where, and by what it is tuned."""
+    """Tracker, suite of training scenes, objective, detections, and seeds per scene in training and validation."""
 
     tracker: str
     suite: str
     objective: str
     detections: str
-    seeds: int  # of each scene in training
+    seeds: int
     validation: int
 
 
@@ -74,9 +75,9 @@ SEARCHES = {
     )
 }
 RECORDINGS = {
-    "blob": (("mot/PETS09-S2L1-first200", "file"), ("mot/TUD-Campus", "file")),
-    "group-pda": (("biwi/seq_hotel", "truth"), ("caviar/mwt1gt.xml", "truth")),
-    "grouping": (("biwi/seq_hotel", "truth"), ("caviar/mwt1gt.xml", "truth")),
+    "blob": ((PETS, "file"), (CAMPUS, "file")),
+    "group-pda": ((HOTEL, "truth"), (WALK_TOGETHER, "truth")),
+    "grouping": ((HOTEL, "truth"), (WALK_TOGETHER, "truth")),
 }
 KEYS = {
     "blob": ("HOTA", "MOTA", "IDF1"),
@@ -90,13 +91,13 @@ def search(given: argparse.Namespace) -> None:
         wanted = SEARCHES[name]
         begun, suite = time.perf_counter(), given.suite or SUITES / wanted.suite
         if given.half:
-            suite = half_sensed(suite, given.sensor, given.out)
+            suite = half_with_sensor(suite, given.sensor, given.out)
         found = tune(
             wanted.tracker, suite, given.trials or 60, objective=given.objective or wanted.objective,
             detections=wanted.detections, workers=given.workers, out=given.out / f"{name}.toml", only=given.only,
             finalists=given.finalists,
             seeds=range(wanted.seeds), validation=range(10_000, 10_000 + (given.validation or wanted.validation)),
-            test=range(20_000, 20_013), progress=said(),
+            test=range(20_000, 20_013), progress=progress_printer(),
             set=sensor_settings(given.sensor) if given.sensor and not given.half else (),
         )  # fmt: skip
         print(found)
@@ -105,8 +106,8 @@ def search(given: argparse.Namespace) -> None:
         print(f"  {time.perf_counter() - begun:.0f} s\n", flush=True)
 
 
-def half_sensed(suite: Path, sensor: Path, out: Path) -> Path:
-    """The suite with this detector in every second scene, the first one included."""
+def half_with_sensor(suite: Path, sensor: Path, out: Path) -> Path:
+    """Writes and returns the suite with this detector in every second scene, beginning with the first."""
     rows = []
     for k, line in enumerate(read_entries(suite)):
         settings = (*line.settings, *(sensor_settings(sensor) if k % 2 == 0 else ()))
@@ -117,27 +118,27 @@ def half_sensed(suite: Path, sensor: Path, out: Path) -> Path:
     return path
 
 
-def said() -> Callable[[int, int | None, str], None]:
-    """Progress, at most once in 30 s."""
+def progress_printer() -> Callable[[int, int | None, str], None]:
+    """Returns a function that prints progress at most once in 30 s."""
     last = [0.0]
 
-    def tell(done: int, total: int | None, what: str) -> None:
+    def print_progress(done: int, total: int | None, what: str) -> None:
         if time.monotonic() - last[0] > 30:
             last[0] = time.monotonic()
             print(f"  … {done} of {total} {what}", flush=True)
 
-    return tell
+    return print_progress
 
 
 def real(given: argparse.Namespace) -> None:
     for name in given.names or RECORDINGS:
         for path, mode in RECORDINGS[name]:
             (sequence,) = open_source(given.data / path, images=False)
-            compared(name, sequence, mode, configs(name, given.out))
+            print_comparison(name, sequence, mode, compared_configs(name, given.out))
 
 
-def configs(name: str, folder: Path) -> dict[str, Config]:
-    """First defaults, present ones, what the search found: of several goals the whole front."""
+def compared_configs(name: str, folder: Path) -> dict[str, Config]:
+    """Returns first defaults, present defaults and what the search found; of several objectives the whole front."""
     kind = LinkRule if name == "grouping" else find(name).config_class
     files = sorted(folder.glob(f"{name}.front-*.toml"), key=lambda path: (len(path.name), path))
     files = files or [folder / f"{name}.toml"]
@@ -145,31 +146,35 @@ def configs(name: str, folder: Path) -> dict[str, Config]:
     return {"first": kind.frozen(), "present": kind(), **found}
 
 
-def compared(name: str, sequence: Sequence, mode: str, chosen: dict[str, Config]) -> None:
-    """A table of the recording: values with intervals, and differences to the present defaults."""
+def print_comparison(name: str, sequence: Sequence, mode: str, chosen: dict[str, Config]) -> None:
+    """Prints the scores on a recording, and differences from the present defaults with intervals."""
     truth = sequence.truth
     assert truth is not None
     every = list(CATALOGUE)
     at = [every.index(key) for key in KEYS[name]]
-    draws = {who: resampled_scorer(truth, answers(name, sequence, mode, c), None, "hull") for who, c in chosen.items()}
+    draws = {
+        which: resampled_scorer(truth, tracks_of(name, sequence, mode, c), None, "hull") for which, c in chosen.items()
+    }
 
     def score(places: Ints) -> np.ndarray:
-        values = {who: np.asarray(draw(places))[at] for who, draw in draws.items()}
-        return np.concatenate([*values.values(), *(values[who] - values["present"] for who in values)])
+        values = {which: np.asarray(draw(places))[at] for which, draw in draws.items()}
+        return np.concatenate([*values.values(), *(values[which] - values["present"] for which in values)])
 
     whole, low, high = moving_blocks(score, truth.length, truth.fps, DRAWS)
     size, count = len(at), len(chosen)
-    print(f"{name} on {sequence.name}, {truth.length / truth.fps:.0f} s, {mode}; less the present defaults'")
-    for k, who in enumerate(chosen):
+    print(
+        f"{name} on {sequence.name}, {truth.length / truth.fps:.0f} s, {mode}; in brackets minus the present defaults"
+    )
+    for k, which in enumerate(chosen):
         cells = []
         for j, key in enumerate(KEYS[name]):
             v, d = k * size + j, (count + k) * size + j
-            less = "" if who == "present" else f" ({whole[d]:+.3f} [{low[d]:+.3f}, {high[d]:+.3f}])"
+            less = "" if which == "present" else f" ({whole[d]:+.3f} [{low[d]:+.3f}, {high[d]:+.3f}])"
             cells.append(f"{key} {whole[v]:.3f}{less}")
-        print(f"  {who:8} " + "   ".join(cells), flush=True)
+        print(f"  {which:8} " + "   ".join(cells), flush=True)
 
 
-def answers(name: str, sequence: Sequence, mode: str, config: Config) -> list[Tracks]:
+def tracks_of(name: str, sequence: Sequence, mode: str, config: Config) -> list[Tracks]:
     truth = sequence.truth
     assert truth is not None
     if isinstance(config, LinkRule):
@@ -178,7 +183,7 @@ def answers(name: str, sequence: Sequence, mode: str, config: Config) -> list[Tr
 
 
 def overhead(given: argparse.Namespace) -> None:
-    """CPU milliseconds of a trial of 16 episodes that cost nothing: asking, testing, storing."""
+    """Prints CPU ms of a trial of 16 episodes that cost nothing: proposing, testing, storing."""
     made = search_plan(TuneOptions(tracker="blob", suite="crossing", trials=given.trials or 200, check=None))
     r = np.random.default_rng(0)
 
@@ -196,7 +201,7 @@ def overhead(given: argparse.Namespace) -> None:
 
 
 def workers(given: argparse.Namespace) -> None:
-    """Seconds of one search by one process and by two, taken in turns; the same is found."""
+    """Prints seconds of one search by one process and by two, in turn, and a hash of what each found."""
     best: dict[int, float] = {}
     for _ in range(2):
         for count in (1, 2):
@@ -212,22 +217,21 @@ def workers(given: argparse.Namespace) -> None:
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    beside = Path(__file__).resolve().parents[2] / "shared" / "data"
+    parser = new_parser(__doc__)
     parser.add_argument("mode", choices=["search", "real", "workers", "overhead"])
     parser.add_argument("names", nargs="*", choices=[*SEARCHES, []])
     parser.add_argument("--out", type=Path, default=Path("tuned"))
     parser.add_argument("--trials", type=int)
     parser.add_argument("--validation", type=int, help="seeds of each scene")
-    parser.add_argument("--suite", type=Path, help="search: another one than the tracker's own")
-    parser.add_argument("--objective", action="append", help="search: another goal than the tracker's own, or several")
-    parser.add_argument("--only", action="append", default=[], help="search: this parameter and others so named, alone")
-    parser.add_argument("--finalists", type=int, default=5, help="search: how many are judged on validation scenes")
+    parser.add_argument("--suite", type=Path, help="search: instead of the tracker's own suite")
+    parser.add_argument("--objective", action="append", help="search: instead of the tracker's own; may be repeated")
+    parser.add_argument("--only", action="append", default=[], help="search: only this parameter; may be repeated")
+    parser.add_argument("--finalists", type=int, default=5, help="search: trials that are played on validation scenes")
     parser.add_argument("--sensor", type=Path)
     parser.add_argument("--half", action="store_true", help="--sensor in every second scene only")
-    parser.add_argument("--workers", type=int, default=1, help="search: processes, which change nothing that is found")
-    parser.add_argument("--data", type=Path, default=Path(os.environ.get("FLOCKSCOPE_DATA", beside)))
-    given = parser.parse_args()
+    parser.add_argument("--workers", type=int, default=1, help="search: processes; the result does not depend on it")
+    add_data(parser)
+    given = parser.parse_intermixed_args()
     if given.half and given.sensor is None:
         parser.error("--half needs --sensor")
     {"search": search, "real": real, "workers": workers, "overhead": overhead}[given.mode](given)

@@ -12,7 +12,7 @@ from sim.hashing import ENGINE
 @pytest.fixture(scope="module")
 def kept() -> dict[str, dict[str, str]]:
     """The golden hashes of this environment."""
-    file, here = golden.kept(), golden.environment()
+    file, here = golden.golden_file(), golden.environment()
     if not golden.FILE.is_file():
         pytest.skip(f"no golden hashes are kept; {golden.WRITE}")
     assert file["engine"] == ENGINE, f"golden hashes are of engine {file['engine']}; {golden.WRITE}"
@@ -23,7 +23,7 @@ def kept() -> dict[str, dict[str, str]]:
 
 @pytest.mark.parametrize("name", names())
 def test_truth_is_as_it_was(name: str, kept: dict[str, dict[str, str]]) -> None:
-    assert golden.difference(name, kept.get(name), golden.made(name)) == ""
+    assert golden.difference(name, kept.get(name), golden.present_hashes(name)) == ""
 
 
 def test_what_has_changed_is_told_apart() -> None:

@@ -14,8 +14,8 @@ SEEDS = range(1000, 1010)
 
 
 @cache
-def walk(size: int) -> realism.Walk:
-    return realism.alone(size, SEEDS)
+def walk(size: int) -> realism.GroupWalk:
+    return realism.walk_alone(size, SEEDS)
 
 
 def test_free_speed_alone() -> None:
@@ -29,14 +29,14 @@ def test_free_speed_alone() -> None:
 def test_groups_are_slower_by_the_member() -> None:
     # Moussaid et al. 2010: 0.04 to 0.08 m/s per member; measured on the same free speeds, so that the draw cancels out
     seeds = range(1000, 1030)
-    means = [realism.alone(n, seeds).speed.mean() for n in (2, 6)]
+    means = [realism.walk_alone(n, seeds).speed.mean() for n in (2, 6)]
     free = [np.mean([_drawn(n, seed) for seed in seeds]) for n in (2, 6)]
     slower = [f - m for f, m in zip(free, means, strict=True)]
     assert 0.04 <= (slower[1] - slower[0]) / 4 <= 0.08
 
 
 def _drawn(size: int, seed: int) -> float:
-    """Mean free speed of the people of realism.alone."""
+    """Mean free speed of the people of realism.walk_alone."""
     return float(realism.alone_motion(size, seed).free_speed.mean())
 
 
@@ -68,7 +68,7 @@ def test_larger_groups_are_two_rows_of_pairs_and_triads(size: int) -> None:
 
 def test_strangers_seldom_go_through_a_group() -> None:
     # of those who come straight at it; walking on blindly, about two of three would
-    passed = np.concatenate([realism.through(n, range(1000, 1012)) for n in (2, 3)])
+    passed = np.concatenate([realism.passes_through(n, range(1000, 1012)) for n in (2, 3)])
     assert passed.mean() < 0.25
 
 
@@ -82,8 +82,8 @@ def test_a_blind_stranger_would_go_through() -> None:
 
 
 def test_the_street_is_like_seq_hotel(shared_data: Path) -> None:
-    real = realism.recording(str(shared_data / "biwi" / "seq_hotel"))
-    speed, closest, acceleration = realism.beside(realism.simulated("street", range(1000, 1010)), real)
+    real = realism.recording_statistics(str(shared_data / "biwi" / "seq_hotel"))
+    speed, closest, acceleration = realism.distances(realism.scenario_statistics("street", range(1000, 1010)), real)
     assert speed <= 0.15
     assert closest <= 0.15
     assert 0.75 <= acceleration <= 1.25

@@ -1,4 +1,4 @@
-"""The baseline rule on real people, from true positions. Figures and what they mean: benchmarks/real_groups.py."""
+"""The baseline rule on real people, from true positions. Figures and what they mean: benchmarks/grouping.py."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""Ids kept through an encounter, as benchmarks/group_pda_ids.py defines it: on scenes written down by hand."""
+"""Ids kept through an encounter, as benchmarks/group_pda/encounters.py defines it: on scenes written down by hand."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from collections.abc import Callable
 
 import pytest
 
-from benchmarks.group_pda_ids import Encounter, Fate, fates, meeting, met
+from benchmarks.group_pda.encounters import Encounter, Outcome, encounter_of, encounters, outcomes
 from sim.types import GroupEvent, Tracks, Truth
 from tests.hand_made import Scene, tracks, truth
 
@@ -54,7 +54,7 @@ def lost_for(frames: int) -> Callable[[int], dict[int, tuple[int, ...]]]:
 
 
 def test_where_the_encounter_begins_and_ends() -> None:
-    e = meeting(true(), 1, 2)
+    e = encounter_of(true(), 1, 2)
     assert (e.first, e.last) == NEAR
     assert e.frames == tuple(range(1, LENGTH + 1))
 
@@ -63,47 +63,47 @@ def test_where_the_encounter_begins_and_ends() -> None:
 @pytest.mark.parametrize(
     ("names", "fate"),
     [
-        (right, Fate(kept=True, merged=False)),
-        (swapped, Fate(kept=False, merged=False)),
-        (one_while_near, Fate(kept=True, merged=True)),
-        (one_to_the_end, Fate(kept=False, merged=True)),
-        (lost_for(4), Fate(kept=True, merged=False)),
-        (lost_for(5), Fate(kept=False, merged=False)),
+        (right, Outcome(kept=True, merged=False)),
+        (swapped, Outcome(kept=False, merged=False)),
+        (one_while_near, Outcome(kept=True, merged=True)),
+        (one_to_the_end, Outcome(kept=False, merged=True)),
+        (lost_for(4), Outcome(kept=True, merged=False)),
+        (lost_for(5), Outcome(kept=False, merged=False)),
     ],
 )
-def test_passing(names: Callable[[int], dict[int, tuple[int, ...]]], fate: Fate, unit: str) -> None:
-    assert fates(true(), said(names, unit=unit)) == [fate]
+def test_passing(names: Callable[[int], dict[int, tuple[int, ...]]], fate: Outcome, unit: str) -> None:
+    assert outcomes(true(), said(names, unit=unit)) == [fate]
 
 
 @pytest.mark.parametrize(("names", "kept"), [(right, True), (swapped, False)])
 def test_side_by_side_from_the_first_to_the_last_frame(
     names: Callable[[int], dict[int, tuple[int, ...]]], kept: bool
 ) -> None:
-    assert fates(true(still=True), said(names, still=True)) == [Fate(kept, merged=False)]
+    assert outcomes(true(still=True), said(names, still=True)) == [Outcome(kept, merged=False)]
 
 
 def test_told_late_it_is_the_first_second_in_which_both_are_told() -> None:
     late = said(lambda frame: {7: A, 8: B} if frame > 60 else {}, still=True)
-    assert fates(true(still=True), late) == [Fate(kept=True, merged=False)]
-    assert fates(true(), late) == [Fate(kept=False, merged=False)]
+    assert outcomes(true(still=True), late) == [Outcome(kept=True, merged=False)]
+    assert outcomes(true(), late) == [Outcome(kept=False, merged=False)]
 
 
 def test_one_id_for_both_is_not_kept() -> None:
     both = said(lambda frame: {7: (*A, *B)}, still=True)
-    assert fates(true(still=True), both) == [Fate(kept=False, merged=True)]
+    assert outcomes(true(still=True), both) == [Outcome(kept=False, merged=True)]
 
 
 def test_nobody_told() -> None:
-    assert fates(true(), []) == [Fate(kept=False, merged=False)]
+    assert outcomes(true(), []) == [Outcome(kept=False, merged=False)]
 
 
 def test_crossings_are_what_counts_where_there_are_any() -> None:
     crossing = GroupEvent("cross", 45, 50, None, (1, 2), (1, 2), (1, 2, 3, 4), (0.0, 0.0))
     frames = tuple(range(1, LENGTH + 1))
-    assert met(true(events=(crossing,))) == [Encounter(1, 2, frames, 45, 50)]
+    assert encounters(true(events=(crossing,))) == [Encounter(1, 2, frames, 45, 50)]
 
 
 @pytest.mark.parametrize("sides", [((1, 2), (1,)), ((1,), (1, 2))])
 def test_groups_that_become_or_were_one_do_not_meet(sides: tuple[tuple[int, ...], tuple[int, ...]]) -> None:
     change = GroupEvent("merge", 90, 95, None, *sides, (1, 2, 3, 4), (0.0, 0.0))
-    assert met(true(events=(change,))) == []
+    assert encounters(true(events=(change,))) == []

@@ -1,0 +1,123 @@
+"""Mode `pixels` of `benchmarks.blob`: on PETS and on rendered scenes, with parts of the tracker switched off.
+
+Columns: HOTA, DetA, AssA, MOTA, IDF1 (means over sequences) and frames per second.
+pets: PETS09-S2L1-first200, by IoU of boxes; the background sample spread over the recording, and its first 50 frames.
+With the calibration View_001.xml also by the position on the ground (similarity 1 - d / 2 m, 0.5 at 1 m).
+rendered: scenes of the catalogue under a camera like that of PETS (480 x 360, 7 frames/s, tilts of 15 and 20 degrees,
+JPEG of quality 80), once with camera and empty background, once as bare video with a background spread over it.
+above: seen from straight above at 20 px per m, and the friends-meet scenes at 40 px per m, from pixels and from boxes.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+
+import tracking
+from benchmarks.support.tables import head, row
+from scenarios.loading.resolve import load
+from sim.io.source import open_source
+from sim.sequence import simulate
+from sim.types import Frame
+from sim.types import Sequence as Recording
+from tracking.run import track
+
+KEYS = "HOTA", "DetA", "AssA", "MOTA", "IDF1"
+ABLATIONS: dict[str, dict[str, object]] = {
+    "blob": {},
+    "no splitting, no person size": {"split": False},
+    "nearest": {"association": "nearest"},
+    "axes hardly expected (5 m)": {"person_noise": 5.0},
+    "MOG2": {"segmentation": "mog2"},
+}
+SCENES = (("street", 15), ("street", 20), ("cross", 15), ("mixed", 15), ("pillar", 20), ("split", 15), ("crowd", 20))
+VIEW = ("image=[480,360]", "fps=7", "focal_px=600", "crop=true", "baseline=0")
+ABOVE = {
+    "20 px per m": [(name, ['camera.kind="top"']) for name in ("merge", "cross")],
+    "Friends Meet, 40 px per m": [
+        (f"scenarios/suites/friends-meet/{name}.toml", []) for name in ("merge", "queue", "hard-party")
+    ],
+}
+LONGEST = 120  # frames of a rendered scene
+
+
+def pixels(parts: Sequence[str], pets_folder: Path, seeds: range) -> None:
+    """Prints the tables of the chosen parts."""
+    if "pets" in parts:
+        pets(pets_folder)
+    if "rendered" in parts:
+        rendered(seeds)
+    if "above" in parts:
+        above(seeds)
+
+
+def scores_and_speed(
+    sequences: Sequence[Recording], params: dict[str, object], similarity: str = "boxes", mode: str = "image"
+) -> list[str]:
+    """Returns the cells of a row: means of the scores over the sequences, and of the frames per second."""
+    scores, speeds = [], []
+    for sequence in sequences:
+        run = track("blob", sequence, params=params, detections=mode)  # type: ignore[arg-type]
+        assert sequence.truth is not None
+        found = tracking.evaluate(sequence.truth, run, similarity=similarity)
+        scores.append([found[k] for k in KEYS])
+        speeds.append(run.info["frames_per_second"])
+    return [*(f"{v:.3f}" for v in np.mean(scores, 0)), f"{np.mean(speeds):.0f}"]
+
+
+def pets(folder: Path) -> None:
+    for background, ablations in (("spread:50", ABLATIONS), ("first:50", {"blob": {}})):
+        head([f"PETS, background {background}", *KEYS, "frames/s"])
+        sequence = open_source(folder, images=True, background=background)[0]
+        for title, params in ablations.items():
+            row([title, *scores_and_speed([sequence], params)])
+    head(["PETS with View_001.xml, background spread:50", *KEYS, "frames/s"])
+    sequence = open_source(folder, images=True, camera=folder / "View_001.xml")[0]
+    for similarity in ("boxes", "ground"):
+        row([similarity, *scores_and_speed([sequence], {}, similarity)])
+
+
+def rendered(seeds: range) -> None:
+    for bare in (False, True):
+        made = [rendered_scene(name, tilt, seed, bare) for name, tilt in SCENES for seed in seeds]
+        head(["rendered, " + ("bare video" if bare else "camera and empty background"), *KEYS, "frames/s"])
+        for title, params in ABLATIONS.items():
+            row([title, *scores_and_speed(made, params)])
+
+
+def rendered_scene(name: str, tilt: int, seed: int, bare: bool) -> Recording:
+    """Returns a rendered scene with its pictures in memory; bare: without camera, background spread over the video.
+
+    People more than half outside the image are left out of the truth.
+    """
+    settings = [f"camera.{s}" for s in (f"tilt_deg={tilt}", *VIEW)]
+    live = simulate(load(name, set=[*settings, "picture.jpeg=80"]), seed)
+    frames = [f for f in live.frames() if f.index <= LONGEST]
+    truth = live.truth
+    assert truth is not None
+    assert truth.truncation is not None
+    keep = (truth.frame <= LONGEST) & (truth.truncation < 0.5)
+    columns = ("frame", "id", "group", "pos", "vel", "box", "visibility", "z", "heading", "height", "truncation")
+    cut = {k: getattr(truth, k)[keep] for k in (*columns, "visible_box") if getattr(truth, k) is not None}
+    none = {"groups": None, "groups_px": None, "labelled": None, "events": None, "near": None, "orders": ()}
+    in_view = truth.replace(length=len(frames), **cut, **none)
+    spread = [frames[k].image for k in np.linspace(0, len(frames) - 1, 50).astype(int)]
+
+    def again() -> Iterator[Frame]:
+        return iter(frames)
+
+    video = replace(live, length=len(frames), frames=again, load_truth=lambda: in_view, bare=None, load_pixels=None)
+    if not bare:
+        return video
+    return replace(video, camera=None, scene=None, px_per_m=float("nan"), load_background=lambda: np.stack(spread))
+
+
+def above(seeds: range) -> None:
+    head(["from straight above", *KEYS, "frames/s"])
+    for title, scenes in ABOVE.items():
+        made = [simulate(load(name, set=settings), seed) for name, settings in scenes for seed in seeds]
+        for mode, what in (("image", "pixels"), ("file", "boxes")):
+            row([f"{title}, {what}", *scores_and_speed(made, {}, mode=mode)])

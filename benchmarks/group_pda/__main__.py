@@ -1,0 +1,67 @@
+"""`group-pda`: scores by scene, its decisions one by one, events, recordings, cost of a step, consistency.
+
+    python -m benchmarks.group_pda MODE [--seeds a:b] [--detections file|truth|image] [--only A,B] [--json FILE] …
+
+scenarios    merging, splitting, crossing, queueing, side by side: lineage, ids, group scores; beside the paper's
+             ablation and the baseline rule over `blob`
+decisions    each decision of the tracker switched off: paired differences
+events       merges and splits of the suites standard and friends-meet
+difference   groups that pass and cross: ids kept against the difference of their velocities; a chart
+real         seq_hotel, Meet_WalkTogether1, PETS09-S2L1 (--data)
+cost         CPU time of a step against the number of measurements
+consistency  NEES, NIS and whiteness of the centroid's filter
+
+The docstrings of scenes.py (the first three modes), velocity_difference.py, recordings.py, cost.py and consistency.py
+in this folder say what the columns mean. Detections "file" and "truth" are points, "image" the tracker's own foreground
+pixels. Groups from pixels are scored in the image, all others on the ground. Intervals are 95 % intervals: of means by
+bootstrap over sequences, of shares by Wilson.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+from benchmarks.group_pda import consistency, cost, recordings, scenes, velocity_difference
+from benchmarks.support.options import add_data, add_seeds, new_parser, one_thread, seeds_text
+
+MODES: dict[str, Callable[[argparse.Namespace], Any]] = {
+    "scenarios": scenes.scenarios,
+    "decisions": scenes.decisions,
+    "events": scenes.events,
+    "difference": velocity_difference.difference,
+    "real": recordings.real,
+    "cost": cost.cost,
+    "consistency": consistency.consistency,
+}
+
+
+def main() -> None:
+    parser = new_parser(__doc__)
+    parser.add_argument("mode", choices=MODES)
+    add_seeds(parser, "20000:20100")
+    add_seeds(parser, "20000:20025", option="--image-seeds", what="difference, curves from pixels: ")
+    parser.add_argument("--detections", choices=("file", "truth", "image"), default="file")
+    parser.add_argument("--only", help="scenes, suites, parts, kinds or differences, separated by commas")
+    parser.add_argument("--each", action="store_true", help="decisions: scene by scene, too")
+    parser.add_argument("--alone", action="store_true", help="scenarios, events: without the ablation and the baseline")
+    parser.add_argument("--workers", type=int, default=2)
+    parser.add_argument("--tracker", default="group-pda", help="another tracker with the same parameters")
+    add_data(parser)
+    parser.add_argument("--out", type=Path, help="difference: the chart, *.svg; real: the video, *.mp4")
+    parser.add_argument("--runs", type=int, default=400, help="consistency: independent runs")
+    parser.add_argument("--rounds", type=int, default=5, help="cost: rounds of which the least time counts")
+    parser.add_argument("--json", type=Path, help="writes what was measured, sequence by sequence")
+    args = parser.parse_args()
+    one_thread()
+    found = MODES[args.mode](args)
+    if args.json is not None:
+        content = {"mode": args.mode, "seeds": seeds_text(args.seeds), "found": found}
+        args.json.write_text(json.dumps(content), encoding="utf-8")
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,135 @@
+"""Mode `real` of `benchmarks.group_pda`: recordings of real people.
+
+hotel: seq_hotel from the labelled positions of people, without their identities. caviar: Meet_WalkTogether1 from the
+centres of labelled boxes, in the image. Columns: group scores with 95 % intervals by moving blocks of frames; pairwise
+scores by the people in each hull (of the baseline rule: by its members). Identity switches and MOTA have no interval,
+because joining blocks adds switches. Below: number of events of each kind that are reported.
+pets: the first 200 frames of PETS09-S2L1 from pixels. No groups are labelled: printed are the number of groups, the
+events, and in how many frames the two people who walk together (11 and 12) are in one hull. A video is written.
+"""
+
+from __future__ import annotations
+
+import argparse
+from collections import Counter
+from collections.abc import Sequence
+from itertools import groupby
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from benchmarks.group_pda.runs import Variant
+from benchmarks.support.options import HOTEL, PETS, WALK_TOGETHER
+from benchmarks.support.tables import interval, table
+from sim.geometry.polygons import contains
+from sim.io.source import open_source
+from sim.types import Array, Ints, Tracks, Truth
+from tracking.app.pictures.overlay import write_overlay
+from tracking.grouping.grouped_tracks import with_groups
+from tracking.run import track
+from tracking.scoring import evaluate
+from tracking.scoring.block_resampling import resampled_scorer
+from tracking.scoring.catalogue import CATALOGUE
+from tracking.scoring.people_and_groups import INSIDE
+from tracking.stats import moving_blocks
+from tracking.tuning.grouping_episodes import people_as_tracks
+
+DRAWS = 200
+KEYS = ("group_1-FP", "group_1-FN", "group_GDSR", "group_MOTP", "group_MOTA", "group_GDSR2", "group_F1", "group_IDSW")
+TABLE_3B = """columns of Bazzani et al. 2012, Table 3b. DEEPER-JIGT, on its own BIWI frames: 1-FP 53.8 %,
+1-FN 78.0 %, GDSR 53.6 %, MOTP 0.44 m, MOTA 29.4 %; it follows people in the video and restarts from the truth when it
+loses one. The input here is the position of every labelled person in each frame (2.5 frames/s) without identities: no
+misses and no false alarms, but no restart from the truth either"""
+PAIR = (11, 12)
+OUT = Path("group-pda-pets.mp4")
+
+
+def real(given: argparse.Namespace) -> Any:
+    """Prints the parts of --only (default: all) and returns what they measured."""
+    parts = {"hotel": hotel, "caviar": caviar, "pets": pets}
+    chosen = given.only.split(",") if given.only else parts
+    return {name: parts[name](given) for name in chosen}
+
+
+def hotel(given: argparse.Namespace) -> Any:
+    return labelled_recording(given, HOTEL, TABLE_3B)
+
+
+def caviar(given: argparse.Namespace) -> Any:
+    return labelled_recording(given, WALK_TOGETHER, "from centres of labelled boxes; MOTP in px")
+
+
+def labelled_recording(given: argparse.Namespace, path: str, note: str) -> Any:
+    """Prints the table of a recording with labelled groups and returns values and intervals by tracker."""
+    sequence = open_source(given.data / path)[0]
+    truth = sequence.truth
+    assert truth is not None
+    variants = (
+        Variant(given.tracker, given.tracker),
+        Variant('association="none"', given.tracker, {"association": "none"}),
+    )
+    answers: dict[str, Sequence[Tracks]] = {
+        v.name: track(v.tracker, sequence, params=v.params or None, detections="truth") for v in variants
+    }
+    answers["baseline rule, given identities"] = with_groups(people_as_tracks(truth), truth.fps, truth.px_per_m)
+    keys = [*KEYS, "pairwise_F1", "pairwise_precision", "pairwise_recall"]
+    found = {name: with_intervals(truth, tracks, keys) for name, tracks in answers.items()}
+    rows = {name: [interval(*ends) for ends in row] for name, row in found.items()}
+    seconds = truth.length / truth.fps
+    title = f"{sequence.name}, {seconds:.0f} s: {note}"
+    table(title, "tracker", [key.removeprefix("group_") for key in keys], rows)
+    for name, tracks in answers.items():
+        print(f"{name}: events reported {dict(Counter(e.kind for t in tracks for e in t.events))}")
+    return found
+
+
+def with_intervals(truth: Truth, answers: Sequence[Tracks], keys: Sequence[str]) -> list[tuple[float, float, float]]:
+    """Returns value, low and high end of each score; the ends of scores without interval are nan."""
+    every = list(CATALOGUE)
+    at = [every.index(key) for key in keys]
+    draw = resampled_scorer(truth, answers, None, "hull")
+
+    def score(places: Ints) -> Array:
+        return draw(places)[at]
+
+    _, low, high = moving_blocks(score, truth.length, truth.fps, DRAWS)
+    whole = evaluate(truth, answers)
+    bare = {"group_IDSW", "group_MOTA"}  # joining blocks adds switches
+    nan = float("nan")
+    return [
+        (whole[key], *((nan, nan) if key in bare else (float(a), float(b))))
+        for key, a, b in zip(keys, low, high, strict=True)
+    ]
+
+
+def pets(given: argparse.Namespace) -> Any:
+    folder = given.data / PETS
+    sequence = open_source(folder, images=True, camera=folder / "View_001.xml")[0]
+    run = track(given.tracker, sequence, detections="image")
+    truth = sequence.truth
+    assert truth is not None
+    count = [len(t.id) for t in run]
+    speed = run.info["frames_per_second"]
+    print(f"\n{sequence.name}, from pixels (background spread over the recording; calibrated), {speed:.0f} frames/s")
+    print("groups reported, frames × groups:", ", ".join(f"{len(list(some))} × {n}" for n, some in groupby(count)))
+    events = [(e.kind, e.start, t.index, e.before, e.after) for t in run for e in t.events]
+    print("events (kind, start, reported in, before, after):", *events, sep="\n  ")
+    seen, one = together(truth, run)
+    print(f"people {PAIR[0]} and {PAIR[1]}: both present in {seen} frames, in one hull in {one}")
+    print(write_overlay(sequence, run, given.out or OUT))
+    return {"groups": count, "events": events, "pair": [seen, one]}
+
+
+def together(truth: Truth, answers: Sequence[Tracks]) -> tuple[int, int]:
+    """Returns in how many frames both people of PAIR are present, and in how many of them in one hull."""
+    seen = one = 0
+    for t in answers:
+        here = truth.at(t.index)
+        rows = np.isin(here.id, PAIR)
+        if rows.sum() == 2 and here.box is not None:
+            middle = here.box[rows, :2] + here.box[rows, 2:] / 2
+            hulls = () if t.groups is None else t.groups.hull
+            seen += 1
+            one += any(contains(hull, middle, INSIDE * truth.px_per_m).all() for hull in hulls)
+    return seen, one

@@ -1,0 +1,152 @@
+"""Sequences that are made once and tracked by several trackers, for the modes of `benchmarks.group_pda`.
+
+A row holds every score of the catalogue by key, and three counts: "pairs", encounters of two groups; "kept", encounters
+after which both groups have their ids; "merged", encounters in which they were one estimated group
+(benchmarks/group_pda/encounters.py).
+"""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass, field, replace
+from unittest import mock
+
+import numpy as np
+
+from benchmarks.group_pda.encounters import outcomes
+from benchmarks.support.in_memory import in_memory
+from scenarios.errors import FlockscopeError
+from scenarios.loading.resolve import Entry
+from sim.sequence import simulate
+from sim.truth.group_hulls import box_groups
+from sim.types import DetectionMode, Image, Tracks, Truth
+from sim.types import Sequence as Recording
+from sim.workers.pool import process_pool
+from tracking.detect import background
+from tracking.detect.background_training import Trained, train
+from tracking.run import TrackingRun, track
+from tracking.scoring import evaluate
+
+Row = dict[str, float]
+
+
+@dataclass(frozen=True)
+class Variant:
+    """A tracker and its parameters.
+
+    in_image: the answers of a tracker of people from pixels are scored in the image, as groups from pixels are: its
+    groups stay, their hulls are those of its boxes.
+    """
+
+    name: str
+    tracker: str
+    params: Mapping[str, object] = field(default_factory=dict)
+    in_image: bool = False
+
+
+@dataclass(frozen=True)
+class TrackingJob:
+    """One sequence to make, and the trackers that track it."""
+
+    entry: Entry
+    seed: int
+    mode: DetectionMode
+    variants: tuple[Variant, ...]
+
+
+def trackers(name: str, mode: DetectionMode) -> tuple[Variant, ...]:
+    """Returns the tracker, its paper's ablation, and the baseline: groups by the baseline rule over `blob`."""
+    blob = (Variant("blob + baseline rule", "blob", in_image=True),) if mode == "image" else ()
+    on_ground = "blob …, on the ground" if mode == "image" else "blob + baseline rule"
+    ours = (Variant(name, name), Variant('association="none"', name, {"association": "none"}))
+    return (*ours, *blob, Variant(on_ground, "blob"))
+
+
+def measure(jobs: Iterable[TrackingJob], processes: int) -> Iterator[tuple[TrackingJob, dict[str, Row]]]:
+    """Yields each job with its rows by variant, as they are done.
+
+    A seed that cannot be simulated is printed and left out.
+    """
+    todo = list(jobs)
+    with process_pool(processes) as run:
+        for done, (job, found) in enumerate(run(rows_of_job, todo), 1):
+            print(f"\r{done}/{len(todo)} sequences", end="", file=sys.stderr, flush=True)
+            if isinstance(found, str):
+                print(f"\n{job.entry.name}, seed {job.seed}, left out: {found}", file=sys.stderr)
+                continue
+            yield job, found
+    print(file=sys.stderr)
+
+
+def rows_of_job(job: TrackingJob) -> dict[str, Row] | str:
+    """Returns the rows of one sequence by variant; the error as text if it cannot be simulated."""
+    streams = ("left",) if job.mode == "image" else ()
+    try:
+        live = simulate(job.entry.scenario, job.seed, job.entry.repeat, streams=streams)
+        truth = live.truth
+    except FlockscopeError as error:
+        return error.line()
+    assert truth is not None
+    sequence = in_memory(live) if streams else live
+    with trained_once():
+        answers = tracked(sequence, job.variants, job.mode)
+    return {v.name: row(truth, image_tracks(answers[v.name]) if v.in_image else answers[v.name]) for v in job.variants}
+
+
+def tracked(sequence: Recording, variants: Iterable[Variant], mode: DetectionMode) -> dict[str, TrackingRun]:
+    """Returns the answers of each variant; variants that differ only in how they are scored share one run."""
+    made: dict[tuple[str, str], TrackingRun] = {}
+    found = {}
+    for v in variants:
+        key = v.tracker, repr(v.params)
+        if key not in made:
+            made[key] = track(v.tracker, sequence, params=v.params or None, detections=mode)
+        found[v.name] = made[key]
+    return found
+
+
+@contextmanager
+def trained_once() -> Iterator[None]:
+    """Within it all trackers share the training on a background sample with the same options.
+
+    Training takes as long as tracking 200 frames. Its result depends on nothing else and is never changed.
+    """
+    known: dict[tuple[int, float, bool], Trained] = {}
+
+    def once(sample: Image, rate: float, follow_gain: bool) -> Trained:
+        key = id(sample), rate, follow_gain
+        if key not in known:
+            known[key] = train(sample, rate, follow_gain)
+        return known[key]
+
+    with mock.patch.object(background, "train", once):
+        yield
+
+
+def row(truth: Truth, answers: Sequence[Tracks]) -> Row:
+    """Returns the row of one tracker's answers."""
+    found = outcomes(truth, answers)
+    own = {"pairs": len(found), "kept": sum(f.kept for f in found), "merged": sum(f.merged for f in found)}
+    return {**evaluate(truth, answers), **own}
+
+
+def image_tracks(answers: Sequence[Tracks]) -> list[Tracks]:
+    """Returns tracks of people on the ground as tracks in the image, at the centres of their boxes."""
+    return [_image_tracks(t) for t in answers]
+
+
+def _image_tracks(t: Tracks) -> Tracks:
+    box = np.zeros((0, 4)) if t.box is None else t.box
+    middle, none = box[:, :2] + box[:, 2:] / 2, np.full((len(box), 2), np.nan)
+    order = np.argsort(t.id)
+    rows = (t.id[order], t.group[order], middle[order], none, box[order])
+    groups = box_groups(np.full(len(box), t.index), *rows, t.index, 1)[0]
+    events = tuple(replace(e, pos=_centre(middle, np.isin(t.id, e.members))) for e in t.events)
+    return t.replace(plane="image", pos=middle, vel=none, groups=groups, events=events)
+
+
+def _centre(middle: np.ndarray, rows: np.ndarray) -> tuple[float, float]:
+    x, y = middle[rows].mean(axis=0) if rows.any() else (float("nan"), float("nan"))
+    return float(x), float(y)

@@ -1,0 +1,56 @@
+"""Markdown tables on standard output, and cells of means, shares and differences with 95 % intervals."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+
+import numpy as np
+
+from tracking.stats import wilson
+
+EXACT = 1e-12  # a difference nearer to 0 is due to rounding
+
+
+def head(columns: Sequence[str]) -> None:
+    """Prints the names of the columns and the rule under them."""
+    row(columns)
+    print("|" + "---|" * len(columns))
+
+
+def row(cells: Iterable[str]) -> None:
+    """Prints one row at once, so that a long benchmark shows its progress."""
+    print("| " + " | ".join(cells) + " |", flush=True)
+
+
+def table(title: str, first: str, columns: Sequence[str], rows: Mapping[str, Sequence[str]]) -> None:
+    """Prints a whole table; first: name of the first column, which holds the keys of `rows`."""
+    print(f"\n{title}\n")
+    head([first, *columns])
+    for name, cells in rows.items():
+        row([name, *cells])
+
+
+def interval(mean: float, low: float, high: float) -> str:
+    """Returns "mean [low, high]"; without the ends if they are not finite; a dash if the mean is not."""
+    if not np.isfinite(mean):
+        return "–"
+    return f"{mean:.3f}" + (f" [{low:.3f}, {high:.3f}]" if np.isfinite(low) else "")
+
+
+def signed(mean: float, low: float, high: float) -> str:
+    """Returns a difference with its sign and its ends; * means that 0 lies outside."""
+    if not np.isfinite(mean):
+        return "–"
+    ends = f" [{low:+.3f}, {high:+.3f}]" if np.isfinite(low) else ""
+    return f"{mean:+.3f}{ends}" + (" *" if low > EXACT or high < -EXACT else "")
+
+
+def share(hits: int, count: int) -> str:
+    """Returns a share with Wilson's interval and its counts; a dash if `count` is 0."""
+    middle, low, high = wilson(hits, count)
+    return f"{interval(middle, low, high)} {hits}/{count}" if count else "–"
+
+
+def number(value: float, digits: int = 3) -> str:
+    """Returns a number, or a dash if it is not finite."""
+    return f"{value:.{digits}f}" if np.isfinite(value) else "–"
