@@ -62,7 +62,9 @@ def _start(
 
 @app.command()
 def demo(
-    quick: Annotated[bool, typer.Option("--quick", help="One short scene only.")] = False,
+    quick: Annotated[
+        bool, typer.Option("--quick", help="Only the short scenes of the suite quick, with one seed.")
+    ] = False,
     out: Out = Path("flockscope-demo"),
     json: Json = False,
 ) -> CommandResult:

@@ -8,7 +8,7 @@ from pathlib import Path
 import cv2
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from scenarios.errors import InputError
@@ -85,6 +85,7 @@ def test_merges_and_splits_outrank_the_rest() -> None:
     assert {5, 150} <= set(choose_frames(bare(200, events), 3))
 
 
+@settings(deadline=None)
 @given(
     length=st.integers(1, 300),
     frames=st.integers(1, 12),
