@@ -1,7 +1,7 @@
 """The types that modules exchange: frames, detections, tracks, groups, events, cameras, truth, sequences.
 
-Conventions (docs/formats.md): on the ground metres, x right, y away from the default camera, z up; in images px, (0, 0)
-the upper left corner, u right, v down; frames are 1-based, t = (frame - 1) / fps in s; angles in radians.
+Conventions (docs/reference/formats.md): on the ground metres, x right, y away from the default camera, z up; in images
+px, (0, 0) the upper left corner, u right, v down; frames are 1-based, t = (frame - 1) / fps in s; angles in radians.
 Arrays are float64 except ids (int64), flags (bool) and images (uint8); every array of these types is read-only. "ltwh"
 is left, top, width, height.
 """

@@ -1,8 +1,8 @@
 """Pixels per metre of an image: where the scale comes from, and the check that a tracker in the image has one.
 
 Lengths in configs are metres. A tracker that works in the image plane multiplies them by this scale once, in `reset`.
-Rules (docs/formats.md): the camera's scale at the image centre, else the scale that the recording states, else the
-median height of the given boxes divided by 1.7 m.
+Rules (docs/reference/formats.md): the camera's scale at the image centre, else the scale that the recording states,
+else the median height of the given boxes divided by 1.7 m.
 """
 
 from __future__ import annotations

@@ -152,7 +152,7 @@ def _make(tracker: str | type[Tracker] | Tracker, params: Params) -> tuple[str, 
     kind: type[Config] | None = getattr(found, "config_class", None)
     if kind is None:
         if params is not None:
-            remedy = "leave the parameters out, or give the class a config_class (docs/trackers.md)"
+            remedy = "leave the parameters out, or give the class a config_class (docs/guides/your-own-tracker.md)"
             raise InputError(place="params", got=name, expected="a tracker with parameters", remedy=remedy)
         return name, _instance(name, found), None
     config = config_of(kind, params)

@@ -95,7 +95,7 @@ def checked(found: Any, spec: str) -> type[Tracker]:
     fault = _class_fault(found)
     if fault:
         expected = f"a class with reset(context, seed), step(frame, detections) and needs, a tuple out of {NEEDS}"
-        raise InputError(file=spec, got=fault, expected=expected, remedy="see docs/trackers.md")
+        raise InputError(file=spec, got=fault, expected=expected, remedy="see docs/guides/your-own-tracker.md")
     return found  # type: ignore[no-any-return]
 
 
@@ -103,7 +103,7 @@ def config_class(tracker: type[Tracker], spec: str) -> type[Config]:
     """Return the class of the tracker's config. Raises InputError, naming `spec`, if the tracker has no parameters."""
     kind = getattr(tracker, "config_class", None)
     if kind is None:
-        remedy = "give the class a config_class that declares them (docs/trackers.md)"
+        remedy = "give the class a config_class that declares them (docs/guides/your-own-tracker.md)"
         raise InputError(place="tracker", got=spec, expected="a tracker with parameters", remedy=remedy)
     return cast("type[Config]", kind)
 

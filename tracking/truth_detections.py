@@ -56,7 +56,9 @@ def _sensed(truth: Truth, sequence: Sequence, sensor: Mapping[str, Any], seed: i
         first = error.errors()[0]
         place = ".".join(["sensor", *map(str, first["loc"])])
         expected = first["msg"]
-        raise InputError(place=place, got=first["input"], expected=expected, remedy="see docs/formats.md") from None
+        raise InputError(
+            place=place, got=first["input"], expected=expected, remedy="see docs/reference/formats.md"
+        ) from None
     if spec.box == "visible" or spec.by_visibility or spec.occlusion_power or spec.min_visibility:
         truth = with_visibility(truth, sequence.image_size)
     hides_groups, load_people = any(hide.group is not None for hide in spec.hide), sequence.load_people

@@ -144,7 +144,7 @@ class TuningEnv(gymnasium.Env[Floats, Floats]):
         assert opened.truth is not None
         rollout = None if self.decision_every is None else self._rollout(base, source)
         if rollout is not None and not hasattr(rollout.prepared.tracker, "config"):
-            expected, remedy = "a tracker that keeps its config as `config`", "see docs/tuning.md, Environment"
+            expected, remedy = "a tracker that keeps its config as `config`", "see docs/reference/environment.md"
             raise InputError(place="decision_every", got=self.tracker.__name__, expected=expected, remedy=remedy)
         self.source, self.base = source, base
         self._clear_episode()
@@ -278,7 +278,7 @@ def _action_parameters(kind: type[Config], mode: DetectionMode, every: int | Non
     space = space_of(kind, mode, online=every is not None)
     if not space:
         what = "parameters to search" if every is None else "parameters that may change between frames"
-        remedy = "declare some in its config (docs/trackers.md)"
+        remedy = "declare some in its config (docs/guides/your-own-tracker.md)"
         raise InputError(place="tracker", got=kind.tracker, expected=f"a tracker with {what}", remedy=remedy)
     return space
 

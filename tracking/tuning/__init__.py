@@ -1,4 +1,4 @@
-"""Search of a tracker's parameters on simulated scenes, judged on other scenes (docs/tuning.md).
+"""Search of a tracker's parameters on simulated scenes, judged on other scenes (docs/reference/tuning.md).
 
 `tracking.tuning.tune` is imported on first use: the command line reads tracking.tuning.options without numpy.
 """

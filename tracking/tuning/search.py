@@ -5,7 +5,7 @@
     found.write("blob.toml")
     tracks = tracking.track("blob", sequence, params=found.config)
 
-docs/tuning.md describes the method and what may be concluded from its results.
+docs/reference/tuning.md describes the method and what may be concluded from its results.
 """
 
 from __future__ import annotations

@@ -106,7 +106,7 @@ def _config(tracker: str, params: Path | None, settings: list[str]) -> Config | 
         place="--params" if params else f"--set {settings[0]}",
         got=tracker,
         expected="a tracker with parameters",
-        remedy="leave it out, or give the class a config_class (docs/trackers.md)",
+        remedy="leave it out, or give the class a config_class (docs/guides/your-own-tracker.md)",
     )
 
 
