@@ -77,7 +77,10 @@ FOOT_X, FOOT_Y, AXIS_X, AXIS_Y, LENGTH, WIDTH, SLOWDOWN = range(7)
 
 @dataclass(frozen=True, slots=True)
 class Steering:
-    """Parameters of the forces. The order of the fields is the order of the slots above."""
+    """Parameters of the forces on people. Each field's comment states unit and meaning.
+
+    The order of the fields is the order of the slots RELAXATION … MAX_ACCELERATION of the kernels' parameter array.
+    """
 
     relaxation: float = 0.5  # s: time in which a person takes up the wanted velocity
     cohesion_time: float = 1.6  # s: time in which a member returns to its place in the formation
@@ -102,17 +105,22 @@ class Steering:
     max_acceleration: float = 2.2  # m/s²: cap of the sum of all forces
 
     def array(self) -> Array:
-        """Returns the parameters as the kernels take them, shape (21,), one slot per field."""
+        """Returns the parameters as the kernels take them: float64, shape (21,), one slot per field, in the order of
+        the fields.
+        """
         return np.array(astuple(self))
 
 
 class GroupArrays(NamedTuple):
-    """State of G groups and of their ways. The goal kernels read it and update `current`, `heading`, `arrived`.
+    """State of G groups of people and of the ways they walk. `drive` reads it and updates current, heading, arrived,
+    status.
 
-    route (G, W, 2): waypoints in m; kind (G, W): PASS, NARROW, GATHER or END; length (G,): number of waypoints; current
-    (G,): index of the waypoint the group is walking to; speed (G,) m/s; heading (G, 2): unit vector; finish (G,): STAND
-    or LEAVE; arrived (G,): the end of the way is reached; status (G, 10): columns COUNT … AVOIDED, rewritten in each
-    step.
+    - route (G, W, 2): x, y of each group's waypoints, m. kind (G, W): PASS, NARROW (door), GATHER or END of each
+      waypoint.
+    - length (G,): number of waypoints. current (G,): index, from 0, of the waypoint the group is walking to.
+    - speed (G,): m/s. heading (G, 2): unit vector. finish (G,): STAND or LEAVE at the end of the way.
+    - arrived (G,): True once the end of the way is reached.
+    - status (G, 10): columns COUNT … AVOIDED as named at the top of this module, rewritten in each step.
     """
 
     route: Array
@@ -127,7 +135,10 @@ class GroupArrays(NamedTuple):
 
     @classmethod
     def empty(cls, g: int, w: int) -> GroupArrays:
-        """Returns arrays for g groups with ways of at most w waypoints: no way, heading along +x, speed 0."""
+        """Returns arrays for g groups with room for w waypoints each.
+
+        Every heading is +x, `arrived` is False, everything else is 0: ways of length 0 and speed 0.
+        """
         return cls(
             np.zeros((g, w, 2)),
             np.zeros((g, w), np.int64),
@@ -144,10 +155,12 @@ class GroupArrays(NamedTuple):
 class PeopleArrays(NamedTuple):
     """What the kernels know of the N people present, in the order of the physics engine's rows.
 
-    place (N, 2): place in the formation, (forward, left) of the group's middle, m; target (N, 2): place in a queue, m,
-    of people in mode TO_TARGET; pace (N,): greatest speed on the way to the target, m/s; wander (N, 2): fluctuation of
-    the wanted velocity, m/s; tag (N, 4): columns GROUP, MODE, QUEUE (-1: in no queue), WAYPOINT (index of the first
-    waypoint that this person has not passed).
+    - place (N, 2): place in the formation, m: forward and left of the group's middle.
+    - target (N, 2): x, y of the place in a queue, m; used only for people in mode TO_TARGET.
+    - pace (N,): greatest speed on the way to the target, m/s.
+    - wander (N, 2): fluctuation of the wanted velocity, m/s.
+    - tag (N, 4): columns GROUP (index), MODE (IN_GROUP or TO_TARGET), QUEUE (index, -1 in no queue), WAYPOINT (index of
+      the first waypoint that this person has not passed).
     """
 
     place: Array
@@ -158,14 +171,16 @@ class PeopleArrays(NamedTuple):
 
     @classmethod
     def empty(cls, n: int) -> PeopleArrays:
-        """Returns arrays for n people: places and targets zero, pace 1 m/s, all tags -1."""
+        """Returns arrays for n people: place, target and wander 0, pace 1 m/s, all four columns of `tag` -1."""
         return cls(np.zeros((n, 2)), np.zeros((n, 2)), np.ones(n), np.zeros((n, 2)), np.full((n, 4), -1, np.int64))
 
 
 class Obstacles(NamedTuple):
-    """What stands still, m: walls (W, 4) x1 y1 x2 y2; pillars (P, 3) x y radius; stairs (S, 7).
+    """What stands still in the scene, in m.
 
-    Columns of stairs: foot x y, unit vector from foot to head x y, length, width, share of the speed kept on them.
+    - walls (W, 4): x1, y1, x2, y2 of the two ends. pillars (P, 3): x, y of the middle, radius.
+    - stairs (S, 7): foot x, y; unit vector from foot to head x, y; length; width; share of the speed kept on them (0 to
+      1).
     """
 
     walls: Array

@@ -65,7 +65,11 @@ def _power_law(dx, dy, wx, wy, radius, strength, horizon, cap):  # type: ignore[
 
 @njit(cache=True)
 def _avoid_groups(status, rules, push):  # type: ignore[no-untyped-def]
-    """Write the acceleration of each group, taken as a disc, to push (G, 2), m/s²; the smaller group yields more."""
+    """Overwrite push (G, 2) with each group's acceleration, m/s², from avoiding other groups as discs.
+
+    status (G, 10): columns COUNT … AVOIDED; groups with AVOIDED 0 get 0. rules (21,): Steering.array(). The smaller
+    group of a pair yields more: its share is 2 × the other's size / the sum of both sizes.
+    """
     strength, horizon, radius = rules[AVOID_GROUP], rules[AVOID_TIME], rules[PERSON_RADIUS]
     reach, cap = rules[GROUP_RANGE], rules[AVOID_MAX]
     push[:] = 0.0
@@ -102,9 +106,9 @@ def _avoid_groups(status, rules, push):  # type: ignore[no-untyped-def]
 
 @njit(cache=True, inline="always")
 def _near_discs(rows, s, last, reach, radius, found):  # type: ignore[no-untyped-def]
-    """Write to `found` the discs s + 1 … last - 1 within reach of disc s and on collision course; returns how many.
+    """Write to `found` the groups s + 1 … last - 1 within `reach` m of group s, on collision course; return how many.
 
-    Two groups of one person each are left out: they avoid each other as people.
+    rows (6, G'): COUNT … RADIUS, groups sorted by x. radius: m per person. Two groups of one person each are left out.
     """
     count, x, y = rows[COUNT], rows[MEAN_X], rows[MEAN_Y]
     vx, vy, disc = rows[MEAN_VX], rows[MEAN_VY], rows[RADIUS]
@@ -123,10 +127,11 @@ def _near_discs(rows, s, last, reach, radius, found):  # type: ignore[no-untyped
 
 @njit(cache=True, inline="always")
 def _pair(state, tag, i, j, dx, dy, d2, rules, out):  # type: ignore[no-untyped-def]
-    """Add the forces between persons i and j to `out`; d = position of i - position of j, d2 = |d|².
+    """Add the forces between persons i and j, m/s², to out (N, 2); (dx, dy) = position i - position j, m; d2 = its
+    square.
 
-    Members of one group, and people in one queue, repel each other linearly at short range. Strangers repel each other
-    linearly where they are too close, else by the power law.
+    Same group or same queue: linear repulsion at short range. Strangers: linear where closer than two person radii,
+    else the power law. j gets the opposite force. state (N, 4): x, y, vx, vy. tag (N, 4): group, mode, queue, waypoint.
     """
     if tag[i, GROUP] == tag[j, GROUP]:
         if d2 >= rules[SEPARATION_RANGE] * rules[SEPARATION_RANGE]:
@@ -159,10 +164,10 @@ def _pair(state, tag, i, j, dx, dy, d2, rules, out):  # type: ignore[no-untyped-
 
 @njit(cache=True)
 def _cells(state, reach):  # type: ignore[no-untyped-def]
-    """Sort people into square cells at least `reach` (m) wide.
+    """Sort the people of state (N, 4), columns x, y, vx, vy, into square grid cells at least `reach` m wide.
 
-    Returns order (N,): people, cell after cell; start (C + 1,): where each cell begins in `order`; the number of cells
-    in a row of the grid. All people share one cell where there are at most BRUTE of them.
+    Returns order (N,): indices of people, cell after cell; start (C + 1,): where each of the C cells begins in `order`;
+    the number of cells along x. Up to BRUTE (48) people, also none, share one cell.
     """
     n = len(state)
     if n <= BRUTE:
@@ -191,10 +196,10 @@ def _cells(state, reach):  # type: ignore[no-untyped-def]
 
 @njit(cache=True, inline="always")
 def _candidates(rows, s, first, last, reach, touch, radius, found, m):  # type: ignore[no-untyped-def]
-    """Append to found[m:] those of first … last - 1 that may act on s; returns the new length.
+    """Append to found[m:] the indices t in first … last - 1 that may act on person s; return the new length.
 
-    They are nearer than the square root of `reach`, and either nearer than the square root of `touch` or on collision
-    course. No branches.
+    rows (4, N): x, y, vx, vy by cell. t counts if its squared distance is below `reach` (m²), and either below `touch`
+    (m²) or on collision course for discs whose radii add up to `radius` m.
     """
     x, y, vx, vy = rows[X], rows[Y], rows[VX], rows[VY]
     for t in range(first, last):
@@ -210,7 +215,7 @@ def _candidates(rows, s, first, last, reach, touch, radius, found, m):  # type: 
 
 @njit(cache=True)
 def _pairs(state, tag, rules, out):  # type: ignore[no-untyped-def]
-    """Add the forces between all people within reach to out (N, 2), each pair once."""
+    """Add the forces between people in reach of each other to out (N, 2), m/s², each pair once; state: x, y, vx, vy."""
     n = len(state)
     order, start, nx = _cells(state, rules[PERSON_RANGE])
     reach, radius = rules[PERSON_RANGE] * rules[PERSON_RANGE], 2.0 * rules[PERSON_RADIUS]
@@ -237,7 +242,10 @@ def _pairs(state, tag, rules, out):  # type: ignore[no-untyped-def]
 
 @njit(cache=True)
 def _walls(state, walls, pillars, rules, out):  # type: ignore[no-untyped-def]
-    """Add the forces of walls and pillars to out (N, 2): exponential repulsion; of pillars the power law, too."""
+    """Add the forces of walls and pillars to out (N, 2), m/s²: exponential repulsion; of pillars the power law, too.
+
+    state (N, 4): x, y, vx, vy. walls (W, 4): x1, y1, x2, y2. pillars (P, 3): x, y, radius. All in m, m/s.
+    """
     strength, decay = rules[WALL], rules[WALL_RANGE]
     for i in range(len(state)):
         x, y = state[i, X], state[i, Y]
@@ -270,10 +278,11 @@ def _walls(state, walls, pillars, rules, out):  # type: ignore[no-untyped-def]
 
 @njit(cache=True)
 def avoid(state, tag, status, walls, pillars, rules, push, out):  # type: ignore[no-untyped-def]
-    """Add all avoidance accelerations to out (N, 2), m/s², and cap each sum at MAX_ACCELERATION.
+    """Add all avoidance accelerations to out (N, 2), m/s², then shorten each row of `out` to MAX_ACCELERATION.
 
-    status (G, 10): as `drive` of forces_goal_kernels left it. push (G, 2): scratch. People in a queue do not take part
-    in the avoidance of their group as a whole.
+    state (N, 4): x, y, vx, vy. tag (N, 4): group, mode, queue, waypoint. status (G, 10): as `drive` left it. walls (W,
+    4), pillars (P, 3): m. rules (21,): Steering.array(). push (G, 2): scratch, overwritten. People in a queue do not
+    take part in the avoidance of their group as a whole.
     """
     _avoid_groups(status, rules, push)
     _pairs(state, tag, rules, out)

@@ -35,7 +35,11 @@ LOOSE = 2.2  # m: a group with a larger radius is not avoided as a whole
 
 @njit(cache=True)
 def _average(state, tag, status):  # type: ignore[no-untyped-def]
-    """Write COUNT and the means of each group to `status`; all other columns but AVOIDED become 0."""
+    """Overwrite status (G, 10): number of members (COUNT), mean position (m) and mean velocity (m/s) of each group.
+
+    All other columns but AVOIDED become 0, and so do the means of a group without members. state (N, 4): x, y, vx, vy.
+    tag (N, 4): its column GROUP is the index of each person's group.
+    """
     status[:, :AVOIDED] = 0.0
     for i in range(len(state)):
         g = tag[i, GROUP]
@@ -50,7 +54,12 @@ def _average(state, tag, status):  # type: ignore[no-untyped-def]
 
 @njit(cache=True)
 def _spread(state, place, tag, groups, status):  # type: ignore[no-untyped-def]
-    """Write RADIUS and MAX_OFF_PLACE of each group to `status`."""
+    """Raise RADIUS and MAX_OFF_PLACE of each group in status (G, 10) to the largest distance of a member, m.
+
+    RADIUS: from the group's mean position. MAX_OFF_PLACE: from the member's place in the formation, whose middle is the
+    gathering point if the current waypoint is GATHER, else the mean position. state (N, 4): x, y, vx, vy. place (N, 2):
+    forward, left, m. tag (N, 4): its column GROUP is the group's index. Both columns must be 0 before the call.
+    """
     for i in range(len(state)):
         g = tag[i, GROUP]
         dx, dy = state[i, X] - status[g, MEAN_X], state[i, Y] - status[g, MEAN_Y]
@@ -67,7 +76,11 @@ def _spread(state, place, tag, groups, status):  # type: ignore[no-untyped-def]
 
 @njit(cache=True)
 def _pass_doors(groups, people, status):  # type: ignore[no-untyped-def]
-    """Advance each group at a door to its next waypoint once every member present is through. Overwrites AVOIDED."""
+    """Advance `groups.current` of each group at a door by one, once every member present has passed the door.
+
+    A group without members present stays. Overwrites AVOIDED: 0.0 if a member has not passed the door yet, else 1.0.
+    status (G, 10) is `groups.status`.
+    """
     for g in range(len(status)):
         groups.status[g, AVOIDED] = 1.0
     for i in range(len(people.tag)):
@@ -82,7 +95,12 @@ def _pass_doors(groups, people, status):  # type: ignore[no-untyped-def]
 
 @njit(cache=True)
 def _lead_groups(groups, status, dt, rules):  # type: ignore[no-untyped-def]
-    """Advance each group on its way by dt (s): current waypoint, arrival, heading, wanted velocity."""
+    """Advance each group on its way by dt (s): updates groups.current, arrived and heading, and the wanted velocity in
+    status.
+
+    status (G, 10): columns COUNT … AVOIDED. rules (21,): Steering.array(). A group without members or way is left as it
+    is. A group that has arrived and stands drifts back to the end of its way at 0.3 m/s at most.
+    """
     turn_time, slow_time = rules[TURN_TIME], rules[SLOW_TIME]
     gather, radius = rules[GATHER_RADIUS], rules[PASS_RADIUS]
     for g in range(len(status)):
@@ -125,7 +143,10 @@ def _lead_groups(groups, status, dt, rules):  # type: ignore[no-untyped-def]
 
 @njit(cache=True)
 def _turn(heading, g, ex, ey, share):  # type: ignore[no-untyped-def]
-    """Turn the heading of group g towards the unit vector (ex, ey) by this share (at most 1) of the angle between."""
+    """Turn row g of heading (G, 2), unit vectors, in place towards the unit vector (ex, ey).
+
+    It turns by `share` of the angle between them, at most the whole angle.
+    """
     hx, hy = heading[g, 0], heading[g, 1]
     angle = np.arctan2(hx * ey - hy * ex, hx * ex + hy * ey) * min(share, 1.0)
     c, s = np.cos(angle), np.sin(angle)
@@ -136,10 +157,11 @@ def _turn(heading, g, ex, ey, share):  # type: ignore[no-untyped-def]
 
 @njit(cache=True)
 def _seek(state, people, groups, stairs, rules, out):  # type: ignore[no-untyped-def]
-    """Write the acceleration of each person towards its goal to out (N, 2), m/s².
+    """Overwrite out (N, 2) with the acceleration of each person towards its goal, m/s².
 
     A person in a queue walks to its target, a member at a door to and through the door, any other member to its place
-    in the formation. Stairs slow all of them down.
+    in the formation. Stairs reduce the wanted speed of all people. Sets the tag WAYPOINT of people who pass a door.
+    state (N, 4): x, y, vx, vy. stairs (S, 7): as in Obstacles. rules (21,): Steering.array().
     """
     status = groups.status
     relax, cohesion = rules[RELAXATION], rules[COHESION_TIME]
@@ -183,7 +205,11 @@ def _seek(state, people, groups, stairs, rules, out):  # type: ignore[no-untyped
 
 @njit(cache=True)
 def _through_door(groups, people, i, g, x, y, limit):  # type: ignore[no-untyped-def]
-    """Wanted velocity of person i whose group g is at a door; counts the person as through near its middle."""
+    """Returns the wanted velocity (vx, vy), m/s, of person i at (x, y), m, whose group g is at a door.
+
+    limit: speed, m/s; a person who has passed the door goes on at DOOR_PACE (0.6) of it. Within DOOR_DISTANCE (0.45 m)
+    of the door's middle the person's tag WAYPOINT is set to the waypoint behind the door.
+    """
     door = groups.current[g]
     w = max(people.tag[i, WAYPOINT], door)
     dx, dy = groups.route[g, w, 0] - x, groups.route[g, w, 1] - y
@@ -197,7 +223,10 @@ def _through_door(groups, people, i, g, x, y, limit):  # type: ignore[no-untyped
 
 @njit(cache=True)
 def _pace_on_stairs(x, y, stairs):  # type: ignore[no-untyped-def]
-    """Share of the speed kept at a point: that of the first stairs it lies on, 1 off the stairs."""
+    """Returns the share of the walking speed (0 to 1) that is kept at the point (x, y), m.
+
+    It is column SLOWDOWN of the first row of stairs (S, 7) that the point lies on, edges included; 1.0 off all stairs.
+    """
     for k in range(len(stairs)):
         dx, dy = x - stairs[k, FOOT_X], y - stairs[k, FOOT_Y]
         s = dx * stairs[k, AXIS_X] + dy * stairs[k, AXIS_Y]
@@ -209,7 +238,10 @@ def _pace_on_stairs(x, y, stairs):  # type: ignore[no-untyped-def]
 
 @njit(cache=True)
 def _mark_avoided(groups):  # type: ignore[no-untyped-def]
-    """Set AVOIDED of each group: 1.0 where its members are close together and it is not at a door."""
+    """Overwrite column AVOIDED of groups.status (G, 10) with 1.0 if others avoid the group as a whole, else 0.0.
+
+    A group is avoided if it has members present, its RADIUS is at most LOOSE (2.2 m) and it is not at a door.
+    """
     status = groups.status
     for g in range(len(status)):
         together = status[g, COUNT] > 0.0 and status[g, RADIUS] <= LOOSE
@@ -222,10 +254,13 @@ def drive(  # type: ignore[no-untyped-def]
     route, kind, length, current, speed, heading, finish, arrived, status,
     stairs, dt, rules, out,
 ):  # fmt: skip
-    """Write the accelerations towards goals to out (N, 2), m/s², and advance the groups' ways and headings by dt (s).
+    """Overwrite out (N, 2) with the accelerations towards goals, m/s², and advance the groups' ways and headings by dt
+    (s).
 
-    Returns False, with nothing written, where a state is not finite. Also rewrites `status`. The arrays of PeopleArrays
-    and GroupArrays are separate arguments, because numba takes 3 µs to unpack a named tuple.
+    Returns True; False, with nothing written, if |x| + |y| + |vx| + |vy| of a person is nan or at least 1e9. state (N,
+    4): x, y, vx, vy. place … tag are the fields of PeopleArrays and route … status those of GroupArrays, as separate
+    arguments, because numba takes 3 µs to unpack a named tuple. stairs (S, 7): as in Obstacles. rules (21,):
+    Steering.array(). Modifies current, heading, arrived, status, and the tag WAYPOINT of people who pass a door.
     """
     for i in range(len(state)):
         if not abs(state[i, X]) + abs(state[i, Y]) + abs(state[i, VX]) + abs(state[i, VY]) < 1e9:

@@ -17,9 +17,10 @@ SIDEWAYS_LEAD = 0.6  # groups side by side meet this share of their distance fur
 
 
 def rows_of(n: int) -> list[int]:
-    """Returns the sizes of the rows of a walking group of n people, front row first.
+    """Returns the sizes of the rows of a walking group of n people, front row first; they add up to n.
 
-    Up to 3 people form one row. More people form rows of 3 in front and rows of 2 behind.
+    Up to 3 people form one row. More people form rows of 3 in front and one or two rows of 2 behind if n is no multiple
+    of 3.
     """
     if n <= 3:
         return [n]
@@ -28,7 +29,11 @@ def rows_of(n: int) -> list[int]:
 
 
 def walking(n: int, spacing: float) -> Array:
-    """Returns the places (n, 2) of a walking group, m; neighbours in a row are `spacing` metres apart."""
+    """Returns the places (n, 2) of a walking group of n ≥ 1 people, m: forward and left of the group's middle.
+
+    Front row first, left to right within a row; the mean is zero. Neighbours in a row are `spacing` m apart, rows 1.15
+    × spacing. The middle person of a row of three is 0.3 × spacing behind the two beside.
+    """
     rows = []
     for k, size in enumerate(rows_of(n)):
         left = (np.arange(size)[::-1] - (size - 1) / 2) * spacing
@@ -42,7 +47,10 @@ def walking(n: int, spacing: float) -> Array:
 
 
 def standing(n: int, spacing: float) -> Array:
-    """Returns the places (n, 2) of a group in conversation, m: a circle with neighbours `spacing` metres apart."""
+    """Returns the places (n, 2) of a group of n ≥ 1 people in conversation, m: forward and left of the group's middle.
+
+    They lie on a circle with neighbours `spacing` m apart. One person stands in the middle.
+    """
     if n == 1:
         return np.zeros((1, 2))
     angle = 2 * np.pi * (np.arange(n) + 0.5) / n
@@ -51,13 +59,20 @@ def standing(n: int, spacing: float) -> Array:
 
 
 def to_world(places: Array, middle: Array, heading: Array) -> Array:
-    """Returns places (n, 2) of a formation as points (n, 2) of the world, m; heading (2,) is a unit vector."""
+    """Returns the world points (n, 2): x, y in m, of places (n, 2): forward and left of a group's middle, m.
+
+    middle (2,): the group's middle in the world, m. heading (2,): unit vector in which the group faces.
+    """
     left = np.array([-heading[1], heading[0]])
     return np.asarray(middle + places[:, :1] * heading + places[:, 1:] * left)
 
 
 def assign(pos: Array, points: Array) -> Ints:
-    """Returns the index of the point that each person takes (n,): the least sum of squared distances; both (n, 2)."""
+    """Returns for each of n people the index of the point that the person takes, shape (n,), every point once.
+
+    The sum of the squared distances is least. pos (n, 2): people; points (n, 2): places; both in m. Raises ValueError
+    if a coordinate is nan.
+    """
     from scipy.optimize import linear_sum_assignment
 
     cost = np.sum((pos[:, None] - points[None]) ** 2, axis=2)
@@ -65,11 +80,12 @@ def assign(pos: Array, points: Array) -> Ints:
 
 
 def meeting_point(middles: Array, speeds: Array, goal: Array | None) -> Array:
-    """Returns where G groups that walk to each other meet (2,), m, all at about the same time.
+    """Returns the point (2,), m, at which G groups that walk to each other meet at about the same time.
 
-    middles (G, 2): where the groups are, m; speeds (G,) m/s; goal (2,): where they go together, None if nowhere. The
-    point is the mean of the middles, weighted by 1 / speed. With a goal it is shifted towards it, the further the more
-    the groups walk side by side, but never beyond it.
+    middles (G, 2): where the groups are, m. speeds (G,): m/s, above 0. goal (2,): where they go together afterwards, m;
+    None if nowhere. The point is the mean of the middles, weighted by 1 / speed. With a goal it is shifted towards the
+    goal, but never beyond it, by 1.2 times the mean distance of the middles from the line between that mean and the
+    goal.
     """
     weights = (1 / speeds) / np.sum(1 / speeds)
     centre = np.asarray(weights @ middles)
@@ -85,10 +101,10 @@ def meeting_point(middles: Array, speeds: Array, goal: Array | None) -> Array:
 
 
 def part_sizes(sizes: list[int | None], total: int) -> list[int]:
-    """Returns the sizes of all parts of a group of `total` people.
+    """Returns the number of people in each part of a group of `total` people that divides, in the order of `sizes`.
 
-    None in `sizes` stands for an equal share of the people left over; the first of these parts get one more where the
-    division leaves a remainder.
+    None in `sizes` stands for an equal share of the people left over. If the division leaves a remainder r, the first r
+    of these parts get one person more. Sizes that do not fit `total` are not checked.
     """
     open_parts = [k for k, s in enumerate(sizes) if s is None]
     rest = total - sum(s for s in sizes if s is not None)
@@ -99,10 +115,12 @@ def part_sizes(sizes: list[int | None], total: int) -> list[int]:
 
 
 def divide(offsets: Array, ways: Array, sizes: list[int]) -> Ints:
-    """Returns the index of the part that each of n members joins (n,); those furthest in a part's direction join it.
+    """Returns the index of the part that each of n members joins when a group divides, shape (n,).
 
-    offsets (n, 2): positions relative to the group's middle, m; ways (K, 2): from the middle to each part's goal, m;
-    sizes: number of members of each part. Members in excess of the sizes join the last part.
+    offsets (n, 2): members' positions relative to the group's middle, m. ways (K, 2): vectors from the middle to each
+    part's goal, m. sizes: number of members of each of the K parts. Parts fill up to their sizes so that the sum of the
+    members' distances ahead, in the direction of their part, is greatest. Members in excess of the sizes join the last
+    part.
     """
     from scipy.optimize import linear_sum_assignment
 

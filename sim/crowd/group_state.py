@@ -35,16 +35,23 @@ MAX_QUEUE_SPEED = 1.4  # m/s, of people on the way to their place in a queue
 
 
 class GroupState:
-    """Groups by index and people by column.
+    """The groups of a running simulation, by group index, and their people, by column (column = person id - 1).
 
-    State: `alive` (index of each existing group by name); `members` (columns), `spacing` (m) and `goals` (point, what
-    to do there) by group index; `arrays` (ways of the groups, as the kernels use them); `settled` (groups that stand in
-    a circle); by column: `group_of`, `queue_of` (-1: none), `present`, `places` (P, 2) in the formation, `targets`
-    (P, 2) in a queue, `waypoint` (first waypoint not passed).
+    - alive: index of each existing group by name. arrays: the ways of all groups, as the kernels use them.
+    - by group index: members (columns), spacing (m), goals (point (2,) in m; "stand", "leave" or "walk").
+    - settled: indices of groups that stand in a circle. next_group: index of the next group that an order makes.
+    - by column: group_of (group index), queue_of (order index, -1 in no queue), present, free_speed (m/s), places (P,
+      2) in the formation (forward, left, m), targets (P, 2) in a queue (x, y, m), waypoint (index of the first not
+      passed).
+    - slowdown: m/s by which a group is slower for each member after the first.
     """
 
     def __init__(self, entering: list[EnteringGroup], new: int, navigator: Navigator, slowdown: float) -> None:
-        """`new`: how many groups orders may still make; `slowdown`: m/s for each member after the first."""
+        """Starts with nobody present and the script's groups alive.
+
+        entering: groups of the script with their people. new: greatest number of groups that orders may still make.
+        navigator: finds ways round walls. slowdown: m/s by which a group is slower for each member after the first.
+        """
         people = [m for g in entering for m in g.members]
         self.navigator, self.slowdown = navigator, slowdown
         self.arrays = GroupArrays.empty(len(entering) + new, MAX_WAY)
@@ -65,11 +72,15 @@ class GroupState:
         self.settled: set[int] = set()
 
     def all_present(self, g: int) -> bool:
-        """True if every member of group g is in the scene."""
+        """Returns True if every member of group index g is in the scene; KeyError for an index without a group."""
         return bool(self.present[self.members[g]].all())
 
     def enter(self, group: EnteringGroup) -> None:
-        """Marks the members as present, starts the group's way and gives the members their places."""
+        """Marks the group's members as present, starts the group's way and sets the members' places in the formation.
+
+        A group whose goal is at most 0.3 m from its start stands in a circle and counts as settled; any other group
+        gets the walking formation.
+        """
         g = group.index
         self.go(g, group.start, group.via, group.goal, group.finish, group.speed)
         columns = self.members[g]
@@ -81,9 +92,10 @@ class GroupState:
         self.places[columns] = places
 
     def remove_leaving(self, columns: Ints) -> list[int]:
-        """Returns those of the columns whose group has arrived where it leaves, and marks them as absent.
+        """Returns the columns of people who leave now, in the given order, and marks them as absent.
 
-        People in a queue stay.
+        columns (N,): people present. A person leaves if the group has reached the end of its way and its finish is
+        LEAVE. People in a queue stay. Empty if nobody leaves.
         """
         done = self.arrays.arrived & (self.arrays.finish == LEAVE)
         if not done.any():
@@ -103,11 +115,12 @@ class GroupState:
         speed: float,
         gather: Array | None = None,
     ) -> None:
-        """Gives group g a way from start past via to goal, points (2,) in m, round walls and through doors.
+        """Sets the way of group index g from start past the via points to goal, round walls and through doors.
 
-        finish: "stand", "leave" or "walk" (straight on beyond the goal); speed: m/s; gather: point where the group
-        first waits for all members, None to start at once. Where no way exists, the group walks straight. Waypoints
-        after the first MAX_WAY are dropped.
+        start, goal, gather (2,) and each of via (2,): m. finish: "stand", "leave" or "walk" (straight on for 1000 m
+        beyond the goal). speed: m/s. gather: point where the group first waits for all members, None to start at once.
+        Where no way exists, the group walks straight. Waypoints after the first MAX_WAY (32) are dropped. Also does
+        what `write_way` does.
         """
         way: list[tuple[Array, int]] = [] if gather is None else [(gather, GATHER)]
         here = start if gather is None else gather
@@ -123,7 +136,14 @@ class GroupState:
         self.write_way(g, way[:MAX_WAY], finish, speed, start)
 
     def write_way(self, g: int, way: list[tuple[Array, int]], finish: str, speed: float, start: Array) -> None:
-        """Writes a way, (point, kind) each, to the arrays of group g, which then faces the first point from start."""
+        """Overwrites the way of group index g: its waypoints, speed (m/s) and finish; the group starts at the first
+        waypoint.
+
+        way: 1 to MAX_WAY (32) pairs of a point (2,) in m and a kind (PASS, NARROW, GATHER or END). finish: "leave"
+        leaves the scene at the end; any other word stands. start (2,): where the group is, m. The heading turns from
+        start to the first waypoint; from a gathering point to the waypoint after it. It stays as it was if these two
+        points coincide. `arrived` becomes False, and the members' waypoints 0.
+        """
         arrays = self.arrays
         for k, (point, kind) in enumerate(way):
             arrays.route[g, k], arrays.kind[g, k] = point, kind
@@ -138,7 +158,11 @@ class GroupState:
         self.waypoint[self.members[g]] = 0
 
     def new_group(self, name: str, columns: list[int], spacing: float) -> int:
-        """Makes a group of the people in these columns, takes them out of queues, and returns its index."""
+        """Makes a group of the people in these columns, takes them out of queues, and returns the new group's index.
+
+        name: of the group in the script. spacing: m between neighbours. The group has no way and no places yet. The old
+        groups keep their entries in `alive` and `members`; the caller removes them from `alive`.
+        """
         g = self.next_group
         self.next_group += 1
         self.alive[name], self.members[g], self.spacing[g] = g, sorted(columns), spacing
@@ -147,16 +171,29 @@ class GroupState:
         return g
 
     def walking_speed(self, columns: list[int]) -> float:
-        """Returns the speed in m/s of a group of these people."""
+        """Returns the speed in m/s of a group of the people in these columns.
+
+        It is the mean of their free speeds minus `slowdown` for each member after the first, at least 0.3 m/s.
+        """
         return walking_speed(list(self.free_speed[columns]), self.slowdown)
 
     def take_places(self, columns: list[int], places: Array, middle: Array, g: int, pos: Array) -> None:
-        """Gives each person at pos (n, 2) the nearest of the places (n, 2) of group g, whose middle is at `middle`."""
+        """Gives each of the people in these n columns one of the places of group index g.
+
+        The sum of the squared distances that they have to walk is least. places (n, 2): forward, left of the group's
+        middle, m. middle (2,), pos (n, 2): the group's middle and the people's positions in the world, m. The group's
+        heading is used.
+        """
         points = to_world(places, middle, self.arrays.heading[g])
         self.places[columns] = places[assign(pos, points)]
 
     def settle_arrived(self, state: Array) -> bool:
-        """Lets groups that have arrived stand in a circle; returns True if there was one. state (P, 4) by column."""
+        """Gives the members of groups that have just arrived and stand the places of a circle; returns True if there
+        was one.
+
+        state (P, 4): x, y, vx, vy of each person by column, m, m/s; nan while absent. Members who are absent get no
+        place.
+        """
         changed = False
         for g in np.flatnonzero(self.arrays.arrived).tolist():
             if g not in self.settled and self.arrays.finish[g] == STAND:
@@ -168,7 +205,10 @@ class GroupState:
         return changed
 
     def fill(self, people: PeopleArrays, columns: Ints) -> None:
-        """Writes groups, places, modes, queues and targets of the people in these columns to the kernels' arrays."""
+        """Overwrites place, target, pace and tag of `people` (N rows) with the state of the people in columns (N,).
+
+        `people.wander` is left as it is. The pace to a place in a queue is the group's speed, at most 1.4 m/s.
+        """
         queue = self.queue_of[columns]
         people.place[:] = self.places[columns]
         people.target[:] = self.targets[columns]

@@ -11,11 +11,12 @@ TURN_TIME = 0.3  # s
 
 
 def headings(pos: Array, vel: Array, present: Bools, intent: Ints, fps: float) -> Array:
-    """Returns where each person faces in each frame, shape (T, P), radians from +x, nan while absent.
+    """Returns the direction in which each person faces in each frame, shape (T, P), radians from +x, nan while absent.
 
-    pos, vel (T, P, 2): m, m/s; present (T, P); intent (T, P): group index, -1 while absent. A heading follows the
-    wanted direction with time constant TURN_TIME. A slow person who is alone keeps the heading. A person who enters
-    faces the wanted direction at once, +x if there is none.
+    pos, vel (T, P, 2): m, m/s. present (T, P): flags. intent (T, P): group index, -1 while absent. fps: frames per s. A
+    person faster than WALKING_SPEED (0.25 m/s) turns to the velocity, a slower one to the middle of the group; a slow
+    person who is alone keeps the heading. The time constant is TURN_TIME (0.3 s). A person who enters for the first
+    time faces the wanted direction at once, +x if there is none.
     """
     out = np.full(present.shape, np.nan)
     facing = np.zeros((present.shape[1], 2))
@@ -36,7 +37,11 @@ def headings(pos: Array, vel: Array, present: Bools, intent: Ints, fps: float) -
 
 
 def _towards_group(pos: Array, intent: Ints, slow: Bools, facing: Array) -> Array:
-    """Directions (K, 2) from the K slow people to the middle of their group; of people alone, their present facing."""
+    """Returns vectors (K, 2), not of unit length, from the K slow people to the middle of their group, m.
+
+    A person who is alone gets the present facing. pos (P, 2): m. intent (P,): group index, -1 while absent. slow (P,):
+    flags of the K people. facing (P, 2): where all people face now.
+    """
     here = intent >= 0
     groups = np.where(here, intent, 0)
     n = int(groups.max()) + 1

@@ -15,9 +15,12 @@ CLEARANCE = 0.6  # m kept from a wall's end on the way round it
 
 
 def cut_walls(walls: Array, doors: list[tuple[Array, float]]) -> tuple[Array, Array]:
-    """Returns the walls (W, 2, 2) with the doors' openings cut out, and the openings (D, 2, 2): two ends each, m.
+    """Returns the walls (W, 2, 2) with the doors' openings cut out, and the openings (D, 2, 2): two ends x, y each, in
+    m.
 
-    walls (N, 2, 2): both ends, m; doors: middle (2,) and width of each, m. A door is cut out of the wall nearest to it.
+    walls (N, 2, 2): both ends, m. doors: middle (2,) and width of each, m. A door is cut out of the wall nearest to it;
+    the opening ends at the wall's ends. The pieces of a cut wall come after all uncut walls; pieces without length are
+    dropped. Raises ValueError if there are doors but no walls.
     """
     pieces = [np.asarray(w, dtype=float) for w in walls]
     openings = []
@@ -38,7 +41,10 @@ def cut_walls(walls: Array, doors: list[tuple[Array, float]]) -> tuple[Array, Ar
 
 
 def scene_of(world: WorldSpec) -> Scene:
-    """Returns the world of a scenario as arrays; its walls leave out the openings of doors."""
+    """Returns the world of a scenario as the arrays of a Scene, in m; its walls leave out the openings of doors.
+
+    Absent things give empty arrays. Raises ValueError if the world has doors but no walls.
+    """
     walls = np.array(world.walls, dtype=float).reshape(-1, 2, 2)
     doors = [(np.array(d.at, dtype=float), d.width) for d in world.doors]
     pieces, openings = cut_walls(walls, doors)
@@ -58,16 +64,17 @@ def scene_of(world: WorldSpec) -> Scene:
 
 
 def _distance(point: Array, wall: Array) -> float:
-    """Distance of a point (2,) from a wall (2, 2), m."""
+    """Returns the distance in m of a point (2,) from the nearest point of a wall (2, 2), two ends x, y in m."""
     along = wall[1] - wall[0]
     s = np.clip((point - wall[0]) @ along / max(along @ along, 1e-12), 0, 1)
     return float(np.linalg.norm(point - wall[0] - s * along))
 
 
 def blocked(a: Array, b: Array, walls: Array) -> Bools:
-    """Returns True (...) for each segment from a to b, both (..., 2), that crosses one of the walls (W, 2, 2).
+    """Returns for each segment from a to b whether it crosses a wall, shape (...).
 
-    Touching a wall with an end is no crossing.
+    a, b (..., 2): ends, m. walls (W, 2, 2): two ends each, m. Touching a wall with an end is no crossing, nor is
+    running along it. Without walls all are False.
     """
     if not len(walls):
         return np.zeros(a.shape[:-1], dtype=np.bool_)
@@ -84,11 +91,13 @@ def blocked(a: Array, b: Array, walls: Array) -> Bools:
 
 
 class Navigator:
-    """Finds shortest ways in one scene.
+    """Finds the shortest ways round walls and through doors in one scene.
 
-    State: `nodes` (N, 2), m: the middles of all doors, then points CLEARANCE beyond the ends of walls; `edges` (N, N):
-    their distances, inf where a wall or door lies between. Doors block segments like walls, so that every way through a
-    door leads over its middle.
+    - nodes (N, 2), m: the middles of all doors, then points CLEARANCE (0.6 m) beyond the ends of walls.
+    - edges (N, N), m: distances between nodes, inf where a wall or door lies between.
+    - walls, doors, closed (…, 2, 2), m: wall pieces, door openings, and both together. size (2,): of the world, m.
+
+    Doors block segments like walls, so every way through a door leads over its middle.
     """
 
     def __init__(self, scene: Scene) -> None:
@@ -100,7 +109,10 @@ class Navigator:
         self.edges = self._lengths(self.nodes, self.nodes)
 
     def _wall_ends(self) -> Array:
-        """Points (K, 2) beyond both ends of each wall that lie in the world and clear of other walls."""
+        """Returns points (K, 2), m, 0.6 m (CLEARANCE) beyond both ends of each wall.
+
+        Points outside the world, and points within 0.54 m of a wall or door, are left out.
+        """
         along = self.walls[:, 1] - self.walls[:, 0]
         along = along / np.linalg.norm(along, axis=1, keepdims=True)
         ends = np.concatenate([self.walls[:, 0] - CLEARANCE * along, self.walls[:, 1] + CLEARANCE * along])
@@ -109,15 +121,19 @@ class Navigator:
         return np.asarray(ends[inside & np.array(free, dtype=bool)])
 
     def _lengths(self, a: Array, b: Array) -> Array:
-        """Distances (A, B) between points, m; inf where the straight line is blocked."""
+        """Returns the distances (A, B) in m from points a (A, 2) to points b (B, 2); inf where a wall or door lies
+        between.
+        """
         d = np.linalg.norm(a[:, None] - b[None], axis=2)
         hidden = blocked(np.repeat(a[:, None], len(b), 1), np.repeat(b[None], len(a), 0), self.closed)
         return np.asarray(np.where(hidden, np.inf, d))
 
     def way(self, start: Array, goal: Array) -> tuple[Array, Bools] | None:
-        """Returns the points (K, 2) to walk to, the goal last, and which of them belong to a door (K,); None if no way.
+        """Returns the points (K, 2) in m to walk to, in order, the goal last, and flags (K,): True for points that
+        belong to a door.
 
-        A door gives two points: its middle, and one BEHIND metres beyond it.
+        start, goal (2,): m; the start is not among the points. A door gives two points: its middle, and one BEHIND (0.7
+        m) beyond it. Returns None if walls leave no way.
         """
         ends = np.stack([start, goal])
         if not blocked(ends[:1], ends[1:], self.closed)[0]:
@@ -142,14 +158,19 @@ class Navigator:
         return np.array(way), np.array(narrow)
 
     def _beyond_door(self, door: int, way: Array) -> Array:
-        """Vector (2,) across the wall, BEHIND metres long, from the middle of a door to where `way` leads."""
+        """Returns the vector (2,), 0.7 m (BEHIND) long, across door number `door`, to the side that the vector way (2,)
+        leads to.
+        """
         along = self.doors[door, 1] - self.doors[door, 0]
         across = np.array([-along[1], along[0]]) / np.linalg.norm(along)
         return np.asarray(BEHIND * across * (1.0 if across @ way > 0 else -1.0))
 
 
 def _dijkstra(lengths: Array, start: int, goal: int) -> list[int] | None:
-    """Shortest path over lengths (N, N), inf = no edge: nodes after the start, the goal last; None if there is none."""
+    """Returns the shortest path from node `start` to node `goal`: node indices without the start, the goal last.
+
+    lengths (N, N): edge lengths, inf = no edge. None if there is no path.
+    """
     n = len(lengths)
     far, before, done = np.full(n, np.inf), np.full(n, -1), np.zeros(n, dtype=bool)
     far[start] = 0.0

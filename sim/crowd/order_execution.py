@@ -21,12 +21,20 @@ from sim.types import Array, Order
 
 
 def groups_made(scenario: Scenario) -> int:
-    """Returns how many groups the orders of a scenario make at most."""
+    """Returns the greatest number of new groups that the orders of a scenario make.
+
+    A merge counts 1 and a split its parts. A queue makes none but counts 1, too.
+    """
     return sum(len(e.parts) if isinstance(e, SplitOrder) else 1 for e in scenario.event)
 
 
 class OrderExecution:
-    """State: the pending orders, ids of those that have come true, and the queues, by index of their order."""
+    """Carries out the orders of one scenario on the groups of a running simulation.
+
+    - groups: the groups whose members, ways and places the orders change. placement: turn and mirror of the script.
+    - pending: all orders, in the order of the file, fired or not. come_true: ids of orders whose rule has come true.
+    - queues: the opened queues, by index (from 0) of their order in the file. fps: frames per s.
+    """
 
     def __init__(
         self, scenario: Scenario, groups: GroupState, placement: ScriptPlacement, seed: int, repeat: int
@@ -41,17 +49,19 @@ class OrderExecution:
         return rng(self.seed, role, *keys, repeat=self.repeat)
 
     def _pending(self, order: MergeOrder | SplitOrder | QueueOrder, k: int) -> PendingOrder:
-        """The k-th order, with its delay and time drawn."""
+        """Returns the order with index k (from 0) in the file, ready to wait for its trigger; its delay and time are
+        drawn, s.
+        """
         when = order.when
         time = np.inf if when.time is None else draw(when.time, self._rng("event", k, 1))
         at = None if when.reach is None or when.reach.at is None else self.placement.point(np.array(when.reach.at))
         return PendingOrder(order, k, draw(when.delay, self._rng("event", k, 0)), time, at)
 
     def advance(self, frame: int, t: float, state: Array) -> bool:
-        """Fires orders that are due at time t (s), serves queues, and lets groups that have arrived stand.
+        """Fires orders that are due at time t (s), serves queues, and lets groups that have arrived stand in a circle.
 
-        frame counts from 0; state (P, 4) by column, nan where absent. Returns False only if nothing has changed that
-        `GroupState.fill` writes.
+        frame counts from 0. state (P, 4): x, y, vx, vy by column, nan while absent. Returns False only if nothing has
+        changed that `GroupState.fill` writes. It is always True once a queue has opened.
         """
         changed = bool(self.queues)
         for pending in self.pending:
@@ -77,7 +87,11 @@ class OrderExecution:
             self._line_up(pending, order)
 
     def _merge(self, pending: PendingOrder, order: MergeOrder, state: Array) -> None:
-        """Makes one group of the parents: it gathers where they meet, then stands there or goes to the order's goal."""
+        """Makes one group of the merging groups; it gathers where they meet.
+
+        Then it stands there in a circle, or walks to the order's goal, no faster than its slowest parent. state (P, 4):
+        x, y, vx, vy by column. Sets pending.before and pending.after (columns).
+        """
         groups, arrays = self.groups, self.groups.arrays
         parents = [groups.alive.pop(name) for name in order.groups]
         parts = [list(groups.members[g]) for g in parents]
@@ -103,7 +117,11 @@ class OrderExecution:
         groups.take_places(columns, places, meeting, g, state[columns, :2])
 
     def _split(self, pending: PendingOrder, order: SplitOrder, state: Array) -> None:
-        """Divides a group into the order's parts, each of which sets out for its own goal."""
+        """Divides a group into the order's parts and gives each part a way to its own goal.
+
+        state (P, 4): x, y, vx, vy by column. Each part keeps the group's heading. Sets pending.before and pending.after
+        (columns).
+        """
         groups = self.groups
         parent = groups.alive.pop(order.group)
         columns = groups.members[parent]
@@ -126,7 +144,11 @@ class OrderExecution:
         pending.after = tuple(after)
 
     def _line_up(self, pending: PendingOrder, order: QueueOrder) -> None:
-        """Opens a queue, sends the groups to it, and draws how long each is served and where it goes afterwards."""
+        """Opens a queue and sends the order's groups to it.
+
+        Draws each group's service time (s). Overwrites where each group goes afterwards, if the order has a goal. Sets
+        pending.before and pending.after (columns).
+        """
         groups = self.groups
         queuing = [groups.alive[n] for n in concerned(order, list(groups.alive))]
         r = self._rng("service", pending.index)
@@ -148,7 +170,11 @@ class OrderExecution:
             )
 
     def _serve(self, k: int, queue: ServiceQueue, t: float, state: Array) -> None:
-        """Moves queue k on: sets the target of each person in it, and sends groups that are done to their goals."""
+        """Advances a queue to time t (s): sets the target place of each person in it, and sends served groups to their
+        goals.
+
+        k: index of the queue's order. state (P, 4): x, y, vx, vy by column.
+        """
         groups = self.groups
         slots, done = queue.advance(t, groups.members, state[:, :2])
         for column, slot in slots.items():
@@ -162,7 +188,11 @@ class OrderExecution:
             groups.places[columns] = walking(len(columns), groups.spacing[g])
 
     def record(self) -> tuple[Order, ...]:
-        """Returns all orders, fired or not, with person ids (column + 1) of the groups before and after."""
+        """Returns all orders of the script, in the order of the file, with the person ids (column + 1) before and
+        after.
+
+        `fired` is the 1-based frame. Of an order that never fired it is None, and before and after are empty.
+        """
 
         def ids(parts: tuple[tuple[int, ...], ...]) -> tuple[tuple[int, ...], ...]:
             return tuple(tuple(c + 1 for c in part) for part in parts)

@@ -31,8 +31,9 @@ WANDER_TIME = 1.5  # s, correlation time
 class ScriptPlacement:
     """How a seed places a whole script in the world.
 
-    middle (2,): middle of the world, m; turn: radians about it, counter-clockwise; flip: -1.0 mirrors x before the
-    turn, 1.0 does not; lead: s by which all walking groups start further along their way.
+    - middle (2,): middle of the world, m, about which the script is turned.
+    - turn: angle in radians, counter-clockwise. flip: -1.0 mirrors x before the turn, 1.0 does not.
+    - lead: s by which all walking groups start further along their way; negative: further back.
     """
 
     middle: Array
@@ -41,12 +42,18 @@ class ScriptPlacement:
     lead: float = 0.0
 
     def point(self, p: Array) -> Array:
-        """Returns where a point (2,) of the script lies in the world, m."""
+        """Returns where a point (2,) of the script, m, lies in the world (2,), m: mirrored, then turned about the
+        middle.
+        """
         d = (p - self.middle) * np.array([self.flip, 1.0])
         return self.middle + self.vector(d, flip=False)
 
     def vector(self, d: Array, *, flip: bool = True) -> Array:
-        """Returns a direction (2,) of the script as one of the world; flip=False leaves out the mirror."""
+        """Returns a direction d (2,) of the script as a direction (2,) of the world: mirrored, then turned; the length
+        is kept.
+
+        flip=False leaves out the mirror.
+        """
         if flip:
             d = d * np.array([self.flip, 1.0])
         c, s = np.cos(self.turn), np.sin(self.turn)
@@ -55,7 +62,12 @@ class ScriptPlacement:
 
 @dataclass
 class Person:
-    """One person: column in the Motion, key of the random streams, free speed (m/s), height (m)."""
+    """One person of a crowd.
+
+    - column: in the arrays of a Motion; the person's id is column + 1.
+    - key: (entry of `group`, its copy, member), each from 0; keys the person's random streams.
+    - free_speed: walking speed alone, m/s. height: of the body, m.
+    """
 
     column: int
     key: tuple[int, ...]
@@ -65,10 +77,12 @@ class Person:
 
 @dataclass
 class EnteringGroup:
-    """One group of the script as it enters.
+    """One group of the script, as it enters the scene.
 
-    index: of the group among all groups; start, goal, via: points (2,) in m; speed: m/s, of the group; spacing: m
-    between neighbours; enter: s; finish: "stand", "leave" or "walk"; pos (n, 2): where the members start, m.
+    - name: in the script. index: among all groups, from 0 (-1 until it has room). members: its people, in order.
+    - start, goal (2,), via (each (2,)): points in the world, m. pos (n, 2): where the members start, m.
+    - speed: of the group, m/s. spacing: between neighbours, m. enter: time of entry, s (0: there from the first frame).
+    - finish: at the goal "stand", "leave" the scene or "walk" on.
     """
 
     name: str
@@ -85,12 +99,16 @@ class EnteringGroup:
 
     @property
     def walks(self) -> bool:
-        """True if the goal is further from the start than STANDING_DISTANCE."""
+        """True if the goal is more than STANDING_DISTANCE (0.3 m) from the start."""
         return bool(np.linalg.norm(self.goal - self.start) > STANDING_DISTANCE)
 
 
 def script_placement(scenario: Scenario, seed: int, repeat: int) -> ScriptPlacement:
-    """Returns the turn, mirror and lead that a seed draws for the script of a scenario."""
+    """Returns the turn, mirror and lead that a seed draws for the script of a scenario.
+
+    repeat: number of the suite entry's copy, 0 for none; a further random key. Raises ValueError if no draw of
+    `turn_deg` or `lead` lies within its clip.
+    """
     r = rng(seed, "layout", repeat=repeat)
     turn = np.deg2rad(draw(scenario.turn_deg, r))
     flip = -1.0 if scenario.mirror and r.random() < 0.5 else 1.0
@@ -98,13 +116,18 @@ def script_placement(scenario: Scenario, seed: int, repeat: int) -> ScriptPlacem
 
 
 def draw_point(point: Point, placement: ScriptPlacement, r: np.random.Generator) -> Array:
-    """Returns a point of the script in the world (2,), m; each coordinate that is a distribution is drawn from r."""
+    """Returns a point of the script in the world (2,), m: drawn, then mirrored and turned.
+
+    Each coordinate that is a distribution is drawn from r. Raises ValueError if no draw lies within its clip.
+    """
     return placement.point(np.array([draw(point[0], r), draw(point[1], r)]))
 
 
 @dataclass(frozen=True)
 class _Draws:
-    """What every draw of a population needs."""
+    """What every draw of a population needs: scenario, its scene, the script's placement, and the random keys seed and
+    repeat.
+    """
 
     scenario: Scenario
     scene: Scene
@@ -119,9 +142,10 @@ class _Draws:
 def draw_population(scenario: Scenario, scene: Scene, seed: int, repeat: int) -> list[EnteringGroup]:
     """Returns all groups of the script with their members, in the order of the file.
 
-    Columns of people count through all groups. Members stand in formation at the group's start. Raises InputError if a
-    group has no free place at its start; a start of two numbers is tried once, a drawn one TRIES times. Only groups
-    that are there from the first frame need room among each other.
+    Columns of people count from 0 through all groups. Members stand in formation at the group's start. Groups with
+    entry time 0 need room among each other, groups that enter later do not. Raises InputError if a group has no free
+    place at its start: a start of two numbers is tried once, a drawn one TRIES (400) times. Raises ValueError if no
+    draw of a distribution lies within its clip.
     """
     draws = _Draws(scenario, scene, script_placement(scenario, seed, repeat), seed, repeat)
     taken: list[Array] = []
@@ -140,7 +164,12 @@ def draw_population(scenario: Scenario, scene: Scene, seed: int, repeat: int) ->
 
 
 def _draw_group(draws: _Draws, spec: GroupSpec, name: str, key: tuple[int, int], column: int) -> EnteringGroup:
-    """Draws a group and its members, without its start; `column` is the first member's."""
+    """Draws a group and its members, without its start, its `pos` and its index.
+
+    spec: its entry in the scenario. key: index of the entry and of the copy, from 0. column: of the first member. The
+    size is at least 1 person and the entry time at least 0 s. An absent speed follows from the members' free speeds.
+    Raises ValueError if no draw lies within its clip.
+    """
     r = draws.rng("group", *key, 0)
     crowd = draws.scenario.crowd
     size = max(1, round(draw(spec.size, r)))
@@ -158,15 +187,20 @@ def _draw_group(draws: _Draws, spec: GroupSpec, name: str, key: tuple[int, int],
 
 
 def walking_speed(free: list[float], slowdown: float) -> float:
-    """Returns the speed of a group in m/s: the mean of its members' free speeds minus slowdown (n - 1), at least 0.3.
+    """Returns the speed of a group in m/s: the mean of its members' free speeds minus slowdown × (n - 1), at least 0.3.
 
-    free: free speeds of the n members, m/s; slowdown: m/s for each member after the first.
+    free: free speeds of the n ≥ 1 members, m/s. slowdown: m/s for each member after the first.
     """
     return max(MIN_SPEED, float(np.mean(free)) - slowdown * (len(free) - 1))
 
 
 def _find_room(draws: _Draws, group: EnteringGroup, spec: GroupSpec, key: tuple[int, int], taken: list[Array]) -> None:
-    """Sets start and pos of the group so that it stands clear of walls, pillars and `taken`; raises InputError."""
+    """Sets group.start and group.pos so that the members stand clear of walls, pillars and, at entry time 0, of
+    `taken`.
+
+    key: index of the entry and of its copy. taken: positions (n, 2), m, of the people of each earlier group. A drawn
+    start is drawn up to TRIES (400) times, a fixed one tried once. Raises InputError if no try finds room.
+    """
     placement, drawn = draws.placement, any(isinstance(v, Distribution) for v in spec.start)
     r = draws.rng("group", *key, 1)
     for _ in range(TRIES if drawn else 1):
@@ -190,7 +224,10 @@ def _find_room(draws: _Draws, group: EnteringGroup, spec: GroupSpec, key: tuple[
 
 
 def _is_free(pos: Array, scene: Scene, taken: list[Array]) -> bool:
-    """True if all places (n, 2) are clear of the taken places, of walls and of pillars."""
+    """Returns True if all of pos (n, 2), m, are 0.55 m clear of the taken places and 0.2 m clear of walls and pillars.
+
+    taken: places (K, 2), m, of each earlier group; may be empty.
+    """
     if taken:
         others = np.concatenate(taken)
         if np.min(np.sum((pos[:, None] - others[None]) ** 2, axis=2)) < START_GAP**2:
@@ -205,10 +242,12 @@ def _is_free(pos: Array, scene: Scene, taken: list[Array]) -> bool:
 
 
 def wander(keys: Sequence[tuple[int, ...]], frames: int, fps: float, seed: int, repeat: int) -> Array:
-    """Returns how each person's wanted velocity fluctuates, shape (frames, P, 2) in m/s, for P people with these keys.
+    """Returns how each person's wanted velocity fluctuates, shape (frames, P, 2): x, y in m/s, for P people.
 
-    An Ornstein-Uhlenbeck process per axis, stationary from the first frame: u_k = a u_(k-1) + sqrt(1 - a²) WANDER_SD
-    n_k, with a = exp(-1 / (fps WANDER_TIME)), standard normal n_k and u_0 = WANDER_SD n_0.
+    keys: Person.key of each person; each person draws from a random stream of its own. An Ornstein-Uhlenbeck process
+    per axis, stationary from the first frame: u_k = a u_(k-1) + sqrt(1 - a²) WANDER_SD n_k, with a = exp(-1 / (fps
+    WANDER_TIME)), standard normal n_k and u_0 = WANDER_SD n_0. The standard deviation WANDER_SD is 0.06 m/s, the
+    correlation time WANDER_TIME 1.5 s.
     """
     keep = float(np.exp(-1 / (fps * WANDER_TIME)))
     out = np.empty((frames, len(keys), 2))

@@ -18,11 +18,12 @@ SERVED_RADIUS = 0.35  # m from the head's place: service can begin
 
 @dataclass
 class ServiceQueue:
-    """One queue at a service point.
+    """One queue at a service point. Groups are given by index; a group is served as a whole.
 
-    Fixed: head (2,): the head's place, m; along (2,): unit vector from the head to the tail; spacing: m; service: s for
-    each group. State: joined: groups in the queue, head first; coming: groups on their way to it; busy_until: when the
-    group at the head is done, s, None while it is not being served.
+    - Fixed: head (2,): place of the first person, m. along (2,): unit vector from head to tail. spacing: between
+      places, m. service: service time of each group, s.
+    - State: joined: groups in the queue, head first. coming: groups on their way to it. busy_until: time at which the
+      group at the head is done, s; None while no group is being served.
     """
 
     head: Array
@@ -34,15 +35,18 @@ class ServiceQueue:
     busy_until: float | None = None
 
     def slot(self, k: int) -> Array:
-        """Returns the k-th place (2,), m; 0 is the head's."""
+        """Returns the place (2,), m, with index k in the queue; 0 is the head's. k is not limited by the queue's
+        length.
+        """
         return self.head + k * self.spacing * self.along
 
     def advance(self, t: float, members: dict[int, list[int]], pos: Array) -> tuple[dict[int, Array], list[int]]:
-        """Moves the queue on to time t (s).
+        """Advances the queue to time t (s).
 
-        Returns the place (2,) in m of each person by column, of groups that are coming, too; and the groups that are
-        done, at most one. members: columns of each group's people; of a group that is coming they are sorted by their
-        distance from the head, in place. pos (P, 2): m, by column.
+        Returns the place (2,) in m of each person by column, and the list of groups whose service has ended, at most
+        one. Groups that are still coming get the places behind the tail. A group joins as soon as one member is within
+        JOIN_RADIUS (0.5 m) of the first free place. members: columns of each group's people; the list of a group that
+        is coming is sorted in place, nearest to the head first. pos (P, 2): m, by column.
         """
         done = self._serve(t, members, pos)
         tail = sum(len(members[g]) for g in self.joined)
@@ -60,7 +64,9 @@ class ServiceQueue:
         return slots, done
 
     def _give_slots(self, g: int, k: int, members: dict[int, list[int]], slots: dict[int, Array]) -> int:
-        """Gives the members of group g the places from k on; returns the next free one."""
+        """Writes the places k, k + 1, … (2,), m, of the members of group g to `slots`, by column; returns the next free
+        index.
+        """
         for column in members[g]:
             slots[column] = self.slot(k)
             k += 1
@@ -70,7 +76,11 @@ class ServiceQueue:
         return bool(np.min(np.linalg.norm(pos[members[g]] - self.slot(k), axis=1)) < JOIN_RADIUS)
 
     def _serve(self, t: float, members: dict[int, list[int]], pos: Array) -> list[int]:
-        """Starts the service of the first group when its first member is at the head; returns it when it is done."""
+        """Returns the group whose service ends by time t (s), as a list of one, and removes it from `joined`; else [].
+
+        Service of the first group begins once its first member is within SERVED_RADIUS (0.35 m) of the head's place.
+        members: columns by group. pos (P, 2): m, by column.
+        """
         if not self.joined:
             return []
         first = self.joined[0]

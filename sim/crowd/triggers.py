@@ -24,10 +24,12 @@ EPS = 1e-9  # s
 class PendingOrder:
     """One order of the script and what became of it.
 
-    Fixed: the order; its index in the script; delay and time of the trigger, s (time: inf if the trigger is no time);
-    reach_at (2,): the place of a `reach` trigger in the world, m, None for the group's goal. State: the 1-based frame
-    in which it fired; when its trigger was met and when it came true, s; for how long its rule has held, s; columns of
-    the people of each group before and after it. None: not yet.
+    - order; index: in the file, from 0; delay: s between trigger and firing; time: of a `time` trigger, s, else inf.
+    - reach_at (2,): place of a `reach` trigger in the world, m; None: the group's goal, or no such trigger.
+    - fired: 1-based frame in which it fired, None: not yet. met_at, true_at: time at which the trigger was met and at
+      which the order's rule had held long enough, s; None: not yet. held_for: s for which the rule has held without a
+      break.
+    - before, after: columns of the people of each group before and after the order; empty until it fires.
     """
 
     order: MergeOrder | SplitOrder | QueueOrder
@@ -43,10 +45,11 @@ class PendingOrder:
     after: tuple[tuple[int, ...], ...] = field(default=())
 
     def is_due(self, t: float, state: Array, groups: GroupState, come_true: set[str]) -> bool:
-        """Returns True if the order fires at time t (s), and records when its trigger was first met.
+        """Returns True if the order fires at time t (s); records in met_at when its trigger was first met.
 
         An order fires `delay` seconds after its trigger was met, and only while every group it concerns exists and is
-        wholly in the scene. state (P, 4) by column; come_true: ids of orders that have come true.
+        wholly in the scene; until then the trigger is not examined either. state (P, 4): x, y, vx, vy by column.
+        come_true: ids of the orders that have come true.
         """
         names = concerned(self.order, list(groups.alive))
         if not all(n in groups.alive and groups.all_present(groups.alive[n]) for n in names):
@@ -56,7 +59,12 @@ class PendingOrder:
         return self.met_at is not None and t >= self.met_at + self.delay - EPS
 
     def _is_met(self, t: float, state: Array, groups: GroupState, names: list[str], come_true: set[str]) -> bool:
-        """True if the trigger is met at time t; names: of the groups concerned."""
+        """Returns True if the trigger (time, after, distance_lt or reach) is met at time t, s.
+
+        state (P, 4): x, y, vx, vy by column. names: of the groups that the order concerns. come_true: ids of orders
+        that have come true. distance_lt: the nearest members of every two groups are closer; False for one group.
+        reach: False if the group no longer exists or is not wholly in the scene.
+        """
         when = self.order.when
         if when.time is not None:
             return t >= self.time - EPS
@@ -75,25 +83,36 @@ class PendingOrder:
         return bool(np.linalg.norm(middle - at) < when.reach.radius)
 
     def watch(self, t: float, fps: float, holds: bool) -> None:
-        """Counts how long the order's rule has held up to this frame; sets `true_at` once that is long enough."""
+        """Adds one frame (1 / fps s) to held_for if the order's rule `holds` in this frame, else sets it to 0.
+
+        Sets true_at = t (s) once the rule has held for its time: 2 s for merge and split, 3 s for queue.
+        """
         self.held_for = self.held_for + 1 / fps if holds else 0.0
         if self.held_for >= RULE_TIME[self.order.type] - EPS:
             self.true_at = t
 
 
 def concerned(order: MergeOrder | SplitOrder | QueueOrder, alive: list[str]) -> list[str]:
-    """Returns the names of the groups that an order concerns; `alive`: names of all existing groups."""
+    """Returns the names of the groups that an order concerns, in its own order.
+
+    alive: names of all existing groups. `g-*` stands for all existing names that begin with `g-`. A plain name is
+    returned even if no such group exists; a name that two patterns match is returned twice.
+    """
     if isinstance(order, SplitOrder):
         return [order.group]
     return [n for pattern in order.groups for n in expand(pattern, alive)]
 
 
 def rule_holds(pending: PendingOrder, state: Array, targets: Array) -> bool:
-    """Returns True if the rule of a fired order holds in this frame; state (P, 4), targets (P, 2) by column.
+    """Returns True if the rule of an order that has fired holds in this frame.
 
-    Queue: at least QUEUE_PEOPLE people, or all if they are fewer, are within IN_PLACE of their targets. Merge: of all
-    pairs of parents, at least as many as there are parents less one satisfy the merge rule. Split: all pairs of parts
-    satisfy the split rule. A merge or split does not hold while somebody is absent.
+    state (P, 4): x, y, vx, vy by column, nan while absent. targets (P, 2): places in the queue, m, by column.
+
+    - Queue: at least 3 people (all if they are fewer) are within IN_PLACE (0.4 m) of their targets.
+    - Merge of n groups: at least n - 1 pairs of them are nearer than 1.5 m and differ by less than 0.5 m/s.
+    - Split: all pairs of parts are more than 2.5 m apart, or more than 1.5 m and differ by more than 0.7 m/s.
+
+    A merge or split does not hold while one of its people is absent.
     """
     order = pending.order
     if isinstance(order, QueueOrder):
@@ -112,10 +131,14 @@ def rule_holds(pending: PendingOrder, state: Array, targets: Array) -> bool:
 
 
 def _nearest(state: Array, a: list[int], b: list[int]) -> float:
-    """Distance of the nearest two people of columns a and b, m."""
+    """Returns the distance in m of the nearest two people, one of columns a and one of columns b; state (P, 4): x, y,
+    vx, vy.
+    """
     return float(np.linalg.norm(state[a, None, :2] - state[None, b, :2], axis=2).min())
 
 
 def _velocity_difference(state: Array, a: list[int], b: list[int]) -> float:
-    """Length of the difference of the mean velocities of columns a and b, m/s."""
+    """Returns the length in m/s of the difference of the mean velocities of columns a and b; state (P, 4): x, y, vx,
+    vy.
+    """
     return float(np.linalg.norm(state[a, 2:].mean(axis=0) - state[b, 2:].mean(axis=0)))

@@ -33,16 +33,18 @@ WRITE = pymunk.batch.BodyFields.FORCE
 
 
 def run(scenario: Scenario, seed: int, repeat: int = 0, steering: Steering | None = None) -> Motion:
-    """Returns the whole motion of a scenario for a seed. steering: None for the default parameters.
+    """Returns the whole motion of a scenario for a seed, without the warm-up.
 
-    Raises InputError if a group has no free place at its start, WorkError if a position or velocity becomes infinite.
+    repeat: number of the suite entry's copy, a further random key. steering: None for the default parameters. Raises
+    InputError if a group has no free place at its start, ValueError if no draw of a distribution lies within its clip,
+    WorkError if a position or velocity is not finite.
     """
     world = World(scenario, seed, repeat, steering or Steering())
     return world.run()
 
 
 def steps_per_frame(fps: float) -> int:
-    """Returns the least number of physics steps per frame that keeps a step within MAX_STEP seconds."""
+    """Returns the least number (≥ 1) of physics steps per frame that keeps a step within MAX_STEP (0.02 s)."""
     return max(1, math.ceil(1 / (fps * MAX_STEP) - 1e-9))
 
 
@@ -56,10 +58,11 @@ def accelerate(
     push: Array,
     out: Array,
 ) -> bool:
-    """Writes the accelerations of all people to out (N, 2), m/s², and advances the groups' ways by dt (s).
+    """Overwrites out (N, 2) with the accelerations of all people, m/s², and advances the groups' ways by dt (s).
 
-    state (N, 4): x, y, vx, vy in m and m/s; rules: Steering.array(); push (G, 2): scratch. Returns False if a state is
-    not finite.
+    state (N, 4): x, y, vx, vy in m, m/s. rules (21,): Steering.array(). push (G, 2): scratch, overwritten. Modifies
+    `groups`, and the tag WAYPOINT of people who pass a door. Returns False, with nothing written, if a state is not
+    finite.
     """
     from sim.crowd.forces_avoidance_kernels import avoid
     from sim.crowd.forces_goal_kernels import drive
@@ -71,11 +74,11 @@ def accelerate(
 
 
 class World:
-    """A scenario in motion.
+    """The running simulation of one scenario and seed; it can be run once. Column = person id - 1.
 
-    State: `space` and `bodies` (by column) of the physics; `state` (N, 4), `force` and `people`: arrays of the N people
-    present, whose columns are `columns`; `groups` and `orders`: the script; `states` (P, 4) and `group_of` (P,): the
-    frame being recorded, by column.
+    State: `space`, `bodies` (by column) of the physics; `state` (N, 4): x, y, vx, vy, `force` and `people` of the N
+    people present, whose columns are `columns`; `waiting`: groups that have not entered; `groups`, `orders`: the
+    script; `states` (P, 4) and `group_of` (P,): the frame being recorded, by column, nan and -1 while absent.
     """
 
     def __init__(self, scenario: Scenario, seed: int, repeat: int, steering: Steering) -> None:
@@ -105,7 +108,7 @@ class World:
         self._read_buffer, self._write_buffer = pymunk.batch.Buffer(), pymunk.batch.Buffer()
 
     def run(self) -> Motion:
-        """Simulates the warm-up, then records duration · fps frames."""
+        """Returns the Motion of duration × fps frames (at least 1) after the warm-up. WorkError as for `frames`."""
         frames = max(1, round(self.scenario.duration * self.fps))
         record = np.empty((frames, len(self.members), 4))
         intent = np.empty((frames, len(self.members)), np.int64)
@@ -114,9 +117,9 @@ class World:
         return self._motion(record, intent)
 
     def frames(self, length: int) -> Iterator[tuple[Array, Ints]]:
-        """Yields `length` frames after the warm-up: (P, 4) x, y, vx, vy in m and m/s, and (P,) group index.
+        """Yields `length` frames after the warm-up: states (P, 4): x, y, vx, vy in m, m/s; group indices (P,).
 
-        nan and -1 where absent. Both arrays are overwritten by the next frame.
+        By column; nan and -1 while absent. The next frame overwrites both. Raises WorkError if a state is not finite.
         """
         warm = round(self.scenario.warmup * self.fps)
         noise = wander([m.key for m in self.members], warm + length, self.fps, self.seed, self.repeat)
@@ -134,7 +137,7 @@ class World:
             yield self.states, self.group_of
 
     def _advance(self, noise: Array) -> None:
-        """Simulates one frame: `substeps` times forces, physics and reading back; noise (P, 2): m/s."""
+        """Simulates one frame; noise (P, 2): wandering, m/s, by column. Raises WorkError if a state is not finite."""
         n = len(self.columns)
         if n == 0:
             return
@@ -152,7 +155,7 @@ class World:
         self.groups.waypoint[self.columns] = self.people.tag[:, WAYPOINT]
 
     def _blown_up(self) -> WorkError:
-        """The error of a motion that is not finite."""
+        """Returns, without raising it, the WorkError for a position or velocity that is not finite."""
         return WorkError(
             file=self.scenario.name,
             place=f"seed {self.seed}",
@@ -162,16 +165,17 @@ class World:
         )
 
     def _read(self) -> Array:
-        """Returns x, y, vx, vy (rows, 4): a view of the buffer that the next read of as many bodies overwrites."""
+        """Returns x, y, vx, vy (rows, 4), m, m/s, of all bodies: a view of a buffer that the next read overwrites."""
         self._read_buffer.clear()
         pymunk.batch.get_space_bodies(self.space, READ, self._read_buffer)
         return np.frombuffer(self._read_buffer.float_buf()).reshape(-1, 4)
 
     def _come_and_go(self, t: float, first: bool) -> None:
-        """Removes people who leave at time t (s) and adds groups that enter; `first`: the first frame of the warm-up.
+        """Removes people who leave at time t (s) and adds groups whose entry time has come; `first`: first frame of the
+        warm-up.
 
-        A group that is there from the start begins the warm-up as far back on its way as it will walk meanwhile, if
-        nothing stands there. A group whose place is taken enters later.
+        A group with entry time 0 begins the warm-up back on its way by speed × warm-up time, if `_way_back_is_free`. A
+        group that enters later waits while people stand at its place.
         """
         gone = self.groups.remove_leaving(self.columns)
         coming = [group for group in self.waiting if (group.enter <= 0 if first else group.enter <= t)]
@@ -193,21 +197,21 @@ class World:
         self._map_rows()
 
     def _way_back_is_free(self, group: EnteringGroup, heading: Array) -> bool:
-        """True if the group walks, no wall lies behind it on its way of the warm-up, and the scene has no pillar."""
+        """True if the group walks, its way back during the warm-up crosses no wall, and there is no pillar."""
         if not group.walks:
             return False
         back = group.pos - self.scenario.warmup * group.speed * heading
         return not blocked(group.pos, back, self.scene.walls).any() and not len(self.scene.pillars)
 
     def _has_room(self, group: EnteringGroup) -> bool:
-        """True if all people present are at least ENTRY_GAP body radii from where the group enters."""
+        """True if all people present are more than 0.44 m from every place where the group enters."""
         if not len(self.state):
             return True
         d = np.linalg.norm(group.pos[:, None] - self.state[None, :, :2], axis=2)
         return bool(d.min() > ENTRY_GAP * BODY_RADIUS)
 
     def _body(self, pos: Array, velocity: Array) -> pymunk.Body:
-        """Adds a person at pos (2,), m, with velocity (2,), m/s, to the space."""
+        """Adds a 1 kg disc of radius 0.2 m to the space, at pos (2,), m, with vel (2,), m/s; returns its body."""
         body = pymunk.Body(1.0, float("inf"))
         body.position = float(pos[0]), float(pos[1])
         body.velocity = float(velocity[0]), float(velocity[1])
@@ -217,7 +221,7 @@ class World:
         return body
 
     def _map_rows(self) -> None:
-        """Finds the column of each row of a batch: dynamic bodies first, in the engine's order, then static ones."""
+        """Rebuilds columns, state, force and people after bodies came or went, in the physics engine's order."""
         self._read_buffer.clear()
         pymunk.batch.get_space_bodies(self.space, pymunk.batch.BodyFields.BODY_ID, self._read_buffer)
         ids = np.frombuffer(self._read_buffer.int_buf(), dtype=np.uintp)
@@ -233,11 +237,11 @@ class World:
         self._fill_people()
 
     def _fill_people(self) -> None:
-        """Copies groups, places and targets of the people present to the kernels' arrays."""
+        """Copies places, targets, pace and tags of the people present from `groups` to `people`."""
         self.groups.fill(self.people, self.columns)
 
     def _motion(self, record: Array, intent: Any) -> Motion:
-        """The Motion of the recorded states (T, P, 4) and group indices (T, P)."""
+        """Returns the Motion of record (T, P, 4): x, y, vx, vy, nan while absent, and intent (T, P): group indices."""
         height = np.array([m.height for m in self.members])
         pos, vel = record[:, :, :2], record[:, :, 2:]
         present = np.isfinite(pos[:, :, 0])
@@ -261,7 +265,7 @@ class World:
 
 
 def _obstacles(scene: Scene, scenario: Scenario) -> Obstacles:
-    """Walls, pillars and stairs as the kernels take them."""
+    """Returns the walls (W, 4), pillars (P, 3) and stairs (S, 7) of a scene as the kernels take them, in m."""
     stairs = np.zeros((len(scene.stairs), 7))
     for row, s, spec in zip(stairs, scene.stairs, scenario.world.stairs, strict=True):
         along = s.head - s.foot
@@ -271,7 +275,7 @@ def _obstacles(scene: Scene, scenario: Scenario) -> Obstacles:
 
 
 def _space(scene: Scene) -> pymunk.Space:
-    """A physics space with the walls and pillars of a scene."""
+    """Returns a new physics space that holds the walls (0.02 m half width) and pillars of a scene, without friction."""
     space = pymunk.Space()
     space.collision_slop = 0.005
     for wall in scene.walls:
