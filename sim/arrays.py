@@ -20,9 +20,9 @@ class Frozen:
     """Base of frozen dataclasses whose array fields become read-only and get the declared number type.
 
     A field declared Array becomes float64, Ints int64, Bools bool, Image uint8; so do the items of a tuple of arrays.
-    An array that already has the type is not copied: the field is a read-only view, and the original stays writable. An
-    array whose conversion could lose values (floats where ids are declared) keeps its type, so that the check of a
-    tracker's answer can report it.
+    None and other values are left as they are. An array that already has the type is not copied: the field is a
+    read-only view, and the original stays writable. An array whose conversion could lose values (floats where ids are
+    declared) keeps its type and raises nothing, so that the check of a tracker's answer can report it.
     """
 
     def __post_init__(self) -> None:
@@ -35,7 +35,9 @@ class Frozen:
                 object.__setattr__(self, name, _settled(value, kind))
 
     def replace(self, **changes: Any) -> Self:
-        """Return a copy with the given fields changed."""
+        """Return a copy with the given fields changed; the original stays as it is. Raises TypeError for an unknown
+        field name.
+        """
         return replace(self, **changes)  # type: ignore[type-var]
 
 
@@ -45,7 +47,9 @@ KINDS["Image"] = np.dtype(np.uint8)
 
 @cache
 def _array_fields(kind: Any) -> tuple[tuple[str, np.dtype[Any], bool], ...]:
-    """Return (name, number type, True for a tuple of arrays) of each field that is declared as an array."""
+    """Return (name, number type, whether a tuple of arrays) of each field that the dataclass `kind` declares as an
+    array.
+    """
     found = []
     for f in fields(kind):
         declared = re.fullmatch(r"(tuple\[)?(Array|Ints|Bools|Image)\b.*", str(f.type))
@@ -55,7 +59,10 @@ def _array_fields(kind: Any) -> tuple[tuple[str, np.dtype[Any], bool], ...]:
 
 
 def _settled(a: NDArray[Any], kind: np.dtype[Any]) -> NDArray[Any]:
-    """Return the array read-only and converted to `kind`; not converted if values could be lost (floats as ids)."""
+    """Return a read-only view of `a`, or a read-only copy converted to the number type `kind`.
+
+    It keeps its number type if the conversion could lose values (floats as ids). `a` itself stays writable.
+    """
     if a.dtype is not kind and a.dtype != kind and np.can_cast(a.dtype, kind, "same_kind"):
         a = a.astype(kind)
     if a.flags.writeable:

@@ -22,10 +22,12 @@ ENGINE = 2
 
 
 def canonical_hash(value: Any) -> str:
-    """Return the SHA-256, in hex, of a value.
+    """Return the SHA-256 of a value as 64 hex digits; equal content gives the same hash on any machine.
 
     The value may be None, bool, int, float, str, bytes, an array of numbers or bools, or a tuple, list, dict or
-    dataclass of such values; a tuple and a list with equal items have the same hash. Raises TypeError for other types.
+    dataclass of such values. A tuple and a list with equal items have the same hash, all nan are alike, and the order
+    of a dict does not count. An int and a float, or arrays of different number types or shapes, have different hashes.
+    Raises TypeError for other types, and for dict keys that cannot be sorted.
     """
     h = hashlib.sha256()
     _feed(h, value)
@@ -33,35 +35,45 @@ def canonical_hash(value: Any) -> str:
 
 
 def file_hash(content: bytes) -> str:
-    """Return the SHA-256 of a file's bytes, in hex."""
+    """Return the SHA-256 of `content`, the bytes of a file, as 64 hex digits."""
     return hashlib.sha256(content).hexdigest()
 
 
 def scenario_hash(text: str) -> str:
-    """Return the hash of a resolved scenario, given as the TOML text that `dump` of scenarios.loading writes."""
+    """Return the SHA-256 (64 hex digits) that names a scenario.
+
+    text: TOML of the resolved scenario as `dump` of scenarios.loading writes it; other text of equal meaning has
+    another hash.
+    """
     return canonical_hash(("scenario", text))
 
 
 def truth_hash(scenario: str, seed: int, repeat: int, truth: Truth | None) -> str:
-    """Return the hash of a resolved scenario's text, seed, repeat and truth; it does not depend on what is rendered.
+    """Return the SHA-256 (64 hex digits) of a scenario, seed, repeat and truth; it does not depend on what is rendered.
 
-    All fields of the truth count but its name. A truth of None counts as None.
+    scenario: TOML text of the resolved scenario. repeat: number of the suite entry's copy, 0 without copies. All fields
+    of the truth count except its name. A truth of None counts as None.
     """
     named = None if truth is None else {f.name: getattr(truth, f.name) for f in fields(truth) if f.name != "name"}
     return canonical_hash(("truth", scenario, seed, repeat, named))
 
 
 def content_hash(truth: str, detections: Any, pixels: Mapping[str, str] | None = None) -> str:
-    """Return the hash of a whole sequence: its truth_hash, its detections, and the raw pixels of its streams.
+    """Return the SHA-256 (64 hex digits) of a whole sequence: its truth, its detections, and the raw pixels of its
+    streams.
 
-    pixels: hash of the pictures before encoding, by stream; None or empty without pictures. The hash is therefore the
-    same for jpg, png and mp4.
+    truth: the sequence's truth_hash. detections: list of Detections, one per frame, empty without a detector. pixels:
+    hash of the pictures before encoding, by stream name; None or empty without pictures. The hash is therefore the same
+    for jpg, png and mp4. Raises TypeError as canonical_hash.
     """
     return canonical_hash(("content", truth, detections, dict(pixels) if pixels else ()))
 
 
 def dataset_hash(contents: Mapping[str, str]) -> str:
-    """Return the hash of a dataset, given the content hash of each sequence by its name <split>/<sequence>."""
+    """Return the SHA-256 (64 hex digits) of a dataset.
+
+    contents: content_hash of each sequence by its name <split>/<sequence>; the order does not count.
+    """
     return canonical_hash(("dataset", dict(contents)))
 
 
@@ -76,12 +88,16 @@ class PixelHash:
         self._h = hashlib.sha256()
 
     def add(self, picture: NDArray[Any]) -> None:
-        """Add the next picture, an array of any shape and number type."""
+        """Add the next picture, an array of numbers or bools of any shape. Raises TypeError for other arrays, which
+        still count.
+        """
         self.count += 1
         _array(self._h, picture)
 
     def hex(self) -> str:
-        """Return the hash of all pictures added so far, in hex."""
+        """Return the SHA-256 (64 hex digits) of all pictures added so far, in their order; without pictures that of no
+        bytes.
+        """
         return self._h.hexdigest()
 
 

@@ -25,11 +25,13 @@ ROLE = {
 
 
 def rng(seed: int, role: str, *keys: int, repeat: int = 0) -> np.random.Generator:
-    """Return the generator over `SeedSequence(seed, spawn_key=(ROLE[role], *keys))`.
+    """Return the numpy Generator over `SeedSequence(seed, spawn_key=(ROLE[role], *keys))`.
 
-    The same arguments give the same numbers. role: a key of ROLE, else KeyError. keys: what the stream belongs to, as a
-    person's id or a frame; non-negative. repeat: the n of a suite's entry `name-n`; 1,000,000 + repeat is a further key
-    unless repeat is 0.
+    The same arguments give a generator of the same numbers. seed: 0 or more. role: a key of ROLE. keys: what the stream
+    belongs to, as a person's id or a frame; 0 or more. repeat: number of the suite entry's copy, from 1; 0 without
+    copies. A repeat other than 0 adds 1,000,000 + repeat as a last key.
+
+    Raises KeyError for an unknown role, ValueError for a negative seed or key.
     """
     spawn_key = (ROLE[role], *keys) if repeat == 0 else (ROLE[role], *keys, 1_000_000 + repeat)
     return np.random.default_rng(np.random.SeedSequence(seed, spawn_key=spawn_key))

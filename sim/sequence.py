@@ -37,15 +37,18 @@ STREAMS = frozenset({"left", "right", "disparity", "ids", "background"})
 
 
 def simulate(scenario: Scenario, seed: int, repeat: int = 0, streams: Iterable[str] = ("left",)) -> Sequence:
-    """Return the sequence that a scenario and a seed define: frames, detections by its sensor, truth by its camera.
+    """Return the Sequence that a scenario and a seed define: frames, detections of its sensor, and truth for its
+    camera.
 
-    repeat: the n of a suite's entry `name-n`. streams, some of STREAMS: "left" and "right" give frames with pictures,
-    drawn while iterating; any stream gives `background()` and exact pixels (`load_pixels`), whose disparity is known if
-    "disparity" is among them; () draws nothing.
+    The motion is simulated at once; detections, truth and pictures are computed when they are first used. repeat:
+    number of the suite entry's copy, 0 without copies. streams: some of "left", "right", "disparity", "ids",
+    "background". "left" and "right" give frames with pictures, drawn while iterating. Any stream gives `background()`
+    and exact pixels (`load_pixels`), whose disparity is None unless "disparity" is among the streams. () draws nothing.
 
-    Raises InputError if the scenario is impossible (no room for its people, people out of view, a right view or
-    disparity without a baseline) or a stream is unknown. Reading the truth raises WorkError if an order of the script
-    was not fulfilled.
+    Raises InputError if the scenario is impossible (no room for its people, people out of view), if "right" or
+    "disparity" is wanted without a baseline, or if a stream is unknown. Reading detections raises InputError if
+    `sensor.hide` names an unknown group. Drawing raises InputError for impossible values of light and picture. Reading
+    the truth raises WorkError if an order of the script was not fulfilled.
     """
     from sim.crowd.world import run
 
@@ -60,15 +63,16 @@ def observe(
     check: bool = True,
     streams: Iterable[str] = (),
 ) -> Sequence:
-    """Return the sequence that a scenario's camera and sensor make of a Motion.
+    """Return the Sequence that a scenario's camera and sensor make of a Motion, the motion of a whole crowd.
 
-    The camera is solved at once; truth and detections are computed when they are first used, independently of each
-    other. people: ids of the people of each group that `sensor.hide` may name; None derives them from the scenario,
-    which must then be the one that the motion was simulated from. check: reading the truth raises WorkError if an order
-    of the script was not fulfilled. streams: as for `simulate`.
+    The camera is placed at once; truth, detections and pictures are computed when they are first used, independently of
+    each other. people: person ids of each group that `sensor.hide` may name, by group name; None derives them from the
+    scenario, which must then be the one that the motion was simulated from. check: reading the truth raises WorkError
+    if an order of the script was not fulfilled. streams: pictures as for `simulate`, by default none.
 
-    Raises InputError if people leave the view, if a stream is unknown, or if the camera has no baseline for a right
-    view or disparities.
+    Raises InputError if people leave the view, a stream is unknown, or the camera has no baseline for "right" or
+    "disparity". Reading detections raises InputError if `sensor.hide` names a group without ids. Drawing raises
+    InputError for impossible values of light and picture.
     """
     camera = place_camera(scenario.camera, motion)
     drawn = _pictures(streams, scenario, motion, camera)
@@ -131,9 +135,10 @@ def observe(
 
 
 class _Pictures:
-    """Draws the requested streams.
+    """Draws the requested streams of a simulated sequence.
 
-    State: the exact pixels of the frame that was drawn last, because they are usually read next.
+    State: index and exact pixels of the frame that was drawn last, because its pixels are usually read next; None
+    before.
     """
 
     def __init__(self, renderer: Renderer, streams: frozenset[str]) -> None:
@@ -142,7 +147,11 @@ class _Pictures:
         self._last: tuple[int, PixelTruth | None] = (0, None)
 
     def draw(self, index: int) -> RenderedFrame:
-        """Draw a frame: its pictures by the requested streams, and its exact pixels if "ids" or "disparity" is one."""
+        """Draw frame `index` (from 1): the left and right picture, each None unless requested.
+
+        Its exact pixels are drawn too if "left" and one of "ids" and "disparity" are requested, else None. Raises
+        InputError for impossible values of light and picture.
+        """
         if not self.has_image:
             return RenderedFrame(right=self.renderer.right(index) if self.has_right else None)
         labels = not self.streams.isdisjoint({"ids", "disparity"})
@@ -151,14 +160,16 @@ class _Pictures:
         return made
 
     def pixels(self, index: int) -> PixelTruth:
-        """Return the exact pixels of a frame; disparity is None unless "disparity" was requested."""
+        """Return the exact pixels of frame `index` (from 1); disparity is None unless the stream "disparity" was
+        requested.
+        """
         last, known = self._last
         if known is not None and last == index:
             return known
         return self.renderer.pixels(index, disparity="disparity" in self.streams)
 
     def background(self) -> Image:
-        """Return pictures of the empty scene, (BACKGROUNDS, H, W, 3) BGR uint8."""
+        """Return pictures of the empty scene before frame 1, (50, H, W, 3) BGR uint8, in the order of time."""
         return np.stack([self.renderer.background(k) for k in range(BACKGROUNDS)])
 
 
@@ -182,9 +193,11 @@ def _pictures(
 def named_people(
     scenario: Scenario, scene: Scene, seed: int, repeat: int, orders: Iterable[Order]
 ) -> dict[str, tuple[int, ...]]:
-    """Return the ids of the people of each group that the script names.
+    """Return the person ids of each group that the script names, by group name.
 
-    These are the groups it starts with, and those that fired merge and split orders made (`into`, `parts`).
+    These are all groups that the scenario lists, also those that enter later, and the groups that merge orders (`into`)
+    and split orders (`parts`) made. orders: the script's orders; one that never took effect (fired None) makes no
+    group. scene, seed, repeat: those of the simulation. Raises InputError if a group has no free place at its start.
     """
     from sim.crowd.population import draw_population
 

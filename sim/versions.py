@@ -16,9 +16,9 @@ DISTRIBUTION = "flockscope"
 
 @lru_cache(maxsize=2)
 def versions(drawn: bool) -> dict[str, str]:
-    """Return the versions of Python, flockscope and LIBRARIES by name; "unknown" for one that is not installed.
+    """Return the versions of Python, flockscope and LIBRARIES by name; "unknown" for a library that is not installed.
 
-    drawn: include PICTURE_LIBRARIES, on which the bytes of pictures depend.
+    drawn: include PICTURE_LIBRARIES, on which the bytes of pictures depend. The dict is cached: do not modify it.
     """
     found = {"python": platform.python_version()}
     for name in (DISTRIBUTION, *LIBRARIES, *(PICTURE_LIBRARIES if drawn else ())):
@@ -33,14 +33,18 @@ def versions(drawn: bool) -> dict[str, str]:
 def runtime() -> dict[str, str]:
     """Return everything that two machines must share to produce the same bytes, as name to value.
 
-    The names are those of `versions(drawn=True)`, "sources" (source_hash) and "cpu" (cpu_level). Computed once.
+    The names are those of `versions(drawn=True)` ("python", "numpy", …), "sources" (hash of our source files) and "cpu"
+    (vector instructions). Computed once and cached: do not modify the dict.
     """
     root = Path(__file__).resolve().parents[1]
     return {**versions(drawn=True), "sources": source_hash(root), "cpu": cpu_level()}
 
 
 def packages() -> tuple[str, ...]:
-    """Return the top-level packages of the installed distribution; those that `sim` needs if it is not installed."""
+    """Return the top-level packages of the installed flockscope, sorted.
+
+    If it is not installed, or does not list its packages: ("scenarios", "sim"), those that simulating needs.
+    """
     try:
         listed = metadata.distribution(DISTRIBUTION).read_text("top_level.txt")
     except metadata.PackageNotFoundError:
@@ -49,7 +53,11 @@ def packages() -> tuple[str, ...]:
 
 
 def source_hash(root: Path) -> str:
-    """Return 12 hex digits of the SHA-256 over names and bytes of all .py and .toml files of `packages()` in `root`."""
+    """Return 12 hex digits of the SHA-256 over the source files of our packages in the folder `root`.
+
+    All .py and .toml files below root/<package> count, for each of `packages()`, by relative name and bytes. A missing
+    package counts as empty.
+    """
     h = hashlib.sha256()
     for package in packages():
         for path in sorted((root / package).rglob("*")):
@@ -59,9 +67,10 @@ def source_hash(root: Path) -> str:
 
 
 def cpu_level() -> str:
-    """Return the vector instructions that numpy may use here; the last bits of its results depend on them.
+    """Return the vector instructions that numpy may use here; the last bits of numpy's results depend on them.
 
-    On x86-64 the level, "x86-64-v2" to "x86-64-v4"; elsewhere the machine's name and its features, as "arm64+ASIMD".
+    On x86-64 this is the level, "x86-64-v2" to "x86-64-v4"; elsewhere the machine's name and its features, as
+    "arm64+ASIMD". Features disabled by NPY_DISABLE_CPU_FEATURES do not count.
     """
     has = importlib.import_module("numpy._core._multiarray_umath").__cpu_features__
     machine = platform.machine().lower()

@@ -38,18 +38,24 @@ def generate(
     streams: Iterable[str] = ("left",),
     images: str = "jpg",
 ) -> list[Path]:
-    """Write OUT/flockscope-<split>/<name>-s<seed>/ for every entry and seed, and OUT/seqmaps; returns the folders.
+    """Write OUT/flockscope-<split>/<name>-s<seed>/ for every entry and seed, and OUT/seqmaps; returns the sequence
+    folders.
 
-    The folders come in the order of entries, then seeds. Stored sequences of the same scenario, seed and pictures are
-    kept.
+    The folders come in the order of entries, all seeds of an entry together. Stored sequences of the same scenario,
+    seed, version and pictures are kept if all their files are intact, else made again.
 
-    entries: resolved entries, or names of scenarios, suites or TOML files. set: "key=value" settings for the named
-    ones. seeds: inside one split. streams: pictures to store (sim.io.store.streams.STREAMS; () for none). images:
-    their file type, "jpg", "png" or "mp4". The workers of a cluster must share the folder `out` under the same path.
+    entries: resolved entries, or names of scenarios, suites or TOML files. set: "key=value" settings for entries given
+    by name. seeds: inside one split (train from 0, val from 10,000, test from 20,000, fit from 30,000, demo from
+    40,000). workers: by default this process. The workers of a cluster must share the folder `out` under the same path.
+    progress: called as progress(sequences done, sequences in all, name of the last one) after each, failed ones
+    included. streams: pictures to store ("left", "right", "disparity", "ids", "background"; () for none). images: their
+    file type, "jpg", "png" or "mp4".
 
-    Raises InputError before anything is simulated if an option is wrong, entries share a name, or a folder holds
-    another sequence. If sequences fail, the others are made and then the first error is raised, with the number of
-    failures. An error that would hit every sequence, as a full disk, is raised at once.
+    Raises InputError before anything is simulated if an option or scenario is wrong, two entries share a name, a folder
+    holds another sequence, or another process writes to `out`. If sequences fail, the others are made, and then an
+    error is raised with the text of the first failure and the number of failures: InputError if all failures are
+    InputErrors, else WorkError. An error that would hit every sequence, as a full disk, ends the work at once. Also
+    raises as `start_workers`.
     """
     if workers.count < 1:
         raise InputError(place="workers", got=workers.count, expected="1 or more", remedy="correct --workers")
@@ -85,7 +91,13 @@ def _resolved(entries: Iterable[Entry | str], set: Iterable[str]) -> list[Entry]
 def _run_jobs(
     jobs: list[SequenceJob], workers: WorkerOptions, done: Callable[[SequenceJob], None]
 ) -> dict[str, FlockscopeError]:
-    """Run all jobs, or those up to the first fatal error; returns the errors by name, in the order of the jobs."""
+    """Run all jobs, or those up to the first fatal error; returns the errors by sequence name, in the order of the
+    jobs.
+
+    workers: which workers to use, never more than jobs. done: called with each finished job, also a failed one, but not
+    with the job of the fatal error. Jobs without error have no entry. Raises as `start_workers`, and WorkError if the
+    workers are lost.
+    """
     errors: dict[str, FlockscopeError] = {}
     with start_workers(min(workers.count, max(1, len(jobs))), workers.cluster) as run:
         marked = jobs if workers.cluster is None else _with_marker(jobs)
@@ -99,7 +111,11 @@ def _run_jobs(
 
 
 def _with_marker(jobs: list[SequenceJob]) -> list[SequenceJob]:
-    """Write a marker file into OUT and return the jobs that ask for it; remove_partials deletes it."""
+    """Write an empty marker file into OUT and return the jobs with that file as their `marker`; needs at least one job.
+
+    A worker starts such a job only if it sees the file, so that it writes to the same file system. remove_partials
+    deletes the file. Raises InputError or WorkError if it cannot be written.
+    """
     marker = jobs[0].folder.parents[1] / f"{PARTIAL}{uuid4().hex}"
     write_file(marker, b"")
     return [replace(job, marker=marker) for job in jobs]
@@ -125,9 +141,12 @@ def _not_visible(job: SequenceJob) -> WorkError:
 
 
 def write_seqmap(root: Path, split: str) -> set[str]:
-    """Write ROOT/seqmaps/flockscope-<split>.txt, TrackEval's list of sequences; returns the names it lists.
+    """Write ROOT/seqmaps/flockscope-<split>.txt, TrackEval's list of sequences; returns the sequence names that it
+    lists.
 
-    It lists every sequence folder of the split that has a manifest, sorted. No file is written if there is none.
+    It lists, sorted, every folder below ROOT/flockscope-<split> that has a manifest; folders whose names begin with a
+    dot are left out. Without such a folder no file is written and the result is empty; an existing file stays. Raises
+    InputError if the file cannot be written, WorkError if the disk is full.
     """
     folder = root / f"flockscope-{split}"
     complete = sorted(p.parent.name for p in folder.glob(f"*/{MANIFEST}") if not p.parent.name.startswith("."))
@@ -137,7 +156,11 @@ def write_seqmap(root: Path, split: str) -> set[str]:
 
 
 def _summary(errors: dict[str, FlockscopeError], total: int) -> FlockscopeError:
-    """Return a single error unchanged, else the first one with the count and up to five names of the others."""
+    """Return one error for all failures of `total` jobs, given by sequence name; `errors` has at least one entry.
+
+    A single error is returned unchanged. Otherwise the result has the text of the first error, the number of further
+    errors and up to five of their names. Its type is that of the errors if all have the same, else WorkError.
+    """
     first, *_ = errors.values()
     if len(errors) == 1:
         return first

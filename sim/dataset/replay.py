@@ -33,7 +33,10 @@ FLAT = ("caviar",)  # recordings whose image, divided by its scale, is taken as 
 
 @dataclass(frozen=True)
 class Cut:
-    """The part of a recording to replay: from `start` s, for `duration` s; None means to its end."""
+    """The part of a recording to replay.
+
+    start: s after the recording's frame 1. duration: s; None means to the recording's end.
+    """
 
     start: float = 0.0
     duration: float | None = None
@@ -51,15 +54,19 @@ def replay(
     calibration: Camera | str | Path | None = None,
     streams: Iterable[str] = ("left",),
 ) -> Sequence:
-    """Return a recording's people as a labelled sequence that our camera and sensor observe.
+    """Return the labelled people of a recording as a simulated sequence: real motion, seen by our camera and sensor.
 
-    source: a sequence, or the path of one. camera: what observes them (camera, sensor, light, picture), or its TOML
-    file; None for the default. seed: for bodies, looks and sensor. cut: the part to replay. calibration: camera of a
-    recording with boxes only, which maps their feet to the ground. streams: as for `simulate`. The result's
-    `source["origin"]` describes the recording.
+    source: a sequence with truth, or the path of one. camera: an ObservationSpec (camera, sensor, light, picture) or
+    its TOML file; None for the default. seed: for bodies, looks and sensor. cut: the part to replay; default all.
+    calibration: camera, or file of a camera, of a recording that has boxes but no ground positions; it maps the boxes'
+    feet to the ground. streams: pictures as for sim.simulate, some of "left", "right", "disparity", "ids",
+    "background". The result's `source["origin"]` describes the recording. Without group labels in the recording, the
+    result's truth has no group labels either.
 
-    Raises InputError if the source holds several sequences, no labelled people or no positions on the ground, if nobody
-    is in the cut, if the cut is outside the recording, or if people leave the view.
+    Raises InputError if the source is invalid, holds several sequences, has no labelled people or no way to positions
+    on the ground; if a calibration is given for labels that are on the ground, is invalid or has another aspect ratio
+    than the recording; if the cut is outside the recording, longer than an hour, or empty of people; if `camera` is
+    invalid, people leave its view, a stream is unknown, or "right" or "disparity" is wanted without a baseline.
     """
     from sim.io.source import open_source
 
@@ -83,9 +90,12 @@ def resolve_replay(
     calibration: Camera | str | Path | None = None,
     streams: Iterable[str] = (),
 ) -> tuple[Sequence, ReplaySpec]:
-    """Return a replay, and its resolved specification, which takes the place of the scenario in files and hashes.
+    """Return (replay, specification): the sequence that `replay` returns for this source, and the ReplaySpec that
+    describes it.
 
-    Arguments and errors are those of `replay`.
+    The specification has all defaults filled in. It takes the place of the scenario in stored files and hashes. source:
+    a sequence with truth. view: camera, sensor, light and picture. seed, cut, calibration: as for `replay`. streams:
+    pictures, by default none. Raises InputError as `replay`.
     """
     truth = _labels(source)
     places = on_ground(truth, source, _calibrated(calibration, source))
@@ -115,11 +125,13 @@ def _labels(source: Sequence) -> Truth:
 
 
 def on_ground(truth: Truth, source: Sequence, calibration: Camera | None = None) -> Array:
-    """Return the positions on the ground (R, 2) m of the rows of a truth, nan where unknown.
+    """Return the positions on the ground (R, 2) m, x and y, of the R rows of a truth, nan where unknown.
 
-    They come from the truth's own positions; else from the feet of its boxes with the calibration or the source's
-    camera; else, for recordings in FLAT, from the boxes' centres divided by the image scale, y up. Raises InputError if
-    none of these is known, or if a calibration is given for a truth with positions.
+    They are the truth's own positions if it has some. Otherwise they are the feet of its boxes, projected with
+    `calibration` or, if that is None, the source's camera onto the ground z = 0. Without a camera, a CAVIAR recording
+    gives the boxes' centres divided by the image scale px_per_m, with y upwards.
+
+    Raises InputError if none of these is known, or if a calibration is given for a truth with positions.
     """
     if truth.pos is not None:
         if calibration is not None:
@@ -154,7 +166,11 @@ def _calibrated(calibration: Camera | str | Path | None, source: Sequence) -> Ca
 
 
 def _moving(places: Array, truth: Truth, source: Sequence, fps: float, cut: Cut) -> Trajectories:
-    """Return the trajectories of the cut at `fps`. Raises InputError if the cut is wrong or nobody is in it."""
+    """Return the trajectories of the people of `source` in the cut, resampled at `fps` frames/s.
+
+    places (R, 2) m: ground positions of the rows of `truth`, rows with nan are ignored. Raises InputError if the cut
+    begins before 0 s or after the end, lasts more than an hour, or has nobody in it.
+    """
     file, whole = source.source.get("path", source.name), (truth.length - 1) / truth.fps
     last = whole if cut.duration is None else min(whole, cut.start + cut.duration - 1 / fps)
     if not 0 <= cut.start <= last <= cut.start + LONGEST:
@@ -214,7 +230,12 @@ def _motion(moving: Trajectories, truth: Truth, name: str, fps: float, cut: Cut,
 
 
 def _intent(moving: Trajectories, truth: Truth, fps: float, cut: Cut) -> Ints:
-    """Return the intent (T, P): the group label nearest in time, an own number for a person alone, -1 if absent."""
+    """Return the number of the group that each person is meant to be in, (T, P): frame × person of `moving`, from frame
+    1.
+
+    It is the person's group label nearest in time; a person alone gets a number of its own; -1 while absent. fps:
+    frames/s of `moving`. cut: its start in s is the time of frame 1.
+    """
     t = cut.start + np.arange(len(moving.present)) / fps
     label = truth.group[nearest_row(truth.frame, truth.id, moving.id, truth.fps, t)]
     alone = int(truth.group.max(initial=0)) + 1 + np.arange(len(moving.id))
@@ -222,7 +243,11 @@ def _intent(moving: Trajectories, truth: Truth, fps: float, cut: Cut) -> Ints:
 
 
 def _heights(people: Ints, truth: Truth, seed: int) -> Array:
-    """Return body heights (P,) m: the first label of each person, else drawn as in simulated crowds, by seed and id."""
+    """Return the body heights (P,) m of `people`, ids (P,) of the truth.
+
+    A person's height is that of its first row in the truth. Where it is unknown, it is drawn as in simulated crowds,
+    from seed and id.
+    """
     from scenarios.schema.scenario import CrowdSpec
     from scenarios.schema.values import draw
 
@@ -234,14 +259,22 @@ def _heights(people: Ints, truth: Truth, seed: int) -> Array:
 
 
 def _name(name: str, cut: Cut) -> str:
-    """Return the replay's name: that of the recording with odd characters replaced, and the start of the cut."""
+    """Return the replay's name: `name` of the recording with "-" for every character other than letters, digits, "_",
+    "." and "-".
+
+    "replay-" is put in front if it does not begin with a letter. "-t<start in s>" is appended if the cut begins after 0
+    s.
+    """
     clean = "".join(c if c.isalnum() or c in "_.-" else "-" for c in name)
     clean = clean if clean[:1].isalpha() else f"replay-{clean}"
     return f"{clean}-t{cut.start:g}" if cut.start else clean
 
 
 def _without_groups(sequence: Sequence) -> Callable[[], Truth]:
-    """Return a loader of the truth with groups marked as not labelled, for a recording without group labels."""
+    """Return a function that loads the sequence's truth without groups, for a recording without group labels.
+
+    In that truth everybody is alone (-1), groups, events and near are None, and no frame counts as labelled.
+    """
 
     def truth() -> Truth:
         assert sequence.load_truth is not None

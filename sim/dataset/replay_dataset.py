@@ -26,9 +26,11 @@ Progress = Callable[[int, int, str], None]
 
 @dataclass(frozen=True)
 class ReplayOptions:
-    """Options that all replays of a dataset share; `cut`, `calibration` and `streams` as for sim.replay.
+    """Options that all replays of a dataset share.
 
-    view: camera, sensor, light and picture. images: file type of the pictures, "jpg", "png" or "mp4".
+    view: camera, sensor, light and picture. cut: the part of each recording to replay, default all. calibration:
+    camera, or its file, of recordings with boxes only; None if not needed. streams: pictures to store, some of "left",
+    "right", "disparity", "ids", "background". images: their file type, "jpg", "png" or "mp4".
     """
 
     view: ObservationSpec
@@ -41,13 +43,16 @@ class ReplayOptions:
 def store_replays(
     sources: Iterable[Sequence], options: ReplayOptions, seeds: range, out: str | Path, progress: Progress | None = None
 ) -> list[Path]:
-    """Write OUT/flockscope-<split>/<recording>-s<seed>/ for every source and seed, and OUT/seqmaps.
+    """Write OUT/flockscope-<split>/<recording>-s<seed>/ for every source and seed, and OUT/seqmaps; returns the
+    folders.
 
-    Returns the folders, all seeds of the first source first. Stored replays with the same options are kept.
-    progress(replays done, replays in all, name of the last one) is called after each.
+    All seeds of the first source come first. A stored replay with the same options is kept if its files are intact.
+    progress: called as progress(replays done, replays in all, name of the last one) after each replay. The first error
+    ends the work; replays stored before it are kept and listed in OUT/seqmaps.
 
-    Raises InputError if seeds span two splits, if two recordings share a name, if a recording of real motion is given
-    with seeds below 20,000 (the tuning splits), or if a folder holds another sequence; otherwise as sim.replay.
+    Raises InputError if `seeds` is empty or spans two splits, two recordings share a name, a recording of real motion
+    is given with seeds below 20,000 (the tuning splits), a stream or file type is unknown, a folder holds another
+    sequence, or another process writes to `out`; otherwise as sim.replay. Raises WorkError if the disk is full.
     """
     recordings, split, root = list(sources), split_of(seeds), Path(out)
     _check(recordings, seeds, split)
@@ -94,6 +99,10 @@ def _store(recording: Sequence, options: ReplayOptions, seed: int, folder: Path)
 
 
 def _job(form: ReplaySpec, seed: int, folder: Path, options: ReplayOptions) -> SequenceJob:
-    """Return the job whose identity is this replay; its resolved specification takes the place of the scenario."""
+    """Return the SequenceJob of one replay; its folder is folder/<name>-s<seed, 5 digits>.
+
+    form: the replay's specification, which takes the scenario's place. folder: OUT/flockscope-<split>. options: give
+    streams and images.
+    """
     entry = Entry(form.name, cast(Any, form))
     return SequenceJob(folder / f"{form.name}-s{seed:05d}", entry, seed, options.streams, options.images)

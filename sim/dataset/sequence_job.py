@@ -20,9 +20,10 @@ MARKER_TIMEOUT = 5.0  # s that a shared file system may take to show one machine
 class SequenceJob:
     """One sequence to make.
 
-    folder: where it is stored; its last part is the sequence's name. streams, images: the pictures to store and their
-    file type, as in sim.io.store.streams. marker: a file that every worker must see before it starts, else it would
-    write to another file system; None for local workers.
+    folder: where it is stored; its last part is the sequence's name. entry: the scenario to simulate. seed: the random
+    seed. streams: pictures to store, some of sim.io.store.streams.STREAMS, () for none. images: their file type, "jpg",
+    "png" or "mp4". marker: a file that a worker must see before it starts, because it would otherwise write to another
+    file system; None for local workers.
     """
 
     folder: Path
@@ -34,21 +35,26 @@ class SequenceJob:
 
     @property
     def name(self) -> str:
-        """The sequence's name: <entry>-s<seed, 5 digits>."""
+        """The sequence's name, the last part of `folder`: <entry>-s<seed, 5 digits>."""
         return self.folder.name
 
 
 @dataclass(frozen=True)
 class JobOutcome:
-    """The error of a job, None if its sequence is stored; fatal: every other job would fail likewise (disk full)."""
+    """How a job ended.
+
+    error: the error, None if the sequence is stored. fatal: True if every other job would fail in the same way, as with
+    a full disk.
+    """
 
     error: FlockscopeError | None = None
     fatal: bool = False
 
 
 def plan_jobs(entries: list[Entry], seeds: range, folder: Path) -> list[SequenceJob]:
-    """Return one job per entry and seed, all seeds of the first entry first, without pictures.
+    """Return one job per entry and seed, all seeds of the first entry first; the jobs store no pictures.
 
+    folder: OUT/flockscope-<split>; each job's folder is <entry>-s<seed, 5 digits> in it. No entries give no jobs.
     Raises InputError if two entries have the same name, since they would share a folder.
     """
     names = [e.name for e in entries]
@@ -61,10 +67,11 @@ def plan_jobs(entries: list[Entry], seeds: range, folder: Path) -> list[Sequence
 
 
 def stored_manifest(job: SequenceJob) -> dict[str, Any] | None:
-    """Return the manifest in the job's folder; None if the folder or a readable manifest is missing.
+    """Return the manifest in the job's folder; None if the folder is missing or has no valid manifest.
 
-    Only the identity is compared, not the files. Raises InputError if the folder holds another sequence: another
-    scenario, seed, version, or choice of pictures.
+    The files are not compared with the manifest. Raises InputError if the folder holds another sequence, that is, if
+    the manifest differs in scenario, seed, repeat, format, engine, streams or file type. Also raises InputError if a
+    stream or the file type of the job is unknown.
     """
     from scenarios.loading.resolve import dump
 
@@ -86,19 +93,21 @@ def stored_manifest(job: SequenceJob) -> dict[str, Any] | None:
 
 
 def is_stored(job: SequenceJob) -> bool:
-    """Return True if the folder holds the job's sequence and every file has the bytes that its manifest names.
+    """Return True if the folder holds the job's sequence and every file has the hash that its manifest names.
 
-    Raises InputError if the folder holds another sequence.
+    Returns False if the folder or a valid manifest is missing, or a file is missing or altered. Raises InputError if
+    the folder holds another sequence.
     """
     manifest = stored_manifest(job)
     return manifest is not None and next(damaged_files(job.folder, manifest), None) is None
 
 
 def simulate_and_store(job: SequenceJob) -> None:
-    """Simulate the job's scenario and write its folder.
+    """Simulate the job's scenario and write its folder, replacing a damaged one.
 
-    Raises InputError or WorkError with the scenario's file, also for an unexpected exception. An error that an
-    OSError caused passes unchanged.
+    If another process has stored the same sequence meanwhile, that one stays. Raises InputError (impossible scenario)
+    or WorkError (unfulfilled order), with the scenario's file in the error. Any other exception becomes a WorkError. An
+    InputError or WorkError that an OSError caused, as a full disk, is raised unchanged.
     """
     from scenarios.loading.resolve import dump
     from sim.sequence import simulate
@@ -122,9 +131,11 @@ def simulate_and_store(job: SequenceJob) -> None:
 
 
 def run_job(job: SequenceJob) -> JobOutcome:
-    """Make the job's sequence unless it is already stored; returns errors instead of raising them.
+    """Make the job's sequence unless it is already stored; returns InputError and WorkError in the JobOutcome, raises
+    neither.
 
-    An error is fatal if an OSError caused it. The fatal error of a job with a marker names the worker's machine.
+    The outcome is fatal if an OSError caused the error, as a full disk or a marker file that the worker cannot see
+    within 5 s. The fatal error of a job with a marker names the worker's machine.
     """
     try:
         if job.marker is not None:
@@ -140,7 +151,9 @@ def run_job(job: SequenceJob) -> JobOutcome:
 
 
 def lost_job(job: SequenceJob, error: WorkError) -> JobOutcome:
-    """Return the outcome of a job that killed too many workers: `error` with the sequence's name as its file."""
+    """Return the outcome of a job that killed too many workers: a copy of `error` with the job's name as file, not
+    fatal.
+    """
     return JobOutcome(WorkError(**{**error.as_dict(), "file": job.name}))
 
 

@@ -17,9 +17,10 @@ SIMULATED = ("simulated", "generated", "replayed")
 
 
 def split_of(seeds: range) -> str:
-    """Return the split that holds all seeds: "train", "val", "test", "fit" or "demo".
+    """Return the name of the split that holds all seeds: "train", "val", "test", "fit" or "demo".
 
-    Raises InputError if the range is empty, has a negative seed, or crosses the border between two splits.
+    The splits begin at the seeds 0, 10,000, 20,000, 30,000 and 40,000. Raises InputError if the range is empty, has a
+    negative seed, or crosses the border between two splits.
     """
     if len(seeds) == 0 or min(seeds) < 0:
         raise InputError(
@@ -39,7 +40,8 @@ def split_of(seeds: range) -> str:
 def is_real(sequence: Sequence) -> bool:
     """Return True if the sequence shows real motion: a recording, or a replay of a recording.
 
-    A sequence whose `source` has neither "origin" nor "kind" counts as simulated.
+    Decided by `sequence.source`: its "origin" (of a replay) says whether it is real; else its "kind" is compared with
+    the simulated kinds. A sequence with neither counts as simulated.
     """
     kind, origin = sequence.source.get("kind"), sequence.source.get("origin")
     return bool(origin["real"]) if origin is not None else kind is not None and kind not in SIMULATED

@@ -22,8 +22,12 @@ GAP = 2.0  # s without label after which a person counts as absent
 
 @dataclass(frozen=True)
 class Trajectories:
-    """Resampled motion: pos (T, P, 2) m and vel (T, P, 2) m/s, nan while absent; id (P,); present (T, P); smoothing:
-    the chosen tau in s."""
+    """Resampled motion of P people in T frames.
+
+    id (P,): person ids, ascending; column k belongs to id[k]. pos (T, P, 2): x, y in m, and vel (T, P, 2): m/s; both
+    nan while absent. present (T, P): True while present. smoothing: the chosen time constant tau in s; faster motion
+    was removed.
+    """
 
     id: Ints
     pos: Array
@@ -37,10 +41,13 @@ Segment = tuple[int, Array, Curve, Curve]
 
 
 def resample(frame: Ints, id: Ints, pos: Array, rate: float, fps: float, first: float, last: float) -> Trajectories:
-    """Return the motion of labelled rows at times first, first + 1/fps, … up to last (s).
+    """Return the smoothed motion of labelled people at times first, first + 1/fps, … up to and including last (s).
 
-    frame, id (R,), pos (R, 2) m: rows in any order. rate: label frames per second; frame 1 is time 0. Segments with a
-    single label are dropped, and people without a segment at any of those times.
+    frame (from 1), id (R,), pos (R, 2) m, finite: labelled rows in any order, each id once in a frame. rate: label
+    frames per second; frame 1 is time 0. A person is absent in gaps of more than 2 s between labels, before the first
+    and after the last label. Segments with a single label are dropped, and so are people who are absent at all of the
+    times. Without rows the result has no people. The smoothing time is the smallest of TIMES that keeps the 99 %
+    quantile of accelerations within 2.5 m/s².
     """
     t = first + np.arange(int(np.floor((last - first) * fps + 1e-6)) + 1) / fps
     for tau in TIMES:
@@ -62,7 +69,12 @@ def _inside(times: Array, t: Array) -> Bools:
 
 
 def _segments(frame: Ints, id: Ints, pos: Array, one: int, rate: float, tau: float) -> list[Segment]:
-    """Return a person's gap-free segments: id, times of the labels, and position and velocity as functions of time."""
+    """Return the gap-free segments of the person with id `one`, smoothed with time constant `tau` (s).
+
+    Each segment is (id, times of its labels in s, position as a function of time, velocity as a function of time).
+    frame (from 1), id (R,), pos (R, 2) m: all labelled rows. rate: label frames per second. A gap is more than 2 s.
+    Segments with a single label are left out.
+    """
     from scipy.interpolate import CubicSpline
 
     rows = np.flatnonzero(id == one)
@@ -80,7 +92,9 @@ def _segments(frame: Ints, id: Ints, pos: Array, one: int, rate: float, tau: flo
 def smoothing_spline(t: Array, y: Array, weight: float) -> Array:
     """Return the smoothing spline f (N, 2) at its knots t (N,): the minimum of Σ |y - f|² + weight ∫ |f''|².
 
-    y (N, 2); fewer than 3 rows are returned unchanged. f is a natural cubic spline.
+    t (N,): ascending times, no two equal. y (N, 2): finite values at t. weight: 0 returns y; a large one gives a
+    straight line. Fewer than 3 rows are returned unchanged. f is a natural cubic spline.
+
     Reinsch (1967): f = y - weight Q γ with (R + weight Qᵀ Q) γ = Qᵀ y, γ being f'' at the inner knots.
     """
     from scipy.linalg import solveh_banded
@@ -104,7 +118,8 @@ def smoothing_spline(t: Array, y: Array, weight: float) -> Array:
 
 
 def _acceleration(segments: list[Segment], fps: float) -> float:
-    """Return the 99 % quantile of the segments' accelerations in m/s², sampled at `fps`; 0 without segments."""
+    """Return the 99 % quantile of the segments' accelerations in m/s², sampled `fps` times per s; 0 if there are none.
+    """
     size = [np.zeros(1)]
     for _, times, _, velocity in segments:
         t = np.arange(times[0], times[-1], 1 / fps)
@@ -113,9 +128,11 @@ def _acceleration(segments: list[Segment], fps: float) -> float:
 
 
 def nearest_row(frame: Ints, id: Ints, people: Ints, rate: float, t: Array) -> Ints:
-    """Return for each time t (T,) and person the row (T, P) of the label that is nearest in time.
+    """Return for each time and person the index of the person's label row that is nearest in time, shape (T, P).
 
-    frame, id (R,): the labels. people (P,): ids, each with a label. Of two equally near labels the earlier one counts.
+    frame (from 1), id (R,): the label rows, in any order. people (P,): ids, each of which must have a row (else
+    IndexError). rate: label frames per second; frame 1 is time 0. t (T,): times in s. Of two equally near rows the
+    earlier one is taken.
     """
     out = np.zeros((len(t), len(people)), np.int64)
     for column, one in enumerate(people):

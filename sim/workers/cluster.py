@@ -43,12 +43,17 @@ PROFILE_SAFE = (
 
 @contextmanager
 def cluster_workers(address: str, workers: int = 1) -> Iterator[RunItems]:
-    """Give the RunItems of the cluster whose scheduler listens at `address`.
+    """Give the RunItems (run a function over items) of the dask cluster whose scheduler listens at `address`.
 
-    As many items are under way as the cluster has worker threads, and `workers` at the least.
+    address: "tcp://HOST:PORT". workers: least number of items under way. As many items are under way as the cluster has
+    worker threads, but at least `workers`, plus the `ahead` of the call. The end of the block closes the connection;
+    the cluster itself keeps running.
 
-    Raises InputError if the address is malformed or dask.distributed is not installed, WorkError if no scheduler
-    answers. A lost connection, or a worker that cannot take part, raises WorkError while results are read.
+    Entering the block raises InputError if the address is malformed or dask.distributed is not installed, and WorkError
+    if no scheduler answers within CONNECT_TIMEOUT (10 s). Reading results raises WorkError if the connection is lost,
+    or if a worker has other versions, sources or CPU instructions than this process, has several threads, or cannot
+    import flockscope. An item that killed too many workers raises WorkError unless `on_loss` is given. A cluster
+    without workers causes a warning after 20 s.
     """
     client = _connect(address)
 
@@ -102,7 +107,12 @@ def _connect(address: str) -> Any:
 
 
 class _ClusterCapacity:
-    """State: the number of the cluster's worker threads at the last count, and since when there are none."""
+    """How many items the cluster can run at a time.
+
+    State: the number of the cluster's worker threads at the last count, the time of that count, and since when there
+    are no threads (None while there are some, or after the warning about that). `least`: the smallest capacity
+    reported.
+    """
 
     def __init__(self, client: Any, address: str, least: int) -> None:
         self._client, self._address, self._least = client, address, least
@@ -110,9 +120,11 @@ class _ClusterCapacity:
         self._empty_since: float | None = time.monotonic()
 
     def count(self) -> int:
-        """Return how many items can run at a time, at least `least`.
+        """Return how many items can run at a time: the number of worker threads, but at least `least`.
 
-        Counts anew after COUNT_INTERVAL. Raises WorkError if the connection to the scheduler is lost.
+        Counts the threads anew if the last count is COUNT_INTERVAL (1 s) old, else returns the last count. Warns once
+        if there are no threads for NO_WORKERS_WARNING (20 s). Raises WorkError if the connection to the scheduler is
+        lost.
         """
         now = time.monotonic()
         if now - self._counted >= COUNT_INTERVAL:
@@ -132,13 +144,17 @@ class _ClusterCapacity:
 
 
 def lost_connection(address: str) -> WorkError:
-    """Return the error for a scheduler that can no longer be reached."""
+    """Return (not raise) the WorkError for a scheduler at `address` that can no longer be reached."""
     got = f"a lost connection to {address}"
     return WorkError(place="--cluster", got=got, expected="a scheduler that stays reachable", remedy=REMEDY)
 
 
 def _submit(client: Any, function: Callable[[Any], Any], item: Any) -> Any:
-    """Submit one call and return its future. The worker runs it by unpickling the bytes of a ClusterCall."""
+    """Submit the call function(item) to the cluster; returns its dask future, whose result is a pickled WorkResult.
+
+    The worker runs the call by unpickling the bytes of a ClusterCall. Raises the pickling error of a function or item
+    that cannot be pickled.
+    """
     name = getattr(getattr(function, "func", function), "__name__", "work").strip("_")
     body = pickle.dumps(ClusterCall(pickle.dumps((function, item)), tuple(runtime().items())))
     return client.submit(pickle.loads, body, key=f"{name}-{uuid.uuid4().hex}", pure=False)
@@ -146,9 +162,11 @@ def _submit(client: Any, function: Callable[[Any], Any], item: Any) -> Any:
 
 @dataclass(frozen=True)
 class ClusterCall:
-    """A pickled (function, item) and the runtime that a worker must have; its pickle unpickles to a pickled WorkResult.
+    """A call for a worker of a cluster: unpickling the pickle of a ClusterCall runs it and gives a pickled WorkResult.
 
-    `__reduce__` makes unpickling run the call: whoever only forwards the bytes needs no code of ours.
+    call: a pickled (function, item). required: (name, value) pairs of the runtime that the worker must have
+    (sim.versions.runtime). `__reduce__` makes unpickling run the call, so a scheduler that only forwards the bytes
+    needs none of our code. Unpickling raises WorkError as `run_on_worker`.
     """
 
     call: bytes
@@ -159,9 +177,14 @@ class ClusterCall:
 
 
 def run_on_worker(call: bytes, required: tuple[tuple[str, str], ...]) -> bytes:
-    """Run a pickled call on a dask worker and return the pickled WorkResult.
+    """Run a call on the dask worker that this process is; returns a pickled WorkResult (value or exception of the
+    call).
 
-    Raises WorkError if the worker has more than one thread, or if its runtime differs from `required`.
+    call: a pickled (function, item). required: (name, value) pairs of the runtime that the worker must have. Sets each
+    of THREAD_VARIABLES to 1 in this process unless it is set already. Before Python 3.11.9 it stops dask's profiler.
+
+    Raises WorkError if the worker has more than one thread, or if its runtime differs from `required`. An exception of
+    the function itself is not raised; it is in the WorkResult.
     """
     from distributed import get_worker
 
@@ -187,7 +210,10 @@ def run_on_worker(call: bytes, required: tuple[tuple[str, str], ...]) -> bytes:
 
 
 def _stop_profiler(worker: Any) -> None:
-    """Stop dask's profiler, which inspects the stack of each thread a hundred times a second."""
+    """Stop the profiler of a dask `worker`, which inspects the stack of each thread a hundred times a second.
+
+    Waits at most CONNECT_TIMEOUT (10 s) until it has stopped. Does nothing if no profiler is running.
+    """
     profile = worker.periodic_callbacks.get("profile")
     if profile is not None and profile.is_running():
         worker.loop.add_callback(profile.stop)
@@ -203,7 +229,9 @@ def _remedy(different: list[str]) -> str:
 
 
 def _drain(finished: queue.SimpleQueue[str]) -> Iterator[str]:
-    """Yield all keys in the queue, after waiting at most COUNT_INTERVAL for the first."""
+    """Yield the keys of all finished futures in the queue; waits at most COUNT_INTERVAL (1 s) for the first, else
+    yields none.
+    """
     with suppress(queue.Empty):
         yield finished.get(timeout=COUNT_INTERVAL)
         while True:
@@ -211,7 +239,10 @@ def _drain(finished: queue.SimpleQueue[str]) -> Iterator[str]:
 
 
 def _fetchers(client: Any, futures: list[Any]) -> list[Callable[[], bytes]]:
-    """Return for each future a call that returns its bytes or raises its error; several are gathered at once."""
+    """Return for each finished future, in order, a call that returns the future's bytes or raises its error.
+
+    Several futures are gathered in one request. If one of them failed, each call fetches its own future instead.
+    """
     if len(futures) > 1:
         with suppress(Exception):  # one of them failed: its own result() raises the error
             return [partial(bytes, body) for body in client.gather(futures)]

@@ -15,10 +15,12 @@ from sim.workers.protocol import MAX_LOSSES, THREAD_VARIABLES, R, RunItems, T, w
 
 @contextmanager
 def process_pool(workers: int) -> Iterator[RunItems]:
-    """Give the RunItems of `workers` spawned processes for the length of the block.
+    """Give the RunItems (run a function over items) of `workers` local worker processes for the length of the block.
 
-    The block sets THREAD_VARIABLES to 1 in this process, so that its children inherit them, and restores them at its
-    end. The end of the block terminates the processes, also in the middle of a call.
+    A process is spawned when it gets its first item, and again after its death. The block sets THREAD_VARIABLES to 1 in
+    this process's environment, so that the workers inherit them, and restores them at its end. The end of the block
+    terminates the processes, also in the middle of a call. Exceptions are raised while results are read, as RunItems
+    says.
     """
     before = {name: os.environ.get(name) for name in THREAD_VARIABLES}
     os.environ.update(dict.fromkeys(THREAD_VARIABLES, "1"))
@@ -46,7 +48,7 @@ def process_pool(workers: int) -> Iterator[RunItems]:
 
 @dataclass
 class _PendingItem(Generic[T]):
-    """An item and the number of workers that have died while running it."""
+    """An item that has no result yet, and `losses`, the number of workers that have died while running it."""
 
     item: T
     losses: int = 0
@@ -58,7 +60,14 @@ def _run_items(
     items: Iterable[T],
     on_loss: Callable[[T, WorkError], R] | None,
 ) -> Iterator[tuple[T, R]]:
-    """Yield (item, result) as they arrive. A process has one item at a time, so a death is that item's loss."""
+    """Yield (item, function(item)) for every item, in the order in which the results arrive.
+
+    Each of `processes` runs one item at a time, so the death of a process is the loss of one item. The item is run
+    again until MAX_LOSSES (3) processes have died of it. Then on_loss(item, error) becomes its result; if `on_loss` is
+    None, the WorkError is raised. It is raised in spite of `on_loss` after more than MAX_LOSSES × (number of processes
+    + 1) deaths without a result in between. Raises the exception of the function. When the iteration ends early, busy
+    processes are terminated.
+    """
     from multiprocessing.connection import wait
 
     waiting, to_repeat, idle = map(_PendingItem, items), list[_PendingItem[T]](), list(processes)

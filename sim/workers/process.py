@@ -20,7 +20,9 @@ EXIT_TIMEOUT = 5.0  # s that a terminated process has to exit before it is kille
 
 
 class RemoteTraceback(Exception):
-    """The text of a traceback from a worker; it is the cause of the exception that is raised here."""
+    """The text of a traceback from a worker process: `__cause__` of the call's exception when that is raised in the
+    parent.
+    """
 
     def __str__(self) -> str:
         return f"\n{self.args[0]}"
@@ -28,24 +30,30 @@ class RemoteTraceback(Exception):
 
 @dataclass(frozen=True)
 class WorkResult:
-    """The outcome of one call in a worker: its return value, or its exception with the text of the traceback."""
+    """The outcome of one call in a worker.
+
+    value: the return value, None after an exception. error: the exception, None after success. trace: the text of the
+    exception's traceback in the worker, "" after success.
+    """
 
     value: Any = None
     error: BaseException | None = None
     trace: str = ""
 
     def result(self) -> Any:
-        """Return the value; raises the call's exception, with a RemoteTraceback as its cause, if there was one."""
+        """Return the call's value, or raise the call's exception with the worker's traceback (RemoteTraceback) as its
+        cause.
+        """
         if self.error is not None:
             raise self.error from RemoteTraceback(self.trace)
         return self.value
 
 
 class WorkerProcess:
-    """A worker process.
+    """A worker process that runs one call at a time.
 
-    State: the process (None before its first item and after its end), the pipe to it, and `ended`, a text that says
-    how the last process ended: "exit code 3" or "signal 9 (SIGKILL)".
+    State: the process (None before its first item and after its end), the pipe to it, and `ended`, a text that says how
+    the last process ended: "exit code 3" or "signal 9 (SIGKILL)"; "" if none has ended.
     """
 
     def __init__(self) -> None:
@@ -54,9 +62,12 @@ class WorkerProcess:
         self._pipe: Any = None
 
     def send(self, function: Callable[[Any], Any], item: Any) -> Any:
-        """Send one call; returns the connection that becomes readable when the call is done or the process is dead.
+        """Send the call function(item); returns the connection that becomes readable when the call is done or the
+        process is dead.
 
-        Starts a process if none is alive. Raises the pickling error of a function or item that cannot be pickled.
+        Starts a process if none is alive. The outcome is read with `receive`, before the next `send`. Raises the
+        pickling error of a function or item that cannot be pickled. A process that dies while the call is sent raises
+        nothing here.
         """
         call = pickle.dumps((function, item))
         if self._process is None or not self._process.is_alive():
@@ -66,7 +77,12 @@ class WorkerProcess:
         return self._pipe
 
     def receive(self) -> WorkResult | None:
-        """Wait for the outcome of the call that was sent last; returns None if the process died instead."""
+        """Wait for the outcome of the call that was sent last; returns None if the process died instead, and then sets
+        `ended`.
+
+        An exception of the call is not raised; it is in the WorkResult. Raises the unpickling error of a value that
+        cannot be unpickled here.
+        """
         try:
             body = self._pipe.recv_bytes()
         except (EOFError, OSError):
@@ -76,12 +92,17 @@ class WorkerProcess:
         return result
 
     def terminate(self) -> None:
-        """Ask the process to exit at once, without waiting for its call or for its exit."""
+        """Ask the process to exit at once, without waiting for its call or for its exit; does nothing without a
+        process.
+        """
         if self._process is not None:
             self._process.terminate()
 
     def join(self) -> None:
-        """Wait until the process has exited, set `ended`; kills a process that takes longer than EXIT_TIMEOUT."""
+        """Wait until the process has exited, close its pipe and set `ended`; does nothing without a process.
+
+        Kills a process that takes longer than EXIT_TIMEOUT (5 s).
+        """
         if self._process is None:
             return
         self._process.join(EXIT_TIMEOUT)
@@ -106,7 +127,11 @@ class WorkerProcess:
 
 
 def _serve(pipe: Any) -> None:
-    """Run in the worker: answer calls from the pipe until the parent closes it."""
+    """Run in the worker process: run each pickled call from `pipe` and send back its WorkResult, until the parent
+    closes it.
+
+    Ignores Ctrl-C. The worker exits with code 1 when its parent exits.
+    """
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     threading.Thread(target=_exit_with_parent, daemon=True).start()
     with suppress(EOFError, OSError):
@@ -115,10 +140,11 @@ def _serve(pipe: Any) -> None:
 
 
 def run_pickled(call: bytes) -> bytes:
-    """Run a pickled (function, item) and return the pickled WorkResult; never raises.
+    """Run a pickled (function, item) and return the pickled WorkResult; never raises, not even SystemExit.
 
-    A result that cannot be pickled becomes a WorkResult with the pickling error. An exception that does not survive
-    pickling becomes a RuntimeError with its type and text.
+    An exception of the call is stored in the WorkResult with the text of its traceback. A result that cannot be pickled
+    gives a WorkResult with the pickling error. An exception that does not survive pickling becomes a RuntimeError with
+    its type and text.
     """
     try:
         function, item = pickle.loads(call)

@@ -24,10 +24,11 @@ R = TypeVar("R")
 
 
 class RunItems(Protocol):
-    """A call that runs a function over items on some workers.
+    """A callable that runs a function over items on some workers: this process, local processes, or a dask cluster.
 
-    The function is pickled by name, so a worker must be able to import it. A dead worker's item is run again by
-    another worker, so the function may run more than once for one item.
+    Workers other than this process get the function pickled by name, so they must be able to import it; items and
+    results are pickled too. A dead worker's item is run again by another worker, so the function may run more than once
+    for one item.
     """
 
     def __call__(
@@ -38,19 +39,24 @@ class RunItems(Protocol):
         ahead: int = 0,
         on_loss: Callable[[T, WorkError], R] | None = None,
     ) -> Iterator[tuple[T, R]]:
-        """Yield (item, function(item)) for every item, in the order in which the results arrive.
+        """Yield (item, function(item)) for every item, in the order in which the results arrive; nothing without items.
 
-        items: read lazily, one whenever a worker is free. A generator can therefore react to earlier results.
-        ahead: items that a cluster's scheduler holds beyond one per worker. Local workers ignore it.
-        on_loss: its return value becomes the result of an item that killed too many workers. This process ignores it.
+        items: read lazily, one whenever a worker is free. A generator can therefore react to earlier results. ahead:
+        number of items that a cluster's scheduler holds beyond one per worker. Local workers and this process ignore
+        it. on_loss: called with the item and the error if an item killed too many workers (3 local ones); its return
+        value becomes the item's result. This process ignores it.
 
-        Raises the exception of the function, which ends the iteration. Raises WorkError if an item killed too many
-        workers and `on_loss` is None, and if the workers cannot be reached any more.
+        Raises the exception of the function, which ends the iteration. Raises WorkError in three cases: an item killed
+        too many workers and `on_loss` is None; local workers die again and again without any result in between, also
+        with `on_loss`; a cluster is lost or a worker of it cannot take part.
         """
 
 
 def worker_loss(losses: int, cause: str) -> WorkError:
-    """Return the error for an item that killed `losses` workers; `cause` says how the last worker ended."""
+    """Return (not raise) the WorkError for an item that killed `losses` workers.
+
+    cause: how the last worker ended, as "exit code 3" or "signal 9 (SIGKILL)".
+    """
     return WorkError(
         got=f"an item that killed {losses} workers, the last by {cause}",
         expected="workers that finish",

@@ -17,8 +17,9 @@ from sim.workers.protocol import R, RunItems, T
 class WorkerOptions:
     """Which workers to use.
 
-    count: number of workers, 1 or more; 1 without a cluster is this process. cluster: address of a dask scheduler
-    (tcp://HOST:PORT), None for local workers.
+    count: number of workers, 1 or more (checked by `start_workers`); 1 without a cluster means this process. With a
+    cluster it is the least number of items under way. cluster: address of a dask scheduler ("tcp://HOST:PORT"), None
+    for local workers.
     """
 
     count: int = 1
@@ -26,11 +27,13 @@ class WorkerOptions:
 
 
 def start_workers(workers: int = 1, cluster: str | None = None) -> AbstractContextManager[RunItems]:
-    """Return a context manager that starts workers, gives their RunItems, and ends them with its block.
+    """Return a context manager that starts workers, gives a RunItems (runs a function over items), and ends them.
 
-    cluster None: this process for one worker, else `workers` spawned processes. Otherwise the workers of the dask
-    cluster with that address; `workers` is then the least number of items under way. Raises InputError if `workers` is
-    below 1; entering the block raises InputError or WorkError if the cluster's address is wrong or nobody answers.
+    cluster None: this process for one worker, else `workers` spawned processes. Otherwise the address of a dask
+    scheduler, "tcp://HOST:PORT"; its workers are used, and `workers` is then the least number of items under way.
+
+    Raises InputError if `workers` is below 1. Entering the block raises InputError if the address is malformed or
+    dask.distributed is not installed, and WorkError if no scheduler answers. Results raise as RunItems says.
     """
     if workers < 1:
         raise InputError(place="workers", got=workers, expected="1 or more", remedy="correct --workers")
@@ -40,10 +43,11 @@ def start_workers(workers: int = 1, cluster: str | None = None) -> AbstractConte
 
 
 def results_in_order(run: RunItems, function: Callable[[T], R], items: Sequence[T]) -> Generator[R, None, None]:
-    """Yield function(item) in the order of the items. No object may stand twice among the items.
+    """Yield function(item) in the order of `items`, with `run` (a RunItems) doing the work.
 
-    Results that arrive early are kept in memory until their turn. When the caller closes the generator, no further
-    item is started; items under way are waited for. Raises what `run` raises.
+    No object may stand twice among the items. Results that arrive early are kept in memory until their turn. When the
+    caller closes the generator, no further item is started, and items under way are waited for. Raises what `run`
+    raises: the exception of the function, or WorkError for lost workers.
     """
     wanted, found = True, dict[int, R]()
     arriving = run(function, (item for item in items if wanted))
@@ -61,7 +65,11 @@ def results_in_order(run: RunItems, function: Callable[[T], R], items: Sequence[
 
 @contextmanager
 def this_process() -> Iterator[RunItems]:
-    """Give a RunItems that calls the function in this process, one item after another."""
+    """Give a RunItems that calls the function in this process, one item after another, in the order of the items.
+
+    It reads an item when the result before it has been taken. It ignores `ahead` and `on_loss`; the function's
+    exceptions are raised unchanged.
+    """
 
     def run(
         function: Callable[[T], R], items: Iterable[T], *, ahead: int = 0, on_loss: Any = None
