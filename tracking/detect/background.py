@@ -43,22 +43,28 @@ INTERLEAVE = 4
 
 
 class Background:
-    """The background model of a still camera.
+    """The background model of a still camera, H x W px; colours are BGR.
 
-    State:
-        mean (3, H, W)        E of each colour channel at gain 1, grey levels; changed by `adapt`
-        var (3, H, W)         sigma^2 in the image, squared grey levels; changed by `adapt`
-        gain (3,)             brightness of the last classified frame relative to `mean`; changed by `classify`
-        s, b (H, W)           normalisers of brightness (s = a |E / sigma|) and of CD; inf where `valid` is False
-        valid (H, W)          False where the sample showed no background; such a pixel is always background
-        thresholds            of CD / b, then lower and upper of (alpha - 1) / a
-        bounds                the limits of alpha: dark foreground below the first, foreground above the second
+    State, float32 unless noted:
+        mean (3, H, W)        E: mean of each colour channel at gain 1, grey levels 0 to 255; changed by `adapt`
+        var (3, H, W)         variance of each channel in the image, squared grey levels; changed by `adapt`
+        gain (3,)             brightness of the last classified frame relative to `mean`, 1 at first; set by `classify`
+        s, b (H, W)           normalisers, no unit: of brightness (s = a |E / sigma|) and of chromaticity distortion CD;
+                              inf where `valid` is False
+        valid (H, W)          bool; False where the sample showed no background: classified as BACKGROUND always
+        thresholds            3 numbers: of CD / b, lower of (alpha - 1) / a, upper of (alpha - 1) / a
+        bounds                2 limits of alpha (pixel brightness over the model's): darker than the first is dark
+                              foreground, brighter than the second is foreground; (1, 1) if the whole sample is grey
+        settings, fps         the BackgroundSettings in use; frames per second
     """
 
     def __init__(self, sample: Image, fps: float, settings: BackgroundSettings | None = None) -> None:
-        """Train on sample (K, H, W, 3) BGR uint8; `settings` None: the defaults.
+        """Train the model on a sample of frames (K, H, W, 3) BGR uint8.
 
-        Raises InputError as `background_training.train` does.
+        fps: frames per second, for the time constants of `adapt`. settings: None stands for the defaults.
+
+        Raises InputError if the sample has a wrong shape or dtype, fewer than 10 frames, or if fewer than half of its
+        pixels show a background.
         """
         self.settings = settings or BackgroundSettings()
         self.fps = fps
@@ -76,13 +82,21 @@ class Background:
         self.follow(self.settings)
 
     def follow(self, settings: BackgroundSettings) -> None:
-        """Use other settings from now on; everything learned stays."""
+        """Replace the settings: thresholds and limits of brightness are computed anew, mean, variance and gain stay as
+        learned.
+
+        A new `gain` setting holds for the frames to come; it does not change how the model was trained.
+        """
         self.settings = settings
         self.thresholds = thresholds(self._counts, settings.detection_rate)
         self.bounds = (1.0, 1.0) if self._grey else (settings.dark, settings.bright)
 
     def classify(self, image: Image) -> Image:
-        """Returns the class of each pixel of a frame (H, W, 3) BGR uint8, as (H, W) uint8; updates `gain`.
+        """Returns the class of each pixel of a frame (H, W, 3) BGR uint8, as (H, W) uint8.
+
+        The classes: 0 BACKGROUND, 1 FOREGROUND, 2 DARK (dark foreground), 3 SHADOW, 4 HIGHLIGHT. A pixel whose `valid`
+        is False is always BACKGROUND. With the setting gain = "global" the model's `gain` is first estimated from this
+        frame and kept; else it stays 1. Mean and variance do not change.
 
         Raises InputError if the frame's size or dtype is not the sample's.
         """
@@ -98,10 +112,14 @@ class Background:
         return classes
 
     def adapt(self, image: Image, classes: Image, protected: Bools | None = None) -> None:
-        """Move the model towards a frame (H, W, 3) BGR uint8, except where `protected` (H, W) is True.
+        """Change the model's mean and variance in place towards a frame (H, W, 3) BGR uint8.
 
-        classes (H, W) must be the result of the last `classify`, which also set the gain. `protected` None: no pixel is
-        protected. Raises InputError if the frame's size or dtype is not the sample's.
+        classes (H, W): the result of the last `classify`, which must have been of this frame, as it set the gain.
+        BACKGROUND pixels move with the time constant background_time, all others with foreground_time (mean only).
+        Pixels where `protected` (H, W) is True do not change; None protects no pixel. Each call changes every fourth
+        row only; four calls change all rows.
+
+        Raises InputError if the frame's size or dtype is not the sample's.
         """
         check_frame(image, self.valid.shape)
         keep = np.zeros(self.valid.shape, bool) if protected is None else protected
@@ -113,8 +131,12 @@ class Background:
         kernels.adapt(image, classes, keep, self.mean, self.var, self.gain, first, INTERLEAVE, fast, slow, FLOOR**2)
 
     def _estimate_gain(self, image: Image) -> Floats:
-        """Returns the gain (3,): from pixels that were not foreground in the last frame; if these are too few, from all
-        valid pixels; if these are too few, the last gain."""
+        """Returns the brightness factor (3,) of a frame (H, W, 3) uint8 relative to the model's mean, one per colour
+        channel.
+
+        It is estimated on a grid of pixels that were not foreground in the last frame. If these are too few to use, all
+        valid pixels of the grid are used. If these are too few as well, the last gain is returned.
+        """
         seen = np.moveaxis(image[self._grid], -1, 0).astype(np.float32)
         mean = self.mean[:, *self._grid]
         found = brightness_gain.gain(seen, mean, self._grid_background)
@@ -124,5 +146,9 @@ class Background:
 
 
 def fused_foreground(classes: Image) -> Bools:
-    """Returns True where the class is foreground or dark foreground (3.3), in the shape of `classes`."""
+    """Returns True where the class is FOREGROUND or DARK (dark foreground), False for the others (Gonzalez et al.,
+    3.3).
+
+    classes: pixel classes from `classify`, any shape; the result has the same shape.
+    """
     return np.asarray((classes == FOREGROUND) | (classes == DARK))

@@ -32,9 +32,14 @@ CLIPPED = 255
 def classify(
     i0: Image, i1: Image, i2: Image, E: Floats, V: Floats, s: Floats, b: Floats, g: Floats, limits: Floats, out: Image
 ) -> None:
-    """Write the class of each pixel into `out` (N,) uint8.
+    """Write the class of each of N pixels, 0 to 4 (see BACKGROUND …), into `out` (N,) uint8. Returns nothing.
 
-    i0, i1, i2 (N,) uint8: the frame's colour planes in the order of E. limits (5,): see the slots above.
+    i0, i1, i2 (N,) uint8: the frame's colour planes in the order of E. E, V (3, N) float32: mean colour at gain 1 in
+    grey levels, and variance. s, b (N,): normalisers of brightness and of chromaticity distortion CD; inf makes the
+    pixel BACKGROUND. g (3,): the frame's gain per channel; E times gain is cut at 255. limits (5,): threshold of CD /
+    b, lower and upper threshold of (alpha - 1) / a, alpha below which a pixel is DARK, alpha above which it is
+    FOREGROUND.
+
     The paper tests CD first, then dark, highlight, shadow. Here the test that the paper makes first is made last, and
     overwrites the others. The result is the same.
     """
@@ -73,13 +78,16 @@ def adapt(
     slow: float,
     least: float,
 ) -> None:
-    """Move E and V (3, H, W) towards a frame (H, W, 3) uint8 of gain g, in rows first, first + step, … only.
+    """Change mean E and variance V, (3, H, W) float32, in place towards a frame (H, W, 3) uint8.
 
-    classes (H, W): the frame's. Pixels where `protected` (H, W) is True stay as they are.
-    E moves towards I / g by the share `fast` where the class is BACKGROUND, by `slow` elsewhere. It stays at 1 or
-    above, as the brightness of a black pixel is undefined. V moves towards the squared residual, by `fast`, where the
-    class is BACKGROUND. It stays at `least` or above.
-    A channel at 255 is skipped where the model expects 255 or more: a clipped value does not show the true brightness.
+    Only the rows first, first + step, first + 2 step, … change. classes (H, W): the frame's pixel classes. g (3,): the
+    frame's gain per channel. Pixels where `protected` (H, W) is True stay as they are.
+
+    E moves towards I / g (I the frame's grey level) by the share `fast` where the class is BACKGROUND, by `slow`
+    elsewhere. It stays at 1 or above, as the brightness of a black pixel is undefined. V moves towards the squared
+    residual in image grey levels, by `fast`, only where the class is BACKGROUND. It stays at `least` (squared grey
+    levels) or above. A channel at 255 is skipped where the model expects 255 or more: a clipped value does not show the
+    true brightness.
     """
     quick, late, floor = np.float32(fast), np.float32(slow), np.float32(least)
     for r in range(first, image.shape[0], step):

@@ -14,7 +14,14 @@ from tracking.config import Config, param
 
 @dataclass(frozen=True)
 class BackgroundSettings(Config):
-    """Detection rate, limits of shadows and highlights, and time constants of adaptation."""
+    """The parameters of the five-class background model; each field states its own default, range and unit.
+
+    detection_rate (probability): sets the thresholds of a pixel's noise. dark, bright (brightness relative to the
+    background): limits of shadow and highlight. background_time, foreground_time (s): time constants of adaptation.
+    gain: "global" or "none", whether the brightness of each frame is corrected.
+
+    Raises InputError if a value is not allowed or foreground_time is shorter than background_time.
+    """
 
     tracker: ClassVar[str] = "background"
 
@@ -68,7 +75,7 @@ class BackgroundSettings(Config):
     )
 
     def check(self) -> None:
-        """Raises InputError if foreground_time is shorter than background_time."""
+        """Raises InputError if foreground_time is shorter than background_time (both in s); returns nothing."""
         if self.foreground_time < self.background_time:
             raise InputError(
                 place="foreground_time",

@@ -50,11 +50,13 @@ BINS, SPAN = 4000, 20.0
 
 @dataclass(frozen=True)
 class Trained:
-    """The trained model.
+    """The trained background model of an image of H x W px.
 
-    mean, sigma (H, W, 3): E and its standard deviation, grey levels. s, b (H, W): normalisers, no unit. valid (H, W):
-    False where the sample shows no background. thresholds: of CD / b, then lower and upper of (alpha - 1) / a.
-    counts (2, BINS): histograms of the normalised brightness and chromaticity distortions, in this order.
+    mean, sigma (H, W, 3): mean colour E at gain 1, and its standard deviation, BGR grey levels. s, b (H, W):
+    normalisers of brightness and of chromaticity distortion CD, no unit. valid (H, W): False where the sample shows no
+    background; there the other arrays have no meaning. thresholds: of CD / b, then lower and upper of (alpha - 1) / a.
+    counts (2, BINS): histograms over [-SPAN, SPAN] of the normalised brightness (row 0) and chromaticity distortions
+    (row 1), from which thresholds for another detection rate can be computed.
     """
 
     mean: Floats
@@ -67,11 +69,13 @@ class Trained:
 
 
 def train(sample: Image, rate: float, follow_gain: bool) -> Trained:
-    """Returns the model of a sample (K, H, W, 3) uint8.
+    """Returns the background model of a sample of frames (K, H, W, 3) BGR uint8.
 
-    rate: the detection rate of the thresholds. follow_gain: divide each frame by its gain first.
-    Raises InputError if the sample has a wrong shape or dtype, has fewer than LEAST_FRAMES frames, or if fewer than
-    half of its pixels show a background.
+    rate: the detection rate, the share of background pixels (0 to 1) that each threshold leaves background.
+    follow_gain: if True, each frame is first divided by its brightness factor relative to the median frame.
+
+    Raises InputError if the sample has a wrong shape or dtype, has fewer than LEAST_FRAMES = 10 frames, or if fewer
+    than half of its pixels show a background.
     """
     check(sample)
     gains = frame_gains(sample) if follow_gain else np.ones((len(sample), 3), np.float32)
@@ -95,7 +99,8 @@ def train(sample: Image, rate: float, follow_gain: bool) -> Trained:
 
 
 def check(sample: Image) -> None:
-    """Raises InputError unless the sample is (K, H, W, 3) uint8 with at least LEAST_FRAMES frames."""
+    """Raises InputError unless the sample is (K, H, W, 3) uint8 with H, W above 0 and K at least LEAST_FRAMES = 10
+    frames."""
     shape, kind = np.shape(sample), getattr(sample, "dtype", None)
     expected, remedy = "", ""
     if kind != np.uint8 or len(shape) != 4 or shape[-1] != 3 or 0 in shape[1:3]:
@@ -107,7 +112,10 @@ def check(sample: Image) -> None:
 
 
 def check_frame(image: Image, size: tuple[int, ...]) -> None:
-    """Raises InputError unless a frame is (H, W, 3) uint8; `size` is (H, W) of the sample."""
+    """Raises InputError unless a frame is a uint8 array of shape (H, W, 3).
+
+    size: (H, W), px, of the background sample, which the frame must have.
+    """
     if image.dtype != np.uint8 or image.shape != (*size, 3):
         raise InputError(
             place="frame",
@@ -118,11 +126,15 @@ def check_frame(image: Image, size: tuple[int, ...]) -> None:
 
 
 def thresholds(counts: Ints, rate: float) -> tuple[float, float, float]:
-    """Returns the thresholds of CD / b, and lower and upper of (alpha - 1) / a, at the detection rate.
+    """Returns 3 thresholds at a detection rate: of CD / b, lower of (alpha - 1) / a (below 0), upper of (alpha - 1) /
+    a.
 
-    counts (2, BINS): histograms of brightness and CD. An empty histogram gives the Gaussian thresholds below.
+    counts (2, BINS): histograms over [-SPAN, SPAN] of normalised brightness (row 0) and chromaticity distortion CD (row
+    1). rate: share of the histogram, between 0 and 1, that each threshold leaves background; 0 or 1 raises an error.
+
     No threshold is nearer to the background than that of Gaussian noise with unit RMS, as a still sample has no tails.
-    The brightness of such noise is normal, and its CD has P(CD > t) = exp(-t^2) (chi2 of 2 degrees over its mean 2).
+    An empty histogram gives just these Gaussian thresholds. The brightness of such noise is normal, and its CD has P(CD
+    > t) = exp(-t^2) (chi2 of 2 degrees over its mean 2).
     """
     edges = np.linspace(-SPAN, SPAN, BINS + 1)
     shares = [np.concatenate([[0], np.cumsum(c)]) / max(c.sum(), 1) for c in counts]

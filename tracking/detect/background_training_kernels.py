@@ -19,7 +19,7 @@ BRIGHTNESS, CHROMATICITY = range(2)
 
 @njit(cache=True, error_model="numpy")
 def sort(values: Floats) -> None:
-    """Sort values (K,) in place by Shell's method, which is quick for small K."""
+    """Sort values (K,) in place, ascending, by Shell's method, which is quick for small K. Returns nothing."""
     for gap in (13, 4, 1):
         for t in range(gap, len(values)):
             x, j = values[t], t
@@ -31,7 +31,10 @@ def sort(values: Floats) -> None:
 
 @njit(cache=True, error_model="numpy")
 def shortest(values: Floats, held: int) -> tuple[int, float]:
-    """Returns the first index and the length of the shortest interval that holds `held` of the sorted values (K,)."""
+    """Returns the start index and the length of the shortest interval that holds `held` neighbours of `values`.
+
+    values (K,): sorted ascending. held: a count from 1 to K. Of equally short intervals the first is returned.
+    """
     first, best = 0, values[held - 1] - values[0]
     for t in range(1, len(values) - held + 1):
         length = values[t + held - 1] - values[t]
@@ -42,11 +45,15 @@ def shortest(values: Floats, held: int) -> tuple[int, float]:
 
 @njit(cache=True, error_model="numpy")
 def inliers(value: Floats, m: Array, sd: Array, inlier: Bools, rules: tuple[float, float, float, int]) -> bool:
-    """Compute one pixel's E and sigma, `m` and `sd` (3,), and its inliers, `inlier` (K,), in turn until they settle.
+    """Compute one pixel's mean E, standard deviation sigma and inlier frames in turn until they settle; all in place.
 
-    All three are changed in place; `m` and `sd` hold first guesses. value (K, 3): grey levels at gain 1.
-    rules: least sigma; sigmas within which a frame is an inlier; sigmas within which a frame is clean; most rounds.
-    Returns True if all frames of the pixel are clean.
+    value (K, 3): the pixel's grey levels at gain 1 in K frames. m, sd (3,): E and sigma of each channel; they hold
+    first guesses on entry. inlier (K,) bool: overwritten; True for a frame whose channels all lie within so many sigmas
+    of E. rules: least sigma; sigmas within which a frame is an inlier; sigmas within which a frame is clean; most
+    rounds.
+
+    Returns True if all frames of the pixel are clean. E stays at 1 or above, sigma at the least sigma, also if no frame
+    is an inlier.
     """
     least, inside, untouched, rounds = rules
     clean = True
@@ -79,10 +86,11 @@ def inliers(value: Floats, m: Array, sd: Array, inlier: Bools, rules: tuple[floa
 
 @njit(cache=True, error_model="numpy")
 def distortions(value: Floats, m: Array, sd: Array, inlier: Bools, alpha: Array, cd: Array) -> tuple[float, float]:
-    """Write (alpha - 1) |E / sigma| and CD of one pixel's frames into `alpha` and `cd` (K,).
+    """Returns s and b of one pixel: the RMS over its inlier frames of the two distortions, 0 if there is no inlier.
 
-    value (K, 3): grey levels; m, sd (3,): E and sigma. Returns the RMS of `alpha` and of `cd` over the inliers, 0 if
-    there is no inlier: s (eq. 7) and b (eq. 8).
+    value (K, 3): grey levels at gain 1 in K frames; m, sd (3,): mean E and standard deviation sigma of each channel;
+    inlier (K,): the frames to average over. Written in place, for all frames: alpha (K,), brightness distortion (alpha
+    - 1) |E / sigma|; cd (K,), chromaticity distortion. s is of `alpha` (eq. 7), b of `cd` (eq. 8).
     """
     norm = 0.0
     for k in range(3):
@@ -118,13 +126,16 @@ def learn(
     valid: Bools,
     counts: Ints,
 ) -> None:
-    """Train on a sample (K, H, W, 3) uint8 and write the model into the last six arguments.
+    """Train on a sample (K, H, W, 3) uint8 and write the model into the last six arguments. Returns nothing.
 
-    gains (K, 3): gain of each frame, by which it is divided. held: frames in the shortest interval.
-    rules: sigma over half the interval's length; least sigma; widest sigma of a valid pixel; sigmas of an inlier;
-    sigmas of a clean frame; most rounds. bins: number and span of the histograms.
-    Written: mean, sigma (H, W, 3); s, b, valid (H, W); counts (2, 2, bins), to which the valid pixels are added: first
-    axis inliers or frames of clean pixels, second axis brightness or CD.
+    gains (K, 3): gain of each frame and channel, by which grey levels are divided. held: frames in the shortest
+    interval. rules: sigma over half the interval's length; least sigma, grey levels; widest sigma of a valid pixel,
+    grey levels; sigmas of an inlier; sigmas of a clean frame; most rounds. bins: number and span of the histograms,
+    which reach from -span to span; values beyond are counted in the end bins.
+
+    Written: mean, sigma (H, W, 3), mean colour and its standard deviation in grey levels; s, b (H, W), normalisers;
+    valid (H, W), False where no background shows. counts (2, 2, number): the values of valid pixels are added; first
+    axis inliers or all frames of clean pixels, second axis brightness or chromaticity.
     """
     as_sigma, least, widest, inside, untouched, rounds = rules
     number, span = bins

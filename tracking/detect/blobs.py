@@ -29,13 +29,14 @@ MAJORITY_M, OPEN_M, CLOSE_M = 0.08, 0.05, 0.15
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Blobs(Frozen):
-    """The blobs of one frame, M rows, the largest first.
+    """The blobs (connected foreground regions) of one frame of H x W px: M rows, the largest area first.
 
     box (M, 4)        left, top, width, height, px
     area (M,)         number of pixels
-    ellipse (M, 5)    x, y, h, w (px), theta (rad); the centre of pixel (0, 0) is at (0.5, 0.5)
+    ellipse (M, 5)    centre x, y, full axes h >= w (px), theta (rad): direction of h from the abscissa, v down;
+                      the centre of pixel (0, 0) is at (0.5, 0.5)
     angle_var (M,)    variance of theta, rad^2; inf for a circle
-    label (H, W)      int32: a pixel of blob m has m + 1, a pixel of no blob has 0
+    label (H, W)      int32: a pixel of blob m (from 0) has m + 1, a pixel of no blob has 0
     """
 
     box: Array
@@ -48,7 +49,10 @@ class Blobs(Frozen):
         return len(self.area)
 
     def contour(self, row: int) -> Array:
-        """Returns the outer contour of one blob, (V, 2) px, through pixel centres."""
+        """Returns the outer contour of blob `row` (from 0), (V, 2) x, y in px, through the centres of its edge pixels.
+
+        Points on straight runs are left out; a blob of one pixel has V = 1. Raises IndexError if there is no such row.
+        """
         left, top, wide, high = self.box[row].astype(int)
         part = (self.label[top : top + high, left : left + wide] == row + 1).astype(np.uint8)
         outlines, _ = cv2.findContours(part, cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_SIMPLE)
@@ -56,20 +60,27 @@ class Blobs(Frozen):
         return np.asarray(longest + np.array([left + 0.5, top + 0.5]))
 
     def hull(self, row: int) -> Array:
-        """Returns the convex hull of one blob's contour, (V, 2) px, counter-clockwise in (x, y)."""
+        """Returns the convex hull of the contour of blob `row` (from 0), (V, 2) x, y in px, counter-clockwise in (x,
+        y).
+
+        It goes through pixel centres, so a blob of one pixel has V = 1. Raises IndexError if there is no such row.
+        """
         return np.asarray(cv2.convexHull(self.contour(row).astype(np.float32), clockwise=False), float).reshape(-1, 2)
 
     def cut(self) -> Bools:
-        """Returns True for each blob (M,) whose box reaches the edge of the image, to within 1 px."""
+        """Returns flags (M,): True for each blob whose box touches an edge of the image or is at most 1 px away from
+        it."""
         high, wide = self.label.shape
         right, bottom = self.box[:, 0] + self.box[:, 2], self.box[:, 1] + self.box[:, 3]
         return np.asarray((self.box[:, 0] <= 1) | (self.box[:, 1] <= 1) | (right >= wide - 1) | (bottom >= high - 1))
 
 
 def clean(foreground: Bools, px_per_m: float) -> Bools:
-    """Returns a foreground mask (H, W) after majority, opening and closing at a scale in px per m (3.3).
+    """Returns a foreground mask (H, W) after majority, opening and closing, in this order; the argument is not changed
+    (3.3).
 
-    The windows are at least 3, 1 and 3 px wide.
+    px_per_m: scale of the image, px per m. The windows are 0.08, 0.05 and 0.15 m wide, rounded to an odd number of px,
+    at least 3, 1 and 3. Raises ValueError if the scale is nan.
     """
     mask: NDArray[Any] = foreground.astype(np.uint8)
     size = odd(MAJORITY_M * px_per_m, 3)
@@ -80,21 +91,29 @@ def clean(foreground: Bools, px_per_m: float) -> Bools:
 
 
 def odd(size: float, least: int) -> int:
-    """Returns the odd number of px nearest to `size`, but at least `least`."""
+    """Returns the odd whole number nearest to `size` (px), but at least `least` (an odd number of px).
+
+    Raises ValueError if `size` is nan.
+    """
     return max(least, 2 * round((size - 1) / 2) + 1)
 
 
 @cache
 def disc(size: int) -> Image:
-    """Returns a round structuring element (size, size) uint8 of odd diameter; OpenCV's own ellipse is not symmetric."""
+    """Returns a disc of diameter `size` px (odd) as an array (size, size) uint8: 1 inside, 0 outside.
+
+    It is a structuring element; OpenCV's own ellipse is not symmetric. The array is cached, so do not change it.
+    """
     v, u = np.mgrid[:size, :size] - (size - 1) / 2
     return np.asarray(np.hypot(u, v) <= size / 2, np.uint8)
 
 
 def find(mask: Bools, min_area: float) -> Blobs:
-    """Returns the connected regions (8 neighbours) of a mask (H, W) that have at least `min_area` pixels.
+    """Returns the connected regions (8 neighbours) of a foreground mask (H, W) bool that have at least `min_area`
+    pixels.
 
-    The largest region comes first; regions of equal size are in raster order of their first pixels.
+    The result is a `Blobs` with a row per region, the largest first; regions of equal size are in raster order of their
+    first pixels. A min_area below 1 counts as 1. Without such a region the result has 0 rows.
     """
     runs = kernels.runs(mask)
     region, count = kernels.connect(runs)
@@ -113,15 +132,21 @@ def find(mask: Bools, min_area: float) -> Blobs:
 
 
 def _moments(centre: Array, spread: Array) -> tuple[Array, Array]:
-    """Returns centre (M, 2) and covariance (M, 2, 2) of unit-square pixels from the moments of their indices."""
+    """Returns centres (M, 2) x, y in px, and covariances (M, 2, 2) in px^2, of M regions made of unit-square pixels.
+
+    centre (M, 2): mean column and row index. spread (M, 3): variance of the column indices, covariance, variance of the
+    row indices. A pixel's centre is its index + 0.5; 1/12 is added to both variances.
+    """
     xx, xy, yy = spread.T
     return centre + 0.5, np.stack([xx + 1 / 12, xy, xy, yy + 1 / 12], axis=-1).reshape(-1, 2, 2)
 
 
 def ellipses(n: Array, centre: Array, cov: Array) -> tuple[Array, Array]:
-    """Returns the ellipses (M, 5) x, y, h, w (px), theta (rad), and the variance of theta (M,), rad^2 (3.3).
+    """Returns the ellipses (M, 5) of M regions: centre x, y, full axes h >= w (px), theta (rad); and theta's variance
+    (M,).
 
-    n (M,): number of pixels; centre (M, 2) px; cov (M, 2, 2) px^2. The variance is inf where both axes are equal.
+    n (M,): number of pixels; centre (M, 2) px; cov (M, 2, 2): covariance of the pixels, px^2 (3.3). theta is the
+    direction of h from the abscissa, v down, from -pi/2 to pi/2. Its variance, rad^2, is inf where both axes are equal.
     """
     half, differ = (cov[:, 0, 0] + cov[:, 1, 1]) / 2, (cov[:, 0, 0] - cov[:, 1, 1]) / 2
     root = np.hypot(differ, cov[:, 0, 1])

@@ -24,7 +24,11 @@ XX, XY, YY = range(3)
 
 @njit(cache=True)
 def runs(mask: Bools) -> Labels:
-    """Returns the runs (R, 3) of a mask (H, W); eight background pixels at once are skipped in one step."""
+    """Returns the runs (R, 3) int32 of a foreground mask (H, W) bool, in raster order; R = 0 for an empty mask.
+
+    A run is a maximal sequence of foreground pixels in one row; its columns are row, first column, last column + 1.
+    Eight background pixels at once are skipped in one step.
+    """
     high, wide = mask.shape
     pixels = mask.ravel().view(np.uint8)
     eights = pixels[: len(pixels) // 8 * 8].view(np.uint64)
@@ -48,9 +52,11 @@ def runs(mask: Bools) -> Labels:
 
 @njit(cache=True)
 def connect(runs: Labels) -> tuple[Ints, int]:
-    """Returns the region of each run (R,), numbered 0, 1, … by first pixels, and the number of regions.
+    """Returns the region of each run (R,), and the number of regions; regions are numbered 0, 1, … by their first
+    pixels.
 
-    Pixels are connected to their 8 neighbours.
+    runs (R, 3): row, first column, last column + 1, in raster order. Two runs are in one region if pixels of theirs are
+    8 neighbours, directly or through other runs.
     """
     parent = np.arange(len(runs))
     above = 0
@@ -75,8 +81,11 @@ def connect(runs: Labels) -> tuple[Ints, int]:
 
 @njit(cache=True)
 def extents(runs: Labels, region: Ints, count: int) -> tuple[Ints, Ints]:
-    """Returns the pixels of each region (M,), and its corners (M, 4): first column, first row, last column + 1, last
-    row + 1."""
+    """Returns the number of pixels (M,) of each of M regions, and its corners (M, 4).
+
+    Corners: first column, first row, last column + 1, last row + 1. runs (R, 3): row, first column, last column + 1, in
+    raster order. region (R,): region 0 to M - 1 of each run. count: M.
+    """
     area, corners = np.zeros(count, np.int64), np.zeros((count, 4), np.int64)
     for k in range(len(runs)):
         row, first, end = runs[k]
@@ -91,10 +100,11 @@ def extents(runs: Labels, region: Ints, count: int) -> tuple[Ints, Ints]:
 
 @njit(cache=True)
 def moments(runs: Labels, region: Ints, area: Ints) -> tuple[Array, Array]:
-    """Returns mean column and row (M, 2), and variance of columns, covariance, variance of rows (M, 3) of each region.
+    """Returns mean column and row (M, 2), and variance of columns, covariance, variance of rows (M, 3) of M regions.
 
-    region (R,): number of each run's region; runs with a negative number are left out. area (M,): pixels of each
-    region.
+    They are moments (divided by the number of pixels) of the pixels' indices, in px and px^2. runs (R, 3): row, first
+    column, last column + 1. region (R,): number of each run's region, 0 to M - 1; runs with a negative number are left
+    out. area (M,): pixels of each region; a region with area 0 gives nan.
     """
     centre, spread = np.zeros((len(area), 2)), np.zeros((len(area), 3))
     for k in range(len(runs)):
@@ -120,7 +130,11 @@ def moments(runs: Labels, region: Ints, area: Ints) -> tuple[Array, Array]:
 
 @njit(cache=True)
 def write_labels(runs: Labels, region: Ints, label: Labels) -> None:
-    """Write region + 1 into the pixels of each run in `label` (H, W); runs with a negative region are left out."""
+    """Write region + 1 into the pixels of each run in `label` (H, W), in place; other pixels are not changed.
+
+    runs (R, 3): row, first column, last column + 1. region (R,): region of each run, from 0; a run with a negative
+    region is left out.
+    """
     for k in range(len(runs)):
         if region[k] >= 0:
             label[runs[k, ROW], runs[k, FIRST] : runs[k, END]] = region[k] + 1

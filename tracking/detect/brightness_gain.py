@@ -19,16 +19,21 @@ FEWEST = 50
 
 
 def grid(high: int, wide: int) -> tuple[slice, slice]:
-    """Returns the rows and the columns of the grid in an image of high x wide px."""
+    """Returns two slices, of rows and of columns, that select a regular grid of pixels from an image of high x wide px.
+
+    The grid has about POINTS = 6000 pixels; in a smaller image it has all of them.
+    """
     step = max(1, int(np.sqrt(high * wide / POINTS)))
     return slice(step // 2, None, step), slice(step // 2, None, step)
 
 
 def gain(image: Floats, mean: Floats, where: Bools) -> Floats | None:
-    """Returns the factor of each channel, (3,) float32, or None if no channel has FEWEST usable pixels.
+    """Returns a frame's brightness factor in each colour channel, (3,) float32, or None if no channel has enough
+    pixels.
 
-    image, mean (3, h, w): grey levels of the frame and of the model on the grid. where (h, w): the pixels to use.
-    A channel with too few usable pixels, as blue under sodium lamps, gets the mean factor of the other channels.
+    image, mean (3, h, w): grey levels of the frame and of the background model on a grid. where (h, w) bool: the pixels
+    to use. A factor is the median of image / mean over usable pixels (expected grey level from 16 to 235). A channel
+    with fewer than FEWEST = 50 usable pixels, as blue under sodium lamps, gets the mean factor of the other channels.
     """
     found = [_one_channel(i[where], e[where]) for i, e in zip(image, mean, strict=True)]
     known = [factor for factor in found if factor is not None]
@@ -38,9 +43,10 @@ def gain(image: Floats, mean: Floats, where: Bools) -> Floats | None:
 
 
 def _one_channel(seen: Floats, mean: Floats) -> float | None:
-    """Returns the median of seen / mean over the usable pixels, None if these are fewer than FEWEST.
+    """Returns the median of seen / mean over the usable pixels, None if these are fewer than FEWEST = 50.
 
-    A pixel is usable if its expected grey level, factor * mean, lies between DARKEST and BRIGHTEST. A first pass, which
+    seen, mean (N,): grey levels of one channel in the frame and in the background model. A pixel is usable if its mean
+    is above DARKEST and its expected grey level, factor * mean, lies between DARKEST and BRIGHTEST. A first pass, which
     chooses by the seen grey level, guesses the factor; alone it would be biased, as noise decides which pixels pass.
     """
     usable = (mean > DARKEST) & (seen > DARKEST) & (seen < BRIGHTEST)
@@ -53,7 +59,7 @@ def _one_channel(seen: Floats, mean: Floats) -> float | None:
 
 
 def _median(values: Floats) -> float:
-    """Returns numpy's median of at least one number in a quarter of its time; the numbers must not be nan."""
+    """Returns the median of values (N,), equal to numpy's but four times as fast; N must be at least 1, without nan."""
     half = len(values) // 2
     middle = np.partition(values, half)
     above = middle[half]
@@ -61,9 +67,10 @@ def _median(values: Floats) -> float:
 
 
 def frame_gains(sample: Image) -> Floats:
-    """Returns the gain of each frame of a sample (K, H, W, 3) relative to the median frame, (K, 3) float32.
+    """Returns the gain of each frame of a sample (K, H, W, 3) uint8, (K, 3) float32, one factor per colour channel.
 
-    The gain of a frame that has too few usable pixels is 1 in all channels.
+    It is relative to the median frame, the median over time of each pixel. The gain of a frame that has too few usable
+    pixels (neither near black nor clipped) is 1 in all channels.
     """
     rows, columns = grid(*sample.shape[1:3])
     values = np.moveaxis(sample[:, rows, columns], -1, 1).astype(np.float32)

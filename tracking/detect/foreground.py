@@ -33,10 +33,11 @@ SAMPLED = 25
 
 @dataclass(frozen=True, eq=False)
 class Segmented:
-    """One picture after `Foreground.segment`.
+    """One picture of H x W px after `Foreground.segment`.
 
-    image (H, W, 3): the picture. classes (H, W) uint8: of each pixel. mask (H, W): the cleaned foreground.
-    plausible: False if more than most_foreground of the image is foreground; a light was switched or the camera moved.
+    image (H, W, 3): the picture, BGR uint8. classes (H, W) uint8: class of each pixel, as in background_kernels (0
+    BACKGROUND, 1 FOREGROUND, …). mask (H, W) bool: the foreground after cleaning. plausible: False if more than the
+    share most_foreground of the mask is foreground: then a light was switched or the camera moved.
     """
 
     image: Image
@@ -46,7 +47,11 @@ class Segmented:
 
 
 class Foreground:
-    """State: the background model (`model`) and the scale of the image (`px_per_m`; nan or 0 while unknown)."""
+    """The pipeline from a picture to foreground blobs: classify the pixels, clean the mask, find blobs, adapt.
+
+    State: model, the background model (`Background` or `Mog2`); px_per_m, the scale of the image, nan or 0 while it is
+    unknown; most_foreground, the largest plausible share of foreground, 0 to 1.
+    """
 
     def __init__(
         self,
@@ -55,10 +60,13 @@ class Foreground:
         most_foreground: float,
         segmentation: str = "horprasert",
     ) -> None:
-        """Train the model on the context's background sample.
+        """Train the background model on the context's background sample, which must not be None (AssertionError).
 
-        most_foreground: largest plausible share of foreground. segmentation: "horprasert" (five classes) or "mog2".
-        Raises InputError if the sample cannot be used; see `background_training.train`.
+        settings: of the model. most_foreground: largest plausible share of foreground, 0 to 1. segmentation: "mog2" for
+        OpenCV's mixture of Gaussians; any other text stands for the five-class model "horprasert".
+
+        Raises InputError if the sample has a wrong shape or dtype, fewer than 10 frames or, with the five-class model,
+        shows too little background.
         """
         assert context.background is not None
         self.px_per_m = context.px_per_m
@@ -70,7 +78,8 @@ class Foreground:
             self.model = Background(context.background, context.fps, settings)
 
     def follow(self, settings: BackgroundSettings, most_foreground: float) -> None:
-        """Use other settings from now on; everything learned stays."""
+        """Replace the settings of the background model and most_foreground (share, 0 to 1); what the model learned
+        stays."""
         self.most_foreground = most_foreground
         if isinstance(self.model, Mog2):
             self.model.follow(Mog2Settings.like(settings))
@@ -79,16 +88,19 @@ class Foreground:
 
     @property
     def shape(self) -> tuple[int, ...]:
-        """(H, W) of the pictures, px."""
+        """(H, W): height and width of the pictures, px."""
         return self.model.valid.shape
 
     @property
     def scale(self) -> float:
-        """px per m; while the scale is unknown, that of an image ASSUMED_HEIGHT high."""
+        """Scale of the image, px per m. While it is unknown: that of an image that is ASSUMED_HEIGHT = 18 m high."""
         return self.px_per_m if self.px_per_m > 0 else self.shape[0] / ASSUMED_HEIGHT
 
     def segment(self, image: Image) -> Segmented:
-        """Returns the classes and the cleaned foreground of a picture (H, W, 3) BGR uint8 (3.2, 3.3).
+        """Returns the pixel classes and the cleaned foreground mask of a picture (H, W, 3) BGR uint8 (3.2, 3.3).
+
+        The background model does not learn from the picture; only its estimate of the picture's brightness changes. The
+        result also states whether the share of foreground is plausible.
 
         Raises InputError if the picture's size or dtype is not that of the background sample.
         """
@@ -97,22 +109,38 @@ class Foreground:
         return Segmented(image, classes, mask, not np.count_nonzero(mask) / mask.size > self.most_foreground)
 
     def adapt(self, seen: Segmented, protected: Bools) -> None:
-        """Let the model learn from the last segmented picture, except where `protected` (H, W) is True."""
+        """Let the background model learn from a segmented picture, except at pixels where `protected` (H, W) is True.
+
+        seen: the result of the last `segment`, as that call also set the brightness of the model.
+        """
         self.model.adapt(seen.image, seen.classes, protected)
 
     def person_blobs(self, mask: Bools) -> blobs.Blobs:
-        """Returns the blobs of a cleaned mask (H, W) that are large enough to be people (3.3), the largest first."""
+        """Returns the blobs of a cleaned mask (H, W) bool that are large enough to be people or parts of them, the
+        largest first.
+
+        They have at least 0.0125 m^2 at the image's scale, and at least 12 pixels (3.3). No such blob gives 0 rows.
+        """
         return blobs.find(mask, max(LEAST_AREA * self.scale**2, LEAST_PIXELS))
 
     def learn_person_size(self, size: PersonSize, sample: Image) -> None:
-        """Let `size` learn from the blobs in a background sample (K, H, W, 3) that the image's edge does not cut."""
+        """Let `size` learn, in place, from the blobs of a background sample (K, H, W, 3) BGR uint8.
+
+        About 25 evenly spaced frames are used. Blobs that the image's edge cuts are left out; `size` itself chooses
+        those that may be one person. Raises InputError if the size or dtype of the frames is not that of the model's
+        own sample.
+        """
         for image in sample[:: max(len(sample) // SAMPLED, 1)]:
             found = self.person_blobs(self.segment(image).mask)
             size.learn(found.box, found.ellipse, ~found.cut())
 
 
 def convex_areas(shape: tuple[int, ...], outlines: list[Array]) -> Bools:
-    """Returns an (H, W) mask, True inside the convex hull of each outline (V, 2) px; `shape` is (H, W)."""
+    """Returns an (H, W) bool mask, True inside and on the convex hull of each outline.
+
+    shape: (H, W). outlines: arrays (V, 2) x, y in px, V at least 1; coordinates are rounded to whole px, and parts
+    outside the image are cut off. No outlines: False everywhere.
+    """
     inside = np.zeros(shape, np.uint8)
     for outline in outlines:
         cv2.fillConvexPoly(inside, cv2.convexHull(np.rint(outline).astype(np.int32)), 1)

@@ -21,7 +21,11 @@ SHADOW_VALUE = 127
 
 @dataclass(frozen=True)
 class Mog2Settings(Config):
-    """The parameters of `Mog2`; the defaults of `variance` and `shadow` are OpenCV's."""
+    """The parameters of `Mog2`; the defaults of `variance` and `shadow` are OpenCV's.
+
+    variance: squared Mahalanobis distance beyond which a pixel is foreground. shadow: brightness relative to the
+    background (0 to 1) below which a pixel is no shadow. background_time: time constant of adaptation, s.
+    """
 
     tracker: ClassVar[str] = "mog2"
 
@@ -37,20 +41,22 @@ class Mog2Settings(Config):
 
     @classmethod
     def like(cls, settings: BackgroundSettings) -> Self:
-        """Returns settings with the shadow limit and the background_time of the five-class model's settings."""
+        """Returns Mog2Settings with shadow = settings.dark and the same background_time; `variance` has its default."""
         return cls(shadow=settings.dark, background_time=settings.background_time)
 
 
 class Mog2:
-    """A mixture of Gaussians per pixel with the interface of `background.Background`.
+    """A mixture of Gaussians per pixel (OpenCV's MOG2) with the interface of `background.Background`.
 
-    State: OpenCV's model. valid (H, W) is True everywhere. The classes DARK and HIGHLIGHT do not occur.
+    State: OpenCV's model; settings; fps, frames per second; valid (H, W) bool, True everywhere. Classes are BACKGROUND,
+    FOREGROUND and SHADOW; DARK and HIGHLIGHT do not occur.
     """
 
     def __init__(self, sample: Image, fps: float, settings: Mog2Settings | None = None) -> None:
-        """Learn from sample (K, H, W, 3) BGR uint8; `settings` None: the defaults.
+        """Learn from all frames of a sample (K, H, W, 3) BGR uint8.
 
-        Raises InputError if the sample has a wrong shape or dtype, or too few frames.
+        fps: frames per second, for the time constant of `adapt`. settings: None stands for the defaults. Raises
+        InputError if the sample has a wrong shape or dtype, or fewer than 10 frames.
         """
         check(sample)
         settings = settings or Mog2Settings()
@@ -63,16 +69,17 @@ class Mog2:
             self._model.apply(frame)
 
     def follow(self, settings: Mog2Settings) -> None:
-        """Use other settings from now on; everything learned stays."""
+        """Replace the settings: thresholds and rate of adaptation change at once, the learned Gaussians stay."""
         self.settings = settings
         self._rate = 1 - math.exp(-1 / (self.fps * settings.background_time))
         self._model.setVarThreshold(settings.variance)
         self._model.setShadowThreshold(settings.shadow)
 
     def classify(self, image: Image) -> Image:
-        """Returns the class of each pixel of a frame (H, W, 3) BGR uint8, as (H, W) uint8.
+        """Returns the class of each pixel of a frame (H, W, 3) BGR uint8, as (H, W) uint8: BACKGROUND, SHADOW or
+        FOREGROUND.
 
-        Raises InputError if the frame's size or dtype is not the sample's.
+        The model does not learn from the frame. Raises InputError if the frame's size or dtype is not the sample's.
         """
         check_frame(image, self.valid.shape)
         found = self._model.apply(image, learningRate=0)
@@ -82,10 +89,10 @@ class Mog2:
         return classes
 
     def adapt(self, image: Image, classes: Image, protected: Bools | None = None) -> None:
-        """Learn from a frame (H, W, 3) BGR uint8; `classes` is not used.
+        """Learn from a frame (H, W, 3) BGR uint8 with the time constant background_time; `classes` is not used.
 
-        Where `protected` (H, W) is True the model is shown its own background image instead of the frame. Raises
-        InputError if the frame's size or dtype is not the sample's.
+        Where `protected` (H, W) is True the model is shown its own background image instead of the frame; None protects
+        no pixel. Raises InputError if the frame's size or dtype is not the sample's.
         """
         check_frame(image, self.valid.shape)
         if protected is not None and protected.any():

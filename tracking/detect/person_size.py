@@ -45,17 +45,17 @@ HEADINGS = np.radians([0.0, 45.0, 90.0, 135.0])  # rad, over which a camera's bo
 
 
 class PersonSize:
-    """State:
+    """The size of a person in the image at every foot point: from a camera if there is one, corrected by lone blobs.
 
+    State ("lone blobs" may be one person each; "from above": the camera is straight above):
     table (2, V, U)         with a pinhole camera: height and width at the nodes of a grid, px; else None
-    axes_above (2,)         from straight above: longer and shorter axis of a person's ellipse, px; else None
-    lone (K, 4)             the last lone blobs: foot u, v, height, width, px (from above: the axes)
-    since_fit               number of lone blobs since the last fit
-    line                    a (px), b of h = a + b v; used without a camera
-    factor (2,)             height and width of the lone blobs over the expected ones
-    agreed                  number of lone blobs whose heights agree with the line and the factor
+    axes_above (2,)         from above: longer and shorter axis of a person's ellipse, px; else None
+    lone (K, 4)             the last lone blobs, at most 400: foot u, v, height, width, px (from above: the axes)
+    since_fit, agreed       numbers of lone blobs: since the last fit; of heights that agree with line and factor
+    line                    a (px), b of h = a + b v, v the foot's row; used without a camera; a is nan before a fit
+    factor (2,)             height and width of the lone blobs over the expected ones; 1 before the first fit
     box_ratios (K, 2)       height and width of the lone blobs' boxes over those of the boxes round their ellipses
-    box_over_ellipse (2,)   their median
+    box_over_ellipse (2,)   their median; 1 from above
     """
 
     def __init__(self, context: Context) -> None:
@@ -73,43 +73,50 @@ class PersonSize:
 
     @property
     def reliable(self) -> bool:
-        """True if the size may decide how many people a blob holds: with a camera, or if enough lone blobs agree."""
+        """True if the size may decide how many people a blob holds: with a camera, or if at least 12 lone blobs, and 30
+        % of all remembered ones, agree with the learned height."""
         return self.from_camera or self.agreed >= max(ENOUGH, AGREE_SHARE * len(self.lone))
 
     @property
     def from_camera(self) -> bool:
-        """True if the context has a camera."""
+        """True if the context had a camera (pinhole or straight above), so that sizes come from it."""
         return self.table is not None or self.above
 
     @property
     def above(self) -> bool:
-        """True if the camera is straight above."""
+        """True if the camera looks straight down; sizes are then the axes of an ellipse."""
         return self.axes_above is not None
 
     def at(self, foot: Array) -> Array:
-        """Returns height and width (N, 2), px, of the box of a person who stands at image points `foot` (N, 2) u, v.
+        """Returns height and width (N, 2), px, of the box of a person who stands at image points `foot` (N, 2) u, v,
+        px.
 
-        nan where the size is unknown or too small. From above it is the box of a person turned by 45 degrees.
+        nan where the size is unknown or smaller than 12 px (6 px from above). From above it is the box of a person
+        turned by 45 degrees. Beyond the camera's table the size is that at its edge.
         """
         size = self._expected(foot)
         return np.sqrt(np.square(size).mean(1, keepdims=True) * np.ones(2)) if self.above else size
 
     def axes(self, foot: Array) -> Array:
-        """Returns height and width (N, 2), px, of the ellipse of a person at `foot` (N, 2); nan where unknown.
+        """Returns height and width (N, 2), px, of the ellipse of a person who stands at `foot` (N, 2) u, v, px.
 
-        From above: the axes of the ellipse, the longer first.
+        From above: the axes of the ellipse, the longer first. nan where the size is unknown or too small, as in `at`.
         """
         return self._expected(foot) if self.above else self._expected(foot) / self.box_over_ellipse
 
     def _expected(self, foot: Array) -> Array:
-        """Returns height and width (N, 2), from above the axes, with the learned factors; nan where too small."""
+        """Returns the expected size (N, 2), px, of people at `foot` (N, 2) u, v: height, width (from above the longer
+        and shorter axis), with the learned factors. nan where it is unknown or smaller than 12 px high (6 px from
+        above)."""
         size = self._unscaled(foot) * self.factor
         return np.where(size[:, :1] >= (SMALLEST_FROM_ABOVE if self.above else SMALLEST), size, np.nan)
 
     def one_person(self, box: Array, ellipse: Array) -> Bools:
-        """Returns True for each blob (M,) of one person's size; False where the size is unknown.
+        """Returns True for each blob (M,) that has the size of one person; False where a person's size is unknown.
 
-        box (M, 4) ltwh; ellipse (M, 5). From above the ellipse's axes are compared, else the box's sides.
+        box (M, 4): left, top, width, height, px; ellipse (M, 5): x, y, h, w (px), theta (rad). The box's sides, from
+        above the ellipse's axes, may be 0.8 (from above 0.6) to 1.25 times the expected height and 0.5 to 1.6 times the
+        width.
         """
         size = ellipse[:, 2:4] if self.above else box[:, :1:-1]
         with np.errstate(invalid="ignore"):
@@ -118,7 +125,8 @@ class PersonSize:
             return np.asarray((tall >= short) & (tall <= TALL) & (wide >= THIN) & (wide <= WIDE))
 
     def _unscaled(self, foot: Array) -> Array:
-        """Returns height and width (N, 2), from above the axes, by the camera or the line, without the factors."""
+        """Returns height and width (N, 2), px, from above the axes, of people at `foot` (N, 2) u, v by the camera or
+        the line, without the learned factors; nan where unknown."""
         if self.axes_above is not None:
             return np.tile(self.axes_above, (len(foot), 1))
         if self.table is not None:
@@ -128,14 +136,16 @@ class PersonSize:
 
     @property
     def px_per_m(self) -> float:
-        """Scale of the image: the median height of the lone blobs over 1.7 m; nan without lone blobs."""
+        """Scale of the image, px per m: the median height of the remembered lone blobs over 1.7 m; nan without lone
+        blobs."""
         return float(np.median(self.lone[:, 2])) / PERSON_HEIGHT if len(self.lone) else float("nan")
 
     def learn(self, box: Array, ellipse: Array, whole: Bools) -> None:
-        """Learn from those of the blobs that may be one person: whole, of a person's proportions, not too small.
+        """Change the size in place by the blobs of a picture that may be one person; the others are ignored.
 
-        box (M, 4) ltwh; ellipse (M, 5); whole (M,): False for a blob that must not be used. With a camera the height
-        must be plausible, too.
+        box (M, 4): left, top, width, height, px; ellipse (M, 5): x, y, h, w (px), theta (rad); whole (M,): False for a
+        blob that must not be used. A blob may be one person if it is not too small and its width over height is within
+        a factor 2 of a person's; with a camera its height must be within a factor 1.4 of the expected one, too.
         """
         foot, size = _feet(box), ellipse[:, 2:4] if self.above else box[:, :1:-1]
         expected = np.divide(*self._unscaled(foot).T[::-1]) if self.from_camera else SLIM
@@ -159,7 +169,11 @@ class PersonSize:
             self._fit()
 
     def _plausible_height(self, foot: Array, size: Array) -> Bools:
-        """Returns True for each blob (M,) whose height is within HEIGHT_FACTOR of the camera's, or if there is none."""
+        """Returns True for each blob (M,) whose height is within the factor HEIGHT_FACTOR of the camera's; all without
+        a camera.
+
+        foot (M, 2): u, v, px; size (M, 2): height, width, px. False where the camera gives nan.
+        """
         if not self.from_camera:
             return np.ones(len(size), bool)
         with np.errstate(invalid="ignore"):
@@ -167,7 +181,7 @@ class PersonSize:
         return np.asarray(off <= np.log(HEIGHT_FACTOR))
 
     def _fit(self) -> None:
-        """Compute the line, if there is no camera, and the factors from the remembered lone blobs.
+        """Compute line (without a camera), factors and `agreed` from the remembered lone blobs, at least one; in place.
 
         A blob weighs more the higher it is, and less the more lone blobs were seen at its place.
         """
@@ -185,7 +199,7 @@ class PersonSize:
 
 
 def upright(place: Array, angle: Array) -> Array:
-    """Returns the bounding boxes x, y, h, w (N, 4) of ellipses, centred.
+    """Returns the bounding boxes (N, 4) of ellipses: centre x, y, height, width, in the unit of `place`.
 
     place (N, 4): centre x, y and two full axes; angle (N,): direction of the first axis, rad, from the abscissa.
     """
@@ -196,17 +210,16 @@ def upright(place: Array, angle: Array) -> Array:
 
 
 def _feet(box: Array) -> Array:
-    """Returns the middle of the lower edge (M, 2) u, v of boxes ltwh (M, 4)."""
+    """Returns the middle of the lower edge (M, 2) u, v, px, of boxes (M, 4): left, top, width, height, px."""
     return np.stack([box[:, 0] + box[:, 2] / 2, box[:, 1] + box[:, 3]], 1)
 
 
 def _densest(value: Array, weight: Array, least: float = 1.0) -> tuple[float, Bools]:
-    """Returns the weighted mean of the values (N,) that agree with the most popular one, and which values these are
-    (N,).
+    """Returns the weighted mean of the values that agree with the most popular one, and flags (N,) of these values.
 
-    The most popular value has the largest weight within AGREEMENT of it. The value 1 has the weight PRIOR_COUNT in
-    advance. least < 1: instead the smallest value with this share of the largest weight (one person is narrower than
-    two).
+    value, weight (N,): ratios and their votes. Two values agree if they differ by at most AGREEMENT = 12 %. The most
+    popular value has the most votes near it. The value 1 has the weight PRIOR_COUNT in advance and counts in the mean.
+    least < 1: instead the smallest value with this share of the most votes (one person is narrower than two).
     """
     value, weight = np.append(value, 1.0), np.append(weight, PRIOR_COUNT)
     near = np.abs(value / np.maximum(value[:, None], 1e-9) - 1) <= AGREEMENT
@@ -217,10 +230,10 @@ def _densest(value: Array, weight: Array, least: float = 1.0) -> tuple[float, Bo
 
 
 def _line(v: Array, h: Array, weight: Array) -> tuple[float, float]:
-    """Returns a (px) and b of the line h = a + b v on which most heights agree.
+    """Returns a (px) and b of the line h = a + b v on which most heights agree; N must be at least 1.
 
-    v, h, weight (N,): rows of the feet, heights, weights. The best of LEVELS x SLOPES lines is refined three times by
-    least squares of relative errors among the heights that agree with it; a weak prior holds its slope.
+    v, h, weight (N,): rows of the feet, px, heights, px, and weights. The best of LEVELS x SLOPES lines is refined
+    three times by least squares of relative errors among the heights that agree with it; a weak prior holds its slope.
     """
     middle, typical = max(float(np.median(v)), 1.0), float(np.median(h))
     at = v / middle - 1
@@ -240,9 +253,10 @@ def _line(v: Array, h: Array, weight: Array) -> tuple[float, float]:
 
 
 def _crowding(place: Array) -> Array:
-    """Returns how many of the places (N, 2), in person heights, lie in the same cell, (N,).
+    """Returns how many of the places lie in the same cell as each place, (N,), itself included; so at least 1.
 
-    With the weight 1 / crowding a person who stands still counts about once.
+    place (N, 2): x, y in person heights; a cell is a quarter of a height wide. With the weight 1 / crowding a person
+    who stands still counts about once.
     """
     cell = np.floor(4 * place).astype(np.int64)
     _, which, count = np.unique(cell[:, 0] * 100_003 + cell[:, 1], return_inverse=True, return_counts=True)
@@ -250,10 +264,11 @@ def _crowding(place: Array) -> Array:
 
 
 def _table(camera: Camera, low: Array) -> Array:
-    """Returns height and width (2, V, U), px, of a person's box at nodes STEP px apart from `low` (2,) u, v on.
+    """Returns height and width (2, V, U), px, of a person's box whose foot is at each node of a grid; nan where nobody
+    stands.
 
-    nan where nobody can stand. The ground point is not at the box's lower edge unless seen from the side, so it is
-    corrected twice.
+    low (2,): u, v of the first node, px; nodes are STEP = 8 px apart and reach MARGIN image sizes beyond the image. The
+    ground point is not at the box's lower edge unless seen from the side, so it is corrected twice.
     """
     from sim.scene.body import person_boxes
     from sim.scene.camera import to_ground
@@ -276,7 +291,8 @@ def _table(camera: Camera, low: Array) -> Array:
 
 
 def _axes_from_above(camera: Camera) -> Array:
-    """Returns the longer and the shorter axis (2,) of a person, px."""
+    """Returns the longer and the shorter axis (2,), px, of an upright person of 1.7 m under a camera that looks
+    straight down."""
     from sim.scene.body import person_boxes
 
     return np.sort(person_boxes(camera, np.zeros((1, 3)), np.zeros(1), np.array([PERSON_HEIGHT]))[0, 2:])[::-1]

@@ -10,9 +10,10 @@ from sim.types import Array
 
 @njit(cache=True)
 def look_up(table: Array, at: Array) -> Array:
-    """Returns bilinear values (N, C) of a table (C, V, U) at `at` (N, 2): u, v in units of the grid.
+    """Returns bilinearly interpolated values (N, C) of a table (C, V, U) at N points.
 
-    A coordinate outside the table is moved to its edge; nan counts as 0.
+    at (N, 2): u, v in grid steps from the table's first node. A coordinate outside the table is moved to its edge; a
+    nan coordinate counts as 0. A nan among the four nodes round a point gives nan.
     """
     last_u, last_v = table.shape[2] - 1.001, table.shape[1] - 1.001
     found = np.empty((len(at), table.shape[0]))
