@@ -118,8 +118,7 @@ def smoothing_spline(t: Array, y: Array, weight: float) -> Array:
 
 
 def _acceleration(segments: list[Segment], fps: float) -> float:
-    """Return the 99 % quantile of the segments' accelerations in m/s², sampled `fps` times per s; 0 if there are none.
-    """
+    """Return the 99 % quantile of the segments' accelerations in m/s², sampled `fps` times per s; 0 if none."""
     size = [np.zeros(1)]
     for _, times, _, velocity in segments:
         t = np.arange(times[0], times[-1], 1 / fps)
