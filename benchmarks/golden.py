@@ -4,8 +4,8 @@
     python -m benchmarks.golden --write    write the present hashes of this environment into the file
 
 The last bits of a truth depend on CPU level, C library and versions (numpy, scipy, numba, LLVM, pymunk). Therefore
-hashes are kept per environment: in a new environment --write adds its hashes. Each hash of a truth stands beside that
-of its scenario, so that an edited scenario is told apart from a changed engine. --write refuses a different truth of
+hashes are kept per environment: in a new environment --write adds its hashes. Each hash of a truth is kept beside that
+of its scenario, so that an edited scenario can be told from a changed engine. --write refuses a different truth of
 the same scenario under the same ENGINE: raise the number first. All hashes of the old number are then dropped.
 """
 

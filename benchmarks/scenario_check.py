@@ -11,7 +11,7 @@ the aim is at most 1.15.
 difficulty: scores of the baseline rule on true positions and velocities, so that what it misses is due to the scene.
 `event` is the mean of the F1 of merges and of splits by the counts of all sequences together. The columns of kinds are
 hits/false/missed of all sequences; a dash means neither a true nor a reported event. The further scores are means over
-sequences, below them their 95 % intervals. An event F1 above 0.98 is marked *: events there tell no trackers apart.
+sequences, below them their 95 % intervals. An event F1 above 0.98 is marked *: events there separate no trackers.
 Without a scenario the whole catalogue is played.
 """
 

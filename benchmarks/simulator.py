@@ -146,11 +146,11 @@ def main() -> int:
         scene, rates = peer_input(people), []
         for _ in range(args.rounds):
             rates.append([our_rate(people), peer_rate(args.peer_python, scene), physics_rate(people)])
-        mine, theirs, engine = np.array(rates).T
-        ratio = mine / theirs
+        ours, peer, engine = np.array(rates).T
+        ratio = ours / peer
         row(
-            [str(people), f"{np.median(mine):.0f}", f"{np.median(theirs):.0f}",
-             f"{np.median(ratio):.1f} ({ratio.min():.1f}-{ratio.max():.1f})", f"{np.median(engine / mine):.1f}"]
+            [str(people), f"{np.median(ours):.0f}", f"{np.median(peer):.0f}",
+             f"{np.median(ratio):.1f} ({ratio.min():.1f}-{ratio.max():.1f})", f"{np.median(engine / ours):.1f}"]
         )  # fmt: skip
         good &= bool(np.median(ratio) >= MUST)
     print(f"must be {MUST:g} each, aim {AIM:g}: {'reached' if good else 'MISSED'}")

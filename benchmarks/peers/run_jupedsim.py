@@ -1,11 +1,11 @@
-"""Run JuPedSim's collision-free speed model; for an environment of its own (pip install jupedsim numpy).
+"""CPU seconds of JuPedSim's collision-free speed model; for an environment of its own (pip install jupedsim numpy).
 
 usage: python run_jupedsim.py < LAYOUT.json
 LAYOUT: {"start": [[x, y]…], "goal", "speed", "size", "margin", "dt", "steps", "episodes"}
 
-Needs nothing of flockscope. An open square with a wall `margin` m round it, everybody on the way to a goal of his own,
-all positions read into an array after every step. Prints {"people", "steps", "seconds"}: CPU seconds in the loop of
-steps; building the scene is left out.
+Needs nothing of flockscope. The scene is an open square with a wall `margin` m round it, in which each person walks to
+a goal of their own. All positions are read into an array after every step. Prints {"people", "steps", "seconds"}: CPU
+seconds in the loop of steps, without building the scene.
 """
 
 import json

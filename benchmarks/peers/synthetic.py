@@ -1,9 +1,9 @@
-"""Box sequences with occlusion, to choose defaults on: people walking on a plane before a tilted camera.
+"""Sequences of boxes with occlusion, on which defaults were chosen: people walk on a plane before a tilted camera.
 
-Not the simulator: a short model of its own, so that a tracker's defaults are not fitted to the simulator's ways. Its
-detector fails as real ones do: boxes are lost behind people and posts, jitter with memory from frame to frame, suppress
-and swallow each other, and false ones stay for some frames or come back in the same place again and again.
-`plain` is the field of constant-velocity squares that peers are timed on.
+This is a short model of its own, independent of the simulator, so that the defaults of a tracker are not fitted to the
+simulator. Its detector fails like real ones. It misses people behind people and posts, its errors are correlated over
+time, overlapping boxes suppress each other or become one box, and false boxes last for some frames or come back in the
+same places. `walk` returns such a scene; `plain` returns squares with constant velocity, on which trackers are timed.
 """
 
 from __future__ import annotations
@@ -17,7 +17,10 @@ WIDTH, HEIGHT = 640.0, 480.0
 
 @dataclass(frozen=True)
 class Boxes:
-    """fps, image size; per frame true ids, true boxes (ltwh), detected boxes with a score (M, 5)."""
+    """fps: frames/s; size: of the image, px; per frame ids (N,), truth (N, 4) true boxes, found (M, 5) boxes and score.
+
+    Boxes are left, top, width, height, px.
+    """
 
     name: str
     fps: float
@@ -28,7 +31,11 @@ class Boxes:
 
 
 def plain(n: int, frames: int = 200, p_detect: float = 1.0, clutter: float = 0.0, seed: int = 1) -> Boxes:
-    """n squares of 40 px with constant velocity in 1920 x 1080, centre noise 1.5 px, shuffled."""
+    """Returns n squares of 40 px with constant velocity in 1920 x 1080 px, detected in random order.
+
+    p_detect: detection probability; clutter: mean number of false boxes per frame. The standard deviation of a detected
+    centre is 1.5 px.
+    """
     r = np.random.default_rng(seed)
     p = np.c_[r.uniform(200, 1720, n), r.uniform(150, 930, n)]
     angle, speed = r.uniform(0, 2 * np.pi, n), r.uniform(1, 3, n)
@@ -48,7 +55,7 @@ def plain(n: int, frames: int = 200, p_detect: float = 1.0, clutter: float = 0.0
 
 
 def walk(seed: int, *, seconds: float = 30.0) -> Boxes:
-    """One scene: frame rate, camera height, density and detector drawn from the seed."""
+    """Returns one scene; frame rate, camera, number of people and detector are drawn from the seed."""
     r = np.random.default_rng(seed)
     fps = float(r.choice([7, 10, 14, 25, 30]))
     camera = float(r.uniform(1.6, 7.0)), float(r.uniform(5, 14)), float(r.uniform(500, 900))
@@ -59,7 +66,7 @@ def walk(seed: int, *, seconds: float = 30.0) -> Boxes:
 
 
 def _paths(r, people, frames, fps, camera):
-    """(T, P, 2) ground positions: walkers, some in pairs, with a slowly changing velocity, turned back at the edges."""
+    """Returns ground positions (T, P, 2), m, of people, some in pairs, who turn at the edges."""
     half, near, far = 0.75 * camera[1], camera[1] * 0.6, camera[1] * 2.0
     p = np.c_[r.uniform(-half, half, people), r.uniform(near, far, people)]
     angle = np.where(r.random(people) < 0.6, r.choice([0.0, np.pi], people), r.uniform(0, 2 * np.pi, people))
@@ -82,7 +89,7 @@ def _paths(r, people, frames, fps, camera):
 
 
 def _see(r, paths, fps, camera, p_detect, clutter, jitter, name):
-    """What camera and detector make of the paths."""
+    """Returns the true and detected boxes of the paths."""
     high, _, focal = camera
     people = paths.shape[1]
     tall, phase = r.normal(1.7, 0.08, people), r.uniform(0, 2 * np.pi, people)
@@ -118,7 +125,7 @@ def _see(r, paths, fps, camera, p_detect, clutter, jitter, name):
 
 
 def _ghosts(r, rate, haunt, size):
-    """New false boxes: a third of them in the haunted places."""
+    """Returns new false boxes: a third of them in the places where false boxes come back."""
     made = []
     for _ in range(r.poisson(rate)):
         side = r.uniform(0.7, 1.3) * np.median(size)
@@ -130,7 +137,7 @@ def _ghosts(r, rate, haunt, size):
 
 
 def _swallow(r, rows, chance):
-    """Pairs of boxes that overlap much come out as one box over both, now and then."""
+    """Returns the boxes after some pairs that overlap much have become one box over both."""
     rows = list(rows)
     for i in range(len(rows) - 1, 0, -1):
         for j in range(i):
@@ -144,7 +151,7 @@ def _swallow(r, rows, chance):
 
 
 def _visible(box, depth):
-    """Share of each box that no nearer box covers, on a 12 x 12 grid."""
+    """Returns the share of each box that no nearer box covers, on a grid of 12 x 12 points."""
     u = (np.arange(12) + 0.5) / 12
     grid = box[:, None, :2] + np.stack(np.meshgrid(u, u), -1).reshape(1, -1, 2) * box[:, None, 2:]
     covers = (
@@ -155,7 +162,7 @@ def _visible(box, depth):
 
 
 def _suppress(rows, limit=0.6):
-    """Greedy non-maximum suppression by IoU."""
+    """Returns the boxes that greedy non-maximum suppression by IoU leaves."""
     kept = []
     for row in rows[np.argsort(-rows[:, 4])]:
         if all(_iou(row, other) < limit for other in kept):

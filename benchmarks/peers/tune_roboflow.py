@@ -2,9 +2,9 @@
 
 usage: python tune_roboflow.py FOLDER TRACKER TRIALS      FOLDER: gt/*.txt and det/*.txt, MOT text; TRACKER: sort, …
 
-For an environment of its own (pip install trackers supervision optuna); needs nothing of flockscope. Its objective is
-HOTA, its defaults are the first trial. Prints one JSON object: "seconds", the quickest trial but the first, in which
-libraries load; "best", HOTA as it says.
+Runs in an environment of its own (pip install trackers supervision optuna) and needs nothing of flockscope. The
+objective is HOTA; the defaults are the first trial. Prints one JSON object: "seconds", the least CPU seconds of a trial
+after the first, in which libraries load; "best", the best HOTA by the tuner's own measure.
 """
 
 import json
@@ -26,7 +26,7 @@ def main(folder, name, trials):
     tuner.run()
     spent, best = [], 0.0
     for seed in range(trials):
-        tuner._seed = seed  # another point each time
+        tuner._seed = seed  # different parameters in each trial
         tuner._default_trial_params = None
         begun = time.process_time()
         tuner.run()

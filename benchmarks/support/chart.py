@@ -17,7 +17,11 @@ KEY = 22
 
 @dataclass(frozen=True)
 class Panel:
-    """One chart. curves: name → values, or (values, low, high), at `x`; vertical: marks on the x axis by name."""
+    """One chart.
+
+    curves: name → values, or (values, low, high), at `x`; vertical: vertical lines by name; ticks: names of the values
+    of `x`; y_range: None stands for the range of the curves.
+    """
 
     title: str
     x: Sequence[float]
@@ -30,7 +34,10 @@ class Panel:
 
 
 def lines(panels: Sequence[Panel], path: Path, columns: int = 2) -> Path:
-    """The charts in rows of `columns`, with one key beneath, as an SVG file; the same numbers give the same bytes."""
+    """Writes the charts as an SVG file, in rows of `columns`, with one key beneath, and returns its path.
+
+    The same numbers give the same bytes.
+    """
     columns = min(columns, len(panels))
     names = list(dict.fromkeys(name for panel in panels for name in panel.curves))
     colour = {name: COLOURS[k % len(COLOURS)] for k, name in enumerate(names)}
@@ -43,7 +50,7 @@ def lines(panels: Sequence[Panel], path: Path, columns: int = 2) -> Path:
         x, y = 20 + k % in_row * 240, rows * HEIGHT + 14 + k // in_row * KEY
         body.append(f'<line x1="{x}" y1="{y}" x2="{x + 22}" y2="{y}" stroke="{colour[name]}" stroke-width="2.5"/>')
         body.append(_text(x + 28, y + 4, name))
-    wide += RIGHT  # the last tick's label reaches over the panel
+    wide += RIGHT  # the label of the last tick extends beyond the panel
     head = f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {wide} {high}" width="{wide}" height="{high}"'
     style = ' font-family="sans-serif" font-size="12"><rect width="100%" height="100%" fill="#fff"/>'
     path.parent.mkdir(parents=True, exist_ok=True)
@@ -110,7 +117,7 @@ def _range(curves: Mapping[str, list[np.ndarray]]) -> tuple[float, float]:
 
 
 def _ticks(low: float, high: float) -> np.ndarray:
-    """Five or so round numbers in a range."""
+    """Returns about five round numbers in a range."""
     raw = (high - low) / 5
     step = 10.0 ** np.floor(np.log10(raw))
     step *= next(m for m in (1, 2, 5, 10) if m * step >= raw)
