@@ -27,7 +27,14 @@ FEW = 20  # with fewer half hidden rows, boxes are taken as amodal and errors as
 
 @dataclass(frozen=True)
 class ErrorSpread:
-    """Errors mean + sd (1 + occluded (1 - visibility)) n, n of variance 1; mean, sd (4,); likelihood: its logarithm."""
+    """A model of the four errors of a detected box: mean + sd (1 + occluded (1 − visibility)) n, n random with variance
+    1.
+
+    - mean (4,), sd (4,): of the errors middle, foot, top (box heights) and logarithm of the width, for a visible
+      person; sd is a standard deviation.
+    - occluded: growth of the standard deviation with the hidden share, 0 or more.
+    - likelihood: log likelihood of the data, up to a constant.
+    """
 
     mean: Array
     sd: Array
@@ -36,7 +43,16 @@ class ErrorSpread:
 
 
 def fit_box_noise(recordings: Sequence[MatchedRecording]) -> tuple[Literal["visible", "amodal"], BoxNoise]:
-    """Returns whether boxes enclose the visible part or the whole person, and their errors against that."""
+    """Returns "visible" or "amodal", and the errors of the detected boxes against boxes of this kind.
+
+    "visible": detected boxes enclose the visible part of a person; "amodal": the whole person. The errors are middle,
+    foot and top in box heights and the logarithm of the width, each with (mean, standard deviation). Further fields:
+    `occluded` (growth with the hidden share), `tails` (excess kurtosis), `memory` (parts that persist over time, None
+    if there are none).
+
+    recordings: at least one, with labelled boxes. Without detected rows that are at least a quarter visible all errors
+    are 0. Raises ValueError if there is no recording.
+    """
     kind: Literal["visible", "amodal"] = "visible" if _of_visible_part(recordings) else "amodal"
     best = _fit_spread(recordings, kind)
     correlated, standardised = [], []
@@ -57,7 +73,11 @@ def fit_box_noise(recordings: Sequence[MatchedRecording]) -> tuple[Literal["visi
 
 
 def _tails(z: Array) -> float:
-    """Returns the likeliest excess kurtosis of `TAILS` for Student-t errors z of variance 1; 0 means normal errors."""
+    """Returns the excess kurtosis of `TAILS` that is likeliest for Student-t errors of variance 1; 0 means normal
+    errors.
+
+    z: standardised errors, of any shape, without nan. Of equals the smallest; 0 without errors.
+    """
     from scipy.special import gammaln
 
     def likelihood(tails: float) -> float:
@@ -71,10 +91,10 @@ def _tails(z: Array) -> float:
 
 
 def _of_visible_part(recordings: Sequence[MatchedRecording]) -> bool:
-    """True if the boxes of half hidden people are nearer to their visible part than to their whole box.
+    """True if the detected boxes of half hidden people are nearer to their visible part than to their whole box.
 
-    Middle, foot and top are compared, after subtracting the median error of people in full view. False if there are
-    fewer than `FEW` half hidden rows.
+    Half hidden: visibility between 0.3 and 0.9. Errors of middle, foot and top are compared in px, after subtracting
+    the median error of people in full view. False if there are fewer than 20 half hidden detected rows.
     """
     away: dict[str, list[Array]] = {"visible": [], "amodal": []}
     for m in recordings:
@@ -89,12 +109,20 @@ def _of_visible_part(recordings: Sequence[MatchedRecording]) -> bool:
 
 
 def _errors(m: MatchedRecording, kind: str) -> Array:
-    """Returns the errors (H, 4) of the H detected rows against their boxes of this kind."""
+    """Returns the errors (H, 4) of the H detected rows against their labelled boxes: middle, foot, top, logarithm of
+    width.
+
+    kind: "visible" compares with the visible part where known, "amodal" with the whole box. Middle, foot and top are in
+    heights of the labelled box.
+    """
     return box_errors(m.box[m.match[m.hit]], _true(m, kind))
 
 
 def _true(m: MatchedRecording, kind: str) -> Array:
-    """Returns the labelled boxes (H, 4) of the H detected rows: of the visible part where known, or of the whole."""
+    """Returns the labelled boxes (H, 4), left, top, width, height in px, of the H detected rows.
+
+    kind: "visible" returns the visible part where it is known, else the whole box; "amodal" always the whole box.
+    """
     assert m.truth.box is not None
     true = m.truth.box
     if kind == "visible" and m.truth.visible_box is not None:
@@ -103,7 +131,11 @@ def _true(m: MatchedRecording, kind: str) -> Array:
 
 
 def _fit_spread(recordings: Sequence[MatchedRecording], kind: str) -> ErrorSpread:
-    """Returns the likeliest spread over the values of `GROWTH`; all 0 without usable rows."""
+    """Returns the likeliest `ErrorSpread` of the detected rows, `occluded` being chosen from `GROWTH`.
+
+    kind: "visible" or "amodal", the labelled boxes that errors are measured against. Rows less than a quarter visible
+    are left out. `occluded` is 0 if fewer than 20 rows are more than 10 % hidden. All values are 0 without usable rows.
+    """
     e = np.concatenate([_errors(m, kind) for m in recordings])
     hidden = np.concatenate([1.0 - m.truth.visibility[m.hit] for m in recordings])
     clear = hidden <= 1.0 - BARELY
@@ -115,10 +147,10 @@ def _fit_spread(recordings: Sequence[MatchedRecording], kind: str) -> ErrorSprea
 
 
 def _spread_of_growth(e: Array, hidden: Array, k: float) -> ErrorSpread:
-    """Returns the spread of errors e (H, 4) if `occluded` is k; hidden (H,): 1 - visibility.
+    """Returns the `ErrorSpread` of errors e (H, 4), H above 0, if `occluded` is k; hidden (H,): 1 − visibility.
 
-    mean and sd are weighted moments. The likelihood is that of a Laplace distribution, which large errors influence
-    little.
+    Columns of e: middle, foot, top, logarithm of width. mean and sd are weighted moments. The likelihood is that of a
+    Laplace distribution, which large errors influence little.
     """
     growth = 1.0 + k * hidden
     weight = 1.0 / growth**2
@@ -130,9 +162,11 @@ def _spread_of_growth(e: Array, hidden: Array, k: float) -> ErrorSpread:
 
 
 def fit_point_noise(recordings: Sequence[MatchedRecording]) -> float | None:
-    """Returns the standard deviation per axis, in m, of the detections' own positions on the ground.
+    """Returns the standard deviation (root mean square error) per axis, in m, of the detections' positions on the
+    ground.
 
-    None if the detections have no positions or no labelled row with a position is detected.
+    Errors are taken against the labelled positions of the detected rows of all recordings. None if the detections or
+    the labels have no positions on the ground, or nobody is detected.
     """
     errors = [
         m.pos[m.match[m.hit]] - m.truth.pos[m.hit] for m in recordings if m.pos is not None and m.truth.pos is not None

@@ -29,11 +29,18 @@ DISTRACTORS = (2, 7, 8, 12)  # MOTChallenge classes: people on vehicles, static 
 
 @dataclass(frozen=True)
 class MatchedRecording:
-    """A recording with R labelled rows (people in frames) and M detections, sorted by frame, matched to each other.
+    """A recording with R labelled rows (people in frames) and M detections, both sorted by frame, matched to each
+    other.
 
-    truth: with boxes and visibilities; size: image width and height in px. frame, score (M,), box (M, 4) ltwh px: of
-    the detections. pos (M, 2): their positions on the ground in m, None if they have none. match (R,): index of the
-    detection of each labelled row, -1 missed. owner (M,): labelled row of each detection, -1 false alarm.
+    - truth: the labels, with boxes and visibilities.
+    - size: image width and height in px.
+    - camera: of the recording, None if unknown.
+    - frame (M,): frame number of each detection, from 1.
+    - box (M, 4): left, top, width, height of each detection in px.
+    - score (M,): of each detection.
+    - pos (M, 2): the detections' positions on the ground in m, None if they have none.
+    - match (R,): index of the detection of each labelled row, −1 missed.
+    - owner (M,): labelled row of each detection, −1 false alarm.
     """
 
     truth: Truth
@@ -48,24 +55,26 @@ class MatchedRecording:
 
     @property
     def hit(self) -> Bools:
-        """True for each labelled row that is detected, (R,)."""
+        """Which labelled rows are detected, (R,) bool."""
         return np.asarray(self.match >= 0)
 
     @property
     def false(self) -> Bools:
-        """True for each detection that is a false alarm, (M,)."""
+        """Which detections are false alarms, belonging to no labelled row, (M,) bool."""
         return np.asarray(self.owner < 0)
 
     def rows(self, index: int) -> slice:
-        """Returns the slice of the detections of frame `index`."""
+        """Returns the slice of the detections of frame number `index` (from 1); empty if the frame has none."""
         low, high = np.searchsorted(self.frame, (index, index + 1))
         return slice(int(low), int(high))
 
 
 def match_sequence(sequence: Sequence) -> MatchedRecording:
-    """Returns the matched labels and detections of a recording.
+    """Returns the labels and detections of a recording, matched one to one in each frame.
 
-    Raises InputError if labelled people, detections, or the boxes of either are missing.
+    Rows of a MOT folder's gt/gt.txt that MOTChallenge does not score are no labels; unmatched detections on them are
+    dropped. Raises InputError if there are no labelled people, labels without boxes, no detections, or detections
+    without boxes. Errors of reading the files are raised too.
     """
     file, truth = sequence.source.get("path", sequence.name), sequence.truth
     missing = (
@@ -92,10 +101,16 @@ def match_detections(
     camera: Camera | None = None,
     left_out: tuple[Ints, Array] | None = None,
 ) -> MatchedRecording:
-    """Returns the matched labels and detections; both must have boxes.
+    """Returns the labels and detections, matched one to one in each frame; both must have boxes.
 
-    size: image width and height in px; None takes the extent of all boxes. left_out: frames and boxes (ltwh px) of
-    labelled rows that are not scored. A detection that covers one of them is dropped unless it matches a person.
+    A match needs an IoU of at least 0.3 with the whole or the visible labelled box. The matching is done twice; the
+    second time the labelled boxes are shifted by the median error of the first. Visibilities are estimated from the
+    boxes if the truth has none.
+
+    found: the detections, one per frame, sorted. size: image width and height in px; None takes the extent of all
+    boxes. camera: stored in the result. left_out: frame numbers (L,) and boxes (L, 4; left, top, width, height in px)
+    of labelled rows that are not scored. A detection that covers one of them by an IoU of 0.5 is dropped unless it
+    matches a person. Fails an assertion if the truth has no boxes.
     """
     assert truth.box is not None
     box = np.concatenate([np.zeros((0, 4)), *(d.box for d in found if d.box is not None)])
@@ -119,9 +134,11 @@ def match_detections(
 
 
 def _pairs(truth: Truth, frame: Ints, box: Array, usual: Array | None = None) -> tuple[Ints, Ints]:
-    """Returns the matched pairs as indices of labelled rows (K,) and of detections (K,).
+    """Returns the matched pairs: indices of labelled rows (K,) and of detections (K,), sorted by frame.
 
-    usual (4,): errors, as `box_errors` defines them, that are applied to the labelled boxes first; None applies none.
+    frame (M,), box (M, 4): frame number and left, top, width, height (px) of the detections. usual (4,): errors
+    (middle, foot, top in box heights, logarithm of the width) that are applied to the labelled boxes first; None
+    applies none. A pair needs an IoU of at least 0.3 with the whole or the visible labelled box.
     """
     assert truth.box is not None
     whole = truth.box
@@ -142,21 +159,31 @@ def _pairs(truth: Truth, frame: Ints, box: Array, usual: Array | None = None) ->
 
 
 def box_iou(a: Array, b: Array) -> Array:
-    """Returns the intersection over union (N, M) of boxes a (N, 4) and b (M, 4) ltwh, 0 where a box is nan."""
+    """Returns the intersection over union (N, M) of boxes a (N, 4) and b (M, 4): left, top, width, height in one unit.
+
+    0 where a box is nan or where both have no area.
+    """
     inner = box_intersections(a, b)
     area = (a[:, 2] * a[:, 3])[:, None] + (b[:, 2] * b[:, 3])[None]
     return np.nan_to_num(inner / (area - inner))
 
 
 def box_intersections(a: Array, b: Array) -> Array:
-    """Returns the common areas (N, M) in px² of boxes a (N, 4) and b (M, 4) ltwh px."""
+    """Returns the common areas (N, M) in px² of boxes a (N, 4) and b (M, 4): left, top, width, height in px.
+
+    0 where boxes do not overlap, nan where a box is nan.
+    """
     low = np.maximum(a[:, None, :2], b[None, :, :2])
     high = np.minimum(a[:, None, :2] + a[:, None, 2:], b[None, :, :2] + b[None, :, 2:])
     return np.asarray(np.prod(np.clip(high - low, 0.0, None), axis=2))
 
 
 def _covered(frame: Ints, box: Array, out_frame: Ints, out_box: Array) -> Bools:
-    """Returns which detections overlap an unscored box of their frame by `IGNORED` or more, (M,) bool."""
+    """Returns which of M detections overlap an unscored box of their frame by an IoU of 0.5 or more, (M,) bool.
+
+    frame (M,), box (M, 4): of the detections; out_frame (L,), out_box (L, 4): of the unscored labels. Boxes: left, top,
+    width, height in px.
+    """
     covered = np.zeros(len(box), bool)
     for index in np.unique(out_frame):
         here, there = np.flatnonzero(frame == index), out_frame == index
@@ -166,9 +193,11 @@ def _covered(frame: Ints, box: Array, out_frame: Ints, out_box: Array) -> Bools:
 
 
 def _left_out(sequence: Sequence) -> tuple[Ints, Array] | None:
-    """Returns frames and boxes of the rows of gt/gt.txt that MOTChallenge does not score.
+    """Returns frame numbers (L,) and boxes (L, 4; left, top, width, height in px) of the rows of gt/gt.txt that
+    MOTChallenge does not score.
 
-    These are the rows with flag 0 or a class of `DISTRACTORS`. None if the source is no MOT folder with such columns.
+    These are the rows with flag 0 or, with 8 or 9 columns, a class of `DISTRACTORS`. None if the source is no MOT
+    folder with a gt/gt.txt that has such columns. Raises InputError if the file is invalid.
     """
     path = Path(str(sequence.source.get("path", ""))) / "gt" / "gt.txt"
     if sequence.source.get("kind") != "mot" or not path.is_file():

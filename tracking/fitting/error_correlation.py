@@ -27,7 +27,12 @@ FEW = 20  # a lag with fewer pairs is left out
 
 @dataclass(frozen=True)
 class Correlations:
-    """Correlations rho (K,) at K lags (K,) in s; pairs (K,): number of pairs of errors behind each."""
+    """Correlations of errors over time at K lags.
+
+    - lag (K,): time between two errors of one person, s.
+    - rho (K,): their correlation.
+    - pairs (K,): number of pairs of errors behind each value.
+    """
 
     lag: Array
     rho: Array
@@ -35,10 +40,11 @@ class Correlations:
 
 
 def pairs_by_lag(truth: Truth, keep: Bools) -> list[tuple[float, Ints, Ints]]:
-    """Returns for each lag: the lag in s, and the labelled rows i (P,) and j (P,) of one person, j this lag after i.
+    """Returns a list of (lag in s, i (P,), j (P,)): indices of labelled rows of one person, row j this lag after row i.
 
-    keep (R,): which rows are used. Lags with fewer than `FEW` pairs are left out. Of more than `PAIRS` pairs a regular
-    selection is returned.
+    Lags go from one frame to 10 s at most, evenly spaced in their logarithm, in ascending order. keep (R,): bool, which
+    labelled rows (people in frames) are used. Lags with fewer than 20 pairs are left out. Of more than 12 000 pairs a
+    regular selection is returned.
     """
     rows = np.flatnonzero(keep)
     people, column = np.unique(truth.id[rows], return_inverse=True)
@@ -56,16 +62,22 @@ def pairs_by_lag(truth: Truth, keep: Bools) -> list[tuple[float, Ints, Ints]]:
 
 
 def correlations(truth: Truth, z: Array, keep: Bools) -> Correlations:
-    """Returns the correlations of errors z (R, D) with mean 0 and variance 1, pooled over the D columns.
+    """Returns the correlations over time of errors z (R, D) of one person, pooled over the D columns.
 
-    keep (R,): which rows are used; z may be nan in the others.
+    z: one row per labelled row of the truth, with mean 0 and variance 1; it may be nan where keep (R,) is false. keep:
+    bool, which rows are used. Lags with fewer than 20 pairs are left out; without any the arrays are empty.
     """
     rows = [(lag, float((z[i] * z[j]).mean()), len(i)) for lag, i, j in pairs_by_lag(truth, keep)]
     return _table(rows)
 
 
 def miss_correlations(truth: Truth, missed: Bools, p_miss: Array) -> Correlations:
-    """Returns the tetrachoric correlations of misses; missed (R,) bool, p_miss (R,): their probabilities."""
+    """Returns the tetrachoric correlations of one person's misses over time, in [−0.5, 0.995].
+
+    A miss is taken as a standard normal number below a threshold; rho is the correlation of two such numbers that
+    explains how often both are missed. missed (R,): bool, p_miss (R,): probability of a miss, clipped to [0.001,
+    0.999]; one per labelled row of the truth. Lags with fewer than 20 pairs are left out.
+    """
     from scipy.special import ndtri
 
     threshold = ndtri(np.clip(p_miss, 1e-3, 1.0 - 1e-3))
@@ -77,15 +89,16 @@ def miss_correlations(truth: Truth, missed: Bools, p_miss: Array) -> Correlation
 
 
 def _table(rows: list[tuple[float, float, int]]) -> Correlations:
-    """Returns rows of lag, correlation and number of pairs as arrays."""
+    """Returns rows (lag in s, correlation, number of pairs) as `Correlations`, with empty arrays without rows."""
     a = np.array(rows, dtype=float).reshape(-1, 3)
     return Correlations(a[:, 0], a[:, 1], a[:, 2])
 
 
 def bivariate_normal_cdf(a: Array, b: Array, rho: float) -> Array:
-    """Returns P(x < a, y < b) for standard normals x, y with correlation rho, |rho| < 1; a, b and the result (P,).
+    """Returns P(x < a, y < b), (P,), for standard normals x, y with correlation rho, |rho| < 1; a, b (P,): thresholds.
 
-    Φ(a) Φ(b) + 1 / 2π ∫ exp(-(a² + b² - 2 a b sin θ) / (2 cos² θ)) dθ from 0 to asin(rho), by 16 Gauss-Legendre nodes.
+    It is Φ(a) Φ(b) + 1 / 2π ∫ exp(−(a² + b² − 2 a b sin θ) / (2 cos² θ)) dθ from 0 to asin(rho), by 16 Gauss-Legendre
+    nodes.
     """
     from scipy.special import ndtr
 
@@ -96,7 +109,11 @@ def bivariate_normal_cdf(a: Array, b: Array, rho: float) -> Array:
 
 
 def _tetrachoric(a: Array, b: Array, both: float) -> float:
-    """Returns the rho in [-0.5, 0.995] with which the expected number of pairs below thresholds a, b is `both`."""
+    """Returns the correlation rho with which the expected number of pairs below both thresholds equals `both`.
+
+    a, b (P,): thresholds of the P pairs of standard normal numbers. both: observed number of pairs below both. The
+    result is limited to [−0.5, 0.995].
+    """
     from scipy.optimize import brentq
 
     low, high = -0.5, 0.995
@@ -110,11 +127,12 @@ def _tetrachoric(a: Array, b: Array, both: float) -> float:
 
 
 def fit_memory(found: Sequence[Correlations]) -> tuple[Memory, ...]:
-    """Returns at most two parts of an error's memory whose sum of exponentials is nearest to the correlations.
+    """Returns at most two parts of an error's memory, each with share and time (s), whose sum of exponentials is
+    nearest to the correlations.
 
-    It minimises the squared distance, weighted by the numbers of pairs. Shares are at least 0 and at most 1 in total. A
-    part with a share below `LEAST` is left out. The result is () without correlations, or if no exponential is nearer
-    than 0.
+    found: correlations of several recordings, pooled. The squared distance, weighted by the numbers of pairs, is
+    minimised. Shares are at least 0 and at most 1 in total. A part with a share below 0.03 is left out. The result is
+    () without correlations, if no part is left, or if no exponential is nearer than 0.
     """
     lag, rho, pairs = (np.concatenate([getattr(c, name) for c in found] or [[]]) for name in ("lag", "rho", "pairs"))
     if not len(lag):
@@ -134,7 +152,10 @@ def fit_memory(found: Sequence[Correlations]) -> tuple[Memory, ...]:
 
 
 def _shares(curves: Array, target: Array) -> Array:
-    """Returns the least-squares shares of one or two curves (K, 1 or 2), at least 0 and at most 1 in total."""
+    """Returns the least-squares shares (1,) or (2,) of one or two curves, at least 0 and at most 1 in total.
+
+    curves (K, 1 or 2): value of each curve at K lags; target (K,): the values to approach. Both are weighted already.
+    """
     from scipy.optimize import nnls
 
     share = nnls(curves, target)[0]

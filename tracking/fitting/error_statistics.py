@@ -19,15 +19,21 @@ LAGS = (0.2, 1.0)  # s: lags of the error correlation
 
 
 def simulated_detections(m: MatchedRecording, sensor: Sensor, seed: int) -> MatchedRecording:
-    """Returns the recording with its detections replaced by a simulated sensor's; seed: of the random draws."""
+    """Returns the recording with its detections replaced by those of a simulated sensor, matched to the labels.
+
+    seed: of the random draws. Raises InputError if `sensor.hide` names a group.
+    """
     found = sense(m.truth, sensor, seed, m.camera, m.size)
     return match_detections(m.truth, found, m.size, m.camera)
 
 
 def error_statistics(recordings: Sequence[MatchedRecording]) -> dict[str, float]:
-    """Returns the statistics by name, all recordings pooled; nan where nothing was observed.
+    """Returns a dict of statistics of a detector's errors, all recordings pooled; keys are texts such as "missed".
 
-    Shares lie between 0 and 1, times are in s, errors of boxes in box heights (of the width: its logarithm).
+    They are: share of misses (all, by visibility), misses in runs, false alarms, overlap quantiles, mean and standard
+    deviation of the box errors and their correlation over time, median scores. Shares lie between 0 and 1, times are in
+    s, errors of boxes in box heights (of the width: its logarithm). A value is nan where nothing was observed. Raises
+    ValueError without recordings.
     """
     hit = np.concatenate([m.hit for m in recordings])
     visibility = np.concatenate([m.truth.visibility for m in recordings])
@@ -60,7 +66,10 @@ def error_statistics(recordings: Sequence[MatchedRecording]) -> dict[str, float]
 
 
 def miss_runs(m: MatchedRecording) -> Ints:
-    """Returns the length in frames of each run of frames in which a labelled person is present and missed."""
+    """Returns the length in frames of each run of successive frames in which a labelled person is present and missed.
+
+    Runs are in order of person id, then time. A frame without the person ends a run. Empty without misses.
+    """
     lengths = []
     for id in np.unique(m.truth.id):
         rows = np.flatnonzero(m.truth.id == id)
@@ -72,7 +81,10 @@ def miss_runs(m: MatchedRecording) -> Ints:
 
 
 def _iou_and_errors(m: MatchedRecording) -> tuple[Array, Array]:
-    """Returns IoU (H,) and errors (H, 4) of the H detected rows against their whole boxes."""
+    """Returns two arrays of the H detected rows against their whole labelled boxes: IoU (H,), errors (H, 4).
+
+    Errors: middle, foot, top in box heights, logarithm of width.
+    """
     assert m.truth.box is not None
     true, box = m.truth.box[m.hit], m.box[m.match[m.hit]]
     low, high = np.maximum(true[:, :2], box[:, :2]), np.minimum(true[:, :2] + true[:, 2:], box[:, :2] + box[:, 2:])
@@ -82,9 +94,11 @@ def _iou_and_errors(m: MatchedRecording) -> tuple[Array, Array]:
 
 
 def _correlation(recordings: Sequence[MatchedRecording], e: Array, lag: float) -> float:
-    """Returns the correlation of one person's errors about `lag` s apart, nan without any.
+    """Returns the correlation of one person's errors about `lag` s apart (half to one and a half times), nan without
+    any.
 
-    e: the errors of all recordings, one after the other. The four kinds of error are pooled.
+    e (H, 4): errors of the detected rows of all recordings, one recording after the other. The four kinds of error are
+    standardised and pooled.
     """
     total, count, first = 0.0, 0, 0
     mean, sd = e.mean(axis=0), np.maximum(e.std(axis=0), 1e-9)

@@ -32,7 +32,9 @@ PLACES = 32  # greatest number of foot points in `at`
 class AlarmTrack:
     """One false alarm over time.
 
-    recording: where it occurred; rows (L,): its detections, in order; person: id of the person it belongs to, -1 none.
+    - recording: where it occurred.
+    - rows (L,): indices of its detections in the recording, in order of time.
+    - person: id of the labelled person it belongs to, −1 none.
     """
 
     recording: MatchedRecording
@@ -41,17 +43,23 @@ class AlarmTrack:
 
     @property
     def frame(self) -> Ints:
-        """Frame of each detection, (L,)."""
+        """Frame number of each detection of the alarm, from 1, (L,)."""
         return self.recording.frame[self.rows]
 
     @property
     def box(self) -> Array:
-        """Box of each detection, (L, 4) ltwh px."""
+        """Box of each detection of the alarm, (L, 4): left, top, width, height in px."""
         return self.recording.box[self.rows]
 
 
 def fit_false_alarms(recordings: Sequence[MatchedRecording]) -> tuple[float, FalseAlarms | None]:
-    """Returns the number of false alarms per frame, and their profile, None if there are fewer than `FEW` alarms."""
+    """Returns the mean number of false alarms per frame, and their profile; None if there are fewer than 5 alarm
+    tracks.
+
+    An alarm track is a series of unmatched detections of one false alarm. Fields about alarms at people, or elsewhere,
+    keep their defaults if there are fewer than 5 alarm tracks of this kind. recordings: matched; at least one frame in
+    all, else ZeroDivisionError is raised.
+    """
     tracks = [track for m in recordings for track in alarm_tracks(m)]
     frames = sum(m.truth.length for m in recordings)
     rate = sum(len(t.rows) for t in tracks) / frames
@@ -72,8 +80,9 @@ def fit_false_alarms(recordings: Sequence[MatchedRecording]) -> tuple[float, Fal
 def alarm_tracks(m: MatchedRecording) -> list[AlarmTrack]:
     """Returns the false alarms of a recording as tracks, in the order of their first detection.
 
-    In each frame unmatched detections continue the open tracks, greatest IoU first, if it is at least `LINK`. The
-    others begin new tracks.
+    In each frame unmatched detections continue the open tracks, greatest IoU first, if the IoU with a track's last
+    detection is at least 0.3. The others begin new tracks. A track that is not detected for more than 0.5 s ends. Empty
+    without false alarms.
     """
     pause = max(1, round(PAUSE * m.truth.fps))
     found: list[list[int]] = []
@@ -94,10 +103,11 @@ def alarm_tracks(m: MatchedRecording) -> list[AlarmTrack]:
 
 
 def _person_of_alarm(m: MatchedRecording, rows: list[int]) -> int:
-    """Returns the id of the person that an alarm belongs to, -1 none.
+    """Returns the id of the labelled person that an alarm belongs to, −1 none.
 
-    People must cover the share `ON` of its box, in the median over its detections. Candidates cover at least `NEARLY`
-    of what the person who covers most does. The candidate with the steadiest offset to the alarm is chosen.
+    rows: indices of the alarm's detections, not empty. People must cover half of its box, in the median over its
+    detections. Candidates cover at least 0.6 of what the person who covers most does. The candidate with the steadiest
+    offset to the alarm is chosen.
     """
     assert m.truth.box is not None
     share: dict[int, float] = {}

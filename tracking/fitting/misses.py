@@ -27,22 +27,31 @@ FEW_MISSES = 10  # with fewer misses in all, no memory is fitted
 
 @dataclass(frozen=True)
 class DetectionProbability:
-    """Probability of detection: best is P, curve the values c (NODES,) with c[-1] = 1, small in px (0: no effect)."""
+    """Probability that a person is detected, by visibility and box height.
+
+    - best: probability P for a person in full view.
+    - curve: factors c at the `NODES` visibilities 0, 0.25 … 1, linear between them; the last is 1.
+    - small: half the box height in px below which detection becomes less likely; 0: height has no effect.
+    """
 
     best: float
     curve: tuple[float, ...]
     small: float
 
     def at(self, visibility: Array, height: Array) -> Array:
-        """Returns the probabilities (R,) at visibility (R,) and box height (R,) in px."""
+        """Returns the probabilities of detection (R,) at visibility (R,), 0 to 1, and box height (R,) in px.
+
+        It is best · c(visibility) · min(1, height / (2 small)), without the last factor if `small` is 0.
+        """
         c = np.interp(visibility, np.linspace(0.0, 1.0, NODES), self.curve)
         return self.best * c * (np.minimum(1.0, height / (2 * self.small)) if self.small else 1.0)
 
 
 def fit_misses(recordings: Sequence[MatchedRecording]) -> tuple[DetectionProbability, tuple[Memory, ...]]:
-    """Returns the probability of detection, and the parts of misses that change slowly over time.
+    """Returns the probability of detection, and the parts of the misses' memory (each with share and time in s).
 
-    The second result is () if there are fewer than `FEW_MISSES` misses or no correlation.
+    recordings: matched, with at least one labelled row in all, else an exception is raised (ValueError or IndexError).
+    The second result is () if there are fewer than 10 misses or no correlation over time.
     """
     hit = np.concatenate([m.hit for m in recordings])
     visibility = np.concatenate([m.truth.visibility for m in recordings])
@@ -64,7 +73,11 @@ def fit_misses(recordings: Sequence[MatchedRecording]) -> tuple[DetectionProbabi
 
 
 def _heights(m: MatchedRecording) -> Array:
-    """Returns the heights (R,) in px that decide on detection; seen from above, the longer side / SHOULDER_SHARE."""
+    """Returns the heights (R,) in px of the labelled rows that decide on detection.
+
+    They are the heights of the boxes; for a camera seen from above (kind "top"), the longer side of the box /
+    `SHOULDER_SHARE`.
+    """
     assert m.truth.box is not None
     from sim.scene.body import SHOULDER_SHARE
 
@@ -74,7 +87,11 @@ def _heights(m: MatchedRecording) -> Array:
 
 
 def _fit_probability(hit: Bools, visibility: Array, height: Array, small: float) -> tuple[DetectionProbability, float]:
-    """Returns the likeliest probability for a given `small` (px), and its log likelihood, prior included."""
+    """Returns the likeliest probability of detection for a given `small`, and its log likelihood, prior included.
+
+    hit (R,): bool, which labelled rows are detected; visibility (R,), 0 to 1; height (R,): of boxes in px. small: half
+    the height in px below which detection becomes less likely; 0: no effect.
+    """
     from scipy.optimize import minimize
 
     levels = np.linspace(0.0, 1.0, NODES)
@@ -98,9 +115,10 @@ def _fit_probability(hit: Bools, visibility: Array, height: Array, small: float)
 
 
 def _rows_per_independent_row(recordings: Sequence[MatchedRecording], probability: DetectionProbability) -> float:
-    """Returns how many rows carry as much information as one independent row, at least 1.
+    """Returns how many labelled rows carry as much information as one independent row, at least 1.
 
-    It is 1 + 2 Σ rho over the lags in frames, rho being the correlation of misses. The greatest of all recordings.
+    It is 1 + 2 Σ rho over the lags in frames, rho being the correlation of one person's misses, clipped to [0, 1]. The
+    greatest of all recordings is returned. probability: of detection, by which misses are standardised.
     """
     found = []
     for m in recordings:

@@ -23,15 +23,19 @@ FEW_SCORES = 20  # with fewer scores, no quantiles are given
 def fit_sensor(sequences: Iterable[Recording] | Recording) -> Sensor:
     """Returns the sensor whose errors are like those of the detector on these recordings, pooled.
 
-    Raises InputError if a recording lacks labels, detections or boxes. Raises InputError if there are fewer than 50
-    labelled rows (people in frames) or fewer than 25 of them are detected.
+    sequences: one recording or several. Raises InputError if a recording lacks labels, detections or boxes. Raises
+    InputError if there are fewer than 50 labelled rows (people in frames) or fewer than 25 of them are detected.
     """
     recordings = [sequences] if isinstance(sequences, Recording) else list(sequences)
     return fit_matched([match_sequence(s) for s in recordings])
 
 
 def fit_matched(recordings: Sequence[MatchedRecording]) -> Sensor:
-    """Returns the sensor of recordings whose detections are matched; raises InputError if there are too few rows."""
+    """Returns the sensor whose errors are like those of the detector on matched recordings, pooled.
+
+    `true_scores` and `false_scores` are None with fewer than 20 scores. Raises InputError if there are fewer than 50
+    labelled rows (people in frames) or fewer than 25 of them are detected.
+    """
     people, hits = sum(len(m.match) for m in recordings), sum(int(m.hit.sum()) for m in recordings)
     if people < LEAST or hits < LEAST // 2:
         name = recordings[0].truth.name if recordings else "fit sensor"
@@ -72,7 +76,7 @@ def _digits(x: float) -> float:
 
 
 def _quantiles(score: Array) -> tuple[float, ...] | None:
-    """Returns `SCORES` quantiles from 0 to 1, None if there are fewer than `FEW_SCORES` scores."""
+    """Returns 11 quantiles of the scores (N,), evenly spaced from the least to the greatest; None if N is below 20."""
     if len(score) < FEW_SCORES:
         return None
     return tuple(round(float(q), 4) for q in np.quantile(score, np.linspace(0.0, 1.0, SCORES)))

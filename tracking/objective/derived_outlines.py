@@ -23,11 +23,14 @@ FROM_LEFT = np.roll(FOOTPRINT, -int(FOOTPRINT[:, 0].argmin()), axis=0)
 
 
 def derived_outlines(tracks: Sequence[Tracks], fps: float, px_per_m: float, labelled: Bools) -> GroupOutlines:
-    """Returns the groups of two or more people in the frames f where labelled[f] is true.
+    """Returns the hulls of groups of two or more people in the frames f where labelled[f] is true, sorted by frame.
 
-    tracks: not empty, of people, without `groups`. If any track has a group id, these ids define the groups, else the
-    baseline rule does. Hulls are drawn round boxes in the image if every track has one, else round footprints.
-    px_per_m: used only in the image. Raises InputError if the tracks are in the image and px_per_m is not above 0.
+    tracks: not empty, of one tracker, of people, without `groups`, sorted by frame. If any track has a group id, these
+    ids define the groups, else the baseline rule does. Hulls are drawn round boxes if the tracks are in the image and
+    every track has a box, else round footprints. Unit: m on the ground, px in the image. px_per_m: used only in the
+    image. labelled (length + 1,): bool by frame number. Group ids of the result are only row numbers.
+
+    Raises InputError if the tracks are in the image and px_per_m is not above 0.
     """
     table = tabulate(tracks, fps, px_per_m, LinkRule())
     order, first = _grouped_rows(table, _group_of_rows(table, fps), labelled)
@@ -41,7 +44,12 @@ def derived_outlines(tracks: Sequence[Tracks], fps: float, px_per_m: float, labe
 
 
 def _group_of_rows(table: TracksTable, fps: float) -> Ints:
-    """Returns a label (R,) that members of one group share within a frame, -1 alone."""
+    """Returns a label for each of the R table rows (tracks in frames), (R,): equal for members of one group in a frame,
+    −1 alone.
+
+    If any row has a group id of the tracker, these ids are returned, else the components that the baseline rule links.
+    fps: frames per second.
+    """
     from tracking.objective import derived_outlines_kernels as kernels
 
     if (table.group >= 0).any():
@@ -56,7 +64,12 @@ def _group_of_rows(table: TracksTable, fps: float) -> Ints:
 
 
 def _grouped_rows(table: TracksTable, group: Ints, labelled: Bools) -> tuple[Ints, Ints]:
-    """Returns the table rows of group members, group after group, and the index at which each group begins."""
+    """Returns the indices of the table rows (tracks in frames) in groups of two or more, group after group, (M,), and
+    the index in this list at which each of the G groups begins, (G,).
+
+    group (R,): label of each table row, −1 alone. labelled: bool by frame number from 1; groups in other frames are
+    left out. Groups are sorted by frame, then label.
+    """
     order = np.lexsort((group, table.frame))
     order = order[(group[order] >= 0) & labelled[table.frame[order] + 1]]
     frame, label = table.frame[order], group[order]
@@ -67,7 +80,12 @@ def _grouped_rows(table: TracksTable, group: Ints, labelled: Bools) -> tuple[Int
 
 
 def flat_convex_hulls(points: Array, ends: Ints) -> tuple[Array, Ints]:
-    """Returns the convex hulls of point sets that end at `ends`: vertices (V, 2) and where each hull ends (G,)."""
+    """Returns the convex hulls of G point sets: all vertices (V, 2), and the index in them at which each hull ends,
+    (G,).
+
+    points (N, 2): the sets one after the other; ends (G,): index at which each set ends (exclusive). Each hull is
+    counter-clockwise from its leftmost point. A set with a nan has a hull without vertices.
+    """
     from sim.geometry.hull_kernels import monotone_chains
 
     begins = np.concatenate([np.zeros(1, np.int64), ends])
@@ -77,7 +95,12 @@ def flat_convex_hulls(points: Array, ends: Ints) -> tuple[Array, Ints]:
 
 
 def flat_footprint_hulls(pos: Array, ends: Ints, scale: float) -> tuple[Array, Ints]:
-    """Returns the hulls of the footprints of people at pos (M, 2); scale: units per metre."""
+    """Returns the convex hulls of the footprints of G groups of people: all vertices (V, 2), and where each hull ends,
+    (G,).
+
+    pos (M, 2): people's x, y, group after group; ends (G,): index at which each group ends (exclusive). scale: units of
+    pos per metre. A footprint is a polygon of 16 vertices round the position.
+    """
     from tracking.objective import derived_outlines_kernels as kernels
 
     hulls: tuple[Array, Ints] = kernels.minkowski_sums(*flat_convex_hulls(pos, ends), FROM_LEFT * scale)
@@ -85,7 +108,12 @@ def flat_footprint_hulls(pos: Array, ends: Ints, scale: float) -> tuple[Array, I
 
 
 def _box_hulls(box: Array, ends: Ints) -> tuple[Array, Ints]:
-    """Returns the hulls of the corners of boxes (M, 4) ltwh."""
+    """Returns the convex hulls of the corners of G groups of boxes: all vertices (V, 2), and where each hull ends,
+    (G,).
+
+    box (M, 4): left, top, width, height in px, group after group; ends (G,): index at which each group ends
+    (exclusive).
+    """
     left, top, wide, high = box.T
     corners = np.stack([left, top, left + wide, top, left + wide, top + high, left, top + high], 1).reshape(-1, 2)
     return flat_convex_hulls(corners, 4 * ends)

@@ -8,12 +8,14 @@ from numba import njit
 
 @njit(cache=True)
 def connected_people(frame, column, length, people, memory, when, a, b, on):  # type: ignore[no-untyped-def]
-    """Returns a label (R,) that connected people of a frame share, -1 for a person who is alone.
+    """Returns a label for each of R rows (people in frames) that connected people of a frame share, −1 alone: (R,).
 
-    The groups are those of tracking.grouping.group_labels.label_people, without its ids. The label is the least column
-    of the connected people. frame (R,) from 0, sorted; column (R,); length: number of frames; people: number of
+    Two people are connected by a link that is on, directly or through others. The label is the least column of the
+    connected people. The groups are those of tracking.grouping.group_labels.label_people, without its ids.
+
+    frame (R,): from 0, sorted; column (R,): number of the person, from 0; length: number of frames; people: number of
     columns; memory: frames for which a missed person still connects others. Links switch on or off in frame when (L,),
-    sorted, between the columns a and b.
+    sorted, between the columns a (L,) and b (L,); on (L,): bool, the new state.
     """
     linked = np.zeros((people, people), np.bool_)
     seen = np.full(people, -memory - 2)
@@ -43,7 +45,12 @@ def connected_people(frame, column, length, people, memory, when, a, b, on):  # 
 
 @njit(cache=True)
 def _spread(p, linked, seen, since, label, stack):  # type: ignore[no-untyped-def]
-    """Sets the label p for all people connected to p, directly or through others, and seen since a frame."""
+    """Sets label[q] = p for person p and all people q connected to p, directly or through others, and seen in frame
+    `since` or later. Changes `label` and `stack` in place.
+
+    linked (P, P): bool by column; seen (P,): last frame of each person; label (P,): −1 not yet labelled; stack (P,):
+    work space.
+    """
     stack[0], n, label[p] = p, 1, p
     while n:
         n -= 1
@@ -57,10 +64,12 @@ def _spread(p, linked, seen, since, label, stack):  # type: ignore[no-untyped-de
 
 @njit(cache=True)
 def minkowski_sums(vertex, ends, polygon):  # type: ignore[no-untyped-def]
-    """Returns the sums of G convex hulls and one convex polygon: vertices (V, 2), and where each sum ends (G,).
+    """Returns the Minkowski sums of G convex hulls with one convex polygon: vertices (V, 2), and the index at which
+    each sum ends (G,).
 
-    Hull g is vertex[ends[g - 1] : ends[g]]. Hulls and `polygon` (S, 2) are counter-clockwise from their leftmost
-    vertex, the lowest of several. The edges of both are merged by direction. A sum may repeat vertices.
+    Hull g is vertex[ends[g − 1] : ends[g]] (hull 0 begins at 0). Hulls and `polygon` (S, 2) are counter-clockwise from
+    their leftmost vertex, the lowest of several. The edges of both are merged by direction. A sum may repeat vertices.
+    An empty hull is not allowed.
     """
     out, stop = np.empty((2 * len(vertex) + len(polygon) * len(ends), 2)), np.empty(len(ends), np.int64)
     n, first = 0, 0

@@ -23,11 +23,14 @@ FLAT = 1e-12  # share of a polygon's squared size: a right turn smaller than thi
 
 @dataclass(frozen=True, eq=False)
 class GroupOutlines:
-    """G groups in frames, sorted by frame, with their hulls in flat arrays.
+    """G groups in frames, sorted by frame, with their hulls in flat arrays, in m on the ground or px in the image.
 
-    pos (G, 2): centres. Polygon g is vertex[ends[g - 1] : ends[g]], counter-clockwise; vertex (V, 2), ends (G,). area
-    (G,): signed. box (G, 4): min x, min y, max x, max y, nan without vertices. regular (G,): True if the polygon has a
-    positive area and is convex.
+    - rows: frame number and id of each group.
+    - pos (G, 2): centres x, y.
+    - vertex (V, 2), ends (G,): polygon g is vertex[ends[g − 1] : ends[g]] (polygon 0 begins at 0), counter-clockwise.
+    - area (G,): signed area.
+    - box (G, 4): min x, min y, max x, max y, nan without vertices.
+    - regular (G,): True if the polygon has a positive area and is convex up to rounding.
     """
 
     rows: FrameRows
@@ -40,7 +43,11 @@ class GroupOutlines:
 
     @classmethod
     def measured(cls, rows: FrameRows, pos: Array, vertex: Array, ends: Ints) -> GroupOutlines:
-        """Returns the outlines with areas, boxes and regularity computed."""
+        """Returns the outlines with area, box and regularity of each polygon computed.
+
+        rows: frame number and id of G groups; pos (G, 2): centres; vertex (V, 2): all polygons one after the other;
+        ends (G,): index at which each polygon ends (exclusive).
+        """
         from tracking.objective import hull_overlaps_kernels as kernels
 
         vertex = np.ascontiguousarray(vertex, float)
@@ -48,7 +55,7 @@ class GroupOutlines:
 
     @classmethod
     def of(cls, groups: GroupRows) -> GroupOutlines:
-        """Returns the outlines of groups."""
+        """Returns the outlines of G groups in their order. A group without a hull gets a polygon without vertices."""
         ends = np.cumsum(np.array([len(h) for h in groups.hull], np.int64))
         return cls.measured(groups.rows, groups.pos, np.concatenate([np.zeros((0, 2)), *groups.hull]), ends)
 
@@ -56,22 +63,27 @@ class GroupOutlines:
         return len(self.rows)
 
     def until(self, last: int) -> GroupOutlines:
-        """Returns the groups of the frames up to `last`."""
+        """Returns the groups of the frames up to and including frame number `last`. The vertices of all groups are
+        kept.
+        """
         n = slice(int(np.searchsorted(self.rows.frame, last, side="right")))
         return GroupOutlines(
             self.rows.keep(n), self.pos[n], self.vertex, self.ends[n], self.area[n], self.box[n], self.regular[n]
         )
 
     def polygons(self, groups: Ints) -> list[Array]:
-        """Returns the polygons (V, 2) of these groups."""
+        """Returns the polygons (V, 2) of the groups with these row indices, in their order; V is 0 for a group without
+        a hull.
+        """
         return [self.vertex[self.ends[g - 1] if g else 0 : self.ends[g]] for g in groups.tolist()]
 
 
 def found_pairs(true: GroupOutlines, est: GroupOutlines) -> Pairs:
     """Returns the pairs of groups of one frame that may have an IoU of 0.5 or more, with their IoU as similarity.
 
-    Pairs well below 0.5 are left out. An IoU is exact where it decides about 0.5 or competes with another pair of the
-    same group; elsewhere it may differ from the exact value by rounding.
+    true, est: outlines in one unit. Pairs below 0.5 − 1e-6 are left out, unless a polygon is not regular (convex with
+    positive area). An IoU is exact where it decides about 0.5 or competes with another pair of the same group;
+    elsewhere it may differ from the exact value by rounding.
     """
     from tracking.objective import hull_overlaps_kernels as kernels
 
@@ -91,10 +103,11 @@ def found_pairs(true: GroupOutlines, est: GroupOutlines) -> Pairs:
 
 
 def count_inside(outlines: GroupOutlines, groups: GroupRows, people: FrameRows, positions: Array, scale: float) -> Ints:
-    """Returns how many people are inside each hull or within 0.3 m of it, (G,); 2 stands for two or more.
+    """Returns how many people of the frame are inside each of G hulls or within 0.3 m of it, (G,); 2 stands for two or
+    more.
 
-    outlines, groups: the same groups twice; positions (R, 2): of `people`, in the unit of the hulls; scale: this unit
-    per metre.
+    outlines, groups: the same G groups twice. people, positions (R, 2): the people in frames and their x, y in the unit
+    of the hulls. scale: this unit per metre. A group without a hull has 0.
     """
     from tracking.objective import hull_overlaps_kernels as kernels
 

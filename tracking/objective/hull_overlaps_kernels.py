@@ -11,15 +11,16 @@ from numba import njit
 
 @njit(cache=True)
 def _turn(a, b, c):  # type: ignore[no-untyped-def]
-    """Returns twice the signed area of the triangle a, b, c: above 0 for a left turn."""
+    """Returns twice the signed area of the triangle of points a, b, c (2,): above 0 for a left turn, 0 on a line."""
     return (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0])
 
 
 @njit(cache=True)
 def measure(vertex, ends, slack):  # type: ignore[no-untyped-def]
-    """Returns area (G,), signed; box (G, 4) min x, min y, max x, max y; regular (G,).
+    """Returns three arrays of G polygons: signed area (G,); box (G, 4): min x, min y, max x, max y; regular (G,) bool.
 
-    regular: the area is positive and no turn is to the right by more than `slack` times the squared size of the box.
+    Polygon g is vertex[ends[g − 1] : ends[g]] (polygon 0 begins at 0); vertex (V, 2), ends (G,). regular: the area is
+    positive and no turn is to the right by more than `slack` times the squared size (width + height) of the box.
     Without vertices the area is 0, the box nan and regular False.
     """
     area, box, regular = np.zeros(len(ends)), np.full((len(ends), 4), np.nan), np.zeros(len(ends), np.bool_)
@@ -45,10 +46,12 @@ def measure(vertex, ends, slack):  # type: ignore[no-untyped-def]
 
 @njit(cache=True)
 def candidates(frame_a, box_a, area_a, frame_b, box_b, area_b, least):  # type: ignore[no-untyped-def]
-    """Returns the rows i (K,), j (K,) of the pairs of one frame whose IoU may reach `least`.
+    """Returns indices i (K,), j (K,) of the pairs of polygons of sides a and b, of one frame, whose IoU may reach
+    `least`.
 
-    The common area is bounded by the smaller polygon and by the overlap of the boxes. frame_a, frame_b: sorted. The
-    result is sorted by i, then j.
+    frame_a (G,), frame_b (H,): frame numbers, sorted. box_a (G, 4), box_b (H, 4): min x, min y, max x, max y. area_a,
+    area_b: areas. The common area is bounded by the smaller polygon and by the overlap of the boxes. A polygon without
+    area or box is in no pair. Pairs are sorted by i, then j.
     """
     i, j, n = np.empty(len(frame_a) + 16, np.int64), np.empty(len(frame_a) + 16, np.int64), 0
     start = 0
@@ -72,7 +75,11 @@ def candidates(frame_a, box_a, area_a, frame_b, box_b, area_b, least):  # type: 
 
 @njit(cache=True)
 def overlaps(vertex_a, ends_a, area_a, vertex_b, ends_b, area_b, i, j):  # type: ignore[no-untyped-def]
-    """Returns the IoU (K,) of the convex polygons i of a and j of b, by Sutherland-Hodgman clipping."""
+    """Returns the IoU (K,) of the convex polygons i[k] of side a and j[k] of side b, by Sutherland-Hodgman clipping.
+
+    vertex_a (V, 2), ends_a (G,): polygon g of a is vertex_a[ends_a[g − 1] : ends_a[g]], counter-clockwise; side b
+    likewise. area_a (G,), area_b (H,): their areas. i, j (K,). 0 if the polygons share no area.
+    """
     out = np.empty(len(i))
     longest = _longest(ends_a) + _longest(ends_b) + 2
     one, two = np.empty((longest, 2)), np.empty((longest, 2))
@@ -94,7 +101,9 @@ def overlaps(vertex_a, ends_a, area_a, vertex_b, ends_b, area_b, i, j):  # type:
 
 @njit(cache=True)
 def _longest(ends):  # type: ignore[no-untyped-def]
-    """Returns the greatest number of vertices of a polygon."""
+    """Returns the greatest number of vertices of a polygon, 0 without polygons; ends (G,): index at which each polygon
+    ends.
+    """
     most, first = 0, 0
     for end in ends:
         most = max(most, end - first)
@@ -104,7 +113,11 @@ def _longest(ends):  # type: ignore[no-untyped-def]
 
 @njit(cache=True)
 def _cut(polygon, n, a, b, spare):  # type: ignore[no-untyped-def]
-    """Clips polygon[:n] in place to the left of the line from a to b; returns the new number of vertices."""
+    """Clips the polygon of the first n rows to the left of the line from a to b; returns the new number of vertices.
+
+    Changes polygon (N, 2) in place: its first rows become the clipped polygon. a, b (2,): points. spare (N, 2): work
+    space. n is returned if nothing is cut off, 0 if everything is.
+    """
     dx, dy = b[0] - a[0], b[1] - a[1]
     outside = False
     for k in range(n):
@@ -131,10 +144,14 @@ def _cut(polygon, n, a, b, spare):  # type: ignore[no-untyped-def]
 
 @njit(cache=True)
 def inside(frame, vertex, ends, box, regular, people, place, reach, slack):  # type: ignore[no-untyped-def]
-    """Returns how many people of the frame are inside each polygon or within `reach` of it, at most 2, (G,).
+    """Returns how many people of the frame are inside each of G polygons or within `reach` of it, (G,), counted up to
+    2.
 
-    -1: unsure, because the polygon is not regular or a person is within `slack` of `reach`. A polygon without vertices
-    has 0. frame (G,): of the polygons; people (R,): frame of each position in place (R, 2); both sorted.
+    −1: unsure, because the polygon is not regular (convex with positive area), or because a person's distance is within
+    `slack` of `reach`. A polygon without vertices has 0.
+
+    frame (G,), vertex (V, 2), ends (G,), box (G, 4: min x, min y, max x, max y), regular (G,): of the polygons. people
+    (R,): frame number of each position in place (R, 2). frame and people are sorted.
     """
     count, start = np.zeros(len(frame), np.int64), 0
     for g in range(len(frame)):
@@ -160,7 +177,7 @@ def inside(frame, vertex, ends, box, regular, people, place, reach, slack):  # t
 
 @njit(cache=True)
 def _gap(p, x, y):  # type: ignore[no-untyped-def]
-    """Returns the distance of the point (x, y) from a convex polygon, 0 inside."""
+    """Returns the distance of the point (x, y) from a convex polygon p (V, 2), counter-clockwise; 0 inside."""
     within, least = True, np.inf
     for k in range(len(p)):
         a, b = p[k], p[(k + 1) % len(p)]

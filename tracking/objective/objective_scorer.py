@@ -27,9 +27,9 @@ from tracking.scoring.rows import FrameRows
 
 
 class ObjectiveScorer:
-    """Computes the objective of any number of trackers against one truth.
+    """Computes the objective (mean of HOTA and group_F1_hull) of any number of trackers against one truth.
 
-    State: a `Scorer` of the truth, and the outlines of the true groups on each surface asked for so far.
+    State: a `Scorer` of the truth, and the outlines of the true groups on each surface used so far.
     """
 
     def __init__(self, truth: Truth) -> None:
@@ -37,11 +37,15 @@ class ObjectiveScorer:
         self._outlines: dict[Surface, GroupOutlines | None] = {}
 
     def scores(self, tracks: Sequence[Tracks], px_per_m: float) -> dict[str, float]:
-        """Returns HOTA, group_F1_hull and objective of the frames 1 … last, the frame of the last tracks.
+        """Returns a dict of HOTA, group_F1_hull and objective over the frames 1 … last, the frame of the last `Tracks`.
 
-        tracks: sorted by frame; px_per_m: scale for deriving groups in the image, nan takes the truth's. The result
-        equals `evaluate(truth, with_groups(tracks, fps, px_per_m), frames=last)` under these keys. A score is nan where
-        it is nan there.
+        tracks: one tracker's, sorted by frame; without any, HOTA and objective are 0. px_per_m: scale for deriving
+        groups in the image; nan takes the truth's. The result equals `evaluate(truth, with_groups(tracks, fps,
+        px_per_m), frames=last)` under these keys. A score is nan where it is nan there: HOTA for a tracker of whole
+        groups, group_F1_hull without labelled groups or shapes.
+
+        Raises IncomparableError if boxes or positions to be compared are missing, and InputError if groups must be
+        derived in the image and the scale is 0 or less.
         """
         truth, last = self.scorer.truth, tracks[-1].index if tracks else 0
         sides = self.scorer.sides(tracks, chosen_frames(last, truth.length))
@@ -56,7 +60,9 @@ class ObjectiveScorer:
         return {**found, "objective": objective_of(found)}
 
     def _true_outlines(self, surface: Surface) -> GroupOutlines | None:
-        """Returns the outlines of all true groups, None if the truth has no shapes on the surface."""
+        """Returns the outlines of all true groups of labelled frames, None if the truth has no group shapes on the
+        surface. Computed once per surface.
+        """
         if surface not in self._outlines:
             true = self.scorer.groups(surface)
             self._outlines[surface] = GroupOutlines.of(true.groups) if true.comparable else None
@@ -64,7 +70,12 @@ class ObjectiveScorer:
 
 
 def _tracked_outlines(sides: ComparedSides, px_per_m: float) -> GroupOutlines:
-    """Returns the outlines of the tracker's scored groups; groups are derived if the tracker reports none."""
+    """Returns the outlines of the tracker's groups that are scored, in labelled frames; groups are derived if the
+    tracker reports none.
+
+    px_per_m: scale for deriving groups in the image; if not finite the truth's is taken. Derived groups have two or
+    more people.
+    """
     tracks, fps = sides.tracks, sides.truth.fps
     px_per_m = px_per_m if np.isfinite(px_per_m) else sides.truth.px_per_m
     if not tracks:
@@ -78,7 +89,11 @@ def _tracked_outlines(sides: ComparedSides, px_per_m: float) -> GroupOutlines:
 
 
 def _whole_outlines(sides: ComparedSides) -> GroupOutlines:
-    """Returns the outlines of groups tracked as wholes, without those that have exactly one person inside."""
+    """Returns the outlines of groups that are tracked as wholes (unit "group"), in labelled frames.
+
+    Groups with exactly one true person inside the hull or within 0.3 m of it are left out; groups with nobody inside
+    stay. If the truth has no positions on the surface, all groups stay.
+    """
     reported = [(t.index, t.groups) for t in sides.tracks if sides.frames[t.index] and t.groups is not None]
     frame = np.repeat(np.array([index for index, _ in reported], np.int64), [len(g.id) for _, g in reported])
     pos = np.concatenate([np.zeros((0, 2)), *(g.pos[:, :2] for _, g in reported)])

@@ -22,9 +22,16 @@ def resampled_scorer(
 ) -> Callable[[Ints], Array]:
     """Returns a function that scores a recording made of chosen frames.
 
-    Its argument holds frame indices from 0, in any order and with repetitions. It returns the scores (K,) in the order
-    of the catalogue. Scores of events and core scores are nan, because they need the original order. Groups are derived
-    once, from the original tracks.
+    The argument of that function is an array of frame indices from 0 (frame number − 1), in any order, repetitions
+    allowed. Its result is an array (K,) of all scores in the order of `CATALOGUE`. Scores of events and core scores are
+    nan, because they need the original order. So is every score that `evaluate` cannot compute.
+
+    tracks: one tracker's `Tracks` of the original recording. Groups that the tracker leaves out are derived once, from
+    the original order. similarity, group_match: as for `evaluate`. A chosen frame without tracks counts as empty.
+
+    Raises InputError if groups must be derived in the image and `truth.px_per_m` is 0 or less. The returned function
+    raises IncomparableError if boxes or positions to compare are missing, and ValueError if an id occurs twice in one
+    frame.
     """
     original = {t.index: t for t in with_groups(tracks, truth.fps, truth.px_per_m)}
 
@@ -38,9 +45,10 @@ def resampled_scorer(
 
 
 def resampled_truth(truth: Truth, order: Sequence[int]) -> Truth:
-    """Returns the truth of these frames in this order, renumbered from 1.
+    """Returns the truth of the chosen frames in the chosen order, renumbered from 1.
 
-    order: frame numbers from 1, repetitions allowed. Events are left out.
+    order: frame numbers from 1 to the truth's length, in any order, repetitions allowed; empty gives a truth of 0
+    frames. Groups and labels are those of the chosen frames. Events and visible boxes are left out.
     """
     rows = [truth.rows(old) for old in order]
     count = [r.stop - r.start for r in rows]

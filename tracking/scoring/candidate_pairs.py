@@ -28,10 +28,11 @@ SLACK = 1e-6  # share of the coordinates' range: more than rounding can move a r
 
 @dataclass(frozen=True)
 class Pairs:
-    """K candidate pairs, sorted by true row and therefore by frame.
+    """K candidate pairs of a true and an estimated row of one frame, sorted by true row and therefore by frame.
 
-    true, est: all rows of both sides, with or without a pair; i, j (K,) int64: row index on each side; s (K,):
-    similarity, 0 < s <= 1 (`compare` stores whatever its function returns, such as distances).
+    - true, est: all R true and S estimated rows (people or groups in frames), with or without a pair.
+    - i (K,), j (K,): int64, index of the pair's row in `true` and in `est`.
+    - s (K,): similarity of the two rows, 0 < s <= 1. `compare` stores whatever its function returns, such as distances.
     """
 
     true: FrameRows
@@ -46,25 +47,31 @@ class Pairs:
         return self.true.frame[self.i]
 
     def keep(self, mask: Bools) -> Pairs:
-        """Returns the same rows with only the pairs where mask (K,) is true."""
+        """Returns the pairs where the bool mask (K,) is true. All true and estimated rows are kept, also those without
+        a pair.
+        """
         return Pairs(self.true, self.est, self.i[mask], self.j[mask], self.s[mask])
 
     @cached_property
     def true_ids(self) -> tuple[Ints, Ints]:
-        """Distinct true ids in ascending order, (N,), and for each true row the index of its id among them, (R,)."""
+        """Returns two arrays: the N distinct true ids in ascending order, (N,), and for each true row the index of its
+        id in the first array, (R,). Both are empty without true rows.
+        """
         return numbered(self.true.id)
 
     @cached_property
     def est_ids(self) -> tuple[Ints, Ints]:
-        """Distinct estimated ids in ascending order, (M,), and for each estimated row the index of its id, (S,)."""
+        """Returns two arrays: the M distinct estimated ids in ascending order, (M,), and for each estimated row the
+        index of its id in the first array, (S,). Both are empty without estimated rows.
+        """
         return numbered(self.est.id)
 
     @cached_property
     def links(self) -> tuple[Ints, Ints, Ints]:
-        """The U distinct (true id, estimated id) combinations among the pairs.
+        """The U distinct combinations (true id, estimated id) among the K pairs, as three arrays.
 
-        Returns the index of the true id (U,), the index of the estimated id (U,), and for each pair its combination
-        (K,). Id indices refer to `true_ids` and `est_ids`.
+        They are: the index of the true id in `true_ids[0]` (U,), the index of the estimated id in `est_ids[0]` (U,),
+        and for each pair the index of its combination (K,). Combinations are sorted by true id, then estimated id.
         """
         width = max(len(self.est_ids[0]), 1)
         key = self.true_ids[1][self.i] * width + self.est_ids[1][self.j]
@@ -72,7 +79,11 @@ class Pairs:
         return distinct // width, distinct % width, which
 
     def in_frames(self, mask: Bools) -> Pairs:
-        """Returns the rows and pairs of the frames f where mask[f] is true. mask is indexed by frame number."""
+        """Returns the rows and pairs of the frames f where mask[f] is true, with i and j renumbered to the kept rows.
+
+        mask (F,): bool, indexed by frame number; it must reach to the last frame of both sides, else IndexError is
+        raised. Frame numbers themselves do not change.
+        """
         true, est = mask[self.true.frame], mask[self.est.frame]
         kept = true[self.i]
         place_i, place_j = np.cumsum(true) - 1, np.cumsum(est) - 1
@@ -91,9 +102,13 @@ def compare(
 ) -> Pairs:
     """Returns the pairs of rows of one frame that a similarity function keeps.
 
-    within = (low, high, at) limits the rows that the function is called for: low, high (R,) belong to the true rows, at
-    (S,) to the estimated ones. Every pair with low[i] <= at[j] <= high[i] is passed, and a few others close to these
-    limits. A true row whose limit is nan or infinite gets no pairs.
+    true, est: R true and S estimated rows. similarity(i, j) gets row indices i (P,) of `true` and j (P,) of `est` of
+    equal frame. It returns the positions (Q,) of the pairs to keep, and their similarities (Q,), which are stored
+    unchanged. It is called once per portion of about 200 000 pairs.
+
+    within = (low, high, at) limits the pairs that the function is called for: low, high (R,) belong to the true rows,
+    at (S,) to the estimated ones. Every pair with low[i] <= at[j] <= high[i] is passed, and a few others close to these
+    limits. A true row with a nan or infinite limit gets no pairs. None passes all pairs of equal frame.
     """
     found = [(np.zeros(0, np.int64), np.zeros(0, np.int64), np.zeros(0))]
     for i, j in same_frame(true.frame, est.frame) if within is None else _near(true, est, *within):
@@ -103,13 +118,21 @@ def compare(
 
 
 def same_frame(a: Ints, b: Ints) -> Iterator[tuple[Ints, Ints]]:
-    """Yields all pairs (index in a, index in b) of equal frame in portions of about CHUNK; a, b: sorted frames."""
+    """Yields all pairs (index in a, index in b) with equal frame, as two int arrays (P,) per portion.
+
+    a (N,), b (M,): frame numbers, b sorted. Pairs are in ascending order of a, then b. A portion has at most about 200
+    000 pairs, but always all partners of at least one element of a. Empty input yields no or empty portions.
+    """
     first = np.searchsorted(b, a, side="left")
     return _portions(first, np.searchsorted(b, a, side="right") - first)
 
 
 def _portions(first: Ints, count: Ints) -> Iterator[tuple[Ints, Ints]]:
-    """Yields (k, first[k] + n) for all k and all n in 0 … count[k] - 1, in portions of about CHUNK pairs."""
+    """Yields arrays k, first[k] + n for all k and all n in 0 … count[k] − 1, in ascending order.
+
+    first (K,): start of each k's range; count (K,): its length, 0 allowed. A portion has at most 200 000 pairs, or all
+    pairs of a single k if that has more.
+    """
     total = np.concatenate(([0], np.cumsum(count)))
     cuts = [0]
     while cuts[-1] < len(count):
@@ -121,10 +144,12 @@ def _portions(first: Ints, count: Ints) -> Iterator[tuple[Ints, Ints]]:
 
 
 def _near(a: FrameRows, b: FrameRows, low: Array, high: Array, at: Array) -> Iterator[tuple[Ints, Ints]]:
-    """Yields the pairs of equal frame with low[i] <= at[j] <= high[i], and a few close to these limits.
+    """Yields arrays of row indices i of a and j of b of equal frame with low[i] <= at[j] <= high[i], and a few pairs
+    just outside these limits.
 
-    Rows of b are sorted by frame * span + at, where span exceeds the range of `at`. One binary search over this axis
-    then finds the partners of every row of a in its own frame.
+    low, high (R,): limits of the rows of a; a row with a nan or infinite limit gets no pairs. at (S,): values of the
+    rows of b. Rows of b are sorted by frame * span + at, where span exceeds the range of `at`. One binary search over
+    this axis then finds the partners of every row of a in its own frame.
     """
     finite = at[np.isfinite(at)]
     least, most = (float(finite.min()), float(finite.max())) if len(finite) else (0.0, 0.0)
@@ -140,9 +165,11 @@ def _near(a: FrameRows, b: FrameRows, low: Array, high: Array, at: Array) -> Ite
 
 
 def box_pairs(true: FrameRows, est: FrameRows, true_box: Array, est_box: Array) -> Pairs:
-    """Returns the pairs of overlapping boxes with their intersection over union as similarity.
+    """Returns the pairs of overlapping boxes of one frame, with their intersection over union as similarity.
 
-    true_box (R, 4), est_box (S, 4): left, top, width, height. A box with no area or with a nan has no pairs.
+    true_box (R, 4), est_box (S, 4): left, top, width, height of each row of `true` and `est`, in one unit (px). A box
+    with a nan, or without positive width and height, has no pairs. Nor has an overlap too small to differ from 0 by
+    rounding.
     """
     (la, ta, ra, ba), (lb, tb, rb, bb) = _edges(true_box), _edges(est_box)
     area_a, area_b = (np.maximum(box[:, 2], 0) * np.maximum(box[:, 3], 0) for box in (true_box, est_box))
@@ -165,9 +192,10 @@ def _edges(box: Array) -> tuple[Array, Array, Array, Array]:
 
 
 def point_pairs(true: FrameRows, est: FrameRows, true_pos: Array, est_pos: Array, reach: float) -> Pairs:
-    """Returns the pairs of positions closer than `reach`, with 1 - distance / reach as similarity.
+    """Returns the pairs of positions of one frame closer than `reach`, with 1 − distance / reach as similarity.
 
-    true_pos (R, 2), est_pos (S, 2) and reach have the same unit. A position with a nan has no pairs.
+    true_pos (R, 2), est_pos (S, 2): x, y of each row of `true` and `est`, in the unit of `reach` (m or px). A position
+    with a nan has no pairs. A nan reach gives no pairs.
     """
     ax, ay, bx, by = (np.ascontiguousarray(pos[:, k]) for pos in (true_pos, est_pos) for k in (0, 1))
 
@@ -183,9 +211,11 @@ def point_pairs(true: FrameRows, est: FrameRows, true_pos: Array, est_pos: Array
 def matrix_pairs(
     true_ids: Sequence[NDArray[Any]], est_ids: Sequence[NDArray[Any]], similarity: Sequence[NDArray[Any]]
 ) -> Pairs:
-    """Returns the pairs of similarity above 0 from lists with one entry per frame, frames counted from 0.
+    """Returns the pairs of similarity above 0, from lists with one entry per frame; entry 0 becomes frame 0.
 
-    true_ids: ids (N,) of each frame; est_ids: ids (M,); similarity: a matrix (N, M) of each frame.
+    true_ids: ids (N,) of each frame; est_ids: ids (M,); similarity: a matrix (N, M) of each frame, rows as true_ids,
+    columns as est_ids. N and M may differ between frames and may be 0. All three lists must have equal length and
+    fitting shapes; this is not checked.
     """
     true, est = _stack_ids(true_ids), _stack_ids(est_ids)
     flat = np.concatenate([np.zeros(0), *(np.asarray(m, float).ravel() for m in similarity)])

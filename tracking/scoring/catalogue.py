@@ -19,10 +19,15 @@ CORE = "groups, core"
 
 @dataclass(frozen=True)
 class Score:
-    """One score.
+    """One score of the catalogue.
 
-    unit: "1" for a share, "m | px" for a length in the unit of the plane. low, high: range. better: the direction that
-    is better. family: group of scores that are shown together. source: the paper that defines it, "" for flockscope.
+    - key: its name in the results, such as "HOTA".
+    - family: name of the group of scores that are shown together.
+    - unit: "1" for a share; "m | px" for a length in m on the ground or in px in the image; "count", "s", "people".
+    - low, high: range of possible values; may be infinite.
+    - better: whether "higher" or "lower" values are better, or "neither".
+    - meaning: definition in words.
+    - source: the paper that defines it, "" if flockscope does.
     """
 
     key: str
@@ -206,7 +211,11 @@ LINEAGE = (
 
 
 def _of_events(name: str, what: str) -> Iterable[Score]:
-    """Yields the scores of one kind of event; name: prefix of the keys, what: the events in words."""
+    """Yields the scores of one kind of event: F1, precision, recall, TP, FP, FN, latency.
+
+    name: the kind, which begins the keys ("merge" gives merge_F1); "event" yields no TP, FP and FN. what: the events as
+    a plural noun for the meanings. The scores have no family yet.
+    """
     yield _share(f"{name}_F1", f"2 matched / (true + reported) {what}")
     yield _share(f"{name}_precision", f"matched / reported {what}")
     yield _share(f"{name}_recall", f"matched / true {what}")
@@ -219,7 +228,9 @@ def _of_events(name: str, what: str) -> Iterable[Score]:
 
 
 def _headline(score: Score) -> Score:
-    """Returns the score of `event` with the meaning of a mean of merges and splits."""
+    """Returns an `event_…` score with a new meaning: the mean of the same score of merge and of split, or the known one
+    of the two. `event_latency` keeps its meaning.
+    """
     if score.key == "event_latency":
         return replace(score, meaning="mean time from the true start to the report, of matched merges and splits")
     name = score.key.removeprefix("event_")

@@ -25,10 +25,15 @@ MOSTLY, LOST = 0.8, 0.2
 
 
 def clear(pairs: Pairs) -> dict[str, float]:
-    """Returns MOTA, MOTP, TP, FN, FP, IDSW, MT, PT, ML and Frag; MT, PT and ML are numbers of true people.
+    """Returns a dict of the CLEAR scores: MOTA, MOTP, TP, FN, FP, IDSW, MT, PT, ML, Frag; all values are floats.
 
-    MOTA = 1 - (FN + FP + IDSW) / true rows, or 0 if either side has no rows. MOTP is the mean similarity of the
-    matches, 0 without matches.
+    Pairs of similarity 0.5 or more are matched one to one in each frame; a match of the previous frame is kept. TP, FN,
+    FP count matches, true rows without one and estimated rows without one. IDSW counts how often a true id is matched
+    to another estimated id than in its previous match. Frag counts how often a true id's matches resume after a pause.
+    MT, PT, ML count true ids matched in more than 80 %, in 20 to 80 %, in less than 20 % of their frames.
+
+    MOTA = 1 − (FN + FP + IDSW) / true rows, or 0 if either side has no rows. MOTP is the mean similarity of the
+    matches, 0 without matches. The counts are 0 where there is nothing to count.
     """
     near = pairs.keep(pairs.s >= FOUND - EPS)
     turn = turns(pairs)
@@ -56,16 +61,22 @@ def clear(pairs: Pairs) -> dict[str, float]:
 
 
 def turns(pairs: Pairs) -> Ints:
-    """Returns for each frame number 0 … last how many frames up to it have people on both sides, (F,)."""
+    """Returns for each frame number 0 … last how many frames up to and including it have rows on both sides, (last +
+    1,).
+
+    last: the last frame with a row on either side of `pairs`; 0 if there is none.
+    """
     end = 1 + max((int(rows.frame[-1]) for rows in (pairs.true, pairs.est) if len(rows)), default=0)
     true, est = (np.bincount(rows.frame, minlength=end) > 0 for rows in (pairs.true, pairs.est))
     return np.cumsum(true & est)
 
 
 def follow(near: Pairs, turn: Ints) -> Bools:
-    """Returns which pairs are matched, (K,) bool, when matches of the previous frame are kept.
+    """Returns which of the K pairs of `near` are matched, (K,) bool, where matches of the previous frame are kept.
 
-    near: pairs of similarity 0.5 or more; turn: from `turns`.
+    In each frame the matching is one to one, with all kept pairs and then the greatest total similarity. The previous
+    frame is the last one with rows on both sides. near: pairs of similarity 0.5 or more; turn: from `turns`, of all
+    pairs: the number of such frames up to each frame number.
     """
     i, j, frame = near.i, near.j, near.frame
     before = _before(near.links[2], turn[frame])
@@ -90,7 +101,11 @@ def follow(near: Pairs, turn: Ints) -> Bools:
 
 
 def _before(link: Ints, turn: Ints) -> Ints:
-    """Returns for each pair the index of the same two ids' pair in the previous frame, K if there is none: (K,)."""
+    """Returns for each of K pairs the index of the pair of the same two ids one turn earlier, K if there is none: (K,).
+
+    link (K,): number of the pair's combination of true and estimated id; turn (K,): number of frames with people on
+    both sides up to the pair's frame.
+    """
     order = np.argsort(link, kind="stable")
     follows = (np.diff(link[order]) == 0) & (np.diff(turn[order]) == 1)
     before = np.full(len(link), len(link))

@@ -39,15 +39,17 @@ Similarity = Literal["boxes", "ground", "image"]
 
 
 class IncomparableError(ValueError):
-    """The truth or the tracks lack the boxes or positions that are to be compared."""
+    """Raised if the truth or the tracks have people but lack the boxes or positions that are to be compared."""
 
 
 @dataclass(frozen=True, eq=False)
 class Scores(Mapping[str, float]):
-    """Scores by key, with every key of the catalogue in its order.
+    """A read-only mapping from key to score (float), with every key of the catalogue in its order.
 
-    nan: not labelled, not comparable, or a denominator of 0. similarity: how people were compared; surface: where
-    groups were compared; group_match: how groups were matched.
+    - by_key: the scores. nan: not labelled, not comparable, or a denominator of 0.
+    - similarity: how people were compared, by "boxes" (IoU) or by positions on the "ground" or in the "image".
+    - surface: where groups were compared, "ground" or "image".
+    - group_match: how groups were matched, by "hull" or by "members".
     """
 
     by_key: Mapping[str, float]
@@ -65,7 +67,7 @@ class Scores(Mapping[str, float]):
         return len(self.by_key)
 
     def __str__(self) -> str:
-        """Returns one line per score that is not nan."""
+        """Returns one line "key value" per score that is not nan, values with four significant digits."""
         return "\n".join(f"{key:28} {value:.4g}" for key, value in self.items() if not math.isnan(value))
 
 
@@ -77,15 +79,17 @@ def evaluate(
     group_match: GroupMatch = "hull",
     frames: int | range | None = None,
 ) -> Scores:
-    """Returns every score of the catalogue (docs/reference/metrics.md).
+    """Returns every score of the catalogue (docs/reference/metrics.md) for one tracker; a score that cannot be computed
+    is nan.
 
-    similarity: compares people by IoU ("boxes") or by max(0, 1 - d / 2 m) ("ground", "image"). None: boxes if both
-    sides have them, else the plane of the tracks. group_match: matches groups by IoU of their hulls ("hull") or Jaccard
-    index of their members ("members"). frames: a number n scores frames 1 … n, a range only its frames, None all
-    frames. A frame without tracks counts as empty. Tracks without groups get groups and events by the baseline rule.
+    tracks: the tracker's `Tracks`, one per frame, in any order; of two with equal frame the later is used. similarity:
+    compares people by IoU ("boxes") or by max(0, 1 − d / 2 m) ("ground", "image"). None: boxes if both sides have them,
+    else the plane of the tracks. group_match: matches groups by IoU of their hulls ("hull") or Jaccard index of their
+    members ("members"). frames: a number n scores frames 1 … n, a range only its frames, None all frames. A frame
+    without tracks counts as empty. Tracks without groups get groups and events by the baseline rule.
 
-    Raises IncomparableError if boxes or positions to be compared are missing, and ValueError if an id occurs twice in
-    one frame.
+    Raises IncomparableError if boxes or positions to be compared are missing, ValueError if an id occurs twice in one
+    frame, and InputError if groups must be derived in the image and `truth.px_per_m` is 0 or less.
     """
     return Scorer(truth).evaluate(tracks, similarity=similarity, group_match=group_match, frames=frames)
 
@@ -93,7 +97,8 @@ def evaluate(
 class Scorer:
     """Scores any number of trackers against one truth.
 
-    State: the truth, its labelled frames, and its people and groups as rows. Rows are built at first use and kept.
+    State: truth; labelled (length + 1,), which frame numbers have labelled groups; the true people and groups as rows
+    of arrays, built at first use and kept. The truth must not change meanwhile.
     """
 
     def __init__(self, truth: Truth) -> None:
@@ -103,22 +108,25 @@ class Scorer:
 
     @cached_property
     def people(self) -> PersonRows:
-        """The true people of all frames."""
+        """The true people of all frames as `PersonRows`, one row per person and frame, sorted by frame."""
         return true_people(self.truth, chosen_frames(None, self.truth.length))
 
     def groups(self, surface: Surface) -> TrueGroups:
-        """Returns the true groups of all labelled frames, members as rows of `people`.
+        """Returns the true groups of two or more people in all labelled frames; members are row indices of `people`.
 
-        At least one frame must be labelled.
+        surface: "ground" (m) or "image" (px). If the truth has groups on the other surface only, their shapes do not
+        count: `comparable` is False. At least one frame must be labelled, else an assertion fails or the groups are
+        empty.
         """
         if surface not in self._groups:
             self._groups[surface] = true_groups(self.truth, self.labelled, self.people.rows, surface)
         return self._groups[surface]
 
     def sides(self, tracks: Sequence[Tracks], frames: Bools) -> ComparedSides:
-        """Returns both sides in the frames f where frames[f] is true.
+        """Returns the truth's and the tracker's data in the frames f where frames[f] is true, before people are mapped.
 
-        tracks: of these frames, sorted. The mapping of people is -1 for all of them.
+        tracks: one tracker's, of these frames only, sorted by frame. frames (length + 1,): bool by frame number. In the
+        result `frames` keeps only labelled frames, and `mapping` is −1 for every tracked row.
         """
         kept = frames[self.people.rows.frame]
         true = self.people if kept.all() else self.people.keep(kept)
@@ -134,7 +142,16 @@ class Scorer:
         group_match: GroupMatch = "hull",
         frames: int | range | None = None,
     ) -> Scores:
-        """Returns what the function `evaluate` returns for this truth; options and exceptions are the same."""
+        """Returns every score of the catalogue for one tracker against this truth, as the function `evaluate` does.
+
+        tracks: one `Tracks` per frame, any order. similarity: "boxes", "ground", "image" or None (boxes if both sides
+        have them, else the tracks' plane). group_match: "hull" or "members". frames: n for frames 1 … n, a range, or
+        None for all. Scores of people are nan for a tracker of whole groups. Scores of groups and events are nan if no
+        chosen frame is labelled.
+
+        Raises IncomparableError if boxes or positions are missing, ValueError if an id occurs twice in one frame,
+        InputError if groups must be derived in the image and `truth.px_per_m` is 0 or less.
+        """
         truth, inside = self.truth, chosen_frames(frames, self.truth.length)
         given: Sequence[Tracks] = _in_order(tracks, inside)
         labelled = bool((self.labelled & inside).any())
@@ -158,9 +175,10 @@ class Scorer:
 
 
 def chosen_frames(frames: int | range | None, length: int) -> Bools:
-    """Returns which of the frames 0 … length are chosen, (length + 1,) bool; frame 0 never is.
+    """Returns which of the frame numbers 0 … length are chosen, (length + 1,) bool; frame 0 never is.
 
-    frames: a number n chooses frames 1 … n, a range its frames between 1 and length, None all.
+    frames: a number n chooses frames 1 … n (none if n < 1, all if n > length), a range its frames between 1 and length,
+    None all.
     """
     inside = np.zeros(length + 1, bool)
     if isinstance(frames, range):
@@ -171,7 +189,11 @@ def chosen_frames(frames: int | range | None, length: int) -> Bools:
 
 
 def labelled_frames(truth: Truth) -> Bools:
-    """Returns which of the frames 0 … length have labelled groups, (length + 1,) bool."""
+    """Returns which of the frame numbers 0 … length have labelled groups, (length + 1,) bool; frame 0 never has.
+
+    Without groups on the ground and in the image no frame has. With groups and without `truth.labelled`, all frames
+    have.
+    """
     if truth.groups is None and truth.groups_px is None:
         return np.zeros(truth.length + 1, bool)
     labelled = np.ones(truth.length, bool) if truth.labelled is None else truth.labelled
@@ -179,20 +201,34 @@ def labelled_frames(truth: Truth) -> Bools:
 
 
 def _in_order(tracks: Iterable[Tracks], inside: Bools) -> list[Tracks]:
-    """Returns the tracks sorted by frame, up to the last chosen frame: later frames must not influence the scores."""
+    """Returns one tracker's `Tracks` sorted by frame, from frame 1 to the last chosen frame.
+
+    inside (length + 1,): which frame numbers are chosen. Frames before the last chosen one are kept even if not chosen;
+    later ones are dropped, as they must not influence the scores. Of two `Tracks` with equal frame the later in the
+    input is kept. Empty if no frame is chosen.
+    """
     last = int(np.flatnonzero(inside)[-1]) if inside.any() else 0
     by_frame = {t.index: t for t in tracks if 1 <= t.index <= last}
     return [by_frame[index] for index in sorted(by_frame)]
 
 
 def plane_of(truth: Truth, tracks: Sequence[Tracks]) -> str:
-    """Returns the plane of the first tracks with people, else of the first tracks, else of the truth."""
+    """Returns the plane of a tracker's positions: "ground", "space" or "image".
+
+    It is that of the first `Tracks` with people, else of the first `Tracks`. Without any it is the truth's: "image" if
+    the truth has no positions on the ground, else "ground".
+    """
     own = "image" if truth.pos is None else "ground"
     return next((t.plane for t in tracks if len(t.id)), tracks[0].plane if tracks else own)
 
 
 def usual_similarity(truth: Truth, tracks: Iterable[Tracks]) -> Similarity:
-    """Returns "boxes" if both sides have boxes, else "image" or "ground" by the plane of the tracks."""
+    """Returns how people are compared by default: "boxes" if the truth and every non-empty frame of the tracks have
+    boxes.
+
+    Else "image" if the first non-empty frame of the tracks is in the image, else "ground". Tracks without anybody count
+    as having boxes.
+    """
     some = [t for t in tracks if len(t.id)]
     if truth.box is not None and all(t.box is not None for t in some):
         return "boxes"
@@ -200,9 +236,11 @@ def usual_similarity(truth: Truth, tracks: Iterable[Tracks]) -> Similarity:
 
 
 def people_pairs(sides: ComparedSides, similarity: Similarity) -> Pairs:
-    """Returns the candidate pairs of true and tracked people.
+    """Returns the candidate pairs of true and tracked people of one frame, with a similarity in (0, 1].
 
-    Raises IncomparableError if a side has people but not the boxes or positions to be compared.
+    similarity: "boxes" takes the IoU; "ground" and "image" take 1 − distance / 2 m, the image by `truth.px_per_m`.
+    Without people on a side there are no pairs. Raises IncomparableError if a side has people but not the boxes or
+    positions to be compared. With "boxes" it is also raised if the truth has no boxes at all.
     """
     true, est = sides.true, sides.est
     if similarity == "boxes":
@@ -215,7 +253,11 @@ def people_pairs(sides: ComparedSides, similarity: Similarity) -> Pairs:
 
 
 def _positions(people: PersonRows, surface: Surface, plane: str) -> Array:
-    """Returns the positions (R, 2) on the surface. Raises IncomparableError if there are people without any."""
+    """Returns the positions x, y (R, 2) of the R rows of `people` on a surface, in m ("ground") or px ("image").
+
+    plane: plane of the positions in `people`. Without rows and positions the result has shape (0, 2). Raises
+    IncomparableError if there are rows but no positions on the surface.
+    """
     positions = people.positions_on(surface, plane)
     if positions is None and len(people.rows):
         where, other = {
@@ -227,9 +269,11 @@ def _positions(people: PersonRows, surface: Surface, plane: str) -> Array:
 
 
 def people_scores(pairs: Pairs) -> dict[str, float]:
-    """Returns the scores of HOTA, CLEAR and Identity; pairs of any similarity in (0, 1].
+    """Returns the scores of HOTA, CLEAR and Identity as one dict by key.
 
-    Raises ValueError if an id occurs twice in one frame.
+    pairs: all people of both sides and their candidate pairs of any similarity in (0, 1]. CLEAR and Identity use pairs
+    of 0.5 or more. Without people on a side scores are 0, and LocA is 1. Raises ValueError if an id occurs twice in one
+    frame on a side.
     """
     pairs.true.require_unique_ids("truth")
     pairs.est.require_unique_ids("tracks")
@@ -237,6 +281,9 @@ def people_scores(pairs: Pairs) -> dict[str, float]:
 
 
 def objective_of(found: Mapping[str, float]) -> float:
-    """Returns the mean of HOTA and group_F1_hull, or the one that is not nan, or nan."""
+    """Returns the mean of found["HOTA"] and found["group_F1_hull"]; if one is nan the other, if both are nan nan.
+
+    Raises KeyError if a key is missing.
+    """
     known = [v for v in (found["HOTA"], found["group_F1_hull"]) if v == v]
     return sum(known) / len(known) if known else float("nan")

@@ -28,16 +28,19 @@ PersonIds = frozenset[int]
 
 @dataclass(frozen=True, slots=True)
 class EventMembers:
-    """People of an event, or of one group before or after it.
+    """The members of an event, or of one group before or after it, as true people.
 
-    people: their true ids; unmatched: how many further members are mapped to nobody, or to a person already listed.
+    - people: ids of true people.
+    - unmatched: number of further members that are mapped to no true person, or to one already in `people`.
     """
 
     people: PersonIds
     unmatched: int = 0
 
     def jaccard(self, other: EventMembers) -> float:
-        """Returns common people / all members of both; unmatched members are never common. 0 if both are empty."""
+        """Returns common people / all members of both, between 0 and 1; unmatched members are never common. 0 if both
+        are empty.
+        """
         common = len(self.people & other.people)
         whole = len(self.people | other.people) + self.unmatched + other.unmatched
         return common / whole if whole else 0.0
@@ -45,11 +48,14 @@ class EventMembers:
 
 @dataclass(frozen=True, slots=True)
 class ComparableEvent:
-    """An event in terms of true people, so that both sides can be compared.
+    """An event whose members are true people, so that a true and a tracker's event can be compared.
 
-    start: frame; emitted: frame of the report, None in the truth; members: None if the tracker names no people; pos:
-    x, y in the unit of the comparison; parents, children: the groups (or single people) before and after the event,
-    None if unknown.
+    - kind: one of `KINDS`, or "form" or "dissolve".
+    - start: frame number from 1 in which the event begins.
+    - emitted: frame number of the `Tracks` that report it; None in the truth.
+    - members: None if the tracker names no people.
+    - pos: x, y, in m on the ground or px in the image.
+    - parents, children: the groups (or single people) before and after the event; None if unknown.
     """
 
     kind: str
@@ -62,13 +68,18 @@ class ComparableEvent:
 
     @property
     def has_lineage(self) -> bool:
-        """True if both parents and children are known."""
+        """True if neither `parents` nor `children` is None."""
         return self.parents is not None and self.children is not None
 
 
 @dataclass(frozen=True, slots=True)
 class MatchedEvents:
-    """All events of one kind on both sides; pairs: the matched ones, (true event, tracker's event)."""
+    """All events of one kind on both sides.
+
+    - kind: one of `KINDS`; "form" is among the merges, "dissolve" among the splits.
+    - true, est: the true events and the tracker's events of this kind, matched or not.
+    - pairs: the matched events, each (true event, tracker's event).
+    """
 
     kind: str
     true: Sequence[ComparableEvent]
@@ -79,9 +90,14 @@ class MatchedEvents:
 def match_events(
     true: Sequence[ComparableEvent], est: Sequence[ComparableEvent], fps: float, scale: float
 ) -> list[MatchedEvents]:
-    """Returns the matched events, one entry per kind of `KINDS`; scale: units of `pos` per metre.
+    """Returns one `MatchedEvents` per kind, in the order of `KINDS`: merge, split, cross, queue, enter, leave.
 
-    Each matching has as many pairs as possible. Of several such matchings it is the one with the most similar pairs.
+    true, est: the true and the tracker's events, any kinds; those of other kinds are ignored ("form" counts as merge,
+    "dissolve" as split). fps: frames per second. scale: units of `pos` per metre.
+
+    Events match if their starts are at most 1 s apart and the Jaccard index of their members is at least 0.5. If a side
+    names no members, their positions must be at most 1.5 m apart instead; a nan position never matches. Matching is one
+    to one, with as many pairs as possible, and then with the most similar pairs.
     """
     found = []
     for kind in KINDS:
@@ -91,7 +107,12 @@ def match_events(
 
 
 def _similarity(true: Sequence[ComparableEvent], est: Sequence[ComparableEvent], fps: float, scale: float) -> Array:
-    """Returns the similarity of each true and estimated event, (N, M); 0 if they do not match."""
+    """Returns the similarity of N true and M estimated events, (N, M); 0 if they cannot be matched.
+
+    It is the Jaccard index of the members (0 below 0.5), or 1 − distance / 3 m if a side names no members (0 beyond 1.5
+    m). Starts more than 1 s apart give 0. Up to 0.001 is added for near starts, to decide between equals. scale: units
+    of `pos` per metre.
+    """
     starts = [np.array([e.start for e in side], float) for side in (true, est)]
     late = np.abs(starts[0][:, None] - starts[1][None]) / fps
     similarity = np.zeros(late.shape)
@@ -110,7 +131,11 @@ def _similarity(true: Sequence[ComparableEvent], est: Sequence[ComparableEvent],
 def _one_to_one(
     true: Sequence[ComparableEvent], est: Sequence[ComparableEvent], similarity: Array
 ) -> list[tuple[ComparableEvent, ComparableEvent]]:
-    """Returns as many pairs of similarity above 0 as possible, with the greatest total similarity."""
+    """Returns pairs (true event, estimated event), each event at most once: as many as possible, then of greatest total
+    similarity.
+
+    similarity (N, M): rows as `true`, columns as `est`; events of similarity 0 are never paired.
+    """
     if not similarity.any():
         return []
     from scipy.optimize import linear_sum_assignment
@@ -121,11 +146,13 @@ def _one_to_one(
 
 
 def event_scores(matched: Sequence[MatchedEvents], fps: float) -> dict[str, float]:
-    """Returns F1, precision, recall, TP, FP, FN and latency of each kind, and the headline scores `event_…`.
+    """Returns a dict of the event scores of each kind, and of merge and split together.
 
-    Headline F1, precision and recall are means of those of merge and split that are not nan. Latency is the mean of
-    (emitted - true start) / fps over matched events, in seconds. A share is nan if its denominator is 0, a latency if
-    nothing matched.
+    matched: from `match_events`. Keys: "<kind>_F1", "_precision", "_recall", "_TP", "_FP", "_FN" and "_latency" for
+    each entry of `matched`; "event_F1", "event_precision", "event_recall" and "event_latency". Event F1, precision and
+    recall are means of the values of merge and split that are not nan. Latency is the mean of (emitted − true start) /
+    fps over matched events, in s; event_latency pools the matched merges and splits. A share is nan if its denominator
+    is 0, a latency if nothing matched.
     """
     out: dict[str, float] = {}
     for m in matched:
@@ -148,15 +175,21 @@ def event_scores(matched: Sequence[MatchedEvents], fps: float) -> dict[str, floa
 
 
 def _latencies(matched: Sequence[MatchedEvents], fps: float) -> list[float]:
-    """Returns the delay of each matched report in seconds."""
+    """Returns the delays of matched events in s: frame of the report minus the true start, divided by fps.
+
+    Negative if reported before the true start. Reports without `emitted` are left out.
+    """
     return [(b.emitted - a.start) / fps for m in matched for a, b in m.pairs if b.emitted is not None]
 
 
 def lineage_scores(matched: Sequence[MatchedEvents]) -> dict[str, float]:
-    """Returns lineage_accuracy and lineage_accuracy_found, shares of true merges and splits with the right lineage.
+    """Returns a dict with lineage_accuracy and lineage_accuracy_found: shares of true merges and splits with right
+    lineage.
 
-    The first divides by all true merges and splits, the second by the matched ones. True events without known parents
-    and children are left out (labels that never change say nothing about lineage). nan if no event is left.
+    matched: from `match_events`. A matched event is right if both sides have equally many parents, each true parent has
+    a Jaccard index above 0.5 with some estimated one, and the same holds for children. lineage_accuracy divides by all
+    true merges and splits, lineage_accuracy_found by the matched ones. True events with unknown parents or children are
+    left out of both (labels that never change say nothing about lineage). nan if no event is left.
     """
     head = [m for m in matched if m.kind in HEADLINE]
     n_true = sum(event.has_lineage for m in head for event in m.true)
@@ -169,18 +202,20 @@ def lineage_scores(matched: Sequence[MatchedEvents]) -> dict[str, float]:
 
 
 def _same_lineage(true: ComparableEvent, est: ComparableEvent) -> bool:
-    """True if parents and children agree; False if either side's are unknown."""
+    """True if parents agree and children agree, as `_same_parts` defines it; False if any of the four is None."""
     if true.parents is None or true.children is None or est.parents is None or est.children is None:
         return False
     return _same_parts(true.parents, est.parents) and _same_parts(true.children, est.children)
 
 
 def _same_parts(true: Sequence[EventMembers], est: Sequence[EventMembers]) -> bool:
-    """True if both sides have equally many parts and each true part is the same as one estimated part."""
+    """True if both sides have equally many parts, and each true part has a Jaccard index above 0.5 with some estimated
+    part.
+    """
     return len(true) == len(est) and all(any(a.jaccard(b) > SAME_PART for b in est) for a in true)
 
 
 def _mean(values: Sequence[float]) -> float:
-    """Returns the mean of the values that are not nan, nan without any."""
+    """Returns the mean of the values that are not nan; nan if there are none."""
     known = [v for v in values if v == v]
     return sum(known) / len(known) if known else float("nan")

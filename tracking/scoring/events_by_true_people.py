@@ -23,12 +23,15 @@ CHANGES = frozenset(HEADLINE) | {kind for kind, counts_as in COUNTS_AS.items() i
 def true_events(
     events: Iterable[GroupEvent], people: PersonRows, positions: Array | None, frames: Bools
 ) -> list[ComparableEvent]:
-    """Returns the truth's events of known kinds that start in a frame f where frames[f] is true.
+    """Returns the truth's events of known kinds that start in a frame f where frames[f] is true, in the order given.
 
-    people: true people; positions (R, 2): theirs on the surface of comparison, None if `GroupEvent.pos` is on it
-    already. With positions, an event lies at the mean of its members at its start (nan if none is present). Parents are
-    the groups of the members one frame before the start, children are the groups at the start. Both are None if the
-    kind changes no groups or if parents and children are equal.
+    Known kinds are those of `KINDS`, form and dissolve. frames (length + 1,): bool by frame number. people: the R true
+    people in frames. positions (R, 2): their x, y on the surface of comparison, in m or px; None if `GroupEvent.pos` is
+    on it already. With positions, an event lies at the mean of its members at its start (nan if none is present).
+
+    Parents are the groups of the members one frame before the start, children are the groups at the start; a member
+    alone or absent is a part of its own. If both are equal, form and dissolve take parents and children from the kind.
+    Both are None if they are still equal, or if the kind is none of merge, split, form, dissolve. `emitted` is None.
     """
     lookup, group = RowLookup(people.rows), _group_by_row(people.group)
 
@@ -47,18 +50,21 @@ def true_events(
 
 
 def _counts(event: GroupEvent, frames: Bools) -> bool:
-    """True if the kind is scored and the event starts in a frame to be scored."""
+    """True if the event's kind is scored, and frames[event.start] is true; False if the start is outside `frames`."""
     known = event.kind in KINDS or event.kind in COUNTS_AS
     return known and 0 <= event.start < len(frames) and bool(frames[event.start])
 
 
 def _group_by_row(group: Ints) -> list[int]:
-    """Returns the group of each row with -1 appended, so that index -1 (no row) means no group."""
+    """Returns group (R,) as a list with −1 appended, so that row index −1 (no row) has group −1 (no group)."""
     return [*group.tolist(), -1]
 
 
 def _by_group(members: Sequence[int], group: Callable[[int], int]) -> list[list[int]]:
-    """Returns the members as lists, one per group; a member without a group is a list of its own."""
+    """Returns the members (ids) as lists, one per group, in the order of first appearance.
+
+    group(id): the member's group, −1 for none. A member without a group is a list of its own.
+    """
     parts: dict[tuple[int, int], list[int]] = {}
     for m in members:
         g = group(m)
@@ -69,10 +75,11 @@ def _by_group(members: Sequence[int], group: Callable[[int], int]) -> list[list[
 def _by_kind(
     event: GroupEvent, before: list[list[int]], after: list[list[int]]
 ) -> tuple[list[list[int]], list[list[int]]]:
-    """Returns parents and children, taken from the kind if the labels are the same before and after.
+    """Returns parents and children of an event, each a list of parts, a part being a list of member ids.
 
-    Then `form` makes one group of single people, and `dissolve` single people of one group. This is so in data whose
-    labels never change.
+    before, after: parts by the group labels before and after the event. If they differ they are returned. If they are
+    equal (data whose labels never change), `form` turns all members from single people into one group, and `dissolve`
+    does the reverse. Other kinds keep `before` and `after`.
     """
     if sorted(before) != sorted(after):
         return before, after
@@ -81,7 +88,10 @@ def _by_kind(
 
 
 def _mean_position(event: GroupEvent, lookup: RowLookup, positions: Array) -> tuple[float, float]:
-    """Returns the mean position of the members at the event's start, nan if none is present."""
+    """Returns the mean x, y of the event's members who are present at its start; (nan, nan) if none is.
+
+    positions (R, 2): of the rows that `lookup` finds; the result has their unit.
+    """
     rows = [row for m in event.members if (row := lookup.nearest(m, event.start, 0)) >= 0]
     if not rows:
         return float("nan"), float("nan")
@@ -94,11 +104,15 @@ def tracked_events(
 ) -> list[ComparableEvent]:
     """Returns a tracker's events with members, of known kinds, that start in a frame f where frames[f] is true.
 
-    people: tracked people; mapping (R,): the row of `true` that each is mapped to, -1 none. A member becomes the person
-    it is mapped to at the event's start, or in the nearest frame within 1 s of it. A member that is never mapped in
-    this time, or to a person already listed, is unmatched. Parents are the groups of the members in the frame before
-    the report, children those in the frame of the report. If both are equal, parents are those of the frame before the
-    event's start.
+    tracks: of the scored frames. people: the R tracked people in frames. mapping (R,): the row of `true` that each is
+    mapped to, −1 none. true: rows of the true people. frames (length + 1,): bool by frame number. fps: frames per
+    second.
+
+    A member becomes the person it is mapped to at the event's start, or in the nearest frame within 1 s of it. A member
+    that is never mapped in this time, or to a person already listed, is unmatched. Parents are the groups of the
+    members in the frame before the report, children those in the frame of the report, each within 1 s if a member is
+    absent. If both are equal, parents are those of the frame before the event's start. If both are still equal, form
+    and dissolve take them from the kind. `emitted` is the frame of the `Tracks` that hold the event.
     """
     reach = round(LATE * fps)
     mapped, lookup, group = RowLookup(people.rows, mapping >= 0), RowLookup(people.rows), _group_by_row(people.group)
@@ -122,7 +136,11 @@ def tracked_events(
 
 
 def _true_members(members: Sequence[int], known: Mapping[int, int]) -> EventMembers:
-    """Returns the people that these tracks are mapped to; known: person of each mapped track."""
+    """Returns the true people that an event's members (track ids) are mapped to.
+
+    known: true id of each mapped track id. Members without one, or mapped to the same person as another, count as
+    unmatched.
+    """
     people = frozenset(known[m] for m in members if m in known)
     return EventMembers(people, len(members) - len(people))
 
@@ -130,12 +148,16 @@ def _true_members(members: Sequence[int], known: Mapping[int, int]) -> EventMemb
 def events_of_hulls(
     tracks: Sequence[Tracks], groups: GroupRows, true: FrameRows, frames: Bools, fps: float, without_members: bool
 ) -> list[ComparableEvent]:
-    """Returns a tracker's events, of known kinds, that start in a frame f where frames[f] is true; members are None.
+    """Returns a tracker's events of known kinds that start in a frame f where frames[f] is true; `members` is None.
 
-    without_members: return only the events that name no members. groups: the tracker's, with rows of `true` as members
-    (`people_inside`). Parents and children are the people whom the hulls of the event's `before` and `after` groups
-    contain. Children are judged in the 2 s from the report on. Parents are judged in the 2 s before the event's start,
-    or before the report if a parent appears only at the start or later.
+    without_members: if True, only events that name no members; else all. tracks: of the scored frames. groups: the
+    tracker's groups, whose members are rows of `true` (from `people_inside`). frames (length + 1,): bool by frame
+    number. fps: frames per second.
+
+    Parents are the people inside the hulls of the groups in `event.before`, children those inside the groups in
+    `event.after`. Children are judged in the 2 s from the report on. Parents are judged in the 2 s before the event's
+    start, or before the report if a parent group appears only at the start or later. A group counts a person who is
+    inside it longer than inside other groups, and in more than half of its frames.
     """
     span, person = round(HULL_TIME * fps), true.id[groups.member]
 
@@ -150,17 +172,21 @@ def events_of_hulls(
 
 
 def _last_appearance(rows: FrameRows, ids: Sequence[int]) -> int:
-    """Returns the latest of the first frames of these ids, 0 if none has a row; rows sorted by frame."""
+    """Returns the frame number in which the last of these group ids appears for the first time; 0 if none has a row.
+
+    rows: groups in frames, sorted by frame. Ids without a row are ignored.
+    """
     frames = [rows.frame[rows.id == id] for id in ids]
     return max((int(own[0]) for own in frames if len(own)), default=0)
 
 
 def _contained(groups: GroupRows, person: Ints, ids: Sequence[int], span: range) -> tuple[EventMembers, ...]:
-    """Returns the people of each of these groups during a span of frames; person (K,): true id of each membership.
+    """Returns the people of each group id in `ids` during the frames `span`, one `EventMembers` per id, in order.
 
-    A person belongs to the one group that contained the person in most frames (of equals the lowest id), and only if
-    these are more than half of the frames in which the group was reported. One frame is not enough, because the hulls
-    of people behind each other overlap in the image.
+    groups: the tracker's groups in frames; person (K,): true id of each of their memberships. A person belongs to the
+    one group that contained the person in most frames (of equals the lowest id), and only if these are more than half
+    of the frames in which the group was reported. One frame is not enough, because the hulls of people behind each
+    other overlap in the image. A group without people gives an empty `EventMembers`.
     """
     rows, now = groups.rows, (groups.rows.frame >= span.start) & (groups.rows.frame < span.stop)
     reported = Counter(rows.id[now].tolist())
@@ -176,5 +202,8 @@ def _contained(groups: GroupRows, person: Ints, ids: Sequence[int], span: range)
 
 
 def _reports(tracks: Sequence[Tracks], frames: Bools) -> list[tuple[GroupEvent, int]]:
-    """Returns the events that count, with the frame of the `Tracks` that contains each, whatever its `emitted` is."""
+    """Returns pairs (event, frame number of the `Tracks` that hold it), whatever the event's `emitted` is.
+
+    Events of unknown kinds, or that start in a frame f where frames[f] is false, are left out.
+    """
     return [(event, t.index) for t in tracks for event in t.events if _counts(event, frames)]

@@ -33,11 +33,14 @@ CORE = 1.0  # s around the start of each true merge or split that the core score
 
 @dataclass(frozen=True, eq=False)
 class ComparedSides:
-    """The truth's and a tracker's data in the scored frames.
+    """The truth's and one tracker's data in the scored frames.
 
-    frames (length + 1,): which of the scored frames have labelled groups. tracks: all scored frames, labelled or not
-    (an event may be reported in an unlabelled one). true, est: people of both sides. mapping (S,): row of `true` that
-    each row of `est` is mapped to, -1 none. plane: of the tracks' positions.
+    - truth: all of it.
+    - tracks: those of all scored frames, labelled or not (an event may be reported in an unlabelled one), sorted.
+    - frames (length + 1,): bool by frame number: scored, and with labelled groups.
+    - true, est: the R true and S tracked people in the scored frames.
+    - mapping (S,): row of `true` that each row of `est` is mapped to, −1 none.
+    - plane: of the tracks' positions: "ground", "space" or "image".
     """
 
     truth: Truth
@@ -50,12 +53,12 @@ class ComparedSides:
 
     @property
     def surface(self) -> Surface:
-        """Where groups are compared: in the image if the tracks are in it, else on the ground."""
+        """Where groups are compared: "image" if the tracks are in the image, else "ground"."""
         return "image" if self.plane == "image" else "ground"
 
     @property
     def scale(self) -> float:
-        """Units of the surface per metre."""
+        """Units of the surface per metre: the truth's px_per_m in the image (nan if unknown), 1 on the ground."""
         return self.truth.px_per_m if self.surface == "image" else 1.0
 
     @property
@@ -66,10 +69,12 @@ class ComparedSides:
 
 @dataclass(frozen=True, eq=False)
 class TrackedGroups:
-    """A tracker's groups in labelled frames.
+    """One tracker's groups in the labelled frames.
 
-    every: all groups, members as rows of the true people. counted: the groups that are scored. person (K,): row of the
-    true person of each membership of `counted`, -1 none.
+    - every: all groups; memberships are rows of the true people, members mapped to nobody are left out.
+    - counted: the groups that are scored. Members are rows of the tracked people if the tracker names members, else
+      rows of the true people inside the hull.
+    - person (K,): for each of the K memberships of `counted`, the row of the true person, −1 none.
     """
 
     every: GroupRows
@@ -78,10 +83,14 @@ class TrackedGroups:
 
 
 def group_and_event_scores(sides: ComparedSides, true: TrueGroups, by: GroupMatch) -> dict[str, float]:
-    """Returns the scores by key; true: groups in the frames of `sides`; by: how groups are matched.
+    """Returns a dict of all scores of groups, pairwise membership, events and lineage, keys as in the catalogue.
 
-    Keys are missing if the truth lacks data: scores by hulls if `true` is not comparable, scores of events if
-    the truth has no events.
+    sides: both sides in the scored frames, with people mapped. true: the true groups in these frames. by: matches
+    groups by "hull" (IoU) or by "members" (Jaccard index).
+
+    Keys are missing if the truth lacks data. group_F1_hull, and with by = "hull" all group scores, are missing if
+    `true` is not comparable. Scores of events and lineage are missing if the truth has no events. A score with a
+    denominator of 0 is nan.
     """
     tracked = tracked_groups(sides)
     found = pairwise_scores(true.groups, tracked.counted, tracked.person)
@@ -99,11 +108,13 @@ def group_and_event_scores(sides: ComparedSides, true: TrueGroups, by: GroupMatc
 
 
 def tracked_groups(sides: ComparedSides) -> TrackedGroups:
-    """Returns the tracker's groups in labelled frames.
+    """Returns the tracker's groups in labelled frames, and which of them are scored.
 
-    If the tracker names members, groups of two or more members count. Otherwise the true people inside the hull are the
-    members. A hull with one person inside does not count, as a person alone is no group. A hull with nobody inside
-    counts, as a false group.
+    If the tracker names members, groups of two or more members are scored. Otherwise, and for a tracker of whole
+    groups, the true people inside the hull or at most 0.3 m from it are the members. A hull with one person inside is
+    not scored, as a person alone is no group. A hull with nobody inside is scored, as a false group. If the truth has
+    no positions on the surface, the members named (if any) stay. `Tracks` whose `groups` is None count as having no
+    groups.
     """
     tracks = [t for t in sides.tracks if sides.frames[t.index]]
     frames = np.array([t.index for t in tracks], np.int64)
@@ -121,19 +132,29 @@ def tracked_groups(sides: ComparedSides) -> TrackedGroups:
 
 
 def _true_rows(groups: GroupRows, mapping: Ints) -> Ints:
-    """Returns the true row that each member (a row of the tracked people) is mapped to, -1 none, (K,)."""
+    """Returns for each of the K memberships of `groups` the row of the true person that the member is mapped to, −1
+    none: (K,).
+
+    groups.member: rows of the tracked people, −1 unknown; mapping (S,): true row of each tracked row, −1 none.
+    """
     return np.where(groups.member >= 0, np.append(mapping, -1)[groups.member], -1)
 
 
 def strict_and_core(sides: ComparedSides, compared: GroupComparison) -> dict[str, float]:
-    """Returns the group scores over all labelled frames, and as …_core without frames near a true merge or split."""
+    """Returns a dict of the group scores over all labelled frames as "group_…", and over the core frames as
+    "group_…_core".
+
+    Core frames are the labelled frames more than 1 s away from the start of every true merge, split, form or dissolve.
+    compared: both sides' groups with their matchings.
+    """
     strict = group_scores(compared, sides.frames)
     core = group_scores(compared, sides.frames & ~near_changes(sides.truth))
     return {f"group_{k}": v for k, v in strict.items()} | {f"group_{k}_core": v for k, v in core.items()}
 
 
 def near_changes(truth: Truth) -> Bools:
-    """Returns which of the frames 0 … length are at most 1 s from the start of a true merge or split, bool.
+    """Returns which frame numbers 0 … length are at most 1 s from the start of a true merge or split, (length + 1,)
+    bool.
 
     `form` and `dissolve` count as merge and split. Without events no frame is near one.
     """
@@ -145,10 +166,10 @@ def near_changes(truth: Truth) -> Bools:
 
 
 def _event_scores(sides: ComparedSides, tracked: TrackedGroups) -> dict[str, float]:
-    """Returns the scores of events and lineage.
+    """Returns a dict of the scores of events ("merge_F1" …) and of lineage. The truth must have events.
 
-    Crossings and queues are derived from people. For a tracker of groups as wholes their scores are nan, unless it
-    reports events of this kind itself.
+    sides: both sides' people; tracked: the tracker's groups. For a tracker of whole groups, scores of crossings and
+    queues are nan unless it reports events of this kind itself: they are derived from people otherwise.
     """
     truth, rows, frames, fps = sides.truth, sides.true.rows, sides.frames, sides.truth.fps
     assert truth.events is not None

@@ -28,10 +28,10 @@ TIE = 1e-9  # weight of closeness in a matching: decides between equal similarit
 
 @dataclass(frozen=True, slots=True, eq=False)
 class SharedMembers:
-    """Number of people that each pair of a true and an estimated group has in common.
+    """Number of people that a true and an estimated group (rows of `GroupRows`) have in common, 0 for pairs not listed.
 
-    key (K,): true row * width + estimated row, sorted; count (K,): common people, above 0; width: number of estimated
-    groups. A pair that is not listed has no common people.
+    key (K,): true row * width + estimated row, ascending; count (K,): common people, above 0; width: number of
+    estimated groups.
     """
 
     key: Ints
@@ -39,7 +39,11 @@ class SharedMembers:
     width: int
 
     def of(self, i: Ints, j: Ints) -> Ints:
-        """Returns the number of common people of true rows i (P,) and estimated rows j (P,), (P,)."""
+        """Returns the number of common people of each of P pairs, (P,); i (P,): rows of true groups, j (P,): of
+        estimated ones.
+
+        0 for a pair without common people.
+        """
         if not len(self.key):
             return np.zeros(len(i), np.int64)
         sought = i * self.width + j
@@ -48,10 +52,10 @@ class SharedMembers:
 
 
 def shared_members(true: GroupRows, est: GroupRows, person: Ints, people: int) -> SharedMembers:
-    """Returns the common members of true and estimated groups.
+    """Returns the numbers of common members of all true and estimated groups.
 
-    person (K,): row of the true person that each membership of `est` is mapped to, -1 none; people: number of rows of
-    true people.
+    true.member: rows of true people. person (K,): row of the true person that each membership of `est` is mapped to, −1
+    none (never common). people: number of rows of true people. A true person counts for one true group only.
     """
     i = group_of_person(true, people)[person]  # -1 selects the last element, which is -1
     known = i >= 0
@@ -60,7 +64,11 @@ def shared_members(true: GroupRows, est: GroupRows, person: Ints, people: int) -
 
 
 def group_of_person(groups: GroupRows, people: int) -> Ints:
-    """Returns the group row of each person row, -1 in no group; shape (people + 1,), the last element is always -1."""
+    """Returns the group (row of `groups`) of each row of people, −1 for a person in no group: (people + 1,).
+
+    The last element is always −1, so that index −1 means no person. people: number of rows of people that groups.member
+    refers to. Memberships with member −1 are ignored. Of several groups with one person the last is returned.
+    """
     group = np.full(people + 1, -1, np.int64)
     known = groups.member >= 0
     group[groups.member[known]] = groups.of[known]
@@ -68,9 +76,10 @@ def group_of_person(groups: GroupRows, people: int) -> Ints:
 
 
 def hull_iou(true: Sequence[Array], est: Sequence[Array]) -> Callable[[Ints, Ints], Array]:
-    """Returns a function of indices i, j (K,): the intersection over union (K,) of polygons true[i] and est[j].
+    """Returns a function of row indices i, j (K,) that gives the intersection over union (K,) of polygons true[i] and
+    est[j].
 
-    true, est: convex polygons (V, 2), counter-clockwise. They are prepared once, here.
+    true, est: convex polygons (V, 2) of x, y, counter-clockwise, in one unit. A polygon without area has IoU 0.
     """
     width = max(map(len, (*true, *est)), default=1)
     a, b = pack(true, width), pack(est, width)
@@ -78,7 +87,9 @@ def hull_iou(true: Sequence[Array], est: Sequence[Array]) -> Callable[[Ints, Int
 
 
 def hull_pairs(true: GroupRows, est: GroupRows) -> Pairs:
-    """Returns the pairs of groups with overlapping hulls, with their intersection over union as similarity."""
+    """Returns the pairs of true and estimated groups of one frame whose hulls overlap; similarity: their IoU. A group
+    without a hull has no pairs.
+    """
     iou = hull_iou(true.hull, est.hull)
 
     def similarity(i: Ints, j: Ints) -> tuple[Ints, Array]:
@@ -90,9 +101,10 @@ def hull_pairs(true: GroupRows, est: GroupRows) -> Pairs:
 
 
 def member_pairs(true: GroupRows, est: GroupRows, shared: SharedMembers) -> Pairs:
-    """Returns the pairs of groups with common members, with the Jaccard index as similarity.
+    """Returns the pairs of true and estimated groups of one frame with common members; similarity: their Jaccard index.
 
-    An estimated member who is mapped to nobody counts as wrong.
+    It is common / (true members + estimated members − common), common from `shared`. An estimated member who is mapped
+    to no true person counts as wrong.
     """
     n, m = true.count, est.count
 
@@ -105,10 +117,12 @@ def member_pairs(true: GroupRows, est: GroupRows, shared: SharedMembers) -> Pair
 
 
 def matched_groups(true_pos: Array, est_pos: Array, pairs: Pairs, least: float = 0.0) -> Pairs:
-    """Returns the one-to-one matching of each frame with the greatest total similarity among pairs of at least `least`.
+    """Returns the pairs of the one-to-one matching of each frame with the greatest total similarity.
 
-    true_pos (G, 2), est_pos (H, 2): centres of the groups in the rows of `pairs`. Jaccard indices are often equal. Of
-    several best matchings the one with the nearer centres is returned, so the order of groups has no influence.
+    pairs: candidate pairs of groups; those of similarity below `least` are not used. true_pos (G, 2), est_pos (H, 2):
+    centres x, y of the true and estimated groups in the rows of `pairs`. Of several best matchings (Jaccard indices are
+    often equal) the one with the nearer centres is returned, so the order of groups has no influence. A nan centre
+    counts as far away.
     """
     near = pairs.keep(pairs.s >= least - EPS)
     apart = np.hypot(*(true_pos[near.i] - est_pos[near.j]).T)
@@ -118,11 +132,11 @@ def matched_groups(true_pos: Array, est_pos: Array, pairs: Pairs, least: float =
 
 @dataclass(frozen=True, eq=False)
 class GroupComparison:
-    """True and estimated groups with their matchings.
+    """G true and H estimated groups in frames, with the numbers of their common people (`shared`) and their matchings.
 
-    pairs: all candidate pairs; chosen: the matching of all pairs; found: the matching of pairs of similarity 0.5 or
-    more.
-    nearest (G,): distance of each true group to the group matched by distance alone, nan if it has none.
+    pairs: all candidate pairs; chosen: the one-to-one matching of all pairs; found: that of pairs of similarity 0.5 or
+    more. nearest (G,): distance (m or px) of each true group to the group matched by distance alone, nan if it has
+    none.
     """
 
     true: GroupRows
@@ -135,16 +149,22 @@ class GroupComparison:
 
 
 def compare_groups(true: GroupRows, est: GroupRows, shared: SharedMembers, by: GroupMatch) -> GroupComparison:
-    """Returns the comparison by IoU of hulls ("hull") or Jaccard index of members ("members")."""
+    """Returns both sides' groups with their matchings, by IoU of hulls ("hull") or Jaccard index of members
+    ("members").
+
+    shared: numbers of common people, from `shared_members`.
+    """
     pairs = hull_pairs(true, est) if by == "hull" else member_pairs(true, est, shared)
     chosen, found = (matched_groups(true.pos, est.pos, pairs, least) for least in (0.0, FOUND))
     return GroupComparison(true, est, shared, pairs, chosen, found, nearest_distances(true, est))
 
 
 def nearest_distances(true: GroupRows, est: GroupRows) -> Array:
-    """Returns the distance (G,) of each true group to the estimated group it is matched with by distance.
+    """Returns for each of G true groups the distance to the estimated group it is matched with by distance, (G,), in m
+    or px.
 
-    Each frame's matching has as many pairs as possible and then the least total distance. nan: not matched.
+    Each frame's one-to-one matching has as many pairs as possible and then the least total distance of centres. nan:
+    not matched, or a centre is nan.
     """
 
     def distance(i: Ints, j: Ints) -> tuple[Ints, Array]:
@@ -161,9 +181,12 @@ def nearest_distances(true: GroupRows, est: GroupRows) -> Array:
 
 
 def group_scores(compared: GroupComparison, frames: Bools) -> dict[str, float]:
-    """Returns the group scores of the frames f where frames[f] is true; keys as in the catalogue without "group_".
+    """Returns a dict of the group scores over the frames f where frames[f] is true; keys as in the catalogue without
+    "group_".
 
-    The keys of HOTA are missing if there is no group on either side.
+    compared: both sides' groups with their matchings. frames (length + 1,): bool by frame number. MOTP and errors are
+    in m or px (MSE squared). A score with a denominator of 0, or a mean of nothing, is nan. The keys of HOTA are
+    missing if neither side has a group in these frames.
     """
     true, est, chosen = compared.true, compared.est, compared.chosen
     kept = frames[true.rows.frame[chosen.i]]
@@ -200,16 +223,17 @@ def ratio(part: float, whole: int) -> float:
 
 
 def _mean(values: Array) -> float:
-    """Returns the mean of the finite values, nan without any."""
+    """Returns the mean of the finite values, nan if there are none."""
     known = values[np.isfinite(values)]
     return float(known.mean()) if len(known) else float("nan")
 
 
 def _correct(compared: GroupComparison, i: Ints, j: Ints) -> tuple[Bools, Bools]:
-    """Returns two masks of the matches (i, j): correct for GDSR, and correct for GDSR2 as well.
+    """Returns two bool masks (K,) of the K matches of true rows i and estimated rows j: correct for GDSR, and for
+    GDSR2.
 
-    GDSR wants 60 % of the true members in the estimated group. GDSR2 also wants 60 % of the estimated members to be
-    among the true ones.
+    GDSR: at least 60 % of the true group's members are in the estimated group. GDSR2: in addition, at least 60 % of the
+    estimated members are in the true group.
     """
     common = compared.shared.of(i, j)
     part, whole = CORRECT
@@ -219,9 +243,11 @@ def _correct(compared: GroupComparison, i: Ints, j: Ints) -> tuple[Bools, Bools]
 
 
 def _by_frame(compared: GroupComparison, frames: Bools, i: Ints) -> dict[str, float]:
-    """Returns 1-FP_frames and 1-FN_frames: 1 - the mean over frames of false (missed) / max(true groups, 1).
+    """Returns a dict with 1-FP_frames and 1-FN_frames: 1 − the mean over frames of false (missed) groups / max(true
+    groups, 1).
 
-    i: true rows of the matches. The paper leaves open whether it means these or the ratios of sums.
+    frames: bool by frame number, the frames that count. i: rows of the true groups that are matched in these frames.
+    Both are nan if no frame counts. Bazzani et al. (2012) leave open whether they mean these or the ratios of sums.
     """
     size = len(frames)
     n, m = (np.bincount(side.rows.frame, minlength=size)[frames] for side in (compared.true, compared.est))
@@ -235,9 +261,11 @@ def _by_frame(compared: GroupComparison, frames: Bools, i: Ints) -> dict[str, fl
 
 
 def count_switches(frame: Ints, true: Ints, est: Ints) -> int:
-    """Returns how often a true id is matched with a different estimated id than in its previous match.
+    """Returns how often a true id is matched with a different estimated id than in its previous match, summed over true
+    ids.
 
-    frame, true, est (K,): frame, true id and estimated id of each match.
+    frame, true, est (K,): frame number, true id and estimated id of each match, in any order. Frames without a match do
+    not count as a switch.
     """
     order = np.lexsort((frame, true))
     t, e = true[order], est[order]
@@ -245,7 +273,12 @@ def count_switches(frame: Ints, true: Ints, est: Ints) -> int:
 
 
 def detection(compared: GroupComparison, frames: Bools) -> dict[str, float]:
-    """Returns F1, precision and recall at similarity 0.5 over the frames f where frames[f] is true."""
+    """Returns a dict with F1, precision and recall of groups at similarity 0.5, over the frames f where frames[f] is
+    true.
+
+    compared: both sides' groups with their matchings. frames: bool by frame number. nan if the denominator is 0:
+    precision without estimated groups, recall without true groups, F1 without both.
+    """
     f = compared.found
     hits = int(frames[f.true.frame[f.i]].sum())
     n_true, n_est = (int(frames[side.rows.frame].sum()) for side in (compared.true, compared.est))
@@ -253,10 +286,12 @@ def detection(compared: GroupComparison, frames: Bools) -> dict[str, float]:
 
 
 def f1(hits: int, n_true: int, n_est: int) -> float:
-    """Returns 2 hits / (true + estimated groups), nan without groups."""
+    """Returns 2 hits / (n_true + n_est), nan if both are 0; hits: matches, n_true, n_est: number on each side."""
     return ratio(2 * hits, n_true + n_est)
 
 
 def _sizes(groups: GroupRows) -> Array:
-    """Returns the number of people in each group, (G,): the reported size, else the number of members."""
+    """Returns the number of people in each of G groups, (G,) float: the reported size, or if that is nan the number of
+    members.
+    """
     return np.where(np.isfinite(groups.size), groups.size, groups.count)

@@ -20,15 +20,21 @@ ALPHAS = np.arange(0.05, 0.99, 0.05)
 
 
 def hota(pairs: Pairs) -> dict[str, float]:
-    """Returns HOTA, DetA, AssA, DetRe, DetPr, AssRe, AssPr and LocA, each the mean over the thresholds `ALPHAS`.
+    """Returns a dict of HOTA, DetA, AssA, DetRe, DetPr, AssRe, AssPr and LocA, each the mean over the 19 thresholds
+    `ALPHAS`.
 
-    At a threshold without matches LocA is 1 and all others are 0.
+    pairs: candidate pairs of true and estimated rows of any similarity above 0, no id twice in a frame. At a threshold
+    without matches LocA is 1 and all others are 0; so all are 0 and LocA is 1 if a side is empty.
     """
     return {name: float(curve.mean()) for name, curve in curves(pairs).items()}
 
 
 def curves(pairs: Pairs) -> dict[str, Array]:
-    """Returns the same scores at each threshold of `ALPHAS`, (19,) each."""
+    """Returns a dict of HOTA, DetA, AssA, DetRe, DetPr, AssRe, AssPr and LocA, each an array (19,) over the similarity
+    thresholds `ALPHAS` = 0.05, 0.10 … 0.95.
+
+    pairs: candidate pairs of any similarity above 0. At a threshold without matches LocA is 1 and all others are 0.
+    """
     true_id, est_id, link = pairs.links
     n = np.bincount(pairs.true_ids[1], minlength=len(pairs.true_ids[0]))[true_id]  # n_i of each link (pair of ids)
     m = np.bincount(pairs.est_ids[1], minlength=len(pairs.est_ids[0]))[est_id]
@@ -60,10 +66,12 @@ def curves(pairs: Pairs) -> dict[str, Array]:
 
 
 def alignment(pairs: Pairs, frames: Ints) -> Array:
-    """Returns the alignment A of each link, a pair of one true and one estimated id, (U,); links as in `Pairs.links`.
+    """Returns the alignment A in [0, 1] of each of the U links, a link being a combination of a true and an estimated
+    id, (U,).
 
-    frames (U,): n_i + m_j of each link. A = C / (n_i + m_j - C). C is the sum over common frames of
-    s(i, j) / (sum of row i + sum of column j - s(i, j)), where the sums run over all similarities of that frame.
+    pairs: the candidate pairs; links are ordered as in `Pairs.links`. frames (U,): number of rows of the true id plus
+    that of the estimated id. A = C / (frames − C). C is the sum over common frames of s(i, j) / (sum of row i + sum of
+    column j − s(i, j)), where the sums run over all similarities of that frame.
     """
     i, j, s = pairs.i, pairs.j, pairs.s
     of_i = np.bincount(i, weights=s, minlength=len(pairs.true))

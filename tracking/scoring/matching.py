@@ -25,10 +25,11 @@ WORTH = 0.2  # share of pairs that a pass must remove for another pass to be qui
 
 
 def match(frame: Ints, i: Ints, j: Ints, weight: Array) -> Bools:
-    """Returns which of the K pairs are matched, (K,) bool: the greatest sum of weights in each frame.
+    """Returns which of K pairs are matched, (K,) bool: one to one, with the greatest sum of weights in each frame.
 
-    frame, i (K,): sorted; i, j (K,): row indices, each of one frame; weight (K,): above 0. Each i and each j is matched
-    at most once. Which of several best matchings is returned is unspecified.
+    frame (K,), i (K,): sorted ascending; frame number and row index of one side. j (K,): row index of the other side. A
+    row index belongs to one frame only. weight (K,): above 0. Each i and each j is matched at most once. Which of
+    several best matchings is returned is unspecified. K = 0 gives an empty array.
     """
     chosen, left = _settle(i, j, weight, strict=False)
     chosen[left[_solved(frame[left], i[left], j[left], weight[left])]] = True
@@ -36,9 +37,11 @@ def match(frame: Ints, i: Ints, j: Ints, weight: Array) -> Bools:
 
 
 def match_as_table(pairs: Pairs, weight: Array) -> Bools:
-    """Returns which of the K pairs are matched, (K,) bool, breaking ties as TrackEval does; weight (K,): above 0.
+    """Returns which of the K pairs are matched, (K,) bool: the greatest sum of weights in each frame, ties broken as
+    TrackEval does.
 
-    Of several best matchings of a frame the result is the one that scipy finds in the table of all the frame's rows.
+    weight (K,): above 0, one per pair, in place of its similarity. Of several best matchings of a frame the result is
+    the one that scipy finds in the table of all the frame's rows.
     """
     chosen, left = _settle(pairs.i, pairs.j, weight, strict=True)
     frame = pairs.frame
@@ -50,9 +53,10 @@ def match_as_table(pairs: Pairs, weight: Array) -> Bools:
 
 
 def solve_frame(pairs: Pairs, start: int, end: int, weight: Array) -> Bools:
-    """Returns which of the pairs start … end - 1 scipy matches, (end - start,) bool.
+    """Returns which of the pairs start … end − 1 scipy's linear_sum_assignment matches, (end − start,) bool.
 
-    These are all pairs of one frame, weight (end - start,) is theirs. Cells of the table without a pair weigh 0.
+    These must be all pairs of one frame, at least one. weight (end − start,): their weights; the greatest sum is
+    sought. The table has all rows of the frame on both sides, and cells without a pair weigh 0.
     """
     from scipy.optimize import linear_sum_assignment
 
@@ -68,7 +72,12 @@ def solve_frame(pairs: Pairs, start: int, end: int, weight: Array) -> Bools:
 
 
 def _settle(i: Ints, j: Ints, weight: Array, strict: bool) -> tuple[Bools, Ints]:
-    """Returns the settled pairs (K,) bool, and the indices of the pairs that still compete."""
+    """Returns a bool mask (K,) of the pairs that need no solver, and the indices of the pairs that still compete.
+
+    i, j (K,): row indices of both sides; weight (K,): above 0. A settled pair weighs at least as much as the best rival
+    of i and of j together; with `strict` clearly more, so that it is in every best matching. Pairs in neither result
+    are not matched.
+    """
     chosen = np.zeros(len(i), bool)
     left = np.arange(len(i))
     while len(left):
@@ -83,9 +92,10 @@ def _settle(i: Ints, j: Ints, weight: Array, strict: bool) -> tuple[Bools, Ints]
 
 
 def _settled(i: Ints, j: Ints, w: Array, strict: bool) -> Bools:
-    """Returns which pairs one pass settles, (K,) bool; no two share a row or a column.
+    """Returns which of K pairs one pass settles, (K,) bool; no two settled pairs share i or j.
 
-    Their weight is at least (strict: clearly more than) the sum of the best rivals in their row and in their column.
+    i, j (K,): row indices of both sides; w (K,): weights. The weight of a settled pair is at least (strict: by a factor
+    above 1 more than) the sum of the best other weight of its i and the best other weight of its j.
     """
     best_i, rival_i = _leaders(i, w)
     best_j, rival_j = _leaders(j, w)
@@ -103,7 +113,12 @@ def _settled(i: Ints, j: Ints, w: Array, strict: bool) -> Bools:
 
 
 def _leaders(row: Ints, w: Array) -> tuple[Array, Array]:
-    """Returns the greatest and the second greatest weight of each row, 0 where the row has too few pairs."""
+    """Returns the greatest and the second greatest weight of each row index 0 … max(row), 0 where there are too few
+    pairs.
+
+    row (K,), not empty: row index of each pair; w (K,): its weight, above 0. If two pairs share the greatest weight,
+    both results equal it.
+    """
     n = int(row.max()) + 1
     best, second = np.zeros(n), np.zeros(n)
     np.maximum.at(best, row, w)
@@ -113,7 +128,7 @@ def _leaders(row: Ints, w: Array) -> tuple[Array, Array]:
 
 
 def _touched(i: Ints, j: Ints, chosen: Bools) -> Bools:
-    """Returns which pairs are chosen or share their row or column with a chosen pair, (K,) bool."""
+    """Returns which of K pairs are chosen, or share i or j with a chosen pair, (K,) bool; chosen (K,): bool."""
     if len(i) == 0:
         return chosen
     taken_i, taken_j = np.zeros(int(i.max()) + 1, bool), np.zeros(int(j.max()) + 1, bool)
@@ -123,7 +138,12 @@ def _touched(i: Ints, j: Ints, chosen: Bools) -> Bools:
 
 
 def _solved(frame: Ints, i: Ints, j: Ints, w: Array) -> Ints:
-    """Returns the indices of the pairs that scipy matches, one table per frame; cells without a pair weigh 0."""
+    """Returns the indices (in 0 … K − 1) of the pairs that scipy matches, with the greatest sum of weights w in each
+    frame.
+
+    frame (K,): sorted; i, j (K,): row indices of both sides; w (K,): weights above 0. Each frame is one table of the
+    rows that occur in its pairs; cells without a pair weigh 0. Empty without pairs.
+    """
     from scipy.optimize import linear_sum_assignment
 
     if len(w) == 0:
@@ -147,7 +167,12 @@ def _solved(frame: Ints, i: Ints, j: Ints, w: Array) -> Ints:
 
 
 def _local(row: Ints, which: Ints, frames: int) -> tuple[Ints, Ints]:
-    """Returns the index of each pair's row within its frame (K,), and the number of such rows in each frame (F,)."""
+    """Returns for each of K pairs the index of its row within its frame (K,), and the number of distinct rows of each
+    frame (F,).
+
+    row (K,): row index of each pair, each row in one frame only, lower rows in earlier frames. which (K,): number 0 …
+    frames − 1 of the pair's frame; frames: F.
+    """
     home = np.full(int(row.max()) + 1, -1)
     home[row] = which
     seen = home >= 0
@@ -157,10 +182,10 @@ def _local(row: Ints, which: Ints, frames: int) -> tuple[Ints, Ints]:
 
 
 def mapped_people(pairs: Pairs, least: float = FOUND) -> Ints:
-    """Returns for each row of pairs.est the row of pairs.true that it is mapped to, -1 none: (S,) int64.
+    """Returns for each of the S rows of pairs.est the row of pairs.true that it is mapped to, −1 none: (S,) int64.
 
     The mapping is the one-to-one matching of each frame with the greatest total similarity, using only pairs of
-    similarity `least` or more.
+    similarity `least` (default 0.5) or more.
     """
     near = pairs.keep(pairs.s >= least - EPS)
     chosen = match(near.true.frame[near.i], near.i, near.j, near.s)

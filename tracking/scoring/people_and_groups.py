@@ -25,10 +25,15 @@ INSIDE = 0.3  # m: a person at most this far from a hull is a member, where a tr
 
 @dataclass(frozen=True, slots=True, eq=False)
 class PersonRows:
-    """R rows, one per person and frame.
+    """R rows, one per person and frame, sorted by frame.
 
-    group (R,): group id, -1 alone. pos (R, 2), vel (R, 2): position and velocity in the plane of this side's data. box
-    (R, 4): left, top, width, height in px. pos, vel or box is None if this side has no such data.
+    - rows: frame number and id of each row.
+    - group (R,): group id, −1 alone.
+    - pos (R, 2), vel (R, 2): x, y of position and velocity in the plane of this side's data, m and m/s or px and px/s.
+      nan unknown.
+    - box (R, 4): left, top, width, height in px.
+
+    pos, vel or box is None if this side has no such data.
     """
 
     rows: FrameRows
@@ -38,12 +43,13 @@ class PersonRows:
     box: Array | None
 
     def keep(self, mask: Bools | slice) -> PersonRows:
-        """Returns the rows that a boolean mask (R,) or a slice selects."""
+        """Returns the rows that a bool mask (R,) or a slice selects, with all their columns."""
         pos, vel, box = (None if a is None else a[mask] for a in (self.pos, self.vel, self.box))
         return PersonRows(self.rows.keep(mask), self.group[mask], pos, vel, box)
 
     def positions_on(self, surface: Surface, plane: str) -> Array | None:
-        """Returns the positions (R, 2) on a surface, None if they are unknown there.
+        """Returns the positions x, y (R, 2) on a surface, in m ("ground") or px ("image"); None if they are unknown
+        there.
 
         plane: the plane of `pos` ("ground", "space" or "image"). On the surface "image" the centre of the box is
         returned where boxes are known, else `pos` if its plane is "image". On "ground" `pos` is returned unless its
@@ -59,9 +65,15 @@ class PersonRows:
 class GroupRows:
     """G rows, one per group and frame, sorted by frame, and K memberships.
 
-    pos (G, 2): centre. size (G,): number of people as reported, nan unknown. extent (G, 2, 2): covariance of the shape,
-    nan unknown. hull: G polygons (V, 2), (0, 2) unknown. pos, extent and hull have the unit of the surface. Membership
-    k says that the person in row member[k] (-1: not among the people) belongs to the group in row of[k].
+    - rows: frame number and id of each group row.
+    - pos (G, 2): centre x, y. nan unknown.
+    - size (G,): number of people as reported, nan unknown.
+    - extent (G, 2, 2): covariance of the shape, nan unknown.
+    - hull: G polygons (V, 2), counter-clockwise; (0, 2) unknown.
+    - of (K,), member (K,): membership k says that the person in row member[k] (−1: not among the people) belongs to the
+      group in row of[k].
+
+    pos, extent and hull are in m on the ground (extent m²), in px in the image.
     """
 
     rows: FrameRows
@@ -81,7 +93,9 @@ class GroupRows:
         return np.bincount(self.of, minlength=len(self)).astype(np.int64)
 
     def keep(self, mask: Bools) -> GroupRows:
-        """Returns the groups where mask (G,) is true, with their memberships."""
+        """Returns the groups where the bool mask (G,) is true, with their memberships; `of` is renumbered, `member`
+        stays.
+        """
         place, kept = np.cumsum(mask) - 1, mask[self.of]
         return GroupRows(
             self.rows.keep(mask), self.pos[mask], self.size[mask], self.extent[mask],
@@ -91,15 +105,20 @@ class GroupRows:
 
 
 def true_people(truth: Truth, frames: Bools) -> PersonRows:
-    """Returns the truth's people in the frames f where frames[f] is true; frames (length + 1,)."""
+    """Returns the truth's people in the frames f where frames[f] is true, sorted by frame; frames (length + 1,): bool
+    by frame number.
+
+    pos is in m on the ground; pos, vel or box is None if the truth has none.
+    """
     every = PersonRows(FrameRows(truth.frame, truth.id), truth.group, truth.pos, truth.vel, truth.box)
     return every.keep(frames[truth.frame])
 
 
 def tracked_people(tracks: Sequence[Tracks]) -> PersonRows:
-    """Returns a tracker's people. `tracks` is sorted by frame.
+    """Returns one tracker's people in frames as rows, in the order of `tracks`, which must be sorted by frame.
 
-    pos and vel keep x and y only. box is None if any frame with people lacks boxes.
+    pos and vel keep x and y only, in the tracks' plane and unit. box is None if any frame with people lacks boxes.
+    Without people all arrays have 0 rows.
     """
     count = [len(t.id) for t in tracks]
     frame = np.repeat(np.array([t.index for t in tracks], np.int64), count)
@@ -115,9 +134,10 @@ def tracked_people(tracks: Sequence[Tracks]) -> PersonRows:
 
 
 def group_rows(frames: Ints, groups: Sequence[Groups], people: FrameRows) -> GroupRows:
-    """Returns the groups of frames (F,), one `Groups` per frame.
+    """Returns the groups of F frames as rows and memberships.
 
-    Members are looked up in `people` by frame and id. A member who has no row there gets -1.
+    frames (F,): frame numbers, ascending; groups: one `Groups` per frame. people: rows in which members are looked up
+    by frame and id. A member without a row there gets member −1. Groups that list no members have no memberships.
     """
     count = [len(g.id) for g in groups]
     none = np.zeros(0, np.int64)
@@ -138,19 +158,21 @@ def group_rows(frames: Ints, groups: Sequence[Groups], people: FrameRows) -> Gro
 
 @dataclass(frozen=True, slots=True, eq=False)
 class TrueGroups:
-    """The truth's groups of two or more people in labelled frames.
+    """The truth's groups of two or more people in labelled frames, on one surface ("ground" or "image").
 
-    comparable: True if the truth has group shapes on the surface. Otherwise all centres are nan, and hulls and extents
-    belong to the other surface.
+    - groups: the groups, members as rows of the true people.
+    - comparable: True if the truth has group shapes on the surface. Otherwise all centres are nan, and hulls and
+      extents belong to the other surface.
     """
 
     groups: GroupRows
     comparable: bool
 
     def in_frames(self, frames: Bools, people: Bools) -> TrueGroups:
-        """Returns the groups of the frames f where frames[f] is true, members renumbered.
+        """Returns the groups of the frames f where frames[f] is true, members renumbered to the kept people.
 
-        people (R,): which rows of the true people are kept; those of the kept frames must be among them.
+        frames (length + 1,): bool by frame number. people (R,): bool, which rows of the true people are kept; all rows
+        of the kept frames must be among them.
         """
         groups = self.groups.keep(frames[self.groups.rows.frame])
         number = np.append(np.cumsum(people) - 1, -1)  # the last element keeps -1, an unknown member
@@ -158,9 +180,11 @@ class TrueGroups:
 
 
 def true_groups(truth: Truth, labelled: Bools, people: FrameRows, surface: Surface) -> TrueGroups:
-    """Returns the truth's groups in the frames f where labelled[f] is true.
+    """Returns the truth's groups of two or more members in the frames f where labelled[f] is true.
 
-    labelled (length + 1,); people: rows in which members are looked up. The truth must have groups on one surface.
+    labelled (length + 1,): bool by frame number. people: rows in which members are looked up. surface: "ground" or
+    "image". If the truth has groups on the other surface only, these are returned with centres nan and `comparable`
+    False. Fails an assertion if the truth has groups on neither.
     """
     wanted, other = truth.groups, truth.groups_px
     if surface == "image":
@@ -176,21 +200,25 @@ def true_groups(truth: Truth, labelled: Bools, people: FrameRows, surface: Surfa
 
 
 def hulls_of(groups: Groups) -> tuple[Array, ...]:
-    """Returns one polygon per group; without hulls each is empty, (0, 2)."""
+    """Returns one polygon (V, 2) per group; if `groups` has no hulls each is empty, (0, 2)."""
     return groups.hull if len(groups.hull) else (np.zeros((0, 2)),) * len(groups.id)
 
 
 def bare_groups(rows: FrameRows, pos: Array, hull: tuple[Array, ...]) -> GroupRows:
-    """Returns groups with centre and hull only: no members, size 0, extent 0."""
+    """Returns groups with centre and hull only: no members, size 0, extent 0.
+
+    rows: frame number and id of the G groups; pos (G, 2): centres; hull: G polygons (V, 2), in the unit of pos.
+    """
     n, nobody = len(rows), np.zeros(0, np.int64)
     return GroupRows(rows, pos, np.zeros(n), np.zeros((n, 2, 2)), hull, nobody, nobody)
 
 
 def people_inside(groups: GroupRows, people: FrameRows, positions: Array, scale: float) -> GroupRows:
-    """Returns the groups with new members: the people of the frame inside the hull or at most 0.3 m from it.
+    """Returns the groups with new members: the people of the same frame inside the hull or at most 0.3 m from it.
 
-    positions (R, 2): of `people`, in the unit of the hulls; scale: this unit per metre. One person may become a member
-    of several groups. A group without a hull gets no members.
+    `member` then holds row indices of `people`; former members are dropped. positions (R, 2): x, y of `people`, in the
+    unit of the hulls. scale: this unit per metre. One person may become a member of several groups. A group without a
+    hull, and a person whose position is nan, is in no membership.
     """
     hulls, points = pack(groups.hull), pack_padded(positions[:, None])
     low, high = hulls.box[:, :2] - INSIDE * scale, hulls.box[:, 2:] + INSIDE * scale

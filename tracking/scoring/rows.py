@@ -15,9 +15,10 @@ NO_ROWS = (0, 0)
 
 @dataclass(frozen=True, slots=True)
 class FrameRows:
-    """R people or groups, sorted by frame: frame (R,) int64 >= 0 and id (R,) int64.
+    """R rows of people or groups, one per frame and id, sorted by frame.
 
-    An id should occur once per frame. `require_unique_ids` checks it; the constructor does not.
+    frame (R,): int64, frame number, 0 or more; id (R,): int64. An id should occur once per frame, and frames should be
+    sorted. The constructor checks neither; `require_unique_ids` checks the ids.
     """
 
     frame: Ints
@@ -27,11 +28,11 @@ class FrameRows:
         return len(self.frame)
 
     def keep(self, mask: Bools | slice) -> FrameRows:
-        """Returns the rows that a boolean mask (R,) or a slice selects."""
+        """Returns the rows that a bool mask (R,) or a slice selects, in the same order."""
         return FrameRows(self.frame[mask], self.id[mask])
 
     def require_unique_ids(self, side: str) -> None:
-        """Raises ValueError if an id occurs twice in one frame. `side` ("truth", "tracks") begins the message."""
+        """Raises ValueError if an id occurs twice in one frame; `side` ("truth" or "tracks") begins the message."""
         frame, number = self.frame, numbered(self.id)[1]
         key = np.sort(frame * (int(number.max()) + 1 if len(number) else 1) + number)
         if (key[1:] == key[:-1]).any():
@@ -41,9 +42,11 @@ class FrameRows:
 
 
 def numbered(values: Ints) -> tuple[Ints, Ints]:
-    """Returns the distinct values in ascending order, (U,), and for each value its index among them, (N,).
+    """Returns the U distinct values in ascending order, (U,), and for each of the N values its index among them, (N,)
+    int64.
 
-    Equals `numpy.unique(values, return_inverse=True)`, but counts instead of sorting where the range is small.
+    Equals `numpy.unique(values, return_inverse=True)`, but counts instead of sorting where the range is small. Both are
+    empty for N = 0.
     """
     if len(values) == 0:
         return np.zeros(0, np.int64), np.zeros(0, np.int64)
@@ -58,7 +61,11 @@ def numbered(values: Ints) -> tuple[Ints, Ints]:
 
 
 def find_rows(rows: FrameRows, wanted: FrameRows) -> Ints:
-    """Returns for each wanted (frame, id) its index in `rows`, -1 if `rows` has none: int64, one per wanted row."""
+    """Returns for each row of `wanted` the index of the row of `rows` with equal frame and id, −1 if there is none:
+    (W,) int64.
+
+    `wanted` need not be sorted. Of equal rows in `rows` the first is found.
+    """
     if not len(rows):
         return np.full(len(wanted), -1, np.int64)
     ids, place = numbered(rows.id)
@@ -72,14 +79,14 @@ def find_rows(rows: FrameRows, wanted: FrameRows) -> Ints:
 
 
 class RowLookup:
-    """Finds the row of one id that is last before, next after or nearest to a frame.
+    """Finds the row of one id that is last before, next after or nearest to a frame, by single lookups.
 
-    State: row indices sorted by id and frame, their frames, and the range that each id occupies in both lists. They are
-    Python lists, because single lookups in lists are faster than in arrays.
+    State, as Python lists, because single lookups in lists are faster than in arrays: row, the row indices sorted by id
+    and frame; frame, their frame numbers; span, the range (low, high) that each id occupies in both lists.
     """
 
     def __init__(self, rows: FrameRows, only: Bools | None = None) -> None:
-        """Indexes all rows, or those where `only` (R,) is true."""
+        """Indexes all R rows, or those where the bool mask `only` (R,) is true; other rows are never found."""
         chosen = np.arange(len(rows)) if only is None else np.flatnonzero(only)
         ids, place = numbered(rows.id[chosen])
         order = np.lexsort((rows.frame[chosen], place))
@@ -90,19 +97,20 @@ class RowLookup:
         self.span = dict(zip(ids.tolist(), pairwise(cuts), strict=True))
 
     def last(self, id: int, frame: int, reach: int) -> int:
-        """Returns the row of the latest frame in [frame - reach, frame]; -1 if the id has no row there."""
+        """Returns the index of the id's row with the latest frame in [frame − reach, frame]; −1 if there is none."""
         low, high = self.span.get(id, NO_ROWS)
         at = bisect_right(self.frame, frame, low, high) - 1
         return self.row[at] if at >= low and frame - self.frame[at] <= reach else -1
 
     def next(self, id: int, frame: int, reach: int) -> int:
-        """Returns the row of the earliest frame in [frame, frame + reach]; -1 if the id has no row there."""
+        """Returns the index of the id's row with the earliest frame in [frame, frame + reach]; −1 if there is none."""
         low, high = self.span.get(id, NO_ROWS)
         at = bisect_left(self.frame, frame, low, high)
         return self.row[at] if at < high and self.frame[at] - frame <= reach else -1
 
     def nearest(self, id: int, frame: int, reach: int) -> int:
-        """Returns the row nearest in time and at most `reach` frames away, -1 if there is none.
+        """Returns the index of the id's row nearest to `frame`, at most `reach` frames before or after; −1 if there is
+        none.
 
         Of two equally near rows the earlier one is returned.
         """
