@@ -29,18 +29,23 @@ ROWS = 500_000  # frames of encounters handled together: bounds memory
 
 
 def crossings(pos: Array, vel: Array, present: Bools, group: Ints, fps: float) -> list[GroupEvent]:
-    """Returns a cross event for each crossing of two groups of two or more people, in order of their first frames.
+    """Returns a cross event for each crossing of two groups of two or more people, in order of first and last frame.
 
-    pos, vel (T, P, 2): m, m/s; present (T, P); group (T, P): group ids, -1 = alone. An encounter is a stretch in which
-    the hulls of two groups are within 1.0 m. It is a crossing if all of this holds:
+    pos, vel (T, P, 2): m, m/s. present (T, P): flags. group (T, P): group ids, -1 = alone or absent. A person with a
+    nan position counts as absent. The id of a person is the column + 1; frames of events count from 1. No group gives
+    no event.
 
-    - the mean over the encounter of their relative velocity is at least CROSS_VELOCITY long;
+    An encounter is a stretch in which the hulls of two groups are within 1.0 m; breaks of at most 0.5 s do not end it.
+    It is a crossing if all of this holds:
+
+    - the mean over the encounter of their relative velocity is at least CROSS_VELOCITY (0.6 m/s) long;
     - they change sides: the direction from one middle to the other turns by more than 90° from the first to the last
-      frame, or the paths of the middles cross, not counting crossings back, from SAME_BEFORE before the encounter to
-      SAME_BEFORE after it;
+      frame, or the paths of the middles cross, not counting crossings back, from SAME_BEFORE (2 s) before the encounter
+      to SAME_BEFORE after it;
     - in that time both groups keep their members.
 
-    The event lasts as long as the encounter. Its position is the mean of both middles where these are closest.
+    The event lasts as long as the encounter. Its `before` and `after` are both group ids, its members those in the
+    first frame. Its position is the mean of both middles where these are closest.
     """
     there = present & np.isfinite(pos).all(axis=2)
     places, label = np.where(there[..., None], pos, np.nan), np.where(there, group, -1)
@@ -53,7 +58,10 @@ def crossings(pos: Array, vel: Array, present: Bools, group: Ints, fps: float) -
 
 
 def _portions(met: Encounters, frames: int, margin: int) -> Iterator[Encounters]:
-    """The encounters in portions of about ROWS frames, `margin` frames before and after each encounter included."""
+    """Yields the encounters in portions, so that the frames of a portion add up to about ROWS (500,000).
+
+    `margin` frames before and after each encounter count, too. frames: length of the recording, unused.
+    """
     total = np.cumsum(met.last - met.first + 1 + 2 * margin)
     return (met[total // ROWS == k] for k in np.unique(total // ROWS))
 
@@ -61,7 +69,12 @@ def _portions(met: Encounters, frames: int, margin: int) -> Iterator[Encounters]
 def _crossed(
     pos: Array, vel: Array, group: Ints, rows: MembersByFrame, met: Encounters, margin: int
 ) -> list[GroupEvent]:
-    """The events of those encounters that are crossings; margin: SAME_BEFORE in frames."""
+    """Returns a cross event for each of the encounters `met` that is a crossing, in their order.
+
+    pos, vel (T, P, 2): m, m/s, nan while absent. group (T, P): group ids, -1 = alone or absent. rows: members of all
+    groups by frame. margin: number of frames before and after the encounter in which the groups must keep their
+    members.
+    """
     low, high = np.maximum(met.first - margin, 0), np.minimum(met.last + margin + 1, len(pos))
     k, frame = runs(low, high)
     a, b = (group_paths(pos, vel, group, rows, name, met.first, k, frame) for name in (met.a, met.b))
@@ -85,7 +98,11 @@ def _crossed(
 
 
 def _relative_speed(a: GroupPath, b: GroupPath, k: Ints, during: Bools, count: int) -> Array:
-    """Length in m/s of the mean relative velocity during each encounter (count,); nan where it is unknown."""
+    """Returns the length in m/s of the mean relative velocity during each of `count` encounters, shape (count,).
+
+    a, b: paths of the two groups, R rows. k (R,): encounter of each row, ascending. during (R,): True for rows that
+    count. nan for an encounter in which no velocity is known.
+    """
     relative = b.vel - a.vel
     known = during & np.isfinite(relative).all(axis=1)
     total = [np.bincount(k[known], relative[known, axis], minlength=count) for axis in (0, 1)]
@@ -94,7 +111,11 @@ def _relative_speed(a: GroupPath, b: GroupPath, k: Ints, during: Bools, count: i
 
 
 def _closest(apart: Array, k: Ints, during: Bools) -> Ints:
-    """The row of each encounter in which the middles are closest."""
+    """Returns for each encounter that has rows the index of the row in which the middles are closest.
+
+    apart (R, 2): vector between the middles, m, nan if unknown. k (R,): encounter of each row, ascending. during (R,):
+    rows outside the encounter are False and are chosen only if no row of it is known.
+    """
     distance = np.where(during & np.isfinite(apart).all(axis=1), np.hypot(*apart.T), np.inf)
     order = np.lexsort((distance, k))
     return order[np.flatnonzero(np.diff(k, prepend=-1))]

@@ -21,7 +21,10 @@ BRIDGE_TIME = 0.5  # s for which hulls may be further apart within one encounter
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Encounters:
-    """E encounters, sorted by first and last frame: first, last (E,): frames from 0; a, b (E,): group ids, a < b."""
+    """E encounters of two groups, sorted by first frame, last frame and group ids.
+
+    first, last (E,): frames from 0, both inclusive. a, b (E,): group ids, a < b.
+    """
 
     first: Ints
     last: Ints
@@ -39,8 +42,10 @@ class Encounters:
 class MembersByFrame:
     """The members of each group in each frame: G rows, one for each group and frame, sorted by (frame, group id).
 
-    t (G,): frame from 0; name (G,): group id; key (G,): t * width + name, ascending, for look-ups; first, count (G,):
-    the members are person[first : first + count]; person (R,): columns.
+    - t (G,): frame from 0. name (G,): group id. key (G,): t * width + name, ascending, for look-ups.
+    - width: greatest group id + 1.
+    - first, count (G,): the members of a row are person[first : first + count].
+    - person: columns (person id - 1) of the members of row after row, ascending within a row.
     """
 
     t: Ints
@@ -52,8 +57,10 @@ class MembersByFrame:
     person: Ints
 
     def find(self, t: Ints, name: Ints) -> tuple[Ints, Ints]:
-        """Returns (first, count) of groups `name` in frames `t`, all (K,); count is 0 where the group does not
-        exist.
+        """Returns (first, count), both (K,), of the groups with ids name (K,) in frames t (K,), which count from 0.
+
+        The members are person[first : first + count]. count is 0 where the group does not exist in that frame; `first`
+        then means nothing. Ids must be from 0 to width - 1.
         """
         if not len(self.t):
             return np.zeros_like(t), np.zeros_like(t)
@@ -63,13 +70,21 @@ class MembersByFrame:
         return self.first[place], np.where(found, self.count[place], 0)
 
     def members(self, t: int, name: int) -> Ints:
-        """Returns the columns of the members of one group in one frame; empty if the group does not exist then."""
+        """Returns the columns (person id - 1), ascending, of the members of group id `name` in frame t, which counts
+        from 0.
+
+        Empty if the group does not exist in that frame.
+        """
         first, count = self.find(np.array([t]), np.array([name]))
         return self.person[first[0] : first[0] + count[0]]
 
 
 def members_by_frame(group: Ints) -> MembersByFrame:
-    """Returns the members of all groups from group ids (T, P), -1 = alone or absent."""
+    """Returns the members of all groups in all frames.
+
+    group (T, P): group id of each person in each frame, -1 = alone or absent. A group of one member gets a row, too. No
+    group gives a result without rows.
+    """
     t, person = np.nonzero(group >= 0)
     order = np.lexsort((person, group[t, person], t))
     t, person = t[order], person[order]
@@ -80,7 +95,12 @@ def members_by_frame(group: Ints) -> MembersByFrame:
 
 
 def encounters(pos: Array, rows: MembersByFrame, fps: float) -> Encounters:
-    """Returns all encounters of groups of two or more people; pos (T, P, 2): m."""
+    """Returns all encounters of two groups of two or more people each, sorted by first and last frame.
+
+    An encounter is a stretch in which the hulls of the members' footprints are within CROSS_GAP (1.0 m). Breaks of at
+    most BRIDGE_TIME (0.5 s) do not end it. pos (T, P, 2): m, finite for all members. rows: the members of all groups by
+    frame.
+    """
     if not len(rows.t):
         return Encounters(rows.t, rows.t, rows.t, rows.t)
     i, j = _within_reach(rows.t, pos[np.repeat(rows.t, rows.count), rows.person], rows.count)
@@ -93,9 +113,11 @@ def encounters(pos: Array, rows: MembersByFrame, fps: float) -> Encounters:
 
 
 def _within_reach(t: Ints, places: Array, count: Ints) -> tuple[Ints, Ints]:
-    """Pairs i < j of groups of two or more people of one frame whose hulls are within CROSS_GAP.
+    """Returns the pairs (i, j), i < j, of rows of one frame whose hulls are within CROSS_GAP (1.0 m), each of shape
+    (K,).
 
-    t, count (G,): frame and size of each group; places (R, 2): members of group after group, m.
+    A row is one group in one frame; only rows of two or more people count. t, count (G,): frame, ascending, and number
+    of people of each row. places (R, 2): x, y of the members of row after row, m.
     """
     start = np.cumsum(count) - count
     middle = np.add.reduceat(places, start) / count[:, None]
@@ -120,10 +142,13 @@ def _within_reach(t: Ints, places: Array, count: Ints) -> tuple[Ints, Ints]:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class GroupPath:
-    """One group of each encounter in R frames around it.
+    """The path of one of the two groups of each encounter, in R rows: frames around the encounters, one encounter after
+    another.
 
-    middle, vel (R, 2): mean position, m, and mean velocity, m/s, of those members at the meeting who are present; nan
-    where none is. same_members (R,): the group has no other members than at the meeting, and those present are in it.
+    - middle, vel (R, 2): mean position, m, and mean velocity, m/s, of the members at the meeting who are present in the
+      row's frame; nan if none of them is.
+    - same_members (R,): True if the group has no other members than at the meeting, and the present ones all belong to
+      it.
     """
 
     middle: Array
@@ -134,10 +159,12 @@ class GroupPath:
 def group_paths(
     pos: Array, vel: Array, group: Ints, rows: MembersByFrame, name: Ints, met: Ints, encounter: Ints, frame: Ints
 ) -> GroupPath:
-    """Returns the paths of groups `name` (E,), with the members they had in frames `met` (E,).
+    """Returns the path of one group of each of E encounters, with the members that it had at the meeting.
 
-    pos, vel (T, P, 2): m, m/s; group (T, P): group ids; encounter, frame (R,): the rows wanted, in order of encounters.
-    A single member who stays after the others have left the scene counts as the same group.
+    pos, vel (T, P, 2): m, m/s, nan while absent. group (T, P): group ids. rows: the members by frame. name (E,): group
+    id in each encounter. met (E,): frame, from 0, whose members count. encounter, frame (R,): the rows wanted,
+    encounters ascending, frames from 0. A single member who stays after the other members have left the scene counts as
+    the same group.
     """
     first, count = rows.find(met, name)
     row, place = runs(first[encounter], (first + count)[encounter])
@@ -154,8 +181,10 @@ def group_paths(
 
 
 def _mean(values: Array, there: Bools, start: Ints) -> Array:
-    """Means (R, 2) of runs of values (N, 2) that begin at `start` (R,), over present people; nan where none is
-    known.
+    """Returns the means (R, 2) of R consecutive runs of values (N, 2); the runs begin at the indices start (R,).
+
+    Only values that are finite and whose flag in there (N,) is True count; nan for a run without any. Without runs: (0,
+    2).
     """
     known = there & np.isfinite(values[:, 0]) & np.isfinite(values[:, 1])
     if not len(start):
@@ -166,9 +195,11 @@ def _mean(values: Array, there: Bools, start: Ints) -> Array:
 
 
 def net_crossings(a: Array, b: Array, encounter: Ints, count: int) -> Ints:
-    """Returns how often path b crosses path a from left to right, minus right to left, for each encounter (count,).
+    """Returns how often path b crosses path a from left to right, minus right to left, for each encounter, shape
+    (count,).
 
-    a, b (R, 2): points of both paths, encounter after encounter; nan points are left out. The two need not be at the
+    a, b (R, 2): points of both paths in m, encounter after encounter; points with nan are left out. encounter (R,):
+    number of each row's encounter, from 0, ascending. An encounter without points gives 0. The two need not be at the
     crossing at the same time.
 
     Let s and t be times on a and b. The difference b(t) - a(s) winds round zero once for each crossing as (s, t) goes
@@ -180,9 +211,10 @@ def net_crossings(a: Array, b: Array, encounter: Ints, count: int) -> Ints:
 
 
 def _turns(path: Array, other: Array, encounter: Ints, count: int) -> Array:
-    """By how much the direction to `path` turns, seen from the first point of `other` less seen from its last (count,).
+    """Returns a difference of two turning angles for each encounter, in radians, shape (count,).
 
-    In radians.
+    It is by how much the direction to `path` turns, seen from the first point of `other`, minus the same seen from its
+    last point. path, other (R, 2): m; points with nan are left out. encounter (R,): encounter of each row, ascending.
     """
     known = np.isfinite(path).all(axis=1)
     point, own = path[known], encounter[known]

@@ -17,7 +17,11 @@ __all__ = ["box_groups", "frame_groups", "groups_over_time"]
 
 @dataclass(frozen=True, eq=False)
 class _MemberRows:
-    """Rows of the R people in groups of two or more, sorted by (frame, group, id), and where each group starts."""
+    """R rows, one for each person in a group of two or more, sorted by (frame, group, id).
+
+    frame, id, group (R,). pos, vel (R, D): position and velocity, in the caller's unit. starts: index of the first row
+    of each group in each frame.
+    """
 
     frame: Ints
     id: Ints
@@ -28,16 +32,16 @@ class _MemberRows:
 
     @property
     def counts(self) -> Ints:
-        """Number of members of each group."""
+        """Number of members of each group in each frame, in the order of `starts`."""
         return np.diff(np.append(self.starts, len(self.id)))
 
 
 def frame_groups(id: Ints, group: Ints, pos: Array, vel: Array) -> Groups:
-    """Returns the groups of two or more people of one frame, in order of their ids.
+    """Returns the groups of two or more people of one frame, in order of their ids; empty Groups if there is none.
 
-    id (N,): person ids; group (N,): group ids, -1 = alone; pos, vel (N, D): m, m/s, D = 2 or 3. Of each group: pos,
-    vel: means over the members; extent (2, 2): covariance of their x and y (divided by the number of members), m²;
-    hull: convex hull of their footprints on the ground.
+    id (N,): person ids. group (N,): group ids, -1 = alone. pos, vel (N, D): m, m/s, D = 2 or 3. Of each group: members:
+    sorted person ids; pos, vel (D,): means over the members; extent (2, 2): covariance of their x and y (divided by the
+    number of members), m²; size: number of members; hull: convex hull of their footprints on the ground, m.
     """
     return groups_over_time(np.zeros(len(id), np.int64), id, group, pos, vel, 0, 1)[0]
 
@@ -45,11 +49,12 @@ def frame_groups(id: Ints, group: Ints, pos: Array, vel: Array) -> Groups:
 def groups_over_time(
     frame: Ints, id: Ints, group: Ints, pos: Array, vel: Array, first: int, length: int, px_per_m: float = 1.0
 ) -> list[Groups]:
-    """Returns what `frame_groups` returns for each of the frames first … first + length - 1.
+    """Returns the Groups of each of the frames first … first + length - 1, as `frame_groups` does for one frame.
 
-    Rows: frame (R,); the other arrays as for `frame_groups`. px_per_m other than 1: pos and vel are in px and px/s, and
-    footprints are discs of that scale in the image; all results are then in px. A frame without a group gives empty
-    Groups.
+    Rows are people in frames, in any order: frame, id, group (R,), group -1 = alone; pos, vel (R, D), D = 2 or 3: m,
+    m/s. Only groups of two or more people of one frame count; a frame without one gives empty Groups. Rows of other
+    frames are ignored. px_per_m other than 1: pos and vel are in px and px/s, footprints are discs of that scale in the
+    image, and all results are in px.
     """
     rows, order = _member_rows(frame, id, group, pos, vel)
     hulls = footprint_hulls(pos[order, :2] / px_per_m, rows.counts)
@@ -59,9 +64,11 @@ def groups_over_time(
 def box_groups(
     frame: Ints, id: Ints, group: Ints, pos: Array, vel: Array, box: Array, first: int, length: int
 ) -> list[Groups]:
-    """Returns what `groups_over_time` returns in the image, with the convex hulls of the members' boxes.
+    """Returns the Groups in the image of each of the frames first … first + length - 1.
 
-    box (R, 4): left, top, width, height in px; pos, vel: px, px/s.
+    Rows are people in frames, in any order: frame, id, group (R,), group -1 = alone; pos, vel (R, 2): px, px/s; box (R,
+    4): left, top, width, height in px. Of each group of two or more people: means of pos and vel, covariance of pos
+    (px²), and as hull the convex hull of the members' boxes. A frame without a group gives empty Groups.
     """
     rows, order = _member_rows(frame, id, group, pos, vel)
     low, high = box[:, :2], box[:, :2] + box[:, 2:]
@@ -72,7 +79,11 @@ def box_groups(
 
 
 def _member_rows(frame: Ints, id: Ints, group: Ints, pos: Array, vel: Array) -> tuple[_MemberRows, Ints]:
-    """The rows of people in groups of two or more, sorted, and their indices in the given arrays."""
+    """Returns the rows of people in groups of two or more, sorted by (frame, group, id), and their indices in the
+    arrays.
+
+    frame, id, group (R,), group -1 = alone. pos, vel (R, D).
+    """
     rows = np.lexsort((id, group, frame))
     rows = rows[group[rows] >= 0]
     new = (np.diff(frame[rows], prepend=-1) != 0) | (np.diff(group[rows], prepend=-1) != 0)
@@ -83,7 +94,10 @@ def _member_rows(frame: Ints, id: Ints, group: Ints, pos: Array, vel: Array) -> 
 
 
 def _assemble(rows: _MemberRows, hulls: Sequence[Array], first: int, length: int) -> list[Groups]:
-    """One Groups for each frame; hulls: of all groups, in the order of the rows."""
+    """Returns one Groups for each of the frames first … first + length - 1; empty Groups for a frame without groups.
+
+    hulls: polygon (V, 2) of each group in each frame, in the order of rows.starts.
+    """
     starts, counts = rows.starts, rows.counts
     if not len(starts):
         return [Groups.none()] * length

@@ -27,10 +27,11 @@ NEVER = np.iinfo(np.int64).max
 
 @dataclass(frozen=True, slots=True)
 class MeasuredMotion:
-    """What partitions are found from.
+    """The motion from which groups are found: T frames, P people.
 
-    pos, vel (T, P, 2): m, m/s, nan where absent; present (T, P); intent (T, P): index of the group a person is meant to
-    belong to; hold: frames for which a rule must hold.
+    - pos, vel (T, P, 2): m, m/s, nan while absent. present (T, P): flags.
+    - intent (T, P): index of the group that the script means a person to belong to, -1 while absent.
+    - hold: number of frames for which the merge or split rule must hold.
     """
 
     pos: Array
@@ -43,10 +44,12 @@ class MeasuredMotion:
 def partitions(
     pos: Array, vel: Array, present: Bools, intent: Ints, fps: float
 ) -> Iterator[tuple[int, list[PersonSet]]]:
-    """Yields (t, parts) for frame 0 and for each later frame t (from 0) in which the parts may have changed.
+    """Yields (t, parts) for frame 0 and for each later frame t in which the parts may have changed; frames count from
+    0.
 
-    parts: disjoint sets of columns that make up all people present; a set of one is a person alone. The parts stay the
-    same until the next t. Arrays as in MeasuredMotion. Yields nothing for a motion without frames.
+    parts: disjoint sets of columns (person id - 1) that make up all people present; a set of one is a person alone.
+    They are valid until the next t. pos, vel (T, P, 2): m, m/s. present (T, P): flags. intent (T, P): index of the
+    group a person is meant to belong to, -1 while absent. Yields nothing for a motion without frames.
     """
     there = present[..., None]
     pos, vel = np.where(there, pos, np.nan), np.where(there, vel, np.nan)
@@ -65,7 +68,11 @@ def partitions(
 
 
 def _turns(present: Bools, intent: Ints) -> Ints:
-    """Frame 0, and all frames in which a person enters, leaves or is meant to be in another group."""
+    """Returns frame 0 and all frames in which a person enters, leaves or is meant to be in another group, ascending,
+    from 0.
+
+    present, intent (T, P). Empty for a motion without frames.
+    """
     if not len(present):
         return np.zeros(0, np.int64)
     moved = (np.diff(present, axis=0) | (np.diff(intent, axis=0) != 0)).any(axis=1)
@@ -73,14 +80,19 @@ def _turns(present: Bools, intent: Ints) -> Ints:
 
 
 def _enter_and_leave(parts: list[PersonSet], motion: MeasuredMotion, t: int) -> list[PersonSet]:
-    """The parts without people who have left; people who have entered are added, one part for each intent."""
+    """Returns the parts (sets of columns) in frame t, without people who have left and with people who have entered.
+
+    People who enter form one new part for each group that they are meant to belong to. They join no existing part here.
+    """
     here = frozenset(np.flatnonzero(motion.present[t]).tolist())
     stay = [part & here for part in parts if part & here]
     return stay + list(_by_intent(here - frozenset().union(*stay), motion, t).values())
 
 
 def _by_intent(people: Iterable[int], motion: MeasuredMotion, t: int) -> dict[int, PersonSet]:
-    """People by the group that they are meant to belong to in frame t."""
+    """Returns sets of the given columns, keyed by the index of the group that they are meant to belong to
+    in frame t.
+    """
     found: dict[int, set[int]] = {}
     for p in sorted(people):
         found.setdefault(int(motion.intent[t, p]), set()).add(p)
@@ -88,10 +100,10 @@ def _by_intent(people: Iterable[int], motion: MeasuredMotion, t: int) -> dict[in
 
 
 class _RuleTimes:
-    """When parts will join or divide. State: for each rule and two parts, the frames from which the rule will hold.
+    """When parts (sets of columns) will join or divide in one motion.
 
-    The frames are measured once, when both parts exist for the first time, and remain valid while the parts stay the
-    same.
+    State: for each rule ("merge" or "split") and two parts, the frames from which the rule will hold long enough. They
+    are measured once, when both parts exist for the first time, and remain valid while the parts stay the same.
     """
 
     def __init__(self, motion: MeasuredMotion) -> None:
@@ -99,7 +111,10 @@ class _RuleTimes:
         self._known: dict[tuple[Rule, PersonSet, PersonSet], Ints] = {}
 
     def join_and_divide(self, parts: list[PersonSet], t: int) -> list[PersonSet]:
-        """The parts after all joins and divisions that are due in frame t."""
+        """Returns the parts (sets of columns) after all joins and divisions that are due in frame t.
+
+        It divides and joins again until nothing changes.
+        """
         while True:
             divided = [piece for part in parts for piece in self._divide(part, t)]
             joined = _connected(divided, self._due_to_join(divided, t))
@@ -108,17 +123,19 @@ class _RuleTimes:
             parts = joined
 
     def next_change(self, parts: list[PersonSet], t: int) -> int:
-        """The first frame after t in which parts join or may divide; NEVER if there is none."""
+        """Returns the first frame after t in which parts join or may divide; NEVER (the largest int64) if there is
+        none.
+        """
         times = [_first(frames, t + 1) for _, frames in self._meant_to_join(parts, t)]
         for part in parts:
             times += [_first(self._onsets("split", a, b, t), t + 1) for a, b in self._meant_to_divide(part, t)]
         return min(times, default=NEVER)
 
     def _meant_to_join(self, parts: list[PersonSet], t: int) -> Iterator[tuple[tuple[PersonSet, PersonSet], Ints]]:
-        """Each two parts that are meant to be one group, with the frames from which the merge rule will hold.
+        """Yields ((a, b), frames) for each two parts that are meant to be one group in frame t.
 
-        A part is meant to join others if more than half of its people are meant to be in one group; the rule is
-        measured between these people.
+        frames: ascending, those from which the merge rule will hold long enough. A part counts only if more than half
+        of its people are meant to be in that group; the rule is measured between these people.
         """
         meant: dict[int, list[tuple[PersonSet, PersonSet]]] = {}
         for part in parts:
@@ -133,25 +150,38 @@ class _RuleTimes:
         return [pair for pair, frames in self._meant_to_join(parts, t) if _first(frames, t) == t]
 
     def _meant_to_divide(self, part: PersonSet, t: int) -> Iterator[tuple[PersonSet, PersonSet]]:
-        """Each two subsets of a part whose people are meant to be in different groups."""
+        """Returns an iterator over each two subsets of a part that are meant to be different groups in frame t; may be
+        empty.
+        """
         return combinations(_by_intent(part, self.motion, t).values(), 2) if len(part) > 1 else iter(())
 
     def _divide(self, part: PersonSet, t: int) -> list[PersonSet]:
-        """The pieces of a part in frame t: its subsets by intent, but those that have not split yet stay together."""
+        """Returns the pieces into which a part divides in frame t; the part itself, in a list, if it does not divide.
+
+        The pieces are its subsets by intended group. Two subsets stay together unless frame t is one from which the
+        split rule holds between them for `hold` frames.
+        """
         if len(part) == 1:
             return [part]
         unsplit = [(a, b) for a, b in self._meant_to_divide(part, t) if _first(self._onsets("split", a, b, t), t) != t]
         return _connected(list(_by_intent(part, self.motion, t).values()), unsplit)
 
     def _onsets(self, rule: Rule, a: PersonSet, b: PersonSet, t: int) -> Ints:
-        """Frames from which the rule will hold long enough between a and b, measured from the first t asked for."""
+        """Returns the frames, ascending, from which the rule will hold long enough between parts a and b.
+
+        They are measured at the first call for this rule and these parts, from that call's t on; later calls return the
+        same.
+        """
         key = (rule, a, b)
         if key not in self._known:
             self._known[key] = self._measure(rule, np.array(sorted(a)), np.array(sorted(b)), t)
         return self._known[key]
 
     def _measure(self, rule: Rule, a: Ints, b: Ints, t: int) -> Ints:
-        """Frames from t on from which the rule holds between columns a and b for `hold` frames."""
+        """Returns the frames from t on, ascending, from which the rule holds between columns a and b for `hold` frames.
+
+        The intent must agree in these frames, too. Empty if a and b are never both present from t on.
+        """
         motion = self.motion
         both = motion.present[t:, a].any(axis=1) & motion.present[t:, b].any(axis=1)
         ends = np.flatnonzero(both)
@@ -164,8 +194,11 @@ class _RuleTimes:
         return np.flatnonzero(holds_for(holds, motion.hold)) + t
 
     def _intended(self, rule: Rule, window: slice, a: Ints, b: Ints) -> Bools:
-        """Frames in which everybody of a and b is meant to be in one group (merge), or no two of a and b are
-        (split).
+        """Returns for each frame of the window whether intent agrees with the rule between columns a and b, shape
+        (frames,).
+
+        merge: all people of a and b who are present are meant to be in one group. split: no person of a is meant to be
+        in the group of a person of b. Absent people are ignored.
         """
         intent, present = self.motion.intent[window], self.motion.present[window]
         same = intent[:, a, None] == intent[:, None, b]
@@ -175,13 +208,16 @@ class _RuleTimes:
 
 
 def _first(frames: Ints, t: int) -> int:
-    """The first of the ascending frames from t on; NEVER if there is none."""
+    """Returns the first of the ascending `frames` that is t or later; NEVER (the largest int64) if there is none."""
     k = int(np.searchsorted(frames, t))
     return int(frames[k]) if k < len(frames) else NEVER
 
 
 def _connected(parts: list[PersonSet], links: list[tuple[PersonSet, PersonSet]]) -> list[PersonSet]:
-    """The parts, joined wherever links connect them directly or through other parts."""
+    """Returns the parts, each set united with all sets that links connect it to, directly or through other parts.
+
+    The order of the first sets is kept; a united set appears once.
+    """
     whole = {part: part for part in parts}
     for a, b in links:
         one = whole[a] | whole[b]

@@ -19,10 +19,11 @@ ALONE = -1
 
 @dataclass(frozen=True, slots=True)
 class GroupChange:
-    """What happened to a group between two partitions.
+    """What happened to a group between two partitions of a crowd.
 
-    kind: merge, split, form (people alone become a group), dissolve (a group becomes people alone), enter or leave;
-    before, after: sorted ids of the groups concerned, -1 once for each person alone; members: sorted person ids.
+    - kind: merge, split, form (people alone become a group), dissolve (a group becomes people alone), enter or leave.
+    - before, after: sorted ids of the groups concerned; -1 once for each person alone; empty where nobody is concerned.
+    - members: sorted ids of the people concerned, as the caller numbers them.
     """
 
     kind: str
@@ -32,10 +33,12 @@ class GroupChange:
 
 
 def identify(old: Members, parts: Iterable[PersonSet], born: Mapping[int, int]) -> dict[PersonSet, int | None]:
-    """Returns the old id that each new group keeps, None for a group that needs a new id.
+    """Returns for each new group of two or more people the id that it keeps, or None if it needs a new id.
 
-    old: members of each group before; parts: the new partition, in which sets of one person are ignored; born: when
-    each old group began.
+    old: members of each group before, by id. parts: the new partition; sets of one person are ignored. born: time at
+    which each old id began. A group with the same members keeps its id. The remaining old and new groups are matched
+    greedily, most common members first; ties go to the older, then the smaller id, then the new group with the smallest
+    person. Fewer than two common members never match.
     """
     new = sorted((p for p in parts if len(p) > 1), key=min)
     same = {people: g for g, people in old.items()}  # mostly nothing has changed: no need to compare all with all
@@ -57,14 +60,17 @@ def identify(old: Members, parts: Iterable[PersonSet], born: Mapping[int, int]) 
 def lineage(
     old: Members, new: Members, before: PersonSet, now: PersonSet, entered: PersonSet = frozenset()
 ) -> list[GroupChange]:
-    """Returns what happened to the groups between two partitions, old groups first, each kind in order of the ids.
+    """Returns what happened to the groups between two partitions, old groups first, each in order of group id.
 
-    old, new: members of each group; before, now: all people present; entered: people who count as having just entered
-    though they are in both. People who are not in both have entered or left.
+    old, new: members of each group by id. before, now: all people present. entered: people who count as having just
+    entered though they are in both. People who are in only one of before and now have left or entered.
 
-    A group that only grows or shrinks by such people gives no change. A new group enters if
-    all its people have just entered, or all but one who was alone. An old group leaves if all its people have left, or
-    all but one.
+    - split or dissolve: the old group's people who stay are in several groups or alone. merge or form: likewise
+      backwards.
+    - enter: all people of a new group have just entered, or all but one who was alone.
+    - leave: all people of an old group have left, or all but one who is now alone.
+
+    A group that only grows or shrinks by people who enter or leave gives no change.
     """
     stay = (before & now) - entered
     was, is_ = _unit_of(old, before), _unit_of(new, now)
@@ -78,20 +84,26 @@ def lineage(
 
 
 def _unit_of(groups: Members, everybody: PersonSet) -> dict[int, int]:
-    """The group id of each person; a person alone gets a negative number of their own."""
+    """Returns the group id of each person of `everybody`; a person alone gets a negative number that no other person
+    has.
+    """
     unit = {p: -1 - k for k, p in enumerate(sorted(everybody))}
     return unit | {p: g for g, people in groups.items() for p in people}
 
 
 def _names(units: Iterable[int]) -> tuple[int, ...]:
-    """Sorted group ids, with -1 for each person alone."""
+    """Returns the numbers of `units` sorted, with every negative number (a person alone) replaced by -1."""
     return tuple(sorted(max(u, ALONE) for u in units))
 
 
 def _changes_of_old(
     g: int, people: PersonSet, stay: PersonSet, is_: dict[int, int], now: PersonSet
 ) -> list[GroupChange]:
-    """The split, dissolve or leave of an old group, if there is one."""
+    """Returns the split, dissolve or leave of the old group g as a list of one, or [].
+
+    people: its members before. stay: people present before and now. is_: group id of each person now, negative if
+    alone. now: all people present now.
+    """
     left = people & stay
     targets = {is_[p] for p in left}
     if len(targets) > 1:
@@ -103,7 +115,11 @@ def _changes_of_old(
 
 
 def _changes_of_new(g: int, people: PersonSet, stay: PersonSet, was: dict[int, int]) -> list[GroupChange]:
-    """The merge, form or enter of a new group, if there is one."""
+    """Returns the merge, form or enter of the new group g as a list of one, or [].
+
+    people: its members now. stay: people present before and now. was: group id of each person before, negative if
+    alone.
+    """
     sources = {was[p] for p in people & stay}
     if len(sources) > 1:
         kind = "form" if max(sources) < 0 else "merge"
@@ -115,9 +131,10 @@ def _changes_of_new(g: int, people: PersonSet, stay: PersonSet, was: dict[int, i
 
 @dataclass
 class Identities:
-    """Group ids through time.
+    """Gives groups ids that last through time.
 
-    State: `groups`: members of each group; `born`: when each id began; `people`: all people present; `next_id`.
+    State: next_id: the next new id. groups: members of each present group, by id. born: time at which each id began, of
+    ended groups, too. people: all people present at the last time.
     """
 
     next_id: int = 1
@@ -128,10 +145,12 @@ class Identities:
     def step(
         self, t: int, people: PersonSet, parts: Iterable[PersonSet], entered: PersonSet = frozenset()
     ) -> list[GroupChange]:
-        """Takes the partition of time t and returns what has changed; `groups` then has the new members by id.
+        """Takes the partition of time t and returns what has changed since the last call; updates groups, born and
+        people.
 
-        people: all people present; parts: the partition, in which people alone may be left out; entered: as in
-        `lineage`. Times must not fall.
+        people: all people present. parts: the partition; people alone may be left out. entered: people who count as
+        having just entered although they were present before. t must not fall from call to call. At the first call all
+        groups enter.
         """
         new: dict[int, PersonSet] = {}
         for part, kept in identify(self.groups, parts, self.born).items():

@@ -19,12 +19,12 @@ INSTANT = 0.02  # s: half the step by which ground velocities become image veloc
 
 
 def image_groups(truth: Truth, ground: tuple[Groups, ...], camera: Camera, shapes: Ellipsoids) -> tuple[Groups, ...]:
-    """Returns the groups of each frame as the camera sees them, with the ids, members and sizes of the ground groups.
+    """Returns the Groups of each frame as the camera sees them, with the ids, members and sizes of the ground groups.
 
-    ground: groups of each frame on the ground; shapes: ellipsoids of the people in the truth's rows. pos, extent: mean
-    (px) and covariance (px²) of the middles of the members' boxes; vel: mean velocity of their bodies' centres, px/s;
-    hull: of their silhouettes, px. A group with a member behind the camera has nan and an empty hull. The truth must
-    have boxes and velocities.
+    truth: with boxes and velocities (else AssertionError). ground: Groups of each frame on the ground. shapes:
+    ellipsoids of body and head of the people, in the order of the truth's rows. Of each group: pos (px) and extent
+    (px²): mean and covariance of the middles of the members' boxes; vel: mean velocity of their bodies' centres in the
+    image, px/s; hull: of their silhouettes, px. A group with a member behind the camera has nan and an empty hull.
     """
     assert truth.box is not None
     assert truth.vel is not None
@@ -43,7 +43,10 @@ def image_groups(truth: Truth, ground: tuple[Groups, ...], camera: Camera, shape
 
 
 def _members(truth: Truth, ground: tuple[Groups, ...]) -> tuple[Ints, Ints]:
-    """Rows of the members of all groups, group after group, and where each group begins (G + 1,), the end last."""
+    """Returns the indices of the truth's rows of all groups' members, group after group, frame after frame.
+
+    Also returns where each of the G groups begins in them, shape (G + 1,), the end last. ground: Groups of each frame.
+    """
     starts = np.searchsorted(truth.frame, np.arange(1, len(ground) + 1))
     rows, sizes = [np.zeros(0, np.int64)], [0]
     for index, (start, groups) in enumerate(zip(starts, ground, strict=True), start=1):
@@ -54,7 +57,10 @@ def _members(truth: Truth, ground: tuple[Groups, ...]) -> tuple[Ints, Ints]:
 
 
 def _means(values: Array, cuts: Ints) -> Array:
-    """Mean (G, ...) of the values of each group's rows."""
+    """Returns the mean (G, ...) of values (R, ...) over each group's rows; empty if there is no group.
+
+    cuts (G + 1,): index at which each group begins, the end last.
+    """
     count = np.diff(cuts).reshape(-1, *[1] * (values.ndim - 1))
     return np.asarray(np.add.reduceat(values, cuts[:-1], axis=0) / count) if len(count) else values[:0]
 
@@ -62,8 +68,9 @@ def _means(values: Array, cuts: Ints) -> Array:
 def hulls(ellipses: Outlines, cuts: Ints) -> list[Array]:
     """Returns the convex hull (V, 2) of each group of silhouettes, px, counter-clockwise in (u, v).
 
-    ellipses: of all members, group after group; cuts (G + 1,): where each group begins, the end last. A group with a
-    silhouette that is nan gets an empty hull (0, 2).
+    ellipses: outlines of body and head of all members, group after group. cuts (G + 1,): index of the member at which
+    each group begins, the end last. A group with a silhouette that is nan, or without members, gets an empty hull (0,
+    2).
     """
     from sim.geometry import hull_kernels
 
@@ -73,6 +80,9 @@ def hulls(ellipses: Outlines, cuts: Ints) -> list[Array]:
 
 
 def image_velocities(camera: Camera, middle: Array, vel: Array) -> Array:
-    """Returns the velocities (N, 2) in px/s of points (N, 3), m, that move at vel (N, 2), m/s, over level ground."""
+    """Returns the velocities (N, 2) in px/s in the image of points middle (N, 3), m, that move at vel (N, 2), m/s.
+
+    They move at constant height. nan where the camera does not project the point, for example behind it.
+    """
     step = INSTANT * np.column_stack([vel, np.zeros(len(vel))])
     return np.asarray((project(camera, middle + step)[0] - project(camera, middle - step)[0]) / (2 * INSTANT))

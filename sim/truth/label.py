@@ -18,15 +18,18 @@ from sim.types import Camera, GroupEvent, Groups, Ints, Motion, Truth
 
 
 def bodies(motion: Motion, camera: Camera | None) -> Truth:
-    """Returns positions, boxes and visibility of every person in every frame; group is -1, groups and events are None.
+    """Returns a Truth with positions, boxes and visibility of every person in every frame, but without groups.
 
-    camera: None for no camera; boxes, truncation and visible boxes are then None, and visibility is 1.
+    group is -1 in every row; groups, events, near and labelled are None. camera None: no camera; boxes, truncation and
+    visible boxes are then None, visibility is 1 and px_per_m nan.
     """
     return _bodies(motion, camera, recorded_bodies(motion))
 
 
 def _bodies(motion: Motion, camera: Camera | None, people: RecordedBodies) -> Truth:
-    """`bodies`, with the rows and shapes of the people given."""
+    """Returns what `bodies` returns, with the rows and shapes of the people given by people =
+    recorded_bodies(motion).
+    """
     t, p = people.frame - 1, people.id - 1
     seen = None if camera is None else measure_visibility(
         camera, motion.scene, people.frame, people.pos3, motion.height[p], people.shapes
@@ -53,9 +56,10 @@ def _bodies(motion: Motion, camera: Camera | None, people: RecordedBodies) -> Tr
 
 
 def label(motion: Motion, camera: Camera | None) -> Truth:
-    """Returns the whole truth: `bodies`, and groups, events and hard negatives measured from motion and intent.
+    """Returns the whole Truth: bodies, and groups, events and hard negatives measured from motion and intent.
 
-    camera: None for no camera; there are then no groups in the image.
+    All frames count as labelled. camera None: no camera; there are then no boxes and no groups in the image, visibility
+    is 1 and px_per_m nan.
     """
     from sim.truth.merge_split_events import groups_and_events
 
@@ -74,7 +78,10 @@ def label(motion: Motion, camera: Camera | None) -> Truth:
 
 
 def _events(motion: Motion, group: Ints, changes: tuple[GroupEvent, ...]) -> tuple[GroupEvent, ...]:
-    """The events of group membership together with crossings and queues, sorted by start, end, kind and members."""
+    """Returns the events `changes` (merge, split, form, dissolve, enter, leave) together with crossings and queues.
+
+    group (T, P): group id of each person, -1 = alone or absent. Sorted by start, end, kind, members and groups after.
+    """
     from sim.truth.crossing_events import crossings
     from sim.truth.queue_detection import queues
 
@@ -85,7 +92,9 @@ def _events(motion: Motion, group: Ints, changes: tuple[GroupEvent, ...]) -> tup
 
 
 def _ground_groups(truth: Truth) -> Iterator[Groups]:
-    """The groups of each frame on the ground."""
+    """Yields the Groups on the ground of frame 1, 2, … in turn; the truth must have pos and vel, else
+    AssertionError.
+    """
     from sim.truth.group_hulls import frame_groups
 
     assert truth.pos is not None

@@ -20,10 +20,11 @@ from sim.types import Array, Bools, GroupEvent, Ints, Near
 
 @dataclass(frozen=True, slots=True, eq=False)
 class GroupsAndEvents:
-    """What is measured of groups.
+    """What is measured of the groups in a motion of T frames and P people.
 
-    group (T, P): id of each person's group, from 1; -1 for a person who is alone or absent. events: of all kinds but
-    cross and queue, in order of their frames. near: pairs of strangers who satisfy the merge rule (hard negatives).
+    - group (T, P): id of each person's group, from 1; -1 for a person who is alone or absent.
+    - events: all kinds but cross and queue, in order of the frame in which the group changed.
+    - near: pairs of people who satisfy the merge rule but are strangers (hard negatives).
     """
 
     group: Ints
@@ -32,13 +33,14 @@ class GroupsAndEvents:
 
 
 def groups_and_events(pos: Array, vel: Array, present: Bools, intent: Ints, fps: float) -> GroupsAndEvents:
-    """Returns the groups, events and near strangers of a motion.
+    """Returns the group ids, the events (all kinds but cross and queue) and the near strangers of a motion.
 
-    pos, vel (T, P, 2): m, m/s; present (T, P); intent (T, P): index of the group a person is meant to belong to. pos
-    and vel are nan, intent is -1 where a person is absent. The id of a person is the column + 1.
+    pos, vel (T, P, 2): m, m/s. present (T, P): flags. intent (T, P): index of the group a person is meant to belong to.
+    pos and vel are nan, intent is -1 where a person is absent. The id of a person is the column + 1; frames of events
+    count from 1.
 
     A merge, split, form or dissolve event starts in the first frame in which its rule holds, and ends when the rule has
-    held for HOLD_TIME. An enter event lies in the group's first frame, a leave event in the last frame before the
+    held for HOLD_TIME (2 s). An enter event lies in the group's first frame, a leave event in the last frame before the
     change. Groups that are there in frame 1 have no enter event.
     """
     group = np.full(present.shape, -1, np.int64)
@@ -55,7 +57,11 @@ def groups_and_events(pos: Array, vel: Array, present: Bools, intent: Ints, fps:
 
 
 def _event(change: GroupChange, t: int, hold: int, pos: Array) -> GroupEvent:
-    """The event of a change in frame t (from 0); its position is the mean of its people in its first frame."""
+    """Returns the event of a change in frame t, which counts from 0; `members` of the change are columns.
+
+    hold: length in frames of all kinds but enter and leave (one frame). pos (T, P, 2): m, nan while absent. The event's
+    position is the mean of its people who are present in its first frame.
+    """
     start = t if change.kind == "leave" else t + 1
     end = start if change.kind in ("enter", "leave") else start + hold - 1
     x, y = mean_of_present(pos[start - 1 : start, list(change.members)])[0]

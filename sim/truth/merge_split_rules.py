@@ -21,14 +21,16 @@ HOLD_TIME = 2.0  # s for which either rule must hold
 
 
 def frames_of(seconds: float, fps: float) -> int:
-    """Returns the number of frames that last `seconds`, rounded up; at least 1."""
+    """Returns the number of frames that last `seconds` at fps frames per s, rounded up; at least 1."""
     return max(1, math.ceil(seconds * fps - 1e-9))
 
 
 def holds_for(holds: Bools, frames: int) -> Bools:
-    """Returns True in each frame from which `holds` (T, ...) is True for `frames` frames, that frame included.
+    """Returns for each frame whether `holds` (T, ...) is True in it and the next frames - 1 frames, same shape as
+    `holds`.
 
-    The last frames - 1 frames are always False: a stretch that the end of the recording cuts off does not count.
+    The last frames - 1 frames are always False: a stretch that the end of the recording cuts off does not count. With
+    fewer than `frames` frames all are False.
     """
     if len(holds) < frames:
         return np.zeros_like(holds)
@@ -40,9 +42,9 @@ def holds_for(holds: Bools, frames: int) -> Bools:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Separation:
-    """How far apart two parts of a crowd are in each frame.
+    """How far apart two parts of a crowd are in each of T frames.
 
-    distance (T,): m between the nearest members; velocity_difference (T,): length in m/s of the difference of the mean
+    distance (T,): m between the nearest members. velocity_difference (T,): length in m/s of the difference of the mean
     velocities. Both are inf in frames in which a part is absent.
     """
 
@@ -50,23 +52,28 @@ class Separation:
     velocity_difference: Array
 
     def merge_rule(self) -> Bools:
-        """Returns True (T,) in each frame in which the parts are close enough, and alike enough in velocity, to
-        merge.
+        """Returns for each frame whether the merge rule holds, shape (T,).
+
+        It holds if the nearest members are less than 1.5 m apart and the mean velocities differ by less than 0.5 m/s;
+        not if a part is absent.
         """
         return (self.distance < MERGE_DISTANCE) & (self.velocity_difference < MERGE_VELOCITY)
 
     def split_rule(self) -> Bools:
-        """Returns True (T,) in each frame in which the parts are far enough apart to split; False if a part is
-        absent.
+        """Returns for each frame whether the split rule holds, shape (T,).
+
+        It holds if the nearest members are more than 2.5 m apart, or more than 1.5 m with mean velocities that differ
+        by more than 0.7 m/s; not if a part is absent.
         """
         leaving = (self.distance > MERGE_DISTANCE) & (self.velocity_difference > SPLIT_VELOCITY)
         return np.isfinite(self.distance) & ((self.distance > SPLIT_DISTANCE) | leaving)
 
 
 def separation(pos: Array, vel: Array, a: Ints, b: Ints) -> Separation:
-    """Returns the separation of the people in columns a from those in columns b.
+    """Returns the distance and velocity difference, in each frame, between the people in columns a and those in columns
+    b.
 
-    pos, vel (T, P, 2): m, m/s, nan where absent. Absent members are left out.
+    pos, vel (T, P, 2): m, m/s, nan while absent. Absent members are left out; both values are inf if a part has nobody.
     """
     gap2 = ((pos[:, a, None] - pos[:, None, b]) ** 2).sum(axis=-1).reshape(len(pos), -1)
     gap2 = np.where(np.isnan(gap2), np.inf, gap2).min(axis=1, initial=np.inf)
@@ -75,9 +82,9 @@ def separation(pos: Array, vel: Array, a: Ints, b: Ints) -> Separation:
 
 
 def mean_of_present(values: Array) -> Array:
-    """Returns the mean (T, 2) of values (T, K, 2) over the K people who are present; nan where none is.
+    """Returns the mean (T, 2) of values (T, K, 2) over those of the K people who are present; nan if none is.
 
-    A person with a nan counts as absent.
+    A person with a nan or inf value counts as absent in that frame.
     """
     there = np.isfinite(values.sum(axis=-1))
     total = np.where(there[..., None], values, 0.0).sum(axis=1)

@@ -31,10 +31,11 @@ WORDS = {
 
 
 def check_orders(motion: Motion, truth: Truth) -> dict[str, int]:
-    """Returns for each order id the index in `truth.events` of the event that fulfils it.
+    """Returns for each order id the index in `truth.events` of the event that fulfils the order.
 
-    Raises WorkError for the first order that no event fulfils, and for a queue that people left in another order than
-    they stood in. The error says how close the motion came to the rule.
+    Raises WorkError for the first order, in the script's order, that no event fulfils; the error says how close the
+    motion came to the rule. Raises WorkError for a queue whose people did not all leave from the same end. A motion
+    without orders gives {}.
     """
     group = dense_groups(truth, motion.present.shape)
     fulfilled = {}
@@ -49,7 +50,10 @@ def check_orders(motion: Motion, truth: Truth) -> dict[str, int]:
 
 
 def _check_fifo(order: Order, motion: Motion, event: GroupEvent) -> None:
-    """Raises WorkError if the people of a queue did not leave it first in, first out."""
+    """Raises WorkError if the people of the queue that is `event` did not all leave it from the same end.
+
+    Does nothing if no queue detected in the motion has the event's frames and members.
+    """
     for queue in detect_queues(motion.pos, motion.vel, motion.present, motion.fps):
         people = {p + 1 for p in queue.order}
         if (queue.first + 1, queue.last + 1) == (event.start, event.end) and people == set(event.members):
@@ -64,7 +68,7 @@ def _check_fifo(order: Order, motion: Motion, event: GroupEvent) -> None:
 
 
 def dense_groups(truth: Truth, shape: tuple[int, ...]) -> Ints:
-    """Returns the group id of each person in each frame, of shape (T, P): -1 = alone, -2 = absent."""
+    """Returns the group id of each person in each frame, shape (T, P): -1 = alone, -2 = absent. shape: (T, P)."""
     group = np.full(shape, -2, np.int64)
     group[truth.frame - 1, truth.id - 1] = truth.group
     return group
@@ -73,7 +77,9 @@ def dense_groups(truth: Truth, shape: tuple[int, ...]) -> Ints:
 def fulfilment(order: Order, truth: Truth, group: Ints) -> int | None:
     """Returns the index in `truth.events` of the first event that fulfils an order, None if no event does.
 
-    group (T, P): result of `dense_groups`. An order that never fired is not fulfilled.
+    group (T, P): group ids, -1 = alone, -2 = absent. The event has the right kind and people. It starts no earlier than
+    the order fired, and so that its rule has held long enough within PATIENCE (10 s) of the firing. An order that never
+    fired is not fulfilled; nor is any order if the truth has no events.
     """
     if order.fired is None:
         return None
@@ -85,10 +91,11 @@ def fulfilment(order: Order, truth: Truth, group: Ints) -> int | None:
 
 
 def _concerns(event: GroupEvent, order: Order, group: Ints) -> bool:
-    """True if an event of the right kind and time does what the order says.
+    """Returns True if an event of the right kind and time has the people and the effect that the order asks for.
 
-    Queue: at least QUEUE_PEOPLE of the order's people, or all if they are fewer, are members. Merge and split: the
-    event has some of the order's people, and its first frame, but not the frame before, shows the order's groups.
+    Queue: at least 3 (QUEUE_PEOPLE) of the order's people, or all if they are fewer, are members. Merge and split: one
+    of the order's people is a member, and the groups that the order plans exist in the event's first frame but not in
+    the frame before. group (T, P): group ids, -1 = alone, -2 = absent.
     """
     if order.kind == "queue":
         people = {p for part in order.before for p in part}
@@ -101,18 +108,27 @@ def _concerns(event: GroupEvent, order: Order, group: Ints) -> bool:
 
 
 def _together(wanted: list[Ints], group: Ints) -> bool:
-    """True if the people of each part are in one group; a part of one person always is."""
+    """Returns True if the people of each part are in one group; a part of one person always is.
+
+    wanted: columns of each part. group (P,): group ids in one frame, negative = alone or absent.
+    """
     return all(group[w[0]] >= 0 and bool((group[w] == group[w[0]]).all()) for w in wanted if len(w) > 1)
 
 
 def _apart(wanted: list[Ints], group: Ints) -> bool:
-    """True if no group has people of two parts."""
+    """Returns True if no group has people of two parts; people alone or absent are ignored.
+
+    wanted: columns of each part. group (P,): group ids in one frame, negative = alone or absent.
+    """
     ids = [set(group[w][group[w] >= 0].tolist()) for w in wanted]
     return sum(map(len, ids)) == len(set().union(*ids))
 
 
 def _unfulfilled(order: Order, motion: Motion, length: int) -> WorkError:
-    """The error of an order that no event fulfils; length: frames of the recording."""
+    """Returns, without raising it, the WorkError for an order that no event fulfils.
+
+    It says that the order never fired, or how close the motion came to its rule. length: frames of the recording.
+    """
     place = f"event {order.id} (seed {motion.seed})"
     if order.fired is None:
         return WorkError(
@@ -132,10 +148,13 @@ def _unfulfilled(order: Order, motion: Motion, length: int) -> WorkError:
 
 
 def closest(order: Order, motion: Motion, window: slice) -> str:
-    """Returns in words how close the motion came to an order's rule within a window of frames.
+    """Returns in words how close the motion came to an order's rule within a window (slice) of frames that count from
+    0.
 
-    Queue: the greatest number of people who waited at once. Merge: the smallest distance; split: the greatest distance;
-    both with the velocity difference at that time.
+    Queue: the greatest number of people who waited at once, and the longest stretch with 3 of them. Merge: the smallest
+    distance of the most distant part from the others. Split: the greatest distance of the nearest part from the others.
+    Both with the velocity difference at that time. Says so if the window is empty or the parts were never there
+    together.
     """
     pos, vel, present = motion.pos[window], motion.vel[window], motion.present[window]
     if not len(pos):
@@ -159,16 +178,18 @@ def closest(order: Order, motion: Motion, window: slice) -> str:
 
 
 def _longest(holds: Bools) -> int:
-    """Number of frames of the longest stretch of True in holds (T,)."""
+    """Returns the number of frames of the longest stretch of True in holds (T,); 0 if there is none."""
     edges = np.flatnonzero(np.diff(np.concatenate([[False], holds, [False]]).astype(np.int8)))
     return int((edges[1::2] - edges[::2]).max(initial=0))
 
 
 def _gaps(columns: list[Ints], pos: Array, vel: Array, present: Bools, widest: bool) -> tuple[Array, Array]:
-    """Distance in m of the nearest members, and velocity difference in m/s, of one part and all others, each (T,).
+    """Returns two arrays (T,) about one part and all other parts: distance of the nearest members, m; velocity
+    difference, m/s.
 
-    The part is chosen in each frame: that with the widest gap (`widest`, for merges) or the narrowest gap (for splits).
-    nan where nobody to compare is present.
+    In each frame the part with the widest gap is taken (`widest`, for merges) or the one with the narrowest gap (for
+    splits). nan where no two parts are present. columns: of the people of each part. pos, vel (T, P, 2): m, m/s, nan
+    while absent. present (T, P): flags.
     """
     gaps, differences = [], []
     for i, a in enumerate(columns):
@@ -183,7 +204,7 @@ def _gaps(columns: list[Ints], pos: Array, vel: Array, present: Bools, widest: b
 
 
 def _mean_velocity(vel: Array, present: Bools, columns: Ints) -> Array:
-    """Mean velocity (T, 2) of the people in these columns who are present, m/s; nan where none is."""
+    """Returns the mean velocity (T, 2), m/s, of the people in these columns who are present; nan if none is."""
     n = present[:, columns].sum(axis=1)[:, None]
     total = np.where(present[:, columns, None], vel[:, columns], 0.0).sum(axis=1)
     return np.where(n > 0, total / np.maximum(n, 1), np.nan)

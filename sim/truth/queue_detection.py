@@ -32,12 +32,15 @@ Vector = tuple[float, float]
 
 @dataclass(frozen=True, slots=True)
 class DetectedQueue:
-    """A queue.
+    """A queue found in measured motion. People are columns (person id - 1).
 
-    first, last: frames from 0; order: columns of its members from one end of the line to the other (either end may be
-    the head), people who joined later being inserted between those they stood between; left: members who left before
-    the end, in the order of leaving; middle: of the line in its first moment, m; fifo: True if everyone who left did
-    so from the same end of the line; a person may leave up to MEMBER_TIME before people nearer to that end.
+    - first, last: frames from 0, both inclusive.
+    - order: members from one end of the line to the other; either end may be the head. People who joined later are
+      inserted between those they stood between. Empty if nobody was in line for MEMBER_TIME (1 s).
+    - left: members who left before the end, in the order of leaving.
+    - middle: x, y of the line's middle when it was first followed, m; this may be before frame `first`.
+    - fifo: True if everyone who left did so from the same end of the line. A person may leave up to MEMBER_TIME before
+      people nearer to that end.
     """
 
     first: int
@@ -50,10 +53,10 @@ class DetectedQueue:
 
 @dataclass(frozen=True, slots=True)
 class _LineNow:
-    """A line in frame t (from 0).
+    """A line of waiting people in frame t, which counts from 0.
 
-    order: columns from one end to the other; u: unit vector from the first person towards the last; middle: m; drift:
-    mean velocity of its people along u and to the left of it, m/s.
+    - order: columns (person id - 1) from one end to the other. u: unit vector from the first person towards the last.
+    - middle: x, y of their mean position, m. drift: their mean velocity along u and to the left of u, m/s.
     """
 
     t: int
@@ -63,17 +66,19 @@ class _LineNow:
     drift: Vector
 
     def turned(self) -> _LineNow:
-        """The same line with its ends exchanged."""
+        """Returns the same line with its ends exchanged: order, u and drift reversed."""
         return replace(self, order=self.order[::-1], u=(-self.u[0], -self.u[1]), drift=(-self.drift[0], -self.drift[1]))
 
 
 @dataclass
 class _FollowedLine:
-    """A line that is followed through time.
+    """A line of waiting people that is followed through time. Frames count from 0; people are columns (person id - 1).
 
-    State: `now`: the line when last seen; `since`: the first frame with QUEUE_PEOPLE, and `three`: the last such frame;
-    `middle`: in the first frame; by person: `seen`: number of moments in the line, `gone`: the line in the last of
-    these; `ranks`: all people in order; `drift`: sum of the drifts over `moments` moments.
+    - now: the line when last seen. since, three: first and last frame with at least 3 people (QUEUE_PEOPLE).
+    - middle: x, y of the line in the frame in which following began, m.
+    - seen: by person, number of moments in the line. gone: by person, the line in the last of these moments.
+    - ranks: all people seen, in order along the line.
+    - drift: sum over `moments` moments of the velocity along the line and to its left, m/s.
     """
 
     now: _LineNow
@@ -88,16 +93,17 @@ class _FollowedLine:
 
 
 def queues(pos: Array, vel: Array, present: Bools, group: Ints, fps: float) -> list[GroupEvent]:
-    """Returns a queue event for each queue, in order of their first frames.
+    """Returns a queue event for each queue, in order of first and last frame.
 
-    pos, vel (T, P, 2): m, m/s; present (T, P); group (T, P): group ids, -1 = alone. A queue is a line (queue_shapes) of
-    waiting people that has QUEUE_PEOPLE for at least QUEUE_TIME. Waiting means slower than WAITING_SPEED, except when
-    advancing.
+    pos, vel (T, P, 2): m, m/s. present (T, P): flags. group (T, P): group ids, -1 = alone. A person with a nan position
+    counts as absent. A queue is a line of waiting people (see queue_shapes) that has 3 people (QUEUE_PEOPLE) for at
+    least QUEUE_TIME (3 s); a line may be lost for 1.5 s. Waiting means slower than WAITING_SPEED (0.4 m/s), except when
+    advancing. A line that moves sideways, faster than 0.1 m/s and than along itself, is no queue.
 
-    The event starts in the first frame with QUEUE_PEOPLE and ends when fewer than two are left in line. Its members are
-    all people who were in line for MEMBER_TIME; a queue without one gives no event. Its position is the middle of the
-    line in the first frame. before, after: sorted ids of the members' groups in the first and last frame, -1 once for
-    each member alone. The id of a person is the column + 1; frames count from 1.
+    The event starts in the first frame with 3 people and ends in the last frame with two in line. Its members are all
+    people who were in line for MEMBER_TIME (1 s); a queue without a member gives no event. Its position is the middle
+    of the line when it was first followed. before, after: sorted ids of the groups of the members present in the first
+    and last frame, -1 once for each member alone. The id of a person is the column + 1; frames of events count from 1.
     """
     found = []
     for q in detect_queues(pos, vel, present, fps):
@@ -111,12 +117,18 @@ def queues(pos: Array, vel: Array, present: Bools, group: Ints, fps: float) -> l
 
 
 def _groups_of(label: Ints) -> tuple[int, ...]:
-    """Ascending ids of the groups among people's labels; -1 once for each person alone."""
+    """Returns the ids of the groups among label (K,), the group ids of K people: -1 once for each negative label, then
+    each id once, ascending.
+    """
     return (-1,) * int((label < 0).sum()) + tuple(np.unique(label[label >= 0]).tolist())
 
 
 def detect_queues(pos: Array, vel: Array, present: Bools, fps: float) -> list[DetectedQueue]:
-    """Returns all queues, sorted by first frame, last frame and members; arguments as for `queues`."""
+    """Returns all queues, sorted by first frame, last frame and members, also queues without members (empty `order`).
+
+    pos, vel (T, P, 2): m, m/s. present (T, P): flags. A person with a nan position counts as absent. At most about 10
+    frames per second (MAX_RATE) are examined.
+    """
     there = present & np.isfinite(pos).all(axis=2)
     stride = max(1, round(fps / MAX_RATE))
     hold, bridge = frames_of(QUEUE_TIME, fps), max(frames_of(BRIDGE_TIME, fps), stride)
@@ -133,10 +145,10 @@ def detect_queues(pos: Array, vel: Array, present: Bools, fps: float) -> list[De
 
 
 def waiting_people(vel: Array, there: Bools, fps: float) -> Bools:
-    """Returns True (T, P) for each person who waits.
+    """Returns for each person and frame whether the person waits, shape (T, P); False while absent.
 
-    A person waits who is slower than WAITING_SPEED, or was and will be with at most ADVANCE_TIME between. vel (T, P,
-    2): m/s; there (T, P): the person is present.
+    A person waits who is slower than WAITING_SPEED (0.4 m/s), or who was and will be so at two times at most
+    ADVANCE_TIME (3 s) apart. vel (T, P, 2): m/s. there (T, P): the person is present.
     """
     with np.errstate(invalid="ignore"):
         slow = there & (np.hypot(vel[..., 0], vel[..., 1]) < WAITING_SPEED)
@@ -149,9 +161,11 @@ def waiting_people(vel: Array, there: Bools, fps: float) -> Bools:
 
 
 def _lines(pos: Array, vel: Array, waits: Bools, stride: int) -> list[_LineNow]:
-    """The lines of every `stride`-th frame, ordered by time.
+    """Returns the lines of waiting people in every `stride`-th frame from frame 0, ordered by frame, then by least
+    column.
 
-    A line of two people is left out unless each of them is in a line of QUEUE_PEOPLE in some frame.
+    pos, vel (T, P, 2): m, m/s. waits (T, P): the person waits. A line of two people is left out unless each of them is
+    in a line of 3 (QUEUE_PEOPLE) or more in some examined frame.
     """
     t, p = np.nonzero(waits[::stride])
     i, j = close_pairs(t, pos[t * stride, p], MAX_SPACING)
@@ -168,7 +182,11 @@ def _lines(pos: Array, vel: Array, waits: Bools, stride: int) -> list[_LineNow]:
 
 
 def _of_table(c: QueueShapes, t: Ints, p: Ints, vel: Array, kept: Bools) -> Iterator[_LineNow]:
-    """The lines of a table that are `kept` (M,); t, p: frame and column of each place."""
+    """Yields those lines of the table c whose flag in kept (M,) is True.
+
+    t, p: frame (from 0) and column of the person in each row that c.rows refers to. vel (T, P, 2): m/s; nan counts as
+    0.
+    """
     within = np.arange(c.rows.shape[1]) < c.count[:, None]
     mean = np.where(within[..., None], np.nan_to_num(vel[t[c.rows], p[c.rows]]), 0.0).sum(axis=1) / c.count[:, None]
     along, aside = (mean * c.u).sum(axis=1), mean[:, 1] * c.u[:, 0] - mean[:, 0] * c.u[:, 1]
@@ -179,10 +197,11 @@ def _of_table(c: QueueShapes, t: Ints, p: Ints, vel: Array, kept: Bools) -> Iter
 
 
 def _follow(following: list[_FollowedLine], now: _LineNow, hold: int, bridge: int) -> None:
-    """Adds a line to the followed line with most of its people, or follows it as a new one.
+    """Adds the line `now` to the line in `following` that shares most people with it, or appends it as a new one.
 
-    A followed line fits if it shares at least two people with the line, in the same order. A line of fewer than
-    QUEUE_PEOPLE that fits none is dropped.
+    A followed line fits if it was last seen earlier and shares at least two people, in the same order. A line of fewer
+    than 3 people (QUEUE_PEOPLE) that fits none is dropped. hold: frames for which a queue needs 3 people. bridge:
+    frames for which it may have fewer before `hold` is reached; the record then starts anew.
     """
     people, long = set(now.order), len(now.order) >= QUEUE_PEOPLE
     fits = [f for f in following if f.now.t < now.t and len(people.intersection(f.now.order)) > 1]
@@ -210,13 +229,15 @@ def _dot(a: Vector, b: Vector) -> float:
 
 
 def _same_order(before: _LineNow, now: _LineNow) -> bool:
-    """True if the people whom both lines share stand in the same order."""
+    """Returns True if the people who are in both lines stand in the same order, whichever end each line starts from."""
     order = now.order if _dot(before.u, now.u) >= 0 else now.order[::-1]
     return [p for p in order if p in before.order] == [p for p in before.order if p in order]
 
 
 def _record_people(f: _FollowedLine) -> None:
-    """Counts the people in line now, and inserts new people behind those who stand before them."""
+    """Counts the people of f.now in `seen` and `gone`, and inserts new people in `ranks` behind all who stand before
+    them.
+    """
     for k, p in enumerate(f.now.order):
         f.seen[p] = f.seen.get(p, 0) + 1
         f.gone[p] = f.now
@@ -226,7 +247,12 @@ def _record_people(f: _FollowedLine) -> None:
 
 
 def _finished(f: _FollowedLine, hold: int, stride: int, fps: float) -> list[DetectedQueue]:
-    """The queue that a followed line was; empty if it was too short or moved sideways."""
+    """Returns the queue that a followed line was, as a list of one; [] if it was too short or moved sideways.
+
+    Too short: the first and last frame with 3 people are less than `hold` - `stride` frames apart. Sideways: faster
+    than 0.1 m/s, and faster than along itself. stride: frames between two moments. People in line for less than 1 s are
+    no members.
+    """
     along, aside = (abs(v) / f.moments for v in f.drift)
     if f.three - f.since + stride < hold or (aside > SIDEWAYS_SPEED and aside > along):
         return []
@@ -236,7 +262,10 @@ def _finished(f: _FollowedLine, hold: int, stride: int, fps: float) -> list[Dete
 
 
 def _from_one_end(f: _FollowedLine, left: list[int], late: float) -> bool:
-    """True if everyone who left did so from the same end: people beyond them left at most `late` frames later."""
+    """Returns True if all people in `left` left the followed line from the same end.
+
+    For a person who left, all people between that person and the end must have left at most `late` frames later.
+    """
 
     def stay(p: int, beyond: tuple[int, ...]) -> bool:
         return any(f.gone[q].t > f.gone[p].t + late for q in beyond)

@@ -28,10 +28,10 @@ MAX_CELLS = 2_000_000  # numbers handled together: bounds memory
 
 @dataclass(frozen=True, slots=True, eq=False)
 class QueueShapes:
-    """M lines of people.
+    """M lines of people who stand behind one another.
 
-    rows (M, n): rows of the people in order, of which the first `count` (M,) count; u (M, 2): unit vector along the
-    line from the first person towards the last; middle (M, 2): mean position, m.
+    - rows (M, n): row numbers of the people, in order along the line; only the first count (M,) of each are valid.
+    - u (M, 2): unit vector along the line from the first person towards the last. middle (M, 2): mean position, m.
     """
 
     rows: Ints
@@ -41,11 +41,12 @@ class QueueShapes:
 
 
 def queue_shapes(pos: Array, i: Ints, j: Ints) -> Iterator[QueueShapes]:
-    """Yields the lines of all crowds, at most one for each crowd, crowds of equal size together.
+    """Yields tables of the lines of all crowds, at most one line for each crowd; a table holds crowds of equal size.
 
-    pos (N, 2): m; i, j (K,): pairs of rows that stand close to each other. A crowd is a connected set of two or more
-    rows. The line holds the whole crowd if that passes the tests, else the longest line of at least three people and
-    MIN_CROWD_SHARE of the crowd.
+    pos (N, 2): m. i, j (K,): pairs of rows that stand close to each other. A crowd is a set of two or more rows
+    connected by such pairs. The line holds the whole crowd if that passes the three tests: spacing 0.4 to 1.5 m along
+    the straight line, at most 0.5 m off it, turns of at most 60°. Else it is the longest line of at least three people
+    and two thirds of the crowd that passes them, if any. A table may be empty.
     """
     for crowd in _crowds(len(pos), i, j):
         portion = max(1, MAX_CELLS // crowd.shape[1] ** 3)
@@ -58,7 +59,10 @@ def queue_shapes(pos: Array, i: Ints, j: Ints) -> Iterator[QueueShapes]:
 
 
 def _crowds(people: int, i: Ints, j: Ints) -> Iterator[Ints]:
-    """Rows (C, n) of the C connected crowds of n > 1 people, for each n."""
+    """Yields for each size n > 1, ascending, the rows (C, n) of the C crowds of n people.
+
+    people: number of rows. i, j (K,): pairs of rows that stand close; a crowd is a set of rows that pairs connect.
+    """
     from scipy.sparse import coo_array
     from scipy.sparse.csgraph import connected_components
 
@@ -72,9 +76,11 @@ def _crowds(people: int, i: Ints, j: Ints) -> Iterator[Ints]:
 
 
 def _best(p: Array) -> tuple[Ints, Ints]:
-    """Order (C, n) and length (C,) of the line in each crowd p (C, n, 2), 0 where there is none.
+    """Returns the order (C, n) of the people along the line in each crowd, and the number of people in the line (C,).
 
-    Of several lines in a crowd the longest is taken, then the one with the smallest squared distances from it.
+    The number is 0 for a crowd without a line; only that many entries of the order are valid. p (C, n, 2): positions,
+    m. Unless the whole crowd is a line, the longest line is taken; of several, the one with the smallest squared
+    distances.
     """
     n = p.shape[1]
     whole_crowd = np.full(len(p), n)
@@ -92,10 +98,11 @@ def _best(p: Array) -> tuple[Ints, Ints]:
 
 
 def _axes(p: Array, count: Ints) -> tuple[Array, Array, Array]:
-    """The straight line that fits each set of positions p (M, n, 2) best.
+    """Returns the straight line that fits each of M sets of positions best (least squared distances).
 
-    Returns its unit vector (M, 2), from the first position towards the last; the middles (M, 2), m; the root of the sum
-    of squared distances from it (M,), m.
+    Three arrays: its unit vector (M, 2), from the first position towards the last; the mean position (M, 2), m; the
+    root of the sum of squared distances from the line (M,), m. p (M, n, 2): positions, m, of which the first count (M,)
+    are valid.
     """
     within = np.arange(p.shape[1]) < count[:, None]
     middle = np.where(within[..., None], p, 0.0).sum(axis=1) / count[:, None]
@@ -110,7 +117,11 @@ def _axes(p: Array, count: Ints) -> tuple[Array, Array, Array]:
 
 
 def _fits(p: Array, count: Ints) -> Bools:
-    """True (M,) for each set of positions p (M, n, 2) that passes the three tests."""
+    """Returns for each of M ordered sets of positions whether it passes the three tests of a line, shape (M,).
+
+    The tests: at most 0.5 m off the best straight line, neighbours 0.4 to 1.5 m apart along it, turns of at most 60°. p
+    (M, n, 2): m, of which the first count (M,) are valid.
+    """
     u, middle, _ = _axes(p, count)
     arm = p - middle[:, None]
     off = np.abs(u[:, None, 0] * arm[..., 1] - u[:, None, 1] * arm[..., 0])
@@ -122,22 +133,27 @@ def _fits(p: Array, count: Ints) -> Bools:
 
 
 def _steps_fit(along: Array) -> Bools:
-    """True (M, n - 1) where the spacing of neighbours fits; along (M, n): positions along the line, m."""
+    """Returns whether neighbours are 0.4 to 1.5 m apart, shape (M, n - 1); along (M, n): positions along
+    the line, m.
+    """
     steps = np.diff(along, axis=1)
     return np.asarray((steps >= MIN_SPACING) & (steps <= MAX_SPACING))
 
 
 def _turns_fit(p: Array) -> Bools:
-    """True (M, n - 2) where the direction turns by at most 60° at a position."""
+    """Returns whether the direction turns by at most 60° at each inner position, shape (M, n - 2); p (M, n, 2): m."""
     step = np.diff(p, axis=1)
     length = np.hypot(step[..., 0], step[..., 1])
     return np.asarray((step[:, :-1] * step[:, 1:]).sum(axis=2) >= MIN_TURN_COSINE * length[:, :-1] * length[:, 1:])
 
 
 def _lines_through_pairs(p: Array, least: int) -> tuple[Ints, Ints, Ints, Array]:
-    """Lines of `least` or more people in crowds p (C, n, 2), along the straight lines through two neighbours.
+    """Returns lines of `least` or more people in crowds p (C, n, 2), m: at most one for each two people 0.4 to 1.5 m
+    apart.
 
-    Returns for each line: crowd (M,), order (M, n), length (M,), root of the sum of squared distances from it (M,), m.
+    Each is sought along the straight line through the two. Four arrays for M lines: crowd (M,); order (M, n) of the
+    people in the crowd, of which the first `length` are valid; length (M,); root of the sum of squared distances (M,),
+    m.
     """
     i, j = np.triu_indices(p.shape[1], 1)
     crowd, seed = np.nonzero(_steps_fit(np.stack([np.zeros((len(p), len(i))), _lengths(p, i, j)], axis=1))[:, 0])
@@ -160,13 +176,18 @@ def _lines_through_pairs(p: Array, least: int) -> tuple[Ints, Ints, Ints, Array]
 
 
 def _lengths(p: Array, i: Ints, j: Ints) -> Array:
-    """Distances (C, K) of positions i and j in each crowd."""
+    """Returns the distances (C, K), m, between positions i and j (K,) of each crowd p (C, n, 2)."""
     step = p[:, j] - p[:, i]
     return np.hypot(step[..., 0], step[..., 1])
 
 
 def _longest(links: Bools) -> tuple[Ints, Ints]:
-    """Start and length (M,), in positions, of the longest run of linked positions; links (M, n - 1): k to k + 1."""
+    """Returns the start index (M,) and length (M,), in positions, of the longest run of linked positions in each of M
+    rows.
+
+    links (M, n - 1): True if position k is linked to position k + 1. Without links the start is 0 and the length 1. Of
+    equally long runs the first is taken.
+    """
     start, count, run = np.zeros(len(links), np.int64), np.ones(len(links), np.int64), np.ones(len(links), np.int64)
     for k in range(links.shape[1]):
         run = np.where(links[:, k], run + 1, 1)
