@@ -74,32 +74,34 @@ class FalseAlarms(Model):
     near: Share = Field(0.0, description="share of false alarms that move with a person (parts of a body, duplicates)")
     across: MeanAndSd = Field(
         (0.0, 0.3),
-        description="those at a person: middle relative to the person's middle: mean, standard deviation; box heights",
+        description="false alarms at a person: middle relative to the person's middle: mean, standard deviation; box heights",
     )
     foot: MeanAndSd = Field(
         (0.0, 0.2),
-        description="those at a person: lower edge below the person's lower edge: mean, standard deviation; "
+        description="false alarms at a person: lower edge below the person's lower edge: mean, standard deviation; "
         "box heights",
     )
     near_height: MeanAndSd = Field(
         (0.0, 0.3),
-        description="those at a person: logarithm of the height relative to the person's: mean, standard deviation",
+        description="false alarms at a person: logarithm of the height relative to the person's: mean, standard deviation",
     )
     height: MeanAndSd = Field(
         (0.0, 0.2),
-        description="all others: logarithm of the height relative to that of a person standing there: mean, "
+        description="other false alarms: logarithm of the height relative to that of a person standing there: mean, "
         "standard deviation",
     )
-    aspect: MeanAndSd = Field((-0.9, 0.2), description="all: logarithm of width / height: mean, standard deviation")
+    aspect: MeanAndSd = Field(
+        (-0.9, 0.2), description="all false alarms: logarithm of width / height: mean, standard deviation"
+    )
     drift: NonNegative = Field(
-        0.0, description="all others: standard deviation of the velocity along each axis, box heights per s"
+        0.0, description="other false alarms: standard deviation of the velocity along each axis, box heights per s"
     )
     jitter: NonNegative = Field(
-        0.0, description="all: standard deviation of each edge from frame to frame, box heights"
+        0.0, description="all false alarms: standard deviation of each edge from frame to frame, box heights"
     )
     at: tuple[tuple[Share, Share], ...] | None = Field(
         None,
-        description="all others: possible foot points x, y as shares of image width and of the rows below the "
+        description="other false alarms: possible foot points x, y as shares of image width and of the rows below the "
         "ground's furthest row; absent: anywhere",
     )
 
