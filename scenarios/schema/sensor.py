@@ -74,7 +74,8 @@ class FalseAlarms(Model):
     near: Share = Field(0.0, description="share of false alarms that move with a person (parts of a body, duplicates)")
     across: MeanAndSd = Field(
         (0.0, 0.3),
-        description="false alarms at a person: middle relative to the person's middle: mean, standard deviation; box heights",
+        description="false alarms at a person: middle relative to the person's middle: mean, standard deviation; "
+        "box heights",
     )
     foot: MeanAndSd = Field(
         (0.0, 0.2),
@@ -83,7 +84,8 @@ class FalseAlarms(Model):
     )
     near_height: MeanAndSd = Field(
         (0.0, 0.3),
-        description="false alarms at a person: logarithm of the height relative to the person's: mean, standard deviation",
+        description="false alarms at a person: logarithm of the height relative to the person's: mean, "
+        "standard deviation",
     )
     height: MeanAndSd = Field(
         (0.0, 0.2),
