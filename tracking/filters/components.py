@@ -33,10 +33,11 @@ from tracking.filters import ellipse_overlap_kernels
 
 @dataclass(frozen=True)
 class Constraint:
-    """The rule by which points are one group; lengths in the points' unit.
+    """The rule by which points are one group; lengths in the points' unit (m or px).
 
-    link: 2 r, largest distance of linked points. gate: squared Mahalanobis radius of a search region. prior (2, 2): S0,
-    the covariance to which S is shrunk. strength: n0, the weight of S0. least: a component of less weight is noise.
+    link: 2 r, largest distance of linked points. gate: squared Mahalanobis radius of a component's search region. prior
+    (2, 2): S0, the covariance to which a component's covariance S is shrunk. strength: n0, the weight of S0, in units
+    of the points' weights. least: a component whose points have less total weight is noise; 0 (default): none is.
     """
 
     link: float
@@ -47,19 +48,25 @@ class Constraint:
 
     @property
     def prior_entries(self) -> Array:
-        """Entries xx, xy, yy of the prior, (3,)."""
+        """Entries xx, xy, yy of the prior covariance, (3,), squared unit of the points."""
         return np.array([self.prior[0, 0], self.prior[0, 1], self.prior[1, 1]])
 
 
 def linked(points: Array, link: float) -> Ints:
-    """Returns G_0: the component of each point (M, 2), as (M,) numbers in the order of first points."""
+    """Returns the component of each point, (M,), numbered 0, 1, … in the order of the components' first points.
+
+    points (M, 2): x, y. Two points are in one component if they are at most `link` apart, directly or through other
+    points (G_0). No points give an empty array.
+    """
     return kernels.components(points, np.ones(len(points)), link)[0]
 
 
 def partition(points: Array, weights: Array, rule: Constraint) -> Ints:
-    """Returns G_y: the group of each point (M, 2), as (M,) numbers in the order of first points; -1 for noise.
+    """Returns the group of each point, (M,), numbered 0, 1, … in the order of the groups' first points; -1 for noise.
 
-    weights (M,): of the points.
+    points (M, 2): x, y; weights (M,): people that each point stands for. rule: linked points are components; components
+    of less than the least weight are noise; components whose search regions overlap are one group (G_y). No points give
+    an empty array.
     """
     label, sums = kernels.components(points, weights, rule.link)
     parts = np.flatnonzero(sums[:, kernels.WEIGHT] >= rule.least)
@@ -71,9 +78,12 @@ def partition(points: Array, weights: Array, rule: Constraint) -> Ints:
 
 
 def prefixes(points: Array, weights: Array, start: int, rule: Constraint) -> Bools:
-    """Returns whether the first start, start + 1, … M points satisfy the group constraint, (M - start + 1,).
+    """Returns flags (M - start + 1,): True if the first start, start + 1, … M points satisfy the group constraint
+    `rule`.
 
-    points (M, 2), weights (M,). False for no point, and where all components are noise.
+    points (M, 2): x, y; weights (M,): people that each point stands for. They satisfy it if they form exactly one group
+    (|G_y| = 1), where components of less than the least weight are left out. False for no point, and where all
+    components are noise.
     """
     return kernels.prefixes(
         points, weights, start, rule.link, rule.gate, rule.prior_entries, rule.strength, rule.least
@@ -81,8 +91,10 @@ def prefixes(points: Array, weights: Array, start: int, rule: Constraint) -> Boo
 
 
 def regions_overlap(mean: Array, covariance: Array, gate: float) -> Bools:
-    """Returns (G, G) True where two search regions (y - mean)' covariance^-1 (y - mean) <= gate have a common point.
+    """Returns flags (G, G): True where two search regions (y - mean)' covariance^-1 (y - mean) <= gate have a common
+    point.
 
-    mean (G, 2); covariance (G, 2, 2), positive definite. Regions that touch overlap.
+    mean (G, 2): x, y; covariance (G, 2, 2), positive definite, squared unit of the means; gate: squared Mahalanobis
+    radius. Regions that touch overlap. The diagonal is True.
     """
     return ellipse_overlap_kernels.overlaps(np.ascontiguousarray(mean), gate * covariance)

@@ -32,7 +32,8 @@ FAR = 2.0**40
 
 @njit(cache=True)
 def cells(points: Array, link: float) -> tuple[Ints, Ints]:
-    """Returns the cell of each point (M,), 0, 1, …, and the 20 cells around each cell (C, 20), -1 for an empty one."""
+    """Returns the cell of each point (M,), 0, 1, …, and the 20 cells around each cell (C, 20), -1 for an empty one.
+    points (M, 2), M at least 1. A cell's diagonal is `link`, in the points' unit."""
     m = len(points)
     side = link / np.sqrt(2.0) * (1 - 1e-12)
     place = np.empty((m, 2), np.int64)
@@ -69,10 +70,8 @@ def _sorted(place: Ints) -> Ints:
 
 @njit(cache=True)
 def _find(place: Ints, first: Ints, count: int, x: int, y: int) -> int:
-    """Returns the number of the cell at x, y by bisection, or -1 if it is empty.
-
-    place (M, 2): cell of each point; first (C,): a point of each cell, in sorted order; count: C.
-    """
+    """Returns the number of the cell in column x and row y of the grid, by bisection, or -1 if it is empty. place (M,
+    2): grid column and row of each point; first (C,): a point of each cell, in sorted order; count: C."""
     low, high = 0, count
     while low < high:
         middle = (low + high) // 2
@@ -91,11 +90,12 @@ def insert(
     k: int, points: Array, weight: float, link: float, cell: Ints, around: Ints,
     parent: Ints, head: Ints, after: Ints, box: Array, sums: Array, work: Ints,
 ) -> None:  # fmt: skip
-    """Add point k to the components, in place: G_0(Y + {y}) from G_0(Y) (4.2.1).
+    """Add point k to the components of the points before it, in place: G_0(Y + {y}) from G_0(Y) (4.2.1).
 
-    cell, around: from `cells`. Changed: parent (M,), the union-find forest of the points; head (C,) and after (M,), the
-    first point of each cell and the next one of each point, -1 at the end; box (C, 4), bounds of each cell's points:
-    least x, y, largest x, y; sums (M, 6), moments of each component, at its root; work (2,).
+    points (M, 2); link: largest distance of linked points; cell (M,), around (C, 20): from `cells`. Changed: parent
+    (M,), union-find forest of the points; head (C,), after (M,), the first point of each cell and the next one of each
+    point, -1 at the end; box (C, 4), bounds of each cell's points: least x, y, largest x, y; sums (M, 6), a component's
+    weight, mean x, y, weight times covariance xx, xy, yy, at its root; work (2,): comparisons, number of components.
     """
     c = cell[k]
     x, y = points[k, 0], points[k, 1]
@@ -132,7 +132,8 @@ def insert(
 
 @njit(cache=True)
 def _join(parent: Ints, sums: Array, a: int, b: int, work: Ints) -> None:
-    """Join the components of points a and b under the older root, so that roots depend only on the order of points."""
+    """Join the components of points a and b under the older root, so that roots depend only on the order of points.
+    Changes parent (M,), sums (M, 6), work (2,) as in `insert`; nothing if the points are in one component already."""
     a, b = find_root(parent, a), find_root(parent, b)
     if a == b:
         return
@@ -144,7 +145,8 @@ def _join(parent: Ints, sums: Array, a: int, b: int, work: Ints) -> None:
 
 @njit(cache=True)
 def pool(into: Array, other: Array) -> None:
-    """Change the moments `into` (6,) of a set of points to those of its union with another set (3.1, with 1/N)."""
+    """Change the moments `into` (6,) of a set of points to those of its union with another set, `other` (6,) (3.1).
+    Columns: weight N, mean x, y, and N times the covariance (with 1/N) xx, xy, yy. N of the union must be above 0."""
     n = into[WEIGHT] + other[WEIGHT]
     share = other[WEIGHT] / n
     dx, dy = other[X] - into[X], other[Y] - into[Y]
@@ -159,7 +161,12 @@ def pool(into: Array, other: Array) -> None:
 
 @njit(cache=True)
 def components(points: Array, weights: Array, link: float) -> tuple[Ints, Array]:
-    """Returns G_0 (3.3): the component of each point (M,), in the order of first points, and the sums (K, 6)."""
+    """Returns the component of each point (M,), numbered in the order of first points, and the moments (K, 6) of
+    components.
+
+    Points (M, 2) at most `link` apart, also through others, are one component, G_0 (3.3). Moments: weight N, mean x, y,
+    N times the covariance xx, xy, yy. No points give no components.
+    """
     m = len(points)
     parent, sums = np.empty(m, np.int64), np.empty((m, 6))
     label, count = np.empty(m, np.int64), 0
@@ -183,11 +190,11 @@ def components(points: Array, weights: Array, link: float) -> tuple[Ints, Array]
 
 @njit(cache=True)
 def closure(sums: Array, gate: float, prior: Array, strength: float) -> Ints:
-    """Returns G_x (3.1) of K components: for each the index of the first component it is joined with, (K,).
+    """Returns G_x (3.1) of K components: for each the index of the first component it is joined with, or its own, (K,).
 
-    sums (K, 6). Components whose regions overlap, directly or through others, are joined. Then the joined components
-    are compared, until no two overlap: a joined region may overlap one that none of its parts did. prior (3,),
-    strength: see `fit`.
+    sums (K, 6): weight N, mean x, y, N times the covariance xx, xy, yy; not changed. Components whose search regions
+    overlap, also through others, are joined; then the joined ones are compared, until no two overlap: a joined region
+    may overlap one that none of its parts did. gate, prior (3,), strength: see `fit`.
     """
     k = len(sums)
     label = np.arange(k)
@@ -224,10 +231,10 @@ def closure(sums: Array, gate: float, prior: Array, strength: float) -> Ints:
 
 @njit(cache=True)
 def fit(sums: Array, gate: float, prior: Array, strength: float, shape: Array) -> None:
-    """Write the search region of a component with `sums` (6,) into `shape` (5,): see the slots above.
+    """Write a component's search region, an ellipse, into `shape` (5,): mean x, y, entries xx, xy, yy of its matrix A.
 
-    A is gate times the shrunk covariance (N S + n0 S0) / (N + n0), N the weight, S the covariance with 1/N, S0 the
-    `prior` (3,) xx, xy, yy, n0 the `strength`.
+    sums (6,): weight N, mean x, y, N S as xx, xy, yy. A is `gate` times the shrunk covariance (N S + n0 S0) / (N + n0),
+    S the covariance with 1/N, S0 the `prior` (3,) xx, xy, yy, n0 the `strength`.
     """
     shape[MEAN_X], shape[MEAN_Y] = sums[X], sums[Y]
     scale = gate / (sums[WEIGHT] + strength)
@@ -240,10 +247,11 @@ def fit(sums: Array, gate: float, prior: Array, strength: float, shape: Array) -
 def prefixes(
     points: Array, weights: Array, start: int, link: float, gate: float, prior: Array, strength: float, least: float
 ) -> tuple[Bools, int]:
-    """Returns whether the first start, start + 1, … M points are one group, |G_y| = 1, (M - start + 1,), and the work.
+    """Returns flags (M - start + 1,): True if the first start, start + 1, … M points are one group; and the comparisons
+    made.
 
-    Components of less weight than `least` are left out; if all are, the points are no group. The work is the number of
-    comparisons, for tests of the cost.
+    One group is |G_y| = 1: points (M, 2) at most `link` apart are components, components lighter than `least` are left
+    out, the others are joined by `closure` with gate, prior (3,), strength. False for no point and if all are left out.
     """
     m = len(points)
     one = np.zeros(m - start + 1, np.bool_)
@@ -276,10 +284,8 @@ def prefixes(
 def _whole(
     sums: Array, tops: Ints, part: Array, gate: float, prior: Array, strength: float, least: float, work: Ints
 ) -> bool:
-    """Returns True if the components with roots `tops` are one group; components lighter than `least` are left out.
-
-    part (M, 6) is working space.
-    """
+    """Returns True if the components with roots `tops` (K,) are one group, leaving out those lighter than `least`. sums
+    (M, 6): moments at the roots. part (M, 6) and work (2,) are changed: working space, number of comparisons."""
     if len(tops) == 1:
         return bool(sums[tops[0], WEIGHT] >= least)
     count = 0

@@ -18,9 +18,10 @@ STEPS = 60
 
 @njit(cache=True)
 def overlap(dx: float, dy: float, axx: float, axy: float, ayy: float, bxx: float, bxy: float, byy: float) -> bool:
-    """Returns True if the ellipses y' A^-1 y <= 1 and (y - d)' B^-1 (y - d) <= 1 have a common point.
+    """Returns True if the filled ellipses y' A^-1 y <= 1 and (y - d)' B^-1 (y - d) <= 1 have a common point.
 
-    dx, dy: d, the distance of the centres. A and B must be positive definite.
+    dx, dy: d, the second centre relative to the first. axx, axy, ayy and bxx, bxy, byy: entries of A and B, squared
+    unit of d, which must be positive definite. Ellipses that touch overlap.
 
     The ellipses are disjoint if and only if f(s) = d' (A / (1 - s) + B / s)^-1 d > 1 for some s in (0, 1)
     (Gilitschenski & Hanebeck 2012). In coordinates with B = I and A = diag(l1, l2), f(s) = sum of s (1 - s) d_i^2 / (1
@@ -68,7 +69,10 @@ def overlap(dx: float, dy: float, axx: float, axy: float, ayy: float, bxx: float
 
 @njit(cache=True)
 def overlaps(mean: Array, shape: Array) -> Bools:
-    """Returns `overlap` of each two of G ellipses, (G, G); mean (G, 2), shape (G, 2, 2): the matrices A."""
+    """Returns flags (G, G): True where two of G filled ellipses have a common point; the diagonal is True.
+
+    mean (G, 2): centres; shape (G, 2, 2): matrices A of (y - mean)' A^-1 (y - mean) <= 1, positive definite.
+    """
     count = len(mean)
     found = np.ones((count, count), np.bool_)
     for i in range(count):

@@ -35,9 +35,11 @@ most pi / 2; a uniform distribution has a standard deviation of 52 deg.)"""
 
 
 def white_acceleration(dt: float, sigma: Array | float) -> Array:
-    """Returns entries 11, 12, 22 of Q, (3, ...) in the shape of `sigma`: filterpy's Q_discrete_white_noise.
+    """Returns entries 11, 12, 22 (place, covariance, rate) of the process noise Q of a step, (3, ...) in the shape of
+    `sigma`.
 
-    dt: s. sigma: standard deviation of the acceleration, unit of the place per s^2.
+    dt: length of the step, s. sigma: standard deviation of the acceleration, unit of the place per s^2. It is
+    filterpy's Q_discrete_white_noise.
     """
     from filterpy.common import Q_discrete_white_noise
 
@@ -47,10 +49,11 @@ def white_acceleration(dt: float, sigma: Array | float) -> Array:
 
 
 def constant_velocity(dt: float, axes: int) -> tuple[Array, Array]:
-    """Returns A and Q, (2 D, 2 D) each, of D = `axes` coordinates with a white acceleration of standard deviation 1.
+    """Returns A (transition) and Q (process noise), (2 D, 2 D) each, of D = `axes` coordinates of constant velocity.
 
-    The state is all places, then all rates: filterpy's kinematics of order 1 and Q_discrete_white_noise, with
-    order_by_dim=False. dt: s.
+    The state is all places, then all rates. dt: length of the step, s. Q is that of a white acceleration of standard
+    deviation 1 in each coordinate. They are filterpy's kinematics of order 1 and Q_discrete_white_noise, with
+    order_by_dim=False.
     """
     from filterpy.common import Q_discrete_white_noise, kinematic_kf
 
@@ -59,9 +62,10 @@ def constant_velocity(dt: float, axes: int) -> tuple[Array, Array]:
 
 
 def born(place: Array, var: Array | float, rate_var: Array | float) -> Array:
-    """Returns the state (5, N, D) of new filters at `place` (N, D) with rate 0.
+    """Returns the state (5, N, D) of N new filters of D coordinates at `place` (N, D), with rate 0.
 
-    var, rate_var: variances of place and rate, (D,) or a number. Their covariance is 0.
+    Rows of the state: place, rate, variance of the place, covariance, variance of the rate. var, rate_var: variances of
+    place and rate, (D,) or a number. The covariance is 0.
     """
     state = np.zeros((5, *place.shape))
     state[PLACE], state[VAR], state[RATE_VAR] = place, var, rate_var
@@ -69,7 +73,11 @@ def born(place: Array, var: Array | float, rate_var: Array | float) -> Array:
 
 
 def predict(state: Array, dt: float, q: Array) -> None:
-    """Predict a bank one step of dt s ahead, in place; q (3, N, D) or (3, D) from `white_acceleration`."""
+    """Predict a bank of filters one step of dt s ahead, in place; returns nothing.
+
+    state (5, N, D): rows place, rate, variance of the place, covariance, variance of the rate. q (3, N, D) or (3, D):
+    process noise of the step, from `white_acceleration`.
+    """
     place, rate, var, cov, rate_var = state
     place += dt * rate  # eq. 1
     step = dt * rate_var  # eq. 2, to the end
@@ -79,11 +87,13 @@ def predict(state: Array, dt: float, q: Array) -> None:
 
 
 def update(state: Array, rows: Ints, z: Array, noise: Array | float) -> Array:
-    """Update the filters `rows` (K,), each at most once, with measurements z (K, D), in place.
+    """Update the filters `rows` (K,) of a bank with measurements z (K, D), in place; each row may occur once at most.
 
-    noise: variances of the measurements, (K, D) or (D,), in the covariances' unit.
-    Returns y^2 / S of each coordinate, (K, D); the sum over the coordinates is d^2 (eq. 9). Its unit is the squared
-    unit of z per unit of covariance.
+    state (5, N, D): rows place, rate, variance of the place, covariance, variance of the rate. noise: variances of the
+    measurements, (K, D) or (D,), in the covariances' unit. No rows change nothing.
+
+    Returns y^2 / S of each coordinate, (K, D): squared innovation over its variance before the update. The sum over the
+    coordinates is d^2 (eq. 9). Its unit is the squared unit of z per unit of covariance.
     """
     new = state.take(rows, 1)
     place, rate, var, cov, rate_var = new
@@ -100,10 +110,12 @@ def update(state: Array, rows: Ints, z: Array, noise: Array | float) -> Array:
 
 
 def distances(state: Array, z: Array, noise: Array | float, scale: Array | float = 1.0) -> Array:
-    """Returns squared Mahalanobis distances y' S^-1 y (N, M) of N predictions and M measurements z (M, D) (eq. 9).
+    """Returns squared Mahalanobis distances y' S^-1 y (N, M) of N predicted filters and M measurements z (M, D) (eq.
+    9).
 
-    noise: variances of the measurements, (M, D) or (D,), in the covariances' unit. scale: units of z per square root of
-    the covariances' unit, (N,) or a number.
+    state (5, N, D): rows place, rate, variance of the place, covariance, variance of the rate. noise: variances of the
+    measurements, (M, D) or (D,), in the covariances' unit. scale: units of z per square root of the covariances' unit
+    (px per m), (N,) or a number.
     """
     place, spread = state[PLACE], np.reshape(np.square(scale), (-1, 1))
     if np.ndim(noise) < 2:
@@ -114,9 +126,11 @@ def distances(state: Array, z: Array, noise: Array | float, scale: Array | float
 
 
 def _common_noise(place: Array, z: Array, w: Array) -> Array:
-    """Returns the sum over d of w (z - place)^2, (N, M), by matrix products.
+    """Returns the sum over coordinates of w (z - place)^2, (N, M), at least 0, by matrix products.
 
-    place, w (N, D); z (M, D). Both are taken relative to the first measurement, so that little precision cancels.
+    place, w (N, D): predictions and weights (inverse innovation variances); z (M, D): measurements. Places are taken
+    relative to the first measurement, so that little precision cancels. No filter or no measurement gives an empty
+    array.
     """
     if not len(place) or not len(z):
         return np.zeros((len(place), len(z)))
@@ -129,10 +143,12 @@ def _common_noise(place: Array, z: Array, w: Array) -> Array:
 
 
 def asymptote(dt: float, sigma: Array | float, noise: Array | float) -> Array:
-    """Returns the innovation variance S to which an unbroken run of measurements converges, in the shape of the input.
+    """Returns the innovation variance S to which a filter converges that is measured in every frame.
 
-    The solution of one coordinate's Riccati equation in closed form (Kalata 1984): with l = sigma dt^2 / sqrt(noise),
-    r = (4 + l - sqrt(8 l + l^2)) / 4 and S = noise / r^2. noise: variance of a measurement.
+    dt: s between frames. sigma: standard deviation of the acceleration, unit per s^2; noise: variance of a measurement,
+    unit squared, above 0; arrays of one shape or numbers, and so is the result. It solves one coordinate's Riccati
+    equation in closed form (Kalata 1984): with l = sigma dt^2 / sqrt(noise), r = (4 + l - sqrt(8 l + l^2)) / 4 and S =
+    noise / r^2.
     """
     index = np.asarray(sigma) * dt**2 / np.sqrt(noise)
     r = (4 + index - np.sqrt(8 * index + index**2)) / 4
@@ -140,23 +156,28 @@ def asymptote(dt: float, sigma: Array | float, noise: Array | float) -> Array:
 
 
 def angle_innovation(measured: Array, predicted: Array) -> Array:
-    """Returns measured - predicted of two axes' directions (eq. 5), rad in [-pi/2, pi/2).
+    """Returns measured - predicted of directions of axes (eq. 5), rad in [-pi/2, pi/2); an axis turned by pi is the
+    same axis.
 
-    An axis turned by pi is the same axis.
+    measured, predicted: directions, rad, of shapes that broadcast.
     """
     return (measured - predicted + np.pi / 2) % np.pi - np.pi / 2
 
 
 def directed(noise: Array) -> Bools:
-    """Returns True where a measured direction's variance (N,), rad^2, is below VAGUE; that of a near circle is not."""
+    """Returns flags (N,): True where a measured direction carries information.
+
+    noise (N,): variance of each measured direction, rad^2. It must be below VAGUE = (30 degrees)^2; that of a near
+    circle is not.
+    """
     return np.asarray(noise < VAGUE)
 
 
 def angle_update(angle: Array, rows: Ints, z: Array, noise: Array) -> None:
     """Update the directions `rows` (K,) of `angle` (2, N) with measured directions z (K,) rad, in place.
 
-    Rows of angle: direction, rad, and its variance, rad^2. noise (K,): variances of the measurements, rad^2. A
-    measurement that is not `directed` is left out.
+    Rows of angle: direction, rad modulo pi, and its variance, rad^2. noise (K,): variances of the measurements, rad^2.
+    A measurement with a variance of (30 degrees)^2 or more is left out.
     """
     usable = directed(noise)
     rows, z, noise = rows[usable], z[usable], noise[usable]

@@ -29,10 +29,10 @@ from tracking.filters import kalman
 
 @dataclass(frozen=True)
 class Dynamics:
-    """The nominal filter of one track with D coordinates, lengths in m.
+    """The nominal Kalman filter of one track with D coordinates (constant velocity in each); lengths in m.
 
     dt: step, s. sigma (D,): standard deviation of the acceleration, m/s^2. noise (D,): variance of a measurement, m^2.
-    birth_rate_var (D,): variance of a new track's rate, (m/s)^2; that of its place is `noise`.
+    birth_rate_var (D,): variance of a new track's rate, (m/s)^2; the variance of its place is `noise`.
     """
 
     dt: float
@@ -42,22 +42,28 @@ class Dynamics:
 
     @property
     def q(self) -> Array:
-        """Entries 11, 12, 22 of the process noise Q of a step, (3, D)."""
+        """Entries 11, 12, 22 (place in m^2, covariance, rate) of the process noise Q of a step of dt, (3, D)."""
         return kalman.white_acceleration(self.dt, self.sigma)
 
     @property
     def asymptote(self) -> Array:
-        """Innovation variance S of each coordinate, (D,) m^2, of a track that is measured in every frame."""
+        """Innovation variance S of each coordinate, (D,) m^2, to which a track converges that is measured in every
+        frame."""
         return kalman.asymptote(self.dt, self.sigma, self.noise)
 
     def newborn(self) -> Array:
-        """Returns the state (5, 1, D) of a new track at 0."""
+        """Returns the state (5, 1, D) of a new track at place 0 with rate 0.
+
+        Rows: place, rate, variance of the place, covariance, variance of the rate; m and s.
+        """
         return kalman.born(np.zeros((1, len(self.noise))), self.noise, self.birth_rate_var)
 
     def steady(self) -> Array:
-        """Returns the state (5, 1, D) of a track at 0 just after a measurement in the steady state, in closed form.
+        """Returns the state (5, 1, D) of a track at place 0 just after a measurement in the steady state, in closed
+        form.
 
-        With K = 1 - R / S the posterior P11 is K R. P12 and P22 follow from the Riccati equation.
+        Rows: place, rate, variance of the place (P11), covariance (P12), variance of the rate (P22); m and s. With K =
+        1 - R / S the posterior P11 is K R. P12 and P22 follow from the Riccati equation.
         """
         s = self.asymptote
         k = 1 - self.noise / s
@@ -70,28 +76,35 @@ class Dynamics:
 
 
 def rho(state: Array, noise: Array, asymptote: Array) -> Array:
-    """Returns sqrt|S| / its asymptote (N,) of predicted filters (4.5; S: eq. 6).
+    """Returns rho (N,) of predicted filters: sqrt|S| over its asymptote, S the innovation covariance (4.5, eq. 6).
 
-    state (5, N, D). noise, asymptote (D,): variance of a measurement and asymptotic S, in the covariances' unit. As S
-    is diagonal, |S| is a product over the coordinates.
+    state (5, N, D): a bank after `predict`. noise, asymptote (D,): variance of a measurement, and S of a track measured
+    in every frame, in the covariances' unit. As S is diagonal, |S| is a product over the coordinates. rho is 1 in the
+    steady state and grows with each miss.
     """
     return np.asarray(np.sqrt(np.multiply.reduce((state[kalman.VAR] + noise) / asymptote, 1)))
 
 
 def after_misses(dynamics: Dynamics, misses: int) -> float:
-    """Returns rho at the prediction that follows `misses` frames without measurement, from the steady state."""
+    """Returns rho (sqrt|S| over its asymptote) at the prediction after `misses` frames without a measurement.
+
+    The track was in the steady state before. misses = 0 gives 1, up to rounding.
+    """
     return _rho_after(dynamics, dynamics.steady(), misses + 1)
 
 
 def at_birth(dynamics: Dynamics) -> float:
-    """Returns rho at the first prediction of a new track."""
+    """Returns rho (sqrt|S| over its asymptote) at the first prediction of a new track, one step after its first
+    measurement."""
     return _rho_after(dynamics, dynamics.newborn(), 1)
 
 
 def hits_to_confirm(dynamics: Dynamics, confirm_ratio: float, limit: int = 1000) -> int:
-    """Returns how many frames with a measurement in a row, the first included, bring rho down to confirm_ratio.
+    """Returns how many frames with a measurement in a row, the first included, bring a new track's rho down to
+    confirm_ratio.
 
-    Returns `limit` if more frames are needed.
+    rho is sqrt|S| over its asymptote, at the prediction for the last of these frames; so the result is at least 2.
+    Returns `limit` if that many frames or more are needed.
     """
     state, q = dynamics.newborn(), dynamics.q
     for hits in range(1, limit):
@@ -103,7 +116,10 @@ def hits_to_confirm(dynamics: Dynamics, confirm_ratio: float, limit: int = 1000)
 
 
 def _rho_after(dynamics: Dynamics, state: Array, steps: int) -> float:
-    """Returns rho after so many predictions of `state` (5, 1, D), which is changed."""
+    """Returns rho (sqrt|S| over its asymptote) after `steps` predictions without a measurement.
+
+    state (5, 1, D): rows place, rate, variance of the place, covariance, variance of the rate; changed in place.
+    """
     q = dynamics.q
     for _ in range(steps):
         kalman.predict(state, dynamics.dt, q)
@@ -111,7 +127,11 @@ def _rho_after(dynamics: Dynamics, state: Array, steps: int) -> float:
 
 
 def check_birth(dynamics: Dynamics, confirm_ratio: float) -> None:
-    """Raises InputError if rho of a new track is at or below confirm_ratio: its first measurement would confirm it."""
+    """Raises InputError if rho of a new track (sqrt|S| over its asymptote) is at or below confirm_ratio, else returns
+    nothing.
+
+    Its first measurement would confirm such a track.
+    """
     start = at_birth(dynamics)
     if start <= confirm_ratio:
         got = f"{confirm_ratio:g}, while new tracks start at {start:.3g} times the asymptote"
@@ -120,5 +140,9 @@ def check_birth(dynamics: Dynamics, confirm_ratio: float) -> None:
 
 
 def time_to_confirm(dynamics: Dynamics, confirm_ratio: float) -> float:
-    """Returns the age, s, that a track measured in every frame must be allowed to reach; the next frame confirms it."""
+    """Returns the age, s, that a track measured in every frame must be allowed to reach; the next frame confirms it.
+
+    The age counts from the first measurement. confirm_ratio: largest rho (sqrt|S| over its asymptote) of a confirmed
+    track. If more than 1000 frames are needed, the result is that of 1000.
+    """
     return (hits_to_confirm(dynamics, confirm_ratio) - 2) * dynamics.dt

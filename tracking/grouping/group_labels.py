@@ -21,10 +21,11 @@ from tracking.grouping.merge_split_events import LinkSwitch, event_of_change
 
 @dataclass
 class _LinkedPeople:
-    """State at one moment. People are columns.
+    """Who is present and linked to whom at one moment. People are columns of the tables, from 0.
 
-    present: the frame since which each person has been present; a missed person stays present for `memory` s.
-    linked: the partners of each person. identities: the groups and their ids.
+    present: by person, the frame (from 0) since which the person has been present; a person who is missed stays present
+    for `memory` s. linked: by person, the people with a link to the person, present or not. identities: the groups of
+    the last step and their ids.
     """
 
     present: dict[int, int] = field(default_factory=dict)
@@ -32,7 +33,11 @@ class _LinkedPeople:
     identities: Identities = field(default_factory=Identities)
 
     def components(self) -> list[PersonSet]:
-        """Connected components, of two or more, of the present people."""
+        """Returns the connected components of the present people under their links, as sets of columns, in order of
+        least column.
+
+        People alone are left out. Links to people who are not present do not count.
+        """
         found, seen = [], set[int]()
         for p in sorted(self.present.keys() & self.linked.keys()):
             part, new = {p}, [] if p in seen else [p]
@@ -45,7 +50,7 @@ class _LinkedPeople:
         return found
 
     def switch(self, a: int, b: int, on: bool) -> None:
-        """Set or remove the link between two people."""
+        """Set (`on`) or remove the link between two people, columns a and b; no effect if it is so already."""
         for p, q in ((a, b), (b, a)):
             partners = self.linked.setdefault(p, set())
             (partners.add if on else partners.discard)(q)
@@ -56,10 +61,12 @@ def label_people(
 ) -> tuple[Ints, list[GroupEvent]]:
     """Return the group id of each row (R,), -1 for a person alone, and the membership events in order of `emitted`.
 
-    frame, column (R,) of the rows, sorted by frame (from 0); pos (T, P, 2) in m by frame and column, nan where absent;
-    links: of the whole sequence. In the events people are columns + 1 and frames count from 1.
+    A row is one person in one frame. frame (R,): from 0, sorted; column (R,): the person; pos (T, P, 2): positions in m
+    by frame and column, nan where absent; links: all switches of links of the sequence; fps: frames per second.
+
     A member who is not seen stays in the group for `rule.memory` s. In a frame in which only one member of a group is
-    seen, that member's label is -1.
+    seen, that member's label is -1. Kinds of events: merge, split, form, dissolve, enter, leave. In them members are
+    columns + 1, positions are in m and frames count from 1.
     """
     spells = _spells(frame, column, frames_of(rule.memory, fps), len(pos))
     state, events = _LinkedPeople(), []
@@ -82,9 +89,10 @@ def label_people(
 
 
 def _spells(frame: Ints, column: Ints, memory: int, length: int) -> dict[int, list[tuple[int, int | None]]]:
-    """By frame: the people who come (column, frame) and those whose memory ends (column, None).
+    """Returns, by frame from 0, who comes, as (column, frame), and whose memory ends, as (column, None), in that frame.
 
-    A gap of at most `memory` frames does not end a spell.
+    frame, column (R,): frame and person of each row. memory: frames. length: of the sequence, in frames. A gap of at
+    most `memory` frames does not end a person's spell. Spells that last to the end of the sequence have no end.
     """
     order = np.lexsort((frame, column))
     found: dict[int, list[tuple[int, int | None]]] = {}
@@ -103,7 +111,11 @@ def _come_or_go(state: _LinkedPeople, p: int, since: int | None) -> None:
 
 
 def _entered(state: _LinkedPeople, switched: Iterable[LinkSwitch], arrival: int) -> PersonSet:
-    """People in no group whose new link began within `arrival` frames of their first frame: they enter with it."""
+    """Returns the people (columns) who count as entering with their group instead of joining it later.
+
+    They are present and in no group yet, and a link of theirs that is set in this frame began at most `arrival` frames
+    after the frame since which they have been present. switched: (a, b, on, since) of the links switched in this frame.
+    """
     grouped = {p for people in state.identities.groups.values() for p in people}
     return frozenset(
         p for a, b, on, since in switched if on for p in (a, b)
@@ -112,7 +124,10 @@ def _entered(state: _LinkedPeople, switched: Iterable[LinkSwitch], arrival: int)
 
 
 def _without_singles(frame: Ints, group: Ints) -> Ints:
-    """Labels (R,) in which a group that has only one row in a frame is -1 there."""
+    """Returns the labels (R,) with -1 wherever a group has only one row in a frame.
+
+    frame, group (R,): frame and group id (-1 alone) of each row; not changed.
+    """
     key = frame * (int(group.max(initial=0)) + 2) + group + 1
     _, place, count = np.unique(key, return_inverse=True, return_counts=True)
     return np.where(count[place] > 1, group, -1)

@@ -38,9 +38,12 @@ MEMBERSHIP_KINDS = frozenset(EVENT_KINDS) - {"cross", "queue"}
 def with_groups(
     tracks: Sequence[Tracks], fps: float, px_per_m: float, rule: LinkRule | None = None
 ) -> tuple[Tracks, ...]:
-    """Return the tracks with groups and events filled in by `derive`.
+    """Return the tracks of a sequence with groups and events filled in by `derive`; in order, one `Tracks` per frame.
 
-    They are returned unchanged if all are marked as derived, or if they are in the image and px_per_m is not finite.
+    fps: frames per second. px_per_m: scale if tracks are in the image. rule: None stands for the default rule.
+
+    They are returned unchanged if there are none, if all are marked as derived, or if they are in the image and
+    px_per_m is nan or infinite. Raises InputError if they are in the image and px_per_m is 0 or below.
     """
     if all(t.derived for t in tracks) or (tracks[0].plane == "image" and not math.isfinite(px_per_m)):
         return tuple(tracks)
@@ -48,20 +51,26 @@ def with_groups(
 
 
 def names_groups(tracks: Sequence[Tracks]) -> bool:
-    """Return True if the tracker reports groups itself: unit "group", a `group` above -1, or any `groups`."""
+    """Return True if the tracker reports groups itself, in any frame of `tracks`.
+
+    It does if there is a frame with unit "group", a `group` above -1, or `groups` that are not None (even without a
+    group). False for no tracks.
+    """
     return any(t.unit == "group" or t.groups is not None or bool((t.group >= 0).any()) for t in tracks)
 
 
 def derive(tracks: Iterable[Tracks], fps: float, px_per_m: float = 1.0, rule: LinkRule | None = None) -> list[Tracks]:
     """Return the tracks with `group`, `groups` and `events` filled in where the tracker left them empty.
 
-    The tracks are those of a whole sequence in order; the result is marked as derived. px_per_m is needed if they are
-    in the image. rule: None stands for the default rule.
+    tracks: of a whole sequence, in order, one per frame from frame 1; the result has as many, marked as derived. fps:
+    frames per second. px_per_m: px per m, used only if the tracks are in the image. rule: None stands for the default
+    rule.
     - A tracker that names groups, in `group` or in the members of its `groups`, keeps them. Else the rule forms groups.
     - Membership events (all kinds but cross and queue) are derived unless the tracker reported any of them.
     - Crossings are derived unless it reported a crossing, queues unless it reported a queue.
-    No tracks, and tracks with unit "group", are returned as they are.
-    Raises InputError if the tracks are in the image and px_per_m is not a number above 0.
+
+    No tracks, and sequences with a frame of unit "group", are returned as they are. Raises InputError if the tracks are
+    in the image and px_per_m is not a number above 0.
     """
     given = list(tracks)
     if not given or any(t.unit == "group" for t in given):
@@ -78,10 +87,11 @@ def derive(tracks: Iterable[Tracks], fps: float, px_per_m: float = 1.0, rule: Li
 
 
 def _grouped(table: TracksTable, named: bool, fps: float, rule: LinkRule) -> tuple[TracksTable, list[GroupEvent]]:
-    """The table with groups, and the membership events; named: the tracker reports groups itself.
+    """Returns the table with groups filled in, and the membership events (people are columns + 1, frames count from 1).
 
-    Groups of the tracker are kept. If they equal those of the rule, the rule's events are used, as their onsets are
-    exact. Else the events follow from the changes of the tracker's labels.
+    named: the tracker reports groups itself. Its groups are kept. If they equal those of the rule, the rule's events
+    are used, as their onsets are exact. Else the events follow from the changes of the tracker's labels. If it reports
+    groups but none of its people has one, the table is returned as it is, without events.
     """
     if named and (table.group < 0).all():
         return table, []
@@ -93,7 +103,11 @@ def _grouped(table: TracksTable, named: bool, fps: float, rule: LinkRule) -> tup
 
 
 def _crossings_and_queues(table: TracksTable, fps: float) -> list[GroupEvent]:
-    """Crossings and queues of the whole recording, `emitted` in the frame in which each is known."""
+    """Returns the crossings, then the queues, of the whole recording; `emitted` is the frame (from 1) in which each is
+    known.
+
+    An event that is not known by the end is emitted in the last frame. People are columns + 1, positions are in m.
+    """
     pos, vel, label = table.positions(), table.velocities(), table.labels()
     present: Bools = np.isfinite(pos[..., 0])
     crossed = crossings(pos, vel, present, label, fps)
@@ -105,9 +119,10 @@ def _crossings_and_queues(table: TracksTable, fps: float) -> list[GroupEvent]:
 
 
 def _filled(given: Sequence[Tracks], table: TracksTable, events: Sequence[GroupEvent]) -> list[Tracks]:
-    """The tracks with the table's groups, hulls where the tracker gave none, and these events added to its own.
+    """Returns the tracks with the table's group ids, groups where `groups` is None, and these events after their own.
 
-    The events' members are columns + 1 and their positions metres; both become the tracks' own ids and unit.
+    events: members are columns + 1 and positions are in m; in the result both are the tracks' own ids and unit. An
+    event is added to the frame in which it is emitted (or, without one, starts). The result is marked as derived.
     """
     groups = _groups_of_frames(given, table)
     cuts = np.searchsorted(table.frame, np.arange(table.length + 1))
@@ -125,13 +140,17 @@ def _filled(given: Sequence[Tracks], table: TracksTable, events: Sequence[GroupE
 
 
 def _with_track_ids(event: GroupEvent, table: TracksTable) -> GroupEvent:
-    """The event with the tracks' ids as members, and its position in the tracks' unit."""
+    """Returns the event with track ids as members instead of columns + 1, and with its position in the tracks' unit."""
     x, y = (v * table.scale for v in event.pos)
     return replace(event, members=tuple(int(table.ids[p - 1]) for p in event.members), pos=(x, y))
 
 
 def _groups_of_frames(given: Sequence[Tracks], table: TracksTable) -> list[Groups]:
-    """The Groups of every frame, in the tracks' unit: hulls of footprints, or of boxes (see `boxes_of_rows`)."""
+    """Returns the Groups of every frame of the sequence, in the tracks' unit (m or px); empty Groups for a frame
+    without any.
+
+    Hulls go round footprints, or round boxes if the tracks are in the image and all have boxes.
+    """
     pos, vel, box = table.pos * table.scale, table.vel * table.scale, boxes_of_rows(given)
     if box is not None:
         return box_groups(table.frame, table.id, table.group, pos, vel, box, 0, table.length)

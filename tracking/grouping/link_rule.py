@@ -29,7 +29,12 @@ ARRIVAL = 1.0
 
 @dataclass(frozen=True)
 class LinkRule(Config):
-    """Parameters of the baseline rule, declared, searched and stored like a tracker's. Lengths are metres."""
+    """Parameters of the baseline rule that links two people: distance, velocity difference and times; each states its
+    unit.
+
+    It is a Config: it is read from TOML files and searched like a tracker's. Raises InputError if a value is not
+    allowed.
+    """
 
     tracker: ClassVar[str] = "grouping"
 
@@ -79,10 +84,11 @@ class LinkRule(Config):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Links:
-    """Switches of links of a sequence: L rows, sorted by frame, then pair.
+    """All switches of links (setting or removing one) of a sequence: L rows, sorted by frame, then pair.
 
-    frame (L,) from 0, in which the link is switched; a, b (L,) columns of the two people, a < b; on (L,) True if the
-    link is set, False if it is removed; since (L,) first frame of the stretch that caused the switch.
+    frame (L,): in which the link is switched, from 0. a, b (L,): columns of the two people in the table, a < b. on
+    (L,): True if the link is set, False if it is removed. since (L,): first frame, from 0, of the stretch that caused
+    the switch (of being near and alike, or of being apart).
     """
 
     frame: Ints
@@ -93,10 +99,11 @@ class Links:
 
 
 def find_links(frame: Ints, column: Ints, pos: Array, vel: Array, length: int, fps: float, rule: LinkRule) -> Links:
-    """Return all switches of links in a sequence of `length` frames.
+    """Return all switches of links in a sequence of `length` frames, sorted by frame, then pair.
 
-    frame (R,) from 0, sorted; column (R,) of the person; pos, vel (R, 2) in m and m/s. A pair with an unknown (nan)
-    velocity counts as moving alike.
+    A row is one person in one frame: frame (R,) from 0, sorted; column (R,) of the person; pos, vel (R, 2): x, y in m
+    and m/s. fps: frames per second. A pair with an unknown (nan) velocity counts as moving alike. No rows give no
+    switches.
     """
     i, j = close_pairs(frame, pos, max(rule.apart, rule.near))
     swap = column[i] > column[j]
@@ -126,7 +133,7 @@ def find_links(frame: Ints, column: Ints, pos: Array, vel: Array, length: int, f
 
 
 def _portions(pairs: Ints, size: int) -> Iterator[Ints]:
-    """The pairs in slices of `size`."""
+    """Yields the pairs (K,) in consecutive slices of `size`; the last one may be shorter. No pairs give no slice."""
     for low in range(0, len(pairs), size):
         yield pairs[low : low + size]
 
@@ -134,10 +141,13 @@ def _portions(pairs: Ints, size: int) -> Iterator[Ints]:
 def _switches(
     frame: Ints, place: Ints, near: Bools, within: Bools, pairs: Ints, present: Bools, fps: float, rule: LinkRule
 ) -> tuple[Ints, Ints, Ints, Ints]:
-    """Frame, pair, on (0 or 1) and since of the switches of these pairs.
+    """Returns the switches of links of K pairs, (S,) each: frame (from 0), pair, on (1) or off (0), since (frame from
+    0).
 
-    pairs (K,): a * P + b. The rows (frame, index of the pair in `pairs`) are those in which a pair is close; near:
-    it is near and alike; within: it is not apart. present (T, P): the people who are seen.
+    pairs (K,): a * P + b, with a < b columns of people. frame, place, near, within (Q,): a row for each pair and frame
+    in which the two are close; place is the index in `pairs`; near: they are near and move alike; within: they are not
+    apart. present (T, P): True where a person is seen. `since` is the first frame of the stretch that caused the
+    switch.
     """
     people = present.shape[1]
     both = present[:, pairs // people] & present[:, pairs % people]
@@ -160,7 +170,10 @@ def _switches(
 
 
 def _recent(flags: Bools, frames: int) -> Ints:
-    """The number (T, K) of true flags among the last `frames` frames, the present one included."""
+    """Returns the number (T, K) of True flags among the last `frames` frames up to each frame, that frame included.
+
+    flags (T, K): by frame and pair. The first frames count only what is there.
+    """
     total = np.cumsum(flags, axis=0)
     late = np.zeros_like(total)
     late[frames:] = total[:-frames] if frames < len(total) else 0
@@ -168,7 +181,11 @@ def _recent(flags: Bools, frames: int) -> Ints:
 
 
 def _onset(together: Bools, window: int) -> Ints:
-    """The first frame (T, K) with a true flag among the last `window` frames."""
+    """Returns the first frame (T, K), from 0, with a True flag among the last `window` frames, the present one
+    included.
+
+    together (T, K): flags by frame and pair. Without a True flag in the window it is the next frame with one, or T.
+    """
     t = np.arange(len(together))[:, None]
     after = np.minimum.accumulate(np.where(together, t, len(together))[::-1], axis=0)[::-1]
     return np.asarray(np.take_along_axis(after, np.maximum(t - window + 1, 0) + np.zeros_like(after), axis=0))

@@ -26,12 +26,16 @@ LinkSwitch = tuple[int, int, bool, int]
 def event_of_change(
     change: GroupChange, t: int, switched: Iterable[LinkSwitch], pos: Array, arrival: int
 ) -> GroupEvent | None:
-    """Return the event of a change of groups that became known in frame t, caused by the links switched in that frame.
+    """Return the event of one change of groups that became known in frame t (from 0), or None.
 
-    pos (T, P, 2) in m, nan where absent. `start` is the first onset among the links switched between the change's
-    people, or t if there is none; of a leave it is the last frame in which two of them were seen. `end` equals
-    `start` for enter and leave, else t.
-    Returns None for an enter that starts in the first `arrival` frames: that group was there from the beginning.
+    change: of a group, in columns. switched: the links switched in frame t. pos (T, P, 2): x, y in m by frame and
+    column, nan where absent. arrival: frames. In the event people are columns + 1, frames count from 1, the position is
+    in m.
+
+    `start` is the first onset among the switches that caused the change: links set (merge, form, enter) or removed
+    (split, dissolve, leave) between two of its people; t if there is none. For a leave it is the last frame in which
+    two of its people were seen. `end` equals `start` for enter and leave, else t. Returns None for an enter that starts
+    in the first `arrival` frames: that group was there from the beginning.
     """
     people = set(change.members)
     joins = change.kind in ("merge", "form", "enter")
@@ -47,10 +51,12 @@ def event_of_change(
 
 
 def events_of_labels(group: Ints, pos: Array) -> list[GroupEvent]:
-    """Return the membership events in group labels (T, P) that a tracker gave; -1 is a person alone.
+    """Return the membership events (merge, split, form, dissolve, enter, leave) in a tracker's group labels, by time.
 
-    pos (T, P, 2) in m, nan where a person is absent. A label that only one person carries counts as alone. `start`,
-    `end` and `emitted` are the frame of the change; a leave starts and ends in the frame before it.
+    group (T, P): label by frame and column, -1 for a person alone. pos (T, P, 2): x, y in m, nan where a person is
+    absent. T is at least 1. A label that only one person carries in a frame counts as alone. `start`, `end` and
+    `emitted` are the frame of the change; a leave starts and ends in the frame before it. In the events people are
+    columns + 1, frames count from 1.
     """
     there = np.isfinite(pos).all(axis=2)
     state = np.where(there, group, ABSENT)
@@ -65,7 +71,13 @@ def events_of_labels(group: Ints, pos: Array) -> list[GroupEvent]:
 
 
 def _event(change: GroupChange, start: int, end: int, t: int, pos: Array) -> GroupEvent:
-    """The event emitted in frame t. Its position is the mean of its people in the frame nearest to `start`."""
+    """Returns the event of a change, with people as columns + 1 and frames from 1; start, end, t (emitted) count from
+    0.
+
+    Its position is the mean of its people, x, y in m, in the frame nearest to `start` in which one of them was seen.
+    Searched are the frames from 20 before `start` to t; one of them must show a member (else ValueError). pos (T, P,
+    2): m, nan where absent.
+    """
     first = max(start - LOOK_BACK, 0)
     places = pos[first : t + 1, change.members]
     known = np.flatnonzero(np.isfinite(places[..., 0]).sum(axis=1))
@@ -78,7 +90,10 @@ def _event(change: GroupChange, start: int, end: int, t: int, pos: Array) -> Gro
 
 
 def _members(state: Ints) -> dict[int, PersonSet]:
-    """The people of each group of two or more in one frame's labels (P,)."""
+    """Returns the columns of the people of each group of two or more, by label, in one frame's labels (P,).
+
+    Labels below 0 (-1 alone, -2 absent) are no groups.
+    """
     found: dict[int, set[int]] = {}
     for p in np.flatnonzero(state >= 0).tolist():
         found.setdefault(int(state[p]), set()).add(p)

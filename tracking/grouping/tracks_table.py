@@ -19,11 +19,12 @@ DEFAULT_CHORD = 0.5
 
 @dataclass(frozen=True, slots=True, eq=False)
 class TracksTable:
-    """R rows, one per track and frame, sorted by frame, then id.
+    """All person tracks of a sequence as R rows, one per track and frame, sorted by frame, then id; lengths in m.
 
-    frame (R,) from 0; id (R,) of the track; column (R,) index of the id in `ids` (P,), the sorted ids; pos, vel (R, 2)
-    in m and m/s, nan if unknown; group (R,) the tracker's own, -1 for a person alone; length: frames T of the sequence;
-    scale: px per metre in the image, else 1.
+    frame (R,): from 0. id (R,): of the track. column (R,): index of the id in `ids`. ids (P,): the ids, sorted. pos,
+    vel (R, 2): x, y in m and m/s; vel is nan if unknown. group (R,): the tracker's own group id, -1 for a person alone.
+    length: frames T of the sequence. scale: px per m by which pos and vel were divided if the tracks are in the image,
+    else 1.
     """
 
     frame: Ints
@@ -37,15 +38,16 @@ class TracksTable:
     scale: float
 
     def positions(self) -> Array:
-        """Return positions (T, P, 2) in m by frame and column; nan where a person is absent."""
+        """Return positions (T, P, 2): x, y in m by frame (from 0) and column; nan where a person is absent."""
         return self._dense(self.pos)
 
     def velocities(self) -> Array:
-        """Return velocities (T, P, 2) in m/s by frame and column; nan where a person is absent."""
+        """Return velocities (T, P, 2): x, y in m/s by frame (from 0) and column; nan where a person is absent or it is
+        unknown."""
         return self._dense(self.vel)
 
     def labels(self) -> Ints:
-        """Return group ids (T, P) by frame and column; -1 where a person is alone or absent."""
+        """Return the tracker's own group ids (T, P) by frame (from 0) and column; -1 for a person alone or absent."""
         out = np.full((self.length, len(self.ids)), -1, np.int64)
         out[self.frame, self.column] = self.group
         return out
@@ -57,11 +59,14 @@ class TracksTable:
 
 
 def tabulate(tracks: Sequence[Tracks], fps: float, px_per_m: float, rule: LinkRule) -> TracksTable:
-    """Return the table of a sequence's tracks (not empty); px_per_m is used only if they are in the image.
+    """Return the table of a sequence's person tracks, one `Tracks` per frame; there must be at least one (else
+    IndexError).
 
-    Velocities are the tracker's own. Unknown ones are replaced by chords over 0.5 s. If `rule.smooth` is above 0, all
-    are replaced by chords over that time.
-    Raises InputError if the tracks are in the image and px_per_m is not a number above 0.
+    fps: frames per second. px_per_m: px per m, used only if the tracks are in the image. Of positions in space z is
+    dropped. Velocities are the tracker's own. Unknown ones (nan) are replaced by chords over the last 0.5 s. If
+    `rule.smooth` (s) is above 0, all are replaced by chords over that time. A chord is nan in a person's first frame.
+
+    Raises InputError if the tracks are in the image and px_per_m is not a finite number above 0.
     """
     scale = px_per_m if tracks[0].plane == "image" else 1.0
     if not math.isfinite(scale) or scale <= 0:
@@ -84,9 +89,10 @@ def tabulate(tracks: Sequence[Tracks], fps: float, px_per_m: float, rule: LinkRu
 
 
 def _named_groups(tracks: Sequence[Tracks]) -> list[Ints]:
-    """The group of each track in each frame, -1 for a person alone.
+    """Returns for each frame the tracker's group id of each track, (N,), -1 for a person alone.
 
-    It is `Tracks.group`, or, if that is -1 in the whole sequence, the group in `Tracks.groups` that lists the track.
+    It is `Tracks.group`, or, if that is -1 in the whole sequence, the group in `Tracks.groups` that lists the track as
+    a member.
     """
     if any((t.group >= 0).any() for t in tracks):
         return [t.group for t in tracks]
@@ -99,10 +105,12 @@ def _named_groups(tracks: Sequence[Tracks]) -> list[Ints]:
 
 
 def backward_velocity(frame: Ints, column: Ints, pos: Array, fps: float, window: float) -> Array:
-    """Return velocities (R, 2) in m/s: the chord from the person's earliest row within the last `window` s.
+    """Return velocities (R, 2), x, y in m/s: the chord to each row from the person's earliest row within the last
+    `window` s.
 
-    frame, column (R,), pos (R, 2) in m, as in TracksTable. nan in a person's first row and where the person has no row
-    within the window.
+    A row is one person in one frame: frame (R,) from 0; column (R,) of the person; pos (R, 2) in m. fps: frames per
+    second; the window is rounded up to whole frames, at least 1. nan in a person's first row and where the person has
+    no other row within the window.
     """
     order = np.lexsort((frame, column))
     f, span = frame[order], frames_of(window, fps)
@@ -116,9 +124,10 @@ def backward_velocity(frame: Ints, column: Ints, pos: Array, fps: float, window:
 
 
 def boxes_of_rows(tracks: Sequence[Tracks]) -> Array | None:
-    """Return the boxes (R, 4) ltwh in px of the table's rows if group hulls are drawn round boxes, else None.
+    """Return the boxes (R, 4) left, top, width, height, px, of the table's rows (by frame, then id), or None.
 
-    Hulls are drawn round boxes if the tracks are in the image and every track has a box.
+    None if group hulls are not drawn round boxes: the tracks (at least one) are not in the image, a frame has tracks
+    but no boxes, or there are no tracks in any frame.
     """
     if tracks[0].plane != "image" or any(t.box is None for t in tracks if len(t.id)):
         return None
