@@ -14,7 +14,13 @@ from tracking.filters.track_uncertainty import Dynamics, check_birth
 
 @dataclass(frozen=True)
 class BlobConfig(BackgroundSettings):
-    """Noises, gates, association, management and reporting of `blob`. Lengths are metres at the person."""
+    """The parameters of the tracker `blob`, with those of the background model; each field states default, range and
+    unit.
+
+    Lengths are metres at the person. They are noises, gates, association, confirmation, deletion, reporting, and, from
+    pixels only, splitting of blobs. Raises InputError if a value is not allowed or foreground_time is shorter than
+    background_time.
+    """
 
     tracker: ClassVar[str] = "blob"
 
@@ -172,10 +178,11 @@ class BlobConfig(BackgroundSettings):
     )
 
     def dynamics(self, fps: float) -> Dynamics:
-        """Returns the nominal filter of (x, y, h, w) at `fps` frames per second, lengths in m.
+        """Returns the nominal filter of the coordinates x, y, h, w (centre, height, width), lengths in m, at `fps`
+        frames per s.
 
         The acceleration noises are roots of spectral densities, so sigma = noise / sqrt(dt) (ours). Raises InputError
-        if the first measurement would confirm a new track.
+        if the first measurement of a new track would confirm it (rho at birth at or below confirm_ratio).
         """
         root = np.sqrt(fps)
         accel, size = self.accel_noise * root, self.size_accel_noise * root

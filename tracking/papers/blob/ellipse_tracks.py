@@ -24,42 +24,49 @@ HEADING = 6.0  # seen from straight above, the direction turns with the heading:
 
 
 class TrackedEllipses(TrackedPeople):
-    """State, beside that of TrackedPeople: angle (2, N), direction (rad) and its variance (rad^2); nominal (5, N, 4), a
-    bank as `bank`, updated with the nominal noise."""
+    """The table of N tracks from pixels: filters of ellipses, with a direction and a nominal covariance for each track.
+
+    State, beside that of TrackedPeople: angle (2, N), direction of the first axis (rad) and its variance (rad^2);
+    nominal (5, N, 4), a bank of filters as `bank`, updated with the nominal noise, from which rho follows. In `bank`
+    the coordinates are x, y, h, w: centre and full axes of the ellipse.
+    """
 
     def __init__(self, config: BlobConfig, dynamics: track_uncertainty.Dynamics, context: Context) -> None:
         self.angle, self.nominal = np.zeros((2, 0)), np.zeros((5, 0, 4))
         super().__init__(config, dynamics, context)
 
     def follow(self, config: BlobConfig, dynamics: track_uncertainty.Dynamics) -> None:
-        """Use another config and its nominal filter from now on; the tracks stay as they are."""
+        """Replace the config and its nominal filter `dynamics` (of the config at the frame rate); the tracks stay as
+        they are."""
         super().follow(config, dynamics)
         rate = config.angle_rate * (HEADING if self.top else 1.0)
         self.angle_var_per_step = np.radians(rate) ** 2 * dynamics.dt
 
     def predict(self) -> None:
-        """Predict all tracks one frame ahead (eqs 1, 2); the direction stays, its variance grows."""
+        """Predict all tracks one frame ahead, in place (eqs 1, 2), and compute rho; directions stay, their variances
+        grow."""
         kalman.predict(self.nominal, self.dynamics.dt, self.q)
         self.angle[kalman.DIRECTION_VAR] += self.angle_var_per_step
         super().predict()
 
     def compute_rho(self) -> Array:
-        """Returns rho (N,) from the nominal covariance."""
+        """Returns rho (N,) of all tracks, sqrt|S| over its asymptote, from the nominal covariance of x, y, h, w."""
         return track_uncertainty.rho(self.nominal, self.noise, self.asymptote)
 
     def upright_boxes(self) -> Array:
-        """Returns the bounding boxes x, y, h, w (N, 4) px of the ellipses; centred."""
+        """Returns the bounding boxes (N, 4) of the tracks' ellipses: centre x, y, height, width, px."""
         return upright(self.bank[kalman.PLACE], self.angle[kalman.DIRECTION])
 
     def keep_only(self, rows: Ints) -> None:
-        """Delete all tracks but `rows`."""
+        """Delete all tracks except those at table positions `rows` (K,); they are in the order of `rows` afterwards."""
         self.angle, self.nominal = self.angle.take(rows, 1), self.nominal.take(rows, 1)
         super().keep_only(rows)
 
     def start_tracks(self, z: Array, score: Array, t: float) -> None:
-        """Start a tentative track for each ellipse z (K, 5) x, y, h, w, theta.
+        """Append a tentative track at rest for each ellipse z (K, 5): centre x, y, axes h, w (px), theta (rad).
 
-        The variance of the direction starts at kalman.VAGUE, so that the next measured direction counts for more.
+        score (K,): 0 to 1; t: time of the frame, s. No ellipse changes nothing. The variance of the direction starts at
+        kalman.VAGUE, so that the next measured direction counts for more.
         """
         super().start_tracks(z[:, :4], score, t)
         new = np.stack([z[:, 4], np.full(len(z), kalman.VAGUE)])
@@ -67,19 +74,22 @@ class TrackedEllipses(TrackedPeople):
         self.nominal = np.concatenate([self.nominal, self.bank[:, self.bank.shape[1] - len(z) :]], 1)
 
     def direction_distances(self, z: Array, angle_var: Array) -> Array:
-        """Returns the direction's part y^2 / S of d^2 (eq. 9), (N, M).
+        """Returns the direction's part y^2 / S of the squared distance d^2 (eq. 9) of N tracks and M ellipses, (N, M).
 
-        z (M,): directions, rad; angle_var (M,): their variances, rad^2. The part of a direction that is not
-        `kalman.directed` is 0.
+        z (M,): measured directions, rad; angle_var (M,): their variances, rad^2. The part is 0 for an ellipse whose
+        variance is (30 degrees)^2 or more, as its direction carries no information.
         """
         s = self.angle[kalman.DIRECTION_VAR][:, None] + angle_var
         turn = kalman.angle_innovation(z, self.angle[kalman.DIRECTION][:, None])
         return np.where(kalman.directed(angle_var), turn * turn / s, 0.0)
 
     def update(self, rows: Ints, z: Array, noise: Array, angle_var: Array) -> Array:
-        """Update the tracks `rows` (K,) with ellipses z (K, 5); returns d^2 (K,), direction included (eqs 3 to 9).
+        """Update the tracks at table positions `rows` (K,), each at most once, with ellipses z (K, 5), in place (eqs 3
+        to 9).
 
-        noise (K, 4): variances of x, y, h, w, m^2; angle_var (K,): variances of theta, rad^2.
+        z: centre x, y, axes h, w (px), theta (rad). noise (K, 4): variances of x, y, h, w, m^2; angle_var (K,):
+        variances of theta, rad^2. Returns d^2 (K,), the squared Mahalanobis distance before the update, direction
+        included.
         """
         terms = kalman.update(self.bank, rows, z[:, :4], noise)
         turn = self.direction_distances(z[:, 4], angle_var)[rows, np.arange(len(rows))]
@@ -88,10 +98,11 @@ class TrackedEllipses(TrackedPeople):
         return np.asarray(np.add.reduce(terms, 1) / np.square(self.scale[rows]) + turn)
 
     def relax_axes(self, rows: Ints, axes: Array, var: float) -> None:
-        """Move the axes of tracks `rows` (K,) towards expected ones (K, 2) px with variance `var` m^2 (ours).
+        """Move the axes h, w of the tracks at positions `rows` (K,) towards expected axes (K, 2), px, in place (ours).
 
-        An Ornstein-Uhlenbeck step: s = exp(-dt / RELAXATION), x = s x + (1 - s) expected, P = s^2 P + (1 - s^2) var.
-        It is no measurement, as the expectation is the same in every frame. rho does not change.
+        var: variance of people's axes about the expected ones, m^2. An Ornstein-Uhlenbeck step: s = exp(-dt /
+        RELAXATION), x = s x + (1 - s) expected, P = s^2 P + (1 - s^2) var. It is no measurement, as the expectation is
+        the same in every frame. rho does not change.
         """
         stay = np.exp(-self.dynamics.dt / RELAXATION)
         bank = self.bank[:, rows, 2:]

@@ -23,9 +23,12 @@ EVIDENCE = 1000.0  # log-likelihood of full support: so large that the first gue
 
 
 def find_new_people(scene: ExplainedForeground, size: PersonSize, support: float) -> Array:
-    """Returns the templates (K, 4) x, foot, h, w of new people, and paints them into `scene`.
+    """Returns the templates (K, 4) x, foot (row of the lower edge), h, w, px, of new people, and paints them into
+    `scene`.
 
-    support: least support of each. A region where a person's size is unknown has no new people.
+    Searched are the regions of foreground that no template covers and no blob explains. support: least support of each
+    template, as a share of its area. A region where a person's size is unknown has no new people; at most 6 are found
+    in a region. K = 0 if there are none.
     """
     found = blobs.find(scene.unexplained(), LEAST * SMALLEST**2 * SLIM * ELLIPSE)
     box = found.box
@@ -40,10 +43,12 @@ def find_new_people(scene: ExplainedForeground, size: PersonSize, support: float
 
 
 def _in_region(scene: ExplainedForeground, guesses: Array, person: float, support: float) -> Array:
-    """Returns the templates (K, 4) of the number of people that explains a region best, and paints them.
+    """Returns the templates (K, 4) x, foot, h, w, px, of the number of people that explains a region best, and paints
+    them.
 
-    guesses (1 + 2 + …, 4): first places for 1, 2, … people; those from the first with an unknown size on are left out.
-    person: area of a person, px.
+    guesses (1 + 2 + …, 4): first places for 1, 2, … people, one number after the other; those from the first with an
+    unknown size (nan) on are left out. person: area of a person, px. support: least support of each template. K may be
+    0.
     """
     known = np.asarray(np.isfinite(guesses).all(1))
     sure = len(known) if known.all() else int(known.argmin())
@@ -54,9 +59,11 @@ def _in_region(scene: ExplainedForeground, guesses: Array, person: float, suppor
 
 
 def _guesses(found: blobs.Blobs, rows: Ints, most: Ints, size: PersonSize) -> list[Array]:
-    """Returns for each of the regions `rows` first places (1 + 2 + … + most, 4) of 1, 2, … `most` people.
+    """Returns a list with the first places (1 + 2 + … + most[k], 4) x, foot, h, w, px, for each region rows[k].
 
-    The people of one number share the region's pixels evenly.
+    They are places for 1, 2, … most[k] people, one number after the other; the people of one number share the region's
+    pixels evenly. rows, most (R,): row of the region in `found`, and most people in it. h, w are nan where the size is
+    unknown.
     """
     if size.above:
         return [_from_above(found, row, n, size) for row, n in zip(rows.tolist(), most.tolist(), strict=True)]
@@ -67,9 +74,11 @@ def _guesses(found: blobs.Blobs, rows: Ints, most: Ints, size: PersonSize) -> li
 
 
 def _from_above(found: blobs.Blobs, row: int, most: int, size: PersonSize) -> Array:
-    """Returns first places (1 + 2 + … + most, 4) along the longer axis of one region, seen from straight above.
+    """Returns first places (1 + 2 + … + most, 4) x, foot, h, w, px, of 1, 2, … `most` people in one region, seen from
+    above.
 
-    Each template is centred on its share of the pixels.
+    They stand in a row along the region's longer axis; each template is centred on its share of the pixels. row: of the
+    region in `found`.
     """
     left, top, wide, high = found.box[row].astype(int)
     at = np.argwhere(found.label[top : top + high, left : left + wide] == row + 1)[:, ::-1] + (left, top) + 0.5

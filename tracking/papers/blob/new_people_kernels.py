@@ -22,10 +22,11 @@ ROUNDING = 1e-9  # added to an upper bound, so that rounding excludes nothing
 
 @kernel
 def part_feet(label: Labels, which: int, box: Ints, most: int) -> Array:
-    """Returns where the parts of a region stand, (1 + 2 + … + most, 2): x and foot of the 1, 2, … `most` parts.
+    """Returns where the parts of a region stand, (1 + 2 + … + most, 2): x and foot, px, of the 1, 2, … `most` parts.
 
-    The region has label `which` in label (H, W) and the box ltwh (4,). It is cut into parts of as many pixels each,
-    from left to right. x is the mean of a part's columns, foot the quantile LOWEST of its rows.
+    The region has the label `which` in label (H, W) and the box (4,) left, top, width, height. It is cut into parts of
+    as many pixels each, from left to right. x is the mean of a part's columns, foot the 0.98 quantile of its rows, both
+    at the pixels' centres or lower edges.
     """
     left, top, wide, high = box
     per_row = np.zeros(high, np.int64)
@@ -53,7 +54,10 @@ def part_feet(label: Labels, which: int, box: Ints, most: int) -> Array:
 
 @kernel
 def quantile(counts: Ints, n: int, q: float, least: int) -> float:
-    """Returns the quantile q, as numpy.quantile, of n whole numbers of which counts[k] are equal to least + k."""
+    """Returns the quantile q (0 to 1) of n whole numbers, interpolated linearly as numpy.quantile does.
+
+    counts[k] of the numbers are equal to least + k; n, at least 1, is the sum of the counts.
+    """
     place = q * (n - 1)
     low = int(place)
     below, above, passed = -1, -1, 0
@@ -79,12 +83,14 @@ def fit_new_people(
     spread: Array,
     nats: float,
 ) -> Array:
-    """Returns the templates (K, 4) of the best number of people, 0 to `most`, and paints them.
+    """Returns the templates (K, 4) x, foot, h, w, px, of the best number of people in a region, 0 to `most`; paints
+    them.
 
-    guesses (1 + 2 + … + most, 4): first places for 1, 2, … people, one number after the other; from there fit_places
-    moves them, with `spread` (one row per guess) and `nats` of evidence. The best number has the largest joint support,
-    less `support` for each person, in units of a person's area `person`, px. Each template must have `support` of its
-    own. Numbers that cannot be better than the best so far are not tried.
+    foreground (H, W) bool; cover (H, W): painted templates per pixel, changed in place. guesses (1 + 2 + … + most, 4):
+    first places for 1, 2, … people, one number after the other; from there fit_places moves them, with `spread` (one
+    row per guess: standard deviation of x and foot, px) and `nats` of evidence. person: area of a person, px. The best
+    number has the largest joint support in units of `person`, less `support` for each person. Each template must have
+    the share `support` of its own. Numbers that cannot be better than the best so far are not tried.
     """
     best, worth = np.zeros((0, 4)), 0.0
     first, bound = 0, unexplained_within_reach(foreground, cover, guesses) / person + ROUNDING
@@ -105,7 +111,10 @@ def fit_new_people(
 
 @kernel
 def unexplained_within_reach(foreground: Bools, cover: Cover, guesses: Array) -> int:
-    """Returns the number of uncovered foreground pixels in the box that holds the templates wherever they can move."""
+    """Returns the number of foreground pixels with cover 0 in a box that templates cannot leave while they are fitted.
+
+    foreground, cover (H, W); guesses (K, 4): first places x, foot, h, w, px. The part outside the image is cut off.
+    """
     low, high, left, right = np.inf, -np.inf, np.inf, -np.inf
     for k in range(len(guesses)):
         x, foot, h, w = guesses[k]
@@ -121,7 +130,12 @@ def unexplained_within_reach(foreground: Bools, cover: Cover, guesses: Array) ->
 
 @kernel
 def joint_support(foreground: Bools, cover: Cover, templates: Array) -> float:
-    """Returns the sum over the pixels that templates (K, 4) cover, in foreground pixels; they must not be painted."""
+    """Returns the sum over the pixels that at least one of the templates (K, 4) x, foot, h, w covers, in foreground
+    pixels.
+
+    A pixel counts 1 if it is foreground, -1/2 if not, 0 if something else is painted there. The templates must not be
+    painted; `cover` (H, W) is the same afterwards.
+    """
     total = 0.0
     for k in range(len(templates)):
         part = kernels.support(foreground, cover, templates[k], 0)

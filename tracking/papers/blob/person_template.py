@@ -22,10 +22,11 @@ from tracking.papers.blob.person_template_kernels import ELLIPSE as ELLIPSE
 
 
 class ExplainedForeground:
-    """One frame's foreground, and what explains it.
+    """One frame's foreground, and what explains it: templates (upright ellipses x, foot, h, w, px) and blobs of one
+    person.
 
-    State: foreground (H, W). cover (H, W) int16: the number of templates painted over each pixel, plus
-    kernels.EXPLAINED where a blob of one person explains the pixel.
+    State: foreground (H, W) bool. cover (H, W) int16: the number of templates painted over each pixel, plus
+    kernels.EXPLAINED = 1000 where a blob of one person explains the pixel; 0 at first.
     """
 
     def __init__(self, foreground: Bools) -> None:
@@ -33,47 +34,61 @@ class ExplainedForeground:
         self.cover: kernels.Cover = np.zeros(foreground.shape, np.int16)
 
     def mark_explained(self, label: Labels, rows: Ints) -> None:
-        """Mark the blobs `rows` (K,) as explained: templates get no support from their pixels.
+        """Mark the pixels of blobs as explained: templates get no support from them. Changes `cover`.
 
-        label (H, W): row + 1 of the blob of each pixel, 0 for none.
+        label (H, W): row + 1 of the blob of each pixel, 0 for none. rows (K,): rows, from 0, of the blobs to mark.
         """
         which = np.zeros(int(rows.max(initial=-1)) + 2, bool)
         which[rows + 1] = True
         kernels.mark_explained(self.cover, label, which)
 
     def unexplained(self) -> Bools:
-        """Returns the foreground (H, W) that no template covers and no blob explains."""
+        """Returns a mask (H, W): foreground that no painted template covers and no blob explains."""
         return np.asarray(self.foreground & (self.cover == 0))
 
     def fit_places(self, templates: Array, spread: Array, evidence: float) -> Array:
-        """Returns the templates (K, 4) at the places where they explain most together; paints them.
+        """Returns the templates (K, 4) x, foot, h, w, px, at the places where they explain most together; paints them.
 
-        Templates with low feet (near people) move first. spread (K, 2): standard deviation, px, of the expected x and
-        foot. evidence: log-likelihood of full support.
+        templates (K, 4): at their expected places, not painted, not changed. Sizes stay. Those with low feet (near
+        people) move first. spread (K, 2): standard deviation, px, of the expected x and foot. evidence: log-likelihood
+        of a template with full support.
         """
         return search.fit_places(self.foreground, self.cover, templates, spread, evidence)
 
     def prune(self, templates: Array, least: float, *, pieces: bool = False) -> Ints:
-        """Returns the rows of painted templates that have enough support, and erases the others, the weakest first.
+        """Returns the rows, ascending, of painted templates (K, 4) that have enough support; erases the others, weakest
+        first.
 
-        The support of the remaining templates is computed anew after each removal. `least`: the support needed.
-        pieces: compare instead the share of foreground among the pixels that the template alone covers, so that a
-        visible piece of a person is enough; 0 if these are less than kernels.BARE of the template. Of two templates on
-        one person either share is low, and one template is erased.
+        The support of the remaining templates is computed anew after each removal. least: the support needed, a share
+        of the template's area. pieces: compare instead the share of foreground among the pixels that the template alone
+        covers, so that a visible piece of a person is enough; 0 if these are less than kernels.BARE of the template. Of
+        two templates on one person either share is low, and one template is erased.
         """
         return np.flatnonzero(kernels.prune(self.foreground, self.cover, templates, least, pieces))
 
     def support(self, templates: Array) -> Array:
-        """Returns the support (K,) of painted templates, each from the pixels that no other template covers."""
+        """Returns the support (K,) of painted templates (K, 4) x, foot, h, w, px: at most 1, may be negative.
+
+        It is the sum over the pixels that only this template covers (1 for foreground, -1/2 for background), divided by
+        its area.
+        """
         return kernels.supports(self.foreground, self.cover, templates, 1)
 
     def visible_share(self, templates: Array) -> Array:
-        """Returns the share (K,) of each template that no template with a lower foot and no explained blob covers."""
+        """Returns the share (K,), 0 to 1, of each template (K, 4) that no template with a lower foot and no explained
+        blob covers.
+
+        A template's columns are x, foot (row of the lower edge), h, w, px. What lies outside the image is not visible.
+        """
         return kernels.visible_share(self.cover, templates)
 
 
 def template_mask(shape: tuple[int, ...], templates: Array) -> Bools:
-    """Returns an (H, W) mask, True where one of the templates (K, 4) covers a pixel; `shape` is (H, W)."""
+    """Returns an (H, W) bool mask, True where an ellipse of the templates (K, 4) x, foot, h, w, px, covers a pixel's
+    centre.
+
+    shape: (H, W). Without templates it is False everywhere.
+    """
     cover = np.zeros(shape, np.int16)
     kernels.paint_all(cover, templates, 1)
     return cover > 0

@@ -29,29 +29,40 @@ kernel = njit(cache=True, error_model="numpy")
 
 @kernel
 def column_range(x: float, half: float, width: int) -> tuple[int, int]:
-    """Returns first column and last column + 1 of the image's pixels whose centre is within `half` px of x."""
+    """Returns first column and last column + 1 of the pixels whose centre is at most `half` px from x, in an image's
+    row.
+
+    width: columns of the image, to which the range is cut. Without such a pixel the second is not above the first.
+    """
     left, right = int(np.ceil(x - half - 0.5)), int(np.floor(x + half - 0.5)) + 1
     return min(max(left, 0), width), min(max(right, 0), width)
 
 
 @kernel
 def half_width(row: int, foot: float, h: float, w: float) -> float:
-    """Returns half the ellipse's width, px, at the centre of a row; -1 outside the ellipse."""
+    """Returns half the width, px, of an upright ellipse at the centre of a row; -1 outside the ellipse.
+
+    The ellipse fills a box of h x w px with its lower edge at row `foot`.
+    """
     t = 2 * (row + 0.5 - foot) / h + 1
     return 0.5 * w * np.sqrt(1 - t * t) if abs(t) < 1 else -1.0
 
 
 @kernel
 def row_range(foot: float, h: float, high: int) -> tuple[int, int]:
-    """Returns the first row and last row + 1 in which a template can have pixels; `high`: rows of the image."""
+    """Returns the first row and last row + 1, cut to the image, in which a template can have pixels.
+
+    foot: row of its lower edge; h: its height, px; high: rows of the image. Without such a row the second is not above
+    the first.
+    """
     return max(int(foot - h), 0), min(int(foot) + 1, high)
 
 
 @kernel
 def area(template: Array, high: int, wide: int) -> float:
-    """Returns the area of a template, px, inside an image of high x wide px; at least LEAST_INSIDE of the whole.
+    """Returns the area, px, of a template (4,) x, foot, h, w inside an image of high x wide px.
 
-    The share inside is that of the template's box.
+    The share inside is taken to be that of the template's box. It is at least LEAST_INSIDE = 0.3 of the whole ellipse.
     """
     x, foot, h, w = template
     across = min(x + w / 2, wide) - max(x - w / 2, 0.0)
@@ -61,7 +72,11 @@ def area(template: Array, high: int, wide: int) -> float:
 
 @kernel
 def paint(cover: Cover, template: Array, more: int) -> None:
-    """Add `more` to the cover of a template's pixels."""
+    """Add `more` to the cover (H, W), in place, at each pixel whose centre lies in the ellipse of a template (4,) x,
+    foot, h, w.
+
+    1 paints the template, -1 erases it. Pixels outside the image are ignored.
+    """
     x, foot, h, w = template
     low, high = row_range(foot, h, cover.shape[0])
     for row in range(low, high):
@@ -74,14 +89,21 @@ def paint(cover: Cover, template: Array, more: int) -> None:
 
 @kernel
 def paint_all(cover: Cover, templates: Array, more: int) -> None:
-    """Add `more` to the cover of the pixels of each of the templates (K, 4)."""
+    """Add `more` to the cover (H, W), in place, at the pixels of each of the templates (K, 4) x, foot, h, w, px.
+
+    1 paints, -1 erases. A pixel under several templates is counted for each.
+    """
     for k in range(len(templates)):
         paint(cover, templates[k], more)
 
 
 @kernel
 def mark_explained(cover: Cover, label: Labels, which: Bools) -> None:
-    """Add EXPLAINED to the cover of each pixel whose label k > 0 has which[k]; a label beyond `which` has not."""
+    """Add EXPLAINED = 1000 to the cover (H, W), in place, at the pixels of marked blobs.
+
+    label (H, W): k > 0 in the pixels of blob k, 0 for none. which: flags by label; a label beyond its end is not
+    marked.
+    """
     for row in range(cover.shape[0]):
         for column in range(cover.shape[1]):
             k = label[row, column]
@@ -91,7 +113,12 @@ def mark_explained(cover: Cover, label: Labels, which: Bools) -> None:
 
 @kernel
 def count_pixels(foreground: Bools, cover: Cover, template: Array, covered: int) -> tuple[int, int]:
-    """Returns the number of a template's pixels whose cover is `covered`, and how many of these are foreground."""
+    """Returns how many pixels of a template (4,) x, foot, h, w have a cover of `covered`, and how many of these are
+    foreground.
+
+    foreground, cover (H, W). covered: 1 for pixels that only a painted template covers, 0 for pixels that nothing
+    covers.
+    """
     x, foot, h, w = template
     low, high = row_range(foot, h, cover.shape[0])
     bare, seen = 0, 0
@@ -108,9 +135,10 @@ def count_pixels(foreground: Bools, cover: Cover, template: Array, covered: int)
 
 @kernel
 def support(foreground: Bools, cover: Cover, template: Array, covered: int) -> float:
-    """Returns the support of a template from the pixels whose cover is `covered`.
+    """Returns the support of a template (4,) x, foot, h, w: at most 1, may be negative.
 
-    covered: 1 for a painted template, 0 for one that is not painted. The support is at most 1 and may be negative.
+    It is the sum over its pixels whose cover (H, W) is `covered`, 1 for foreground and -1/2 for background, divided by
+    its area. covered: 1 for a painted template, 0 for one that is not painted.
     """
     bare, seen = count_pixels(foreground, cover, template, covered)
     halves = HALVES * seen + EMPTY * (bare - seen)
@@ -119,7 +147,11 @@ def support(foreground: Bools, cover: Cover, template: Array, covered: int) -> f
 
 @kernel
 def supports(foreground: Bools, cover: Cover, templates: Array, covered: int) -> Array:
-    """Returns the `support` (K,) of each of the templates (K, 4)."""
+    """Returns the support (K,) of each of the templates (K, 4) x, foot, h, w, from the pixels whose cover is `covered`.
+
+    Support: 1 for each foreground pixel, -1/2 for each background pixel, divided by the area; at most 1. covered: 1 if
+    the templates are painted, 0 if not.
+    """
     found = np.zeros(len(templates))
     for k in range(len(templates)):
         found[k] = support(foreground, cover, templates[k], covered)
@@ -128,9 +160,10 @@ def supports(foreground: Bools, cover: Cover, templates: Array, covered: int) ->
 
 @kernel
 def piece_support(foreground: Bools, cover: Cover, template: Array) -> float:
-    """Returns the share of foreground among the pixels that a painted template alone covers.
+    """Returns the share of foreground, 0 to 1, among the pixels that a painted template (4,) x, foot, h, w alone
+    covers.
 
-    0 if these are less than BARE of the template's area.
+    0 if these pixels are less than BARE = 0.1 of the template's area, as the template is hidden then.
     """
     bare, seen = count_pixels(foreground, cover, template, 1)
     whole = area(template, cover.shape[0], cover.shape[1])
@@ -139,7 +172,11 @@ def piece_support(foreground: Bools, cover: Cover, template: Array) -> float:
 
 @kernel
 def piece_supports(foreground: Bools, cover: Cover, templates: Array) -> Array:
-    """Returns the `piece_support` (K,) of each of the templates (K, 4)."""
+    """Returns for each painted template (K, 4) x, foot, h, w the share of foreground, (K,), among the pixels it alone
+    covers.
+
+    0 for a template of which less than BARE = 0.1 is free of others.
+    """
     found = np.zeros(len(templates))
     for k in range(len(templates)):
         found[k] = piece_support(foreground, cover, templates[k])
@@ -148,7 +185,10 @@ def piece_supports(foreground: Bools, cover: Cover, templates: Array) -> Array:
 
 @kernel
 def near_first(templates: Array) -> Ints:
-    """Returns the rows (K,) of templates sorted by feet, the lowest in the image (nearest) first; insertion sort."""
+    """Returns the rows (K,) of templates (K, 4) x, foot, h, w, sorted by foot, the lowest in the image (nearest) first.
+
+    Equal feet keep their order (insertion sort).
+    """
     order = np.arange(len(templates))
     for k in range(1, len(order)):
         while k > 0 and templates[order[k], FOOT] > templates[order[k - 1], FOOT]:
@@ -159,7 +199,12 @@ def near_first(templates: Array) -> Ints:
 
 @kernel
 def visible_share(cover: Cover, templates: Array) -> Array:
-    """Returns the share (K,) of each template that no template with a lower foot and no explained pixel covers."""
+    """Returns the share (K,), 0 to 1, of each template that no template with a lower foot and no explained pixel
+    covers.
+
+    templates (K, 4): x, foot, h, w, px. cover (H, W): at least EXPLAINED where a pixel is explained; not changed. The
+    share is of the area inside the image.
+    """
     hidden = np.zeros(cover.shape, np.bool_)
     share = np.zeros(len(templates))
     for k in near_first(templates):
@@ -179,9 +224,10 @@ def visible_share(cover: Cover, templates: Array) -> Array:
 
 @kernel
 def prune(foreground: Bools, cover: Cover, templates: Array, least: float, by_pieces: bool) -> Bools:
-    """Returns True for each painted template (K,) that stays; erases the others from `cover`.
+    """Returns flags (K,): True for each painted template that stays; erases the others from `cover` (H, W), in place.
 
-    The weakest template is erased until the weakest has `least`: of support, or of piece support if `by_pieces`.
+    The weakest template is erased, and the support of its neighbours computed anew, until the weakest has `least`: of
+    support, or of piece support (share of foreground among the pixels that it alone covers) if `by_pieces`.
     """
     stays = np.ones(len(templates), np.bool_)
     worth = piece_supports(foreground, cover, templates) if by_pieces else supports(foreground, cover, templates, 1)
@@ -202,7 +248,8 @@ def prune(foreground: Bools, cover: Cover, templates: Array, least: float, by_pi
 
 @kernel
 def boxes_touch(one: Array, other: Array) -> bool:
-    """Returns True if the boxes of two templates are at most 1 px apart in both directions."""
+    """Returns True if the boxes of two templates (4,) x, foot, h, w overlap or are at most 1 px apart in both
+    directions."""
     aside = abs(one[X] - other[X]) <= (one[WIDTH] + other[WIDTH]) / 2 + 1
     top, other_top = one[FOOT] - one[HEIGHT], other[FOOT] - other[HEIGHT]
     return bool(aside and top <= other[FOOT] + 1 and other_top <= one[FOOT] + 1)

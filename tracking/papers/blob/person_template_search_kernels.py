@@ -36,7 +36,11 @@ SWEEPS = 3  # most sweeps over all templates: the first on the coarse grid, the 
 
 @kernel
 def column_range_within(x: float, half: float, low: np.int32, high: np.int32) -> tuple[np.int32, np.int32]:
-    """Returns `column_range` within columns low to high - 1, counted from low; equal ends if there is no column."""
+    """Returns first column and last column + 1, counted from `low`, of the pixels whose centre is at most `half` px
+    from x.
+
+    Only columns low to high - 1 count; both results are equal if there is no such column.
+    """
     left, right = np.int32(np.ceil(x - half - 0.5)), np.int32(np.floor(x + half - 0.5)) + np.int32(1)
     left = min(max(left, low), high)
     return left - low, min(max(right, left), high) - low
@@ -44,10 +48,12 @@ def column_range_within(x: float, half: float, low: np.int32, high: np.int32) ->
 
 @kernel
 def worth_when_moved(foreground: Bools, cover: Cover, template: Array, steps: int, step: float) -> Whole:
-    """Returns the sum over the template's uncovered pixels, in halves, at each place of a grid.
+    """Returns the sum over a template's uncovered pixels at each place of a grid round its own, in halves of a pixel,
+    int32.
 
     Shape (2 steps + 1, 2 steps + 1): rows are moves down, columns moves to the right, by multiples of `step` px from
-    -steps to steps. Uncovered pixels have cover 0. The template must not be painted.
+    -steps to steps. A pixel counts 2 halves if it is foreground, -1 if background, 0 if its cover is not 0. template
+    (4,): x, foot, h, w, px, not painted. Pixels outside the image count 0.
     """
     x, foot, h, w = template
     reach = steps * step
@@ -75,7 +81,11 @@ def worth_when_moved(foreground: Bools, cover: Cover, template: Array, steps: in
 
 @kernel
 def row_sums(foreground: Bools, cover: Cover) -> Whole:
-    """Returns running sums along the rows, (H, W + 1), of the uncovered pixels in halves."""
+    """Returns running sums along the rows, (H, W + 1), first column 0, of what pixels count in halves of a foreground
+    pixel.
+
+    A pixel of foreground (H, W) counts 2, of background -1, and 0 where cover (H, W) is not 0.
+    """
     sums = np.empty((cover.shape[0], cover.shape[1] + 1), np.int32)
     for row in range(cover.shape[0]):
         total = 0
@@ -91,10 +101,12 @@ def row_sums(foreground: Bools, cover: Cover) -> Whole:
 def best_place(
     foreground: Bools, cover: Cover, at: Array, expected: Array, spread: Array, evidence: float, fine: bool
 ) -> tuple[float, float]:
-    """Returns x and foot on the grid round template `at` (4,) with the largest evidence * support - d^2 / 2.
+    """Returns x and foot, px, on the grid round template `at` (4,) x, foot, h, w with the largest evidence * support -
+    d^2 / 2.
 
-    The template must not be painted. expected (4,): its expected place, spread (2,): see `fit_places`. fine: use the
-    fine grid. Returns the place of `at` unless another one is better.
+    d is the distance from the expected place in standard deviations. at: not painted. expected (4,): template at its
+    expected place; spread (2,): standard deviation of its x and foot, px. evidence: log-likelihood of full support.
+    fine: use the fine grid. Returns the place of `at` unless another one is better.
     """
     step, steps = max(at[HEIGHT] / STEPS_PER_HEIGHT, 1.0), FINE_STEPS
     if fine:
@@ -118,11 +130,12 @@ def best_place(
 
 @kernel
 def fit_places(foreground: Bools, cover: Cover, templates: Array, spread: Array, evidence: float) -> Array:
-    """Returns the templates (K, 4) at the places where they explain most, and paints them.
+    """Returns the templates (K, 4) x, foot, h, w, px, at the places where they explain most, and paints them into
+    `cover`.
 
-    Each template in turn moves to its best place while the others stay, those with low feet first, in at most SWEEPS
-    sweeps. spread (K, 2): standard deviation, px, of the expected x and foot, which `templates` hold. evidence:
-    log-likelihood of full support.
+    templates: at their expected places, not painted, not changed; sizes stay. Each in turn moves to its best place
+    while the others stay, those with low feet first, in at most SWEEPS = 3 sweeps. spread (K, 2): standard deviation,
+    px, of the expected x and foot. evidence: log-likelihood of full support.
     """
     found, order = templates.copy(), near_first(templates)
     paint_all(cover, found, 1)

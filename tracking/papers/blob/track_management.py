@@ -28,18 +28,18 @@ CONFIRMED, MEASURED, MISS_EXPLAINED = range(3)
 
 
 class TrackedPeople:
-    """The table of N tracks. `numbers` (6, N) and `flags` (3, N) are stacked, so that few arrays change their length.
+    """The table of N tracks of `blob`: their filters, ages and flags. Tracks are columns of the stacked arrays.
 
-    State:
+    State; `numbers` (6, N) and `flags` (3, N) stack the named rows, so that few arrays change their length:
         bank (5, N, 4)      Kalman filters of x, y, h, w (tracking.filters.kalman); places px, covariances m^2
-        id (N,)             never used again; next_id: that of the next track
+        id (N,)             never used again; next_id: that of the next track, from 1
         scale (N,)          px per m
-        rho (N,)            at the last prediction
+        rho (N,)            sqrt|S| over its asymptote at the last prediction
         born (N,)           time of the first measurement, s
         score (N,)          score of the last measurement, 0 to 1
         hits (N,)           frames with a measurement
         misses (N,)         frames since the last measurement
-        confirmed (N,)      True once confirmed
+        confirmed (N,)      True once confirmed; else the track is tentative
         measured (N,)       True if measured in this frame
         miss_explained (N,) True if another track or a merged box explained a miss since the last measurement
         view_low, view_high (2,)   corners x, y of the field of view, px
@@ -54,7 +54,11 @@ class TrackedPeople:
         self.follow(config, dynamics)
 
     def follow(self, config: BlobConfig, dynamics: track_uncertainty.Dynamics) -> None:
-        """Use another config and its nominal filter from now on; the tracks stay as they are."""
+        """Replace the config and its nominal filter `dynamics` (of the config at the frame rate); the tracks stay as
+        they are.
+
+        The limits of rho for deletion and reporting are computed anew.
+        """
         self.config, self.dynamics = config, dynamics
         self.q, self.noise, self.asymptote = dynamics.q, dynamics.noise, dynamics.asymptote
         self.birth_rho = track_uncertainty.at_birth(dynamics)
@@ -67,34 +71,42 @@ class TrackedPeople:
         self.explained_silence_rho = max(self.silence_rho, self._rho_after(config.report_hidden))
 
     def _bind(self, numbers: Array, flags: Bools) -> None:
-        """Give the rows of both tables their names; the named rows are views."""
+        """Use `numbers` (6, N) and `flags` (3, N) as the tables, and bind their rows to scale, rho, … as views."""
         self.numbers, self.flags = numbers, flags
         self.scale, self.rho, self.born, self.score, self.hits, self.misses = numbers
         self.confirmed, self.measured, self.miss_explained = flags
 
     def _rho_after(self, seconds: float) -> float:
-        """Returns rho in the frame that ends so many seconds without measurement, from the steady state."""
+        """Returns rho (sqrt|S| over its asymptote) in the frame that ends `seconds` without measurement, from the
+        steady state.
+
+        Seconds are rounded up to whole frames.
+        """
         frames = int(np.ceil(seconds * self.context.fps - 1e-6))
         return track_uncertainty.after_misses(self.dynamics, frames - 1)
 
     def predict(self) -> None:
-        """Predict all tracks one frame ahead (eqs 1, 2)."""
+        """Predict all tracks one frame ahead, in place (eqs 1, 2), and compute their rho."""
         kalman.predict(self.bank, self.dynamics.dt, self.q)
         self.rho[:] = self.compute_rho()
 
     def compute_rho(self) -> Array:
-        """Returns rho = sqrt|S| / its asymptote of each track, (N,)."""
+        """Returns rho (N,) of all tracks as predicted: sqrt|S| over its asymptote, S the innovation covariance."""
         return track_uncertainty.rho(self.bank, self.noise, self.asymptote)
 
     def upright_boxes(self) -> Array:
-        """Returns the boxes x, y, h, w (N, 4) px of all tracks, predicted or updated as the bank is; centred."""
+        """Returns the boxes (N, 4) of all tracks: centre x, y, height, width, px; predicted or updated, as the bank is.
+
+        The array is a view of the bank: do not change it.
+        """
         return np.asarray(self.bank[kalman.PLACE])
 
     def record_measured(self, rows: Ints, near: Bools, score: Array) -> None:
-        """Record that the tracks `rows` (K,) were measured in this frame and all others missed; confirm tracks.
+        """Record that the tracks at positions `rows` (K,) were measured in this frame and all others missed; confirm
+        tracks.
 
         A measured track is confirmed if its rho is at most confirm_ratio and `near` (K,) is True: its d^2 is inside
-        confirm_gate. score (K,): scores of the measurements.
+        confirm_gate. score (K,): scores of the measurements, 0 to 1. Counts, flags and scales are changed in place.
         """
         self.measured[:] = False
         self.measured[rows] = True
@@ -107,9 +119,10 @@ class TrackedPeople:
         self.scale[:] = self._scale_of(self.bank[kalman.PLACE])
 
     def _scale_of(self, place: Array) -> Array:
-        """Returns px per m (N,) of people in boxes (N, 4): longer side / 1.7 m, half to twice the sequence's scale.
+        """Returns px per m (N,) at people in centred boxes `place` (N, 4): centre x, y, height, width, px.
 
-        Seen from straight above it is the sequence's scale.
+        It is the longer side / 1.7 m, limited to half to twice the sequence's scale. Seen from straight above it is the
+        sequence's scale.
         """
         whole = self.context.px_per_m
         if self.top:
@@ -120,8 +133,9 @@ class TrackedPeople:
     def associate(self, cost: Array, gate: float) -> tuple[Ints, Ints]:
         """Returns rows and columns (K,) of associated tracks and measurements, one to one.
 
-        cost (N, M): d^2 inside the gates, inf outside; gate: the widest gate. "nearest" (4.4): each measurement chooses
-        its nearest track, and each track keeps the nearest of these. "optimal" (ours): least total d^2 + 2 ln rho.
+        cost (N, M): d^2 of track and measurement inside the gates, inf outside; gate: the widest gate, a d^2.
+        association = "nearest" (4.4): each measurement chooses its nearest track, and each track keeps the nearest of
+        these. "optimal" (ours): least total d^2 + 2 ln rho; a lone pair inside a gate is always associated.
         """
         if self.config.association == "nearest":
             return assignment.cheapest_per_track(*assignment.nearest(cost), cost)
@@ -129,8 +143,8 @@ class TrackedPeople:
         return assignment.optimal(cost + penalty[:, None], gate + self.largest_penalty)
 
     def explain_misses(self) -> None:
-        """Set miss_explained of each missed confirmed track that is hidden: one measured track with lower feet covers
-        the share HIDDEN of its box. From straight above nothing is hidden."""
+        """Set miss_explained of each missed confirmed track that is hidden: one measured track with a lower foot covers
+        at least the share HIDDEN = 0.4 of its box. From straight above nothing is hidden."""
         lost = (self.confirmed & ~self.measured & ~self.miss_explained).nonzero()[0]
         if not len(lost) or self.top:
             return
@@ -143,12 +157,12 @@ class TrackedPeople:
             self.miss_explained[lost[share.max(1) >= HIDDEN]] = True
 
     def cover_several(self, z: Array, unseen: Bools) -> Bools:
-        """Returns True for each measured box z (M, 4) that covers several confirmed tracks, at least one of them
+        """Returns flags (M,): True for each box z (M, 4) that covers several confirmed tracks, at least one of them
         unseen.
 
-        unseen (N,): tracks without a measurement. A box covers several tracks if it holds their centres, and if the
-        hull of their boxes fits it (IoU) at least as well as the best single box, and at least SAME. Sets
-        miss_explained of the unseen tracks in such a box.
+        z: centre x, y, height, width, px. unseen (N,): flags of tracks without a measurement. A box covers several
+        tracks if it holds their centres, and if the hull of their boxes fits it (IoU) at least as well as the best
+        single box, and at least SAME = 0.5. Also sets miss_explained of the unseen tracks in such a box.
         """
         found = np.zeros(len(z), bool)
         if not len(z) or not unseen.any():
@@ -167,11 +181,12 @@ class TrackedPeople:
         return found
 
     def delete_tracks(self, t: float) -> None:
-        """Delete tracks at time t, s (5, and ours).
+        """Delete tracks from the table at time t, s (5, and ours).
 
-        Deleted are: missed confirmed tracks whose rho reached the value after coast_time (merged_time if the miss is
-        explained); missed tentative tracks whose rho reached its value at birth; tentative tracks past their time
-        limit; missed tracks whose centre is outside the image.
+        Deleted are: missed confirmed tracks whose rho reached the value after coast_time (the longer of it and
+        merged_time if the miss is explained); missed tentative tracks whose rho reached its value at birth; tentative
+        tracks older than their time limit; missed tracks whose centre is outside the image, if the image's size is
+        known.
         """
         lost = (~(self.measured & self.confirmed)).nonzero()[0]
         if not len(lost):
@@ -187,18 +202,26 @@ class TrackedPeople:
             self.keep_only(stay.nonzero()[0])
 
     def keep_only(self, rows: Ints) -> None:
-        """Delete all tracks but `rows`."""
+        """Delete all tracks except those at table positions `rows` (K,); they are in the order of `rows` afterwards."""
         self.bank, self.id = self.bank.take(rows, 1), self.id.take(rows)
         self._bind(self.numbers.take(rows, 1), self.flags.take(rows, 1))
 
     def _outside(self, place: Array) -> Bools:
-        """Returns True where the centre of a box (N, 4) is outside the image; never if the image's size is unknown."""
+        """Returns flags (N,): True where a box's centre is outside the image; all False if the image's size is unknown.
+
+        place (N, 4): centre x, y, height, width, px.
+        """
         if self.context.image_size is None:
             return np.zeros(len(place), bool)
         return np.asarray(((place[:, :2] < 0) | (place[:, :2] > self.context.image_size)).any(1))
 
     def start_tracks(self, z: Array, score: Array, t: float) -> None:
-        """Start a tentative track at rest for each box z (K, 4) x, y, h, w with score (K,), at time t, s."""
+        """Append a tentative track at rest for each box z (K, 4): centre x, y, height, width, px. No box changes
+        nothing.
+
+        score (K,): 0 to 1; t: time of the frame, s. The tracks get fresh ids, in order, and count as measured in this
+        frame.
+        """
         n = len(z)
         if not n:
             return
@@ -212,11 +235,12 @@ class TrackedPeople:
         self.bank = np.concatenate([self.bank, kalman.born(z, self.noise, self.dynamics.birth_rate_var)], 1)
 
     def rows_to_report(self, t: float) -> Ints:
-        """Returns the rows (K,) of the tracks to report at time t, s (ours).
+        """Returns the table positions (K,), ascending, of the tracks to report at time t, s (ours).
 
         Reported are measured tracks that are confirmed or at least report_delay old. A missed confirmed track is
-        reported until rho passes the value after report_coast (report_hidden if the miss is explained), for at most
-        report_credit times the frames in which it was measured, and not while it leaves the field of view.
+        reported until rho passes the value after report_coast (the longer of it and report_hidden if the miss is
+        explained), for at most report_credit times the frames in which it was measured, and not while it leaves the
+        field of view.
         """
         reported = self.measured & (self.confirmed | (t - self.born >= self.config.report_delay - 1e-6))
         lost = (self.confirmed & ~self.measured).nonzero()[0]
@@ -227,7 +251,10 @@ class TrackedPeople:
         return np.asarray(reported.nonzero()[0])
 
     def widen_view(self, z: Array) -> None:
-        """Set the field of view to the image, or, if its size is unknown, widen it to hold the boxes z (M, 4)."""
+        """Set the field of view to the image, or, if its size is unknown, widen it to hold the boxes z (M, 4).
+
+        z: centre x, y, height, width, px; ignored if the image's size is known.
+        """
         if self.context.image_size is not None:
             self.view_low, self.view_high = np.zeros(2), np.array(self.context.image_size, float)
         elif len(z):
@@ -235,7 +262,8 @@ class TrackedPeople:
             self.view_high = np.maximum(self.view_high, (z[:, :2] + z[:, :1:-1] / 2).max(0))
 
     def _leaving(self, rows: Ints) -> Bools:
-        """Returns True for each of `rows` whose box crosses an edge of the field of view and moves outwards there."""
+        """Returns flags (K,): True for each track at positions `rows` (K,) whose box crosses an edge of the field of
+        view and whose centre moves outwards there."""
         place, rate = self.upright_boxes()[rows], self.bank[kalman.RATE, rows, :2]
         centre, half = place[:, :2], place[:, :1:-1] / 2
         out = ((centre - half < self.view_low) & (rate < 0)) | ((centre + half > self.view_high) & (rate > 0))

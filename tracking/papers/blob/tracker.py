@@ -58,7 +58,11 @@ from tracking.papers.blob.update_from_pixels import PixelUpdater
 
 
 class Blob:
-    """The tracker. State: `people`, the table of tracks, and `updater`, which updates it from boxes or from pixels."""
+    """The tracker `blob`: people tracked from boxes or from pixels.
+
+    State: config, a BlobConfig, which may be replaced between two frames; people, the table of tracks; updater, which
+    updates the table from boxes or from pixels; context, of the sequence. All but config exist after `reset` only.
+    """
 
     needs: ClassVar[tuple[str, ...]] = ("pixels", "boxes")
     config_class: ClassVar[type[BlobConfig]] = BlobConfig
@@ -69,8 +73,9 @@ class Blob:
     def reset(self, context: Context, seed: int) -> None:
         """Delete all tracks and start a sequence: from pixels if the context has a background sample, else from boxes.
 
-        `seed` is not used. Raises InputError if the config's noises confirm new tracks at once, or if the background
-        sample or the scale cannot be used.
+        `seed` is not used. If the image's size is unknown, it is taken from the background sample. Raises InputError if
+        the config's noises confirm new tracks at once, if the background sample has a wrong shape, too few frames or
+        shows no background, or, from pixels, if the scale px_per_m is zero or negative (nan: it is learned).
         """
         c = self.config
         if context.image_size is None and context.background is not None:
@@ -87,10 +92,15 @@ class Blob:
             self.people, self.updater = people, PixelUpdater(c, people, context)
 
     def step(self, frame: Frame, detections: Detections | None) -> Tracks:
-        """Returns the tracks after a frame: boxes in the image, positions on the ground if the context has a camera.
+        """Returns the tracks to report after a frame, unit "person", each `group` -1; updates all tracks.
 
-        If `config` was replaced since the last frame, all tracks go on with the new one. Raises InputError and leaves
-        everything as it was if the new config is invalid at this frame rate.
+        They are boxes in the image (plane "image", px). With a camera they are on the ground (plane "ground", m) with
+        boxes, and a track above the horizon is left out. detections: used from boxes only; None is a frame without
+        measurement. From pixels a frame without image is one. If `config` was replaced since the last frame, all tracks
+        go on with the new one.
+
+        Raises InputError if the new config is invalid at this frame rate (nothing is changed then), if the picture's
+        size or dtype is not the background sample's, or if there are boxes and the scale px_per_m is unknown.
         """
         if self.config is not self.people.config:
             dynamics = self.config.dynamics(self.context.fps)
@@ -100,7 +110,8 @@ class Blob:
         return self._report(frame)
 
     def _report(self, frame: Frame) -> Tracks:
-        """Returns the tracks to report. With a camera a track above the horizon has no ground position: left out."""
+        """Returns the Tracks to report in this frame. With a camera a track above the horizon has no ground position:
+        left out."""
         people = self.people
         rows = people.rows_to_report(frame.t)
         state, scale = people.bank.take(rows, 1), people.scale[rows]
@@ -121,7 +132,8 @@ class Blob:
 def image_covariance(state: Array, scale: Array) -> Array:
     """Returns covariances (N, 4, 4) of x, y, vx, vy in px and px/s.
 
-    state (5, N, D): a bank whose first coordinates are x, y, with covariances in m^2; scale (N,): px per m.
+    state (5, N, D): a bank of filters (rows place, rate, variance of the place, covariance, variance of the rate) whose
+    first coordinates are x, y, with covariances in m^2 and s; scale (N,): px per m.
     """
     cov = np.zeros((state.shape[1], 16))  # entry (i, j) at 4 i + j: the strides below walk along diagonals
     var, cross, rate = state[kalman.VAR :, :, :2] * (scale * scale)[:, None]
@@ -131,11 +143,14 @@ def image_covariance(state: Array, scale: Array) -> Array:
 
 
 def on_ground(camera: Camera, state: Array, scale: Array) -> tuple[Array, Array, Array, Bools]:
-    """Returns ground positions (K, 2) m, velocities (K, 2) m/s, covariances (K, 4, 4), and which tracks have one (N,).
+    """Returns ground positions (K, 2) m, velocities (K, 2) m/s, covariances (K, 4, 4), and flags (N,) of tracks that
+    have one.
 
-    state (5, N, 4): a bank of x, y, h, w; scale (N,): px per m. A track above the horizon has no ground position.
-    The projected point is the bottom centre of the box for a pinhole, its centre from straight above. With the Jacobian
-    J of sim.scene.camera.to_ground: v = J (u', v'), and P = J P_uv J' block by block.
+    state (5, N, 4): a bank of filters of x, y, h, w (rows place, rate, variance of the place, covariance, variance of
+    the rate); scale (N,): px per m. A track above the horizon has no ground position and is in no result but the flags.
+    The projected point is the bottom centre of the box for a pinhole, its centre from straight above. Covariances are
+    of x, y, vx, vy. With the Jacobian J of sim.scene.camera.to_ground: v = J (u', v'), and P = J P_uv J' block by
+    block.
     """
     from sim.scene.camera import ground_jacobian, to_ground
 
@@ -152,10 +167,12 @@ def on_ground(camera: Camera, state: Array, scale: Array) -> tuple[Array, Array,
 
 
 def _foot(camera: Camera, state: Array, scale: Array) -> tuple[Array, Array, Array]:
-    """Returns place (N, 2) px, velocity (N, 2) px/s and covariance (N, 4, 4) of the point projected to the ground.
+    """Returns place (N, 2) px, velocity (N, 2) px/s and covariance (N, 4, 4) of the image point projected to the
+    ground.
 
-    For a pinhole this is (x, y + h / 2). The place of `state` is the reported box; its variances of h are those of the
-    bank, taken for the box's height.
+    state (5, N, 4): a bank of x, y, h, w; scale (N,): px per m. For a pinhole the point is (x, y + h / 2), else (x, y).
+    Covariances are of u, v, u', v'. The place of `state` is the reported box; its variances of h are those of the bank,
+    taken for the box's height.
     """
     place, rate = state[kalman.PLACE, :, :2].copy(), state[kalman.RATE, :, :2].copy()
     cov = image_covariance(state, scale)

@@ -20,14 +20,18 @@ INSIDE = 0.8  # share of a box that must lie in a larger predicted box to be a p
 
 
 class BoxUpdater:
-    """Updates the tracks from the boxes of each frame. State: the config and the gates that follow from it."""
+    """Updates the tracks of `people` from the boxes of each frame.
+
+    State: people, the table of tracks; config; noise, asymptote (4,), variance of a measurement and asymptotic S of x,
+    y, h, w, m^2; gate, orphan_gate, confirm_gate: largest d^2 (squared Mahalanobis distance) at the config's shares.
+    """
 
     def __init__(self, config: BlobConfig, people: TrackedPeople) -> None:
         self.people = people
         self.follow(config)
 
     def follow(self, config: BlobConfig) -> None:
-        """Use another config, which `people` follow already."""
+        """Replace the config and compute the gates anew; `people` must follow the config already."""
         from scipy.special import chdtri
 
         self.config = config
@@ -36,10 +40,10 @@ class BoxUpdater:
         self.gate, self.orphan_gate, self.confirm_gate = chdtri(4, shares)  # largest d^2 at these shares (eq. 10)
 
     def step(self, frame: Frame, detections: Detections | None) -> None:
-        """Update the tracks with a frame's detections; `None`, no boxes or no detection are a frame without
-        measurement.
+        """Update the tracks with a frame's detections: predict, associate, update, confirm, delete, start.
 
-        Raises InputError if there are boxes and the scale (px per m) is unknown.
+        None, detections without boxes and no detection are a frame without measurement. Raises InputError if there are
+        usable boxes and the scale (px per m) is unknown; then nothing is changed.
         """
         z, score = self._measurements(detections)
         people = self.people
@@ -58,13 +62,16 @@ class BoxUpdater:
         people.start_tracks(z[orphans], score[orphans], frame.t)
 
     def reported_boxes(self, rows: Ints) -> Array:
-        """Returns the centred boxes x, y, h, w (K, 4) px that the tracker reports for `rows` (K,)."""
+        """Returns the boxes (K, 4) that the tracker reports for the tracks at positions `rows` (K,): centre x, y,
+        height, width, px."""
         return self.people.upright_boxes()[rows]
 
     def _measurements(self, detections: Detections | None) -> tuple[Array, Array]:
-        """Returns z (M, 4) and scores (M,) of the boxes with a positive size and at least score_continue.
+        """Returns centred boxes z (M, 4): centre x, y, height, width, px, and scores (M,) of the usable detections, in
+        order.
 
-        Without scores all are 1.
+        Usable are boxes with a positive size and a score of at least score_continue. Without scores all are 1. None or
+        no boxes give empty arrays.
         """
         if detections is None or detections.box is None or not len(detections.box):
             return np.zeros((0, 4)), np.zeros(0)
@@ -76,9 +83,11 @@ class BoxUpdater:
         return box_geometry.centred_from_ltwh(box), score
 
     def _associate(self, z: Array, score: Array) -> tuple[Ints, Ints, Bools, Array]:
-        """Returns rows and columns (K,) of associated tracks and measurements, the free measurements (M,), d^2 (N, M).
+        """Returns rows and columns (K,) of associated tracks and measurements, flags (M,) of free measurements, and d^2
+        (N, M).
 
-        Measurements below score_start choose after all others (ours). d^2: eq. 9; gates: eq. 10.
+        z (M, 4): centred boxes, px; score (M,). d^2: squared Mahalanobis distance, eq. 9; gates: eq. 10. Measurements
+        below score_start choose after all others (ours).
         """
         people, free = self.people, np.ones(len(z), bool)
         if not len(z) or not len(people.id):
@@ -96,9 +105,11 @@ class BoxUpdater:
         return rows, columns, free, d2
 
     def _weak_pairs(self, cost: Array, taken: Ints) -> tuple[Ints, Ints]:
-        """Returns pairs of weak measurements and tracks that are not `taken` (K,).
+        """Returns rows and columns (K,) of pairs of weak measurements (below score_start) and tracks that are not
+        `taken`.
 
-        cost (N, M): inf for strong measurements. With "nearest" a measurement whose nearest track is taken has no pair.
+        cost (N, M): d^2 inside the gates, inf outside and for strong measurements; it may be changed. taken: positions
+        of tracks that have a measurement. With "nearest" a measurement whose nearest track is taken has no pair.
         """
         if self.config.association == "optimal":
             cost[taken] = np.inf
@@ -108,10 +119,12 @@ class BoxUpdater:
         return rows[open_rows], columns[open_rows]
 
     def _without_merged_boxes(self, rows: Ints, columns: Ints, z: Array) -> tuple[Ints, Ints]:
-        """Returns the pairs without those whose box covers several people, which the wide gate of a long-missed track
-        would let in (ours).
+        """Returns the pairs rows, columns (K,) of tracks and boxes z (M, 4) without those whose box covers several
+        people (ours).
 
-        Only boxes whose size is outside the gate of a track that is measured in every frame are examined.
+        The wide gate of a long-missed track would let such a box in. Only boxes whose size is outside the gate of a
+        track that is measured in every frame are examined; if all tracks are associated, none is. Missed tracks in such
+        a box get miss_explained.
         """
         people = self.people
         if len(rows) == len(people.id):
@@ -128,12 +141,13 @@ class BoxUpdater:
     def _with_pieces(
         self, rows: Ints, columns: Ints, free: Bools, z: Array, score: Array, d2: Array
     ) -> tuple[Ints, Array, Array, Bools]:
-        """Returns rows (K,), scores (K,) and measurements (K, 4) of the tracks with pieces fused, and the free ones
+        """Returns positions (K,), scores (K,) and measurements (K, 4) of the tracks with pieces fused, and free flags
         (M,).
 
-        Free measurements that are pieces of a track (`_owners`) are fused, together with the track's own measurement if
-        it has one. The fused box updates the track if it is nearer than the own measurement, or, without one, inside
-        the gate. A piece is no longer free in any case.
+        rows, columns: associated tracks and measurements z (M, 4): centre x, y, height, width, px; free (M,) bool,
+        changed in place; d2 (N, M). Free measurements that are pieces of a track (`_owners`) are fused, together with
+        the track's own measurement if it has one. The fused box updates the track if it is nearer than the own
+        measurement, or, without one, inside the gate. A piece is no longer free in any case.
         """
         people, measured, best = self.people, z[columns], score[columns]
         left = free.nonzero()[0]
@@ -159,11 +173,13 @@ class BoxUpdater:
         return rows, best, measured, free
 
     def _owners(self, rows: Ints, pieces: Array, d2: Array) -> Ints:
-        """Returns the row (K,) of the track of which each free measurement (K, 4) is a piece, -1 if of none (ours).
+        """Returns the position (K,) of the track of which each free measurement is a piece, -1 if it is a piece of none
+        (ours).
 
-        It is a piece of the nearest of the measured tracks `rows` if it lies in that track's orphan_gate, by the S of a
-        track measured in every frame. Otherwise it is a piece of the confirmed track that covers most of it, if it is
-        smaller than the predicted box, its centre lies inside and INSIDE of it is covered. d2 (N, K): distances.
+        rows: positions of the measured tracks. pieces (K, 4): centre x, y, height, width, px. d2 (N, K): squared
+        distances. A piece belongs to the nearest measured track if it lies in that track's orphan_gate, by the S of a
+        track measured in every frame. Otherwise it belongs to the confirmed track that covers most of it, if it is
+        smaller than the predicted box, its centre lies inside and INSIDE = 0.8 of it is covered.
         """
         people = self.people
         place, owner = people.bank[kalman.PLACE], np.full(len(pieces), -1)
@@ -181,20 +197,30 @@ class BoxUpdater:
         return np.asarray(owner)
 
     def _away(self, rows: Ints, measured: Array) -> Array:
-        """Returns d^2 (K,) of tracks `rows` (K,) and their measurements (K, 4) (eq. 9)."""
+        """Returns d^2 (K,), squared Mahalanobis distance (eq. 9), of the tracks at positions `rows` (K,) and their
+        measurements.
+
+        measured (K, 4): centre x, y, height, width, px.
+        """
         people = self.people
         y = (measured - people.bank[kalman.PLACE, rows]) / people.scale[rows, None]
         return np.asarray((y * y / (people.bank[kalman.VAR, rows] + self.noise)).sum(1))
 
     def _update(self, rows: Ints, measured: Array) -> Array:
-        """Update the tracks `rows` (K,) with their measurements (K, 4), px; returns d^2 (K,) (eqs 3 to 9)."""
+        """Update the tracks at positions `rows` (K,) with measurements (K, 4), in place; returns d^2 (K,) (eqs 3 to 9).
+
+        measured: centre x, y, height, width, px. d^2 is the squared Mahalanobis distance before the update.
+        """
         people = self.people
         terms = kalman.update(people.bank, rows, measured, self.noise)
         return np.asarray(np.add.reduce(terms, 1) / np.square(people.scale[rows]))
 
     def _orphans(self, z: Array, score: Array, free: Bools) -> Ints:
-        """Returns the columns (K,) of the measurements that start tracks: free, at least score_start, not over several
-        people."""
+        """Returns the columns (K,), ascending, of the measurements that start tracks.
+
+        They are free, have at least score_start and do not cover several people. z (M, 4): centre x, y, height, width,
+        px; score, free (M,). Tracks hidden in a box that covers several get miss_explained.
+        """
         left, people = (free & (score >= self.config.score_start)).nonzero()[0], self.people
         if not len(left):
             return left

@@ -40,10 +40,11 @@ LEAST_SHOWN = 0.2  # a person of whom a smaller share is visible is measured as 
 
 
 class Measured(NamedTuple):
-    """Measurements of K tracks.
+    """Measurements of K tracks, one row each.
 
-    rows (K,): of the tracks. z (K, 5): x, y, h, w (px), theta (rad). noise (K, 4): variances of x, y, h, w, m^2.
-    angle_var (K,): variance of theta, rad^2. support (K,): share of the template that is foreground; 1 for a lone blob.
+    rows (K,): table positions of the tracks. z (K, 5): ellipse: centre x, y, axes h, w (px), theta (rad). noise (K, 4):
+    variances of x, y, h, w, m^2. angle_var (K,): variance of theta, rad^2, inf if it is not measured. support (K,), 0
+    to 1: how well the template is filled with foreground; 1 for a blob of one person.
     """
 
     rows: Ints
@@ -53,18 +54,25 @@ class Measured(NamedTuple):
     support: Array
 
     def joined(self, more: Measured) -> Measured:
-        """Returns these measurements followed by `more`."""
+        """Returns new Measured with the rows of these measurements followed by those of `more`."""
         return Measured(*(np.concatenate(pair) for pair in zip(self, more, strict=True)))
 
 
 class PixelUpdater:
-    """Updates the tracks from the picture of each frame. State: the foreground pipeline and the person size."""
+    """Updates the tracks of `people` from the picture of each frame.
+
+    State: foreground, the pipeline with its background model; size, the size of a person at each place; people, the
+    table of tracks; config; gates, confirm_gates (2,): largest d^2 without and with direction; angle_noise: variance,
+    rad^2.
+    """
 
     def __init__(self, config: BlobConfig, people: TrackedEllipses, context: Context) -> None:
-        """Learn background and person size from the context's background sample.
+        """Learn background and person size from the context's background sample, which must not be None
+        (AssertionError).
 
-        If the context has no scale (nan), it is learned from lone people in the sample. Raises InputError if the scale
-        is given but not positive, or if the sample cannot be used.
+        If the context has no scale (px_per_m is nan), it is learned from people who stand alone in the sample; without
+        any it stays unknown, and an image is taken to be 18 m high. Raises InputError if the scale is zero or negative,
+        or if the sample has a wrong shape or dtype, too few frames or shows no background.
         """
         assert context.background is not None
         if not np.isnan(context.px_per_m):
@@ -78,12 +86,13 @@ class PixelUpdater:
         self._set(config)
 
     def follow(self, config: BlobConfig) -> None:
-        """Use another config, which `people` follow already; background and person size stay as learned."""
+        """Replace the config, which `people` must follow already; background and person size stay as learned."""
         self.foreground.follow(config, config.most_foreground)
         self._set(config)
 
     def _set(self, config: BlobConfig) -> None:
-        """Compute the gates and the noise of the direction from the config."""
+        """Keep the config and compute from it the gates (largest d^2, squared Mahalanobis distance) and the direction's
+        variance."""
         from scipy.special import chdtri
 
         self.config = config
@@ -93,16 +102,17 @@ class PixelUpdater:
         self.angle_noise = np.radians(config.angle_noise) ** 2
 
     def _take_scale(self) -> None:
-        """Use the learned scale if the context has none."""
+        """If the context has no scale (nan), use the learned one, px per m, for foreground and tracks."""
         if np.isnan(self.context.px_per_m):
             self.foreground.px_per_m = self.size.px_per_m
             self.people.context = self.context.replace(px_per_m=self.foreground.scale)
 
     def step(self, frame: Frame, detections: Detections | None) -> None:
-        """Update the tracks with a frame's picture; `detections` are not used.
+        """Update the tracks with a frame's picture (H, W, 3) BGR uint8; `detections` are not used.
 
         If the picture is missing or implausible (more than most_foreground of it is foreground), no track is measured.
-        An implausible picture still adapts the background.
+        An implausible picture still adapts the background. Raises InputError if the picture's size or dtype is not that
+        of the background sample; the tracks are then already predicted.
         """
         people = self.people
         people.predict()
@@ -127,22 +137,28 @@ class PixelUpdater:
         return None
 
     def _measure_nobody(self, t: float) -> None:
-        """Record a miss of all tracks: their state stays the prediction, as with gain 0 (4.4)."""
+        """Record a miss of all tracks at time t, s, and delete those missed for too long; the others keep the
+        prediction (4.4)."""
         people = self.people
         people.record_measured(np.zeros(0, np.int64), np.zeros(0, bool), np.zeros(0))
         people.delete_tracks(t)
 
     def _protected(self) -> Bools:
-        """Returns an (H, W) mask of the places of confirmed tracks."""
+        """Returns a mask (H, W), True at the places of confirmed tracks: there the background must not adapt."""
         boxes = self._person_boxes(self.people.upright_boxes()[self.people.confirmed])
         return template_mask(self.foreground.shape, box_geometry.standing(boxes))
 
     def reported_boxes(self, rows: Ints) -> Array:
-        """Returns the centred boxes x, y, h, w (K, 4) px that the tracker reports for `rows` (K,)."""
+        """Returns the boxes (K, 4) that the tracker reports for the tracks at positions `rows` (K,): centre x, y,
+        height, width, px."""
         return self._person_boxes(self.people.upright_boxes()[rows])
 
     def _measure(self, t: float, mask: Bools, found: Blobs) -> None:
-        """Update and manage the tracks with a cleaned foreground mask (H, W) and its blobs."""
+        """Update, confirm, delete and start tracks with the foreground of a frame at time t, s.
+
+        mask (H, W) bool: the cleaned foreground; found: its blobs. Blobs of one person are associated; with `split`,
+        and once the size of people is reliable, other foreground is divided among the tracks by templates.
+        """
         people, c = self.people, self.config
         expected = people.upright_boxes()
         split = c.split and self.size.reliable
@@ -170,41 +186,54 @@ class PixelUpdater:
         people.start_tracks(unexplained, np.ones(len(unexplained)), t)
 
     def _relax_sizes(self) -> None:
-        """Move the axes of all tracks towards those of a person at their places, where these are known."""
+        """Move the axes of all tracks, in place, towards those of a person at their places; a track stays where these
+        are unknown."""
         at = box_geometry.standing(self.people.upright_boxes())
         axes = self.size.axes(at[:, :2])
         rows = np.flatnonzero(np.isfinite(axes).all(1))
         self.people.relax_axes(rows, -np.sort(-axes[rows]), self.config.person_noise**2)
 
     def _lone_people(self, found: Blobs, expected: Array) -> Bools:
-        """Returns True for each blob (M,) of one person's size that the image's edge does not cut and in which at most
-        one confirmed track is expected; expected (N, 4) centred boxes."""
+        """Returns flags (M,): True for each blob that is taken for one person.
+
+        It has one person's size, the image's edge does not cut it, and at most one confirmed track is expected in it.
+        expected (N, 4): boxes of all tracks: centre x, y, height, width, px.
+        """
         one = self.size.one_person(found.box, found.ellipse)
         return np.asarray(one & ~found.cut() & ~self._several_expected(found.box, expected))
 
     def _person_boxes(self, upright: Array) -> Array:
-        """Returns the centred boxes (N, 4) of people whose ellipses have these bounding boxes (N, 4)."""
+        """Returns the boxes (N, 4) of people whose ellipses have the bounding boxes `upright` (N, 4).
+
+        Both are centre x, y, height, width, px. A person's box differs from its ellipse's by the learned factors.
+        """
         return np.concatenate([upright[:, :2], upright[:, 2:] * self.size.box_over_ellipse], 1)
 
     def _person_ellipses(self, box: Array) -> Array:
-        """Returns the ellipses (N, 5) x, y, h, w, theta of upright people in these centred boxes (N, 4)."""
+        """Returns the ellipses (N, 5) centre x, y, axes h, w (px), theta (rad), of upright people in the boxes `box`
+        (N, 4).
+
+        Boxes are centre x, y, height, width, px.
+        """
         return box_geometry.inscribed_ellipses(np.concatenate([box[:, :2], box[:, 2:] / self.size.box_over_ellipse], 1))
 
     def _several_expected(self, box: Array, expected: Array) -> Bools:
-        """Returns True for each blob (M,) in which two or more confirmed tracks are expected.
+        """Returns flags (M,): True for each blob in which two or more confirmed tracks are expected.
 
-        box (M, 4) ltwh; expected (N, 4) centred boxes of all tracks.
+        box (M, 4): left, top, width, height, px, of the blobs; expected (N, 4): centre x, y, height, width, px, of all
+        tracks. A track is expected in a blob that covers at least SHARED = 0.35 of its box.
         """
         sure = expected[self.people.confirmed]
         blobs = box_geometry.centred_from_ltwh(box)
         return np.asarray((box_geometry.covered_share(sure, blobs) >= SHARED).sum(0) > 1)
 
     def _associate(self, z: Array, angle_var: Array) -> tuple[Ints, Ints, Bools]:
-        """Returns rows and columns (K,) of associated tracks and ellipses z (M, 5), and which ellipses are in a gate
-        (M,).
+        """Returns rows and columns (K,) of associated tracks and ellipses, and flags (M,) of the ellipses that are in
+        any gate.
 
-        The gate has 5 degrees of freedom if the ellipse has a direction, else 4 (eqs 9, 10). Seen from straight above
-        it always has 4, as people turn on the spot.
+        z (M, 5): centre x, y, axes h, w (px), theta (rad); angle_var (M,): variance of theta, rad^2. The gate has 5
+        degrees of freedom if the ellipse has a direction, else 4 (eqs 9, 10). Seen from straight above it always has 4,
+        as people turn on the spot.
         """
         people = self.people
         if not len(z) or not len(people.id):
@@ -221,10 +250,13 @@ class PixelUpdater:
     def _measure_by_templates(
         self, scene: ExplainedForeground, expected: Array, rows: Ints, confirmed: bool
     ) -> Measured:
-        """Returns template measurements of the confirmed (or of the tentative) tracks that are not among `rows`.
+        """Returns template measurements of the confirmed (or, if `confirmed` is False, of the tentative) tracks not in
+        `rows`.
 
-        A track whose template has too little support is left out. The variances grow with the inverse square of the
-        visible share; those of h and w are BLIND times larger still, as the template keeps the track's own size.
+        scene: the frame's foreground; the templates are painted into it. expected (N, 4): boxes of all tracks: centre
+        x, y, height, width, px. rows: positions of tracks measured already. A track whose template has too little
+        support is left out. The variances grow with the inverse square of the visible share; those of h and w are BLIND
+        times larger still, as the template keeps the track's own size.
         """
         people, c = self.people, self.config
         open_rows = np.setdiff1d(np.flatnonzero(people.confirmed == confirmed), rows)
