@@ -26,9 +26,12 @@ XX, XY, YY = 0, 1, 2  # entries of a symmetric 2 x 2 matrix packed by `packed_in
 
 @dataclass(frozen=True)
 class BodyPart:
-    """One ellipsoid of a person of height 1: height of its centre, half axes across, along the heading, and up.
+    """One ellipsoid (body or head) of a person of height 1; all numbers are shares without unit.
 
-    For BODY, `across` and `along` are shares of the person's own width and depth, not of the height.
+    centre   height of its centre above the ground, share of the person's height
+    across   half axis to the right; share of the height for HEAD, of the person's width for BODY
+    along    half axis along the heading; share of the height for HEAD, of the person's depth for BODY
+    up       half axis upwards, share of the height
     """
 
     centre: float
@@ -43,7 +46,11 @@ HEAD = BodyPart(centre=0.93, across=0.045, along=0.057, up=0.07)
 
 @dataclass(frozen=True)
 class Ellipsoids:
-    """Bodies and heads of N people: centre (N, 2, 3) m, shape (N, 2, 3, 3) m². The second axis is body, head."""
+    """Bodies and heads of N people in the world, as ellipsoids (X - centre)ᵀ shape⁻¹ (X - centre) <= 1.
+
+    centre (N, 2, 3)     x, y, z in m; the second axis is body, head
+    shape (N, 2, 3, 3)   symmetric matrices in m², the squared half axes turned by the heading
+    """
 
     centre: Array
     shape: Array
@@ -51,9 +58,12 @@ class Ellipsoids:
 
 @dataclass(frozen=True)
 class Outlines:
-    """Silhouettes of N people, two ellipses each: centre (N, 2, 2) px, shape (N, 2, 2, 2) px².
+    """Silhouettes of N people in an image, as ellipses (u - centre)ᵀ shape⁻¹ (u - centre) <= 1, two each.
 
-    The second axis is body, head. An ellipse is nan if its ellipsoid is not wholly in front of the camera.
+        centre (N, 2, 2)     u, v in px; the second axis is body, head
+        shape (N, 2, 2, 2)   symmetric matrices in px²
+
+    An ellipse is nan if its ellipsoid is not wholly in front of the camera.
     """
 
     centre: Array
@@ -62,8 +72,13 @@ class Outlines:
 
 @dataclass(frozen=True)
 class RecordedBodies:
-    """All bodies of a Motion, B rows sorted by frame, then id: frame (B,) from 1 on, id (B,), feet pos3 (B, 3) m,
-    shapes."""
+    """B bodies of a Motion, one row per person and frame, sorted by frame, then id.
+
+    frame (B,)     frame number, from 1 on
+    id (B,)        person id = column of the Motion + 1
+    pos3 (B, 3)    feet: x, y, z in m
+    shapes         Ellipsoids of body and head, B rows
+    """
 
     frame: Ints
     id: Ints
@@ -72,9 +87,10 @@ class RecordedBodies:
 
 
 def half_axes(height: Array, width: Array | None = None, depth: Array | None = None) -> Array:
-    """Return the half axes (N, 2, 3) m of bodies and heads: across, along the heading, up.
+    """Return the half axes (N, 2, 3) in m of N people: second axis body, head; last axis across, along the heading, up.
 
-    height, width, depth (N,) m; without width or depth, SHOULDER_SHARE or DEPTH_SHARE of the height.
+    height, width, depth (N,) m: of the whole person. width None: SHOULDER_SHARE (0.27) of the height. depth None:
+    DEPTH_SHARE (0.16) of the height. Width and depth change the body only, not the head.
     """
     width = SHOULDER_SHARE * height if width is None else width
     depth = DEPTH_SHARE * height if depth is None else depth
@@ -87,7 +103,11 @@ def half_axes(height: Array, width: Array | None = None, depth: Array | None = N
 def ellipsoids(
     pos3: Array, heading: Array, height: Array, width: Array | None = None, depth: Array | None = None
 ) -> Ellipsoids:
-    """Return the ellipsoids of N people with feet at pos3 (N, 3) m who face heading (N,) rad; sizes as `half_axes`."""
+    """Return the Ellipsoids, body and head, of N upright people.
+
+    pos3 (N, 3) m: feet. heading (N,) rad: direction faced, 0 along +x, counter-clockwise. height, width, depth (N,) m;
+    width None stands for 0.27 of the height, depth None for 0.16 of it. A nan in pos3 or heading gives nan.
+    """
     half = half_axes(height, width, depth)
     c, s = np.cos(heading), np.sin(heading)
     a = half**2
@@ -102,9 +122,13 @@ def ellipsoids(
 
 
 def bodies_at(motion: Motion, t: Ints, p: Ints) -> tuple[Array, Ellipsoids]:
-    """Return feet (N, 3) m and ellipsoids of the people in columns p (N,) of a Motion, in its time rows t (N,).
+    """Return the feet (N, 3), x, y, z in m, and the Ellipsoids of N people of a Motion.
 
-    The feet are on the ground of the scene, stairs included.
+    t (N,): time rows of the Motion, from 0 on (frame - 1). p (N,): columns of the Motion, from 0 on (id - 1). The feet
+    are on the ground of the scene, stairs included. A person who is absent at that time has nan x, y, height 0 and a
+    nan ellipsoid.
+
+    Raises IndexError for a row or column that the Motion does not have.
     """
     xy = motion.pos[t, p]
     pos3 = np.column_stack([xy, height_at(motion.scene, xy)])
@@ -112,14 +136,21 @@ def bodies_at(motion: Motion, t: Ints, p: Ints) -> tuple[Array, Ellipsoids]:
 
 
 def recorded_bodies(motion: Motion) -> RecordedBodies:
-    """Return the bodies of all people in all frames in which they are present."""
+    """Return the bodies of all people in all frames in which they are present, as RecordedBodies sorted by frame, then
+    id.
+
+    It has no rows if nobody is ever present.
+    """
     t, p = np.nonzero(motion.present)
     return RecordedBodies(t + 1, p + 1, *bodies_at(motion, t, p))
 
 
 def outlines(camera: Camera, people: Ellipsoids) -> Outlines:
-    """Return the exact outline of each ellipsoid in the image; nan where it is not wholly in front of a pinhole
-    camera."""
+    """Return the exact ellipse in the image of each ellipsoid, as Outlines in px with the same N rows.
+
+    Kind "pinhole": an ellipse is nan where the ellipsoid is not wholly in front of the camera; lens distortion is
+    ignored. Kind "top": ellipses do not depend on the depth. Ellipses are not clipped to the image.
+    """
     R = camera.rotation
     c = (people.centre - camera.position) @ R.T
     S = R @ people.shape @ R.T
@@ -136,7 +167,10 @@ def outlines(camera: Camera, people: Ellipsoids) -> Outlines:
 
 
 def outline_boxes(ellipses: Outlines) -> Array:
-    """Return boxes (N, 4) ltwh px round body and head: amodal, not clipped to the image; nan if an outline is nan."""
+    """Return the boxes (N, 4), left, top, width, height in px, each round the ellipses of body and head of one person.
+
+    Boxes are amodal (hidden parts included) and not clipped to the image. A row is nan if either ellipse is nan.
+    """
     half = np.sqrt(np.diagonal(ellipses.shape, axis1=2, axis2=3))
     low, high = (ellipses.centre - half).min(axis=1), (ellipses.centre + half).max(axis=1)
     return np.concatenate([low, high - low], axis=1)
@@ -145,20 +179,31 @@ def outline_boxes(ellipses: Outlines) -> Array:
 def person_boxes(
     camera: Camera, pos3: Array, heading: Array, height: Array, width: Array | None = None, depth: Array | None = None
 ) -> Array:
-    """Return the boxes (N, 4) ltwh px of people with feet at pos3 (N, 3) m: `outline_boxes` of their `ellipsoids`."""
+    """Return the boxes (N, 4), left, top, width, height in px, round body and head of N people in the camera's image.
+
+    pos3 (N, 3) m: feet. heading (N,) rad: direction faced, 0 along +x, counter-clockwise. height, width, depth (N,) m;
+    width None stands for 0.27 of the height, depth None for 0.16 of it. Boxes are amodal (hidden parts included) and
+    not clipped. A row is nan if the person is not wholly in front of a pinhole camera. Lens distortion is ignored.
+    """
     return outline_boxes(outlines(camera, ellipsoids(pos3, heading, height, width, depth)))
 
 
 def packed_inverse(shape: Array) -> Array:
-    """Return E⁻¹ of symmetric matrices E (..., 2, 2) as (..., 3): its entries 11, 12, 22 (slots XX, XY, YY)."""
+    """Return the inverses of symmetric matrices E (..., 2, 2) as (..., 3): their entries 11, 12, 22 (slots XX, XY, YY).
+
+    A nan matrix gives nan. A singular one gives inf or nan, with a numpy warning.
+    """
     a, b, d = shape[..., 0, 0], shape[..., 0, 1], shape[..., 1, 1]
     return np.asarray(np.stack([d, -b, a], axis=-1) / (a * d - b * b)[..., None])
 
 
 def contour(ellipses: Outlines, points: int = 16) -> Array:
-    """Return points on the outlines (N, 2 * points, 2) px, those of the body first; nan where an outline is nan.
+    """Return points on the outlines of N people, (N, 2 * points, 2), u and v in px: first those of the body, then the
+    head's.
 
-    They are m + L (cos, sin) with L Lᵀ = E, at `points` evenly spaced angles.
+    An ellipse with centre m and shape E has the points m + L (cos, sin) with L Lᵀ = E, at `points` evenly spaced angles
+    from 0 on. The points of a nan ellipse are nan. They are not clipped to the image, and points of the head may lie in
+    the body.
     """
     angle = 2 * np.pi * np.arange(points) / points
     circle = np.stack([np.cos(angle), np.sin(angle)], axis=1)
@@ -172,10 +217,13 @@ def contour(ellipses: Outlines, points: int = 16) -> Array:
 
 
 def occlusion_distance(camera: Camera, pos3: Array, height: Array) -> Array:
-    """Return a distance (N,) m that orders people from near to far: of two on one line of sight, the nearer hides.
+    """Return a distance (N,) in m that orders people from near to far: of two on one line of sight, the nearer hides.
 
-    Pinhole: the horizontal distance from the camera to the body's axis. A ray meets upright bodies in this order,
-    whatever the camera's tilt. From above: the height of the camera over the top of the head.
+    Kind "pinhole": the horizontal distance from the camera to the body's axis; a ray meets upright bodies in this
+    order, whatever the camera's tilt. Kind "top": height of the camera minus that of the top of the head; negative for
+    a head above the camera.
+
+    pos3 (N, 3) m: feet. height (N,) m: body heights.
     """
     if camera.kind == "top":
         return np.asarray(camera.position[2] - pos3[:, 2] - height)

@@ -19,19 +19,22 @@ NEAREST_DEPTH = 0.05  # m: points at this depth or nearer are not projected
 
 
 def camera_rotation(tilt: float, yaw: float) -> Array:
-    """Return the rotation (3, 3) from world to camera; its rows are the camera's right, down and forward axes.
+    """Return the rotation matrix (3, 3) from world to camera; its rows are the camera's right, down and forward axes.
 
-    tilt, yaw: rad; tilt > 0 looks down, yaw 0 looks along +y, yaw > 0 turns left.
+    tilt: angle in rad by which the camera looks down; negative looks up. yaw: rad; 0 looks along world +y, positive
+    turns left. x_camera = rotation (X - position).
     """
     ct, st, cy, sy = np.cos(tilt), np.sin(tilt), np.cos(yaw), np.sin(yaw)
     return np.array([[cy, sy, 0.0], [st * sy, -st * cy, -ct], [-sy * ct, cy * ct, -st]])
 
 
 def project(camera: Camera, xyz: Array) -> tuple[Array, Array]:
-    """Return image points (N, 2) px and depths (N,) m along the optical axis of world points xyz (N, 3) m.
+    """Return image points (N, 2), u right and v down in px, and depths (N,) in m of world points xyz (N, 3) in m.
 
-    The image point is nan in two cases: behind a pinhole camera (depth at most NEAREST_DEPTH), and where a lens with
-    radial < 0 does not show the point. The depth is never nan.
+    The depth is measured along the optical axis and is negative behind the camera. Kind "top": the image point does not
+    depend on the depth, and is never nan. Kind "pinhole": the image point is nan where the depth is at most
+    NEAREST_DEPTH (0.05 m), and where a lens with radial < 0 does not show the point. Points outside the image are not
+    clipped. A nan in a row of xyz makes that row's point and depth nan.
     """
     x = (np.asarray(xyz, dtype=float) - camera.position) @ camera.rotation.T
     depth = x[:, 2]
@@ -42,9 +45,12 @@ def project(camera: Camera, xyz: Array) -> tuple[Array, Array]:
 
 
 def rays(camera: Camera, uv: Array) -> tuple[Array, Array]:
-    """Return the lines of sight of image points uv (N, 2) px: origins (N, 3) m and directions (N, 3).
+    """Return the lines of sight of image points uv (N, 2) px in the world: origins (N, 3) in m and directions (N, 3).
 
-    A direction has depth 1 m along the optical axis per unit. Origins differ only for kind "top".
+    The point origin + s direction has the depth s (m) along the optical axis; a direction is not a unit vector. Kind
+    "pinhole": every origin is the camera's position, and lens distortion is undone. Kind "top": origins differ, all
+    directions are the forward axis. One of the two arrays is read-only (one row repeated). uv may lie outside the
+    image.
     """
     uv = np.asarray(uv, dtype=float)
     if camera.kind == "top":
@@ -57,9 +63,10 @@ def rays(camera: Camera, uv: Array) -> tuple[Array, Array]:
 
 
 def to_ground(camera: Camera, uv: Array, z: float = 0.0) -> Array:
-    """Return the points (N, 2) m of the plane at height z (m) seen at image points uv (N, 2) px.
+    """Return the points (N, 2), x and y in m, of the plane at height z (m) that are seen at image points uv (N, 2) px.
 
-    nan where the line of sight does not meet the plane in front of the camera, as at and above the horizon.
+    A row is nan where the line of sight does not meet the plane in front of the camera: at and above the horizon, or
+    for a plane above a camera that looks down. Walls and stairs are ignored. uv may lie outside the image.
     """
     origin, direction = rays(camera, uv)
     with np.errstate(divide="ignore", invalid="ignore"):
@@ -69,10 +76,12 @@ def to_ground(camera: Camera, uv: Array, z: float = 0.0) -> Array:
 
 
 def ground_jacobian(camera: Camera, uv: Array, z: float = 0.0) -> Array:
-    """Return the Jacobian of `to_ground`, d(x, y)/d(u, v), (N, 2, 2) in m/px: rows x, y, columns u, v.
+    """Return the derivative of `to_ground` at image points uv (N, 2) px, d(x, y)/d(u, v), as (N, 2, 2) in m/px.
 
-    Pinhole: with the ray X = O + s D and s = (z - O_z)/D_z, dX = s dD + D ds and ds = -s dD_z/D_z. Top: dX = dO. It has
-    no meaning at and above the horizon.
+    Rows are x, y on the plane at height z (m); columns are u, v. Kind "pinhole": with the ray X = O + s D and s = (z -
+    O_z)/D_z, dX = s dD + D ds and ds = -s dD_z/D_z. Kind "top": the same read-only matrix in every row, for any z.
+
+    Special cases: the matrix is inf or nan at the horizon, with a numpy warning. Above the horizon it has no meaning.
     """
     origin, direction = rays(camera, uv)
     if camera.kind == "top":
@@ -89,12 +98,19 @@ def ground_jacobian(camera: Camera, uv: Array, z: float = 0.0) -> Array:
 
 
 def right_camera(camera: Camera) -> Camera:
-    """Return the right camera of a stereo pair: the same camera, `baseline` metres further along camera x."""
+    """Return the right camera of a stereo pair: a copy of `camera`, moved by its `baseline` (m) along its own x axis.
+
+    The copy stands where `camera` does if the baseline is 0. Kind "top" is not refused.
+    """
     return camera.replace(position=camera.position + camera.baseline * camera.rotation[0])
 
 
 def disparity(camera: Camera, depth: Array) -> Array:
-    """Return the disparity u_left - u_right = f B / z in px for depths (m) of any shape; 0 for kind "top"."""
+    """Return the disparity u_left - u_right = f B / z in px for depths z (m) of any shape; zeros for kind "top".
+
+    f is the horizontal focal length in px, B the camera's baseline in m. A depth of 0 gives inf or nan, with a numpy
+    warning.
+    """
     if camera.kind == "top":
         return np.zeros_like(depth)
     return np.asarray(camera.focal_px[0] * camera.baseline / depth)
@@ -103,10 +119,12 @@ def disparity(camera: Camera, depth: Array) -> Array:
 def px_per_m_at_centre(camera: Camera) -> float:
     """Return the scale of the image, px per m, at the ground point seen in the image centre.
 
-    Kind "top": px_per_m. Pinhole: height in px of an upright person of PERSON_HEIGHT there, over PERSON_HEIGHT. Tilted
-    more than STEEP_DEG: focal length over the depth of that point. If the centre shows no ground, the point is taken
-    halfway between the first row below the centre that shows ground and the lower edge. If no row shows ground, the
-    point is 10 m ahead of the camera.
+    Kind "top": px_per_m. Kind "pinhole": the height in px of an upright person of PERSON_HEIGHT (1.7 m) there, over
+    PERSON_HEIGHT. If the camera is tilted more than STEEP_DEG (70°), it is the vertical focal length over the depth of
+    that point.
+
+    If the centre shows no ground, the point is taken halfway between two rows: the first below the centre that shows
+    ground, and the lower edge of the image. If no row shows ground, the point is 10 m ahead of the camera.
     """
     if camera.kind == "top":
         return camera.px_per_m
@@ -121,7 +139,11 @@ def px_per_m_at_centre(camera: Camera) -> float:
 
 
 def _low_ground(camera: Camera) -> Array:
-    """Ground point (2,) m below the image centre, halfway to the lower edge; 10 m ahead if no ground is shown."""
+    """Return a ground point (2,), x and y in m, that the camera sees below its image centre, in the centre's column.
+
+    It is seen halfway between the first row below the centre that shows ground and the lower edge of the image. If no
+    row shows ground, it is the point 10 m ahead of the camera, in the direction of its forward axis.
+    """
     u, bottom = camera.centre_px[0], float(camera.image[1])
     v = np.linspace(camera.centre_px[1], bottom, 129)
     ground = to_ground(camera, np.column_stack([np.full_like(v, u), v]))

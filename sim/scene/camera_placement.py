@@ -28,12 +28,18 @@ TOLERANCE = 1e-6
 
 
 def place_camera(spec: CameraSpec, motion: Motion) -> Camera:
-    """Return the camera of a scenario, with height, position and scale (px_per_m, kind "top") solved if not given.
+    """Return the Camera of a scenario; what its settings leave out is solved: position, height, and px_per_m for kind
+    "top".
 
-    All bodies of all frames are in view, as large as possible. With `crop`, only bodies on the world's own ground are
-    fitted, and others may leave the view. Without bodies to fit, four standard people in the world's corners are
-    fitted. Raises InputError, naming the first person out of view, if the given values leave a body out of view and
-    `crop` is false.
+    It is placed so that the bodies of all frames are in view and as large as possible, with a margin of 2 % of the
+    image's shorter side. No solved height is below 0.3 m. From above, a height that is not given is 20 m. With
+    `spec.crop`, only bodies on the world's rectangle are fitted, and others may leave the view. Without bodies to fit,
+    four standard people in the world's corners are fitted.
+
+    spec: the scenario's camera settings. motion: the crowd's motion, with its scene.
+
+    Raises InputError, naming the first person out of view, if `spec.crop` is false and a body is not wholly in the
+    image. That can happen where position, height or scale are given, or where the tilt allows no place.
     """
     everybody = recorded_bodies(motion)
     aimed = _bodies_to_fit(everybody, motion, spec.crop)
@@ -49,7 +55,12 @@ def _select(bodies: RecordedBodies, keep: Bools) -> RecordedBodies:
 
 
 def _bodies_to_fit(bodies: RecordedBodies, motion: Motion, crop: bool) -> RecordedBodies:
-    """The bodies to keep in view; standard people in the world's four corners if there are none."""
+    """Return the bodies to keep in view: all of `bodies` or, with `crop`, those whose feet are in the world's
+    rectangle.
+
+    If there are none, four bodies of standard people (1.7 m) in the world's corners are returned, with frame 0 and id
+    0. motion: gives the scene's size.
+    """
     if crop:
         xy = bodies.pos3[:, :2]
         bodies = _select(bodies, np.all((xy >= 0) & (xy <= motion.scene.size), axis=1))
@@ -62,25 +73,40 @@ def _bodies_to_fit(bodies: RecordedBodies, motion: Motion, crop: bool) -> Record
 
 
 def _reach(bodies: RecordedBodies, normals: Array) -> Array:
-    """Least n·c - sqrt(nᵀ S n) over body and head: (B, K) for normals (K, 3)."""
+    """Return how far each of B bodies reaches against each of K normals, (B, K): the least n·X over its points X, in m.
+
+    normals (K, 3). For an ellipsoid (centre c, shape S) it is n·c - sqrt(nᵀ S n); the smaller of body and head counts.
+    """
     centre = bodies.shapes.centre @ normals.T
     spread = np.sqrt(np.einsum("ki,bpij,kj->bpk", normals, bodies.shapes.shape, normals))
     return np.asarray((centre - spread).min(axis=1))
 
 
 def _slopes(spec: CameraSpec, margin: float) -> tuple[float, float]:
-    """Half the view's width and half its height, per metre of depth, less `margin` px on each side."""
+    """Return half the width and half the height of the view, in m per m of depth, less `margin` px on each side.
+
+    spec: gives the image size and focal length, both in px.
+    """
     return (spec.image[0] / 2 - margin) / spec.focal_px, (spec.image[1] / 2 - margin) / spec.focal_px
 
 
 def _edges(rotation: Array, slopes: tuple[float, float]) -> Array:
-    """Inward normals (4, 3), in the world, of the planes of the left, right, upper and lower image edge."""
+    """Return the inward normals (4, 3), in the world, of the planes through the left, right, upper and lower image
+    edge.
+
+    rotation (3, 3): world to camera. slopes: half the view's width and half its height per m of depth. The normals are
+    not unit vectors.
+    """
     k, m = slopes
     return np.array([[1, 0, k], [-1, 0, k], [0, 1, m], [0, -1, m]]) @ rotation
 
 
 def _pinhole(spec: CameraSpec, bodies: RecordedBodies) -> Camera:
-    """A pinhole camera with all bodies in view: at the given position or height, else at the closest place."""
+    """Return a pinhole camera with all bodies in view: at the given position or height, else at the closest place.
+
+    A solved height is at least 0.3 m. If the given values contradict each other, the violation of the view's edges is
+    shared out; nothing is raised. There must be at least one body.
+    """
     rotation = camera_rotation(float(np.deg2rad(spec.tilt_deg)), float(np.deg2rad(spec.yaw_deg)))
     slopes = _slopes(spec, MARGIN * min(spec.image))
     normals = _edges(rotation, slopes)
@@ -103,18 +129,23 @@ def _camera(spec: CameraSpec, centre: Array, rotation: Array, baseline: float = 
 
 
 def _closest(rotation: Array, slopes: tuple[float, float], b: Array) -> Array:
-    """Camera centre (3,) m furthest forward.
+    """Return the camera centre (3,) in m, in the world, that is furthest forward with all bodies in view.
 
-    Two opposite planes meet at forward = (b1 + b2)/2k; the pair that meets first limits, the other pair is centred.
+    rotation (3, 3): world to camera. slopes: half the view's width and half its height per m of depth. b (4,): least
+    reach of the bodies against the left, right, upper and lower edge's normal, m. Two opposite planes meet at forward =
+    (b1 + b2) / (2 slope). The pair that meets first limits; the other pair is centred.
     """
     forward = min((b[0] + b[1]) / (2 * slopes[0]), (b[2] + b[3]) / (2 * slopes[1]))
     return np.asarray(np.array([(b[0] - b[1]) / 2, (b[2] - b[3]) / 2, forward]) @ rotation)
 
 
 def _at_height(height: float, rotation: Array, slopes: tuple[float, float], b: Array) -> Array:
-    """Camera centre (3,) m at this height, as far ahead over the ground as the edges allow.
+    """Return the camera centre (3,) in m at this height (m), as far ahead over the ground as the image edges allow.
 
-    If the edges contradict each other, their violation is smallest there.
+    rotation (3, 3): world to camera. slopes: half the view's width and half its height per m of depth. b (4,): least
+    reach of the bodies against the left, right, upper and lower edge's normal, m. If the edges contradict each other,
+    the middle between the contradicting limits is taken. A camera that looks straight down is put in the middle of both
+    limits.
     """
     k, m = slopes
     ahead = np.cross([0.0, 0.0, 1.0], rotation[0])
@@ -131,10 +162,10 @@ def _at_height(height: float, rotation: Array, slopes: tuple[float, float], b: A
 
 
 def _largest(limits: list[tuple[float, float]]) -> float:
-    """The largest g with a g <= c for all (a, c).
+    """Return the largest g with a g <= c for all pairs (a, c) of limits.
 
-    If none exists, the middle between the least upper and the greatest lower limit; without an upper limit, the lower
-    one, or 0.
+    If none exists, it is the middle between the least upper and the greatest lower limit. Without an upper limit it is
+    the greatest lower limit; without any limit 0. Pairs with |a| <= 1e-6 are ignored.
     """
     upper = min((c / a for a, c in limits if a > TOLERANCE), default=np.inf)
     lower = max((c / a for a, c in limits if a < -TOLERANCE), default=-np.inf)
@@ -144,7 +175,11 @@ def _largest(limits: list[tuple[float, float]]) -> float:
 
 
 def _height_at_position(spec: CameraSpec, normals: Array, b: Array) -> float:
-    """The given height, or the lowest height at the given position from which all bodies are in view, m."""
+    """Return the camera's height in m: the given one, or the lowest at the given position with all bodies in view.
+
+    normals (4, 3), b (4,): inward normals of the left, right, upper and lower image edge, and the bodies' least reach
+    against each, m. A solved height is at least 0.3 m. If no height fits, the middle between the limits is returned.
+    """
     if spec.height is not None:
         return spec.height
     position = np.array(spec.position, dtype=float)
@@ -153,7 +188,11 @@ def _height_at_position(spec: CameraSpec, normals: Array, b: Array) -> float:
 
 
 def _top(spec: CameraSpec, bodies: RecordedBodies) -> Camera:
-    """A camera from above: over the middle of the bodies' extent, at the largest scale that shows all, unless given."""
+    """Return a camera of kind "top": over the middle of the bodies' extent, at the largest scale that shows all bodies.
+
+    A given position, px_per_m or height is used as it is. A height that is not given is 20 m. There must be at least
+    one body.
+    """
     rotation = camera_rotation(np.pi / 2, float(np.deg2rad(spec.yaw_deg)))
     sides = np.concatenate([rotation[:2], -rotation[:2]])
     low_x, low_y, minus_high_x, minus_high_y = _reach(bodies, sides).min(axis=0)
@@ -167,7 +206,11 @@ def _top(spec: CameraSpec, bodies: RecordedBodies) -> Camera:
 
 
 def _check_all_in_view(camera: Camera, spec: CameraSpec, bodies: RecordedBodies, motion: Motion) -> None:
-    """Raise InputError, naming the first body that is not wholly inside the image, if there is one."""
+    """Return nothing; raise InputError, naming the first body that is not wholly inside the image, if there is one.
+
+    A body may reach out of the view by at most 1e-6 m. Without bodies nothing is raised. motion: gives scenario name
+    and seed for the message.
+    """
     if camera.kind == "top":
         sides = np.concatenate([camera.rotation[:2], -camera.rotation[:2]])
         half = np.array(camera.image) / (2 * camera.px_per_m)

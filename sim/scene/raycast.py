@@ -23,8 +23,12 @@ CENTRE_X, CENTRE_Y, RADIUS = range(3)  # columns of Solids.pillars
 class Solids(NamedTuple):
     """The solid things of a scene, as the kernels take them; lengths in m.
 
-    walls (W, 4): x1, y1, x2, y2; wall_height; pillars (P, 3): x, y, radius; pillar_height; flights (S, 9): see
-    `sim.scene.terrain.flight_rows`.
+    walls (W, 4)     x1, y1, x2, y2 of each wall's line on the ground
+    wall_height      of all walls
+    pillars (P, 3)   x, y, radius
+    pillar_height    of all pillars
+    flights (S, 9)   stairs: foot x, foot y, unit axis x, unit axis y, length, half width, rise, number of steps,
+                     landing
     """
 
     walls: Array
@@ -36,9 +40,10 @@ class Solids(NamedTuple):
 
 @dataclass(frozen=True)
 class PixelRays:
-    """Lines of sight of a camera: pixel (u, v) looks from origin @ (u, v, 1) along direction @ (u, v, 1).
+    """Lines of sight of a camera: image point (u, v) px looks from origin @ (u, v, 1) along direction @ (u, v, 1).
 
-    origin, direction (3, 3). A direction has depth 1 m along the optical axis per unit.
+    origin (3, 3)      its product is a point of the world, x, y, z in m
+    direction (3, 3)   its product is a vector in the world, with depth 1 along the optical axis; not a unit vector
     """
 
     origin: Array
@@ -46,26 +51,35 @@ class PixelRays:
 
 
 def solids_of(scene: Scene) -> Solids:
-    """Return the walls, pillars and stairs of a scene for the kernels."""
+    """Return the walls, pillars and stairs of a scene as Solids for the kernels, with 0 rows where there are none."""
     walls = np.array(scene.walls, dtype=float).reshape(-1, 4)
     pillars = np.array(scene.pillars, dtype=float)
     return Solids(walls, float(scene.wall_height), pillars, float(scene.pillar_height), flight_rows(scene))
 
 
 def only_flights(flights: Array) -> Solids:
-    """Return Solids with these flights of stairs (S, 9), without walls and pillars."""
+    """Return Solids with these flights of stairs (S, 9), rows of `terrain.flight_rows`, without walls and pillars."""
     return Solids(np.zeros((0, 4)), 0.0, np.zeros((0, 3)), 0.0, flights)
 
 
 def unprojection(camera: Camera) -> Array:
-    """Return the matrix Rᵀ K⁻¹ (3, 3) that maps (u, v, 1) to a line of sight in the world; pinhole cameras only."""
+    """Return the matrix Rᵀ K⁻¹ (3, 3) that maps (u, v, 1), u and v in px, to the direction of the line of sight in the
+    world.
+
+    The direction has depth 1 along the optical axis. For pinhole cameras only; kind "top" is not refused, but the
+    result has no meaning. Lens distortion is ignored.
+    """
     (fx, fy), (cx, cy) = camera.focal_px, camera.centre_px
     inverse = np.array([[1 / fx, 0, -cx / fx], [0, 1 / fy, -cy / fy], [0, 0, 1]])
     return np.asarray(camera.rotation.T @ inverse)
 
 
 def pixel_rays(camera: Camera) -> PixelRays:
-    """Return a camera's lines of sight as linear functions of the pixel; lens distortion is ignored."""
+    """Return the lines of sight of a camera, pinhole or from above, as two matrices that act on (u, v, 1); see
+    PixelRays.
+
+    Lens distortion is ignored.
+    """
     origin, direction = np.zeros((3, 3)), np.zeros((3, 3))
     origin[:, 2] = camera.position
     if camera.kind == "pinhole":
@@ -78,8 +92,9 @@ def pixel_rays(camera: Camera) -> PixelRays:
 
 
 def signed_scale(camera: Camera) -> float:
-    """Return the image scale as the kernels take it.
+    """Return the image scale as the kernels take it; its sign tells the kind of camera.
 
-    Pinhole: the focal length, px per m at a depth of 1 m. From above: minus px_per_m, the scale at any depth.
+    Kind "pinhole": the horizontal focal length in px, which is px per m at a depth of 1 m. Kind "top": minus px_per_m,
+    the scale at any depth.
     """
     return float(camera.focal_px[0]) if camera.kind == "pinhole" else -camera.px_per_m

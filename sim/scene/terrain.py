@@ -10,9 +10,10 @@ FOOT_X, FOOT_Y, AXIS_X, AXIS_Y, LENGTH, HALF_WIDTH, RISE, STEPS, LANDING = range
 
 
 def height_at(scene: Scene, xy: Array) -> Array:
-    """Return the ground's height (...) m at points xy (..., 2) m: 0 off the stairs, and 0 where xy is nan.
+    """Return the ground's height in m at points xy (..., 2) m, shape (...): 0 off the stairs, and 0 where xy is nan.
 
-    Where two flights overlap, the height further from 0 counts.
+    On stairs the height rises smoothly over each step; on a landing it is the flight's whole rise. Where two flights
+    overlap, the height further from 0 counts. A flight of length 0 counts nowhere.
     """
     xy = np.asarray(xy, dtype=float)
     z = np.zeros(xy.shape[:-1])
@@ -23,10 +24,13 @@ def height_at(scene: Scene, xy: Array) -> Array:
 
 
 def _flight_height(stairs: Stairs, xy: Array) -> Array:
-    """Height (...) of one flight; each step rises smoothly over its tread, as a walker's body does.
+    """Return the height in m of one flight of stairs at points xy (..., 2) m, shape (...); 0 off the flight and where
+    xy is nan.
 
-    h = rise/n (k + r - sin(2πr)/2π) with k + r = n s, where s is the share of the way from foot to head. Value and
-    slope are continuous; each step adds rise/n and is level at both its edges.
+    Each step rises smoothly over its tread, as a walker's body does: h = rise/n (k + r - sin(2πr)/2π) with k + r = n s,
+    where s is the share of the way from foot to head and n the number of steps. Value and slope are continuous; each
+    step adds rise/n and is level at both its edges. Behind the head, as far as the landing, h = rise. A flight of
+    length 0 gives 0.
     """
     axis = stairs.head - stairs.foot
     length = float(np.hypot(axis[0], axis[1]))
@@ -43,9 +47,10 @@ def _flight_height(stairs: Stairs, xy: Array) -> Array:
 
 
 def flight_rows(scene: Scene) -> Array:
-    """Return the stairs as rows (S, 9) for the compiled ray casting, in m.
+    """Return the stairs of a scene as rows (S, 9) for the compiled ray casting; (0, 9) without stairs.
 
-    Columns: foot x, foot y, unit axis x, unit axis y, length, half width, rise, number of steps, landing.
+    Columns: foot x, foot y (m), unit axis x, unit axis y (from foot to head), length, half width, rise (m), number of
+    steps, landing (m). A flight of length 0 has a nan axis, with a numpy warning.
     """
     rows = np.zeros((len(scene.stairs), 9))
     for row, stairs in zip(rows, scene.stairs, strict=True):

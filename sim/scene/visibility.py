@@ -20,10 +20,13 @@ from sim.types import Array, Camera, Ints, Scene
 
 @dataclass(frozen=True)
 class BodyVisibility:
-    """What a camera sees of R people.
+    """What a camera sees of R people, one row each.
 
-    box (R, 4) ltwh px: amodal, not clipped. visibility (R,): visible share of the whole silhouette. truncation (R,):
-    share outside the image. visible_box (R, 4) ltwh px: box of the visible part, nan if nothing is visible.
+    box (R, 4)          left, top, width, height in px of the whole body, hidden parts included, not clipped to the
+                        image; nan if the person is not wholly in front of a pinhole camera
+    visibility (R,)     visible share of the whole silhouette, 0 to 1
+    truncation (R,)     share of the silhouette outside the image, 0 to 1
+    visible_box (R, 4)  left, top, width, height in px of the visible part; nan if nothing is visible
     """
 
     box: Array
@@ -35,11 +38,17 @@ class BodyVisibility:
 def measure_visibility(
     camera: Camera, scene: Scene, frame: Ints, pos3: Array, height: Array, shapes: Ellipsoids
 ) -> BodyVisibility:
-    """Return what the camera sees of R people, all frames in one call.
+    """Return what the camera sees of R people, as a BodyVisibility with R rows; all frames in one call.
 
-    frame (R,) must be sorted; people hide each other only within a frame. pos3 (R, 3) m: feet; height (R,) m; shapes:
-    their ellipsoids. Visibility and truncation are exact to about 1/300, the share of one grid sample. A person who is
-    not wholly in front of a pinhole camera has a nan box, visibility 0 and truncation 1.
+    A point of a person is visible if it lies in the image and nothing hides it. People of the same frame hide each
+    other. For a pinhole camera the scene's walls, pillars and stairs hide, too; from above they hide nobody.
+
+    frame (R,): frame numbers, sorted; unsorted ones give wrong results without an error. pos3 (R, 3) m: feet. height
+    (R,) m: body heights. shapes: Ellipsoids of the same R people.
+
+    Visibility and truncation are exact to about 1/300, the share of one sample of the silhouette. A person who is not
+    wholly in front of a pinhole camera has a nan box, visibility 0, truncation 1 and a nan visible box. Lens distortion
+    is ignored. R may be 0.
     """
     from sim.scene.visibility_kernels import sample_visibility
 
@@ -64,5 +73,9 @@ def measure_visibility(
 
 
 def frame_starts(frame: Ints) -> Ints:
-    """Return the row at which each frame begins in sorted frame numbers (R,), and R at the end."""
+    """Return the first row of each frame that occurs in sorted frame numbers (R,), followed by R: shape (F + 1,),
+    int64.
+
+    Rows count from 0; F is the number of distinct frames. Without rows the result is [0, 0], one frame without rows.
+    """
     return np.concatenate([[0], np.flatnonzero(np.diff(frame)) + 1, [len(frame)]]).astype(np.int64)
