@@ -27,14 +27,18 @@ def open_source(
     images: bool = True,
     background: str | None = None,
 ) -> list[Sequence]:
-    """Return the Sequences of a path; those of a dataset sorted by path.
+    """Return the Sequences at a path: those of a dataset sorted by path, else one.
 
-    fps, px_per_m and camera (or the path of its file) replace what a recording lacks; None: unknown. images False
-    leaves out the pictures of MOTChallenge folders. background: frames for background models, "first:N" or "spread:N";
-    None: spread:50, or the stored empty frames of a generated sequence.
+    path: a generated sequence or dataset, a MOTChallenge folder or text, a BIWI folder, a CAVIAR XML, a video, or a
+    folder that holds some of these at most 3 levels down. fps: frames per second; px_per_m: image scale; camera:
+    calibration or the path of its file. These three replace what a recording lacks or states; None: as the recording
+    states, else unknown. images False leaves out the pictures of MOTChallenge folders; other formats ignore it.
+    background: frames for background models, "first:N" or "spread:N"; None: spread:50, or the stored empty frames of a
+    generated sequence.
 
-    Raises InputError if the path holds no known format, a file is invalid, or an option is wrong or has no effect on
-    the format. Generated sequences reject fps, px_per_m and camera.
+    Raises InputError if the path does not exist or holds no known format, a file is invalid, or an option is wrong or
+    has no effect on the format. Generated sequences reject fps, px_per_m and camera. Warns about recordings without a
+    frame rate. Truth and pictures are read later and may then raise InputError.
     """
     path = Path(path)
     for option, value in (("--fps", fps), ("--px-per-m", px_per_m)):
@@ -54,9 +58,10 @@ def open_source(
 
 
 def sequence_folders(path: Path, kind: str) -> list[Path]:
-    """Return the sequence folders at or below a path, sorted.
+    """Return the sequence folders at a path or at most 3 levels below it, sorted.
 
-    kind: "generated", "biwi" or "mot". Raises InputError if there is none, or one of another kind.
+    kind: "generated", "biwi" or "mot". Raises InputError if there is none, if one is of another kind, or if there is a
+    video or CAVIAR file among them.
     """
     found = _find(path, DEPTH) if path.is_dir() else []
     other = next((p for p in found if p.is_file() or _kind(p) != kind), None)
@@ -68,13 +73,17 @@ def sequence_folders(path: Path, kind: str) -> list[Path]:
 
 
 def split_and_name(folder: Path) -> str:
-    """Return <split>/<name>, the last two parts of a sequence folder's path; datasets name sequences so."""
+    """Return <split>/<name>, the last two parts of a sequence folder's absolute path, without looking at the disk."""
     return "/".join(folder.absolute().parts[-2:])
 
 
 @dataclass(frozen=True)
 class RecordingOptions:
-    """The user's options for a recording; None: not given."""
+    """The user's options for a recording; None: not given.
+
+    fps: frames per second. px_per_m: image scale. camera: calibration. images: False leaves out the pictures of
+    MOTChallenge folders. background: sample of frames for background models.
+    """
 
     fps: float | None
     px_per_m: float | None
@@ -83,7 +92,11 @@ class RecordingOptions:
     background: BackgroundChoice | None
 
     def reject(self, path: Path, kind: str, why: str, *names: str) -> None:
-        """Raise InputError if any of the options `names` is given: it has no effect on a source of this kind."""
+        """Raise InputError if any of the options `names` (fields of this class) is given; do nothing otherwise.
+
+        path, kind: the source and what it is, as "a BIWI recording". why: why the options have no effect on it. All
+        three are for the error.
+        """
         given = [f"--{name.replace('_', '-')}" for name in names if getattr(self, name) is not None]
         if given:
             remedy = f"leave {'it' if len(given) == 1 else 'them'} out: {why}"
@@ -117,7 +130,12 @@ def _kind(folder: Path) -> str | None:
 
 
 def _find(folder: Path, depth: int) -> list[Path]:
-    """Return sequence folders, videos and CAVIAR files at or below a folder, down to `depth` levels, sorted."""
+    """Return sequence folders, videos and CAVIAR files at or below a folder, down to `depth` levels, sorted in each
+    folder.
+
+    A folder that is a sequence itself gives only itself. Subfolders come before files; names that begin with a dot are
+    skipped.
+    """
     if _kind(folder) is not None:
         return [folder]
     if depth == 0:

@@ -23,11 +23,14 @@ PERSON = {"id": 1, "name": "person", "supercategory": "person"}
 def coco(source: str | Path, out: str | Path) -> Path:
     """Write a COCO file with every sequence of a source that has labelled boxes, and return its path.
 
-    Each frame is an image, each sequence a video. Annotations have bbox [left, top, width, height] px (amodal,
-    unclipped), track_id, group_id (-1 for alone) and visibility. file_name is the frame's picture or video, also where
-    none is stored. info has the content hash if all sequences are generated. The same dataset gives the same bytes.
+    source: path of a dataset or recording. out: the JSON file, replaced if it exists. Each frame is an image, each
+    sequence a video, both numbered from 1. Annotations have bbox [left, top, width, height] px (amodal, unclipped),
+    track_id, group_id (-1 for alone) and visibility; rows with an unknown box are left out. file_name is the frame's
+    picture or video, also where none is stored. An unknown image size is replaced by the extent of the boxes. info has
+    the content hash if all exported sequences are generated. The same dataset gives the same bytes.
 
-    Raises InputError if no sequence has labelled boxes, or `out` cannot be written.
+    Raises InputError if the source cannot be opened, no sequence has labelled boxes, or `out` cannot be written;
+    WorkError if the disk is full.
     """
     sequences = [s for s in open_source(source, images=False) if s.truth is not None and s.truth.box is not None]
     if not sequences:
@@ -57,7 +60,10 @@ def _block(name: str, rows: Any) -> str:
 
 
 def _size(sequence: Sequence) -> dict[str, int]:
-    """Return width and height in px; for an unknown image size, the extent of the boxes."""
+    """Return {"width", "height"} of the sequence's pictures in px; for an unknown image size, the extent of the boxes.
+
+    The extent is the highest right and lower edge, rounded up, at least 1. The sequence must have a truth with boxes.
+    """
     if sequence.image_size is not None:
         return {"width": sequence.image_size[0], "height": sequence.image_size[1]}
     truth = sequence.truth

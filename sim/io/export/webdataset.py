@@ -40,14 +40,16 @@ def webdataset(
     samples: str = "sequence",
     progress: Progress | None = None,
 ) -> dict[str, Any]:
-    """Pack a generated dataset into OUT/shard-000000.tar, …, and write OUT/index.json; returns the index.
+    """Pack a generated dataset into OUT/shard-000000.tar, …, and write OUT/index.json; returns the index as a dict.
 
     shard_size: bytes that a shard may have. A sequence is never divided, so a shard of a single sequence may be larger.
-    samples: "sequence" or "frame". Complete shards of an earlier run are kept. progress(shards done, shards in all,
-    name of the last one) is called after each shard.
+    samples: "sequence" (all files of a sequence) or "frame" (one frame's labels and pictures). Complete shards of an
+    earlier run are kept. progress: called as progress(shards done, shards in all, name of the last one) after each
+    shard. Keys of the index: format, samples, content_hash, and shards, the content of each shard's .json.
 
-    Raises InputError if the source is no generated dataset, if two sequences share a name, if OUT holds shards of
-    another export, or if samples are frames and the pictures are videos.
+    Raises InputError if the source is not a generated dataset or a file of it is missing or altered, two sequences
+    share a name, OUT holds shards of another export, another process writes to OUT, or samples are frames and the
+    pictures are videos. Raises WorkError if the disk is full.
     """
     items, root = _items(Path(source), samples), Path(out)
     shards = list(_shards(items, shard_size))
@@ -67,9 +69,9 @@ def webdataset(
 
 
 def size_of(text: str) -> int:
-    """Return the number of bytes that a text names: `500MB`, `1.5 GB`, `20000000`; units of 1000.
+    """Return the number of bytes that a text names: `500MB`, `1.5 GB`, `3 kB`, `20000000`; units are powers of 1000.
 
-    Raises InputError if the text is no such size or rounds to less than one byte.
+    Fractions of a byte are rounded. Raises InputError if the text is no such size (a unit needs its B) or rounds to 0.
     """
     found = re.fullmatch(r"(\d{1,12}(?:\.\d{1,6})?)\s*(?:([kMG])?B)?", text.strip())
     size = 0 if found is None else round(float(found[1]) * UNITS[found[2] or ""])
@@ -81,7 +83,11 @@ def size_of(text: str) -> int:
 
 
 def _items(source: Path, samples: str) -> list[SequenceItem]:
-    """Return the sequences to pack, sorted by name."""
+    """Return the sequences to pack, sorted by their names <split>/<sequence>.
+
+    samples: "sequence" or "frame". Raises InputError if the source is not a generated dataset, a manifest is invalid,
+    two sequences share a name, or samples are "frame" and a sequence has videos.
+    """
     found = sorted(map(read_item, sequence_folders(source, "generated")), key=lambda item: item.name)
     twice = next((a.name for a, b in pairwise(found) if a.name == b.name), None)
     if twice is not None:
@@ -96,7 +102,10 @@ def _items(source: Path, samples: str) -> list[SequenceItem]:
 
 
 def _shards(items: list[SequenceItem], size: int) -> Iterator[list[SequenceItem]]:
-    """Yield the sequences of each shard: consecutive ones, as many as fit into `size` bytes, one at the least."""
+    """Yield the sequences of each shard: consecutive items, as many as fit into `size` bytes, at least one.
+
+    Without items one empty shard is yielded.
+    """
     some: list[SequenceItem] = []
     full = 0
     for item in items:
@@ -109,14 +118,22 @@ def _shards(items: list[SequenceItem], size: int) -> Iterator[list[SequenceItem]
 
 
 def _facts(samples: str, number: int, items: list[SequenceItem]) -> dict[str, Any]:
-    """Return what the shard's .json holds before the tar is written: all but its size and hash."""
+    """Return what the .json of a shard holds before its tar is written.
+
+    Keys: name, samples, manifests (hash of the sequences' manifests), sequences (content hash by <split>/<sequence>).
+    The size and hash of the tar are added later. number: of the shard, from 0.
+    """
     manifests = hashing.canonical_hash([item.manifest for item in items])
     hashes = {item.name: item.content for item in items}
     return {"name": f"shard-{number:06d}.tar", "samples": samples, "manifests": manifests, "sequences": hashes}
 
 
 def _reject_other_shards(root: Path, plan: list[dict[str, Any]]) -> None:
-    """Raise InputError if OUT holds a shard that the plan does not name or whose .json contradicts the plan."""
+    """Raise InputError if OUT (`root`) holds a shard of another export; do nothing otherwise.
+
+    plan: the facts of each shard to write. A shard-*.tar is of another export if the plan does not name it or its .json
+    contradicts the plan. A tar without .json is accepted, as an interrupted run leaves it.
+    """
     wanted = {facts["name"]: facts for facts in plan}
     for path in sorted(root.glob("shard-*.tar")):
         beside = path.with_suffix(".json")
@@ -129,7 +146,11 @@ def _reject_other_shards(root: Path, plan: list[dict[str, Any]]) -> None:
 
 
 def _complete_shard(root: Path, facts: dict[str, Any]) -> dict[str, Any] | None:
-    """Return the .json of a shard whose tar has the hash that it names; None otherwise."""
+    """Return the .json of a shard in OUT (`root`) that is complete: its tar has the hash that the .json names; else
+    None.
+
+    facts: give the shard's name. Raises InputError if the .json is no JSON object.
+    """
     path = root / facts["name"]
     if not path.is_file() or not path.with_suffix(".json").is_file():
         return None

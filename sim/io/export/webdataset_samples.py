@@ -29,8 +29,9 @@ Member = tuple[str, Callable[[], bytes]]
 class SequenceItem:
     """A stored sequence to pack.
 
-    bytes: its size in a tar, about. content: its content hash. manifest: the hash of its manifest. images: file type of
-    its pictures ("jpg", "png" or "mp4"), None without pictures or with 16-bit streams only.
+    folder: where it is stored. bytes: its approximate size in a tar. content: its content hash. manifest: the hash of
+    its manifest. images: file type of its pictures ("jpg", "png" or "mp4"), None without pictures or with 16-bit
+    streams only.
     """
 
     folder: Path
@@ -41,27 +42,34 @@ class SequenceItem:
 
     @property
     def name(self) -> str:
-        """The name <split>/<sequence>."""
+        """The name <split>/<sequence>, the last two parts of the folder's path."""
         return split_and_name(self.folder)
 
     @property
     def key(self) -> str:
-        """The name as a sample's key; dots are written %2E because webdataset ends a key at its first dot."""
+        """The name <split>/<sequence> as a sample's key; dots become %2E because webdataset ends a key at its first
+        dot.
+        """
         return self.name.replace(".", "%2E")
 
 
 def read_item(folder: Path) -> SequenceItem:
-    """Return the item of a sequence folder. Raises InputError if its manifest is missing or damaged."""
+    """Return the item (size, hashes, file type) of a stored sequence's folder.
+
+    Raises InputError if its manifest is missing, altered or of another format. The other files are not read.
+    """
     manifest = read_manifest(folder)
     size = sum(TAR_HEADER + facts["bytes"] for facts in manifest["files"].values())
     return SequenceItem(folder, size, manifest["content_hash"], manifest["sha256"], manifest.get("images"))
 
 
 def tar_members(item: SequenceItem, samples: str) -> Iterator[Member]:
-    """Yield the tar members of a sequence in the order in which they are packed.
+    """Yield the tar members of a stored sequence as (name, function that reads the content), in the order of packing.
 
     samples "sequence": every file of the sequence, the manifest first. Otherwise, for each frame, its JSON labels and
-    its pictures. Reading a member raises InputError if its file differs from the manifest.
+    then its stored pictures (left, right, disparity, ids). Raises InputError if the manifest is invalid; for frames
+    also if a file of labels or detections differs from it. The reading functions raise InputError if their file is
+    missing or differs from the manifest.
     """
     manifest = read_manifest(item.folder)
     stored = StoredPictures(item.folder, manifest)
@@ -79,11 +87,14 @@ def tar_members(item: SequenceItem, samples: str) -> Iterator[Member]:
 
 
 def frame_labels(folder: Path, manifest: dict[str, Any]) -> Iterator[bytes]:
-    """Yield one JSON object per frame of a stored sequence; unknown values are null.
+    """Yield the JSON object of each frame of a stored sequence, from frame 1, as UTF-8 bytes; unknown values are null.
 
-    Keys: sequence, fps, image_size, frame, t; people (id, group with -1 for alone, box ltwh px amodal, x, y in m,
-    vx, vy in m/s, visibility) and groups (id, members, hull in m) where the truth is stored; detections (score, box,
-    plane, and x, y, z in its unit) where detections are stored.
+    manifest: that of the folder. Keys: sequence (name), fps, image_size [width, height] px, frame (from 1), t in s.
+    people, where the truth is stored: id, group (-1 for alone), box (left, top, width, height in px, amodal), x, y in
+    m, vx, vy in m/s, visibility. groups, likewise: id, members, hull in m. detections, where they are stored: score,
+    box, plane, and x, y, (z) in m or px by the plane.
+
+    Raises InputError if a file of the sequence is missing or altered.
     """
     sequence = open_sequence(folder)
     truth = sequence.truth
@@ -122,5 +133,5 @@ def _detections(found: Detections) -> Iterator[dict[str, Any]]:
 
 
 def _numbers(row: Array) -> list[float | None]:
-    """Return a row's values as JSON numbers, None for nan."""
+    """Return the values of an array (N,) as a list of JSON numbers, None for nan."""
     return [tables.nan_to_none(value) for value in row.tolist()]

@@ -19,7 +19,10 @@ DISK_FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
 
 
 def write_error(path: Path, error: OSError) -> FlockscopeError:
-    """Return the user's error for an OSError while writing: WorkError if the disk is full, else InputError."""
+    """Return (not raise) the user's error for an OSError while writing `path`.
+
+    It is a WorkError if the disk or quota is full or the file too large, else an InputError.
+    """
     reason = error.strerror or type(error).__name__
     if error.errno in DISK_FULL:
         return WorkError(
@@ -32,9 +35,9 @@ def write_error(path: Path, error: OSError) -> FlockscopeError:
 def staged_path(target: Path) -> Iterator[Path]:
     """Give a temporary path beside the target for the length of the block, then delete what is left there.
 
-    The block creates a file or folder at that path and renames it. The target's parents are created, and removed again
-    if they stay empty. The name is random, since writers on two machines may share a process id. An OSError inside the
-    block is raised as InputError or WorkError (write_error).
+    The block creates a file or folder at that path and renames it to the target. The target's parents are created, and
+    removed again if they stay empty. The name is random, since writers on two machines may share a process id. An
+    OSError inside the block is raised as WorkError if the disk is full, else as InputError (write_error).
     """
     partial = target.parent / f"{PARTIAL}{target.name}-{uuid4().hex[:12]}"
     made = [p for p in (target.parent, *target.parent.parents) if not p.exists()]
@@ -51,7 +54,10 @@ def staged_path(target: Path) -> Iterator[Path]:
 
 
 def write_file(target: Path, content: bytes) -> None:
-    """Write a file that appears complete or not at all; replaces an existing one. Raises as `staged_path`."""
+    """Write `content` to the file `target`, which appears complete or not at all; an existing file is replaced.
+
+    Missing parent folders are created. Raises WorkError if the disk is full, InputError if the file cannot be written.
+    """
     with staged_path(target) as partial:
         _write_synced(partial, content)
         os.replace(partial, target)
@@ -60,7 +66,12 @@ def write_file(target: Path, content: bytes) -> None:
 
 @contextmanager
 def new_file(target: Path) -> Iterator[Path]:
-    """Give a temporary path to write a file to; the file replaces the target if the block ends without an exception."""
+    """Give a temporary path for the block to write a file to; the file replaces the target when the block ends.
+
+    The block must create the file. If it ends with an exception, the temporary file is deleted and the target stays as
+    it was. Missing parent folders are created. An OSError is raised as WorkError if the disk is full, else as
+    InputError.
+    """
     with staged_path(target) as partial:
         yield partial
         _sync_file(partial)
@@ -70,10 +81,12 @@ def new_file(target: Path) -> Iterator[Path]:
 
 @contextmanager
 def new_folder(target: Path, keep: Callable[[], bool] = lambda: False) -> Iterator[Path]:
-    """Give an empty temporary folder to fill; it becomes the target if the block ends without an exception.
+    """Give an empty temporary folder for the block to fill; it becomes the folder `target` when the block ends.
 
-    An existing target is deleted first, unless `keep()` returns True: then the new folder is dropped. `keep` serves two
-    writers of the same sequence, of which the first one wins. Raises as `staged_path`.
+    An existing target is deleted first, unless `keep()` returns True: then the target stays and the new folder is
+    dropped. By default nothing is kept. `keep` serves two writers of the same sequence, of which the first one wins. If
+    the block ends with an exception, the new folder is deleted and the target stays. An OSError is raised as WorkError
+    if the disk is full, else as InputError.
     """
     with staged_path(target) as partial:
         partial.mkdir()
@@ -92,22 +105,32 @@ def new_folder(target: Path, keep: Callable[[], bool] = lambda: False) -> Iterat
 
 
 def write_folder(target: Path, files: Mapping[str, bytes]) -> None:
-    """Write a folder of files (content by relative name), complete or not at all; replaces an existing folder."""
+    """Write a folder of files, complete or not at all; an existing folder is deleted with all that it holds.
+
+    files: content by name relative to the folder; a name may have subfolders. Raises WorkError if the disk is full,
+    InputError if the folder cannot be written.
+    """
     with new_folder(target) as partial:
         for name, content in files.items():
             write_unsynced(partial / name, content)
 
 
 def write_unsynced(path: Path, content: bytes) -> None:
-    """Write a file into a folder that is still temporary, parents included, without syncing it."""
+    """Write a file into a folder that is still temporary, without syncing it to disk; missing parents are created.
+
+    An existing file is overwritten. Raises OSError if the file cannot be written.
+    """
     path.parent.mkdir(parents=True, exist_ok=True)
     path.write_bytes(content)
 
 
 def replace_files(target: Path, files: Mapping[str, bytes], stale: tuple[str, ...] = ()) -> None:
-    """Write files into a folder that may hold other files; all are synced before the first replaces its target.
+    """Write files into the folder `target`, which may hold other files; all are synced before the first replaces its
+    target.
 
-    The files appear one by one, in the order of `files`. stale: names that are deleted first unless written again.
+    files: content by relative name. They appear one by one, in the order of `files`, so a killed run may leave only the
+    first of them. stale: names that are deleted first unless `files` has them. Other files stay. Raises WorkError if
+    the disk is full, InputError if the folder cannot be written.
     """
     with staged_path(target) as partial:
         _write_synced_files(partial, files)
@@ -122,7 +145,10 @@ def replace_files(target: Path, files: Mapping[str, bytes], stale: tuple[str, ..
 
 
 def remove_partials(*folders: Path) -> None:
-    """Delete the temporary files and folders that killed runs left in the given folders; their content is lost."""
+    """Delete the temporary files and folders (.partial-…) directly in the given folders, left by killed runs.
+
+    Missing folders, and files that cannot be deleted, are ignored.
+    """
     for path in [p for folder in folders for p in folder.glob(f"{PARTIAL}*")]:
         _remove(path)
 
@@ -135,7 +161,10 @@ def _write_synced_files(folder: Path, files: Mapping[str, bytes]) -> None:
 
 
 def _sync_tree(folder: Path) -> None:
-    """Sync all files and folders below a folder, and itself; files in parallel, which is faster than one by one."""
+    """Sync a folder and all files and folders below it to disk; files in parallel, which is faster than one by one.
+
+    Raises OSError if a file cannot be synced.
+    """
     within = sorted(folder.rglob("*"))
     with ThreadPoolExecutor(SYNC_THREADS) as pool:
         list(pool.map(_sync_file, [path for path in within if not path.is_dir()]))
@@ -156,7 +185,7 @@ def _write_synced(path: Path, content: bytes) -> None:
 
 
 def _sync_folder(path: Path) -> None:
-    """Sync a folder's entries; does nothing on systems that cannot."""
+    """Sync a folder's list of entries to disk; does nothing on systems that cannot."""
     with suppress(OSError):
         descriptor = os.open(path, os.O_RDONLY)
         try:

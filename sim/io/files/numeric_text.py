@@ -14,28 +14,38 @@ from sim.types import Array, Bools, Ints
 
 @dataclass(frozen=True)
 class NumericTable:
-    """The rows of a numeric text file: values (N, C), and line (N,), the 1-based line number of each row."""
+    """The N rows of a numeric text file with C columns.
+
+    file: its path, for errors. values (N, C): the numbers. line (N,): line number of each row in the file, from 1.
+    """
 
     file: Path
     values: Array
     line: Ints
 
     def reject(self, wrong: Bools | np.bool_, expected: str, remedy: str) -> None:
-        """Raise InputError about the first row where `wrong` (N,) is True; do nothing if there is none."""
+        """Raise InputError about the first row where `wrong` is True; do nothing if there is none.
+
+        wrong: flags (N,), one per row. expected, remedy: texts of the error: what should be there, and what to do.
+        """
         if np.any(wrong):
             k = int(np.argmax(wrong))
             got = ",".join(f"{v:g}" for v in self.values[k])
             raise InputError(file=self.file, place=f"line {self.line[k]}", got=got, expected=expected, remedy=remedy)
 
     def integers(self, column: int, name: str) -> Ints:
-        """Return a column as integers (N,). Raises InputError at the first value that is no integer up to 2**52."""
+        """Return column number `column` (from 0) as integers (N,).
+
+        name: what the column holds, for the error. Raises InputError, with the line, at the first value that is not an
+        integer or is beyond ±2**52.
+        """
         v = self.values[:, column]
         self.reject((v != np.round(v)) | (np.abs(v) > 2**52), f"a whole number as {name}", f"correct the {name}")
         return v.astype(np.int64)
 
 
 def read_text(path: Path) -> str:
-    """Return the text of a UTF-8 file, its byte order mark removed. Raises InputError if unreadable or not UTF-8."""
+    """Return the text of a UTF-8 file without byte order mark. Raises InputError if it is unreadable or not UTF-8."""
     try:
         return path.read_text(encoding="utf-8-sig")
     except UnicodeDecodeError as error:
@@ -49,11 +59,13 @@ def read_text(path: Path) -> str:
 
 
 def read_numbers(path: Path, columns: tuple[int, int]) -> NumericTable:
-    """Read all non-empty lines as rows of numbers, separated by commas if the first line has one, else by blanks.
+    """Read all non-empty lines of a text file as rows of numbers, separated by commas if the first has one, else by
+    blanks.
 
-    columns: least and greatest number of columns. A file without lines gives a table of shape (0, columns[0]). Raises
-    InputError with the line if a cell is no finite number or the lines differ in their number of columns, and if that
-    number is outside `columns`.
+    columns: (least, greatest) number of columns. A file without lines gives a table of shape (0, columns[0]).
+
+    Raises InputError if the file is unreadable or not UTF-8. Raises InputError with the line if a cell is not a finite
+    number, the lines differ in their number of columns, or that number is outside `columns`.
     """
     numbered = [(k, line) for k, line in enumerate(read_text(path).splitlines(), 1) if line.strip()]
     if not numbered:
@@ -75,7 +87,12 @@ def read_numbers(path: Path, columns: tuple[int, int]) -> NumericTable:
 
 
 def _first_bad_line(path: Path, numbered: list[tuple[int, str]], separator: str | None) -> InputError:
-    """Return the error for the first line that holds a word or differs from the first in its number of cells."""
+    """Return (not raise) the InputError for the first line that holds a word or has another number of cells than the
+    first.
+
+    numbered: (line number from 1, text) of the non-empty lines. separator: "," or None for blanks. Without such a line
+    the error is about the whole file.
+    """
     width = len(numbered[0][1].split(separator))
     for k, line in numbered:
         cells = line.split(separator)

@@ -21,7 +21,11 @@ REDO = "run the command that made it again"
 
 @dataclass(frozen=True)
 class Column:
-    """A column to write: values (R,), or R arrays of number type `kind` for a column of lists; unit as a text."""
+    """A column of a Parquet table to write.
+
+    values: an array (R,), or R arrays of any lengths for a column of lists. unit: its unit as a text, "1" for none.
+    kind: number type of the arrays of a column of lists; ignored otherwise.
+    """
 
     name: str
     values: NDArray[Any] | list[NDArray[Any]]
@@ -31,7 +35,11 @@ class Column:
 
 @dataclass(frozen=True)
 class StoredTable:
-    """A table as read: `columns` by name, and `facts`, the metadata that was stored with it."""
+    """A Parquet table as read from `file`.
+
+    columns: by name an array (R,), or for a column of lists the pair (all values in one array, end of each list in it).
+    facts: the metadata that was stored with the table, by name, and "format".
+    """
 
     file: Path
     columns: dict[str, Any]
@@ -42,16 +50,16 @@ class StoredTable:
         return name in self.columns
 
     def floats(self, *names: str) -> Array:
-        """Return one column as (R,), or n columns as (R, n), float64. Raises InputError if a column is missing."""
+        """Return one column as (R,), or n > 1 columns as (R, n), float64. Raises InputError if a column is missing."""
         found = [np.asarray(self._get(name), np.float64) for name in names]
         return found[0] if len(found) == 1 else np.stack(found, axis=1)
 
     def ints(self, name: str) -> Ints:
-        """Return a column as (R,), int64. Raises InputError if it is missing."""
+        """Return a column as (R,), int64; fractions are cut off. Raises InputError if it is missing."""
         return np.asarray(self._get(name), np.int64)
 
     def lists(self, name: str, kind: type) -> list[NDArray[Any]]:
-        """Return the R arrays of a column of lists. Raises InputError if it is missing."""
+        """Return a column of lists as R arrays of number type `kind`. Raises InputError if the column is missing."""
         values, ends = self._get(name)
         return [np.asarray(v, kind) for v in np.split(values, ends[:-1])] if len(ends) else []
 
@@ -61,14 +69,18 @@ class StoredTable:
         return self.columns[name]
 
     def fact(self, name: str) -> Any:
-        """Return one value of the metadata. Raises InputError if it is missing."""
+        """Return the value `name` of the table's metadata. Raises InputError if it is missing."""
         if name not in self.facts:
             raise InputError(file=self.file, place="schema", got=f"no {name}", expected="that value", remedy=REDO)
         return self.facts[name]
 
 
 def table_bytes(columns: Iterable[Column], facts: dict[str, Any]) -> bytes:
-    """Return a Parquet file as bytes; equal content gives equal bytes. `facts` becomes JSON in the schema."""
+    """Return a Parquet file as bytes; equal content gives equal bytes.
+
+    columns: all of equal length. facts: metadata, stored as JSON in the schema together with our "format". Raises
+    ValueError if `facts` holds NaN or infinity, TypeError if it holds what JSON cannot.
+    """
     import pyarrow as pa
     import pyarrow.parquet as pq
 
@@ -94,7 +106,11 @@ def _arrow(column: Column) -> Any:
 
 
 def read_table(path: Path) -> StoredTable:
-    """Read a table that table_bytes wrote. Raises InputError if it is missing, damaged, foreign, or holds nulls."""
+    """Read a Parquet table that table_bytes wrote.
+
+    Raises InputError if the file is missing or damaged, was not written by table_bytes, has another format number, or
+    holds nulls. NaN is no null.
+    """
     import pyarrow as pa
     import pyarrow.parquet as pq
 
@@ -126,24 +142,33 @@ def _numpy(column: Any) -> Any:
 
 
 def json_text(value: Any) -> str:
-    """Return a value as JSON on one line, keys in their order. Raises ValueError for NaN and infinity."""
+    """Return a value as JSON on one line, keys in their order.
+
+    Raises ValueError for NaN and infinity, TypeError for a type that JSON does not have.
+    """
     return json.dumps(value, ensure_ascii=False, allow_nan=False)
 
 
 def json_document(value: dict[str, Any]) -> bytes:
-    """Return a JSON file, indented by two blanks, as bytes. Raises ValueError for NaN and infinity."""
+    """Return a JSON file, indented by two blanks and ended by a line feed, as UTF-8 bytes.
+
+    Raises ValueError for NaN and infinity, TypeError for a type that JSON does not have.
+    """
     return (json.dumps(value, ensure_ascii=False, allow_nan=False, indent=2) + "\n").encode()
 
 
 def json_list(name: str, items: Iterable[dict[str, Any]]) -> bytes:
-    """Return the JSON file {"format": 1, name: [items]} as bytes, with one item per line."""
+    """Return the JSON file {"format": 1, name: [items]} as UTF-8 bytes, with one item per line.
+
+    Raises ValueError for NaN and infinity, TypeError for a type that JSON does not have.
+    """
     lines = ",\n".join(json_text(item) for item in items)
     body = f"[\n{lines}\n]" if lines else "[]"
     return f'{{"format": {FORMAT}, "{name}": {body}}}\n'.encode()
 
 
 def read_json(path: Path) -> dict[str, Any]:
-    """Read a file that holds one JSON object. Raises InputError if it cannot be read or is no JSON object."""
+    """Read a file that holds one JSON object, as a dict. Raises InputError if it is unreadable or no JSON object."""
     from sim.io.files.numeric_text import read_text
 
     try:
@@ -158,9 +183,10 @@ def read_json(path: Path) -> dict[str, Any]:
 
 
 def read_document(path: Path) -> dict[str, Any]:
-    """Read a JSON object of ours. Raises InputError as read_json, and if its key "format" differs from FORMAT.
+    """Read a JSON object that we wrote, as a dict.
 
-    A file without that key is accepted.
+    A file without the key "format" is accepted. Raises InputError if the file is unreadable, no JSON object, or of
+    another format number than 1.
     """
     value = read_json(path)
     found = value.get("format", FORMAT)
@@ -170,10 +196,10 @@ def read_document(path: Path) -> dict[str, Any]:
 
 
 def nan_to_none(value: float) -> float | None:
-    """Return a number for JSON: None for nan."""
+    """Return the number as it stands in JSON: None for nan, else a float. Infinity stays infinity."""
     return None if value != value else float(value)
 
 
 def none_to_nan(value: float | None) -> float:
-    """Return a number from JSON: nan for None."""
+    """Return the number as read from JSON: nan for None, else a float."""
     return float("nan") if value is None else float(value)

@@ -22,9 +22,11 @@ FPS = 2.5
 
 
 def frame_numbers(raw: Ints) -> Ints:
-    """Return our 1-based frames, round((raw - first) / step) + 1, shape of `raw` (N,).
+    """Return our frame numbers from 1, round((raw - first) / step) + 1, shape of `raw` (N,), int64.
 
-    raw: video frames. step: the most frequent difference between successive raw frames. Equal raw frames give ones.
+    raw (N,): numbers of video frames, in any order; first is the lowest. step: the most frequent difference between
+    successive distinct raw numbers, the smallest if several are as frequent. If all are equal the result is ones; an
+    empty `raw` gives an empty result.
     """
     steps = np.diff(np.unique(raw))
     if len(steps) == 0:
@@ -35,10 +37,11 @@ def frame_numbers(raw: Ints) -> Ints:
 
 
 def read_groups(path: Path) -> dict[int, int]:
-    """Return the group label of each person in a groups.txt, by id; labels are 1, 2, … in the order of the lines.
+    """Return the group label of each person in a BIWI groups.txt, by person id; people alone have no entry.
 
-    Lines with fewer than two different ids are no group. Lines that share a person become one group, with a warning.
-    Raises InputError with the line if a word is no integer.
+    A line lists the ids of one group; labels count from 1 in the order of the lines. Lines with fewer than two
+    different ids are no group. Lines that share a person become one group with the lowest label, with a warning. Raises
+    InputError if the file is unreadable, or, with the line, if a word is no integer.
     """
     label: dict[int, int] = {}
     for number, line in enumerate(read_text(path).splitlines(), 1):
@@ -69,7 +72,12 @@ def _ids(path: Path, number: int, line: str) -> list[int]:
 
 
 def _table(folder: Path) -> tuple[NumericTable, Ints, Ints]:
-    """Return obsmat.txt sorted by (frame, id), with our frames (R,) and the ids (R,)."""
+    """Return (rows of obsmat.txt, our frames from 1 (R,), person ids (R,)), all sorted by (frame, id).
+
+    A row is frame, id, x, z, y, vx, vz, vy in m and m/s, frame being the file's own number. Raises InputError if the
+    file is unreadable, a line is not 8 finite numbers, a frame or id is no integer, an id is negative, or an id stands
+    twice in a frame.
+    """
     rows = read_numbers(folder / "obsmat.txt", (8, 8))
     frame, id = frame_numbers(rows.integers(0, "frame")), rows.integers(1, "id")
     rows.reject(id < 0, "ids from 0", "correct the id")
@@ -81,10 +89,12 @@ def _table(folder: Path) -> tuple[NumericTable, Ints, Ints]:
 
 
 def read_truth(folder: Path, fps: float = FPS) -> Truth:
-    """Return the recording's truth: positions and velocities on the ground, no boxes.
+    """Return the truth of the BIWI recording in `folder`: positions m and velocities m/s on the ground, no boxes.
 
-    Groups are those of groups.txt; hulls and events are measured (group_labels). Without groups.txt no frame has group
-    labels. Raises InputError if a file is invalid.
+    Groups are those of groups.txt; their hulls and events are measured from the motion. Without groups.txt everybody is
+    alone, no frame counts as labelled, and groups and events are None. fps: annotated frames per second, default 2.5.
+    Raises InputError if obsmat.txt or groups.txt is unreadable or invalid; warns if two lines of groups.txt share a
+    person.
     """
     rows, frame, id = _table(folder)
     pos, vel = rows.values[:, (2, 4)], rows.values[:, (5, 7)]
@@ -102,9 +112,10 @@ def read_truth(folder: Path, fps: float = FPS) -> Truth:
 
 
 def open_folder(folder: Path, *, fps: float | None = None) -> Sequence:
-    """Return a BIWI folder as Sequence, without pictures and detections. fps None: 2.5.
+    """Return the BIWI recording in `folder` as Sequence, without pictures and detections.
 
-    Raises InputError if a file is invalid.
+    fps: annotated frames per second, above 0; None: 2.5. Raises InputError if obsmat.txt is unreadable or invalid. An
+    invalid groups.txt raises InputError when the truth is read.
     """
     rate = FPS if fps is None else fps
     length = int(_table(folder)[1].max(initial=0))

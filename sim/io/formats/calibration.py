@@ -15,9 +15,9 @@ SHAPE_TOLERANCE = 0.01  # relative difference allowed between the aspect ratios 
 
 
 def read_calibration(path: Path) -> Camera:
-    """Return the camera of a calibration file: Tsai's XML if its name ends in .xml, else our camera.json.
+    """Return the Camera of a calibration file: Tsai's XML if its name ends in .xml, else our camera.json.
 
-    Raises InputError if there is no such file or its content is invalid.
+    Raises InputError if there is no such file, or if a value is missing, not finite, or of the wrong kind or shape.
     """
     if not path.is_file():
         expected = "a camera.json, or Tsai's calibration as .xml"
@@ -26,12 +26,12 @@ def read_calibration(path: Path) -> Camera:
 
 
 def scaled_to_image(camera: Camera, image: tuple[int, int] | None, path: Path) -> Camera:
-    """Return the camera for pictures of `image` = (width, height) px.
+    """Return the camera for pictures of `image` = (width, height) px, if it was calibrated at another size.
 
-    Focal lengths, image centre and px_per_m are scaled if the calibration was made at another size. `image` None
-    returns the camera unchanged. `path` is the recording, for the error.
+    Focal lengths, image centre and px_per_m are scaled. With `image` None or equal to the camera's size, the camera is
+    returned unchanged. path: the recording, for the error.
 
-    Raises InputError if the aspect ratios differ by more than SHAPE_TOLERANCE.
+    Raises InputError if the aspect ratios differ by more than SHAPE_TOLERANCE (1 %).
     """
     if image is None or image == camera.image:
         return camera

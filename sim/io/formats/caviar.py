@@ -28,10 +28,11 @@ CHORD = 1.0  # s, for velocities: labels rest for some frames and then jump by p
 
 @dataclass(frozen=True)
 class CaviarRecording:
-    """A CAVIAR file: R rows sorted by (frame, id), `length` frames.
+    """The content of a CAVIAR file: R boxes sorted by (frame, id), and `length` frames.
 
-    frame, id (R,); label (R,), the group's id, -1 for alone; centre, size (R, 2) px of the box. labelled: True if the
-    file lists groups.
+    frame (R,): from 1. id (R,): the person's id. label (R,): the id of the person's group, -1 for alone. centre (R, 2):
+    x, y of the box's centre, px. size (R, 2): width, height, px. labelled: True if the file has a list of groups in any
+    frame.
     """
 
     name: str
@@ -45,15 +46,16 @@ class CaviarRecording:
 
     @property
     def px_per_m(self) -> float:
-        """The image scale: median of the boxes' longer sides / 1.7 m; nan without boxes."""
+        """The image scale, px per m: median of the boxes' longer sides in px / 1.7 m; nan without boxes."""
         return float(np.median(self.size.max(axis=1))) / PERSON_HEIGHT if len(self.size) else float("nan")
 
 
 def read_xml(path: Path) -> CaviarRecording:
-    """Read the people and groups of a CAVIAR file. Our frames are those of the file + 1.
+    """Read the people and groups of a CAVIAR file (CVML). Our frame is the file's frame number + 1.
 
-    A list of one member is no group; a person in two groups of a frame stays in the first, with a warning. Raises
-    InputError, with the frame, if the file is no valid CVML or an id stands twice in a frame.
+    A list of fewer than two members is no group. A person in two groups of a frame stays in the first, with a warning.
+    Raises InputError if the file is unreadable or no CVML, and, with the file's frame number, if an object has no box
+    or a box without area, a number is missing or wrong, or an id stands twice in a frame.
     """
     root = _root(path)
     rows: list[tuple[float, ...]] = []
@@ -108,7 +110,12 @@ def _number(path: Path, place: str, element: ET.Element, key: str) -> float:
 
 
 def _labels(path: Path, index: int, element: ET.Element) -> dict[int, int]:
-    """Return the group of each person in one frame, by id."""
+    """Return the group id of each person in one frame by person id; people alone have no entry.
+
+    element: the XML of the frame. index: our frame, from 1; messages name index - 1. Groups with fewer than two members
+    are ignored; a person in two groups keeps the first, with a warning. Raises InputError if a member or group id is no
+    number.
+    """
     label: dict[int, int] = {}
     for group in element.iterfind("grouplist/group"):
         words = (group.findtext("members") or "").replace(",", " ").split()
@@ -128,7 +135,11 @@ def _labels(path: Path, index: int, element: ET.Element) -> dict[int, int]:
 
 
 def _row(path: Path, index: int, person: ET.Element, label: dict[int, int]) -> tuple[float, ...]:
-    """Return one object as (frame, id, label, centre x, centre y, width, height)."""
+    """Return one object as (frame, id, label, centre x, centre y, width, height), px; label -1 for alone.
+
+    index: our frame, from 1. person: the XML of the object. label: group ids of the frame, by person id. Raises
+    InputError if the box is missing or has no area, or a number is missing or wrong.
+    """
     place = f"frame {index - 1}"
     id, box = int(_number(path, place, person, "id")), person.find("box")
     if box is None:
@@ -143,10 +154,15 @@ def _row(path: Path, index: int, person: ET.Element, label: dict[int, int]) -> t
 
 
 def read_truth(path: Path, fps: float = FPS, px_per_m: float | None = None) -> Truth:
-    """Return the recording's truth in the image: boxes, no positions on the ground.
+    """Return the truth of a CAVIAR file in the image: boxes (left, top, width, height in px), no positions on the
+    ground.
 
-    Group hulls are hulls of boxes. px_per_m None: the scale of the boxes. Without group lists no frame has labels.
-    Raises InputError as read_xml.
+    Groups are those of the file, one hull around their members' boxes (groups_px); events are measured from the motion
+    of the boxes' centres. If the file has no group lists or no boxes, no frame counts as labelled, and groups and
+    events are None. fps: frames per second, default 25. px_per_m: image scale; None: the median of the boxes' longer
+    sides / 1.7 m.
+
+    Raises InputError if the file is unreadable or invalid (see read_xml).
     """
     found = read_xml(path)
     scale = found.px_per_m if px_per_m is None else px_per_m
@@ -168,9 +184,10 @@ def read_truth(path: Path, fps: float = FPS, px_per_m: float | None = None) -> T
 
 
 def open_file(path: Path, *, fps: float | None = None, px_per_m: float | None = None) -> Sequence:
-    """Return a CAVIAR file as Sequence, without pictures and detections.
+    """Return a CAVIAR file as Sequence, without pictures and detections; image size 384 × 288 px.
 
-    fps None: 25. px_per_m None: the scale of the boxes. Raises InputError as read_xml.
+    fps: frames per second; None: 25. px_per_m: image scale; None: the median of the boxes' longer sides / 1.7 m, nan
+    without boxes. Raises InputError at once if the file is unreadable or invalid (see read_xml).
     """
     rate, found = FPS if fps is None else fps, read_xml(path)
     scale = found.px_per_m if px_per_m is None else px_per_m
@@ -186,6 +203,8 @@ def open_file(path: Path, *, fps: float | None = None, px_per_m: float | None = 
 
 
 def is_caviar(path: Path) -> bool:
-    """Return True if the first 1000 bytes of a file contain CVML's root element."""
+    """Return True if the first 1000 bytes of the file contain "<dataset", CVML's root element. Raises OSError if
+    unreadable.
+    """
     with path.open("rb") as file:
         return b"<dataset" in file.read(1000)

@@ -15,7 +15,11 @@ from sim.types import Array, GroupEvent, Groups, Ints
 
 
 def rows_to_grid(frame: Ints, id: Ints, values: Array, length: int) -> Array:
-    """Return rows (R, …) as an array (T, P, …), nan where absent; people stand in ascending order of id."""
+    """Return rows (R, …) as an array (T, P, …) with T = length frames and P people, nan where a person has no row.
+
+    frame (R,): from 1. id (R,): person ids; the people's columns are in ascending order of id. values (R, …): any
+    numbers per row. Each id stands once in a frame.
+    """
     out = np.full((length, len(np.unique(id)), *values.shape[1:]), np.nan)
     out[frame - 1, np.searchsorted(np.unique(id), id)] = values
     return out
@@ -24,11 +28,15 @@ def rows_to_grid(frame: Ints, id: Ints, values: Array, length: int) -> Array:
 def labelled_truth_fields(
     frame: Ints, id: Ints, label: Ints, pos: Array, vel: Array, *, fps: float, length: int, px_per_m: float = 1.0
 ) -> dict[str, Any]:
-    """Return the fields groups, events, near and labelled of a Truth, by name.
+    """Return the fields groups, events, near and labelled of a Truth, by name, for a recording with group labels.
 
-    frame, id, label (R,) sorted by (frame, id), label -1 for alone; pos (R, 2), vel (R, 2) per s, in px if px_per_m is
-    not 1, else in m. groups: as labelled. Merges, splits and the like: of measured groups, which get the label of their
-    members as id. Crossings and queues: of the labelled groups. Places of events and hulls are in the unit of pos.
+    frame (from 1), id, label (R,), sorted by (frame, id); label is the id of the person's group, -1 for alone. pos, vel
+    (R, 2): m and m/s, or px and px/s if px_per_m is not 1. fps: frames/s. length: number of frames.
+
+    groups: one Groups per frame, as labelled. Merge, split, form, dissolve, enter and leave events are those of groups
+    measured from motion and labels; such a group gets the label of its members as id. Cross and queue events are those
+    of the labelled groups. near: strangers that came near each other, by person id. labelled: all True. Places and
+    hulls are in the unit of `pos`.
     """
     from sim.truth.crossing_events import crossings
     from sim.truth.group_hulls import groups_over_time
@@ -57,13 +65,20 @@ def labelled_truth_fields(
 
 
 def _names(measured: Ints, label: Ints) -> dict[int, int]:
-    """Return the label of each measured group, by its measured id, read from the group's first row."""
+    """Return the label of each measured group, by its measured id; it is the label in the group's first row.
+
+    measured, label (R,): of each row the id of its measured group (-1 for alone, left out) and its group label.
+    """
     found, first = np.unique(measured, return_index=True)
     return {int(g): int(label[k]) for g, k in zip(found, first, strict=True) if g >= 0}
 
 
 def _named(event: GroupEvent, names: dict[int, int], people: Ints, px_per_m: float) -> GroupEvent:
-    """Return an event with the recording's person ids, group labels and unit."""
+    """Return a copy of the event with the recording's person ids, group labels and unit.
+
+    names: label by measured group id; ids without a label stay. people (P,): person id of each column; the event's
+    member m is column m - 1. The event's place, in m, is multiplied by px_per_m.
+    """
     return replace(
         event,
         before=tuple(sorted(names.get(g, g) for g in event.before)),
@@ -74,7 +89,11 @@ def _named(event: GroupEvent, names: dict[int, int], people: Ints, px_per_m: flo
 
 
 def scale_groups(groups: Groups, factor: float) -> Groups:
-    """Return groups with every length multiplied by `factor`, and extents by its square."""
+    """Return groups with positions, velocities and hulls multiplied by `factor`, and extents (covariances) by its
+    square.
+
+    Ids, members and sizes stay. Factor 1 returns `groups` itself.
+    """
     if factor == 1.0:
         return groups
     return groups.replace(

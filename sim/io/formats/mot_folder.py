@@ -21,7 +21,12 @@ DEFAULT_FPS = 25.0
 
 @dataclass(frozen=True)
 class SeqInfo:
-    """The content of a seqinfo.ini; None for a key that is missing. image_size: (width, height) px."""
+    """The content of a seqinfo.ini.
+
+    name: the folder's name if missing. fps: frames per second, None if missing. length: number of frames, None if
+    missing. image_size: (width, height) px, None if one is missing. image_dir: the folder of the pictures, "img1" if
+    missing.
+    """
 
     name: str
     fps: float | None
@@ -31,7 +36,11 @@ class SeqInfo:
 
 
 def read_seqinfo(path: Path) -> SeqInfo:
-    """Read a seqinfo.ini. Raises InputError if it is no ini file, or a number in it is not positive."""
+    """Read the section [Sequence] of a seqinfo.ini; without that section every key counts as missing.
+
+    Raises InputError if the file is unreadable or no ini file, or if a number in it is not above 0 and below
+    10,000,000.
+    """
     parser = configparser.ConfigParser(interpolation=None)
     try:
         parser.read_string(read_text(path))
@@ -61,9 +70,9 @@ def read_seqinfo(path: Path) -> SeqInfo:
 
 
 def frame_rate(given: float | None, found: float | None) -> float:
-    """Return the frames per second: `given` by --fps, else `found` in the recording, else 25 with a warning.
+    """Return the frames per second: `given` by the user (--fps), else `found` in the recording, else 25 with a warning.
 
-    Raises InputError if `given` is not above 0.
+    given, found: None if unknown. Raises InputError if `given` is nan or not above 0.
     """
     if given is not None:
         if not given > 0:
@@ -86,14 +95,18 @@ def open_folder(
     images: bool = True,
     background: BackgroundChoice | None = None,
 ) -> Sequence:
-    """Return a MOTChallenge folder as Sequence.
+    """Return a MOTChallenge folder (seqinfo.ini, img1/, gt/gt.txt, det/det.txt, each optional) as Sequence.
 
-    images False leaves the pictures out; otherwise they are decoded one by one while iterating. fps and px_per_m
-    replace what the recording says. camera: its calibration. background: sample for background models, None for 50
-    frames spread over the recording.
+    fps: frames per second instead of those of seqinfo.ini; with neither, 25 with a warning. px_per_m: image scale;
+    None: unknown (nan; the truth then takes the boxes' median height / 1.7 m). camera: its calibration, scaled to the
+    picture size; None: unknown. images False leaves the pictures out; otherwise they are decoded one by one while
+    iterating. A frame without a readable picture has none, with a warning. background: sample of frames for background
+    models; None for 50 frames spread over the recording, fewer if it is shorter.
 
-    Raises InputError if a file is invalid, if nothing tells the length, if pictures differ from seqinfo.ini in size, or
-    if `background` is given without pictures.
+    Raises InputError if seqinfo.ini, det.txt or an option is invalid, two pictures are the same frame, nothing tells
+    the length, the pictures differ from seqinfo.ini in size, the calibration has another aspect ratio, or `background`
+    is given without pictures or asks for more frames than there are. Reading the truth raises InputError for an invalid
+    gt.txt; iterating, for pictures of different sizes or none that can be read.
     """
     ini = path / "seqinfo.ini"
     info = read_seqinfo(ini) if ini.is_file() else SeqInfo(path.name, None, None, None)
@@ -136,7 +149,11 @@ def open_folder(
 
 
 def _picture_size(ini: Path, stated: tuple[int, int] | None, seen: tuple[int, int] | None) -> tuple[int, int] | None:
-    """Return the picture size by seqinfo.ini or the pictures, None if unknown. Raises InputError if they differ."""
+    """Return the (width, height) px of the pictures, None if unknown.
+
+    stated: the size by seqinfo.ini. seen: that of the first picture. Each is None if unknown. ini: its path, for the
+    error. Raises InputError if both are known and differ.
+    """
     if stated is not None and seen is not None and stated != seen:
         raise InputError(
             file=ini, place="imWidth, imHeight", got="{} × {}".format(*stated),
@@ -148,9 +165,15 @@ def _picture_size(ini: Path, stated: tuple[int, int] | None, seen: tuple[int, in
 def open_text(
     path: Path, *, fps: float | None = None, px_per_m: float | None = None, camera: Camera | None = None
 ) -> Sequence:
-    """Return a single MOT text file as Sequence without pictures: detections if every id is -1, else truth.
+    """Return a single MOT text file as Sequence without pictures: its rows are detections if every id is -1, else
+    truth.
 
-    fps None: 25 with a warning. Raises InputError if the file is invalid or has no row.
+    fps: frames per second; None: 25 with a warning. px_per_m: image scale; None: unknown (nan; the truth then takes the
+    boxes' median height / 1.7 m). camera: calibration, None if unknown; it is not scaled. The length is the last frame
+    in the file.
+
+    Raises InputError if `fps` is not above 0, or if the file is unreadable, invalid or has no row. Reading the truth
+    raises InputError for an id twice in a frame, a row without box, or an invalid visibility.
     """
     rate = frame_rate(fps, None)
     scale = float("nan") if px_per_m is None else px_per_m
@@ -173,6 +196,10 @@ def open_text(
 
 
 def _labelled(found: mot_text.DetectionTable | None, gt: Path) -> int:
-    """Return the last frame in det.txt and gt.txt; 0 if both are missing or empty."""
+    """Return the last frame (from 1) in det.txt, given as table `found`, and in the file `gt`; 0 if both are missing or
+    empty.
+
+    Raises InputError if `gt` exists and is invalid.
+    """
     last = 0 if found is None else int(found.frame.max(initial=0))
     return max(last, int(mot_text.read_table(gt).frame.max(initial=0))) if gt.is_file() else last

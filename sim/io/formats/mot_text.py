@@ -23,9 +23,11 @@ MAX_FRAME = 10_000_000
 
 @dataclass(frozen=True)
 class MotTable:
-    """A MOT text file, N rows in its order.
+    """A MOTChallenge text file, N rows in the order of the file.
 
-    frame, id (N,). box (N, 4) ltwh px. rest (N, 0 to 4): the columns after the box.
+    rows: the numbers as read, with their lines for errors. frame (N,): from 1. id (N,). box (N, 4): left, top, width,
+    height in px. rest (N, 0 to 4): the columns after the box: confidence or flag; then class and visibility, or x, y, z
+    in m.
     """
 
     rows: NumericTable
@@ -35,11 +37,14 @@ class MotTable:
     rest: Array
 
     def without_box(self) -> Bools:
-        """Return flags (N,), True for rows whose box is -1,-1,-1,-1, that is, without box."""
+        """Return flags (N,), True for rows whose box is -1,-1,-1,-1, which means that the row has no box."""
         return np.asarray((self.box == -1).all(axis=1))
 
     def ground(self) -> Array | None:
-        """Return x, y, z in m (N, 3), nan where unknown (z = -1); None if they are missing or unknown in all rows."""
+        """Return the ground positions x, y, z in m, (N, 3), nan where unknown (z = -1).
+
+        Returns None if the file has fewer than 10 columns, or if the position is unknown in all rows.
+        """
         if self.rest.shape[1] < 4:
             return None
         known = self.rest[:, 3] != -1
@@ -47,10 +52,12 @@ class MotTable:
 
 
 def read_table(path: Path, *, length: int | None = None, boxless: bool = False) -> MotTable:
-    """Read a MOT text file of 6 to 10 columns.
+    """Read a MOTChallenge text file of 6 to 10 columns: frame, id, left, top, width, height, and up to four more.
 
-    length: the last frame allowed. boxless: allow -1,-1,-1,-1 for "no box". Raises InputError with the line if a frame
-    is outside 1 to `length`, a box has no area, or a frame or id is no integer.
+    length: the last frame allowed; None: 10,000,000. boxless: allow -1,-1,-1,-1 for "no box". A file without lines
+    gives a table without rows. Raises InputError if the file is unreadable, and, with the line, if a cell is no finite
+    number, the number of columns is wrong, a frame is outside 1 to `length`, a frame or id is no integer, or a box has
+    no area.
     """
     rows = read_numbers(path, (6, 10))
     frame, id = rows.integers(0, "frame"), rows.integers(1, "id")
@@ -65,7 +72,10 @@ def read_table(path: Path, *, length: int | None = None, boxless: bool = False) 
 
 
 def reject_duplicate_ids(table: MotTable, keep: Bools) -> None:
-    """Raise InputError if an id stands twice in a frame among the rows `keep` (N,); negative ids are not checked."""
+    """Raise InputError, with the line, if an id stands twice in a frame; do nothing otherwise.
+
+    keep (N,): True for the rows of the table that count. Negative ids are not checked.
+    """
     order = np.lexsort((np.arange(len(table.frame)), table.id, table.frame))
     same = (np.diff(table.frame[order]) == 0) & (np.diff(table.id[order]) == 0)
     counted = (keep & (table.id >= 0))[order]
@@ -76,7 +86,11 @@ def reject_duplicate_ids(table: MotTable, keep: Bools) -> None:
 
 @dataclass(frozen=True)
 class DetectionTable:
-    """A det.txt, N rows sorted by frame: pos (N, 2) in m or px by `plane`, box (N, 4) ltwh px or None, score (N,)."""
+    """The content of a det.txt, N rows sorted by frame.
+
+    frame (N,): from 1. id (N,). plane: "ground" (pos in m) or "image" (pos in px). pos (N, 2): x, y on the ground, or
+    the box's centre. box (N, 4): left, top, width, height in px, None if any row has none. score (N,): in [0, 1].
+    """
 
     frame: Ints
     id: Ints
@@ -86,17 +100,22 @@ class DetectionTable:
     score: Array
 
     def at(self, index: int, fps: float) -> Detections:
-        """Return the detections of frame `index`; their time is (index - 1) / fps."""
+        """Return the detections of frame `index` (from 1), none if the file has no row of it; their time is (index - 1)
+        / fps s.
+        """
         low, high = np.searchsorted(self.frame, (index, index + 1))
         box = None if self.box is None else self.box[low:high]
         return Detections(index, (index - 1) / fps, self.plane, self.pos[low:high], None, box, self.score[low:high])
 
 
 def read_detections(path: Path, length: int | None) -> DetectionTable:
-    """Read a det.txt: points on the ground if every row has one, else the centres of boxes in the image.
+    """Read a det.txt: points on the ground (m) if every row has one, else the centres of the boxes in the image (px).
 
-    box is None if any row lacks one. Scores are scaled by unit_scores. length: the last frame allowed, None for any.
-    Raises InputError as read_table, and if a row has neither ground point nor box.
+    length: the last frame allowed, None for any. The boxes are None if any row lacks one. Scores outside [0, 1] are
+    scaled by unit_scores; they are 1 if the file has none. A file without lines gives no rows.
+
+    Raises InputError as read_table: the file is unreadable, or a line is invalid. Also raises InputError for a row
+    without box if any row lacks a ground point.
     """
     table = read_table(path, length=length, boxless=True)
     ground, boxless = table.ground(), table.without_box()
@@ -111,15 +130,19 @@ def read_detections(path: Path, length: int | None) -> DetectionTable:
 
 
 def ground_cells(xyz: Sequence[float]) -> str:
-    """Return the last three cells of a line: x,y,z in m, 3 digits. z = -1 would mean unknown and is written -1.001."""
+    """Return the last three cells "x,y,z" of a MOT line, in m with 3 decimals, for a position xyz of 3 finite numbers.
+
+    z = -1 would mean unknown, so a z that rounds to -1.000 is written -1.001.
+    """
     x, y, z = (f"{v:.3f}" for v in xyz)
     return f"{x},{y},{z if z != '-1.000' else '-1.001'}"
 
 
 def unit_scores(score: Array) -> Array:
-    """Return scores in [0, 1], shape (N,).
+    """Return the scores (N,) brought into [0, 1].
 
-    They are unchanged if all lie in [0, 1]. Otherwise their range is mapped to [0, 1]; if all are equal they become 1.
+    They are returned unchanged if all lie in [0, 1] or there are none. Otherwise the lowest becomes 0, the highest 1,
+    and the others are scaled linearly; if all are equal they become 1.
     """
     if len(score) == 0 or (score.min() >= 0 and score.max() <= 1):
         return score
@@ -128,12 +151,15 @@ def unit_scores(score: Array) -> Array:
 
 
 def read_truth(path: Path, name: str, fps: float, length: int | None = None, px_per_m: float = float("nan")) -> Truth:
-    """Read a gt.txt as truth of people, without group labels.
+    """Read a gt.txt as truth of people, without group labels: everybody is alone (-1), and no frame counts as labelled.
 
-    Rows with flag 0 or a class other than 1 are left out, as in MOTChallenge's own scoring; so are negative ids. length
-    None: up to the last frame. px_per_m nan: the median height of the boxes / 1.7 m. Velocities, where the file has
-    ground positions, are differences over 0.5 s. Raises InputError as read_table, for an id twice in a frame, and for a
-    visibility outside [0, 1] other than -1.
+    Rows with flag 0 or a class other than 1 are left out, as in MOTChallenge's own scoring; so are negative ids. name:
+    of the sequence. length: number of frames; None: up to the last frame kept. px_per_m: image scale; nan: the median
+    height of the boxes / 1.7 m. Positions and velocities are None without ground positions, nan in rows where they are
+    unknown; velocities are differences over 0.5 s. Visibility is 1 where the file has none or -1.
+
+    Raises InputError as read_table (unreadable file, invalid line, row without box), for an id twice in a frame, and
+    for a visibility outside [0, 1] other than -1.
     """
     table = read_table(path, length=length)
     keep = table.id >= 0

@@ -26,7 +26,11 @@ POSITIVE = ("width", "height", "dpx", "dpy", "focal", "sx")
 
 
 def read_tsai(path: Path) -> Camera:
-    """Return the camera of a calibration file. Raises InputError if it is no XML or a number is missing or wrong."""
+    """Return the Camera (kind "pinhole") of Tsai's calibration as XML; lengths in m, focal lengths and centre in px.
+
+    Raises InputError if the file is unreadable or no XML, or if a number is missing, not finite, or not above 0 where
+    it must be (image size, pixel size, focal length, sx).
+    """
     v = _values(path)
     rotation = _rotation(v["rx"], v["ry"], v["rz"])
     shift = np.array([v["tx"], v["ty"], v["tz"]]) / MM
@@ -67,7 +71,7 @@ def _values(path: Path) -> dict[str, float]:
 
 
 def _rotation(rx: float, ry: float, rz: float) -> Array:
-    """Return the rotation Rz Ry Rx (3, 3) of three angles in rad."""
+    """Return the rotation matrix Rz Ry Rx, (3, 3), of three angles in rad about the x, y and z axis."""
     (a, b, c), (sa, sb, sc) = np.cos([rx, ry, rz]), np.sin([rx, ry, rz])
     x = np.array([[1, 0, 0], [0, a, -sa], [0, sa, a]])
     y = np.array([[b, 0, sb], [0, 1, 0], [-sb, 0, b]])

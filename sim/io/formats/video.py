@@ -38,11 +38,16 @@ def open_video(
     camera: Camera | None = None,
     background: BackgroundChoice = ANY,
 ) -> Sequence:
-    """Return a video file as Sequence; its pictures are decoded while iterating.
+    """Return a video file as Sequence; its pictures are decoded while iterating, and it has no detections or truth.
 
-    fps None: see frame_rate. px_per_m, camera: image scale and calibration, None if unknown. background: sample for
-    background models. Warns if the video is shorter than its header says or has gaps. Raises InputError if no picture
-    can be decoded.
+    fps: frames per second; None: found in the file (frame_rate). px_per_m: image scale, None if unknown. camera:
+    calibration, scaled to the picture size, None if unknown. background: sample of frames for background models,
+    default 50 spread over the video, fewer if it is shorter. A frame that cannot be decoded has no picture, with a
+    warning. The length is None for VP8 videos, whose packets are not all shown.
+
+    Warns if the video is shorter than its header says, has gaps in time, or states no credible frame rate. Raises
+    InputError if the file is no video or no picture can be decoded, the calibration has another aspect ratio, or more
+    background frames are asked for than there are. Iterating raises InputError for a picture of another size.
     """
     index = video_decoding.index_packets(path)
     length = len(index.stamps)
@@ -71,7 +76,12 @@ def open_video(
 
 
 def missing(index: video_decoding.PacketIndex) -> Iterator[str]:
-    """Yield a text for each part of a video that is missing: its end, compared with its header, and gaps in time."""
+    """Yield a text for each part of a video that is missing, made from the index of its packets; nothing if it is
+    whole.
+
+    Its end is missing if reading broke off, or if the video is shorter than its header promises. A gap is a time
+    without frames of more than 1 s and more than 5 usual steps; one text reports the first gap and counts the others.
+    """
     times, length = index.times(), len(index.stamps)
     step = np.diff(times)
     usual = float(np.median(step)) if len(step) else 0.0
@@ -89,10 +99,11 @@ def missing(index: video_decoding.PacketIndex) -> Iterator[str]:
 
 
 def frame_rate(name: str, given: float | None, index: video_decoding.PacketIndex) -> tuple[float, str]:
-    """Return the frames per second and a text that says where they come from.
+    """Return (frames per second, text that says where they come from).
 
-    In this order: `given` by --fps; the container's rate, if plausible and within AGREE of the time stamps; the rate of
-    the time stamps; 25. The last two warn.
+    The first of these is taken: `given` by the user; the container's rate, if it is from 0.1 to 300 and within 2 % of
+    the time stamps' rate or that one is implausible; the rate of the time stamps; 25. The last two cause a warning.
+    name: the video's name in the warning. index: the video's packets.
     """
     if given is not None:
         return given, f"{given:g}, as given"
@@ -114,7 +125,10 @@ def _plausible(rate: float) -> bool:
 
 
 def stamped_rate(index: video_decoding.PacketIndex) -> float:
-    """Return the frames per second by the time stamps, rounded to 0.001, without gaps; 0 with fewer than two stamps."""
+    """Return the frames per second by the time stamps of the packets, rounded to 0.001; 0 with fewer than two stamps.
+
+    Only steps within half of the median step count, so gaps are left out.
+    """
     step = np.diff(index.times())
     if not len(step):
         return 0.0

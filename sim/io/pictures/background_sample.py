@@ -17,9 +17,10 @@ from sim.types import BACKGROUNDS, Image
 
 @dataclass(frozen=True)
 class BackgroundChoice:
-    """Which frames the sample has: the first `count`, or `count` spread evenly over the recording.
+    """Which frames of a recording are the sample for a background model.
 
-    asked: True if the user gave --background, False for the default.
+    how: "first" for the first `count` frames, "spread" for `count` frames spread evenly over the recording. asked: True
+    if the user gave --background, False for the default.
     """
 
     how: Literal["first", "spread"] = "spread"
@@ -27,16 +28,19 @@ class BackgroundChoice:
     asked: bool = False
 
     def __str__(self) -> str:
-        """Return the text that run.json holds; "causal" means without frames that follow the tracked one."""
+        """Return the text that run.json holds, as "first 50 frames (causal from frame 50)".
+
+        "causal" means that no frame of the sample follows the frame that is tracked.
+        """
         if self.how == "first":
             return f"first {self.count} frames (causal from frame {self.count})"
         return f"{self.count} frames spread over the recording (not causal)"
 
     def of(self, length: int, path: Path) -> BackgroundChoice:
-        """Return the choice for a recording of `length` frames.
+        """Return the choice for a recording of `length` frames: itself if there are enough frames.
 
-        A default choice is reduced to all frames of a shorter recording. Raises InputError, naming `path`, if the user
-        asked for more frames than there are.
+        A default choice is reduced to all frames of a shorter recording. Raises InputError, naming the recording
+        `path`, if the user asked for more frames than there are.
         """
         if length >= self.count:
             return self
@@ -48,14 +52,21 @@ class BackgroundChoice:
         return replace(self, count=length)
 
     def indices(self, length: int) -> list[int]:
-        """Return the frames of the sample (1-based, ascending) for a recording of `length` frames."""
+        """Return the frames of the sample, from 1 and ascending, for a recording of `length` frames.
+
+        A recording with at most `count` frames gives all of them. "spread" takes the middle frame of each of `count`
+        equal parts.
+        """
         if self.how == "first" or length <= self.count:
             return list(range(1, min(self.count, length) + 1))
         return [int((k + 0.5) * length / self.count) + 1 for k in range(self.count)]
 
 
 def parse_choice(text: str | None) -> BackgroundChoice:
-    """Parse --background, `first:N` or `spread:N`; None is the default, spread:50. Raises InputError otherwise."""
+    """Return the choice that --background names: "first:N" or "spread:N", with N from 1 to 999,999.
+
+    None gives the default, spread:50, which counts as not asked for. Raises InputError for any other text.
+    """
     if text is None:
         return BackgroundChoice()
     found = re.fullmatch(r"(first|spread):([0-9]{1,6})", text)
@@ -68,10 +79,10 @@ def parse_choice(text: str | None) -> BackgroundChoice:
 
 @dataclass(frozen=True)
 class BackgroundSample:
-    """The sample of one recording; calling it reads the pictures.
+    """The sample of one recording's frames for a background model; calling it reads the pictures.
 
-    length: frames of the recording. path: its name in errors. pictures(frames): a function that yields (frame, picture)
-    for those of the given frames that can be read.
+    choice: which frames. length: number of frames of the recording. path: the recording, for messages. pictures: called
+    with ascending frames (from 1), it yields (frame, picture) for those of them that can be read.
     """
 
     choice: BackgroundChoice
@@ -80,9 +91,10 @@ class BackgroundSample:
     pictures: Callable[[list[int]], Iterable[tuple[int, Image]]]
 
     def __call__(self) -> Image:
-        """Return the pictures (K, H, W, 3) BGR uint8; frames that cannot be read are left out.
+        """Return the pictures (K, H, W, 3) BGR uint8 in the order of frames; frames that cannot be read are left out.
 
-        Warns if a default sample covers the whole recording. Raises InputError if no picture can be read.
+        Warns if a default sample covers the whole recording, because that is shorter than 50 frames. Raises InputError
+        if no picture can be read or their sizes differ.
         """
         wanted, count = self.choice.indices(self.length), 0
         for count, (_, picture) in enumerate(self.pictures(wanted), 1):  # no second copy: 0.3 GB at 1920×1080

@@ -21,10 +21,10 @@ SPARSE = 100  # numbers in file names that use less than 1 of 100 values are tim
 
 
 def fill_gaps(pairs: Iterable[tuple[int, Image]], length: int | None, place: str) -> Iterator[Image | None]:
-    """Yield a picture for each frame from 1 on; None for frames that `pairs` of (frame, picture), ascending, leave out.
+    """Yield a picture for each frame from 1 on, None for a frame that `pairs` leave out.
 
-    length: number of frames, None for up to the last pair. The first missing frame is reported by a warning with the
-    recording's name `place`.
+    pairs: (frame, picture), frames from 1 and ascending. length: number of frames; None: up to the last pair. The first
+    missing frame is reported by a warning with the recording's name `place`; further ones are not.
     """
     shown, warned = 0, False
     for number, picture in pairs:
@@ -45,12 +45,15 @@ def _warn_lost(place: str, frame: int) -> bool:
 
 
 def size_of(picture: NDArray[Any]) -> tuple[int, int]:
-    """Return (width, height) in px of a picture (H, W) or (H, W, 3)."""
+    """Return (width, height) in px of a picture of shape (H, W) or (H, W, 3)."""
     return picture.shape[1], picture.shape[0]
 
 
 def require_size(picture: Picture, size: tuple[int, int], path: Path, place: str = "") -> Picture:
-    """Return the picture. Raises InputError if its (width, height) is not `size`."""
+    """Return the picture unchanged if its (width, height) in px is `size`, else raise InputError.
+
+    path, place: the file, and the frame in it, for the error.
+    """
     if size_of(picture) != size:
         got, expected = "{}×{} px".format(*size_of(picture)), "{}×{} px like the first".format(*size)
         raise InputError(file=path, place=place, got=got, expected=expected, remedy="give pictures of one size")
@@ -58,9 +61,9 @@ def require_size(picture: Picture, size: tuple[int, int], path: Path, place: str
 
 
 def read_picture(path: Path) -> Image | None:
-    """Return a picture file as (H, W, 3) BGR uint8; None if it is missing, truncated or no picture.
+    """Return a picture file as (H, W, 3) BGR uint8; None if it is missing, unreadable, truncated or no picture.
 
-    Grey pictures become BGR, 16-bit pictures keep their upper 8 bits, transparency is dropped.
+    Grey pictures become BGR, 16-bit pictures keep their upper 8 bits, transparency is dropped. Raises nothing.
     """
     import cv2
 
@@ -81,9 +84,9 @@ def read_picture(path: Path) -> Image | None:
 
 
 def is_complete(body: bytes) -> bool:
-    """Return False if a JPEG or PNG lacks its end mark, or if the file is empty.
+    """Return False if `body`, the bytes of a picture file, is empty, or a JPEG or PNG without its end mark; else True.
 
-    Checked first because some decoders return half a picture of a truncated file, or print to stderr.
+    Checked before decoding, because some decoders return half a picture of a truncated file, or print to stderr.
     """
     if body.startswith(b"\xff\xd8"):
         return body.rfind(b"\xff\xd9") > body.rfind(b"\xff\xda") > 0
@@ -92,26 +95,27 @@ def is_complete(body: bytes) -> bool:
 
 @dataclass(frozen=True)
 class PictureFolder:
-    """The picture files of a folder by frame (1-based)."""
+    """The picture files of a folder. files: path by frame (from 1); frames without a picture are missing."""
 
     folder: Path
     files: dict[int, Path]
 
     @property
     def last(self) -> int:
-        """The highest frame with a file; 0 without files."""
+        """The highest frame (from 1) with a file; 0 without files."""
         return max(self.files, default=0)
 
     def first_size(self) -> tuple[int, int] | None:
-        """Return (width, height) of the first picture that can be read; None if none can."""
+        """Return (width, height) in px of the first picture that can be read; None if none can."""
         found = (read_picture(path) for path in self.files.values())
         return next((size_of(picture) for picture in found if picture is not None), None)
 
     def read(self, frames: Iterable[int], size: tuple[int, int] | None) -> Iterator[tuple[int, Image]]:
-        """Yield (frame, picture) for those of `frames` whose picture can be read.
+        """Yield (frame, picture) for those of `frames` (from 1) whose picture can be read; pictures are (H, W, 3) BGR
+        uint8.
 
-        size: (width, height) of all pictures; None means that no file can be read. Raises InputError for None, and for
-        a picture of another size.
+        size: (width, height) px of all pictures; None means that no file can be read. Raises InputError for None, and
+        for a picture of another size.
         """
         if size is None:
             raise InputError(
@@ -125,12 +129,15 @@ class PictureFolder:
 
 
 def find_pictures(folder: Path, length: int | None, labelled: bool) -> PictureFolder:
-    """Return the picture files of a folder, with their frames.
+    """Return the picture files of a folder by frame (from 1); a missing folder gives no files.
 
-    The number at the end of a file's name is its frame. Numbers are shifted so that the lowest becomes 1 if the lowest
-    is 0, if the highest exceeds `length`, or if neither `length` nor labels (`labelled`) define frames. Files are
-    numbered by the order of their names instead if one has no number, if the rest of their names differs, or if the
-    numbers are SPARSE. A missing folder gives no files. Raises InputError if two files are the same frame.
+    length: number of frames, None if unknown. labelled: True if labels or detections define the frames. The number at
+    the end of a file's name is its frame. Numbers are shifted so that the lowest becomes 1 if the lowest is 0, if the
+    highest exceeds `length`, or if `length` is None and `labelled` False. Files are numbered from 1 in the order of
+    their names instead if one has no number, the rest of their names differs, or the numbers use less than 1 of 100
+    values.
+
+    Raises InputError if two files are the same frame.
     """
     found = sorted(p for p in folder.iterdir() if p.suffix.lower() in SUFFIXES) if folder.is_dir() else []
     numbers = [_number(path) for path in found]

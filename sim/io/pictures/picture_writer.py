@@ -28,9 +28,11 @@ Facts = dict[str, dict[str, Any]]
 
 @dataclass(frozen=True)
 class WrittenPictures:
-    """What was written: the streams, their file type, the hash of each stream's raw pixels, and the files.
+    """What `write_pictures` wrote; all empty if nothing was.
 
-    images: None if the streams leave no choice of file type. files: "sha256" and "bytes" of each file, by name.
+    streams: names of the streams. images: file type ("jpg", "png" or "mp4"), None if the streams leave no choice.
+    pixels: hash of the raw pixels by stream. files: {"sha256", "bytes"} of each file, by name relative to the sequence
+    folder.
     """
 
     streams: tuple[str, ...] = ()
@@ -43,10 +45,10 @@ NO_PICTURES = WrittenPictures()
 
 
 class StreamWriter:
-    """Writes one stream as picture files or as one video; used as a context manager.
+    """Writes one stream as picture files or as one video below `folder`; used as a context manager.
 
-    State: the hash of the raw pixels so far (`pixels`), the open video if there is one, and `files`, the hash and size
-    of each file that is complete.
+    State: the hash of the raw pixels so far (`pixels`), the open video if there is one, and `files`: {"sha256",
+    "bytes"} of each complete file, by name. Entering the block raises InputError if a video's width or height is odd.
     """
 
     def __init__(self, folder: Path, stream: str, images: str, size: tuple[int, int], fps: float):
@@ -57,7 +59,11 @@ class StreamWriter:
             self._open = write_video(folder / streams.file_name(stream, images, 1), size, fps)
 
     def add(self, picture: NDArray[Any]) -> None:
-        """Write the next picture: (H, W, 3) BGR uint8, or (H, W) uint16 for the streams ids and disparity."""
+        """Write the next picture of the stream: (H, W, 3) BGR uint8, or (H, W) uint16 for the streams ids and
+        disparity.
+
+        Frames count from 1 in the order of the calls. Raises OSError if the file cannot be written.
+        """
         self.pixels.add(picture)
         if self._movie is not None:
             self._movie.add(picture)
@@ -81,7 +87,10 @@ class StreamWriter:
 
 
 def encoded(picture: NDArray[Any], kind: str) -> bytes:
-    """Return a picture as the bytes of a file of type `kind`, "jpg" or "png"."""
+    """Return a picture as the bytes of a file of type `kind`: "jpg" (quality 95) or "png" (lossless).
+
+    picture: (H, W, 3) BGR uint8, or (H, W) uint16 for "png" only.
+    """
     import cv2
 
     options = [cv2.IMWRITE_JPEG_QUALITY, JPG_QUALITY] if kind == "jpg" else []
@@ -91,10 +100,14 @@ def encoded(picture: NDArray[Any], kind: str) -> bytes:
 
 
 def write_pictures(folder: Path, sequence: Sequence, wanted: tuple[str, ...], images: str) -> WrittenPictures:
-    """Draw the streams `wanted` of a sequence into a folder, one picture in memory at a time; returns what was written.
+    """Draw the streams `wanted` of a sequence and write them into a folder; returns what was written.
 
-    If the sequence has exact pixels and truth, the table TABLE is written too. No streams write nothing. Raises
-    InputError if the sequence lacks a stream.
+    One picture per stream is in memory at a time. images: file type, "jpg", "png" or "mp4". If the sequence has exact
+    pixels and truth, gt/pixels.parquet is written too. An empty `wanted` writes nothing. The sequence needs an image
+    size.
+
+    Raises InputError if the sequence lacks a stream, or its width or height is odd for "mp4"; WorkError if the stream
+    ids has a person id above 999; OSError if a file cannot be written. Also raises what drawing raises.
     """
     if not wanted:
         return NO_PICTURES
@@ -126,7 +139,11 @@ def _background(sequence: Sequence) -> Image:
 
 
 def _add(outputs: dict[str, StreamWriter], sequence: Sequence, frame: Frame, known: list[PixelTruth]) -> None:
-    """Add one frame to each open stream, and its exact pixels without the images to `known`."""
+    """Add one frame to each open stream (`outputs`, by name), and append its PixelTruth without the images to `known`.
+
+    `known` stays as it is for a sequence without exact pixels. Raises InputError if the sequence lacks a stream,
+    WorkError if the stream ids has a person id above 999.
+    """
     for name, picture in (("left", frame.image), ("right", frame.right)):
         if name in outputs:
             if picture is None:
@@ -154,10 +171,12 @@ def _missing(sequence: Sequence, stream: str) -> InputError:
 
 
 def pixel_table(truth: Truth, known: list[PixelTruth]) -> bytes:
-    """Return the table of visible pixels as Parquet bytes: one row per person and frame, ordered as truth.parquet.
+    """Return the table of visible pixels as Parquet bytes: one row per person and frame, in the order of the truth's
+    rows.
 
-    Columns: frame, id, visible_px, amodal_px, visibility_px (their ratio), box of the visible pixels, blob. Meanings as
-    in sim.types.PixelTruth.
+    known: the PixelTruth of every frame, from frame 1. Columns: frame (from 1), id, visible_px and amodal_px (px²),
+    visibility_px (their ratio), modal_left, modal_top, modal_width, modal_height (px; box of the visible pixels, nan if
+    hidden), blob (number of the connected region, -1 if hidden).
     """
 
     def joined(name: str) -> NDArray[Any]:

@@ -24,23 +24,26 @@ from sim.types import Array, Image, Ints, PixelTruth
 
 @dataclass(frozen=True)
 class StoredPictures:
-    """The pictures of a sequence folder, described by its manifest."""
+    """The pictures of a stored sequence. folder: the sequence folder. manifest: the content of its manifest.json."""
 
     folder: Path
     manifest: dict[str, Any]
 
     @property
     def streams(self) -> tuple[str, ...]:
-        """The stored streams."""
+        """The stored streams, some of "left", "right", "disparity", "ids", "background"; () without pictures."""
         return tuple(self.manifest["streams"])
 
     @property
     def images(self) -> str:
-        """File type of the pictures: "jpg", "png" or "mp4"."""
+        """File type of the pictures: "jpg", "png" or "mp4"; "png" without pictures or with 16-bit streams only."""
         return self.manifest.get("images") or "png"
 
     def body(self, name: str) -> bytes:
-        """Return the bytes of a file. Raises InputError if it is missing or its hash is not the manifest's."""
+        """Return the bytes of the file `name`, relative to the sequence folder.
+
+        Raises InputError if the file is missing, the manifest does not name it, or its hash is not the manifest's.
+        """
         path, facts = self.folder / name, self.manifest["files"].get(name)
         wanted = "a file that manifest.json names" if facts is None else f"the {facts['bytes']} bytes of manifest.json"
         try:
@@ -52,10 +55,11 @@ class StoredPictures:
         return body
 
     def one(self, stream: str, index: int) -> NDArray[Any]:
-        """Return one picture of a stream that is stored as picture files; `index` from 1.
+        """Return picture number `index` (from 1; the frame, except for "background") of a stream that is stored as
+        picture files.
 
         Shape (H, W, 3) BGR uint8, or (H, W) uint16 for the streams ids and disparity. Raises InputError if the file is
-        missing or altered, no picture, or of another size.
+        missing or altered, no picture, or of another size than the sequence's.
         """
         import cv2
 
@@ -72,9 +76,11 @@ class StoredPictures:
         return width, height
 
     def all(self, stream: str, count: int, wanted: list[int] | None = None) -> Iterator[NDArray[Any]]:
-        """Yield the pictures of a stream in order, `count` in all, or only the numbers `wanted` (ascending, from 1).
+        """Yield the pictures of a stream in order: `count` in all, or only the numbers `wanted` (ascending, from 1).
 
-        Raises InputError as `one`, and if a video holds another number of pictures.
+        Shape (H, W, 3) BGR uint8, or (H, W) uint16 for the streams ids and disparity. None or an empty `wanted` yields
+        all, except that an empty one yields none of a video. Raises InputError if a file is missing or altered, no
+        picture, or of another size, and if a video holds another number of pictures.
         """
         if streams.suffix(stream, self.images) != "mp4":
             yield from (self.one(stream, k) for k in wanted or range(1, count + 1))
@@ -90,17 +96,26 @@ class StoredPictures:
             raise InputError(file=path, got=f"{found} pictures", expected=count, remedy=REDO)
 
     def sample(self, wanted: list[int]) -> Iterable[tuple[int, Image]]:
-        """Return pairs (frame, picture) of the given frames (ascending) of the left camera, read while iterating."""
+        """Return pairs (frame, picture (H, W, 3) BGR uint8) of the left camera, read while iterating.
+
+        wanted: frames, from 1, ascending, not empty. Iterating raises InputError if a file is missing, altered or no
+        picture.
+        """
         return zip(wanted, self.all("left", self.manifest["sequence"]["length"], wanted), strict=True)
 
     def table(self) -> StoredTable:
-        """Return the table of visible pixels (picture_writer.pixel_table)."""
+        """Return the table of visible pixels, gt/pixels.parquet: one row per person and frame (columns: see
+        pixel_table).
+
+        Raises InputError if the file is missing or damaged. Its hash is not checked.
+        """
         return read_table(self.folder / TABLE)
 
     def pixel_loader(self) -> Callable[[int], PixelTruth]:
-        """Return a function that maps a frame to its PixelTruth, read from the streams ids and disparity.
+        """Return a function that maps a frame (from 1) to its PixelTruth, read from the streams ids and disparity.
 
-        Disparities are rounded to steps of 1/64 px, so they are off by 1/128 px at most; None if not stored.
+        The stream ids must be stored. Disparities are rounded to steps of 1/64 px, so they are off by 1/128 px at most;
+        the field is None if the stream is not stored. The function raises InputError if a file is missing or damaged.
         """
 
         @cache

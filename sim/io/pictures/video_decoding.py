@@ -31,10 +31,10 @@ REMEDY = "give a video that a player plays to its end"
 class PacketIndex:
     """The packets of a video stream, in the order of the file.
 
-    stamps: when each is shown, in units of time_base (s), None if unknown. keys: True where a group of packets begins
-    that can be decoded by itself. rate: frames per second, promised: number of frames, seconds: duration, all by the
-    header and 0 if missing. broken: why reading stopped before the end of the file, "" if it did not. reorders: True if
-    packets are not stored in the order in which they are shown.
+    stamps: when each packet is shown, in units of time_base (s), None if unknown. keys: True where a group of packets
+    begins that can be decoded by itself. rate: frames per second; promised: number of frames; seconds: duration; these
+    three by the header, 0 if missing. broken: why reading stopped before the end of the file, "" if it did not. codec:
+    libav's name of the codec. reorders: True if packets are not stored in the order in which they are shown.
     """
 
     stamps: tuple[int | None, ...]
@@ -48,14 +48,14 @@ class PacketIndex:
     reorders: bool
 
     def times(self) -> Array:
-        """Return the known times at which frames are shown, in s, ascending."""
+        """Return the times at which frames are shown, in s, ascending; unknown and repeated stamps are left out."""
         return np.array(sorted({s for s in self.stamps if s is not None}), float) * float(self.time_base)
 
     def ranks(self) -> dict[int, int] | None:
-        """Return the frame (1-based) of each time stamp.
+        """Return the frame (from 1) of each time stamp, a stamp being in units of time_base.
 
-        None if the stamps cannot be trusted: one is missing or stands twice, they contradict `reorders`, or the codec
-        has packets that are never shown.
+        Returns None if the stamps cannot be trusted: one is missing or stands twice, they ascend in the file although
+        `reorders` is True, or the codec (VP8) has packets that are never shown.
         """
         known = [s for s in self.stamps if s is not None]
         ascending = known == sorted(known)
@@ -64,7 +64,10 @@ class PacketIndex:
         return {stamp: k for k, stamp in enumerate(sorted(known), 1)}
 
     def groups(self, wanted: set[int]) -> set[int] | None:
-        """Return the numbers (from 1) of the packet groups that hold the frames `wanted`; None if unknown."""
+        """Return the numbers (from 1) of the packet groups that hold the frames `wanted` (from 1).
+
+        A packet group can be decoded by itself. Returns None if the time stamps cannot be trusted (see ranks).
+        """
         ranks = self.ranks()
         if ranks is None:
             return None
@@ -76,9 +79,10 @@ class PacketIndex:
 
 @contextmanager
 def open_stream(path: Path) -> Iterator[tuple[Any, Any]]:
-    """Give (container, video stream) of a file for the length of the block; cover pictures are no video stream.
+    """Give (libav container, first video stream) of a file for the length of the block, set to decode in one thread.
 
-    Raises InputError if the file is empty or no video, has no video stream, or uses an unknown codec.
+    Cover pictures are no video stream. Raises InputError if the file is empty or no video, has no video stream, or uses
+    an unknown codec.
     """
     import av
 
@@ -103,9 +107,10 @@ def _reason(error: Exception) -> str:
 
 
 def index_packets(path: Path) -> PacketIndex:
-    """Read the packet index of a file without decoding; a damaged file is indexed up to the damage.
+    """Return the packet index of a video file: time stamps, key packets and header, read without decoding.
 
-    Raises InputError as open_stream.
+    A damaged file is indexed up to the damage, and `broken` says why. Empty and discarded packets do not count. Raises
+    InputError if the file is empty or no video, has no video stream, or uses an unknown codec.
     """
     import av
 
@@ -126,7 +131,10 @@ def index_packets(path: Path) -> PacketIndex:
 
 
 def _seconds(stream: Any) -> float:
-    """Return the stream's duration by the header in s, 0 if missing; Matroska writes it as 00:00:11.429000000."""
+    """Return the duration of a libav video stream in s by the header, 0 if missing.
+
+    Matroska writes it as a tag DURATION, as 00:00:11.429000000.
+    """
     if stream.duration is not None:
         return float(stream.duration * stream.time_base)
     found = re.fullmatch(r"(\d+):(\d\d):(\d\d(?:\.\d+)?)", stream.metadata.get("DURATION", ""))
@@ -134,7 +142,9 @@ def _seconds(stream: Any) -> float:
 
 
 def _demuxed(container: Any, stream: Any) -> Iterator[Any]:
-    """Yield the packets up to the place where `index_packets` stopped."""
+    """Yield the packets of the video stream up to the first that cannot be read, which is where index_packets stops
+    too.
+    """
     import av
 
     packets = container.demux(stream)
@@ -149,9 +159,12 @@ def _demuxed(container: Any, stream: Any) -> Iterator[Any]:
 
 
 def decode_frames(path: Path, index: PacketIndex, wanted: list[int] | None = None) -> Iterator[tuple[int, Image]]:
-    """Yield (frame, picture (H, W, 3) BGR uint8) in order, of all frames or of those `wanted`.
+    """Yield (frame, picture (H, W, 3) BGR uint8) in the order in which frames are shown, of all frames or those
+    `wanted`.
 
-    Frames that cannot be decoded are left out. Raises InputError as open_stream.
+    Frames count from 1. index: the packet index of the same file. wanted: frames in any order; None for all. Frames
+    that cannot be decoded, and frames beyond the end, are left out. Raises InputError if the file is empty or no video,
+    has no video stream, or uses an unknown codec.
     """
     ranks, last, count = index.ranks(), max(wanted or [0]), 0
     some = None if wanted is None else set(wanted)
@@ -167,7 +180,10 @@ def decode_frames(path: Path, index: PacketIndex, wanted: list[int] | None = Non
 
 
 def _decoded(container: Any, stream: Any, groups: set[int] | None) -> Iterator[Any]:
-    """Yield decoded frames, None for a packet that cannot be decoded; only packet groups in `groups` if given."""
+    """Yield the decoded libav frames in order, None for a packet that cannot be decoded.
+
+    groups: numbers (from 1) of the packet groups to decode; the others are skipped. None decodes all.
+    """
     group, running = 0, False
     for packet in _demuxed(container, stream):
         group += packet.is_keyframe
@@ -191,10 +207,10 @@ def _decode_packet(stream: Any, packet: Any) -> list[Any]:
 
 
 def _picture(frame: Any) -> Image:
-    """Return a decoded frame as (H, W, 3) BGR uint8, turned upright.
+    """Return a decoded libav frame as (H, W, 3) BGR uint8, turned upright by the rotation it states (quarter turns).
 
-    OpenCV converts the usual pixel format (yuv420p, BT.601, narrow range). Other formats go through swscale's exact
-    conversion, which takes ten times as long; its default one darkens by one or two grey levels.
+    OpenCV converts the usual pixel format (yuv420p, BT.601, narrow range, even size). Other formats go through
+    swscale's exact conversion, which takes ten times as long; its default one darkens by one or two grey levels.
     """
     import cv2
 

@@ -21,15 +21,18 @@ BT601, NARROW = 6, 1  # libav's numbers of the colour matrix and range that Open
 
 
 def rate_of(fps: float) -> Fraction:
-    """Return frames per second as the fraction (denominator up to 1001) that containers store."""
+    """Return `fps`, frames per second, as the nearest fraction with a denominator up to 1001."""
     return Fraction(fps).limit_denominator(1001)
 
 
 @contextmanager
 def write_video(path: Path, size: tuple[int, int], fps: float, quality: int = QUALITY) -> Iterator[VideoWriter]:
-    """Give a VideoWriter for pictures of `size` = (width, height) px; the file is complete after the block.
+    """Give a VideoWriter for an H.264 mp4 file `path`, which is complete after the block; an existing file is
+    overwritten.
 
-    quality: x264's constant rate factor, lower is better. Raises InputError if width or height is odd.
+    size: (width, height) px of all pictures. fps: frames per second. quality: x264's constant rate factor, lower is
+    better, default 18. If the block raises, an incomplete file stays. Raises InputError if width or height is odd,
+    OSError if the file cannot be opened.
     """
     if size[0] % 2 or size[1] % 2:
         raise InputError(
@@ -48,7 +51,10 @@ def write_video(path: Path, size: tuple[int, int], fps: float, quality: int = QU
 
 
 class VideoWriter:
-    """A video that is being written; made by `write_video`. State: libav's open container and stream."""
+    """A video that is being written; made by `write_video`, which also ends and closes it.
+
+    State: libav's open container and stream.
+    """
 
     def __init__(self, file: Any, size: tuple[int, int], fps: float, quality: int):
         import av
@@ -65,7 +71,7 @@ class VideoWriter:
         context.colorspace = context.color_primaries = context.color_trc = BT601
 
     def add(self, picture: Image) -> None:
-        """Append a picture (H, W, 3) BGR uint8 of the video's size."""
+        """Append a picture (H, W, 3) BGR uint8; its size must be that of the video."""
         import av
         import cv2
 
@@ -75,9 +81,9 @@ class VideoWriter:
         self._container.mux(self._stream.encode(frame))
 
     def end(self) -> None:
-        """Encode the frames that the encoder still holds; no picture may follow."""
+        """Encode and write the frames that the encoder still holds; no picture may be added afterwards."""
         self._container.mux(self._stream.encode(None))
 
     def close(self) -> None:
-        """Write the index and close the container."""
+        """Write the index of the file and close the container; the file object that was given stays open."""
         self._container.close()
