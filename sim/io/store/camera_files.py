@@ -13,10 +13,11 @@ from sim.types import Array, Camera, Scene, Stairs
 
 
 def camera_document(camera: Camera) -> dict[str, Any]:
-    """Return the content of camera.json.
+    """Return the content of camera.json as a dict for JSON.
 
-    Keys: format, kind, image [width, height] px, focal_px, centre_px, position (3) m, rotation 3x3 (world to camera),
-    baseline m, px_per_m (null if unknown, as for a pinhole), and radial unless it is 0.
+    Keys: format, kind ("pinhole" or "top"), image [width, height] px, focal_px [fx, fy], centre_px [cx, cy], position
+    [x, y, z] m, rotation 3x3 (world to camera), baseline m, px_per_m (null if unknown, as for a pinhole), and radial
+    (distortion) unless it is 0.
     """
     distortion = {"radial": camera.radial} if camera.radial else {}
     return {
@@ -34,7 +35,11 @@ def camera_document(camera: Camera) -> dict[str, Any]:
 
 
 def read_camera(path: Path) -> Camera:
-    """Read a camera.json. Raises InputError if a key is missing, or its value has the wrong type, shape or size."""
+    """Read a camera.json as Camera; missing baseline and radial are 0, a missing or null px_per_m is nan.
+
+    Raises InputError if the file is unreadable or no JSON object, a key is missing, a value has the wrong type or shape
+    or is not finite, or px_per_m is missing for kind "top". The format number is not checked.
+    """
     d = tables.read_json(path)
     kind = _key(path, d, "kind")
     if kind not in ("pinhole", "top"):
@@ -55,10 +60,10 @@ def read_camera(path: Path) -> Camera:
 
 
 def scene_document(scene: Scene) -> dict[str, Any]:
-    """Return the content of scene.json, all in m.
+    """Return the content of scene.json as a dict for JSON, all lengths in m.
 
     Keys: format, size [x, y], walls and doors [[x1, y1], [x2, y2]], pillars [x, y, radius], service [x, y], stairs
-    (foot, head, width, rise, steps, landing), wall_height, pillar_height.
+    (foot, head [x, y], width, rise, steps, landing), wall_height, pillar_height.
     """
     stairs = [
         {"foot": s.foot.tolist(), "head": s.head.tolist(), "width": s.width, "rise": s.rise, "steps": s.steps,
@@ -71,7 +76,11 @@ def scene_document(scene: Scene) -> dict[str, Any]:
 
 
 def read_scene(path: Path) -> Scene:
-    """Read a scene.json. Raises InputError if a key is missing, or its value has the wrong type or shape."""
+    """Read a scene.json as Scene.
+
+    Raises InputError if the file is unreadable or no JSON object, a key is missing, or a value has the wrong type or
+    shape or is not finite. The format number is not checked.
+    """
     d = tables.read_json(path)
 
     def flight(k: int, s: dict[str, Any]) -> Stairs:
@@ -102,9 +111,11 @@ def _key(path: Path, d: dict[str, Any], key: str) -> Any:
 
 
 def _numbers(path: Path, d: dict[str, Any], key: str, shape: tuple[int, ...] | None) -> Array:
-    """Return the numbers of a key as float64. Raises InputError if missing, not finite, or of another shape.
+    """Return the numbers under `key` of the JSON object `d` as a float64 array.
 
-    shape: -1 in front for any length; None for any shape.
+    shape: the shape they must have; -1 in front for any length, which may be 0; () for a single number; None for any
+    shape. path: the file, for the error. Raises InputError if the key is missing, or a value is not finite or of
+    another shape.
     """
     value = _key(path, d, key)
     try:

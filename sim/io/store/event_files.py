@@ -17,7 +17,9 @@ NEAR_COLUMNS = "start,end,a,b"
 
 
 def event_dict(event: GroupEvent) -> dict[str, Any]:
-    """Return an event as a JSON object; unknown coordinates of its place are null."""
+    """Return an event as a dict for JSON, with the fields of GroupEvent as keys; unknown (nan) coordinates of `pos` are
+    None.
+    """
     return {
         "kind": event.kind, "start": int(event.start), "end": int(event.end),
         "emitted": None if event.emitted is None else int(event.emitted),
@@ -27,14 +29,17 @@ def event_dict(event: GroupEvent) -> dict[str, Any]:
 
 
 def events_bytes(events: Iterable[GroupEvent]) -> bytes:
-    """Return the events.json of a truth, as bytes."""
+    """Return the events.json of a truth, as bytes, with one event per line in the given order."""
     return json_list("events", map(event_dict, events))
 
 
 def read_events(path: Path) -> list[tuple[GroupEvent, int | None]]:
-    """Read an events.json: pairs of an event and the frame whose tracks reported it, None if it is not stored.
+    """Read an events.json as pairs (event, frame whose tracks reported it), in the order of the file.
 
-    Raises InputError if the file is no JSON object, or an event lacks a key, has an unknown kind or impossible frames.
+    The frame counts from 1 and is None if the file does not store it, as in a truth. Null coordinates become nan.
+    Raises InputError if the file is unreadable, no JSON object, of another format number or without a list of events.
+    Also raises InputError if an event lacks a key, has an unknown kind or a value of the wrong type, starts before
+    frame 1 or ends before it starts.
     """
     found = read_document(path).get("events")
     if not isinstance(found, list):
@@ -77,13 +82,17 @@ def _bad(path: Path, k: int, got: str, expected: str) -> InputError:
 
 
 def near_bytes(near: Near) -> bytes:
-    """Return near.csv, with columns start,end,a,b, as bytes."""
+    """Return near.csv as bytes: a header and the columns start, end (frames from 1, inclusive), a, b (person ids)."""
     rows = zip(near.start, near.end, near.a, near.b, strict=True)
     return "".join([NEAR_COLUMNS + "\n", *(f"{s},{e},{a},{b}\n" for s, e, a, b in rows)]).encode()
 
 
 def read_near(path: Path) -> Near:
-    """Read a near.csv. Raises InputError if its header or a line is invalid."""
+    """Read a near.csv (frames start, end and person ids a, b); a file with the header alone gives no rows.
+
+    Raises InputError if the file is unreadable, its header is another one, or a line is not four integers. Ranges are
+    not checked.
+    """
     lines = read_text(path).splitlines()
     if lines[:1] != [NEAR_COLUMNS]:
         raise InputError(
@@ -99,10 +108,10 @@ def read_near(path: Path) -> Near:
 
 
 def script_bytes(orders: Iterable[Order], fulfilled: Iterable[int | None]) -> bytes:
-    """Return script.json, as bytes.
+    """Return script.json as bytes, with one order of the script per line.
 
-    orders: the script's orders. fulfilled: for each order the position in events.json of the event that fulfilled it,
-    or None; stored as the key "event".
+    orders: the script's orders. fulfilled: for each order the index (from 0) in events.json of the event that fulfilled
+    it, or None; stored as the key "event". Raises ValueError if the two differ in length.
     """
     rows = (
         {"id": o.id, "kind": o.kind, "fired": o.fired, "before": o.before, "after": o.after, "event": event}
@@ -112,7 +121,11 @@ def script_bytes(orders: Iterable[Order], fulfilled: Iterable[int | None]) -> by
 
 
 def read_script(path: Path) -> tuple[Order, ...]:
-    """Read the orders of a script.json. Raises InputError if an order lacks a key or has a wrong value."""
+    """Read the orders of a script.json, in the order of the file; the key "event" is ignored, a missing list gives ().
+
+    Raises InputError if the file is unreadable, no JSON object or of another format number, or if an order lacks a key
+    or has a person id that is no integer.
+    """
     found = read_document(path).get("orders")
     try:
         return tuple(

@@ -22,10 +22,12 @@ AXES = ("x", "y", "z")
 
 
 def groups_bytes(frames: Series[Groups | None], first: int, unit: str) -> bytes:
-    """Return groups.parquet, as bytes, for consecutive frames from `first`.
+    """Return groups.parquet as bytes, for the groups of consecutive frames, the first of which has index `first`.
 
-    unit: "m" or "px". A frame may be None (groups unknown), which is stored apart from a frame without groups. Columns:
-    frame, group, members, x, y, (z), vx, vy, (vz), extent_xx to extent_yy, size, hull (x1, y1, x2, …).
+    unit: "m" or "px", that of positions and hulls. An item of `frames` may be None (groups unknown), which is stored
+    apart from a frame without groups. One row per frame and group; columns: frame, group (id), members (person ids), x,
+    y, (z), vx, vy, (vz), extent_xx, extent_xy, extent_yx, extent_yy (covariance of the members' positions), size
+    (people), hull (x1, y1, x2, …).
     """
     known = [g for g in frames if g is not None]
     axes = AXES[: known[0].pos.shape[1]] if known else AXES[:2]
@@ -50,7 +52,11 @@ def groups_bytes(frames: Series[Groups | None], first: int, unit: str) -> bytes:
 
 
 def _lists(rows: list[tuple[Any, ...]], ids: list[Ints], empty: NDArray[Any]) -> list[NDArray[Any]]:
-    """Return one flat array per group, over all frames; empty arrays for a frame that has no lists."""
+    """Return one flat array per group, over all frames.
+
+    rows: of each frame the lists of its groups (members or hulls), or () if that frame has none. ids: of each frame its
+    group ids. empty: the array, of the wanted number type, for a group of a frame without lists.
+    """
     every = [item for row, id in zip(rows, ids, strict=True) for item in (row or (empty,) * len(id))]
     return [np.asarray(item, empty.dtype).ravel() for item in every]
 
@@ -60,7 +66,11 @@ def _stack(parts: list[Array], width: int) -> Array:
 
 
 def read_groups(table: StoredTable) -> list[Groups | None]:
-    """Return the groups of each frame of a groups.parquet, None for a frame whose groups are unknown."""
+    """Return the groups of each frame of a groups.parquet that was read as a table, in the order of frames.
+
+    An item is None for a frame whose groups are unknown, and Groups without rows for a frame without groups. Raises
+    InputError if a column or a value of the metadata is missing.
+    """
     first, count = int(table.fact("first")), int(table.fact("frames"))
     missing, memberless = set(table.fact("missing")), set(table.fact("memberless"))
     axes = [a for a in AXES if table.has(a)]
@@ -79,13 +89,20 @@ def read_groups(table: StoredTable) -> list[Groups | None]:
 
 
 def wkt(hull: Array, digits: int) -> str:
-    """Return a hull (V, 2) as a WKT polygon with `digits` decimals, "POLYGON EMPTY" without vertices."""
+    """Return a hull, vertices (V, 2) x, y, as text "POLYGON ((x y, …))" with `digits` decimals, the first vertex
+    repeated.
+
+    A hull without vertices is "POLYGON EMPTY".
+    """
     points = [f"{x:.{digits}f} {y:.{digits}f}" for x, y in hull]
     return f"POLYGON (({', '.join([*points, points[0]])}))" if points else "POLYGON EMPTY"
 
 
 def parse_wkt(text: str) -> Array:
-    """Return the vertices (V, 2) of a WKT POLYGON, the first not repeated. Raises ValueError for other texts."""
+    """Return the vertices (V, 2) x, y of a WKT POLYGON of one ring; a last vertex equal to the first is left out.
+
+    "POLYGON EMPTY" gives shape (0, 2). Raises ValueError for other texts and for coordinates that are not finite.
+    """
     body = text.strip().removeprefix("POLYGON").strip()
     if body == "EMPTY":
         return np.zeros((0, 2))
@@ -98,10 +115,12 @@ def parse_wkt(text: str) -> Array:
 
 
 def groups_csv(ground: Series[Groups | None] | None, image: Series[Groups | None] | None, first: int = 1) -> bytes:
-    """Return groups.csv, as bytes, for consecutive frames from `first`.
+    """Return groups.csv as bytes, for consecutive frames, the first of which has index `first`.
 
-    x, y, hull: of `ground`, in the plane of its tracks, 3 digits. hull_px: of the group with the same id in `image`, 2
-    digits; the column exists if `image` is given. Without `ground` x, y and hull are empty.
+    ground: groups of each frame in the plane of their tracks or truth, None if unknown. image: groups of each frame in
+    px. Columns: frame, group (id), members (ids separated by blanks), x, y, hull (WKT, 3 decimals), size, and, if
+    `image` is given, hull_px (WKT, 2 decimals) of the group with the same id. Where the ground groups of a frame are
+    unknown, its rows are the image's groups, and x, y and hull are empty. Unknown numbers (nan) are empty, too.
     """
     text = io.StringIO()
     writer = csv.writer(text, lineterminator="\n")
@@ -134,10 +153,14 @@ def _cell(value: float) -> str:
 
 
 def read_groups_csv(path: Path, length: int) -> list[Groups]:
-    """Read a groups.csv, ours or another program's, as the groups of frames 1 to `length`.
+    """Read a groups.csv, ours or another program's, as the Groups of each frame from 1 to `length`.
 
-    Velocities are 0, extents nan. Further columns are ignored; hull, x, y and size may be empty. Raises InputError with
-    the line if a column is missing, a cell is invalid, a frame is outside, or a group stands twice in a frame.
+    The columns frame, group, members (ids separated by blanks), x, y and hull (WKT) must exist; size may be missing,
+    and further columns are ignored. Empty x, y and size become nan, an empty hull has no vertices. Velocities are 0,
+    extents nan. Groups are sorted by id. Whether members exist is not checked.
+
+    Raises InputError if the file is unreadable, and, with the line, if a column is missing, a cell is invalid, a frame
+    is outside 1 to `length`, a group id is negative, or a group stands twice in a frame.
     """
     reader = csv.DictReader(io.StringIO(read_text(path)))
     wanted = [c for c in CSV_COLUMNS[:6] if c not in (reader.fieldnames or [])]

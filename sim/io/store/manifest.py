@@ -21,15 +21,19 @@ REDO = "run the same `flockscope generate` again"
 
 
 def is_sequence(folder: Path) -> bool:
-    """Return True if a folder is a stored sequence, also an incomplete one: it has a manifest.json or scenario.toml."""
+    """Return True if the folder has a manifest.json or scenario.toml: it is a stored sequence, perhaps an incomplete
+    one.
+    """
     return (folder / MANIFEST).is_file() or (folder / "scenario.toml").is_file()
 
 
 def identity(scenario: str, seed: int, repeat: int, streams: Iterable[str] = (), images: str = "jpg") -> dict[str, Any]:
-    """Return the manifest's fields that identify a sequence: formats, engine, seed, repeat, scenario_hash, pictures.
+    """Return the fields of a manifest that identify a sequence, by name.
 
-    scenario: TOML text of the resolved scenario. streams, images: as in sim.io.store.streams; raises InputError for
-    unknown ones.
+    Keys: format, schema, engine, seed, repeat, scenario_hash, streams (in the usual order, "background" added to "left"
+    or "right"), images (None if no stream depends on it). scenario: TOML text of the resolved scenario. repeat: number
+    of the suite entry's copy, 0 without copies. streams: stored pictures. images: their file type, "jpg", "png" or
+    "mp4". Raises InputError for an unknown stream or file type.
     """
     wanted = check_streams(streams, images)
     return {
@@ -45,13 +49,20 @@ def identity(scenario: str, seed: int, repeat: int, streams: Iterable[str] = (),
 
 
 def with_hash(manifest: dict[str, Any]) -> dict[str, Any]:
-    """Return the manifest with the field `sha256`, the canonical hash of all its other fields."""
+    """Return a copy of the manifest with the field `sha256`, the canonical hash of all its other fields.
+
+    An old `sha256` is replaced.
+    """
     body = {key: value for key, value in manifest.items() if key != "sha256"}
     return {**body, "sha256": hashing.canonical_hash(body)}
 
 
 def read_manifest(folder: Path) -> dict[str, Any]:
-    """Read a folder's manifest. Raises InputError if it is missing, invalid, altered or of another format."""
+    """Read the manifest.json of a sequence folder, as a dict.
+
+    Raises InputError if it is missing, unreadable or no JSON object, has another format number, lacks a key, or was
+    altered, that is, its fields do not have the hash that it names.
+    """
     path = folder / MANIFEST
     if not path.is_file():
         raise InputError(file=path, got="missing", expected="the manifest of a complete sequence", remedy=REDO)
@@ -70,9 +81,10 @@ def read_manifest(folder: Path) -> dict[str, Any]:
 
 
 def damaged_files(folder: Path, manifest: dict[str, Any], *, pictures: bool = True) -> Iterator[InputError]:
-    """Yield an InputError for each file that is missing or whose hash differs from the manifest's.
+    """Yield (not raise) an InputError for each file of the manifest that is missing or whose hash differs.
 
-    pictures False: of pictures only the size is compared.
+    pictures: True compares the hash of every file. False compares only the size of pictures; a picture of another size
+    is reported. Files that the manifest does not name are ignored.
     """
     for name, facts in manifest["files"].items():
         path = folder / name

@@ -36,14 +36,17 @@ def write_sequence(
     images: str = "jpg",
     keep: Callable[[], bool] = lambda: False,
 ) -> Path:
-    """Write a sequence as `folder`, complete or not at all, and return the folder.
+    """Write a sequence as the folder `folder`, complete or not at all, and return the folder; an existing one is
+    replaced.
 
-    scenario: TOML text of the resolved scenario. streams: pictures to store (sim.io.store.streams.STREAMS). images:
-    their file type, "jpg", "png" or "mp4". One picture at a time is in memory. keep: if it returns True, a folder that
-    another process has written meanwhile stays.
+    scenario: TOML text of the resolved scenario. seed: that of the simulation. repeat: number of the suite entry's
+    copy, 0 without copies. streams: pictures to store, "left", "right", "disparity", "ids", "background"; by default
+    none. images: their file type, "jpg", "png" or "mp4". One picture per stream is in memory at a time. keep: called
+    before an existing folder is replaced; if it returns True, that folder stays.
 
-    Raises InputError if a stream is missing or unknown or the folder cannot be written, and WorkError if an order of
-    the script was not fulfilled or the disk is full.
+    Raises InputError if a stream or file type is unknown, the sequence lacks a stream, a video would have an odd width
+    or height, or the folder cannot be written. Raises WorkError if an order of the script was not fulfilled, the stream
+    ids has a person id above 999, or the disk is full.
     """
     wanted = check_streams(streams, images)
     with atomic.new_folder(folder, keep) as partial:
@@ -59,9 +62,11 @@ def write_sequence(
 def sequence_files(
     sequence: Sequence, *, scenario: str, seed: int, repeat: int = 0, pictures: WrittenPictures = NO_PICTURES
 ) -> dict[str, bytes]:
-    """Return all files of a sequence but its pictures: content by name, the manifest last.
+    """Return all files of a sequence except its pictures: content by name relative to its folder, the manifest last.
 
-    pictures: what has been written of its pictures, for the manifest.
+    scenario: TOML text of the resolved scenario. seed, repeat: of the simulation; repeat 0 without copies. pictures:
+    what has been written of its pictures, for the manifest; by default nothing. Raises WorkError if an order of the
+    script was not fulfilled.
     """
     frames = list(sequence.without_pictures())
     found = [f.detections for f in frames if f.detections is not None]
@@ -112,7 +117,11 @@ def _manifest(
 
 
 def _seqinfo(sequence: Sequence, length: int, pictures: WrittenPictures) -> bytes:
-    """Return seqinfo.ini. Without JPG or PNG pictures it names img1 and .jpg, so that MOTChallenge tools accept it."""
+    """Return seqinfo.ini as bytes: name, imDir, frameRate, seqLength, and, if the image size is known, imWidth,
+    imHeight, imExt.
+
+    Without JPG or PNG pictures it names the folder img1 and .jpg, so that MOTChallenge tools accept it.
+    """
     width, height = sequence.image_size or (0, 0)
     folder, _, name = file_name("left", "png" if pictures.images == "png" else "jpg", 1).partition("/")
     lines = [
@@ -127,11 +136,12 @@ def _seqinfo(sequence: Sequence, length: int, pictures: WrittenPictures) -> byte
 
 
 def open_sequence(folder: Path, *, background: BackgroundChoice | None = None) -> Sequence:
-    """Return a stored sequence, equal to the one that was written.
+    """Return the stored sequence in a folder, equal to the one that was written, except for its `source`.
 
-    background: sample of frames for background models, instead of the stored empty frames. Raises InputError if the
-    manifest is invalid, a file is missing or altered, or `background` is given for a sequence without left pictures.
-    Pictures are checked against their hash when they are read.
+    background: sample of frames for background models, instead of the stored empty frames; None takes those. Raises
+    InputError if the manifest is invalid, a file is missing or altered, `background` is given for a sequence without
+    left pictures, or it asks for more frames than there are. Pictures are checked against their hash when they are
+    read; a damaged one raises InputError then.
     """
     manifest = read_manifest(folder)
     for error in damaged_files(folder, manifest, pictures=False):
@@ -179,7 +189,12 @@ def open_sequence(folder: Path, *, background: BackgroundChoice | None = None) -
 def _background(
     pictures: StoredPictures, choice: BackgroundChoice | None, length: int
 ) -> tuple[Callable[[], Image] | None, dict[str, str]]:
-    """Return a loader of background pictures, None without any, and the entry for `Sequence.source` that names them."""
+    """Return (loader of background pictures, entry for `Sequence.source` that names them); (None, {}) if there are
+    none.
+
+    choice: sample of frames of the left pictures; None takes the stored empty frames. length: frames of the sequence.
+    Raises InputError if a choice is given without left pictures, or asks for more frames than there are.
+    """
     if choice is not None:
         if "left" not in pictures.streams:
             got, remedy = "--background", "leave it out: it has none"
@@ -192,7 +207,11 @@ def _background(
 
 
 def _people(folder: Path, manifest: dict[str, Any]) -> dict[str, tuple[int, ...]]:
-    """Return the ids of the people of each group of the script, computed again from the stored scenario and seed."""
+    """Return the person ids of each group that the script names, by group name.
+
+    They are computed again from the stored scenario, scene, seed and orders. Raises InputError if one of these files is
+    unreadable or invalid.
+    """
     from scenarios import load
     from sim.sequence import named_people
 

@@ -24,9 +24,11 @@ Codes = NDArray[np.uint16]
 
 
 def check_streams(streams: Iterable[str], images: str) -> tuple[str, ...]:
-    """Return the streams in the order of STREAMS, with "background" added if "left" or "right" is among them.
+    """Return the streams in the order of STREAMS, each once, with "background" added if "left" or "right" is among
+    them.
 
-    Raises InputError if a stream or the file type `images` is unknown.
+    streams: names, () for none. images: file type. Raises InputError if a stream is unknown, or `images` is not "jpg",
+    "png" or "mp4".
     """
     wanted = set(streams)
     unknown = sorted(wanted - set(STREAMS))
@@ -41,33 +43,41 @@ def check_streams(streams: Iterable[str], images: str) -> tuple[str, ...]:
 
 
 def coding(streams: Iterable[str], images: str) -> str | None:
-    """Return `images` if it affects any stream; None without streams or with 16-bit ones (always PNG) only."""
+    """Return `images`, the file type, if it affects any of the streams; else None.
+
+    It affects none if there are no streams, or only disparity and ids, which are always PNG.
+    """
     return images if set(streams) - set(EXACT) else None
 
 
 def suffix(stream: str, images: str) -> str:
-    """Return the file type of a stream: `images`, or "png" for the 16-bit streams."""
+    """Return the file type of a stream, without dot: "png" for disparity and ids, else `images`."""
     return "png" if stream in EXACT else images
 
 
 def file_name(stream: str, images: str, index: int) -> str:
-    """Return the name of a picture's file inside the sequence folder, as img1/000001.jpg or left.mp4.
+    """Return the name of a picture's file relative to the sequence folder, as img1/000001.jpg; one mp4 per stream, as
+    left.mp4.
 
-    index: the frame; for "background" the picture's number, from 1.
+    images: file type, "jpg", "png" or "mp4". index: the frame, from 1; for "background" the picture's number, from 1.
+    Ignored for a video.
     """
     kind = suffix(stream, images)
     return f"{stream}.mp4" if kind == "mp4" else f"{FOLDERS[stream]}/{index:06d}.{kind}"
 
 
 def is_picture(name: str) -> bool:
-    """Return True if a file of a sequence folder, given by its relative name, holds pictures."""
+    """Return True if a file of a sequence folder holds pictures: a video, or a file in the folder of a stream.
+
+    name: relative to the sequence folder, with "/" between its parts.
+    """
     return name.endswith(".mp4") or name.partition("/")[0] in FOLDERS.values()
 
 
 def encode_ids(ids: Ints) -> Codes:
     """Return ids (H, W) as uint16 in the style of MOTS: 2000 + id for people, 3000 for walls and pillars, 0 elsewhere.
 
-    ids: as in PixelTruth. Raises WorkError for an id above 999.
+    ids: person id (from 1), negative for walls and pillars, 0 elsewhere. Raises WorkError for an id above 999.
     """
     if ids.max(initial=0) > PEOPLE:
         raise WorkError(
@@ -78,18 +88,21 @@ def encode_ids(ids: Ints) -> Codes:
 
 
 def decode_ids(codes: Codes) -> Ints:
-    """Return the inverse of encode_ids, (H, W) int64: person id, -2 for walls and pillars, 0 elsewhere."""
+    """Return the ids (H, W) int64 of MOTS codes, the inverse of encode_ids.
+
+    Code 3000 gives -2 (walls and pillars), any other above 2000 gives code - 2000 (person id), the rest 0.
+    """
     wide = codes.astype(np.int64)
     return np.where(wide == STATIC, -2, np.where(wide > PERSON, wide - PERSON, 0))
 
 
 def encode_disparity(disparity: Array) -> Codes:
-    """Return disparities (H, W) px as uint16: round(64 d) between 1 and 65535, 0 where unknown (nan)."""
+    """Return disparities (H, W) px as uint16: round(64 d), clipped to 1 … 65535, 0 where d is nan or infinite."""
     known = np.isfinite(disparity)
     steps = np.clip(np.rint(np.where(known, disparity, 0.0) * STEPS), 1, 65535)
     return np.where(known, steps, 0).astype(np.uint16)
 
 
 def decode_disparity(codes: Codes) -> Array:
-    """Return the inverse of encode_disparity, (H, W) px, nan where unknown."""
+    """Return the disparities (H, W) px of stored codes: code / 64, nan where the code is 0 (unknown)."""
     return np.where(codes > 0, codes / STEPS, np.nan)

@@ -16,8 +16,9 @@ WIDTH = 0.50  # m, diameter of the upright cylinder
 def box_source(tracks: Sequence[Tracks], camera: Camera | None) -> Literal["measured", "projected", "none"]:
     """Return where the boxes of stored tracks come from, the value `boxes` of run.json.
 
-    "measured": the tracker gave a box in at least one frame. "projected": it gave none, tracks people on the ground,
-    and the camera is known. "none": otherwise, that is without a camera, for tracks in the image, or for groups.
+    tracks: those of one tracker, one Tracks per frame. "measured": the tracker gave a box in at least one frame with
+    tracks. "projected": it gave none, its tracks are people on the ground or in space, and the camera is known. "none":
+    otherwise, that is without a camera, for tracks in the image, or for groups.
     """
     if any(t.box is not None and len(t.id) for t in tracks):
         return "measured"
@@ -26,9 +27,10 @@ def box_source(tracks: Sequence[Tracks], camera: Camera | None) -> Literal["meas
 
 
 def upright_boxes(camera: Camera, pos: Array) -> Array:
-    """Return the boxes (N, 4) ltwh px of upright cylinders, PERSON_HEIGHT high and WIDTH across, that stand at `pos`.
+    """Return the boxes (N, 4) left, top, width, height in px of upright cylinders that stand at `pos`.
 
-    pos: (N, 3) m, or (N, 2) m on the ground z = 0. A cylinder that is partly behind the camera has a box of nan.
+    A cylinder is 1.7 m high and 0.5 m across. pos: (N, 3) m, or (N, 2) m on the ground z = 0. Boxes are not clipped to
+    the image. A cylinder that is partly behind the camera has a box of nan.
     """
     from sim.scene.camera import project
 

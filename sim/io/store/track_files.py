@@ -37,12 +37,16 @@ def write_tracks(
     scene: Scene | None = None,
     info: dict[str, Any] | None = None,
 ) -> Path:
-    """Write the tracks of consecutive frames into `folder`, run.json last, and return the folder.
+    """Write the tracks of consecutive frames of one tracker into `folder`, and return the folder.
 
-    Files of an earlier run are replaced or deleted. camera: gives tracks of people on the ground without boxes the
-    boxes of upright people. scene: gives the height of the ground under them, 0 without. info: content of run.json,
-    to which "format" and "boxes" (track_boxes.box_source) are added. Raises InputError or WorkError if the folder
-    cannot be written.
+    Files: tracks.parquet, tracks.txt, tracks.mot.txt, groups.parquet and groups.csv if there are groups, events.json,
+    and run.json last. Files of these names from an earlier run are replaced or deleted, others stay. tracks: one Tracks
+    per frame, all of one plane and unit. fps: frames/s. camera: if the tracker gives no boxes, tracks of people on the
+    ground get the boxes of upright people in the texts; None: no such boxes. scene: gives the height of the ground
+    under 2-D positions; None: 0. info: content of run.json, to which "format" and "boxes" (where the boxes come from)
+    are added.
+
+    Raises InputError if the folder cannot be written, WorkError if the disk is full, ValueError if `info` holds NaN.
     """
     folder = Path(folder)
     replace_files(folder, tracks_files(tracks, fps=fps, camera=camera, scene=scene, info=info), stale=NAMES)
@@ -57,7 +61,11 @@ def tracks_files(
     scene: Scene | None = None,
     info: dict[str, Any] | None = None,
 ) -> dict[str, bytes]:
-    """Return the files that `write_tracks` writes: content by name."""
+    """Return the files that `write_tracks` writes: content by name, run.json last; arguments are those of write_tracks.
+
+    Nothing is written. No tracks give tables without rows, in the plane "ground". Raises ValueError if `info` holds
+    NaN.
+    """
     every = list(tracks)
     rows, boxes = _flatten(every, fps), box_source(every, camera)
     text_box, place = rows.box, None if rows.plane == "image" else with_ground_height(rows.pos, scene)
@@ -81,7 +89,13 @@ def tracks_files(
 
 @dataclass(frozen=True)
 class _Rows:
-    """The tracks of all frames, row by row; rows of a frame without boxes have box nan and boxless True."""
+    """The tracks of all frames of one tracker, R rows in the order of frames.
+
+    plane, unit: of all tracks. frame (R,): from the tracks' index. id, group (R,). pos, vel (R, D) m or px (per s), D =
+    3 in the plane "space", else 2. cov (R, 2D, 2D): covariance of position and velocity. box (R, 4): left, top, width,
+    height in px, nan in a frame without boxes. boxless (R,): True in such a frame. score (R,): 1 if the tracker gives
+    none.
+    """
 
     plane: str
     unit: str
@@ -166,11 +180,13 @@ def _text(rows: _Rows, box: Array, place: Array | None, *, full: bool) -> bytes:
 def read_tracks(path: str | Path, *, fps: float | None = None, length: int | None = None) -> list[Tracks]:
     """Read the tracks of a folder that write_tracks wrote, of one of its files, or of another program's MOT text.
 
-    tracks.parquet is read if it exists. From text, velocities are differences over 0.5 s, covariances nan, and groups
-    and events those of groups.csv and events.json beside our own tracks.txt; boxes are left out if run.json says that
-    they were projected. fps (None: 25) and length apply to text only: `length` adds empty frames at the end.
+    Returns one Tracks per frame. tracks.parquet is read if it exists, and is exact. From text, velocities are
+    differences over 0.5 s, covariances nan, and everybody is alone; beside our own tracks.txt, groups and events are
+    those of groups.csv and events.json, and boxes are left out if run.json says that they were projected. fps (None:
+    25) and length (None: to the last frame in the file) apply to text only; `length` adds empty frames at the end.
 
-    Raises InputError if there are no tracks, a file is invalid, or an event's frame is outside the tracks.
+    Raises InputError if there are no tracks, a file is unreadable or invalid, a frame is beyond `length`, or an event's
+    frame is outside the tracks. Warns about a text without rows if `length` is given.
     """
     path = Path(path)
     folder = path if path.is_dir() else path.parent
@@ -193,7 +209,10 @@ def read_tracks(path: str | Path, *, fps: float | None = None, length: int | Non
 
 
 def _boxes(path: Path) -> Any:
-    """Return the value "boxes" of a run.json, None if missing."""
+    """Return the value "boxes" of a run.json ("measured", "projected" or "none"), None if missing.
+
+    Raises InputError if the file is unreadable, no JSON object or of another format number.
+    """
     return tables.read_document(path).get("boxes")
 
 

@@ -15,14 +15,16 @@ from sim.types import Array, Plane, Tracks
 
 
 def read_track_text(path: Path, fps: float, length: int | None, *, projected: bool = False) -> list[Tracks]:
-    """Return the tracks of frames 1 to `length` (None: to the last frame in the file).
+    """Return the tracks of a MOTChallenge text, one Tracks per frame from 1 to `length`; frames without rows are empty.
 
-    Positions are on the ground if the file has them, else box centres in the image. Velocities are differences over
-    0.5 s, covariances nan, and everybody is alone. projected True leaves the boxes out, since they were computed from
-    the positions.
+    length: None: to the last frame in the file. fps: frames/s. Positions are on the ground (m) if the file has them,
+    else box centres in the image (px). Velocities are differences over 0.5 s, covariances nan, and everybody is alone
+    (group -1). Boxes are None if a row lacks one. Scores outside [0, 1] are scaled to it (unit_scores). projected: True
+    leaves the boxes out if there are ground positions, since they were computed from these.
 
-    Raises InputError if a line is invalid, an id is negative or stands twice in a frame, only some lines have a ground
-    position, or the file has no row and `length` is None. Warns about a file without rows otherwise.
+    Raises InputError if the file is unreadable, a line is invalid, a frame is beyond `length`, an id is negative or
+    stands twice in a frame, only some lines have a ground position, a line has neither box nor ground position, or the
+    file has no row and `length` is None. Warns about a file without rows otherwise.
     """
     table = read_table(path, length=length, boxless=True)
     _reject_empty(table, length)
@@ -54,7 +56,11 @@ def read_track_text(path: Path, fps: float, length: int | None, *, projected: bo
 
 
 def _reject_empty(table: MotTable, length: int | None) -> None:
-    """Raise InputError for a file without rows if the length is unknown, else warn: it may have been truncated."""
+    """Raise InputError for a table without rows if `length`, the number of frames, is None; else warn that nobody was
+    tracked.
+
+    Does nothing if the table has rows.
+    """
     if len(table.frame):
         return
     if length is None:
@@ -63,13 +69,18 @@ def _reject_empty(table: MotTable, length: int | None) -> None:
 
 
 def _centres(table: MotTable) -> Array:
-    """Return the centres of the boxes (N, 2) px. Raises InputError if a row has none."""
+    """Return the centres x, y of the boxes, (N, 2) px, in the table's order. Raises InputError if a row has no box."""
     table.rows.reject(table.without_box(), "a box, or a ground position in every line", "complete the lines")
     return table.box[:, :2] + table.box[:, 2:] / 2
 
 
 def with_groups(found: list[Tracks], path: Path) -> list[Tracks]:
-    """Return the tracks with the groups of a groups.csv; each member gets its group's id."""
+    """Return copies of one tracker's tracks with the groups of a groups.csv; each member's `group` is its group's id.
+
+    found: one Tracks per frame, from frame 1. path: the groups.csv. People in no group keep their group; of a person in
+    two groups the one with the higher id counts. Members without a track are ignored. Raises InputError if the file is
+    unreadable or invalid, or names a frame beyond the tracks.
+    """
     every = read_groups_csv(path, len(found))
     answers = []
     for tracks, groups in zip(found, every, strict=True):

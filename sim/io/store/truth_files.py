@@ -21,10 +21,10 @@ SINGLE = (("z", "m"), ("heading", "rad"), ("height", "m"), ("truncation", "1"))
 
 
 def truth_files(truth: Truth) -> dict[str, bytes]:
-    """Return the files under gt/: content by name.
+    """Return the files under gt/ of a truth: content as bytes by name, as "gt/truth.parquet".
 
-    Always truth.parquet and script.json; where the truth has them, gt.txt (MOTChallenge), groups.parquet,
-    groups_px.parquet, groups.csv, events.json and near.csv.
+    Always truth.parquet and script.json. Where the truth has boxes, gt.txt (MOTChallenge); where it has groups,
+    groups.parquet, groups_px.parquet (in the image) and groups.csv; where it has them, events.json and near.csv.
     """
     files = {"gt/truth.parquet": _table(truth), "gt/script.json": script_bytes(truth.orders, _fulfilled(truth))}
     if truth.box is not None:
@@ -43,7 +43,9 @@ def truth_files(truth: Truth) -> dict[str, bytes]:
 
 
 def _fulfilled(truth: Truth) -> list[int | None]:
-    """Return for each order the position of the event that fulfilled it, None without one."""
+    """Return for each order of the script the index (from 0) in `truth.events` of the event that fulfilled it, None
+    without one.
+    """
     if not truth.orders:
         return []
     from sim.truth.order_fulfilment import dense_groups, fulfilment
@@ -74,7 +76,9 @@ def _table(truth: Truth) -> bytes:
 
 
 def _spans(flags: Bools) -> list[list[int]]:
-    """Return [first frame, last frame] of each run of True in flags (T,)."""
+    """Return [first frame, last frame], counted from 1 and inclusive, of each run of True in flags (T,); [] without
+    any.
+    """
     edges = np.flatnonzero(np.diff(np.concatenate([[False], flags, [False]]).astype(np.int8)))
     return [[int(a) + 1, int(b)] for a, b in edges.reshape(-1, 2)]
 
@@ -87,7 +91,11 @@ def _flags(spans: list[list[int]], length: int) -> Bools:
 
 
 def _mot_text(truth: Truth, box: Array) -> bytes:
-    """Return gt.txt with 9 columns; people without a finite box of positive size have no row."""
+    """Return gt.txt as bytes, with a row per person and frame: frame, id, left, top, width, height, 1, 1, visibility.
+
+    box: (R, 4) left, top, width, height in px of the truth's rows. People without a finite box of positive size have no
+    row. Widths and heights below 0.01 px are written as 0.01.
+    """
     lines = []
     rows = zip(truth.frame.tolist(), truth.id.tolist(), box.tolist(), truth.visibility.tolist(), strict=True)
     for frame, id, (left, top, width, height), visibility in rows:
@@ -98,7 +106,12 @@ def _mot_text(truth: Truth, box: Array) -> bytes:
 
 
 def read_truth(folder: Path) -> Truth:
-    """Read the truth of a sequence folder, equal to the one written. Raises InputError if a file is invalid."""
+    """Read the truth of a sequence folder, equal to the one written; columns and files that are not stored become None.
+
+    A frame whose groups are unknown comes back as a frame without groups. Raises InputError if gt/truth.parquet or
+    gt/script.json is missing, a file is damaged or invalid, or rows are not sorted by (frame, id), stand twice or lie
+    outside the sequence.
+    """
     gt = folder / "gt"
     table = read_table(gt / "truth.parquet")
     length, labelled = int(table.fact("length")), table.fact("labelled")
@@ -141,9 +154,12 @@ def _groups(path: Path) -> tuple[Groups, ...] | None:
 
 
 def detection_files(detections: list[Detections], fps: float, scene: Scene | None = None) -> dict[str, bytes]:
-    """Return det/det.parquet (exact) and det/det.txt (MOT, 10 columns) for the detections of frames 1, 2, …, by name.
+    """Return det/det.parquet (exact) and det/det.txt (MOT text with 10 columns), content by name.
 
-    scene: gives the height of the ground, which is the z of ground points in det.txt; 0 without a scene.
+    detections: one Detections per frame, from frame 1, all of one plane, and all with or without boxes and velocities.
+    fps: frames/s. scene: gives the height of the ground, which is the z of ground points (x, y) in det.txt; None: 0.
+    Missing scores are written as 1. In det.txt the id is -1, a missing box -1,-1,-1,-1, and the position of a detection
+    in the image -1,-1,-1.
     """
     plane, boxed, moving = _form(detections)
     axes = ("x", "y", "z")[: detections[0].pos.shape[1]] if detections else ("x", "y")
@@ -168,19 +184,25 @@ def detection_files(detections: list[Detections], fps: float, scene: Scene | Non
 
 
 def _form(detections: list[Detections]) -> tuple[str, bool, bool]:
-    """Return the plane, whether there are boxes, and whether there are velocities; equal in all frames."""
+    """Return (plane, whether there are boxes, whether there are velocities), which must be equal in all frames.
+
+    Without frames: ("image", True, False). Frames that differ fail an assertion.
+    """
     forms = {(d.plane, d.box is not None, d.vel is not None) for d in detections}
     assert len(forms) <= 1, f"detections of one sequence differ in kind: {sorted(forms)}"
     return next(iter(forms), ("image", True, False))
 
 
 def scores_or_ones(score: Array, rows: int) -> Array:
-    """Return the scores (N,) for `rows` = N rows; ones if the detector or tracker gives none."""
+    """Return `score` (N,) if it has `rows` = N items, else N ones: the detector or tracker gives no scores."""
     return score if len(score) == rows else np.ones(rows)
 
 
 def with_ground_height(pos: Array, scene: Scene | None) -> Array:
-    """Return positions (N, 3) m: z is that of `pos`, else the height of the ground, 0 without a scene."""
+    """Return positions x, y, z in m, (N, 3).
+
+    pos: (N, 3) is returned unchanged; (N, 2) gets the height of the scene's ground as z, 0 without a scene.
+    """
     if pos.shape[1] == 3:
         return pos
     z = np.zeros(len(pos)) if scene is None else height_at(scene, pos)
@@ -198,7 +220,10 @@ def _det_text(frame: Any, box: Array | None, score: Array, ground: Array | None)
 
 
 def read_detections(path: Path) -> list[Detections]:
-    """Read a det.parquet: one Detections per frame. Raises InputError if the file is invalid."""
+    """Read a det.parquet: one Detections per frame, from frame 1; frames without rows have none.
+
+    Raises InputError if the file is missing or damaged, or a column or a value of the metadata is missing.
+    """
     table = read_table(path)
     axes = [a for a in ("x", "y", "z") if table.has(a)]
     pos, score, fps = table.floats(*axes), table.floats("score"), float(table.fact("fps"))

@@ -21,9 +21,13 @@ from sim.types import BACKGROUNDS, Detections, Groups, Truth
 
 
 def validate(folder: str | Path) -> list[FlockscopeError]:
-    """Return the problems of a generated sequence or dataset, sorted by path; empty if there are none.
+    """Return the problems of a generated sequence or dataset, as errors that are not raised; empty if there are none.
 
-    Raises InputError if the folder does not exist or holds nothing of a dataset.
+    Checked are: files left by interrupted runs, the lists in seqmaps/, and of each sequence hashes, content, texts and
+    pictures. Problems come in that order, the sequences sorted by path. If files of a sequence are damaged, only these
+    are reported for it. A single sequence is checked without leftovers and seqmaps.
+
+    Raises InputError if the folder does not exist, or holds no sequence and no other problem.
     """
     folder = Path(folder)
     if not folder.is_dir():
@@ -40,9 +44,10 @@ def validate(folder: str | Path) -> list[FlockscopeError]:
 
 
 def content_hash(folder: str | Path) -> str:
-    """Return the dataset hash of a generated dataset or sequence; exports of it contain the same hash.
+    """Return the SHA-256 (64 hex digits) of a generated dataset or sequence; exports of it contain the same hash.
 
-    Raises InputError if it holds no sequences or a recording.
+    It is made from the content hashes in the manifests; the files are not read. Raises InputError if the folder holds
+    no sequences or a recording, or if a manifest is missing or altered.
     """
     found = {
         split_and_name(p): manifests.read_manifest(p)["content_hash"]
@@ -61,7 +66,11 @@ def _left_behind(root: Path) -> Iterator[InputError]:
 
 
 def _seqmaps(root: Path) -> Iterator[InputError]:
-    """Yield a problem for each sequence that a split's seqmap or folder lacks."""
+    """Yield a problem for each sequence that is in a split's seqmap or folder but not in both, and for a missing
+    seqmap.
+
+    root: the folder of a dataset, or of one split of it.
+    """
     base = root if (root / "seqmaps").is_dir() else root.parent
     for split in sorted(root.glob("flockscope-*")) if base == root else [root]:
         path = base / "seqmaps" / f"{split.name}.txt"
@@ -94,7 +103,10 @@ def _extra(folder: Path, manifest: dict[str, Any]) -> Iterator[InputError]:
 
 
 def _content(folder: Path, manifest: dict[str, Any]) -> Iterator[FlockscopeError]:
-    """Compare the files with each other, and recompute the hashes."""
+    """Yield a problem for each stored hash, length, text, group, event or picture that contradicts the other files.
+
+    folder: a sequence all of whose files have the hashes of `manifest`. Raises InputError if a file is invalid.
+    """
     text = (folder / "scenario.toml").read_text(encoding="utf-8")
     if hashing.scenario_hash(text) != manifest["scenario_hash"]:
         yield _problem(folder / "scenario.toml", "another scenario", "the one of scenario_hash")
@@ -117,7 +129,11 @@ def _content(folder: Path, manifest: dict[str, Any]) -> Iterator[FlockscopeError
 
 
 def _pictures(folder: Path, manifest: dict[str, Any], length: int) -> Iterator[FlockscopeError]:
-    """Yield a problem for pictures that are missing, unreadable, of another size, or PNGs with other pixels."""
+    """Yield a problem for pictures that are missing, unreadable, of another size or beyond the last frame.
+
+    Streams stored as PNG are also compared with the hash of their raw pixels. length: frames of the sequence. One
+    problem at most is reported for each stream, but every surplus picture.
+    """
     stored = StoredPictures(folder, manifest)
     named = {name for name in manifest["files"] if is_picture(name)}
     for stream in stored.streams:
@@ -153,7 +169,10 @@ def _truth(folder: Path, truth: Truth, length: int) -> Iterator[InputError]:
 
 
 def _text(path: Path, wanted: bytes) -> Iterator[InputError]:
-    """Yield a problem at the first line where a text file differs from `wanted`, made from the exact table."""
+    """Yield a problem at the first line where a text file differs from `wanted`, or if it is missing; nothing if equal.
+
+    wanted: the bytes that the exact Parquet table gives.
+    """
     if not path.is_file():
         yield _problem(path, "missing", "the text of the exact table")
         return
@@ -165,7 +184,10 @@ def _text(path: Path, wanted: bytes) -> Iterator[InputError]:
 
 
 def _groups(path: Path, truth: Truth, groups: tuple[Groups, ...] | None) -> Iterator[InputError]:
-    """Yield a problem for the first frame with a group whose member is absent or has another group."""
+    """Yield a problem for the first frame with a group whose member is absent or has another group in the truth.
+
+    path: the file of the groups, for the message. groups: one Groups per frame, from frame 1; None yields nothing.
+    """
     for index, some in enumerate(groups or (), 1):
         here = truth.rows(index)
         group_of = dict(zip(truth.id[here].tolist(), truth.group[here].tolist(), strict=True))
