@@ -2,9 +2,7 @@
 
 Conventions (docs/reference/formats.md): on the ground metres, x right, y away from the default camera, z up; in images
 px, (0, 0) the upper left corner, u right, v down; frames are 1-based, t = (frame - 1) / fps in s; angles in radians.
-Arrays are float64 except ids (int64), flags (bool) and images (uint8); every array of these types is read-only. "ltwh"
-is left, top, width, height.
-"""
+Arrays are float64 except ids (int64), flags (bool) and images (uint8); every array of these types is read-only."""
 
 from __future__ import annotations
 
@@ -31,12 +29,11 @@ EVENT_KINDS = ("merge", "split", "cross", "queue", "form", "dissolve", "enter", 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Detections(Frozen):
-    """What a detector found in one frame, M rows.
+    """What a detector found in frame `index` (from 1) at time t (s), M rows.
 
-    plane is the plane of `pos` (M, D): "ground" (x, y in m), "space" (x, y, z in m) or "image" (px, the box's centre).
-    vel (M, D) in the plane's unit per s, None if unknown. box (M, 4) ltwh px, None from a detector of points. score
-    (M,) in [0, 1]; empty if the detector gives none.
-    """
+    plane: "ground" (pos x, y in m), "space" (pos x, y, z in m) or "image" (pos is the box's centre in px). pos (M, D).
+    vel (M, D): the plane's unit per s, None if unknown. box (M, 4): left, top, width, height in px, None from a
+    detector of points. score (M,): in [0, 1]; empty if the detector gives none."""
 
     index: int
     t: float
@@ -49,8 +46,8 @@ class Detections(Frozen):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Frame(Frozen):
-    """What the sensors deliver for one frame; image (left camera) and right are (H, W, 3) BGR uint8, None if missing;
-    detections are None without a detector."""
+    """What the sensors deliver for frame `index` (from 1) at time t (s). image: of the left camera, right: of the right
+    camera, each (H, W, 3) BGR uint8, None if missing. detections: None without a detector."""
 
     index: int
     t: float
@@ -61,12 +58,11 @@ class Frame(Frozen):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Groups(Frozen):
-    """Groups of one frame, G rows, in the plane and unit of the Tracks or Truth that holds them.
+    """The groups of one frame, G rows, in the plane and unit of the Tracks or Truth that holds them.
 
-    id (G,). members: ids of each group's people, empty if the method knows groups only. pos, vel (G, D): of the centre.
-    extent (G, 2, 2): covariance of the members' positions, nan if unknown. size (G,): people, nan if unknown. hull: a
-    polygon (V, 2) for each group, counter-clockwise in (x, y).
-    """
+    id (G,). members: person ids of each group, () if the method knows groups only. pos (G, D): the centre; vel (G, D):
+    its velocity per s. extent (G, 2, 2): covariance of the members' positions, nan if unknown. size (G,): number of
+    people, nan if unknown. hull: a polygon (V, 2) for each group, x, y counter-clockwise; V = 0 if unknown."""
 
     id: Ints
     members: tuple[Ints, ...]
@@ -78,19 +74,18 @@ class Groups(Frozen):
 
     @classmethod
     def none(cls) -> Groups:
-        """Return the Groups of a frame without groups."""
+        """Return the Groups of a frame without groups: zero rows, positions with 2 columns."""
         two = np.zeros((0, 2))
         return cls(no_ids(), (), two, two, np.zeros((0, 2, 2)), np.zeros(0), ())
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class GroupEvent:
-    """One event of groups, from frame `start` to frame `end`, both inclusive.
+    """One event of groups, from frame `start` to frame `end` (from 1, both inclusive).
 
-    kind: one of EVENT_KINDS. start: the onset, which may be earlier than emitted, the frame in which the tracker
-    reported the event (None in the truth). before, after: sorted group ids, with -1 once for each person alone.
-    members: ids of all people concerned, sorted, empty if unknown. pos: the place, in the plane's unit.
-    """
+    kind: one of EVENT_KINDS. emitted: frame in which the tracker reported the event, which may be later than `start`;
+    None in the truth. before, after: sorted group ids, with -1 once for each person alone. members: ids of all people
+    concerned, sorted, () if unknown. pos: the place (x, y) in the plane's unit, nan if unknown."""
 
     kind: str
     start: int
@@ -104,13 +99,13 @@ class GroupEvent:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Tracks(Frozen):
-    """What a tracker reports for one frame, N rows.
+    """What one tracker reports for frame `index` (from 1) at time t (s), N rows.
 
-    unit "person": group (N,) is the id of the person's group, -1 for alone. unit "group": rows are groups, group == id.
-    pos, vel (N, D) in the plane's unit (per s). cov (N, 2D, 2D): covariance of x, y, (z), vx, vy, (vz). box (N, 4) ltwh
-    px or None. score (N,) in [0, 1] or empty. A tracker may leave groups and events empty: they are then derived from
-    the tracks. derived: True once that is done.
-    """
+    plane: "ground", "space" (m) or "image" (px). unit "person": group (N,) is the id of the person's group, -1 for
+    alone. unit "group": rows are groups, group == id. pos, vel (N, D): plane's unit, and per s. cov (N, 2D, 2D):
+    covariance of x, y, (z), vx, vy, (vz). box (N, 4): left, top, width, height in px, or None. score (N,): in [0, 1],
+    or empty. groups None, events (): the tracker gives none; they are then derived from the tracks, and `derived` is
+    True."""
 
     index: int
     t: float
@@ -130,8 +125,9 @@ class Tracks(Frozen):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Stairs(Frozen):
-    """Stairs: z rises in `steps` steps from 0 at the edge with midpoint foot (2,) to `rise` at the edge with midpoint
-    head (2,), `width` wide; behind the head a plateau of length `landing` has z = rise. All lengths in m."""
+    """Stairs, all lengths in m: z rises in `steps` steps from 0 at the edge with midpoint foot (2,) to `rise` at the
+    edge with midpoint head (2,), `width` wide; behind the head a plateau of length `landing` has z = rise (0: no
+    plateau)."""
 
     foot: Array
     head: Array
@@ -143,8 +139,9 @@ class Stairs(Frozen):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Scene(Frozen):
-    """The static world, in m: size (2,); walls (W, 2, 2) segments; pillars (P, 3) x, y, radius; doors (D, 2, 2),
-    segments that are openings in walls; service (S, 2) service points; stairs; heights of walls and pillars."""
+    """The static world, in m: size (2,) x, y; walls (W, 2, 2): segments [x1, y1], [x2, y2]; pillars (P, 3): x, y,
+    radius; doors (D, 2, 2): segments, openings in walls; service (S, 2): service points x, y; stairs; heights of walls,
+    pillars."""
 
     size: Array
     walls: Array = field(default_factory=lambda: np.zeros((0, 2, 2)))
@@ -161,10 +158,10 @@ class Camera(Frozen):
     """A camera; sim.scene.camera projects with it.
 
     kind "pinhole": x_cam = rotation (X - position), u = fx x/z + cx, v = fy y/z + cy with focal_px (fx, fy), centre_px
-    (cx, cy). kind "top": orthographic with scale px_per_m, looking straight down on `position`. image: (width, height)
-    px. position (3,) m. rotation (3, 3), world to camera. baseline in m: the right camera is at +baseline along camera
-    x; 0 without one. radial: Tsai's distortion, x_ideal = x (1 + radial |x|²) for x = ((u - cx)/fx, (v - cy)/fy).
-    """
+    (cx, cy). kind "top": orthographic, looking straight down on `position`, scale px_per_m (nan for "pinhole"). image:
+    (width, height) px. position (3,) m. rotation (3, 3), world to camera. baseline in m: the right camera is at
+    +baseline along camera x; 0 without one. radial: Tsai's distortion, 0 for none, x_ideal = x (1 + radial |x|²) for x
+    = ((u - cx)/fx, (v - cy)/fy)."""
 
     kind: Literal["pinhole", "top"]
     image: tuple[int, int]
@@ -179,8 +176,8 @@ class Camera(Frozen):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Context(Frozen):
-    """What a tracker may know before the first frame, None where unknown. px_per_m: image scale. image_size: (width,
-    height) px. background: sample pictures (K, H, W, 3) BGR uint8."""
+    """What a tracker may know before the first frame; None where unknown. fps: frames/s. px_per_m: image scale, nan if
+    unknown. image_size: (width, height) px. background: pictures (K, H, W, 3) BGR uint8, for background models."""
 
     fps: float
     px_per_m: float
@@ -194,9 +191,8 @@ class Context(Frozen):
 class Order:
     """One order of the script, as recorded in gt/script.json; measured events never depend on it.
 
-    fired: frame in which it took effect, None if it never did. before, after: ids of the people of each group
-    concerned, as the script plans them before and after.
-    """
+    fired: frame (from 1) in which it took effect, None if it never did. before, after: person ids of each group
+    concerned, as the script plans them before and after the order."""
 
     id: str
     kind: str
@@ -207,12 +203,11 @@ class Order:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Motion(Frozen):
-    """The motion of a whole crowd: T frames, P people; person id = column + 1.
+    """The motion of a whole crowd: T frames from frame 1, P people; person id = column + 1.
 
-    pos (T, P, 2) m, vel (T, P, 2) m/s, heading (T, P) rad: nan while absent. present (T, P). intent (T, P): number of
-    the group that the script assigns the person to (a number of its own for a person alone, -1 while absent). height,
-    width, depth (P,) m of the body. free_speed (P,) m/s. repeat: further random key, as in sim.rng.
-    """
+    pos (T, P, 2): x, y in m; vel (T, P, 2): m/s; heading (T, P): rad; nan while absent. present (T, P). intent (T, P):
+    number of the group that the script assigns the person to (a number of its own for a person alone, -1 while absent).
+    height, width, depth (P,): of the body, m. free_speed (P,): m/s. repeat: number of the suite entry's copy, or 0."""
 
     name: str
     seed: int
@@ -233,8 +228,8 @@ class Motion(Frozen):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Near(Frozen):
-    """Hard negatives (gt/near.csv), K rows: people a and b satisfy the merge rule from frame start to end, but are
-    strangers (not in one group). a, b are person ids; all fields (K,)."""
+    """Hard negatives (gt/near.csv), K rows: persons with ids a and b satisfy the merge rule from frame start to end
+    (from 1, both inclusive), but are strangers, that is, not in one group. All fields (K,), int64."""
 
     start: Ints
     end: Ints
@@ -243,13 +238,13 @@ class Near(Frozen):
 
     @classmethod
     def none(cls) -> Near:
-        """Return a Near without rows."""
+        """Return a Near of zero rows."""
         return cls(no_ids(), no_ids(), no_ids(), no_ids())
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class FrameTruth(Frozen):
-    """The truth of one frame, N people; fields as in Truth. It never reaches a tracker."""
+    """The truth of frame `index` (from 1) at time t (s), N people; fields as in Truth. It never reaches a tracker."""
 
     index: int
     t: float
@@ -268,11 +263,10 @@ class FrameTruth(Frozen):
 class PixelTruth(Frozen):
     """The truth of one frame's pixels, N people in the order of FrameTruth's rows.
 
-    ids (H, W) int64: person id, -2 for walls and pillars, 0 elsewhere. disparity (H, W) px, nan where the right camera
-    does not see the point; None if it was not computed. visible_px (N,): pixels that show the person; amodal_px (N,):
-    pixels inside the image that would without any occlusion. box (N, 4) ltwh px of the visible pixels, nan without any.
-    blob (N,): number of the connected region of people that shows the person, -1 if hidden.
-    """
+    ids (H, W): person id, -2 for walls and pillars, 0 elsewhere. disparity (H, W): px, nan where the right camera does
+    not see the point; None if not computed. visible_px (N,): number of pixels that show the person; amodal_px (N,):
+    number inside the image that would without occlusion. box (N, 4): left, top, width, height in px of the visible
+    pixels, nan without any. blob (N,): number of the connected region of people that shows the person, -1 if hidden."""
 
     ids: Ints
     disparity: Array | None
@@ -283,20 +277,21 @@ class PixelTruth(Frozen):
 
     @property
     def visibility(self) -> Array:
-        """Return visible_px / amodal_px, shape (N,); 0 for a person without amodal pixels."""
+        """The visible share of each person, visible_px / amodal_px, (N,); 0 for a person without amodal pixels."""
         return np.asarray(self.visible_px / np.maximum(self.amodal_px, 1.0))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Truth(Frozen):
-    """The truth of a sequence of `length` frames: R rows sorted by (frame, id), one per person and frame.
+    """The truth of a sequence of T = `length` frames from frame 1: R rows sorted by (frame, id), one per person and
+    frame.
 
-    frame, id, group (R,), group -1 for alone. pos (R, 2) m, vel (R, 2) m/s on the ground. z (R,) m, height of the
-    ground. box (R, 4) ltwh px, amodal and unclipped. visible_box (R, 4): of the visible part, nan if hidden.
-    visibility, truncation (R,): visible share, share outside the image. heading (R,) rad, height (R,) m of the person.
-    groups, groups_px: one Groups per frame, on the ground and in the image. labelled (T,): frames with group labels.
-    events, near: measured from the motion. orders: of the script. Optional fields are None if unknown.
-    """
+    frame, id (R,). group (R,): id of the person's group, -1 for alone. pos (R, 2): x, y on the ground, m. vel (R, 2):
+    m/s. box (R, 4): left, top, width, height in px, amodal and unclipped. visible_box (R, 4): of the visible part, nan
+    if hidden. visibility (R,): visible share. truncation (R,): share outside the image. z (R,): height of the ground,
+    m. heading (R,): rad. height (R,): of the person, m. groups, groups_px: one Groups per frame, on the ground and in
+    the image. labelled (T,): True for frames with group labels. events, near: measured from the motion. orders: of the
+    script. px_per_m: image scale, nan if unknown. Fields that may be None are None if unknown."""
 
     name: str
     fps: float
@@ -322,12 +317,13 @@ class Truth(Frozen):
     orders: tuple[Order, ...] = ()
 
     def rows(self, index: int) -> slice:
-        """Return the slice of the rows of frame `index` (1-based)."""
+        """Return the slice of the rows of frame `index` (from 1); an empty slice for a frame without people."""
         low, high = np.searchsorted(self.frame, (index, index + 1))
         return slice(int(low), int(high))
 
     def at(self, index: int) -> FrameTruth:
-        """Return the truth of frame `index` (1-based), without its pixels."""
+        """Return the truth of frame `index`, from 1 to `length`, without its pixels; no rows for a frame without
+        people."""
         r = self.rows(index)
 
         def cut(a: Array | None) -> Array | None:
@@ -351,12 +347,12 @@ class Truth(Frozen):
 class Sequence:
     """A sequence of frames, simulated, stored or recorded; it can be iterated any number of times.
 
-    frames(): a new iterator over Frame, with the file's or simulated sensor's detections. bare(): the same without
-    pictures, None if that is not quicker. length: None if unknown before reading. px_per_m: nan if unknown.
-    Each load_ field is a function, or None if there is nothing to load: load_truth() the Truth; load_background()
-    sample pictures (K, H, W, 3); load_people() the ids of the people of each group that the script names;
-    load_pixels(index) the PixelTruth of a frame. source: where the sequence comes from ("kind", "path", "seed", …).
-    """
+    frames(): a new iterator over Frame, from frame 1, with the detections. bare(): the same without pictures, None if
+    that is not quicker. length: number of frames, None if unknown before reading. image_size: (width, height) px.
+    px_per_m: nan if unknown. Each load_ field is a function, or None if there is nothing to load: load_truth() gives
+    the Truth; load_background() pictures (K, H, W, 3); load_people() the person ids of each group that the script
+    names; load_pixels(index) the PixelTruth of frame `index`. source: where the sequence comes from ("kind", "path",
+    "seed", …)."""
 
     name: str
     fps: float
@@ -380,11 +376,12 @@ class Sequence:
         return self.frames()
 
     def without_pictures(self) -> Iterator[Frame]:
-        """Return a new iterator over the frames; their pictures are left out where that saves time."""
+        """Return a new iterator over the frames, from frame 1, without pictures where that saves time."""
         return self.frames() if self.bare is None else self.bare()
 
     def frame_truth(self, index: int) -> FrameTruth | None:
-        """Return the truth of frame `index` with its pixels if they are known; None without truth."""
+        """Return the truth of frame `index` (from 1), with its pixels if they are known; None without truth. Raises as
+        truth."""
         if self.truth is None:
             return None
         here = self.truth.at(index)
@@ -392,7 +389,8 @@ class Sequence:
 
     @property
     def truth(self) -> Truth | None:
-        """The truth, loaded on first use and then kept; None if nothing is labelled."""
+        """The truth, loaded on first use and then kept; None if nothing is labelled. Raises InputError if its files are
+        invalid, WorkError if an order of a simulated script was not fulfilled."""
         if self.load_truth is None:
             return None
         cached: Truth | None = self.__dict__.get("_truth")
@@ -402,18 +400,20 @@ class Sequence:
         return cached
 
     def background(self) -> Image | None:
-        """Return sample pictures (K, H, W, 3) BGR uint8 to train a background model on, or None."""
+        """Return sample pictures (K, H, W, 3) BGR uint8 to train a background model on; None if there are none."""
         return None if self.load_background is None else self.load_background()
 
 
 class Tracker(Protocol):
-    """The interface of a tracker. needs: the inputs it accepts, out of "pixels", "stereo", "boxes", "points"."""
+    """The interface of a tracker. needs: the inputs it accepts, some of "pixels", "stereo", "boxes", "points"."""
 
     needs: tuple[str, ...]
 
     def reset(self, context: Context, seed: int) -> None:
-        """Forget all state and start a new sequence."""
+        """Forget all state and start a new sequence. context: what is known of it. seed: for the tracker's random
+        numbers."""
 
     def step(self, frame: Frame, detections: Detections | None) -> Tracks:
-        """Return the tracks of this frame, computed from this and earlier frames only."""
+        """Return this tracker's tracks of `frame`, from this and earlier frames only. detections: None without a
+        detector."""
         ...
