@@ -6,10 +6,11 @@ from typing import ClassVar
 
 
 class FlockscopeError(Exception):
-    """An error message for users; `str()` is exactly one line.
+    """An error message for users; `str()` is exactly one line. Exit code 1 unless a subclass says otherwise.
 
-    file: the file read or written, "" if there is none; place: the line, key, row or frame in it; got: what was found
-    there; expected: what should be there; remedy: what to do.
+    - file: the file read or written, "" if there is none. place: the line, key, row or frame in it, "" if there is
+      none.
+    - got: what was found there. expected: what should be there. remedy: what the user can do.
     """
 
     exit_code: ClassVar[int] = 1
@@ -20,14 +21,17 @@ class FlockscopeError(Exception):
         super().__init__(self.line())
 
     def line(self) -> str:
-        """Returns the error as one line; an empty file or place is left out."""
+        """Returns the error as one line: "file: place: got …; expected …; remedy".
+
+        An empty file or place is left out. Runs of white space, also line breaks, become one space.
+        """
         where = ": ".join(part for part in (self.file, self.place) if part)
         text = f"{where}: " if where else ""
         text += f"got {self.got}; expected {self.expected}; {self.remedy}"
         return " ".join(text.split())
 
     def as_dict(self) -> dict[str, str]:
-        """Returns the error object of `--json`: file, place, got, expected, remedy."""
+        """Returns the error object that `--json` prints, all values as text: file, place, got, expected, remedy."""
         names = ("file", "place", "got", "expected", "remedy")
         return {name: getattr(self, name) for name in names}
 
@@ -36,13 +40,15 @@ class FlockscopeError(Exception):
 
 
 class InputError(FlockscopeError):
-    """Wrong input or usage. Exit code 2."""
+    """Wrong input or usage: a command that raises it ends with exit code 2. Keyword arguments as for
+    FlockscopeError.
+    """
 
     exit_code: ClassVar[int] = 2
 
 
 class WorkError(FlockscopeError):
-    """The work failed, or a check was not passed. Exit code 1."""
+    """The work failed, or a check was not passed: a command that raises it ends with exit code 1."""
 
 
 def _rebuild(kind: type[FlockscopeError], parts: dict[str, str]) -> FlockscopeError:

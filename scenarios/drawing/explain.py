@@ -18,7 +18,11 @@ ROW = 30.0  # px between the lines of groups in the drawing of the script
 
 
 def text(scenario: Scenario) -> str:
-    """Returns what happens in a scenario: setting, plan in characters, people, orders, sensor."""
+    """Returns a description of a scenario for people, as lines of text.
+
+    In order: name, about, setting, plan in characters, people, orders, sensor. The scenario must be one that `load`
+    accepts.
+    """
     lines = [scenario.name, *([scenario.about] if scenario.about else []), "", *describe.setting(scenario), ""]
     lines += [character_plan(scenario), "", "People"]
     wide = max(len(group.id) for group in scenario.group)
@@ -30,7 +34,7 @@ def text(scenario: Scenario) -> str:
 
 
 def svg(scenario: Scenario) -> str:
-    """Returns an SVG drawing of a scenario.
+    """Returns an SVG drawing of a scenario, which must be one that `load` accepts.
 
     It has the plan with starts, ways and goals of all groups, and beneath it the script: one line for each group, which
     joins and divides at the orders.
@@ -61,7 +65,10 @@ def svg(scenario: Scenario) -> str:
 
 
 def _colours(ways: list[GroupRoute], orders: list[OrderMark]) -> dict[str, str]:
-    """A colour for each group name; all groups of a `repeat` have the same one."""
+    """Returns the colour (#rrggbb) of each group name, also of groups that orders make; ten colours in turn.
+
+    All groups of a `repeat` have the same one.
+    """
     named: dict[str, str] = {}
     for course in ways:
         c = COLOURS[len(set(named.values())) % len(COLOURS)]
@@ -78,7 +85,11 @@ def _cut(words: str, length: int) -> str:
 def _script(
     ways: list[GroupRoute], orders: list[OrderMark], colour: dict[str, str], top: float
 ) -> tuple[list[str], float]:
-    """The drawing of the script, top to bottom: lines of groups, then the orders in words; and its lower end, px."""
+    """Returns the SVG elements of the script, and the y of their lower end, px: lines of groups, then the orders in
+    words.
+
+    ways, orders: groups and orders to draw. colour: by group name. top: y of the title, px.
+    """
     parts = [f'<text x="{MARGIN}" y="{top:.0f}" style="font-weight:700">Script</text>']
     rows, x0 = {course.id: k for k, course in enumerate(ways)}, MARGIN + 60
     step = min((WIDTH - 2 * MARGIN - 110) / max(len(orders), 1), 170)
@@ -120,11 +131,11 @@ ScriptLine = tuple[str, int, float, float, float]
 def _lines(
     rows: dict[str, int], row_of: dict[str, str], orders: list[OrderMark]
 ) -> tuple[list[ScriptLine], dict[int, list[int]]]:
-    """The lines of groups, and by order number the rows that the order concerns.
+    """Returns the lines of groups to draw, and for each order number the rows that the order concerns.
 
-    rows: row of each group; row_of: name of the `repeat` by name of each of its groups. A line is (group, row, order
-    where it starts, order where it ends, row at its end). One group of a `repeat` branches off; the line of the others
-    goes on.
+    A line is (group name, row, order number where it starts, order number where it ends, row at its end); numbers count
+    from 1, 0 is the start. rows: row of each entry of `group`; rows of new groups are added to it. row_of: id of the
+    entry by name of each of its groups. One group of a `repeat` branches off; the line of the others goes on.
     """
     since = dict.fromkeys(rows, 0.0)
     lines: list[ScriptLine] = []

@@ -20,7 +20,10 @@ text { font: 13px system-ui, sans-serif; fill: #1b1f24 } .small { font-size: 11.
 
 
 class SvgPlan:
-    """Draws in world metres (y up) on a picture in px (y down). State: scale and offsets."""
+    """Draws in world metres (y up) on a picture in px (y down).
+
+    State: world; scale, px per m; left, top: px of the world's upper left corner; bottom: lower end of the plan, px.
+    """
 
     def __init__(self, world: WorldSpec) -> None:
         self.world = world
@@ -30,21 +33,26 @@ class SvgPlan:
         self.bottom = self.top + world.size[1] * self.scale + 20
 
     def __call__(self, at: XY) -> XY:
-        """Returns a point of the world as a point of the picture, px."""
+        """Returns a point (x, y) of the world, m, as a point (u, v) of the picture, px."""
         return self.left + at[0] * self.scale, self.top + (self.world.size[1] - at[1]) * self.scale
 
     def path(self, points: Iterable[XY], attributes: str) -> str:
-        """Returns a line through points of the world."""
+        """Returns an SVG line through points (x, y) of the world, m. attributes: SVG text such as `class="wall"`."""
         through = " ".join(f"{x:.1f},{y:.1f}" for x, y in map(self, points))
         return f'<polyline points="{through}" {attributes}/>'
 
     def label(self, at: XY, words: str, dx: float = 0, dy: float = 0, attributes: str = "") -> str:
-        """Returns words beside a point of the world; dx, dy: px."""
+        """Returns an SVG text at a point (x, y) of the world, m, shifted by dx, dy px. words are escaped, attributes
+        are not.
+        """
         x, y = self(at)
         return f'<text x="{x + dx:.1f}" y="{y + dy:.1f}" {attributes}>{escape(words)}</text>'
 
     def floor(self) -> list[str]:
-        """Returns the ground with a line for each metre (each 5 m in worlds wider than 40 m) and its size in words."""
+        """Returns SVG elements of the ground: a line for each metre, a frame, and the world's size in words.
+
+        Worlds wider than 40 m have a line for each 5 m.
+        """
         width, depth = self.world.size
         (x0, y1), (x1, y0) = self((0, 0)), self((width, depth))
         step = 1.0 if width <= 40 else 5.0
@@ -60,7 +68,7 @@ class SvgPlan:
         ]
 
     def scene(self) -> list[str]:
-        """Returns stairs, walls, doors, pillars and service points."""
+        """Returns SVG elements of stairs, walls without their doors, labels of doors, pillars and service points."""
         parts = [part for stairs in self.world.stairs for part in self._stairs(stairs)]
         parts += [self.path([wall[:2], wall[2:]], 'class="wall"') for wall in walls_without_doors(self.world)]
         parts += [self.label(door.at, "door", 0, -8, 'class="small" text-anchor="middle"') for door in self.world.doors]
@@ -74,7 +82,7 @@ class SvgPlan:
         return parts
 
     def _stairs(self, stairs: StairsSpec) -> list[str]:
-        """A flight of stairs with its steps, landing and rise."""
+        """Returns SVG elements of a flight of stairs: outline with landing, a line per step, and its rise in words."""
         (fx, fy), (hx, hy) = stairs.foot, stairs.head
         length = math.dist(stairs.foot, stairs.head)
         ex, ey = (hx - fx) / length, (hy - fy) / length
@@ -93,7 +101,10 @@ class SvgPlan:
         ]
 
     def route(self, route: GroupRoute, colour: str) -> list[str]:
-        """Returns the way of a group, its goal, and the range of the goal where it is drawn at random."""
+        """Returns SVG elements of a group's way and goal, and the range of the goal if the goal is drawn at random.
+
+        colour: #rrggbb.
+        """
         end = route.points[-1]
         u, v = self(end)
         return [
@@ -103,7 +114,10 @@ class SvgPlan:
         ]
 
     def _spread(self, at: XY, half: XY, colour: str) -> list[str]:
-        """A rectangle over the range of a place that is drawn at random; nothing for a fixed place."""
+        """Returns a rectangle over the range of a random place, as a list of one SVG element; [] if half is (0, 0).
+
+        at: its middle, m. half: half its width and height, m. colour: #rrggbb.
+        """
         if half == (0, 0):
             return []
         u, v = self(at)
@@ -114,7 +128,11 @@ class SvgPlan:
         ]
 
     def start(self, route: GroupRoute, colour: str, lift: int = 0) -> list[str]:
-        """Returns the people at the start, at most 12, with the group's name and size; lift: text lines further up."""
+        """Returns SVG elements of a group's start: 1 to 12 people, the range of a random start, name, copies and mean
+        size.
+
+        colour: #rrggbb. lift: number of text lines by which the words stand higher.
+        """
         at, parts = route.points[0], self._spread(route.points[0], route.spread[0], colour)
         n = min(max(round(route.people), 1), 12)
         reach = 0.0 if n == 1 else 0.75 / (2 * math.sin(math.pi / n))
@@ -130,7 +148,11 @@ class SvgPlan:
         return parts
 
     def mark(self, mark: OrderMark, colour: dict[str, str]) -> list[str]:
-        """Returns the ways that an order opens, dashed, and the places of a queue."""
+        """Returns SVG elements of an order: the ways that it opens, dashed, with group names, and the places of a
+        queue.
+
+        colour: by group name; the order's first group must be in it, else KeyError.
+        """
         parts = []
         for arrow in mark.arrows:
             c = colour.get(arrow.id, colour[mark.before[0]])
@@ -146,7 +168,9 @@ class SvgPlan:
         return parts
 
     def numbers(self, orders: list[OrderMark]) -> list[str]:
-        """Returns the numbers of the orders where they happen, side by side at the same place."""
+        """Returns SVG elements with the number of each order at its place; orders at nearly the same place stand side
+        by side.
+        """
         parts, used = [], dict[tuple[int, int], int]()
         for mark in orders:
             u, v = self(mark.at)
@@ -157,7 +181,7 @@ class SvgPlan:
 
 
 def badge(x: float, y: float, number: int) -> str:
-    """Returns the number of an order in a black disc at a point of the picture, px."""
+    """Returns the SVG elements of an order's number in a black disc around the point (x, y) of the picture, px."""
     return (
         f'<circle cx="{x:.1f}" cy="{y:.1f}" r="10" fill="#1b1f24" stroke="#fff" stroke-width="1.5"/>'
         f'<text x="{x:.1f}" y="{y + 4.3:.1f}" text-anchor="middle" style="fill:#fff;font-weight:700">{number}</text>'
@@ -165,7 +189,7 @@ def badge(x: float, y: float, number: int) -> str:
 
 
 def marker(colour: str) -> str:
-    """Returns the definition of the arrow head of a colour."""
+    """Returns the SVG definition of an arrow head in a colour #rrggbb; its id is the colour without #."""
     return (
         f'<marker id="{colour[1:]}" viewBox="0 0 8 8" refX="7" refY="4" markerWidth="9" markerHeight="9" '
         f'markerUnits="userSpaceOnUse" orient="auto"><path d="M0,0.5 L8,4 L0,7.5 z" fill="{colour}"/></marker>'

@@ -13,7 +13,11 @@ LEGEND = "A start of a   ◎ goal   · way   ① order   ○ queue   █ wall   
 
 
 class CharacterPlan:
-    """A grid of characters over the world, the y axis pointing up. State: the characters."""
+    """A grid of characters over the world, the y axis pointing up.
+
+    State: cells: rows of characters, top row first; scale: columns per m; columns, rows: size of the grid, at least 4
+    rows; size: of the world, x, y, m.
+    """
 
     def __init__(self, size: XY, columns: int) -> None:
         self.scale = columns / size[0]
@@ -22,7 +26,10 @@ class CharacterPlan:
         self.cells = [[" "] * columns for _ in range(self.rows)]
 
     def put(self, at: XY, text: str, over: str = "") -> None:
-        """Writes text to the right of a point, m; with `over`, only where one of these characters is."""
+        """Writes text to the right of a point (x, y), m; with `over`, only where the grid has one of its characters.
+
+        A point outside the grid is moved to its edge. Text that would pass the right edge is moved to the left.
+        """
         column = min(max(int(at[0] * self.scale), 0), self.columns - len(text))
         row = min(max(int((self.size[1] - at[1]) / self.size[1] * self.rows), 0), self.rows - 1)
         for k, character in enumerate(text):
@@ -30,8 +37,10 @@ class CharacterPlan:
                 self.cells[row][column + k] = character
 
     def name(self, at: XY, text: str) -> None:
-        """Writes a name at a point, m, in the nearest of five rows where it covers only ways, else in the point's
-        own.
+        """Writes a name to the right of a point (x, y), m.
+
+        It takes the nearest of five rows where the name covers only blanks and ways (·); the point's own row if there
+        is none.
         """
         column = min(max(int(at[0] * self.scale), 0), self.columns - len(text))
         step = self.size[1] / self.rows
@@ -45,19 +54,28 @@ class CharacterPlan:
         self.put((at[0], y), text)
 
     def line(self, a: XY, b: XY, character: str, over: str = "", gap: float = 0.5) -> None:
-        """Writes characters along a segment, `gap` columns apart."""
+        """Writes a character repeatedly along the segment from a to b (x, y in m), about `gap` columns apart, both ends
+        included.
+
+        With `over`, only where the grid has one of its characters.
+        """
         steps = max(int(math.dist(a, b) * self.scale / gap), 1)
         for k in range(steps + 1):
             self.put((a[0] + (b[0] - a[0]) * k / steps, a[1] + (b[1] - a[1]) * k / steps), character, over)
 
     def text(self) -> str:
-        """Returns the drawing with a frame."""
+        """Returns the grid as lines of text with a frame around it."""
         rows = ["│" + "".join(row) + "│" for row in self.cells]
         return "\n".join(["┌" + "─" * self.columns + "┐", *rows, "└" + "─" * self.columns + "┘"])
 
 
 def character_plan(scenario: Scenario, columns: int = 64) -> str:
-    """Returns the plan of a scenario, `columns` characters wide, with its size and legend."""
+    """Returns the plan of a scenario as lines of text, `columns` characters wide plus a frame, with its size and
+    legend.
+
+    Later things cover earlier ones: stairs, ways, queues, walls, pillars, service points, goals, names of groups,
+    orders.
+    """
     world = scenario.world
     plan = CharacterPlan(world.size, columns)
     _stairs(plan, scenario)

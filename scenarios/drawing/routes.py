@@ -20,10 +20,11 @@ SLOTS = 6
 
 @dataclass(frozen=True)
 class GroupRoute:
-    """The way of one entry of `group`.
+    """The way of one entry of `group`, as far as it is known before the simulation.
 
-    points: start, via, goal, m; spread: half the range of each in x and y, m; people: mean number of people; repeat:
-    number of such groups.
+    - id: of the entry. points: start, via points, goal: x, y in m; a distribution is replaced by its mean.
+    - spread: half the range of each point in x and y, m; 0 for a fixed coordinate.
+    - people: mean number of people. repeat: number of such groups.
     """
 
     id: str
@@ -35,7 +36,9 @@ class GroupRoute:
 
 @dataclass(frozen=True)
 class Arrow:
-    """A way that an order opens: name of the group ("served" for groups after a queue) and points, m."""
+    """A way that an order opens. id: name of the group, "served" for groups after a queue. points: x, y in
+    m, in order.
+    """
 
     id: str
     points: tuple[XY, ...]
@@ -45,8 +48,9 @@ class Arrow:
 class OrderMark:
     """An order on the plan.
 
-    number: from 1; at: where it happens, m; before, after: names of its groups; arrows: the ways it opens; slots:
-    places of a queue, m.
+    - number: of the order in the file, from 1. event: the order. at: x, y of where it happens, m.
+    - before, after: names of its groups; the same for a queue.
+    - arrows: the ways it opens. slots: x, y of the places of a queue, m; empty for other orders.
     """
 
     number: int
@@ -59,7 +63,11 @@ class OrderMark:
 
 
 def middle(value: Value) -> float:
-    """Returns the mean of a value without `clip`, or the bound of `clip` nearest to it if it lies outside."""
+    """Returns the mean of a value, a number or a distribution, moved to the nearest bound of its `clip` if it lies
+    outside.
+
+    The mean is that of the distribution without clip.
+    """
     if not isinstance(value, Distribution):
         return float(value)
     if value.normal is not None:
@@ -75,10 +83,10 @@ def middle(value: Value) -> float:
 
 
 def spread(value: Value) -> float:
-    """Returns half the width of the range in which nearly all draws lie; 0 for a number.
+    """Returns half the width of the range in which nearly all draws of a value lie; 0 for a number.
 
-    Half the distance between the bounds; for a normal distribution at most two standard deviations; without an upper
-    bound twice the mean.
+    Half the distance between the bounds; for a normal distribution at most two standard deviations; twice the mean if
+    there is no upper bound.
     """
     if not isinstance(value, Distribution):
         return 0.0
@@ -90,7 +98,7 @@ def spread(value: Value) -> float:
 
 
 def group_routes(scenario: Scenario) -> list[GroupRoute]:
-    """Returns the ways of all entries of `group`, in order."""
+    """Returns the ways of all entries of `group`, in order; an entry with `repeat` gives one."""
     made = []
     for group in scenario.group:
         points = (group.start, *group.via, group.goal)
@@ -100,7 +108,10 @@ def group_routes(scenario: Scenario) -> list[GroupRoute]:
 
 
 def order_marks(scenario: Scenario) -> list[OrderMark]:
-    """Returns the orders on the plan, in the order of the file."""
+    """Returns the orders as drawn on the plan, in the order of the file, numbered from 1; empty without orders.
+
+    Merges and splits are taken to happen half-way. Raises KeyError for an order of a group that does not exist.
+    """
     places = {}
     for group in scenario.group:
         start, goal = _at(group.start), _at(group.goal)
@@ -117,7 +128,10 @@ def _mean(points: list[XY]) -> XY:
 
 
 def _mark(number: int, event: ScriptOrder, places: dict[str, tuple[XY, XY]], world: XY) -> OrderMark:
-    """One order on the plan; updates places: start and goal by group name."""
+    """Returns one order on the plan; places, start and goal (x, y, m) by name of existing group, is updated.
+
+    number: from 1. world: its size, m; places of a queue outside it are left out.
+    """
     if isinstance(event, MergeOrder):
         return _merge(number, event, places)
     if isinstance(event, SplitOrder):
@@ -128,7 +142,10 @@ def _mark(number: int, event: ScriptOrder, places: dict[str, tuple[XY, XY]], wor
 
 
 def _merge(number: int, event: MergeOrder, places: dict[str, tuple[XY, XY]]) -> OrderMark:
-    """A merge: half-way between the starts and goals of its groups."""
+    """Returns a merge on the plan, at the mean of its groups' half-way points between start and goal.
+
+    places: start and goal (x, y, m) by group; the merged groups are removed and the new one is added.
+    """
     ways = [places.pop(name) for name in event.groups]
     meeting = _mean([_mean([start, goal]) for start, goal in ways])
     goal = meeting if isinstance(event.goal, str) else _at(event.goal)
@@ -138,7 +155,10 @@ def _merge(number: int, event: MergeOrder, places: dict[str, tuple[XY, XY]]) -> 
 
 
 def _split(number: int, event: SplitOrder, places: dict[str, tuple[XY, XY]]) -> OrderMark:
-    """A split: half-way between the start and goal of its group."""
+    """Returns a split on the plan, half-way between the start and goal of its group.
+
+    places: start and goal (x, y, m) by group; the group is removed and its parts are added.
+    """
     start, goal = places.pop(event.group)
     at = _mean([start, goal])
     arrows = [Arrow(part.id, (at, *map(_at, part.via), _at(part.goal))) for part in event.parts]
@@ -147,7 +167,10 @@ def _split(number: int, event: SplitOrder, places: dict[str, tuple[XY, XY]]) -> 
 
 
 def _served(event: QueueOrder, names: tuple[str, ...], places: dict[str, tuple[XY, XY]]) -> tuple[Arrow, ...]:
-    """The way of groups after a queue; none where they go to their own goals."""
+    """Returns the common way of all groups after a queue, as a tuple of one; () where they go to their own goals.
+
+    names: of the groups. places: start and goal (x, y, m) by group, is updated if the queue has a goal.
+    """
     if event.goal is None:
         return ()
     goal = _at(event.goal)

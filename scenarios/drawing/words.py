@@ -9,7 +9,10 @@ AT_GOAL = {"stand": "stand there", "leave": "leave", "walk": "walk on"}
 
 
 def number(value: Value, unit: str = "") -> str:
-    """Returns a value in words: `1.2 ± 0.1`, `0 to 5`, `about 3`, `1 or 2`, with its unit and clip."""
+    """Returns a value in words, with its unit and, except for uniform and choice, its clip.
+
+    `1.2` a number, `1.2 ± 0.1` normal, `0 to 5` uniform, `about 3` exponential or Poisson, `1 or 2` choice.
+    """
     tail = f" {unit}" if unit else ""
     if not isinstance(value, Distribution):
         return f"{value:g}{tail}"
@@ -25,7 +28,9 @@ def number(value: Value, unit: str = "") -> str:
 
 
 def _choice(values: tuple[float, ...]) -> str:
-    """`1 or 2`; `1 (67 %) or 2 (33 %)` where the probabilities differ."""
+    """Returns the values of a choice in words: `1 or 2`; `1 (67 %) or 2 (33 %)` if some occur more often
+    than others.
+    """
     times = {v: values.count(v) for v in values}
     if len(set(times.values())) == 1:
         return " or ".join(f"{v:g}" for v in times)
@@ -33,17 +38,17 @@ def _choice(values: tuple[float, ...]) -> str:
 
 
 def place(point: Point) -> str:
-    """Returns a point in words: `(5, 3 to 4)`."""
+    """Returns a point in words, metres without unit: `(5, 3 to 4)`."""
     return f"({number(point[0])}, {number(point[1])})"
 
 
 def count(n: Value, one: str, many: str) -> str:
-    """Returns a number with its noun: `1 person`, `3 people`."""
+    """Returns a number or distribution with its noun, `one` only for exactly 1: `1 person`, `3 people`."""
     return f"{number(n)} {one if n == 1 else many}"
 
 
 def setting(scenario: Scenario) -> list[str]:
-    """Returns three lines about duration, world and camera."""
+    """Returns three lines in words: duration and how the script is placed; size and content of the world; camera."""
     world, camera = scenario.world, scenario.camera
     things = {"wall": world.walls, "door": world.doors, "pillar": world.pillars, "flight of stairs": world.stairs}
     things["service point"] = world.service
@@ -64,7 +69,10 @@ def setting(scenario: Scenario) -> list[str]:
 
 
 def people(group: GroupSpec) -> str:
-    """Returns size, start, way, goal, speed and time of entry of a group in words."""
+    """Returns in words the number of groups, size, start, way, goal, speed and time of entry of an entry of `group`.
+
+    An absent speed, an entry at time 0 and an empty way are left out.
+    """
     words = [count(group.size, "person", "people")]
     words[0] = f"{group.repeat} groups of {words[0]}" if group.repeat > 1 else words[0]
     words.append(f"from {place(group.start)}")
@@ -77,7 +85,7 @@ def people(group: GroupSpec) -> str:
 
 
 def trigger(when: When) -> str:
-    """Returns in words when an order fires."""
+    """Returns in words when an order fires: its trigger, and the delay after it unless that is 0."""
     if when.time is not None:
         text = f"at {number(when.time, 's')}"
     elif when.reach is not None:
@@ -91,7 +99,9 @@ def trigger(when: When) -> str:
 
 
 def order(event: ScriptOrder) -> str:
-    """Returns in words what an order does."""
+    """Returns in words what an order does: kind, groups before and after, goals; of a queue its place and service time,
+    too.
+    """
     if isinstance(event, MergeOrder):
         goal = "to meet and stand" if isinstance(event.goal, str) else f"to {place(event.goal)}"
         return f"merge {' + '.join(event.groups)} → {event.into}, {goal}"
@@ -103,7 +113,9 @@ def order(event: ScriptOrder) -> str:
 
 
 def sensor(scenario: Scenario) -> list[str]:
-    """Returns lines about the sensor: detection, false alarms, noise, visibility, artificial occlusions."""
+    """Returns lines in words about the sensor: detection and false alarms; noise; visibility; one line per
+    occlusion.
+    """
     s = scenario.sensor
     edges = f"{s.noise_px:g} px on the edges of boxes" if s.box_noise is None else "in proportion to boxes"
     points = "points under their feet" if s.points == "foot" else f"{s.noise_m:g} m on points"

@@ -22,7 +22,11 @@ BODY = 0.2
 
 
 def check(scenario: Scenario, file: str | Path = "") -> None:
-    """Raises InputError for the first thing in the scenario that cannot work."""
+    """Raises InputError, naming `file`, for the first thing in the scenario that cannot work; returns nothing.
+
+    Checked in this order: walls, doors and stairs; groups; hidden groups of the sensor; places inside the world and
+    clear of walls; the orders of the script.
+    """
     try:
         _check_world(scenario)
         _check_groups(scenario)
@@ -34,7 +38,7 @@ def check(scenario: Scenario, file: str | Path = "") -> None:
 
 
 def _check_world(scenario: Scenario) -> None:
-    """Walls and stairs have a length; each door lies on one wall."""
+    """Raises InputError for a wall or stairs without length, or for a door that does not lie on one wall."""
     world = scenario.world
     for k, wall in enumerate(world.walls):
         if wall[:2] == wall[2:]:
@@ -51,7 +55,10 @@ def _check_world(scenario: Scenario) -> None:
 
 
 def _check_groups(scenario: Scenario) -> None:
-    """Names are unique; sizes, speeds and times of entry are possible."""
+    """Raises InputError for a group whose name is taken, or whose size, speed or time of entry cannot be.
+
+    The size must be at least 0.5 in every draw, the speed above 0 in some draw, the entry before the end in some draw.
+    """
     seen: set[str] = set()
     for group in scenario.group:
         for name in group_names(group):
@@ -70,7 +77,11 @@ def _check_groups(scenario: Scenario) -> None:
 
 
 def _check_sensor(scenario: Scenario) -> None:
-    """Artificial occlusions name groups of the script and end after they start."""
+    """Raises InputError for an artificial occlusion of a group that the script does not have, or that ends before it
+    starts.
+
+    Groups that merges and splits make count, too.
+    """
     known = [name for group in scenario.group for name in group_names(group)] + [
         name
         for event in scenario.event
@@ -85,10 +96,10 @@ def _check_sensor(scenario: Scenario) -> None:
 
 
 def _check_points(scenario: Scenario) -> None:
-    """All places lie inside the world; places without a distribution are clear of walls and pillars.
+    """Raises InputError for a place that can lie outside the world, or is less than 0.2 m (BODY) from a wall or pillar.
 
-    A script with a turn is not checked, because its places depend on the draw. A script that may be mirrored is checked
-    both ways.
+    Places drawn from a distribution are checked against the world by their finite bounds only, and not against walls. A
+    script that may be mirrored is checked both ways. A script that may be turned is not checked.
     """
     if bounds(scenario.turn_deg) != (0.0, 0.0):
         return
@@ -108,9 +119,10 @@ def _check_points(scenario: Scenario) -> None:
 
 
 def points(scenario: Scenario) -> Iterator[tuple[str, Point]]:
-    """Yields every place where people start or are sent, with its key.
+    """Yields (key, point in m) for every place where people start or are sent, groups first, then orders.
 
-    Of a queue these are the first QUEUE_PEOPLE places, all with the key `at`.
+    Coordinates are numbers or distributions. Of a queue these are the first 3 places, all with the key `event.ID.at`,
+    and its goal if it has one.
     """
     for group in scenario.group:
         yield f"group.{group.id}.start", group.start

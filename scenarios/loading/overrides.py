@@ -21,9 +21,12 @@ KeyPath = tuple[str | int, ...]
 
 
 def apply_settings(table: Table, settings: Iterable[str], file: object = "") -> tuple[Table, dict[KeyPath, str]]:
-    """Returns a copy of the table with each `key=value` applied in turn, and the setting text by path of its key.
+    """Returns a copy of the table with each `key=value` applied in turn, and the text of each setting by path of its
+    key.
 
-    Raises InputError if a setting is not of the form key=value or its key leads into nothing.
+    A path has indices where the key has ids. A key of a table that does not exist is added, so a misspelt key is found
+    only by `validate`. Raises InputError, naming `file`, if a setting is not of the form key=value, its value is not
+    TOML, or its key leads into a plain value or to a row that an array does not have.
     """
     table = copy.deepcopy(table)
     places: dict[KeyPath, str] = {}
@@ -34,7 +37,10 @@ def apply_settings(table: Table, settings: Iterable[str], file: object = "") -> 
 
 
 def parse_setting(text: str) -> tuple[list[str], Any]:
-    """Returns the steps of the key and the value of `a.b=value`; raises InputError for any other form."""
+    """Returns the steps of the key (`a.b` gives ["a", "b"]) and the TOML value of a setting `a.b=value`.
+
+    A word without quotes is a string. Raises InputError for any other form, an empty step, or a value that is not TOML.
+    """
     key, equals, value = text.partition("=")
     steps = key.strip().split(".")
     if not equals or not all(steps):
@@ -45,8 +51,10 @@ def parse_setting(text: str) -> tuple[list[str], Any]:
 
 
 def parse_value(value: str, text: str) -> Any:
-    """Returns a TOML value; a word without quotes is a string. text: the whole setting, for the InputError it
-    raises.
+    """Returns the Python value of the text of a TOML value.
+
+    A word without quotes (a letter, then letters, digits, `_ . * : -`) is a string. Raises InputError for any other
+    text; `text`, the whole setting, appears in its message.
     """
     try:
         table = tomllib.loads(f"value = {value}")
@@ -62,7 +70,11 @@ def parse_value(value: str, text: str) -> Any:
 
 
 def _put(table: Table, steps: list[str], value: Any, text: str, file: object) -> KeyPath:
-    """Sets the value in the table; returns the path of its key, with ids replaced by indices."""
+    """Sets the value in the table, which is modified; returns the path of its key, with ids replaced by indices.
+
+    steps: of the key. text: the whole setting, for messages. Missing tables on the way are created. Raises InputError
+    if the key leads into a plain value or to a row that an array does not have.
+    """
     here: Any = table
     path: list[str | int] = []
     while True:
@@ -91,8 +103,10 @@ def _put(table: Table, steps: list[str], value: Any, text: str, file: object) ->
 
 
 def _index(rows: list[Any], steps: list[str], value: Any, text: str, file: object) -> tuple[int, list[str]]:
-    """The index of the row that the next steps name, and the steps after them. Ids may have dots; the longest id
-    wins.
+    """Returns the index in `rows` that the first steps name, by index or id, and the steps after them.
+
+    Ids may have dots; the longest id wins. A table set on a new id gives the index after the last row, and gets that
+    id. Raises InputError if there is no such row. text: the whole setting, for the message.
     """
     if steps[0].isdigit() and int(steps[0]) < len(rows):
         return int(steps[0]), steps[1:]
@@ -114,7 +128,10 @@ def _index(rows: list[Any], steps: list[str], value: Any, text: str, file: objec
 
 
 def _with_id(rows: list[Any], index: int, value: Any) -> Any:
-    """The value; a table that replaces a row gets the row's id unless it has one."""
+    """Returns the value; if it is a table without `id` that replaces a row with one, a copy with the row's id.
+
+    index may be one past the last row: the value is then returned as it is.
+    """
     if index < len(rows) and isinstance(value, dict) and isinstance(rows[index], dict) and "id" in rows[index]:
         return {"id": rows[index]["id"], **value}
     return value

@@ -21,8 +21,9 @@ __all__ = ["Entry", "dump", "load", "load_observation", "names", "resolve", "sui
 class Entry:
     """One sequence to make.
 
-    name: unique; scenario: what to simulate; repeat: number of the copy from 1 where a suite's entry has `repeat`, else
-    0; file: the scenario's file, and the entry in a suite, for messages.
+    - name: unique. scenario: what to simulate, checked.
+    - repeat: number of the copy, from 1, where a suite's entry has `repeat`, else 0.
+    - file: the scenario's file, or the suite's file and the entry, for messages; not compared.
     """
 
     name: str
@@ -32,20 +33,21 @@ class Entry:
 
 
 def load(name_or_path: str | Path, set: Iterable[str] = ()) -> Scenario:
-    """Returns the scenario of a catalogue name or a *.toml file.
+    """Returns the checked scenario of a catalogue name or a *.toml file.
 
     `extends` is applied first, then each `key=value` of `set` in turn. Raises InputError for everything that can be
-    found wrong without simulating: an unknown name, a wrong key or value, a place in a wall, an order for a group that
-    does not exist.
+    found wrong without simulating: an unknown name, an unreadable file, a wrong key or value, a place in a wall, an
+    order for a group that does not exist.
     """
     path = toml_files.find(name_or_path)
     return _build(path, tuple(set))
 
 
 def load_observation(path: str | Path | None = None, set: Iterable[str] = ()) -> ObservationSpec:
-    """Returns camera, sensor, light and picture of a TOML file, with each `key=value` of `set` applied.
+    """Returns camera, sensor, light and picture of a TOML file, with each `key=value` of `set` applied in turn.
 
-    path: None for all defaults. Raises InputError if the file cannot be read or a key or value is wrong.
+    path None: all defaults. `extends` is not supported. Raises InputError if the file does not exist, is not TOML, or a
+    key or value is wrong.
     """
     if path is not None and not Path(path).is_file():
         raise InputError(
@@ -57,10 +59,11 @@ def load_observation(path: str | Path | None = None, set: Iterable[str] = ()) ->
 
 
 def resolve(name: str, set: Iterable[str] = ()) -> list[Entry]:
-    """Returns the entries of a *.toml file (scenario or suite) or of a name in the catalogue.
+    """Returns the entries, in order, of a *.toml file (scenario or suite) or of a name in the catalogue.
 
     A name that is both a scenario's and a suite's means the scenario; `suite:NAME` means the suite. A scenario gives
-    one entry. `set` is applied to each entry, after the entry's own settings. Raises InputError as `load` does.
+    one entry. Each `key=value` of `set` is applied to each entry, after the entry's own settings. Raises InputError for
+    an unknown name, a wrong suite file, and everything that `load` finds wrong in a scenario.
     """
     settings = tuple(set)
     if name.startswith("suite:"):
@@ -81,7 +84,11 @@ def resolve(name: str, set: Iterable[str] = ()) -> list[Entry]:
 
 
 def _entries(path: Path, settings: tuple[str, ...]) -> list[Entry]:
-    """Loads all entries of a suite file. Copies of an entry share one load; each scenario gets its entry's name."""
+    """Returns all entries of a suite file, loaded; settings are applied after each entry's own.
+
+    Copies of an entry share one load. Each scenario gets its entry's name. Raises InputError if the suite or a scenario
+    is wrong.
+    """
     loaded: dict[tuple[str, tuple[str, ...]], Scenario] = {}
     entries = []
     for entry in suites.read_entries(path):
@@ -94,7 +101,10 @@ def _entries(path: Path, settings: tuple[str, ...]) -> list[Entry]:
 
 
 def _load_entry(entry: suites.SuiteEntry, path: Path, settings: tuple[str, ...]) -> Scenario:
-    """Loads the scenario of an entry; errors name the suite and the entry."""
+    """Returns the scenario of an entry of the suite file `path`, with the entry's settings, then `settings`.
+
+    A scenario file is sought beside the suite first. An InputError names the suite and the entry.
+    """
     try:
         return _build(toml_files.find(entry.scenario, beside=path.parent), entry.settings + settings)
     except InputError as error:
@@ -103,7 +113,9 @@ def _load_entry(entry: suites.SuiteEntry, path: Path, settings: tuple[str, ...])
 
 
 def _build(path: Path, settings: tuple[str, ...]) -> Scenario:
-    """Reads, validates and checks the scenario of a file."""
+    """Returns the scenario of a file with `key=value` settings applied; raises InputError if it is wrong or cannot
+    work.
+    """
     table, places = overrides.apply_settings(toml_files.read(path), settings, path)
     scenario = validate(table, path, places, model=Scenario)
     check(scenario, path)

@@ -17,15 +17,16 @@ QUEUE_PEOPLE = 3
 
 
 def fail(place: str, got: str, expected: str, remedy: str) -> NoReturn:
-    """Raises the InputError of a check, without the file, which `check` adds."""
+    """Always raises the InputError with these texts. It has no file; `check` adds it."""
     raise InputError(place=place, got=got, expected=expected, remedy=remedy)
 
 
 def check_script(scenario: Scenario) -> None:
-    """Raises InputError for the first order of the script that cannot work.
+    """Raises InputError, without a file, for the first order of the script that cannot work; returns nothing.
 
-    Orders are taken in the order of the file. Each merge and split ends its groups and makes new ones, with the range
-    of sizes that follows.
+    Orders are taken in the order of the file. Each merge and split ends its groups and makes new groups, whose possible
+    sizes follow. Checked are unique ids, triggers, existing groups, new names, sizes of parts, and enough people in
+    queues.
     """
     alive = {name: _people(bounds(group.size)) for group in scenario.group for name in group_names(group)}
     gone: dict[str, str] = {}
@@ -40,14 +41,22 @@ def check_script(scenario: Scenario) -> None:
 
 
 def _people(size: SizeRange) -> SizeRange:
-    """The least and greatest number of people for the bounds of a `size`."""
+    """Returns the least and greatest number of people for the bounds of a group's `size`.
+
+    The least is rounded and at least 1; the greatest is not rounded and may be inf.
+    """
     return max(1.0, float(round(size[0]))), size[1]
 
 
 def _check_when(
     event: ScriptOrder, key: str, orders: list[str], alive: dict[str, SizeRange], gone: dict[str, str], duration: float
 ) -> None:
-    """Raises InputError for a trigger that cannot be met within the duration, or names what does not exist."""
+    """Raises InputError for a trigger of an order that names what does not exist, or that is too early or too late.
+
+    key: `event.ID`. orders: ids of earlier orders; `after` must be one of them. alive, gone: existing groups with their
+    sizes, and for each ended group the order that ended it. The least delay and time must not be negative, and their
+    sum must be below duration, s.
+    """
     when = event.when
     if when.after is not None and when.after not in orders:
         fail(
@@ -67,7 +76,10 @@ def _check_when(
 
 
 def _exists(name: str, place: str, alive: dict[str, SizeRange], gone: dict[str, str]) -> None:
-    """Raises InputError unless the group exists at this point of the script; gone: the order that ended each group."""
+    """Raises InputError unless the group `name` exists at this point of the script.
+
+    place: key for the message. alive: sizes by existing group. gone: for each ended group the order that ended it.
+    """
     if name in gone:
         expected = "a group that still exists: " + ", ".join(alive)
         fail(place, f"{name!r}, which ended with {gone[name]!r}", expected, "name another group, or move the order up")
@@ -76,7 +88,10 @@ def _exists(name: str, place: str, alive: dict[str, SizeRange], gone: dict[str, 
 
 
 def _add_group(name: str, size: SizeRange, place: str, alive: dict[str, SizeRange], gone: dict[str, str]) -> None:
-    """Adds a new group to `alive`; raises InputError if its name is taken."""
+    """Adds a new group with its range of sizes to `alive`; raises InputError if its name is or was another group's.
+
+    place: key for the message. gone: for each ended group the order that ended it.
+    """
     if name in alive or name in gone:
         fail(place, f"{name!r}, which is another group's name", "a new name", "rename it")
     alive[name] = size
@@ -92,7 +107,10 @@ def _apply(event: ScriptOrder, key: str, alive: dict[str, SizeRange], gone: dict
 
 
 def _merge(event: MergeOrder, key: str, alive: dict[str, SizeRange], gone: dict[str, str]) -> None:
-    """Checks a merge: at least two different existing groups become a new one."""
+    """Checks a merge, moves its groups from `alive` to `gone`, and adds the new group, whose size is their sum.
+
+    Raises InputError for a group that does not exist or is named twice, or a new name that is taken. key: `event.ID`.
+    """
     for k, name in enumerate(event.groups):
         _exists(name, f"{key}.groups.{k}", alive, gone)
         if name in event.groups[:k]:
@@ -103,7 +121,12 @@ def _merge(event: MergeOrder, key: str, alive: dict[str, SizeRange], gone: dict[
 
 
 def _split(event: SplitOrder, key: str, alive: dict[str, SizeRange], gone: dict[str, str]) -> None:
-    """Checks a split: the sizes of the parts fit the size of the group."""
+    """Checks a split, moves its group from `alive` to `gone`, and adds the parts with their ranges of sizes.
+
+    Raises InputError for a group that does not exist, a part's name that is taken, and sizes that do not fit every
+    possible size of the group: parts without a size need one person each; if all have sizes, the sum must be exact.
+    key: `event.ID`.
+    """
     _exists(event.group, f"{key}.group", alive, gone)
     low, high = alive.pop(event.group)
     gone[event.group] = event.id
@@ -120,7 +143,12 @@ def _split(event: SplitOrder, key: str, alive: dict[str, SizeRange], gone: dict[
 
 
 def _queue(event: QueueOrder, key: str, alive: dict[str, SizeRange], gone: dict[str, str]) -> None:
-    """Checks a queue: its groups exist and can have QUEUE_PEOPLE people."""
+    """Raises InputError if a name or pattern of a queue fits no existing group, or its groups cannot have 3 people in
+    sum.
+
+    key: `event.ID`. alive: least and greatest size by existing group. gone: for each ended group the order that ended
+    it.
+    """
     queued: list[str] = []
     for k, pattern in enumerate(event.groups):
         found = expand(pattern, list(alive))

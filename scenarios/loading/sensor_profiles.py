@@ -19,19 +19,25 @@ from scenarios.schema.values import Model
 
 
 class SensorFile(Model):
-    """The content of a profile file."""
+    """The content of a profile file: `schema` (1, may be absent) and the required table `[sensor]`."""
 
     schema_: Literal[1] = Field(1, alias="schema")
     sensor: Sensor
 
 
 def sensor_settings(path: str | Path) -> tuple[str, ...]:
-    """Returns `sensor.key=value` for each key of the file; raises InputError as `sensor_table` does."""
+    """Returns a setting `sensor.key=value` for each key given in the file's `[sensor]` table, in its order.
+
+    Raises InputError if the file does not exist, is not TOML, or a key or value is wrong.
+    """
     return tuple(f"sensor.{key}={toml_value(v)}" for key, v in sensor_table(path).items())
 
 
 def sensor_table(path: str | Path) -> Table:
-    """Returns the keys given in the file's `[sensor]` table; raises InputError if the file or a value is wrong."""
+    """Returns the keys given in the file's `[sensor]` table with their values, without defaults.
+
+    Raises InputError if the file does not exist or is not TOML, if it has no `[sensor]`, or if a key or value is wrong.
+    """
     path = Path(path)
     if not path.is_file():
         raise InputError(
@@ -45,7 +51,10 @@ def sensor_table(path: str | Path) -> Table:
 
 
 def dump_sensor(sensor: Sensor, about: str = "") -> str:
-    """Returns the text of a profile file with all keys of a sensor that are set; about: comment lines above them."""
+    """Returns the text of a profile file with all keys of a sensor, defaults included, as TOML.
+
+    Keys that are None and an empty `hide` are left out. about: text that becomes comment lines at the top; "" for none.
+    """
     table = sensor.model_dump(mode="python", exclude_none=True)
     lines = [f"# {line}".rstrip() for line in about.splitlines()]
     rows = [f"{key} = {toml_value(v)}" for key, v in table.items() if key != "hide" or v]

@@ -30,7 +30,11 @@ EXPECTED = {
 
 @dataclass(frozen=True)
 class SuiteEntry:
-    """One entry of a suite, not loaded yet; repeat: number of the copy from 1, 0 where the entry has no `repeat`."""
+    """One entry of a suite whose scenario is not loaded yet.
+
+    - name: of the sequence, with -1, -2, … where the entry has `repeat`. scenario: catalogue name or *.toml file.
+    - settings: `key=value` texts. repeat: number of the copy from 1, 0 where the entry has no `repeat`.
+    """
 
     name: str
     scenario: str
@@ -39,7 +43,7 @@ class SuiteEntry:
 
 
 def find_suite(name: str) -> Path:
-    """Returns the file of a suite, given a *.toml path or a name in the catalogue; raises InputError."""
+    """Returns the file of a suite, given an existing *.toml path or a name in the catalogue; else raises InputError."""
     if name.endswith(".toml") and Path(name).is_file():
         return Path(name)
     if name in suite_names():
@@ -48,9 +52,10 @@ def find_suite(name: str) -> Path:
 
 
 def read_entries(path: Path) -> list[SuiteEntry]:
-    """Returns the entries of a suite file, in order, with each `repeat` expanded.
+    """Returns the entries of a suite file, in order, with an entry of `repeat = n` expanded to name-1 … name-n.
 
-    Raises InputError if the file has an unknown key, no entry, a wrong value, or two entries of one name.
+    Scenarios are not loaded. Raises InputError if the file cannot be read or is not TOML, has an unknown key, no entry,
+    a wrong value, an entry without scenario, or two entries of one name.
     """
     table = parse(path)
     for key in table.keys() - {"about", "entry"}:
@@ -80,12 +85,18 @@ def read_entries(path: Path) -> list[SuiteEntry]:
 
 
 def about(path: Path) -> str:
-    """Returns the `about` text of a suite file; "" if it has none."""
+    """Returns the `about` text of a suite file; "" if it has none. InputError if the file cannot be read or is not
+    TOML.
+    """
     return str(parse(path).get("about", ""))
 
 
 def _expand(entry: Any, place: str, path: Path) -> Iterator[SuiteEntry]:
-    """The entries that one row of the file stands for."""
+    """Yields the one entry, or with `repeat = n` the n entries, that one row of the file `path` stands for.
+
+    An absent name is the scenario's name or its file's stem. place: `entry.INDEX`, for messages. Raises InputError if
+    the row is wrong.
+    """
     _check(entry, place, path)
     name = entry.get("name", Path(entry["scenario"]).stem)
     settings = tuple(entry.get("set", ()))
@@ -96,7 +107,10 @@ def _expand(entry: Any, place: str, path: Path) -> Iterator[SuiteEntry]:
 
 
 def _check(entry: Table, place: str, path: Path) -> None:
-    """Raises InputError for the first thing wrong with an entry."""
+    """Raises InputError if an entry is no table, has an unknown key or wrong value, or no `scenario`.
+
+    place: `entry.INDEX`, and path: the suite's file, for messages.
+    """
     if not isinstance(entry, dict):
         raise InputError(file=path, place=place, got=repr(entry), expected="a table", remedy="write { scenario = … }")
     for key, value in entry.items():

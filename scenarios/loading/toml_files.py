@@ -42,7 +42,10 @@ def suite_names() -> list[str]:
 
 
 def did_you_mean(word: str, known: list[str]) -> str:
-    """Returns the remedy of an error about an unknown name: the known names most like it, or all known names."""
+    """Returns the remedy of an error about an unknown name, as text for users.
+
+    It lists up to three known names that are like the word; all known names if none is; else that there is none.
+    """
     close = difflib.get_close_matches(word, known, n=3, cutoff=0.5)
     if close:
         return "did you mean " + " or ".join(repr(name) for name in close) + "?"
@@ -50,16 +53,18 @@ def did_you_mean(word: str, known: list[str]) -> str:
 
 
 def closest(word: str, known: Iterable[str]) -> str:
-    """Returns the known name most like a word, ignoring upper and lower case; "" if there are no known names."""
+    """Returns the known name most like a word, however unlike, ignoring upper and lower case; "" without
+    known names.
+    """
     names = {name.casefold(): name for name in known}
     return names[difflib.get_close_matches(word.casefold(), names, 1, 0.0)[0]] if names else ""
 
 
 def find(name: str | Path, beside: Path | None = None) -> Path:
-    """Returns the file of a scenario.
+    """Returns the file of a scenario; it is not read.
 
-    name: a catalogue name, or a path that ends in .toml, relative to `beside` (the working folder if None), else to the
-    catalogue. Raises InputError if there is no such scenario or file.
+    name: a catalogue name, or a path that ends in .toml, relative to the folder `beside` (the working folder if None),
+    else to the catalogue. Raises InputError if there is no such scenario or file.
     """
     text = str(name)
     if not text.endswith(".toml"):
@@ -78,7 +83,10 @@ def find(name: str | Path, beside: Path | None = None) -> Path:
 
 
 def parse(path: Path) -> Table:
-    """Returns the content of a TOML file. Raises InputError if it cannot be read, is not UTF-8 or is not TOML."""
+    """Returns the content of a TOML file, without applying `extends`.
+
+    Raises InputError if the file cannot be read, is not UTF-8 or is not TOML.
+    """
     try:
         return tomllib.loads(path.read_bytes().decode())
     except tomllib.TOMLDecodeError as error:
@@ -108,10 +116,10 @@ def parse(path: Path) -> Table:
 
 
 def read(path: Path, chain: tuple[Path, ...] = ()) -> Table:
-    """Returns a file merged over all files it extends; `name` is the file's where it has none.
+    """Returns the content of a TOML file merged over all files it extends.
 
-    chain: the files that extend this one. Raises InputError if a file cannot be read, or if files extend each other in
-    a circle.
+    `name` is the file's stem where the file itself has none. chain: the files that extend this one. Raises InputError
+    if a file cannot be found or read, if `extends` is no text, or if files extend each other in a circle.
     """
     chain = (*chain, path.resolve())
     table = parse(path)
@@ -136,7 +144,9 @@ def read(path: Path, chain: tuple[Path, ...] = ()) -> Table:
 
 
 def _base(path: Path, base: str) -> Path:
-    """The file that `extends = base` in the file `path` means; raises InputError."""
+    """Returns the file that `extends = base` means in the file `path`: beside it, else in the catalogue. Else
+    InputError.
+    """
     try:
         return find(base, beside=path.parent)
     except InputError as error:
@@ -146,7 +156,11 @@ def _base(path: Path, base: str) -> Path:
 
 
 def merge(below: Table, above: Table) -> Table:
-    """Returns `above` merged over `below` by the rules in the module's docstring; changes neither."""
+    """Returns a new table: `above`, of the extending file, merged over `below`, of the extended file; changes neither.
+
+    Tables are merged key by key. Lists of tables that all have an `id` are merged by id; rows with a new id are
+    appended. A distribution, a `when` and any other value replace the value of `below`.
+    """
     merged = dict(below)
     for key, value in above.items():
         merged[key] = _merge_value(key, below.get(key), value)
@@ -162,7 +176,7 @@ def _merge_value(key: str, below: Any, above: Any) -> Any:
 
 
 def _is_value(key: str, table: Table) -> bool:
-    """True for a `when` and for a distribution, which replace the value of the base as a whole."""
+    """True for a table that replaces the base's value as a whole: under the key `when`, or a non-empty distribution."""
     return key == "when" or (bool(table) and table.keys() <= DISTRIBUTION_KEYS)
 
 
@@ -182,13 +196,16 @@ def _merge_by_id(below: list[Table], above: list[Table]) -> list[Table]:
 
 
 class _Dumps(Protocol):
-    """A pydantic model. A protocol, because this module must not import pydantic."""
+    """A pydantic model, as far as `dump` needs it. A protocol, because this module must not import pydantic."""
 
     def model_dump(self, *, mode: str, by_alias: bool, exclude_none: bool) -> dict[str, Any]: ...
 
 
 def dump(scenario: _Dumps) -> str:
-    """Returns a scenario, or another model of tables, as TOML: all defaults included, the same bytes each time."""
+    """Returns a scenario, or another pydantic model of tables, as TOML; equal models give equal bytes.
+
+    All defaults are included, keys that are None are left out. Plain values come first, then a block per table or row.
+    """
     table = scenario.model_dump(mode="python", by_alias=True, exclude_none=True)
     flat = [(k, v) for k, v in table.items() if not _is_table(v) and not _is_rows(v)]
     blocks = [_lines(dict(flat))]
@@ -213,7 +230,7 @@ def _lines(table: dict[str, Any]) -> str:
 
 
 def toml_value(v: Any) -> str:
-    """Returns a value as TOML on one line."""
+    """Returns a bool, text, number, list, tuple or dict as TOML on one line. Keys of dicts are not quoted."""
     if isinstance(v, bool):
         return str(v).lower()
     if isinstance(v, str):

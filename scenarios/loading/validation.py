@@ -23,8 +23,9 @@ M = typing.TypeVar("M", bound=BaseModel)
 def validate(table: Table, file: object = "", places: dict[KeyPath, str] | None = None, *, model: type[M]) -> M:
     """Returns the table as a model: a Scenario or one of its tables.
 
-    Raises InputError with the file, the key and what was expected there. places: the settings by path, as
-    overrides.apply_settings returns them; an error at such a path names the setting.
+    Types are strict: no text for a number. Raises InputError with the first problem: the file, the key and what was
+    expected there. places: texts of `--set` by path, as overrides.apply_settings returns them; an error at such a path
+    names the setting.
     """
     try:
         return model.model_validate(_tuples(table), strict=True)
@@ -33,7 +34,7 @@ def validate(table: Table, file: object = "", places: dict[KeyPath, str] | None 
 
 
 def _tuples(value: Any) -> Any:
-    """The table with tuples for lists, as pydantic's strict mode requires."""
+    """Returns the value with tuples for all lists in it, as pydantic's strict mode requires."""
     if isinstance(value, dict):
         return {key: _tuples(v) for key, v in value.items()}
     return tuple(_tuples(v) for v in value) if isinstance(value, list) else value
@@ -42,9 +43,11 @@ def _tuples(value: Any) -> Any:
 def input_error(
     error: ValidationError, table: Table, file: object, places: dict[KeyPath, str], model: type[BaseModel] = Scenario
 ) -> InputError:
-    """Returns the first problem as an InputError and says how many more there are.
+    """Returns, without raising it, the InputError for the first problem of a pydantic error, and says how many more
+    there are.
 
-    Unknown keys come first, because a misspelt key explains a missing one.
+    Unknown keys come first, because a misspelt key explains a missing one. table: what was validated. places: texts of
+    `--set` by path of their keys.
     """
     found = [e for e in error.errors() if _branch_fits(e["loc"], table)] or list(error.errors())
     first = min(found, key=lambda e: (e["type"] != "extra_forbidden", e["type"] == "too_short" and len(found) > 1))
@@ -55,12 +58,17 @@ def input_error(
 
 
 def table_path(loc: tuple[int | str, ...], table: Table) -> KeyPath:
-    """Returns a pydantic location as a path into the table: without the names of union branches."""
+    """Returns a pydantic error location as a path into the table: keys and indices, without the names of union
+    branches.
+    """
     return tuple(step for step, _, is_tag in _walk(loc, table) if not is_tag)
 
 
 def _walk(loc: tuple[int | str, ...], table: Any) -> typing.Iterator[tuple[int | str, Any, bool]]:
-    """Yields each step of a location, the value it starts from, and True if it names a union branch only."""
+    """Yields each step of a pydantic location, the value it starts from, and True if it only names a union branch.
+
+    The value is None below a key or index that the table does not have.
+    """
     here = table
     for k, step in enumerate(loc):
         last = k == len(loc) - 1
@@ -75,12 +83,15 @@ def _walk(loc: tuple[int | str, ...], table: Any) -> typing.Iterator[tuple[int |
 
 
 def _is_branch(step: int | str) -> bool:
-    """True if a step is the name of a union branch of a value that may be a distribution."""
+    """True if a step of a pydantic location names a union branch ("float", "Distribution", "tuple[…]"), not a key."""
     return isinstance(step, str) and (step == "float" or "[" in step or step == "Distribution")
 
 
 def _branch_fits(loc: tuple[int | str, ...], table: Table) -> bool:
-    """True if the union branch that an error is about is the one that fits the kind of the value."""
+    """Returns False if an error at this location is about a union branch for another kind of value than the table has.
+
+    For example the branch for a point [x, y], where the table has a text.
+    """
     for step, value, is_tag in _walk(loc, table):
         if not is_tag or not isinstance(step, str):
             continue
@@ -99,7 +110,10 @@ def _branch_fits(loc: tuple[int | str, ...], table: Table) -> bool:
 
 
 def _words(error: Any, path: KeyPath, table: Table, model: type[BaseModel]) -> tuple[str, str, str]:
-    """Returns got, expected and remedy of one pydantic error."""
+    """Returns the texts got, expected and remedy for one error of pydantic's list.
+
+    path: of the wrong value in the table; its last step is the unknown or missing key, if it is one.
+    """
     kind, message = error["type"], str(error["msg"])
     if kind == "extra_forbidden":
         known = known_keys(path[:-1], table, model)
@@ -126,7 +140,7 @@ def _words(error: Any, path: KeyPath, table: Table, model: type[BaseModel]) -> t
 
 
 def _expectation(message: str) -> str:
-    """What pydantic expected, in words for users."""
+    """Returns what pydantic expected, in words for users, from the message of its error."""
     for start in ("Input should be ", "Value error, "):
         message = message.removeprefix(start)
     message = re.sub(r"^.* exactly one of (.*), not \[.*\]$", r"exactly one of \1", message)
@@ -134,7 +148,7 @@ def _expectation(message: str) -> str:
 
 
 def _show(value: Any) -> str:
-    """The value as a user wrote it, at most 80 characters."""
+    """Returns a value as a user writes it in TOML; tables and plain values are cut to 80 characters."""
     if isinstance(value, tuple):
         return "[" + ", ".join(map(_show, value)) + "]"
     if isinstance(value, dict):
@@ -150,7 +164,9 @@ def _cut(text: str) -> str:
 
 
 def _place(path: KeyPath, table: Table, places: dict[KeyPath, str]) -> str:
-    """Where a path is set: the `--set` text that made it, else its key."""
+    """Returns where a path is set, for messages: `--set …` if a setting set it or a table around it, else its dotted
+    key.
+    """
     for n in range(len(path), 0, -1):
         if path[:n] in places:
             return f"--set {places[path[:n]]}"
@@ -158,7 +174,9 @@ def _place(path: KeyPath, table: Table, places: dict[KeyPath, str]) -> str:
 
 
 def key_text(path: KeyPath, table: Table) -> str:
-    """Returns a path as `--set` takes it, with the ids of rows that have one."""
+    """Returns a path as a dotted key for `--set`: a row that has an `id` appears by its id, any other row
+    by its index.
+    """
     here: Any = table
     steps = []
     for step in path:
@@ -173,7 +191,11 @@ def key_text(path: KeyPath, table: Table) -> str:
 
 
 def known_keys(path: KeyPath, table: Table, form: type[BaseModel] = Scenario) -> list[str]:
-    """Returns the keys that a model knows at a path of a table; empty where the path leads to no table."""
+    """Returns the keys that a model knows at a path of a table; empty where the model has no table there.
+
+    form: model of the whole table. A row of `event` gives the keys of its `type`. Raises KeyError or IndexError if the
+    table does not have the path.
+    """
     model: type[BaseModel] | None = form
     here: Any = table
     for step in path:
@@ -189,7 +211,10 @@ def known_keys(path: KeyPath, table: Table, form: type[BaseModel] = Scenario) ->
 
 
 def _event_keys(models: list[type[BaseModel]], path: KeyPath, table: Table) -> list[str]:
-    """The known keys inside a row of `event`, whose model follows from its `type`; the first model if that is wrong."""
+    """Returns the keys known at a path inside a row of `event`, whose model follows from its `type`.
+
+    models: of the kinds of orders; the first if `type` is absent or wrong. Empty where the model has no table there.
+    """
     row = table["event"][path[1]]
     kind = next((m for m in models if row.get("type") in typing.get_args(m.model_fields["type"].annotation)), models[0])
     keys = kind
@@ -202,7 +227,7 @@ def _event_keys(models: list[type[BaseModel]], path: KeyPath, table: Table) -> l
 
 
 def _models(annotation: Any) -> list[type[BaseModel]]:
-    """The models inside a type annotation."""
+    """Returns the pydantic models inside a type annotation, in order; empty for a plain type."""
     if isinstance(annotation, type) and issubclass(annotation, BaseModel):
         return [annotation]
     return [model for inner in typing.get_args(annotation) for model in _models(inner)]

@@ -13,9 +13,11 @@ DOOR_TOLERANCE = 0.05  # m
 
 
 def along(wall: WallSegment, point: FixedPoint) -> FixedPoint:
-    """Returns where a point lies relative to a wall: metres along it from its first end, and metres from its line.
+    """Returns where a point lies relative to a wall: metres along it from its first end, and metres (≥ 0) from its
+    line.
 
-    For a wall of length zero: 0 and the distance from it.
+    wall: x1, y1, x2, y2 of its ends, m. point: x, y, m. The first is negative or beyond the length for points past an
+    end. For a wall of length zero: 0 and the distance from it.
     """
     x, y = point[0] - wall[0], point[1] - wall[1]
     length = math.dist(wall[:2], wall[2:])
@@ -26,14 +28,21 @@ def along(wall: WallSegment, point: FixedPoint) -> FixedPoint:
 
 
 def door_fits(door: DoorSpec, wall: WallSegment) -> bool:
-    """Returns True if the whole opening of a door lies on a wall, within DOOR_TOLERANCE of its line."""
+    """Returns True if the whole opening of a door lies on a wall, its middle at most 0.05 m (DOOR_TOLERANCE) off its
+    line.
+
+    wall: x1, y1, x2, y2 of its ends, m.
+    """
     s, off = along(wall, door.at)
     length = math.dist(wall[:2], wall[2:])
     return off <= DOOR_TOLERANCE and door.width / 2 <= s + 1e-9 and s + door.width / 2 <= length + 1e-9
 
 
 def walls_without_doors(world: WorldSpec) -> Iterator[WallSegment]:
-    """Yields the pieces of all walls that remain when the openings of the doors are cut out."""
+    """Yields the pieces of all walls, x1, y1, x2, y2 in m, that remain when the openings of the doors are cut out.
+
+    A door that does not lie wholly on a wall is not cut out of it.
+    """
     for wall in world.walls:
         length = math.dist(wall[:2], wall[2:])
         ex, ey = ((wall[2] - wall[0]) / length, (wall[3] - wall[1]) / length) if length else (0.0, 0.0)
@@ -47,9 +56,9 @@ def walls_without_doors(world: WorldSpec) -> Iterator[WallSegment]:
 
 
 def clearance(point: FixedPoint, world: WorldSpec) -> tuple[float, str]:
-    """Returns the distance in m from a point to the nearest wall or pillar, and words for that obstacle.
+    """Returns the distance in m from a point (x, y) to the nearest wall or pillar, and words for that obstacle.
 
-    Negative inside a pillar; inf and "nothing" where there is neither wall nor pillar.
+    Openings of doors do not count as wall. Negative inside a pillar; inf and "nothing" without walls and pillars.
     """
     best = (math.inf, "nothing")
     for wall in walls_without_doors(world):
@@ -62,7 +71,7 @@ def clearance(point: FixedPoint, world: WorldSpec) -> tuple[float, str]:
 
 
 def queue_places(event: QueueOrder, count: int) -> tuple[FixedPoint, ...]:
-    """Returns the first `count` places of a queue, m, head first."""
+    """Returns the first `count` places (x, y) of a queue, m, head first; they may lie outside the world."""
     angle = math.radians(event.direction_deg)
     (x, y), step = event.at, event.spacing
     return tuple((x + k * step * math.cos(angle), y + k * step * math.sin(angle)) for k in range(count))

@@ -22,7 +22,9 @@ from scenarios.schema.values import Model, NonNegative, Positive
 
 
 class ObservationSpec(Model):
-    """Camera, sensor, light and picture, with the keys that they have in a scenario."""
+    """Camera, sensor, light and picture, with the keys that they have in a scenario; an absent table has
+    all defaults.
+    """
 
     schema_: Literal[1] = Field(1, alias="schema")
     camera: CameraSpec = CameraSpec()
@@ -34,10 +36,12 @@ class ObservationSpec(Model):
 class ReplayOrigin(Model):
     """The recording whose motion a replay shows.
 
-    kind, name: of the recording; real: it shows real people, so nothing may be tuned on it; people: its ids of persons
-    1, 2, … of the replay; start, duration: the part replayed, s; smoothing: movements of the labels that are quicker
-    than this are removed as jitter, s; shift: positions in the replay minus those in the recording, m; motion: SHA-256
-    of its labelled positions, ids and groups.
+    - kind, name: of the recording. real: it shows real people, so nothing may be tuned on it.
+    - people: the recording's ids of persons 1, 2, … of the replay, in this order.
+    - start, duration: the part that is replayed, s. shift: positions in the replay minus those in the recording, x, y,
+      m.
+    - smoothing: movements of the labels that are quicker than this are removed as jitter, s.
+    - motion: SHA-256 of the recording's labelled positions, ids and groups.
     """
 
     kind: str
@@ -52,7 +56,9 @@ class ReplayOrigin(Model):
 
 
 class ReplaySpec(ObservationSpec):
-    """A replay with all defaults filled in: the content of its scenario.toml."""
+    """A replay with all defaults filled in, as stored in its scenario.toml: name of the sequence, `replay`,
+    observation.
+    """
 
     name: str
     replay: ReplayOrigin

@@ -12,7 +12,11 @@ from scenarios.schema.values import Distribution, Model, NonNegative, Positive, 
 
 
 class LightSwitch(Model):
-    """A sudden change of brightness, as of a lamp or a cloud."""
+    """A sudden change of brightness, as of a lamp or a cloud.
+
+    - at: time of the change, s. gain: factor of the brightness from then on, above 0. Either may be a distribution.
+    - ramp: duration of the change, s.
+    """
 
     at: Value = Field(description="time of the change, s")
     gain: Value = Field(description="factor of the brightness from then on; above 0")
@@ -20,7 +24,14 @@ class LightSwitch(Model):
 
 
 class Light(Model):
-    """The light on the scene; it changes pictures only."""
+    """The light on the scene; it changes pictures only. Brightness changes are relative standard deviations.
+
+    - sun_azimuth_deg (from where the light comes; 0 = from +x, 90 = from +y), sun_elevation_deg: degrees.
+    - shadow: share of the brightness lost in a cast shadow; 0 = no shadows. penumbra: width of a shadow's soft edge, m.
+    - drift, drift_time: slow changes, and their time constant, s. flicker: changes from frame to frame.
+    - cloud, cloud_size (m), cloud_speed (m/s): soft patches that move over the ground.
+    - switch: sudden changes of brightness.
+    """
 
     sun_azimuth_deg: Value = Field(
         Distribution(uniform=(-180, 180)), description="direction from which the light comes; 0 = from +x, 90 = from +y"
@@ -44,7 +55,15 @@ class Light(Model):
 
 
 class Picture(Model):
-    """Texture, noise, blur and artefacts; they change pictures only."""
+    """Texture, noise, blur and artefacts; they change pictures only.
+
+    - texture: contrast of the patterns on ground and walls, 0 to 1.
+    - noise: standard deviation per pixel and channel at grey level 128, grey levels. shot: share of its variance that
+      is proportional to the brightness.
+    - blur_px: standard deviation of the blur, px. jpeg: quality 0 to 100; 0 = no compression.
+    - foliage: share of the image covered by moving plants. sway_px, sway_time: standard deviation of their movement,
+      px, and the time after which its correlation is 0.6, s.
+    """
 
     texture: Share = Field(0.5, description="contrast of the patterns on ground and walls")
     noise: NonNegative = Field(

@@ -31,14 +31,17 @@ SPACING = Distribution(normal=(0.75, 0.12), clip=(0.5, 1.2))
 
 
 class DoorSpec(Model):
-    """A door: an opening in a wall."""
+    """A door: an opening in a wall. at: x, y of its middle, m, on a wall. width: m."""
 
     at: FixedPoint = Field(description="middle of the opening, m; must lie on a wall")
     width: Positive = Field(1.2, description="m")
 
 
 class StairsSpec(Model):
-    """A flight of stairs; its height rises linearly from `foot` to `head`."""
+    """A flight of stairs; its height rises from 0 at `foot` to `rise` at `head`, the middles of its ends (x, y in m).
+
+    width, rise, landing (level ground behind the head): m. steps: number. slowdown: share of the walking speed kept.
+    """
 
     foot: FixedPoint = Field(description="middle of the lowest edge, m")
     head: FixedPoint = Field(description="middle of the highest edge, m")
@@ -52,7 +55,11 @@ class StairsSpec(Model):
 
 
 class WorldSpec(Model):
-    """The immobile parts of the scene: walls, pillars, stairs, doors, service points."""
+    """The immobile parts of the scene, in m.
+
+    size: x, y. walls: x1, y1, x2, y2. pillars: x, y, radius. stairs. doors: openings in walls. service: x, y of
+    counters.
+    """
 
     size: tuple[Positive, Positive] = Field((16.0, 10.0), description="extent in x and y, m")
     walls: tuple[tuple[float, float, float, float], ...] = Field(
@@ -69,7 +76,11 @@ class WorldSpec(Model):
 
 
 class CameraSpec(Model):
-    """Place, direction and lens of the camera, size and rate of its images."""
+    """Place, direction and lens of the camera; size (px) and rate (fps) of its images.
+
+    px_per_m (kind top), height (m) and position (x, y, m) None: chosen so that all people are in view. Angles in
+    degrees. crop False: people who walk out of view are an error.
+    """
 
     kind: Literal["pinhole", "top"] = Field("pinhole", description="perspective, or orthographic from above")
     image: tuple[Annotated[int, Field(ge=16, le=8192)], Annotated[int, Field(ge=16, le=8192)]] = Field(
@@ -95,7 +106,11 @@ class CameraSpec(Model):
 
 
 class CrowdSpec(Model):
-    """How people walk; the defaults are measured values (docs/experiments/realism.md)."""
+    """How people walk: free speed (m/s), spacing in a group (m), body height (m), slowdown per member after the first
+    (m/s).
+
+    The first three are numbers or distributions. The defaults are measured values (docs/experiments/realism.md).
+    """
 
     free_speed: Value = Field(FREE_SPEED, description="walking speed of a person alone, m/s")
     spacing: Value = Field(SPACING, description="distance between neighbours in a group, m")
@@ -106,7 +121,11 @@ class CrowdSpec(Model):
 
 
 class GroupSpec(Model):
-    """A group of people who belong together from the start; a person alone is a group of one."""
+    """A group of people who belong together from the start; a person alone is a group of one. `repeat` makes n such
+    groups.
+
+    start, goal, via: points in m. speed: m/s, None: follows from the members. enter: s. size: number of people.
+    """
 
     id: Name = Field(description="name in the script; repeat = n makes the groups id-1 … id-n")
     size: Value = Field(GROUP_SIZE, description="number of people; rounded, at least 1")
@@ -127,7 +146,7 @@ class GroupSpec(Model):
 
 
 class Reach(Model):
-    """A trigger: the middle of a group comes near a place."""
+    """A trigger: the middle of `group` comes within `radius` m of the place `at` (x, y, m; None: the group's goal)."""
 
     group: Name = Field(description="name of the group")
     at: FixedPoint | None = Field(None, description="the place, m; absent: the group's goal")
@@ -135,7 +154,12 @@ class Reach(Model):
 
 
 class When(Model):
-    """When an order fires: exactly one of time, reach, distance_lt, after, and a delay after it."""
+    """An order fires `delay` s after its trigger: exactly one of the other fields, else ValidationError; the rest is
+    None.
+
+    time: s. reach: a group comes near a place. distance_lt: every two of the order's groups are nearer than this, m.
+    after: id of an order whose rule has come true.
+    """
 
     time: Value | None = Field(None, description="the order fires at this time, s")
     reach: Reach | None = None
@@ -149,7 +173,7 @@ class When(Model):
 
     @model_validator(mode="after")
     def _one_trigger(self) -> Self:
-        """Raises ValueError unless exactly one trigger is given."""
+        """Returns the model; raises ValueError unless exactly one of time, reach, distance_lt and after is given."""
         given = [name for name in ("time", "reach", "distance_lt", "after") if getattr(self, name) is not None]
         if len(given) != 1:
             raise ValueError(f"`when` has exactly one of time, reach, distance_lt, after, not {given}")
@@ -157,7 +181,10 @@ class When(Model):
 
 
 class SplitPart(Model):
-    """One part of a group that splits."""
+    """One part of a group that splits. id: of the new group. goal, via: points in m. at_goal: stand, leave or walk on.
+
+    size: number of people; None: an equal share of the people left over.
+    """
 
     id: Name = Field(description="name of the new group")
     size: Annotated[int, Field(ge=1)] | None = Field(
@@ -169,7 +196,10 @@ class SplitPart(Model):
 
 
 class MergeOrder(Model):
-    """An order: groups become one."""
+    """An order: the groups named in `groups` (two or more) become the new group `into`. when: its trigger.
+
+    The new group walks past `via` to `goal` (m). Goal "meet": it stands in conversation where the groups meet.
+    """
 
     id: Name = Field(description="name of the order")
     type: Literal["merge"] = Field(description="several groups become one")
@@ -185,7 +215,7 @@ class MergeOrder(Model):
 
 
 class SplitOrder(Model):
-    """An order: a group divides into parts."""
+    """An order: the group named `group` divides into two or more parts with goals of their own. when: its trigger."""
 
     id: Name = Field(description="name of the order")
     type: Literal["split"] = Field(description="a group divides into parts")
@@ -195,7 +225,12 @@ class SplitOrder(Model):
 
 
 class QueueOrder(Model):
-    """An order: groups line up at a point, are served one group after the other, and walk on."""
+    """An order: groups line up at the point `at` (m), are served one group after the other, and walk on. when: its
+    trigger.
+
+    groups: names, or patterns such as `g-*`. spacing: m. service: time per group, s. goal: m, None: each group's own
+    goal.
+    """
 
     id: Name = Field(description="name of the order")
     type: Literal["queue"] = Field(description="groups line up and are served one by one")
@@ -217,7 +252,12 @@ ScriptOrder = Annotated[MergeOrder | SplitOrder | QueueOrder, Field(discriminato
 
 
 class Scenario(Model):
-    """A whole scenario after `extends` (scenarios.loading.toml_files) has been applied: the form that is stored."""
+    """A whole scenario with all defaults, after `extends` has been applied: the form that is stored. Unknown keys are
+    errors.
+
+    duration, warmup, lead: s. turn_deg: degrees. group: at least one. event: the orders, in order; empty without a
+    script.
+    """
 
     schema_: Literal[1] = Field(alias="schema", description="version of the file format")
     name: Name = Field("scenario", description="name of the sequences made from it; absent: the file's name")
@@ -249,5 +289,9 @@ def group_names(group: GroupSpec) -> list[str]:
 
 
 def expand(pattern: str, names: list[str]) -> list[str]:
-    """Returns all names that begin with `g-` for the pattern `g-*`, and a name without `*` as it is."""
+    """Returns the names of groups that a pattern means: for `g-*` all of `names` that begin with `g-`, in order, maybe
+    none.
+
+    A pattern without `*` is returned as the only name, whether or not it is in `names`.
+    """
     return [n for n in names if n.startswith(pattern[:-1])] if pattern.endswith("*") else [pattern]

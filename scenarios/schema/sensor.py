@@ -18,7 +18,9 @@ MeanAndSd = tuple[float, NonNegative]
 
 
 class Hide(Model):
-    """Artificial occlusion: some people, or all, are not detected for a while."""
+    """Artificial occlusion from `start` to `end`, s: no person of the group named `group` is detected; None: no person
+    at all.
+    """
 
     start: NonNegative = Field(description="start of the occlusion, s")
     end: NonNegative = Field(description="end of the occlusion, s")
@@ -26,7 +28,10 @@ class Hide(Model):
 
 
 class Memory(Model):
-    """A part of an error that changes slowly from frame to frame."""
+    """A part of an error that changes slowly from frame to frame.
+
+    share: its share of the error's variance, 0 to 1. time: time after which its correlation is 0.37, s.
+    """
 
     share: Share = Field(description="share of the error's variance")
     time: Positive = Field(description="time after which the correlation of this part is 0.37, s")
@@ -36,7 +41,15 @@ Memories = tuple[Memory, ...]
 
 
 class BoxNoise(Model):
-    """Errors of boxes that are proportional to the box height: [mean, standard deviation] each."""
+    """Errors of detected boxes in proportion to the box height; each is (mean, standard deviation).
+
+    - across: middle, to the right; foot, top: lower and upper edge, downwards; all in box heights.
+    - width: logarithm of the width.
+    - occluded: each standard deviation is multiplied by 1 + this × hidden share of the box.
+    - tails: excess kurtosis of the errors; 0 = normal.
+    - memory: parts that change slowly; None: all errors are drawn anew in each frame. Shares above 1 in sum are an
+      error.
+    """
 
     across: MeanAndSd = Field(
         (0.0, 0.0), description="error of the middle, to the right: mean, standard deviation; box heights"
@@ -65,7 +78,15 @@ class BoxNoise(Model):
 
 
 class FalseAlarms(Model):
-    """False alarms that last, some of them attached to people."""
+    """False alarms that last, some of them attached to people. Pairs are (mean, standard deviation).
+
+    - life: mean life, s; 0 = one frame. seen: probability that a living one is detected in a frame.
+    - near: share that moves with a person. Of these: across, foot: place relative to the person, box heights;
+      near_height: logarithm of the height relative to the person's.
+    - Of all others: height: logarithm of the height relative to a person there; drift: standard deviation of the
+      velocity per axis, box heights per s; at: possible foot points as shares of the image, None: anywhere.
+    - Of all: aspect: logarithm of width / height; jitter: standard deviation of each edge per frame, box heights.
+    """
 
     life: NonNegative = Field(0.0, description="mean life of a false alarm, s; 0 = one frame")
     seen: Annotated[float, Field(gt=0, le=1)] = Field(
@@ -109,7 +130,18 @@ class FalseAlarms(Model):
 
 
 class Sensor(Model):
-    """The synthetic detector that makes the points and boxes of det/det.txt."""
+    """The synthetic detector that makes the points and boxes of det/det.txt.
+
+    - detect_prob; clutter_rate: mean false alarms per frame; noise_px, noise_m: standard deviation of box edges and
+      points.
+    - occlusion_power, min_visibility, small_px (box height, px), persistence: what lowers or correlates detection.
+    - box: "visible" or "amodal". hide: artificial occlusions.
+    - by_visibility, miss_memory, box_noise: measured, they replace occlusion_power, persistence, noise_px; None: they
+      do not.
+    - points, false_alarms, true_scores, false_scores: measured; None: not measured.
+
+    Raises pydantic.ValidationError for unknown keys and keys that exclude each other.
+    """
 
     detect_prob: Share = Field(0.95, description="probability that a fully visible person of usual size is detected")
     clutter_rate: NonNegative = Field(0.3, description="mean number of false alarms per frame (Poisson)")
@@ -153,7 +185,9 @@ class Sensor(Model):
 
     @model_validator(mode="after")
     def _consistent(self) -> Self:
-        """Raises ValueError if keys exclude each other, quantiles decrease, or shares add up to more than 1."""
+        """Returns the model; raises ValueError for miss_memory together with persistence, quantiles of scores that
+        decrease, or shares of miss_memory that add up to more than 1.
+        """
         if self.miss_memory is not None and self.persistence:
             raise ValueError("either miss_memory or persistence, not both")
         for scores in (self.true_scores, self.false_scores):
@@ -164,6 +198,6 @@ class Sensor(Model):
 
 
 def _check_shares(memory: Memories | None) -> None:
-    """Raises ValueError if the shares add up to more than 1."""
+    """Raises ValueError if the shares of the parts add up to more than 1; None and no part are fine."""
     if sum(part.share for part in memory or ()) > 1 + 1e-9:
         raise ValueError("shares whose sum is at most 1")

@@ -25,13 +25,22 @@ FixedPoint = tuple[float, float]
 
 
 class Model(BaseModel):
-    """Base class of all tables: frozen; unknown keys, infinite numbers and nan are errors."""
+    """Base class of all tables of scenario files: frozen.
+
+    Unknown keys, infinite numbers and nan raise pydantic.ValidationError.
+    """
 
     model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False, populate_by_name=True)
 
 
 class Distribution(BaseModel):
-    """One of five distributions: exactly one of the keys besides `clip` is given."""
+    """One of five distributions of a number: exactly one of the keys besides `clip` is given, the rest is None.
+
+    - normal: mean, standard deviation. uniform: least, greatest. exponential, poisson: mean.
+    - choice: values of equal probability. clip: least and greatest value kept; draws outside are drawn again.
+
+    Any other combination, or bounds in the wrong order, raises pydantic.ValidationError.
+    """
 
     model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
 
@@ -44,7 +53,9 @@ class Distribution(BaseModel):
 
     @model_validator(mode="after")
     def _one_kind(self) -> Self:
-        """Raises ValueError unless exactly one kind is given and all bounds are in order."""
+        """Returns the model; raises ValueError unless exactly one kind is given, and the bounds of uniform and clip are
+        in order.
+        """
         kinds = [name for name in ("normal", "uniform", "exponential", "poisson", "choice") if getattr(self, name)]
         if len(kinds) != 1:
             raise ValueError(
@@ -57,7 +68,7 @@ class Distribution(BaseModel):
         return self
 
     def _draw(self, rng: np.random.Generator) -> float:
-        """One draw, without `clip`."""
+        """Returns one draw from rng, ignoring `clip`; poisson gives a whole number as float."""
         if self.normal is not None:
             return float(rng.normal(*self.normal))
         if self.uniform is not None:
@@ -70,7 +81,10 @@ class Distribution(BaseModel):
         return self.choice[int(rng.integers(len(self.choice)))]
 
     def draw(self, rng: np.random.Generator) -> float:
-        """Returns one value. Raises ValueError if none of MAX_REDRAWS draws lies within `clip`."""
+        """Returns one value from rng within `clip`, bounds included; draws outside are drawn again.
+
+        Raises ValueError if none of MAX_REDRAWS (10,000) draws lies within `clip`.
+        """
         for _ in range(MAX_REDRAWS):
             value = self._draw(rng)
             if self.clip is None or self.clip[0] <= value <= self.clip[1]:
@@ -83,12 +97,19 @@ Point = tuple[Value, Value]
 
 
 def draw(value: Value, rng: np.random.Generator) -> float:
-    """Returns the number, or one draw of the distribution; raises ValueError as `Distribution.draw` does."""
+    """Returns the number itself as float, or one draw of the distribution from rng.
+
+    Raises ValueError if none of 10,000 draws lies within the distribution's clip.
+    """
     return value.draw(rng) if isinstance(value, Distribution) else float(value)
 
 
 def bounds(value: Value) -> tuple[float, float]:
-    """Returns the least and greatest number that a value can take; -inf or inf where there is no bound."""
+    """Returns the least and greatest number that a value can take, `clip` included; -inf or inf where there is no
+    bound.
+
+    A number gives itself twice. Without clip, normal gives -inf and inf, exponential and poisson 0 and inf.
+    """
     if not isinstance(value, Distribution):
         return float(value), float(value)
     if value.uniform is not None:
@@ -101,6 +122,6 @@ def bounds(value: Value) -> tuple[float, float]:
 
 
 def fixed(point: Point) -> tuple[float, float] | None:
-    """Returns the point if both coordinates are numbers, None if one is a distribution."""
+    """Returns the point (x, y) if both coordinates are numbers, None if one is a distribution."""
     x, y = point
     return None if isinstance(x, Distribution) or isinstance(y, Distribution) else (float(x), float(y))
