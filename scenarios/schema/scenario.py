@@ -106,10 +106,10 @@ class CameraSpec(Model):
 
 
 class CrowdSpec(Model):
-    """How people walk: free speed (m/s), spacing in a group (m), body height (m), slowdown per member after the first
-    (m/s).
+    """How people walk; the defaults are measured values (docs/experiments/realism.md).
 
-    The first three are numbers or distributions. The defaults are measured values (docs/experiments/realism.md).
+    free_speed (m/s), spacing in a group (m), body height (m): numbers or distributions. slowdown_per_member: m/s for
+    each member after the first.
     """
 
     free_speed: Value = Field(FREE_SPEED, description="walking speed of a person alone, m/s")

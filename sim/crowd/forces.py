@@ -77,9 +77,16 @@ FOOT_X, FOOT_Y, AXIS_X, AXIS_Y, LENGTH, WIDTH, SLOWDOWN = range(7)
 
 @dataclass(frozen=True, slots=True)
 class Steering:
-    """Parameters of the forces on people. Each field's comment states unit and meaning.
+    """Parameters of the forces on people; 21 fields, in the order of the slots of the kernels' parameter array.
 
-    The order of the fields is the order of the slots RELAXATION … MAX_ACCELERATION of the kernels' parameter array.
+    - relaxation, cohesion_time, turn_time, slow_time, avoid_time: time constants, s. alignment: rate, 1/s.
+    - separation, shove: repulsion at distance zero between members and between strangers, m/s²; wall: at contact, m/s².
+    - separation_range, wall_range, person_range, group_range: distances at which forces end (wall_range: fall to 37 %),
+      m.
+    - haste: share of the group's speed that a member may add. avoid_person, avoid_group: strengths of the power law.
+    - person_radius: half the distance that strangers keep, m. avoid_max, max_acceleration: caps of one and of all
+      forces, m/s². gather_radius, pass_radius: distances at which a group has gathered, and a waypoint counts as
+      passed, m.
     """
 
     relaxation: float = 0.5  # s: time in which a person takes up the wanted velocity
@@ -112,7 +119,7 @@ class Steering:
 
 
 class GroupArrays(NamedTuple):
-    """State of G groups of people and of the ways they walk. `drive` reads it and updates current, heading, arrived,
+    """State of G groups of people and of the ways they walk. The goal kernels update current, heading, arrived and
     status.
 
     - route (G, W, 2): x, y of each group's waypoints, m. kind (G, W): PASS, NARROW (door), GATHER or END of each
@@ -120,7 +127,9 @@ class GroupArrays(NamedTuple):
     - length (G,): number of waypoints. current (G,): index, from 0, of the waypoint the group is walking to.
     - speed (G,): m/s. heading (G, 2): unit vector. finish (G,): STAND or LEAVE at the end of the way.
     - arrived (G,): True once the end of the way is reached.
-    - status (G, 10): columns COUNT … AVOIDED as named at the top of this module, rewritten in each step.
+    - status (G, 10), rewritten in each step: number of members present; mean position x, y, m; mean velocity x, y, m/s;
+      largest distance of a member from the mean position, and from its place, m; wanted velocity x, y, m/s; 1.0 while
+      other groups avoid this group as a whole, else 0.0.
     """
 
     route: Array
