@@ -24,9 +24,9 @@ FASTEST = 2.0
 class PointClaims:
     """Which of M points each of G groups may have. Rows of the bank stand for groups.
 
-    points (M, 2); weights (M,): people that each stands for; last_seen (M,) s: when it was measured; d2 (G, M): squared
-    Mahalanobis distances, inf outside the regions; owner (M,): row of the one group that may have the point although it
-    is in no region, or -1; claimants (M,): number of groups that may have the point.
+    points (M, 2): x, y; weights (M,): people that each stands for; last_seen (M,): time, s, when it was measured; d2
+    (G, M): squared Mahalanobis distances, inf outside the search regions; owner (M,): row of the one group that may
+    have the point although it is in no region, or -1; claimants (M,): number of groups that may have the point.
     """
 
     points: Array
@@ -39,11 +39,11 @@ class PointClaims:
 
 @dataclass(frozen=True)
 class Associated:
-    """The result of `associate`.
+    """The result of `associate` for G groups and M points.
 
-    chosen (G, M): points of each group's likeliest association, which groups may share; exclusive (G, M): the same with
-    each point at one group only. innovation: (id, y (2,), S (2, 2)) of each confirmed group that was measured: the
-    innovation of its likeliest association and its covariance.
+    chosen (G, M) bool: points of each group's likeliest association, which groups may share; exclusive (G, M) bool: the
+    same with each point at one group only. innovation: (id, y (2,), S (2, 2)) of each confirmed group that was
+    measured: the innovation of its likeliest association, in the unit of the points, and its covariance.
     """
 
     chosen: Bools
@@ -52,10 +52,11 @@ class Associated:
 
 
 def gated_distances(bank: GroupBank, points: Array, scaled: ScaledParameters, t: float) -> Array:
-    """Return squared Mahalanobis distances (G, M) of the points (M, 2), inf outside a group's search region (eq. 2.2).
+    """Return squared Mahalanobis distances (G, M) of the points (M, 2) from the groups, inf outside a search region
+    (eq. 2.2).
 
-    Lost groups have no region. Tentative groups have no points that lie in a confirmed group's region. The region of a
-    group without feasible associations widens at `split_speed`.
+    t: time of the frame, s. Lost groups have no region. Tentative groups have no points that lie in a confirmed group's
+    region. The region of a group without feasible associations widens at `split_speed`.
     """
     config = scaled.config
     lost = bank.confirmed & (t - bank.last_seen > max(config.coast_time, scaled.dt) + 1e-9)
@@ -72,9 +73,10 @@ def gated_distances(bank: GroupBank, points: Array, scaled: ScaledParameters, t:
 def attached(points: Array, d2: Array, bank: GroupBank, scaled: ScaledParameters) -> Ints:
     """Return for each point (M,) the row of the group that it is attached to, or -1 (ours).
 
-    A point in no region is attached to a group if it is linked (R_0), directly or through others, to a point in the
-    group's region; of several groups, to the one whose point is nearest. From points, a confirmed group takes only
-    points within walking distance of its members: the others are newcomers or false alarms.
+    points (M, 2); d2 (G, M): inf outside the search regions. A point in no region is attached to a group if it is
+    linked (at most 2 r apart, R_0), directly or through others, to a point in the group's region; of several groups, to
+    the one whose point is nearest. From points, a confirmed group takes only points within walking distance of its
+    members: the others are newcomers or false alarms. A point in a region gets -1.
     """
     link, owner = scaled.constraint.link, np.full(len(points), -1)
     taken = np.isfinite(d2).any(0) if len(d2) else np.zeros(len(points), bool)
@@ -100,25 +102,32 @@ def attached(points: Array, d2: Array, bank: GroupBank, scaled: ScaledParameters
 
 
 def walking_reach(scaled: ScaledParameters, elapsed: Array) -> Array:
-    """Return how far (K,) a member may be from its predicted place, `elapsed` (K,) s after its last measurement.
+    """Return how far (K,), in the unit of the points, a member may be from its predicted place.
 
-    Times shorter than a frame count as one frame.
+    elapsed (K,) or a number: s after its last measurement; times shorter than a frame count as one frame. The reach is
+    2 m/s times that, plus 3 standard deviations of a measured position.
     """
     return np.asarray(scaled.scale * FASTEST * np.maximum(elapsed, scaled.dt) + 3 * scaled.point_sd)
 
 
 def claimed(points: Array, weights: Array, d2: Array, owner: Ints, t: float) -> PointClaims:
-    """Return the claims on the points of frame time t. owner (M,): from `attached`, or -1 for all points."""
+    """Return the claims on the points (M, 2) of the frame at time t, s: who may have each point.
+
+    weights (M,): people that each point stands for; d2 (G, M): squared distances, inf outside the search regions; owner
+    (M,): from `attached`, or -1 for all points. All points are measured at t.
+    """
     claimants = np.where(owner >= 0, 1, np.isfinite(d2).sum(0))
     return PointClaims(points, weights, np.full(len(points), t), d2, owner, claimants)
 
 
 def associate(bank: GroupBank, claims: PointClaims, log_ratio: Array, scaled: ScaledParameters, t: float) -> Associated:
-    """Update the groups of the bank by their associations (sec. 4.1 to 4.3) and return the points that they have.
+    """Update the groups of the bank in place by their associations (sec. 4.1 to 4.3) and return the points that they
+    have.
 
-    log_ratio (G, M): of the points' colours (tracking.papers.group_pda.colour), or (G, 0) without colours.
-    A group counts as measured if its association has a point of this frame. `null_time` grows by a frame for a group
-    without feasible associations, and shrinks by a frame, down to 0, for a measured one.
+    log_ratio (G, M): log p(colour | group) - log p(colour | other groups) of each point, or (G, 0) without colours. t:
+    time of the frame, s. A group counts as measured if its association has a point of this frame. `null_time` grows by
+    a frame for a group without feasible associations, and shrinks by a frame, down to 0, for a measured one. last_seen,
+    measured_time and own_people are updated, too.
     """
     weighted = scaled.config.appearance * log_ratio
     state, chosen, report = kernels.associate(
@@ -142,9 +151,10 @@ def associate(bank: GroupBank, claims: PointClaims, log_ratio: Array, scaled: Sc
 
 
 def nearest_claims(claimed: Bools, d2: Array, log_ratio: Array) -> Bools:
-    """Return the claims (G, M) with each point at one group only: the nearest of those that claim it.
+    """Return a copy of the claims (G, M) bool with each point at one group only: the nearest of those that claim it.
 
-    d2 (G, M): squared distances from the centroids; the colours' log_ratio (G, M), or (G, 0), counts twice against it.
+    d2 (G, M): squared distances from the centroids. log_ratio (G, M) of the points' colours, or (G, 0): twice its value
+    is subtracted from d2. Of equal distances the first row wins. A point that no group claims stays so.
     """
     one, shared = claimed.copy(), np.flatnonzero(claimed.sum(0) > 1)
     if len(shared):

@@ -43,8 +43,10 @@ INNOVATION_X, INNOVATION_Y, S_XX, S_XY, S_YY, MISS_MASS = range(6)
 
 @njit(cache=True)
 def search(points: Array, x: Array, P: Array, extent: Array, noise: float, wider: Array, gate: float) -> Array:
-    """Return squared Mahalanobis distances (G, M) of points from groups, inf outside the search region (eq. 2.2).
+    """Return squared Mahalanobis distances (G, M) of points (M, 2) from groups, inf outside the search region (eq.
+    2.2).
 
+    x (G, 4): centroid x, y, velocity; P (G, 4, 4): its covariance; extent (G, 2, 2): Sigma, covariance of the members.
     The region is d^2 < gate. Departure: the covariance is Sigma + (H P H' + (noise + wider) I), because the centroid is
     uncertain. noise: variance of a point; wider (G,): further variance of each group.
     """
@@ -66,9 +68,9 @@ def search(points: Array, x: Array, P: Array, extent: Array, noise: float, wider
 
 @njit(cache=True)
 def any_within(place: Array, points: Array, reach: float) -> Bools:
-    """Return flags (K,): True if any of the points (M, 2) is at most `reach` from the place (K, 2).
+    """Return flags (K,): True if any of the points (M, 2) is at most `reach` from the place (K, 2); all in one unit.
 
-    The points are looked at outwards along x.
+    Without points all are False. The points are looked at outwards along x.
     """
     order = np.argsort(points[:, 0])
     x = points[order, 0]
@@ -98,13 +100,15 @@ def associate(
 ) -> tuple[Ints, Bools, Array]:  # fmt: skip
     """Update the groups x (G, 4), P (G, 4, 4), extent (G, 2, 2), size (G,) in place by the points (sec. 4.1 to 4.3).
 
-    d2 (G, M): from `search`. log_ratio (G, M): what a point adds to the log mass per person by its colour, or (G, 0)
-    without colours. owner (M,): the row of the only group that may have the point outside its region, or -1.
-    claimants (M,): number of groups that may have the point. rest (G,): groups whose extent and size must not change.
+    points (M, 2); weights (M,): people each stands for. d2 (G, M): from `search`. log_ratio (G, M): what a point adds
+    to the log mass per person by its colour, or (G, 0) without colours. owner (M,): the row of the only group that may
+    have the point outside its region, or -1. claimants (M,): number of groups that may have the point. rest (G,): True
+    for groups whose extent and size must not change. rules: see association_mass_kernels.
 
-    Returns the state (G,) of each group, the points (G, M) of its likeliest association, and the report (G, 6).
-    - NOTHING: the group has no points, only noise, or the miss has at least the mass of all associations. No points
-      are chosen. The group is updated by the mixture if it has a feasible association.
+    Returns the state (G,) of each group, the points (G, M) bool of its likeliest association, and the report (G, 6):
+    innovation x, y, its covariance xx, xy, yy, normalised mass of the miss.
+    - NOTHING: the group has no points, only noise, or the miss has at least the mass of all associations. No points are
+      chosen. The group is updated by the mixture if it has a feasible association.
     - NULL: it has points, more than noise, but no feasible association. All its points are chosen; it is not updated.
     - MEASURED: else.
     """
@@ -140,9 +144,10 @@ def associate(
 
 @njit(cache=True)
 def _ordered_points(d2: Array, log_ratio: Array, owner: Ints, claimants: Ints, g: int) -> tuple[Ints, int]:
-    """The points of group g: first the unshared ones, then the shared ones by distance less colour evidence (sec. 4.1).
+    """Returns the indices of the points of group g, and the number of unshared ones, which come first (sec. 4.1).
 
-    Also the number of unshared ones.
+    The shared points follow by distance less twice the colour evidence. d2, log_ratio (M,): of this group (log_ratio
+    may be empty); owner, claimants (M,): as in `associate`.
     """
     inside = np.flatnonzero((d2 < np.inf) | (owner == g))
     shared = claimants[inside] > 1
@@ -159,10 +164,12 @@ def _estimate(
     points: Array, weights: Array, colour: Array, start: int, feasible: Bools,
     x: Array, P: Array, extent: Array, size: Array, rest: bool, rules: Array, report: Array,
 ) -> int:  # fmt: skip
-    """Update one group in place by its associations: the first start, start + 1, … of its ordered points.
+    """Update one group (x, P, extent, size, report) in place by its associations: the first start, start + 1, … of its
+    points.
 
-    feasible (J,): which associations satisfy the group constraint (m_g, eq. 4.1). Returns the number of shared points
-    in the likeliest association, or -1 if the miss has at least the mass of all associations together.
+    points (M, 2), weights, colour (M,): ordered; the first `start` are unshared. feasible (J,): which associations
+    satisfy the group constraint (m_g, eq. 4.1), at least one. rest: extent and size must not change. Returns the number
+    of shared points in the likeliest association, or -1 if the miss has at least the mass of all associations together.
     """
     people, mean, cov = running_moments(points, weights, x[0], x[1], start)
     S = np.empty((len(people), 3))
@@ -193,10 +200,11 @@ def _estimate(
 
 @njit(cache=True)
 def _mix(beta: Array, miss: float, mean: Array, S: Array, x: Array, P: Array) -> None:
-    """Mix the conditional estimates (sec. 4.3) in place: x = sum beta_j x_j, P = sum beta_j (P_j + spread of x_j).
+    """Mix the conditional estimates (sec. 4.3) into x (4,) and P (4, 4), in place: means over the J associations.
 
-    beta (J,) and miss: normalised masses; mean (J, 2): innovations; S (J, 3): their covariances. Each association has
-    its own gain; the miss leaves the prediction.
+    x = sum beta_j x_j, P = sum beta_j (P_j + spread of x_j). beta (J,) and miss: normalised masses; mean (J, 2):
+    innovations; S (J, 3): their covariances xx, xy, yy. Each association has its own gain; the miss leaves the
+    prediction.
     """
     shift, spread, less = np.zeros(4), np.zeros((4, 4)), np.zeros((4, 4))
     step = np.empty(4)
@@ -225,10 +233,12 @@ def _mix(beta: Array, miss: float, mean: Array, S: Array, x: Array, P: Array) ->
 
 @njit(cache=True)
 def _adapt(beta: Array, people: Array, cov: Array, extent: Array, size: Array, rules: Array) -> None:
-    """Update extent and size in place by eq. 2.4, as means over the associations; the miss leaves them as they are.
+    """Update extent (2, 2) and size (1,) in place by eq. 2.4, as means over J associations; the miss leaves them as
+    they are.
 
-    Departures: covariances of few people are shrunk to the prior, and divided by GATE_FACTOR to restore what the edge
-    of the search region cuts off.
+    beta (J,): normalised masses; people (J,), cov (J, 3): number and covariance xx, xy, yy of each association's
+    people. Departures: covariances of few people are shrunk to the prior, and divided by GATE_FACTOR to restore what
+    the edge of the search region cuts off.
     """
     target, count = np.zeros(3), 0.0
     total = beta.sum()

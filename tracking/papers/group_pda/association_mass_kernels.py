@@ -33,9 +33,12 @@ NEWCOMERS = 0.02
 
 @njit(cache=True)
 def running_moments(points: Array, weights: Array, x: float, y: float, start: int) -> tuple[Array, Array, Array]:
-    """Return people (J,), centroid (J, 2) relative to (x, y) and 1/N covariance (J, 3) of each association's points.
+    """Return people (J,), centroid (J, 2) relative to (x, y) and covariance (J, 3) xx, xy, yy of each association's
+    points.
 
-    Association j has the first start + j points. Its sums come from those of the one before (sec. 4.2.1).
+    points (M, 2), weights (M,): people each stands for. Association j = 0, 1, … M - start has the first start + j
+    points. The covariance is that with 1/N. All are 0 for an association without points. Its sums come from those of
+    the one before (sec. 4.2.1).
     """
     count = len(points) - start + 1
     people, mean, cov = np.zeros(count), np.zeros((count, 2)), np.zeros((count, 3))
@@ -55,9 +58,10 @@ def running_moments(points: Array, weights: Array, x: float, y: float, start: in
 
 @njit(cache=True)
 def log_count(people: float, size: float, width: float) -> float:
-    """Return log m_N (sec. 4.2), the density per person: a Gaussian about N with variance `width`.
+    """Return log m_N (sec. 4.2), the log density, per person, of seeing `people` people in a group of `size` people.
 
-    Departure: a small uniform part gives it tails, because people who join a group come all at once.
+    It is a Gaussian about `size` with variance `width`, people^2. Departure: a small uniform part gives it tails,
+    because people who join a group come all at once.
     """
     gauss = np.exp(-0.5 * (people - size) ** 2 / width) / np.sqrt(2 * np.pi * width)
     return float(np.log((1 - NEWCOMERS) * gauss + NEWCOMERS / (size + people + 1)))
@@ -67,11 +71,13 @@ def log_count(people: float, size: float, width: float) -> float:
 def centroid_noise(seen: float, cov: Array, extent: Array, size: float, rules: Array) -> tuple[float, float, float]:
     """Return R (xx, xy, yy), the covariance of the centroid of m = `seen` people about that of all n people there.
 
-    n = size / DETECT_PROB. cov (3,): covariance of the seen people.
+    n = size / DETECT_PROB, size: people of the group that are measured on average. cov (3,): covariance xx, xy, yy of
+    the seen people; extent (2, 2): Sigma, covariance of the members; r: POINT_SD.
     - REDRAWN, eq. 2.1 read literally: Sigma / m.
     - Members keep their places (ours): r^2 / m + (1 - m / n) n / (n - 1) Sigma / m, the variance of a mean of m drawn
       out of n without replacement, with Sigma less r^2.
     - More are seen than are there: the same with the roles exchanged and `cov` for Sigma.
+
     n - 1 is at least LEAST_OTHERS: 1 from points, where a size between one and two means doubt about which of the two.
     """
     noise = rules[POINT_SD] ** 2  # Sigma is the covariance of measured positions, so it contains this variance
@@ -90,7 +96,10 @@ def centroid_noise(seen: float, cov: Array, extent: Array, size: float, rules: A
 
 @njit(cache=True)
 def log_density(dx: float, dy: float, S: Array) -> float:
-    """Return log m_d (sec. 4.2): log N((dx, dy); 0, S), per unit of area. S (3,)."""
+    """Return log m_d (sec. 4.2): the log of the Gaussian density N((dx, dy); 0, S), per unit of area.
+
+    S (3,): covariance xx, xy, yy, positive definite, in the squared unit of dx and dy.
+    """
     area = S[0] * S[2] - S[1] * S[1]
     d2 = (S[2] * dx * dx - 2 * S[1] * dx * dy + S[0] * dy * dy) / area
     return float(-0.5 * (d2 + np.log(area)) - np.log(2 * np.pi))
@@ -98,9 +107,12 @@ def log_density(dx: float, dy: float, S: Array) -> float:
 
 @njit(cache=True)
 def log_miss(points: Array, weights: Array, start: int, extent: Array, P: Array, size: float, rules: Array) -> float:
-    """Return the log mass of the miss hypothesis (ours): no point is the group's; -inf without the hypothesis.
+    """Return the log mass of the miss hypothesis (ours): no point is the group's; -inf if MISS_PROB is 0 (no
+    hypothesis).
 
-    The points' centroid is uniform over the region. The number of the unshared points is uniform up to twice the size.
+    points (M, 2); weights (M,): people each stands for; start: number of unshared points; extent (2, 2), P (4, 4),
+    size: of the group. The points' centroid is uniform over the search region. The number of the unshared points is
+    uniform up to twice the size.
     """
     if rules[MISS_PROB] <= 0:
         return -np.inf

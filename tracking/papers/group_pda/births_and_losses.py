@@ -23,8 +23,10 @@ RECAPTURE_GATE = 13.28
 
 @dataclass(frozen=True)
 class ExpectedMembers:
-    """Where K members of confirmed groups should be: place (K, 2), reach (K,) how far from there they may be, and the
-    id of their group (K,)."""
+    """Where K members of confirmed groups should be, in the unit of the points.
+
+    place (K, 2): predicted x, y; reach (K,): how far from there a member may be; group (K,): id of the member's group.
+    """
 
     place: Array
     reach: Array
@@ -32,7 +34,11 @@ class ExpectedMembers:
 
 
 def expected_members(bank: GroupBank, scaled: ScaledParameters, t: float) -> ExpectedMembers:
-    """Return the expected members of the confirmed groups that were measured in the last `carry_time` s or frame."""
+    """Return the expected members, at time t (s), of the confirmed groups that were measured lately.
+
+    That is within the last `carry_time` s, or within one frame if that is longer. Without such a group the result has K
+    = 0.
+    """
     recent = t - bank.last_seen <= max(scaled.config.carry_time, scaled.dt) + 1e-9
     rows = np.flatnonzero(bank.confirmed & recent).tolist()
     places = [bank.positions(r) for r in rows]
@@ -45,10 +51,11 @@ def expected_members(bank: GroupBank, scaled: ScaledParameters, t: float) -> Exp
 def add_newborns(
     bank: GroupBank, points: Array, weights: Array, expected: ExpectedMembers, scaled: ScaledParameters, t: float
 ) -> None:
-    """Append the tentative groups that the unclaimed points (M, 2) form under G_y (sec. 3.3).
+    """Append to the bank the tentative groups that the unclaimed points form under the group constraint G_y (sec. 3.3).
 
-    expected: the members before the groups were updated. A newborn group within their reach is the child of the nearest
-    member's group (ours).
+    points (M, 2), weights (M,): people each stands for; t: s. expected: the members before the groups were updated. A
+    newborn group with a point within their reach is the child of the nearest member's group (ours). Noise forms no
+    group.
     """
     if not len(points):
         return
@@ -64,9 +71,9 @@ def add_newborns(
 
 
 def _set_parent(born: GroupBank, k: int, bank: GroupBank, row: int, scaled: ScaledParameters) -> None:
-    """Make newborn group k a child of the group in `row`, with its velocity if `inherit_velocity` is set.
+    """Make group k of the bank `born` a child of the group in `row` of `bank`; changes `born` in place.
 
-    Its origin is the common centroid of both.
+    Its origin is the common centroid of both. With `inherit_velocity` it starts with the parent's velocity.
     """
     share = bank.size[row] / (bank.size[row] + born.size[k])
     born.parent[k] = bank.id[row]
@@ -77,10 +84,11 @@ def _set_parent(born: GroupBank, k: int, bank: GroupBank, row: int, scaled: Scal
 
 
 def confirm(bank: GroupBank, scaled: ScaledParameters, t: float, ids: GroupIds) -> Iterator[BankEvent]:
-    """Give ids to tentative groups that were measured for longer than `confirm_time`; yield their events.
+    """Give ids to tentative groups that were measured for longer than `confirm_time`; yield their events. t: s.
 
-    A group that fits an unmeasured confirmed group takes over its id, without an event; the old row becomes tentative
-    and is dropped. Any other group gets a fresh id, with a split if its parent still exists, else an enter.
+    A group that fits a confirmed group not measured in this frame takes over its id, without an event, if `recapture`
+    is on; the old row becomes tentative and is dropped later. Any other group gets a fresh id, with a split event if
+    its parent still exists, else an enter event. It is a generator: the bank changes only while it is read.
     """
     c = scaled.config
     new = np.flatnonzero(~bank.confirmed & (bank.measured_time > c.confirm_time + 1e-9))
@@ -103,11 +111,11 @@ def confirm(bank: GroupBank, scaled: ScaledParameters, t: float, ids: GroupIds) 
 
 
 def _recaptured(bank: GroupBank, new: Ints, old: Ints, scaled: ScaledParameters) -> Iterator[tuple[int, int]]:
-    """Pairs (row of a new group, row of an unmeasured old group) that are the same group, nearest first.
+    """Yields pairs (row of a new group, row of an unmeasured old group) that are the same group, nearest first.
 
-    The new state lies in the old group's predicted region of position and velocity, the velocities differ by no more
-    than `merge_velocity` and a standard deviation, and the old group was not measured after the new one's birth. No row
-    occurs twice.
+    new, old: rows of the bank to compare. The new state lies in the old group's predicted region of position and
+    velocity, the velocities differ by no more than `merge_velocity` and a standard deviation, and the old group was
+    last measured before the new one's birth. No row occurs twice.
     """
     d = bank.x[new][:, None] - bank.x[old]
     S = bank.P[new][:, None] + bank.P[old]
@@ -125,10 +133,11 @@ def _recaptured(bank: GroupBank, new: Ints, old: Ints, scaled: ScaledParameters)
 
 
 def remove_lost(bank: GroupBank, scaled: ScaledParameters, t: float) -> Iterator[BankEvent]:
-    """Remove the groups that were not measured for too long; yield a leave event for each confirmed one.
+    """Remove the groups that were not measured for too long, at time t (s); yield a leave event for each confirmed one.
 
     Too long is `confirm_time` for a tentative group, `coast_time` for a confirmed one, or `recapture_time` if that is
-    longer and recapture is on. The event's onset and position are those of the last measurement.
+    longer and recapture is on. The event's onset and position are those of the last measurement. It is a generator: the
+    groups are removed when it has been read to its end.
     """
     c = scaled.config
     patience = np.where(bank.confirmed, max(c.coast_time, c.recapture_time if c.recapture else 0.0), c.confirm_time)

@@ -11,7 +11,13 @@ from tracking.detect.background_settings import BackgroundSettings
 
 @dataclass(frozen=True)
 class GroupPdaConfig(BackgroundSettings):
-    """Search regions, masses, group constraint, merging, splitting, reporting and foreground of `group-pda`."""
+    """The parameters of the tracker `group-pda`, with those of the background model; each field states default, range
+    and unit.
+
+    Lengths are metres. They are search regions, masses of associations, group constraint, merging, splitting,
+    confirmation, reporting and, from pixels, the grid of points. Raises InputError if a value is not allowed or
+    foreground_time is shorter than background_time.
+    """
 
     tracker: ClassVar[str] = "group-pda"
 

@@ -20,24 +20,31 @@ LEAST_MEASURED = 0.55
 
 
 def may_be_one(bank: GroupBank, i: int, j: int) -> bool:
-    """Return True if so few people of the groups in rows i and j are measured that the two may be one group."""
+    """Return True if so few people of the groups in rows i and j of the bank are measured that the two may be one
+    group.
+
+    Few are less than LEAST_MEASURED = 55 % of the sum of their sizes.
+    """
     return bool(LEAST_MEASURED * (bank.size[i] + bank.size[j]) > bank.own_people[i] + bank.own_people[j])
 
 
 class DuplicateGroups:
-    """State: for each pair of group ids whose regions overlap, a clock in s.
+    """Finds pairs of groups that follow the same people.
 
-    The clock goes forward in frames in which the two may be one and back in the others; at 0 it is dropped.
+    State: clock, in s, by pair of ids of groups whose search regions overlap. It goes forward in frames in which the
+    two may be one and back in the others; at 0 it is dropped.
     """
 
     def __init__(self) -> None:
         self.clock: dict[tuple[int, int], float] = {}
 
     def step(self, bank: GroupBank, scaled: ScaledParameters, t: float) -> None:
-        """Make one group of each pair lost whose clock has passed `coast_time`.
+        """Advance the clocks by a frame, at time t (s), and make one group lost of each pair whose clock has passed
+        `coast_time`.
 
-        It is the one with the smaller share of people of its own, then the younger one. A lost group claims no points
-        until it is recaptured.
+        Only confirmed groups measured in this frame take part. Lost is the group with the smaller share of people of
+        its own; if equal, the younger one. A lost group claims no points until it is recaptured; `last_seen` is set
+        back in the bank.
         """
         rows = np.flatnonzero(bank.confirmed & (bank.last_seen >= t))
         pairs = {(int(bank.id[i]), int(bank.id[j])): (i, j) for i, j in _overlapping(bank, rows, scaled.config.gate)}
@@ -53,12 +60,18 @@ class DuplicateGroups:
 
 
 def _overlapping(bank: GroupBank, rows: Ints, gate: float) -> Iterator[tuple[int, int]]:
-    """Pairs of rows whose search regions overlap."""
+    """Yields pairs (i, j) of rows of the bank, out of `rows`, whose search regions overlap.
+
+    gate: squared Mahalanobis radius of a region, whose covariance is the group's extent.
+    """
     near = regions_overlap(bank.x[rows, :2], bank.extent[rows], gate)
     return ((int(rows[i]), int(rows[j])) for i, j in np.argwhere(np.triu(near, 1)).tolist())
 
 
 def _with_fewer_own(bank: GroupBank, i: int, j: int) -> int:
-    """The row, i or j, with the smaller share of people of its own; if equal, the younger, then the larger id."""
+    """Returns the row, i or j, with the smaller share of people of its own (measured and nearer to no other group).
+
+    If equal, the younger group (later first_seen), then the larger id.
+    """
     share: Array = bank.own_people[[i, j]] / bank.size[[i, j]]
     return min((i, j), key=lambda row: (share[0] if row == i else share[1], -bank.first_seen[row], -bank.id[row]))

@@ -26,10 +26,11 @@ REACH = 1.1
 
 
 class PairMoment(NamedTuple):
-    """Two groups at one time t, in s.
+    """Two groups a and b at one time.
 
-    difference (2,): of their centroids, m on the ground. middle (2,): point half-way between the centroids, in the unit
-    of the points. gap: distance of their nearest people, m.
+    t: s. difference (2,): centroid of b less that of a, m on the ground. middle (2,): point half-way between the
+    centroids, in the unit of the points. gap: distance of their nearest people, m; negative if, from pixels, they
+    overlap.
     """
 
     t: float
@@ -40,10 +41,10 @@ class PairMoment(NamedTuple):
 
 @dataclass
 class PairHistory:
-    """Two groups that are near each other.
+    """The past of two groups that are near each other.
 
     alike_since: time in s since which they have also had like velocities; inf if they have unlike ones now. moments:
-    the pair in the last seconds, oldest first.
+    the pair in each frame of the last 5 s in which it was near, oldest first.
     """
 
     alike_since: float
@@ -52,8 +53,9 @@ class PairHistory:
     def merge_onset(self, merge_velocity: float) -> tuple[float, Array]:
         """Return when, in s, the groups came to be near with like velocities, and where (2,), in the points' unit.
 
-        It is the moment after the last one in which the gap was above 1.5 m, or the chord's velocity difference was
-        above 1.2 merge_velocity (in m/s) at a time up to `alike_since`.
+        merge_velocity: m/s. The onset is the moment after the last one in which the gap was above 1.5 m, or the chord's
+        velocity difference was above 1.2 merge_velocity at a time up to `alike_since`; the first moment if there is
+        none. It is the last moment at the latest.
         """
         t, d = np.array([m.t for m in self.moments]), np.array([m.difference for m in self.moments])
         before = (chords(t, d, MERGE_CHORD) > MERGE_CHORD_MARGIN * merge_velocity) & (t <= self.alike_since)
@@ -63,10 +65,11 @@ class PairHistory:
 
 
 def chords(t: Array, d: Array, half: float, *, full_length: bool = False) -> Array:
-    """Return speeds (K,) of the positions d (K, 2) at the times t (K,): chords from `half` s before to `half` s after.
+    """Return speeds (K,) of the positions d (K, 2) at the times t (K,), s, ascending: chords from `half` s before to
+    after.
 
     A chord spans at least one frame to each side if there is one. At both ends of the series chords are shorter. With
-    full_length they are as long there as elsewhere, but not centred on their times.
+    full_length they are as long there as elsewhere, but not centred on their times. A single position has speed 0.
     """
     k, middle = np.arange(len(t)), t
     if full_length:
@@ -79,15 +82,17 @@ def chords(t: Array, d: Array, half: float, *, full_length: bool = False) -> Arr
 def split_onset(
     recent: list[tuple[float, Array]], parts: list[Array], metres_per_unit: Array, body_cov: Array, known: float
 ) -> tuple[float, Array]:
-    """Return when, in s, a group began to fall into two parts, and its centroid (2,) at that time.
+    """Return when, in s, a group began to divide into two parts, and its centroid (2,) at that time, in the unit of the
+    points.
 
-    recent: (time, points (K, 2)) of the group, oldest first. parts: the points of both parts, now.
-    metres_per_unit (2,): as in ScaledParameters. body_cov (2, 2): covariance of one person's points. known: time in s
-    at which the split is known.
+    recent: (time in s, points (K, 2)) of the group, oldest first. parts: the points (K, 2) of both parts, now.
+    metres_per_unit (2,): metres on the ground per unit along x and y. body_cov (2, 2): covariance of one person's
+    points. known: time in s at which the split is known; later moments of `recent` are ignored.
+
     Going back from `known`, each moment's points are divided between the two centroids, which follow them. The nearest
     people of the parts are taken to be nearer than the centroids by the same distance as now. The onset is the moment
-    after the last one in which the parts were together by the split rule (1.5 m; 2.5 m if slower than 0.7 m/s).
-    Without two earlier moments the onset is `known`.
+    after the last one in which the parts were together by the split rule (1.5 m; 2.5 m if slower than 0.7 m/s). Without
+    two earlier moments the onset is `known`.
     """
     before = [(t, y * metres_per_unit) for t, y in recent if t <= known + 1e-9]
     if len(before) < 2:

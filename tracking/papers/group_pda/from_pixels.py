@@ -21,11 +21,14 @@ LEAST_SINE_TILT = 0.2
 
 
 class ForegroundPoints:
-    """State: the foreground pipeline with its background model.
+    """Foreground pixels on a grid as points, each a share of a person.
 
-    scale: px per metre, the context's or learned from lone people in its background sample. step: px between the grid's
-    points. person (2,): width and height of a person in the image, px.
-    Raises InputError if the scale is neither known nor learned.
+    State: config; foreground, the pipeline with its background model. scale: px per metre, the context's, or, if that
+    is nan, learned from lone people in its background sample. step: px between the grid's points. person (2,): width
+    and height of a person in the image, px.
+
+    The context must have a background sample (else AssertionError). Raises InputError if the scale is neither known nor
+    learned, if it is zero or negative, or if the sample cannot be used.
     """
 
     def __init__(self, config: GroupPdaConfig, context: Context) -> None:
@@ -38,14 +41,15 @@ class ForegroundPoints:
         self.person = _person(context.camera, self.scale)
 
     def follow(self, config: GroupPdaConfig) -> None:
-        """Use another config from now on. The background model and the scale stay as they are."""
+        """Replace the config: settings and grid step change; the background model and the scale stay as they are."""
         self.config = config
         self.foreground.follow(config, config.most_foreground)
         self.step = max(1, round(config.grid * self.scale))
 
     @property
     def people_per_point(self) -> float:
-        """The people that one grid point stands for: the area of a grid cell over that of a person's ellipse."""
+        """The people, a share below 1 as a rule, that one grid point stands for: area of a grid cell over that of a
+        person's ellipse."""
         return float(self.step**2 / (np.pi / 4 * self.person.prod()))
 
     @property
@@ -54,10 +58,14 @@ class ForegroundPoints:
         return np.asarray(np.eye(2) * np.square(self.person / 4), np.float64)
 
     def points(self, image: Image, outlines: list[Array]) -> Array | None:
-        """Return the grid points (M, 2) in px that are foreground; None if more is foreground than `most_foreground`.
+        """Return the grid points (M, 2) u, v in px that are foreground; None if more is foreground than
+        `most_foreground`.
 
-        outlines: points (V, 2) in px round each group. The background model learns from the picture except inside their
-        convex hulls, so that people who stand still do not become background.
+        image (H, W, 3) BGR uint8. outlines: points (V, 2) u, v in px round each group. The background model learns from
+        the picture except inside their convex hulls, so that people who stand still do not become background. M may be
+        0.
+
+        Raises InputError if the picture's size or dtype is not the background sample's.
         """
         seen = self.foreground.segment(image)
         self.foreground.adapt(seen, convex_areas(self.foreground.shape, outlines))
@@ -65,9 +73,9 @@ class ForegroundPoints:
 
 
 def grid_points(mask: Bools, step: int) -> Array:
-    """Return u, v (M, 2) in px of the centres of the foreground pixels on a grid of every `step`-th pixel.
+    """Return u, v (M, 2) in px of the centres of the foreground pixels on a grid of every `step`-th pixel, by rows.
 
-    mask (H, W): True for foreground.
+    mask (H, W): True for foreground. The grid begins at pixel step // 2 in both directions.
     """
     first = step // 2
     v, u = np.nonzero(mask[first::step, first::step])
@@ -75,12 +83,16 @@ def grid_points(mask: Bools, step: int) -> Array:
 
 
 def sine_tilt(camera: Camera | None) -> float:
-    """Return the sine of the camera's tilt, by which depth is shortened: at least 0.2; 1 without a camera."""
+    """Return the sine of the camera's downward tilt, the factor by which depth on the ground is shortened in the image.
+
+    It is at least 0.2, and 1 without a camera or straight above.
+    """
     return 1.0 if camera is None else float(max(-camera.rotation[2, 2], LEAST_SINE_TILT))
 
 
 def _learned(foreground: Foreground, context: Context) -> float:
-    """The scale, px per m, by people who are alone in the background sample; nan if there are none."""
+    """Returns the scale, px per m, learned from people who are alone in the background sample; nan if there
+    are none."""
     assert context.background is not None
     size = PersonSize(context)
     foreground.learn_person_size(size, context.background)
@@ -88,9 +100,9 @@ def _learned(foreground: Foreground, context: Context) -> float:
 
 
 def _person(camera: Camera | None, scale: float) -> Array:
-    """Width and height (2,) in px of a person: the mean box at the image's centre over directions, or by the scale.
+    """Returns width and height (2,) in px of a person: the mean box at the image's centre over four headings.
 
-    The scale, px per m, is used without a camera and if the image's centre is above the horizon.
+    Without a camera, and if the image's centre is above the horizon, it follows from the scale, px per m, instead.
     """
     if camera is None:
         return scale * PERSON_HEIGHT * np.array([WIDTH_PER_HEIGHT, 1.0])

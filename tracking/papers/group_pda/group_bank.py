@@ -25,7 +25,9 @@ LISTS = ("members", "recent_points")
 class MemberPlaces(NamedTuple):
     """Where a group's K members were measured last: their points, or, from pixels, the convex hull of the points.
 
-    offset (K, 2) from the centroid; last_seen (K,) s; known (K,): see `remember` in missed_members.
+    offset (K, 2): from the group's centroid, in the unit of the points; last_seen (K,): time, s; known (K,) bool: True
+    if a member was measured near that place before, so that it may stand in when it is missed (see `remember` in
+    missed_members).
     """
 
     offset: Array
@@ -34,29 +36,28 @@ class MemberPlaces(NamedTuple):
 
 
 class GroupIds:
-    """Fresh group ids, from 1. State: the next one."""
+    """Fresh group ids, counted from 1. State: next, the id that is given next."""
 
     def __init__(self) -> None:
         self.next = 1
 
     def new(self) -> int:
-        """Return an id that was never returned before."""
+        """Return the next id, which was never returned before."""
         self.next += 1
         return self.next - 1
 
 
 @dataclass
 class GroupBank:
-    """The state of G groups, a row each. Lengths are in the unit of the points, times in s.
+    """The state of G groups, a row each. Lengths are in the unit of the points (m or px), times in s.
 
-    x (G, 4): centroid xi and velocity v, in order x, y, vx, vy; P (G, 4, 4) their covariance.
-    extent (G, 2, 2): Sigma, covariance of the members' positions about the centroid; size (G,): N, people.
-    id (G,): NO_ID for a tentative group. first_seen, last_seen (G,): times of first and last measurement.
-    measured_time (G,): total time measured. null_time (G,): time without a feasible association, see `association`.
-    own_people (G,): people measured in this frame who are nearer to no other group.
-    parent (G,): id of the group that a tentative group has left, or NO_ID; origin (G, 2): where it left it.
-    colour_hist (G, C): people by colour; C = 0 without colours. members: of each group. recent_points: of each group,
-    (time, points (K, 2)) of the last seconds.
+    x (G, 4): centroid xi and velocity v, in order x, y, vx, vy; P (G, 4, 4) their covariance. extent (G, 2, 2): Sigma,
+    covariance of the members' positions about the centroid; size (G,): N, people. id (G,): NO_ID = -1 for a tentative
+    group. first_seen, last_seen (G,): times of first and last measurement. measured_time (G,): total time measured.
+    null_time (G,): time without a feasible association, less measured frames in it. own_people (G,): people measured in
+    this frame who are nearer to no other group. parent (G,): id of the group that a tentative group has left, or NO_ID;
+    origin (G, 2): where it left it. colour_hist (G, C): people by colour; C = 0 without colours. members: a
+    MemberPlaces of each group. recent_points: of each group, a list of (time, points (K, 2)) of the last seconds.
     """
 
     x: Array
@@ -77,7 +78,7 @@ class GroupBank:
 
     @classmethod
     def empty(cls, colour_bins: int = 0) -> GroupBank:
-        """Return a bank without groups."""
+        """Return a bank without groups; colour_bins: columns C of colour_hist, 0 without colours."""
         none, ids, two = np.zeros(0), np.zeros(0, np.int64), np.zeros((0, 2))
         four = np.zeros((0, 4))
         return cls(
@@ -90,42 +91,46 @@ class GroupBank:
 
     @property
     def confirmed(self) -> Bools:
-        """Flags (G,): True for groups with an id."""
+        """Flags (G,): True for groups with an id; the others are tentative."""
         return np.asarray(self.id != NO_ID)
 
     def positions(self, row: int) -> Array:
-        """Return the positions (K, 2) of a group's members, moved along with its centroid."""
+        """Return the positions (K, 2) x, y of the members of the group in `row`: last measured places, moved with its
+        centroid.
+
+        From pixels they are the vertices of the hull of its points.
+        """
         return self.members[row].offset + self.x[row, :2]
 
     def keep(self, kept: Bools) -> None:
-        """Remove the rows that are False in kept (G,)."""
+        """Remove the rows that are False in kept (G,) bool, in place."""
         for f in fields(self):
             value = getattr(self, f.name)
             new = [v for v, k in zip(value, kept, strict=True) if k] if f.name in LISTS else value[kept]
             setattr(self, f.name, new)
 
     def remove(self, row: int) -> None:
-        """Remove one row."""
+        """Remove the group in `row`, in place; later rows move up by one."""
         self.keep(np.arange(len(self)) != row)
 
     def add(self, other: GroupBank) -> None:
-        """Append the rows of another bank."""
+        """Append the rows of another bank with as many colour bins (else ValueError), in place."""
         for f in fields(self):
             a, b = getattr(self, f.name), getattr(other, f.name)
             setattr(self, f.name, a + b if f.name in LISTS else np.concatenate([a, b]))
 
     def predict(self, scaled: ScaledParameters) -> None:
-        """Predict all groups to the next frame: x = F x, P = F P F' + Q (eq. 2.3)."""
+        """Predict all groups to the next frame, in place: x = F x, P = F P F' + Q (eq. 2.3), F and Q from `scaled`."""
         self.x = self.x @ scaled.F.T
         self.P = scaled.F @ self.P @ scaled.F.T + scaled.Q
 
 
 def newborn(points: Array, weights: Array, group: Ints, scaled: ScaledParameters, t: float) -> GroupBank:
-    """Return a bank of tentative groups made from points alone (sec. 3.3), with velocity 0.
+    """Return a bank of tentative groups made from points alone (sec. 3.3), with velocity 0, in order of group number.
 
-    points (M, 2); weights (M,): people that each point stands for; group (M,): 0, 1, … or -1 for no group; t: s.
-    Centroid and size are the weighted mean and sum. The extent is the covariance, shrunk towards the prior and divided
-    by the gate factor (both ours). The bank is empty if no point has a group.
+    points (M, 2); weights (M,): people that each point stands for; group (M,): 0, 1, … without gaps, or -1 for no
+    group; t: time of the frame, s. Centroid and size are the weighted mean and sum. The extent is the covariance,
+    shrunk towards the prior and divided by the gate factor (both ours). The bank is empty if no point has a group.
     """
     count = int(group.max(initial=-1)) + 1
     if not count:

@@ -39,9 +39,10 @@ Pair = tuple[int, int]
 
 
 class NearPair(NamedTuple):
-    """Two groups whose regions overlap or whose points are linked in this frame.
+    """Two groups whose search regions overlap or whose points are linked in this frame.
 
-    alike: their velocities are alike and, from pixels, their people are not far apart.
+    ids: of the groups, the smaller first. alike: their velocities are alike and, from pixels, their people are not far
+    apart. moment: time, difference of centroids and gap of the pair in this frame.
     """
 
     ids: Pair
@@ -50,18 +51,23 @@ class NearPair(NamedTuple):
 
 
 class GroupMerging:
-    """State: the history of each pair of groups that are near each other."""
+    """Merges groups that stay near with like velocities.
+
+    State: histories, by pair of ids (the smaller first): the past of each pair of groups that are near each other.
+    """
 
     def __init__(self) -> None:
         self.histories: dict[Pair, PairHistory] = {}
 
     def step(self, bank: GroupBank, scaled: ScaledParameters, t: float) -> Iterator[BankEvent]:
-        """Merge the groups for which R_x has held for `merge_time`; yield their events. The states are updated ones.
+        """Merge the groups for which R_x (near, with like velocities) has held for `merge_time`; yield their events. t:
+        s.
 
-        A group takes part if it is confirmed, was measured in this frame, has no `null_time`, and enough of its people
-        are nearer to no other group: else its velocity is unknown or another group's. An event is a merge if
-        at least two of the groups were there for more than 1 s before the onset or are children of another group. Else
-        it is an enter.
+        The bank holds updated states and is changed in place. A group takes part if it is confirmed, was measured in
+        this frame, has no `null_time`, and at least 20 % of its people are nearer to no other group: else its velocity
+        is unknown or another group's. An event is a merge if at least two of the groups were there for more than 1 s
+        before the onset or are children of another group. Else it is an enter. It is a generator: groups merge only
+        while it is read.
         """
         able = np.flatnonzero(
             bank.confirmed & (bank.last_seen >= t) & (bank.null_time <= 0) & (bank.own_people >= LEAST_OWN * bank.size)
@@ -90,10 +96,10 @@ class GroupMerging:
             yield BankEvent(kind, onset, tuple(sorted(ids)), (heir,), tuple(place.tolist()))
 
     def _pass_on(self, ids: list[int], heir: int, bank: GroupBank, scaled: ScaledParameters) -> None:
-        """Give the histories of the merged groups with other groups to the heir.
+        """Give the histories of the merged groups `ids` with other groups to `heir`, the id of their union in the bank.
 
-        The differences of centroids are shifted, so that they do not jump. Of two histories with the same group, the
-        one that has been alike for longer is kept.
+        The differences of centroids are shifted, so that they do not jump. Of two histories with the same other group,
+        the one that has been alike for longer is kept.
         """
         histories = {p: h for p, h in self.histories.items() if not set(p) & set(ids)}
         for p, history in self.histories.items():
@@ -110,18 +116,19 @@ class GroupMerging:
         self.histories = histories
 
     def _extended(self, pair: NearPair) -> PairHistory:
-        """The pair's history with this frame's moment added."""
+        """Returns the pair's history with this frame's moment added and moments older than 5 s dropped;
+        stores nothing."""
         before, now = self.histories.get(pair.ids, PairHistory(np.inf, [])), pair.moment
         moments = [m for m in before.moments if m.t > now.t - HISTORY_TIME]
         return PairHistory(min(before.alike_since, now.t) if pair.alike else np.inf, [*moments, now])
 
 
 def merged(bank: GroupBank, rows: Ints) -> GroupBank:
-    """Return a bank with the union (eq. 3.1) of the groups in `rows`.
+    """Return a bank of one row, the union (eq. 3.1) of the groups in `rows` (at least one); `bank` is not changed.
 
     Centroid and velocity are means weighted by size, the extent contains the spread of the centroids. P is that of a
-    weighted mean of independent centroids, sum w^2 P_i (ours): the spread of the centroids is no estimation error.
-    The group with most people, then the oldest, gives the id.
+    weighted mean of independent centroids, sum w^2 P_i (ours): the spread of the centroids is no estimation error. The
+    group with most people (rounded), then the oldest, then the least id, gives the id.
     """
     size = np.asarray(bank.size[rows].sum())
     w = bank.size[rows] / size
@@ -143,9 +150,9 @@ def merged(bank: GroupBank, rows: Ints) -> GroupBank:
 
 
 def _near_pairs(bank: GroupBank, rows: Ints, scaled: ScaledParameters, t: float) -> Iterator[NearPair]:
-    """The pairs of groups in `rows` whose search regions overlap or whose points are linked.
+    """Yields the pairs of groups, out of the bank's `rows`, whose search regions overlap or whose points are linked.
 
-    From points, pairs that may be one group are left out. From pixels they are not, as bodies hide each other.
+    From points, pairs that may be one group are left out. From pixels they are not, as bodies hide each other. t: s.
     """
     close = regions_overlap(bank.x[rows, :2], bank.extent[rows], GATE_MARGIN * scaled.config.gate)
     close |= _linked(bank, rows, scaled)
@@ -166,10 +173,11 @@ def _near_pairs(bank: GroupBank, rows: Ints, scaled: ScaledParameters, t: float)
 
 
 def _gap(bank: GroupBank, a: int, b: int, d: Array, scaled: ScaledParameters) -> float:
-    """Distance, m, of the nearest people of the groups in rows a and b; d (2,): difference of their centroids, m.
+    """Returns the distance, m, of the nearest people of the groups in rows a and b; d (2,): difference of their
+    centroids, m.
 
     From points it is that of the nearest members' places. From pixels, which are parts of bodies, it is the distance of
-    the centroids less how far people stand from them in this direction.
+    the centroids less how far people stand from them in this direction; it may be negative.
     """
     if not scaled.from_pixels:
         here, there = (bank.positions(k) for k in (a, b))
@@ -178,9 +186,11 @@ def _gap(bank: GroupBank, a: int, b: int, d: Array, scaled: ScaledParameters) ->
 
 
 def _people_sd(bank: GroupBank, row: int, way: Array, scaled: ScaledParameters) -> float:
-    """Standard deviation, m, of the positions of a group's people along the direction `way` on the ground.
+    """Returns the standard deviation, m, of the positions of the people of the group in `row` along a direction on the
+    ground.
 
-    It is that of the extent without the prior that it was shrunk to and without the extent of one body.
+    way (2,): the direction, m, of any length. It is that of the extent without the prior that it was shrunk to and
+    without the extent of one body; at least 0.
     """
     n, n0 = bank.size[row], scaled.constraint.strength
     factor = scaled.kernel_rules[GATE_FACTOR]
@@ -190,9 +200,11 @@ def _people_sd(bank: GroupBank, row: int, way: Array, scaled: ScaledParameters) 
 
 
 def _linked(bank: GroupBank, rows: Ints, scaled: ScaledParameters) -> Bools:
-    """Flags (K, K): the groups have points, or from pixels hulls, within the link distance of each other (ours).
+    """Returns flags (K, K): True if the groups in rows i and j have points within the link distance of each other
+    (ours).
 
-    This finds near groups whose extents lag because they rest while points are shared.
+    From pixels the hulls of the points are compared. The diagonal is True. This finds near groups whose extents lag
+    because they rest while points are shared.
     """
     found = np.eye(len(rows), dtype=bool)
     place, link = [bank.positions(r) for r in rows.tolist()], scaled.constraint.link
@@ -208,7 +220,8 @@ def _linked(bank: GroupBank, rows: Ints, scaled: ScaledParameters) -> Bools:
 
 
 def _connected(pairs: list[Pair]) -> list[list[int]]:
-    """The connected components of the graph with these edges, as sorted lists of ids (G_x)."""
+    """Returns the connected components of the graph whose edges are `pairs` of ids, each as a sorted list
+    of ids (G_x)."""
     parts: list[set[int]] = []
     for pair in pairs:
         touched = [p for p in parts if p & set(pair)]

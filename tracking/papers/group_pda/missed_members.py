@@ -25,7 +25,11 @@ RECENT_POINTS = 64
 
 
 def with_missed_members(claims: PointClaims, bank: GroupBank, scaled: ScaledParameters, t: float) -> PointClaims:
-    """Return the claims with the missed members of groups that have any points appended, each its own group's alone."""
+    """Return new claims with the members missed at time t (s) appended as points that only their own group may have.
+
+    Only groups with any points in this frame (in their region or attached) get them. Each counts as one person, with
+    the time of its last measurement.
+    """
     has_points = np.asarray(np.isfinite(claims.d2).any(axis=1))
     has_points[claims.owner[claims.owner >= 0]] = True
     place, row, last_seen = missed_members(bank, claims.points, scaled, t)
@@ -42,10 +46,12 @@ def with_missed_members(claims: PointClaims, bank: GroupBank, scaled: ScaledPara
 
 
 def missed_members(bank: GroupBank, points: Array, scaled: ScaledParameters, t: float) -> tuple[Array, Ints, Array]:
-    """Return the places (K, 2), rows of the bank (K,) and last measurements (K,) in s of the members missed at time t.
+    """Return the places (K, 2), rows of the bank (K,) and last measurements (K,) in s of the members missed at time t
+    (s).
 
-    A member is missed if no point (M, 2) is within `carry_reach` of its predicted place. Only `known`
-    members that were measured within the last `carry_time` count. There are none from pixels.
+    points (M, 2): of this frame. A member is missed if no point is within `carry_reach` of its predicted place. Only
+    `known` members (measured near their place before) that were measured within the last `carry_time` count. There are
+    none from pixels, or if carry_time is 0.
     """
     c, recent = scaled.config, []
     if c.carry_time > 0 and not scaled.from_pixels:
@@ -62,10 +68,11 @@ def missed_members(bank: GroupBank, points: Array, scaled: ScaledParameters, t: 
 
 
 def remember(bank: GroupBank, claims: PointClaims, exclusive: Bools, scaled: ScaledParameters, t: float) -> None:
-    """Store each group's points of this frame, exclusive (G, M), as its members and recent points.
+    """Store each group's points of this frame, exclusive (G, M) bool, as its members and recent points, in the bank.
 
-    A group without points keeps its old ones. A member is `known` if, relative to the centroid, one of the group's
-    previous members was within `carry_reach` of it; from pixels all are.
+    t: s. A group without points keeps its old ones. A member is `known` if, relative to the centroid, one of the
+    group's previous members was within `carry_reach` of it. From pixels only the vertices of the points' convex hull
+    are kept as members, all known.
     """
     for row in np.flatnonzero(exclusive.any(1)).tolist():
         mine, last_seen = claims.points[exclusive[row]], claims.last_seen[exclusive[row]]
@@ -81,9 +88,10 @@ def remember(bank: GroupBank, claims: PointClaims, exclusive: Bools, scaled: Sca
 
 
 def thinned(points: Array) -> Array:
-    """Return at most RECENT_POINTS of the points (M, 2), selected by a hash of their coordinates.
+    """Return at most RECENT_POINTS = 64 of the points (M, 2), selected by a hash of their coordinates.
 
-    The choice does not depend on the points' order, and a grid of points leaves no pattern.
+    The choice does not depend on the points' order, and a grid of points leaves no pattern. 64 or fewer are returned as
+    they are.
     """
     if len(points) <= RECENT_POINTS:
         return points

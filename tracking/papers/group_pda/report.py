@@ -17,8 +17,8 @@ from tracking.papers.group_pda.scaled_parameters import ScaledParameters
 class BankEvent:
     """A change of the set of confirmed groups.
 
-    kind: merge, split, enter or leave, as in GroupEvent. onset: s, when it began. before, after: ids of the groups
-    concerned. pos: x, y in the unit of the points.
+    kind: merge, split, enter or leave, as in GroupEvent. onset: time, s, when it began. before, after: ids of the
+    groups concerned before and after the change, sorted. pos: x, y in the unit of the points.
     """
 
     kind: str
@@ -30,10 +30,10 @@ class BankEvent:
 
 @dataclass(frozen=True)
 class ReportFrame:
-    """The frame that is reported. index: from 1; t: s.
+    """The frame that is reported. index: from 1; t: time, s; plane: "ground" or "image"; fps: frames per second.
 
-    outline (V, 2): a polygon round the origin that stands for what covers the ground or the image about one member's
-    place: a footprint, a usual box, or a cell of the pixel grid.
+    outline (V, 2): a polygon round the origin, in the plane's unit, that stands for what covers the ground or the image
+    about one member's place: a footprint, a usual box, or a cell of the pixel grid.
     """
 
     index: int
@@ -44,10 +44,11 @@ class ReportFrame:
 
 
 def report_tracks(bank: GroupBank, events: list[BankEvent], scaled: ScaledParameters, frame: ReportFrame) -> Tracks:
-    """Return Tracks, unit "group", of the confirmed groups that were measured within `report_coast` s, by id.
+    """Return Tracks with unit "group", sorted by id, of the confirmed groups measured within the last `report_coast` s.
 
     The reported size is N divided by the probability that a member is measured. Hulls go round the outlines of all
-    members' places. An event's start is its onset, its end and `emitted` are this frame; it has no members.
+    members' places; lists of members are empty, boxes None, scores 1. An event's start is its onset (a frame from 1 to
+    this one), its end and `emitted` are this frame; it has no members.
     """
     rows = np.flatnonzero(bank.confirmed & (frame.t - bank.last_seen <= scaled.config.report_coast + 1e-9))
     rows = rows[np.argsort(bank.id[rows])]
@@ -68,7 +69,8 @@ def report_tracks(bank: GroupBank, events: list[BankEvent], scaled: ScaledParame
 
 
 def _hulls(places: list[Array], outline: Array) -> tuple[Array, ...]:
-    """Convex hulls of the outline (V, 2) moved to each group's places (K, 2)."""
+    """Returns the convex hull (W, 2) of each group: of the outline (V, 2) moved to each of the group's
+    places (K, 2)."""
     # The places on their own hull suffice, and are few.
     return convex_hulls([(corner[:, None] + outline).reshape(-1, 2) for corner in convex_hulls(places)])
 

@@ -18,13 +18,14 @@ COLOUR_BINS = 64
 
 @dataclass(frozen=True)
 class ScaledParameters:
-    """Lengths are in the unit of the points: m on the ground, px in the image.
+    """The parameters of `group-pda` per frame; lengths are in the unit of the points: m on the ground, px in the image.
 
-    dt: s between frames. scale: units per metre. constraint: of the group constraint G_y (sec. 3.3). point_sd: standard
-    deviation of one person's measured position. kernel_rules (RULES,): the array `rules` of the kernels. F, Q (4, 4) of
-    eq. 2.3. from_pixels: the points are foreground pixels, not people. metres_per_unit (2,): metres on the ground per
-    unit along x and along y (depth in an image). body_cov (2, 2): covariance of one person's pixels, 0 from points.
-    colour_bins: bins of colour histograms, 0 if colours are not used.
+    config: they come from. dt: s between frames. scale: units per metre. constraint: of the group constraint G_y (sec.
+    3.3). point_sd: standard deviation of one person's measured position. kernel_rules (RULES,): the array `rules` of
+    the kernels. F, Q (4, 4): transition and process noise of x, y, vx, vy, eq. 2.3. from_pixels: True if the points are
+    foreground pixels, not people. metres_per_unit (2,): metres on the ground per unit along x and along y (depth in an
+    image). body_cov (2, 2): covariance of one person's pixels, 0 from points. colour_bins: bins of colour histograms, 0
+    if colours are not used.
     """
 
     config: GroupPdaConfig
@@ -44,10 +45,10 @@ class ScaledParameters:
 def scale_parameters(
     config: GroupPdaConfig, fps: float, scale: float, body_cov: Array | None = None, sine_tilt: float = 1.0
 ) -> ScaledParameters:
-    """Return the parameters for a frame rate and a scale in units per metre.
+    """Return the parameters for a frame rate `fps` (frames per s) and a scale in units of the points per metre.
 
-    body_cov (2, 2): covariance of one person's pixels in px^2; None if the points are people.
-    sine_tilt: sine of the camera's tilt, the factor by which lengths in depth are shortened in the image.
+    body_cov (2, 2): covariance of one person's pixels in px^2; None if the points are people. sine_tilt: sine of the
+    camera's tilt, above 0, the factor by which lengths in depth are shortened in the image.
     """
     c, dt, pixels = config, 1 / fps, body_cov is not None
     point_sd = scale * (c.pixel_noise if pixels else c.point_noise)
@@ -77,7 +78,11 @@ def scale_parameters(
 def _kernel_rules(
     c: GroupPdaConfig, fps: float, constraint: Constraint, point_sd: float, factor: float, pixels: bool
 ) -> Array:
-    """The array `rules` of the kernels; its slots are explained in association_mass_kernels."""
+    """Returns the array `rules` (RULES,) of the kernels; its slots are explained in association_mass_kernels.
+
+    c: the config. point_sd: standard deviation of a measured position. factor: share of its covariance that a Gaussian
+    keeps inside the gate, 1 without gate_correction. pixels: the points are foreground pixels.
+    """
     rules = np.zeros(kernels.RULES)
     rules[kernels.GATE], rules[kernels.LINK] = constraint.gate, constraint.link
     rules[kernels.PRIOR_XX : kernels.PRIOR_YY + 1] = constraint.prior_entries
@@ -100,9 +105,10 @@ def _kernel_rules(
 
 
 def gate_factor(gate: float) -> float:
-    """Return c: Gaussian points in the plane that lie within the gate have c times the covariance of all points.
+    """Return c, below 1: Gaussian points in the plane that lie within the gate have c times the covariance of all
+    points.
 
-    c = F_chi2,4(gate) / F_chi2,2(gate), where gate is the squared Mahalanobis radius.
+    c = F_chi2,4(gate) / F_chi2,2(gate), where gate is the squared Mahalanobis radius, above 0.
     """
     tail = np.exp(-gate / 2)
     return float((1 - tail * (1 + gate / 2)) / (1 - tail))

@@ -18,11 +18,13 @@ def split(
 ) -> BankEvent | None:
     """Replace the group in `row` by those that its points (M, 2) form under G_y; return the event of a confirmed group.
 
-    - Several groups: they are appended to the bank in place of the old one. The largest (then the one nearest to the
+    weights (M,): people each point stands for; t: s; ids: gives fresh ids. The bank is changed in place.
+    - Several groups: they are appended to the bank and the old row is removed. The largest (then the one nearest to the
       old centroid) keeps the id, the others get fresh ids. The event is a split.
-    - One group: it stays, and its `null_time` ends. None is returned.
+    - One group: it stays, and its `null_time` becomes 0. None is returned.
     - No group, only noise: it is removed. The event is a leave.
-    None is returned for a tentative group.
+
+    None is returned for a tentative group, whose parts stay tentative.
     """
     group = partition(points, weights, scaled.constraint)
     confirmed = bank.id[row] != NO_ID
@@ -49,9 +51,10 @@ def split(
 def children(
     bank: GroupBank, row: int, points: Array, weights: Array, group: Ints, scaled: ScaledParameters, t: float
 ) -> GroupBank:
-    """Return a bank of the groups into which the group in `row` splits; group (M,) of each point, -1 none.
+    """Return a bank of the groups into which the group in `row` splits; `bank` is not changed.
 
-    They are newborn from their points. Departures: they keep the parent's age and colours, and, with
+    points (M, 2), weights (M,): people each stands for; group (M,): part 0, 1, … of each point, -1 none; t: s. The
+    parts are newborn from their points. Departures: they keep the parent's age and colours, and, with
     `inherit_velocity`, its velocity, with `split_speed` as further standard deviation.
     """
     c = scaled.config

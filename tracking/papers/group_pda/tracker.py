@@ -83,12 +83,12 @@ SQUARE = np.array([[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]])
 
 
 class GroupPda:
-    """The tracker.
+    """The tracker `group-pda`: groups of people tracked as wholes, from points or from foreground pixels.
 
-    State: the bank of groups, the next id, the histories of pairs that may merge, the clocks of duplicate groups, and,
-    from pixels, the background model.
-    innovation: (id, y (2,), S (2, 2)) of each confirmed group measured in the last step: innovation of its likeliest
-    association and its covariance, in the unit of the points.
+    State: config, which may be replaced between two frames; the bank of groups, the next id, the histories of pairs
+    that may merge, the clocks of duplicate groups, and, from pixels, the background model. All but config exist after
+    `reset` only. innovation: (id, y (2,), S (2, 2)) of each confirmed group measured in the last step: innovation of
+    its likeliest association and its covariance, in the unit of the points.
     """
 
     needs: ClassVar[tuple[str, ...]] = ("pixels", "points")
@@ -98,9 +98,12 @@ class GroupPda:
         self.config = config or GroupPdaConfig()
 
     def reset(self, context: Context, seed: int) -> None:
-        """Forget everything. With a background sample in the context pixels are tracked, else points.
+        """Forget everything and start a sequence. With a background sample in the context pixels are tracked, else
+        points.
 
-        `seed` has no effect: nothing is random. Raises InputError if pixels are tracked without a known scale.
+        `seed` has no effect: nothing is random. If pixels are tracked, raises InputError if the scale px_per_m is zero
+        or negative, or neither known nor learned from the sample, or if the sample has a wrong shape, too few frames or
+        shows no background.
         """
         self.context = context
         self.bank, self.ids = GroupBank.empty(), GroupIds()
@@ -117,16 +120,20 @@ class GroupPda:
 
     @property
     def px_per_m(self) -> float:
-        """Scale of the image in px per metre: the context's, or learned from its background sample; nan if unknown."""
+        """Scale of the image in px per metre: the context's, or, from pixels, learned from its background sample; nan
+        if unknown."""
         return self.context.px_per_m
 
     def step(self, frame: Frame, detections: Detections | None) -> Tracks:
-        """Return the groups and events of the frame, as Tracks with unit "group".
+        """Return the groups and events of the frame, as Tracks with unit "group"; updates all groups.
 
         Order: predict; gate, associate, update, split (Fig. 1), births; duplicates; merge; confirm; remove lost groups.
-        A frame without a picture or without detections (None) is predicted only.
-        A config that has replaced `config` since the last frame holds from this frame on; the groups stay.
-        Raises InputError if points lie in the image and the context has no scale.
+        From points `detections.pos` is used, from pixels `frame.image`. A frame without them (None), and from pixels
+        one with too much foreground, is predicted only. A config that has replaced `config` since the last frame holds
+        from this frame on; the groups stay.
+
+        Raises InputError if points are in the image and the context has no scale, or if the picture's size or dtype is
+        not the background sample's.
         """
         if self.pixels is not None and self.pixels.config is not self.config:
             self.pixels.follow(self.config)
@@ -150,7 +157,11 @@ class GroupPda:
         return report_tracks(bank, events, scaled, shown)
 
     def _points(self, frame: Frame, detections: Detections | None) -> tuple[Array | None, Array]:
-        """The frame's points (M, 2) and the people (M,) that each stands for; None if the frame has no information."""
+        """Returns the frame's points (M, 2) x, y and the people (M,) that each stands for; None and (0,) without
+        information.
+
+        From pixels it also lets the background learn and sets `colours`; from points it sets `plane`.
+        """
         if self.pixels is not None:
             found = None if frame.image is None else self.pixels.points(frame.image, self.outlines())
             if found is not None and frame.image is not None and self.config.appearance > 0:
@@ -162,9 +173,11 @@ class GroupPda:
         return np.ascontiguousarray(detections.pos[:, :2]), np.ones(len(detections.pos))
 
     def _outline(self, detections: Detections | None) -> Array:
-        """The polygon (V, 2) that one member covers, about the origin: a grid cell, a footprint, or a usual box.
+        """Returns the polygon (V, 2) that one member covers, about the origin: a grid cell, a footprint, or a usual
+        box.
 
-        The usual box is the median of the frame's boxes in the image, or of an earlier frame's if there are none.
+        Its unit is m on the ground, px in the image. The usual box is the median of the frame's boxes in the image, or
+        of an earlier frame's if there are none; if there never were any it is a footprint at the image's scale.
         """
         if self.pixels is not None:
             return SQUARE * self.pixels.step / 2
@@ -175,18 +188,24 @@ class GroupPda:
         return FOOTPRINT * self.context.px_per_m if self.usual_box is None else SQUARE * self.usual_box / 2
 
     def outlines(self) -> list[Array]:
-        """Return points (K, 2) in px round the places of each confirmed group: the corners of whole grid cells."""
+        """Return points (V, 2) u, v in px round the places of each confirmed group: the corners of whole grid cells.
+
+        From points they are the corners of footprints or usual boxes, in the unit of the points.
+        """
         bank, cell = self.bank, self._outline(None)
         rows = np.flatnonzero(bank.confirmed).tolist()
         return [(bank.positions(r)[:, None] + cell).reshape(-1, 2) for r in rows]
 
     def _no_tracks(self, frame: Frame) -> Tracks:
-        """Tracks without groups, before the plane of the points is known."""
+        """Returns Tracks without groups and events for this frame, before the plane of the points is known."""
         none, ids = np.zeros((0, 2)), np.zeros(0, np.int64)
         return Tracks(frame.index, frame.t, self.plane, "group", ids, ids, none, none, np.zeros((0, 4, 4)))
 
     def _scaled_parameters(self) -> ScaledParameters:
-        """The present config's parameters in the unit of the points; computed anew if the config was replaced."""
+        """Returns the present config's parameters in the unit of the points; computed anew if the config was replaced.
+
+        Raises InputError if points are in the image and the context has no scale.
+        """
         if self.scaled is not None and self.scaled.config is self.config:
             return self.scaled
         if self.pixels is not None:
@@ -200,7 +219,10 @@ class GroupPda:
         return self.scaled
 
     def _measure(self, points: Array, weights: Array, scaled: ScaledParameters, t: float) -> list[BankEvent]:
-        """Gate, associate and update (sec. 4), split, and make newborn groups (sec. 3.3); the events of splits."""
+        """Gate, associate and update (sec. 4), split, and add newborn groups (sec. 3.3); returns the events of splits.
+
+        points (M, 2); weights (M,): people each stands for; t: s. The bank and `innovation` are changed.
+        """
         bank = self.bank
         d2 = gated_distances(bank, points, scaled, t)
         owner = attached(points, d2, bank, scaled) if self.config.attach else np.full(len(points), -1)
@@ -220,7 +242,12 @@ class GroupPda:
     def _split(
         self, claims: PointClaims, chosen: Bools, log_ratio: Array, scaled: ScaledParameters, t: float
     ) -> list[BankEvent]:
-        """Split the groups that had no feasible association for `split_time`, each by the points nearest to it."""
+        """Split the groups that had no feasible association for `split_time`, each by the points nearest to it; returns
+        events.
+
+        chosen (G, M) bool: points of each group; log_ratio (G, M) of colours, or (G, 0); t: s. An event may be a split,
+        or a leave of a group that has only noise.
+        """
         bank, events = self.bank, []
         due = np.flatnonzero((bank.null_time >= self.config.split_time - 1e-9) & (bank.null_time > 0))
         nearest = nearest_claims(np.isfinite(claims.d2), claims.d2, log_ratio)
