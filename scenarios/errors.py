@@ -40,15 +40,19 @@ class FlockscopeError(Exception):
 
 
 class InputError(FlockscopeError):
-    """Wrong input or usage: a command that raises it ends with exit code 2. Keyword arguments as for
-    FlockscopeError.
+    """Wrong input or usage: a command that raises it ends with exit code 2.
+
+    Keyword arguments: file and place ("" by default), got, expected, remedy. `str()` is one line of them.
     """
 
     exit_code: ClassVar[int] = 2
 
 
 class WorkError(FlockscopeError):
-    """The work failed, or a check was not passed: a command that raises it ends with exit code 1."""
+    """The work failed, or a check was not passed: a command that raises it ends with exit code 1.
+
+    Keyword arguments: file and place ("" by default), got, expected, remedy. `str()` is one line of them.
+    """
 
 
 def _rebuild(kind: type[FlockscopeError], parts: dict[str, str]) -> FlockscopeError:

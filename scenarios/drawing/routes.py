@@ -128,9 +128,10 @@ def _mean(points: list[XY]) -> XY:
 
 
 def _mark(number: int, event: ScriptOrder, places: dict[str, tuple[XY, XY]], world: XY) -> OrderMark:
-    """Returns one order on the plan; places, start and goal (x, y, m) by name of existing group, is updated.
+    """Returns one order as drawn on the plan.
 
-    number: from 1. world: its size, m; places of a queue outside it are left out.
+    number: of the order, from 1. places: start and goal (x, y, m) by name of existing group; it is updated. world: its
+    size (x, y), m; places of a queue outside it are left out. Raises KeyError for a group that does not exist.
     """
     if isinstance(event, MergeOrder):
         return _merge(number, event, places)

@@ -32,12 +32,14 @@ Table = dict[str, Any]
 
 
 def names() -> list[str]:
-    """Returns the names of the scenarios in the catalogue, sorted."""
+    """Returns the names (file names without .toml) of the scenarios in the catalogue, sorted; suites are not among
+    them.
+    """
     return sorted(path.stem for path in CATALOGUE.glob("*.toml"))
 
 
 def suite_names() -> list[str]:
-    """Returns the names of the suites in the catalogue, sorted."""
+    """Returns the names (file names without .toml) of the suites in the catalogue, sorted."""
     return sorted(path.stem for path in SUITES.glob("*.toml"))
 
 

@@ -284,7 +284,10 @@ class Scenario(Model):
 
 
 def group_names(group: GroupSpec) -> list[str]:
-    """Returns the names of the groups that an entry makes: its id, or id-1 … id-n where `repeat` is n > 1."""
+    """Returns the names of the groups that an entry of `group` makes, in order.
+
+    It is the id alone for `repeat = 1`, and id-1 … id-n for `repeat = n` above 1.
+    """
     return [group.id] if group.repeat == 1 else [f"{group.id}-{k + 1}" for k in range(group.repeat)]
 
 

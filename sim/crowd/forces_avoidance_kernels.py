@@ -33,12 +33,12 @@ PILLAR_MARGIN = 1.2  # person radii that are added to a pillar's radius in the p
 
 @njit(cache=True, inline="always")
 def _power_law(dx, dy, wx, wy, radius, strength, horizon, cap):  # type: ignore[no-untyped-def]
-    """Avoidance acceleration (fx, fy) in m/s² of one of two discs whose radii add up to `radius` (m).
+    """Returns the avoidance acceleration (fx, fy) in m/s² of one of two discs whose radii add up to `radius` (m).
 
-    d = own position - other position, w = own velocity - other velocity. Minus the gradient of strength exp(-tau /
-    horizon) / tau² over the relative position, tau being the time to collision (Karamouzas 2014, eq. 2-3), at most
-    `cap` long. Zero where no collision lies ahead within 4 horizon, and where the discs overlap already. *Ours*: tau is
-    at least 0.05 s.
+    (dx, dy) = own - other position, m; (wx, wy) = own - other velocity, m/s. Minus the gradient of strength exp(-tau /
+    horizon) / tau² over the relative position, tau being the time to collision in s (Karamouzas 2014, eq. 2-3), cut to
+    length `cap`. Zero where no collision lies ahead within 4 horizon, and where the discs overlap. *Ours*: tau ≥ 0.05
+    s.
     """
     a = wx * wx + wy * wy
     c = dx * dx + dy * dy - radius * radius

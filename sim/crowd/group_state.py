@@ -119,8 +119,8 @@ class GroupState:
 
         start, goal, gather (2,) and each of via (2,): m. finish: "stand", "leave" or "walk" (straight on for 1000 m
         beyond the goal). speed: m/s. gather: point where the group first waits for all members, None to start at once.
-        Where no way exists, the group walks straight. Waypoints after the first MAX_WAY (32) are dropped. Also does
-        what `write_way` does.
+        Where no way exists, the group walks straight. Waypoints after the first MAX_WAY (32) are dropped. The group
+        turns at once to its way, `arrived` becomes False, and its members start at the first waypoint.
         """
         way: list[tuple[Array, int]] = [] if gather is None else [(gather, GATHER)]
         here = start if gather is None else gather

@@ -108,7 +108,10 @@ class World:
         self._read_buffer, self._write_buffer = pymunk.batch.Buffer(), pymunk.batch.Buffer()
 
     def run(self) -> Motion:
-        """Returns the Motion of duration × fps frames (at least 1) after the warm-up. WorkError as for `frames`."""
+        """Returns the Motion of duration × fps frames (at least 1) after the warm-up.
+
+        Raises WorkError if a position or velocity is not finite.
+        """
         frames = max(1, round(self.scenario.duration * self.fps))
         record = np.empty((frames, len(self.members), 4))
         intent = np.empty((frames, len(self.members)), np.int64)
@@ -197,7 +200,7 @@ class World:
         self._map_rows()
 
     def _way_back_is_free(self, group: EnteringGroup, heading: Array) -> bool:
-        """True if the group walks, its way back during the warm-up crosses no wall, and there is no pillar."""
+        """True if the group walks, its way back during the warm-up crosses no wall, and the scene has no pillar."""
         if not group.walks:
             return False
         back = group.pos - self.scenario.warmup * group.speed * heading

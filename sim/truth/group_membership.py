@@ -167,10 +167,11 @@ class _RuleTimes:
         return _connected(list(_by_intent(part, self.motion, t).values()), unsplit)
 
     def _onsets(self, rule: Rule, a: PersonSet, b: PersonSet, t: int) -> Ints:
-        """Returns the frames, ascending, from which the rule will hold long enough between parts a and b.
+        """Returns the frames, ascending, from which the rule ("merge" or "split") will hold long enough between parts a
+        and b.
 
-        They are measured at the first call for this rule and these parts, from that call's t on; later calls return the
-        same.
+        They are measured at the first call for this rule and these parts, from frame t on; later calls return the same
+        array.
         """
         key = (rule, a, b)
         if key not in self._known:

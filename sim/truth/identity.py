@@ -63,10 +63,13 @@ def lineage(
     """Returns what happened to the groups between two partitions, old groups first, each in order of group id.
 
     old, new: members of each group by id. before, now: all people present. entered: people who count as having just
-    entered though they are in both. People who are in only one of before and now have left or entered.
+    entered though they are in both. People who are in only one of before and now have left or entered. People who stay
+    are in both.
 
-    - split or dissolve: the old group's people who stay are in several groups or alone. merge or form: likewise
-      backwards.
+    - split: the people of an old group who stay are now in several groups, or in groups and alone; dissolve: two or
+      more stay and all are alone.
+    - merge: the people of a new group who stay were in several groups, or in groups and alone; form: two or more stay
+      and all were alone.
     - enter: all people of a new group have just entered, or all but one who was alone.
     - leave: all people of an old group have left, or all but one who is now alone.
 

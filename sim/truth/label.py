@@ -27,8 +27,9 @@ def bodies(motion: Motion, camera: Camera | None) -> Truth:
 
 
 def _bodies(motion: Motion, camera: Camera | None, people: RecordedBodies) -> Truth:
-    """Returns what `bodies` returns, with the rows and shapes of the people given by people =
-    recorded_bodies(motion).
+    """Returns a Truth with positions, boxes and visibility of every person in every frame, but without groups.
+
+    people: rows and shapes as recorded_bodies(motion) returns them. camera None: no boxes, visibility 1, px_per_m nan.
     """
     t, p = people.frame - 1, people.id - 1
     seen = None if camera is None else measure_visibility(
@@ -78,9 +79,10 @@ def label(motion: Motion, camera: Camera | None) -> Truth:
 
 
 def _events(motion: Motion, group: Ints, changes: tuple[GroupEvent, ...]) -> tuple[GroupEvent, ...]:
-    """Returns the events `changes` (merge, split, form, dissolve, enter, leave) together with crossings and queues.
+    """Returns all events of a motion, sorted by start, end, kind, members and groups after.
 
-    group (T, P): group id of each person, -1 = alone or absent. Sorted by start, end, kind, members and groups after.
+    changes: its merge, split, form, dissolve, enter and leave events; crossings and queues are measured here. group (T,
+    P): group id of each person, -1 = alone or absent.
     """
     from sim.truth.crossing_events import crossings
     from sim.truth.queue_detection import queues

@@ -200,8 +200,8 @@ def _follow(following: list[_FollowedLine], now: _LineNow, hold: int, bridge: in
     """Adds the line `now` to the line in `following` that shares most people with it, or appends it as a new one.
 
     A followed line fits if it was last seen earlier and shares at least two people, in the same order. A line of fewer
-    than 3 people (QUEUE_PEOPLE) that fits none is dropped. hold: frames for which a queue needs 3 people. bridge:
-    frames for which it may have fewer before `hold` is reached; the record then starts anew.
+    than 3 people (QUEUE_PEOPLE) that fits none is dropped. hold: frames for which a queue needs 3 people. The record of
+    a followed line starts anew if it had fewer than 3 people for more than `bridge` frames before it reached `hold`.
     """
     people, long = set(now.order), len(now.order) >= QUEUE_PEOPLE
     fits = [f for f in following if f.now.t < now.t and len(people.intersection(f.now.order)) > 1]
