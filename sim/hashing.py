@@ -78,7 +78,7 @@ def dataset_hash(contents: Mapping[str, str]) -> str:
 
 
 class PixelHash:
-    """A hash over pictures that are added one by one: their number types, shapes and raw bytes.
+    """A hash over pictures that are added one by one: their number types, shapes and raw bytes, in order.
 
     State: the SHA-256 so far, and `count`, the number of pictures added.
     """

@@ -400,7 +400,8 @@ class Sequence:
         return cached
 
     def background(self) -> Image | None:
-        """Return sample pictures (K, H, W, 3) BGR uint8 to train a background model on; None if there are none."""
+        """Return sample pictures (K, H, W, 3) BGR uint8 to train a background model on; None if there are none. Raises
+        InputError if none can be read."""
         return None if self.load_background is None else self.load_background()
 
 

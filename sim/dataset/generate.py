@@ -141,8 +141,7 @@ def _not_visible(job: SequenceJob) -> WorkError:
 
 
 def write_seqmap(root: Path, split: str) -> set[str]:
-    """Write ROOT/seqmaps/flockscope-<split>.txt, TrackEval's list of sequences; returns the sequence names that it
-    lists.
+    """Write ROOT/seqmaps/flockscope-<split>.txt, TrackEval's list of sequences; returns the names in it.
 
     It lists, sorted, every folder below ROOT/flockscope-<split> that has a manifest; folders whose names begin with a
     dot are left out. Without such a folder no file is written and the result is empty; an existing file stays. Raises

@@ -67,10 +67,10 @@ def plan_jobs(entries: list[Entry], seeds: range, folder: Path) -> list[Sequence
 
 
 def stored_manifest(job: SequenceJob) -> dict[str, Any] | None:
-    """Return the manifest in the job's folder; None if the folder is missing or has no valid manifest.
+    """Return the manifest in the job's folder; None if the folder is missing or has no valid manifest of our format.
 
     The files are not compared with the manifest. Raises InputError if the folder holds another sequence, that is, if
-    the manifest differs in scenario, seed, repeat, format, engine, streams or file type. Also raises InputError if a
+    the manifest differs in scenario, seed, repeat, schema, engine, streams or file type. Also raises InputError if a
     stream or the file type of the job is unknown.
     """
     from scenarios.loading.resolve import dump
@@ -131,11 +131,11 @@ def simulate_and_store(job: SequenceJob) -> None:
 
 
 def run_job(job: SequenceJob) -> JobOutcome:
-    """Make the job's sequence unless it is already stored; returns InputError and WorkError in the JobOutcome, raises
-    neither.
+    """Make the job's sequence unless it is already stored; returns how that ended.
 
-    The outcome is fatal if an OSError caused the error, as a full disk or a marker file that the worker cannot see
-    within 5 s. The fatal error of a job with a marker names the worker's machine.
+    InputError and WorkError are returned in the JobOutcome, not raised. The outcome is fatal if an OSError caused the
+    error, as a full disk or a marker file that the worker cannot see within 5 s. The fatal error of a job with a marker
+    names the worker's machine.
     """
     try:
         if job.marker is not None:

@@ -27,7 +27,8 @@ def open_source(
     images: bool = True,
     background: str | None = None,
 ) -> list[Sequence]:
-    """Return the Sequences at a path: those of a dataset sorted by path, else one.
+    """Return the Sequences at a path: those of a folder sorted by path, subfolders before files; one for a single
+    recording.
 
     path: a generated sequence or dataset, a MOTChallenge folder or text, a BIWI folder, a CAVIAR XML, a video, or a
     folder that holds some of these at most 3 levels down. fps: frames per second; px_per_m: image scale; camera:

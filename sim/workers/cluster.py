@@ -177,14 +177,13 @@ class ClusterCall:
 
 
 def run_on_worker(call: bytes, required: tuple[tuple[str, str], ...]) -> bytes:
-    """Run a call on the dask worker that this process is; returns a pickled WorkResult (value or exception of the
-    call).
+    """Run a call on the dask worker that this process is; returns a pickled WorkResult.
 
-    call: a pickled (function, item). required: (name, value) pairs of the runtime that the worker must have. Sets each
-    of THREAD_VARIABLES to 1 in this process unless it is set already. Before Python 3.11.9 it stops dask's profiler.
+    It holds the call's value or exception, so an exception of the function itself is not raised. call: a pickled
+    (function, item). required: (name, value) pairs of the runtime that the worker must have. Sets each of
+    THREAD_VARIABLES to 1 in this process unless it is set already. Before Python 3.11.9 it stops dask's profiler.
 
-    Raises WorkError if the worker has more than one thread, or if its runtime differs from `required`. An exception of
-    the function itself is not raised; it is in the WorkResult.
+    Raises WorkError if the worker has more than one thread, or if its runtime differs from `required`.
     """
     from distributed import get_worker
 

@@ -89,10 +89,9 @@ def _named(event: GroupEvent, names: dict[int, int], people: Ints, px_per_m: flo
 
 
 def scale_groups(groups: Groups, factor: float) -> Groups:
-    """Return groups with positions, velocities and hulls multiplied by `factor`, and extents (covariances) by its
-    square.
+    """Return groups with all lengths multiplied by `factor`: positions, velocities and hulls.
 
-    Ids, members and sizes stay. Factor 1 returns `groups` itself.
+    Extents (covariances) are multiplied by its square. Ids, members and sizes stay. Factor 1 returns `groups` itself.
     """
     if factor == 1.0:
         return groups

@@ -89,10 +89,9 @@ def read_groups(table: StoredTable) -> list[Groups | None]:
 
 
 def wkt(hull: Array, digits: int) -> str:
-    """Return a hull, vertices (V, 2) x, y, as text "POLYGON ((x y, …))" with `digits` decimals, the first vertex
-    repeated.
+    """Return a hull, vertices (V, 2) x, y, as text "POLYGON ((x y, …))" with the first vertex repeated at the end.
 
-    A hull without vertices is "POLYGON EMPTY".
+    digits: decimals of each number. A hull without vertices is "POLYGON EMPTY".
     """
     points = [f"{x:.{digits}f} {y:.{digits}f}" for x, y in hull]
     return f"POLYGON (({', '.join([*points, points[0]])}))" if points else "POLYGON EMPTY"

@@ -56,11 +56,11 @@ def suffix(stream: str, images: str) -> str:
 
 
 def file_name(stream: str, images: str, index: int) -> str:
-    """Return the name of a picture's file relative to the sequence folder, as img1/000001.jpg; one mp4 per stream, as
-    left.mp4.
+    """Return the name of a picture's file relative to the sequence folder: "img1/000001.jpg" or "left.mp4", for
+    instance.
 
-    images: file type, "jpg", "png" or "mp4". index: the frame, from 1; for "background" the picture's number, from 1.
-    Ignored for a video.
+    images: file type, "jpg", "png" or "mp4"; disparity and ids are always PNG. index: the frame, from 1; for
+    "background" the picture's number, from 1. An mp4 holds all pictures of a stream, so `index` is then ignored.
     """
     kind = suffix(stream, images)
     return f"{stream}.mp4" if kind == "mp4" else f"{FOLDERS[stream]}/{index:06d}.{kind}"
