@@ -17,11 +17,15 @@ if TYPE_CHECKING:
 
 
 def perturb_boxes(box: Array, visibility: Array, noise: BoxNoise, n: Array) -> Array:
-    """Return boxes (R, 4) ltwh px moved by random errors, by standard normals n (R, 4): middle, foot, top, width.
+    """Return boxes (R, 4), left, top, width, height in px, moved by random errors; the boxes given are not changed.
 
-    An error is mean + standard deviation × n, as `noise` gives them. `noise.occluded` times the hidden share raises the
-    standard deviation, `noise.tails` gives n heavier tails. visibility (R,): share of each person that is visible.
-    Width and height keep at least 1 px, or their former value if that was less.
+    n (R, 4): standard normals for the errors of the middle (to the right), the foot (downwards), the top (downwards),
+    all in box heights, and of the logarithm of the width. An error is mean + standard deviation × n, as `noise` gives
+    them. The standard deviation is multiplied by 1 + `noise.occluded` × hidden share; `noise.tails`, an excess
+    kurtosis, gives n heavier tails. visibility (R,): visible share of each person, 0 to 1.
+
+    Width and height keep at least 1 px, or their former value if that was less; then the top yields. A nan box stays
+    nan.
     """
     n = heavy_tailed(n, noise.tails)
     means, sds = np.array([noise.across, noise.foot, noise.top, noise.width]).T
@@ -35,9 +39,10 @@ def perturb_boxes(box: Array, visibility: Array, noise: BoxNoise, n: Array) -> A
 
 
 def move_edges(box: Array, move: Array) -> Array:
-    """Return boxes (R, 4) ltwh px whose left, top, right and lower edges move by the columns of move (R, 4) px.
+    """Return boxes (R, 4), left, top, width, height in px, with edges moved by move (R, 4) px; the boxes given stay.
 
-    Width and height keep at least 1 px, or their former value if that was less; then the right or lower edge yields.
+    Columns of move: left edge, top edge, right edge, lower edge; positive is to the right or downwards. Width and
+    height keep at least 1 px, or their former value if that was less; then the right or lower edge yields.
     """
     edges = np.concatenate([box[:, :2], box[:, :2] + box[:, 2:]], axis=1) + move
     size = np.maximum(edges[:, 2:] - edges[:, :2], np.minimum(box[:, 2:], 1.0))
@@ -45,9 +50,11 @@ def move_edges(box: Array, move: Array) -> Array:
 
 
 def heavy_tailed(n: Array, excess_kurtosis: float) -> Array:
-    """Return standard normals n, of any shape, mapped to Student's t of variance 1 and this excess kurtosis.
+    """Return standard normals n, of any shape, mapped to Student's t of variance 1 and this excess kurtosis (0 or
+    more).
 
-    Quantiles are mapped to quantiles. n itself is returned if the excess kurtosis is 0.
+    Quantiles are mapped to quantiles, with 4 + 6 / kurtosis degrees of freedom. If the excess kurtosis is 0, n itself
+    is returned, not a copy.
     """
     if not excess_kurtosis:
         return n
@@ -58,9 +65,11 @@ def heavy_tailed(n: Array, excess_kurtosis: float) -> Array:
 
 
 def box_errors(box: Array, true: Array) -> Array:
-    """Return the errors (R, 4) of boxes (R, 4) ltwh against the true boxes (R, 4): middle, foot, top, log width.
+    """Return the errors (R, 4) of boxes (R, 4) against the true boxes (R, 4), both left, top, width, height in px.
 
-    This undoes `perturb_boxes` but for means and standard deviations. Heights are those of the true boxes.
+    Columns: middle to the right, foot downwards, top downwards, each divided by the true height; and the logarithm of
+    width over true width. These are the errors that `perturb_boxes` adds. A true height or width of 0 gives inf or nan,
+    with a numpy warning.
     """
     h = true[:, 3]
     foot, true_foot = box[:, 1] + box[:, 3], true[:, 1] + h
@@ -70,10 +79,11 @@ def box_errors(box: Array, true: Array) -> Array:
 
 
 def foot_points(box: Array, z: Array, camera: Camera) -> Array:
-    """Return the points (R, 2) m where people with boxes (R, 4) ltwh px stand, on ground of height z (R,) m.
+    """Return the ground points (R, 2), x and y in m, of people with boxes (R, 4), left, top, width, height in px.
 
-    The point is seen at the middle of the box's lower edge, from above at the box's middle. nan where no ground is
-    seen.
+    A person stands where the middle of the box's lower edge is seen; for a camera of kind "top", where the box's middle
+    is seen. z (R,) m: height of the ground at each person. A row is nan where the line of sight meets no ground of that
+    height.
     """
     from sim.scene.camera import rays
 

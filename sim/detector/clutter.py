@@ -34,12 +34,17 @@ def false_alarms(
     image_size: tuple[int, int] | None,
     repeat: int = 0,
 ) -> Readings:
-    """Return the false alarms of all frames.
+    """Return the false alarms of all frames 1 to truth.length as Readings; their number per frame is Poisson.
 
     With a camera, their feet are spread evenly over the part of the image that shows ground, and each is as large as a
-    person standing there. Without a camera, boxes have the sizes of labelled boxes and are spread evenly over the
-    image, and points are spread evenly over the labelled area. Boxes are None if the truth has none; with `sensor.box`
-    "visible" they are clipped to the image. Without a camera and without labels there are no false alarms.
+    person standing there. Without a camera, boxes have the sizes of labelled boxes and are spread evenly over the image
+    (image_size: width, height in px; None: over the labelled box centres). Points are spread evenly over the labelled
+    area. Positions are in m; in px, the box's centre, if the truth has no positions. With `sensor.false_alarms`, alarms
+    last several frames and follow their own rules of place and size.
+
+    Boxes are None if the truth has none. With `sensor.box` "visible" they are clipped to the image if its size is
+    known. Without a camera and without labels there are no false alarms. seed, repeat (number of the suite entry's
+    copy, 0 without copies): name the random streams. Raises ValueError for a negative seed.
     """
     size = camera.image if camera is not None else image_size
     if sensor.false_alarms is not None and (len(truth.id) or camera is not None):
@@ -63,15 +68,21 @@ def false_alarms(
 
 
 def false_alarm_counts(rate: float, length: int, seed: int, repeat: int = 0) -> Ints:
-    """Return the number of false alarms of each frame (length,), Poisson of this rate; see `poisson_counts`."""
+    """Return the number of false alarms of each frame 1 to `length`, (length,), Poisson with mean `rate` per frame.
+
+    seed, repeat (number of the suite entry's copy, 0 without copies): name the random stream; for fixed ones a higher
+    rate never lowers a number. All are 0 if the rate is 0. Raises ValueError for a negative seed.
+    """
     return poisson_counts(rate, uniforms(rng(seed, "clutter", 0, repeat=repeat), 1, length, 1)[:, 0])
 
 
 def _placed_by_camera(camera: Camera, u: Array) -> tuple[Array, Array]:
-    """Ground points (N, 2) m and boxes (N, 4) of people of drawn height (1.5 to 1.95 m) and heading, seen by the
-    camera.
+    """Return ground points (N, 2) in m and boxes (N, 4), left, top, width, height in px, of N false alarms in the
+    image.
 
-    Right under a pinhole camera, where a body has no box, a box of a person's size is put round the image point.
+    Each is a person 1.5 to 1.95 m tall. u (N, 6): uniforms in (0, 1), columns ACROSS, DOWN, HEIGHT, HEADING, SCORE,
+    ORDER. Right under a pinhole camera, where a body has no box, a box of a person's size is put round the image point.
+    A point is nan where no ground is seen.
     """
     width, height = camera.image
     top = 0.0 if camera.kind == "top" else furthest_row(camera)
@@ -87,9 +98,12 @@ def _placed_by_camera(camera: Camera, u: Array) -> tuple[Array, Array]:
 
 
 def _placed_by_labels(truth: Truth, image_size: tuple[int, int] | None, u: Array) -> tuple[Array, Array | None]:
-    """Points (N, 2) over the labelled area and boxes (N, 4) of labelled sizes; zeros or None for what has no labels.
+    """Return points (N, 2) in m over the labelled area, and boxes (N, 4), left, top, width, height in px, of labelled
+    sizes.
 
-    Boxes are spread over the image, or over the labelled box centres if the image size is unknown.
+    u (N, 6): uniforms in (0, 1), columns ACROSS, DOWN, HEIGHT, HEADING, SCORE, ORDER. Boxes have their centres evenly
+    over the image (image_size: width, height in px), or over the labelled box centres if that is None. Points are 0 if
+    the truth has no positions. Boxes are None if it has no boxes.
     """
     spread = u[:, [ACROSS, DOWN]]
     pos = np.zeros((len(u), 2))

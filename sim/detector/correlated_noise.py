@@ -22,10 +22,14 @@ if TYPE_CHECKING:
 def correlated_normals(
     fresh: Array, memory: Sequence[Memory], first: int, fps: float, seed: int, *keys: int, repeat: int = 0
 ) -> Array:
-    """Return correlated standard normals (F, D) of frames `first`, `first` + 1, …; `fresh` itself if memory is empty.
+    """Return standard normals (F, D), correlated over time, of frames `first` to `first` + F - 1 (frames from 1 on).
 
-    fresh (F, D): standard normals, used as the white part. memory: share of variance and time (s) of each AR(1) part;
-    its random stream is named by `keys` and its number. The D columns are independent.
+    fresh (F, D): standard normals, used as the white part. memory: share of the variance and time constant (s) of each
+    AR(1) part; the shares must not add up to more than 1. The D columns are independent. The random stream of a part is
+    named by the seed, `keys`, the part's number from 0 on, and repeat (number of the suite entry's copy). If memory is
+    empty, `fresh` itself is returned.
+
+    Raises ValueError for a negative seed or key.
     """
     if not memory:
         return fresh
@@ -40,7 +44,10 @@ def correlated_normals(
 
 
 def _autoregression(e: Array, rho: float) -> Array:
-    """x_1 = e_1, x_t = rho x_(t-1) + sqrt(1 - rho²) e_t down the rows of e, which is changed."""
+    """Return x (F, D) with x_1 = e_1, x_t = rho x_(t-1) + sqrt(1 - rho²) e_t down the rows of e (F, D).
+
+    It changes e: rows 2 on are scaled.
+    """
     from scipy.signal import lfilter
 
     e[1:] *= np.sqrt(1.0 - rho**2)

@@ -33,8 +33,13 @@ AlarmRows = tuple[Ints, Array, Array]
 
 @dataclass(frozen=True)
 class Births:
-    """B alarms by frame of birth: frame (B,); at_birth (B, BIRTH_DRAWS), their draws at birth; in_frames, one array
-    (L, FRAME_DRAWS) per alarm, its draws in each of the L frames it lives."""
+    """All B false alarms of a sequence, sorted by frame of birth.
+
+    frame (B,)        frame of birth, from 1 on
+    at_birth (B, 9)   uniforms: columns LIFE, AT_PERSON, SITE, X, Y, TALL, ASPECT, VX, VY
+    in_frames         B arrays (L, 7) of uniforms, one row for each of the L frames that the alarm lives: columns SHOWN,
+                      four edges (left, top, right, lower), SCORE, ORDER
+    """
 
     frame: Ints
     at_birth: Array
@@ -44,10 +49,15 @@ class Births:
 def persistent_false_alarms(
     truth: Truth, sensor: Sensor, seed: int, camera: Camera | None, size: Array | None, repeat: int
 ) -> Readings:
-    """Return the false alarms of all frames; size (2,) px of the image, None if unknown.
+    """Return the false alarms of all frames 1 to truth.length as Readings, where alarms last several frames.
 
-    Boxes are None if the truth has none. With `sensor.box` "visible" they are clipped to the image if its size is
-    known; an alarm without any box area is dropped.
+    `sensor.false_alarms` holds their settings and must be given (else AssertionError). size (2,): width, height of the
+    image in px, None if unknown. camera None: places and sizes come from the labels. seed, repeat (number of the suite
+    entry's copy): name the random streams.
+
+    Positions are in m; in px, the box's centre, if the truth has no positions. Boxes are None if the truth has none.
+    With `sensor.box` "visible" they are clipped to the image if its size is known. If the truth has boxes, an alarm
+    whose box has no area is dropped. Raises ValueError for a negative seed.
     """
     model = sensor.false_alarms
     assert model is not None
@@ -70,7 +80,13 @@ def persistent_false_alarms(
 
 
 def _draw_births(model: FalseAlarms, rate: float, truth: Truth, seed: int, repeat: int) -> Births:
-    """Draw all alarms of a sequence; frame 1 starts with the stationary number of living alarms."""
+    """Return all alarms of a sequence; frame 1 starts with the stationary number of living alarms, as if they began
+    earlier.
+
+    rate: mean number of alarms reported per frame. An alarm's life is geometric with mean about `model.life` (s), and
+    is cut at the last frame; 0 means one frame. seed, repeat (number of the suite entry's copy): name the random
+    streams.
+    """
     q = np.exp(-1.0 / (truth.fps * model.life)) if model.life else 0.0
     alive = rate / model.seen
     u = uniforms(rng(seed, "clutter", 0, 1, repeat=repeat), 1, truth.length, 1)[:, 0]
@@ -87,9 +103,11 @@ def _draw_births(model: FalseAlarms, rate: float, truth: Truth, seed: int, repea
 
 
 def _one_alarm(model: FalseAlarms, ground: VisibleGround, born: Births, k: int, seed: int, repeat: int) -> AlarmRows:
-    """Alarm k: its frames (L,), boxes ltwh and points (L, 6), and draws in those frames (L, FRAME_DRAWS).
+    """Return row k of `born`, one alarm, as its frames (L,), rows (L, 6) and uniforms in those frames (L, 7).
 
-    An alarm at a person ends when the person leaves. Without people in the frame of birth it is on its own.
+    Rows are left, top, width, height in px of the box, then x, y in m of the point. Columns of the uniforms: SHOWN,
+    four edges, SCORE, ORDER. An alarm at a person ends when the person leaves, at least by the end of its life. Without
+    people in the frame of birth it is on its own.
     """
     start, at_birth, in_frames = int(born.frame[k]), born.at_birth[k], born.in_frames[k]
     frame = start + np.arange(len(in_frames))
@@ -109,15 +127,22 @@ def _one_alarm(model: FalseAlarms, ground: VisibleGround, born: Births, k: int, 
 
 
 def _draw_person(ids: Ints, seed: int, frame: int, nth: int, repeat: int) -> int:
-    """Id of the person an alarm goes with: the one with the highest draw. Draws are keyed by the person, so that one
-    person more changes few alarms."""
+    """Return the id of the person with whom an alarm goes: the one of `ids` with the highest random draw.
+
+    frame, nth: frame of birth and number of the alarm in it. Draws are keyed by the person, so that one person more
+    changes few alarms. Raises ValueError if `ids` is empty.
+    """
     draws = [rng(seed, "clutter", 2, frame, nth, int(id), repeat=repeat).random() for id in ids]
     return int(ids[int(np.argmax(draws))])
 
 
 def _rows_of_person(truth: Truth, id: int, frame: Ints) -> tuple[Ints, Bools]:
-    """Truth rows of a person from the first of these frames until the person is first absent, and a mask (L,) of the
-    frames they belong to."""
+    """Return the rows (M,) of the truth in which a person is present, and a mask (L,) of the frames to which they
+    belong.
+
+    frame (L,): consecutive frame numbers, from 1 on. The rows run from the first of these frames until the person is
+    first absent. The person must have at least one row in the truth.
+    """
     mine = np.flatnonzero(truth.id == id)
     place = np.minimum(np.searchsorted(truth.frame[mine], frame), len(mine) - 1)
     present = np.logical_and.accumulate(truth.frame[mine[place]] == frame)
@@ -125,7 +150,12 @@ def _rows_of_person(truth: Truth, id: int, frame: Ints) -> tuple[Ints, Bools]:
 
 
 def _boxes_at_person(model: FalseAlarms, ground: VisibleGround, row: Ints, n: Array) -> tuple[Array, Array]:
-    """Boxes (L, 4) and points (L, 2) of an alarm that goes with a person in these rows of the truth."""
+    """Return boxes (L, 4), left, top, width, height in px, and points (L, 2) in m, of an alarm that goes with a person.
+
+    row (L,): the person's rows of the truth. n (9,): standard normals, columns as `at_birth` of Births. Boxes are 0 if
+    the truth has none. The points are under the boxes if there is a camera and ground is seen there; else beside the
+    person, or 0 if the truth has no positions.
+    """
     truth = ground.truth
     across, down = (mean + sd * n[c] for (mean, sd), c in ((model.across, X), (model.foot, Y)))
     aside = PERSON_HEIGHT * across * np.array([1.0, 0.0])
@@ -141,7 +171,12 @@ def _boxes_at_person(model: FalseAlarms, ground: VisibleGround, row: Ints, n: Ar
 def _boxes_alone(
     model: FalseAlarms, ground: VisibleGround, frames: int, at_birth: Array, n: Array
 ) -> tuple[Array, Array]:
-    """Boxes (L, 4) and points (L, 2) of an alarm that stands or drifts on its own."""
+    """Return boxes (L, 4), left, top, width, height in px, and points (L, 2) in m, of an alarm that stands or drifts
+    alone.
+
+    frames: L, the frames it lives. at_birth (9,): its uniforms, columns LIFE … VY; n (9,): the same as standard
+    normals. It starts at one of the sites `model.at`, else anywhere on the part of the image that shows ground.
+    """
     x, y = at_birth[X], at_birth[Y]
     if model.at:
         x, y = model.at[min(int(at_birth[SITE] * len(model.at)), len(model.at) - 1)]
@@ -155,6 +190,10 @@ def _boxes_alone(
 
 
 def _boxes_on_feet(middle: Array, foot: Array, tall: Array, model: FalseAlarms, n: Array) -> Array:
-    """Boxes (L, 4) ltwh px by column of the middle, row of the feet and height, all (L,) px; the aspect is drawn."""
+    """Return boxes (L, 4), left, top, width, height in px, that stand on given feet.
+
+    middle (L,) or one number: column of the middle. foot (L,) or one number: row of the feet. tall (L,): height. All
+    are in px. n (9,): standard normals; that of ASPECT draws the width over the height.
+    """
     wide = tall * np.exp(model.aspect[0] + model.aspect[1] * n[ASPECT])
     return np.stack([middle - wide / 2, foot - tall, wide, tall], axis=1)

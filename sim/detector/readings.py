@@ -14,9 +14,12 @@ from sim.types import Array, Detections, Ints, Plane, Truth
 class Readings:
     """R detections of a whole sequence, true ones or false alarms.
 
-    frame (R,) from 1 on. pos (R, 2): m on the ground, or px where the truth has no positions. box (R, 4) ltwh px, or
-    None. score (R,) in [0, 1]. order (R,) in (0, 1), random: detections of a frame are listed by it, so that a place in
-    the list tells nothing.
+    frame (R,)    frame number, from 1 on
+    pos (R, 2)    x, y in m on the ground; the box's centre in px where the truth has no positions
+    box (R, 4)    left, top, width, height in px; None without boxes
+    score (R,)    in [0, 1]
+    order (R,)    in (0, 1), random: the detections of a frame are listed in ascending order of it, so that a place in
+                  the list tells nothing
     """
 
     frame: Ints
@@ -27,9 +30,12 @@ class Readings:
 
 
 def detections_by_frame(true: Readings, false: Readings, truth: Truth) -> list[Detections]:
-    """Return one Detections for each frame of the truth, empty ones included: true detections and false alarms mixed.
+    """Return a list of truth.length Detections, for frames 1 on: true detections and false alarms mixed, in random
+    order.
 
-    The plane is "ground" if the truth has positions, else "image". Boxes are None unless both kinds have boxes.
+    A frame without any has empty Detections. The plane is "ground" (positions in m) if the truth has positions, else
+    "image" (px). Boxes are None unless `true` and `false` both have boxes. Velocities are None. Readings outside frames
+    1 to truth.length are dropped.
     """
     frame = np.concatenate([true.frame, false.frame])
     order = np.lexsort((np.concatenate([true.order, false.order]), frame))

@@ -42,14 +42,20 @@ def sense(
     repeat: int = 0,
     people: Mapping[str, tuple[int, ...]] | None = None,
 ) -> list[Detections]:
-    """Return the detections of each frame, 1 to truth.length, false alarms included.
+    """Return a list of truth.length Detections, for frames 1 on: what the simulated detector reports, false alarms
+    included.
 
     If the truth has positions, `pos` is the ground point (m), with the box beside it if boxes are known. Else `pos` is
-    the centre of the box (px). camera, image_size: place and size the false alarms; the camera also scales `small_px`
-    seen from above, and turns boxes into ground points if `sensor.points` is "foot". seed, repeat: name the random
-    streams. people: ids of each group of the script, for `sensor.hide`.
-    Raises InputError in two cases: `sensor.hide` names an unknown group, or `sensor.box` is "visible" and the truth has
-    boxes but no visible boxes.
+    the centre of the box (px). A frame without any has empty Detections.
+
+    camera, image_size (width, height in px): place and size the false alarms. The camera also scales `small_px` seen
+    from above, and turns boxes into ground points if `sensor.points` is "foot". Without both, false alarms are placed
+    by the labels. seed, repeat (number of the suite entry's copy, 0 without copies): name the random streams. people:
+    ids of the people of each group that the script names, for `sensor.hide`.
+
+    Raises InputError if `sensor.hide` names a group that is not in `people`, or if `sensor.box` is "visible" and the
+    truth has boxes but no visible boxes. Raises AssertionError if the truth has neither positions nor boxes, ValueError
+    for a negative seed.
     """
     if sensor.box == "visible" and truth.box is not None and truth.visible_box is None:
         raise InputError(
@@ -84,19 +90,26 @@ def _true_detections(
 
 
 def _foot_points_or(otherwise: Array, box: Array, truth: Truth, seen: Bools, camera: Camera) -> Array:
-    """Ground points (N, 2) m under the boxes; rows of `otherwise` where a box shows no ground."""
+    """Return the ground points (N, 2) in m under the boxes (N, 4), left, top, width, height in px.
+
+    A coordinate is taken from `otherwise` (N, 2) where a box shows no ground. seen (R,): True for the N rows of the
+    truth to which the boxes belong; their ground height counts, 0 if the truth has none.
+    """
     z = np.zeros(len(box)) if truth.z is None else truth.z[seen]
     pos = foot_points(box, z, camera)
     return np.where(np.isfinite(pos), pos, otherwise)
 
 
 def person_draws(truth: Truth, seed: int, repeat: int, sensor: Sensor) -> Array:
-    """Return the uniforms in (0, 1) of each row of the truth, (R, DRAWS), keyed by the person and the frame.
+    """Return the uniforms in (0, 1] of each of the R rows of the truth, (R, 10), keyed by the person and the frame.
 
     Columns: KEEP, DETECT, four box edges, two point coordinates, SCORE, ORDER. With `sensor.persistence` ρ, DETECT is
     that of the previous frame with probability ρ. It stays uniform, and misses of neighbouring frames have correlation
-    ρ if the detection probability is constant. `miss_memory` and `box_noise.memory` make DETECT and the edges
-    correlated over time (their normal quantiles are AR(1) sums).
+    ρ if the detection probability is constant. `sensor.miss_memory` and `box_noise.memory` make DETECT and the edges
+    correlated over time (their normal quantiles are AR(1) sums). repeat: number of the suite entry's copy, 0 without
+    copies.
+
+    Raises ValueError for a negative seed or id.
     """
     u = np.empty((len(truth.id), DRAWS))
     by_person = np.argsort(truth.id, kind="stable")
@@ -120,7 +133,12 @@ def _one_person(id: int, frame: Ints, seed: int, repeat: int, sensor: Sensor, fp
 
 
 def _correlate(u: Array, first: int, sensor: Sensor, fps: float, seed: int, id: int, repeat: int) -> None:
-    """Replace DETECT and EDGES of u (F, DRAWS), frames `first` on, by correlated draws where a memory is set."""
+    """Replace columns DETECT and EDGES of u by correlated uniforms where the sensor has a memory for them. It changes
+    u.
+
+    u (F, 10): uniforms of person `id` in frames `first` to `first` + F - 1. `sensor.miss_memory` is for DETECT,
+    `sensor.box_noise.memory` for the edges; without memory nothing changes. Returns nothing.
+    """
     of_boxes = None if sensor.box_noise is None else sensor.box_noise.memory
     parts = ((0, slice(DETECT, DETECT + 1), sensor.miss_memory), (1, EDGES, of_boxes))
     for key, columns, memory in parts:
@@ -132,10 +150,11 @@ def _correlate(u: Array, first: int, sensor: Sensor, fps: float, seed: int, id: 
 
 
 def detection_probability(truth: Truth, sensor: Sensor, camera: Camera | None = None) -> Array:
-    """Return the probability (R,) that each row of the truth is detected, `sensor.hide` not considered.
+    """Return the probability (R,), 0 to 1, that each row of the truth is detected; `sensor.hide` is not considered.
 
-    Size is the box's height or, seen from above (camera of kind "top"), the larger side of the box over SHOULDER_SHARE.
-    Without boxes, size has no effect. nan sizes count as 0.
+    It is detect_prob times the factor of visibility times min(1, size / (2 small_px)), and 0 below min_visibility. Size
+    is the box's height in px; seen from above (camera of kind "top") it is the larger side of the box over 0.27. Size
+    has no effect without boxes or if small_px is 0. A nan size counts as 0.
     """
     visible = truth.visibility
     p = sensor.detect_prob * _visibility_factor(visible, sensor)
@@ -147,14 +166,21 @@ def detection_probability(truth: Truth, sensor: Sensor, camera: Camera | None = 
 
 
 def _visibility_factor(visible: Array, sensor: Sensor) -> Array:
-    """Factor (R,) that occlusion leaves of the detection probability."""
+    """Return the factor (R,), 0 to 1, by which the visibilities (R,), 0 to 1, lower the probability of detection.
+
+    It is visibility^occlusion_power, or the curve `sensor.by_visibility` if that is given.
+    """
     if sensor.by_visibility is None:
         return np.asarray(visible**sensor.occlusion_power)
     return np.interp(visible, np.linspace(0.0, 1.0, len(sensor.by_visibility)), sensor.by_visibility)
 
 
 def _artificially_hidden(truth: Truth, sensor: Sensor, people: Mapping[str, tuple[int, ...]]) -> Bools:
-    """True (R,) for rows that a `sensor.hide` covers; raises InputError if it names an unknown group."""
+    """Return True (R,) for the rows of the truth that an entry of `sensor.hide` covers: start <= t < end, in s.
+
+    people: ids of the people of each group that the script names. An entry without a group hides everybody. Raises
+    InputError if an entry names a group that is not in `people`.
+    """
     t = (truth.frame - 1) / truth.fps
     hidden = np.zeros(len(t), dtype=np.bool_)
     for k, hide in enumerate(sensor.hide):
@@ -170,10 +196,11 @@ def _artificially_hidden(truth: Truth, sensor: Sensor, people: Mapping[str, tupl
 
 
 def _sensed_boxes(truth: Truth, sensor: Sensor) -> Array | None:
-    """Boxes (R, 4) that the sensor frames before noise: visible parts, amodal where nothing is visible or if it says
-    so.
+    """Return the boxes (R, 4), left, top, width, height in px, that the detector measures, before errors are added.
 
-    None if the truth has no boxes.
+    They are the boxes of the visible parts; a number that is nan there, as nothing is visible, is taken from the amodal
+    box. If `sensor.box` is "amodal" or the truth has no visible boxes, they are the amodal boxes. None if the truth has
+    no boxes.
     """
     if truth.box is None or truth.visible_box is None or sensor.box == "amodal":
         return truth.box
@@ -181,7 +208,12 @@ def _sensed_boxes(truth: Truth, sensor: Sensor) -> Array | None:
 
 
 def _with_box_noise(box: Array, visibility: Array, sensor: Sensor, u: Array) -> Array:
-    """Boxes with the errors of `sensor.box_noise` or, without it, of `sensor.noise_px`, by uniforms u (N, 4)."""
+    """Return boxes (N, 4), left, top, width, height in px, with the errors of `sensor.box_noise`, else of
+    `sensor.noise_px`.
+
+    u (N, 4): uniforms in (0, 1] that draw the errors. visibility (N,): visible share, 0 to 1. `box` itself is returned
+    if there is no error to add.
+    """
     if sensor.box_noise is not None:
         return perturb_boxes(box, visibility, sensor.box_noise, normals(u))
     return move_edges(box, sensor.noise_px * normals(u)) if sensor.noise_px else box

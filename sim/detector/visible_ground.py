@@ -14,10 +14,14 @@ SMALLEST = 0.25  # ground ends where people are smaller than this share of a per
 class VisibleGround:
     """The part of an image that shows ground, and the height of people there: by the camera, else by the labels.
 
-    State: `low`, `high` (2,) px, the upper left and lower right corner of that part. Without a camera, a person's
-    height is linear in the row of the feet, as on flat ground, and limited to half the least and 1.5 times the greatest
-    labelled height. The part ends at the row where people have SMALLEST of the height in the middle of the image.
-    Without a camera and without an image size, it is the rectangle round the labelled feet.
+        truth, camera   as given; camera is None if unknown
+        low, high (2,)  upper left and lower right corner of that part, u, v in px; zeros without camera and boxes
+        line (2,)       a, b of a person's height a + b v (px) at row v of the feet; used without a camera only
+        limits          least and greatest height in px: half the least and 1.5 times the greatest labelled height
+
+    size: width, height of the image in px, None if unknown. The part ends at the row where people have SMALLEST (0.25)
+    of the height in the middle of the image. Without a camera and without an image size, it is the rectangle round the
+    labelled feet.
     """
 
     def __init__(self, truth: Truth, camera: Camera | None, size: Array | None) -> None:
@@ -36,12 +40,21 @@ class VisibleGround:
                 self.low, self.high = np.array([0.0, _furthest_labelled_row(self.line, float(size[1]))]), np.array(size)
 
     def image_point(self, x: float, y: float) -> tuple[float, float]:
-        """Return the image point (u, v) px at share x of the width and share y of the height of the ground part."""
+        """Return the image point (u, v) px at share x (0 to 1) of the width and share y of the height of the ground
+        part.
+
+        (0, 0) is its upper left corner. Shares outside 0 to 1 give points outside the part.
+        """
         u, v = self.low + np.array([x, y]) * (self.high - self.low)
         return float(u), float(v)
 
     def usual_height(self, u: float, v: float) -> float:
-        """Return the height in px of the box of a standard person whose feet are at (u, v) px."""
+        """Return the height in px of the box of a standard person (1.7 m) whose feet are at image point (u, v) px.
+
+        Without a camera it is estimated from the labelled boxes, within half the least and 1.5 times the greatest
+        labelled height; 1 px without boxes. Where the camera gives no box, as right under it, it is 1.7 m at the depth
+        of the camera's height.
+        """
         if self.camera is None:
             return float(np.clip(self.line @ [1.0, v], *self.limits))
         pos = to_ground(self.camera, np.array([[u, v]]))
@@ -52,10 +65,10 @@ class VisibleGround:
         return float(tall)
 
     def ground_points(self, u: Array, v: Array, otherwise: Array) -> Array:
-        """Return the ground points (L, 2) m seen at image points u, v (L,) px.
+        """Return the ground points (L, 2), x and y in m, seen at image points u, v (L,) px.
 
-        Rows of `otherwise` (L, 2) replace points where no ground is seen, and all points if there is no camera. Image
-        points above the ground part are moved down to its upper edge.
+        Coordinates from `otherwise` (L, 2) replace points where no ground is seen. `otherwise` itself is returned if
+        there is no camera. Image points above the ground part are moved down to its upper edge.
         """
         if self.camera is None:
             return otherwise
@@ -64,7 +77,10 @@ class VisibleGround:
         return np.where(np.isfinite(pos), pos, otherwise)
 
     def labelled_point(self, x: float, y: float) -> Array:
-        """Return the point (2,) m at shares x, y of the rectangle round all labelled positions; (0, 0) without any."""
+        """Return the point (2,) in m at shares x, y (0 to 1) of the rectangle round all labelled positions.
+
+        (0, 0) is the corner of least x and y. Without labelled positions the result is zeros.
+        """
         pos = self.truth.pos
         if pos is None or not len(pos):
             return np.zeros(2)
@@ -73,9 +89,11 @@ class VisibleGround:
 
 
 def furthest_row(camera: Camera) -> float:
-    """Return the uppermost image row (px) at which people are not too small, by SMALLEST; for pinhole cameras.
+    """Return the uppermost image row (px, from 0 at the top) at which people have at least 0.25 of their height in the
+    middle.
 
-    0 if they are too small at every row. Rows are tested along the column through the image centre.
+    For pinhole cameras. 241 rows are tested along the column through the image centre. If the middle row shows no
+    ground, heights are compared with the greatest height at any row. 0 if no row shows ground or no row qualifies.
     """
     v = np.linspace(0.0, camera.image[1], 241)
     ground = to_ground(camera, np.column_stack([np.full_like(v, camera.centre_px[0]), v]))
@@ -88,15 +106,20 @@ def furthest_row(camera: Camera) -> float:
 
 
 def _furthest_labelled_row(line: Array, rows: float) -> float:
-    """The same by a `height_line`, in an image of so many rows; 0 if heights do not grow downwards."""
+    """Return the row (px) at which people have 0.25 of the height of people at the middle row of the image.
+
+    line (2,): a, b of the height a + b v at row v, see `height_line`. rows: height of the image in px. The result is
+    kept between 0 and rows / 2; it is 0 if heights do not grow downwards.
+    """
     a, b = line
     return float(np.clip((SMALLEST * (a + b * rows / 2) - a) / b, 0.0, rows / 2)) if b > 1e-6 else 0.0
 
 
 def height_line(foot: Array, height: Array) -> Array:
-    """Return (a, b) of the least-squares line height = a + b foot through box heights (N,) and foot rows (N,), px.
+    """Return (a, b) of the least-squares line height = a + b foot through box heights (N,) and rows of the feet (N,),
+    px.
 
-    b is 0 if all feet are in one row.
+    b is 0 if all feet are in one row. Without boxes (N = 0) the result is (nan, 0), with a numpy warning.
     """
     spread = foot - foot.mean()
     b = float(spread @ height / (spread @ spread)) if spread @ spread > 1e-9 * len(foot) else 0.0
@@ -104,7 +127,10 @@ def height_line(foot: Array, height: Array) -> Array:
 
 
 def clip_boxes(box: Array, image_size: tuple[int, int]) -> Array:
-    """Return the parts (N, 4) ltwh px of boxes that lie in the image; width or height 0 for a box outside."""
+    """Return the parts (N, 4) of boxes (N, 4) that lie in the image, both left, top, width, height in px.
+
+    image_size: width, height in px. A box outside has width or height 0. A nan box stays nan.
+    """
     limit = np.array(image_size, dtype=float)
     low, high = np.clip(box[:, :2], 0, limit), np.clip(box[:, :2] + box[:, 2:], 0, limit)
     return np.concatenate([low, high - low], axis=1)

@@ -20,10 +20,11 @@ CHUNK = 4096  # pairs per pass: their arrays stay in the cache
 
 @dataclass(frozen=True, slots=True, eq=False)
 class PackedPolygons:
-    """N polygons in arrays of equal width.
+    """N convex polygons in arrays of equal width, for the `*_pairs` functions; len() gives N.
 
-    vertex (N, V, 2): the last vertex is repeated up to V; nan for a polygon without vertices.
-    box (N, 4): min x, min y, max x, max y. area (N,): signed, negative if clockwise, 0 without vertices.
+    vertex (N, V, 2): x, y, in any unit; the last vertex of each polygon is repeated up to V. box (N, 4): min x, min y,
+    max x, max y. Both are nan for a polygon without vertices. area (N,): signed, negative if the vertices are
+    clockwise, 0 without vertices or with a nan.
     """
 
     vertex: Array
@@ -35,9 +36,9 @@ class PackedPolygons:
 
 
 def pack(polygons: Sequence[Array], width: int = 1) -> PackedPolygons:
-    """Pack polygons (V, 2) for the `*_pairs` functions, each padded to at least `width` vertices.
+    """Return PackedPolygons of N polygons (V, 2), each padded to the most vertices of any, and to at least `width`.
 
-    A polygon without vertices becomes nan; it overlaps nothing, and its distance to anything is nan.
+    A polygon without vertices becomes nan: it overlaps nothing, and its distance to anything is nan. N may be 0.
     """
     count = np.array([len(p) for p in polygons], np.int64)
     flat = np.concatenate([*(np.asarray(p, float).reshape(-1, 2) for p in polygons), [[np.nan, np.nan]]])
@@ -48,13 +49,17 @@ def pack(polygons: Sequence[Array], width: int = 1) -> PackedPolygons:
 
 
 def pack_padded(vertex: Array) -> PackedPolygons:
-    """Pack polygons whose vertices (N, V, 2) are already padded by repeating the last one."""
+    """Return PackedPolygons of vertices (N, V, 2) already padded by repeating the last of each; ValueError if V is 0."""
     box = np.concatenate([vertex.min(axis=1), vertex.max(axis=1)], axis=1)
     return PackedPolygons(vertex, box, np.nan_to_num(_shoelace(vertex)))
 
 
 def _shoelace(vertex: Array) -> Array:
-    """Signed area (N,) of (N, V, 2), computed relative to the first vertex: exact far from the origin, too."""
+    """Return the signed area (N,) of polygons with vertices (N, V, 2): positive if counter-clockwise, nan with a nan
+    vertex.
+
+    It is computed relative to the first vertex, so that it is exact far from the origin, too.
+    """
     p = vertex - vertex[:, :1]
     return np.asarray(0.5 * _cross(p, np.roll(p, -1, axis=1)).sum(axis=1))
 
@@ -65,7 +70,8 @@ def _cross(a: Array, b: Array) -> Array:
 
 
 def area(polygon: Array) -> float:
-    """Return the signed area of one polygon (V, 2): negative if clockwise, 0 with fewer than 3 vertices."""
+    """Return the signed area of one polygon (V, 2): negative if clockwise, 0 with fewer than 3 vertices, nan with a
+    nan."""
     return float(_shoelace(np.asarray(polygon, float)[None])[0]) if len(polygon) > 2 else 0.0
 
 
@@ -73,7 +79,8 @@ def convex_hull(points: Array) -> Array:
     """Return the convex hull (V, 2) of points (N, 2), counter-clockwise, by Andrew's monotone chain.
 
     The first vertex is the leftmost point, the lowest of several. Repeated points and points on an edge are dropped:
-    points on one line give its two ends, no points give (0, 2).
+    points on one line give its two ends, one point gives itself, no points give (0, 2). With a nan the result has no
+    meaning.
     """
     rows = sorted(set(map(tuple, np.asarray(points, float).tolist())))
     if len(rows) < 3:
@@ -83,7 +90,10 @@ def convex_hull(points: Array) -> Array:
 
 
 def _chain(rows: list[tuple[float, ...]]) -> list[tuple[float, ...]]:
-    """Lower half of the hull of points sorted by x, then y (the upper half, if sorted backwards)."""
+    """Return the lower half of the convex hull of points (x, y) sorted by x, then y, with its first and last point.
+
+    Points sorted the other way round give the upper half.
+    """
     kept: list[tuple[float, ...]] = []
     for x, y in rows:
         while len(kept) > 1:
@@ -96,12 +106,13 @@ def _chain(rows: list[tuple[float, ...]]) -> list[tuple[float, ...]]:
 
 
 def intersection_pairs(a: PackedPolygons, b: PackedPolygons, i: Ints, j: Ints) -> Array:
-    """Return the area (K,) that polygons a[i[k]] and b[j[k]] have in common; 0 if either has no positive area.
+    """Return the area (K,) that polygons a[i[k]] and b[j[k]] have in common; 0 if either is empty, clockwise or has no
+    area.
 
-    The common part is the convex hull of two kinds of points: the ends of a's edges clipped to b (Cyrus & Beck), and
-    the vertices of b inside a. These points are in convex position, so sorting them by angle round their mean orders
-    them. A point counted twice, or off by a rounding error, changes the area by a rounding error; clipping edge by edge
-    does not promise that where edges coincide.
+    i, j (K,): rows of a and of b, from 0 on; IndexError if one does not exist. The common part is the convex hull of
+    the ends of a's edges clipped to b (Cyrus & Beck) and of the vertices of b inside a. Sorting these points by angle
+    round their mean orders them. A point counted twice, or off by a rounding error, changes the area by a rounding
+    error; clipping edge by edge does not promise that where edges coincide.
     """
     common = np.zeros(len(i))
     near = (a.box[i, :2] < b.box[j, 2:]).all(axis=1) & (b.box[j, :2] < a.box[i, 2:]).all(axis=1)
@@ -113,7 +124,8 @@ def intersection_pairs(a: PackedPolygons, b: PackedPolygons, i: Ints, j: Ints) -
 
 
 def _common_area(a: Array, b: Array) -> Array:
-    """Common area (K,) of polygons (K, V, 2) and (K, W, 2)."""
+    """Return the common area (K,) of polygons a (K, V, 2) and b (K, W, 2), pair by pair; both counter-clockwise, with
+    area."""
     origin = a[:, :1]
     a, b = a - origin, b - origin
     size = np.abs(np.concatenate([a, b], axis=1)).max(axis=(1, 2))
@@ -127,7 +139,10 @@ def _common_area(a: Array, b: Array) -> Array:
 
 
 def _left_of_edges(points: Array, polygon: Array) -> Array:
-    """Return (K, V, N): distance of each of N points to the left of each of V edges, times the edge's length."""
+    """Return (K, V, N): distance of each of N points to the left of each of V edges, times the edge's length.
+
+    points (K, N, 2), polygon (K, V, 2): edge v leads from vertex v to the next. Negative to the right of an edge.
+    """
     edge = np.roll(polygon, -1, axis=1) - polygon
     offset = _cross(polygon, edge)  # cross(e, p - a) = cross(e, p) + cross(a, e)
     return (
@@ -138,9 +153,11 @@ def _left_of_edges(points: Array, polygon: Array) -> Array:
 
 
 def _clip(a: Array, b: Array, slack: Array) -> tuple[Array, Array]:
-    """Return where the edges of a enter and leave b, each (K, V), as shares of the edge's length.
+    """Return where each edge of a (K, V, 2) enters and leaves b (K, W, 2), two arrays (K, V), as shares of the edge's
+    length.
 
-    enter > leave: the edge has no part inside b.
+    Polygons are counter-clockwise. slack (K, 1, 1): tolerance of edge length times distance, within which a point is on
+    an edge. enter > leave: the edge has no part inside b.
     """
     start = _left_of_edges(a, b)
     change = np.roll(start, -1, axis=2) - start
@@ -153,7 +170,8 @@ def _clip(a: Array, b: Array, slack: Array) -> tuple[Array, Array]:
 
 
 def _area_by_angle(points: Array, valid: Bools) -> Array:
-    """Area (K,) of the convex polygons whose vertices are the valid ones (K, N) of points (K, N, 2), in any order."""
+    """Return the area (K,) of convex polygons, each with the vertices of points (K, N, 2) where valid (K, N), in any
+    order."""
     n = valid.sum(axis=1)
     middle = np.where(valid[..., None], points, 0.0).sum(axis=1) / np.maximum(n, 1)[:, None]
     arm = points - middle[:, None]
@@ -168,9 +186,11 @@ def _area_by_angle(points: Array, valid: Bools) -> Array:
 
 
 def iou_pairs(a: PackedPolygons, b: PackedPolygons, i: Ints, j: Ints) -> Array:
-    """Return the intersection over union (K,) of a[i[k]] and b[j[k]], from 0 to 1; 0 if either has no positive area.
+    """Return the intersection over union (K,), 0 to 1, of a[i[k]] and b[j[k]]; 0 if either is empty, clockwise or has
+    no area.
 
-    Polygons with equal vertices, packed to equal width, give exactly 1.
+    i, j (K,): rows of a and of b, from 0 on; IndexError if one does not exist. Polygons with equal vertices, packed to
+    equal width, give exactly 1.
     """
     common = intersection_pairs(a, b, i, j)
     union = a.area[i] + b.area[j] - common
@@ -181,17 +201,22 @@ def iou_pairs(a: PackedPolygons, b: PackedPolygons, i: Ints, j: Ints) -> Array:
 
 
 def iou_matrix(a: Sequence[Array], b: Sequence[Array]) -> Array:
-    """Return the intersection over union (N, M) of each of N polygons with each of M polygons; see `iou_pairs`."""
+    """Return the intersection over union (N, M), 0 to 1, of each of N polygons in a with each of M polygons in b.
+
+    A polygon is an array (V, 2), convex and counter-clockwise. The value is 0 if either is empty, clockwise or has no
+    area, and exactly 1 for equal polygons. N or M may be 0.
+    """
     i, j = (g.ravel() for g in np.indices((len(a), len(b))))
     width = max((len(p) for p in (*a, *b)), default=1)
     return iou_pairs(pack(a, width), pack(b, width), i, j).reshape(len(a), len(b))
 
 
 def gap_pairs(a: PackedPolygons, b: PackedPolygons, i: Ints, j: Ints) -> Array:
-    """Return the distance (K,) between polygons a[i[k]] and b[j[k]].
+    """Return the distance (K,) between polygons a[i[k]] and b[j[k]]: 0 where they overlap or touch; nan for an empty
+    one.
 
-    It is 0 where they overlap or touch, and nan where one has no vertices. At least one of the two must have area: for
-    two polygons without area use `edge_distance_pairs`.
+    i, j (K,): rows of a and of b, from 0 on; IndexError if one does not exist. At least one polygon of a pair must have
+    area: two without may get 0 although they are apart. For them use `edge_distance_pairs`.
     """
     gap = np.empty(len(i))
     for low in range(0, len(i), CHUNK):
@@ -203,8 +228,9 @@ def gap_pairs(a: PackedPolygons, b: PackedPolygons, i: Ints, j: Ints) -> Array:
 def edge_distance_pairs(a: PackedPolygons, b: PackedPolygons, i: Ints, j: Ints) -> Array:
     """Return the least distance (K,) from a vertex of either polygon, a[i[k]] or b[j[k]], to an edge of the other.
 
-    It is the distance between the polygons unless they overlap; nan where one has no vertices. It is cheaper than
-    `gap_pairs`, and polygons need no area.
+    i, j (K,): rows of a and of b, from 0 on; IndexError if one does not exist. It is the distance between the polygons
+    unless they overlap; then it may be above 0. nan where one has no vertices. It is cheaper than `gap_pairs`, and
+    polygons need no area: one vertex is a point, two are a segment.
     """
     least = np.empty(len(i))
     for low in range(0, len(i), CHUNK):
@@ -218,19 +244,25 @@ def _edge_distance(a: Array, b: Array) -> Array:
 
 
 def _gap(a: Array, b: Array) -> Array:
-    """Distance (K,): 0 unless an edge of one polygon has the whole other one on its outer side (separating axes)."""
+    """Return the distance (K,) between polygons a (K, V, 2) and b (K, W, 2), of which one has area; nan with a nan
+    vertex.
+
+    It is 0 unless an edge of one polygon has the whole other one on its outer side (separating axes).
+    """
     least = _edge_distance(a, b)
     apart = _outside_an_edge(b, a) | _outside_an_edge(a, b)
     return np.where(apart | np.isnan(least), least, 0.0)
 
 
 def _outside_an_edge(points: Array, polygon: Array) -> Bools:
-    """True (K,) if all of the points (K, N, 2) are on the outer side of one edge of the polygon (K, V, 2)."""
+    """Return True (K,) where all points (K, N, 2) are on the outer side of one edge of the counter-clockwise polygon
+    (K, V, 2)."""
     return np.asarray((_left_of_edges(points, polygon).max(axis=2) < 0).any(axis=1))
 
 
 def _distance_to_edges(points: Array, polygon: Array) -> Array:
-    """Least distance (K,) from any of the points (K, N, 2) to any edge of the polygon (K, V, 2)."""
+    """Return the least distance (K,) from any of the points (K, N, 2) to any edge of the polygon (K, V, 2); nan with a
+    nan."""
     # x and y apart: numpy sums over an axis of length two slowly.
     ex, ey = (np.roll(polygon[..., k], -1, axis=1)[..., None] - polygon[..., k, None] for k in (0, 1))
     ax, ay = (points[:, None, :, k] - polygon[..., k, None] for k in (0, 1))
@@ -241,15 +273,21 @@ def _distance_to_edges(points: Array, polygon: Array) -> Array:
 
 
 def polygon_gap(a: Array, b: Array) -> float:
-    """Return the distance between two polygons (V, 2), of which one has area; 0 where they overlap; see `gap_pairs`."""
+    """Return the distance between convex polygons (V, 2) and (W, 2): 0 where they overlap or touch; nan if one is
+    empty.
+
+    At least one of them must have area: two without may get 0 although they are apart.
+    """
     none = np.zeros(1, np.int64)
     return float(gap_pairs(pack([a]), pack([b]), none, none)[0])
 
 
 def contains(polygon: Array, points: Array, dilate: float = 0.0) -> Bools:
-    """Return which of the points (N, 2) lie in the polygon (V, 2), on its edge, or at most `dilate` away from it.
+    """Return True (N,) for the points (N, 2) in the convex polygon (V, 2), on its edge, or at most `dilate` away from
+    it.
 
-    A polygon without vertices contains nothing. One without area contains nothing unless `dilate` is above 0.
+    False for nan. A polygon without vertices contains nothing. One that is clockwise, or has one or two vertices,
+    contains nothing unless `dilate` is above 0.
     """
     points = np.asarray(points, float).reshape(-1, 2)
     if not len(polygon):
