@@ -49,7 +49,7 @@ def pack(polygons: Sequence[Array], width: int = 1) -> PackedPolygons:
 
 
 def pack_padded(vertex: Array) -> PackedPolygons:
-    """Return PackedPolygons of vertices (N, V, 2) already padded by repeating the last of each; ValueError if V is 0."""
+    """Return PackedPolygons of vertices (N, V, 2) padded by repeating the last of each; ValueError if V is 0."""
     box = np.concatenate([vertex.min(axis=1), vertex.max(axis=1)], axis=1)
     return PackedPolygons(vertex, box, np.nan_to_num(_shoelace(vertex)))
 
