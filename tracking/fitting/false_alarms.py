@@ -130,10 +130,11 @@ def _person_of_alarm(m: MatchedRecording, rows: list[int]) -> int:
 
 
 def _life_and_seen(recordings: Sequence[MatchedRecording], tracks: Sequence[AlarmTrack]) -> tuple[float, float]:
-    """Returns the mean life of a false alarm in s, and the probability that a living one is detected in a frame.
+    """Returns the mean life of a false alarm in s, and the probability that an alarm that still lasts is detected in a
+    frame.
 
-    (0, 1) if less than `LEAST_AGAIN` of the alarms are detected again after any lag. With one lag only, `seen` is 1.
-    The life is at most `LONGEST`, and `seen` at least 0.2.
+    (0, 1) if less than 5 % of the alarms are detected again after any lag up to 1.5 s. With one lag only the second
+    value is 1. The life is at most 60 s, and the probability at least 0.2. tracks: the alarm tracks of all recordings.
     """
     lag, share, weight = [], [], []
     for m in recordings:
@@ -159,10 +160,10 @@ def _life_and_seen(recordings: Sequence[MatchedRecording], tracks: Sequence[Alar
 
 
 def _robust_spread(values: Sequence[float], tracks: Sequence[AlarmTrack]) -> tuple[float, float]:
-    """Returns the weighted median and half the width of the middle 68 %, in place of mean and standard deviation.
+    """Returns the weighted median, and half the width of the middle 68 %, in place of mean and standard deviation.
 
-    values: one per track. The weight of a track is the root of its number of detections. Quantiles are used because
-    some alarms are assigned to a person wrongly.
+    values: one per alarm track, not empty. tracks: the same alarm tracks; the weight of a track is the root of its
+    number of detections. Quantiles are used because some alarms are assigned to a person wrongly.
     """
     order = np.argsort(values, kind="stable")
     w, v = np.sqrt([len(t.rows) for t in tracks])[order], np.array(values)[order]
@@ -171,15 +172,19 @@ def _robust_spread(values: Sequence[float], tracks: Sequence[AlarmTrack]) -> tup
 
 
 def _aspect(tracks: Sequence[AlarmTrack]) -> tuple[float, float]:
-    """Returns median and spread of the logarithm of width / height."""
+    """Returns median and spread (half the middle 68 %) of the logarithm of width / height of the alarms' boxes.
+
+    The logarithm is averaged over each alarm track first.
+    """
     return _robust_spread([float(np.log(t.box[:, 2] / t.box[:, 3]).mean()) for t in tracks], tracks)
 
 
 def _jitter(tracks: Sequence[AlarmTrack]) -> float:
-    """Returns the standard deviation of an edge from frame to frame, in box heights; 0 without three frames in a row.
+    """Returns the standard deviation of an alarm box's edge from frame to frame, in box heights.
 
-    It is estimated from second differences x(t-1) - 2 x(t) + x(t+1), which steady motion leaves at 0: 1.4826 times
-    their median absolute value, divided by sqrt 6.
+    It is estimated from second differences x(t−1) − 2 x(t) + x(t+1) of left, top, right and lower edge, which steady
+    motion leaves at 0: 1.4826 times their median absolute value, divided by sqrt 6. 0 if no alarm is detected in three
+    successive frames.
     """
     second_differences = [np.zeros((0, 4))]
     for t in tracks:
@@ -191,7 +196,13 @@ def _jitter(tracks: Sequence[AlarmTrack]) -> float:
 
 
 def _fit_at_people(tracks: Sequence[AlarmTrack]) -> dict[str, tuple[float, float]]:
-    """Returns across, foot and near_height of `FalseAlarms`: median and spread relative to the alarm's person."""
+    """Returns a dict of the fields across, foot and near_height of `FalseAlarms`, each (median, spread) over alarm
+    tracks.
+
+    They are relative to the alarm's person: middle to the right and foot downwards, in heights of the person's box, and
+    the logarithm of the alarm's height / the person's. tracks: alarms that belong to a person, not empty; frames
+    without the person are left out.
+    """
     rows = []
     for t in tracks:
         truth = t.recording.truth
@@ -210,9 +221,11 @@ def _fit_at_people(tracks: Sequence[AlarmTrack]) -> dict[str, tuple[float, float
 
 
 def _fit_elsewhere(tracks: Sequence[AlarmTrack]) -> dict[str, object]:
-    """Returns height, drift and at of `FalseAlarms`; the drift uses tracks of four or more detections only.
+    """Returns a dict of the fields height, drift and at of `FalseAlarms`, for alarms that belong to no person.
 
-    height: median and spread of the logarithm of the height relative to a person standing there.
+    height: median and spread of the logarithm of the height relative to a person standing there. drift: root mean
+    square speed per axis in box heights per s, from tracks of four or more detections; 0 without any. at: up to 32 foot
+    points x, y as shares (0 to 1) of the visible ground.
     """
     height, place, velocity = [], [], []
     for t in tracks:

@@ -16,11 +16,14 @@ from tracking.tuning.goals import Goal
 
 @dataclass(frozen=True)
 class TrialRecord:
-    """A finished trial, for plots and tables.
+    """A finished trial of a search, for plots and tables.
 
-    number: its place in the search, 0 for the defaults; values: one per goal, an estimate if the trial was pruned,
-    empty if its parameters are impossible; episodes: training episodes played; error: why its parameters are
-    impossible, "" if they are possible.
+    - number: its place in the search, 0 for the defaults.
+    - values: one per goal, from training; an estimate if the trial was pruned, empty if its parameters are impossible.
+    - params: value of each searched parameter by name.
+    - episodes: number of training episodes played, 0 if the parameters are impossible.
+    - pruned: True if it was stopped before its last training scene.
+    - error: why its parameters are impossible, "" if they are possible.
     """
 
     number: int
@@ -33,11 +36,13 @@ class TrialRecord:
 
 @dataclass(frozen=True)
 class Comparison:
-    """One score of the defaults and of a tuned config on the same sequences.
+    """One score of the defaults and of a tuned config on the same sequences, in the unit of the score.
 
-    scenes: the name of the suite; higher: True if greater values are better; before, after: means of the defaults and
-    of the config over the sequences where both have the score; difference: mean of after - before; low, high: its 95 %
-    interval; sequences: how many there are.
+    - scenes: name of the suite, or "validation".
+    - key: the score; higher: True if greater values are better.
+    - before, after: means of the defaults and of the config over the sequences where both have the score.
+    - difference: mean of after − before; low, high: its 95 % interval, nan if not known.
+    - sequences: number of these sequences.
     """
 
     scenes: str
@@ -52,13 +57,15 @@ class Comparison:
 
     @property
     def verdict(self) -> str:
-        """ "better", "worse", or "no sure difference" if the interval contains 0 or is not known."""
+        """ "better" or "worse" if the interval of the difference excludes 0, else (or with nan) "no sure difference"."""
         if not (self.low > 0 or self.high < 0):
             return "no sure difference"
         return "better" if (self.difference > 0) == self.higher else "worse"
 
     def line(self) -> str:
-        """Returns the comparison as one line of text."""
+        """Returns one line of text: scenes, key, before → after, difference with its interval, number of sequences,
+        verdict.
+        """
         ends = f"[{self.low:+.4f}, {self.high:+.4f}]"
         change = f"{self.before:.4f} → {self.after:.4f}, {self.difference:+.4f} {ends}"
         return f"{self.scenes}: {self.key} {change}, {self.sequences} sequences: {self.verdict}"
@@ -66,10 +73,12 @@ class Comparison:
 
 @dataclass(frozen=True)
 class Candidate:
-    """A config that was good in training.
+    """A config that was good in training, or the defaults.
 
-    trial: number of its trial; training, validation: its values by goal on the training and validation scenes, empty
-    if not played; gain: its first goal compared with that of the defaults on the validation scenes.
+    - trial: number of its trial in the search, 0 for the defaults.
+    - config: all parameters.
+    - training, validation: its values, one per goal, on the training and validation scenes; () if not played.
+    - gain: its first goal compared with that of the defaults on the validation scenes, None if not played or unknown.
     """
 
     trial: int
@@ -80,9 +89,10 @@ class Candidate:
 
 
 def compare_episodes(scenes: str, goal: Goal, before: Sequence[Episode], after: Sequence[Episode]) -> Comparison | None:
-    """Returns the paired comparison of a goal on the same sequences in the same order.
+    """Returns the comparison of a goal between `before` and `after`, paired by sequence.
 
-    Sequences where either side lacks the score are left out; None if that leaves no sequence.
+    scenes: name for the result. before, after: episodes of the same sequences in the same order, else ValueError is
+    raised. Sequences where either side lacks the score are left out; None if that leaves no sequence.
     """
     a, b = (np.array([goal.of(e) for e in episodes]) for episodes in (before, after))
     known = np.isfinite(a) & np.isfinite(b)
@@ -96,10 +106,11 @@ def compare_episodes(scenes: str, goal: Goal, before: Sequence[Episode], after: 
 
 
 def pareto_front(candidates: Sequence[Candidate], goals: Sequence[Goal]) -> list[Candidate]:
-    """Returns the candidates that no other candidate dominates on the validation scenes, best first goal first.
+    """Returns the candidates that no other candidate dominates on the validation scenes, sorted by the first goal, best
+    first.
 
     A candidate dominates another if it is no worse in any goal and better in one. Of candidates with equal values the
-    first stays.
+    first stays. Every candidate needs one validation value per goal, else ValueError is raised.
     """
 
     def dominates(one: Candidate, other: Candidate) -> bool:

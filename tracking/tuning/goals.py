@@ -21,39 +21,49 @@ FAST_KEYS = ("objective", "HOTA", "group_F1_hull")
 
 @dataclass(frozen=True)
 class Goal:
-    """One score to improve. key: its name in the catalogue, or SPEED; higher: True if greater values are better."""
+    """One score to improve.
+
+    key: its name in the catalogue of scores, or SPEED (frames per second of the tracker). higher: True if greater
+    values are better.
+    """
 
     key: str
     higher: bool = True
 
     def of(self, episode: Episode) -> float:
-        """Returns the score of one episode, nan if the episode does not have it; of SPEED frames per second."""
+        """Returns the score of one episode, nan if the episode does not have it.
+
+        For SPEED it is frames / seconds in the tracker, nan if that is 0 s.
+        """
         if self.key == SPEED:
             return episode.frames / episode.seconds_tracking if episode.seconds_tracking else float("nan")
         return episode.scores.get(self.key, float("nan"))
 
     def mean(self, episodes: Sequence[Episode]) -> float:
-        """Returns the mean over the episodes that have the score, nan if none has; of SPEED all frames per second."""
+        """Returns the mean over the episodes that have the score, nan if none has. For SPEED it is all frames / all
+        seconds.
+        """
         if self.key == SPEED:
             seconds = sum(e.seconds_tracking for e in episodes)
             return sum(e.frames for e in episodes) / seconds if seconds else float("nan")
         return finite_mean(self.of(e) for e in episodes)
 
     def gain(self, before: float, after: float) -> float:
-        """Returns by how much `after` is better than `before`, negative if it is worse."""
+        """Returns by how much the value `after` is better than `before`, negative if worse, nan if one is nan."""
         return after - before if self.higher else before - after
 
 
 def finite_mean(values: Iterable[float]) -> float:
-    """Returns the mean of the values that are not nan, nan if there are none."""
+    """Returns the mean of the values that are not nan, nan if there are none. Infinite values are kept."""
     known = [v for v in values if v == v]
     return sum(known) / len(known) if known else float("nan")
 
 
 def goals_of(keys: Iterable[str]) -> tuple[Goal, ...]:
-    """Returns one goal per key, in the order given; the direction comes from the catalogue.
+    """Returns one goal per key, in the order given; the catalogue of scores says which direction is better.
 
-    Raises InputError if there is no key, if a key is unknown or given twice, and if its score has no better direction.
+    keys: names of scores, or "frames/s". Raises InputError if there is no key, if a key is unknown or given twice, or
+    if neither direction of its score is better.
     """
     from tracking.scoring.catalogue import CATALOGUE
 

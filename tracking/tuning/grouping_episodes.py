@@ -22,10 +22,12 @@ from tracking.grouping.link_rule import LinkRule
 
 @dataclass(frozen=True)
 class LabelErrors:
-    """How labels err. sd: standard deviation of a position in each coordinate, m; time: its correlation time, s.
+    """How the labelled positions of people err.
 
-    filmed: True for boxes in the image without velocities; scale: the image scale (px per m) is wrong by a factor
-    between 1 / scale and scale.
+    - sd: standard deviation of a position in each coordinate, m.
+    - time: its correlation time, s.
+    - filmed: True for boxes in the image without velocities, False for positions on the ground.
+    - scale: the image scale (px per m) is wrong by a random factor between 1 / scale and scale.
     """
 
     sd: float
@@ -40,10 +42,12 @@ Meet_WalkTogether1, where they jump by 0.05 m between frames at 25 fps. The scal
 
 
 def play_rule(source: Source, rule: LinkRule, source_cache: SourceCache) -> Episode:
-    """Returns the episode of the rule on the people of a source, whose identity is known.
+    """Returns the episode of the baseline rule of groups on the people of a source, whose identity is known.
 
     Simulated people get label errors: FILMED with odd seeds, SURVEYED with even ones. Recorded people are taken as
-    labelled. The episode has every score of the catalogue that is not nan. Raises InputError without labels.
+    labelled. `scores` has every score of the catalogue that is not nan. The opened source is kept in `source_cache`.
+
+    Raises InputError if the source has no labels or cannot be read, or if people are in the image without a scale.
     """
     from tracking.scoring.evaluation import evaluate
 
@@ -67,8 +71,8 @@ def play_rule(source: Source, rule: LinkRule, source_cache: SourceCache) -> Epis
 def with_label_errors(truth: Truth, errors: LabelErrors, seed: int, repeat: int = 0) -> Truth:
     """Returns the truth with label errors: a first-order autoregressive process per person and coordinate.
 
-    Each person has a random stream of its own, chosen by seed, id and repeat. With `errors.filmed` the result has boxes
-    without `pos` and `vel`; else only `pos` changes. `truth` needs `pos`, and `box` if filmed.
+    Each person has a random stream of its own, chosen by seed, id and repeat. With `errors.filmed` the boxes are moved
+    and `pos` and `vel` become None; else only `pos` changes. Fails an assertion if `truth` has no `pos` or no `box`.
     """
     assert truth.pos is not None, "simulated people have positions"
     assert truth.box is not None, "scenes have cameras"
@@ -85,10 +89,10 @@ def with_label_errors(truth: Truth, errors: LabelErrors, seed: int, repeat: int 
 
 
 def people_as_tracks(truth: Truth) -> list[Tracks]:
-    """Returns the labelled people of every frame as tracks of persons without groups, one Tracks per frame.
+    """Returns the labelled people of every frame as tracks of persons without groups, one `Tracks` per frame from 1.
 
-    The tracks lie on the ground, or at box centres in the image if the truth has no positions. Velocities are nan if
-    the truth has none; covariances are 0.
+    The tracks lie on the ground in m, or at box centres in the image in px if the truth has no positions. Velocities
+    are nan if the truth has none; covariances are 0. Fails an assertion if the truth has neither positions nor boxes.
     """
     plane: Plane = "image" if truth.pos is None else "ground"
     return [_tracks(truth.at(index), plane) for index in range(1, truth.length + 1)]

@@ -33,17 +33,22 @@ STORED = "judged "
 
 @dataclass(frozen=True)
 class HeldOutEvaluator:
-    """Plays configs on the held-out scenes of a plan. report: called with a text before each set of scenes."""
+    """Plays configs on the validation and test scenes, which the search did not use.
+
+    plan: the search; play: function that plays episodes; report: called with a text before each set of scenes, does
+    nothing by default.
+    """
 
     plan: SearchPlan
     play: PlayEpisodes
     report: Callable[[str], None] = field(default=lambda text: None)
 
     def validated(self, candidates: Sequence[Candidate]) -> list[Candidate]:
-        """Returns the candidates with their values on the validation scenes and their gain over the first one.
+        """Returns the candidates in order, with their values on the validation scenes and their gain over the first
+        one.
 
-        The first candidate must be the defaults; an error of theirs is raised. Another candidate with an error on a
-        validation scene is left out.
+        The first candidate must be the defaults; a FlockscopeError of theirs is raised. Another candidate with an error
+        on a validation scene is left out. Errors of the workers are raised.
         """
         found = list[Candidate]()
         defaults: Sequence[Episode] = ()
@@ -61,10 +66,12 @@ class HeldOutEvaluator:
         return found
 
     def simplified(self, config: Config, value: float, order: Sequence[str]) -> tuple[Config, float]:
-        """Returns the config with needless changes reset to the defaults, and its value on the validation scenes.
+        """Returns the config with needless changes reset to the defaults, and its value by the first goal on the
+        validation scenes.
 
-        value: that of `config` on these scenes, by the first goal. Parameters are tried one after the other in `order`.
-        A parameter is reset if that does not lower the value and causes no error.
+        value: that of `config` on these scenes. order: names of parameters, tried one after the other; unchanged ones
+        are skipped. A parameter is reset if that does not lower the value and causes no error. Errors of the workers
+        are raised.
         """
         goal = self.plan.goals[0]
         changed = [name for name in order if getattr(config, name) != self.plan.defaults[name]]
@@ -83,10 +90,11 @@ class HeldOutEvaluator:
         return config, value
 
     def compared(self, config: Config) -> tuple[list[Comparison], list[str]]:
-        """Returns the comparisons of the config with the defaults on every test suite, and notes.
+        """Returns the comparisons of the config with the defaults on every test suite, and notes (texts).
 
         Compared are the goals and COMPARED_KEYS, without scores that no sequence has. A suite on which the config
-        causes an error has a note instead of comparisons. An error of the defaults is raised.
+        causes an error has a note instead of comparisons. An error of the defaults, and errors of the workers, are
+        raised.
         """
         found, notes = list[Comparison](), list[str]()
         for name, sources in self.plan.tests.items():
@@ -109,7 +117,11 @@ class HeldOutEvaluator:
     def _episodes(
         self, sources: Sequence[Source], config: Config, every_score: bool
     ) -> list[Episode] | FlockscopeError:
-        """All episodes, or the first error that the parameters cause; errors of the workers are raised."""
+        """Returns the episodes of all sources, or the first FlockscopeError that the parameters cause; errors of the
+        workers are raised.
+
+        every_score: compute the whole catalogue of scores.
+        """
         found = []
         for result in self.play(sources, config.as_dict(), every_score):
             if isinstance(result, FlockscopeError):
@@ -121,8 +133,8 @@ class HeldOutEvaluator:
 def stored_in_study(study: SearchStudy, play: PlayEpisodes) -> PlayEpisodes:
     """Returns a function like `play` that stores complete sets of episodes in the study and takes them from there.
 
-    A set is known by its sources, parameters and `every_score`. A set with an error, or one that its taker did not
-    read to the end, is not stored. Stored episodes have only the scores that are compared.
+    A set is known by its sources, parameters and `every_score`. A set with an error, or one that its taker did not read
+    to the end, is not stored. Stored episodes have only the goals and COMPARED_KEYS as scores.
     """
     kept = {*COMPARED_KEYS, *(goal.key for goal in study.plan.goals)}
 

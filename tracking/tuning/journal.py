@@ -29,14 +29,17 @@ HEAD = b'{"op_code":'
 
 
 class TrialLocks:
-    """Locks on bytes of a file. State: the open file, whose closing releases every lock."""
+    """Locks on single bytes of the file `path`, shared by the processes of a search; the file is created if missing.
+
+    State: the open file; closing it releases every lock. Raises OSError if the file cannot be opened for writing.
+    """
 
     def __init__(self, path: Path) -> None:
         self._file = os.open(path, os.O_RDWR | os.O_CREAT, 0o644)
 
     @contextmanager
     def locked(self, byte: int) -> Iterator[None]:
-        """Holds the lock on a byte for the time of the context; waits until it is free."""
+        """Holds the lock on a byte (offset in the file) for the time of the context; waits until it is free."""
         import fcntl
 
         fcntl.lockf(self._file, fcntl.LOCK_EX, 1, byte)
@@ -47,24 +50,30 @@ class TrialLocks:
 
     @contextmanager
     def choosing(self) -> Iterator[None]:
-        """Holds the lock under which a trial is chosen, for the time of the context."""
+        """Holds the lock under which a trial is chosen for the time of the context; waits until it is free."""
         with self.locked(CHOOSING):
             yield
 
     def hold_trial(self, number: int) -> None:
-        """Locks trial `number` for this process until `release_trial`; waits until the lock is free."""
+        """Locks trial `number` (from 0) for this process until `release_trial` or `close`.
+
+        Waits until no other process holds the lock.
+        """
         import fcntl
 
         fcntl.lockf(self._file, fcntl.LOCK_EX, 1, FIRST_TRIAL + number)
 
     def release_trial(self, number: int) -> None:
-        """Releases the lock on trial `number`."""
+        """Releases this process's lock on trial `number` (from 0); does nothing if it holds none."""
         import fcntl
 
         fcntl.lockf(self._file, fcntl.LOCK_UN, 1, FIRST_TRIAL + number)
 
     def is_abandoned(self, number: int) -> bool:
-        """Returns True if no other process holds the lock on trial `number`; releases this process's own lock on it."""
+        """Returns True if no other process holds the lock on trial `number` (from 0).
+
+        Releases this process's own lock on the trial, if it holds one.
+        """
         import fcntl
 
         try:
@@ -80,7 +89,11 @@ class TrialLocks:
 
 
 class LockedJournal(JournalFileBackend):
-    """Optuna's journal file, written under `locks`. Raises ValueError if the file is not a journal of Optuna."""
+    """Optuna's journal file at `path`, created if missing, and written under `locks`. An incomplete last line is
+    removed.
+
+    Raises ValueError if the file is not a journal of Optuna, and OSError if it cannot be opened.
+    """
 
     def __init__(self, path: Path, locks: TrialLocks) -> None:
         self._path, self._locks = path, locks
@@ -90,7 +103,7 @@ class LockedJournal(JournalFileBackend):
             self._remove_incomplete_line()
 
     def append_logs(self, logs: list[dict[str, Any]]) -> None:
-        """Appends one JSON line per log."""
+        """Appends one JSON line per log (a dict); removes an incomplete last line first. OSError if writing fails."""
         text = "".join(json.dumps(log, separators=(",", ":")) + "\n" for log in logs)
         with self._locks.locked(WRITING):
             self._remove_incomplete_line()
@@ -98,14 +111,14 @@ class LockedJournal(JournalFileBackend):
                 file.write(text.encode())
 
     def _check_head(self) -> None:
-        """ValueError if the file is something else, of which nothing may be removed."""
+        """Raises ValueError if the file does not begin as an Optuna journal; an empty or cut beginning is accepted."""
         with open(self._path, "rb") as file:
             head = file.read(len(HEAD))
         if not HEAD.startswith(head):
             raise ValueError("no journal of Optuna")
 
     def _remove_incomplete_line(self) -> None:
-        """Removes a last line without line end."""
+        """Removes a last line without line end from the file, the whole content if it has no line end."""
         with open(self._path, "r+b") as file:
             size = file.seek(0, os.SEEK_END)
             if size == 0:

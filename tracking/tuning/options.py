@@ -20,10 +20,10 @@ Progress = Callable[[int, int | None, str], None]
 
 @dataclass(frozen=True, kw_only=True)
 class TuneOptions:
-    """The options of a search. Raises InputError if a number lies outside its range.
+    """The options of a search; the metadata of each field hold its help text and range.
 
-    check: in Python "" is the default suite and None no second suite. Where a help text names an option as --name, the
-    Python argument of that name is meant.
+    Raises InputError if a number lies outside its range. check: in Python "" is the default suite and None no second
+    suite. Where a help text names an option as --name, the Python argument of that name is meant.
     """
 
     tracker: str | type[Tracker] = field(

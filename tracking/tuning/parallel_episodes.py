@@ -23,7 +23,15 @@ CACHE_BYTES = 512 * 2**20
 
 @dataclass(frozen=True)
 class EpisodeTask:
-    """One episode to play. values: the parameters; code: hash of the tracker's file where the search runs."""
+    """One episode to play by a worker.
+
+    - tracker: a name, file.py:Class, module:Class or class.
+    - source: the scene with its seed.
+    - values: parameters by name.
+    - detections: the tracker's input, "image", "file" or "truth".
+    - every_score: True to compute the whole catalogue of scores.
+    - code: hash of the tracker's file where the search runs, "" if there is no file.
+    """
 
     tracker: str | type[Tracker]
     source: Source
@@ -42,11 +50,15 @@ PlayEpisodes = Callable[[Sequence[Source], dict[str, Any], bool], Generator[Epis
 def episode_player(
     tracker: TunedTracker, detections: DetectionMode, workers: int = 1, cluster: str | None = None
 ) -> Iterator[PlayEpisodes]:
-    """Opens the workers for the time of the context and returns the function that plays episodes.
+    """Opens the workers for the time of the context and returns the function play(sources, values, every_score).
 
-    workers: number of processes, 1 for this process; cluster: address of a dask scheduler. When the taker of the
-    results stops, no further episode is begun. Raises InputError if a class is to be played by other processes, and
-    WorkError from the function if workers are lost.
+    That function yields one result per source in order: the episode, or the FlockscopeError of these parameters. When
+    its taker stops, no further episode is begun. workers: number of processes, 1 for this process; cluster: address of
+    a dask scheduler, None for no cluster.
+
+    Raises InputError if a class is to be played by other processes, if `workers` is below 1, or if the address is wrong
+    or dask is missing. Raises WorkError if no scheduler answers. The function raises WorkError if workers are lost or
+    their tracker file differs.
     """
     from sim.workers.start import results_in_order, start_workers
 
@@ -71,7 +83,8 @@ def episode_player(
 def play_task(task: EpisodeTask) -> EpisodeOrError:
     """Plays an episode in a worker, which keeps its sources for later episodes.
 
-    Returns the episode, or the error that the parameters cause. Raises WorkError if the worker's tracker file differs.
+    Returns the episode, or the FlockscopeError that the parameters cause. Raises WorkError if the worker's tracker file
+    differs from that of the search, and InputError if it cannot be found.
     """
     return _attempt(task, *_tracker_and_cache(task.tracker, task.code))
 

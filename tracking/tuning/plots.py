@@ -27,19 +27,22 @@ BLUE, ORANGE, RED = "#0b6bcb", "#d4600a", "#b42318"
 
 @dataclass(frozen=True)
 class Axes:
-    """Axes of a plot. x, y: the ranges (low, high) of the data, low below high."""
+    """Axes of a plot. x, y: the ranges (low, high) of the data that fill the plot, low below high."""
 
     x: tuple[float, float]
     y: tuple[float, float]
 
     def to_page(self, x: float, y: float) -> tuple[float, float]:
-        """Returns the place of a data point on the page, px from the left and from the top."""
+        """Returns the place (u, v) of the data point (x, y) on the page, px from the left and px from the top.
+
+        Points outside the ranges lie outside the axes.
+        """
         across = (x - self.x[0]) / (self.x[1] - self.x[0])
         up = (y - self.y[0]) / (self.y[1] - self.y[0])
         return LEFT + across * (WIDTH - LEFT - RIGHT), HEIGHT - BOTTOM - up * (HEIGHT - TOP - BOTTOM)
 
     def elements(self, x_label: str, y_label: str) -> list[str]:
-        """Returns the SVG elements of grid lines, tick labels and axis labels."""
+        """Returns the SVG elements of grid lines, tick labels and the two axis labels, one text each."""
         (left, bottom), (right, top) = self.to_page(self.x[0], self.y[0]), self.to_page(self.x[1], self.y[1])
         made = []
         for value in ticks(*self.y):
@@ -53,10 +56,11 @@ class Axes:
 
 
 def history_plot(plan: SearchPlan, records: Sequence[TrialRecord]) -> str:
-    """Returns an SVG plot of the first goal's training value of every trial, in the order of the search.
+    """Returns an SVG text: plot of the first goal's training value of every trial, in the order of the search.
 
-    Pruned trials are hollow: their values are estimates. The defaults are a dashed line, the best value so far a
-    stepped line. Values far outside the range of the unpruned trials are ticks at the edge.
+    records: finished trials; trials without values (impossible) are not drawn but counted in the title. Pruned trials
+    are hollow: their values are estimates. The defaults are a dashed line, the best value so far a stepped line. Values
+    far outside the range of the unpruned trials are ticks at the edge. Raises ValueError if no trial has a value.
     """
     goal, trials = plan.goals[0], [t for t in records if t.values]
     unpruned = [t for t in trials if not t.pruned]
@@ -90,8 +94,9 @@ def history_plot(plan: SearchPlan, records: Sequence[TrialRecord]) -> str:
 
 
 def importance_plot(plan: SearchPlan, importance: Mapping[str, float], config: Config) -> str:
-    """Returns an SVG bar plot of the share of each parameter in the first goal's training values.
+    """Returns an SVG text: bar plot of the share of each parameter in the first goal's training values, greatest first.
 
+    importance: share by parameter name; at least one must be above 0, else ValueError or ZeroDivisionError is raised.
     Beside each bar stand the default and, if the winner `config` changed it, the new value.
     """
     ranked = sorted(importance.items(), key=lambda pair: -pair[1])
@@ -112,7 +117,12 @@ def importance_plot(plan: SearchPlan, importance: Mapping[str, float], config: C
 
 
 def pareto_plot(plan: SearchPlan, candidates: Sequence[Candidate], front: Sequence[Candidate]) -> str:
-    """Returns an SVG plot of the first two goals of the candidates on the validation scenes, the front joined."""
+    """Returns an SVG text: plot of the first two goals of the candidates on the validation scenes, the front joined by
+    a line.
+
+    candidates: each with a value of every goal; front: those of them that no other dominates. Raises ValueError if the
+    plan has one goal only.
+    """
     one, two = plan.goals[:2]
     points = [c.validation[:2] for c in candidates]
     axes = Axes(_range([p[0] for p in points], 0.08), _range([p[1] for p in points], 0.08))
@@ -129,7 +139,10 @@ def pareto_plot(plan: SearchPlan, candidates: Sequence[Candidate], front: Sequen
 
 
 def ticks(low: float, high: float) -> list[float]:
-    """Returns round numbers in a range at equal distances, two to eleven of them; low must be below high."""
+    """Returns round numbers in [low, high] at equal distances (1, 2 or 5 times a power of ten), two to eleven of them.
+
+    low must be below high, else ValueError is raised.
+    """
     raw = (high - low) / 5
     step: float = 10.0 ** math.floor(math.log10(raw))
     step *= next(m for m in (1, 2, 5, 10) if m * step >= raw * (1 - 1e-9))
@@ -138,13 +151,20 @@ def ticks(low: float, high: float) -> list[float]:
 
 
 def _clipped_range(values: Sequence[float], unpruned: Sequence[float]) -> tuple[float, float]:
-    """The range of the unpruned values and a margin; one extreme trial must not flatten all others."""
+    """Returns the range (low, high) of the unpruned values with a margin, but no wider than all values need.
+
+    values: all values, not empty; unpruned: those of them that are no estimates; if empty all values are used. One
+    extreme trial must not flatten all others.
+    """
     low, high = _range(unpruned or values, 0.15)
     return max(low, min(values) - 0.02 * (high - low)), min(high, max(values) + 0.1 * (high - low))
 
 
 def _range(values: Sequence[float], pad: float) -> tuple[float, float]:
-    """The range of the values, wider by `pad` times its width on both sides; never empty."""
+    """Returns (low, high): the range of the values, wider by `pad` times its width on both sides; low is below high.
+
+    Equal values get a margin of 5 % of their size, at least 0.05. Without values about 0 to 1.
+    """
     low, high = min(values, default=0.0), max(values, default=1.0)
     room = pad * (high - low) or max(abs(high), 1.0) * 0.05
     return low - room, high + room
@@ -169,7 +189,11 @@ def _dot(u: float, v: float, colour: str, hollow: bool = False) -> str:
 
 
 def _page(title: str, body: list[str], legend: list[tuple[str, str]], height: float = HEIGHT) -> str:
-    """The SVG file: title, legend beneath it, body."""
+    """Returns the SVG file as text: title, legend beneath it, body.
+
+    body: SVG elements. legend: pairs (colour, meaning); the colours "dashes" and "hollow" stand for a dashed line and a
+    hollow dot. height: of the page in px.
+    """
     u, shown = 20.0, list[str]()
     for colour, meaning in legend:
         if colour == "dashes":

@@ -19,18 +19,22 @@ LEAST_SCENES = 2
 
 
 class SignedRankPruner(BasePruner):
-    """Prunes a trial if its values are surely worse than those of the best trial.
+    """Prunes a trial if its values on the scenes played so far are surely worse than those of the best trial on the
+    same scenes.
 
-    p: a trial is pruned at p-values below this. Values are reported with the number of the scene as step.
+    p: a trial is pruned at p-values below this. Values must be reported with the number of the scene as step. For
+    studies with one goal.
     """
 
     def __init__(self, p: float) -> None:
         self.p = p
 
     def prune(self, study: optuna.Study, trial: FrozenTrial) -> bool:
-        """Returns True if the trial is to be pruned: p-value below p, and a worse mean on the common scenes.
+        """Returns True if the trial is to be pruned: its p-value is below `p`, and its mean on the common scenes is
+        worse.
 
-        False as long as no trial is complete or fewer than two scenes are common.
+        Common scenes are those on which both this trial and the best complete trial have a value. False if no trial is
+        complete, or fewer than two scenes are common. Raises RuntimeError if the study has several goals.
         """
         try:
             best = study.best_trial.intermediate_values
@@ -42,9 +46,11 @@ class SignedRankPruner(BasePruner):
 
 
 def signed_rank_p_value(gains: Sequence[float]) -> float:
-    """Returns the probability of a sum of positive ranks no greater than observed if every sign were random.
+    """Returns the one-sided p-value of Wilcoxon's signed-rank test: small if the gains are mostly negative.
 
-    Ranks are those of the absolute values, averaged over equal values. Zeros take part in the ranking and have no sign.
+    It is the probability, if every sign were random, of a sum of positive ranks no greater than observed. Ranks are
+    those of the absolute values, averaged over equal values. Zeros take part in the ranking and have no sign. 1 without
+    gains.
     """
     d = np.asarray(gains, float)
     _, place, count = np.unique(np.abs(d), return_inverse=True, return_counts=True)

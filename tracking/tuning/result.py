@@ -30,11 +30,16 @@ MANY = 4
 class TuningResult:
     """The result of `tracking.tune`.
 
-    config: the winner; candidates: the defaults and the best trials, with their values on the validation scenes; front:
-    with several goals the candidates that no other dominates; trials: all finished ones; importance: share of each
-    parameter in the training values; comparisons: winner and defaults on the test scenes; taken_back: parameters that
-    the best trial changed and the winner does not; validation: values of defaults and winner by goal on the validation
-    scenes; notes: remarks for the reader; study: name of the study.
+    - plan: the search.
+    - config: the winner, all its parameters.
+    - front: with several goals the candidates that no other dominates, best first goal first; else ().
+    - candidates: the defaults and the best trials, with their values on the validation scenes.
+    - trials: all finished ones in the order of the search.
+    - importance: share (0 to 1) of each parameter in the training values.
+    - comparisons: winner and defaults on the test scenes; () if the defaults won.
+    - taken_back: names of parameters that the best trial changed and the winner does not.
+    - validation: values by goal of the defaults and of the winner on the validation scenes.
+    - notes: remarks for the reader; study: name of the study.
     """
 
     plan: SearchPlan = field(repr=False)
@@ -51,12 +56,14 @@ class TuningResult:
 
     @property
     def default(self) -> Config:
-        """What the winner is compared with: the defaults of the tracker, with the values that `set` fixed."""
+        """The config that the winner is compared with: the tracker's defaults with the values that `set` fixed."""
         return self.plan.base
 
     @property
     def changed(self) -> dict[str, tuple[Any, Any]]:
-        """The default and the new value of every parameter that the winner changed, by name."""
+        """A dict: parameter name to (default, new value), for every parameter in which the winner differs from the
+        defaults.
+        """
         old, new = self.default.as_dict(), self.config.as_dict()
         return {name: (old[name], new[name]) for name in new if old[name] != new[name]}
 
@@ -76,14 +83,14 @@ class TuningResult:
         return sum(bool(trial.error) for trial in self.trials)
 
     def __str__(self) -> str:
-        """The lines of `lines()` as one text."""
+        """Returns the lines of `lines()` (settings, counts, values, comparisons) as one text."""
         return "\n".join(self.lines())
 
     def lines(self, chosen: Candidate | None = None) -> list[str]:
         """Returns lines of text: settings, counts, validation values, and the comparisons and notes on the winner.
 
-        With `chosen`, a candidate of the front, its validation values instead of the comparisons. Training values are
-        never shown, as the search has optimised them.
+        chosen: a candidate of the front, whose validation values are shown instead of the winner's, and no comparisons;
+        None for the winner. Training values are never shown, as the search has optimised them.
         """
         plan, seeds = self.plan, self.plan.seeds
         names = ", ".join(goal.key for goal in plan.goals)
@@ -106,9 +113,10 @@ class TuningResult:
         return [*lines, *self.notes]
 
     def to_toml(self, chosen: Candidate | None = None) -> str:
-        """Returns the parameters of the winner, or of a candidate of the front, as `track --params` reads them.
+        """Returns a TOML text of all parameters of the winner, or of `chosen`, a candidate of the front.
 
-        Comments hold the lines of `lines(chosen)`, the versions of the packages, and the default of changed parameters.
+        `flockscope track --params` reads it. Comments hold the lines of `lines(chosen)`, the versions of the packages,
+        and the default of changed parameters.
         """
         config = self.config if chosen is None else chosen.config
         old = self.default.as_dict()
@@ -122,7 +130,11 @@ class TuningResult:
         return "\n".join([*(f"# {comment}" for comment in comments), *lines, ""])
 
     def as_dict(self) -> dict[str, Any]:
-        """Returns all figures as nested dicts and lists for JSON; a figure that is not known is nan."""
+        """Returns everything as nested dicts and lists for JSON; an unknown number is nan.
+
+        Keys: settings, counts, params, changed, taken_back, validation, comparisons, candidates, front (empty with one
+        goal), importance, notes, versions.
+        """
         plan, seeds = self.plan, self.plan.seeds
         return {
             "settings": plan.identity()
@@ -152,9 +164,11 @@ class TuningResult:
         }  # fmt: skip
 
     def write(self, path: str | Path) -> list[Path]:
-        """Writes the parameters to `path`, the figures (.json) and the plots (.svg) beside it; returns the paths.
+        """Writes the parameters to `path` (TOML), and beside it all figures (.json) and the plots (.svg); returns all
+        paths written.
 
         With several goals each candidate of the front gets a file, too (.front-1.toml …, best first goal first).
+        Existing files are replaced. Raises OSError if a file cannot be written.
         """
         target = Path(path)
         files = {".json": json.dumps(_without_nan(self.as_dict()), indent=1, allow_nan=False) + "\n", **self.plots()}
@@ -166,7 +180,10 @@ class TuningResult:
         return [target, *(target.with_suffix(suffix) for suffix in files)]
 
     def plots(self) -> dict[str, str]:
-        """Returns the plots that have something to show, as SVG text by file suffix."""
+        """Returns the plots as SVG text by file suffix: ".history.svg", ".importance.svg", ".front.svg".
+
+        The second is missing if all shares are 0, the third with one goal.
+        """
         plots = {".history.svg": history_plot(self.plan, self.trials)}
         if any(self.importance.values()):
             plots[".importance.svg"] = importance_plot(self.plan, self.importance, self.config)
@@ -183,7 +200,7 @@ def _candidate(candidate: Candidate) -> dict[str, Any]:
 
 
 def versions() -> dict[str, str]:
-    """Returns the versions of PACKAGES by name, "unknown" if a package is not installed."""
+    """Returns a dict from each name of PACKAGES to its installed version, "unknown" if it is not installed."""
     from importlib.metadata import PackageNotFoundError, version
 
     found = {}
@@ -196,7 +213,10 @@ def versions() -> dict[str, str]:
 
 
 def _without_nan(value: Any) -> Any:
-    """The value with None for nan and infinity, which JSON does not have."""
+    """Returns a copy of nested dicts, lists and tuples with None for nan and infinity, which JSON lacks.
+
+    Tuples become lists.
+    """
     if isinstance(value, dict):
         return {key: _without_nan(v) for key, v in value.items()}
     if isinstance(value, list | tuple):
@@ -205,7 +225,10 @@ def _without_nan(value: Any) -> Any:
 
 
 def _short_settings(settings: Sequence[str]) -> Iterator[str]:
-    """Settings for the text: long values are cut, and many sensor settings become their number."""
+    """Yields settings ("key=value") for the text, cut to 40 characters.
+
+    More than 4 settings that begin with "sensor." are replaced by one text with their number, which comes first.
+    """
     sensor = [setting for setting in settings if setting.startswith("sensor.")]
     profile = len(sensor) > MANY
     if profile:

@@ -42,7 +42,11 @@ TPE_FROM = 10
 
 
 def distribution(p: Param) -> BaseDistribution:
-    """Returns Optuna's distribution of a parameter, in the unit of the parameter."""
+    """Returns Optuna's distribution of a parameter, in the unit of the parameter.
+
+    It is categorical over its choices, integer, or a float range (log scale if declared so), from `low` to `high`
+    inclusive.
+    """
     if p.scale == "categorical":
         return CategoricalDistribution(p.choices)
     if p.scale == "int":
@@ -51,16 +55,20 @@ def distribution(p: Param) -> BaseDistribution:
 
 
 def place_in_search(trials: Sequence[FrozenTrial], trial: FrozenTrial) -> int:
-    """Returns the place of a trial in the search, 0 for the defaults; a repeated trial has the place of the first try.
+    """Returns the place of a trial in the search, 0 for the defaults; a repeated trial has the place of its first try.
 
-    The place is the number of trials begun before it that are no repetitions.
+    trials: all trials of the study. The place is the number of trials begun before it that are no repetitions.
     """
     number = trial.user_attrs.get(AGAIN, trial.number)
     return sum(t.number < number and AGAIN not in t.user_attrs for t in trials)
 
 
 class HillClimbingSampler(BaseSampler):
-    """Optuna's sampler interface. State: of the current trial its generator, its TPE sampler, and which is used."""
+    """Optuna sampler that moves a few parameters of a good finished trial; every fourth trial is drawn by TPE.
+
+    The parameters of a trial depend only on the seed of the search, its place in it and the trials finished before.
+    State: of the current trial its random generator, its TPE sampler, and whether TPE is used.
+    """
 
     def __init__(self, plan: SearchPlan) -> None:
         seed = plan.options.seed
@@ -68,7 +76,11 @@ class HillClimbingSampler(BaseSampler):
         self._rng, self._tpe, self._use_tpe = np.random.default_rng(seed), TPESampler(seed=seed), False
 
     def before_trial(self, study: optuna.Study, trial: FrozenTrial) -> None:
-        """Seeds the generators for this trial and decides whether TPE draws it."""
+        """Seeds the generators for this trial from the seed of the search and the trial's place; decides whether TPE
+        draws it.
+
+        TPE draws every fourth trial, once ten trials are complete.
+        """
         trials = study.get_trials(deepcopy=False)
         place = place_in_search(trials, trial)
         entropy = np.random.SeedSequence([self._plan.options.seed, place])
@@ -78,23 +90,34 @@ class HillClimbingSampler(BaseSampler):
         self._use_tpe = place % TPE_EVERY == TPE_EVERY - 1 and complete >= TPE_FROM
 
     def infer_relative_search_space(self, study: optuna.Study, trial: FrozenTrial) -> dict[str, BaseDistribution]:
-        """Returns the parameters that `sample_relative` draws: all of them, or those that TPE draws jointly."""
+        """Returns the distributions by name that `sample_relative` draws from.
+
+        They are those of all parameters, or of those that TPE draws jointly if TPE draws this trial.
+        """
         return self._tpe.infer_relative_search_space(study, trial) if self._use_tpe else self._space
 
     def sample_relative(
         self, study: optuna.Study, trial: FrozenTrial, search_space: dict[str, BaseDistribution]
     ) -> dict[str, Any]:
-        """Returns values by name: a moved good trial, or what TPE draws."""
+        """Returns a dict of values by parameter name: a good trial with some parameters moved, or what TPE draws.
+
+        search_space: distributions by name; used by TPE only.
+        """
         return self._tpe.sample_relative(study, trial, search_space) if self._use_tpe else self._moved(study)
 
     def sample_independent(
         self, study: optuna.Study, trial: FrozenTrial, param_name: str, param_distribution: BaseDistribution
     ) -> Any:
-        """Returns the value that TPE draws for one parameter."""
+        """Returns the value that TPE draws for the parameter `param_name` alone, from its distribution."""
         return self._tpe.sample_independent(study, trial, param_name, param_distribution)
 
     def _moved(self, study: optuna.Study) -> dict[str, Any]:
-        """A parent with some parameters moved; if the config refuses that, on the line back to the parent."""
+        """Returns the values by name of a good trial with some parameters moved, three on average and at least one.
+
+        A moved parameter takes a normal step in [−1, 1], mirrored at the ends; a categorical one is drawn anew. If the
+        config refuses the values, a point on the line back to the good trial is taken. Raises InputError if the config
+        refuses the good trial.
+        """
         space, rng = self._plan.space, self._rng
         parent = self._parent(study)
         base = self._plan.config(parent)
@@ -110,9 +133,11 @@ class HillClimbingSampler(BaseSampler):
         return {name: getattr(config, name) if name in moved else value for name, value in parent.items()}
 
     def _parent(self, study: optuna.Study) -> dict[str, Any]:
-        """The parameters of one of the best unpruned trials, the best most likely; the defaults if there is none.
+        """Returns the values by name of one of the three best unpruned trials, the best most likely; the defaults if
+        there is none.
 
-        With several goals it is a trial of the Pareto front, each equally likely.
+        With several goals it is a trial of the Pareto front, each equally likely. Trials over other parameters are
+        ignored.
         """
         trials = study.get_trials(deepcopy=False, states=(TrialState.COMPLETE,))
         whole = [t for t in trials if PRUNED not in t.user_attrs and t.params.keys() == self._plan.defaults.keys()]
@@ -128,5 +153,8 @@ class HillClimbingSampler(BaseSampler):
 
 
 def _reflected(point: Array) -> Array:
-    """Coordinates beyond an end of [-1, 1] mirrored at that end."""
+    """Returns coordinates of any shape with those beyond an end of [−1, 1] mirrored at that end.
+
+    Those beyond 3 or −3 would land outside again; they become −1 or 1.
+    """
     return np.clip(np.where(np.abs(point) > 1, np.sign(point) * 2 - point, point), -1.0, 1.0)

@@ -28,16 +28,21 @@ CHECK_SUITES = ("friends-meet", "crossing")
 
 
 def suite_names(suite: Scenes) -> tuple[str, ...]:
-    """Returns the names of suites, scenarios or files as texts; a single name becomes a tuple of one."""
+    """Returns the names of suites, scenarios or files as texts, in the order given.
+
+    A single name or path becomes a tuple of one.
+    """
     return (str(suite),) if isinstance(suite, str | Path) else tuple(map(str, suite))
 
 
 def chosen_seeds(seeds: range | None, split: str, scenes: int) -> range:
     """Returns the seeds, or the default of the split if they are None.
 
-    split: "train", "val" or "test". scenes: number of scenes that each seed is played with. The default begins at the
-    first seed of the split and makes at least EPISODES[split] episodes, with at least LEAST_SEEDS seeds. Raises
-    InputError if `seeds` is no range, is empty, or reaches out of the range of the split.
+    split: "train", "val" or "test". scenes: number of scenes that each seed is played with, 1 or more. The default
+    begins at the first seed of the split and makes at least EPISODES[split] episodes, with at least LEAST_SEEDS (2)
+    seeds.
+
+    Raises InputError if `seeds` is no range, is empty, or reaches out of the range of the split.
     """
     low, high = next((low, high) for name, low, high in SPLITS if name == split)
     if seeds is None:
@@ -78,23 +83,36 @@ def count_scenes(names: Sequence[str], settings: Sequence[str], option: str) -> 
 
 
 def episode_sources(names: Sequence[str], seeds: range, settings: Sequence[str]) -> tuple[Source, ...]:
-    """Returns one source for every scene of the suites with every seed. settings: "key=value" overrides."""
+    """Returns one source for every scene of the suites `names` with every seed. settings: "key=value" overrides of the
+    scenes.
+
+    Raises InputError if a name is unknown, there is no scene, or a setting does not fit.
+    """
     return sources(list(names), seeds, tuple(settings))
 
 
 def default_check_suite(names: Sequence[str]) -> str | None:
-    """Returns the first of CHECK_SUITES that shares no scenario with the suites `names`, None if there is none."""
+    """Returns the first of CHECK_SUITES that shares no scenario with the suites `names`, None if there is none.
+
+    Raises InputError if a name is unknown.
+    """
     return next((suite for suite in CHECK_SUITES if not shared_scenarios(names, (suite,))), None)
 
 
 def shared_scenarios(names: Sequence[str], others: Sequence[str]) -> list[str]:
-    """Returns the names of the scenarios that both lists of suites, scenarios and files contain, sorted."""
+    """Returns the names of the scenarios that both lists of suites, scenarios and files contain, sorted; [] if none.
+
+    Scenarios are equal if their files are. Raises InputError if a name is unknown or a file unreadable.
+    """
     common = {file for name in names for file in _files(name)} & {file for name in others for file in _files(name)}
     return sorted(Path(file).stem for file in common)
 
 
 def _files(name: str) -> list[str]:
-    """The scenario files that the name of a suite, a scenario or a file refers to."""
+    """Returns the absolute paths of the scenario files that the name of a suite, a scenario or a *.toml file refers to.
+
+    A suite gives one path per entry. Raises InputError if the name is unknown.
+    """
     bare = name.removeprefix("suite:")
     if bare != name or (bare in toml_files.suite_names() and bare not in toml_files.names()) or _is_suite(bare):
         path = suites.find_suite(bare)

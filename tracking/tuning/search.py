@@ -69,7 +69,7 @@ def _search(options: TuneOptions) -> TuningResult:
 
 
 def _check_optuna() -> None:
-    """InputError if the search library is not installed."""
+    """Raises InputError if the package optuna is not installed."""
     try:
         import optuna  # noqa: F401
     except ImportError:
@@ -78,7 +78,7 @@ def _check_optuna() -> None:
 
 
 def _checked_target(out: Path) -> Path:
-    """The file for the result; InputError if its name does not end in .toml or it is a folder."""
+    """Returns `out`, the file for the result. Raises InputError if its name does not end in .toml or it is a folder."""
     if out.suffix != ".toml" or out.is_dir():
         remedy = "choose a name that ends in .toml"
         raise InputError(file=out, place="--out", got=out.name, expected="a file, *.toml", remedy=remedy)
@@ -86,7 +86,13 @@ def _checked_target(out: Path) -> Path:
 
 
 def _evaluated(plan: SearchPlan, study: SearchStudy, play: PlayEpisodes, report: Callable[[str], None]) -> TuningResult:
-    """The winner of a finished study: chosen and simplified on validation scenes, then compared on test scenes."""
+    """Returns the result of a finished study: the winner is chosen and simplified on validation scenes, then compared
+    on test scenes.
+
+    With one goal the winner is the candidate of best value among those surely better than the defaults, else the
+    defaults. With several goals it is the one of the Pareto front that is best in the first goal, not simplified.
+    report: called with a text before each set of scenes. Errors of the defaults and of the workers are raised.
+    """
     evaluator = HeldOutEvaluator(plan, play, report)
     candidates = evaluator.validated(_candidates(plan, study))
     importance = study.importance()
@@ -109,7 +115,10 @@ def _evaluated(plan: SearchPlan, study: SearchStudy, play: PlayEpisodes, report:
 
 
 def _why_defaults(candidates: list[Candidate], goal: Goal) -> list[str]:
-    """One line that says why the defaults are the result."""
+    """Returns a list of one line that says why the defaults are the result.
+
+    candidates: the defaults first, then the others with their gains on the validation scenes.
+    """
     gains = [c.gain for c in candidates[1:] if c.gain is not None]
     if not gains:
         return ["the defaults stay: no trial was better in training"]
@@ -121,9 +130,10 @@ def _why_defaults(candidates: list[Candidate], goal: Goal) -> list[str]:
 
 
 def _candidates(plan: SearchPlan, study: SearchStudy) -> list[Candidate]:
-    """The defaults, and the best unpruned trials in training; no config twice.
+    """Returns the defaults, and the best unpruned trials in training, at most `finalists` of them; no config twice.
 
-    With several goals the trials come from the Pareto front of training, spread over it.
+    They are sorted by the first goal, best first. With several goals the trials come from the Pareto front of training,
+    spread over it. The defaults must be finished, else StopIteration is raised.
     """
     played = [t for t in study.records() if not t.pruned and not t.error]
     defaults, goal = next(t for t in played if t.params == plan.defaults), plan.goals[0]
@@ -142,7 +152,10 @@ def _candidates(plan: SearchPlan, study: SearchStudy) -> list[Candidate]:
 
 
 def _spread(ranked: list[TrialRecord], count: int) -> list[TrialRecord]:
-    """`count` of the trials at even distances from the first to the last; all if there are no more than `count`."""
+    """Returns `count` of the trials at even distances from the first to the last, in the same order.
+
+    All are returned if there are no more than `count`.
+    """
     if len(ranked) <= count:
         return ranked
     return [ranked[round(k * (len(ranked) - 1) / max(count - 1, 1))] for k in range(count)]

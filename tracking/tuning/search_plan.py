@@ -34,7 +34,10 @@ from tracking.tuning.tuned_tracker import TunedTracker, tuned_tracker
 
 @dataclass(frozen=True)
 class SearchSeeds:
-    """The seeds of every scene: of the suite that is tuned on, and for tests of the second suite."""
+    """The seeds that every scene is played with, as ranges with the end excluded.
+
+    training, validation, test: of the suite that is tuned on. check: test seeds of the second suite.
+    """
 
     training: range
     validation: range
@@ -46,8 +49,13 @@ class SearchSeeds:
 class SearchPlan:
     """A search whose options fit together.
 
-    tracker: what is tuned; base: its config with the values that `--set` fixed; space: the parameters to search; suite:
-    what is tuned on; check: a second suite to test on, or None; scene_settings: "key=value" overrides of the scenes.
+    - options: as given.
+    - tracker: what is tuned; base: its config with the values that `--set` fixed; space: the parameters to search.
+    - suite: names of what is tuned on; check: a second suite to test on, or None.
+    - seeds: of training, validation and tests.
+    - goals: scores to improve, the first decides.
+    - detections: the tracker's input, "image", "file" or "truth".
+    - scene_settings: "key=value" overrides of the scenes.
     """
 
     options: TuneOptions
@@ -68,38 +76,43 @@ class SearchPlan:
 
     @property
     def suite_name(self) -> str:
-        """The names of the suites that are tuned on, without folders."""
+        """The names of the suites, scenarios and files that are tuned on, joined by ", "; without folders."""
         return ", ".join(map(_without_folder, self.suite))
 
     @property
     def defaults(self) -> dict[str, Value]:
-        """The values of the first trial by parameter name."""
+        """The values of the searched parameters in the first trial, a dict by parameter name."""
         return {p.name: getattr(self.base, p.name) for p in self.space}
 
     @property
     def needs_every_score(self) -> bool:
-        """True if a goal needs the whole catalogue of scores to be computed."""
+        """True if a goal is none of objective, HOTA, group_F1_hull and frames/s: all scores are then computed."""
         return any(goal.key not in (*FAST_KEYS, SPEED) for goal in self.goals)
 
     def config(self, values: dict[str, Any]) -> Config:
-        """Returns the base config with these values. Raises InputError if the config refuses them together."""
+        """Returns the base config with these values (by parameter name).
+
+        Raises InputError if a name is unknown or the config refuses the values, alone or together.
+        """
         return type(self.base).from_dict({**self.base.as_dict(), **values})
 
     @cached_property
     def training(self) -> tuple[Source, ...]:
-        """The sources of the episodes of each trial."""
+        """The sources (scene and seed) of the training episodes of each trial."""
         return episode_sources(self.suite, self.seeds.training, self.scene_settings)
 
     @cached_property
     def validation(self) -> tuple[Source, ...]:
-        """The sources of the episodes that choose among the best trials."""
+        """The sources (scene and seed) of the episodes that choose among the best trials."""
         return episode_sources(self.suite, self.seeds.validation, self.scene_settings)
 
     @cached_property
     def tests(self) -> dict[str, tuple[Source, ...]]:
-        """The sources of the episodes that measure the gain, by the name of the suite.
+        """The sources (scene and seed) of the episodes that measure the gain, a dict by the name of the suite.
 
-        The second suite keeps its own scenes; only `sensor.` settings apply to it.
+        It has the suite that is tuned on and, if there is one, the second suite. The second suite keeps its own scenes;
+        only settings that begin with "sensor." apply to it. Raises InputError if a setting does not fit the second
+        suite.
         """
         found = {self.suite_name: episode_sources(self.suite, self.seeds.test, self.scene_settings)}
         if self.check is not None:
@@ -108,7 +121,11 @@ class SearchPlan:
         return found
 
     def identity(self) -> dict[str, Any]:
-        """Returns everything that the value of a trial depends on; a study is resumed only if this is the same."""
+        """Returns a dict of everything that the value of a trial depends on; a study is resumed only if it is the same.
+
+        Keys: tracker, code, versions, suite, seeds, motions, detections, objective, searched, ranges, fixed, prune,
+        seed. Long lists are given as hashes.
+        """
         return {
             "tracker": self.tracker_name,
             "code": self.tracker.code,
@@ -127,10 +144,10 @@ class SearchPlan:
 
 
 def search_plan(options: TuneOptions) -> SearchPlan:
-    """Returns the plan that follows from the options, with defaults for everything they leave open.
+    """Returns the plan that follows from the options, with defaults for everything that the options leave open.
 
     Raises InputError if the tracker, a parameter, a suite, a seed or a score is unknown or not allowed, if the options
-    contradict each other, and if the tracker cannot work with the detections.
+    contradict each other, if no parameter is left to search, and if the tracker cannot work with the detections.
     """
     tracker = tuned_tracker(options.tracker)
     fixed, scene_settings = _split_settings(options.set)
@@ -159,12 +176,16 @@ def search_plan(options: TuneOptions) -> SearchPlan:
 
 
 def seeds_text(seeds: range) -> str:
-    """Returns the seeds as "first:last + 1", as the option `--seeds` takes them."""
+    """Returns a range of seeds as "start:stop", stop excluded, as the option `--seeds` takes it."""
     return f"{seeds.start}:{seeds.stop}"
 
 
 def _split_settings(settings: Iterable[str]) -> tuple[list[str], tuple[str, ...]]:
-    """The settings of the tracker, and those of the scenes without the prefix `scenario.`."""
+    """Returns the "key=value" settings of the tracker (a list), and those of the scenes (a tuple).
+
+    Scenes have keys that begin with "scenario." (removed in the result) or "sensor." (kept); all others are the
+    tracker's.
+    """
     tracker, scenes = [], []
     for setting in settings:
         key, _, value = setting.partition("=")
@@ -176,7 +197,10 @@ def _split_settings(settings: Iterable[str]) -> tuple[list[str], tuple[str, ...]
 
 
 def _count_check_scenes(suite: Sequence[str], check: str | None) -> int:
-    """The number of scenes of the second suite, 1 if there is none; InputError if it shares a scenario."""
+    """Returns the number of scenes of the second suite `check`, 1 if it is None.
+
+    Raises InputError if it shares a scenario with `suite`, is unknown, or holds no scenes to simulate.
+    """
     if check is None:
         return 1
     count = count_scenes((check,), (), "--check")
@@ -189,7 +213,13 @@ def _count_check_scenes(suite: Sequence[str], check: str | None) -> int:
 
 
 def _space(base: Config, settings: Sequence[str], only: tuple[str, ...], mode: DetectionMode) -> tuple[Param, ...]:
-    """The parameters to search: tunable, not fixed, with an effect on this input, and in `only` unless it is empty."""
+    """Returns the parameters to search: tunable, not fixed, with an effect on this input, and in `only` unless it is
+    empty.
+
+    settings: "name=value" texts of fixed parameters. only: names of parameters. mode: the tracker's input; "image"
+    leaves out parameters about points, other modes those about pixels. Raises InputError if a name in `only` is unknown
+    or no such parameter, or if no parameter is left.
+    """
     fixed = {setting.removeprefix("tracker.").partition("=")[0].strip() for setting in settings}
     unused = "points" if mode == "image" else "pixels"
     for name in only:

@@ -28,9 +28,10 @@ FINISHED = (TrialState.COMPLETE, TrialState.PRUNED)
 
 
 class SearchStudy:
-    """An open study. State: Optuna's study, and the locks by which processes share its journal, None without them.
+    """An open study of a search, which several processes can share. A new study gets the defaults as its first trial.
 
-    Raises InputError if the study in the storage is about another search. The first trial is the defaults.
+    plan: the search; study (kept as `optuna`): Optuna's study; locks: locks by which processes share its journal, None
+    without them; storage: names it in errors. Raises InputError if the study is about another search.
     """
 
     def __init__(self, plan: SearchPlan, study: optuna.Study, locks: TrialLocks | None, storage: object = None) -> None:
@@ -44,15 +45,18 @@ class SearchStudy:
                 study.enqueue_trial(dict(plan.defaults))
 
     def trials(self) -> list[FrozenTrial]:
-        """Returns all trials by number, those running, waiting and abandoned included."""
+        """Returns all trials in the order of their numbers; running, waiting and abandoned ones are included."""
         return self.optuna.get_trials(deepcopy=False)
 
     def finished(self) -> list[FrozenTrial]:
-        """Returns the finished trials: complete, pruned or impossible."""
+        """Returns the finished trials by number: complete, stopped early, or with impossible parameters.
+
+        The state of the first two is COMPLETE, that of the last PRUNED.
+        """
         return [t for t in self.trials() if t.state in FINISHED]
 
     def ask(self, retry_unfinished: bool = False) -> optuna.Trial | None:
-        """Returns the next trial to play; None if as many as planned are finished or running.
+        """Returns the next trial to play, locked for this process; None if as many as planned are finished or running.
 
         With a journal, an abandoned trial is repeated first. Without one it is not known which trials are abandoned:
         running ones count as played by others, or, with `retry_unfinished`, as abandoned.
@@ -72,14 +76,22 @@ class SearchStudy:
             return trial
 
     def tell(self, trial: optuna.Trial, values: Sequence[float] | None) -> None:
-        """Stores the values of a trial, one per goal; None means that its parameters are impossible."""
+        """Stores the values of a trial, one per goal, and releases its lock; None means that its parameters are
+        impossible.
+
+        A trial that is finished already keeps its values. Raises ValueError if the number of values differs from that
+        of the goals or a value is nan.
+        """
         state = TrialState.PRUNED if values is None else TrialState.COMPLETE
         self.optuna.tell(trial, values, state, skip_if_finished=True)
         if self._locks is not None:
             self._locks.release_trial(trial.number)
 
     def place(self, trial: optuna.Trial) -> int:
-        """Returns the place of a trial in the search, 0 for the defaults."""
+        """Returns the place of a trial in the search, 0 for the defaults.
+
+        A repeated trial has the place of its first try.
+        """
         trials = self.trials()
         return place_in_search(trials, trials[trial.number])
 
@@ -95,12 +107,18 @@ class SearchStudy:
         return TrialRecord(place, tuple(t.values or ()), dict(t.params), episodes, PRUNED in t.user_attrs)
 
     def best(self) -> set[int]:
-        """Returns the places of the best trial, or, with several goals, of the trials of the Pareto front."""
+        """Returns the places in the search of the best trial, or, with several goals, of the trials of the Pareto
+        front.
+
+        Estimates of pruned trials take part. Of one goal, all trials with the best value are returned. Empty if no
+        trial is complete.
+        """
         trials = self.trials()
         return {place_in_search(trials, t) for t in self.optuna.best_trials}
 
     def importance(self) -> dict[str, float]:
-        """Returns the share of each parameter in the first goal's training values (PED-ANOVA), greatest first.
+        """Returns the share (0 to 1) of each parameter in the first goal's training values (PED-ANOVA), a dict by name,
+        greatest first.
 
         All shares are 0 if fewer than two trials have values, or all values are equal.
         """
@@ -117,14 +135,17 @@ class SearchStudy:
 
     @property
     def knows_running_trials(self) -> bool:
-        """True if it is known which running trials other processes still play, as it is with a journal."""
+        """True if it is known which running trials other processes still play.
+
+        This is so with a journal file on a system with fcntl.
+        """
         return self._locks is not None
 
     def _choosing(self) -> AbstractContextManager[None]:
         return nullcontext() if self._locks is None else self._locks.choosing()
 
     def _repeat(self, abandoned: FrozenTrial) -> None:
-        """Puts an abandoned trial back in the queue with its parameters and place, and marks it as failed."""
+        """Marks an abandoned trial as failed and queues it again, once, with its parameters and place."""
         number = abandoned.user_attrs.get(AGAIN, abandoned.number)
         repeated = any(t.user_attrs.get(AGAIN) == number and t.number > abandoned.number for t in self.trials())
         if not repeated:
@@ -135,10 +156,11 @@ class SearchStudy:
 
 @contextmanager
 def open_study(plan: SearchPlan, storage: str | Path | None, name: str) -> Iterator[SearchStudy]:
-    """Opens or creates the study `name` for the time of the context.
+    """Opens or creates the study `name` for the time of the context, and yields it as a `SearchStudy`.
 
-    storage: a journal file, the URL of an Optuna storage, or None for memory. Raises InputError if the storage cannot
-    be used, or holds a study of this name that is about another search.
+    storage: a journal file, the URL of an Optuna storage, or None for memory. The folder of a journal is created.
+    Raises InputError if the storage cannot be used, or holds a study of this name that is about another search; OSError
+    if a file cannot be opened.
     """
     with _quiet_optuna():
         place = storage if storage is None or "://" in str(storage) else Path(storage)
@@ -166,7 +188,11 @@ def _pruner(plan: SearchPlan) -> optuna.pruners.BasePruner:
 
 
 def _check_identity(plan: SearchPlan, study: optuna.Study, storage: object) -> None:
-    """InputError if the study was begun with other settings; a study without trials and settings fits every plan."""
+    """Raises InputError if the study was begun with other settings; a study without trials and settings fits every
+    plan.
+
+    storage: names the study's place in the error.
+    """
     mine, stored = plan.identity(), study.user_attrs.get(SETTINGS)
     if stored is None and not study.get_trials(deepcopy=False):
         return
@@ -182,7 +208,10 @@ def _check_identity(plan: SearchPlan, study: optuna.Study, storage: object) -> N
 
 
 def _trial_locks(journal: Path) -> TrialLocks | None:
-    """The locks of a journal file, None if the system has no fcntl."""
+    """Returns the locks of a journal file, None if the system has no fcntl. Creates the folder and the lock file.
+
+    Raises OSError if these cannot be created.
+    """
     try:
         import fcntl  # noqa: F401
     except ImportError:
@@ -192,7 +221,10 @@ def _trial_locks(journal: Path) -> TrialLocks | None:
 
 
 def _optuna_storage(place: str | Path | None, locks: TrialLocks | None) -> BaseStorage | str | None:
-    """Optuna's storage for a journal file, a URL or (None) memory; InputError if Optuna cannot open it."""
+    """Returns Optuna's storage for a journal file (Path), a URL (str) or memory (None, which is returned).
+
+    Raises InputError if Optuna cannot open it, OSError if a file cannot be opened.
+    """
     from optuna.storages import GrpcStorageProxy, JournalStorage
     from optuna.storages.journal import JournalFileBackend, JournalFileOpenLock, JournalRedisBackend
 

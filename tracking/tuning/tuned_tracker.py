@@ -16,11 +16,13 @@ RULE = LinkRule.tracker
 
 @dataclass(frozen=True)
 class TunedTracker:
-    """A tracker with parameters, or the baseline rule of groups.
+    """A tracker with parameters, or the baseline rule of groups, as a search tunes it.
 
-    tracker: as `tracking.track` takes it; name: for messages and files; config_class: declares its parameters; needs:
-    the inputs that it needs; code: hash of the file that defines the tracker,
-    "" if there is none.
+    - tracker: as `tracking.track` takes it: name, file.py:Class, module:Class or class.
+    - name: for messages and files.
+    - config_class: declares its parameters.
+    - needs: inputs that it can use, such as "boxes", "points", "stereo".
+    - code: hash of the file that defines the tracker, "" if there is none.
     """
 
     tracker: str | type[Tracker]
@@ -31,18 +33,23 @@ class TunedTracker:
 
     @property
     def objective(self) -> str:
-        """Key of the score that it is tuned for by default: "pairwise_F1" for the rule of groups, else "objective"."""
+        """Key of the score that it is tuned for by default: "pairwise_F1" for the baseline rule of groups, else
+        "objective".
+        """
         return "pairwise_F1" if self.name == RULE else "objective"
 
     @property
     def detections(self) -> DetectionMode:
-        """Its input by default: "truth" for the rule, "file" if it takes boxes or points, else "image"."""
+        """Its input by default: "truth" for the rule of groups, "file" if it takes boxes or points, else "image"."""
         if self.name == RULE:
             return "truth"
         return "file" if {"boxes", "points"} & {*self.needs} else "image"
 
     def check_input(self, source: Source, detections: DetectionMode) -> None:
-        """Raises InputError if it cannot work on this source with these detections."""
+        """Raises InputError if it cannot work on this source with these detections, or if the source cannot be opened.
+
+        The baseline rule of groups works with "truth" only; its source is not opened.
+        """
         from tracking.detection_mode import choose_mode
 
         if self.name == RULE:
@@ -55,10 +62,12 @@ class TunedTracker:
     def play(
         self, source: Source, values: dict[str, Any], detections: DetectionMode, cache: SourceCache, every_score: bool
     ) -> Episode:
-        """Returns one episode with the parameters `values`; the tracker's own seed is the seed of the source.
+        """Returns one episode with the parameters `values` (by name, defaults for others), from the first frame to the
+        last.
 
-        every_score: compute the whole catalogue. Raises InputError if the tracker refuses the parameters, and
-        WorkError if it fails with them.
+        The tracker's own seed is the seed of the source. cache: keeps the opened source. every_score: compute the whole
+        catalogue of scores. The baseline rule ignores `detections` and `every_score`. Raises InputError if the tracker
+        refuses the parameters or the source has no labels, and WorkError if it fails with them.
         """
         if self.name == RULE:
             from tracking.tuning.grouping_episodes import play_rule
@@ -71,9 +80,10 @@ class TunedTracker:
 
 
 def tuned_tracker(tracker: str | type[Tracker]) -> TunedTracker:
-    """Returns what is to be tuned under this name, file or class; `grouping` is the baseline rule of groups.
+    """Returns what is to be tuned: `grouping` is the baseline rule of groups, else a tracker by name, file.py:Class,
+    module:Class or class.
 
-    Raises InputError if it is no tracker, or declares no parameters.
+    Raises InputError if it is unknown or cannot be imported, is no tracker, or declares no parameters.
     """
     from tracking.tracker_registry import checked, code_hash, config_class, find
 
