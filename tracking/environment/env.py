@@ -42,7 +42,7 @@ Floats = NDArray[np.float32]
 
 @dataclass(frozen=True, kw_only=True)
 class TuningEnvOptions:
-    """The keyword arguments of the environment. Raises InputError if a choice is unknown."""
+    """The keyword arguments of the environment. InputError if observation, detections or render_mode is unknown."""
 
     tracker: AnyTracker = field(metadata=option('Registered name, "file.py:Class", "module:Class" or a class.'))
     suite: SourceSpec | Source = field(
@@ -77,10 +77,12 @@ class TuningEnvOptions:
 
 
 class TuningEnv(gymnasium.Env[Floats, Floats]):
-    """The environment. State: the sources and their cache; of the episode: source, config, rollout, observer, score.
+    """The environment: an episode is one run of a tracker, an action sets its parameters, the reward is the gain in
+    score.
 
-    Keyword arguments are the fields of TuningEnvOptions. Raises InputError if an argument is unknown or wrong, if the
-    tracker has no parameters to search, and if a source cannot provide the detections.
+    Keyword arguments are the fields of TuningEnvOptions. State: sources and their cache; config, rollout, score of the
+    episode. Raises InputError if an argument is unknown or wrong, the tracker has no parameters to search, or a source
+    lacks the detections.
     """
 
     metadata = METADATA
@@ -108,17 +110,17 @@ class TuningEnv(gymnasium.Env[Floats, Floats]):
 
     @property
     def parameter_names(self) -> tuple[str, ...]:
-        """The name of the parameter that each number of an action sets."""
+        """The name of the parameter that each of the P numbers of an action sets, in order."""
         return tuple(p.name for p in self.space)
 
     @property
     def observation_names(self) -> tuple[str, ...]:
-        """The name of each number of an observation: statistics, then parameters; "nothing" for "none"."""
+        """The name of each number of an observation: statistics, then (if chosen) parameters; "nothing" for "none"."""
         names = {"statistics": NAMES, "parameters": (*NAMES, *self.parameter_names), "none": ("nothing",)}
         return names[self.observation]
 
     def _metadata(self, fps: float) -> dict[str, Any]:
-        """Metadata by which a video with one picture per action runs at the speed of the sequence."""
+        """Returns metadata with "render_fps": one picture per action at the speed of a sequence of `fps`."""
         return {**METADATA, "render_fps": max(round(fps / (self.decision_every or 1)), 1)}
 
     def _clear_episode(self) -> None:
@@ -127,12 +129,13 @@ class TuningEnv(gymnasium.Env[Floats, Floats]):
         self.config, self.score, self.scores, self.refused = self.base, 0.0, dict[str, float](), ""
 
     def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> tuple[Floats, dict[str, Any]]:
-        """Begins an episode on a source that the env's own generator draws; returns observation and info.
+        """Begins an episode on a source that the env's own generator draws; returns observation (float32) and an info
+        dict.
 
-        seed: reseeds the generator. options: "scenario" and "seed" restrict the draw to sources of this name and seed;
-        "params" are the parameters that the episode begins with. Raises InputError if an option is unknown, if no
-        source fits, if the tracker refuses the parameters, or if the source has no labels; the running episode then
-        goes on.
+        seed: reseeds the generator, None goes on with it. options: "scenario" and "seed" restrict the draw to sources
+        of this name and seed; "params" are the parameters that the episode begins with. Raises InputError if an option
+        is unknown, no source fits, the tracker refuses the parameters, or the source has no labels; the running episode
+        then goes on.
         """
         super().reset(seed=seed)
         options = options or {}
@@ -155,11 +158,11 @@ class TuningEnv(gymnasium.Env[Floats, Floats]):
     def step(self, action: Any) -> tuple[Floats, float, bool, bool, dict[str, Any]]:
         """Sets the parameters and tracks on, to the end or for `decision_every` frames.
 
-        Returns observation, reward, True at the end of the sequence, False (never truncated), and info. action: (P,)
-        numbers, clipped to [-1, 1]. A point whose config is refused is moved towards the parameters that the episode
-        began with (tracking.parameter_space.decode). If the tracker refuses a config between frames it keeps the one
-        before, and `info["refused"]` holds the error. Raises InputError before `reset`, if the action has another
-        shape or is not finite, and if the tracker fails for another reason.
+        Returns observation, reward (gain of the objective), True at the end of the sequence, False (never truncated),
+        info dict. action: (P,) numbers, clipped to [−1, 1]. Refused parameters are moved towards those that the episode
+        began with. If the tracker refuses a config between frames it keeps the one before, and `info["refused"]` holds
+        the error. Raises InputError before `reset`, or if the action has another shape or is not finite. Errors of the
+        tracker are raised.
         """
         if self._observer is None:
             raise InputError(place="step", got="no episode", expected="one that was begun", remedy="call reset() first")
@@ -182,7 +185,7 @@ class TuningEnv(gymnasium.Env[Floats, Floats]):
         )
 
     def _advance(self, upto: int | None) -> bool:
-        """Tracks to frame `upto` or to the last one; True if the sequence has ended."""
+        """Tracks to frame number `upto`, None: to the last frame. Returns True if the sequence has ended."""
         assert self.rollout is not None
         for frame, tracks in self.rollout.advance(upto):
             if self.observation != "none":
@@ -192,7 +195,10 @@ class TuningEnv(gymnasium.Env[Floats, Floats]):
         return done == self.rollout.length or upto is None or done < upto
 
     def _advance_with(self, config: Config) -> bool:
-        """Tracks `decision_every` frames with this config, or with the one before if the tracker refuses it."""
+        """Tracks `decision_every` frames with this config, or with the last one if the tracker refuses it.
+
+        True if the sequence has ended. Errors of the tracker are raised if it fails with both.
+        """
         assert self.rollout is not None
         assert self.decision_every is not None
         upto = len(self.rollout.tracks) + self.decision_every
@@ -209,7 +215,7 @@ class TuningEnv(gymnasium.Env[Floats, Floats]):
             return self._advance(upto)
 
     def render(self) -> Image | None:
-        """Returns the last frame with detections and tracks drawn on it, (H, W, 3) RGB; None without a render_mode."""
+        """Returns the last frame with detections and tracks, uint8 (H, W, 3) RGB; None without a render_mode."""
         if self.render_mode is None:
             return None
         from tracking.environment.picture import episode_picture
@@ -218,7 +224,7 @@ class TuningEnv(gymnasium.Env[Floats, Floats]):
         return episode_picture(opened, self.rollout, self.score)
 
     def close(self) -> None:
-        """Ends the episode and empties the cache."""
+        """Ends the episode and empties the cache of sources. `reset` may follow."""
         self._clear_episode()
         self.cache = SourceCache(self.cache.limit)
 
@@ -255,10 +261,10 @@ class TuningEnv(gymnasium.Env[Floats, Floats]):
 
 
 def _detection_mode(tracker: type[Tracker], among: Iterable[Source], wanted: DetectionMode | None) -> DetectionMode:
-    """The detections of all episodes; the same for all, so that all have the same parameters.
+    """Returns the input of the tracker, "image", "file" or "truth", the same in all episodes: `wanted` if given.
 
-    If none are wanted, the first recording decides; without recordings "image" or "file", by what the tracker takes.
-    InputError if a recording does not have these detections.
+    Else the first recording decides; without recordings "image" or "file", by what the tracker takes. InputError if a
+    recording does not have it.
     """
     among = tuple(among)
     for source in among:
@@ -271,7 +277,10 @@ def _detection_mode(tracker: type[Tracker], among: Iterable[Source], wanted: Det
 
 
 def _action_parameters(kind: type[Config], mode: DetectionMode, every: int | None) -> Space:
-    """The parameters that an action sets; InputError if there are none, or `every` is no number of frames."""
+    """The parameters that an action sets. every: frames between actions, None: one action per episode.
+
+    InputError if there are none, or if `every` is no whole number above 0.
+    """
     if every is not None and (not isinstance(every, int | np.integer) or isinstance(every, bool) or every < 1):
         got, expected = repr(every), "a number of frames, 1 or more, or None"
         raise InputError(place="decision_every", got=got, expected=expected, remedy="correct it")
@@ -284,7 +293,7 @@ def _action_parameters(kind: type[Config], mode: DetectionMode, every: int | Non
 
 
 def _check_choice(place: str, got: object, known: Iterable[object]) -> None:
-    """InputError if the value is not among the known ones."""
+    """Raises InputError, with `place` as the option's name, if `got` is not among the known values."""
     known = tuple(known)
     if got not in known:
         remedy = f"did you mean {closest(str(got), map(str, known))}?" if known else "remove it"

@@ -26,9 +26,10 @@ TIMES_COUNTED = 2
 
 
 class OpenedSource:
-    """A source whose sequence is open. State: the sequence; once used, its detections, truth and background.
+    """A source whose sequence is open. Its detections, truth and background are kept once used.
 
-    streams: the pictures that are drawn if the source is simulated ("left", "right", "background").
+    source: what is opened. streams: the pictures that are drawn if the source is simulated ("left", "right",
+    "background"); () draws none. Raises InputError if the source cannot be opened.
     """
 
     def __init__(self, source: Source, streams: tuple[str, ...] = ()) -> None:
@@ -47,7 +48,7 @@ class OpenedSource:
 
     @cached_property
     def truth(self) -> Truth:
-        """The truth of the sequence. Raises InputError if the sequence has no labels."""
+        """The truth (labels) of the sequence. Raises InputError if the sequence has no labels."""
         truth = self._opened.truth
         if truth is None:
             remedy = "give a sequence with labels: there is nothing to score by"
@@ -56,14 +57,17 @@ class OpenedSource:
 
     @cached_property
     def judge(self) -> ObjectiveScorer:
-        """Scores tracks against the truth of the sequence; built on first use."""
+        """An `ObjectiveScorer` for the sequence's truth, built on first use. InputError without labels."""
         from tracking.objective import ObjectiveScorer
 
         return ObjectiveScorer(self.truth)
 
 
 def _computed_once(compute: Callable[[], T]) -> Callable[[], T]:
-    """A function that calls `compute` once and keeps its result where `array_bytes` finds it."""
+    """Returns a function that calls `compute` at its first call and returns that same result at every call.
+
+    The result is kept where `array_bytes` finds it. If `compute` raises an error, the next call tries again.
+    """
     kept: list[T] = []
 
     def first_result() -> T:
@@ -75,11 +79,11 @@ def _computed_once(compute: Callable[[], T]) -> Callable[[], T]:
 
 
 class SourceCache:
-    """Opened sources; the least recently used one is dropped first. State: the opened sources and their bytes.
+    """Opened sources for reuse; the least recently used one is dropped first.
 
     limit: bytes of arrays that all opened sources may hold together; the source in use is kept whatever its size. The
     bytes of a source are counted when the next source is opened, and again after its second use. Raises InputError if
-    `limit` is negative.
+    `limit` is negative. State: the opened sources and their bytes.
     """
 
     def __init__(self, limit: int = DEFAULT_LIMIT) -> None:
@@ -95,13 +99,17 @@ class SourceCache:
 
     @property
     def bytes(self) -> int:
-        """Bytes of the arrays that the opened sources hold now."""
+        """Bytes of the arrays that the opened sources hold, counted anew for the last used one; 0 without sources."""
         self._counted.clear()
         self._count_last()
         return sum(self._bytes.values())
 
     def open(self, source: Source, streams: tuple[str, ...] = ()) -> OpenedSource:
-        """Returns the source, opened now or earlier with the same `streams`."""
+        """Returns the opened source; it is opened now, or was opened earlier with the same `streams` and is still kept.
+
+        streams: the pictures that are drawn if the source is simulated ("left", "right", "background"). Other sources
+        are dropped if they exceed the limit. Raises InputError if the source cannot be opened.
+        """
         key = (*source.key, streams)
         if self._opened and next(reversed(self._opened)) == key:
             return self._opened[key]
@@ -126,7 +134,11 @@ class SourceCache:
 
 
 def array_bytes(root: object) -> int:
-    """Returns the bytes of all arrays that can be reached from an object; each array counts once."""
+    """Returns the bytes of all numpy arrays that can be reached from an object; each array counts once, a view as its
+    base.
+
+    Containers, functions, methods and objects of the packages sim and tracking are searched; other objects are not.
+    """
     arrays: dict[int, int] = {}
     seen: set[int] = set()
     waiting: list[Any] = [root]
@@ -145,7 +157,7 @@ def array_bytes(root: object) -> int:
 
 
 def _parts(one: Any) -> list[Any]:
-    """The objects inside a container, an object of ours, or the closure of a function."""
+    """Returns the objects in a container, an object of sim or tracking, or a function's closure; else []."""
     if isinstance(one, tuple | list):
         return list(one)
     if isinstance(one, dict):

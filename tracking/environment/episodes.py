@@ -21,11 +21,14 @@ AnyTracker = str | type[Tracker]
 
 @dataclass(frozen=True)
 class Episode:
-    """The result of an episode.
+    """The result of an episode: one tracker on one sequence.
 
-    name, seed: of the source; objective: nan if there is nothing to score; scores: by key of the catalogue, without
-    those that are nan; frames: number played; seconds_tracking: time in the tracker; seconds_scoring: time for groups
-    and scores.
+    - name, seed: of the source.
+    - objective: mean of HOTA and group_F1_hull; nan if there is nothing to score.
+    - scores: by key of the catalogue, without those that are nan.
+    - frames: number of frames played.
+    - seconds_tracking: time in the tracker, s.
+    - seconds_scoring: time for groups and scores, s.
     """
 
     name: str
@@ -48,12 +51,17 @@ def play(
     upto: int | None = None,
     every_score: bool = False,
 ) -> Episode:
-    """Plays one episode, from the first frame to the last or to frame `upto`, and returns its result.
+    """Plays one episode, from the first frame to the last or to frame number `upto`, and returns its result.
 
-    tracker, config, detections: as for `tracking.track`. A simulated source is drawn as pictures only if `detections`
-    is "image" or the tracker takes neither boxes nor points. The objective equals that of
-    `tracking.evaluate(sequence.truth, tracking.track(…))` up to that frame. every_score: compute the whole catalogue.
-    Raises the errors of `tracking.track`, and InputError if the source has no labels.
+    tracker: name, file.py:Class, module:Class or class. config: its parameters, None for the defaults. detections: its
+    input, None chooses one that works. tracker_seed: seed of the tracker's random numbers. cache: keeps the opened
+    source, None keeps nothing. upto: from 1, None plays all. every_score: compute the whole catalogue, else the
+    objective and its two parts. A simulated source is drawn as pictures only if `detections` is "image" or the tracker
+    takes neither boxes nor points. The objective equals that of `tracking.evaluate(sequence.truth, tracking.track(…))`
+    up to that frame.
+
+    Raises InputError if an argument is wrong, tracker and source do not fit, or the source has no labels, and WorkError
+    if the tracker fails.
     """
     rollout = Rollout(tracker, source, config, detections=detections, tracker_seed=tracker_seed, cache=cache)
     for _ in rollout.advance(upto):
@@ -64,7 +72,9 @@ def play(
 class Rollout:
     """An episode that is played frame by frame; the arguments are those of `play`.
 
-    State: the prepared tracker, the tracks of the frames so far, the last frame, the seconds spent.
+    State: the prepared tracker; tracks, those of the frames so far; last, the last frame; seconds spent on tracking and
+    scoring. Raises InputError if an argument is wrong, tracker and source do not fit, or the source has no labels, and
+    WorkError if the tracker's `reset` fails.
     """
 
     def __init__(
@@ -93,7 +103,7 @@ class Rollout:
 
     @property
     def sequence(self) -> Sequence:
-        """The sequence that is played."""
+        """The opened sequence that is played."""
         return self.opened.sequence
 
     @property
@@ -102,9 +112,11 @@ class Rollout:
         return self.truth.length
 
     def advance(self, upto: int | None = None) -> Iterator[tuple[Frame, Tracks]]:
-        """Plays to frame `upto` or to the last one; yields each frame as the tracker got it, and the tracker's tracks.
+        """Plays to frame number `upto` (from 1), or to the last one; yields each frame and the tracker's tracks.
 
-        After an error of the tracker the next call begins with the same frame.
+        The frame is as the tracker got it. A frame is played when the iterator is asked for it, and none if `upto` is
+        reached already. Raises InputError if the tracker refuses a frame and WorkError if it fails. The next call then
+        begins with the same frame.
         """
         last = self.length if upto is None else min(upto, self.length)
         while len(self.tracks) < last:
@@ -119,7 +131,11 @@ class Rollout:
             yield frame, tracks
 
     def episode(self, every_score: bool = False) -> Episode:
-        """Returns the result of the frames so far. every_score: compute the whole catalogue."""
+        """Returns the result of the frames so far; objective is nan if there is nothing to score.
+
+        every_score: compute the whole catalogue, else the objective and its two parts. Raises IncomparableError if the
+        tracks lack the boxes or positions to compare.
+        """
         scores = self.scores(every_score)
         return Episode(
             self.source.name,
@@ -132,9 +148,10 @@ class Rollout:
         )
 
     def scores(self, every: bool = False) -> dict[str, float]:
-        """Returns the scores of the frames so far by key, without those that are nan.
+        """Returns a dict of the scores of the frames so far by key, without those that are nan.
 
-        every: the whole catalogue; else the objective and the scores that it is the mean of.
+        every: the whole catalogue; else objective, HOTA and group_F1_hull. The time is added to `seconds_scoring`.
+        Raises IncomparableError if the tracks lack the boxes or positions to compare.
         """
         start = time.perf_counter()
         px_per_m = self.prepared.px_per_m(self.tracks)
@@ -152,7 +169,9 @@ class Rollout:
 def streams_for(tracker: AnyTracker, detections: DetectionMode | None) -> tuple[str, ...]:
     """Returns the pictures that a simulated sequence needs for this tracker, () if it needs none.
 
-    They are needed if `detections` is "image", or is None and the tracker takes neither boxes nor points.
+    They are needed if `detections` is "image", or is None and the tracker takes neither boxes nor points. They are
+    "left" and "background", and "right" if the tracker takes stereo. Raises InputError if the name of a tracker is
+    unknown.
     """
     from tracking.tracker_registry import find
 

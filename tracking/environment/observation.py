@@ -35,7 +35,11 @@ TWO_PEOPLE = 1.5
 
 @dataclass(frozen=True)
 class Statistic:
-    """One number of the observation. half: the value that 0.5 stands for, in `unit`; None for a share."""
+    """One number of the observation: its name and its meaning in words.
+
+    half: the value that 0.5 stands for, in `unit`; None for a share, which stands for itself. unit: "" for plain
+    numbers.
+    """
 
     name: str
     half: float | None
@@ -83,7 +87,7 @@ NAMES = tuple(s.name for s in STATISTICS)
 
 
 class Observer:
-    """Collects the frames between two decisions. fps: frames per second of the sequence.
+    """Collects frames and tracks between two decisions, for the statistics of the observation. fps: frames per second.
 
     State: frames and tracks since the last decision, the tracks of the frame before them, the first frame of each id,
     the brightness of the pictures.
@@ -98,7 +102,7 @@ class Observer:
         self._brightness: list[float] = []
 
     def add(self, frame: Frame, tracks: Tracks) -> None:
-        """Adds the next frame, as the tracker got it, and the tracks that it reported."""
+        """Adds the next frame, as the tracker got it, and its tracks. Of a picture only the brightness is kept."""
         self._tracks.append(tracks)
         self._frames.append(Frame(frame.index, frame.t, detections=frame.detections))
         for id in tracks.id.tolist():
@@ -107,9 +111,10 @@ class Observer:
             self._brightness.append(float(frame.image[::PIXEL_STEP, ::PIXEL_STEP].mean()) / 255)
 
     def statistics(self, px_per_m: float) -> NDArray[np.float32]:
-        """Returns the statistics (K,) of the frames since the last call, in the order of STATISTICS.
+        """Returns the statistics (K,) float32 in [0, 1] of the frames since the last call, in the order of STATISTICS.
 
-        px_per_m: scale of tracks in the image; nan or 0 if unknown, then lengths and speeds are 0.
+        px_per_m: scale of tracks in the image; nan or 0 if unknown, then lengths and speeds are 0. A statistic that is
+        not known is 0; all are 0 if no frame was added. Frames so far are forgotten, apart from the last tracks.
         """
         values = self._values(px_per_m) if self._tracks else {}
         self._before, self._tracks, self._frames = self._tracks[-1:] or self._before, [], []
@@ -117,7 +122,11 @@ class Observer:
         return np.array([squashed(s, values.get(s.name, 0.0)) for s in STATISTICS], np.float32)
 
     def _values(self, px_per_m: float) -> dict[str, float]:
-        """The known statistics by name, before they are mapped to [0, 1]."""
+        """Returns a dict of the known statistics by name, before they are mapped to [0, 1]. At least one frame must be
+        added.
+
+        px_per_m: scale of tracks in the image; without it (nan or 0) statistics in m or m/s are missing.
+        """
         last = self._tracks[-1]
         seconds = len(self._tracks) / self.fps
         known = last.plane != "image" or px_per_m > 0
@@ -143,7 +152,11 @@ class Observer:
         }
 
     def _movement(self, rows: TrackRows, found: DetectionRows) -> dict[str, float]:
-        """Statistics of speeds and distances, and of tracks against detections if any detections are known."""
+        """Returns a dict of the statistics of speeds and distances, and of tracks against detections if any are known.
+
+        rows: tracks in m, the frame before the window included (with number 0 if there is one); found: detections of
+        the window in m.
+        """
         now = rows.frame >= len(self._before)
         before, after = consecutive_rows(rows)
         expected = rows.pos + rows.vel / self.fps
@@ -164,7 +177,12 @@ class Observer:
 
 
 def _innovations(rows: TrackRows, expected: Array, found: DetectionRows) -> dict[str, float]:
-    """Statistics of the expected positions (R, 2), one frame later, against the detections there."""
+    """Returns a dict: orphans, missed, innovation, innovation_sigma, residual; of expected positions against
+    detections.
+
+    expected (R, 2), m: where each row of `rows` (tracks in frames) is expected one frame later. found: the detections,
+    m. Only rows whose next frame has known detections count. A statistic without values is 0.
+    """
     looked = np.isin(rows.frame + 1, found.frames)
     here = np.flatnonzero(looked)
     owner = nearest_expected(expected[here], rows.frame[here] + 1, rows.reach[here], found)
@@ -189,7 +207,7 @@ def _innovations(rows: TrackRows, expected: Array, found: DetectionRows) -> dict
 
 
 def _group_values(tracks: Sequence[Tracks], seconds: float) -> dict[str, float]:
-    """Statistics of the groups and events that the tracker itself reports."""
+    """Returns a dict: merges, splits (1/min), grouped (share), group_size (people) as the tracker reports, 0 without."""
     kinds = [e.kind for t in tracks for e in t.events]
     merges, splits = (sum(kind in pair for kind in kinds) for pair in (("merge", "form"), ("split", "dissolve")))
     values = {"merges": 60 * merges / seconds, "splits": 60 * splits / seconds}
@@ -204,7 +222,10 @@ def _group_values(tracks: Sequence[Tracks], seconds: float) -> dict[str, float]:
 
 
 def _detection_values(found: DetectionRows, rows: TrackRows, frames: int) -> dict[str, float]:
-    """Statistics of the number and scores of the detections in a window of `frames` frames; {} if none are known."""
+    """Returns a dict: seen, detections, flicker, score, weak, surplus; {} if no frame has known detections.
+
+    found: detections of a window of `frames` frames; rows: the tracks.
+    """
     count = np.bincount(found.frame - found.first, minlength=frames)[[f - found.first for f in found.frames]]
     if not len(count):
         return {}
@@ -219,7 +240,10 @@ def _detection_values(found: DetectionRows, rows: TrackRows, frames: int) -> dic
 
 
 def _picture_values(brightness: Sequence[float]) -> dict[str, float]:
-    """Statistics of the brightness of consecutive pictures, each in [0, 1]; {} without pictures."""
+    """Returns a dict: brightness of the last picture, and lights, the mean relative change from picture to picture.
+
+    brightness: of consecutive pictures, each in [0, 1]. {} without pictures; lights is 0 with one picture.
+    """
     if not brightness:
         return {}
     level = np.array(brightness)
@@ -228,7 +252,10 @@ def _picture_values(brightness: Sequence[float]) -> dict[str, float]:
 
 
 def _squared_sigmas(shift: Array, cov: Array) -> Array:
-    """d' C^-1 d / 2 of shifts (N, 2) and covariances (N, 2, 2); rows with a singular covariance are left out."""
+    """Returns d' C^-1 d / 2 of shifts d (N, 2) in m with covariances C (N, 2, 2) in m².
+
+    Rows without a positive determinant are left out, so the result may be shorter than N.
+    """
     det = cov[:, 0, 0] * cov[:, 1, 1] - cov[:, 0, 1] * cov[:, 1, 0]
     good = det > 0
     (x, y), c = shift[good].T, cov[good]
@@ -249,7 +276,8 @@ def share(which: Bools) -> float:
 def squashed(statistic: Statistic, value: float) -> float:
     """Returns the value of a statistic mapped to [0, 1]: a share is clipped, another value x becomes x / (x + half).
 
-    Negative values and nan become 0, infinity becomes 1; a share that is nan or infinite becomes 0.
+    half: the statistic's value that 0.5 stands for. Negative values and nan become 0, infinity becomes 1; a share that
+    is nan or infinite becomes 0.
     """
     if not np.isfinite(value):
         return 0.0 if statistic.half is None else float(value > 0)
@@ -259,7 +287,7 @@ def squashed(statistic: Statistic, value: float) -> float:
 
 
 def table() -> str:
-    """Returns the statistics as a Markdown table for docs/reference/environment.md."""
+    """Returns the statistics as a Markdown table (number from 0, name, value of 0.5, meaning) for docs/tuning.md."""
     lines = [
         f"| {k} | `{s.name}` | {'share' if s.half is None else f'{s.half:g} {s.unit}'.strip()} | {s.meaning} |"
         for k, s in enumerate(STATISTICS)

@@ -22,10 +22,13 @@ EXTENT_SIGMAS = 2.0
 
 @dataclass(frozen=True, eq=False)
 class TrackRows:
-    """R reported track states, frame by frame.
+    """R reported tracks in frames, frame by frame.
 
-    frame: (R,) counted from 0; id: (R,); pos: (R, 2) m; vel: (R, 2) m/s, 0 if unknown; cov: (R, 2, 2) covariance of the
-    position, m²; reach: (R,) distance within which detections belong to the track, m.
+    - frame (R,): counted from 0 at the first frame given.
+    - id (R,): of the track.
+    - pos (R, 2): x, y in m; vel (R, 2): in m/s, 0 if unknown.
+    - cov (R, 2, 2): covariance of the position, m².
+    - reach (R,): distance within which detections belong to the track, m.
     """
 
     frame: Ints
@@ -43,8 +46,11 @@ class TrackRows:
 class DetectionRows:
     """D detections, frame by frame.
 
-    frame: (D,) counted like the frames of the TrackRows; pos: (D, 2) m; score: (D,); frames: the frames whose
-    detections are known, frames without a detection included; first: the first frame of the window.
+    - frame (D,): counted like the frames of the TrackRows, from 0.
+    - pos (D, 2): x, y in m.
+    - score (D,): 1 if unknown.
+    - frames: numbers of the frames whose detections are known, frames without a detection included.
+    - first: number of the first frame of the window.
     """
 
     frame: Ints
@@ -57,7 +63,7 @@ class DetectionRows:
         return len(self.frame)
 
     def neighbours(self, reach: float) -> float:
-        """Returns the mean number of other detections of the same frame within `reach` m of a detection, 0 if none."""
+        """Returns the mean number of other detections of a frame within `reach` (m) of a detection, 0 if empty."""
         if not len(self):
             return 0.0
         tree = _tree(self.pos, self.frame)
@@ -65,7 +71,11 @@ class DetectionRows:
 
 
 def track_rows(tracks: Sequence[Tracks], scale: float) -> TrackRows:
-    """Returns the tracks of consecutive frames as rows. scale: units of their plane per metre."""
+    """Returns the tracks of consecutive frames as rows in m; frame k of the list gets number k, from 0.
+
+    tracks: one `Tracks` per frame. scale: units of their plane per metre (px per m in the image, else 1), not 0.
+    Unknown velocities become 0.
+    """
     frame = np.repeat(np.arange(len(tracks)), [len(t.id) for t in tracks])
     id = np.concatenate([np.zeros(0, np.int64), *(t.id for t in tracks)])
     pos, vel = (
@@ -77,7 +87,11 @@ def track_rows(tracks: Sequence[Tracks], scale: float) -> TrackRows:
 
 
 def _reach(t: Tracks) -> Array:
-    """(N,) m, REACH for a person, more for a group by EXTENT_SIGMAS times the root mean square of its extent."""
+    """Returns the distance (N,) in m within which detections belong to each of the N tracks of a frame.
+
+    It is 1 m for a person. For a group (unit "group") 2 standard deviations of its extent are added, root mean square
+    over x and y, 0 if unknown.
+    """
     reach = np.full(len(t.id), REACH)
     if t.unit != "group" or t.groups is None or not len(t.groups.id):
         return reach
@@ -87,10 +101,11 @@ def _reach(t: Tracks) -> Array:
 
 
 def detection_rows(detections: Sequence[Detections | None], plane: str, scale: float, first: int) -> DetectionRows:
-    """Returns the detections of frames first, first + 1, … as rows.
+    """Returns the detections of consecutive frames as rows in m; entry k of the list gets frame number first + k.
 
-    Frames without detections (None), or with detections in another plane than `plane`, are left out. A detection
-    without score has score 1. scale: units of the plane per metre.
+    Frames without detections (None), or with detections in another plane than `plane`, are left out; frames with 0
+    detections are kept. A detection without score has score 1. scale: units of the plane per metre (px per m in the
+    image, else 1).
     """
     known = [(first + k, d) for k, d in enumerate(detections) if d is not None and (d.plane == plane or not len(d.pos))]
     frame = np.repeat([f for f, _ in known], [len(d.pos) for _, d in known]).astype(np.int64)
@@ -100,7 +115,10 @@ def detection_rows(detections: Sequence[Detections | None], plane: str, scale: f
 
 
 def consecutive_rows(rows: TrackRows) -> tuple[Ints, Ints]:
-    """Returns the pairs of rows of the same track in consecutive frames: earlier rows (K,), later rows (K,)."""
+    """Returns the indices of pairs of rows of one track in consecutive frames: earlier rows (K,), later rows (K,).
+
+    Pairs are sorted by id, then frame. Both are empty without pairs.
+    """
     order = np.lexsort((rows.frame, rows.id))
     a, b = order[:-1], order[1:]
     same: Bools = (rows.id[a] == rows.id[b]) & (rows.frame[a] + 1 == rows.frame[b])
@@ -108,9 +126,10 @@ def consecutive_rows(rows: TrackRows) -> tuple[Ints, Ints]:
 
 
 def nearest_distances(pos: Array, frame: Ints) -> Array:
-    """Returns the distance from each position (N, 2) to the nearest other one of the same frame, m.
+    """Returns the distance in m from each of N positions to the nearest other one of the same frame.
 
-    Positions that are alone in their frame (N,) are left out, so the result may be shorter than N.
+    pos (N, 2): x, y in m; frame (N,): number of the frame. Positions that are alone in their frame are left out, so the
+    result may be shorter than N. Empty if N is below 2.
     """
     if len(pos) < 2:
         return np.zeros(0)
@@ -119,9 +138,11 @@ def nearest_distances(pos: Array, frame: Ints) -> Array:
 
 
 def nearest_expected(expected: Array, frame: Ints, reach: Array, detections: DetectionRows) -> Ints:
-    """Returns for each detection (D,) the index of the nearest expected position (N, 2) of its frame.
+    """Returns for each of D detections the index of the nearest expected position of its frame, (D,), −1 if there is
+    none near.
 
-    It is -1 if that position is farther away than its `reach` (N,), m, or if there is none. frame: (N,).
+    expected (N, 2): x, y in m; frame (N,): number of their frame; reach (N,): greatest distance in m at which a
+    detection belongs to the position.
     """
     if not len(expected) or not len(detections):
         return np.full(len(detections), -1)
@@ -130,7 +151,7 @@ def nearest_expected(expected: Array, frame: Ints, reach: Array, detections: Det
 
 
 def _with_frame(pos: Array, frame: Ints) -> Array:
-    """(N, 3) positions with a third coordinate that keeps frames apart."""
+    """Returns positions (N, 2) in m with a third column that keeps frames (N,) apart, (N, 3)."""
     return np.column_stack([pos, frame * FRAME_DISTANCE])
 
 

@@ -21,10 +21,11 @@ LETTER = 0.5
 
 
 def episode_picture(opened: OpenedSource, rollout: Rollout | None, score: float) -> Image:
-    """Returns the last tracked frame with its detections and tracks, (H, W, 3) RGB uint8, height and width even.
+    """Returns the last tracked frame with its detections and tracks, uint8 (H, W, 3) RGB, height and width even.
 
-    Before the first frame, and without a rollout, only the scene or an empty picture is drawn. A text line above shows
-    source, seed, number of frames and `score`.
+    opened: the source. rollout: the episode. Before the first frame, and if it is None, only the scene or an empty
+    picture is drawn. A text line above shows source, seed, number of frames and `score`. Raises InputError if the
+    source has no labels.
     """
     frame, tracks = (None, []) if rollout is None else (rollout.last, rollout.tracks)
     canvas = _canvas(opened, frame, tracks)
@@ -44,7 +45,11 @@ def episode_picture(opened: OpenedSource, rollout: Rollout | None, score: float)
 
 
 def _canvas(opened: OpenedSource, frame: Frame | None, tracks: list[Tracks]) -> Canvas:
-    """The frame's image, or a plan of the scene, or an empty image if neither pictures nor ground positions exist."""
+    """Returns a canvas to draw on: the frame's image, a plan of the ground, or an empty image.
+
+    With pictures it is the frame's image, empty if `frame` is None or has none. Without pictures it is a plan if the
+    tracks (before the first frame, the truth) lie on the ground, else an empty image in image coordinates.
+    """
     sequence = opened.sequence
     if sequence.has_images and sequence.image_size is not None:
         shown = None if frame is None else frame.image
@@ -62,12 +67,16 @@ def _canvas(opened: OpenedSource, frame: Frame | None, tracks: list[Tracks]) -> 
 
 
 def _on_ground(opened: OpenedSource, tracks: list[Tracks]) -> bool:
-    """True if the tracks lie on the ground; before the first frame, if the truth does."""
+    """Returns True if the last tracks are not in the image; without tracks, if the truth has positions."""
     return tracks[-1].plane != "image" if tracks else opened.truth.pos is not None
 
 
 def _bounds(opened: OpenedSource) -> tuple[Array, Array]:
-    """The least and greatest coordinates of the scene; without a scene, of all detections, else of all labels."""
+    """Returns the least and the greatest x, y, (2,) each, that the picture must show.
+
+    They are those of the scene, in m; without a scene of all detections, else of all labels, with a margin of 1 unit (m
+    or px). (0, 0) and (1, 1) if there is nothing.
+    """
     scene = opened.sequence.scene
     if scene is not None:
         return np.zeros(2), scene.size
@@ -82,14 +91,17 @@ def _bounds(opened: OpenedSource) -> tuple[Array, Array]:
 
 
 def _draw_detections(canvas: Canvas, detections: Detections, plane: str) -> None:
-    """Draws small grey discs; detections in the image are not drawn on a plan."""
+    """Draws a small grey disc on the canvas for each detection. plane: of the tracks, "ground", "space" or "image".
+
+    Nothing is drawn if one of detections and tracks is in the image and the other is not.
+    """
     if detections.plane == plane or detections.plane != "image" != plane:
         for at in detections.pos[:, :2]:
             canvas.disc(at, 2.5, THING)
 
 
 def _layer(opened: OpenedSource, tracks: list[Tracks], canvas: Canvas) -> Layer:
-    """The marks of the last seconds of tracks, in the coordinates of the canvas."""
+    """Returns the marks of the last `TRAIL_SECONDS` of tracks, in the coordinates of the canvas (plan or image)."""
     recent = tracks[-round(TRAIL_SECONDS * opened.sequence.fps) - 1 :]
     if canvas.upwards:
         return plan_layer_of_tracks(recent)

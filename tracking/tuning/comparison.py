@@ -57,7 +57,9 @@ class Comparison:
 
     @property
     def verdict(self) -> str:
-        """ "better" or "worse" if the interval of the difference excludes 0, else (or with nan) "no sure difference"."""
+        """Returns "better" or "worse" if the interval of the difference excludes 0, else (or with nan) "no sure
+        difference".
+        """
         if not (self.low > 0 or self.high < 0):
             return "no sure difference"
         return "better" if (self.difference > 0) == self.higher else "worse"
