@@ -108,7 +108,7 @@ class Rollout:
 
     @property
     def length(self) -> int:
-        """Number of frames of the whole episode."""
+        """Number of frames of the whole sequence, played or not."""
         return self.truth.length
 
     def advance(self, upto: int | None = None) -> Iterator[tuple[Frame, Tracks]]:

@@ -207,7 +207,7 @@ def _innovations(rows: TrackRows, expected: Array, found: DetectionRows) -> dict
 
 
 def _group_values(tracks: Sequence[Tracks], seconds: float) -> dict[str, float]:
-    """Returns a dict: merges, splits (1/min), grouped (share), group_size (people) as the tracker reports, 0 without."""
+    """Returns a dict: merges, splits (1/min), grouped (share), group_size (people), as the tracker reports them."""
     kinds = [e.kind for t in tracks for e in t.events]
     merges, splits = (sum(kind in pair for kind in kinds) for pair in (("merge", "form"), ("split", "dissolve")))
     values = {"merges": 60 * merges / seconds, "splits": 60 * splits / seconds}
@@ -264,12 +264,12 @@ def _squared_sigmas(shift: Array, cov: Array) -> Array:
 
 
 def median(values: Array | Ints) -> float:
-    """Returns the median, 0 if there are no values."""
+    """Returns the median of the values (N,), 0 if there are none; nan if one is nan."""
     return float(np.median(values)) if len(values) else 0.0
 
 
 def share(which: Bools) -> float:
-    """Returns the share of true values, 0 if there are no values."""
+    """Returns the share of true values (N,), between 0 and 1; 0 if there are none."""
     return float(which.mean()) if len(which) else 0.0
 
 

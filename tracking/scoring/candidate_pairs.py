@@ -43,7 +43,7 @@ class Pairs:
 
     @property
     def frame(self) -> Ints:
-        """Frame number of each pair, (K,)."""
+        """Frame number of each of the K pairs, (K,)."""
         return self.true.frame[self.i]
 
     def keep(self, mask: Bools) -> Pairs:

@@ -115,8 +115,7 @@ class Scorer:
         """Returns the true groups of two or more people in all labelled frames; members are row indices of `people`.
 
         surface: "ground" (m) or "image" (px). If the truth has groups on the other surface only, their shapes do not
-        count: `comparable` is False. At least one frame must be labelled, else an assertion fails or the groups are
-        empty.
+        count: `comparable` is False. At least one frame must be labelled, else an error may be raised.
         """
         if surface not in self._groups:
             self._groups[surface] = true_groups(self.truth, self.labelled, self.people.rows, surface)

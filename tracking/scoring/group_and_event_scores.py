@@ -63,7 +63,7 @@ class ComparedSides:
 
     @property
     def groups_only(self) -> bool:
-        """True if the tracker follows groups as wholes (unit "group") in some frame."""
+        """True if the tracker follows groups as wholes (`Tracks.unit` is "group") in some scored frame."""
         return any(t.unit == "group" for t in self.tracks)
 
 

@@ -218,7 +218,7 @@ def group_scores(compared: GroupComparison, frames: Bools) -> dict[str, float]:
 
 
 def ratio(part: float, whole: int) -> float:
-    """Returns part / whole, nan if whole is 0."""
+    """Returns part / whole, nan if whole is 0. It may exceed 1 or be negative."""
     return part / whole if whole else float("nan")
 
 

@@ -89,7 +89,7 @@ class GroupRows:
 
     @property
     def count(self) -> Ints:
-        """Number of memberships of each group, (G,)."""
+        """Number of members of each of the G groups, (G,) int64; 0 for a group without members."""
         return np.bincount(self.of, minlength=len(self)).astype(np.int64)
 
     def keep(self, mask: Bools) -> GroupRows:

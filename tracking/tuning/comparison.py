@@ -93,8 +93,8 @@ class Candidate:
 def compare_episodes(scenes: str, goal: Goal, before: Sequence[Episode], after: Sequence[Episode]) -> Comparison | None:
     """Returns the comparison of a goal between `before` and `after`, paired by sequence.
 
-    scenes: name for the result. before, after: episodes of the same sequences in the same order, else ValueError is
-    raised. Sequences where either side lacks the score are left out; None if that leaves no sequence.
+    scenes: name for the result. before, after: episodes of the same sequences in the same order (not checked).
+    Sequences where either side lacks the score are left out; None if that leaves no sequence.
     """
     a, b = (np.array([goal.of(e) for e in episodes]) for episodes in (before, after))
     known = np.isfinite(a) & np.isfinite(b)

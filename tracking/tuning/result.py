@@ -79,7 +79,7 @@ class TuningResult:
 
     @property
     def impossible(self) -> int:
-        """Number of trials whose parameters the tracker refused or failed with."""
+        """Number of trials with impossible parameters: the tracker refused them or failed with them."""
         return sum(bool(trial.error) for trial in self.trials)
 
     def __str__(self) -> str:

@@ -64,7 +64,7 @@ def chosen_seeds(seeds: range | None, split: str, scenes: int) -> range:
 
 
 def count_scenes(names: Sequence[str], settings: Sequence[str], option: str) -> int:
-    """Returns the number of scenes that the suites, scenarios and files contain.
+    """Returns the number of scenes that the suites, scenarios and files `names` contain, each counted with one seed.
 
     settings: "key=value" overrides of every scene. option: the option that the error messages name. Raises InputError
     if a name is a recording or stored data, is unknown, or contains no scene, and if a setting does not fit.

@@ -71,7 +71,7 @@ class SearchPlan:
 
     @property
     def tracker_name(self) -> str:
-        """The name of the tracker, without the folder of its file."""
+        """The name of the tracker; of a tracker given by file, file.py:Class without the folder."""
         return self.tracker.name.rpartition("/")[2]
 
     @property

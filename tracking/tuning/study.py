@@ -96,7 +96,10 @@ class SearchStudy:
         return place_in_search(trials, trials[trial.number])
 
     def records(self) -> list[TrialRecord]:
-        """Returns the finished trials in the order of the search; a repeated trial has the place of its first try."""
+        """Returns the finished trials in the order of the search, numbered by their place in it, 0 for the defaults.
+
+        A repeated trial has the place of its first try. Pruned and impossible trials are included.
+        """
         trials = self.trials()
         return sorted((self._record(t, place_in_search(trials, t)) for t in self.finished()), key=lambda r: r.number)
 
