@@ -5,8 +5,7 @@ A file with `extends = "base.toml"` (relative to itself, else in the catalogue) 
 - a table is merged key by key with the table of the same key; an empty table changes nothing;
 - a distribution and a `when` replace the value of the base as a whole, though they are tables, too;
 - two lists of tables that all have an `id` (group, event, parts) are merged by id: rows with a known id are merged,
-other
-  rows are appended;
+  rows with a new id are appended;
 - any other value replaces the value of the base;
 - `name` is not inherited: without one, a scenario has the name of its own file.
 
