@@ -159,7 +159,7 @@ class TuningEnv(gymnasium.Env[Floats, Floats]):
         """Sets the parameters and tracks on, to the end or for `decision_every` frames.
 
         Returns observation, reward (gain of the objective), True at the end of the sequence, False (never truncated),
-        info dict. action: (P,) numbers, clipped to [−1, 1]. Refused parameters are moved towards those that the episode
+        info dict. action: (P,) numbers, clipped to [-1, 1]. Refused parameters are moved towards those that the episode
         began with. If the tracker refuses a config between frames it keeps the one before, and `info["refused"]` holds
         the error. Raises InputError before `reset`, or if the action has another shape or is not finite. Errors of the
         tracker are raised.

@@ -138,7 +138,7 @@ def nearest_distances(pos: Array, frame: Ints) -> Array:
 
 
 def nearest_expected(expected: Array, frame: Ints, reach: Array, detections: DetectionRows) -> Ints:
-    """Returns for each of D detections the index of the nearest expected position of its frame, (D,), −1 if there is
+    """Returns for each of D detections the index of the nearest expected position of its frame, (D,), -1 if there is
     none near.
 
     expected (N, 2): x, y in m; frame (N,): number of their frame; reach (N,): greatest distance in m at which a

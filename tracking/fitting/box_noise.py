@@ -27,7 +27,7 @@ FEW = 20  # with fewer half hidden rows, boxes are taken as amodal and errors as
 
 @dataclass(frozen=True)
 class ErrorSpread:
-    """A model of the four errors of a detected box: mean + sd (1 + occluded (1 − visibility)) n, n random with variance
+    """A model of the four errors of a detected box: mean + sd (1 + occluded (1 - visibility)) n, n random with variance
     1.
 
     - mean (4,), sd (4,): of the errors middle, foot, top (box heights) and logarithm of the width, for a visible
@@ -147,7 +147,7 @@ def _fit_spread(recordings: Sequence[MatchedRecording], kind: str) -> ErrorSprea
 
 
 def _spread_of_growth(e: Array, hidden: Array, k: float) -> ErrorSpread:
-    """Returns the `ErrorSpread` of errors e (H, 4), H above 0, if `occluded` is k; hidden (H,): 1 − visibility.
+    """Returns the `ErrorSpread` of errors e (H, 4), H above 0, if `occluded` is k; hidden (H,): 1 - visibility.
 
     Columns of e: middle, foot, top, logarithm of width. mean and sd are weighted moments. The likelihood is that of a
     Laplace distribution, which large errors influence little.

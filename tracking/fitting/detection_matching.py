@@ -39,8 +39,8 @@ class MatchedRecording:
     - box (M, 4): left, top, width, height of each detection in px.
     - score (M,): of each detection.
     - pos (M, 2): the detections' positions on the ground in m, None if they have none.
-    - match (R,): index of the detection of each labelled row, −1 missed.
-    - owner (M,): labelled row of each detection, −1 false alarm.
+    - match (R,): index of the detection of each labelled row, -1 missed.
+    - owner (M,): labelled row of each detection, -1 false alarm.
     """
 
     truth: Truth

@@ -72,7 +72,7 @@ def correlations(truth: Truth, z: Array, keep: Bools) -> Correlations:
 
 
 def miss_correlations(truth: Truth, missed: Bools, p_miss: Array) -> Correlations:
-    """Returns the tetrachoric correlations of one person's misses over time, in [−0.5, 0.995].
+    """Returns the tetrachoric correlations of one person's misses over time, in [-0.5, 0.995].
 
     A miss is taken as a standard normal number below a threshold; rho is the correlation of two such numbers that
     explains how often both are missed. missed (R,): bool, p_miss (R,): probability of a miss, clipped to [0.001,
@@ -97,7 +97,7 @@ def _table(rows: list[tuple[float, float, int]]) -> Correlations:
 def bivariate_normal_cdf(a: Array, b: Array, rho: float) -> Array:
     """Returns P(x < a, y < b), (P,), for standard normals x, y with correlation rho, |rho| < 1; a, b (P,): thresholds.
 
-    It is Φ(a) Φ(b) + 1 / 2π ∫ exp(−(a² + b² − 2 a b sin θ) / (2 cos² θ)) dθ from 0 to asin(rho), by 16 Gauss-Legendre
+    It is Φ(a) Φ(b) + 1 / 2π ∫ exp(-(a² + b² - 2 a b sin θ) / (2 cos² θ)) dθ from 0 to asin(rho), by 16 Gauss-Legendre
     nodes.
     """
     from scipy.special import ndtr
@@ -112,7 +112,7 @@ def _tetrachoric(a: Array, b: Array, both: float) -> float:
     """Returns the correlation rho with which the expected number of pairs below both thresholds equals `both`.
 
     a, b (P,): thresholds of the P pairs of standard normal numbers. both: observed number of pairs below both. The
-    result is limited to [−0.5, 0.995].
+    result is limited to [-0.5, 0.995].
     """
     from scipy.optimize import brentq
 

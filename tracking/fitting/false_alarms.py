@@ -34,7 +34,7 @@ class AlarmTrack:
 
     - recording: where it occurred.
     - rows (L,): indices of its detections in the recording, in order of time.
-    - person: id of the labelled person it belongs to, −1 none.
+    - person: id of the labelled person it belongs to, -1 none.
     """
 
     recording: MatchedRecording
@@ -103,7 +103,7 @@ def alarm_tracks(m: MatchedRecording) -> list[AlarmTrack]:
 
 
 def _person_of_alarm(m: MatchedRecording, rows: list[int]) -> int:
-    """Returns the id of the labelled person that an alarm belongs to, −1 none.
+    """Returns the id of the labelled person that an alarm belongs to, -1 none.
 
     rows: indices of the alarm's detections, not empty. People must cover half of its box, in the median over its
     detections. Candidates cover at least 0.6 of what the person who covers most does. The candidate with the steadiest
@@ -182,7 +182,7 @@ def _aspect(tracks: Sequence[AlarmTrack]) -> tuple[float, float]:
 def _jitter(tracks: Sequence[AlarmTrack]) -> float:
     """Returns the standard deviation of an alarm box's edge from frame to frame, in box heights.
 
-    It is estimated from second differences x(t−1) − 2 x(t) + x(t+1) of left, top, right and lower edge, which steady
+    It is estimated from second differences x(t-1) - 2 x(t) + x(t+1) of left, top, right and lower edge, which steady
     motion leaves at 0: 1.4826 times their median absolute value, divided by sqrt 6. 0 if no alarm is detected in three
     successive frames.
     """

@@ -45,7 +45,7 @@ def derived_outlines(tracks: Sequence[Tracks], fps: float, px_per_m: float, labe
 
 def _group_of_rows(table: TracksTable, fps: float) -> Ints:
     """Returns a label for each of the R table rows (tracks in frames), (R,): equal for members of one group in a frame,
-    −1 alone.
+    -1 alone.
 
     If any row has a group id of the tracker, these ids are returned, else the components that the baseline rule links.
     fps: frames per second.
@@ -67,7 +67,7 @@ def _grouped_rows(table: TracksTable, group: Ints, labelled: Bools) -> tuple[Int
     """Returns the indices of the table rows (tracks in frames) in groups of two or more, group after group, (M,), and
     the index in this list at which each of the G groups begins, (G,).
 
-    group (R,): label of each table row, −1 alone. labelled: bool by frame number from 1; groups in other frames are
+    group (R,): label of each table row, -1 alone. labelled: bool by frame number from 1; groups in other frames are
     left out. Groups are sorted by frame, then label.
     """
     order = np.lexsort((group, table.frame))

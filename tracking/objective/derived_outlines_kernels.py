@@ -8,7 +8,7 @@ from numba import njit
 
 @njit(cache=True)
 def connected_people(frame, column, length, people, memory, when, a, b, on):  # type: ignore[no-untyped-def]
-    """Returns a label for each of R rows (people in frames) that connected people of a frame share, −1 alone: (R,).
+    """Returns a label for each of R rows (people in frames) that connected people of a frame share, -1 alone: (R,).
 
     Two people are connected by a link that is on, directly or through others. The label is the least column of the
     connected people. The groups are those of tracking.grouping.group_labels.label_people, without its ids.
@@ -48,7 +48,7 @@ def _spread(p, linked, seen, since, label, stack):  # type: ignore[no-untyped-de
     """Sets label[q] = p for person p and all people q connected to p, directly or through others, and seen in frame
     `since` or later. Changes `label` and `stack` in place.
 
-    linked (P, P): bool by column; seen (P,): last frame of each person; label (P,): −1 not yet labelled; stack (P,):
+    linked (P, P): bool by column; seen (P,): last frame of each person; label (P,): -1 not yet labelled; stack (P,):
     work space.
     """
     stack[0], n, label[p] = p, 1, p
@@ -67,7 +67,7 @@ def minkowski_sums(vertex, ends, polygon):  # type: ignore[no-untyped-def]
     """Returns the Minkowski sums of G convex hulls with one convex polygon: vertices (V, 2), and the index at which
     each sum ends (G,).
 
-    Hull g is vertex[ends[g − 1] : ends[g]] (hull 0 begins at 0). Hulls and `polygon` (S, 2) are counter-clockwise from
+    Hull g is vertex[ends[g - 1] : ends[g]] (hull 0 begins at 0). Hulls and `polygon` (S, 2) are counter-clockwise from
     their leftmost vertex, the lowest of several. The edges of both are merged by direction. A sum may repeat vertices.
     An empty hull is not allowed.
     """

@@ -27,7 +27,7 @@ class GroupOutlines:
 
     - rows: frame number and id of each group.
     - pos (G, 2): centres x, y.
-    - vertex (V, 2), ends (G,): polygon g is vertex[ends[g − 1] : ends[g]] (polygon 0 begins at 0), counter-clockwise.
+    - vertex (V, 2), ends (G,): polygon g is vertex[ends[g - 1] : ends[g]] (polygon 0 begins at 0), counter-clockwise.
     - area (G,): signed area.
     - box (G, 4): min x, min y, max x, max y, nan without vertices.
     - regular (G,): True if the polygon has a positive area and is convex up to rounding.
@@ -81,7 +81,7 @@ class GroupOutlines:
 def found_pairs(true: GroupOutlines, est: GroupOutlines) -> Pairs:
     """Returns the pairs of groups of one frame that may have an IoU of 0.5 or more, with their IoU as similarity.
 
-    true, est: outlines in one unit. Pairs below 0.5 − 1e-6 are left out, unless a polygon is not regular (convex with
+    true, est: outlines in one unit. Pairs below 0.5 - 1e-6 are left out, unless a polygon is not regular (convex with
     positive area). An IoU is exact where it decides about 0.5 or competes with another pair of the same group;
     elsewhere it may differ from the exact value by rounding.
     """

@@ -19,7 +19,7 @@ def _turn(a, b, c):  # type: ignore[no-untyped-def]
 def measure(vertex, ends, slack):  # type: ignore[no-untyped-def]
     """Returns three arrays of G polygons: signed area (G,); box (G, 4): min x, min y, max x, max y; regular (G,) bool.
 
-    Polygon g is vertex[ends[g − 1] : ends[g]] (polygon 0 begins at 0); vertex (V, 2), ends (G,). regular: the area is
+    Polygon g is vertex[ends[g - 1] : ends[g]] (polygon 0 begins at 0); vertex (V, 2), ends (G,). regular: the area is
     positive and no turn is to the right by more than `slack` times the squared size (width + height) of the box.
     Without vertices the area is 0, the box nan and regular False.
     """
@@ -77,7 +77,7 @@ def candidates(frame_a, box_a, area_a, frame_b, box_b, area_b, least):  # type: 
 def overlaps(vertex_a, ends_a, area_a, vertex_b, ends_b, area_b, i, j):  # type: ignore[no-untyped-def]
     """Returns the IoU (K,) of the convex polygons i[k] of side a and j[k] of side b, by Sutherland-Hodgman clipping.
 
-    vertex_a (V, 2), ends_a (G,): polygon g of a is vertex_a[ends_a[g − 1] : ends_a[g]], counter-clockwise; side b
+    vertex_a (V, 2), ends_a (G,): polygon g of a is vertex_a[ends_a[g - 1] : ends_a[g]], counter-clockwise; side b
     likewise. area_a (G,), area_b (H,): their areas. i, j (K,). 0 if the polygons share no area.
     """
     out = np.empty(len(i))
@@ -147,7 +147,7 @@ def inside(frame, vertex, ends, box, regular, people, place, reach, slack):  # t
     """Returns how many people of the frame are inside each of G polygons or within `reach` of it, (G,), counted up to
     2.
 
-    −1: unsure, because the polygon is not regular (convex with positive area), or because a person's distance is within
+    -1: unsure, because the polygon is not regular (convex with positive area), or because a person's distance is within
     `slack` of `reach`. A polygon without vertices has 0.
 
     frame (G,), vertex (V, 2), ends (G,), box (G, 4: min x, min y, max x, max y), regular (G,): of the polygons. people

@@ -22,7 +22,7 @@ def resampled_scorer(
 ) -> Callable[[Ints], Array]:
     """Returns a function that scores a recording made of chosen frames.
 
-    The argument of that function is an array of frame indices from 0 (frame number − 1), in any order, repetitions
+    The argument of that function is an array of frame indices from 0 (frame number - 1), in any order, repetitions
     allowed. Its result is an array (K,) of all scores in the order of `CATALOGUE`. Scores of events and core scores are
     nan, because they need the original order. So is every score that `evaluate` cannot compute.
 

@@ -128,7 +128,7 @@ def same_frame(a: Ints, b: Ints) -> Iterator[tuple[Ints, Ints]]:
 
 
 def _portions(first: Ints, count: Ints) -> Iterator[tuple[Ints, Ints]]:
-    """Yields arrays k, first[k] + n for all k and all n in 0 … count[k] − 1, in ascending order.
+    """Yields arrays k, first[k] + n for all k and all n in 0 … count[k] - 1, in ascending order.
 
     first (K,): start of each k's range; count (K,): its length, 0 allowed. A portion has at most 200 000 pairs, or all
     pairs of a single k if that has more.
@@ -192,7 +192,7 @@ def _edges(box: Array) -> tuple[Array, Array, Array, Array]:
 
 
 def point_pairs(true: FrameRows, est: FrameRows, true_pos: Array, est_pos: Array, reach: float) -> Pairs:
-    """Returns the pairs of positions of one frame closer than `reach`, with 1 − distance / reach as similarity.
+    """Returns the pairs of positions of one frame closer than `reach`, with 1 - distance / reach as similarity.
 
     true_pos (R, 2), est_pos (S, 2): x, y of each row of `true` and `est`, in the unit of `reach` (m or px). A position
     with a nan has no pairs. A nan reach gives no pairs.

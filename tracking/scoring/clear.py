@@ -32,7 +32,7 @@ def clear(pairs: Pairs) -> dict[str, float]:
     to another estimated id than in its previous match. Frag counts how often a true id's matches resume after a pause.
     MT, PT, ML count true ids matched in more than 80 %, in 20 to 80 %, in less than 20 % of their frames.
 
-    MOTA = 1 − (FN + FP + IDSW) / true rows, or 0 if either side has no rows. MOTP is the mean similarity of the
+    MOTA = 1 - (FN + FP + IDSW) / true rows, or 0 if either side has no rows. MOTP is the mean similarity of the
     matches, 0 without matches. The counts are 0 where there is nothing to count.
     """
     near = pairs.keep(pairs.s >= FOUND - EPS)

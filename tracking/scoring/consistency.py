@@ -57,7 +57,7 @@ def whiteness(innovations: Array, lags: int = LAGS) -> Array:
     """Returns the autocorrelation r of one track's normalised innovations (T, n), one row per frame: (lags,), r at lags
     1, 2, … `lags` in frames.
 
-    r(l) = sum v(t)' v(t + l) / (sum |v(t)|^2 sum |v(t + l)|^2)^1/2, all sums over the same T − l frames. It is nan at
+    r(l) = sum v(t)' v(t + l) / (sum |v(t)|^2 sum |v(t + l)|^2)^1/2, all sums over the same T - l frames. It is nan at
     lags of T or more, and where a sum of squares is 0 or nan.
     """
     found = np.full(lags, np.nan)
@@ -74,7 +74,7 @@ def whiteness_band(frames: int, dims: int, lag: int = 1, level: float = LEVEL) -
     `level`.
 
     frames: number T of frames, above `lag`; dims: length n of one innovation; lag: in frames; level: 0 to 1, default
-    0.95. r is approximately normal with mean 0 and variance 1 / (n (T − lag)).
+    0.95. r is approximately normal with mean 0 and variance 1 / (n (T - lag)).
     """
     from scipy.stats import norm
 

@@ -83,7 +83,7 @@ def evaluate(
     is nan.
 
     tracks: the tracker's `Tracks`, one per frame, in any order; of two with equal frame the later is used. similarity:
-    compares people by IoU ("boxes") or by max(0, 1 − d / 2 m) ("ground", "image"). None: boxes if both sides have them,
+    compares people by IoU ("boxes") or by max(0, 1 - d / 2 m) ("ground", "image"). None: boxes if both sides have them,
     else the plane of the tracks. group_match: matches groups by IoU of their hulls ("hull") or Jaccard index of their
     members ("members"). frames: a number n scores frames 1 … n, a range only its frames, None all frames. A frame
     without tracks counts as empty. Tracks without groups get groups and events by the baseline rule.
@@ -125,7 +125,7 @@ class Scorer:
         """Returns the truth's and the tracker's data in the frames f where frames[f] is true, before people are mapped.
 
         tracks: one tracker's, of these frames only, sorted by frame. frames (length + 1,): bool by frame number. In the
-        result `frames` keeps only labelled frames, and `mapping` is −1 for every tracked row.
+        result `frames` keeps only labelled frames, and `mapping` is -1 for every tracked row.
         """
         kept = frames[self.people.rows.frame]
         true = self.people if kept.all() else self.people.keep(kept)
@@ -237,7 +237,7 @@ def usual_similarity(truth: Truth, tracks: Iterable[Tracks]) -> Similarity:
 def people_pairs(sides: ComparedSides, similarity: Similarity) -> Pairs:
     """Returns the candidate pairs of true and tracked people of one frame, with a similarity in (0, 1].
 
-    similarity: "boxes" takes the IoU; "ground" and "image" take 1 − distance / 2 m, the image by `truth.px_per_m`.
+    similarity: "boxes" takes the IoU; "ground" and "image" take 1 - distance / 2 m, the image by `truth.px_per_m`.
     Without people on a side there are no pairs. Raises IncomparableError if a side has people but not the boxes or
     positions to be compared. With "boxes" it is also raised if the truth has no boxes at all.
     """

@@ -109,7 +109,7 @@ def match_events(
 def _similarity(true: Sequence[ComparableEvent], est: Sequence[ComparableEvent], fps: float, scale: float) -> Array:
     """Returns the similarity of N true and M estimated events, (N, M); 0 if they cannot be matched.
 
-    It is the Jaccard index of the members (0 below 0.5), or 1 − distance / 3 m if a side names no members (0 beyond 1.5
+    It is the Jaccard index of the members (0 below 0.5), or 1 - distance / 3 m if a side names no members (0 beyond 1.5
     m). Starts more than 1 s apart give 0. Up to 0.001 is added for near starts, to decide between equals. scale: units
     of `pos` per metre.
     """
@@ -150,7 +150,7 @@ def event_scores(matched: Sequence[MatchedEvents], fps: float) -> dict[str, floa
 
     matched: from `match_events`. Keys: "<kind>_F1", "_precision", "_recall", "_TP", "_FP", "_FN" and "_latency" for
     each entry of `matched`; "event_F1", "event_precision", "event_recall" and "event_latency". Event F1, precision and
-    recall are means of the values of merge and split that are not nan. Latency is the mean of (emitted − true start) /
+    recall are means of the values of merge and split that are not nan. Latency is the mean of (emitted - true start) /
     fps over matched events, in s; event_latency pools the matched merges and splits. A share is nan if its denominator
     is 0, a latency if nothing matched.
     """

@@ -56,14 +56,14 @@ def _counts(event: GroupEvent, frames: Bools) -> bool:
 
 
 def _group_by_row(group: Ints) -> list[int]:
-    """Returns group (R,) as a list with −1 appended, so that row index −1 (no row) has group −1 (no group)."""
+    """Returns group (R,) as a list with -1 appended, so that row index -1 (no row) has group -1 (no group)."""
     return [*group.tolist(), -1]
 
 
 def _by_group(members: Sequence[int], group: Callable[[int], int]) -> list[list[int]]:
     """Returns the members (ids) as lists, one per group, in the order of first appearance.
 
-    group(id): the member's group, −1 for none. A member without a group is a list of its own.
+    group(id): the member's group, -1 for none. A member without a group is a list of its own.
     """
     parts: dict[tuple[int, int], list[int]] = {}
     for m in members:
@@ -105,7 +105,7 @@ def tracked_events(
     """Returns a tracker's events with members, of known kinds, that start in a frame f where frames[f] is true.
 
     tracks: of the scored frames. people: the R tracked people in frames. mapping (R,): the row of `true` that each is
-    mapped to, −1 none. true: rows of the true people. frames (length + 1,): bool by frame number. fps: frames per
+    mapped to, -1 none. true: rows of the true people. frames (length + 1,): bool by frame number. fps: frames per
     second.
 
     A member becomes the person it is mapped to at the event's start, or in the nearest frame within 1 s of it. A member

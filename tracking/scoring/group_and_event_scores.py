@@ -39,7 +39,7 @@ class ComparedSides:
     - tracks: those of all scored frames, labelled or not (an event may be reported in an unlabelled one), sorted.
     - frames (length + 1,): bool by frame number: scored, and with labelled groups.
     - true, est: the R true and S tracked people in the scored frames.
-    - mapping (S,): row of `true` that each row of `est` is mapped to, −1 none.
+    - mapping (S,): row of `true` that each row of `est` is mapped to, -1 none.
     - plane: of the tracks' positions: "ground", "space" or "image".
     """
 
@@ -74,7 +74,7 @@ class TrackedGroups:
     - every: all groups; memberships are rows of the true people, members mapped to nobody are left out.
     - counted: the groups that are scored. Members are rows of the tracked people if the tracker names members, else
       rows of the true people inside the hull.
-    - person (K,): for each of the K memberships of `counted`, the row of the true person, −1 none.
+    - person (K,): for each of the K memberships of `counted`, the row of the true person, -1 none.
     """
 
     every: GroupRows
@@ -132,10 +132,10 @@ def tracked_groups(sides: ComparedSides) -> TrackedGroups:
 
 
 def _true_rows(groups: GroupRows, mapping: Ints) -> Ints:
-    """Returns for each of the K memberships of `groups` the row of the true person that the member is mapped to, −1
+    """Returns for each of the K memberships of `groups` the row of the true person that the member is mapped to, -1
     none: (K,).
 
-    groups.member: rows of the tracked people, −1 unknown; mapping (S,): true row of each tracked row, −1 none.
+    groups.member: rows of the tracked people, -1 unknown; mapping (S,): true row of each tracked row, -1 none.
     """
     return np.where(groups.member >= 0, np.append(mapping, -1)[groups.member], -1)
 

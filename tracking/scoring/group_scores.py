@@ -54,7 +54,7 @@ class SharedMembers:
 def shared_members(true: GroupRows, est: GroupRows, person: Ints, people: int) -> SharedMembers:
     """Returns the numbers of common members of all true and estimated groups.
 
-    true.member: rows of true people. person (K,): row of the true person that each membership of `est` is mapped to, −1
+    true.member: rows of true people. person (K,): row of the true person that each membership of `est` is mapped to, -1
     none (never common). people: number of rows of true people. A true person counts for one true group only.
     """
     i = group_of_person(true, people)[person]  # -1 selects the last element, which is -1
@@ -64,10 +64,10 @@ def shared_members(true: GroupRows, est: GroupRows, person: Ints, people: int) -
 
 
 def group_of_person(groups: GroupRows, people: int) -> Ints:
-    """Returns the group (row of `groups`) of each row of people, −1 for a person in no group: (people + 1,).
+    """Returns the group (row of `groups`) of each row of people, -1 for a person in no group: (people + 1,).
 
-    The last element is always −1, so that index −1 means no person. people: number of rows of people that groups.member
-    refers to. Memberships with member −1 are ignored. Of several groups with one person the last is returned.
+    The last element is always -1, so that index -1 means no person. people: number of rows of people that groups.member
+    refers to. Memberships with member -1 are ignored. Of several groups with one person the last is returned.
     """
     group = np.full(people + 1, -1, np.int64)
     known = groups.member >= 0
@@ -103,7 +103,7 @@ def hull_pairs(true: GroupRows, est: GroupRows) -> Pairs:
 def member_pairs(true: GroupRows, est: GroupRows, shared: SharedMembers) -> Pairs:
     """Returns the pairs of true and estimated groups of one frame with common members; similarity: their Jaccard index.
 
-    It is common / (true members + estimated members − common), common from `shared`. An estimated member who is mapped
+    It is common / (true members + estimated members - common), common from `shared`. An estimated member who is mapped
     to no true person counts as wrong.
     """
     n, m = true.count, est.count
@@ -243,7 +243,7 @@ def _correct(compared: GroupComparison, i: Ints, j: Ints) -> tuple[Bools, Bools]
 
 
 def _by_frame(compared: GroupComparison, frames: Bools, i: Ints) -> dict[str, float]:
-    """Returns a dict with 1-FP_frames and 1-FN_frames: 1 − the mean over frames of false (missed) groups / max(true
+    """Returns a dict with 1-FP_frames and 1-FN_frames: 1 - the mean over frames of false (missed) groups / max(true
     groups, 1).
 
     frames: bool by frame number, the frames that count. i: rows of the true groups that are matched in these frames.

@@ -70,8 +70,8 @@ def alignment(pairs: Pairs, frames: Ints) -> Array:
     id, (U,).
 
     pairs: the candidate pairs; links are ordered as in `Pairs.links`. frames (U,): number of rows of the true id plus
-    that of the estimated id. A = C / (frames − C). C is the sum over common frames of s(i, j) / (sum of row i + sum of
-    column j − s(i, j)), where the sums run over all similarities of that frame.
+    that of the estimated id. A = C / (frames - C). C is the sum over common frames of s(i, j) / (sum of row i + sum of
+    column j - s(i, j)), where the sums run over all similarities of that frame.
     """
     i, j, s = pairs.i, pairs.j, pairs.s
     of_i = np.bincount(i, weights=s, minlength=len(pairs.true))

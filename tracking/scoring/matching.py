@@ -53,9 +53,9 @@ def match_as_table(pairs: Pairs, weight: Array) -> Bools:
 
 
 def solve_frame(pairs: Pairs, start: int, end: int, weight: Array) -> Bools:
-    """Returns which of the pairs start … end − 1 scipy's linear_sum_assignment matches, (end − start,) bool.
+    """Returns which of the pairs start … end - 1 scipy's linear_sum_assignment matches, (end - start,) bool.
 
-    These must be all pairs of one frame, at least one. weight (end − start,): their weights; the greatest sum is
+    These must be all pairs of one frame, at least one. weight (end - start,): their weights; the greatest sum is
     sought. The table has all rows of the frame on both sides, and cells without a pair weigh 0.
     """
     from scipy.optimize import linear_sum_assignment
@@ -138,7 +138,7 @@ def _touched(i: Ints, j: Ints, chosen: Bools) -> Bools:
 
 
 def _solved(frame: Ints, i: Ints, j: Ints, w: Array) -> Ints:
-    """Returns the indices (in 0 … K − 1) of the pairs that scipy matches, with the greatest sum of weights w in each
+    """Returns the indices (in 0 … K - 1) of the pairs that scipy matches, with the greatest sum of weights w in each
     frame.
 
     frame (K,): sorted; i, j (K,): row indices of both sides; w (K,): weights above 0. Each frame is one table of the
@@ -171,7 +171,7 @@ def _local(row: Ints, which: Ints, frames: int) -> tuple[Ints, Ints]:
     frame (F,).
 
     row (K,): row index of each pair, each row in one frame only, lower rows in earlier frames. which (K,): number 0 …
-    frames − 1 of the pair's frame; frames: F.
+    frames - 1 of the pair's frame; frames: F.
     """
     home = np.full(int(row.max()) + 1, -1)
     home[row] = which
@@ -182,7 +182,7 @@ def _local(row: Ints, which: Ints, frames: int) -> tuple[Ints, Ints]:
 
 
 def mapped_people(pairs: Pairs, least: float = FOUND) -> Ints:
-    """Returns for each of the S rows of pairs.est the row of pairs.true that it is mapped to, −1 none: (S,) int64.
+    """Returns for each of the S rows of pairs.est the row of pairs.true that it is mapped to, -1 none: (S,) int64.
 
     The mapping is the one-to-one matching of each frame with the greatest total similarity, using only pairs of
     similarity `least` (default 0.5) or more.

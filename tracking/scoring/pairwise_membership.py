@@ -15,7 +15,7 @@ def pairwise_scores(true: GroupRows, est: GroupRows, person: Ints) -> dict[str, 
     """Returns a dict of pairwise_F1, pairwise_precision and pairwise_recall over pairs of people in one group.
 
     Pairs of all frames are counted together. true.member: rows of true people. person (K,): row of the true person that
-    each membership of `est` is mapped to, −1 none. An estimated pair is right if both persons are in one true group. An
+    each membership of `est` is mapped to, -1 none. An estimated pair is right if both persons are in one true group. An
     estimated pair with an unmapped member is false. A true pair with a person whom no track is mapped to is missed. A
     pair inside several estimated groups counts once. A score whose denominator is 0 is nan.
     """
@@ -43,6 +43,6 @@ def pairwise_scores(true: GroupRows, est: GroupRows, person: Ints) -> dict[str, 
 
 
 def _pairs_in(groups: GroupRows) -> int:
-    """Returns the number of unordered pairs of members, n (n − 1) / 2 per group of n, summed over groups."""
+    """Returns the number of unordered pairs of members, n (n - 1) / 2 per group of n, summed over groups."""
     n = groups.count
     return int((n * (n - 1) // 2).sum())

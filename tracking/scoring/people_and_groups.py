@@ -28,7 +28,7 @@ class PersonRows:
     """R rows, one per person and frame, sorted by frame.
 
     - rows: frame number and id of each row.
-    - group (R,): group id, −1 alone.
+    - group (R,): group id, -1 alone.
     - pos (R, 2), vel (R, 2): x, y of position and velocity in the plane of this side's data, m and m/s or px and px/s.
       nan unknown.
     - box (R, 4): left, top, width, height in px.
@@ -70,7 +70,7 @@ class GroupRows:
     - size (G,): number of people as reported, nan unknown.
     - extent (G, 2, 2): covariance of the shape, nan unknown.
     - hull: G polygons (V, 2), counter-clockwise; (0, 2) unknown.
-    - of (K,), member (K,): membership k says that the person in row member[k] (−1: not among the people) belongs to the
+    - of (K,), member (K,): membership k says that the person in row member[k] (-1: not among the people) belongs to the
       group in row of[k].
 
     pos, extent and hull are in m on the ground (extent m²), in px in the image.
@@ -137,7 +137,7 @@ def group_rows(frames: Ints, groups: Sequence[Groups], people: FrameRows) -> Gro
     """Returns the groups of F frames as rows and memberships.
 
     frames (F,): frame numbers, ascending; groups: one `Groups` per frame. people: rows in which members are looked up
-    by frame and id. A member without a row there gets member −1. Groups that list no members have no memberships.
+    by frame and id. A member without a row there gets member -1. Groups that list no members have no memberships.
     """
     count = [len(g.id) for g in groups]
     none = np.zeros(0, np.int64)

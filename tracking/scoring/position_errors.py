@@ -22,7 +22,7 @@ def position_scores(
     """Returns a dict of RMSE_pos, RMSE_vel, GOSPA, GOSPA_localisation, GOSPA_missed, GOSPA_false.
 
     Lengths are in m on the ground or px in the image, RMSE_vel in m/s. mapping (S,): row of `true` of each row of
-    `est`, −1 none. surface: "ground" or "image", where positions are compared. plane: of the tracks' positions. scale:
+    `est`, -1 none. surface: "ground" or "image", where positions are compared. plane: of the tracks' positions. scale:
     units of the surface per metre. frames: number of scored frames. RMSE_vel is nan in the image and where a side has
     no velocities. GOSPA's cut-off is 2 m; its scores are nan if frames is 0. The result is empty if one side has no
     positions on the surface, or if the scale is not finite.
@@ -40,7 +40,7 @@ def people_errors(
 ) -> dict[str, float]:
     """Returns a dict of RMSE_pos and RMSE_vel over mapped people, in the units of the inputs.
 
-    mapping (S,): true row of each estimated row, −1 none. true_pos, true_vel (R, 2) and est_pos, est_vel (S, 2): x, y
+    mapping (S,): true row of each estimated row, -1 none. true_pos, true_vel (R, 2) and est_pos, est_vel (S, 2): x, y
     of one plane, in one unit. Rows with a nan are left out. A score is nan if no mapped person has both values;
     RMSE_vel also if a velocity array is None.
     """

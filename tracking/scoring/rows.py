@@ -61,7 +61,7 @@ def numbered(values: Ints) -> tuple[Ints, Ints]:
 
 
 def find_rows(rows: FrameRows, wanted: FrameRows) -> Ints:
-    """Returns for each row of `wanted` the index of the row of `rows` with equal frame and id, −1 if there is none:
+    """Returns for each row of `wanted` the index of the row of `rows` with equal frame and id, -1 if there is none:
     (W,) int64.
 
     `wanted` need not be sorted. Of equal rows in `rows` the first is found.
@@ -97,19 +97,19 @@ class RowLookup:
         self.span = dict(zip(ids.tolist(), pairwise(cuts), strict=True))
 
     def last(self, id: int, frame: int, reach: int) -> int:
-        """Returns the index of the id's row with the latest frame in [frame − reach, frame]; −1 if there is none."""
+        """Returns the index of the id's row with the latest frame in [frame - reach, frame]; -1 if there is none."""
         low, high = self.span.get(id, NO_ROWS)
         at = bisect_right(self.frame, frame, low, high) - 1
         return self.row[at] if at >= low and frame - self.frame[at] <= reach else -1
 
     def next(self, id: int, frame: int, reach: int) -> int:
-        """Returns the index of the id's row with the earliest frame in [frame, frame + reach]; −1 if there is none."""
+        """Returns the index of the id's row with the earliest frame in [frame, frame + reach]; -1 if there is none."""
         low, high = self.span.get(id, NO_ROWS)
         at = bisect_left(self.frame, frame, low, high)
         return self.row[at] if at < high and self.frame[at] - frame <= reach else -1
 
     def nearest(self, id: int, frame: int, reach: int) -> int:
-        """Returns the index of the id's row nearest to `frame`, at most `reach` frames before or after; −1 if there is
+        """Returns the index of the id's row nearest to `frame`, at most `reach` frames before or after; -1 if there is
         none.
 
         Of two equally near rows the earlier one is returned.

@@ -33,7 +33,7 @@ def score_arrays(
     frame.
 
     A table maps column names to arrays of R rows, in any order: frame (R,), whole numbers from 1; id (R,), whole
-    numbers; pos (R, 2), x, y on the ground in m; box (R, 4): left, top, width, height in px; group (R,), group id, −1
+    numbers; pos (R, 2), x, y on the ground in m; box (R, 4): left, top, width, height in px; group (R,), group id, -1
     alone. frame, id and one of pos and box are required. Groups are compared on the ground if both tables have pos,
     else in the image. An empty table fits both.
 

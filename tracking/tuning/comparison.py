@@ -41,7 +41,7 @@ class Comparison:
     - scenes: name of the suite, or "validation".
     - key: the score; higher: True if greater values are better.
     - before, after: means of the defaults and of the config over the sequences where both have the score.
-    - difference: mean of after − before; low, high: its 95 % interval, nan if not known.
+    - difference: mean of after - before; low, high: its 95 % interval, nan if not known.
     - sequences: number of these sequences.
     """
 

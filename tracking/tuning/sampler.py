@@ -114,7 +114,7 @@ class HillClimbingSampler(BaseSampler):
     def _moved(self, study: optuna.Study) -> dict[str, Any]:
         """Returns the values by name of a good trial with some parameters moved, three on average and at least one.
 
-        A moved parameter takes a normal step in [−1, 1], mirrored at the ends; a categorical one is drawn anew. If the
+        A moved parameter takes a normal step in [-1, 1], mirrored at the ends; a categorical one is drawn anew. If the
         config refuses the values, a point on the line back to the good trial is taken. Raises InputError if the config
         refuses the good trial.
         """
@@ -153,8 +153,8 @@ class HillClimbingSampler(BaseSampler):
 
 
 def _reflected(point: Array) -> Array:
-    """Returns coordinates of any shape with those beyond an end of [−1, 1] mirrored at that end.
+    """Returns coordinates of any shape with those beyond an end of [-1, 1] mirrored at that end.
 
-    Those beyond 3 or −3 would land outside again; they become −1 or 1.
+    Those beyond 3 or -3 would land outside again; they become -1 or 1.
     """
     return np.clip(np.where(np.abs(point) > 1, np.sign(point) * 2 - point, point), -1.0, 1.0)
