@@ -52,12 +52,12 @@ def crossings(pos: Array, vel: Array, present: Bools, group: Ints, fps: float) -
     rows = members_by_frame(label)
     met = encounters(places, rows, fps)
     found: list[GroupEvent] = []
-    for some in _portions(met, len(pos), frames_of(SAME_BEFORE, fps)):
+    for some in _portions(met, frames_of(SAME_BEFORE, fps)):
         found += _crossed(places, vel, label, rows, some, frames_of(SAME_BEFORE, fps))
     return found
 
 
-def _portions(met: Encounters, frames: int, margin: int) -> Iterator[Encounters]:
+def _portions(met: Encounters, margin: int) -> Iterator[Encounters]:
     """Yields the encounters in portions, so that the frames of a portion add up to about ROWS (500,000).
 
     `margin` frames before and after each encounter count, too. frames: length of the recording, unused.

@@ -287,7 +287,7 @@ def squashed(statistic: Statistic, value: float) -> float:
 
 
 def table() -> str:
-    """Returns the statistics as a Markdown table (number from 0, name, value of 0.5, meaning) for docs/tuning.md."""
+    """Returns the statistics as a Markdown table (number from 0, name, value of 0.5, meaning) for docs/reference/environment.md."""
     lines = [
         f"| {k} | `{s.name}` | {'share' if s.half is None else f'{s.half:g} {s.unit}'.strip()} | {s.meaning} |"
         for k, s in enumerate(STATISTICS)
