@@ -26,10 +26,12 @@ FROZEN = Path(__file__).parent / "frozen"
 
 @dataclass(frozen=True)
 class Param:
-    """One declared parameter.
+    """One declared parameter of a tracker.
 
-    low, high: range, both ends allowed; choices: the allowed values if scale is "categorical". online, tunable, before,
-    sees: see ParamUse.
+    name; default; unit and meaning: texts for the docs. scale: "linear", "log", "int" or "categorical". low, high:
+    range, both ends allowed. choices: the allowed values if scale is "categorical", else empty. online: it may change
+    between two frames. tunable: searches may change it. before: its value in the frozen first defaults if their file
+    lacks it; None: not declared. sees: "pixels" or "points" if it has an effect only with these, else "".
     """
 
     name: str
@@ -47,16 +49,18 @@ class Param:
 
     @property
     def expected(self) -> str:
-        """The allowed values in words, for error messages."""
+        """The allowed values in words, for error messages: "one of a, b", "an integer from 1 to 5" or "a number from 0
+        to 1"."""
         if self.scale == "categorical":
             return "one of " + ", ".join(str(c) for c in self.choices)
         kind = "an integer" if self.scale == "int" else "a number"
         return f"{kind} from {self.low:g} to {self.high:g}"
 
     def check(self, value: object, file: object = "") -> Value:
-        """Return the value as float, or as int if scale is "int"; a choice is returned as it is.
+        """Return the value as float, or as int if scale is "int" (3.0 is allowed); a choice is returned as it is.
 
-        Raises InputError, naming `file`, if the value has a wrong type, is out of range or is no choice.
+        file: only for the error message, "" for none. Raises InputError if the value has a wrong type (a bool is no
+        number), is out of range (both ends are inside), is nan, or is no choice of the same type.
         """
         if self.scale == "categorical":
             if any(type(value) is type(c) and value == c for c in self.choices):
@@ -70,7 +74,10 @@ class Param:
         raise InputError(file=file, place=self.name, got=repr(value), expected=self.expected, remedy=remedy)
 
     def parse(self, text: str) -> Value:
-        """Return the value that `text` stands for. Raises InputError if it stands for no allowed value."""
+        """Return the value, number or choice, that `text` stands for; True and False may be in lower case.
+
+        Raises InputError if it stands for no allowed value.
+        """
         for choice in self.choices:
             if text == str(choice) or (isinstance(choice, bool) and text.lower() == str(choice).lower()):
                 return choice
@@ -85,7 +92,8 @@ class ParamUse(TypedDict, total=False):
 
     online: True (default) if it may change between two frames. tunable: True (default) if searches may change it.
     before: for a parameter that is missing in the frozen first defaults, the value with which the tracker behaves as it
-    did then. sees: "pixels" or "points" if it has an effect only with these; searches over others leave it out.
+    did then; None (default): not declared. sees: "pixels" or "points" if it has an effect only with these, and searches
+    over others leave it out; "" (default): it has an effect with both.
     """
 
     online: bool
@@ -102,10 +110,11 @@ def param(
     scale: Scale = "linear",
     **use: Unpack[ParamUse],
 ) -> Any:
-    """Return a dataclass field that declares a parameter.
+    """Return a dataclass field that declares a parameter with its default.
 
-    values: (low, high), or the choices if scale is "categorical". unit, meaning: for the docs. scale: how a search
-    moves: "linear" or "log" for numbers, "int" for whole numbers.
+    values: (low, high), both allowed, or the choices if scale is "categorical". unit, meaning: texts for the docs.
+    scale: how a search moves: "linear" or "log" for numbers, "int" for whole numbers, "categorical" for choices. use:
+    see ParamUse. The default itself is checked only when a config is created.
     """
     categorical = scale == "categorical"
     low, high = (float("-inf"), float("inf")) if categorical else values
@@ -115,9 +124,10 @@ def param(
 
 @dataclass(frozen=True)
 class Config:
-    """Base class of configs. A subclass is a frozen dataclass that sets `tracker` and declares its parameters.
+    """Base class of configs. A subclass is a frozen dataclass that sets `tracker` and declares its fields with `param`.
 
-    Raises InputError when created with a value that is not allowed or if `check` refuses the values together.
+    tracker: name of the tracker, for files and messages. Creating a config raises InputError if a value is not allowed
+    or if `check` refuses the values together.
     """
 
     tracker: ClassVar[str] = ""
@@ -128,22 +138,28 @@ class Config:
         self.check()
 
     def check(self) -> None:
-        """Raise InputError if the parameters contradict each other; a subclass overrides this."""
+        """Raise InputError if the parameters contradict each other; a subclass overrides this. Here nothing
+        is checked."""
 
     @classmethod
     def params(cls) -> dict[str, Param]:
-        """Return all declared parameters by name, in order."""
+        """Return all declared parameters by name, in order of the fields, inherited ones first."""
         found = [f for f in dataclasses.fields(cls) if "param" in f.metadata]
         return {f.name: dataclasses.replace(f.metadata["param"], name=f.name) for f in found}
 
     @classmethod
     def space(cls, *, online: bool = False) -> tuple[Param, ...]:
-        """Return the tunable parameters; with `online` only those of them that may change between two frames."""
+        """Return the tunable parameters, in order of the fields; with `online` only those that may change between two
+        frames."""
         return tuple(p for p in cls.params().values() if p.tunable and (p.online or not online))
 
     @classmethod
     def known(cls, name: str, file: object = "") -> Param:
-        """Return the parameter of this name. Raises InputError with the nearest known name if there is none."""
+        """Return the declared parameter of this name.
+
+        file: only for the error message, "" for none. Raises InputError, with the most similar name, if there is no
+        such parameter.
+        """
         declared = cls.params()
         if name in declared:
             return declared[name]
@@ -152,9 +168,10 @@ class Config:
 
     @classmethod
     def from_dict(cls, values: Mapping[str, object], file: object = "") -> Self:
-        """Return the config with these values and defaults for the others.
+        """Return the config with these values by parameter name, and defaults for the others.
 
-        Raises InputError, naming `file`, for unknown names and values that are not allowed.
+        file: only for the error message, "" for none. Raises InputError for unknown names, values that are not allowed,
+        and values that contradict each other.
         """
         return cls(**{name: cls.known(name, file).check(value, file) for name, value in values.items()})
 
@@ -162,7 +179,8 @@ class Config:
     def from_toml(cls, path: str | Path) -> Self:
         """Return the config in a TOML file: optional `tracker = "name"` and a table [params]; the rest has its default.
 
-        Raises InputError if the file cannot be read, is of another tracker, or has wrong keys or values.
+        Raises InputError if the file cannot be read, is no TOML, is of another tracker, or has unknown keys, or values
+        that are not allowed or contradict each other.
         """
         return cls.from_dict(cls._values(path), path)
 
@@ -170,8 +188,9 @@ class Config:
     def frozen(cls) -> Self:
         """Return the first defaults of the tracker, from tracking/frozen/NAME.toml, against which tuning is judged.
 
-        A parameter that the file lacks has its `before` if the class declares it, and its default if it is inherited.
-        Raises AssertionError if a declared one has no `before`, and InputError if the file is missing or wrong.
+        NAME is the class's `tracker`. A parameter that the file lacks has its `before` if the class itself declares it,
+        and its default if it is inherited. Raises AssertionError if one declared by the class has no `before`, and
+        InputError if the file is missing or wrong.
         """
         path = FROZEN / f"{cls.tracker}.toml"
         first = cls._values(path)
@@ -182,7 +201,11 @@ class Config:
 
     @classmethod
     def _values(cls, path: str | Path) -> dict[str, object]:
-        """The table [params] of a file, unchecked; InputError if the file is no parameter file of this tracker."""
+        """Returns the table [params] of a TOML file, unchecked; {} if there is none.
+
+        Raises InputError if the file cannot be read, is no TOML, is of another tracker, or has other keys than tracker
+        and [params].
+        """
         text = _read(path)
         try:
             content = tomllib.loads(text)
@@ -199,9 +222,11 @@ class Config:
         return values
 
     def with_set(self, *assignments: str) -> Self:
-        """Return a copy with assignments `name=value`, or `tracker.name=value`, applied.
+        """Return a copy with assignments "name=value" applied, from left to right; the word "tracker." before a name is
+        ignored.
 
-        Raises InputError for an assignment without "=", an unknown name or a value that is not allowed.
+        Raises InputError for an assignment without "=", an unknown name, a value that is not allowed, or values that
+        contradict each other.
         """
         changes: dict[str, Any] = {}
         for assignment in assignments:
@@ -213,30 +238,31 @@ class Config:
         return dataclasses.replace(self, **changes)
 
     def as_dict(self) -> dict[str, Value]:
-        """Return the parameters' values by name."""
+        """Return the values of all parameters by name, in order of the fields."""
         return {name: getattr(self, name) for name in self.params()}
 
     def to_toml(self) -> str:
-        """Return the text of a TOML file from which `from_toml` reads an equal config."""
+        """Return the text of a TOML file, with the tracker's name and all values, from which `from_toml` reads an equal
+        config."""
         lines = [f"{name} = {_toml(value)}" for name, value in self.as_dict().items()]
         return "\n".join([f'tracker = "{self.tracker}"', "", "[params]", *lines, ""])
 
     @classmethod
     def table(cls) -> str:
-        """Return the parameters as a Markdown table for the docs."""
+        """Return all parameters as a Markdown table for the docs: parameter, default, range, unit, meaning."""
         rows = [_row(p) for p in cls.params().values()]
         return "\n".join(["| parameter | default | range | unit | meaning |", "|---|---|---|---|---|", *rows, ""])
 
 
 def _row(p: Param) -> str:
-    """A parameter's row of the Markdown table."""
+    """Returns a parameter's row of the Markdown table: parameter, default, range or choices, unit, meaning."""
     span = ", ".join(f"`{c}`" for c in p.choices) if p.choices else f"{p.low:g} to {p.high:g}"
     note = " (log)" if p.scale == "log" else ""
     return f"| `{p.name}` | {p.default} | {span}{note} | {p.unit} | {p.meaning} |"
 
 
 def _toml(value: Value) -> str:
-    """A value as TOML."""
+    """Returns a value as TOML text: true or false, a number, or a quoted string (quotes inside are not escaped)."""
     if isinstance(value, bool):
         return str(value).lower()
     return f'"{value}"' if isinstance(value, str) else repr(value)

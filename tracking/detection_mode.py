@@ -22,15 +22,22 @@ from tracking.tracks_check import finite
 def runs_own_detector(needs: tuple[str, ...], sequence: Sequence) -> bool:
     """Return True if a tracker with these needs can run its own detector on the sequence's pictures.
 
-    That takes pictures for "pixels", and a right picture for "stereo".
+    needs: some of "pixels", "stereo", "boxes", "points"; any one suffices. "pixels" takes pictures, "stereo" a right
+    picture.
     """
     return ("pixels" in needs and sequence.has_images) or ("stereo" in needs and sequence.has_right)
 
 
 def choose_mode(needs: tuple[str, ...], sequence: Sequence, requested: DetectionMode | None) -> DetectionMode:
-    """Return `requested` if that mode can work; if it is None, the first of image, file, truth that can.
+    """Return the mode of detections: `requested` if it can work; if it is None, the first of image, file, truth that
+    can.
 
-    Raises InputError, naming the tracker's needs and what the sequence has, if the requested mode or every mode fails.
+    needs: what the tracker can work with, any one of "pixels", "stereo", "boxes", "points". Mode "image" works if the
+    tracker can run its own detector, "file" and "truth" if it takes boxes or points and the sequence has detections or
+    truth.
+
+    Raises InputError, naming the needs and what the sequence has, if the requested mode, or without one every mode,
+    fails.
     """
     able = [mode for mode in ("image", "file", "truth") if _works(mode, needs, sequence)]
     if requested in able or (requested is None and able):
@@ -49,7 +56,8 @@ def _works(mode: str, needs: tuple[str, ...], sequence: Sequence) -> bool:
 
 
 def _contents(sequence: Sequence) -> str:
-    """What the sequence has, in words for an error message."""
+    """Returns what the sequence has (images, a right image, detections, truth) in words for an error message; or
+    "nothing"."""
     parts = {
         "images": sequence.has_images,
         "a right image": sequence.has_right,
@@ -62,10 +70,13 @@ def _contents(sequence: Sequence) -> str:
 def frames_with_detections(
     needs: tuple[str, ...], mode: DetectionMode, sequence: Sequence, sensor: Mapping[str, Any], seed: int
 ) -> tuple[Frame, ...] | None:
-    """Return the sequence's frames with the detections of `mode` and without pictures; None if `mode` is "image".
+    """Return the sequence's frames with the detections of `mode` and without pictures, or None if `mode` is "image".
 
-    sensor: settings that degrade the detections of mode "truth"; seed: of their random numbers.
-    Raises InputError if there are only points and the tracker does not take points.
+    needs: of the tracker. sensor: settings of a scenario's [sensor] that degrade the detections of mode "truth", {} for
+    none; seed: of their random numbers. Both are ignored in mode "file". Frames count from 1.
+
+    Raises InputError if there are points without any boxes and the tracker does not take points, if the sensor settings
+    are wrong, or if the stored detections or the truth cannot be read.
     """
     if mode == "image":
         return None
@@ -83,10 +94,10 @@ def frames_with_detections(
 
 
 def check_detections(detections: Detections, needs: tuple[str, ...]) -> None:
-    """Raise InputError if a frame's detections cannot be given to a tracker with these needs.
+    """Raise InputError if a frame's detections cannot be given to a tracker with these needs; else return nothing.
 
-    They cannot if a number is nan or infinite (the error names frame and row), or if there are detections without
-    boxes and the tracker does not take points.
+    They cannot if a number is nan or infinite (the error names frame and row, both from 1), or if there are detections
+    without boxes and the tracker does not take points.
     """
     rows = len(detections.pos)
     arrays = [a for a in (detections.pos, detections.vel, detections.box, detections.score) if a is not None]

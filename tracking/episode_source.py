@@ -25,7 +25,9 @@ SourceSpec = str | Path | Sequence | Iterable["str | Path | Sequence | Source"]
 class Source:
     """One sequence to play on: a scenario entry with its seed, or a path, or a Sequence in memory.
 
-    Exactly one of entry, path and sequence is set. A source with a Sequence in memory cannot be pickled.
+    name: of the scenario or sequence. seed: of the simulation, or stated by the recording (0 if it states none). entry:
+    the scenario; path: of a stored sequence, "" if none; sequence: in memory. Exactly one of these three is set. A
+    source with a Sequence in memory cannot be pickled.
     """
 
     name: str
@@ -36,7 +38,11 @@ class Source:
 
     @cached_property
     def key(self) -> tuple[object, ...]:
-        """A key that is equal for sources of the same sequence: by scenario content and seed, by path, or by object."""
+        """A tuple that is equal for sources of the same sequence: by scenario content, copy and seed, by path, or by
+        object.
+
+        Two paths are equal if they resolve to the same file, two Sequences in memory if they are the same object.
+        """
         if self.entry is not None:
             content = self.entry.scenario.model_dump_json()
             return self.name, self.seed, self.entry.repeat, hashlib.sha256(content.encode()).hexdigest()
@@ -44,20 +50,25 @@ class Source:
 
     @property
     def simulated(self) -> bool:
-        """True if the sequence is simulated from a scenario."""
+        """True if the sequence is simulated from a scenario, False if it is stored or in memory."""
         return self.entry is not None
 
     @property
     def fps(self) -> float:
-        """Frames per second."""
+        """Frames per second. The sequence is opened for it, unless the scenario has a camera; then `open`'s errors can
+        occur."""
         camera = self.entry.scenario.camera if self.entry is not None else None
         return self.open().fps if camera is None else camera.fps
 
     def open(self, streams: Iterable[str] = ()) -> Sequence:
-        """Return the sequence.
+        """Return the sequence: simulated, read from its path, or as it is if it is in memory.
 
-        streams: the picture streams to draw if it is simulated. If it is stored, pictures are read if "left" is in it.
-        A sequence in memory is returned as it is.
+        streams: the picture streams to draw if it is simulated ("left", "right", "disparity", "ids", "background"),
+        none by default. If it is stored, pictures are read if "left" is in it. If several sequences are at the path,
+        the first one.
+
+        Raises InputError if the scenario is impossible, a stream is unknown, or the path does not exist or holds no
+        known format.
         """
         if self.sequence is not None:
             return self.sequence
@@ -74,10 +85,11 @@ def sources(what: SourceSpec | Source, seeds: Iterable[int] = range(10), set: It
     """Return the sources that `what` stands for, in order.
 
     what: a suite's or scenario's name, a TOML file, a folder, dataset or recording, a Sequence, a Source, or a list of
-    these. A scenario gives one source for each of the seeds.
-    set: `key=value` settings for the scenarios.
-    Raises InputError if a name is unknown, `seeds` is no iterable, `set` is a single string, there is no source at all,
-    or there are settings but no scenario.
+    these. A scenario gives one source for each of the `seeds` (by default 0 to 9); the others ignore seeds. set:
+    "key=value" settings for the scenarios.
+
+    Raises InputError if a name is unknown, a file or setting is wrong, `seeds` is no iterable, `set` is a single
+    string, there is no source at all, or there are settings but no scenario.
     """
     if isinstance(what, str | Path | Sequence | Source):
         what = (what,)
@@ -113,7 +125,10 @@ def _sources_of(
 
 
 def _stored(path: Path) -> list[Source]:
-    """The sources of all sequences in a folder, dataset or recording."""
+    """Returns the sources of all sequences in a folder, dataset or recording, sorted by path; pictures are not read.
+
+    Raises InputError if the path holds no known format or a file is invalid.
+    """
     from sim.io.source import open_source
 
     found = open_source(path, images=False)

@@ -17,7 +17,8 @@ LIBRARY = "gymnasium"
 
 
 def register_when_imported() -> None:
-    """Register the environment now, or when Gymnasium is imported. Further calls have no effect."""
+    """Register the environment flockscope/Tuning-v0 now if Gymnasium is imported, else as soon as it is. Further calls
+    have no effect."""
     if hasattr(sys.modules.get(LIBRARY), "register"):
         _register()
     elif not any(isinstance(finder, _RegisteringFinder) for finder in sys.meta_path):
@@ -32,7 +33,10 @@ def _register() -> None:
 
 
 class _RegisteringFinder(MetaPathFinder):
-    """Import hook: makes the loader of Gymnasium register the environment after loading. It finds no modules itself."""
+    """Import hook: makes the loader of Gymnasium register the environment after loading, then removes itself.
+
+    It finds no modules itself; other modules are left to the other finders.
+    """
 
     def find_spec(
         self, fullname: str, path: Sequence[str] | None = None, target: ModuleType | None = None

@@ -18,7 +18,7 @@ from sim.types import DetectionMode, Detections, Frame, Sequence, Tracks
 
 
 def required(px_per_m: float) -> float:
-    """Return px_per_m unchanged. Raises InputError if it is nan, zero or negative."""
+    """Return px_per_m (image scale, px per m) unchanged. Raises InputError if it is nan, zero or negative."""
     if px_per_m > 0:
         return px_per_m
     raise InputError(
@@ -30,19 +30,21 @@ def required(px_per_m: float) -> float:
 
 
 def from_boxes(frames: Iterable[Detections | Tracks | None]) -> float:
-    """Return the median height of all boxes divided by 1.7 m, in px per m; nan if there is no box.
+    """Return the image scale, px per m: the median height of all boxes of all frames divided by 1.7 m; nan if there is
+    no box.
 
-    frames: detections or tracks of each frame. None, and frames without boxes, are skipped.
+    frames: detections or tracks of each frame, read to the end. None, and frames without boxes, are skipped; so are
+    heights that are nan.
     """
     heights = [d.box[:, 3] for d in frames if d is not None and d.box is not None and len(d.box)]
     return float(np.nanmedian(np.concatenate(heights))) / PERSON_HEIGHT if heights else float("nan")
 
 
 def from_tracks(given: float, learned: object, tracks: SequenceOf[Tracks]) -> float:
-    """Return the scale for deriving groups from tracks, in px per m; nan if it is unknown.
+    """Return the image scale for deriving groups from tracks, in px per m; nan if it is unknown.
 
-    The first known value counts: `given` (the context's scale, nan if unknown), `learned` (the tracker's own attribute
-    `px_per_m`, None if it has none), then the scale from the boxes of the tracks.
+    The first known (finite) value counts: `given` (the context's scale, nan if unknown), `learned` (the tracker's own
+    attribute `px_per_m`, None if it has none), then the median height of the tracks' boxes divided by 1.7 m.
     """
     if np.isfinite(given):
         return given
@@ -52,10 +54,11 @@ def from_tracks(given: float, learned: object, tracks: SequenceOf[Tracks]) -> fl
 
 
 def of_sequence(sequence: Sequence, mode: DetectionMode, frames: tuple[Frame, ...] | None) -> float:
-    """Return the scale that a tracker is given with a sequence, in px per m; nan if it is unknown.
+    """Return the image scale that a tracker is given with a sequence, in px per m; nan if it is unknown.
 
-    It is the camera's scale at the image centre, else the sequence's own. If the sequence has none and `mode` is not
-    "image", it follows from the boxes of `frames`, or of the sequence's stored detections if `frames` is None.
+    It is the camera's scale at the image centre, else the one that the sequence states. If there is neither and `mode`
+    is not "image", it is the median box height over 1.7 m, of the boxes of `frames`, or of the sequence's stored
+    detections if `frames` is None.
     """
     if sequence.camera is not None:
         from sim.scene.camera import px_per_m_at_centre

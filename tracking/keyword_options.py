@@ -25,19 +25,20 @@ T = TypeVar("T")
 def option(
     help: str, *, low: float | None = None, below: float | None = None, metavar: str | None = None
 ) -> dict[str, Any]:
-    """Returns the metadata of a dataclass field for an option.
+    """Returns the metadata of a dataclass field for an option, with the keys help, low, below, metavar.
 
-    low, below: the range of a number, `low` included and `below` excluded; None is no limit. metavar: what stands for
-    the value in the help of a command.
+    help: text for users. low, below: the range of a number, `low` included and `below` excluded; None is no limit, and
+    without `low` nothing is checked. metavar: what stands for the value in the help of a command, None for the default.
     """
     return {"help": help, "low": low, "below": below, "metavar": metavar}
 
 
 def from_keywords(kind: type[T], function: str, given: Mapping[str, Any]) -> T:
-    """Returns an instance of the options dataclass `kind` with the given values and otherwise its defaults.
+    """Returns an instance of the options dataclass `kind` with the given values by name and otherwise its defaults.
 
-    function: the name for the error message. Raises InputError if a name is no option, with the most similar option,
-    and if a required option is missing.
+    function: name of the function for the error message. Raises InputError if a name is no option, with the most
+    similar option, or if an option without default is missing. Types and ranges are checked only by the dataclass
+    itself.
     """
     known = [f for f in fields(kind) if f.init]  # type: ignore[arg-type]
     names = [f.name for f in known]
@@ -52,9 +53,11 @@ def from_keywords(kind: type[T], function: str, given: Mapping[str, Any]) -> T:
 
 
 def check_ranges(options: Any) -> None:
-    """Raises InputError at the first number of an options dataclass that lies outside its declared range.
+    """Raises InputError at the first number of an options dataclass that lies outside its declared range; else returns
+    nothing.
 
-    The message names the option as the command line does, for example `--trials`. nan lies outside every range.
+    The message names the option as the command line does, for example `--trials`. nan lies outside every range. Options
+    without a lower limit are not checked.
     """
     for f in fields(options):
         low, below, value = f.metadata.get("low"), f.metadata.get("below"), getattr(options, f.name)
@@ -65,10 +68,12 @@ def check_ranges(options: Any) -> None:
 
 
 def documented(kind: type, positional: int = 0) -> Callable[[F], F]:
-    """Returns a decorator that gives a function the signature and the list of options of an options dataclass.
+    """Returns a decorator that gives a function the signature and, in its docstring, the list of options of a
+    dataclass.
 
-    positional: so many of the first options may be given without their name. A first parameter `self` is kept. The
-    decorated function itself is not changed: it still takes what it was written to take.
+    kind: the options dataclass. positional: so many of the first options may be given without their name. A first
+    parameter `self` is kept. The decorator returns the same function with `__signature__` and `__doc__` replaced; it
+    still takes what it was written to take.
     """
 
     def decorate(function: F) -> F:
@@ -83,7 +88,8 @@ def documented(kind: type, positional: int = 0) -> Callable[[F], F]:
 
 
 def options_text(kind: type) -> str:
-    """The options of an options dataclass, one a line: name, default and help text."""
+    """Returns the options of an options dataclass, one a line: "name=default: help text", without "=default" if
+    required."""
     return "\n".join(f"{f.name}{'' if _required(f) else f'={f.default!r}'}: {f.metadata['help']}" for f in fields(kind))
 
 

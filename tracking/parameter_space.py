@@ -31,17 +31,18 @@ HALVINGS = 6
 
 
 def space_of(kind: type[Config], mode: DetectionMode | None = None, *, online: bool = False) -> Space:
-    """Return the tunable parameters of a config class that have an effect in this detection mode.
+    """Return the tunable parameters of a config class that have an effect in this detection mode, in order of the
+    fields.
 
-    Mode "image" leaves out parameters for points, "file" and "truth" those for pixels, None leaves out none.
-    online: only parameters that may change between two frames.
+    Mode "image" leaves out parameters for points, "file" and "truth" those for pixels, None leaves out none. online:
+    only parameters that may change between two frames.
     """
     without_effect = {"image": "points", None: None}.get(mode, "pixels")
     return tuple(p for p in kind.space(online=online) if p.sees == "" or p.sees != without_effect)
 
 
 def encode(space: Space, config: Config) -> Array:
-    """Return the vector (P,) in [-1, 1] of the config's values of the parameters in `space`, in their order."""
+    """Return the vector (P,) in [-1, 1] of the config's values of the P parameters in `space`, in their order."""
     return np.array([_to_unit(p, getattr(config, p.name)) for p in space])
 
 
@@ -50,8 +51,11 @@ def decode(
 ) -> Config:
     """Return the config at the vector `action` (P,), which is clipped to [-1, 1]; other parameters are those of `base`.
 
+    space: the P parameters, in the vector's order. allowed: a function of a config that raises InputError to refuse it.
     A config is not allowed if its own `check` or `allowed` raises InputError. Then six bisections look for an allowed
-    config on the line from `base`, which must be allowed, to the action, and the farthest one found is returned.
+    config on the line from `base`, which must be allowed, to the action, and the farthest one found is returned; `base`
+    if none is.
+
     Raises InputError if the action has another shape or is not finite.
     """
     point = _point(action, len(space))
@@ -67,9 +71,11 @@ def decode(
 
 
 def decode_and_build(space: Space, action: ArrayLike, base: Config, build: Callable[[Config], T]) -> tuple[Config, T]:
-    """Return the config at the vector `action` (P,) and the result of `build` for it.
+    """Return the config at the vector `action` (P,), clipped to [-1, 1], and the result of `build` for it.
 
-    As `decode`, where a config for which `build` raises InputError is not allowed.
+    As `decode`: a config for which its own check or `build` raises InputError is not allowed, and the farthest allowed
+    one on the line from `base` is taken. Raises InputError if the action has another shape or is not finite, or if only
+    `base` is left and `build` refuses it.
     """
     made: dict[Config, T] = {}
 
@@ -83,7 +89,10 @@ def decode_and_build(space: Space, action: ArrayLike, base: Config, build: Calla
 
 
 def _attempt(space: Space, point: Array, base: Config, allowed: Callable[[Config], object]) -> Config | None:
-    """The config at a vector (P,), or None if it is not allowed."""
+    """Returns the config at a vector (P,) in [-1, 1], with other parameters as in `base`, or None if it is not allowed.
+
+    It is not allowed if its own check or `allowed` raises InputError.
+    """
     values = {p.name: _from_unit(p, float(a)) for p, a in zip(space, point, strict=True)}
     try:
         config = dataclasses.replace(base, **values)
@@ -94,7 +103,10 @@ def _attempt(space: Space, point: Array, base: Config, allowed: Callable[[Config
 
 
 def _point(action: ArrayLike, size: int) -> Array:
-    """The action as a vector (size,), clipped to [-1, 1]."""
+    """Returns the action as a vector (size,), clipped to [-1, 1].
+
+    Raises InputError if it has another shape or is not finite.
+    """
     point = np.asarray(action, float)
     if point.shape != (size,) or not np.isfinite(point).all():
         got = f"shape {point.shape}" if point.shape != (size,) else "NaN or infinity"
@@ -104,7 +116,7 @@ def _point(action: ArrayLike, size: int) -> Array:
 
 
 def _to_unit(p: Param, value: Value) -> float:
-    """The coordinate in [-1, 1] of a parameter's value."""
+    """Returns the coordinate in [-1, 1] of a parameter's value. Raises ValueError for a value that is no choice."""
     if p.scale == "categorical":
         return _middle(p.choices.index(value), len(p.choices))
     assert isinstance(value, int | float)
@@ -117,7 +129,7 @@ def _to_unit(p: Param, value: Value) -> float:
 
 
 def _from_unit(p: Param, a: float) -> Value:
-    """The value of a parameter at a coordinate in [-1, 1]."""
+    """Returns the value of a parameter at a coordinate a in [-1, 1]; numbers are limited to the parameter's range."""
     share = (a + 1) / 2
     if p.scale == "categorical":
         return p.choices[_part(share, len(p.choices))]
@@ -129,16 +141,17 @@ def _from_unit(p: Param, a: float) -> Value:
 
 
 def _whole(p: Param) -> tuple[int, int]:
-    """The first whole number of a parameter's range, and the count of whole numbers in it."""
+    """Returns the first whole number of a parameter's range, and how many whole numbers the range holds."""
     first = math.ceil(p.low)
     return first, math.floor(p.high) - first + 1
 
 
 def _middle(k: int, count: int) -> float:
-    """The middle of part k, from 0, of [-1, 1] divided into `count` equal parts."""
+    """Returns the middle of part k (from 0) of the range [-1, 1] divided into `count` equal parts."""
     return (2 * k + 1) / count - 1
 
 
 def _part(share: float, count: int) -> int:
-    """The index of the part, of `count` equal ones, that contains `share` of [0, 1]."""
+    """Returns the index, from 0, of the part that contains `share`, if [0, 1] is divided into `count` equal parts; 1 is
+    in the last part."""
     return min(int(share * count), count - 1)

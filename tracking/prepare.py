@@ -27,9 +27,10 @@ Params = Config | Mapping[str, Any] | str | Path | None
 class PreparedTracker:
     """A tracker instance and everything that it is given for one sequence. Call `reset` before the first `step`.
 
-    name: as the user gave it. config: None if the tracker has no parameters. mode: of the detections. frames_given:
-    frames with detections and without pictures; None if the sequence's own frames are used (mode "image").
-    history: what the tracker has reported since `reset`.
+    name: as the user gave it. config: None if the tracker has no parameters. context: what the tracker knows before the
+    first frame. mode: of the detections, "image", "file" or "truth". frames_given: frames with detections and without
+    pictures; None if the sequence's own frames are used (mode "image"). history: what the tracker has reported since
+    `reset`.
     """
 
     name: str
@@ -42,23 +43,29 @@ class PreparedTracker:
     history: ReportHistory = field(default_factory=ReportHistory)
 
     def frames(self) -> Iterator[Frame]:
-        """Return an iterator over the frames as the tracker gets them. It may be called more than once.
+        """Return a new iterator over the frames as the tracker gets them, in order. It may be called more than once.
 
-        In mode "image" the detections that are stored with the sequence are removed.
+        In mode "image" the detections that are stored with the sequence are removed, and pictures are read while
+        iterating, which raises InputError if one cannot be read.
         """
         if self.frames_given is not None:
             return iter(self.frames_given)
         return (replace(f, detections=None) for f in self.sequence)
 
     def px_per_m(self, tracks: SequenceOf[Tracks]) -> float:
-        """Return the scale for deriving groups from these tracks (tracking.image_scale.from_tracks); nan if unknown."""
+        """Return the image scale, px per m, for deriving groups from these tracks of the whole sequence; nan if
+        unknown.
+
+        It is the context's, else the tracker's attribute `px_per_m`, else the median height of the tracks' boxes over
+        1.7 m.
+        """
         return image_scale.from_tracks(self.context.px_per_m, getattr(self.tracker, "px_per_m", None), tracks)
 
     def reset(self, seed: int) -> None:
-        """Reset the tracker for this sequence.
+        """Reset the tracker for this sequence and forget what it has reported. seed: of the tracker's random numbers.
 
-        A FlockscopeError of the tracker passes through, with the recording as its file if it names none.
-        Raises WorkError for any other exception of the tracker.
+        A FlockscopeError of the tracker (InputError, WorkError) passes through, with the recording as its file if it
+        names none. Raises WorkError for any other exception of the tracker.
         """
         self.history.clear()
         try:
@@ -71,9 +78,10 @@ class PreparedTracker:
     def step(self, frame: Frame) -> Tracks:
         """Return the tracker's checked tracks of the next frame; frames come in order, from `frames`.
 
-        Raises InputError if the frame's detections cannot be given to the tracker, and WorkError if the tracker raises
-        an exception or returns tracks that tracking.tracks_check refuses. A FlockscopeError of the tracker passes
-        through as in `reset`.
+        Raises InputError if the frame's detections cannot be given to the tracker (nan, or points alone to a tracker
+        that needs boxes). Raises WorkError if the tracker raises an exception or returns tracks that
+        tracking.tracks_check refuses. A FlockscopeError of the tracker passes through, with the recording as its file
+        if it names none.
         """
         detections = frame.detections
         if detections is not None:
@@ -88,13 +96,17 @@ class PreparedTracker:
 
 
 def _with_file(error: FlockscopeError, sequence: Sequence) -> FlockscopeError:
-    """The same error; if it names no file, with the path (else the name) of the recording as its file."""
+    """Returns the same error; if it names no file, a copy with the path (else the name) of the recording as
+    its file."""
     path = sequence.source.get("path", sequence.name)
     return error if error.file else type(error)(**{**error.as_dict(), "file": path})
 
 
 def _tracker_failed(tracker: str, method: str, place: str, error: Exception) -> WorkError:
-    """The error for an exception raised by a tracker's own code, with the first line of its message."""
+    """Returns the WorkError for an exception raised by a tracker's own code, with the first line of its message.
+
+    tracker: its name; method: "reset", "step" or "__init__"; place: sequence and frame, in words.
+    """
     got = f"{type(error).__name__}: {error}".partition("\n")[0]
     remedy = f"correct the tracker's {method}(); FLOCKSCOPE_DEBUG=1 shows where"
     return WorkError(file=tracker, place=place, got=got, expected="no exception", remedy=remedy)
@@ -109,11 +121,16 @@ def prepare(
     sensor: Mapping[str, Any] | None = None,
     seed: int = 0,
 ) -> PreparedTracker:
-    """Return the tracker ready to be reset for the sequence; the arguments are those of `tracking.run.track`.
+    """Return the tracker ready to be reset for the sequence.
 
-    seed: of the sensor's random numbers in mode "truth".
-    Raises InputError if `sequence` is no Sequence, if the tracker or its parameters are wrong, if tracker and sequence
-    do not fit, or if `sensor` is given with a mode other than "truth".
+    tracker: a registered name, "file.py:Class", "module:Class", a class or an instance. params: a config, values by
+    name or a TOML file; None for the defaults. detections: "image", "file" or "truth"; None for the first of them that
+    can work. sensor: settings that degrade mode "truth"; seed: of their random numbers.
+
+    Raises InputError if `sequence` is no Sequence, if the tracker, its parameters or the sensor settings are wrong, if
+    parameters are given to an instance or to a tracker without any, if tracker and sequence do not fit, if `sensor` is
+    given with a mode other than "truth", or if files of the sequence cannot be read. Raises WorkError if the tracker
+    cannot be created.
     """
     if not isinstance(sequence, Sequence):
         remedy = "open it: sim.io.source.open_source(path), or sim.simulate(scenario, seed)"
@@ -138,9 +155,10 @@ def prepare(
 
 
 def _make(tracker: str | type[Tracker] | Tracker, params: Params) -> tuple[str, Tracker, Config | None]:
-    """The tracker's name, an instance and its config (None without parameters).
+    """Returns the tracker's name, an instance and its config (None without parameters).
 
-    A class gets its config from its `config_class`; an instance keeps its own and takes no `params`.
+    A class gets its config from its `config_class`; an instance keeps its own and takes no `params`. Raises InputError
+    if tracker or params are wrong or do not fit, and WorkError if the tracker cannot be created.
     """
     if not isinstance(tracker, str | type):
         if params is not None:
@@ -171,7 +189,8 @@ def _instance(name: str, tracker_class: Any, *arguments: Any) -> Tracker:
 def config_of(kind: type[Config], params: Params) -> Config:
     """Return `params` as a config of the class `kind`; the default config if `params` is None.
 
-    Raises InputError for unknown names, values out of range, an unreadable file, or a config of another tracker.
+    params: a config of this class, values by name, or the path of a TOML file. Raises InputError for unknown names,
+    values out of range or in contradiction, an unreadable file, or a config of another class.
     """
     if params is None:
         return kind()

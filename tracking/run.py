@@ -20,7 +20,10 @@ from tracking.run_info import Speed, run_info
 
 @dataclass(frozen=True, eq=False)
 class TrackingRun(SequenceOf[Tracks]):
-    """The tracks of one run, one `Tracks` per frame in order. info: the content of run.json."""
+    """The tracks of one run; as a sequence, one `Tracks` per frame in order: item 0 is frame 1, a slice gives a tuple.
+
+    info: the content of run.json, {} by default.
+    """
 
     tracks: tuple[Tracks, ...]
     info: dict[str, Any] = field(default_factory=dict)
@@ -49,18 +52,16 @@ def track(
 ) -> TrackingRun:
     """Return the tracker's tracks of every frame of the sequence, completed with groups and events.
 
-    tracker: a registered name, "file.py:Class", "module:Class", a class or an instance.
-    params: a config, values by name, or a TOML file; by default the tracker's defaults.
-    detections: "image", "file" or "truth"; by default the first of them that can work.
-    sensor: settings as in a scenario's [sensor] that degrade "truth" (misses, clutter, noise, hiding).
-    seed: for the tracker's and the sensor's random numbers.
-    grouping: the rule, or its TOML file, that groups people if the tracker names no groups; else it has no effect, with
-    a UserWarning.
-    progress: called with each frame's number when the frame is done.
+    tracker: a registered name, "file.py:Class", "module:Class", a class or an instance. params: a config, values by
+    name, or a TOML file; None for the tracker's defaults. detections: "image", "file" or "truth"; None for the first of
+    them that can work. sensor: settings as in a scenario's [sensor] that degrade "truth" (misses, clutter, noise,
+    hiding); None: perfect. seed: for the tracker's and the sensor's random numbers. grouping: the rule, or its TOML
+    file, that groups people if the tracker names no groups; None: the default rule. If the tracker names groups, it has
+    no effect, with a UserWarning. progress: called with each frame's number, from 1, when the frame is done.
 
-    Raises InputError before the first frame if the arguments are wrong or tracker and sequence do not fit, and for a
-    frame whose detections are not finite. Raises WorkError if the tracker raises an exception or returns wrong
-    tracks.
+    Raises InputError before the first frame if the arguments are wrong or tracker and sequence do not fit; later for a
+    frame whose detections are not finite or whose picture cannot be read. Raises WorkError if the tracker raises an
+    exception or returns wrong tracks.
     """
     from tracking.grouping.grouped_tracks import names_groups, with_groups
 
@@ -85,9 +86,12 @@ def track(
 
 
 def grouped(tracks: SequenceOf[Tracks], sequence: Sequence) -> tuple[Tracks, ...]:
-    """Return stored tracks of a sequence with groups and events filled in where the tracker left them empty.
+    """Return stored tracks of a sequence, one `Tracks` per frame, with groups and events filled in where they are
+    empty.
 
-    The scale in px per m is the sequence's, or its truth's if the sequence states none.
+    The scale in px per m is the sequence's, or its truth's if the sequence states none; without any, tracks in the
+    image are returned unchanged. Raises InputError if the truth cannot be read or tracks in the image have a scale of 0
+    or below.
     """
     from tracking.grouping.grouped_tracks import with_groups
 

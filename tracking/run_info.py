@@ -18,7 +18,10 @@ SENSOR_SETTINGS_SHOWN = 6
 
 @dataclass(frozen=True)
 class Speed:
-    """Speed in frames per second. tracker: of the tracker's steps alone; whole: with reading and decoding frames."""
+    """Speed of a run in frames per second, 0 if nothing was run.
+
+    tracker: of the tracker's steps alone; whole: with reading and decoding frames.
+    """
 
     tracker: float = 0.0
     whole: float = 0.0
@@ -34,8 +37,10 @@ def run_info(
 ) -> dict[str, Any]:
     """Return the content of run.json as a dictionary. Two equal runs differ only in their speeds.
 
-    tracks: of the whole run. sensor: settings of mode "truth", empty if none. px_per_m: the scale by which groups were
-    derived; nan is stored as None.
+    tracks: of the whole run, one `Tracks` per frame, possibly none. seed: of the run. sensor: settings of mode "truth",
+    empty if none. px_per_m: the scale by which groups were derived; nan is stored as None. Keys: tracker, config, seed,
+    sequence, detections, sensor, plane, boxes, fps, px_per_m, background, causal, causal_from, frames,
+    frames_per_second, whole_frames_per_second, versions.
     """
     from sim.io.store.track_boxes import box_source
 
@@ -65,8 +70,8 @@ def run_info(
 def causal_from(sequence: Sequence) -> int | None:
     """Return the first frame (from 1) whose background sample holds no later frame; None if there is no such frame.
 
-    The result is 1 if the sample holds no frame of the recording itself, N for a sample of the first N frames, and None
-    for a sample spread over the recording.
+    The result is 1 if the sample holds no frame of the recording itself (or there is no sample), N for a sample of the
+    first N frames, and None for a sample spread over the recording.
     """
     from sim.io.pictures.background_sample import BackgroundSample
 
@@ -79,8 +84,8 @@ def causal_from(sequence: Sequence) -> int | None:
 def input_summary(info: Mapping[str, Any]) -> str:
     """Return one line on what a tracker was given, from the content of its run.json.
 
-    The line is the detection mode, then in brackets the background sample and the first sensor settings. It is empty
-    if `info` names no detection mode, background or sensor.
+    The line is the detection mode, then in brackets the background sample and the first six sensor settings, with the
+    number of the others. It is "" if `info` has none of the keys detections, background and sensor.
     """
     mode, background, sensor = (info.get(key) for key in ("detections", "background", "sensor"))
     more = [f"background: {background}"] if background else []
@@ -90,7 +95,8 @@ def input_summary(info: Mapping[str, Any]) -> str:
 
 
 def _versions() -> dict[str, str]:
-    """The versions of flockscope, numpy and scipy; a package that is not installed is left out."""
+    """Returns the installed versions of flockscope, numpy and scipy by name; a package that is not installed is left
+    out."""
     from importlib.metadata import PackageNotFoundError, version
 
     found = {}

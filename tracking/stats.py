@@ -28,10 +28,11 @@ SURE = 60.0
 
 
 def bootstrap(values: Array, draws: int = DRAWS) -> tuple[Array, Array, Array]:
-    """Return mean, low and high end (K,) each of percentile intervals over S sequences; values (S, K).
+    """Return mean, low end and high end, (K,) each, of 95 % percentile intervals over S sequences; values (S, K).
 
-    nan is left out, for each column by itself. The ends of a column with fewer than two numbers are nan; without any
-    number the mean is nan, too. Average several runs of one sequence (tracker seeds) before the call.
+    draws: number of bootstrap samples. nan and infinite values are left out, for each column by itself. The ends of a
+    column with fewer than two numbers are nan; without any number the mean is nan, too. Average several runs of one
+    sequence (tracker seeds) before the call. The random numbers are fixed.
     """
     count, columns = values.shape
     known = np.isfinite(values)
@@ -48,15 +49,17 @@ def bootstrap(values: Array, draws: int = DRAWS) -> tuple[Array, Array, Array]:
 
 
 def paired(first: Array, second: Array, draws: int = DRAWS) -> tuple[Array, Array, Array]:
-    """Return mean, low and high end (K,) each of second - first over the same S sequences; both (S, K).
+    """Return mean, low end and high end, (K,) each, of second - first over the same S sequences; both (S, K).
 
-    Pairs with a nan are left out.
+    The interval is a 95 % bootstrap interval from `draws` samples. Pairs with a nan are left out; with fewer than two
+    pairs the ends are nan, without any the mean, too.
     """
     return bootstrap(second - first, draws)
 
 
 def wilson(hits: int, count: int) -> tuple[float, float, float]:
-    """Return the share of `hits` out of `count` and the low and high end of its interval (Wilson 1927).
+    """Return the share of `hits` out of `count`, and the low and high end of its 95 % interval, within 0 to 1 (Wilson
+    1927).
 
     The interval holds all p with (share - p)^2 <= z^2 p (1 - p) / count. If count is 0: nan, 0 and 1.
     """
@@ -71,11 +74,12 @@ def wilson(hits: int, count: int) -> tuple[float, float, float]:
 def moving_blocks(
     score: Callable[[Ints], Array], frames: int, fps: float, draws: int = DRAWS
 ) -> tuple[Array, Array, Array]:
-    """Return the scores of one recording and the low and high ends of their intervals, (K,) each.
+    """Return the scores (K,) of one recording, and the low and the high ends (K,) of their 95 % intervals.
 
-    Frames are resampled in moving blocks (Künsch 1989). score: takes indices (N,) of frames, from 0, some more than
-    once, and returns scores (K,), nan where undefined. For an interval of a difference let it return the difference of
-    two trackers in the same frames. The ends are nan where all samples are nan. Under SURE seconds they are indicative.
+    score: takes indices (N,) of frames, from 0, some more than once, and returns scores (K,), nan where undefined.
+    frames: of the recording; fps: frames per second; draws: number of samples. Frames are resampled in moving blocks
+    (Künsch 1989). For an interval of a difference let `score` return the difference of two trackers in the same frames.
+    The ends are nan where all samples are nan, and without frames. Under SURE = 60 seconds they are indicative.
     """
     whole = np.asarray(score(np.arange(frames)), float)
     r = np.random.default_rng(0)
@@ -88,17 +92,25 @@ def moving_blocks(
 
 
 def block_length(frames: int, fps: float) -> int:
-    """Return the frames of a block: the longer of 1 s and a twentieth of the recording, but at most all frames."""
+    """Return the length of a block in frames: the longer of 1 s and a twentieth of the recording, but at most all
+    frames.
+
+    frames: of the recording; fps: frames per second.
+    """
     return min(frames, max(1, ceil(SHORTEST_BLOCK * fps), ceil(frames / BLOCKS)))
 
 
 def draw_blocks(frames: int, block: int, r: np.random.Generator) -> Ints:
-    """Return indices (frames,) of frames: blocks of `block` consecutive frames from random starts, the last one cut."""
+    """Return indices (frames,) of frames, from 0: blocks of `block` consecutive frames from random starts, the last one
+    cut.
+
+    block: frames of a block, from 1 to `frames` (else an exception). r: the generator, which is advanced.
+    """
     starts = r.integers(0, frames - block + 1, -(-frames // block))
     return np.asarray((starts[:, None] + np.arange(block)).ravel()[:frames])
 
 
 def _ends(drawn: Array) -> Array:
-    """Low and high end (2,) of the interval of these samples."""
+    """Returns the low and the high end (2,) of the 95 % interval of samples (N,): their 2.5 % and 97.5 % quantiles."""
     tail = (1 - LEVEL) / 2
     return np.asarray(np.quantile(drawn, (tail, 1 - tail)))

@@ -25,15 +25,15 @@ NEEDS = ("pixels", "stereo", "boxes", "points")
 
 
 def names() -> tuple[str, ...]:
-    """Return the names of the registered trackers."""
+    """Return the names of the registered trackers, in fixed order."""
     return tuple(REGISTRY)
 
 
 def find(spec: str) -> type[Tracker]:
     """Return the tracker class that `spec` names: a registered name, "file.py:Class" or "module:Class".
 
-    Raises InputError if the name is unknown, if the file or module is missing or cannot be imported, if it has no such
-    class, or if the class is no tracker.
+    The file or module is imported, which runs its code. Raises InputError if the name is unknown, if the file or module
+    is missing or cannot be imported, if it has no such class, or if the class is no tracker.
     """
     target = REGISTRY.get(spec, spec)
     where, colon, class_name = target.rpartition(":")
@@ -48,10 +48,10 @@ def find(spec: str) -> type[Tracker]:
 
 
 def _from_file(path: Path) -> Any:
-    """Import a file under a private name that depends on its path and content.
+    """Returns the module of a Python file, imported under a private name that depends on its path and content.
 
     The name hides no other module. An unchanged file is imported once, so that a config keeps fitting its tracker; a
-    changed file is imported again.
+    changed file is imported again. Raises InputError if there is no such file or it cannot be imported.
     """
     if not path.is_file():
         raise InputError(file=path, got="no such file", expected="a Python file", remedy="check the path")
@@ -88,9 +88,9 @@ def _import_failed(where: object, error: BaseException) -> InputError:
 def checked(found: Any, spec: str) -> type[Tracker]:
     """Return `found` unchanged if it is a tracker class. Raises InputError otherwise; `spec` names it in the error.
 
-    A tracker class has `needs` (a tuple or list out of NEEDS, not empty), `reset(context, seed)` and
-    `step(frame, detections)`. It is created with its config if it has a `config_class` (a subclass of Config), else
-    without arguments.
+    A tracker class has `needs` (a tuple or list out of "pixels", "stereo", "boxes", "points", not empty),
+    `reset(context, seed)` and `step(frame, detections)`. It is created with its config if it has a `config_class` (a
+    subclass of Config), else without arguments.
     """
     fault = _class_fault(found)
     if fault:
@@ -100,7 +100,10 @@ def checked(found: Any, spec: str) -> type[Tracker]:
 
 
 def config_class(tracker: type[Tracker], spec: str) -> type[Config]:
-    """Return the class of the tracker's config. Raises InputError, naming `spec`, if the tracker has no parameters."""
+    """Return the class of the tracker's config, its attribute `config_class`.
+
+    Raises InputError, naming the tracker as `spec`, if it has none and so no parameters.
+    """
     kind = getattr(tracker, "config_class", None)
     if kind is None:
         remedy = "give the class a config_class that declares them (docs/guides/your-own-tracker.md)"
@@ -112,14 +115,14 @@ def config_class(tracker: type[Tracker], spec: str) -> type[Config]:
 def code_hash(tracker: type[Tracker]) -> str:
     """Return the first 12 hex digits of the SHA-256 of the file that defines the class; "" if there is no file.
 
-    The file is read at the first call for this class.
+    The file is read at the first call for this class and not again; imported files do not count.
     """
     file = Path(getattr(sys.modules.get(tracker.__module__), "__file__", None) or "")
     return hashlib.sha256(file.read_bytes()).hexdigest()[:12] if file.is_file() else ""
 
 
 def _class_fault(found: Any) -> str | None:
-    """Why `found` is no tracker class, in words; None if it is one."""
+    """Returns why `found` is no tracker class, in words for an error message; None if it is one."""
     if not isinstance(found, type):
         return f"a {type(found).__name__}"
     missing = [name for name in ("needs", "reset", "step") if not hasattr(found, name)]
@@ -142,7 +145,7 @@ def _class_fault(found: Any) -> str | None:
 
 
 def _takes(function: Any, count: int) -> bool:
-    """True if the function can be called with `count` positional arguments, or if its signature is unknown."""
+    """Returns True if the function can be called with `count` positional arguments, or if its signature is unknown."""
     try:
         inspect.signature(function).bind(*range(count))
     except TypeError:

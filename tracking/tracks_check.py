@@ -23,14 +23,14 @@ Fault = tuple[str, str]
 class ReportHistory:
     """What a tracker has reported in a sequence so far.
 
-    plane_and_unit: of its first tracks, None before. ids: all track ids so far.
+    plane_and_unit: (plane, unit) of its first tracks, None before. ids: all track ids so far, of people or of groups.
     """
 
     plane_and_unit: tuple[str, str] | None = None
     ids: set[int] = field(default_factory=set)
 
     def clear(self) -> None:
-        """Forget everything, for the start of another sequence."""
+        """Forget everything, in place, for the start of another sequence."""
         self.plane_and_unit = None
         self.ids.clear()
 
@@ -58,7 +58,8 @@ def check_tracks(tracks: Any, index: int, tracker: str, history: ReportHistory |
 
 
 def _filled(tracks: Tracks) -> Tracks:
-    """The tracks with empty scores, and events' open `emitted` and `end`, filled in."""
+    """Returns the tracks with empty scores filled in (1), and in events `emitted` and `end` where they are None (this
+    frame)."""
     if not np.size(tracks.score) and np.ndim(tracks.id) == 1:
         tracks = tracks.replace(score=np.ones(len(tracks.id)))
     if isinstance(tracks.events, tuple) and any(map(_has_open_frames, tracks.events)):
@@ -71,7 +72,7 @@ def _has_open_frames(event: Any) -> bool:
 
 
 def _with_frames(event: Any, index: int) -> Any:
-    """The event with `emitted` and `end` set to this frame where they are None."""
+    """Returns the event with `emitted` and `end` set to frame `index` where they are None; anything else as it is."""
     if not _has_open_frames(event):
         return event
     emitted = index if event.emitted is None else event.emitted
@@ -80,7 +81,10 @@ def _with_frames(event: Any, index: int) -> Any:
 
 
 def _fault(tracks: Any, index: int, history: ReportHistory) -> Fault | None:
-    """The first fault of what a tracker returned, or None. Adds plane, unit and ids to the history."""
+    """Returns the first fault of what a tracker returned for frame `index`, as (got, expected), or None.
+
+    Plane and unit of the first frame, and ids, are added to the history, in place.
+    """
     if not isinstance(tracks, Tracks):
         return type(tracks).__name__, "sim.types.Tracks"
     if tracks.index != index:
@@ -101,7 +105,8 @@ def _fault(tracks: Any, index: int, history: ReportHistory) -> Fault | None:
 
 
 def _rows_fault(tracks: Tracks) -> Fault | None:
-    """Fault in the shape, type or finiteness of the arrays with one row per track."""
+    """Returns the first fault, as (got, expected), in shape, type or finiteness of the arrays with one row per track,
+    or None."""
     if np.ndim(tracks.id) != 1:
         return f"id of shape {np.shape(tracks.id)}", "(N,)"
     n, d = len(tracks.id), 3 if tracks.plane == "space" else 2
@@ -118,7 +123,11 @@ def _rows_fault(tracks: Tracks) -> Fault | None:
 
 
 def _arrays_fault(shapes: dict[str, tuple[Any, tuple[int, ...]]]) -> Fault | None:
-    """Fault of the first array that is no array of numbers, has another shape, or is not finite."""
+    """Returns the fault, as (got, expected), of the first array with a wrong type or shape or with nan or infinity, or
+    None.
+
+    shapes: by name, the array and the shape that it must have.
+    """
     for name, (a, shape) in shapes.items():
         if not isinstance(a, np.ndarray) or a.dtype.kind not in "iuf":
             return f"{name} of type {getattr(a, 'dtype', type(a).__name__)}", "an array of numbers"
@@ -130,13 +139,16 @@ def _arrays_fault(shapes: dict[str, tuple[Any, tuple[int, ...]]]) -> Fault | Non
 
 
 def finite(a: Any) -> bool:
-    """Return True if all numbers of the array are finite."""
+    """Return True if all numbers of the array are finite; True for an empty array."""
     # The sum of squares is cheap and finite for ordinary numbers; only if it overflows is each number looked at.
     return isfinite(np.vdot(a, a)) or bool(np.isfinite(a).all())
 
 
 def _id_fault(tracks: Tracks) -> Fault | None:
-    """Fault in the tracks' ids and group ids: type, sign, uniqueness, id == group for unit "group"."""
+    """Returns the first fault, as (got, expected), in the tracks' ids and group ids, or None.
+
+    Both must be int64; group at least -1, and equal to id for unit "group"; ids non-negative and unique.
+    """
     if not isinstance(tracks.id, np.ndarray) or tracks.id.dtype != np.int64 or tracks.group.dtype != np.int64:
         kinds = (getattr(a, "dtype", type(a).__name__) for a in (tracks.id, tracks.group))
         return "ids of type {}, groups of type {}".format(*kinds), "int64"
@@ -148,7 +160,8 @@ def _id_fault(tracks: Tracks) -> Fault | None:
 
 
 def _ids_fault(id: Any, name: str) -> Fault | None:
-    """Fault in ids that must be non-negative and unique; `name` stands for them in the message."""
+    """Returns the fault, as (got, expected), of ids that are negative or not unique, or None; `name` is their name in
+    it."""
     if len(id) and id.min() < 0:
         return f"{name} {id.min()}", f"non-negative {name}s"
     if len(set(id.tolist())) != len(id):
@@ -157,9 +170,10 @@ def _ids_fault(id: Any, name: str) -> Fault | None:
 
 
 def _groups_fault(groups: Any, d: int, people: Iterable[int]) -> Fault | None:
-    """Fault in `Tracks.groups`. d: columns of pos and vel; people: ids that may be members.
+    """Returns the first fault, as (got, expected), in `Tracks.groups`, or None.
 
-    nan is allowed in vel, extent and size, where it means unknown.
+    d: columns of pos and vel, 2 or 3; people: ids that may be members. nan is allowed in vel, extent and size, where it
+    means unknown.
     """
     if not isinstance(groups, Groups):
         return f"groups of type {type(groups).__name__}", "sim.types.Groups or None"
@@ -176,7 +190,10 @@ def _groups_fault(groups: Any, d: int, people: Iterable[int]) -> Fault | None:
 
 
 def _ragged_fault(groups: Groups, n: int, people: Iterable[int]) -> Fault | None:
-    """Fault in members and hulls. Each is a tuple with one array per group (n groups), or an empty tuple."""
+    """Returns the first fault, as (got, expected), in the members and hulls of n groups, or None.
+
+    Each is a tuple with one array per group, or an empty tuple. people: ids that may be members.
+    """
     for name in ("members", "hull"):
         items = getattr(groups, name)
         if not isinstance(items, tuple) or len(items) not in (0, n):
@@ -196,7 +213,11 @@ def _ragged_fault(groups: Groups, n: int, people: Iterable[int]) -> Fault | None
 
 
 def _members_fault(members: Iterable[Any], people: Iterable[int], name: str) -> Fault | None:
-    """Fault of the first member that is no whole number or not among `people`."""
+    """Returns the fault, as (got, expected), of the first member that is no whole number or not among `people`, or
+    None.
+
+    name: what the members are called in the message.
+    """
     for m in members:
         if not isinstance(m, int | np.integer) or isinstance(m, bool) or m not in people:  # type: ignore[operator]
             return f"{m!r} in {name}", "ids that the tracker has reported"

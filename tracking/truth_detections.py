@@ -16,11 +16,13 @@ _SEES_ALL = {"occlusion_power": 0.0, "min_visibility": 0.0, "small_px": 0.0}
 
 
 def from_truth(sequence: Sequence, sensor: Mapping[str, Any], seed: int) -> Iterator[Detections]:
-    """Return an iterator over the detections of a labelled sequence, one for each frame in order.
+    """Return an iterator over the detections of a labelled sequence, one for each frame in order, from frame 1.
 
     sensor: settings with the keys of a scenario's [sensor]; those left out have the value of a perfect sensor. Empty:
     the labels themselves. seed: of the sensor's random numbers.
-    Raises InputError if a key is unknown, a value is wrong, or a group that is to be hidden is not in the script.
+
+    Raises InputError if the truth cannot be read, a key is unknown, a value is wrong, or a group that is to be hidden
+    is not in the script. A sequence without labels is an AssertionError.
     """
     truth = sequence.truth
     assert truth is not None, "the mode was chosen for a source with labels"
@@ -30,10 +32,10 @@ def from_truth(sequence: Sequence, sensor: Mapping[str, Any], seed: int) -> Iter
 
 
 def perfect(truth: FrameTruth) -> Detections:
-    """Return the labels of a frame as detections with score 1 and no velocities.
+    """Return the labels of a frame as detections with score 1 and no velocities, a row per person.
 
-    They are in the plane "ground" at the labelled positions, with the labelled boxes if there are any. Without
-    positions they are in the plane "image", at the centres of the boxes.
+    They are in the plane "ground" at the labelled positions, m, with the labelled boxes if there are any. Without
+    positions they are in the plane "image", at the centres of the boxes, px. Labels without both are an AssertionError.
     """
     score = np.ones(len(truth.id))
     if truth.pos is not None:
@@ -43,7 +45,12 @@ def perfect(truth: FrameTruth) -> Detections:
 
 
 def _sensed(truth: Truth, sequence: Sequence, sensor: Mapping[str, Any], seed: int) -> Iterator[Detections]:
-    """The detections of a sensor with these settings."""
+    """Returns an iterator over the detections, one per frame, of a sensor with these settings (keys of a scenario's
+    [sensor]).
+
+    Settings left out have the value of a perfect sensor. Raises InputError if a key is unknown, a value is wrong or a
+    group that is to be hidden is not in the script.
+    """
     from pydantic import ValidationError
 
     from scenarios.schema.sensor import Sensor
