@@ -60,7 +60,7 @@ def crossings(pos: Array, vel: Array, present: Bools, group: Ints, fps: float) -
 def _portions(met: Encounters, margin: int) -> Iterator[Encounters]:
     """Yields the encounters in portions, so that the frames of a portion add up to about ROWS (500,000).
 
-    `margin` frames before and after each encounter count, too. frames: length of the recording, unused.
+    `margin` frames before and after each encounter count, too.
     """
     total = np.cumsum(met.last - met.first + 1 + 2 * margin)
     return (met[total // ROWS == k] for k in np.unique(total // ROWS))

@@ -287,7 +287,10 @@ def squashed(statistic: Statistic, value: float) -> float:
 
 
 def table() -> str:
-    """Returns the statistics as a Markdown table (number from 0, name, value of 0.5, meaning) for docs/reference/environment.md."""
+    """Returns the statistics as the Markdown table of docs/reference/environment.md.
+
+    Columns: number from 0, name, value that is shown as 0.5, meaning.
+    """
     lines = [
         f"| {k} | `{s.name}` | {'share' if s.half is None else f'{s.half:g} {s.unit}'.strip()} | {s.meaning} |"
         for k, s in enumerate(STATISTICS)
