@@ -26,7 +26,7 @@ REACH = 1.1
 
 
 class PairMoment(NamedTuple):
-    """Two groups a and b at one time.
+    """Two groups a and b at one time; a has the smaller id.
 
     t: s. difference (2,): centroid of b less that of a, m on the ground. middle (2,): point half-way between the
     centroids, in the unit of the points. gap: distance of their nearest people, m; negative if, from pixels, they
