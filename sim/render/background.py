@@ -31,8 +31,9 @@ MATERIALS = 0  # key of the random role "texture"; people have the keys from 1 o
 class PixelGeometry:
     """What each pixel's centre shows of the empty scene.
 
-    depth (H, W) m along the optical axis, inf for sky. kind (H, W): NOTHING … RISER of `sim.scene.raycast`. place
-    (H, W, 3): world coordinates, m.
+    depth (H, W)      float32: m along the optical axis; inf for sky
+    kind (H, W)       uint8: NOTHING (sky), GROUND, WALL, PILLAR, TREAD or RISER of `sim.scene.raycast`
+    place (H, W, 3)   float32: x, y, z in m in the world; 1e9 for sky
     """
 
     depth: Floats
@@ -42,10 +43,11 @@ class PixelGeometry:
 
 @dataclass(frozen=True)
 class EmptyScene:
-    """The painted empty scene.
+    """The painted empty scene, float32; each number is a mean over the pixel.
 
-    colour (H, W, 3) BGR: lit, in grey levels. direct (H, W): share of direct sun in the light of each pixel. plants
-    (H, W): share of each pixel that shows plants.
+    colour (H, W, 3)   BGR in grey levels, lit, without plants' sway and noise
+    direct (H, W)      share of direct sun in the pixel's light, 0 to 1; 0 for sky
+    plants (H, W)      share of the pixel that shows plants, 0 to 1
     """
 
     colour: Floats
@@ -54,7 +56,7 @@ class EmptyScene:
 
 
 def trace_geometry(camera: Camera, scene: Scene) -> PixelGeometry:
-    """Return what the centre of each pixel shows of the empty scene."""
+    """Return the PixelGeometry of the empty scene: what the centre of each pixel shows. Lens distortion is ignored."""
     from sim.render.background_kernels import trace_pixels
 
     width, height = camera.image
@@ -74,9 +76,10 @@ def paint_empty_scene(
     seed: int,
     repeat: int = 0,
 ) -> EmptyScene:
-    """Return the colours of the empty scene under steady light, with unmoved plants.
+    """Return the EmptyScene, colours of the empty scene under steady light, with unmoved plants.
 
-    texture: contrast of the patterns, 0 to 1. seed, repeat: draw the materials.
+    texture: contrast of the patterns, 0 to 1. plants: None for none. seed, repeat (number of the suite entry's copy, 0
+    without copies): draw the materials. Lens distortion is ignored. Raises ValueError for a negative seed.
     """
     from sim.render.background_kernels import paint_pixels
 

@@ -28,7 +28,11 @@ POINT, NORMAL, SPARE, BLOCKED = range(4)  # rows of the scratch `more`
 
 @njit(cache=True)
 def _tint(base, brightness, warmth, out):  # type: ignore[no-untyped-def]
-    """Set out (3,) to a palette colour (BGR) made brighter and warmer by these shares."""
+    """Set out (3,) to a palette colour base (3,), BGR, made brighter and warmer by these shares; colours are not below
+    0.
+
+    brightness: 0.1 raises all three by 10 %. warmth: 0.1 raises red and lowers blue by 10 %. Returns nothing.
+    """
     out[0] = base[0] * max(0.0, 1 + brightness - warmth)
     out[1] = base[1] * max(0.0, 1 + brightness)
     out[2] = base[2] * max(0.0, 1 + brightness + warmth)
@@ -36,9 +40,12 @@ def _tint(base, brightness, warmth, out):  # type: ignore[no-untyped-def]
 
 @njit(cache=True)
 def _ground(x, y, size, footprint, style, palette, key, out):  # type: ignore[no-untyped-def]
-    """Set out (3,) to the colour of the ground at (x, y) m: paving inside the world, grass outside, plants over both.
+    """Set out (3,) to the colour (BGR, grey levels) of the ground at (x, y) m under full light.
 
-    Returns whether it is grass, and the share covered by plants. The border of the paving is ragged.
+    It is paving inside the world with a ragged border, grass outside, plants over both. Returns whether it is grass
+    (bool), and the share covered by plants, 0 to 1. size (2,): of the world, m. footprint: size of the pixel on the
+    ground, m. style (4,): CONTRAST, SLAB_WIDTH, PLANT_KEY, PLANT_LEVEL. palette (6, 3): rows GREY … SKY. key: of the
+    patterns.
     """
     contrast, slab = style[CONTRAST], style[SLAB_WIDTH]
     outside = max(max(-x, x - size[0]), max(-y, y - size[1])) - 1.0 + 0.3 * value_noise(x, y, key + 90)
@@ -62,7 +69,11 @@ def _ground(x, y, size, footprint, style, palette, key, out):  # type: ignore[no
 
 @njit(cache=True)
 def _upright(kind, along, z, footprint, contrast, palette, key, out):  # type: ignore[no-untyped-def]
-    """Set out (3,) to the colour of a wall (bricks with a skirting), or of a pillar or step (stone)."""
+    """Set out (3,) to the colour (BGR, grey levels) of a wall (bricks with a skirting), or of a pillar or step (stone).
+
+    kind: WALL, PILLAR, TREAD or RISER. along, z: place on the surface, m. footprint: size of the pixel on the surface,
+    m. contrast: 0 to 1. palette (6, 3): rows GREY … SKY. key: of the patterns. Returns nothing.
+    """
     fine = grain(along, z, key + 60, footprint, 0.6)
     if kind == WALL:
         tile = slabs(along, z, 0.5, 0.25, 0.012, key + 61, footprint)
@@ -76,7 +87,11 @@ def _upright(kind, along, z, footprint, contrast, palette, key, out):  # type: i
 
 @njit(cache=True)
 def _sky(d, key, palette, out):  # type: ignore[no-untyped-def]
-    """Set out (3,) to the colour of the sky in direction d: clouded, brighter towards the horizon."""
+    """Set out (3,) to the colour (BGR, grey levels) of the sky in direction d (3,): clouded, brighter towards the
+    horizon.
+
+    d: in the world, of any length. key: of the clouds. palette (6, 3): its row SKY counts. Returns nothing.
+    """
     length = np.sqrt(d[0] * d[0] + d[1] * d[1] + d[2] * d[2])
     up = max(d[2] / length, 0.0)
     x, y = d[0] / (d[2] + 0.1 * length), d[1] / (d[2] + 0.1 * length)
@@ -86,7 +101,11 @@ def _sky(d, key, palette, out):  # type: ignore[no-untyped-def]
 
 @njit(cache=True)
 def _sunlit(point, normal, sun, penumbra, solids, spare, hit):  # type: ignore[no-untyped-def]
-    """Return the share, out of four points across the penumbra, from which no solid thing hides the sun."""
+    """Return the share, 0 to 1, of four points across the penumbra from which no solid thing hides the sun.
+
+    point, normal (3,): place in m and unit normal of the surface. sun (3,): unit vector to the sun. penumbra: width of
+    a shadow's soft edge, m. spare, hit (6,): scratch, overwritten. 1 without solids.
+    """
     if len(solids.walls) + len(solids.pillars) + len(solids.flights) == 0:
         return 1.0
     share = 0.0
@@ -103,7 +122,8 @@ def _sunlit(point, normal, sun, penumbra, solids, spare, hit):  # type: ignore[n
 def trace_pixels(origin, direction, solids, depth, kind, place):  # type: ignore[no-untyped-def]
     """Set depth (H, W), kind (H, W) and place (H, W, 3) to what each pixel's centre shows; see `PixelGeometry`.
 
-    origin, direction (3, 3): of PixelRays. The place of sky is 1e9.
+    origin, direction (3, 3): of PixelRays. solids: a `raycast.Solids`. depth is in m along the optical axis, inf for
+    sky. place is in m; that of sky is 1e9. Returns nothing.
     """
     height, width = depth.shape
     o, d, hit = np.empty(3), np.empty(3), np.empty(HIT_SLOTS)
@@ -121,10 +141,11 @@ def trace_pixels(origin, direction, solids, depth, kind, place):  # type: ignore
 def _point_colour(  # type: ignore[no-untyped-def]
     x, y, rays, scale, sun, shadow, penumbra, solids, size, style, palette, key, o, d, hit, more, out
 ):
-    """Set out (3,) to the colour seen through the image point (x, y).
+    """Set out (3,) to the colour (BGR, grey levels) seen through the image point (x, y) px.
 
-    Returns the share of direct sun in its light, the share covered by plants, and a number that is equal for points of
-    one surface lit alike. o, d, hit, more (4, 6): scratch; the other arguments as for `paint_pixels`.
+    Returns the share of direct sun in its light, the share covered by plants (both 0 to 1), and a whole number that is
+    equal for points of one surface lit alike. For sky they are 0, 0, 0. o, d (3,), hit (6,), more (4, 6): scratch,
+    overwritten. The other arguments are as for `paint_pixels`.
     """
     at_pixel(rays[0], x, y, o)
     at_pixel(rays[1], x, y, d)
@@ -163,12 +184,13 @@ def _point_colour(  # type: ignore[no-untyped-def]
 def paint_pixels(  # type: ignore[no-untyped-def]
     rays, scale, sun, shadow, penumbra, solids, size, style, palette, key, colour, direct, plants
 ):
-    """Set colour (H, W, 3), direct (H, W) and plants (H, W) of the empty scene; see `background.EmptyScene`.
+    """Set colour (H, W, 3) BGR in grey levels, direct (H, W) and plants (H, W) of the empty scene; see `EmptyScene`.
 
     A pixel takes the ray through its centre, as patterns are no finer than pixels. Where surfaces meet, it takes the
-    mean of 2 x 2 rays. rays: origin and direction (3, 3) of PixelRays; scale: see `raycast.signed_scale`; sun (3,):
-    unit vector to the sun; shadow: its share of the light; penumbra m; size (2,) m: of the world; style (4,): slots
-    CONTRAST … PLANT_LEVEL; palette (6, 3): rows GREY … SKY; key: of the random patterns.
+    mean of 2 x 2 rays. rays: origin and direction, each (3, 3), of PixelRays. scale: see `raycast.signed_scale`. sun
+    (3,): unit vector to the sun. shadow: the sun's share of the light, 0 to 1. penumbra: width of a shadow's soft edge,
+    m. solids: a `raycast.Solids`. size (2,) m: of the world. style (4,): CONTRAST, SLAB_WIDTH (m), PLANT_KEY,
+    PLANT_LEVEL (inf without plants). palette (6, 3): rows GREY … SKY. key: of the random patterns. Returns nothing.
     """
     height, width = direct.shape
     o, d, hit, more, c = np.empty(3), np.empty(3), np.empty(HIT_SLOTS), np.empty((4, HIT_SLOTS)), np.empty(3)

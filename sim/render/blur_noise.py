@@ -24,7 +24,10 @@ LONGEST = 3 * 8192  # numbers that a row may need: 3 colours, the widest image
 
 
 def blur_weights(sd: float) -> NDArray[np.float32]:
-    """Return the weights (2 r + 1,) of a Gaussian blur with a standard deviation of `sd` px; (1,) if sd is 0."""
+    """Return the weights (2 r + 1,) float32, sum 1, of a Gaussian blur with a standard deviation of `sd` px, 0 or more.
+
+    The radius r is 3 sd, rounded up. The result is [1] if sd is 0.
+    """
     radius = int(np.ceil(3 * sd))
     x = np.arange(-radius, radius + 1)
     weights = np.exp(-0.5 * (x / sd) ** 2) if radius else np.ones(1)
@@ -33,13 +36,19 @@ def blur_weights(sd: float) -> NDArray[np.float32]:
 
 @cache
 def _normals() -> NDArray[np.float32]:
-    """The pool (POOL + LONGEST,) of standard normals; its beginning is repeated at the end. The same for all seeds."""
+    """Return the pool (POOL + LONGEST,) float32 of standard normals; its beginning is repeated at the end.
+
+    It is the same for all seeds, and kept.
+    """
     normals = rng(0, "noise").standard_normal(POOL, dtype=np.float32)
     return np.concatenate([normals, normals[:LONGEST]])
 
 
 def noise_pool(sd: float, unit: float) -> NDArray[np.int16]:
-    """Return the pool of normal numbers with standard deviation `sd` grey levels, times `unit`, rounded to int16."""
+    """Return a pool (POOL + LONGEST,) int16 of normal numbers with standard deviation `sd` grey levels, times `unit`.
+
+    They are rounded, and clipped to the range of int16. The pool is the same for all seeds.
+    """
     return np.asarray(np.clip(np.rint(_normals() * np.float32(sd * unit)), -32768, 32767), np.int16)
 
 
@@ -49,8 +58,10 @@ def _offsets_of_frames(rows: int, seed: int, side: int, draw: int, repeat: int) 
 
 
 def noise_offsets(rows: int, seed: int, side: int, frame: int, repeat: int = 0) -> Ints:
-    """Return where in the pool each row (rows,) of a frame's noise begins.
+    """Return the index in the noise pool, 0 to POOL - 1, at which the noise of each image row begins: (rows,) int64.
 
-    side: 0 the left camera, 1 the right one. frame: number of the frame, background frames included.
+    side: 0 the left camera, 1 the right one. frame: number of the frame, background frames included, from 0 on. seed,
+    repeat (number of the suite entry's copy, 0 without copies): name the random stream. Raises ValueError if seed, side
+    or frame is negative.
     """
     return np.asarray(_offsets_of_frames(rows, seed, side, frame // FRAMES_PER_DRAW, repeat)[frame % FRAMES_PER_DRAW])

@@ -16,14 +16,15 @@ ONE, GREY = np.float32(1.0), np.float32(1.0 / (MID_GREY * UNIT))
 
 @njit(cache=True)
 def _add_line(line, weight, many, out):  # type: ignore[no-untyped-def]
-    """Add weight times a line to out (many,)."""
+    """Add weight times the first `many` numbers of line to out (many,), in place."""
     for i in range(many):
         out[i] += weight * np.float32(line[i])
 
 
 @njit(cache=True)
 def _blur_five_lines(a, b, c, d, e, w, x, y, many, out):  # type: ignore[no-untyped-def]
-    """Set out (many,) to the blur of radius 2, the usual one: w, x, y, x, w times five lines."""
+    """Set out (many,) to the blur of radius 2, the usual one: w a + x b + y c + x d + w e for five lines a to e
+    (many,)."""
     for i in range(many):
         out[i] = (
             w * (np.float32(a[i]) + np.float32(e[i])) + x * (np.float32(b[i]) + np.float32(d[i])) + y * np.float32(c[i])
@@ -32,7 +33,10 @@ def _blur_five_lines(a, b, c, d, e, w, x, y, many, out):  # type: ignore[no-unty
 
 @njit(cache=True)
 def _with_noise(x, grain, read, slope):  # type: ignore[no-untyped-def]
-    """Return the grey level (uint8) of canvas value x with noise: `grain` times sqrt(read + slope x)."""
+    """Return the grey level (uint8, 0 to 255) of canvas value x (grey level times UNIT) with noise.
+
+    The noise is `grain`, a number of the pool, times sqrt(read + slope x). The level is rounded and clipped.
+    """
     x = (x + np.float32(grain) * np.sqrt(read + slope * x)) * SCALE + HALF
     x = x if x > LOW else LOW
     return np.uint8(np.int32(x if x < HIGH else HIGH))
@@ -40,7 +44,11 @@ def _with_noise(x, grain, read, slope):  # type: ignore[no-untyped-def]
 
 @njit(cache=True)
 def _show_line(line, gain, grain, shot, many, out):  # type: ignore[no-untyped-def]
-    """Set out (many,) uint8 to gain times a line plus noise; the share `shot` of its variance grows with brightness."""
+    """Set out (many,) uint8 to gain times a line of canvas values plus noise, as grey levels, clipped to 0 … 255.
+
+    grain (many,): numbers of the noise pool. gain: one number. shot: share of the noise's variance that grows with
+    brightness, 0 to 1.
+    """
     read, slope = ONE - shot, shot * GREY
     for i in range(many):
         out[i] = _with_noise(np.float32(line[i]) * gain, grain[i], read, slope)
@@ -48,7 +56,11 @@ def _show_line(line, gain, grain, shot, many, out):  # type: ignore[no-untyped-d
 
 @njit(cache=True)
 def _show_line_by_gains(line, gain, grain, shot, many, out):  # type: ignore[no-untyped-def]
-    """As `_show_line`, with one gain (many,) for each number."""
+    """Set out (many,) uint8 to a line of canvas values times gain (many,) plus noise, as grey levels, clipped to 0 …
+    255.
+
+    grain (many,): numbers of the noise pool. shot: share of the noise's variance that grows with brightness, 0 to 1.
+    """
     read, slope = ONE - shot, shot * GREY
     for i in range(many):
         out[i] = _with_noise(np.float32(line[i]) * gain[i], grain[i], read, slope)
@@ -56,7 +68,10 @@ def _show_line_by_gains(line, gain, grain, shot, many, out):  # type: ignore[no-
 
 @njit(cache=True)
 def brightness_row(nodes, step, v, width, out):  # type: ignore[no-untyped-def]
-    """Set out (W * 3,) to the brightness of row v, linear between the nodes (J, I) at every `step`-th pixel."""
+    """Set out (W * 3,) to the brightness of image row v, three equal numbers per pixel, linear between nodes.
+
+    nodes (J, I): brightness at every `step`-th pixel, at least 2 x 2; the first node is at (0, 0) px. width: W.
+    """
     y = (v + np.float32(0.5)) / np.float32(step)
     j = min(int(y), nodes.shape[0] - 2)
     b = np.float32(y - j)
@@ -70,8 +85,9 @@ def brightness_row(nodes, step, v, width, out):  # type: ignore[no-untyped-def]
 
 @njit(cache=True)
 def _blur_block(canvas, top, left, rows, cols, weights, edge, wide, out):  # type: ignore[no-untyped-def]
-    """Set out (rows, cols * 3) to the blur of the block at (top, left); image edges are repeated.
+    """Set out (rows, cols * 3) to the blur of the block of rows x cols px at row `top`, column `left` of a canvas.
 
+    canvas (H, W * 3) int16; pixels beyond its edges repeat the edge. weights (2 r + 1,): the same across and down.
     edge, wide: scratch, a padded line, and lines blurred across.
     """
     height, width = canvas.shape[0], canvas.shape[1] // 3
@@ -105,7 +121,10 @@ def _blur_block(canvas, top, left, rows, cols, weights, edge, wide, out):  # typ
 
 @njit(cache=True)
 def _scratch(radius, width):  # type: ignore[no-untyped-def]
-    """Return scratch for `_blur_block`: edge, wide, and a block of lines for its result."""
+    """Return scratch arrays for `_blur_block` in an image `width` px wide: edge, wide, and TILE_H lines for its result.
+
+    radius: of the blur, px. Their contents are not set.
+    """
     return (
         np.empty(3 * (width + 2 * radius), np.int16),
         np.empty((TILE_H + 2 * radius, 3 * width), np.float32),
@@ -115,7 +134,10 @@ def _scratch(radius, width):  # type: ignore[no-untyped-def]
 
 @njit(cache=True)
 def blur_all(canvas, weights, out):  # type: ignore[no-untyped-def]
-    """Set out (H, W * 3) int16 to the blur of the whole canvas (H, W * 3) int16 with weights (2 r + 1,)."""
+    """Set out (H, W * 3) int16 to the blur of the whole canvas (H, W * 3) int16 with weights (2 r + 1,), rounded.
+
+    Pixels beyond the image's edges repeat the edge. The canvas is not changed. Returns nothing.
+    """
     height, width = canvas.shape[0], canvas.shape[1] // 3
     edge, wide, tile = _scratch(len(weights) // 2, width)
     for top in range(0, height, TILE_H):
@@ -128,12 +150,13 @@ def blur_all(canvas, weights, out):  # type: ignore[no-untyped-def]
 
 @njit(cache=True)
 def finish_image(canvas, empty, dirty, weights, nodes, step, noise, shot, offsets, out):  # type: ignore[no-untyped-def]
-    """Set out (H, W * 3) uint8 to the image: the blurred canvas times brightness, plus noise.
+    """Set out (H, W * 3) uint8 to the image: the blurred canvas times brightness, plus noise. Returns nothing.
 
-    canvas (H, W * 3) int16: the sharp scene, of which only dirty tiles and their surroundings are read. empty
-    (H, W * 3) int16: the blurred empty scene, for clean tiles. dirty: marks of tiles. weights (2 r + 1,): of the blur.
-    nodes (J, I): brightness at every `step`-th pixel, or (1, 1) if it is the same everywhere. noise (n,) int16: the
-    pool; row v reads it from offsets[v] on. shot: share of shot noise.
+    canvas (H, W * 3) int16, grey levels times UNIT: the sharp scene, of which only dirty tiles and their surroundings
+    are read. empty (H, W * 3) int16: the blurred empty scene, for clean tiles. dirty (rows, columns): 1 for tiles of 8
+    x 16 px to blur anew. weights (2 r + 1,): of the blur. nodes (J, I): brightness at every `step`-th pixel, or (1, 1)
+    if it is the same everywhere. noise (n,) int16: the pool; row v reads it from offsets[v] on. shot: share of the
+    noise's variance that grows with brightness, 0 to 1.
     """
     height, width = canvas.shape[0], canvas.shape[1] // 3
     edge, wide, tile = _scratch(len(weights) // 2, width)

@@ -27,7 +27,8 @@ OCCLUDER = -2  # id of walls and pillars in id maps
 class CameraView:
     """The empty scene as one camera sees it. Each part is computed when first needed, and kept.
 
-    State: besides these constants, the canvases that were returned and are ready for the next frame.
+    Also gives brightness and wind in the image at any time. plants is None without plants. State: besides these
+    constants, the canvases that were returned and are ready for the next frame.
     """
 
     def __init__(
@@ -40,7 +41,11 @@ class CameraView:
         self._spare: list[FrameCanvas] = []
 
     def take_canvas(self) -> FrameCanvas:
-        """Return a canvas that shows the empty scene: one that was returned, or a new one."""
+        """Return a FrameCanvas that shows the empty scene, not shaded, all tiles clean: one given back before, or a new
+        one.
+
+        The caller may draw on it, and gives it back with `return_canvas`.
+        """
         if self._spare:
             return self._spare.pop()
         size = self.height, self.width
@@ -48,7 +53,10 @@ class CameraView:
         return FrameCanvas(self.empty_canvas.copy(), self.geometry.depth.copy(), np.zeros(size, np.uint8), dirty)
 
     def return_canvas(self, canvas: FrameCanvas) -> None:
-        """Restore a canvas to the empty scene, and keep it for the next frame."""
+        """Restore the dirty tiles of a canvas to the empty scene, and keep it for a later `take_canvas`.
+
+        The canvas must come from this view, and the caller must not use it any more. Returns nothing.
+        """
         from sim.render.canvas_kernels import restore
 
         flat = self.height, 3 * self.width
@@ -58,23 +66,23 @@ class CameraView:
 
     @cached_property
     def geometry(self) -> PixelGeometry:
-        """What the centre of each pixel shows."""
+        """The PixelGeometry of the empty scene: depth, kind of surface and place seen at the centre of each pixel."""
         return trace_geometry(self.camera, self.motion.scene)
 
     @cached_property
     def empty_scene(self) -> EmptyScene:
-        """The painted empty scene."""
+        """The painted EmptyScene under steady light, with unmoved plants: colour, shares of sun and of plants."""
         m = self.motion
         return paint_empty_scene(self.camera, m.scene, self.light, self.picture.texture, self.plants, m.seed, m.repeat)
 
     @cached_property
     def empty_canvas(self) -> NDArray[np.int16]:
-        """(H, W, 3): grey levels of the empty scene times UNIT, not blurred."""
+        """Colours (H, W, 3) BGR of the empty scene as int16: grey levels times UNIT (64), not blurred."""
         return np.asarray(np.clip(np.rint(self.empty_scene.colour * np.float32(UNIT)), 0, MOST), np.int16)
 
     @cached_property
     def blurred_canvas(self) -> NDArray[np.int16]:
-        """(H, W, 3): `empty_canvas` blurred by the lens."""
+        """Colours (H, W, 3) BGR of the empty scene as int16: grey levels times UNIT (64), blurred."""
         from sim.render.blur_noise_kernels import blur_all
 
         out, flat = np.empty_like(self.empty_canvas), (self.height, 3 * self.width)
@@ -87,19 +95,21 @@ class CameraView:
         return np.where(solid, OCCLUDER, 0).astype(np.int64) if solid.any() else None
 
     def empty_ids(self) -> NDArray[np.int64]:
-        """Return a new id map (H, W) of the empty scene: OCCLUDER where a wall or pillar shows, else 0."""
+        """Return a new id map (H, W) int64 of the empty scene: OCCLUDER (-2) where a wall or pillar shows, else 0."""
         return np.zeros((self.height, self.width), np.int64) if self._occluders is None else self._occluders.copy()
 
     @cached_property
     def level(self) -> bool:
-        """True if shadows can fall on nothing but the ground at z = 0."""
+        """True if the image shows nothing but level ground and sky, so that shadows fall only on z = 0."""
         return bool(((self.geometry.kind == GROUND) | (self.geometry.kind == NOTHING)).all())
 
     @cached_property
     def _nodes(self) -> tuple[Array, Array]:
-        """Ground points (J * I, 2) m at every NODE_STEP-th pixel, and the half size (J * I,) m of the ground around.
+        """Ground points (J * I, 2), x and y in m, at every 16th pixel, and the half size (J * I,) in m of the ground
+        around each.
 
-        The size is inf where a node sees no ground; fields smoothed by it vanish there.
+        The J rows of I nodes run from (0, 0) px to the image's edges or beyond. The size is inf where a node sees no
+        ground; fields smoothed by it vanish there.
         """
         u, v = np.meshgrid(*(np.arange(-(-n // NODE_STEP) + 1) * float(NODE_STEP) for n in (self.width, self.height)))
         uv1 = np.stack([u.ravel(), v.ravel(), np.ones(u.size)])
@@ -112,7 +122,7 @@ class CameraView:
         return (o + t * d)[:2].T, spread
 
     def _grid(self, field: Array) -> NDArray[np.float32]:
-        """Values at the nodes (J * I,) as a grid (J, I)."""
+        """Return the values (J * I,) at the nodes as a float32 grid (J, I), row by row."""
         return field.reshape(-(-self.height // NODE_STEP) + 1, -1).astype(np.float32)
 
     @cached_property
@@ -120,9 +130,10 @@ class CameraView:
         return self.light.clouds.sampled(*self._nodes)
 
     def brightness(self, t: float, key: int) -> NDArray[np.float32]:
-        """Return the brightness at time t (s) at the nodes (J, I); (1, 1) if it is the same everywhere.
+        """Return the brightness, a factor about 1, at time t (s) at the nodes (J, I), which are 16 px apart.
 
-        key: number of the frame, see `Illumination.gain`.
+        It is (1, 1) if the brightness is the same everywhere. key: number of the frame, background frames included,
+        which names the random stream of the flicker (see `Illumination.gain`).
         """
         gain = self.light.gain(t, key)
         if self.light.clouds.amplitude == 0:
@@ -137,14 +148,17 @@ class CameraView:
         return across, down
 
     def wind(self, t: float) -> NDArray[np.float32]:
-        """Return the sway of plants at time t (s) at the nodes, (2, J, I): px across, px down."""
+        """Return the sway of plants at time t (s) at the nodes, (2, J, I): px across, px down. Nodes are 16 px apart.
+
+        It is 0 where a node sees no ground. Raises AssertionError if the view has no plants.
+        """
         assert self.plants is not None
         strength = self.plants.strength(t)
         return np.stack([self._grid(strength * field.at(t)) for field in self._sway])
 
     @cached_property
     def plant_runs(self) -> Ints:
-        """(S, 3): row, first column, last column + 1 of each run of pixels that show plants."""
+        """Runs of pixels that show plants, (S, 3) int64: row, first column, last column + 1; (0, 3) without plants."""
         shown = np.pad(self.empty_scene.plants > 0, ((0, 0), (1, 1))).astype(np.int8)
         row, edge = np.nonzero(np.diff(shown, axis=1))
         return np.column_stack([row[::2], edge[::2], edge[1::2]])

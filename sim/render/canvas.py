@@ -21,10 +21,12 @@ RUN_ROW, RUN_FIRST, RUN_END = range(3)  # columns of runs of pixels: row, first 
 
 @dataclass(frozen=True, eq=False)
 class FrameCanvas:
-    """What one frame of one view is drawn on; at first the empty scene.
+    """What one frame of one view is drawn on; at first the empty scene. The arrays are changed by drawing.
 
-    colour (H, W, 3) int16: grey levels times UNIT. depth (H, W) float32 m. shaded (H, W) uint8: 255 times the share of
-    the direct sun that people's shadows take. dirty (rows, columns) uint8: 1 for tiles in which any of these changed.
+    colour (H, W, 3)        int16, BGR: grey levels times UNIT (64)
+    depth (H, W)            float32: m along the optical axis, inf for sky
+    shaded (H, W)           uint8: 255 times the share of the direct sun that people's shadows take
+    dirty (rows, columns)   uint8: 1 for tiles of 8 x 16 px in which any of these changed, or near which colour did
     """
 
     colour: NDArray[np.int16]

@@ -11,7 +11,10 @@ from sim.scene.body import XX, XY, YY
 
 @njit(cache=True, error_model="numpy")
 def ellipse_row(y, a, b, d):  # type: ignore[no-untyped-def]
-    """Return the ends x0 <= x1 of row y of the ellipse a x² + 2 b x y + d y² <= 1; x0 > x1 if the row misses it."""
+    """Return the ends x0 <= x1 of row y of the ellipse a x² + 2 b x y + d y² <= 1, measured from its centre.
+
+    The result is (1, -1), x0 > x1, if the row misses the ellipse, or for nan.
+    """
     root = b * b * y * y - a * (d * y * y - 1.0)
     if not (root >= 0.0 and a > 0.0):
         return 1.0, -1.0
@@ -21,9 +24,11 @@ def ellipse_row(y, a, b, d):  # type: ignore[no-untyped-def]
 
 @njit(cache=True, error_model="numpy")
 def outline_columns(v, i, e, middle, inverse, width):  # type: ignore[no-untyped-def]
-    """Return the first column and the last column + 1 of row v whose pixel centres lie in an outline and in the image.
+    """Return the first column and the last column + 1 of image row v whose pixel centres lie in an outline and in the
+    image.
 
-    The outline is part e of person i: middle (N, 2, 2) px, inverse (N, 2, 3) packed. (0, 0) if there are none.
+    The outline is part e (0 body, 1 head) of person i: middle (N, 2, 2) px, inverse (N, 2, 3) packed as entries 11, 12,
+    22. width: of the image, px. The two numbers are equal if there are no such pixels.
     """
     x0, x1 = ellipse_row(v + 0.5 - middle[i, e, 1], inverse[i, e, XX], inverse[i, e, XY], inverse[i, e, YY])
     if x0 > x1:
@@ -34,7 +39,12 @@ def outline_columns(v, i, e, middle, inverse, width):  # type: ignore[no-untyped
 
 @njit(cache=True)
 def mark_dirty(dirty, v, left, right, margin, height, width):  # type: ignore[no-untyped-def]
-    """Mark the tiles that hold columns left … right - 1 of row v, or pixels at most `margin` px away from them."""
+    """Set to 1 the tiles of `dirty` that hold columns left … right - 1 of row v, or pixels at most `margin` px away
+    from them.
+
+    dirty (rows, columns): one number per tile of 8 x 16 px. height, width: of the image, px. Nothing is marked if right
+    <= left. Returns nothing.
+    """
     if right > left:
         first, last = max(left - margin, 0) // TILE_W, (min(right + margin, width) - 1) // TILE_W
         for r in range(max(v - margin, 0) // TILE_H, min(v + margin, height - 1) // TILE_H + 1):
@@ -50,9 +60,11 @@ def _copy(line, many, out):  # type: ignore[no-untyped-def]
 
 @njit(cache=True)
 def restore(dirty, empty_colour, empty_depth, colour, depth, shaded):  # type: ignore[no-untyped-def]
-    """Restore the dirty tiles of a canvas to the empty scene, shaded to 0, and mark all tiles clean.
+    """Restore the dirty tiles of a canvas to the empty scene, set `shaded` to 0 there, and mark all tiles clean, in
+    place.
 
-    empty_colour, colour (H, W * 3); empty_depth, depth, shaded (H, W).
+    dirty (rows, columns): 1 for tiles of 8 x 16 px that changed. empty_colour, colour (H, W * 3). empty_depth, depth,
+    shaded (H, W). Clean tiles are not touched. Returns nothing.
     """
     height, width = depth.shape
     for j in range(dirty.shape[0]):

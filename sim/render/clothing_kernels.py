@@ -20,7 +20,11 @@ FINE = 3  # samples each way per texel
 
 @njit(cache=True)
 def _head(across, along, up, style):  # type: ignore[no-untyped-def]
-    """Return colour row and shade: hair on top and behind, down to HAIRLINE; a face with darker eyes and chin."""
+    """Return the colour row (HAIR or SKIN) and the shade, a factor up to 1, at a point of a head.
+
+    across: -1 left to 1 right. along: 1 front, -1 back. up: -1 to 1. style (6,): only its slot HAIRLINE counts. Hair is
+    on top and behind, down to the hairline; the face has darker eyes and chin.
+    """
     if up > style[HAIRLINE] - 0.5 * max(along, 0.0) + 0.5 or (along < 0.15 and up > -0.75):
         return HAIR, 1.0
     eyes = along > 0.6 and abs(up - 0.1) < 0.12 and 0.15 < abs(across) < 0.6
@@ -29,7 +33,12 @@ def _head(across, along, up, style):  # type: ignore[no-untyped-def]
 
 @njit(cache=True)
 def _body(across, along, up, round_, style, key):  # type: ignore[no-untyped-def]
-    """Return colour row and shade of a body; up is -1 at the ground and 1 at the neck, round_ in [0, 4)."""
+    """Return the colour row (SHOES, TROUSERS, SHIRT, SECOND or SKIN) and the shade, a factor up to 1, at a point of a
+    body.
+
+    across: -1 left to 1 right. along: 1 front, -1 back. up: -1 at the ground, 1 at the neck. round_: turn round the
+    body in [0, 4). style (6,): slots CUT, COUNT, HEM, HAIRLINE, LEG_GAP, ARM. key: of the patches.
+    """
     cut, hem, count, arm = int(style[CUT]), style[HEM], style[COUNT], style[ARM]
     if up < -0.9:
         return SHOES, 1.0
@@ -53,10 +62,12 @@ def _body(across, along, up, round_, style, key):  # type: ignore[no-untyped-def
 
 @njit(cache=True)
 def draw_page(style, key, colours, part, out):  # type: ignore[no-untyped-def]
-    """Set out (UP, ROUND, 3) to the colours (BGR) of a body or head; part: BODY_PART or HEAD_PART.
+    """Set out (UP, ROUND, 3), 64 x 64 texels, to the colours (BGR, grey levels) of a body or head, not clipped to 255.
 
-    style (6,): slots CUT … ARM. key: of its random patterns. colours (6, 3): rows SHOES … HAIR. Row j of a page is at
-    height up = -1 … 1, column i at the turn round_ = 0 … 4 round the body.
+    part: BODY_PART or HEAD_PART. style (6,): slots CUT, COUNT, HEM, HAIRLINE, LEG_GAP, ARM. key: of its random
+    patterns. colours (6, 3): rows SHOES, TROUSERS, SHIRT, SECOND, SKIN, HAIR. Row j of a page runs over the height up =
+    -1 … 1, column i over the turn round_ = 0 … 4 round the body. Each texel is a mean of 3 x 3 samples. Returns
+    nothing.
     """
     out[:] = 0.0
     for j in range(UP * FINE):

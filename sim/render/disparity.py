@@ -11,8 +11,12 @@ from sim.types import Array, Ints
 
 
 def empty_scene_disparities(left: CameraView, right: CameraView) -> Array:
-    """Return the disparities (H, W) px of the empty scene between two views; nan for sky and for points that only the
-    left camera sees."""
+    """Return the disparities (H, W) in px of the empty scene between the two views of a pair, at the left view's
+    pixels.
+
+    A disparity is u_left - u_right, above 0. It is nan for sky and for points that the right camera does not see:
+    outside its image on the left, or hidden by a solid thing.
+    """
     from sim.render import disparity_kernels as kernels
 
     out = np.empty((left.height, left.width))
@@ -31,10 +35,11 @@ def frame_disparities(
     in_left: ProjectedPeople,
     in_right: ProjectedPeople,
 ) -> Array:
-    """Return the disparities (H, W) px of a frame with people; nan as in `empty_scene_disparities`.
+    """Return the disparities (H, W) in px of a frame with people, at the left view's pixels, as a new array.
 
-    empty (H, W): disparities of the empty scene. canvas: the left view's, with people drawn. ids (H, W): person id
-    where a person is visible in the left view. in_left, in_right: the same people as each camera sees them.
+    nan for sky and for points that the right camera does not see. empty (H, W) px: disparities of the empty scene.
+    canvas: the left view's, with people drawn. ids (H, W): person id where a person is visible in the left view.
+    people: the N people of the frame. in_left, in_right: the same people as each camera sees them.
     """
     from sim.render import disparity_kernels as kernels
 
@@ -48,5 +53,5 @@ def frame_disparities(
 
 
 def _scale(left: CameraView, right: CameraView) -> float:
-    """Focal length times the distance of the two cameras, px m."""
+    """Return the horizontal focal length (px) times the distance of the two cameras (m), in px m."""
     return left.camera.focal_px[0] * float(np.linalg.norm(right.camera.position - left.camera.position))

@@ -16,10 +16,12 @@ SAME = 1e-3  # m: a point in front by less than this counts as the same point
 
 @njit(cache=True, error_model="numpy")
 def empty_scene_disparities(depth, scale, origin, direction, solids, out):  # type: ignore[no-untyped-def]
-    """Set out (H, W) px to the disparities of the empty scene, scale / depth.
+    """Set out (H, W) px to the disparities u_left - u_right of the empty scene, scale / depth, at the left camera's
+    pixels.
 
-    nan where the right camera does not see the point, and for sky. depth (H, W) m; scale: focal length times baseline,
-    px m; origin, direction (3, 3): PixelRays of the right camera.
+    nan where the right camera does not see the point, and for sky. depth (H, W) m: of the left view, inf for sky.
+    scale: focal length times baseline, px m. origin, direction (3, 3): PixelRays of the right camera. solids: a
+    `raycast.Solids`. Returns nothing.
     """
     height, width = depth.shape
     any_solid = len(solids.walls) + len(solids.pillars) + len(solids.flights) > 0
@@ -38,9 +40,10 @@ def empty_scene_disparities(depth, scale, origin, direction, solids, out):  # ty
 
 @njit(cache=True, error_model="numpy")
 def _part_is_before(x, i, e, start, step, row, z):  # type: ignore[no-untyped-def]
-    """Return True if the right camera's ray at column x meets part e of person i before depth z.
+    """Return True if the right camera's ray at column x meets part e of person i in front of depth z (m), by over 1 mm.
 
-    row (6,): what the image row adds to the ray's origin and direction in the part's axes.
+    start, step (N, 2, 3, 3): the right camera's matrices of ray origins and directions in the part's axes. row (6,):
+    what the image row adds to the ray's origin (first three) and direction (last three). e: 0 body, 1 head.
     """
     a = b = c = 0.0
     for k in range(3):
@@ -54,7 +57,12 @@ def _part_is_before(x, i, e, start, step, row, z):  # type: ignore[no-untyped-de
 
 @njit(cache=True, error_model="numpy")
 def _set_people(depth, ids, bounds, id, scale, right_depth, origin, direction, solids, out):  # type: ignore[no-untyped-def]
-    """Set the disparities of the pixels that show people; nan where solid things hide them from the right camera."""
+    """Set out (H, W) px to the disparity at the pixels that show people; other pixels are left. Returns nothing.
+
+    nan where the point is outside the right image, or solid things hide it from the right camera. depth (H, W) m, ids
+    (H, W), bounds (N, 4): of the left image, with people. id (N,). scale: focal length times baseline, px m.
+    right_depth (H, W) m: of the empty scene in the right view. origin, direction (3, 3): PixelRays of the right camera.
+    """
     width = depth.shape[1]
     any_solid = len(solids.walls) + len(solids.pillars) + len(solids.flights) > 0
     o, d, hit = np.empty(3), np.empty(3), np.empty(HIT_SLOTS)
@@ -79,12 +87,13 @@ def _set_people(depth, ids, bounds, id, scale, right_depth, origin, direction, s
 def add_people(  # type: ignore[no-untyped-def]
     depth, ids, bounds, id, scale, start, step, middle, inverse, nearest, right_depth, origin, direction, solids, out
 ):
-    """Add people to out (H, W) px, on entry the disparities of the empty scene.
+    """Add N people to out (H, W) px, on entry the disparities of the empty scene, at the left camera's pixels.
 
-    Pixels that people hide from the right camera become nan. depth, ids (H, W), bounds (N, 4), id (N,): of the left
-    image, with people. scale: focal length times baseline, px m. The rest is the right camera's: start, step, middle,
-    inverse, nearest (N, 2) m: see `people.ProjectedPeople`; right_depth (H, W) m: of the empty scene; origin, direction
-    (3, 3): PixelRays.
+    Pixels that people hide from the right camera become nan. depth (H, W) m, ids (H, W), bounds (N, 4) (first row, last
+    row + 1, first column, last column + 1), id (N,): of the left image, with people. scale: focal length times
+    baseline, px m. The rest is the right camera's: start, step (N, 2, 3, 3), middle (N, 2, 2), inverse (N, 2, 3),
+    nearest (N, 2) m: see `people.ProjectedPeople`; right_depth (H, W) m: of the empty scene; origin, direction (3, 3):
+    PixelRays; solids: a `raycast.Solids`. Returns nothing.
     """
     height, width = depth.shape
     row = np.empty(6)

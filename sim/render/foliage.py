@@ -30,10 +30,12 @@ PLACE, ACROSS, DOWN, STRENGTH = range(4)  # keys of the random role "wind"
 
 @dataclass(frozen=True, eq=False)
 class Foliage:
-    """The plants of a sequence.
+    """The plants of a sequence, and the wind that moves them.
 
-    key: of the pattern `texture_kernels.plant_pattern`; level: plants grow where the pattern is above it. sway: px
-    across and px down at a strength of 1. gusts: logarithm of the wind's strength.
+    key     key of the pattern `texture_kernels.plant_pattern`
+    level   plants grow where the pattern is above it, no unit
+    sway    two fields: movement in px across and px down at a strength of 1
+    gusts   field, the same everywhere: logarithm of the wind's strength
     """
 
     key: int
@@ -42,7 +44,8 @@ class Foliage:
     gusts: PlaneWaves
 
     def strength(self, t: float) -> float:
-        """Return the wind's strength at time t (s); its mean square over time is 1."""
+        """Return the wind's strength at time t (s), a factor above 0 on the plants' sway; its mean square over time is
+        1."""
         return float(np.exp(self.gusts.at_origin(t) - GUST**2))
 
 
@@ -50,7 +53,10 @@ def grow_plants(picture: Picture, camera: Camera, scene: Scene, seed: int, repea
     """Return the plants of this seed; None if their share is 0, or if no ground in view is near enough to show leaves.
 
     `picture.foliage` gives the share of this camera's image that plants cover. They cover less if less ground is near
-    enough. Places outside the world are preferred. Raises InputError if the drawn share is not between 0 and 1.
+    enough. Places outside the world are preferred. repeat: number of the suite entry's copy, 0 without copies.
+
+    Raises InputError if the drawn share is not between 0 and 1, ValueError if no draw lies within a distribution's clip
+    or the seed is negative.
     """
     source = rng(seed, "wind", PLACE, repeat=repeat)
     share = draw(picture.foliage, source)

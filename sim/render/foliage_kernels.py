@@ -14,11 +14,12 @@ from sim.scene.raycast_kernels import at_pixel, first_hit
 
 @njit(cache=True)
 def sample_plants(rays, scale, step, solids, size, key, pattern, cover):  # type: ignore[no-untyped-def]
-    """Sample the plant pattern at every `step`-th pixel of an image.
+    """Set pattern (J, I) and cover (J, I) to samples of the plant pattern at every `step`-th pixel of an image.
 
-    Sets pattern (J, I): `plant_pattern` on level ground, -inf elsewhere; and cover (J, I): share of the pixel that
-    plants would cover if they grew everywhere, 0 where leaves are too far away to show. rays: origin and direction
-    (3, 3); scale: see `raycast.signed_scale`; size (2,) m: of the world.
+    pattern: `plant_pattern` on level ground, -inf elsewhere. cover: share of the pixel, 0 to 1, that plants would cover
+    if they grew everywhere; 0 where leaves are too far away to show. rays: origin and direction, each (3, 3), of
+    PixelRays. scale: see `raycast.signed_scale`. solids: a `raycast.Solids`. size (2,) m: of the world. key: of the
+    pattern. Returns nothing.
     """
     o, d, hit = np.empty(3), np.empty(3), np.empty(HIT_SLOTS)
     for j in range(pattern.shape[0]):
@@ -37,7 +38,11 @@ def sample_plants(rays, scale, step, solids, size, key, pattern, cover):  # type
 
 @njit(cache=True)
 def _interpolate(nodes, x, y, k):  # type: ignore[no-untyped-def]
-    """Return nodes[k] (J, I) of nodes (K, J, I), bilinear at column x and row y of the grid."""
+    """Return the value of nodes[k] at column x and row y of its grid, bilinear between the nodes.
+
+    nodes (K, J, I): K grids of J rows and I columns. x, y: in node steps from 0; beyond the last node the value is
+    extrapolated.
+    """
     i, j = min(int(x), nodes.shape[2] - 2), min(int(y), nodes.shape[1] - 2)
     a, b = x - i, y - j
     low = nodes[k, j, i] * (1 - a) + nodes[k, j, i + 1] * a
@@ -46,11 +51,12 @@ def _interpolate(nodes, x, y, k):  # type: ignore[no-untyped-def]
 
 @njit(cache=True)
 def sway(empty, share, runs, nodes, step, colour, dirty, margin):  # type: ignore[no-untyped-def]
-    """Draw plants where wind has moved them: colour (H, W, 3) at pixel p is `empty` at p - share(p) * wind(p).
+    """Draw plants where wind has moved them: colour at pixel p becomes `empty` at p - share(p) * wind(p), bilinear.
 
-    empty (H, W, 3): canvas of the empty scene. share (H, W): share of each pixel that shows plants. runs (S, 3): row,
-    first column, last column + 1 of the pixels that show plants. nodes (2, J, I): wind, px across and down, at every
-    `step`-th pixel. dirty: tiles, marked `margin` px round the runs.
+    colour, empty (H, W, 3) int16: canvas to draw on and that of the empty scene. share (H, W): share of each pixel that
+    shows plants. runs (S, 3): row, first column, last column + 1 of the pixels that show plants; no others are drawn.
+    nodes (2, J, I): wind, px across and px down, at every `step`-th pixel. dirty: tiles, set to 1 up to `margin` px
+    round the runs. Places outside the image are moved to its edge. Returns nothing.
     """
     height, width = share.shape
     for s in range(len(runs)):

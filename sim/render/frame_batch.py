@@ -15,8 +15,12 @@ FRAMES = 16  # frames of a batch
 
 @dataclass(frozen=True, eq=False)
 class PeopleInView:
-    """People as one view sees them: projected; shadows, None if the light casts none; sunlit (N, 3), the share of the
-    sun at feet, waist and head."""
+    """N people as one camera view sees them.
+
+    projected        ProjectedPeople: rays and outlines of body and head
+    shadows          PeopleShadows; None if the light casts none
+    sunlit (N, 3)    share of the sun, 0 or 1, that solid things leave to feet, waist and head
+    """
 
     projected: ProjectedPeople
     shadows: PeopleShadows | None
@@ -24,9 +28,10 @@ class PeopleInView:
 
 
 class FrameBatch:
-    """The people of FRAMES consecutive frames of a Motion, among them frame `index` (from 1 on).
+    """The people of up to 16 (FRAMES) consecutive frames of a Motion, among them frame `index` (from 1 on).
 
-    State: all people of the batch, and what each view sees of them, computed when first asked for.
+    Batches begin at frames 1, 17, 33, …. `index in batch` tells whether a frame number belongs to it. State: all people
+    of the batch, and what each view sees of them, computed when first asked for.
     """
 
     def __init__(self, motion: Motion, light: Illumination, index: int) -> None:
@@ -44,11 +49,18 @@ class FrameBatch:
         return slice(int(self._starts[k]), int(self._starts[k + 1]))
 
     def people(self, index: int) -> DrawnPeople:
-        """Return the people of frame `index`."""
+        """Return the people of frame `index` (from 1 on), sorted by id; 0 rows if nobody is present.
+
+        The frame must belong to the batch. Raises IndexError if the Motion has no such frame.
+        """
         return take_rows(self._people, self._rows(index))
 
     def in_view(self, view: CameraView, side: int, index: int) -> PeopleInView:
-        """Return the people of frame `index` as a view sees them; `side` must always name the same view."""
+        """Return the people of frame `index` (from 1 on) as a view sees them, in the order of `people`.
+
+        side: number under which the view's results are kept; it must always name the same view. Shadows are None if the
+        light casts none. The frame must belong to the batch. Raises IndexError if the Motion has no such frame.
+        """
         if side not in self._views:
             light, people = self.light, self._people
             shadows = None

@@ -27,10 +27,14 @@ SUN, DRIFT, FLICKER, SWITCH, CLOUD = range(5)  # keys of the random role "light"
 class Illumination:
     """The light of one sequence.
 
-    sun (3,): unit vector to the sun. shadow: the sun's share of the light on level ground. penumbra: width of a
-    shadow's soft edge, m. drift, clouds: logarithm of brightness, the same everywhere and by place. flicker: standard
-    deviation of the logarithm from frame to frame. switches: (start s, end s, gain) each. seed, repeat: name the random
-    streams.
+    sun (3,)       unit vector to the sun, x, y, z
+    shadow         the sun's share of the light on level ground, 0 to 1; 0: people cast no shadows
+    penumbra       width of a shadow's soft edge, m
+    drift          slow changes of the logarithm of brightness, the same everywhere
+    clouds         patches of the logarithm of brightness that move over the ground
+    flicker        standard deviation of the logarithm of brightness from frame to frame
+    switches       sudden changes: (start s, end s, gain) each; gain is the factor of brightness from the end on
+    seed, repeat   name the random stream of the flicker
     """
 
     sun: Array
@@ -44,10 +48,11 @@ class Illumination:
     repeat: int
 
     def gain(self, t: float, key: int) -> float:
-        """Return the brightness at time t (s), clouds left out; about 1 before any switch.
+        """Return the factor of brightness at time t (s), clouds left out: about 1 before any switch, always above 0.
 
-        key: number of the frame, background frames included; it names the random stream of the flicker. The logarithm
-        of a switch's gain rises linearly from its start to its end.
+        It combines drift, flicker and switches. key: number of the frame, background frames included, 0 or more; it
+        names the random stream of the flicker. The logarithm of a switch's gain rises linearly from its start to its
+        end. Raises ValueError for a negative key if there is flicker.
         """
         log = self.drift.at_origin(t)
         if self.flicker > 0:
@@ -59,10 +64,12 @@ class Illumination:
 
 
 def draw_illumination(light: Light, seed: int, repeat: int = 0) -> Illumination:
-    """Return the light that a scenario's settings and this seed give.
+    """Return the Illumination that a scenario's light settings and this seed give; the same arguments give the same
+    light.
 
-    Raises InputError if a drawn value is impossible: the sun's elevation not in (0°, 90°], a negative cloud, or a
-    switch gain that is not above 0.
+    repeat: number of the suite entry's copy, 0 without copies. Raises InputError if a drawn value is impossible: the
+    sun's elevation not in (0°, 90°], a negative cloud, or a switch gain that is not above 0. Raises ValueError if a
+    distribution never draws within its clip, or for a negative seed.
     """
     source = rng(seed, "light", SUN, repeat=repeat)
     azimuth, elevation = (np.deg2rad(draw(v, source)) for v in (light.sun_azimuth_deg, light.sun_elevation_deg))

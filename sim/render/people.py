@@ -18,8 +18,12 @@ T = TypeVar("T")
 class DrawnPeople:
     """N people of one frame, or of several frames one after the other.
 
-    id (N,); pos3 (N, 3) m: feet; height (N,) m; shapes: ellipsoids; half (N, 2, 3) m: half axes of body and head; turn
-    (N, 3, 3): rotation from the world to a person's own axes across (to the right), along the heading, up.
+    id (N,)             person id = column of the Motion + 1
+    pos3 (N, 3)         feet: x, y, z in m
+    height (N,)         body height, m
+    shapes              Ellipsoids of body and head
+    half (N, 2, 3)      half axes of body and head in m: across, along the heading, up
+    turn (N, 3, 3)      rotation from the world to a person's own axes: across (to the right), along the heading, up
     """
 
     id: Ints
@@ -32,10 +36,12 @@ class DrawnPeople:
 
 @dataclass(frozen=True, eq=False)
 class ImageOutlines:
-    """Ellipses of N people in the image, two each (body, head).
+    """Ellipses of N people in the image, two each; the second axis is body, head.
 
-    middle (N, 2, 2) px; inverse (N, 2, 3): packed inverse shapes, see `body.packed_inverse`; bounds (N, 4): first row,
-    last row + 1, first column, last column + 1 of the pixels that either ellipse may cover.
+    middle (N, 2, 2)    centres, u and v in px; nan if not wholly in front of the camera
+    inverse (N, 2, 3)   inverse shapes in 1/px²: entries 11, 12, 22; nan likewise
+    bounds (N, 4)       first row, last row + 1, first column, last column + 1 of the pixels that either ellipse may
+                        cover, clipped to the image; empty if an ellipse is nan
     """
 
     middle: Array
@@ -45,10 +51,12 @@ class ImageOutlines:
 
 @dataclass(frozen=True, eq=False)
 class ProjectedPeople:
-    """N people as one camera sees them.
+    """N people as one camera sees them; the second axis is body, head.
 
-    start, step (N, 2, 3, 3): origins and directions of pixel rays in the axes of each part, where the part is a ball of
-    radius 1. outlines: of body and head. nearest_depth (N, 2) m: no point of the part is nearer.
+    start (N, 2, 3, 3)     times (u, v, 1): origin of a pixel's ray in the part's axes, where it is a ball of radius 1
+    step (N, 2, 3, 3)      times (u, v, 1): direction of that ray, depth 1 m per unit
+    outlines               ImageOutlines of body and head
+    nearest_depth (N, 2)   m along the optical axis: no point of the part is nearer; negative behind the camera
     """
 
     start: Array
@@ -58,9 +66,10 @@ class ProjectedPeople:
 
 
 def people_of_frames(motion: Motion, first: int, last: int) -> tuple[DrawnPeople, Ints]:
-    """Return the people of frames first … last - 1 (from 1 on), one frame after the other.
+    """Return the people of frames first … last - 1 (frames from 1 on), one frame after the other, each sorted by id.
 
-    Also returns the row at which each frame begins, and the number of rows at the end.
+    Also returns the row at which each frame begins, and the number of rows at the end: (last - first + 1,). A frame in
+    which nobody is present has no rows. Frames behind the Motion's last are left out of both.
     """
     present = motion.present[first - 1 : last - 1]
     t, p = np.nonzero(present)
@@ -75,7 +84,10 @@ def people_of_frames(motion: Motion, first: int, last: int) -> tuple[DrawnPeople
 
 
 def take_rows(value: T, rows: slice) -> T:
-    """Return a dataclass with these rows of all its arrays, those of nested dataclasses included."""
+    """Return a copy of a dataclass with these rows of all its arrays, those of nested dataclasses included.
+
+    Every field must be an array or such a dataclass. The arrays are views of the given ones.
+    """
     kept = {
         f.name: v[rows] if isinstance(v := getattr(value, f.name), np.ndarray) else take_rows(v, rows)
         for f in fields(value)  # type: ignore[arg-type]
@@ -84,7 +96,10 @@ def take_rows(value: T, rows: slice) -> T:
 
 
 def project_people(camera: Camera, rays: PixelRays, people: DrawnPeople) -> ProjectedPeople:
-    """Return these people as this camera, with these pixel rays, sees them."""
+    """Return N people as this camera sees them, with rays in the axes of their parts, outlines and nearest depths.
+
+    rays: the camera's own PixelRays. Outlines are nan where a body or head is not wholly in front of a pinhole camera.
+    """
     to_ball = people.turn[:, None] / people.half[..., None]
     start = to_ball @ rays.origin
     start[..., 2] -= np.einsum("npij,npj->npi", to_ball, people.shapes.centre)
@@ -97,16 +112,22 @@ def project_people(camera: Camera, rays: PixelRays, people: DrawnPeople) -> Proj
 
 
 def image_outlines(camera: Camera, ellipses: Outlines) -> ImageOutlines:
-    """Return outlines ready for the kernels; the bounds of a nan outline are empty."""
+    """Return the ImageOutlines of N people: centres, packed inverse shapes, and the pixel bounds of both ellipses
+    together.
+
+    ellipses: Outlines of body and head in px. The bounds are clipped to the image, and empty if either ellipse is nan.
+    """
     half = np.sqrt(np.diagonal(ellipses.shape, axis1=2, axis2=3))
     bounds = pixel_bounds(camera, (ellipses.centre - half).min(axis=1), (ellipses.centre + half).max(axis=1))
     return ImageOutlines(ellipses.centre, packed_inverse(ellipses.shape), bounds)
 
 
 def pixel_bounds(camera: Camera, low: Array, high: Array) -> Ints:
-    """Return the bounds (N, 4) of the pixels touched by boxes from low (N, 2) to high (N, 2) px, clipped to the image.
+    """Return the bounds (N, 4) int64 of the pixels touched by boxes from low (N, 2) to high (N, 2), clipped to the
+    image.
 
-    Columns: first row, last row + 1, first column, last column + 1. Empty for a nan box.
+    low, high: u, v in px of the upper left and lower right corner. Columns: first row, last row + 1, first column, last
+    column + 1. A nan box, or one outside the image, has no rows or no columns (first equals end).
     """
     size = np.array(camera.image, dtype=float)
     low, high = (np.clip(np.nan_to_num(edge), 0, size) for edge in (low, high))

@@ -22,7 +22,13 @@ FEET, WAIST, HEAD = range(3)  # columns of `sunlit`
 
 @njit(cache=True, error_model="numpy")
 def _row_of_rays(i, e, v, start, step, ray):  # type: ignore[no-untyped-def]
-    """Set ray (3, 4) to the rays of image row v in the axes of part e of person i."""
+    """Set ray (3, 4) to the rays of image row v in the own axes of part e of person i, where the part is a ball of
+    radius 1.
+
+    Rows of ray: across, along, up. Columns: origin at column 0, its change per column, direction at column 0, its
+    change per column. start, step (N, 2, 3, 3): matrices of ray origins and directions. e: 0 body, 1 head. Returns
+    nothing.
+    """
     for k in range(3):
         ray[k, P_AT_0] = start[i, e, k, 1] * (v + 0.5) + start[i, e, k, 2]
         ray[k, P_PER_COLUMN] = start[i, e, k, 0]
@@ -32,7 +38,11 @@ def _row_of_rays(i, e, v, start, step, ray):  # type: ignore[no-untyped-def]
 
 @njit(cache=True, error_model="numpy")
 def _hit_depths(ray, left, many, t):  # type: ignore[no-untyped-def]
-    """Set t (many,) to the depths at which the rays of a row's pixels, from column `left` on, meet the ball."""
+    """Set t (many,) to the depths in m at which the rays of a row's pixels meet a ball of radius 1 round the origin.
+
+    ray (3, 4): see `_row_of_rays`. left: column of the first of `many` pixels. A ray that misses the ball gets the
+    depth of its nearest point. Returns nothing.
+    """
     px0, px1, dx0, dx1 = ray[X, P_AT_0], ray[X, P_PER_COLUMN], ray[X, D_AT_0], ray[X, D_PER_COLUMN]
     py0, py1, dy0, dy1 = ray[Y, P_AT_0], ray[Y, P_PER_COLUMN], ray[Y, D_AT_0], ray[Y, D_PER_COLUMN]
     pz0, pz1, dz0, dz1 = ray[Z, P_AT_0], ray[Z, P_PER_COLUMN], ray[Z, D_AT_0], ray[Z, D_PER_COLUMN]
@@ -50,12 +60,13 @@ def _hit_depths(ray, left, many, t):  # type: ignore[no-untyped-def]
 def _texture_and_light(  # type: ignore[no-untyped-def]
     ray, left, many, t, half, sun, shadow, sunlit, head, place, across, up, light
 ):
-    """Set where on a texture page the points at depths t (many,) are, and how they are lit.
+    """Set where on a texture page the points at depths t (many,) m are, and how they are lit. Returns nothing.
 
-    place (many,): index of the lower left of four texels, in the page; across, up (many,), 0 to 1: how far beyond that
-    texel the point is. light (many,): brightness times UNIT. half (3,) m: half axes; sun (3,): in own axes; shadow: the
-    sun's share of the light; sunlit (3,): share of the sun at feet, waist and head; head: True for a head. Numbers are
-    float32, exact to 1e-4 of a page.
+    place (many,): index of the lower left of four texels, in the page. across, up (many,), 0 to 1: how far beyond that
+    texel the point is. light (many,): brightness times UNIT. ray (3, 4): see `_row_of_rays`; left: column of the first
+    pixel. half (3,) m: half axes. sun (3,): unit vector to the sun, in own axes. shadow: the sun's share of the light.
+    sunlit (3,): share of the sun at feet, waist and head. head: True for a head. Numbers are float32, exact to 1e-4 of
+    a page.
     """
     f = np.float32
     px0, px1 = f(ray[X, P_AT_0]), f(ray[X, P_PER_COLUMN])
@@ -96,15 +107,17 @@ def draw_people(  # type: ignore[no-untyped-def]
     order, start, step, half, middle, inverse, bounds, id, sun, shadow, sunlit, pages, atlas,
     shade, label, depth, ids, colour, dirty, margin, amodal,
 ):  # fmt: skip
-    """Draw people by depth, in this `order`; from near to far is fastest, the result does not depend on it.
+    """Draw N people by depth, in this `order` of rows; from near to far is fastest, the result does not depend on it.
 
-    start, step (N, 2, 3, 3): P and D of each part. half (N, 2, 3) m. middle (N, 2, 2), inverse (N, 2, 3), bounds (N,
-    4): see `people.ImageOutlines`. id (N,). sun (N, 3): unit vector to the sun in each person's axes. shadow: the sun's
-    share of the light. sunlit (N, 3): share of the sun at feet, waist and head. pages (N,): pages of the atlas (P, 2,
-    texels), see `clothing.clothing_atlas`. depth (H, W): on entry that of the empty scene, on return that of
-    everything. Changed tiles, with a margin in px, are marked in dirty. With `label`, ids (H, W) gets the person's id
-    where a person is visible, and amodal (N,) is raised by the pixels of each silhouette in the image. With `shade`,
-    colour (H, W, 3) is drawn. Light is the sky's, more from above than from the side, and the sun's by Lambert's law.
+    start, step (N, 2, 3, 3): matrices of ray origins and directions in the axes of each part. half (N, 2, 3) m: half
+    axes. middle (N, 2, 2) px, inverse (N, 2, 3), bounds (N, 4): see `people.ImageOutlines`. id (N,). sun (N, 3): unit
+    vector to the sun in each person's axes. shadow: the sun's share of the light. sunlit (N, 3): share of the sun at
+    feet, waist and head. pages (N,): pages of the atlas (P, 2, texels), see `clothing.clothing_atlas`.
+
+    depth (H, W) m: on entry that of the empty scene, on return that of everything. Changed tiles, with a margin in px,
+    are marked in dirty. With `label`, ids (H, W) gets the person's id where a person is visible, and amodal (N,) is
+    raised by the pixels of each silhouette in the image. With `shade`, colour (H, W, 3) int16 is drawn. Light is the
+    sky's, more from above than from the side, and the sun's by Lambert's law. Returns nothing.
     """
     height, width = depth.shape
     t, ray = np.empty(width), np.empty((3, 4))

@@ -9,11 +9,12 @@ from sim.types import Array, Bools, Camera, Ints, Motion, PixelTruth
 
 
 def pixel_truth(ids: Ints, bounds: Ints, id: Ints, amodal: Ints, disparity: Array | None) -> PixelTruth:
-    """Return the pixel truth of an id map: visible pixels and box of each person, and people who share a region.
+    """Return the PixelTruth of an id map, with visible pixels, box and connected region of each of N people.
 
-    ids (H, W): person id where a person is visible. id (N,): of the people. bounds (N, 4): pixels outside which each
-    person is not visible (first row, last row + 1, first column, last column + 1). amodal (N,): pixels of the whole
-    silhouettes in the image. disparity (H, W) px is passed through, None included.
+    ids (H, W): person id where a person is visible, 0 or negative elsewhere. id (N,): of the people; every positive id
+    in the map must be among them. bounds (N, 4): first row, last row + 1, first column, last column + 1 outside which
+    each person is not visible. amodal (N,): pixels of the whole silhouettes in the image. disparity (H, W) px is passed
+    through, None included. A person without visible pixels has count 0, a nan box and blob -1.
     """
     from sim.render.pixel_truth_kernels import count_pixels
 
@@ -27,14 +28,17 @@ def pixel_truth(ids: Ints, bounds: Ints, id: Ints, amodal: Ints, disparity: Arra
 
 
 def modal_mask(pixels: PixelTruth, person: int) -> Bools:
-    """Return the mask (H, W) of the pixels in which this person (id) is visible."""
+    """Return the mask (H, W), True at the pixels in which the person with this id is visible; all False if hidden or
+    absent."""
     return np.asarray(pixels.ids == person)
 
 
 def amodal_mask(motion: Motion, camera: Camera, index: int, person: int) -> Bools:
-    """Return the mask (H, W) of the pixels that would show this person (id) if nothing hid the person in frame `index`.
+    """Return the mask (H, W), True at the pixels that would show a person if nothing hid that person in frame `index`.
 
-    Empty if the person is absent or not in front of the camera.
+    index: from 1 on. person: id, from 1 on. All False if the person is absent in that frame, or outside the image. A
+    body or head that is not wholly in front of the camera is left out. Raises IndexError for a frame behind the last or
+    an id above the number of people.
     """
     t, p = np.array([index - 1]), np.array([person - 1])
     width, height = camera.image

@@ -13,12 +13,13 @@ LEFT, RIGHT, TOP, BOTTOM = range(4)  # columns of `edges`
 
 @njit(cache=True, error_model="numpy")
 def count_pixels(ids, bounds, id, row_of, count, edges, blob):  # type: ignore[no-untyped-def]
-    """Count the visible pixels of each person in an id map (H, W).
+    """Count the visible pixels of each of N people in an id map (H, W), and find who touch in the image.
 
-    bounds (N, 4): pixels outside which person id (N,) is not visible. row_of (max id + 1,): row of each id. Sets count
-    (N,), on entry 0: visible pixels. edges (N, 4): first column, last column + 1, first row, last row + 1 of them. blob
-    (N,): number of the connected region, -1 if nothing is visible. People are in one region if a pixel of one is an
-    8-neighbour of a pixel of the other. Regions are numbered by their first person's row.
+    bounds (N, 4): first row, last row + 1, first column, last column + 1 outside which person id (N,) is not visible.
+    row_of (max id + 1,): row of each id in `id`. Three arrays are set. count (N,), 0 on entry: visible pixels. edges
+    (N, 4): first column, last column + 1, first row, last row + 1 of them; without any W, 0, H, 0. blob (N,): number of
+    the connected region from 0 on, -1 if nothing is visible. People are in one region if a pixel of one is an
+    8-neighbour of a pixel of the other. Regions are numbered by their first person's row. Returns nothing.
     """
     height, width = ids.shape
     parent = np.arange(len(id))

@@ -18,20 +18,30 @@ WAVES = 24
 
 @dataclass(frozen=True, eq=False)
 class SampledField:
-    """A field at N fixed places: sine, cosine (N, W), the coefficients of each wave; omega (W,) rad/s."""
+    """A field, as of brightness or wind, at N fixed places, as W waves in time.
+
+    sine, cosine (N, W)   coefficients of each wave at each place, in the field's unit
+    omega (W,)            angular frequencies, rad/s
+    """
 
     sine: Array
     cosine: Array
     omega: Array
 
     def at(self, t: float) -> Array:
-        """Return the field's values (N,) at time t (s)."""
+        """Return the field's values (N,) at time t (s), in the order of the places."""
         return np.asarray(self.sine @ np.cos(self.omega * t) + self.cosine @ np.sin(self.omega * t))
 
 
 @dataclass(frozen=True, eq=False)
 class PlaneWaves:
-    """A field as W plane waves: amplitude of each wave; k (W, 2) rad/m, omega (W,) rad/s, phase (W,) rad."""
+    """A random field over ground and time: the sum of W plane waves amplitude sin(k·x + omega t + phase).
+
+    amplitude    of each wave, in the field's unit; 0 or more
+    k (W, 2)     wave vectors, rad/m
+    omega (W,)   angular frequencies, rad/s
+    phase (W,)   rad
+    """
 
     amplitude: float
     k: Array
@@ -39,13 +49,15 @@ class PlaneWaves:
     phase: Array
 
     def at_origin(self, t: float) -> float:
-        """Return the field's value at the world's origin at time t (s)."""
+        """Return the field's value at the world's origin (0, 0) at time t (s); 0 if the amplitude is 0."""
         return float(self.amplitude * np.sin(self.omega * t + self.phase).sum()) if self.amplitude > 0 else 0.0
 
     def sampled(self, places: Array, spread: Array) -> SampledField:
-        """Return the field at places (N, 2) m, smoothed by a Gaussian of standard deviation spread (N,) m there.
+        """Return the field at places (N, 2), x and y in m, each smoothed by a Gaussian of standard deviation spread
+        (N,) m.
 
-        Smoothing multiplies wave k by exp(-|k|² spread² / 2).
+        Smoothing multiplies wave k by exp(-|k|² spread² / 2). With a spread of inf the field vanishes at that place,
+        unless a wave vector is 0, which gives nan.
         """
         amplitude = self.amplitude * np.exp(-0.5 * (self.k**2).sum(axis=1) * spread[:, None] ** 2)
         at = places @ self.k.T + self.phase
@@ -53,24 +65,24 @@ class PlaneWaves:
 
 
 def _with_random_phases(source: np.random.Generator, sd: float, k: Array, omega: Array) -> PlaneWaves:
-    """A field of standard deviation sd from waves k (W, 2), omega (W,), with phases drawn from source."""
+    """Return a field of standard deviation sd from waves k (W, 2) rad/m, omega (W,) rad/s, with phases drawn from
+    source."""
     return PlaneWaves(sd * float(np.sqrt(2 / len(omega))), k, omega, source.uniform(0, 2 * np.pi, len(omega)))
 
 
 def uniform_drift(source: np.random.Generator, sd: float, time: float) -> PlaneWaves:
-    """Draw a field that is the same everywhere, with standard deviation sd and correlation exp(-|lag| / time); time in
-    s.
+    """Return a random field that is the same everywhere, with standard deviation sd and correlation exp(-|lag| / time).
 
-    Its frequencies are Cauchy with scale 1 / time.
+    time: time constant in s, above 0. The field is 0 if sd is 0. Its frequencies are Cauchy with scale 1 / time.
     """
     omega = np.tan(np.pi * (source.uniform(size=WAVES) - 0.5)) / time
     return _with_random_phases(source, sd, np.zeros((WAVES, 2)), omega)
 
 
 def moving_pattern(source: np.random.Generator, sd: float, length: float, speed: float) -> PlaneWaves:
-    """Draw a pattern with correlation length `length` (m) that moves unchanged at `speed` (m/s) in a random direction.
+    """Return a random pattern that moves unchanged over the ground at `speed` (m/s) in a random direction.
 
-    sd: its standard deviation.
+    sd: its standard deviation; 0 gives the field 0. length: distance in m, above 0, at which its correlation is 0.6.
     """
     angle = source.uniform(0, 2 * np.pi)
     k = source.normal(size=(WAVES, 2)) / length
@@ -78,5 +90,8 @@ def moving_pattern(source: np.random.Generator, sd: float, length: float, speed:
 
 
 def oscillation(source: np.random.Generator, sd: float, length: float, time: float) -> PlaneWaves:
-    """Draw a field with standard deviation sd and correlation exp(-r² / 2 length²) exp(-lag² / 2 time²), in m and s."""
+    """Return a random field with standard deviation sd and correlation exp(-r² / 2 length²) exp(-lag² / 2 time²).
+
+    r: distance on the ground; length in m, above 0. lag: in s; time in s, above 0. The field is 0 if sd is 0.
+    """
     return _with_random_phases(source, sd, source.normal(size=(WAVES, 2)) / length, source.normal(size=WAVES) / time)

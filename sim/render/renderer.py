@@ -36,7 +36,8 @@ LEFT, RIGHT = 0, 1
 
 @dataclass(frozen=True, eq=False)
 class RenderedFrame:
-    """The requested parts of one frame: image and right (H, W, 3) BGR uint8, pixels; None for a part not requested."""
+    """The requested parts of one frame, None if not requested: image (the camera's own) and right (the right camera's),
+    both (H, W, 3) uint8 BGR; pixels, which person each pixel of `image` shows."""
 
     image: Image | None = None
     right: Image | None = None
@@ -44,9 +45,10 @@ class RenderedFrame:
 
 
 class Renderer:
-    """Draws the frames of one Motion as one camera, or a stereo pair, sees them.
+    """Draws the frames of one Motion as one camera, or a stereo pair, sees them. Frames count from 1.
 
-    State: everything that is the same in all frames, computed when first needed; and the batch of frames drawn last.
+    The constructor raises InputError if the camera's lens distorts (radial not 0). State: everything that is the same
+    in all frames, computed when first needed; and the people of the 16 frames drawn last.
     """
 
     def __init__(self, motion: Motion, camera: Camera, light: Light, picture: Picture) -> None:
@@ -60,23 +62,26 @@ class Renderer:
 
     @cached_property
     def illumination(self) -> Illumination:
-        """The light of this seed."""
+        """The Illumination of this seed; InputError if a draw is impossible, ValueError if a clip has no draw."""
         return draw_illumination(self.light, self.motion.seed, self.motion.repeat)
 
     @cached_property
     def left_view(self) -> CameraView:
-        """The empty scene as the camera itself sees it."""
+        """The CameraView of the empty scene by the camera itself; InputError if drawn light or plants are wrong."""
         return CameraView(self.camera, self.motion, self.illumination, self.picture, self._plants)
 
     @cached_property
     def right_view(self) -> CameraView:
-        """The empty scene as the right camera of the pair sees it; raises InputError if there is no right camera."""
+        """The CameraView of the empty scene from the right camera of the pair, `baseline` m to the right.
+
+        Raises InputError if there is no right camera (kind "top", or a baseline of 0), or as `left_view`.
+        """
         self.check_pair()
         right = cameras.right_camera(self.camera)
         return CameraView(right, self.motion, self.illumination, self.picture, self._plants)
 
     def check_pair(self) -> None:
-        """Raise InputError if there is no right camera: kind "top", or a baseline of 0."""
+        """Raise InputError if there is no right camera: kind "top", or a baseline of 0. Returns nothing."""
         if not self.camera.baseline > 0 or self.camera.kind != "pinhole":
             raise InputError(
                 place="camera.baseline", got=f"{self.camera.kind}, baseline {self.camera.baseline:g}",
@@ -101,7 +106,7 @@ class Renderer:
 
     @property
     def _margin(self) -> int:
-        """How far the blur reaches, px."""
+        """The distance in px over which the blur spreads a pixel; 0 without blur."""
         return len(self._weights) // 2
 
     @cached_property
@@ -109,33 +114,45 @@ class Renderer:
         return empty_scene_disparities(self.left_view, self.right_view)
 
     def frame(self, index: int) -> Image:
-        """Return the image (H, W, 3) BGR of frame `index`, from 1 on."""
+        """Return the image (H, W, 3) uint8, BGR, of frame `index`, from 1 on; the same index always gives the same
+        image.
+
+        Raises IndexError for frame 0 or one behind the last, InputError if the drawn light or share of plants is
+        impossible.
+        """
         return self._draw(index, LEFT, shade=True, label=False)[0]
 
     def right(self, index: int) -> Image:
-        """Return the right camera's image of frame `index`; raises InputError if there is no right camera."""
+        """Return the right camera's image (H, W, 3) uint8, BGR, of frame `index`, from 1 on.
+
+        Raises InputError if there is no right camera (kind "top", or a baseline of 0); else errors as `frame`.
+        """
         return self._draw(index, RIGHT, shade=True, label=False)[0]
 
     def pixels(self, index: int, *, disparity: bool = False) -> PixelTruth:
-        """Return the pixel truth of frame `index`, with disparities if `disparity` is True.
+        """Return the PixelTruth of frame `index`, from 1 on; its disparities are None unless `disparity` is True.
 
-        Raises InputError if disparities are asked for and there is no right camera.
+        Raises InputError if disparities are asked for and there is no right camera; else errors as `frame`.
         """
         truth = self._draw(index, LEFT, shade=False, label=True, disparity=disparity)[1]
         assert truth is not None
         return truth
 
     def draw(self, index: int, *, right: bool = False, pixels: bool = False, disparity: bool = False) -> RenderedFrame:
-        """Return the image of frame `index` and the parts asked for, without drawing anything twice.
+        """Return the image of frame `index` (from 1 on) and the parts asked for, without drawing anything twice.
 
         right: the right camera's image. pixels: the pixel truth. disparity: disparities in the pixel truth; no effect
-        without `pixels`. Raises InputError if `right` or disparities are asked for and there is no right camera.
+        without `pixels`. Raises InputError if `right` or disparities are asked for and there is no right camera (kind
+        "top", or a baseline of 0); else errors as `frame`.
         """
         image, truth = self._draw(index, LEFT, shade=True, label=pixels, disparity=disparity and pixels)
         return RenderedFrame(image, self.right(index) if right else None, truth)
 
     def background(self, k: int) -> Image:
-        """Return image k = 0 … BACKGROUNDS - 1 of the scene without people, at t = (k - BACKGROUNDS) / fps."""
+        """Return image k = 0 … BACKGROUNDS - 1 (49), (H, W, 3) uint8, BGR, of the scene without people.
+
+        Its time is (k - BACKGROUNDS) / fps s, before frame 1. Raises InputError as `frame`.
+        """
         view, index = self.left_view, k - BACKGROUNDS + 1
         canvas = self._moved_canvas(view, index)
         image = self._finish(view, canvas, index, LEFT)
@@ -151,7 +168,7 @@ class Renderer:
         return self._last_batch
 
     def _moved_canvas(self, view: CameraView, index: int) -> FrameCanvas:
-        """A canvas of the empty scene with its plants where the wind of this frame moves them."""
+        """Return a canvas of the empty scene with its plants where the wind of frame `index` moves them."""
         canvas = view.take_canvas()
         if view.plants is not None:
             from sim.render.foliage_kernels import sway
@@ -165,7 +182,11 @@ class Renderer:
     def _draw(
         self, index: int, side: int, *, shade: bool, label: bool, disparity: bool = False
     ) -> tuple[Image, PixelTruth | None]:
-        """The image of one view of a frame (empty unless `shade`) and, with `label`, its pixel truth."""
+        """Return the image (H, W, 3) uint8 of one view of a frame and its pixel truth; side: LEFT or RIGHT.
+
+        shade: draw the image; else it has shape (0, 0, 3). label: make the pixel truth; else it is None. disparity:
+        with disparities; no effect without `label`. Raises InputError if the right view is needed and there is none.
+        """
         view, batch = self.right_view if side else self.left_view, self._batch(index)
         people, seen = batch.people(index), batch.in_view(view, side, index)
         canvas = self._moved_canvas(view, index) if shade else view.take_canvas()
@@ -210,7 +231,11 @@ class Renderer:
         shade: bool,
         label: bool,
     ) -> None:
-        """Draw people on a canvas (with `shade`), and set ids (H, W) and amodal (N,) (with `label`)."""
+        """Draw N people, `seen` by this view, on a canvas by depth; the canvas is changed.
+
+        With `shade`, colours are drawn. With `label`, ids (H, W) gets the person's id where one is visible, and amodal
+        (N,) is raised by the pixels of each whole silhouette in the image. Else the two are left as they are.
+        """
         from sim.render.people_kernels import draw_people
 
         here, light = seen.projected, self.illumination
@@ -222,7 +247,8 @@ class Renderer:
         )  # fmt: skip
 
     def _finish(self, view: CameraView, canvas: FrameCanvas, index: int, side: int) -> Image:
-        """The image of a canvas: blurred, lit, with noise and, if wanted, the artefacts of JPEG."""
+        """Return the image (H, W, 3) uint8 of a canvas: blurred, times the brightness, with noise and JPEG artefacts,
+        if wanted."""
         from sim.render.blur_noise_kernels import finish_image
 
         image = np.empty((view.height, view.width, 3), np.uint8)
@@ -238,7 +264,7 @@ class Renderer:
 
 
 def _compressed(image: Image, quality: int) -> Image:
-    """The image after JPEG compression with this quality, 1 to 100."""
+    """Return the image (H, W, 3) uint8, BGR, after JPEG compression with this quality, 1 (worst) to 100."""
     import cv2
 
     code = cv2.imencode(".jpg", image, [cv2.IMWRITE_JPEG_QUALITY, quality])[1]
@@ -250,8 +276,8 @@ def make_renderer(
 ) -> Renderer:
     """Return a Renderer of a Motion as this camera sees it; light and picture as in a scenario, defaults if None.
 
-    Raises InputError if the camera's lens distorts. Impossible values of light and picture raise InputError when the
-    first frame is drawn.
+    Raises InputError if the camera's lens distorts (radial not 0). Impossible drawn values of light and plants raise
+    InputError only when the first frame is drawn.
     """
     from scenarios.schema.picture import Light, Picture
 
@@ -261,9 +287,11 @@ def make_renderer(
 def render(
     motion: Motion, camera: Camera, index: int, light: Light | None = None, picture: Picture | None = None
 ) -> Frame:
-    """Return frame `index` (from 1 on) with its image, without detections; arguments and errors as `make_renderer`.
+    """Return frame `index` (from 1 on) as a Frame with the left image, without right image and detections.
 
-    For many frames, keep one `make_renderer`.
+    light, picture: as in a scenario, defaults if None. For many frames, keep one `make_renderer`. Raises InputError if
+    the lens distorts (radial not 0) or drawn light or plants are impossible; IndexError for frame 0 or one behind the
+    last.
     """
     image = make_renderer(motion, camera, light, picture).frame(index)
     return Frame(index, (index - 1) / motion.fps, image)

@@ -17,10 +17,11 @@ LIT_HEIGHTS = (0.12, 0.5, 0.95)  # of the height: feet (they stand a step deep i
 
 @dataclass(frozen=True, eq=False)
 class PeopleShadows:
-    """Shadows of N people, one of the body and one of the head.
+    """Shadows of N people on the ground at their feet, two each; the second axis is body, head.
 
-    shape (N, 2, 3): packed inverse of P S Pᵀ, see `people_shadows`. softness (N, 2): half the penumbra over the mean
-    radius. outlines: of the shadows in the image.
+    shape (N, 2, 3)    inverse shape of each shadow's ellipse, 1/m²: entries 11, 12, 22 (inverse of P S Pᵀ)
+    softness (N, 2)    half the penumbra's width over the ellipse's mean radius, no unit
+    outlines           ImageOutlines of the shadows with their soft edges, and of the pixels on which they can fall
     """
 
     shape: Array
@@ -29,11 +30,12 @@ class PeopleShadows:
 
 
 def people_shadows(camera: Camera, people: DrawnPeople, sun: Array, penumbra: float, level: bool) -> PeopleShadows:
-    """Return the shadows of people in the image of a camera.
+    """Return the PeopleShadows of N people as a camera sees them.
 
-    Ellipsoid (c, S), lit along the unit vector s to the sun, casts on the plane at height z an ellipse with centre
-    c - s (c_z - z)/s_z and shape P S Pᵀ, where P = I - s e_zᵀ/s_z. penumbra: width of the soft edge, m. level: True if
-    shadows can fall on level ground only. Else the bounds also cover walls and stairs up to the height of the head.
+    An ellipsoid with centre c and shape S casts on the plane at height z an ellipse with centre c - s (c_z - z)/s_z and
+    shape P S Pᵀ. Here s is the unit vector `sun` (3,) to the sun, and P = I - s e_zᵀ/s_z. The sun must stand above the
+    horizon. penumbra: width of the soft edge, m. level: True if shadows can fall on level ground only. Else the bounds
+    also cover walls and stairs up to the height of the head.
     """
     along = np.eye(3) - np.outer(sun / sun[2], [0.0, 0.0, 1.0])
     shape = along @ people.shapes.shape @ along.T
@@ -49,9 +51,12 @@ def people_shadows(camera: Camera, people: DrawnPeople, sun: Array, penumbra: fl
 
 
 def _bounds_up_to_head(camera: Camera, people: DrawnPeople, sun: Array, flat: Array) -> Ints:
-    """Bounds (N, 4) of all pixels on which a shadow can fall, from the lower of feet and z = 0 up to the head.
+    """Return the bounds (N, 4) of all pixels on which a shadow can fall, from the lower of feet and z = 0 up to the
+    head.
 
-    The whole image for a person whose shadow may reach behind the camera.
+    Columns: first row, last row + 1, first column, last column + 1, clipped to the image. sun (3,): unit vector to the
+    sun. flat (N, 2, 3, 3): shapes of the shadows with soft edges, m². The bounds are the whole image for a person whose
+    shadow may reach behind the camera.
     """
     half = np.sqrt(np.diagonal(flat, axis1=2, axis2=3))[..., :2]
     low_z, high_z = np.minimum(people.pos3[:, 2], 0.0), people.pos3[:, 2] + people.height
@@ -69,9 +74,10 @@ def _bounds_up_to_head(camera: Camera, people: DrawnPeople, sun: Array, flat: Ar
 
 
 def sunlit_shares(solids: Solids, people: DrawnPeople, sun: Array) -> Array:
-    """Return the share of the sun, 0 or 1, that solid things leave to each person's feet, waist and head, (N, 3).
+    """Return (N, 3) floats: 1 if the sun reaches a person's feet, waist and head (columns), 0 if a solid thing hides
+    it.
 
-    sun (3,): unit vector to the sun.
+    sun (3,): unit vector to the sun. People hide nobody here. All are 1 without solids.
     """
     lit = np.ones((len(people.id), 3))
     if not any(len(part) for part in solids if isinstance(part, np.ndarray)):

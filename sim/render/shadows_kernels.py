@@ -14,8 +14,9 @@ from sim.scene.body import BODY_PART, HEAD_PART, XX, XY, YY
 def _shade_line(place, many, centre, shape, sx, sy, softness, shade):  # type: ignore[no-untyped-def]
     """Raise shade (many,) to 255 times the share of the sun that one body part takes at places (many, 3) m.
 
-    A value that is higher already is kept. The direction to the sun is (sx, sy, 1). centre (3,), shape (3,), softness:
-    of the part, as for `draw_shadows`.
+    A value that is higher already is kept. The direction to the sun is (sx, sy, 1). centre (3,) m: of the ellipsoid.
+    shape (3,): inverse shape of its shadow, entries 11, 12, 22, 1/m². softness: half the penumbra over the shadow's
+    mean radius. Places above the centre stay unshaded. Returns nothing.
     """
     f = np.float32
     x, y, z, a, b, c = f(centre[0]), f(centre[1]), f(centre[2]), f(shape[XX]), f(2 * shape[XY]), f(shape[YY])
@@ -35,13 +36,14 @@ def _shade_line(place, many, centre, shape, sx, sy, softness, shade):  # type: i
 def draw_shadows(  # type: ignore[no-untyped-def]
     place, direct, bounds, flat, middle, inverse, centre, shape, sun, softness, shaded, colour, dirty, margin
 ):
-    """Darken colour (H, W, 3) where people stand before the sun; of several shadows, the darkest counts.
+    """Darken colour (H, W, 3) int16 where N people stand before the sun; of several shadows, the darkest counts.
 
-    place (H, W, 3) m and direct (H, W), the sun's share of the light: of the empty scene. bounds (N, 4): pixels on
-    which each person's shadow can fall. flat: True if only level ground is in view, where the shadow of part e has the
-    outline middle (N, 2, 2), inverse (N, 2, 3). centre (N, 2, 3) m: of the ellipsoids. shape (N, 2, 3), softness (N,
-    2): see `shadows.PeopleShadows`. sun (3,): vector to the sun. shaded (H, W) uint8: on entry 0, on return 255 times
-    the share of the sun that is gone. Changed tiles, with a margin in px, are marked in dirty.
+    place (H, W, 3) m and direct (H, W), the sun's share of the light: of the empty scene. bounds (N, 4) (first row,
+    last row + 1, first column, last column + 1): pixels on which each person's shadow can fall. flat: True if only
+    level ground is in view, where the shadow of part e has the outline middle (N, 2, 2) px, inverse (N, 2, 3). centre
+    (N, 2, 3) m: of the ellipsoids. shape (N, 2, 3), softness (N, 2): see `shadows.PeopleShadows`. sun (3,): vector to
+    the sun, above the horizon. shaded (H, W) uint8: on entry 0, on return 255 times the share of the sun that is gone.
+    Changed tiles, with a margin in px, are marked in dirty. Returns nothing.
     """
     height, width = direct.shape
     sx, sy = sun[0] / sun[2], sun[1] / sun[2]

@@ -18,7 +18,7 @@ COS, SIN = np.cos(0.7), np.sin(0.7)  # each octave is turned against the one bef
 
 @njit(cache=True)
 def lattice_value(i, j, key):  # type: ignore[no-untyped-def]
-    """Return a number in [-1, 1) for each pair of integers and key, by multiply-and-shift hashing of 32 bits."""
+    """Return a number in [-1, 1) that depends on the integers i, j and key only, by multiply-and-shift hashing."""
     h = (i * 0x9E3779B1 + j * 0x85EBCA77 + key * 0xC2B2AE3D) & MASK
     h = ((h ^ (h >> 15)) * 0x2C1B3C6D) & MASK
     h = ((h ^ (h >> 12)) * 0x297A2D39) & MASK
@@ -27,7 +27,10 @@ def lattice_value(i, j, key):  # type: ignore[no-untyped-def]
 
 @njit(cache=True)
 def value_noise(x, y, key):  # type: ignore[no-untyped-def]
-    """Return value noise of unit wavelength at (x, y): in [-1, 1), continuous in value and slope, sd about 0.4."""
+    """Return value noise at (x, y), given in wavelengths: in [-1, 1), continuous in value and slope.
+
+    Its standard deviation is about 0.4. key: another key gives another pattern.
+    """
     i, j = int(np.floor(x)), int(np.floor(y))
     a, b = x - i, y - j
     a, b = a * a * (3 - 2 * a), b * b * (3 - 2 * b)
@@ -38,16 +41,21 @@ def value_noise(x, y, key):  # type: ignore[no-untyped-def]
 
 @njit(cache=True)
 def contrast_kept(wavelength, footprint):  # type: ignore[no-untyped-def]
-    """Return the share of a pattern's contrast that pixels of this footprint keep.
+    """Return the share, 0 to 1, of a pattern's contrast that pixels of this footprint keep.
 
-    0 below two pixels per wavelength, 1 above five, linear between.
+    wavelength: of the pattern, m. footprint: size of a pixel on the surface, m, above 0. The share is 0 below two
+    pixels per wavelength, 1 above five, linear between.
     """
     return min(max((wavelength / footprint - 2.0) / 3.0, 0.0), 1.0)
 
 
 @njit(cache=True)
 def grain(x, y, key, footprint, coarsest):  # type: ignore[no-untyped-def]
-    """Return noise at (x, y) m, sd about 0.5, with equal contrast at each scale from `coarsest` m down to the pixel."""
+    """Return noise at (x, y) m, of standard deviation about 0.5 where no scale is lost.
+
+    It has equal contrast at each of up to nine scales, from `coarsest` m down to the pixel. footprint: size of a pixel
+    on the surface, m. It is 0 if even the coarsest scale is finer than pixels. key: first of nine keys of the pattern.
+    """
     total, wavelength = 0.0, coarsest
     x, y = x / coarsest, y / coarsest
     for octave in range(9):
@@ -62,9 +70,12 @@ def grain(x, y, key, footprint, coarsest):  # type: ignore[no-untyped-def]
 
 @njit(cache=True)
 def slabs(x, y, width, depth, joint, key, footprint):  # type: ignore[no-untyped-def]
-    """Return the brightness at (x, y) m of slabs in a running bond: in [-1, 1] by slab, down to -1.5 in the joints.
+    """Return the brightness at (x, y) m of slabs in a running bond: a value in [-1, 1] by slab, down to -1.5 in the
+    joints.
 
-    width, depth, joint: of slabs and joints, m. Every second row is shifted by half a slab.
+    width, depth: of a slab along x and y, joint: width of a joint, m. Every second row is shifted by half a slab.
+    footprint: size of a pixel on the surface, m; the contrast vanishes as slabs get finer than pixels. key: of the
+    slabs' brightness.
     """
     row = np.floor(y / depth)
     shift = (int(row) % 2) * 0.5 * width
@@ -79,9 +90,10 @@ def slabs(x, y, width, depth, joint, key, footprint):  # type: ignore[no-untyped
 
 @njit(cache=True)
 def plant_pattern(x, y, size, key):  # type: ignore[no-untyped-def]
-    """Return the pattern at (x, y) m that decides where plants grow: where it is above a level.
+    """Return the pattern at (x, y) m that decides where plants grow: they grow where it is above a level.
 
-    size (2,) m: of the world. The pattern is higher outside the world, so that plants grow there first.
+    size (2,) m: of the world. The pattern, from -2.5 to 2.5, is raised by up to 1 outside the world and lowered by up
+    to 1 inside, so that plants grow outside first. key: of the pattern.
     """
     outside = max(max(-x, x - size[0]), max(-y, y - size[1]))
     patches = value_noise(0.4 * x, 0.4 * y, key) + 0.5 * value_noise(1.1 * x, 1.1 * y, key + 1)
@@ -90,9 +102,11 @@ def plant_pattern(x, y, size, key):  # type: ignore[no-untyped-def]
 
 @njit(cache=True)
 def plant_cover(x, y, size, key, level, footprint):  # type: ignore[no-untyped-def]
-    """Return the share of a pixel at (x, y) m that shows plants, which grow where `plant_pattern` is above `level`.
+    """Return the share, 0 to 1, of a pixel at (x, y) m that shows plants, which grow where `plant_pattern` is above
+    `level`.
 
-    0 where the footprint is so large that leaves are finer than pixels.
+    size (2,) m: of the world. key: of the pattern. footprint: size of the pixel on the ground, m. The share is 0 where
+    the footprint is so large that leaves are finer than pixels.
     """
     near = min(max(2.0 * contrast_kept(0.3, footprint) - 0.5, 0.0), 1.0)
     return near * min(max((plant_pattern(x, y, size, key) - level) / 0.1 + 0.5, 0.0), 1.0)
