@@ -39,7 +39,8 @@ def perturb_boxes(box: Array, visibility: Array, noise: BoxNoise, n: Array) -> A
 
 
 def move_edges(box: Array, move: Array) -> Array:
-    """Return boxes (R, 4), left, top, width, height in px, with edges moved by move (R, 4) px; the boxes given stay.
+    """Return boxes (R, 4), left, top, width, height in px, whose edges are moved by move (R, 4) px; `box` is not
+    changed.
 
     Columns of move: left edge, top edge, right edge, lower edge; positive is to the right or downwards. Width and
     height keep at least 1 px, or their former value if that was less; then the right or lower edge yields.

@@ -80,12 +80,11 @@ def persistent_false_alarms(
 
 
 def _draw_births(model: FalseAlarms, rate: float, truth: Truth, seed: int, repeat: int) -> Births:
-    """Return all alarms of a sequence; frame 1 starts with the stationary number of living alarms, as if they began
-    earlier.
+    """Return all alarms of a sequence, with the uniforms that draw them, as Births.
 
-    rate: mean number of alarms reported per frame. An alarm's life is geometric with mean about `model.life` (s), and
-    is cut at the last frame; 0 means one frame. seed, repeat (number of the suite entry's copy): name the random
-    streams.
+    Frame 1 starts with the stationary number of living alarms, as if some had begun earlier. rate: mean number of
+    alarms reported per frame. An alarm's life is geometric with mean about `model.life` (s), and is cut at the last
+    frame; 0 means one frame. seed, repeat (number of the suite entry's copy): name the random streams.
     """
     q = np.exp(-1.0 / (truth.fps * model.life)) if model.life else 0.0
     alive = rate / model.seen
@@ -106,8 +105,8 @@ def _one_alarm(model: FalseAlarms, ground: VisibleGround, born: Births, k: int, 
     """Return row k of `born`, one alarm, as its frames (L,), rows (L, 6) and uniforms in those frames (L, 7).
 
     Rows are left, top, width, height in px of the box, then x, y in m of the point. Columns of the uniforms: SHOWN,
-    four edges, SCORE, ORDER. An alarm at a person ends when the person leaves, at least by the end of its life. Without
-    people in the frame of birth it is on its own.
+    four edges, SCORE, ORDER. An alarm at a person ends when the person is first absent, if that is before the end of
+    its life. Without people in the frame of birth it is on its own.
     """
     start, at_birth, in_frames = int(born.frame[k]), born.at_birth[k], born.in_frames[k]
     frame = start + np.arange(len(in_frames))

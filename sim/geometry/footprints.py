@@ -26,19 +26,22 @@ FLAT = 1e-9  # rad: a narrower cone is a rounding error, and its vertex lies on 
 
 
 def footprint_hull(pos: Array) -> Array:
-    """Return the hull (V, 2) m, counter-clockwise, of the footprints of the people at pos (N, 2) m.
+    """Return the convex hull (V, 2), x and y in m, counter-clockwise, of the footprints of N people at pos (N, 2) m.
 
-    (0, 2) if nobody is given.
+    A footprint is a regular 16-gon on a circle of 0.25 m round the person; one person has 16 vertices. (0, 2) if nobody
+    is given. Positions must not be nan: the result then has no meaning.
     """
     pos = np.asarray(pos, float).reshape(-1, 2)
     return footprint_hulls(pos, np.array([len(pos)]))[0]
 
 
 def footprint_hulls(pos: Array, count: Ints) -> list[Array]:
-    """Return one hull (V, 2) m per group, counter-clockwise: the hull of its members' footprints.
+    """Return a list of one convex hull (V, 2) in m per group, counter-clockwise: the hull of its members' footprints.
 
-    pos (R, 2) m holds the members of group 0, then those of group 1, and so on; count (G,) is the number of members of
-    each group. The hull of a group without members is (0, 2).
+    A footprint is a regular 16-gon on a circle of 0.25 m round the person. pos (R, 2) m holds the members of group 0,
+    then those of group 1, and so on; count (G,) is the number of members of each group. The hull of a group without
+    members is (0, 2). Positions must not be nan. Raises IndexError if the counts add up to more than R; further rows
+    are ignored.
     """
     hulls: list[Array] = [np.zeros((0, 2))] * len(count)
     for groups, members in _groups_of_equal_size(pos, count):
@@ -48,9 +51,11 @@ def footprint_hulls(pos: Array, count: Ints) -> list[Array]:
 
 
 def position_hulls(pos: Array, count: Ints) -> list[Array]:
-    """Return one hull (V, 2) m per group: the hull of its members' positions, without footprints.
+    """Return a list of one convex hull (V, 2) in m per group, counter-clockwise: the hull of its members' positions.
 
-    Arguments as for `footprint_hulls`. A vertex may be repeated. A group without members has (0, 2).
+    pos (R, 2) m holds the members of group 0, then those of group 1, and so on; count (G,) is the number of members of
+    each group. A vertex may be repeated, the first one as the last. A group without members has (0, 2). Positions must
+    not be nan. Raises IndexError if the counts add up to more than R; further rows are ignored.
     """
     hulls: list[Array] = [np.zeros((0, 2))] * len(count)
     for groups, members in _groups_of_equal_size(pos, count):
@@ -60,7 +65,11 @@ def position_hulls(pos: Array, count: Ints) -> list[Array]:
 
 
 def _groups_of_equal_size(pos: Array, count: Ints) -> Iterator[tuple[Ints, Array]]:
-    """Yield groups of equal size n together: their indices (G,) and positions (G, n, 2), at most CHUNK groups."""
+    """Yield groups of equal size n together: their indices (K,), from 0 on, and members' positions (K, n, 2) in m.
+
+    K is at most CHUNK (512). Smaller groups come first; groups without members are left out. pos (R, 2) m: the members
+    of group 0, then those of group 1, and so on; count (G,): number of members of each group.
+    """
     first = np.cumsum(count) - count
     for n in np.unique(count[count > 0]):
         every = np.flatnonzero(count == n)
@@ -70,11 +79,13 @@ def _groups_of_equal_size(pos: Array, count: Ints) -> Iterator[tuple[Ints, Array
 
 
 def _gift_wrap(pos: Array) -> tuple[Array, Array, Array]:
-    """Return the convex hulls of G sets of n points (G, n, 2), by gift wrapping all sets in step.
+    """Return the convex hulls of G sets of n points, pos (G, n, 2) in m, by gift wrapping all sets in step; n is at
+    least 1.
 
-    Returns vertices (G, V, 2), the angle at which each vertex's normal cone begins (G, V) rad, and the width of that
-    cone (G, V) rad. Padding vertices repeat the last vertex and have width 0. Each walk round a hull begins where the
-    normal cone of footprint vertex 0 begins, so that no footprint cone lies across both ends of the walk.
+    Returns vertices (G, V, 2) in m, counter-clockwise, the angle at which each vertex's normal cone begins (G, V) rad,
+    and the width of that cone (G, V) rad; V = n + 1. Padding vertices repeat the last vertex and have width 0. Each
+    walk round a hull begins where the normal cone of footprint vertex 0 begins, so that no footprint cone lies across
+    both ends of the walk.
     """
     rows, n = np.arange(len(pos)), pos.shape[1]
     now = (pos @ np.array([np.cos(CONES[0]), np.sin(CONES[0])])).argmax(axis=1)
@@ -101,9 +112,11 @@ def _gift_wrap(pos: Array) -> tuple[Array, Array, Array]:
 
 
 def _minkowski_sums(p: Array, start: Array, width: Array) -> list[Array]:
-    """Return the vertices p_i + q_k in the order of their normals, one array (V, 2) for each of G hulls.
+    """Return a list of G arrays (V, 2) in m: the hulls p + FOOTPRINT, each with its vertices p_i + q_k by angle of
+    normal.
 
-    p (G, V, 2), start (G, V) and width (G, V) are the result of `_gift_wrap`.
+    p (G, V, 2) m, start (G, V) rad and width (G, V) rad are the result of `_gift_wrap`: vertices of the hulls of
+    positions, and where the normal cone of each begins and how wide it is.
     """
     after = (CONES - start[..., None]) % (2 * np.pi)  # (G, V, 16): angle from the start of p_i's cone to that of q_k's
     before = 2 * np.pi - after

@@ -67,7 +67,10 @@ class Renderer:
 
     @cached_property
     def left_view(self) -> CameraView:
-        """The CameraView of the empty scene by the camera itself; InputError if drawn light or plants are wrong."""
+        """The CameraView of the empty scene as the camera itself sees it; computed once.
+
+        Raises InputError if the drawn light or share of plants is impossible.
+        """
         return CameraView(self.camera, self.motion, self.illumination, self.picture, self._plants)
 
     @cached_property

@@ -58,7 +58,7 @@ def _bodies_to_fit(bodies: RecordedBodies, motion: Motion, crop: bool) -> Record
     """Return the bodies to keep in view: all of `bodies` or, with `crop`, those whose feet are in the world's
     rectangle.
 
-    If there are none, four bodies of standard people (1.7 m) in the world's corners are returned, with frame 0 and id
+    If there are none, the result is four bodies of standard people (1.7 m) in the world's corners, with frame 0 and id
     0. motion: gives the scene's size.
     """
     if crop:
@@ -104,8 +104,8 @@ def _edges(rotation: Array, slopes: tuple[float, float]) -> Array:
 def _pinhole(spec: CameraSpec, bodies: RecordedBodies) -> Camera:
     """Return a pinhole camera with all bodies in view: at the given position or height, else at the closest place.
 
-    A solved height is at least 0.3 m. If the given values contradict each other, the violation of the view's edges is
-    shared out; nothing is raised. There must be at least one body.
+    A solved height is at least 0.3 m. If the given values leave no such place, bodies may be out of view; nothing is
+    raised. There must be at least one body.
     """
     rotation = camera_rotation(float(np.deg2rad(spec.tilt_deg)), float(np.deg2rad(spec.yaw_deg)))
     slopes = _slopes(spec, MARGIN * min(spec.image))

@@ -31,9 +31,9 @@ def _inside(centre, inverse, i, u, v):  # type: ignore[no-untyped-def]
 def _nearer_people(i, first, last, box, distance, found):  # type: ignore[no-untyped-def]
     """Write into `found` the rows of the people of one frame who may hide person i; return their number.
 
-    They are the rows first … last - 1 that are nearer than i and whose boxes overlap that of i. Of two at one distance
-    the lower row is nearer. box (R, 4): left, top, width, height in px. distance (R,) m: see `body.occlusion_distance`.
-    found: int64, long enough for all rows; entries behind the number returned are not set.
+    They are those of the rows first … last - 1 (last excluded) that are nearer than i and whose boxes overlap that of
+    i. Of two at one distance the lower row is nearer. box (R, 4): left, top, width, height in px. distance (R,) m: see
+    `body.occlusion_distance`. found: int64, long enough for all rows; entries behind the number returned are not set.
     """
     n = 0
     for j in range(first, last):
