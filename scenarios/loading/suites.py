@@ -94,7 +94,8 @@ def about(path: Path) -> str:
 def _expand(entry: Any, place: str, path: Path) -> Iterator[SuiteEntry]:
     """Yields the one entry, or with `repeat = n` the n entries, that one row of the file `path` stands for.
 
-    An absent name is the scenario's name or its file's stem. place: `entry.INDEX`, for messages. Raises InputError if
+    An absent name is the scenario's name or its file's stem. The n entries are named NAME-1 … NAME-n and hold their
+    number from 1; an entry without `repeat` has number 0. place: `entry.INDEX`, for messages. Raises InputError if
     the row is wrong.
     """
     _check(entry, place, path)

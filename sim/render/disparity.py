@@ -1,4 +1,7 @@
-"""Exact disparities of a stereo pair, u_left - u_right = f B / depth; nan where the right camera sees no point."""
+"""Exact disparities of a stereo pair in px; nan where the right camera does not see the point.
+
+The disparity of a point is u_left - u_right = f B / depth: focal length f in px, baseline B and depth in m.
+"""
 
 from __future__ import annotations
 

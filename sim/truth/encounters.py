@@ -183,7 +183,8 @@ def group_paths(
 def _mean(values: Array, there: Bools, start: Ints) -> Array:
     """Returns the means (R, 2) of R consecutive runs of values (N, 2); the runs begin at the indices start (R,).
 
-    Only values that are finite and whose flag in there (N,) is True count; nan for a run without any. Without runs: (0,
+    A row counts if both its numbers are finite and its flag in `there` (N,) is True; nan for a run without such rows.
+    Without runs: (0,
     2).
     """
     known = there & np.isfinite(values[:, 0]) & np.isfinite(values[:, 1])

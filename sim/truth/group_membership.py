@@ -68,8 +68,10 @@ def partitions(
 
 
 def _turns(present: Bools, intent: Ints) -> Ints:
-    """Returns frame 0 and all frames in which a person enters, leaves or is meant to be in another group, ascending,
-    from 0.
+    """Returns frame 0 and the frames, counted from 0 and ascending, from which on something is different.
+
+    That is the first frame of a person, the first frame without a person who has left, and the first frame in which a
+    person is meant to be in another group.
 
     present, intent (T, P). Empty for a motion without frames.
     """

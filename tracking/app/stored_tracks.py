@@ -36,7 +36,8 @@ class StoredTracks:
     def read(self, sequence: Sequence) -> TrackingRun:
         """Reads the tracks at the sequence's frame rate.
 
-        Raises InputError if run.json states another frame rate, or if a file is damaged.
+        Raises InputError if run.json states another frame rate, if there are no tracks, if a file is damaged, or if a
+        MOTChallenge text has a frame beyond the sequence's length.
         """
         fps = self.info.get("fps")
         if fps is not None and abs(fps - sequence.fps) > 1e-9 * sequence.fps:
@@ -90,7 +91,8 @@ def _run_info(path: Path) -> dict[str, Any]:
 def match_tracks(sequences: list[Sequence], stored: list[StoredTracks]) -> list[tuple[Sequence, StoredTracks]]:
     """Each sequence with the tracks of the same name; a single text and a single sequence match whatever their names.
 
-    Tracks of other sequences are ignored. Raises InputError if a sequence has no tracks, or if two have the same name.
+    Tracks of other sequences are ignored. Raises InputError if a sequence has no tracks, or if two
+    of `stored` have the same name.
     """
     if len(sequences) == len(stored) == 1 and not stored[0].name:
         return [(sequences[0], stored[0])]

@@ -71,7 +71,8 @@ def _sorted(place: Ints) -> Ints:
 @njit(cache=True)
 def _find(place: Ints, first: Ints, count: int, x: int, y: int) -> int:
     """Returns the number of the cell in column x and row y of the grid, by bisection, or -1 if it is empty. place (M,
-    2): grid column and row of each point; first (C,): a point of each cell, in sorted order; count: C."""
+    2): grid column and row of each point; first (C,): a point of each cell, cells sorted by column, then row;
+    count: C."""
     low, high = 0, count
     while low < high:
         middle = (low + high) // 2

@@ -72,8 +72,9 @@ class MatchedRecording:
 def match_sequence(sequence: Sequence) -> MatchedRecording:
     """Returns the labels and detections of a recording, matched one to one in each frame.
 
-    Rows of a MOT folder's gt/gt.txt that MOTChallenge does not score are no labels; unmatched detections on them are
-    dropped. Raises InputError if there are no labelled people, labels without boxes, no detections, or detections
+    A match needs an IoU of at least 0.3. Rows of a MOT folder's gt/gt.txt that MOTChallenge does not score are no
+    labels. An unmatched detection that overlaps such a row by an IoU of at least 0.5 is dropped. Raises InputError if
+    there are no labelled people, labels without boxes, no detections, or detections
     without boxes. Errors of reading the files are raised too.
     """
     file, truth = sequence.source.get("path", sequence.name), sequence.truth

@@ -1,6 +1,7 @@
 """Compiled measures and overlaps of the groups' hulls. Exact versions: sim.geometry.polygons and tracking.scoring.
 
-Polygons follow each other in vertex (V, 2), counter-clockwise. Polygon g is vertex[ends[g - 1] : ends[g]].
+Polygons follow each other in vertex (V, 2), counter-clockwise. Polygon g is vertex[ends[g - 1] : ends[g]]; polygon 0
+begins at row 0.
 """
 
 from __future__ import annotations

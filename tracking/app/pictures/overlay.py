@@ -69,7 +69,11 @@ def write_overlay(
 
 
 def _panels(sequence: Sequence, tracks: SequenceOf[Tracks] | None, placement: TruthPlacement | None) -> list[Panel]:
-    """The panels from left to right."""
+    """Returns the panels from left to right, each a list of layers with their styles.
+
+    placement None: one panel of tracks. "beside": truth, then tracks. "over": one panel, plain truth below tracks.
+    "only", or tracks None: one panel of truth. Raises InputError if truth is needed and nothing is labelled.
+    """
     if tracks is None or placement is not None:
         if sequence.truth is None:
             got = "a sequence without labels" if tracks is not None else "neither tracks nor labels"

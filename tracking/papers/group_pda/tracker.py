@@ -21,7 +21,8 @@ Departures, all ours.
 Search region and update:
 - The covariance of the search region is Sigma plus those of the centroid and of a point. The region widens while no
   association is feasible.
-- The extent is divided by what the region's edge cuts off, and shrunk to a prior, as few people have no covariance.
+- The extent is divided by the share of it that points inside the region have (below 1), and shrunk to a prior, as few
+  people have no covariance.
   Splitting and merging use the same extents, so that a split group is not merged at once.
 - R of the centroid assumes that members keep their places and that some are not seen. m_N has a width that grows
   with N, and tails. A miss hypothesis says that no point is the group's.
