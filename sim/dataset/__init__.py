@@ -1,1 +1,2 @@
-"""Datasets on disk: many sequences, generated from scenarios or replayed from recordings."""
+"""Datasets on disk: many sequences in one folder, simulated from scenarios or replayed from the motion of
+recordings."""

@@ -1,4 +1,7 @@
-"""Compiled union-find lookup, used to label connected pixels and connected components."""
+"""Compiled union-find lookup: finds the element that stands for all elements joined with a given one.
+
+The elements 0 to M - 1 form trees in an array of parents (M,). Used to label connected pixels and components.
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,8 @@
-"""Compiled painting of the empty scene, ray by ray: colours, light, depth and place of each pixel."""
+"""Compiled painting of the empty scene as a camera sees it, ray by ray.
+
+From the rays of the pixels and the solid things of the scene it computes for each pixel: depth (m), kind of surface,
+place in the world (m), colour (BGR, grey levels), share of direct sun, and share covered by plants (both 0 to 1).
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,8 @@
-"""Compiled helpers for drawing on a canvas: pixels that an outline covers, dirty tiles, restoring the empty scene."""
+"""Compiled helpers for drawing on a canvas, the working image of a frame.
+
+They find the pixels of an image row that an elliptic outline covers, mark tiles (8 x 16 px) that drawing has changed as
+dirty, and restore dirty tiles to the empty scene.
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,7 @@
-"""What people wear: colours and patterns as texture pages, drawn from each person's own random stream."""
+"""What people wear: colours and patterns, painted on one texture page (uint8, BGR) for the body and one for the head.
+
+Each person draws from random streams of their own, so one person more changes nobody else's clothes.
+"""
 
 from __future__ import annotations
 

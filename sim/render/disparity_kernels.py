@@ -1,4 +1,8 @@
-"""Compiled disparities: of the empty scene, then of people, with the points that the right camera cannot see."""
+"""Compiled disparities of a stereo pair, u_left - u_right in px, at the pixels of the left image.
+
+First those of the empty scene, then those of people. The disparity is nan where the right camera does not see the
+point, as it is hidden or outside the right image, and for sky.
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,8 @@
-"""Compiled loops of `sim.render.foliage`: where plants can grow in an image, and their sway in one frame."""
+"""Compiled loops for plants in an image (see `sim.render.foliage`).
+
+`sample_plants` finds where plants can grow, on a coarse grid of pixels. `sway` draws the plants of one frame where the
+wind, in px, has moved them.
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,7 @@
-"""The people of a batch of frames, as each view sees them: computed for all frames at once, cut frame by frame."""
+"""The people of a batch of up to 16 consecutive frames, in the world and as each camera view sees them.
+
+They are computed for all frames of the batch at once, which is faster, and returned frame by frame.
+"""
 
 from __future__ import annotations
 

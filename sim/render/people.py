@@ -1,4 +1,8 @@
-"""People as the drawing kernels take them: rays in the axes of each body part, outlines in the image, pixel bounds."""
+"""People of a motion as the compiled drawing takes them, each with two ellipsoids: body and head.
+
+For a camera it computes: its rays in the axes of each ellipsoid, the outlines in the image (ellipses in px), nearest
+depths in m, and the range of rows and columns of the pixels that each person can cover.
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,8 @@
-"""The exact truth of a frame's pixels (`types.PixelTruth`), and masks of single people."""
+"""The exact truth of one frame's pixels (`types.PixelTruth`), and masks (H, W) of single people, visible or whole.
+
+The truth is measured in an id map (H, W), which holds the id of the person that each pixel shows. It has each person's
+number of visible pixels, the box round them in px, and the number of the connected region of people.
+"""
 
 from __future__ import annotations
 

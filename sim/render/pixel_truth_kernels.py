@@ -1,4 +1,7 @@
-"""Compiled counts over an id map: each person's visible pixels, their box, and which people touch in the image."""
+"""Compiled counts over an id map (H, W), which holds the id of the person that each pixel shows.
+
+They give each person's number of visible pixels, the box round these pixels, and which people touch in the image.
+"""
 
 from __future__ import annotations
 

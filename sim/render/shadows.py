@@ -1,4 +1,8 @@
-"""Shadows: where people's shadows fall in an image, and how much of the sun solid things leave to each person."""
+"""Shadows of people, whose bodies and heads are ellipsoids, in the light of the sun.
+
+Computes where each person's shadow falls in an image (outlines, ranges of pixels, softness of the edge), and whether
+solid things such as walls hide the sun from a person's feet, waist and head.
+"""
 
 from __future__ import annotations
 

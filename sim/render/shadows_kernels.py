@@ -1,4 +1,7 @@
-"""Compiled drawing of people's shadows on the canvas of the empty scene. The tests hold a slow twin."""
+"""Compiled drawing of people's shadows on the canvas (image in int16) of the empty scene.
+
+Of several shadows on a pixel only the darkest counts. The tests compare the result with a slow implementation.
+"""
 
 from __future__ import annotations
 

@@ -1,1 +1,2 @@
-"""Geometry of what a camera sees: cameras, people's bodies, ground, ray casting, visibility."""
+"""Geometry of what a camera sees: cameras, people's bodies as ellipsoids, ground and stairs, ray casting,
+visibility."""

@@ -1,4 +1,7 @@
-"""The height of the ground, z = h(x, y): zero except on stairs."""
+"""The height z = h(x, y) of the ground, m, at points x, y in m: 0 except on stairs and the landings behind them.
+
+Also gives the stairs of a scene as rows of numbers for the compiled ray casting.
+"""
 
 from __future__ import annotations
 

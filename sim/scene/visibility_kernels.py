@@ -1,4 +1,7 @@
-"""Compiled loops of `sim.scene.visibility`: which samples of a silhouette are visible. The tests hold a numpy twin."""
+"""Compiled loops of `sim.scene.visibility`: which sample points of a person's silhouette in the image are visible.
+
+A sample is hidden by nearer people, walls, pillars or stairs. The tests compare the result with a numpy implementation.
+"""
 
 from __future__ import annotations
 

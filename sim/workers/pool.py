@@ -1,4 +1,8 @@
-"""A pool of local worker processes: spawned, one thread each, replaced when they die."""
+"""A pool of local worker processes that run a function over items.
+
+Processes are spawned, use one thread each, and are replaced when they die. The item of a dead process is run again,
+until three processes have died of it; then it is an error (WorkError) or gets a substitute result.
+"""
 
 from __future__ import annotations
 
@@ -48,7 +52,10 @@ def process_pool(workers: int) -> Iterator[RunItems]:
 
 @dataclass
 class _PendingItem(Generic[T]):
-    """An item that has no result yet, and `losses`, the number of workers that have died while running it."""
+    """An item that has no result yet.
+
+    item: the argument for the function. losses: number of worker processes that have died while running it, 0 at first.
+    """
 
     item: T
     losses: int = 0

@@ -1,1 +1,1 @@
-"""Exports of stored datasets: COCO, WebDataset."""
+"""Exports stored datasets to formats of other programs: COCO (one JSON file) and WebDataset (tar files)."""

@@ -1,4 +1,8 @@
-"""COCO export: one JSON file with the labelled boxes of every sequence."""
+"""Writes a dataset or recording as one COCO JSON file, with all sequences that have labelled boxes.
+
+Each frame is an image and each sequence a video. Each box of a person is an annotation (left, top, width, height in px,
+unclipped), with the person's id, group id and visibility. Boxes that are unknown (nan) are left out.
+"""
 
 from __future__ import annotations
 

@@ -1,1 +1,1 @@
-"""Files in general: atomic writing, locks, numeric text, Parquet and JSON."""
+"""Files of any content: atomic writing, locks on folders, strict text files of numbers, Parquet tables and JSON."""

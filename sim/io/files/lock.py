@@ -1,4 +1,7 @@
-"""A lock on an output folder: two commands never write to one folder at the same time."""
+"""A lock on an output folder: two commands never write to one folder at the same time.
+
+The second command fails at once with InputError. On systems and file systems without such locks, nothing is locked.
+"""
 
 from __future__ import annotations
 

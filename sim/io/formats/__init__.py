@@ -1,1 +1,1 @@
-"""Readers for recordings in public formats: MOTChallenge, BIWI, CAVIAR, videos, and Tsai's calibrations."""
+"""Readers for recordings in public formats: MOTChallenge, BIWI, CAVIAR, video files, and Tsai's camera calibrations."""

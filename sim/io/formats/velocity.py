@@ -1,4 +1,7 @@
-"""Velocities from positions, for recordings and tracks that are stored without velocities."""
+"""Computes velocities from positions by differences over a window of time (default 0.5 s).
+
+Used for recordings and tracks that are stored without velocities. The unit is that of the positions per second.
+"""
 
 from __future__ import annotations
 

@@ -1,1 +1,1 @@
-"""Pictures and videos: reading, writing, decoding, encoding."""
+"""Pictures and videos of sequences and recordings: reading and decoding files, drawing, encoding and writing them."""

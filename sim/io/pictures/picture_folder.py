@@ -95,7 +95,11 @@ def is_complete(body: bytes) -> bool:
 
 @dataclass(frozen=True)
 class PictureFolder:
-    """The picture files of a folder. files: path by frame (from 1); frames without a picture are missing."""
+    """The picture files of a recording.
+
+    folder: their folder. files: path of the file of each frame, by frame number (from 1); a frame without a picture has
+    no entry. `last` is the highest number, so frames without a picture below it are gaps.
+    """
 
     folder: Path
     files: dict[int, Path]

@@ -1,1 +1,2 @@
-"""Our own files: one folder per sequence, and the tracks of a run."""
+"""The project's own files: a folder for each sequence (pictures, truth, detections), and the tracks of a tracker's
+run."""

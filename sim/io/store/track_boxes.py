@@ -1,4 +1,8 @@
-"""The boxes that are written for tracks: a tracker's own, or projections of upright people, or none."""
+"""Which boxes (left, top, width, height in px) are written for a tracker's tracks.
+
+They are the tracker's own if it gives any. Else they are projections of upright people, 1.7 m high and 0.5 m across, if
+the tracks are on the ground or in space and the camera is known. Else there are no boxes.
+"""
 
 from __future__ import annotations
 

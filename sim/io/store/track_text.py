@@ -1,4 +1,8 @@
-"""Read tracks from MOTChallenge text of any program, and the groups.csv beside it."""
+"""Reads tracks from MOTChallenge text that any program has written, and adds groups from a groups.csv.
+
+The result is one Tracks per frame, from frame 1. Positions are on the ground (m) if the file has them, else the centres
+of the boxes (px). Velocities are differences of positions.
+"""
 
 from __future__ import annotations
 
