@@ -190,14 +190,23 @@ def webdataset(options: WebdatasetOptions) -> CommandResult:
 
 
 def run(arguments: Sequence[str]) -> int:
-    """Runs the command line `arguments`, prints its result or error, and returns its exit code. Empty: the help."""
+    """Runs one command line, prints its result on stdout or its error on stderr, and returns the exit code.
+
+    arguments: the words after `flockscope`; none: the help is printed. Exit codes: 0 done; 1 the work failed or a check
+    found problems; 2 wrong input or usage; 130 Ctrl-C. Errors are not raised. Only if the environment variable
+    FLOCKSCOPE_DEBUG is set, an unexpected exception is raised.
+    """
     from tracking.app.command_runner import run_command
 
     return run_command(app, list(arguments) or ["--help"])
 
 
 def main() -> None:
-    """Runs the command line of this process and ends the process with the command's exit code."""
+    """Runs the command line of this process (sys.argv) and never returns: the process ends with the command's exit
+    code.
+
+    Raises SystemExit for that. After Ctrl-C (code 130) it ends the process at once, without exit handlers.
+    """
     code = run(sys.argv[1:])
     if code == INTERRUPTED:
         sys.stdout.flush()

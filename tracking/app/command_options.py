@@ -45,7 +45,13 @@ class ScenariosOptions:
 
 @dataclass(frozen=True, kw_only=True)
 class GenerateOptions:
-    """Options of `generate`."""
+    """Options of the command `generate`, which simulates scenarios and stores them as a dataset.
+
+    names: scenarios, *.toml files or suites. seeds: "A:B" (A to B - 1) or one number. out: folder to write. settings:
+    texts "key=value". sensor: file of a detector profile; None: the scenario's own. streams: names of the pictures to
+    store, or "none". images: format of pictures; None: jpg. workers: number of processes. cluster: address of a dask
+    scheduler; None: this machine.
+    """
 
     names: Annotated[list[str], typer.Argument(metavar="NAME…", help="Scenarios, *.toml files or suites.")]
     seeds: Annotated[str, typer.Option("--seeds", metavar="A:B", help="Seeds from A to B - 1, or one seed.")]
@@ -60,7 +66,15 @@ class GenerateOptions:
 
 @dataclass(frozen=True, kw_only=True)
 class TrackOptions:
-    """Options of `track`."""
+    """Options of the command `track`, which runs a tracker on a sequence or dataset and stores its tracks.
+
+    tracker: its name, file.py:Class or module:Class. source, out: paths. params: file of the tracker's parameters;
+    None: its defaults. settings: texts "key=value". detections: "image", "truth" or "file"; None: the first of image,
+    file, truth that tracker and source allow. sensor: file of a detector profile, None if not given. grouping: file of
+    a rule that derives groups, None if not given. seed: the tracker's. fps: frames per second; None: the recording's
+    own. px_per_m: pixels per metre, camera: calibration file; None if not given. background: "first:N" or "spread:N",
+    the frames that a background model is trained on; None if not given.
+    """
 
     tracker: Tracker
     source: Source
@@ -84,7 +98,13 @@ class TrackOptions:
 
 @dataclass(frozen=True, kw_only=True)
 class ScoreOptions:
-    """Options of `score`."""
+    """Options of the command `score`, which compares tracks with the truth.
+
+    truth, tracks: paths. similarity: how people are compared, "boxes", "ground" or "image"; None: by what both sides
+    have. group_match: how groups are compared, by "hull" or "members". against: other tracks whose scores are
+    subtracted; None: none. blocks: number of draws of blocks of frames for the intervals of a single recording; 0: no
+    such intervals. fps: frames per second; None: the recording's own. px_per_m: pixels per metre; None if not given.
+    """
 
     truth: Annotated[Path, typer.Argument(metavar="TRUTH", help="Labelled sequence or dataset.")]
     tracks: Annotated[Path, typer.Argument(metavar="TRACKS", help="Output of `track`, or MOT text.")]
@@ -110,7 +130,11 @@ class ScoreOptions:
 
 @dataclass(frozen=True, kw_only=True)
 class FitSensorOptions:
-    """Options of `fit sensor`."""
+    """Options of the command `fit sensor`, which measures a detector's errors.
+
+    sources: recordings with true boxes and detections, pooled. out: the TOML file to write. fps: frames per second;
+    None: the recordings' own.
+    """
 
     sources: Annotated[list[Path], typer.Argument(metavar="SOURCE…", help="Recordings with gt and det, pooled.")]
     out: Annotated[Path, typer.Option("--out", metavar="FILE.toml", help="File to write: a [sensor] table.")]
@@ -156,7 +180,13 @@ class ReplayCommandOptions:
 
 @dataclass(frozen=True, kw_only=True)
 class ViewOptions:
-    """Options of `view`."""
+    """Options of the command `view`, which writes a page that replays sequences.
+
+    source: sequence or dataset. tracks: stored tracks; None: only the truth. out: HTML file, or a folder for several
+    sequences. video: pictures "inside" the page, "beside" it as a video file, "none", or "auto" (beside from 12 MB on).
+    fps: frames per second; None: the recording's own. px_per_m: pixels per metre, camera: calibration file; None if not
+    given.
+    """
 
     source: Source
     tracks: Tracks = None
@@ -174,7 +204,11 @@ class ViewOptions:
 
 @dataclass(frozen=True, kw_only=True)
 class SheetOptions:
-    """Options of `sheet`."""
+    """Options of the command `sheet`, which draws several frames of a sequence in one picture.
+
+    source: sequence or dataset. out: PNG file, or a folder for several sequences. frames: number of frames to show, 1
+    to 64. fps: frames per second; None: the recording's own.
+    """
 
     source: Source
     out: Annotated[
@@ -206,7 +240,11 @@ class OverlayOptions:
 
 @dataclass(frozen=True, kw_only=True)
 class WebdatasetOptions:
-    """Options of `export webdataset`."""
+    """Options of the command `export webdataset`, which writes tar shards.
+
+    folder: a generated sequence or dataset. out: folder to write. shard_size: the largest shard, as "500MB" or "2GB"; a
+    larger sequence has its own. samples: a sample is a whole "sequence" or one labelled "frame".
+    """
 
     folder: Annotated[Path, typer.Argument(metavar="DIR", help="A generated sequence or dataset.")]
     out: Out

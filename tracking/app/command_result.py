@@ -28,9 +28,11 @@ WIDTH = 160
 
 @dataclass(frozen=True)
 class CommandResult:
-    """What a command returns. data: for --json. text: for people; a string or anything that rich can print.
+    """What a command returns.
 
-    code: the exit code, 0, or 1 if a check found problems.
+    data: the content of the JSON object that --json prints, without its "status". text: what people see without --json,
+    a string or anything that the library rich can print; "" by default. code: the exit code, 0 (default), or 1 if a
+    check found problems.
     """
 
     data: dict[str, Any]
@@ -39,7 +41,11 @@ class CommandResult:
 
 
 def print_result(result: CommandResult, as_json: bool) -> int:
-    """Prints a result on stdout, as one JSON object if `as_json`; returns its exit code."""
+    """Prints the result of a command on stdout and returns its exit code, 0 or 1.
+
+    as_json: print one JSON object, "status" ("ok" or "failed") and then result.data; else result.text. Raises OSError
+    if stdout cannot be written, as with a closed pipe or a full disk.
+    """
     if as_json:
         _print_json({"status": STATUS[result.code], **result.data})
     else:
@@ -59,7 +65,11 @@ def _rendered(tables: Any) -> str:
 
 
 def print_error(error: FlockscopeError, as_json: bool) -> int:
-    """Prints an error as one line on stderr, or as one JSON object on stdout; returns its exit code."""
+    """Prints an error and returns its exit code, 2 for wrong input, 1 if the work failed.
+
+    as_json: print one JSON object with "status" and "error" on stdout; else one line "error: ..." on stderr. Raises
+    OSError if that cannot be written.
+    """
     if as_json:
         _print_json({"status": STATUS[error.exit_code], "error": error.as_dict()})
     else:
@@ -79,10 +89,10 @@ def print_interrupted(as_json: bool) -> int:
 
 
 def as_flockscope_error(error: Exception) -> FlockscopeError:
-    """An unexpected exception as an error for users.
+    """Returns, not raises, the error for users that stands for an unexpected exception.
 
-    An OSError becomes a WorkError if the disk or memory is full or broken, else an InputError about the path. Any other
-    exception becomes a WorkError that calls it a bug.
+    An OSError becomes a WorkError (exit code 1) if the disk or memory is full or the disk is broken, else an InputError
+    (exit code 2) about the path. Any other exception becomes a WorkError that calls it a bug.
     """
     if isinstance(error, OSError):
         return _system_error(error)
@@ -105,7 +115,12 @@ def _print_json(data: dict[str, Any]) -> None:
 
 
 def as_json_value(value: Any) -> Any:
-    """The value in types that `json` writes: numpy values as Python's, paths as text, nan and infinity as None."""
+    """Returns a copy of the value in types that `json` can write.
+
+    Dictionaries (keys as text), lists, tuples and ranges (as lists) are converted entry by entry; numpy arrays and
+    numbers become lists and Python numbers; paths become text; nan and infinity become None. Any other value is
+    returned as it is, even if `json` cannot write it.
+    """
     if isinstance(value, dict):
         return {str(key): as_json_value(v) for key, v in value.items()}
     if isinstance(value, list | tuple | range):

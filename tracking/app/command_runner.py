@@ -86,14 +86,16 @@ def _run(app: typer.Typer, arguments: list[str]) -> CommandResult | int:
 
 
 def _comes_from_interrupt(error: BaseException | None) -> bool:
-    """True if Ctrl-C caused the error. An interrupted import may raise another exception in its place."""
+    """True if a KeyboardInterrupt (Ctrl-C) is the error itself or one of the exceptions that caused it;
+    False for None."""
     while error is not None and not isinstance(error, KeyboardInterrupt):
         error = error.__cause__ or error.__context__
     return error is not None
 
 
 def _usage(error: Any) -> InputError:
-    """The error of a wrong command line."""
+    """Returns the InputError for a wrong command line; error: the usage exception of typer or click, with
+    its message."""
     where = "flockscope" if error.ctx is None else error.ctx.command_path
     message = error.format_message().rstrip(".")
     got, remedy = message[:1].lower() + message[1:], f"see {where} --help"

@@ -20,7 +20,11 @@ def command_sections() -> str:
 
 
 def _commands(group: Any, prefix: str) -> Iterator[tuple[str, Any]]:
-    """Name and command of each command, those of a group in its place."""
+    """Yields (full name, command) of each command below a typer group, in order of declaration.
+
+    prefix: words before the name, with a space at the end, or "". A group inside the group is replaced by its commands:
+    "fit sensor".
+    """
     for name, command in group.commands.items():
         if hasattr(command, "commands"):
             yield from _commands(command, f"{prefix}{name} ")

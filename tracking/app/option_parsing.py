@@ -14,7 +14,11 @@ SUBJECTS = ("tracker", "sensor", "scenario")
 
 
 def seeds(text: str, option: str = "--seeds") -> range:
-    """The seeds of `a:b`, from a to b - 1, or of one number. Raises InputError, naming `option`, for any other text."""
+    """Returns the seeds of the text "a:b", a to b - 1 (empty if b <= a), or of one number, a range of length 1.
+
+    option: the option's name for the error message. Raises InputError for any other text, as a negative number or one
+    of more than 18 digits.
+    """
     found = re.fullmatch(r"(\d{1,18})(?::(\d{1,18}))?", text.strip())
     if found is None:
         raise InputError(
@@ -25,15 +29,21 @@ def seeds(text: str, option: str = "--seeds") -> range:
 
 
 def settings(texts: Iterable[str], default: str, subjects: Iterable[str]) -> list[tuple[str, str]]:
-    """Splits `--set` texts into (subject, "key=value"); a key that begins with no subject belongs to `default`.
+    """Splits `--set` texts into pairs (subject, "key=value"), in the order given.
 
-    Raises InputError for a text without "=" or without a key, and for a subject that is not in `subjects`.
+    A key may start with "tracker.", "sensor." or "scenario."; that word is the subject and is removed. Any other key
+    belongs to the subject `default` and stays whole. subjects: those that the command allows. Raises InputError for a
+    text without "=" or without a key, and for a subject that is not in `subjects`. Values are not checked.
     """
     return [_setting(text, default, tuple(subjects)) for text in texts]
 
 
 def _setting(text: str, default: str, subjects: tuple[str, ...]) -> tuple[str, str]:
-    """(subject, "key=value") of one text."""
+    """(subject, "key=value") of one `--set` text: the subject is "tracker", "sensor" or "scenario" if the key starts
+    with that word and a dot, else `default`.
+
+    Raises InputError if "=" or the key is missing, or the subject is not in `subjects`.
+    """
     key, equals, value = text.partition("=")
     if not equals or not key.strip():
         raise InputError(
@@ -53,9 +63,10 @@ def _setting(text: str, default: str, subjects: tuple[str, ...]) -> tuple[str, s
 
 
 def scenario_settings(texts: Iterable[str]) -> list[str]:
-    """The `--set` texts of a command on scenarios as "key=value"; keys of the sensor keep their prefix `sensor.`.
+    """Returns `--set` texts of a command on scenarios as "key=value", in the order given.
 
-    Raises InputError as `settings` does.
+    The prefix "scenario." is removed, "sensor." is kept. Raises InputError for a text without "=" or without a key, and
+    for a key that starts with "tracker.". Values are not checked.
     """
     found = settings(texts, "scenario", ("scenario", "sensor"))
     return [f"sensor.{text}" if subject == "sensor" else text for subject, text in found]
@@ -74,9 +85,11 @@ def sensor_settings(file: Path | None) -> tuple[str, ...]:
 
 
 def pictures(streams: str, images: str | None) -> tuple[tuple[str, ...], str]:
-    """The streams of `--streams` (none: empty) and the format of `--images` (absent: "jpg").
+    """Returns (names of the streams, picture format) from the texts of `--streams` and `--images`.
 
-    Raises InputError if `--images` is given and no stream is stored in that format.
+    streams: names with commas between them; "none" or empty names give none. The names themselves are not checked.
+    images: "jpg", "png" or "mp4"; None gives "jpg". Raises InputError if `images` is given and none of the streams is
+    stored in that format.
     """
     from sim.io.store.streams import coding
 
@@ -88,9 +101,10 @@ def pictures(streams: str, images: str | None) -> tuple[tuple[str, ...], str]:
 
 
 def toml_values(texts: Iterable[str]) -> dict[str, Any]:
-    """Texts "key=value" as a dictionary; values are read as TOML, a bare word as a string.
+    """Returns texts "key=value" as a dictionary from key to value; of equal keys the last counts.
 
-    Raises InputError for a value that is neither.
+    A key may have dots. A value is read as TOML, a bare word as a string. Raises InputError for a text that cannot be
+    read so.
     """
     from scenarios.loading.overrides import parse_setting
 
@@ -98,7 +112,11 @@ def toml_values(texts: Iterable[str]) -> dict[str, Any]:
 
 
 def output_file(out: Path, suffix: str) -> Path:
-    """Returns `out`. Raises InputError if it is a folder or does not end in `suffix`."""
+    """Returns `out` unchanged. Nothing is created.
+
+    suffix: the required ending with its dot, as ".html"; upper case is allowed in `out`. Raises InputError if `out` is
+    an existing folder or ends otherwise.
+    """
     is_folder = out.is_dir()
     if is_folder or out.suffix.lower() != suffix:
         got, better = (f"{out}, a folder", out / "page") if is_folder else (str(out), out.with_suffix(""))
@@ -108,7 +126,10 @@ def output_file(out: Path, suffix: str) -> Path:
 
 
 def output_folder(out: Path) -> Path:
-    """Returns `out`. Raises InputError if it, or the nearest parent that exists, is a file."""
+    """Returns `out` unchanged. Nothing is created; it need not exist.
+
+    Raises InputError if `out`, or its nearest parent that exists, is a file.
+    """
     existing = next(p for p in (out, *out.parents) if p.exists())
     if not existing.is_dir():
         raise InputError(

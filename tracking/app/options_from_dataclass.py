@@ -53,7 +53,8 @@ def options_from(options: type[T]) -> Callable[[Callable[[T], CommandResult]], C
 
 
 def _parameters(options: type) -> list[inspect.Parameter]:
-    """The keyword arguments that stand for the fields, and `json` after them."""
+    """Returns one keyword-only parameter per field of the dataclass `options`, in order, and then one for `json`, False
+    by default."""
     types = get_type_hints(options, include_extras=True)
     found = [_parameter(f.name, types[f.name], _default(f)) for f in dataclasses.fields(options)]
     return [*found, _parameter("json", Json, False)]
@@ -64,7 +65,8 @@ def _parameter(name: str, annotation: Any, default: Any) -> inspect.Parameter:
 
 
 def _default(field: dataclasses.Field[Any]) -> Any:
-    """The default of a field, `inspect.Parameter.empty` if it has none."""
+    """Returns the default of a dataclass field; a `default_factory` is called. `inspect.Parameter.empty` if it has
+    none."""
     if field.default_factory is not dataclasses.MISSING:
         return field.default_factory()
     return inspect.Parameter.empty if field.default is dataclasses.MISSING else field.default

@@ -19,9 +19,11 @@ PAUSE = 10.0
 
 
 class ProgressMeter:
-    """Counts finished items and shows them: a bar on a terminal, else a line every 10 s. A context manager.
+    """Counts finished items of a long work and shows them on stderr. A context manager; leaving it removes the bar.
 
-    State: done and total (None if unknown), the current item's name, and the bar once it is shown.
+    On a terminal a bar appears after 2 s; elsewhere `update` prints a line, at most every 10 s and not in the first 2
+    s. what: name of the work. total: number of all items, None if unknown. done: items finished. item: name of the
+    current item, "" for none.
     """
 
     def __init__(self, what: str, total: int | None = None) -> None:
@@ -44,11 +46,14 @@ class ProgressMeter:
                 self._bar.stop()
 
     def step(self, item: str = "", amount: int = 1) -> None:
-        """Adds `amount` finished items; `item` is the name of the last."""
+        """Adds `amount` finished items (1 by default) and shows the count. item: name to show, "" for none."""
         self.update(self.done + amount, self.total, item)
 
     def update(self, done: int, total: int | None, item: str = "") -> None:
-        """Sets the number of finished items and of all items, None if unknown; `item` is the name that is shown."""
+        """Sets the number of finished items, `done`, and of all items, `total` (None if unknown), and shows them.
+
+        item: name to show, "" for none.
+        """
         self.done, self.total, self.item = done, total, item
         if self._bar is not None:
             self._bar.update(self._bar.task_ids[0], completed=done, total=total, item=item)

@@ -25,8 +25,9 @@ EXPECTED = "a folder made by `flockscope track`, a folder of such folders, or MO
 class StoredTracks:
     """The stored tracks of one sequence, not read yet.
 
-    name: the sequence's, from run.json or the folder's or text's name; "" for a text that was given itself. info: the
-    content of run.json, empty if there is none.
+    name: the sequence's name: from run.json, or else the name of the folder or, without suffix, of the text; "" for a
+    text file that the user gave itself. path: the folder with the tracks, or the text file. info: the content of
+    run.json as a dictionary, empty if there is none.
     """
 
     name: str
@@ -49,9 +50,12 @@ class StoredTracks:
 
 
 def find_tracks(path: Path) -> list[StoredTracks]:
-    """All stored tracks at or below a path, in the order of their paths; text files of a folder come last.
+    """Returns all stored tracks at or below a path, not read yet, in the order of their paths; text files of a folder
+    come last.
 
-    Raises InputError if the path does not exist or holds no tracks, or if a run.json is no JSON object.
+    path: a text file in MOTChallenge format, a folder with tracks.parquet or tracks.txt, or a folder that holds such
+    folders or *.txt files, at most three levels down. Hidden folders are left out. Raises InputError if the path does
+    not exist or holds no tracks, or if a run.json is no JSON object.
     """
     if not path.exists():
         raise InputError(file=path, got="no such file or folder", expected=EXPECTED, remedy="check the path")
@@ -62,7 +66,11 @@ def find_tracks(path: Path) -> list[StoredTracks]:
 
 
 def _below(folder: Path, depth: int) -> list[StoredTracks]:
-    """The stored tracks in a folder and in `depth` levels of folders below it; hidden folders are left out."""
+    """Returns the stored tracks in a folder and in `depth` levels of folders below it; none found: an empty list.
+
+    A folder with tracks.parquet or tracks.txt counts as one and is not searched further. Hidden folders are left out.
+    Raises InputError if a run.json is no JSON object.
+    """
     if any((folder / name).is_file() for name in TRACK_FILES):
         info = _run_info(folder / "run.json")
         return [StoredTracks(str(info.get("sequence", folder.name)), folder, info)]
@@ -74,7 +82,10 @@ def _below(folder: Path, depth: int) -> list[StoredTracks]:
 
 
 def _run_info(path: Path) -> dict[str, Any]:
-    """The content of run.json, empty if there is no such file."""
+    """Returns the content of the run.json at `path`, an empty dictionary if there is no such file.
+
+    Raises InputError if the file is no JSON object.
+    """
     if not path.is_file():
         return {}
     try:
