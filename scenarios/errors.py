@@ -1,4 +1,7 @@
-"""The two errors that users see: InputError and WorkError. Each is one line: file, place, got, expected, remedy."""
+"""The errors that users see: InputError (wrong input, exit code 2) and WorkError (failed work or check, exit code 1).
+
+Each message is one line: file, place in it, what was found, what was expected, and what the user can do.
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,7 @@
-"""Array types of the frozen dataclasses: fixed number types, and arrays that are read-only."""
+"""Array types for the fields of frozen dataclasses: Array (float64), Ints (int64), Bools (bool) and Image (uint8).
+
+The base class `Frozen` converts array fields to their declared number type and makes them read-only.
+"""
 
 from __future__ import annotations
 

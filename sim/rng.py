@@ -1,4 +1,7 @@
-"""Keyed random streams: one generator per (seed, role, keys), so that an extra draw changes no other stream."""
+"""Keyed random streams: each combination of seed, role and keys (such as a person's number) has a generator of its own.
+
+An additional draw from one stream therefore changes no other stream.
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,8 @@
-"""Which way people face: along their velocity while they walk, towards their group while they stand."""
+"""The direction in which each person faces, in radians from +x, for a whole motion of T frames and P people.
+
+People who walk (faster than 0.25 m/s) turn towards their velocity; people who stand turn towards the middle of their
+group. A person who stands alone keeps the direction.
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,8 @@
-"""Which data serve what: the seed range of each split, and the rule that nothing is tuned on real motion."""
+"""The splits of the data (train, val, test, fit, demo): which range of seeds belongs to which split.
+
+Also tells recordings and their replays, whose motion is real, from simulated sequences. Nothing may be tuned on real
+motion.
+"""
 
 from __future__ import annotations
 

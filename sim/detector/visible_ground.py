@@ -1,4 +1,8 @@
-"""Where false alarms can be: the part of an image that shows ground, and the height of a person standing there."""
+"""Where a detector's false alarms can be: the part of an image that shows ground, as a range of u, v in px.
+
+Also the height in px that a person standing there would have. Both come from the camera, or from the labelled boxes if
+the camera is unknown.
+"""
 
 from __future__ import annotations
 

@@ -18,11 +18,11 @@ FRAMES = 16  # frames of a batch
 
 @dataclass(frozen=True, eq=False)
 class PeopleInView:
-    """N people as one camera view sees them.
+    """N people of one or more frames as one camera view sees them.
 
-    projected        ProjectedPeople: rays and outlines of body and head
-    shadows          PeopleShadows; None if the light casts none
-    sunlit (N, 3)    share of the sun, 0 or 1, that solid things leave to feet, waist and head
+    projected: ProjectedPeople: rays in the axes of body and head, outlines in px. shadows: PeopleShadows; None if the
+    light casts none. sunlit (N, 3): 1 if the sun reaches a person's feet, waist and head (columns), 0 if a solid thing,
+    as a wall, hides it.
     """
 
     projected: ProjectedPeople

@@ -1,4 +1,7 @@
-"""Hulls, mean positions and extents of groups, from people whose group ids are known (truth or tracks)."""
+"""Hulls, mean positions and extents (covariances of positions) of groups in each frame.
+
+They are computed from positions of people whose group ids are known, of the truth or of a tracker's tracks.
+"""
 
 from __future__ import annotations
 

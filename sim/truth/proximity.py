@@ -1,5 +1,7 @@
-"""Finds pairs of people near each other, stretches of time that pairs share, and strangers who satisfy the merge
-rule.
+"""Searches for people near each other in a motion.
+
+Finds pairs of people closer than a distance, stretches of frames in which a condition holds for a pair, and strangers:
+pairs who satisfy the merge rule but do not belong to one group (hard negatives).
 """
 
 from __future__ import annotations

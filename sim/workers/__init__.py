@@ -1,1 +1,1 @@
-"""Run a function over many items: in this process, in local worker processes, or on a dask cluster."""
+"""Runs a function over many items: in this process, in local worker processes, or on a dask cluster."""

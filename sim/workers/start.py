@@ -1,4 +1,7 @@
-"""Start the workers that a command asks for: this process, local processes, or a dask cluster, behind one call."""
+"""Starts the workers that a command asks for: this process, local processes, or a dask cluster.
+
+All three are used in the same way, as a function that runs another function over items.
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,7 @@
-"""Strict reading of text files with rows of numbers; an error names the first line that is wrong."""
+"""Strict reading of text files with rows of numbers into an array (N rows, C columns).
+
+A file with a wrong row raises InputError, which names the first wrong line.
+"""
 
 from __future__ import annotations
 

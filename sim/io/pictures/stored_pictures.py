@@ -1,4 +1,7 @@
-"""Read the pictures of a stored sequence one by one, each checked against the hash in the manifest."""
+"""Reads the pictures of a stored sequence one by one.
+
+The bytes of each file are compared with their hash in the sequence's manifest.json; a difference raises InputError.
+"""
 
 from __future__ import annotations
 
@@ -24,7 +27,11 @@ from sim.types import Array, Image, Ints, PixelTruth
 
 @dataclass(frozen=True)
 class StoredPictures:
-    """The pictures of a stored sequence. folder: the sequence folder. manifest: the content of its manifest.json."""
+    """The pictures of a stored sequence, read when asked for.
+
+    folder: the sequence folder. manifest: the content of its manifest.json, with the stored streams ("left", "right",
+    "disparity", "ids", "background") and the hash of each file.
+    """
 
     folder: Path
     manifest: dict[str, Any]

@@ -1,4 +1,4 @@
-"""camera.json and scene.json: a camera and a scene as JSON, read back equal to the last bit."""
+"""camera.json and scene.json: a Camera and a Scene (the static world) as JSON, read back equal to the last bit."""
 
 from __future__ import annotations
 

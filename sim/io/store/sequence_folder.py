@@ -1,4 +1,7 @@
-"""Write and read our own format: one folder per sequence, read back equal to the last bit."""
+"""Writes and reads sequences in the project's own format: one folder per sequence.
+
+A sequence that is read back equals the one written to the last bit, except pictures in a lossy file type (jpg, mp4).
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,8 @@
-"""The picture streams of a stored sequence: their names, file types, file names, and 16-bit coding."""
+"""The picture streams of a stored sequence: left, right, disparity, ids and background.
+
+Says which names are valid, which file type each stream has ("jpg", "png" or "mp4"; disparity and ids are always PNG),
+how files are named, and how disparities and ids are coded in 16 bits.
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,8 @@
-"""A sequence's truth and detections as files: exact in Parquet, rounded in MOTChallenge text."""
+"""The truth and the detections of a sequence as files, and back.
+
+Parquet tables hold the exact values; MOTChallenge text (gt.txt, det.txt) holds them rounded, for other programs. gt.txt
+is written only for a truth with boxes.
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,8 @@
-"""Check a dataset: every file has the hash of its manifest, can be read, and agrees with the other files."""
+"""Checks a stored sequence or dataset, and returns the problems as a list of errors.
+
+Every file must have the hash in its manifest.json, be readable, and agree with the other files. Files that interrupted
+runs left over are problems, too.
+"""
 
 from __future__ import annotations
 
