@@ -100,10 +100,11 @@ def _run_info(path: Path) -> dict[str, Any]:
 
 
 def match_tracks(sequences: list[Sequence], stored: list[StoredTracks]) -> list[tuple[Sequence, StoredTracks]]:
-    """Each sequence with the tracks of the same name; a single text and a single sequence match whatever their names.
+    """Returns each sequence with the stored tracks of the same name, in the order of `sequences`.
 
-    Tracks of other sequences are ignored. Raises InputError if a sequence has no tracks, or if two
-    of `stored` have the same name.
+    A single text file that was given itself matches a single sequence whatever their names. Tracks of other sequences
+    are ignored. Raises InputError if a sequence has no tracks, or if two of `stored` have the same name. `stored` must
+    not be empty if there is a sequence.
     """
     if len(sequences) == len(stored) == 1 and not stored[0].name:
         return [(sequences[0], stored[0])]

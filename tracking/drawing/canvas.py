@@ -33,7 +33,11 @@ Colour = tuple[int, int, int]
 
 
 def colour(identity: int) -> Colour:
-    """The BGR colour of an id, the same as on the replay page; grey for a negative id."""
+    """Returns the BGR colour (blue, green, red, 0 to 255) of an id: one of ten, by the id modulo 10; grey for a
+    negative id.
+
+    It is the same as on the replay page.
+    """
     if identity < 0:
         return THING
     text = PALETTE[identity % len(PALETTE)]
@@ -57,7 +61,12 @@ class Canvas:
 
     @classmethod
     def fit(cls, image: Image, low: Array, high: Array, upwards: bool) -> Canvas:
-        """A canvas on `image` that shows the rectangle from `low` to `high`, centred, at the largest scale."""
+        """Returns a canvas that draws on `image` and shows a rectangle, centred, at the largest scale at which it fits.
+
+        image: (H, W, 3) uint8 BGR. low, high: (2,) the rectangle's smallest and largest x and y in drawing coordinates
+        (m on a plan, px over a picture); both sides must be longer than 0. upwards: True if y grows upwards. The
+        canvas's own low and high reach beyond the rectangle where the image has spare room.
+        """
         height, width = image.shape[:2]
         span = high - low
         scale = min(width / span[0], height / span[1])
@@ -65,22 +74,39 @@ class Canvas:
         return cls(image, float(scale), low - spare, high + spare, upwards)
 
     def map(self, points: Array) -> Array:
-        """Pixel coordinates (N, 2) of points (N, 2) in drawing coordinates."""
+        """Returns pixel coordinates (N, 2), x and y from the image's upper left corner, of points in drawing
+        coordinates.
+
+        points: (N, 2) x, y, or one point (2,); drawing units are m on a plan, px over a picture. nan stays nan; points
+        outside the image are not clipped.
+        """
         points = np.asarray(points, float).reshape(-1, 2)
         y = self.high[1] - points[:, 1] if self.upwards else points[:, 1] - self.low[1]
         return np.stack([points[:, 0] - self.low[0], y], axis=1) * self.scale
 
     def line(self, points: Array, ink: Colour, width: int, closed: bool = False) -> None:
-        """Draws a polyline through points (N, 2), `width` px wide; `closed` joins the last point to the first."""
+        """Draws a polyline in place. points: (N, 2) in drawing coordinates (m on a plan, px over a picture); ink: BGR;
+        width: px.
+
+        closed: join the last point to the first. Points must not be nan.
+        """
         cv2.polylines(self.image, [fixed_point(self.map(points))], closed, ink, width, cv2.LINE_AA, SHIFT)
 
     def disc(self, at: Array, radius: float, ink: Colour, width: int = -1) -> None:
-        """Draws a disc of `radius` px round the point `at` (2,); with `width` > 0 a ring whose line is that wide."""
+        """Draws a disc, or with `width` > 0 a ring, in place.
+
+        at: (2,) its centre in drawing coordinates (m on a plan, px over a picture), not nan. radius: px. ink: BGR.
+        width: of the ring's line in px; -1 (default): a filled disc.
+        """
         x, y = fixed_point(self.map(at))[0]
         cv2.circle(self.image, (int(x), int(y)), round(radius * 2**SHIFT), ink, width, cv2.LINE_AA, SHIFT)
 
     def arrow(self, ends: Array, ink: Colour, width: int) -> None:
-        """Draws an arrow from ends[0] to ends[1] (2, 2); its head is at most 7 px and half the arrow long."""
+        """Draws an arrow in place. ends: (2, 2), start and tip in drawing coordinates (m on a plan, px over a picture),
+        not nan.
+
+        ink: BGR. width: of its line in px. The head is 7 px long, or half the arrow if that is less.
+        """
         a, b = self.map(ends)
         far = float(np.hypot(*(b - a)))
         tip = min(7.0, far / 2) / far if far > 0 else 0.0
@@ -88,7 +114,11 @@ class Canvas:
         cv2.arrowedLine(self.image, start, end, ink, width, cv2.LINE_AA, SHIFT, tip)
 
     def fill(self, polygon: Array, ink: Colour, opacity: float) -> None:
-        """Fills a polygon (V, 2), given in pixel coordinates, at an opacity from 0 to 1."""
+        """Fills a polygon in place. polygon: (V, 2) x, y in pixel coordinates of the image, not in drawing coordinates;
+        V >= 1.
+
+        ink: BGR. opacity: 0 (invisible) to 1. What lies outside the image is not drawn.
+        """
         low = np.maximum(np.floor(polygon.min(axis=0)).astype(int) - 1, 0)
         high = np.ceil(polygon.max(axis=0)).astype(int) + 2
         patch = self.image[low[1] : high[1], low[0] : high[0]]
@@ -100,9 +130,11 @@ class Canvas:
 
 
 def fixed_point(points: Array) -> np.ndarray:
-    """Pixel coordinates as int32 with SHIFT fractional bits, for cv2, whose whole coordinates are pixel centres.
+    """Returns pixel coordinates (N, 2) as int32 with 4 fractional bits (16 = 1 px), as cv2's drawing functions take
+    them.
 
-    Coordinates are limited to ±30,000 px.
+    points: px from the image's corner. 0.5 px are subtracted, because cv2's whole coordinates are pixel centres. The
+    result is limited to ±30,000 px. nan is not allowed.
     """
     limited = np.clip(points - 0.5, -30_000, 30_000)
     return np.asarray(np.rint(limited * 2**SHIFT), np.int32)
@@ -120,9 +152,10 @@ def ascii_only(words: str) -> str:
 
 
 def text(image: Image, words: str, at: tuple[float, float], size: float, ink: Colour = INK, bold: int = 1) -> None:
-    """Writes `words` with a light rim; `at` is the lower left corner in px, `size` cv2's font scale.
+    """Writes words with a light rim into `image` in place.
 
-    Characters outside ASCII become question marks.
+    at: lower left corner of the first letter, x and y in px. size: cv2's font scale. ink: BGR, dark by default. bold:
+    width of the strokes in px. Characters outside ASCII become question marks.
     """
     place = (round(at[0]), round(at[1]))
     words = ascii_only(words)

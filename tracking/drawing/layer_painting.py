@@ -50,14 +50,15 @@ class LayerStyle:
 
 
 def kind_colour(kind: str) -> Colour:
-    """The BGR colour of a kind of event."""
+    """Returns the BGR colour of a kind of event, as "merge" or "split"; red for an unknown kind."""
     return colour(KIND_COLOUR.get(kind, ALARM))
 
 
 def event_words(event: GroupEvent, prefix: str = "G") -> str:
-    """An event in ASCII, as "merge G1+G2 -> G1"; one list of groups if they are the same before and after.
+    """Returns an event in words, as "merge G1+G2 -> G1": its kind, the groups before it and after it.
 
-    People who were or are alone are counted: "alone", "2 alone".
+    If the groups are the same before and after, they stand once and without arrow. prefix: written before each group
+    id, "G" by default. Negative ids are people who are alone; they are only counted, in front: "alone", "2 alone".
     """
 
     def listed(ids: tuple[int, ...]) -> str:
@@ -71,7 +72,13 @@ def event_words(event: GroupEvent, prefix: str = "G") -> str:
 
 
 def paint_layer(canvas: Canvas, layer: Layer, index: int, fps: float, style: LayerStyle = LayerStyle()) -> None:
-    """Draws frame `index` of a layer: groups first, then trails, boxes (a ring for people without a box), and ids."""
+    """Draws one frame of a layer (truth or a tracker's output) on a canvas, in place.
+
+    index: frame number, counted from 1; a frame without marks draws nothing. fps: frames per second; trails reach back
+    3 s. Order: groups, trails, ellipses and boxes (a ring for people without a box), ids of people, ids of groups. With
+    more than 60 people their ids are left out; only the first 60 groups are named. style.plain: only thin white boxes
+    and rings. Unknown (nan) boxes, points and ellipses are skipped.
+    """
     marks = layer.at(index)
     groups = () if style.plain else marks.groups
     for group in groups:
@@ -94,7 +101,10 @@ def paint_layer(canvas: Canvas, layer: Layer, index: int, fps: float, style: Lay
 
 
 def _paint_group(canvas: Canvas, group: GroupMark, ink: Colour) -> None:
-    """The hull filled, the extent dotted, and an arrow from the centre to where it is in 1 s."""
+    """Draws one group in place: its hull filled, its extent dotted, an arrow from its centre to where it is in 1 s.
+
+    ink: BGR. Whichever of the three has no points is left out.
+    """
     if len(group.hull):
         canvas.fill(canvas.map(group.hull), ink, 0.18)
         canvas.line(group.hull, ink, 2, closed=True)
@@ -119,7 +129,10 @@ def _paint_dots(canvas: Canvas, ring: Array, ink: Colour) -> None:
 
 
 def _fits(canvas: Canvas, ring: Array) -> bool:
-    """True if the points span less than the image in both directions."""
+    """True if the points `ring` (V, 2), V >= 1, in drawing coordinates span less than the image in both directions.
+
+    They may lie outside the image.
+    """
     return bool((np.ptp(ring, axis=0) * canvas.scale < canvas.image.shape[1::-1]).all())
 
 
@@ -191,14 +204,23 @@ def draw_label(image: Image, words: str, at: tuple[float, float], size: float, i
 
 
 def draw_captions(image: Image, layer: Layer, index: int, fps: float, size: float) -> None:
-    """Writes the events that became known in the last 2.5 s, upwards from the lower left corner, the newest lowest."""
+    """Writes the captions of recent events into `image` in place, upwards from the lower left corner, the newest
+    lowest.
+
+    Shown are at most 6 events that became known in frame `index` (counted from 1) or less than 2.5 s before it; kinds
+    enter and leave have no caption. fps: frames per second. size: cv2's font scale, of which 1.25 times is used.
+    """
     y = float(image.shape[0] - 6)
     for event in layer.recent_events(index, CAPTION_SECONDS * fps)[:CAPTIONS]:
         y -= draw_label(image, event_words(event, layer.prefix), (6, y), size * 1.25, kind_colour(event.kind)) + 3
 
 
 def draw_banner(image: Image, words: str, warnings: list[str], size: float) -> None:
-    """Fills the whole image with the floor's colour, writes `words` at its left and `warnings` on red at its right."""
+    """Fills the whole `image` with a light colour, in place, and writes a line of text on it.
+
+    words: at its left. warnings: on red rectangles at its right, the first rightmost; may be empty. size: cv2's font
+    scale.
+    """
     image[:] = FLOOR
     y = image.shape[0] * 0.5 + 9 * size
     cv2.putText(image, words, (6, round(y)), cv2.FONT_HERSHEY_SIMPLEX, size, INK, 1, cv2.LINE_AA)

@@ -55,11 +55,13 @@ class GroupMark:
 
 @dataclass(frozen=True, eq=False)
 class FrameMarks:
-    """One layer in one frame: N people, or N groups if `whole_groups`, in drawing coordinates.
+    """What is drawn of one layer in one frame: N people, or N groups if `whole_groups`, in drawing coordinates (px, or
+    m on a plan).
 
-    id: (N,). box: (N, 4) ltwh, nan where unknown. at: (N, 2), the point that trails follow, nan where unknown. ellipse:
-    (N, 32, 2), holds the position with 95 % probability, nan where unknown. hidden: (N,), true people of whom less than
-    HIDDEN is visible. groups: the groups of the frame.
+    id: (N,) of people or groups. box: (N, 4) left, top, width, height. at: (N, 2), the point that trails follow.
+    ellipse: (N, 32, 2), points of the ellipse that holds the position with 95 % probability. Rows of these three are
+    nan where unknown. hidden: (N,) True for true people of whom less than 20 % is visible. groups: marks of the groups
+    in the frame. whole_groups: True if the tracker tracks groups, not people.
     """
 
     id: Ints
@@ -78,10 +80,12 @@ class FrameMarks:
 
 @dataclass(frozen=True, eq=False)
 class Layer:
-    """The truth or a tracker's output over a sequence. name: "true" or "tracked". prefix: of group ids, "G" or "T".
+    """What to draw of the truth or of one tracker's output over a sequence.
 
-    frames: the marks by frame index. events: each event with the frame in which it becomes known: for tracks the frame
-    in which it was emitted, for truth its first frame.
+    name: "true" or "tracked". prefix: letter before group ids, "G" for the truth, "T" for tracks. frames: the marks by
+    frame number, counted from 1; a frame may be missing. events: pairs (frame, event); the frame is that in which the
+    event becomes known: for tracks that in which it was emitted (its first frame if that is unknown), for the truth its
+    first frame.
     """
 
     name: str
@@ -90,13 +94,16 @@ class Layer:
     events: tuple[tuple[int, GroupEvent], ...] = field(default=())
 
     def at(self, index: int) -> FrameMarks:
-        """The marks of a frame; empty ones for a frame that has none."""
+        """Returns the marks of frame `index`, counted from 1; marks without people and groups if the layer has no such
+        frame."""
         return self.frames.get(index, FrameMarks.none())
 
     def trails(self, index: int, past: int) -> Iterator[tuple[int, Array]]:
-        """(id, points) of each trail that ends in frame `index`; points (K, 2), the newest first, K >= 2.
+        """Yields (id, points) of each trail that ends in frame `index`, counted from 1; points (K, 2) in drawing
+        coordinates.
 
-        A trail reaches back `past` frames at most, and ends before a frame in which the point is unknown.
+        The newest point is first, K >= 2; shorter trails are left out. past: number of earlier frames that a trail
+        reaches back at most. A trail ends before a frame that lacks the id or in which its point is nan.
         """
         trails: dict[int, list[Array]] = {}
         unbroken = set(self.at(index).id.tolist())
@@ -109,13 +116,22 @@ class Layer:
         return ((i, np.array(points)) for i, points in trails.items() if len(points) > 1)
 
     def recent_events(self, index: int, frames: float) -> list[GroupEvent]:
-        """Events that became known in frame `index` or less than `frames` before it, newest first; no enter, leave."""
+        """Returns the events that became known in frame `index` or less than `frames` frames before it, newest first.
+
+        Kinds "enter" and "leave" are left out.
+        """
         recent = [(known, e) for known, e in self.events if 0 <= index - known < frames and e.kind not in NOT_CAPTIONED]
         return [event for _, event in sorted(recent, key=lambda pair: -pair[0])]
 
 
 def layer_of_truth(truth: Truth) -> Layer:
-    """The truth's layer, in px. Frames without a person, and all frames of a truth without boxes, have no marks."""
+    """Returns the layer of the truth over pictures, in px: boxes, the middles of their lower edges, hulls of groups,
+    events.
+
+    A frame without people, and every frame of a truth without boxes, has no marks. Ellipses are nan. Boxes of people of
+    whom less than 20 % is visible are marked hidden. A group's hull holds its members' boxes and 5 px round them;
+    groups with fewer than two boxes have none.
+    """
     frames = {}
     for index in range(1, truth.length + 1):
         now = truth.at(index)
@@ -138,12 +154,17 @@ def layer_of_tracks(tracks: SequenceOf[Tracks], camera: Camera | None, scene: Sc
 
 
 def plan_layer_of_tracks(tracks: SequenceOf[Tracks]) -> Layer:
-    """A tracker's layer on a plan, in m, without boxes; the tracks must be on the ground."""
+    """Returns the layer of a tracker's output on a plan, in m: positions, 95 % ellipses, hulls of groups, events; boxes
+    are nan.
+
+    tracks: one entry per frame, with positions on the ground; this is not checked.
+    """
     return Layer("tracked", "T", {t.index: _marks_on_plan(t) for t in tracks}, _emitted(tracks))
 
 
 def _emitted(tracks: SequenceOf[Tracks]) -> tuple[tuple[int, GroupEvent], ...]:
-    """Each event with the frame in which it was emitted, or with its first frame if that is unknown."""
+    """Returns pairs (frame, event) of all events of a tracker's output; frame: that in which the event was emitted, or
+    its first frame if that is None."""
     return tuple((e.start if e.emitted is None else e.emitted, e) for t in tracks for e in t.events)
 
 
@@ -184,7 +205,11 @@ def _marks_on_plan(t: Tracks) -> FrameMarks:
 
 
 def _whole_groups(t: Tracks, to_drawing: Callable[[Array], Array]) -> tuple[GroupMark, ...]:
-    """The groups of tracks whose rows are groups; `to_drawing` maps points to drawing coordinates."""
+    """Returns one mark per row of tracks `t` whose rows are groups, in order.
+
+    to_drawing: maps points (K, 2 or 3) to drawing coordinates (K, 2), or to no rows if they cannot be seen. A row
+    without an entry in t.groups has no hull and extent, and its size is nan.
+    """
     groups = t.groups or Groups.none()
     rows = dict(zip(groups.id.tolist(), range(len(groups.id)), strict=True))
 
@@ -205,7 +230,12 @@ def _feet(box: Array) -> Array:
 
 
 def _box_hulls(group: Ints, box: Array) -> tuple[GroupMark, ...]:
-    """Each group that has two or more known boxes, with the hull of these, widened by BOX_MARGIN."""
+    """Returns a mark for each group with two or more known boxes, by increasing id: the hull of these boxes and 5 px
+    round each.
+
+    group: (N,) group id of each person, negative for none. box: (N, 4) left, top, width, height in px, nan where
+    unknown.
+    """
     names = np.unique(group[group >= 0])
     box = box + BOX_MARGIN * np.array([-1, -1, 2, 2])
     found = [(int(g), box[(group == g) & np.isfinite(box[:, 0])]) for g in names]
@@ -229,9 +259,11 @@ def _in_picture(points: Array, plane: str, camera: Camera | None, scene: Scene |
 
 
 def ellipse(centre: Array, cov: Array, sigmas: float) -> Array:
-    """(32, 2) points at `sigmas` standard deviations of the covariance `cov` (2, 2) round `centre` (2,).
+    """Returns 32 points (32, 2) of the ellipse at `sigmas` standard deviations round `centre` (2,), in the unit of
+    `centre`.
 
-    Returns (0, 2) if an entry of `cov` is not finite.
+    cov: (2, 2) covariance matrix; negative eigenvalues count as 0. Returns (0, 2) if an entry of `cov` is not finite; a
+    nan in `centre` gives nan.
     """
     if not np.isfinite(cov).all():
         return NO_POINTS
@@ -240,7 +272,11 @@ def ellipse(centre: Array, cov: Array, sigmas: float) -> Array:
 
 
 def _ellipses(t: Tracks, camera: Camera | None, scene: Scene | None) -> Array:
-    """The 95 % ellipses of people's positions, (N, 32, 2) px; nan where the covariance is unknown or it is unseen."""
+    """Returns the 95 % ellipses of the people's positions in a picture, (N, 32, 2) px.
+
+    A row is nan where the covariance is not finite, or a point of the ellipse cannot be seen by the camera. camera:
+    None: rows of tracks on the ground are nan. scene: gives the ground's height; None: 0.
+    """
     found = np.full((len(t.id), len(UNIT_CIRCLE), 2), np.nan)
     for k, cov in enumerate(t.cov[:, :2, :2]):
         points = _in_picture(ellipse(t.pos[k, :2], cov, SIGMA_95), t.plane, camera, scene)

@@ -26,7 +26,11 @@ def plan_area(scene: Scene | None, places: Array) -> tuple[Array, Array] | None:
 
 
 def _scene_area(scene: Scene, places: Array) -> tuple[Array, Array]:
-    """As `plan_area`. The margin is 2 MARGIN, cut at the world's border, but nowhere less than MARGIN."""
+    """Returns the lower left and upper right corner (2,), in m, of the ground to show of a scene.
+
+    It holds `places` (N, 2, no nan), pillars, doors, service points and stairs, with a margin of 2 m, cut at the
+    world's border to not less than 1 m. Without any of these it is the whole world.
+    """
     objects = [places, scene.pillars[:, :2], scene.doors.reshape(-1, 2), scene.service]
     objects += [end[None] for flight in scene.stairs for end in (flight.foot, flight.head)]
     points = _finite(np.concatenate([np.asarray(each).reshape(-1, 2) for each in objects]))

@@ -34,9 +34,10 @@ LABEL_DIRECTIONS = ((1, 1), (1, -1), (-1, 1), (-1, -1), (0, 1), (1, 0), (-1, 0),
 
 
 def draw_scene(canvas: Canvas, scene: Scene | None) -> None:
-    """Draws grid lines, and of a scene its border, stairs, walls with gaps for doors, pillars and service points.
+    """Draws grid lines, and of a scene its border, stairs, walls with gaps for doors, pillars and service points, in
+    place.
 
-    Grid lines are 1, 5 or 20 m apart, by the size of the plan.
+    Grid lines are 1 m apart on plans up to 30 m long, 5 m up to 120 m, else 20 m. scene: None: only the grid.
     """
     span = float((canvas.high - canvas.low).max())
     step = 1.0 if span <= 30 else 5.0 if span <= 120 else 20.0
@@ -70,9 +71,11 @@ def _draw_stairs(canvas: Canvas, flight: Stairs) -> None:
 
 
 def draw_trails(canvas: Canvas, truth: Truth, index: int, places: Array) -> None:
-    """Draws where each person in frame `index` was during the last 3 s, back to the last frame without that person.
+    """Draws in place where each person of frame `index` (counted from 1) was during the last 3 s, in a pale colour of
+    the id.
 
-    places: (R, 2) drawing coordinates of the truth's R rows.
+    places: (R, 2) drawing coordinates of the truth's R rows (one row per person and frame), not nan. A trail stops at
+    the last frame without that person; one of a single point is not drawn.
     """
     present = truth.id[truth.rows(index)]
     first = truth.rows(max(index - round(TRAIL_SECONDS * truth.fps), 1)).start
@@ -91,9 +94,10 @@ def _pale(ink: Colour) -> Colour:
 
 
 def draw_group_hulls(canvas: Canvas, truth: Truth, index: int, places: Array, boxes: Array | None) -> None:
-    """Draws the hull and id of each group that has two or more members in frame `index`.
+    """Draws in place the hull and id of each true group that has two or more members in frame `index`, counted from 1.
 
-    The hull holds the members' boxes (R, 4) ltwh where `boxes` is given, else a disc round each of `places` (R, 2).
+    places: (R, 2) drawing coordinates of the truth's R rows (one row per person and frame). boxes: (R, 4) left, top,
+    width, height, whose corners the hull holds; None: it holds a circle round each place, of 0.3 m and at least 9 px.
     """
     rows = truth.rows(index)
     group = truth.group[rows]
@@ -121,9 +125,12 @@ def _outlines(canvas: Canvas, places: Array, boxes: Array | None) -> Array:
 
 
 def draw_people(canvas: Canvas, truth: Truth, index: int, places: Array, boxes: Array | None, ids: bool) -> None:
-    """Draws each person of frame `index` whose place is known: a disc with a heading line, or a box if boxes are given.
+    """Draws in place each person of frame `index` (counted from 1): a disc with a heading line, or a box if `boxes` is
+    given.
 
-    places: (R, 2); boxes: (R, 4) ltwh, of the truth's R rows. No heading line is drawn below 0.1 m/s. `ids` adds ids.
+    places: (R, 2) drawing coordinates of the truth's R rows (one row per person and frame); people with nan are
+    skipped. boxes: (R, 4) left, top, width, height; None: discs. ids: also write ids. There is no heading line without
+    velocities or below 0.1 m/s.
     """
     rows, radius = truth.rows(index), max(0.22 * canvas.scale, 6.0)
     for row in range(rows.start, rows.stop):
@@ -147,9 +154,10 @@ def _draw_heading(canvas: Canvas, truth: Truth, row: int, at: Array, ink: Colour
 
 
 def draw_ids(canvas: Canvas, ids: Ints, places: Array, radius: float) -> None:
-    """Writes each id (N,) beside the disc of `radius` px at its place (N, 2).
+    """Writes each id into the canvas's image, in place, beside the disc at its place.
 
-    Of eight positions round the disc each id takes the one that covers the least of discs and ids drawn before.
+    ids: (N,). places: (N, 2) in drawing coordinates; those with nan are skipped. radius: of the discs in px. Of eight
+    positions round its disc an id takes the one that covers the least of all discs and of the ids written before.
     """
     discs = canvas.map(places)
     taken = np.concatenate([discs - radius, discs + radius], axis=1)
