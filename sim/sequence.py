@@ -1,4 +1,7 @@
-"""Simulate a scenario: a Sequence whose pictures, truth and detections are computed when they are first used."""
+"""Simulates a scenario with a seed as a Sequence.
+
+Its pictures, detections and truth are computed when they are first used, not when the Sequence is made.
+"""
 
 from __future__ import annotations
 

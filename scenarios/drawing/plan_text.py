@@ -1,4 +1,7 @@
-"""Draws the plan of a scenario in characters. Two columns are as wide as one row is high, as in most terminals."""
+"""Draws the plan of a scenario as lines of characters, the y axis pointing up.
+
+Two columns stand for the same length in m as one row, because characters are about twice as high as wide.
+"""
 
 from __future__ import annotations
 

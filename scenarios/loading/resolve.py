@@ -1,4 +1,8 @@
-"""Loads scenarios: `load` one by name or file, `resolve` a file, scenario or suite into its entries."""
+"""Loads scenarios: `load` returns the checked scenario of a catalogue name or a TOML file.
+
+`resolve` returns the entries of a scenario or a suite (a list of scenarios); each entry is one sequence to make for
+every seed.
+"""
 
 from __future__ import annotations
 

@@ -1,5 +1,6 @@
-"""Checks the script of a scenario: each order concerns groups that exist then, in sizes that fit, within the
-duration.
+"""Checks the script of a scenario before it is simulated; the first order that cannot work raises InputError.
+
+Each order must concern groups that exist at that point of the script, in sizes that fit, within the duration.
 """
 
 from __future__ import annotations

@@ -1,4 +1,7 @@
-"""Geometry of a scenario's world: walls without their doors, distances from walls and pillars, places of queues."""
+"""Geometry of a scenario's world, in m: pieces of walls without the openings of doors, distances, and queues.
+
+Distances are from a point to the nearest wall or pillar. The places of a queue are points x, y, head first.
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,8 @@
-"""One sequence of a dataset: where it goes, whether it is already stored, and how a worker simulates and stores it."""
+"""A job makes one sequence of a dataset, from one entry (scenario) and one seed.
+
+This module names its folder, finds out whether the sequence is already stored there undamaged, and otherwise simulates
+the scenario and stores the sequence. A worker process can run a job.
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,7 @@
-"""Compiled convex hulls of many point sets at once. `sim.geometry.polygons.convex_hull` computes a single hull."""
+"""Compiled convex hulls of many sets of points (x, y in any unit) at once, by Andrew's monotone chain.
+
+The result is one array of vertices for each set. `sim.geometry.polygons.convex_hull` computes a single hull.
+"""
 
 from __future__ import annotations
 

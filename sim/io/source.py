@@ -1,4 +1,7 @@
-"""Open what a user gives as SOURCE: recognise the format and return its Sequences. New readers are added here."""
+"""Opens the path that a user gives as SOURCE, recognises its format, and returns its Sequences.
+
+SOURCE is a stored sequence or dataset, or a recording in a public format. New readers are added here.
+"""
 
 from __future__ import annotations
 

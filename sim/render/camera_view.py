@@ -1,4 +1,8 @@
-"""Constants of one camera: geometry and colours of the empty scene, canvases to draw on, light and wind by pixel."""
+"""What is the same in all frames that one camera sees, computed when first needed.
+
+It holds the geometry (depth, kind of surface, place) and the colours of the empty scene, canvases to draw on, and the
+random fields from which brightness and wind in the image follow at any time.
+"""
 
 from __future__ import annotations
 

@@ -18,10 +18,11 @@ WAVES = 24
 
 @dataclass(frozen=True, eq=False)
 class SampledField:
-    """A field, as of brightness or wind, at N fixed places, as W waves in time.
+    """A random field, as of brightness or wind, at N fixed places: a sum of W waves in time.
 
-    sine, cosine (N, W)   coefficients of each wave at each place, in the field's unit
-    omega (W,)            angular frequencies, rad/s
+    Its value at place n and time t (s) is a sum over waves w of a sine and a cosine of omega[w] t with coefficients.
+    sine, cosine (N, W): coefficients of each wave at each place, in the field's unit. omega (W,): angular frequencies,
+    rad/s.
     """
 
     sine: Array

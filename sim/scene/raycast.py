@@ -1,6 +1,7 @@
-"""Inputs of the compiled ray casting: the solid things of a scene, and the lines of sight of a camera's pixels.
+"""Inputs of the compiled ray casting, in m: the solid things of a scene, and the lines of sight of a camera.
 
-`sim.scene.raycast_kernels.first_hit` finds what a ray meets first among `Solids` and the ground.
+`Solids` holds walls, pillars and stairs. `PixelRays` holds two 3 x 3 matrices that give the line of sight of each image
+point (u, v) px. `sim.scene.raycast_kernels.first_hit` finds what a ray meets first among `Solids` and the ground.
 """
 
 from __future__ import annotations

@@ -1,4 +1,8 @@
-"""Our Parquet tables (a unit for each column, metadata in the schema) and JSON files: to bytes and strictly back."""
+"""The project's Parquet tables and JSON files, to bytes and strictly back.
+
+Each column of a table has a unit, and the table has metadata in its schema. Equal content gives equal bytes. nan is
+null in JSON.
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,7 @@
-"""Write the picture streams of a sequence, one picture at a time: draw, hash the raw pixels, encode, write."""
+"""Writes the picture streams of a sequence, such as left and disparity, one picture at a time.
+
+Each picture is drawn, its raw pixels are hashed, and it is encoded and written as a picture file or part of a video.
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,8 @@
-"""Group events (events.json), hard negatives (near.csv) and the script's orders (script.json): to bytes and back."""
+"""Small files of a sequence's truth, to bytes and back.
+
+events.json: group events. near.csv: hard negatives, that is pairs of people who satisfy the merge rule but are
+strangers; frames from 1. script.json: the orders of the scenario's script.
+"""
 
 from __future__ import annotations
 

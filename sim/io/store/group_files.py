@@ -1,4 +1,8 @@
-"""Groups per frame as files: exact in groups.parquet, and as text in groups.csv with hulls as WKT polygons."""
+"""The groups of each frame as files, and back.
+
+groups.parquet holds the exact values. groups.csv holds text for other programs, with each group's hull as a WKT text
+"POLYGON ((x y, …))".
+"""
 
 from __future__ import annotations
 
