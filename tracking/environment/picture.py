@@ -1,4 +1,8 @@
-"""The picture that the environment renders: the last frame, or a plan of the ground, with detections and tracks."""
+"""The picture that the environment renders after a step, as an array (H, W, 3) uint8 RGB.
+
+It shows the last frame's image with the tracks or, without images, a plan of the ground (or an empty image plane) with
+detections and tracks; above it a line of text with source, seed, frame and score.
+"""
 
 from __future__ import annotations
 

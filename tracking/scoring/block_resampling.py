@@ -1,4 +1,8 @@
-"""Scores of a recording resampled from its own frames, for confidence intervals by moving blocks (tracking.stats)."""
+"""Scores of a single recording made of frames chosen from it, in any order and with repetitions.
+
+`tracking.stats` draws blocks of consecutive frames with replacement, lets this module score each draw, and turns the
+scores of all draws into confidence intervals. Scores of events need the original order and are nan.
+"""
 
 from __future__ import annotations
 

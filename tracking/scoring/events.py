@@ -74,11 +74,11 @@ class ComparableEvent:
 
 @dataclass(frozen=True, slots=True)
 class MatchedEvents:
-    """All events of one kind on both sides.
+    """All events of one kind in a sequence, of the truth and of a tracker, and which of them match.
 
     - kind: one of `KINDS`; "form" is among the merges, "dissolve" among the splits.
     - true, est: the true events and the tracker's events of this kind, matched or not.
-    - pairs: the matched events, each (true event, tracker's event).
+    - pairs: the matched events, each (true event, tracker's event); an event is in one pair at most.
     """
 
     kind: str

@@ -1,4 +1,5 @@
-"""Rows of people or groups, one per frame and id, and lookups of a row by frame and id."""
+"""Rows of people or groups of one side (the truth or a tracker), one row per frame and id; lookups of a row by frame
+and id."""
 
 from __future__ import annotations
 

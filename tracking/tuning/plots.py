@@ -27,7 +27,8 @@ BLUE, ORANGE, RED = "#0b6bcb", "#d4600a", "#b42318"
 
 @dataclass(frozen=True)
 class Axes:
-    """Axes of a plot. x, y: the ranges (low, high) of the data that fill the plot, low below high."""
+    """Axes of a plot. x, y: each the range (low, high) of the data that fills the plot, in the data's unit, low below
+    high."""
 
     x: tuple[float, float]
     y: tuple[float, float]
