@@ -1,4 +1,7 @@
-"""Run a tracker over a whole sequence: `track` returns its tracks of every frame and what run.json holds."""
+"""Run a tracker over a whole sequence: `track` returns its tracks of every frame and what run.json holds.
+
+Input: a tracker (name, class or instance) and a sequence. Output: a `TrackingRun`.
+"""
 
 from __future__ import annotations
 
@@ -22,7 +25,8 @@ from tracking.run_info import Speed, run_info
 class TrackingRun(SequenceOf[Tracks]):
     """The tracks of one run; as a sequence, one `Tracks` per frame in order: item 0 is frame 1, a slice gives a tuple.
 
-    info: the content of run.json, {} by default.
+    tracks: the `Tracks` of every frame. info: the content of run.json (tracker, config, seed, detections, speed), {} by
+    default.
     """
 
     tracks: tuple[Tracks, ...]

@@ -1,4 +1,7 @@
-"""The content of run.json: which tracker ran, with which config and seed, on which detections, how fast."""
+"""The content of run.json: which tracker ran, with which config and seed, on which detections, how fast.
+
+`run_info` makes the dict, `input_summary` makes one line of it. Speeds are in frames per second.
+"""
 
 from __future__ import annotations
 
@@ -20,7 +23,7 @@ SENSOR_SETTINGS_SHOWN = 6
 class Speed:
     """Speed of a run in frames per second, 0 if nothing was run.
 
-    tracker: of the tracker's steps alone; whole: with reading and decoding frames.
+    tracker: speed of the tracker's steps alone. whole: speed including the reading and decoding of frames.
     """
 
     tracker: float = 0.0

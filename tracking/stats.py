@@ -1,7 +1,8 @@
 """Confidence intervals of scores: bootstrap over sequences, paired differences, shares, moving blocks of one recording.
 
 Neighbouring frames are alike, so single frames are never resampled: whole sequences are, or blocks of frames. All
-intervals are 95 % intervals. The random numbers are fixed, so that the same input gives the same interval.
+intervals are 95 % intervals: mean or score, low end and high end, in the unit of the score. The random numbers are
+fixed, so that the same input gives the same interval.
 """
 
 from __future__ import annotations

@@ -23,7 +23,8 @@ Fault = tuple[str, str]
 class ReportHistory:
     """What a tracker has reported in a sequence so far.
 
-    plane_and_unit: (plane, unit) of its first tracks, None before. ids: all track ids so far, of people or of groups.
+    plane_and_unit: (plane, unit) of its first tracks, None before. ids: all track ids
+    so far, of people or of groups. It starts empty.
     """
 
     plane_and_unit: tuple[str, str] | None = None

@@ -1,4 +1,9 @@
-"""Detections made from the labels, for `--detections truth`: perfect, or degraded by sensor settings."""
+"""Detections made from the labels, for `--detections truth`: perfect, or degraded by sensor settings.
+
+Input: the labels of a sequence (positions in m on the ground, or boxes in px). Output: one `Detections` per frame, in
+order from frame 1. Without settings these are the labels with score 1. The settings have the keys of a scenario's
+[sensor]; a key that is left out has the value of a perfect sensor.
+"""
 
 from __future__ import annotations
 

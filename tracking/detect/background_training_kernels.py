@@ -1,6 +1,8 @@
 """Kernels of tracking.detect.background_training: the model of each pixel in one pass over the sample.
 
-Numpy twins: tests/reference_background.py. Equations: Horprasert et al. (2000).
+Input: a sample of K frames, BGR grey levels. Output per pixel: mean E and standard deviation sigma of each channel over
+its inliers (frames that show the background), and normalisers of brightness and chromaticity distortion. Numpy twins:
+tests/reference_background.py. Equations: Horprasert et al. (2000).
 """
 
 from __future__ import annotations

@@ -1,6 +1,7 @@
 """The brightness of a frame relative to the background model: one factor per colour channel (ours).
 
-The factor of a channel is the median of I / E over background pixels, I the frame's grey level and E the model's mean.
+The factor of a channel is the median of I / E over background pixels, I the frame's grey level and E the model's
+mean grey level. It has no unit and is 1 for a frame as bright as the model.
 """
 
 from __future__ import annotations

@@ -1,4 +1,8 @@
-"""OpenCV's mixture of Gaussians (Zivkovic 2004) as an alternative background model, for comparison."""
+"""OpenCV's mixture of Gaussians (Zivkovic 2004) as an alternative background model, for comparison.
+
+It gives each pixel of a BGR picture a class: background, foreground or shadow. The model learns from the frames of a
+sample, later from each frame that `adapt` gets.
+"""
 
 from __future__ import annotations
 

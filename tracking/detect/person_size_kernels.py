@@ -1,4 +1,4 @@
-"""Kernel of tracking.detect.person_size: values of a table between its nodes."""
+"""Kernel of tracking.detect.person_size: values of a table (C, V, U) between its nodes, by bilinear interpolation."""
 
 from __future__ import annotations
 

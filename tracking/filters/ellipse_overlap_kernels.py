@@ -1,6 +1,7 @@
 """Kernels of tracking.filters.components: do two filled ellipses have a common point? (Gilitschenski & Hanebeck 2012)
 
-Twin: tests/reference_components.py. A 2x2 covariance is given by its entries xx, xy, yy.
+An ellipse is the set of points y with y' A^-1 y <= 1 about its centre. Its symmetric 2 x 2 matrix A is given by the
+entries xx, xy, yy, in the squared unit of the centres. Slow twin for tests: tests/reference_components.py.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""The uncertainty of a track, rho = sqrt|S| / its asymptote, and the values of rho that decide about tracks.
+"""The uncertainty of a track, rho = sqrt(det S) / its asymptote, and the values of rho that decide about tracks.
 
 Gonzalez et al. (2006, 4.5, 5) manage tracks by sqrt|S|, S the innovation covariance (eq. 6): it falls towards an
 asymptote while measurements are associated and rises while they are missed. It does not depend on measured values. This

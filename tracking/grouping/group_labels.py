@@ -1,6 +1,7 @@
 """From links between two people to groups over time: the group id of each person in each frame, and the events.
 
-A group is a connected component of linked people. Ids follow the identity rule of the truth (sim.truth.identity).
+A group is a connected component of linked people. People are columns of the
+tables, frames count from 0. Ids follow the identity rule of the truth (sim.truth.identity).
 """
 
 from __future__ import annotations
@@ -23,9 +24,9 @@ from tracking.grouping.merge_split_events import LinkSwitch, event_of_change
 class _LinkedPeople:
     """Who is present and linked to whom at one moment. People are columns of the tables, from 0.
 
-    present: by person, the frame (from 0) since which the person has been present; a person who is missed stays present
-    for `memory` s. linked: by person, the people with a link to the person, present or not. identities: the groups of
-    the last step and their ids.
+    present: dict by person (column): the frame (from 0) since which the person has been present; a person who is missed
+    stays present for `memory` s. linked: by person, the people with a link to the person, present or not. identities:
+    the groups of the last step and their ids.
     """
 
     present: dict[int, int] = field(default_factory=dict)

@@ -4,9 +4,10 @@ The state's h, w are the axes of the person's ellipse, the longer one first as m
 from the abscissa, v down, modulo pi. theta is a random walk (Gonzalez et al. 2006, 4.1). The box of a track is the
 bounding box of its ellipse.
 
-The paper's rho counts measurements by the covariance (4.5). Here the covariance also knows that a partly hidden person
+The paper's rho is sqrt|S| over its asymptote, S the covariance of the innovation (measurement less prediction). It
+counts measurements by the covariance (4.5). Here the covariance also knows that a partly hidden person
 is measured with more noise, and that axes return to expected ones (both ours). So rho is computed from a second,
-nominal covariance, which is updated with the nominal R only.
+nominal covariance, which is updated with the nominal R (variance of a measurement) only.
 """
 
 from __future__ import annotations

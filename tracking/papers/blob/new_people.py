@@ -2,8 +2,9 @@
 
 Each unexplained region is tried with 1, 2, … templates of a person's size at its place. They start side by side, each
 where its columns of the region reach down to (from straight above: in a row along the region's longer axis). Then they
-move in turn to where they explain most (person_template). The number is chosen whose templates together explain most,
-where each template costs `support` of a whole person. No template may have less support than that.
+move in turn to where they explain most (person_template). The number is chosen whose templates together explain most:
+the sum over covered pixels (foreground 1, background -1/2), where each template costs the share `support` of a person's
+area. No template may have less support than that.
 """
 
 from __future__ import annotations

@@ -1,6 +1,9 @@
 """Kernels of tracking.papers.blob.new_people: first guesses of places, and the number of templates that explains most.
 
-Twins: tests/reference_templates.py; templates, foreground and cover as in person_template_kernels.
+Templates (K, 4) are upright ellipses x (middle), foot (lower edge), h, w, px. foreground (H, W) bool; cover (H, W)
+int16: the number of templates over each pixel, plus EXPLAINED = 1000 where a blob of one person explains it. A
+template's support is the sum over the pixels that it alone covers (foreground 1, background -1/2) over its area. Slow
+twins for tests: tests/reference_templates.py.
 """
 
 from __future__ import annotations

@@ -1,9 +1,9 @@
 """Kernels of tracking.papers.blob.person_template: sums over upright ellipses, row by row.
 
-Twins: tests/reference_templates.py. A template (4,) is x, foot, h, w, px: an ellipse that fills a box of h x w px round
-column x with its lower edge at row `foot`. foreground (H, W) bool. cover (H, W) int16: the number of templates painted
-over each pixel, plus EXPLAINED where a blob of one person explains the pixel. Sums count in halves of a foreground
-pixel: they are whole numbers, and exact in any order.
+Slow twins for tests: tests/reference_templates.py. A template (4,) is x, foot, h, w, px: an ellipse that fills a box of
+h x w px round column x with its lower edge at row `foot`. foreground (H, W) bool. cover (H, W) int16: the number of
+templates painted over each pixel, plus EXPLAINED where a blob of one person explains the pixel. Sums count in halves of
+a foreground pixel: they are whole numbers, and exact in any order.
 """
 
 from __future__ import annotations

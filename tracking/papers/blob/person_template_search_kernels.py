@@ -1,6 +1,8 @@
 """Kernels of tracking.papers.blob.person_template: the search for the places where templates explain most.
 
-Twins: tests/reference_templates.py; templates, foreground and cover as in person_template_kernels. A template moves on
+Templates are upright ellipses x (middle), foot (lower edge), h, w, px. foreground (H, W) bool; cover (H, W) int16: the
+number of templates over each pixel, plus EXPLAINED = 1000 where a blob of one person explains it. Slow twins for tests:
+tests/reference_templates.py. A template moves on
 a grid round its place while the others stay. The sum over one of its rows is a difference of the image row's running
 sum, so that a place costs one difference per row.
 """

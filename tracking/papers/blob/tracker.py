@@ -5,6 +5,10 @@ Gonzalez, Rowe, Andrade, Villanueva, "Efficient management of multiple agent tra
 covariances in m and s. The measurement is z = (x, y, h, w): centre, height and width of a box. A box has no direction;
 the paper's ninth state, the angle theta, is measured from pixels only. There h and w are the axes of a blob's ellipse.
 
+    (A, Q: transition and process noise; P: covariance of x; C: picks the measured coordinates; R: measurement noise;
+    y = z - C x: innovation; S = C P C' + R its covariance; K: gain; d^2: squared Mahalanobis distance; chi2:
+    chi-squared)
+
     predict    x = A x,  P = A P A' + Q                        eqs 1, 2        tracking.filters.kalman
     gate       z_pred = C A x (x before the prediction)        eq. 8           update_from_boxes, update_from_pixels
                d^2 = (z - z_pred)' S^-1 (z - z_pred) <= q      eqs 9, 10       q: the quantile `gate` of chi2 with 4

@@ -62,10 +62,9 @@ class PixelUpdater:
     """Updates the tracks of `people` from the picture of each frame.
 
     State: foreground, the pipeline with its background model; size, the size of a person at each place; people, the
-    table of tracks; config; gates, confirm_gates (2,): largest squared Mahalanobis
-    distance d^2, without and with direction, of an association and of a measurement that may confirm a track;
-    angle_noise: variance,
-    rad^2.
+    table of tracks; config; gates, confirm_gates (2,): largest squared Mahalanobis distance d^2, without and with
+    direction, of an association and of a measurement that may confirm a track; angle_noise: variance of a measured
+    direction, rad^2.
     """
 
     def __init__(self, config: BlobConfig, people: TrackedEllipses, context: Context) -> None:

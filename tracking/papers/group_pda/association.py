@@ -1,7 +1,9 @@
 """Data association of `group-pda`: which points a group may have (gate, attachment), and its update by them (sec. 4).
 
-Order in a frame: `gated_distances`, `attached`, `claimed` (then tracking.papers.group_pda.missed_members adds missed
-members), `associate`. The masses and the update are in association_kernels and association_mass_kernels.
+Input: points (M, 2), in m on the ground or px, and the bank of G groups. Output: which points each group takes
+(`Associated`); the groups' states in the bank are updated in place. Order in a frame: `gated_distances`, `attached`,
+`claimed` (then tracking.papers.group_pda.missed_members adds missed members), `associate`. The masses and the update
+are in association_kernels and association_mass_kernels.
 """
 
 from __future__ import annotations
@@ -22,11 +24,12 @@ FASTEST = 2.0
 
 @dataclass(frozen=True)
 class PointClaims:
-    """Which of M points each of G groups may have. Rows of the bank stand for groups.
+    """Which of M points each of G groups may have. Groups are rows of the bank, from 0; points are in m or px.
 
     points (M, 2): x, y; weights (M,): people that each stands for; last_seen (M,): time, s, when it was measured; d2
-    (G, M): squared Mahalanobis distances, inf outside the search regions; owner (M,): row of the one group that may
-    have the point although it is in no region, or -1; claimants (M,): number of groups that may have the point.
+    (G, M): squared Mahalanobis distances of points from groups, inf outside a group's search region; owner (M,): row of
+    the one group that may have the point although it is in no region, or -1; claimants (M,): number of groups that may
+    have the point.
     """
 
     points: Array

@@ -1,9 +1,10 @@
 """Kernels of `group-pda`: search regions, and the update of each group by its associations and their masses.
 
 Gennari & Hager (2004), section 4. Points are (M, 2); weights (M,) are the people that each point stands for: 1, or the
-share of a person that a pixel is. A group's state is x (4,) = xi, v with covariance P (4, 4), extent Sigma (2, 2) and
-size N in people. Lengths are in the unit of the points. Symmetric 2 x 2 matrices are stored as (3,) = xx, xy, yy.
-Face: tracking.papers.group_pda.association; masses: association_mass_kernels. Slow twins: tests/reference_group_pda.py.
+share of a person that a pixel is. A group's state is x (4,) = xi, v (centroid x, y and velocity) with covariance P
+(4, 4); extent Sigma (2, 2), the covariance of its members' positions; size N in people. Lengths are in the unit of the
+points. Symmetric 2 x 2 matrices are stored as (3,) = xx, xy, yy. Face: tracking.papers.group_pda.association; masses:
+association_mass_kernels. Slow twins: tests/reference_group_pda.py.
 """
 
 from __future__ import annotations

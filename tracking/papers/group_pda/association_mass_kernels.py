@@ -1,7 +1,11 @@
 """Kernels of `group-pda`: the parts of an association's mass (eq. 4.2), and the noise of a measured centroid.
 
-m_d is `log_density` of the centroid with S = H P H' + R, where R is `centroid_noise`; m_N is `log_count`; m_g is 1 for
-a feasible association. `log_miss` is the mass of the miss hypothesis. The module association_kernels puts them
+An association is a set of points that may be one group's; its mass, a relative weight, is m_d m_N m_g. m_d is the
+density of the points' centroid about the predicted one: `log_density`, with covariance S = H P H' + R. P is the
+covariance of the group's state, H picks its position, and R (`centroid_noise`) is the covariance of the measured
+centroid. m_N is the density of the number of people in the points, given that of the group: `log_count`. m_g is 1 for
+a feasible association (its points form one group), else 0. `log_miss` is the log mass of the miss hypothesis, that no
+point is the group's. The module association_kernels puts them
 together. Symmetric 2 x 2 matrices are stored as (3,) = xx, xy, yy. The slots of the array `rules` are named here.
 """
 

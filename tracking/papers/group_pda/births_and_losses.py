@@ -1,6 +1,9 @@
 """Births, confirmation, recapture and loss of `group-pda`'s groups: how a group's life begins and ends.
 
-Each function changes the bank in place. Events of confirmed groups are returned as `BankEvent`s.
+A new group is tentative (without id). It is confirmed, and gets an id, once it has been measured long enough. A group
+without measurements for too long is lost; recapture gives its id to a newborn group that fits.
+
+Each function changes the bank of groups in place. Events of confirmed groups are returned as `BankEvent`s.
 """
 
 from __future__ import annotations
@@ -23,7 +26,7 @@ RECAPTURE_GATE = 13.28
 
 @dataclass(frozen=True)
 class ExpectedMembers:
-    """Where K members of confirmed groups should be, in the unit of the points.
+    """Where K members of confirmed groups should be, in the unit of the points (m on the ground, px in the image).
 
     place (K, 2): predicted x, y; reach (K,): how far from there a member may be; group (K,): id of the member's group.
     """

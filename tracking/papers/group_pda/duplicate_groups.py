@@ -31,8 +31,8 @@ def may_be_one(bank: GroupBank, i: int, j: int) -> bool:
 class DuplicateGroups:
     """Finds pairs of groups that follow the same people.
 
-    State: clock, in s, by pair of ids of groups whose search regions overlap. It goes forward in frames in which the
-    two may be one and back in the others; at 0 it is dropped.
+    State: clock, a dict: the time, s, by pair of ids of groups whose search regions overlap. A time grows in frames in
+    which the two may be the same group and falls in the others; at 0 the pair is dropped.
     """
 
     def __init__(self) -> None:

@@ -43,7 +43,7 @@ class PairMoment(NamedTuple):
 class PairHistory:
     """The past of two groups that are near each other.
 
-    alike_since: time in s since which they have also had like velocities; inf if they have unlike ones now. moments:
+    alike_since: time, s, since which they have also had like velocities; inf if the velocities differ now. moments:
     the pair in each frame of the last 5 s in which it was near, oldest first.
     """
 

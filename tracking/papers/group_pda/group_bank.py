@@ -36,7 +36,7 @@ class MemberPlaces(NamedTuple):
 
 
 class GroupIds:
-    """Fresh group ids, counted from 1. State: next, the id that is given next."""
+    """Gives fresh group ids, counted from 1; no id is given twice. State: next, the id that is given next."""
 
     def __init__(self) -> None:
         self.next = 1

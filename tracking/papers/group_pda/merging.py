@@ -1,8 +1,9 @@
 """Merging of `group-pda`'s groups (sec. 3.1, 3.2): which are near with like velocities, for how long, and their union.
 
-The relation R_x holds for two groups whose search regions overlap and whose velocities are alike; G_x are the connected
-components. Departures: the velocity test is a physical difference (`merge_velocity`), R_x must hold for `merge_time`,
-and only groups whose velocity is known well take part (see `GroupMerging.step`).
+The relation R_x holds for two groups whose search regions overlap and whose velocities are alike. G_x are the connected
+components of groups under R_x; each becomes one group. Departures: the velocity test is a physical difference
+(`merge_velocity`), R_x must hold for `merge_time`, and only groups whose velocity is known well take part (see
+`GroupMerging.step`).
 """
 
 from __future__ import annotations
@@ -41,8 +42,9 @@ Pair = tuple[int, int]
 class NearPair(NamedTuple):
     """Two groups whose search regions overlap or whose points are linked in this frame.
 
-    ids: of the groups, the smaller first. alike: their velocities are alike and, from pixels, their people are not far
-    apart. moment: time, difference of centroids and gap of the pair in this frame.
+    ids: of the two groups, the smaller first. alike: True if their velocities are alike and, from pixels, their people
+    are not far apart. moment: the pair in this frame: time (s), difference of centroids (m), gap between nearest people
+    (m).
     """
 
     ids: Pair

@@ -1,4 +1,8 @@
-"""What `group-pda` reports in a frame: the confirmed groups with their hulls, and the events."""
+"""What `group-pda` reports in a frame: the confirmed groups with their hulls, and the events.
+
+Input: the bank of groups, whose lengths are in the unit of the points (m on the ground or px in the image), and the
+frame's events as `BankEvent`s. Output: the `Tracks` of the frame with unit "group".
+"""
 
 from __future__ import annotations
 
@@ -17,7 +21,7 @@ from tracking.papers.group_pda.scaled_parameters import ScaledParameters
 class BankEvent:
     """A change of the set of confirmed groups.
 
-    kind: merge, split, enter or leave, as in GroupEvent. onset: time, s, when it began. before, after: ids of the
+    kind: "merge", "split", "enter" or "leave". onset: time, s, when it began. before, after: ids (tuples) of the
     groups concerned before and after the change, sorted. pos: x, y in the unit of the points.
     """
 
@@ -30,8 +34,9 @@ class BankEvent:
 
 @dataclass(frozen=True)
 class ReportFrame:
-    """The frame that is reported. index: from 1; t: time, s; plane: "ground" or "image"; fps: frames per second.
+    """The frame that is reported.
 
+    index: its number, from 1; t: time, s; plane: "ground" or "image"; fps: frames per second.
     outline (V, 2): a polygon round the origin, in the plane's unit, that stands for what covers the ground or the image
     about one member's place: a footprint, a usual box, or a cell of the pixel grid.
     """

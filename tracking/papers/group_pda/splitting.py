@@ -1,4 +1,10 @@
-"""Splitting of `group-pda`'s groups (sec. 3.3): a group without feasible associations falls apart."""
+"""Splitting of `group-pda`'s groups (sec. 3.3): a group without feasible associations falls apart.
+
+An association is feasible if its points form one group under the group constraint G_y (tracking.filters.components).
+`split` partitions the points (M, 2) of a group without feasible associations by G_y and replaces its row of the bank by
+one row per part. A group of one part stays, one of noise only is removed.
+`children` makes the rows of the parts. Lengths are in the unit of the points (m on the ground or px), times in s.
+"""
 
 from __future__ import annotations
 

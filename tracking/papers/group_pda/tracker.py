@@ -4,6 +4,9 @@ Gennari & Hager, "Probabilistic data association methods in visual tracking of g
 (xi, v, Sigma, N): centroid xi and velocity v, together x with covariance P; extent Sigma of the members' positions;
 number of people N. The steps of a frame (Fig. 1), with their equation (eq.) or section (sec.) and the module:
 
+    (F, Q: transition and process noise of x; S: covariance of a point about xi; y: a point; gamma: squared Mahalanobis
+    radius; m_d, m_N, m_g: masses by the centroid's place, the number of people and the group constraint)
+
     predict    x = F x, P = F P F' + Q                                 eq. 2.3            group_bank
     gate       {y : (y - xi)' S^-1 (y - xi) < gamma}                   eq. 2.2            association
     associate  theta_j: unshared points and the j nearest shared ones  sec. 4.1           association_kernels
@@ -34,8 +37,9 @@ Search region and update:
 Splitting and merging:
 - A split needs `split_time` without a feasible association; measured frames shorten that time, they do not end it.
   Children have their parent's velocity. The largest keeps the id. People who walk out of the region are its children.
-- SR_v is a difference of velocities in m/s, and R_x must hold for `merge_time`. Groups whose points are linked are near
-  even if their regions do not overlap. From pixels, groups that are far apart on the ground are not near.
+- SR_v, the region of like velocities, is a largest difference of velocities in m/s, and R_x must hold for `merge_time`.
+  Groups whose points are linked are near even if their regions do not overlap. From pixels, groups that are far apart
+  on the ground are not near.
 - Tentative and coasting groups, groups without a feasible association and groups without points of their own do not
   merge. P of a merged group is that of a weighted mean.
 - Of two groups that follow the same people for too long, one becomes lost.
