@@ -56,7 +56,9 @@ def test_tud_without_seqinfo_is_taken_at_25_fps_with_one_warning(shared_data):
 
 
 def test_a_folder_of_folders_is_a_dataset(shared_data):
-    assert [s.name for s in open_source(shared_data / "mot", fps=10)] == ["PETS09-S2L1-first200", "TUD-Campus"]
+    folders = sorted(folder.name for folder in (shared_data / "mot").iterdir() if folder.is_dir())
+    assert len(folders) >= 2
+    assert [s.name for s in open_source(shared_data / "mot", fps=10)] == folders
 
 
 def test_nine_columns_are_flag_class_visibility(tmp_path):
