@@ -29,10 +29,10 @@ OCCLUDER = -2  # id of walls and pillars in id maps
 
 
 class CameraView:
-    """The empty scene as one camera sees it. Each part is computed when first needed, and kept.
+    """The empty scene as one camera sees it; each part is computed when first needed, and kept.
 
-    Also gives brightness and wind in the image at any time. plants is None without plants. State: besides these
-    constants, the canvases that were returned and are ready for the next frame.
+    Parts: depth, kind and place of each pixel, colours, ids, and canvases to draw on; also brightness and wind in the
+    image at any time. plants is None without plants. Canvases that were returned are kept ready for the next frame.
     """
 
     def __init__(

@@ -20,8 +20,8 @@ WAVES = 24
 class SampledField:
     """A random field, as of brightness or wind, at N fixed places: a sum of W waves in time.
 
-    Its value at place n and time t (s) is a sum over waves w of a sine and a cosine of omega[w] t with coefficients.
-    sine, cosine (N, W): coefficients of each wave at each place, in the field's unit. omega (W,): angular frequencies,
+    Its values at time t (s) are sine @ cos(omega t) + cosine @ sin(omega t). sine, cosine (N, W): sine and cosine of
+    the waves' phases at each place, times their amplitudes, in the field's unit. omega (W,): angular frequencies,
     rad/s.
     """
 
