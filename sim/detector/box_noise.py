@@ -1,7 +1,9 @@
-"""Errors of a detector's boxes in proportion to their size, as `scenarios.schema.sensor.BoxNoise` describes them.
+"""Errors of a detector's boxes (left, top, width, height in px), as `scenarios.schema.sensor.BoxNoise` describes them.
 
-The four errors of a box are, in order: middle to the right, foot downwards, top downwards (all in box heights), and the
-logarithm of the width. `perturb_boxes` applies them, `box_errors` measures them.
+The four errors of a box are, in order: middle to the right, foot (lower edge) downwards, top edge downwards, all three
+divided by the box height; and the logarithm of the width over the true width. `perturb_boxes` applies them,
+`box_errors` measures them. `move_edges` adds errors in px instead; `foot_points` gives the ground points on which boxes
+stand.
 """
 
 from __future__ import annotations
@@ -20,12 +22,12 @@ def perturb_boxes(box: Array, visibility: Array, noise: BoxNoise, n: Array) -> A
     """Return boxes (R, 4), left, top, width, height in px, moved by random errors; the boxes given are not changed.
 
     n (R, 4): standard normals for the errors of the middle (to the right), the foot (downwards), the top (downwards),
-    all in box heights, and of the logarithm of the width. An error is mean + standard deviation × n, as `noise` gives
-    them. The standard deviation is multiplied by 1 + `noise.occluded` × hidden share; `noise.tails`, an excess
-    kurtosis, gives n heavier tails. visibility (R,): visible share of each person, 0 to 1.
+    all in box heights, and of the logarithm of the width. An error is mean + standard deviation × n; `noise` holds this
+    pair as across, foot, top and width. The standard deviation is multiplied by 1 + `noise.occluded` × hidden share;
+    `noise.tails`, an excess kurtosis, gives n heavier tails. visibility (R,): visible share of each person, 0 to 1.
 
-    Width and height keep at least 1 px, or their former value if that was less; then the top yields. A nan box stays
-    nan.
+    Width and height keep at least 1 px, or their former value if that was less; the middle and the foot stay where the
+    errors put them. A nan box stays nan.
     """
     n = heavy_tailed(n, noise.tails)
     means, sds = np.array([noise.across, noise.foot, noise.top, noise.width]).T
@@ -54,8 +56,8 @@ def heavy_tailed(n: Array, excess_kurtosis: float) -> Array:
     """Return standard normals n, of any shape, mapped to Student's t of variance 1 and this excess kurtosis (0 or
     more).
 
-    Quantiles are mapped to quantiles, with 4 + 6 / kurtosis degrees of freedom. If the excess kurtosis is 0, n itself
-    is returned, not a copy.
+    Quantiles are mapped to quantiles, with 4 + 6 / kurtosis degrees of freedom. nan stays nan; n above about 8.3 gives
+    inf. If the excess kurtosis is 0, n itself is returned, not a copy.
     """
     if not excess_kurtosis:
         return n
@@ -84,7 +86,7 @@ def foot_points(box: Array, z: Array, camera: Camera) -> Array:
 
     A person stands where the middle of the box's lower edge is seen; for a camera of kind "top", where the box's middle
     is seen. z (R,) m: height of the ground at each person. A row is nan where the line of sight meets no ground of that
-    height.
+    height in front of the camera, as above the horizon, and for a nan box or z.
     """
     from sim.scene.camera import rays
 

@@ -38,13 +38,14 @@ def false_alarms(
 
     With a camera, their feet are spread evenly over the part of the image that shows ground, and each is as large as a
     person standing there. Without a camera, boxes have the sizes of labelled boxes and are spread evenly over the image
-    (image_size: width, height in px; None: over the labelled box centres). Points are spread evenly over the labelled
-    area. Positions are in m; in px, the box's centre, if the truth has no positions. With `sensor.false_alarms`, alarms
-    last several frames and follow their own rules of place and size.
+    (image_size: width, height in px, ignored with a camera; None: over the labelled box centres). Points are spread
+    evenly over the labelled area. Positions are in m; in px, the box's centre, if the truth has no positions. With
+    `sensor.false_alarms`, alarms last several frames and follow their own rules of place and size.
 
-    Boxes are None if the truth has none. With `sensor.box` "visible" they are clipped to the image if its size is
-    known. Without a camera and without labels there are no false alarms. seed, repeat (number of the suite entry's
-    copy, 0 without copies): name the random streams. Raises ValueError for a negative seed.
+    Rows are not sorted by frame. A position is nan where no ground is seen. Boxes are None if the truth has none. With
+    `sensor.box` "visible" they are clipped to the image if its size is known; an alarm that lasts one frame then stays
+    even without area. Without a camera and without labels there are no false alarms. seed, repeat (number of the suite
+    entry's copy, 0 without copies): name the random streams. Raises ValueError for a negative seed.
     """
     size = camera.image if camera is not None else image_size
     if sensor.false_alarms is not None and (len(truth.id) or camera is not None):
@@ -68,10 +69,11 @@ def false_alarms(
 
 
 def false_alarm_counts(rate: float, length: int, seed: int, repeat: int = 0) -> Ints:
-    """Return the number of false alarms of each frame 1 to `length`, (length,), Poisson with mean `rate` per frame.
+    """Return the number of false alarms of each frame 1 to `length`, (length,) int64, Poisson with mean `rate` per
+    frame.
 
     seed, repeat (number of the suite entry's copy, 0 without copies): name the random stream; for fixed ones a higher
-    rate never lowers a number. All are 0 if the rate is 0. Raises ValueError for a negative seed.
+    rate never lowers a number. All are 0 if the rate is 0. Raises ValueError for a negative seed or rate.
     """
     return poisson_counts(rate, uniforms(rng(seed, "clutter", 0, repeat=repeat), 1, length, 1)[:, 0])
 
@@ -80,9 +82,10 @@ def _placed_by_camera(camera: Camera, u: Array) -> tuple[Array, Array]:
     """Return ground points (N, 2) in m and boxes (N, 4), left, top, width, height in px, of N false alarms in the
     image.
 
-    Each is a person 1.5 to 1.95 m tall. u (N, 6): uniforms in (0, 1), columns ACROSS, DOWN, HEIGHT, HEADING, SCORE,
-    ORDER. Right under a pinhole camera, where a body has no box, a box of a person's size is put round the image point.
-    A point is nan where no ground is seen.
+    Each is a person 1.5 to 1.95 m tall. The feet are even over the image; for a pinhole camera only below the row
+    `furthest_row`, where people become small. u (N, 6): uniforms in (0, 1], columns ACROSS, DOWN (place of the feet),
+    HEIGHT (of the body), HEADING (of the body), SCORE, ORDER (both not used here). Where the camera gives no box, as
+    right under it, a box of a person's size is put round the image point. A point is nan where no ground is seen.
     """
     width, height = camera.image
     top = 0.0 if camera.kind == "top" else furthest_row(camera)
@@ -101,9 +104,10 @@ def _placed_by_labels(truth: Truth, image_size: tuple[int, int] | None, u: Array
     """Return points (N, 2) in m over the labelled area, and boxes (N, 4), left, top, width, height in px, of labelled
     sizes.
 
-    u (N, 6): uniforms in (0, 1), columns ACROSS, DOWN, HEIGHT, HEADING, SCORE, ORDER. Boxes have their centres evenly
-    over the image (image_size: width, height in px), or over the labelled box centres if that is None. Points are 0 if
-    the truth has no positions. Boxes are None if it has no boxes.
+    u (N, 6): uniforms in (0, 1], columns ACROSS, DOWN (place), HEIGHT (which labelled box gives the size), HEADING,
+    SCORE, ORDER (not used here). Boxes have their centres evenly over the image (image_size: width, height in px), or
+    over the rectangle of the labelled box centres if that is None. Points are evenly in the rectangle of all labelled
+    positions, or 0 if the truth has no positions. Boxes are None if it has no boxes.
     """
     spread = u[:, [ACROSS, DOWN]]
     pos = np.zeros((len(u), 2))

@@ -1,8 +1,10 @@
 """Normal draws that stay correlated over time: sums of stationary AR(1) processes and of white noise.
 
-A part of share s and time constant tau is sqrt(s) x with x_t = rho x_(t-1) + sqrt(1 - rho²) e_t and
-rho = exp(-1 / (fps tau)). The sum of all parts is N(0, 1) with autocorrelation sum s exp(-lag / tau); the rest of the
-variance is white. Every process begins in frame 1, so that the draws of a frame do not depend on when a person enters.
+A part has a share s of the variance and a time constant tau in s. It adds sqrt(s) x_t in frame t, where x_t = rho
+x_(t-1) + sqrt(1 - rho²) e_t, e_t is a new standard normal, and rho = exp(-1 / (fps tau)) at fps frames/s. The sum of
+all parts is N(0, 1); its autocorrelation at a lag in s is the sum of s exp(-lag / tau). The rest of the variance is
+white, that is independent in each frame. Every process begins in frame 1, so that the draws of a frame do not depend on
+when a person enters.
 """
 
 from __future__ import annotations
@@ -24,10 +26,11 @@ def correlated_normals(
 ) -> Array:
     """Return standard normals (F, D), correlated over time, of frames `first` to `first` + F - 1 (frames from 1 on).
 
-    fresh (F, D): standard normals, used as the white part. memory: share of the variance and time constant (s) of each
-    AR(1) part; the shares must not add up to more than 1. The D columns are independent. The random stream of a part is
-    named by the seed, `keys`, the part's number from 0 on, and repeat (number of the suite entry's copy). If memory is
-    empty, `fresh` itself is returned.
+    fresh (F, D): standard normals, used as the white part, which has the variance that no part of the memory takes.
+    memory: share of the variance and time constant (s) of each AR(1) part; the shares must not add up to more than 1,
+    which is not checked. fps: frames per second. The D columns are independent. The random stream of a part is named by
+    the seed, `keys`, the part's number from 0 on, and repeat (number of the suite entry's copy, 0 without copies). It
+    begins in frame 1, whatever `first` is. If memory is empty, `fresh` itself is returned; otherwise it is not changed.
 
     Raises ValueError for a negative seed or key.
     """
@@ -44,9 +47,11 @@ def correlated_normals(
 
 
 def _autoregression(e: Array, rho: float) -> Array:
-    """Return x (F, D) with x_1 = e_1, x_t = rho x_(t-1) + sqrt(1 - rho²) e_t down the rows of e (F, D).
+    """Return x (F, D) with x_1 = e_1 and x_t = rho x_(t-1) + sqrt(1 - rho²) e_t down the rows of e (F, D), t being the
+    row.
 
-    It changes e: rows 2 on are scaled.
+    rho: correlation of successive rows, 0 to 1. If e is standard normal, so is x. It changes e: rows 2 on are scaled by
+    sqrt(1 - rho²).
     """
     from scipy.signal import lfilter
 

@@ -21,9 +21,10 @@ HIGHEST_FALSE_SCORE = 0.7  # of a false alarm whose detector has no measured sco
 def uniforms(generator: np.random.Generator, first: int, frames: int, per_frame: int) -> Array:
     """Return uniforms, (frames, per_frame), for frames `first` to `first` + frames - 1 (frames from 1 on).
 
-    They are above 0 and at most 1; a value may round to 1. The generator must be new, and is advanced. It spends
-    `per_frame` numbers on each frame, so that a frame's draws do not depend on `first`. Raises AttributeError if the
-    generator's bit generator cannot be advanced; numpy's default can.
+    They are above 0 and at most 1; a value may round to 1. The generator must be new, and is advanced: past the numbers
+    of the frames before `first` and those returned. It spends `per_frame` numbers on each frame, so that a frame's
+    draws do not depend on `first`. Raises AttributeError if the generator's bit generator cannot be advanced; numpy's
+    default can.
     """
     generator.bit_generator.advance((first - 1) * per_frame)  # type: ignore[attr-defined]
     return np.asarray(generator.random((frames, per_frame)) + 2.0**-54)
@@ -33,7 +34,7 @@ def normals(u: Array) -> Array:
     """Return the standard normal quantiles at u, any shape, with 0 < u <= 1: always finite, as u = 1 is lowered a
     little.
 
-    u = 0 gives -inf.
+    u = 0 gives -inf, nan or a negative u gives nan, u above 1 counts as 1.
     """
     from scipy.special import ndtri
 
@@ -44,7 +45,8 @@ def poisson_counts(rate: float, u: Array) -> Ints:
     """Return the quantiles (N,) int64 of a Poisson distribution of mean `rate` at uniforms u (N,); zeros if the rate is
     0.
 
-    For a fixed u they never fall when the rate rises. Raises ValueError for a negative rate.
+    A quantile is the smallest number whose cumulative probability is at least u. For a fixed u it never falls when the
+    rate rises. Raises ValueError for a negative or nan rate.
     """
     if not rate:
         return np.zeros(len(u), np.int64)
@@ -55,19 +57,22 @@ def poisson_counts(rate: float, u: Array) -> Ints:
 
 
 def interpolated_quantiles(curve: tuple[float, ...], u: Array) -> Array:
-    """Return the quantiles (N,) at u (N,) of a distribution given by evenly spaced quantiles, linear between them.
+    """Return the quantiles (N,) at u (N,), 0 to 1, of a distribution given by evenly spaced quantiles, linear between
+    them.
 
-    curve: the quantiles from u = 0 to u = 1, at least one number, in ascending order.
+    curve: the quantiles from u = 0 to u = 1, at least one number, in ascending order; a single one is the result for
+    every u. u outside 0 to 1 gives the first or last of them. Raises ValueError for an empty curve.
     """
     return np.interp(u, np.linspace(0.0, 1.0, len(curve)), curve)
 
 
 def true_scores(u: Array, visibility: Array, sensor: Sensor) -> Array:
-    """Return the scores (N,) in [0, 1] of N true detections at uniforms u (N,), by their visibility (N,), 0 to 1.
+    """Return the scores (N,) in [0, 1] of N true detections at uniforms u (N,), 0 to 1, by their visibility (N,), 0 to
+    1.
 
-    If `sensor.true_scores` is given, they are its quantiles, whatever the visibility. Else they are 1 for a detector
-    without misses and false alarms (detect_prob 1, clutter_rate 0). Otherwise the score is (0.4 + 0.6 √u)(0.5 + 0.5
-    visibility): its mean is 0.8 in full view, and half as much at visibility 0.
+    If `sensor.true_scores` is given, they are its quantiles at u, whatever the visibility. Else they are 1 for a
+    detector without misses and false alarms (`sensor.detect_prob` 1, `sensor.clutter_rate` 0). Otherwise the score is
+    (0.4 + 0.6 √u)(0.5 + 0.5 visibility): its mean is 0.8 in full view, and half as much at visibility 0.
     """
     if sensor.true_scores is not None:
         return interpolated_quantiles(sensor.true_scores, u)
@@ -77,9 +82,9 @@ def true_scores(u: Array, visibility: Array, sensor: Sensor) -> Array:
 
 
 def false_scores(u: Array, sensor: Sensor) -> Array:
-    """Return the scores (N,) in [0, 1] of N false alarms at uniforms u (N,).
+    """Return the scores (N,) in [0, 1] of N false alarms at uniforms u (N,), 0 to 1.
 
-    They are the quantiles of `sensor.false_scores` if given, else 0.7 u², with a mean of 0.23.
+    They are the quantiles of `sensor.false_scores` at u if given, else 0.7 u², with a mean of 0.23.
     """
     curve = sensor.false_scores
     return HIGHEST_FALSE_SCORE * u**2 if curve is None else interpolated_quantiles(curve, u)

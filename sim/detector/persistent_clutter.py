@@ -1,10 +1,11 @@
 """False alarms that persist over frames (`sensor.false_alarms`): at people (body parts, doubles) or on their own.
 
 Alarms are born as a Poisson process and live for a geometric number of frames: each survives to the next frame with
-probability q = exp(-1 / (fps life)). A living alarm is reported in a frame with probability `seen`. rate / seen alarms
-live in every frame, from the first on. The number reported in a frame is therefore Poisson with mean `clutter_rate`,
-whatever the life. The k-th alarm born in a frame has a random stream of its own: a higher rate adds alarms and keeps
-the earlier ones.
+probability q = exp(-1 / (fps life)), where fps is frames/s and life the mean life in s. A living alarm is reported in a
+frame with probability `seen`. On average, rate / seen alarms live in a frame, from the first on, where rate is
+`sensor.clutter_rate`. The number reported in a frame is therefore Poisson with mean `clutter_rate`, whatever the life;
+it is lower where alarms at people end early because the people leave. The k-th alarm born in a frame has a random
+stream of its own: a higher rate adds alarms and keeps the earlier ones.
 """
 
 from __future__ import annotations
@@ -36,9 +37,12 @@ class Births:
     """All B false alarms of a sequence, sorted by frame of birth.
 
     frame (B,)        frame of birth, from 1 on
-    at_birth (B, 9)   uniforms: columns LIFE, AT_PERSON, SITE, X, Y, TALL, ASPECT, VX, VY
-    in_frames         B arrays (L, 7) of uniforms, one row for each of the L frames that the alarm lives: columns SHOWN,
-                      four edges (left, top, right, lower), SCORE, ORDER
+    at_birth (B, 9)   uniforms in (0, 1] that draw: LIFE (number of frames), AT_PERSON (whether it goes with a person),
+                      SITE (which of the given sites), X, Y (place), TALL (height), ASPECT (width over height), VX, VY
+                      (velocity)
+    in_frames         B arrays (L, 7) of uniforms, one row for each of the L frames that the alarm lives: columns SHOWN
+                      (whether it is reported), errors of the left, top, right and lower edge, SCORE, ORDER (place in
+                      the frame's list)
     """
 
     frame: Ints
@@ -53,11 +57,12 @@ def persistent_false_alarms(
 
     `sensor.false_alarms` holds their settings and must be given (else AssertionError). size (2,): width, height of the
     image in px, None if unknown. camera None: places and sizes come from the labels. seed, repeat (number of the suite
-    entry's copy): name the random streams.
+    entry's copy, 0 without copies): name the random streams.
 
-    Positions are in m; in px, the box's centre, if the truth has no positions. Boxes are None if the truth has none.
-    With `sensor.box` "visible" they are clipped to the image if its size is known. If the truth has boxes, an alarm
-    whose box has no area is dropped. Raises ValueError for a negative seed.
+    Rows are sorted by alarm, not by frame; the mean number per frame is `sensor.clutter_rate`. Positions are in m; in
+    px, the box's centre, if the truth has no positions. Boxes are None if the truth has none. With `sensor.box`
+    "visible" they are clipped to the image if its size is known. If the truth has boxes, an alarm is dropped in frames
+    where its box has no area. Raises ValueError for a negative seed.
     """
     model = sensor.false_alarms
     assert model is not None
@@ -82,9 +87,10 @@ def persistent_false_alarms(
 def _draw_births(model: FalseAlarms, rate: float, truth: Truth, seed: int, repeat: int) -> Births:
     """Return all alarms of a sequence, with the uniforms that draw them, as Births.
 
-    Frame 1 starts with the stationary number of living alarms, as if some had begun earlier. rate: mean number of
-    alarms reported per frame. An alarm's life is geometric with mean about `model.life` (s), and is cut at the last
-    frame; 0 means one frame. seed, repeat (number of the suite entry's copy): name the random streams.
+    Frame 1 starts with the stationary number of living alarms, as if some had begun earlier. truth: gives the frame
+    rate and the number of frames. rate: mean number of alarms reported per frame. An alarm's life is geometric with
+    mean about `model.life` (s), and is cut at the last frame; 0 means one frame. seed, repeat (number of the suite
+    entry's copy): name the random streams. Raises ValueError for a negative seed or rate.
     """
     q = np.exp(-1.0 / (truth.fps * model.life)) if model.life else 0.0
     alive = rate / model.seen
@@ -104,9 +110,11 @@ def _draw_births(model: FalseAlarms, rate: float, truth: Truth, seed: int, repea
 def _one_alarm(model: FalseAlarms, ground: VisibleGround, born: Births, k: int, seed: int, repeat: int) -> AlarmRows:
     """Return row k of `born`, one alarm, as its frames (L,), rows (L, 6) and uniforms in those frames (L, 7).
 
-    Rows are left, top, width, height in px of the box, then x, y in m of the point. Columns of the uniforms: SHOWN,
-    four edges, SCORE, ORDER. An alarm at a person ends when the person is first absent, if that is before the end of
-    its life. Without people in the frame of birth it is on its own.
+    Frames count from 1. Rows are left, top, width, height in px of the box, then x, y in m of the point. Columns of the
+    uniforms: SHOWN (whether it is reported), four edges, SCORE, ORDER. With probability `model.near` the alarm goes
+    with a person who is present in its frame of birth, and ends when that person is first absent. Otherwise, or without
+    people in that frame, it is on its own. `model.jitter`: standard deviation of the random error of each edge in each
+    frame, in box heights. seed, repeat: name the random streams.
     """
     start, at_birth, in_frames = int(born.frame[k]), born.at_birth[k], born.in_frames[k]
     frame = start + np.arange(len(in_frames))
@@ -128,19 +136,21 @@ def _one_alarm(model: FalseAlarms, ground: VisibleGround, born: Births, k: int, 
 def _draw_person(ids: Ints, seed: int, frame: int, nth: int, repeat: int) -> int:
     """Return the id of the person with whom an alarm goes: the one of `ids` with the highest random draw.
 
-    frame, nth: frame of birth and number of the alarm in it. Draws are keyed by the person, so that one person more
-    changes few alarms. Raises ValueError if `ids` is empty.
+    frame, nth: frame of birth (from 1) and number of the alarm in it (from 0). Each draw has a random stream of its
+    own, named by seed, repeat (number of the suite entry's copy), frame, nth and the person's id. One person more
+    therefore changes few alarms. Raises ValueError if `ids` is empty, or for a negative seed or id.
     """
     draws = [rng(seed, "clutter", 2, frame, nth, int(id), repeat=repeat).random() for id in ids]
     return int(ids[int(np.argmax(draws))])
 
 
 def _rows_of_person(truth: Truth, id: int, frame: Ints) -> tuple[Ints, Bools]:
-    """Return the rows (M,) of the truth in which a person is present, and a mask (L,) of the frames to which they
+    """Return the rows (M,) of the truth in which person `id` is present, and a mask (L,) of the frames to which they
     belong.
 
     frame (L,): consecutive frame numbers, from 1 on. The rows run from the first of these frames until the person is
-    first absent. The person must have at least one row in the truth.
+    first absent. If the person is absent in the first frame, M is 0 and the mask is all False. The person must have at
+    least one row in the truth, else IndexError.
     """
     mine = np.flatnonzero(truth.id == id)
     place = np.minimum(np.searchsorted(truth.frame[mine], frame), len(mine) - 1)
@@ -151,9 +161,11 @@ def _rows_of_person(truth: Truth, id: int, frame: Ints) -> tuple[Ints, Bools]:
 def _boxes_at_person(model: FalseAlarms, ground: VisibleGround, row: Ints, n: Array) -> tuple[Array, Array]:
     """Return boxes (L, 4), left, top, width, height in px, and points (L, 2) in m, of an alarm that goes with a person.
 
-    row (L,): the person's rows of the truth. n (9,): standard normals, columns as `at_birth` of Births. Boxes are 0 if
-    the truth has none. The points are under the boxes if there is a camera and ground is seen there; else beside the
-    person, or 0 if the truth has no positions.
+    row (L,): the person's rows of the truth. n (9,): standard normals, columns as `at_birth` of Births. `model` gives
+    pairs (mean, standard deviation): across and foot, the shift of the middle to the right and of the lower edge
+    downwards, in the person's box heights; near_height, the logarithm of height over the person's height. Boxes are 0
+    if the truth has none. The points are under the boxes if there is a camera and ground is seen there. Else they are
+    the person's, moved along x by the shift across × 1.7 m, or 0 if the truth has no positions.
     """
     truth = ground.truth
     across, down = (mean + sd * n[c] for (mean, sd), c in ((model.across, X), (model.foot, Y)))
@@ -173,8 +185,12 @@ def _boxes_alone(
     """Return boxes (L, 4), left, top, width, height in px, and points (L, 2) in m, of an alarm that stands or drifts
     alone.
 
-    frames: L, the frames it lives. at_birth (9,): its uniforms, columns LIFE … VY; n (9,): the same as standard
-    normals. It starts at one of the sites `model.at`, else anywhere on the part of the image that shows ground.
+    frames: L, the frames it lives. at_birth (9,): its uniforms, columns as `at_birth` of Births; n (9,): the same as
+    standard normals. It starts near one of the sites `model.at` (shares of width and height of the ground part of the
+    image), with a standard deviation of 0.03 and inside that part; without sites, anywhere on it. It moves with
+    constant velocity, drawn with standard deviation `model.drift` (box heights per s) per axis. `model.height`: mean
+    and standard deviation of the logarithm of its height over a person's. Points are those under the feet if there is a
+    camera; else one fixed point of the labelled area, which does not drift.
     """
     x, y = at_birth[X], at_birth[Y]
     if model.at:
@@ -192,7 +208,8 @@ def _boxes_on_feet(middle: Array, foot: Array, tall: Array, model: FalseAlarms, 
     """Return boxes (L, 4), left, top, width, height in px, that stand on given feet.
 
     middle (L,) or one number: column of the middle. foot (L,) or one number: row of the feet. tall (L,): height. All
-    are in px. n (9,): standard normals; that of ASPECT draws the width over the height.
+    are in px. The width is the same share of the height in all rows: its logarithm has the mean and standard deviation
+    `model.aspect`, and is drawn by the standard normal in column ASPECT of n (9,).
     """
     wide = tall * np.exp(model.aspect[0] + model.aspect[1] * n[ASPECT])
     return np.stack([middle - wide / 2, foot - tall, wide, tall], axis=1)

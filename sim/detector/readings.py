@@ -12,14 +12,14 @@ from sim.types import Array, Detections, Ints, Plane, Truth
 
 @dataclass(frozen=True)
 class Readings:
-    """R detections of a whole sequence, true ones or false alarms.
+    """R detections of a whole sequence, true ones or false alarms; rows need not be sorted by frame.
 
     frame (R,)    frame number, from 1 on
     pos (R, 2)    x, y in m on the ground; the box's centre in px where the truth has no positions
     box (R, 4)    left, top, width, height in px; None without boxes
     score (R,)    in [0, 1]
-    order (R,)    in (0, 1), random: the detections of a frame are listed in ascending order of it, so that a place in
-                  the list tells nothing
+    order (R,)    random, above 0 and at most 1: the detections of a frame are listed in ascending order of it, so that
+                  a place in the list tells nothing
     """
 
     frame: Ints

@@ -1,10 +1,11 @@
 """The simulated point and box detector: from the truth to the detections that a detector with these settings reports.
 
-A person is detected if u < p with p = detect_prob · visibility^occlusion_power · min(1, size / (2 small_px)). p is 0
-below min_visibility and for people hidden by `sensor.hide`. Each person has one random stream and each false alarm
-another; all are read at the frame's own offset. One person or one frame more therefore changes no other draw, and a
-changed setting keeps all draws, so that sweeps over settings are paired. Everything is drawn as uniforms
-(`sim.detector.draws`).
+A person is detected in a frame if a uniform draw u is below p = detect_prob · visibility^occlusion_power · min(1, size
+/ (2 small_px)). visibility is the visible share of the person, size the height of the box in px; the other names are
+settings of the sensor. p is 0 if the visibility is below min_visibility, and for people hidden by `sensor.hide`. Each
+person has one random stream and each false alarm another; all are read at the frame's own offset. One person or one
+frame more therefore changes no other draw, and a changed setting keeps all draws, so that sweeps over settings are
+paired. Everything is drawn as uniforms (`sim.detector.draws`).
 
 A measured profile (`flockscope fit sensor`) replaces visibility^occlusion_power by a curve. It makes misses and errors
 correlated over time (`sim.detector.correlated_noise`) and errors proportional to the box (`sim.detector.box_noise`).
@@ -46,16 +47,17 @@ def sense(
     included.
 
     If the truth has positions, `pos` is the ground point (m), with the box beside it if boxes are known. Else `pos` is
-    the centre of the box (px). A frame without any has empty Detections.
+    the centre of the box (px). Detections of a frame are in random order, with scores and without velocities. A frame
+    without any has empty Detections.
 
-    camera, image_size (width, height in px): place and size the false alarms. The camera also scales `small_px` seen
-    from above, and turns boxes into ground points if `sensor.points` is "foot". Without both, false alarms are placed
-    by the labels. seed, repeat (number of the suite entry's copy, 0 without copies): name the random streams. people:
-    ids of the people of each group that the script names, for `sensor.hide`.
+    camera, image_size (width, height in px, ignored with a camera): place and size the false alarms. The camera also
+    scales `small_px` seen from above, and turns boxes into ground points if `sensor.points` is "foot". Without both,
+    false alarms are placed by the labels. seed, repeat (number of the suite entry's copy, 0 without copies): name the
+    random streams. people: ids of the people of each group that the script names, for `sensor.hide`; None: no groups.
 
     Raises InputError if `sensor.hide` names a group that is not in `people`, or if `sensor.box` is "visible" and the
     truth has boxes but no visible boxes. Raises AssertionError if the truth has neither positions nor boxes, ValueError
-    for a negative seed.
+    for a negative seed or person id.
     """
     if sensor.box == "visible" and truth.box is not None and truth.visible_box is None:
         raise InputError(
@@ -103,11 +105,12 @@ def _foot_points_or(otherwise: Array, box: Array, truth: Truth, seen: Bools, cam
 def person_draws(truth: Truth, seed: int, repeat: int, sensor: Sensor) -> Array:
     """Return the uniforms in (0, 1] of each of the R rows of the truth, (R, 10), keyed by the person and the frame.
 
-    Columns: KEEP, DETECT, four box edges, two point coordinates, SCORE, ORDER. With `sensor.persistence` ρ, DETECT is
-    that of the previous frame with probability ρ. It stays uniform, and misses of neighbouring frames have correlation
-    ρ if the detection probability is constant. `sensor.miss_memory` and `box_noise.memory` make DETECT and the edges
-    correlated over time (their normal quantiles are AR(1) sums). repeat: number of the suite entry's copy, 0 without
-    copies.
+    Columns: KEEP (whether DETECT is kept), DETECT (misses), four box edges, two point coordinates, SCORE, ORDER (place
+    in the frame's list). With `sensor.persistence` ρ, DETECT is that of the previous frame with probability ρ. It stays
+    uniform, and misses of neighbouring frames have correlation ρ if the detection probability is constant.
+    `sensor.miss_memory` and `box_noise.memory` make DETECT and the edges correlated over time (their normal quantiles
+    are AR(1) sums). Frames in which a person is absent are drawn, too. repeat: number of the suite entry's copy, 0
+    without copies. A truth without rows gives shape (0, 10).
 
     Raises ValueError for a negative seed or id.
     """
@@ -136,8 +139,10 @@ def _correlate(u: Array, first: int, sensor: Sensor, fps: float, seed: int, id: 
     """Replace columns DETECT and EDGES of u by correlated uniforms where the sensor has a memory for them. It changes
     u.
 
-    u (F, 10): uniforms of person `id` in frames `first` to `first` + F - 1. `sensor.miss_memory` is for DETECT,
-    `sensor.box_noise.memory` for the edges; without memory nothing changes. Returns nothing.
+    u (F, 10): uniforms of person `id` in frames `first` to `first` + F - 1, from 1 on, at `fps` frames/s.
+    `sensor.miss_memory` is for DETECT (misses), `sensor.box_noise.memory` for the four columns EDGES (box errors);
+    without memory nothing changes. seed, id and repeat (number of the suite entry's copy) name the random streams.
+    Returns nothing. Raises ValueError for a negative seed or id.
     """
     of_boxes = None if sensor.box_noise is None else sensor.box_noise.memory
     parts = ((0, slice(DETECT, DETECT + 1), sensor.miss_memory), (1, EDGES, of_boxes))
@@ -152,9 +157,11 @@ def _correlate(u: Array, first: int, sensor: Sensor, fps: float, seed: int, id: 
 def detection_probability(truth: Truth, sensor: Sensor, camera: Camera | None = None) -> Array:
     """Return the probability (R,), 0 to 1, that each row of the truth is detected; `sensor.hide` is not considered.
 
-    It is detect_prob times the factor of visibility times min(1, size / (2 small_px)), and 0 below min_visibility. Size
-    is the box's height in px; seen from above (camera of kind "top") it is the larger side of the box over 0.27. Size
-    has no effect without boxes or if small_px is 0. A nan size counts as 0.
+    It is detect_prob times the factor of visibility times min(1, size / (2 small_px)), and 0 where the visibility is
+    below min_visibility or nan; these names are settings of the sensor. The factor is visibility^occlusion_power, or
+    the curve `sensor.by_visibility` if given. Size is the box's height in px; seen from above (camera of kind "top") it
+    is the larger side of the box over 0.27. Size has no effect without boxes or if small_px is 0. A nan size counts as
+    0.
     """
     visible = truth.visibility
     p = sensor.detect_prob * _visibility_factor(visible, sensor)
@@ -166,9 +173,11 @@ def detection_probability(truth: Truth, sensor: Sensor, camera: Camera | None = 
 
 
 def _visibility_factor(visible: Array, sensor: Sensor) -> Array:
-    """Return the factor (R,), 0 to 1, by which the visibilities (R,), 0 to 1, lower the probability of detection.
+    """Return the factor (R,), 0 to 1, by which the visibilities `visible` (R,), 0 to 1, lower the probability of
+    detection.
 
-    It is visibility^occlusion_power, or the curve `sensor.by_visibility` if that is given.
+    It is visibility^occlusion_power. If `sensor.by_visibility` is given, it is that curve instead: values at evenly
+    spaced visibilities from 0 to 1, linear between them.
     """
     if sensor.by_visibility is None:
         return np.asarray(visible**sensor.occlusion_power)
@@ -199,8 +208,8 @@ def _sensed_boxes(truth: Truth, sensor: Sensor) -> Array | None:
     """Return the boxes (R, 4), left, top, width, height in px, that the detector measures, before errors are added.
 
     They are the boxes of the visible parts; a number that is nan there, as nothing is visible, is taken from the amodal
-    box. If `sensor.box` is "amodal" or the truth has no visible boxes, they are the amodal boxes. None if the truth has
-    no boxes.
+    box (that of the whole person). If `sensor.box` is "amodal" or the truth has no visible boxes, they are the amodal
+    boxes themselves, not a copy. None if the truth has no boxes.
     """
     if truth.box is None or truth.visible_box is None or sensor.box == "amodal":
         return truth.box
@@ -211,8 +220,9 @@ def _with_box_noise(box: Array, visibility: Array, sensor: Sensor, u: Array) -> 
     """Return boxes (N, 4), left, top, width, height in px, with the errors of `sensor.box_noise`, else of
     `sensor.noise_px`.
 
-    u (N, 4): uniforms in (0, 1] that draw the errors. visibility (N,): visible share, 0 to 1. `box` itself is returned
-    if there is no error to add.
+    u (N, 4): uniforms in (0, 1] that draw the errors. `box_noise`: errors in proportion to the box height. `noise_px`:
+    standard deviation in px by which each edge is moved. visibility (N,): visible share, 0 to 1, which only `box_noise`
+    uses. `box` itself is returned if `box_noise` is None and `noise_px` 0.
     """
     if sensor.box_noise is not None:
         return perturb_boxes(box, visibility, sensor.box_noise, normals(u))

@@ -21,11 +21,12 @@ class VisibleGround:
         truth, camera   as given; camera is None if unknown
         low, high (2,)  upper left and lower right corner of that part, u, v in px; zeros without camera and boxes
         line (2,)       a, b of a person's height a + b v (px) at row v of the feet; used without a camera only
-        limits          least and greatest height in px: half the least and 1.5 times the greatest labelled height
+        limits          least and greatest height in px, used without a camera only: half the least and 1.5 times the
+                        greatest labelled height; (1, 1) without boxes
 
-    size: width, height of the image in px, None if unknown. The part ends at the row where people have SMALLEST (0.25)
-    of the height in the middle of the image. Without a camera and without an image size, it is the rectangle round the
-    labelled feet.
+    size: width, height of the image in px, None if unknown; ignored with a camera. The part ends at the top where
+    people have SMALLEST (0.25) of the height in the middle of the image; seen from above (kind "top") it is the whole
+    image. Without a camera and without an image size, it is the rectangle round the labelled feet.
     """
 
     def __init__(self, truth: Truth, camera: Camera | None, size: Array | None) -> None:
@@ -56,8 +57,8 @@ class VisibleGround:
         """Return the height in px of the box of a standard person (1.7 m) whose feet are at image point (u, v) px.
 
         Without a camera it is estimated from the labelled boxes, within half the least and 1.5 times the greatest
-        labelled height; 1 px without boxes. Where the camera gives no box, as right under it, it is 1.7 m at the depth
-        of the camera's height.
+        labelled height; 1 px without boxes. Where the camera gives no box, as right under it, it is 1.7 m at a depth
+        that equals the camera's height, at least 1 m.
         """
         if self.camera is None:
             return float(np.clip(self.line @ [1.0, v], *self.limits))
@@ -83,7 +84,8 @@ class VisibleGround:
     def labelled_point(self, x: float, y: float) -> Array:
         """Return the point (2,) in m at shares x, y (0 to 1) of the rectangle round all labelled positions.
 
-        (0, 0) is the corner of least x and y. Without labelled positions the result is zeros.
+        (0, 0) is the corner of least x and y. Shares outside 0 to 1 give points outside the rectangle. Without labelled
+        positions the result is zeros; if a labelled position is nan, it is nan.
         """
         pos = self.truth.pos
         if pos is None or not len(pos):
@@ -96,8 +98,9 @@ def furthest_row(camera: Camera) -> float:
     """Return the uppermost image row (px, from 0 at the top) at which people have at least 0.25 of their height in the
     middle.
 
-    For pinhole cameras. 241 rows are tested along the column through the image centre. If the middle row shows no
-    ground, heights are compared with the greatest height at any row. 0 if no row shows ground or no row qualifies.
+    For pinhole cameras. A person is 1.7 m tall, and the height is that seen in px. 241 rows from the top to the bottom
+    are tested, along the column through the image centre. If the middle row shows no ground, heights are compared with
+    the greatest height at any row. 0 if no row shows ground or no row qualifies.
     """
     v = np.linspace(0.0, camera.image[1], 241)
     ground = to_ground(camera, np.column_stack([np.full_like(v, camera.centre_px[0]), v]))
