@@ -29,9 +29,10 @@ class Param:
     """One declared parameter of a tracker.
 
     name; default; unit and meaning: texts for the docs. scale: "linear", "log", "int" or "categorical". low, high:
-    range, both ends allowed. choices: the allowed values if scale is "categorical", else empty. online: it may change
-    between two frames. tunable: searches may change it. before: its value in the frozen first defaults if their file
-    lacks it; None: not declared. sees: "pixels" or "points" if it has an effect only with these, else "".
+    range, both ends allowed; -inf and inf if scale is "categorical". choices: the allowed values if scale is
+    "categorical", else empty. online: it may change between two frames. tunable: searches may change it. before: its
+    value in the frozen first defaults if their file lacks it; None: not declared. sees: "pixels" or "points" if it has
+    an effect only with these, else "".
     """
 
     name: str
@@ -74,9 +75,9 @@ class Param:
         raise InputError(file=file, place=self.name, got=repr(value), expected=self.expected, remedy=remedy)
 
     def parse(self, text: str) -> Value:
-        """Return the value, number or choice, that `text` stands for; True and False may be in lower case.
+        """Return the value that `text` stands for: a choice, else a number, as int if scale is "int", else as float.
 
-        Raises InputError if it stands for no allowed value.
+        True and False may be in lower case. Raises InputError if the text stands for no allowed value.
         """
         for choice in self.choices:
             if text == str(choice) or (isinstance(choice, bool) and text.lower() == str(choice).lower()):
@@ -114,7 +115,8 @@ def param(
 
     values: (low, high), both allowed, or the choices if scale is "categorical". unit, meaning: texts for the docs.
     scale: how a search moves: "linear" or "log" for numbers, "int" for whole numbers, "categorical" for choices. use:
-    see ParamUse. The default itself is checked only when a config is created.
+    keywords online, tunable, before, sees, described at ParamUse. The default itself is checked only when a config is
+    created. Raises ValueError if the `values` of a number are not two.
     """
     categorical = scale == "categorical"
     low, high = (float("-inf"), float("inf")) if categorical else values
@@ -126,8 +128,8 @@ def param(
 class Config:
     """Base class of configs. A subclass is a frozen dataclass that sets `tracker` and declares its fields with `param`.
 
-    tracker: name of the tracker, for files and messages. Creating a config raises InputError if a value is not allowed
-    or if `check` refuses the values together.
+    tracker: name of the tracker, for files and messages. Creating a config converts numbers to float, or to int if the
+    scale is "int". It raises InputError if a value is not allowed or if `check` refuses the values together.
     """
 
     tracker: ClassVar[str] = ""
@@ -143,7 +145,10 @@ class Config:
 
     @classmethod
     def params(cls) -> dict[str, Param]:
-        """Return all declared parameters by name, in order of the fields, inherited ones first."""
+        """Return all declared parameters by name, in order of the fields, inherited ones first.
+
+        Fields that are not declared with `param` are left out; {} if there is no parameter.
+        """
         found = [f for f in dataclasses.fields(cls) if "param" in f.metadata]
         return {f.name: dataclasses.replace(f.metadata["param"], name=f.name) for f in found}
 
@@ -189,8 +194,8 @@ class Config:
         """Return the first defaults of the tracker, from tracking/frozen/NAME.toml, against which tuning is judged.
 
         NAME is the class's `tracker`. A parameter that the file lacks has its `before` if the class itself declares it,
-        and its default if it is inherited. Raises AssertionError if one declared by the class has no `before`, and
-        InputError if the file is missing or wrong.
+        and its default if it is inherited. Raises AssertionError if a lacking parameter that the class declares has no
+        `before`. Raises InputError if the file is missing or wrong.
         """
         path = FROZEN / f"{cls.tracker}.toml"
         first = cls._values(path)
@@ -222,11 +227,11 @@ class Config:
         return values
 
     def with_set(self, *assignments: str) -> Self:
-        """Return a copy with assignments "name=value" applied, from left to right; the word "tracker." before a name is
-        ignored.
+        """Return a copy with assignments "name=value" applied, from left to right, and checked as a whole at the end.
 
-        Raises InputError for an assignment without "=", an unknown name, a value that is not allowed, or values that
-        contradict each other.
+        A literal "tracker." before a name, whatever the tracker is called, and spaces around name and value are
+        ignored. Raises InputError for an assignment without "=", an unknown name, a value that is not allowed, or
+        values that contradict each other.
         """
         changes: dict[str, Any] = {}
         for assignment in assignments:
@@ -243,19 +248,26 @@ class Config:
 
     def to_toml(self) -> str:
         """Return the text of a TOML file, with the tracker's name and all values, from which `from_toml` reads an equal
-        config."""
+        config.
+
+        Quotes and backslashes inside texts are not escaped.
+        """
         lines = [f"{name} = {_toml(value)}" for name, value in self.as_dict().items()]
         return "\n".join([f'tracker = "{self.tracker}"', "", "[params]", *lines, ""])
 
     @classmethod
     def table(cls) -> str:
-        """Return all parameters as a Markdown table for the docs: parameter, default, range, unit, meaning."""
+        """Return all parameters as a Markdown table for the docs: parameter, default, range, unit, meaning.
+
+        The range of a categorical parameter lists its choices; " (log)" follows the range if scale is "log".
+        """
         rows = [_row(p) for p in cls.params().values()]
         return "\n".join(["| parameter | default | range | unit | meaning |", "|---|---|---|---|---|", *rows, ""])
 
 
 def _row(p: Param) -> str:
-    """Returns a parameter's row of the Markdown table: parameter, default, range or choices, unit, meaning."""
+    """Returns a parameter's row of the Markdown table: parameter, default, range or choices, unit, meaning. " (log)"
+    follows the range if scale is "log"."""
     span = ", ".join(f"`{c}`" for c in p.choices) if p.choices else f"{p.low:g} to {p.high:g}"
     note = " (log)" if p.scale == "log" else ""
     return f"| `{p.name}` | {p.default} | {span}{note} | {p.unit} | {p.meaning} |"

@@ -22,8 +22,8 @@ from tracking.tracks_check import finite
 def runs_own_detector(needs: tuple[str, ...], sequence: Sequence) -> bool:
     """Return True if a tracker with these needs can run its own detector on the sequence's pictures.
 
-    needs: some of "pixels", "stereo", "boxes", "points"; any one suffices. "pixels" takes pictures, "stereo" a right
-    picture.
+    needs: some of "pixels", "stereo", "boxes", "points". True if "pixels" is among them and the sequence has pictures,
+    or "stereo" and it has right pictures; either suffices.
     """
     return ("pixels" in needs and sequence.has_images) or ("stereo" in needs and sequence.has_right)
 
@@ -33,8 +33,8 @@ def choose_mode(needs: tuple[str, ...], sequence: Sequence, requested: Detection
     can.
 
     needs: what the tracker can work with, any one of "pixels", "stereo", "boxes", "points". Mode "image" works if the
-    tracker can run its own detector, "file" and "truth" if it takes boxes or points and the sequence has detections or
-    truth.
+    tracker can run its own detector on the sequence's pictures. "file" works if it takes boxes or points and the
+    sequence has stored detections, "truth" if it takes these and the sequence has labels.
 
     Raises InputError, naming the needs and what the sequence has, if the requested mode, or without one every mode,
     fails.
@@ -73,10 +73,12 @@ def frames_with_detections(
     """Return the sequence's frames with the detections of `mode` and without pictures, or None if `mode` is "image".
 
     needs: of the tracker. sensor: settings of a scenario's [sensor] that degrade the detections of mode "truth", {} for
-    none; seed: of their random numbers. Both are ignored in mode "file". Frames count from 1.
+    none; seed: of their random numbers. Both are ignored in mode "file". Frames count from 1, frame k at (k - 1) / fps
+    seconds. In mode "file" a frame may have None.
 
-    Raises InputError if there are points without any boxes and the tracker does not take points, if the sensor settings
-    are wrong, or if the stored detections or the truth cannot be read.
+    Raises InputError if there are detections, none of them has boxes and the tracker does not take points, if the
+    sensor settings are wrong, or if the stored detections or the truth cannot be read. In mode "truth" raises WorkError
+    if an order of a simulated script was not fulfilled, AssertionError for a sequence without labels.
     """
     if mode == "image":
         return None

@@ -26,8 +26,9 @@ class Source:
     """One sequence to play on: a scenario entry with its seed, or a path, or a Sequence in memory.
 
     name: of the scenario or sequence. seed: of the simulation, or stated by the recording (0 if it states none). entry:
-    the scenario; path: of a stored sequence, "" if none; sequence: in memory. Exactly one of these three is set. A
-    source with a Sequence in memory cannot be pickled.
+    a scenario with its name and copy number, None if it is not simulated; path: of a stored sequence, "" if none;
+    sequence: in memory, else None. Exactly one of these three is to be set, which is not checked. A source with a
+    Sequence in memory cannot be pickled.
     """
 
     name: str
@@ -38,10 +39,10 @@ class Source:
 
     @cached_property
     def key(self) -> tuple[object, ...]:
-        """A tuple that is equal for sources of the same sequence: by scenario content, copy and seed, by path, or by
-        object.
+        """A tuple that is equal for sources of the same sequence. It is computed once.
 
-        Two paths are equal if they resolve to the same file, two Sequences in memory if they are the same object.
+        For a scenario: name, seed, number of the copy and a hash of the content. For a path: the path resolved, so that
+        two paths are equal if they lead to the same file. For a Sequence in memory: the identity of the object.
         """
         if self.entry is not None:
             content = self.entry.scenario.model_dump_json()
@@ -64,11 +65,12 @@ class Source:
         """Return the sequence: simulated, read from its path, or as it is if it is in memory.
 
         streams: the picture streams to draw if it is simulated ("left", "right", "disparity", "ids", "background"),
-        none by default. If it is stored, pictures are read if "left" is in it. If several sequences are at the path,
-        the first one.
+        none by default. Of a stored MOTChallenge folder, the pictures are left out unless "left" is among them; other
+        stored and in-memory sequences ignore it. If several sequences are at the path, the first one.
 
-        Raises InputError if the scenario is impossible, a stream is unknown, or the path does not exist or holds no
-        known format.
+        Raises InputError if the scenario is impossible, a stream is unknown or needs a baseline that the camera lacks,
+        or the path does not exist, holds no known format or an invalid file. Truth, detections and pictures are read
+        later and may raise then.
         """
         if self.sequence is not None:
             return self.sequence
@@ -82,11 +84,12 @@ class Source:
 
 
 def sources(what: SourceSpec | Source, seeds: Iterable[int] = range(10), set: Iterable[str] = ()) -> tuple[Source, ...]:
-    """Return the sources that `what` stands for, in order.
+    """Return the sources that `what` stands for, in order: for each scenario or suite entry all its seeds, then the
+    next.
 
     what: a suite's or scenario's name, a TOML file, a folder, dataset or recording, a Sequence, a Source, or a list of
-    these. A scenario gives one source for each of the `seeds` (by default 0 to 9); the others ignore seeds. set:
-    "key=value" settings for the scenarios.
+    these. A scenario gives one source for each of the `seeds` (by default 0 to 9); the others ignore seeds. A name in
+    the catalogue counts before a folder of that name. set: "key=value" settings for the scenarios.
 
     Raises InputError if a name is unknown, a file or setting is wrong, `seeds` is no iterable, `set` is a single
     string, there is no source at all, or there are settings but no scenario.

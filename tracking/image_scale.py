@@ -33,8 +33,8 @@ def from_boxes(frames: Iterable[Detections | Tracks | None]) -> float:
     """Return the image scale, px per m: the median height of all boxes of all frames divided by 1.7 m; nan if there is
     no box.
 
-    frames: detections or tracks of each frame, read to the end. None, and frames without boxes, are skipped; so are
-    heights that are nan.
+    frames: detections or tracks of each frame, read to the end. The height is the last of a box's four columns, px.
+    None, and frames without boxes, are skipped; so are heights that are nan. If all are nan, so is the result.
     """
     heights = [d.box[:, 3] for d in frames if d is not None and d.box is not None and len(d.box)]
     return float(np.nanmedian(np.concatenate(heights))) / PERSON_HEIGHT if heights else float("nan")
@@ -43,8 +43,9 @@ def from_boxes(frames: Iterable[Detections | Tracks | None]) -> float:
 def from_tracks(given: float, learned: object, tracks: SequenceOf[Tracks]) -> float:
     """Return the image scale for deriving groups from tracks, in px per m; nan if it is unknown.
 
-    The first known (finite) value counts: `given` (the context's scale, nan if unknown), `learned` (the tracker's own
-    attribute `px_per_m`, None if it has none), then the median height of the tracks' boxes divided by 1.7 m.
+    The first finite value counts: `given` (the context's scale, nan if unknown), `learned` (the tracker's own attribute
+    `px_per_m`; anything but a number is ignored), then the median height of the tracks' boxes divided by 1.7 m. Zero
+    and negative values are not refused.
     """
     if np.isfinite(given):
         return given
@@ -58,7 +59,7 @@ def of_sequence(sequence: Sequence, mode: DetectionMode, frames: tuple[Frame, ..
 
     It is the camera's scale at the image centre, else the one that the sequence states. If there is neither and `mode`
     is not "image", it is the median box height over 1.7 m, of the boxes of `frames`, or of the sequence's stored
-    detections if `frames` is None.
+    detections if `frames` is None. Raises InputError if these cannot be read.
     """
     if sequence.camera is not None:
         from sim.scene.camera import px_per_m_at_centre

@@ -53,11 +53,11 @@ def from_keywords(kind: type[T], function: str, given: Mapping[str, Any]) -> T:
 
 
 def check_ranges(options: Any) -> None:
-    """Raises InputError at the first number of an options dataclass that lies outside its declared range; else returns
-    nothing.
+    """Raises InputError at the first number, in order of the fields, of an options dataclass that lies outside its
+    declared range; else returns nothing.
 
-    The message names the option as the command line does, for example `--trials`. nan lies outside every range. Options
-    without a lower limit are not checked.
+    The message names the option with two hyphens, for example `--trials`. nan lies outside every range. Options without
+    a lower limit are not checked.
     """
     for f in fields(options):
         low, below, value = f.metadata.get("low"), f.metadata.get("below"), getattr(options, f.name)

@@ -42,7 +42,10 @@ def space_of(kind: type[Config], mode: DetectionMode | None = None, *, online: b
 
 
 def encode(space: Space, config: Config) -> Array:
-    """Return the vector (P,) in [-1, 1] of the config's values of the P parameters in `space`, in their order."""
+    """Return the vector (P,) in [-1, 1] of the config's values of the P parameters in `space`, in their order.
+
+    low is -1 and high 1; whole numbers and choices have the middle of their part of [-1, 1]. An empty space gives (0,).
+    """
     return np.array([_to_unit(p, getattr(config, p.name)) for p in space])
 
 
@@ -116,7 +119,11 @@ def _point(action: ArrayLike, size: int) -> Array:
 
 
 def _to_unit(p: Param, value: Value) -> float:
-    """Returns the coordinate in [-1, 1] of a parameter's value. Raises ValueError for a value that is no choice."""
+    """Returns the coordinate in [-1, 1] of a parameter's value: low is -1 and high 1, on a linear or logarithmic scale.
+
+    A whole number or choice has the middle of its part, where all have equal parts. Raises ValueError for a value that
+    is no choice.
+    """
     if p.scale == "categorical":
         return _middle(p.choices.index(value), len(p.choices))
     assert isinstance(value, int | float)
@@ -129,7 +136,11 @@ def _to_unit(p: Param, value: Value) -> float:
 
 
 def _from_unit(p: Param, a: float) -> Value:
-    """Returns the value of a parameter at a coordinate a in [-1, 1]; numbers are limited to the parameter's range."""
+    """Returns the value of a parameter at a coordinate a in [-1, 1]: -1 is low and 1 high, on a linear or logarithmic
+    scale.
+
+    Whole numbers and choices divide [-1, 1] into equal parts. Other numbers are limited to the parameter's range.
+    """
     share = (a + 1) / 2
     if p.scale == "categorical":
         return p.choices[_part(share, len(p.choices))]

@@ -27,10 +27,10 @@ Params = Config | Mapping[str, Any] | str | Path | None
 class PreparedTracker:
     """A tracker instance and everything that it is given for one sequence. Call `reset` before the first `step`.
 
-    name: as the user gave it. config: None if the tracker has no parameters. context: what the tracker knows before the
-    first frame. mode: of the detections, "image", "file" or "truth". frames_given: frames with detections and without
-    pictures; None if the sequence's own frames are used (mode "image"). history: what the tracker has reported since
-    `reset`.
+    name: as the user gave it, or of the class. tracker: the instance. config: None if the tracker has no parameters.
+    context: what the tracker knows before the first frame. mode: of the detections, "image", "file" or "truth".
+    sequence: the one to track. frames_given: frames with detections and without pictures; None if the sequence's own
+    frames are used (mode "image"). history: what the tracker has reported since `reset`.
     """
 
     name: str
@@ -56,8 +56,8 @@ class PreparedTracker:
         """Return the image scale, px per m, for deriving groups from these tracks of the whole sequence; nan if
         unknown.
 
-        It is the context's, else the tracker's attribute `px_per_m`, else the median height of the tracks' boxes over
-        1.7 m.
+        It is the first finite one of the context's, the tracker's attribute `px_per_m`, and the median height of the
+        tracks' boxes over 1.7 m.
         """
         return image_scale.from_tracks(self.context.px_per_m, getattr(self.tracker, "px_per_m", None), tracks)
 
@@ -125,12 +125,13 @@ def prepare(
 
     tracker: a registered name, "file.py:Class", "module:Class", a class or an instance. params: a config, values by
     name or a TOML file; None for the defaults. detections: "image", "file" or "truth"; None for the first of them that
-    can work. sensor: settings that degrade mode "truth"; seed: of their random numbers.
+    can work. sensor: settings that degrade mode "truth", None or {} for none; seed: of their random numbers. Stored
+    detections or labels are read here, and in mode "image" the background pictures.
 
     Raises InputError if `sequence` is no Sequence, if the tracker, its parameters or the sensor settings are wrong, if
-    parameters are given to an instance or to a tracker without any, if tracker and sequence do not fit, if `sensor` is
-    given with a mode other than "truth", or if files of the sequence cannot be read. Raises WorkError if the tracker
-    cannot be created.
+    parameters are given to an instance or to a tracker without any, if tracker and sequence do not fit, if sensor
+    settings are given with a mode other than "truth", or if files of the sequence cannot be read. Raises WorkError if
+    the tracker cannot be created, or in mode "truth" if an order of a simulated script was not fulfilled.
     """
     if not isinstance(sequence, Sequence):
         remedy = "open it: sim.io.source.open_source(path), or sim.simulate(scenario, seed)"
@@ -157,8 +158,9 @@ def prepare(
 def _make(tracker: str | type[Tracker] | Tracker, params: Params) -> tuple[str, Tracker, Config | None]:
     """Returns the tracker's name, an instance and its config (None without parameters).
 
-    A class gets its config from its `config_class`; an instance keeps its own and takes no `params`. Raises InputError
-    if tracker or params are wrong or do not fit, and WorkError if the tracker cannot be created.
+    A class gets its config from its `config_class`. An instance has the name of its class, keeps its own config (its
+    attribute `config`, None if missing) and takes no `params`. Raises InputError if tracker or params are wrong or do
+    not fit, and WorkError if the tracker cannot be created. A FlockscopeError of its __init__ passes through.
     """
     if not isinstance(tracker, str | type):
         if params is not None:

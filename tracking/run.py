@@ -64,8 +64,9 @@ def track(
     no effect, with a UserWarning. progress: called with each frame's number, from 1, when the frame is done.
 
     Raises InputError before the first frame if the arguments are wrong or tracker and sequence do not fit; later for a
-    frame whose detections are not finite or whose picture cannot be read. Raises WorkError if the tracker raises an
-    exception or returns wrong tracks.
+    frame whose detections are not finite or whose picture cannot be read; after the last frame if tracks in the image
+    have a scale of 0 or below. Raises WorkError if the tracker raises an exception or returns wrong tracks, or in mode
+    "truth" if an order of a simulated script was not fulfilled.
     """
     from tracking.grouping.grouped_tracks import names_groups, with_groups
 
@@ -90,12 +91,13 @@ def track(
 
 
 def grouped(tracks: SequenceOf[Tracks], sequence: Sequence) -> tuple[Tracks, ...]:
-    """Return stored tracks of a sequence, one `Tracks` per frame, with groups and events filled in where they are
-    empty.
+    """Return one tracker's stored tracks of a sequence, one `Tracks` per frame, with groups and events filled in where
+    they are empty.
 
     The scale in px per m is the sequence's, or its truth's if the sequence states none; without any, tracks in the
-    image are returned unchanged. Raises InputError if the truth cannot be read or tracks in the image have a scale of 0
-    or below.
+    image are returned unchanged, as are tracks marked as derived, or of groups. Raises InputError if the truth cannot
+    be read or tracks in the image have a scale of 0 or below; WorkError if an order of a simulated script was not
+    fulfilled.
     """
     from tracking.grouping.grouped_tracks import with_groups
 

@@ -41,9 +41,13 @@ def run_info(
     """Return the content of run.json as a dictionary. Two equal runs differ only in their speeds.
 
     tracks: of the whole run, one `Tracks` per frame, possibly none. seed: of the run. sensor: settings of mode "truth",
-    empty if none. px_per_m: the scale by which groups were derived; nan is stored as None. Keys: tracker, config, seed,
-    sequence, detections, sensor, plane, boxes, fps, px_per_m, background, causal, causal_from, frames,
-    frames_per_second, whole_frames_per_second, versions.
+    empty if none. px_per_m: the scale by which groups were derived; nan is stored as None.
+
+    Keys: tracker (name); config (values by name, {} without); seed; sequence (name); detections (the mode); sensor;
+    plane (of the first tracks, None without); boxes ("measured", "projected" or "none"); fps; px_per_m; background
+    (text on the sample, None without); causal (True if any frame's sample holds no later frame); causal_from (the first
+    such frame, from 1, or None); frames (number); frames_per_second (the tracker's steps alone);
+    whole_frames_per_second (with reading); versions (of packages, by name).
     """
     from sim.io.store.track_boxes import box_source
 

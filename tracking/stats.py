@@ -29,11 +29,13 @@ SURE = 60.0
 
 
 def bootstrap(values: Array, draws: int = DRAWS) -> tuple[Array, Array, Array]:
-    """Return mean, low end and high end, (K,) each, of 95 % percentile intervals over S sequences; values (S, K).
+    """Return mean, low end and high end, (K,) each, of 95 % percentile intervals of the mean over S sequences; values
+    (S, K).
 
-    draws: number of bootstrap samples. nan and infinite values are left out, for each column by itself. The ends of a
-    column with fewer than two numbers are nan; without any number the mean is nan, too. Average several runs of one
-    sequence (tracker seeds) before the call. The random numbers are fixed.
+    draws: number of bootstrap samples. nan and infinite values are left out, for each column by itself; a sample
+    without any number of a column does not count for it. The ends of a column with fewer than two numbers are nan;
+    without any number the mean is nan, too. Average several runs of one sequence (tracker seeds) before the call. The
+    random numbers are fixed.
     """
     count, columns = values.shape
     known = np.isfinite(values)
@@ -52,8 +54,8 @@ def bootstrap(values: Array, draws: int = DRAWS) -> tuple[Array, Array, Array]:
 def paired(first: Array, second: Array, draws: int = DRAWS) -> tuple[Array, Array, Array]:
     """Return mean, low end and high end, (K,) each, of second - first over the same S sequences; both (S, K).
 
-    The interval is a 95 % bootstrap interval from `draws` samples. Pairs with a nan are left out; with fewer than two
-    pairs the ends are nan, without any the mean, too.
+    The interval is a 95 % bootstrap interval of the mean from `draws` samples. Pairs with a nan or infinity are left
+    out, for each column by itself; with fewer than two pairs the ends are nan, without any the mean, too.
     """
     return bootstrap(second - first, draws)
 
@@ -62,7 +64,8 @@ def wilson(hits: int, count: int) -> tuple[float, float, float]:
     """Return the share of `hits` out of `count`, and the low and high end of its 95 % interval, within 0 to 1 (Wilson
     1927).
 
-    The interval holds all p with (share - p)^2 <= z^2 p (1 - p) / count. If count is 0: nan, 0 and 1.
+    hits: 0 to count. The interval holds all p with (share - p)^2 <= z^2 p (1 - p) / count, where z = 1.96 is the normal
+    quantile. If count is 0: nan, 0 and 1.
     """
     if count == 0:
         return float("nan"), 0.0, 1.0
@@ -77,10 +80,12 @@ def moving_blocks(
 ) -> tuple[Array, Array, Array]:
     """Return the scores (K,) of one recording, and the low and the high ends (K,) of their 95 % intervals.
 
-    score: takes indices (N,) of frames, from 0, some more than once, and returns scores (K,), nan where undefined.
-    frames: of the recording; fps: frames per second; draws: number of samples. Frames are resampled in moving blocks
-    (Künsch 1989). For an interval of a difference let `score` return the difference of two trackers in the same frames.
-    The ends are nan where all samples are nan, and without frames. Under SURE = 60 seconds they are indicative.
+    score: takes indices (frames,) of frames, from 0, some more than once, and returns scores (K,), nan where undefined.
+    It is called 1 + draws times, first with every frame once. frames: number in the recording; fps: frames per second;
+    draws: number of samples. Frames are resampled in moving blocks (Künsch 1989): whole stretches of consecutive
+    frames. For an interval of a difference let `score` return the difference of two trackers in the same frames. nan
+    and infinite scores of samples are left out; the ends are nan if none remains, and without frames. The random
+    numbers are fixed. Under SURE = 60 seconds the intervals are indicative.
     """
     whole = np.asarray(score(np.arange(frames)), float)
     r = np.random.default_rng(0)
@@ -93,10 +98,10 @@ def moving_blocks(
 
 
 def block_length(frames: int, fps: float) -> int:
-    """Return the length of a block in frames: the longer of 1 s and a twentieth of the recording, but at most all
-    frames.
+    """Return the length of a block in frames: the longer of 1 s and a twentieth of the recording, rounded up, but at
+    most all frames.
 
-    frames: of the recording; fps: frames per second.
+    frames: number in the recording, 0 gives 0; fps: frames per second.
     """
     return min(frames, max(1, ceil(SHORTEST_BLOCK * fps), ceil(frames / BLOCKS)))
 
@@ -105,7 +110,8 @@ def draw_blocks(frames: int, block: int, r: np.random.Generator) -> Ints:
     """Return indices (frames,) of frames, from 0: blocks of `block` consecutive frames from random starts, the last one
     cut.
 
-    block: frames of a block, from 1 to `frames` (else an exception). r: the generator, which is advanced.
+    block: frames of a block, from 1 to `frames`; ZeroDivisionError for 0, ValueError for more. r: the generator, which
+    is advanced.
     """
     starts = r.integers(0, frames - block + 1, -(-frames // block))
     return np.asarray((starts[:, None] + np.arange(block)).ravel()[:frames])

@@ -43,9 +43,10 @@ def check_tracks(tracks: Any, index: int, tracker: str, history: ReportHistory |
 
     Checked are type, frame index, shapes, finite numbers, ids (int64, non-negative, unique in the frame), groups and
     events. Plane and unit must be those of the first frame in `history`. Members of groups and events must be ids that
-    the tracker has reported in this frame or before. Any reported id may come back after a gap.
-    Filled in are empty scores (1) and, in events, `emitted` and `end` where they are None (this frame).
-    history: of this sequence; it is updated here. None stands for an empty history.
+    the tracker has reported in this frame or before; with unit "group" there may be none. Any reported id may come back
+    after a gap. Events must be emitted in this frame, start from frame 1 to this one, and not end before they start.
+    Filled in are empty scores (1) and, in events, `emitted` and `end` where they are None (this frame). history: of
+    this sequence; it is updated here, also if a fault is found later. None stands for an empty history.
     """
     if isinstance(tracks, Tracks):
         tracks = _filled(tracks)
@@ -107,7 +108,11 @@ def _fault(tracks: Any, index: int, history: ReportHistory) -> Fault | None:
 
 def _rows_fault(tracks: Tracks) -> Fault | None:
     """Returns the first fault, as (got, expected), in shape, type or finiteness of the arrays with one row per track,
-    or None."""
+    or None.
+
+    For N tracks with D coordinates, 3 in plane "space", else 2: id and group (N,), pos and vel (N, D), cov (N, 2D, 2D),
+    score (N,), box (N, 4) if it is not None.
+    """
     if np.ndim(tracks.id) != 1:
         return f"id of shape {np.shape(tracks.id)}", "(N,)"
     n, d = len(tracks.id), 3 if tracks.plane == "space" else 2
@@ -127,7 +132,7 @@ def _arrays_fault(shapes: dict[str, tuple[Any, tuple[int, ...]]]) -> Fault | Non
     """Returns the fault, as (got, expected), of the first array with a wrong type or shape or with nan or infinity, or
     None.
 
-    shapes: by name, the array and the shape that it must have.
+    shapes: by name, the array and the shape that it must have. Only numpy arrays of integers or floats are right.
     """
     for name, (a, shape) in shapes.items():
         if not isinstance(a, np.ndarray) or a.dtype.kind not in "iuf":
@@ -173,8 +178,9 @@ def _ids_fault(id: Any, name: str) -> Fault | None:
 def _groups_fault(groups: Any, d: int, people: Iterable[int]) -> Fault | None:
     """Returns the first fault, as (got, expected), in `Tracks.groups`, or None.
 
-    d: columns of pos and vel, 2 or 3; people: ids that may be members. nan is allowed in vel, extent and size, where it
-    means unknown.
+    d: columns of pos and vel, 2 or 3; people: ids that may be members. For G groups: id (G,) int64, unique and
+    non-negative, pos and vel (G, d), extent (G, 2, 2), size (G,). nan is allowed in vel, extent and size, where it
+    means unknown. Without groups the other columns are not checked.
     """
     if not isinstance(groups, Groups):
         return f"groups of type {type(groups).__name__}", "sim.types.Groups or None"
@@ -193,7 +199,8 @@ def _groups_fault(groups: Any, d: int, people: Iterable[int]) -> Fault | None:
 def _ragged_fault(groups: Groups, n: int, people: Iterable[int]) -> Fault | None:
     """Returns the first fault, as (got, expected), in the members and hulls of n groups, or None.
 
-    Each is a tuple with one array per group, or an empty tuple. people: ids that may be members.
+    Each is a tuple with one array per group, or an empty tuple: members (k,) integers that are in `people`, the ids
+    that may be members; hulls (V, 2) finite numbers.
     """
     for name in ("members", "hull"):
         items = getattr(groups, name)

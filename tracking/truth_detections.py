@@ -26,8 +26,10 @@ def from_truth(sequence: Sequence, sensor: Mapping[str, Any], seed: int) -> Iter
     sensor: settings with the keys of a scenario's [sensor]; those left out have the value of a perfect sensor. Empty:
     the labels themselves. seed: of the sensor's random numbers.
 
-    Raises InputError if the truth cannot be read, a key is unknown, a value is wrong, or a group that is to be hidden
-    is not in the script. A sequence without labels is an AssertionError.
+    Raises at once, before the first detections: InputError if the truth cannot be read, a key is unknown, a value is
+    wrong, a group that is to be hidden is not in the script, or visible boxes are asked for and cannot be known;
+    WorkError if an order of a simulated script was not fulfilled; AssertionError for a sequence without labels;
+    ValueError for a negative seed.
     """
     truth = sequence.truth
     assert truth is not None, "the mode was chosen for a source with labels"
@@ -40,7 +42,8 @@ def perfect(truth: FrameTruth) -> Detections:
     """Return the labels of a frame as detections with score 1 and no velocities, a row per person.
 
     They are in the plane "ground" at the labelled positions, m, with the labelled boxes if there are any. Without
-    positions they are in the plane "image", at the centres of the boxes, px. Labels without both are an AssertionError.
+    positions they are in the plane "image", at the centres of the boxes, px. Boxes are left, top, width, height in px,
+    amodal: as if nothing hid the person. Labels without both are an AssertionError.
     """
     score = np.ones(len(truth.id))
     if truth.pos is not None:
@@ -50,11 +53,12 @@ def perfect(truth: FrameTruth) -> Detections:
 
 
 def _sensed(truth: Truth, sequence: Sequence, sensor: Mapping[str, Any], seed: int) -> Iterator[Detections]:
-    """Returns an iterator over the detections, one per frame, of a sensor with these settings (keys of a scenario's
-    [sensor]).
+    """Returns an iterator over the detections, one per frame from frame 1, of a sensor with these settings (keys of a
+    scenario's [sensor]).
 
-    Settings left out have the value of a perfect sensor. Raises InputError if a key is unknown, a value is wrong or a
-    group that is to be hidden is not in the script.
+    Settings left out have the value of a perfect sensor. Everything is computed before it returns. Raises InputError if
+    a key is unknown, a value is wrong, a group that is to be hidden is not in the script, or visible boxes are asked
+    for and cannot be known.
     """
     from pydantic import ValidationError
 
