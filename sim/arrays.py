@@ -38,8 +38,8 @@ class Frozen:
                 object.__setattr__(self, name, _settled(value, kind))
 
     def replace(self, **changes: Any) -> Self:
-        """Return a copy with the given fields changed; the original stays as it is. Raises TypeError for an unknown
-        field name.
+        """Return a copy with the given fields changed; the original stays as it is. New arrays are converted as on
+        construction, and are read-only. Raises TypeError for an unknown field name.
         """
         return replace(self, **changes)  # type: ignore[type-var]
 
@@ -52,6 +52,8 @@ KINDS["Image"] = np.dtype(np.uint8)
 def _array_fields(kind: Any) -> tuple[tuple[str, np.dtype[Any], bool], ...]:
     """Return (name, number type, whether a tuple of arrays) of each field that the dataclass `kind` declares as an
     array.
+
+    Recognised are fields annotated Array, Ints, Bools or Image, or a tuple of these, in the order of declaration.
     """
     found = []
     for f in fields(kind):

@@ -1,8 +1,8 @@
 """Canonical hashes: equal content gives the same SHA-256 in any process and on any platform.
 
-Each value is hashed with its kind and size in front, so that different values never produce the same bytes. An array
-is hashed by number type, shape and little-endian bytes, with all NaN alike; text by its UTF-8; a dict by sorted keys; a
-dataclass as the dict of its fields.
+Each value is hashed with its kind and size in front, so that values of different kinds or sizes never produce the same
+bytes. An array is hashed by number type, shape and little-endian bytes, with all NaN alike; text by its UTF-8; a dict
+by sorted keys; a dataclass as the dict of its fields; a tuple as a list.
 """
 
 from __future__ import annotations
@@ -25,9 +25,10 @@ def canonical_hash(value: Any) -> str:
     """Return the SHA-256 of a value as 64 hex digits; equal content gives the same hash on any machine.
 
     The value may be None, bool, int, float, str, bytes, an array of numbers or bools, or a tuple, list, dict or
-    dataclass of such values. A tuple and a list with equal items have the same hash, all nan are alike, and the order
-    of a dict does not count. An int and a float, or arrays of different number types or shapes, have different hashes.
-    Raises TypeError for other types, and for dict keys that cannot be sorted.
+    dataclass of such values. A tuple and a list with equal items have the same hash, and so have a dataclass and the
+    dict of its fields. All nan are alike, and the order of a dict does not count. An int and a float, or arrays of
+    different number types or shapes, have different hashes. Raises TypeError for other types (also arrays of complex
+    numbers, texts or objects), and for dict keys that cannot be sorted.
     """
     h = hashlib.sha256()
     _feed(h, value)
@@ -52,7 +53,7 @@ def truth_hash(scenario: str, seed: int, repeat: int, truth: Truth | None) -> st
     """Return the SHA-256 (64 hex digits) of a scenario, seed, repeat and truth; it does not depend on what is rendered.
 
     scenario: TOML text of the resolved scenario. repeat: number of the suite entry's copy, 0 without copies. All fields
-    of the truth count except its name. A truth of None counts as None.
+    of the truth count except its name. truth None (a sequence without truth) has a hash of its own.
     """
     named = None if truth is None else {f.name: getattr(truth, f.name) for f in fields(truth) if f.name != "name"}
     return canonical_hash(("truth", scenario, seed, repeat, named))

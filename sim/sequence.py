@@ -49,9 +49,10 @@ def simulate(scenario: Scenario, seed: int, repeat: int = 0, streams: Iterable[s
     and exact pixels (`load_pixels`), whose disparity is None unless "disparity" is among the streams. () draws nothing.
 
     Raises InputError if the scenario is impossible (no room for its people, people out of view), if "right" or
-    "disparity" is wanted without a baseline, or if a stream is unknown. Reading detections raises InputError if
-    `sensor.hide` names an unknown group. Drawing raises InputError for impossible values of light and picture. Reading
-    the truth raises WorkError if an order of the script was not fulfilled.
+    "disparity" is wanted without a baseline, or if a stream is unknown. Raises ValueError for a negative seed or a
+    distribution without a draw in its clip, WorkError if a position becomes infinite or nan. Later, reading detections
+    raises InputError if `sensor.hide` names an unknown group. Drawing raises InputError for impossible values of light
+    and picture. Reading the truth raises WorkError if an order of the script was not fulfilled.
     """
     from sim.crowd.world import run
 
@@ -69,9 +70,11 @@ def observe(
     """Return the Sequence that a scenario's camera and sensor make of a Motion, the motion of a whole crowd.
 
     The camera is placed at once; truth, detections and pictures are computed when they are first used, independently of
-    each other. people: person ids of each group that `sensor.hide` may name, by group name; None derives them from the
-    scenario, which must then be the one that the motion was simulated from. check: reading the truth raises WorkError
-    if an order of the script was not fulfilled. streams: pictures as for `simulate`, by default none.
+    each other. people: person ids of each group that `sensor.hide` may name, by group name. None derives them from the
+    scenario, which must then be the Scenario that the motion was simulated from; else reading detections with such a
+    `sensor.hide`, or load_people(), raises AssertionError. check: reading the truth raises WorkError if an order of the
+    script was not fulfilled. streams: some of "left", "right", "disparity", "ids", "background": pictures to draw; by
+    default none.
 
     Raises InputError if people leave the view, a stream is unknown, or the camera has no baseline for "right" or
     "disparity". Reading detections raises InputError if `sensor.hide` names a group without ids. Drawing raises
@@ -140,8 +143,9 @@ def observe(
 class _Pictures:
     """Draws the requested streams of a simulated sequence.
 
-    State: index and exact pixels of the frame that was drawn last, because its pixels are usually read next; None
-    before.
+    renderer: draws the frames. streams: some of "left", "right", "disparity", "ids", "background". State: index (from
+    1) and exact pixels of the frame that was drawn last, because its pixels are usually read next; 0 and None before,
+    pixels None if they were not drawn.
     """
 
     def __init__(self, renderer: Renderer, streams: frozenset[str]) -> None:
@@ -152,8 +156,9 @@ class _Pictures:
     def draw(self, index: int) -> RenderedFrame:
         """Draw frame `index` (from 1): the left and right picture, each None unless requested.
 
-        Its exact pixels are drawn too if "left" and one of "ids" and "disparity" are requested, else None. Raises
-        InputError for impossible values of light and picture.
+        Its exact pixels are drawn too, and kept for `pixels`, if "left" and one of "ids" and "disparity" are requested,
+        else None. Raises InputError for impossible values of light and picture, or if there is no right camera for
+        "right" or "disparity"; IndexError for a frame that does not exist.
         """
         if not self.has_image:
             return RenderedFrame(right=self.renderer.right(index) if self.has_right else None)
@@ -165,6 +170,9 @@ class _Pictures:
     def pixels(self, index: int) -> PixelTruth:
         """Return the exact pixels of frame `index` (from 1); disparity is None unless the stream "disparity" was
         requested.
+
+        The pixels of the frame drawn last are not drawn again. Raises InputError for impossible values of light and
+        picture, IndexError for a frame that does not exist.
         """
         last, known = self._last
         if known is not None and last == index:
@@ -172,7 +180,10 @@ class _Pictures:
         return self.renderer.pixels(index, disparity="disparity" in self.streams)
 
     def background(self) -> Image:
-        """Return pictures of the empty scene before frame 1, (50, H, W, 3) BGR uint8, in the order of time."""
+        """Return pictures of the empty scene before frame 1, (50, H, W, 3) BGR uint8, in the order of time.
+
+        Raises InputError for impossible values of light and picture.
+        """
         return np.stack([self.renderer.background(k) for k in range(BACKGROUNDS)])
 
 
@@ -200,7 +211,8 @@ def named_people(
 
     These are all groups that the scenario lists, also those that enter later, and the groups that merge orders (`into`)
     and split orders (`parts`) made. orders: the script's orders; one that never took effect (fired None) makes no
-    group. scene, seed, repeat: those of the simulation. Raises InputError if a group has no free place at its start.
+    group. scene, seed, repeat: those of the simulation. Raises InputError if a group has no free place at its start,
+    ValueError if a distribution has no draw within its clip.
     """
     from sim.crowd.population import draw_population
 

@@ -29,11 +29,10 @@ EVENT_KINDS = ("merge", "split", "cross", "queue", "form", "dissolve", "enter", 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Detections(Frozen):
-    """What a detector found in frame `index` (from 1) at time t (s), M rows.
-
-    plane: "ground" (pos x, y in m), "space" (pos x, y, z in m) or "image" (pos is the box's centre in px). pos (M, D).
-    vel (M, D): the plane's unit per s, None if unknown. box (M, 4): left, top, width, height in px, None from a
-    detector of points. score (M,): in [0, 1]; empty if the detector gives none."""
+    """What a detector found in frame `index` (from 1) at time t (s): M detections, one row each. plane: "ground" (pos:
+    x, y in m), "space" (pos: x, y, z in m) or "image" (pos: u, v of the box's centre in px). pos (M, D): D is 3 in
+    space, else 2. vel (M, D): the plane's unit per s, None if unknown. box (M, 4): left, top, width, height in px, None
+    from a detector of points. score (M,): in [0, 1]; empty if the detector gives none."""
 
     index: int
     t: float
@@ -46,8 +45,8 @@ class Detections(Frozen):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Frame(Frozen):
-    """What the sensors deliver for frame `index` (from 1) at time t (s). image: of the left camera, right: of the right
-    camera, each (H, W, 3) BGR uint8, None if missing. detections: None without a detector."""
+    """What the sensors deliver for frame `index` (from 1) at time t (s). image: of the left (or only) camera, right: of
+    the right camera, each (H, W, 3) BGR uint8, None if missing. detections: of this frame, None without a detector."""
 
     index: int
     t: float
@@ -58,11 +57,11 @@ class Frame(Frozen):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Groups(Frozen):
-    """The groups of one frame, G rows, in the plane and unit of the Tracks or Truth that holds them.
-
-    id (G,). members: person ids of each group, () if the method knows groups only. pos (G, D): the centre; vel (G, D):
-    its velocity per s. extent (G, 2, 2): covariance of the members' positions, nan if unknown. size (G,): number of
-    people, nan if unknown. hull: a polygon (V, 2) for each group, x, y counter-clockwise; V = 0 if unknown."""
+    """The groups of one frame, one row for each of G groups. Plane and unit (m or px) are those of the Tracks or Truth
+    around it. id (G,). members: person ids of each group, () if the method knows groups only. pos (G, D): the centre;
+    vel (G, D): its velocity, unit per s. extent (G, 2, 2): covariance of the members' x and y, unit squared, nan if
+    unknown. size (G,): number of people, nan if unknown. hull: a polygon (V, 2) for each group, x, y counter-clockwise;
+    V = 0 if unknown."""
 
     id: Ints
     members: tuple[Ints, ...]
@@ -81,11 +80,11 @@ class Groups(Frozen):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class GroupEvent:
-    """One event of groups, from frame `start` to frame `end` (from 1, both inclusive).
-
-    kind: one of EVENT_KINDS. emitted: frame in which the tracker reported the event, which may be later than `start`;
-    None in the truth. before, after: sorted group ids, with -1 once for each person alone. members: ids of all people
-    concerned, sorted, () if unknown. pos: the place (x, y) in the plane's unit, nan if unknown."""
+    """One event of groups, from frame `start` to frame `end` (from 1, both inclusive). kind: merge, split, cross,
+    queue, form, dissolve, enter or leave. emitted: frame in which the tracker reported the event, which may be later
+    than `start`; None in the truth. before, after: sorted ids of the groups concerned, before and after it, with -1
+    once for each person alone. members: ids of all people concerned, sorted, () if unknown. pos: the place (x, y) in
+    the unit of the plane (m or px), nan if unknown."""
 
     kind: str
     start: int
@@ -99,13 +98,13 @@ class GroupEvent:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Tracks(Frozen):
-    """What one tracker reports for frame `index` (from 1) at time t (s), N rows.
+    """What one tracker reports for frame `index` (from 1) at time t (s): N people or groups, one row each.
 
-    plane: "ground", "space" (m) or "image" (px). unit "person": group (N,) is the id of the person's group, -1 for
-    alone. unit "group": rows are groups, group == id. pos, vel (N, D): plane's unit, and per s. cov (N, 2D, 2D):
-    covariance of x, y, (z), vx, vy, (vz). box (N, 4): left, top, width, height in px, or None. score (N,): in [0, 1],
-    or empty. groups None, events (): the tracker gives none; they are then derived from the tracks, and `derived` is
-    True."""
+    plane: "ground", "space" (m) or "image" (px). unit "person": rows are people, group (N,) is the id of each person's
+    group, -1 for alone. unit "group": rows are groups, group == id. pos, vel (N, D): plane's unit, and per s. cov (N,
+    2D, 2D): covariance of x, y, (z), vx, vy, (vz). box (N, 4): left, top, width, height in px, or None. score (N,): in
+    [0, 1], or empty. groups None, events (): the tracker gives none; they are then derived from its tracks, and
+    `derived` is True."""
 
     index: int
     t: float
@@ -139,9 +138,9 @@ class Stairs(Frozen):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Scene(Frozen):
-    """The static world, in m: size (2,) x, y; walls (W, 2, 2): segments [x1, y1], [x2, y2]; pillars (P, 3): x, y,
-    radius; doors (D, 2, 2): segments, openings in walls; service (S, 2): service points x, y; stairs; heights of walls,
-    pillars."""
+    """The static world, in m: size (2,) x, y, from the origin on; walls (W, 2, 2): segments [x1, y1], [x2, y2]; pillars
+    (P, 3): x, y, radius; doors (D, 2, 2): segments, openings in walls; service (S, 2): service points x, y; stairs;
+    heights of walls and pillars. Empty arrays and () by default."""
 
     size: Array
     walls: Array = field(default_factory=lambda: np.zeros((0, 2, 2)))
@@ -155,13 +154,13 @@ class Scene(Frozen):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Camera(Frozen):
-    """A camera; sim.scene.camera projects with it.
+    """A camera that maps world points X (3,) in m to pixels u, v; sim.scene.camera projects with it.
 
-    kind "pinhole": x_cam = rotation (X - position), u = fx x/z + cx, v = fy y/z + cy with focal_px (fx, fy), centre_px
-    (cx, cy). kind "top": orthographic, looking straight down on `position`, scale px_per_m (nan for "pinhole"). image:
-    (width, height) px. position (3,) m. rotation (3, 3), world to camera. baseline in m: the right camera is at
-    +baseline along camera x; 0 without one. radial: Tsai's distortion, 0 for none, x_ideal = x (1 + radial |x|²) for x
-    = ((u - cx)/fx, (v - cy)/fy)."""
+    kind "pinhole": x_cam = rotation (X - position) = (x right, y down, z forward) in m; u = fx x/z + cx, v = fy y/z +
+    cy with focal_px (fx, fy), centre_px (cx, cy). kind "top": orthographic, looking straight down on `position`, scale
+    px_per_m (nan for "pinhole"). image: (width, height) px. position (3,) m. rotation (3, 3), world to camera. baseline
+    in m: the right camera is at +baseline along camera x; 0 without one. radial: Tsai's lens distortion, 0 for none:
+    ideal coordinates p (1 + radial |p|²) for p = ((u - cx)/fx, (v - cy)/fy) of the picture."""
 
     kind: Literal["pinhole", "top"]
     image: tuple[int, int]
@@ -177,7 +176,8 @@ class Camera(Frozen):
 @dataclass(frozen=True, slots=True, eq=False)
 class Context(Frozen):
     """What a tracker may know before the first frame; None where unknown. fps: frames/s. px_per_m: image scale, nan if
-    unknown. image_size: (width, height) px. background: pictures (K, H, W, 3) BGR uint8, for background models."""
+    unknown. camera, scene: of the recording. image_size: (width, height) px. background: sample pictures (K, H, W, 3)
+    BGR uint8 to train a background model."""
 
     fps: float
     px_per_m: float
@@ -189,10 +189,9 @@ class Context(Frozen):
 
 @dataclass(frozen=True, slots=True)
 class Order:
-    """One order of the script, as recorded in gt/script.json; measured events never depend on it.
-
-    fired: frame (from 1) in which it took effect, None if it never did. before, after: person ids of each group
-    concerned, as the script plans them before and after the order."""
+    """One order of a scenario's script, as recorded in gt/script.json; measured events never depend on it. kind:
+    "merge", "split" or "queue". fired: frame (from 1) in which it took effect, None if it never did. before, after:
+    person ids of each group concerned, as the script plans them before and after the order."""
 
     id: str
     kind: str
@@ -203,11 +202,11 @@ class Order:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Motion(Frozen):
-    """The motion of a whole crowd: T frames from frame 1, P people; person id = column + 1.
-
-    pos (T, P, 2): x, y in m; vel (T, P, 2): m/s; heading (T, P): rad; nan while absent. present (T, P). intent (T, P):
-    number of the group that the script assigns the person to (a number of its own for a person alone, -1 while absent).
-    height, width, depth (P,): of the body, m. free_speed (P,): m/s. repeat: number of the suite entry's copy, or 0."""
+    """The motion of a whole crowd: T frames from frame 1, P people; person id = column + 1. seed: of the simulation.
+    repeat: number of the suite entry's copy, or 0. fps: frames/s. pos (T, P, 2): x, y in m; vel (T, P, 2): m/s; heading
+    (T, P): rad; nan while absent. present (T, P): True while in the scene. intent (T, P): number of the group that the
+    script assigns the person to (a number of its own for a person alone, -1 while absent). height, width, depth (P,):
+    of the body, m. free_speed (P,): walking speed alone, m/s. orders: of the script."""
 
     name: str
     seed: int
@@ -228,8 +227,9 @@ class Motion(Frozen):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Near(Frozen):
-    """Hard negatives (gt/near.csv), K rows: persons with ids a and b satisfy the merge rule from frame start to end
-    (from 1, both inclusive), but are strangers, that is, not in one group. All fields (K,), int64."""
+    """Hard negatives (gt/near.csv), K rows: persons with ids a and b satisfy the merge rule (nearer than 1.5 m,
+    velocities within 0.5 m/s, for 2 s) from frame start to end (from 1, both inclusive), but are not in one group. All
+    fields (K,), int64."""
 
     start: Ints
     end: Ints
@@ -244,7 +244,10 @@ class Near(Frozen):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class FrameTruth(Frozen):
-    """The truth of frame `index` (from 1) at time t (s), N people; fields as in Truth. It never reaches a tracker."""
+    """The truth of frame `index` (from 1) at time t (s), one row for each of N people. It never reaches a tracker. id
+    (N,): persons. group (N,): id of the person's group, -1 for alone. pos (N, 2): x, y in m. vel (N, 2): m/s. box (N,
+    4): left, top, width, height in px, of the whole body, unclipped. visibility (N,): visible share. groups: on the
+    ground, in m; groups_px: in the image, in px. pixels: who is in each pixel. None: unknown."""
 
     index: int
     t: float
@@ -261,12 +264,11 @@ class FrameTruth(Frozen):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class PixelTruth(Frozen):
-    """The truth of one frame's pixels, N people in the order of FrameTruth's rows.
-
-    ids (H, W): person id, -2 for walls and pillars, 0 elsewhere. disparity (H, W): px, nan where the right camera does
-    not see the point; None if not computed. visible_px (N,): number of pixels that show the person; amodal_px (N,):
-    number inside the image that would without occlusion. box (N, 4): left, top, width, height in px of the visible
-    pixels, nan without any. blob (N,): number of the connected region of people that shows the person, -1 if hidden."""
+    """The truth of one frame's pixels; its N people are the frame's people, sorted by id. ids (H, W): person id, -2 for
+    walls and pillars, 0 elsewhere. disparity (H, W): px, nan where the right camera does not see the point; None if not
+    computed. visible_px (N,): number of pixels that show the person; amodal_px (N,): number inside the image that would
+    without occlusion. box (N, 4): left, top, width, height in px of the visible pixels, nan without any. blob (N,):
+    number of the connected region of people that shows the person, -1 if hidden."""
 
     ids: Ints
     disparity: Array | None
@@ -277,21 +279,20 @@ class PixelTruth(Frozen):
 
     @property
     def visibility(self) -> Array:
-        """The visible share of each person, visible_px / amodal_px, (N,); 0 for a person without amodal pixels."""
+        """The visible share of each person, visible_px / amodal_px, (N,); 0 without pixels in the image."""
         return np.asarray(self.visible_px / np.maximum(self.amodal_px, 1.0))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Truth(Frozen):
     """The truth of a sequence of T = `length` frames from frame 1: R rows sorted by (frame, id), one per person and
-    frame.
-
-    frame, id (R,). group (R,): id of the person's group, -1 for alone. pos (R, 2): x, y on the ground, m. vel (R, 2):
-    m/s. box (R, 4): left, top, width, height in px, amodal and unclipped. visible_box (R, 4): of the visible part, nan
-    if hidden. visibility (R,): visible share. truncation (R,): share outside the image. z (R,): height of the ground,
-    m. heading (R,): rad. height (R,): of the person, m. groups, groups_px: one Groups per frame, on the ground and in
-    the image. labelled (T,): True for frames with group labels. events, near: measured from the motion. orders: of the
-    script. px_per_m: image scale, nan if unknown. Fields that may be None are None if unknown."""
+    frame. frame, id (R,). group (R,): id of the person's group, -1 for alone. pos (R, 2): x, y on the ground, m. vel
+    (R, 2): m/s. box (R, 4): left, top, width, height in px, of the whole body, unclipped. visible_box (R, 4): of the
+    visible part, nan if hidden. visibility (R,): visible share. truncation (R,): share outside the image. z (R,):
+    height of the ground, m. heading (R,): rad. height (R,): of the person, m. groups, groups_px: one Groups per frame,
+    on the ground (m) and in the image (px). labelled (T,): True for frames with group labels. events, near (strangers
+    who walk like a group): measured from the motion. orders: of the script, () without. px_per_m: image scale, nan if
+    unknown. fps: frames/s. Fields that may be None are None if unknown."""
 
     name: str
     fps: float
@@ -317,13 +318,12 @@ class Truth(Frozen):
     orders: tuple[Order, ...] = ()
 
     def rows(self, index: int) -> slice:
-        """Return the slice of the rows of frame `index` (from 1); an empty slice for a frame without people."""
+        """Return the slice of the rows of frame `index` (from 1); an empty slice if that frame has none."""
         low, high = np.searchsorted(self.frame, (index, index + 1))
         return slice(int(low), int(high))
 
     def at(self, index: int) -> FrameTruth:
-        """Return the truth of frame `index`, from 1 to `length`, without its pixels; no rows for a frame without
-        people."""
+        """Return the truth of frame `index`, 1 to `length` (unchecked), without pixels; no rows if nobody is there."""
         r = self.rows(index)
 
         def cut(a: Array | None) -> Array | None:
@@ -345,14 +345,13 @@ class Truth(Frozen):
 
 @dataclass(frozen=True)
 class Sequence:
-    """A sequence of frames, simulated, stored or recorded; it can be iterated any number of times.
-
-    frames(): a new iterator over Frame, from frame 1, with the detections. bare(): the same without pictures, None if
-    that is not quicker. length: number of frames, None if unknown before reading. image_size: (width, height) px.
-    px_per_m: nan if unknown. Each load_ field is a function, or None if there is nothing to load: load_truth() gives
-    the Truth; load_background() pictures (K, H, W, 3); load_people() the person ids of each group that the script
-    names; load_pixels(index) the PixelTruth of frame `index`. source: where the sequence comes from ("kind", "path",
-    "seed", …)."""
+    """A sequence of frames, simulated, stored or recorded; it can be iterated any number of times, from frame 1. fps:
+    frames/s. length: number of frames, None if unknown before reading. frames(): a new iterator over Frame, with the
+    detections. bare(): the same without pictures, None if that is not quicker. has_ fields: what the frames hold.
+    image_size: (width, height) px, camera, scene: None if unknown. px_per_m: nan if unknown. Each load_ field is a
+    function, or None if there is nothing to load: load_truth() gives the Truth; load_background() pictures (K, H, W, 3)
+    of a scene to train a background model; load_people() the person ids of each group that the script names;
+    load_pixels(index) the PixelTruth of frame `index`. source: where it comes from ("kind", "path", "seed", …)."""
 
     name: str
     fps: float
@@ -376,12 +375,12 @@ class Sequence:
         return self.frames()
 
     def without_pictures(self) -> Iterator[Frame]:
-        """Return a new iterator over the frames, from frame 1, without pictures where that saves time."""
+        """Return a new iterator over Frame, from frame 1, without pictures if `bare` is given, else with them."""
         return self.frames() if self.bare is None else self.bare()
 
     def frame_truth(self, index: int) -> FrameTruth | None:
-        """Return the truth of frame `index` (from 1), with its pixels if they are known; None without truth. Raises as
-        truth."""
+        """Return the truth of frame `index` (from 1), with its pixels if they are known; None without truth. Raises
+        InputError if files are invalid, WorkError if an order of a simulated script was not fulfilled."""
         if self.truth is None:
             return None
         here = self.truth.at(index)
@@ -406,7 +405,8 @@ class Sequence:
 
 
 class Tracker(Protocol):
-    """The interface of a tracker. needs: the inputs it accepts, some of "pixels", "stereo", "boxes", "points"."""
+    """The interface of a tracker. needs: the inputs it accepts, any one suffices: "pixels" (pictures), "stereo" (left
+    and right pictures), "boxes" or "points" (detections)."""
 
     needs: tuple[str, ...]
 

@@ -1,4 +1,6 @@
-"""What the bytes of a result depend on besides its inputs: versions, our own sources, the CPU's vector instructions."""
+"""What the bytes of a result depend on besides its inputs: versions of Python and libraries, a hash of our own source
+files, and the vector instructions of the CPU.
+"""
 
 from __future__ import annotations
 
@@ -16,9 +18,10 @@ DISTRIBUTION = "flockscope"
 
 @lru_cache(maxsize=2)
 def versions(drawn: bool) -> dict[str, str]:
-    """Return the versions of Python, flockscope and LIBRARIES by name; "unknown" for a library that is not installed.
+    """Return the versions of Python, flockscope and the libraries we compute with, by name; "unknown" if not installed.
 
-    drawn: include PICTURE_LIBRARIES, on which the bytes of pictures depend. The dict is cached: do not modify it.
+    The names are "python", "flockscope", "numpy", "scipy", "numba", "pymunk", "pyarrow" and "pydantic". drawn: include
+    "opencv-python-headless" and "av", on which the bytes of pictures depend. The dict is cached: do not modify it.
     """
     found = {"python": platform.python_version()}
     for name in (DISTRIBUTION, *LIBRARIES, *(PICTURE_LIBRARIES if drawn else ())):
@@ -33,15 +36,16 @@ def versions(drawn: bool) -> dict[str, str]:
 def runtime() -> dict[str, str]:
     """Return everything that two machines must share to produce the same bytes, as name to value.
 
-    The names are those of `versions(drawn=True)` ("python", "numpy", …), "sources" (hash of our source files) and "cpu"
-    (vector instructions). Computed once and cached: do not modify the dict.
+    The names are those of `versions(drawn=True)` ("python", "numpy", …), whose values are version numbers, "sources"
+    (hash of our source files, 12 hex digits) and "cpu" (vector instructions, as "x86-64-v3"). Computed once and cached:
+    do not modify the dict.
     """
     root = Path(__file__).resolve().parents[1]
     return {**versions(drawn=True), "sources": source_hash(root), "cpu": cpu_level()}
 
 
 def packages() -> tuple[str, ...]:
-    """Return the top-level packages of the installed flockscope, sorted.
+    """Return the top-level packages of the installed flockscope, sorted; normally ("scenarios", "sim", "tracking").
 
     If it is not installed, or does not list its packages: ("scenarios", "sim"), those that simulating needs.
     """
@@ -55,8 +59,8 @@ def packages() -> tuple[str, ...]:
 def source_hash(root: Path) -> str:
     """Return 12 hex digits of the SHA-256 over the source files of our packages in the folder `root`.
 
-    All .py and .toml files below root/<package> count, for each of `packages()`, by relative name and bytes. A missing
-    package counts as empty.
+    All .py and .toml files below root/<package> count, for each of `packages()` ("scenarios", "sim" and, if installed,
+    "tracking"), by relative name and bytes. A missing package counts as empty. Raises OSError for an unreadable file.
     """
     h = hashlib.sha256()
     for package in packages():

@@ -82,10 +82,11 @@ def _gift_wrap(pos: Array) -> tuple[Array, Array, Array]:
     """Return the convex hulls of G sets of n points, pos (G, n, 2) in m, by gift wrapping all sets in step; n is at
     least 1.
 
-    Returns vertices (G, V, 2) in m, counter-clockwise, the angle at which each vertex's normal cone begins (G, V) rad,
-    and the width of that cone (G, V) rad; V = n + 1. Padding vertices repeat the last vertex and have width 0. Each
-    walk round a hull begins where the normal cone of footprint vertex 0 begins, so that no footprint cone lies across
-    both ends of the walk.
+    Returns vertices (G, V, 2) in m, counter-clockwise, the angle at which each vertex's normal cone (directions in
+    which it is the furthest point) begins (G, V) rad, and the width of that cone (G, V) rad; V = n + 1. Padding
+    vertices repeat the last vertex and have width 0. Each walk round a hull begins where the normal cone of footprint
+    vertex 0 begins, at -π/16, so that no footprint cone lies across both ends of the walk. The walk ends at its first
+    vertex.
     """
     rows, n = np.arange(len(pos)), pos.shape[1]
     now = (pos @ np.array([np.cos(CONES[0]), np.sin(CONES[0])])).argmax(axis=1)
@@ -112,11 +113,12 @@ def _gift_wrap(pos: Array) -> tuple[Array, Array, Array]:
 
 
 def _minkowski_sums(p: Array, start: Array, width: Array) -> list[Array]:
-    """Return a list of G arrays (V, 2) in m: the hulls p + FOOTPRINT, each with its vertices p_i + q_k by angle of
-    normal.
+    """Return a list of G arrays (V, 2) in m, counter-clockwise: hulls of footprints, each a hull p plus the 16-gon
+    FOOTPRINT.
 
-    p (G, V, 2) m, start (G, V) rad and width (G, V) rad are the result of `_gift_wrap`: vertices of the hulls of
-    positions, and where the normal cone of each begins and how wide it is.
+    Such a Minkowski sum has the vertices p_i + q_k, of vertex i of the hull and k of the 16-gon, whose normal cones
+    share an angle, in the order of that angle. p (G, V, 2) m, start (G, V) rad and width (G, V) rad are the result of
+    `_gift_wrap`: vertices of the hulls of positions, and where the normal cone of each begins and how wide it is.
     """
     after = (CONES - start[..., None]) % (2 * np.pi)  # (G, V, 16): angle from the start of p_i's cone to that of q_k's
     before = 2 * np.pi - after

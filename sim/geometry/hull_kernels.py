@@ -17,8 +17,8 @@ def convex_hulls(sets: Sequence[Array]) -> tuple[Array, ...]:
     """Return the convex hull of each set of points (K, 2), as one array of vertices (V, 2) per set, in the order of the
     sets.
 
-    Vertices are counter-clockwise from the leftmost point, the lowest of several, as `polygons.convex_hull` gives them.
-    One exception: a set of one point repeated gives that point twice. The hull of an empty set, and of a set that
+    Vertices are counter-clockwise from the leftmost point, the lowest of several. Points on an edge and repeated points
+    are dropped, but a set of one point repeated gives that point twice. The hull of an empty set, and of a set that
     contains a nan, has shape (0, 2). Without sets the result is ().
     """
     count = np.array([len(points) for points in sets], np.int64)
@@ -40,9 +40,10 @@ def monotone_chains(points, cuts):  # type: ignore[no-untyped-def]
     """Return the hulls of G point sets by Andrew's monotone chain: vertices (V, 2) one hull after the other, and ends
     (G,).
 
-    ends[g] is the row behind the last vertex of hull g. Each hull is counter-clockwise from its leftmost point, the
-    lowest of several. Set g is points[cuts[g]:cuts[g + 1]] and must be sorted by x, then y. points (N, 2), cuts (G +
-    1,). An empty set and a set with a nan have no vertices. A set of one point repeated gives that point twice.
+    ends[g] is the row behind the last vertex of hull g; hull g begins at ends[g - 1], hull 0 at 0. Each hull is
+    counter-clockwise from its leftmost point, the lowest of several, without points on its edges. Set g is
+    points[cuts[g]:cuts[g + 1]] and must be sorted by x, then y. points (N, 2), cuts (G + 1,). An empty set and a set
+    with a nan have no vertices. A set of one point repeated gives that point twice.
     """
     out = np.empty((2 * len(points) + 2, 2))
     ends = np.empty(len(cuts) - 1, np.int64)

@@ -39,7 +39,7 @@ def pack(polygons: Sequence[Array], width: int = 1) -> PackedPolygons:
     """Return PackedPolygons of N polygons (V, 2), each padded to the most vertices of any, and to at least `width`.
 
     A polygon without vertices becomes nan: it overlaps nothing, and its distance to anything is nan. N may be 0.
-    """
+    ValueError if `width` is 0 and no polygon has a vertex."""
     count = np.array([len(p) for p in polygons], np.int64)
     flat = np.concatenate([*(np.asarray(p, float).reshape(-1, 2) for p in polygons), [[np.nan, np.nan]]])
     first = np.cumsum(count) - count
@@ -49,7 +49,8 @@ def pack(polygons: Sequence[Array], width: int = 1) -> PackedPolygons:
 
 
 def pack_padded(vertex: Array) -> PackedPolygons:
-    """Return PackedPolygons of vertices (N, V, 2) padded by repeating the last of each; ValueError if V is 0."""
+    """Return PackedPolygons of vertices (N, V, 2) padded by repeating the last of each; ValueError if V is 0. A polygon
+    with a nan vertex has a nan box and area 0."""
     box = np.concatenate([vertex.min(axis=1), vertex.max(axis=1)], axis=1)
     return PackedPolygons(vertex, box, np.nan_to_num(_shoelace(vertex)))
 
@@ -92,8 +93,8 @@ def convex_hull(points: Array) -> Array:
 def _chain(rows: list[tuple[float, ...]]) -> list[tuple[float, ...]]:
     """Return the lower half of the convex hull of points (x, y) sorted by x, then y, with its first and last point.
 
-    Points sorted the other way round give the upper half.
-    """
+    Points on the line between two others are dropped. Points sorted the other way round give the upper half. There must
+    be no equal points."""
     kept: list[tuple[float, ...]] = []
     for x, y in rows:
         while len(kept) > 1:
@@ -109,11 +110,10 @@ def intersection_pairs(a: PackedPolygons, b: PackedPolygons, i: Ints, j: Ints) -
     """Return the area (K,) that polygons a[i[k]] and b[j[k]] have in common; 0 if either is empty, clockwise or has no
     area.
 
-    i, j (K,): rows of a and of b, from 0 on; IndexError if one does not exist. The common part is the convex hull of
-    the ends of a's edges clipped to b (Cyrus & Beck) and of the vertices of b inside a. Sorting these points by angle
-    round their mean orders them. A point counted twice, or off by a rounding error, changes the area by a rounding
-    error; clipping edge by edge does not promise that where edges coincide.
-    """
+    i, j (K,): rows of a and of b, from 0 on; IndexError if one does not exist. Both polygons must be convex. The common
+    part is the convex hull of the ends of a's edges clipped to b (Cyrus & Beck) and of the vertices of b inside a.
+    Sorting these points by angle round their mean orders them. A point counted twice, or off by a rounding error,
+    changes the area by a rounding error; clipping edge by edge does not promise that where edges coincide."""
     common = np.zeros(len(i))
     near = (a.box[i, :2] < b.box[j, 2:]).all(axis=1) & (b.box[j, :2] < a.box[i, 2:]).all(axis=1)
     possible = np.flatnonzero(near & (a.area[i] > 0) & (b.area[j] > 0))
@@ -124,8 +124,10 @@ def intersection_pairs(a: PackedPolygons, b: PackedPolygons, i: Ints, j: Ints) -
 
 
 def _common_area(a: Array, b: Array) -> Array:
-    """Return the common area (K,) of polygons a (K, V, 2) and b (K, W, 2), pair by pair; both counter-clockwise, with
-    area."""
+    """Return the common area (K,) of convex polygons a (K, V, 2) and b (K, W, 2), pair by pair; 0 if they are apart.
+
+    Both must be counter-clockwise and have area. Points closer to an edge than 1e-9 of the polygons' size count as on
+    it."""
     origin = a[:, :1]
     a, b = a - origin, b - origin
     size = np.abs(np.concatenate([a, b], axis=1)).max(axis=(1, 2))
@@ -171,7 +173,9 @@ def _clip(a: Array, b: Array, slack: Array) -> tuple[Array, Array]:
 
 def _area_by_angle(points: Array, valid: Bools) -> Array:
     """Return the area (K,) of convex polygons, each with the vertices of points (K, N, 2) where valid (K, N), in any
-    order."""
+    order.
+
+    0 with fewer than three valid points."""
     n = valid.sum(axis=1)
     middle = np.where(valid[..., None], points, 0.0).sum(axis=1) / np.maximum(n, 1)[:, None]
     arm = points - middle[:, None]
@@ -204,20 +208,19 @@ def iou_matrix(a: Sequence[Array], b: Sequence[Array]) -> Array:
     """Return the intersection over union (N, M), 0 to 1, of each of N polygons in a with each of M polygons in b.
 
     A polygon is an array (V, 2), convex and counter-clockwise. The value is 0 if either is empty, clockwise or has no
-    area, and exactly 1 for equal polygons. N or M may be 0.
-    """
+    area, and exactly 1 for equal polygons. N or M may be 0. ValueError if there are polygons but none has a vertex."""
     i, j = (g.ravel() for g in np.indices((len(a), len(b))))
     width = max((len(p) for p in (*a, *b)), default=1)
     return iou_pairs(pack(a, width), pack(b, width), i, j).reshape(len(a), len(b))
 
 
 def gap_pairs(a: PackedPolygons, b: PackedPolygons, i: Ints, j: Ints) -> Array:
-    """Return the distance (K,) between polygons a[i[k]] and b[j[k]]: 0 where they overlap or touch; nan for an empty
-    one.
+    """Return the distance (K,) between convex polygons a[i[k]] and b[j[k]]: 0 where they overlap or touch; nan for an
+    empty one.
 
-    i, j (K,): rows of a and of b, from 0 on; IndexError if one does not exist. At least one polygon of a pair must have
-    area: two without may get 0 although they are apart. For them use `edge_distance_pairs`.
-    """
+    i, j (K,): rows of a and of b, from 0 on; IndexError if one does not exist. Both must be counter-clockwise. At least
+    one polygon of a pair must have area: two without may get 0 although they are apart. For them use
+    `edge_distance_pairs`."""
     gap = np.empty(len(i))
     for low in range(0, len(i), CHUNK):
         part = slice(low, low + CHUNK)
@@ -273,11 +276,10 @@ def _distance_to_edges(points: Array, polygon: Array) -> Array:
 
 
 def polygon_gap(a: Array, b: Array) -> float:
-    """Return the distance between convex polygons (V, 2) and (W, 2): 0 where they overlap or touch; nan if one is
-    empty.
+    """Return the distance between convex, counter-clockwise polygons (V, 2) and (W, 2): 0 where they overlap or touch;
+    nan if one is empty.
 
-    At least one of them must have area: two without may get 0 although they are apart.
-    """
+    At least one of them must have area: two without may get 0 although they are apart."""
     none = np.zeros(1, np.int64)
     return float(gap_pairs(pack([a]), pack([b]), none, none)[0])
 
@@ -286,9 +288,8 @@ def contains(polygon: Array, points: Array, dilate: float = 0.0) -> Bools:
     """Return True (N,) for the points (N, 2) in the convex polygon (V, 2), on its edge, or at most `dilate` away from
     it.
 
-    False for nan. A polygon without vertices contains nothing. One that is clockwise, or has one or two vertices,
-    contains nothing unless `dilate` is above 0.
-    """
+    False for a nan point. A polygon without vertices contains nothing. One that is clockwise, or has one or two
+    vertices, contains only points at most `dilate` from an edge or vertex, and nothing if `dilate` is 0 or less."""
     points = np.asarray(points, float).reshape(-1, 2)
     if not len(polygon):
         return np.zeros(len(points), bool)
