@@ -79,14 +79,20 @@ FOOT_X, FOOT_Y, AXIS_X, AXIS_Y, LENGTH, WIDTH, SLOWDOWN = range(7)
 class Steering:
     """Parameters of the forces on people; 21 fields, in the order of the slots of the kernels' parameter array.
 
-    - relaxation, cohesion_time, turn_time, slow_time, avoid_time: time constants, s. alignment: rate, 1/s.
-    - separation, shove: repulsion at distance zero between members and between strangers, m/s²; wall: at contact, m/s².
-    - separation_range, wall_range, person_range, group_range: distances at which forces end (wall_range: fall to 37 %),
-      m.
-    - haste: share of the group's speed that a member may add. avoid_person, avoid_group: strengths of the power law.
-    - person_radius: half the distance that strangers keep, m. avoid_max, max_acceleration: caps of one and of all
-      forces, m/s². gather_radius, pass_radius: distances at which a group has gathered, and a waypoint counts as
-      passed, m.
+    - relaxation: s, to take up the wanted velocity. cohesion_time: s, to return to one's place in the formation.
+      alignment: rate of taking up the group's mean velocity, 1/s.
+    - separation: repulsion of two members at distance zero, m/s², falling to 0 at separation_range, m. haste: share of
+      the group's speed that a member may add.
+    - turn_time: s, in which a group's heading follows its way. slow_time: s, how early a group slows down before a goal
+      where it stands.
+    - avoid_person, avoid_group: strengths of the power law of the time to collision, between strangers and between
+      whole groups. avoid_time: its time constant, s; collisions beyond four times that are ignored.
+    - person_radius: half the distance that strangers keep, m. person_range, group_range: strangers, and groups, further
+      apart ignore each other, m.
+    - avoid_max: cap of one avoidance force, m/s². shove: repulsion of strangers at distance zero, m/s².
+    - wall: repulsion of a wall or pillar at contact, m/s²; it falls to 37 % over wall_range, m.
+    - gather_radius: a group has gathered when all members are this close to their places, m. pass_radius: distance at
+      which a waypoint counts as passed, m. max_acceleration: cap of the sum of all forces, m/s².
     """
 
     relaxation: float = 0.5  # s: time in which a person takes up the wanted velocity

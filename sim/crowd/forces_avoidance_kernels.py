@@ -1,8 +1,7 @@
 """Forces that keep people, groups, walls and pillars apart, as numba kernels; numpy twins: tests/reference_steering.py.
 
 `avoid` is the entry. sim.crowd.forces names all columns, slots and units. Neighbours are found through a cell list once
-there are more than BRUTE people. A first pass without branches, which the compiler vectorises, picks the pairs that may
-act on each other. Only those pairs go through the formulas.
+there are more than BRUTE (48) people. Only pairs that may act on each other go through the formulas.
 """
 
 from __future__ import annotations
@@ -33,13 +32,11 @@ PILLAR_MARGIN = 1.2  # person radii that are added to a pillar's radius in the p
 
 @njit(cache=True, inline="always")
 def _power_law(dx, dy, wx, wy, radius, strength, horizon, cap):  # type: ignore[no-untyped-def]
-    """Returns the avoidance acceleration (fx, fy) in m/s² of one of two discs whose radii add up to `radius` (m).
-
-    (dx, dy) = own - other position, m; (wx, wy) = own - other velocity, m/s. Minus the gradient of strength exp(-tau /
+    """Returns the avoidance acceleration (fx, fy) in m/s² of one of two discs whose radii add up to `radius` (m). (dx,
+    dy) = own - other position, m; (wx, wy) = own - other velocity, m/s. Minus the gradient of strength exp(-tau /
     horizon) / tau² over the relative position, tau being the time to collision in s (Karamouzas 2014, eq. 2-3), cut to
     length `cap`. Zero where no collision lies ahead within 4 horizon, and where the discs overlap. *Ours*: tau ≥ 0.05
-    s.
-    """
+    s."""
     a = wx * wx + wy * wy
     c = dx * dx + dy * dy - radius * radius
     b = -(dx * wx + dy * wy)
@@ -65,11 +62,10 @@ def _power_law(dx, dy, wx, wy, radius, strength, horizon, cap):  # type: ignore[
 
 @njit(cache=True)
 def _avoid_groups(status, rules, push):  # type: ignore[no-untyped-def]
-    """Overwrite push (G, 2) with each group's acceleration, m/s², from avoiding other groups as discs.
-
-    status (G, 10): columns COUNT … AVOIDED; groups with AVOIDED 0 get 0. rules (21,): Steering.array(). The smaller
-    group of a pair yields more: its share is 2 × the other's size / the sum of both sizes.
-    """
+    """Overwrite push (G, 2) with each group's acceleration, m/s², from avoiding other groups as discs (radius + person
+    radius). status (G, 10): columns COUNT … AVOIDED; groups with AVOIDED 0 and pairs of single people get 0. rules
+    (21,): Steering.array(). The smaller group of a pair yields more: its share is 2 × the other's size / both sizes'
+    sum."""
     strength, horizon, radius = rules[AVOID_GROUP], rules[AVOID_TIME], rules[PERSON_RADIUS]
     reach, cap = rules[GROUP_RANGE], rules[AVOID_MAX]
     push[:] = 0.0
@@ -128,11 +124,9 @@ def _near_discs(rows, s, last, reach, radius, found):  # type: ignore[no-untyped
 @njit(cache=True, inline="always")
 def _pair(state, tag, i, j, dx, dy, d2, rules, out):  # type: ignore[no-untyped-def]
     """Add the forces between persons i and j, m/s², to out (N, 2); (dx, dy) = position i - position j, m; d2 = its
-    square.
-
-    Same group or same queue: linear repulsion at short range. Strangers: linear where closer than two person radii,
-    else the power law. j gets the opposite force. state (N, 4): x, y, vx, vy. tag (N, 4): group, mode, queue, waypoint.
-    """
+    square. Same group or same queue: linear repulsion at short range. Strangers: linear where closer than two person
+    radii, else the power law. j gets the opposite force. state (N, 4): x, y, vx, vy. tag (N, 4): group, mode, queue,
+    waypoint. rules (21,): Steering.array()."""
     if tag[i, GROUP] == tag[j, GROUP]:
         if d2 >= rules[SEPARATION_RANGE] * rules[SEPARATION_RANGE]:
             return
@@ -215,7 +209,8 @@ def _candidates(rows, s, first, last, reach, touch, radius, found, m):  # type: 
 
 @njit(cache=True)
 def _pairs(state, tag, rules, out):  # type: ignore[no-untyped-def]
-    """Add the forces between people in reach of each other to out (N, 2), m/s², each pair once; state: x, y, vx, vy."""
+    """Add the forces between people within reach of each other to out (N, 2), m/s², each pair once, both directions.
+    state (N, 4): x, y, vx, vy. tag (N, 4): group, mode, queue, waypoint. rules (21,): Steering.array()."""
     n = len(state)
     order, start, nx = _cells(state, rules[PERSON_RANGE])
     reach, radius = rules[PERSON_RANGE] * rules[PERSON_RANGE], 2.0 * rules[PERSON_RADIUS]
@@ -242,10 +237,9 @@ def _pairs(state, tag, rules, out):  # type: ignore[no-untyped-def]
 
 @njit(cache=True)
 def _walls(state, walls, pillars, rules, out):  # type: ignore[no-untyped-def]
-    """Add the forces of walls and pillars to out (N, 2), m/s²: exponential repulsion; of pillars the power law, too.
-
-    state (N, 4): x, y, vx, vy. walls (W, 4): x1, y1, x2, y2. pillars (P, 3): x, y, radius. All in m, m/s.
-    """
+    """Add the forces of walls within 1.2 m and pillars within 6 m to out (N, 2), m/s²: exponential repulsion; of
+    pillars the power law, too. state (N, 4): x, y, vx, vy. walls (W, 4): x1, y1, x2, y2. pillars (P, 3): x, y, radius;
+    all in m, m/s. rules (21,): Steering.array()."""
     strength, decay = rules[WALL], rules[WALL_RANGE]
     for i in range(len(state)):
         x, y = state[i, X], state[i, Y]
@@ -278,12 +272,10 @@ def _walls(state, walls, pillars, rules, out):  # type: ignore[no-untyped-def]
 
 @njit(cache=True)
 def avoid(state, tag, status, walls, pillars, rules, push, out):  # type: ignore[no-untyped-def]
-    """Add all avoidance accelerations to out (N, 2), m/s², then shorten each row of `out` to MAX_ACCELERATION.
-
-    state (N, 4): x, y, vx, vy. tag (N, 4): group, mode, queue, waypoint. status (G, 10): as `drive` left it. walls (W,
-    4), pillars (P, 3): m. rules (21,): Steering.array(). push (G, 2): scratch, overwritten. People in a queue do not
-    take part in the avoidance of their group as a whole.
-    """
+    """Add all avoidance accelerations to out (N, 2), m/s², then shorten each row of `out` to MAX_ACCELERATION. state
+    (N, 4): x, y, vx, vy. tag (N, 4): group, mode, queue, waypoint. status (G, 10): as `drive` left it. walls (W, 4):
+    x1, y1, x2, y2; pillars (P, 3): x, y, radius; m. rules (21,): Steering.array(). push (G, 2): scratch, overwritten.
+    People in a queue do not take part in the avoidance of their group as a whole."""
     _avoid_groups(status, rules, push)
     _pairs(state, tag, rules, out)
     _walls(state, walls, pillars, rules, out)

@@ -58,7 +58,8 @@ def _spread(state, place, tag, groups, status):  # type: ignore[no-untyped-def]
 
     RADIUS: from the group's mean position. MAX_OFF_PLACE: from the member's place in the formation, whose middle is the
     gathering point if the current waypoint is GATHER, else the mean position. state (N, 4): x, y, vx, vy. place (N, 2):
-    forward, left, m. tag (N, 4): its column GROUP is the group's index. Both columns must be 0 before the call.
+    forward, left, m. tag (N, 4): its column GROUP is the group's index. groups: GroupArrays (ways and headings). Both
+    columns must be 0, and the mean positions set, before the call.
     """
     for i in range(len(state)):
         g = tag[i, GROUP]
@@ -78,8 +79,9 @@ def _spread(state, place, tag, groups, status):  # type: ignore[no-untyped-def]
 def _pass_doors(groups, people, status):  # type: ignore[no-untyped-def]
     """Advance `groups.current` of each group at a door by one, once every member present has passed the door.
 
-    A group without members present stays. Overwrites AVOIDED: 0.0 if a member has not passed the door yet, else 1.0.
-    status (G, 10) is `groups.status`.
+    At a door: the current waypoint is NARROW. A member has passed it if the tag WAYPOINT of `people` is above the
+    current waypoint. A group without members present stays. Overwrites AVOIDED: 0.0 if the group is at a door that a
+    member has not passed yet, else 1.0. status (G, 10) is `groups.status`.
     """
     for g in range(len(status)):
         groups.status[g, AVOIDED] = 1.0
@@ -98,8 +100,15 @@ def _lead_groups(groups, status, dt, rules):  # type: ignore[no-untyped-def]
     """Advance each group on its way by dt (s): updates groups.current, arrived and heading, and the wanted velocity in
     status.
 
+    - A PASS waypoint is passed within pass_radius + 0.3 × the group's radius; a GATHER one once all members are within
+      gather_radius of their places. At most one is passed in a call. The end of the way counts as arrived within 0.25 m
+      (STAND) or pass_radius (LEAVE).
+    - The heading turns towards the waypoint, but not within 0.3 m of it, while gathering, or after arrival.
+    - Wanted velocity: speed × heading; slower shortly before an end where the group stands. A group that has arrived
+      and stands drifts back to the end of its way at 0.3 m/s at most.
+
     status (G, 10): columns COUNT … AVOIDED. rules (21,): Steering.array(). A group without members or way is left as it
-    is. A group that has arrived and stands drifts back to the end of its way at 0.3 m/s at most.
+    is.
     """
     turn_time, slow_time = rules[TURN_TIME], rules[SLOW_TIME]
     gather, radius = rules[GATHER_RADIUS], rules[PASS_RADIUS]
@@ -159,9 +168,11 @@ def _turn(heading, g, ex, ey, share):  # type: ignore[no-untyped-def]
 def _seek(state, people, groups, stairs, rules, out):  # type: ignore[no-untyped-def]
     """Overwrite out (N, 2) with the acceleration of each person towards its goal, m/s².
 
-    A person in a queue walks to its target, a member at a door to and through the door, any other member to its place
-    in the formation. Stairs reduce the wanted speed of all people. Sets the tag WAYPOINT of people who pass a door.
-    state (N, 4): x, y, vx, vy. stairs (S, 7): as in Obstacles. rules (21,): Steering.array().
+    A person in a queue walks to its target, a member at a door to and through the door. A member who gathers walks to
+    its place round the gathering point, any other to its place in the moving formation, and then also takes up the
+    group's mean velocity. The wanted speed is capped (stairs lower the cap), then the wander is added, less of it below
+    0.3 m/s. Sets the tag WAYPOINT of people who pass a door. state (N, 4): x, y, vx, vy. people, groups: PeopleArrays,
+    GroupArrays. stairs (S, 7): as in Obstacles. rules (21,): Steering.array().
     """
     status = groups.status
     relax, cohesion = rules[RELAXATION], rules[COHESION_TIME]
@@ -207,8 +218,9 @@ def _seek(state, people, groups, stairs, rules, out):  # type: ignore[no-untyped
 def _through_door(groups, people, i, g, x, y, limit):  # type: ignore[no-untyped-def]
     """Returns the wanted velocity (vx, vy), m/s, of person i at (x, y), m, whose group g is at a door.
 
-    limit: speed, m/s; a person who has passed the door goes on at DOOR_PACE (0.6) of it. Within DOOR_DISTANCE (0.45 m)
-    of the door's middle the person's tag WAYPOINT is set to the waypoint behind the door.
+    It leads to the first waypoint, from the door on, that the person has not passed (tag WAYPOINT of `people`; ways in
+    `groups`). limit: speed, m/s; a person who has passed the door goes on at DOOR_PACE (0.6) of it. Within
+    DOOR_DISTANCE (0.45 m) of the door's middle the person's tag WAYPOINT is set to the waypoint behind the door.
     """
     door = groups.current[g]
     w = max(people.tag[i, WAYPOINT], door)
@@ -258,9 +270,15 @@ def drive(  # type: ignore[no-untyped-def]
     (s).
 
     Returns True; False, with nothing written, if |x| + |y| + |vx| + |vy| of a person is nan or at least 1e9. state (N,
-    4): x, y, vx, vy. place … tag are the fields of PeopleArrays and route … status those of GroupArrays, as separate
-    arguments, because numba takes 3 µs to unpack a named tuple. stairs (S, 7): as in Obstacles. rules (21,):
-    Steering.array(). Modifies current, heading, arrived, status, and the tag WAYPOINT of people who pass a door.
+    4): x, y, vx, vy, m, m/s. stairs (S, 7): as in Obstacles. rules (21,): Steering.array().
+
+    - Fields of PeopleArrays: place (N, 2) in the formation, forward and left, m; target (N, 2) in a queue, m; pace (N,)
+      to it, m/s; wander (N, 2), m/s; tag (N, 4): group, mode, queue, waypoint.
+    - Fields of GroupArrays: route (G, W, 2), m, and kind (G, W) of waypoints, length (G,) of them used; current (G,)
+      waypoint; speed (G,), m/s; heading (G, 2); finish (G,): STAND or LEAVE; arrived (G,); status (G, 10).
+
+    They are separate arguments because numba takes 3 µs to unpack a named tuple. Modifies current, heading, arrived,
+    status, and the tag WAYPOINT of people who pass a door.
     """
     for i in range(len(state)):
         if not abs(state[i, X]) + abs(state[i, Y]) + abs(state[i, VX]) + abs(state[i, VY]) < 1e9:

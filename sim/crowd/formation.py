@@ -19,8 +19,8 @@ SIDEWAYS_LEAD = 0.6  # groups side by side meet this share of their distance fur
 def rows_of(n: int) -> list[int]:
     """Returns the sizes of the rows of a walking group of n people, front row first; they add up to n.
 
-    Up to 3 people form one row. More people form rows of 3 in front and one or two rows of 2 behind if n is no multiple
-    of 3.
+    Up to 3 people form one row; n = 0 gives [0]. More people form rows of 3 in front and one or two rows of 2 behind if
+    n is no multiple of 3: 4 gives [2, 2], 7 gives [3, 2, 2].
     """
     if n <= 3:
         return [n]
@@ -31,8 +31,9 @@ def rows_of(n: int) -> list[int]:
 def walking(n: int, spacing: float) -> Array:
     """Returns the places (n, 2) of a walking group of n ≥ 1 people, m: forward and left of the group's middle.
 
-    Front row first, left to right within a row; the mean is zero. Neighbours in a row are `spacing` m apart, rows 1.15
-    × spacing. The middle person of a row of three is 0.3 × spacing behind the two beside.
+    Front row first, left to right within a row; the mean is zero. Rows have 3 people, the last one or two 2; up to 3
+    people form one row. Neighbours in a row are `spacing` m apart, rows 1.15 × spacing. The middle person of a row of
+    three is 0.3 × spacing behind the two beside.
     """
     rows = []
     for k, size in enumerate(rows_of(n)):
@@ -49,7 +50,8 @@ def walking(n: int, spacing: float) -> Array:
 def standing(n: int, spacing: float) -> Array:
     """Returns the places (n, 2) of a group of n ≥ 1 people in conversation, m: forward and left of the group's middle.
 
-    They lie on a circle with neighbours `spacing` m apart. One person stands in the middle.
+    They lie on a circle with neighbours `spacing` m apart, counter-clockwise. The first is half a step (180° / n) left
+    of straight ahead. One person stands in the middle.
     """
     if n == 1:
         return np.zeros((1, 2))
@@ -84,8 +86,8 @@ def meeting_point(middles: Array, speeds: Array, goal: Array | None) -> Array:
 
     middles (G, 2): where the groups are, m. speeds (G,): m/s, above 0. goal (2,): where they go together afterwards, m;
     None if nowhere. The point is the mean of the middles, weighted by 1 / speed. With a goal it is shifted towards the
-    goal, but never beyond it, by 1.2 times the mean distance of the middles from the line between that mean and the
-    goal.
+    goal, but never beyond it. The shift is 1.2 times the mean distance of the middles from the line between that mean
+    and the goal.
     """
     weights = (1 / speeds) / np.sum(1 / speeds)
     centre = np.asarray(weights @ middles)
@@ -103,8 +105,9 @@ def meeting_point(middles: Array, speeds: Array, goal: Array | None) -> Array:
 def part_sizes(sizes: list[int | None], total: int) -> list[int]:
     """Returns the number of people in each part of a group of `total` people that divides, in the order of `sizes`.
 
-    None in `sizes` stands for an equal share of the people left over. If the division leaves a remainder r, the first r
-    of these parts get one person more. Sizes that do not fit `total` are not checked.
+    sizes: wanted number of people of each part. None in it stands for an equal share of the people left over. If the
+    division leaves a remainder r, the first r of these parts get one person more. Without None, `sizes` come back as
+    they are. Sizes that do not fit `total` are not checked and may give negative shares.
     """
     open_parts = [k for k, s in enumerate(sizes) if s is None]
     rest = total - sum(s for s in sizes if s is not None)
@@ -120,7 +123,7 @@ def divide(offsets: Array, ways: Array, sizes: list[int]) -> Ints:
     offsets (n, 2): members' positions relative to the group's middle, m. ways (K, 2): vectors from the middle to each
     part's goal, m. sizes: number of members of each of the K parts. Parts fill up to their sizes so that the sum of the
     members' distances ahead, in the direction of their part, is greatest. Members in excess of the sizes join the last
-    part.
+    part. With too few members, some parts stay smaller. Raises ValueError for nan.
     """
     from scipy.optimize import linear_sum_assignment
 

@@ -38,12 +38,13 @@ class GroupState:
     """The groups of a running simulation, by group index, and their people, by column (column = person id - 1).
 
     - alive: index of each existing group by name. arrays: the ways of all groups, as the kernels use them.
-    - by group index: members (columns), spacing (m), goals (point (2,) in m; "stand", "leave" or "walk").
+    - by group index, ended groups included: members (columns), spacing (m), goals (point (2,) in m; "stand", "leave" or
+      "walk"). A group that an order made has no entry in `goals` until it queues.
     - settled: indices of groups that stand in a circle. next_group: index of the next group that an order makes.
     - by column: group_of (group index), queue_of (order index, -1 in no queue), present, free_speed (m/s), places (P,
       2) in the formation (forward, left, m), targets (P, 2) in a queue (x, y, m), waypoint (index of the first not
       passed).
-    - slowdown: m/s by which a group is slower for each member after the first.
+    - slowdown: m/s by which a group is slower for each member after the first. navigator: finds ways round walls.
     """
 
     def __init__(self, entering: list[EnteringGroup], new: int, navigator: Navigator, slowdown: float) -> None:
@@ -119,8 +120,8 @@ class GroupState:
 
         start, goal, gather (2,) and each of via (2,): m. finish: "stand", "leave" or "walk" (straight on for 1000 m
         beyond the goal). speed: m/s. gather: point where the group first waits for all members, None to start at once.
-        Where no way exists, the group walks straight. Waypoints after the first MAX_WAY (32) are dropped. The group
-        turns at once to its way, `arrived` becomes False, and its members start at the first waypoint.
+        Where no way exists, the group walks straight. Waypoints after the first MAX_WAY (32) are dropped, the goal with
+        them. The group turns at once to its way, `arrived` becomes False, and its members start at the first waypoint.
         """
         way: list[tuple[Array, int]] = [] if gather is None else [(gather, GATHER)]
         here = start if gather is None else gather
@@ -139,10 +140,10 @@ class GroupState:
         """Overwrites the way of group index g: its waypoints, speed (m/s) and finish; the group starts at the first
         waypoint.
 
-        way: 1 to MAX_WAY (32) pairs of a point (2,) in m and a kind (PASS, NARROW, GATHER or END). finish: "leave"
-        leaves the scene at the end; any other word stands. start (2,): where the group is, m. The heading turns from
-        start to the first waypoint; from a gathering point to the waypoint after it. It stays as it was if these two
-        points coincide. `arrived` becomes False, and the members' waypoints 0.
+        way: 1 to MAX_WAY (32) pairs of a point (2,) in m and a kind (PASS, NARROW, GATHER or END); more raise
+        IndexError. finish: "leave" leaves the scene at the end; any other word stands. start (2,): where the group is,
+        m. The heading turns from start to the first waypoint; from a gathering point to the waypoint after it. It stays
+        as it was if these two points coincide. `arrived` becomes False, and the members' waypoints 0.
         """
         arrays = self.arrays
         for k, (point, kind) in enumerate(way):
@@ -160,8 +161,8 @@ class GroupState:
     def new_group(self, name: str, columns: list[int], spacing: float) -> int:
         """Makes a group of the people in these columns, takes them out of queues, and returns the new group's index.
 
-        name: of the group in the script. spacing: m between neighbours. The group has no way and no places yet. The old
-        groups keep their entries in `alive` and `members`; the caller removes them from `alive`.
+        name: of the group in the script. spacing: m between neighbours. The group has no way, goal or places yet. The
+        old groups keep their entries in `alive` and `members`; the caller removes them from `alive`.
         """
         g = self.next_group
         self.next_group += 1
@@ -171,7 +172,7 @@ class GroupState:
         return g
 
     def walking_speed(self, columns: list[int]) -> float:
-        """Returns the speed in m/s of a group of the people in these columns.
+        """Returns the speed in m/s of a group of the people in these columns, at least one.
 
         It is the mean of their free speeds minus `slowdown` for each member after the first, at least 0.3 m/s.
         """
@@ -182,7 +183,7 @@ class GroupState:
 
         The sum of the squared distances that they have to walk is least. places (n, 2): forward, left of the group's
         middle, m. middle (2,), pos (n, 2): the group's middle and the people's positions in the world, m. The group's
-        heading is used.
+        heading is used. Raises ValueError if a position is nan.
         """
         points = to_world(places, middle, self.arrays.heading[g])
         self.places[columns] = places[assign(pos, points)]
@@ -192,7 +193,7 @@ class GroupState:
         was one.
 
         state (P, 4): x, y, vx, vy of each person by column, m, m/s; nan while absent. Members who are absent get no
-        place.
+        place. The groups' indices join `settled`, so this happens once for each group until it walks on.
         """
         changed = False
         for g in np.flatnonzero(self.arrays.arrived).tolist():
@@ -207,7 +208,8 @@ class GroupState:
     def fill(self, people: PeopleArrays, columns: Ints) -> None:
         """Overwrites place, target, pace and tag of `people` (N rows) with the state of the people in columns (N,).
 
-        `people.wander` is left as it is. The pace to a place in a queue is the group's speed, at most 1.4 m/s.
+        `people.wander` is left as it is. The mode in the tag is TO_TARGET for people in a queue, else IN_GROUP. The
+        pace to a place in a queue is the group's speed, at most 1.4 m/s.
         """
         queue = self.queue_of[columns]
         people.place[:] = self.places[columns]

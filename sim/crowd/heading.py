@@ -1,7 +1,8 @@
-"""The direction in which each person faces, in radians from +x, for a whole motion of T frames and P people.
+"""The direction in which each person faces, in radians counter-clockwise from +x, for a whole motion of T frames and P
+people.
 
-People who walk (faster than 0.25 m/s) turn towards their velocity; people who stand turn towards the middle of their
-group. A person who stands alone keeps the direction.
+It is computed from positions, velocities, presence and groups. People who walk (0.25 m/s or faster) turn towards their
+velocity; people who stand turn towards the middle of their group. A person who stands alone keeps the direction.
 """
 
 from __future__ import annotations
@@ -15,12 +16,14 @@ TURN_TIME = 0.3  # s
 
 
 def headings(pos: Array, vel: Array, present: Bools, intent: Ints, fps: float) -> Array:
-    """Returns the direction in which each person faces in each frame, shape (T, P), radians from +x, nan while absent.
+    """Returns the direction in which each person faces in each frame, shape (T, P), radians counter-clockwise from +x,
+    nan while absent.
 
-    pos, vel (T, P, 2): m, m/s. present (T, P): flags. intent (T, P): group index, -1 while absent. fps: frames per s. A
-    person faster than WALKING_SPEED (0.25 m/s) turns to the velocity, a slower one to the middle of the group; a slow
-    person who is alone keeps the heading. The time constant is TURN_TIME (0.3 s). A person who enters for the first
-    time faces the wanted direction at once, +x if there is none.
+    pos, vel (T, P, 2): x, y in m and m/s. present (T, P): flags. intent (T, P): group index, -1 while absent. fps:
+    frames per s. A person at WALKING_SPEED (0.25 m/s) or faster turns to the velocity, a slower one to the middle of
+    the group. A slow person who is alone, or exactly in the middle, keeps the heading. Headings follow with the time
+    constant TURN_TIME (0.3 s). A person who enters for the first time faces the wanted direction at once, +x if there
+    is none. A person who returns goes on from the last heading.
     """
     out = np.full(present.shape, np.nan)
     facing = np.zeros((present.shape[1], 2))
@@ -43,8 +46,8 @@ def headings(pos: Array, vel: Array, present: Bools, intent: Ints, fps: float) -
 def _towards_group(pos: Array, intent: Ints, slow: Bools, facing: Array) -> Array:
     """Returns vectors (K, 2), not of unit length, from the K slow people to the middle of their group, m.
 
-    A person who is alone gets the present facing. pos (P, 2): m. intent (P,): group index, -1 while absent. slow (P,):
-    flags of the K people. facing (P, 2): where all people face now.
+    A person who is alone gets the present facing. pos (P, 2): x, y in m. intent (P,): group index, -1 while absent.
+    slow (P,): flags of the K people, all present. facing (P, 2): vector in which each person faces now.
     """
     here = intent >= 0
     groups = np.where(here, intent, 0)

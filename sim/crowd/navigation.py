@@ -18,9 +18,10 @@ def cut_walls(walls: Array, doors: list[tuple[Array, float]]) -> tuple[Array, Ar
     """Returns the walls (W, 2, 2) with the doors' openings cut out, and the openings (D, 2, 2): two ends x, y each, in
     m.
 
-    walls (N, 2, 2): both ends, m. doors: middle (2,) and width of each, m. A door is cut out of the wall nearest to it;
-    the opening ends at the wall's ends. The pieces of a cut wall come after all uncut walls; pieces without length are
-    dropped. Raises ValueError if there are doors but no walls.
+    walls (N, 2, 2): both ends, m. doors: middle (2,) and width of each, m. Doors are cut one by one, each out of the
+    wall nearest to it (of equally near ones the first). Its opening ends at the wall's ends. The pieces of a cut wall
+    come after all uncut walls; pieces without length are dropped. Raises ValueError if there are doors but no walls
+    left. That every door lies on its wall is not checked.
     """
     pieces = [np.asarray(w, dtype=float) for w in walls]
     openings = []
@@ -71,10 +72,10 @@ def _distance(point: Array, wall: Array) -> float:
 
 
 def blocked(a: Array, b: Array, walls: Array) -> Bools:
-    """Returns for each segment from a to b whether it crosses a wall, shape (...).
+    """Returns for each segment from a to b whether it crosses a wall, shape (...), bool.
 
     a, b (..., 2): ends, m. walls (W, 2, 2): two ends each, m. Touching a wall with an end is no crossing, nor is
-    running along it. Without walls all are False.
+    running along it. Without walls, and for nan, the answer is False.
     """
     if not len(walls):
         return np.zeros(a.shape[:-1], dtype=np.bool_)
@@ -109,7 +110,8 @@ class Navigator:
         self.edges = self._lengths(self.nodes, self.nodes)
 
     def _wall_ends(self) -> Array:
-        """Returns points (K, 2), m, 0.6 m (CLEARANCE) beyond both ends of each wall.
+        """Returns points (K, 2), m, 0.6 m (CLEARANCE) beyond both ends of each wall: all first ends, then all second
+        ends.
 
         Points outside the world, and points within 0.54 m of a wall or door, are left out.
         """
@@ -132,8 +134,8 @@ class Navigator:
         """Returns the points (K, 2) in m to walk to, in order, the goal last, and flags (K,): True for points that
         belong to a door.
 
-        start, goal (2,): m; the start is not among the points. A door gives two points: its middle, and one BEHIND (0.7
-        m) beyond it. Returns None if walls leave no way.
+        start, goal (2,): m; the start is not among the points. If nothing lies between, the goal is the only point. A
+        door gives two points: its middle, and one BEHIND (0.7 m) beyond it. Returns None if walls leave no way.
         """
         ends = np.stack([start, goal])
         if not blocked(ends[:1], ends[1:], self.closed)[0]:
@@ -160,6 +162,8 @@ class Navigator:
     def _beyond_door(self, door: int, way: Array) -> Array:
         """Returns the vector (2,), 0.7 m (BEHIND) long, across door number `door`, to the side that the vector way (2,)
         leads to.
+
+        For a way along the door it points to the right of the direction from the door's first to its second end.
         """
         along = self.doors[door, 1] - self.doors[door, 0]
         across = np.array([-along[1], along[0]]) / np.linalg.norm(along)
@@ -167,7 +171,8 @@ class Navigator:
 
 
 def _dijkstra(lengths: Array, start: int, goal: int) -> list[int] | None:
-    """Returns the shortest path from node `start` to node `goal`: node indices without the start, the goal last.
+    """Returns the shortest path from node `start` to another node `goal`: node indices without the start, the goal
+    last.
 
     lengths (N, N): edge lengths, inf = no edge. None if there is no path.
     """

@@ -32,8 +32,12 @@ class OrderExecution:
     """Carries out the orders of one scenario on the groups of a running simulation.
 
     - groups: the groups whose members, ways and places the orders change. placement: turn and mirror of the script.
-    - pending: all orders, in the order of the file, fired or not. come_true: ids of orders whose rule has come true.
+    - pending: all orders, in the order of the file, fired or not. come_true: ids of orders whose rule has held long
+      enough (people are together, apart or in line, as ordered).
     - queues: the opened queues, by index (from 0) of their order in the file. fps: frames per s.
+    - seed, repeat (the suite entry's copy, 0 for none): keys of the random draws of times, goals and service times.
+
+    Construction draws each order's delay and time. It raises ValueError if no draw lies within its distribution's clip.
     """
 
     def __init__(
@@ -51,6 +55,8 @@ class OrderExecution:
     def _pending(self, order: MergeOrder | SplitOrder | QueueOrder, k: int) -> PendingOrder:
         """Returns the order with index k (from 0) in the file, ready to wait for its trigger; its delay and time are
         drawn, s.
+
+        The time is inf unless the trigger is `time`. Raises ValueError if no draw lies within its distribution's clip.
         """
         when = order.when
         time = np.inf if when.time is None else draw(when.time, self._rng("event", k, 1))
@@ -60,8 +66,10 @@ class OrderExecution:
     def advance(self, frame: int, t: float, state: Array) -> bool:
         """Fires orders that are due at time t (s), serves queues, and lets groups that have arrived stand in a circle.
 
-        frame counts from 0. state (P, 4): x, y, vx, vy by column, nan while absent. Returns False only if nothing has
-        changed that `GroupState.fill` writes. It is always True once a queue has opened.
+        frame counts from 0. state (P, 4): x, y, vx, vy by column, m, m/s, nan while absent. Orders are taken in the
+        order of the file. From the frame after firing, an order's rule is examined until it has held long enough; then
+        its id joins come_true. Returns False only if nothing has changed that `GroupState.fill` writes. It is always
+        True once a queue has opened. Raises ValueError if a goal or service time has no draw within its clip.
         """
         changed = bool(self.queues)
         for pending in self.pending:
@@ -87,10 +95,12 @@ class OrderExecution:
             self._line_up(pending, order)
 
     def _merge(self, pending: PendingOrder, order: MergeOrder, state: Array) -> None:
-        """Makes one group of the merging groups; it gathers where they meet.
+        """Makes one new group of the merging groups, which cease to exist; it gathers where they meet.
 
-        Then it stands there in a circle, or walks to the order's goal, no faster than its slowest parent. state (P, 4):
-        x, y, vx, vy by column. Sets pending.before and pending.after (columns).
+        Then it stands there in a circle (goal "meet"), or walks to the order's goal. It is no faster than its slowest
+        parent; a walking group also no faster than its members' mean free speed less the slowdown. Its spacing is the
+        mean of the parents'. state (P, 4): x, y, vx, vy by column, m, m/s. Sets pending.before and pending.after
+        (columns). Raises ValueError if a goal has no draw within its clip.
         """
         groups, arrays = self.groups, self.groups.arrays
         parents = [groups.alive.pop(name) for name in order.groups]
@@ -117,10 +127,11 @@ class OrderExecution:
         groups.take_places(columns, places, meeting, g, state[columns, :2])
 
     def _split(self, pending: PendingOrder, order: SplitOrder, state: Array) -> None:
-        """Divides a group into the order's parts and gives each part a way to its own goal.
+        """Divides a group, which ceases to exist, into the order's parts and gives each part a way to its own goal.
 
-        state (P, 4): x, y, vx, vy by column. Each part keeps the group's heading. Sets pending.before and pending.after
-        (columns).
+        Each member joins the part in whose goal's direction it is furthest ahead, as far as the parts' sizes allow.
+        state (P, 4): x, y, vx, vy by column, m, m/s. Each part keeps the group's heading and spacing. Sets
+        pending.before and pending.after (columns). Raises ValueError if a goal has no draw within its clip.
         """
         groups = self.groups
         parent = groups.alive.pop(order.group)
@@ -146,8 +157,10 @@ class OrderExecution:
     def _line_up(self, pending: PendingOrder, order: QueueOrder) -> None:
         """Opens a queue and sends the order's groups to it.
 
-        Draws each group's service time (s). Overwrites where each group goes afterwards, if the order has a goal. Sets
-        pending.before and pending.after (columns).
+        Draws each group's service time (s). Overwrites where each group goes afterwards, if the order has a goal.
+        Without one, groups keep their own; a group that an order made has none and stands at the queue's head. Sets
+        pending.before (columns of each group) and pending.after (all columns as one part). Raises ValueError if a draw
+        has no value within its clip.
         """
         groups = self.groups
         queuing = [groups.alive[n] for n in concerned(order, list(groups.alive))]
@@ -173,7 +186,8 @@ class OrderExecution:
         """Advances a queue to time t (s): sets the target place of each person in it, and sends served groups to their
         goals.
 
-        k: index of the queue's order. state (P, 4): x, y, vx, vy by column.
+        A served group leaves the queue and walks on in formation. k: index of the queue's order. state (P, 4): x, y,
+        vx, vy by column, m, m/s.
         """
         groups = self.groups
         slots, done = queue.advance(t, groups.members, state[:, :2])

@@ -80,7 +80,8 @@ class EnteringGroup:
     """One group of the script, as it enters the scene.
 
     - name: in the script. index: among all groups, from 0 (-1 until it has room). members: its people, in order.
-    - start, goal (2,), via (each (2,)): points in the world, m. pos (n, 2): where the members start, m.
+    - start: the group's middle as it enters; goal (2,), via (each (2,)): points in the world, m. pos (n, 2): where the
+      members start, m.
     - speed: of the group, m/s. spacing: between neighbours, m. enter: time of entry, s (0: there from the first frame).
     - finish: at the goal "stand", "leave" the scene or "walk" on.
     """
@@ -106,8 +107,9 @@ class EnteringGroup:
 def script_placement(scenario: Scenario, seed: int, repeat: int) -> ScriptPlacement:
     """Returns the turn, mirror and lead that a seed draws for the script of a scenario.
 
+    The turn is `turn_deg` in radians. If the scenario has `mirror`, the script is mirrored with probability 0.5.
     repeat: number of the suite entry's copy, 0 for none; a further random key. Raises ValueError if no draw of
-    `turn_deg` or `lead` lies within its clip.
+    `turn_deg` or `lead` lies within its clip, or the seed is negative.
     """
     r = rng(seed, "layout", repeat=repeat)
     turn = np.deg2rad(draw(scenario.turn_deg, r))
@@ -116,18 +118,17 @@ def script_placement(scenario: Scenario, seed: int, repeat: int) -> ScriptPlacem
 
 
 def draw_point(point: Point, placement: ScriptPlacement, r: np.random.Generator) -> Array:
-    """Returns a point of the script in the world (2,), m: drawn, then mirrored and turned.
+    """Returns a point of the script in the world (2,), m: drawn, then mirrored and turned by `placement`.
 
-    Each coordinate that is a distribution is drawn from r. Raises ValueError if no draw lies within its clip.
+    Each coordinate that is a distribution is drawn from r; x first. Raises ValueError if no draw lies within its clip.
     """
     return placement.point(np.array([draw(point[0], r), draw(point[1], r)]))
 
 
 @dataclass(frozen=True)
 class _Draws:
-    """What every draw of a population needs: scenario, its scene, the script's placement, and the random keys seed and
-    repeat.
-    """
+    """What every draw of a population needs: scenario, its scene, the script's placement (turn, mirror and lead), and
+    the random keys seed and repeat (number of the suite entry's copy, 0 for none)."""
 
     scenario: Scenario
     scene: Scene
@@ -143,9 +144,10 @@ def draw_population(scenario: Scenario, scene: Scene, seed: int, repeat: int) ->
     """Returns all groups of the script with their members, in the order of the file.
 
     Columns of people count from 0 through all groups. Members stand in formation at the group's start. Groups with
-    entry time 0 need room among each other, groups that enter later do not. Raises InputError if a group has no free
-    place at its start: a start of two numbers is tried once, a drawn one TRIES (400) times. Raises ValueError if no
-    draw of a distribution lies within its clip.
+    entry time 0 need room among each other, groups that enter later do not; all must be clear of walls and pillars.
+    seed, repeat: random keys. Raises InputError if a group has no free place at its start: a start of two numbers is
+    tried once, a drawn one TRIES (400) times. Raises ValueError if no draw of a distribution lies within its clip, or
+    the seed is negative.
     """
     draws = _Draws(scenario, scene, script_placement(scenario, seed, repeat), seed, repeat)
     taken: list[Array] = []
@@ -166,9 +168,9 @@ def draw_population(scenario: Scenario, scene: Scene, seed: int, repeat: int) ->
 def _draw_group(draws: _Draws, spec: GroupSpec, name: str, key: tuple[int, int], column: int) -> EnteringGroup:
     """Draws a group and its members, without its start, its `pos` and its index.
 
-    spec: its entry in the scenario. key: index of the entry and of the copy, from 0. column: of the first member. The
-    size is at least 1 person and the entry time at least 0 s. An absent speed follows from the members' free speeds.
-    Raises ValueError if no draw lies within its clip.
+    draws: gives the random streams. spec: its entry in the scenario. name: of the group. key: index of the entry and of
+    the copy, from 0. column: of the first member. The size is rounded, at least 1 person; the entry time is at least 0
+    s. An absent speed follows from the members' free speeds. Raises ValueError if no draw lies within its clip.
     """
     r = draws.rng("group", *key, 0)
     crowd = draws.scenario.crowd
@@ -198,8 +200,10 @@ def _find_room(draws: _Draws, group: EnteringGroup, spec: GroupSpec, key: tuple[
     """Sets group.start and group.pos so that the members stand clear of walls, pillars and, at entry time 0, of
     `taken`.
 
-    key: index of the entry and of its copy. taken: positions (n, 2), m, of the people of each earlier group. A drawn
-    start is drawn up to TRIES (400) times, a fixed one tried once. Raises InputError if no try finds room.
+    The group faces its first via point, else its goal. The script's `lead` (s) moves the start of a group that walks by
+    lead × speed in that direction, at most half-way. key: index of the entry and of its copy. taken: positions (n, 2),
+    m, of the people of each earlier group. A drawn start is drawn up to TRIES (400) times, a fixed one tried once.
+    Raises InputError if no try finds room, ValueError if no draw lies within its clip.
     """
     placement, drawn = draws.placement, any(isinstance(v, Distribution) for v in spec.start)
     r = draws.rng("group", *key, 1)
@@ -244,10 +248,10 @@ def _is_free(pos: Array, scene: Scene, taken: list[Array]) -> bool:
 def wander(keys: Sequence[tuple[int, ...]], frames: int, fps: float, seed: int, repeat: int) -> Array:
     """Returns how each person's wanted velocity fluctuates, shape (frames, P, 2): x, y in m/s, for P people.
 
-    keys: Person.key of each person; each person draws from a random stream of its own. An Ornstein-Uhlenbeck process
-    per axis, stationary from the first frame: u_k = a u_(k-1) + sqrt(1 - a²) WANDER_SD n_k, with a = exp(-1 / (fps
-    WANDER_TIME)), standard normal n_k and u_0 = WANDER_SD n_0. The standard deviation WANDER_SD is 0.06 m/s, the
-    correlation time WANDER_TIME 1.5 s.
+    keys: Person.key of each person. Each person draws from a random stream of its own, keyed by seed, key and repeat.
+    An Ornstein-Uhlenbeck process per axis, stationary from the first frame: u_k = a u_(k-1) + sqrt(1 - a²) WANDER_SD
+    n_k, with a = exp(-1 / (fps WANDER_TIME)), standard normal n_k and u_0 = WANDER_SD n_0. The standard deviation
+    WANDER_SD is 0.06 m/s, the correlation time WANDER_TIME 1.5 s. Raises ValueError if the seed is negative.
     """
     keep = float(np.exp(-1 / (fps * WANDER_TIME)))
     out = np.empty((frames, len(keys), 2))

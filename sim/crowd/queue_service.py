@@ -21,7 +21,7 @@ class ServiceQueue:
     """One queue at a service point. Groups are given by index; a group is served as a whole.
 
     - Fixed: head (2,): place of the first person, m. along (2,): unit vector from head to tail. spacing: between
-      places, m. service: service time of each group, s.
+      neighbouring places, m. service: service time in s of each group, by group index.
     - State: joined: groups in the queue, head first. coming: groups on their way to it. busy_until: time at which the
       group at the head is done, s; None while no group is being served.
     """
@@ -41,12 +41,16 @@ class ServiceQueue:
         return self.head + k * self.spacing * self.along
 
     def advance(self, t: float, members: dict[int, list[int]], pos: Array) -> tuple[dict[int, Array], list[int]]:
-        """Advances the queue to time t (s).
+        """Advances the queue to time t (s): ends and begins service, and lets groups join at the tail.
 
-        Returns the place (2,) in m of each person by column, and the list of groups whose service has ended, at most
-        one. Groups that are still coming get the places behind the tail. A group joins as soon as one member is within
-        JOIN_RADIUS (0.5 m) of the first free place. members: columns of each group's people; the list of a group that
-        is coming is sorted in place, nearest to the head first. pos (P, 2): m, by column.
+        Returns (places, done). places: the place (2,) in m of each person, keyed by the person's column. done: list of
+        the group whose service has ended; empty if none has, at most one. That group gets no places any more. A coming
+        group joins as soon as one member is within JOIN_RADIUS (0.5 m) of the first free place. Several may join in one
+        call, the nearest to the tail first (ties: lower index). Groups that are still coming get the places behind the
+        tail, in that order. Modifies joined, coming and busy_until.
+
+        members: columns of the people of each group, at least one; the list of a group still coming is sorted in place,
+        nearest to the head first. pos (P, 2): x, y in m, by column.
         """
         done = self._serve(t, members, pos)
         tail = sum(len(members[g]) for g in self.joined)
@@ -64,8 +68,10 @@ class ServiceQueue:
         return slots, done
 
     def _give_slots(self, g: int, k: int, members: dict[int, list[int]], slots: dict[int, Array]) -> int:
-        """Writes the places k, k + 1, … (2,), m, of the members of group g to `slots`, by column; returns the next free
-        index.
+        """Writes the places k, k + 1, … (2,), m, of the members of group g to `slots`, keyed by column; returns the
+        next free place's index.
+
+        members: columns by group index. Place 0 is the head's.
         """
         for column in members[g]:
             slots[column] = self.slot(k)
@@ -78,8 +84,10 @@ class ServiceQueue:
     def _serve(self, t: float, members: dict[int, list[int]], pos: Array) -> list[int]:
         """Returns the group whose service ends by time t (s), as a list of one, and removes it from `joined`; else [].
 
-        Service of the first group begins once its first member is within SERVED_RADIUS (0.35 m) of the head's place.
-        members: columns by group. pos (P, 2): m, by column.
+        Service of the first group begins once its first member is within SERVED_RADIUS (0.35 m) of the head's place;
+        this call sets busy_until and returns []. When service ends, busy_until is None again; the next group's service
+        begins in a later call. Without joined groups the result is []. members: columns by group index. pos (P, 2): x,
+        y in m, by column.
         """
         if not self.joined:
             return []

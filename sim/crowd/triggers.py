@@ -22,14 +22,16 @@ EPS = 1e-9  # s
 
 @dataclass
 class PendingOrder:
-    """One order of the script and what became of it.
+    """One order of the script (merge, split or queue) and what became of it.
 
     - order; index: in the file, from 0; delay: s between trigger and firing; time: of a `time` trigger, s, else inf.
     - reach_at (2,): place of a `reach` trigger in the world, m; None: the group's goal, or no such trigger.
-    - fired: 1-based frame in which it fired, None: not yet. met_at, true_at: time at which the trigger was met and at
-      which the order's rule had held long enough, s; None: not yet. held_for: s for which the rule has held without a
-      break.
-    - before, after: columns of the people of each group before and after the order; empty until it fires.
+    - fired: 1-based frame in which it fired, None: not yet. met_at: time at which the trigger (the order's condition
+      for firing) was first met, s; None: not yet.
+    - held_for: s for which the order's rule (people are together, apart or in line, as ordered) has held without a
+      break. true_at: time at which it had held long enough, s; None: not yet.
+    - before, after: columns (person id - 1) of the people of each group before and after the order; empty until it
+      fires.
     """
 
     order: MergeOrder | SplitOrder | QueueOrder
@@ -47,9 +49,13 @@ class PendingOrder:
     def is_due(self, t: float, state: Array, groups: GroupState, come_true: set[str]) -> bool:
         """Returns True if the order fires at time t (s); records in met_at when its trigger was first met.
 
-        An order fires `delay` seconds after its trigger was met, and only while every group it concerns exists and is
-        wholly in the scene; until then the trigger is not examined either. state (P, 4): x, y, vx, vy by column.
-        come_true: ids of the orders that have come true.
+        An order fires `delay` seconds after its trigger was first met, even if the trigger is no longer met. It fires
+        only while every group it concerns exists and is wholly in the scene; until then the trigger is not examined
+        either. A queue whose names match no group concerns none and may fire. state (P, 4): x, y, vx, vy by column, m,
+        m/s. groups: the running groups, with their members and goals. come_true: ids of the orders that have come true.
+
+        Raises KeyError for a `reach` trigger without a place if its group was made by an order and has no goal
+        recorded.
         """
         names = concerned(self.order, list(groups.alive))
         if not all(n in groups.alive and groups.all_present(groups.alive[n]) for n in names):
@@ -59,11 +65,16 @@ class PendingOrder:
         return self.met_at is not None and t >= self.met_at + self.delay - EPS
 
     def _is_met(self, t: float, state: Array, groups: GroupState, names: list[str], come_true: set[str]) -> bool:
-        """Returns True if the trigger (time, after, distance_lt or reach) is met at time t, s.
+        """Returns True if the order's trigger is met at time t, s.
 
-        state (P, 4): x, y, vx, vy by column. names: of the groups that the order concerns. come_true: ids of orders
-        that have come true. distance_lt: the nearest members of every two groups are closer; False for one group.
-        reach: False if the group no longer exists or is not wholly in the scene.
+        - time: t has reached it. after: the order with that id is in come_true, the ids of orders that have come true.
+        - distance_lt: in every two of the groups `names`, the nearest members are closer than it, m; False for fewer
+          than two groups.
+        - reach: the mean position of the trigger's group is nearer to the place than its radius; False if that group no
+          longer exists or is not wholly in the scene.
+
+        state (P, 4): x, y, vx, vy by column, m, m/s. names: of the groups that the order concerns. Raises KeyError for
+        `reach` without a place if the group was made by an order and has no goal recorded.
         """
         when = self.order.when
         if when.time is not None:
@@ -83,7 +94,8 @@ class PendingOrder:
         return bool(np.linalg.norm(middle - at) < when.reach.radius)
 
     def watch(self, t: float, fps: float, holds: bool) -> None:
-        """Adds one frame (1 / fps s) to held_for if the order's rule `holds` in this frame, else sets it to 0.
+        """Adds one frame (1 / fps s) to held_for if the order's rule `holds` in this frame, else sets it to 0. Returns
+        nothing.
 
         Sets true_at = t (s) once the rule has held for its time: 2 s for merge and split, 3 s for queue.
         """
@@ -104,15 +116,18 @@ def concerned(order: MergeOrder | SplitOrder | QueueOrder, alive: list[str]) -> 
 
 
 def rule_holds(pending: PendingOrder, state: Array, targets: Array) -> bool:
-    """Returns True if the rule of an order that has fired holds in this frame.
+    """Returns True if the rule of an order that has fired holds in this frame: the people are together, apart or in
+    line.
 
-    state (P, 4): x, y, vx, vy by column, nan while absent. targets (P, 2): places in the queue, m, by column.
+    state (P, 4): x, y, vx, vy by column, m, m/s, nan while absent. targets (P, 2): places in the queue, m, by column.
 
-    - Queue: at least 3 people (all if they are fewer) are within IN_PLACE (0.4 m) of their targets.
+    - Queue: at least 3 of its people (all if they are fewer) are within IN_PLACE (0.4 m) of their targets; absent
+      people are not.
     - Merge of n groups: at least n - 1 pairs of them are nearer than 1.5 m and differ by less than 0.5 m/s.
     - Split: all pairs of parts are more than 2.5 m apart, or more than 1.5 m and differ by more than 0.7 m/s.
 
-    A merge or split does not hold while one of its people is absent.
+    Distances are those of the nearest members, velocities the members' means. A merge or split does not hold while one
+    of its people is absent. pending: the order with the columns of its people before and after.
     """
     order = pending.order
     if isinstance(order, QueueOrder):

@@ -1,8 +1,8 @@
 """The physics: turns a scenario and a seed into a Motion. The only module that imports pymunk.
 
-People are discs of BODY_RADIUS and mass 1, so a force is an acceleration. The space resolves contacts. States are read
-and forces written in batches (`pymunk.batch`); `World.columns` says which row of a batch is which person. Only forces
-move a person who has entered. A frame is the state after the step that ends at its time.
+People are discs of radius 0.2 m and mass 1 kg, so a force is an acceleration. The space resolves contacts. States are
+read and forces written in batches; `World.columns` says which row of a batch is which person. Only forces move a person
+who has entered. A frame is the state after the step that ends at its time.
 """
 
 from __future__ import annotations
@@ -33,12 +33,10 @@ WRITE = pymunk.batch.BodyFields.FORCE
 
 
 def run(scenario: Scenario, seed: int, repeat: int = 0, steering: Steering | None = None) -> Motion:
-    """Returns the whole motion of a scenario for a seed, without the warm-up.
-
-    repeat: number of the suite entry's copy, a further random key. steering: None for the default parameters. Raises
-    InputError if a group has no free place at its start, ValueError if no draw of a distribution lies within its clip,
-    WorkError if a position or velocity is not finite.
-    """
+    """Returns the whole motion of a scenario for a seed, without the warm-up. repeat: number of the suite entry's copy,
+    a further random key; 0 for none. steering: None for the default parameters. Raises InputError if a group has no
+    free place at its start, ValueError if the seed is negative or no draw of a distribution lies within its clip,
+    WorkError if a position or velocity is not finite."""
     world = World(scenario, seed, repeat, steering or Steering())
     return world.run()
 
@@ -58,12 +56,10 @@ def accelerate(
     push: Array,
     out: Array,
 ) -> bool:
-    """Overwrites out (N, 2) with the accelerations of all people, m/s², and advances the groups' ways by dt (s).
-
-    state (N, 4): x, y, vx, vy in m, m/s. rules (21,): Steering.array(). push (G, 2): scratch, overwritten. Modifies
-    `groups`, and the tag WAYPOINT of people who pass a door. Returns False, with nothing written, if a state is not
-    finite.
-    """
+    """Overwrites out (N, 2) with the accelerations of all people, m/s², and advances the groups' ways by dt (s). state
+    (N, 4): x, y, vx, vy in m, m/s. obstacles: walls, pillars and stairs, m. rules (21,): Steering.array(). push (G, 2):
+    scratch, overwritten. Modifies `groups`, and the tag WAYPOINT of people who pass a door. Returns True. Returns
+    False, with nothing written, if a state is not finite or 1e9 or more."""
     from sim.crowd.forces_avoidance_kernels import avoid
     from sim.crowd.forces_goal_kernels import drive
 
@@ -76,9 +72,15 @@ def accelerate(
 class World:
     """The running simulation of one scenario and seed; it can be run once. Column = person id - 1.
 
-    State: `space`, `bodies` (by column) of the physics; `state` (N, 4): x, y, vx, vy, `force` and `people` of the N
-    people present, whose columns are `columns`; `waiting`: groups that have not entered; `groups`, `orders`: the
-    script; `states` (P, 4) and `group_of` (P,): the frame being recorded, by column, nan and -1 while absent.
+    - scenario, seed, repeat; scene; fps; substeps: physics steps per frame, of dt s; rules: steering parameters;
+      obstacles; push: scratch; members: all people by column; entering: all groups; waiting: those not entered yet;
+      groups, orders: the script.
+    - `space`, `bodies` (by column): of the physics. state (N, 4): x, y, vx, vy, m, m/s, `force` and `people`: of the N
+      people present, whose columns are `columns`. states (P, 4), group_of (P,): the frame being recorded, by column,
+      nan and -1 while absent.
+
+    Construction raises InputError if a group finds no room, ValueError if no draw of a distribution lies within its
+    clip.
     """
 
     def __init__(self, scenario: Scenario, seed: int, repeat: int, steering: Steering) -> None:
@@ -108,10 +110,8 @@ class World:
         self._read_buffer, self._write_buffer = pymunk.batch.Buffer(), pymunk.batch.Buffer()
 
     def run(self) -> Motion:
-        """Returns the Motion of duration × fps frames (at least 1) after the warm-up.
-
-        Raises WorkError if a position or velocity is not finite.
-        """
+        """Returns the Motion of duration × fps frames (rounded, at least 1) after the warm-up. Raises WorkError if a
+        position or velocity is not finite, ValueError if an order's draw has no value within its clip."""
         frames = max(1, round(self.scenario.duration * self.fps))
         record = np.empty((frames, len(self.members), 4))
         intent = np.empty((frames, len(self.members)), np.int64)
@@ -120,10 +120,9 @@ class World:
         return self._motion(record, intent)
 
     def frames(self, length: int) -> Iterator[tuple[Array, Ints]]:
-        """Yields `length` frames after the warm-up: states (P, 4): x, y, vx, vy in m, m/s; group indices (P,).
-
-        By column; nan and -1 while absent. The next frame overwrites both. Raises WorkError if a state is not finite.
-        """
+        """Yields `length` frames after the warm-up: states (P, 4): x, y, vx, vy in m, m/s; group indices (P,). By
+        column; nan and -1 while absent. The next frame overwrites both. While iterating it raises WorkError if a state
+        is not finite, ValueError if an order's draw has no value within its clip."""
         warm = round(self.scenario.warmup * self.fps)
         noise = wander([m.key for m in self.members], warm + length, self.fps, self.seed, self.repeat)
         for f in range(-warm, length):
@@ -140,7 +139,8 @@ class World:
             yield self.states, self.group_of
 
     def _advance(self, noise: Array) -> None:
-        """Simulates one frame; noise (P, 2): wandering, m/s, by column. Raises WorkError if a state is not finite."""
+        """Simulates one frame; noise (P, 2): wandering, x, y in m/s, by column. Does nothing while nobody is present.
+        Raises WorkError if a state is not finite."""
         n = len(self.columns)
         if n == 0:
             return
@@ -168,18 +168,18 @@ class World:
         )
 
     def _read(self) -> Array:
-        """Returns x, y, vx, vy (rows, 4), m, m/s, of all bodies: a view of a buffer that the next read overwrites."""
+        """Returns x, y, vx, vy (rows, 4), m, m/s, of all bodies, static ones last: a view that the next read
+        overwrites."""
         self._read_buffer.clear()
         pymunk.batch.get_space_bodies(self.space, READ, self._read_buffer)
         return np.frombuffer(self._read_buffer.float_buf()).reshape(-1, 4)
 
     def _come_and_go(self, t: float, first: bool) -> None:
         """Removes people who leave at time t (s) and adds groups whose entry time has come; `first`: first frame of the
-        warm-up.
-
-        A group with entry time 0 begins the warm-up back on its way by speed × warm-up time, if `_way_back_is_free`. A
-        group that enters later waits while people stand at its place.
-        """
+        warm-up. In that frame only groups with entry time 0 come, even without room. A walking one starts back on its
+        way by speed × warm-up time, if `_way_back_is_free`. A group that enters later waits while people stand at its
+        place; groups that enter in one frame are not checked against each other. Walking groups enter at their speed,
+        others at rest."""
         gone = self.groups.remove_leaving(self.columns)
         coming = [group for group in self.waiting if (group.enter <= 0 if first else group.enter <= t)]
         coming = [group for group in coming if first or self._has_room(group)]
@@ -200,21 +200,23 @@ class World:
         self._map_rows()
 
     def _way_back_is_free(self, group: EnteringGroup, heading: Array) -> bool:
-        """True if the group walks, its way back during the warm-up crosses no wall, and the scene has no pillar."""
+        """Returns True if the group walks along heading (2,), the scene has no pillar, and no member's straight way
+        back during the warm-up crosses a wall; doorways are free."""
         if not group.walks:
             return False
         back = group.pos - self.scenario.warmup * group.speed * heading
         return not blocked(group.pos, back, self.scene.walls).any() and not len(self.scene.pillars)
 
     def _has_room(self, group: EnteringGroup) -> bool:
-        """True if all people present are more than 0.44 m from every place where the group enters."""
+        """True if all people present are more than 0.44 m (centre to centre) from every place where the group enters."""
         if not len(self.state):
             return True
         d = np.linalg.norm(group.pos[:, None] - self.state[None, :, :2], axis=2)
         return bool(d.min() > ENTRY_GAP * BODY_RADIUS)
 
     def _body(self, pos: Array, velocity: Array) -> pymunk.Body:
-        """Adds a 1 kg disc of radius 0.2 m to the space, at pos (2,), m, with vel (2,), m/s; returns its body."""
+        """Adds a 1 kg disc of radius 0.2 m to the space, at pos (2,), m, with velocity (2,), m/s; returns its body. It
+        does not rotate and has no friction."""
         body = pymunk.Body(1.0, float("inf"))
         body.position = float(pos[0]), float(pos[1])
         body.velocity = float(velocity[0]), float(velocity[1])
@@ -224,7 +226,8 @@ class World:
         return body
 
     def _map_rows(self) -> None:
-        """Rebuilds columns, state, force and people after bodies came or went, in the physics engine's order."""
+        """Rebuilds columns, state, force and people after bodies came or went, in the physics engine's order. Sets all
+        of states to nan and group_of to -1. Raises AssertionError if static bodies do not come last."""
         self._read_buffer.clear()
         pymunk.batch.get_space_bodies(self.space, pymunk.batch.BodyFields.BODY_ID, self._read_buffer)
         ids = np.frombuffer(self._read_buffer.int_buf(), dtype=np.uintp)
@@ -268,7 +271,9 @@ class World:
 
 
 def _obstacles(scene: Scene, scenario: Scenario) -> Obstacles:
-    """Returns the walls (W, 4), pillars (P, 3) and stairs (S, 7) of a scene as the kernels take them, in m."""
+    """Returns the walls (W, 4): x1, y1, x2, y2, pillars (P, 3): x, y, radius, and stairs (S, 7) of a scene for the
+    kernels, in m. Columns of stairs: foot x, y; unit vector from foot to head x, y; length; width; share of the speed
+    kept on them."""
     stairs = np.zeros((len(scene.stairs), 7))
     for row, s, spec in zip(stairs, scene.stairs, scenario.world.stairs, strict=True):
         along = s.head - s.foot
