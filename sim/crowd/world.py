@@ -208,7 +208,7 @@ class World:
         return not blocked(group.pos, back, self.scene.walls).any() and not len(self.scene.pillars)
 
     def _has_room(self, group: EnteringGroup) -> bool:
-        """True if all people present are more than 0.44 m (centre to centre) from every place where the group enters."""
+        """True if everyone present is more than 0.44 m (centre to centre) from every place where the group enters."""
         if not len(self.state):
             return True
         d = np.linalg.norm(group.pos[:, None] - self.state[None, :, :2], axis=2)
