@@ -45,8 +45,8 @@ class PixelGeometry:
 class EmptyScene:
     """The painted empty scene, float32; each number is a mean over the pixel.
 
-    colour (H, W, 3)   BGR in grey levels, lit, without plants' sway and noise
-    direct (H, W)      share of direct sun in the pixel's light, 0 to 1; 0 for sky
+    colour (H, W, 3)   BGR in grey levels, 0 or more, not clipped at 255; lit, without plants' sway and noise
+    direct (H, W)      share of direct sun in the pixel's light, 0 to 1; 0 for sky and where a solid thing hides the sun
     plants (H, W)      share of the pixel that shows plants, 0 to 1
     """
 
@@ -56,7 +56,8 @@ class EmptyScene:
 
 
 def trace_geometry(camera: Camera, scene: Scene) -> PixelGeometry:
-    """Return the PixelGeometry of the empty scene: what the centre of each pixel shows. Lens distortion is ignored."""
+    """Return the PixelGeometry of the empty scene: depth (m), kind of surface and place (m) that the centre of each
+    pixel shows. Lens distortion is ignored."""
     from sim.render.background_kernels import trace_pixels
 
     width, height = camera.image
@@ -76,10 +77,13 @@ def paint_empty_scene(
     seed: int,
     repeat: int = 0,
 ) -> EmptyScene:
-    """Return the EmptyScene, colours of the empty scene under steady light, with unmoved plants.
+    """Return the EmptyScene: colours, shares of sun and of plants in the empty scene under steady light, with unmoved
+    plants.
 
-    texture: contrast of the patterns, 0 to 1. plants: None for none. seed, repeat (number of the suite entry's copy, 0
-    without copies): draw the materials. Lens distortion is ignored. Raises ValueError for a negative seed.
+    light: direction of the sun, shadow share and penumbra are used. texture: contrast of the patterns, 0 to 1. plants:
+    the Foliage, None for none. seed, repeat (number of the suite entry's copy, 0 without copies): name the random
+    stream of colours, width of the paving slabs and patterns. Lens distortion is ignored. Raises ValueError for a
+    negative seed.
     """
     from sim.render.background_kernels import paint_pixels
 

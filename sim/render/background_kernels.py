@@ -46,10 +46,11 @@ def _tint(base, brightness, warmth, out):  # type: ignore[no-untyped-def]
 def _ground(x, y, size, footprint, style, palette, key, out):  # type: ignore[no-untyped-def]
     """Set out (3,) to the colour (BGR, grey levels) of the ground at (x, y) m under full light.
 
-    It is paving inside the world with a ragged border, grass outside, plants over both. Returns whether it is grass
-    (bool), and the share covered by plants, 0 to 1. size (2,): of the world, m. footprint: size of the pixel on the
-    ground, m. style (4,): CONTRAST, SLAB_WIDTH, PLANT_KEY, PLANT_LEVEL. palette (6, 3): rows GREY … SKY. key: of the
-    patterns.
+    It is paving (without slabs if their width is 0) up to about 1 m outside the world, where a ragged border begins the
+    grass. Plants grow over both. Returns whether the ground is grass, not paving (bool), and the share covered by
+    plants, 0 to 1. size (2,): of the world, m. footprint: size of the pixel on the ground, m. style (4,): contrast,
+    slab width (m), key of the plant pattern, level above which plants grow (inf: no plants). palette (6, 3): BGR of
+    paving, grass, bricks, stone, steps, sky. key: of the patterns.
     """
     contrast, slab = style[CONTRAST], style[SLAB_WIDTH]
     outside = max(max(-x, x - size[0]), max(-y, y - size[1])) - 1.0 + 0.3 * value_noise(x, y, key + 90)
@@ -73,10 +74,12 @@ def _ground(x, y, size, footprint, style, palette, key, out):  # type: ignore[no
 
 @njit(cache=True)
 def _upright(kind, along, z, footprint, contrast, palette, key, out):  # type: ignore[no-untyped-def]
-    """Set out (3,) to the colour (BGR, grey levels) of a wall (bricks with a skirting), or of a pillar or step (stone).
+    """Set out (3,) to the colour (BGR, grey levels) of a wall (bricks with a darker skirting), or of a pillar or step
+    (stone).
 
-    kind: WALL, PILLAR, TREAD or RISER. along, z: place on the surface, m. footprint: size of the pixel on the surface,
-    m. contrast: 0 to 1. palette (6, 3): rows GREY … SKY. key: of the patterns. Returns nothing.
+    kind: WALL, PILLAR, TREAD or RISER; others count as TREAD. along, z: place on the surface, m. footprint: size of the
+    pixel on the surface, m. contrast: 0 to 1. palette (6, 3): BGR of paving, grass, bricks, stone, steps, sky. key: of
+    the patterns. Returns nothing.
     """
     fine = grain(along, z, key + 60, footprint, 0.6)
     if kind == WALL:
@@ -94,7 +97,8 @@ def _sky(d, key, palette, out):  # type: ignore[no-untyped-def]
     """Set out (3,) to the colour (BGR, grey levels) of the sky in direction d (3,): clouded, brighter towards the
     horizon.
 
-    d: in the world, of any length. key: of the clouds. palette (6, 3): its row SKY counts. Returns nothing.
+    d: in the world, of any length above 0, not below the horizon. key: of the clouds. palette (6, 3): its last row, the
+    sky's colour, counts. Returns nothing.
     """
     length = np.sqrt(d[0] * d[0] + d[1] * d[1] + d[2] * d[2])
     up = max(d[2] / length, 0.0)
@@ -124,10 +128,11 @@ def _sunlit(point, normal, sun, penumbra, solids, spare, hit):  # type: ignore[n
 
 @njit(cache=True)
 def trace_pixels(origin, direction, solids, depth, kind, place):  # type: ignore[no-untyped-def]
-    """Set depth (H, W), kind (H, W) and place (H, W, 3) to what each pixel's centre shows; see `PixelGeometry`.
+    """Set depth (H, W), kind (H, W) and place (H, W, 3) to what the centre of each pixel shows of the empty scene.
 
-    origin, direction (3, 3): of PixelRays. solids: a `raycast.Solids`. depth is in m along the optical axis, inf for
-    sky. place is in m; that of sky is 1e9. Returns nothing.
+    origin, direction (3, 3): of the camera's PixelRays. solids: a `raycast.Solids`. depth is in m along the optical
+    axis, inf for sky. kind is NOTHING (sky), GROUND, WALL, PILLAR, TREAD or RISER. place is x, y, z in m in the world;
+    that of sky is 1e9. Returns nothing.
     """
     height, width = depth.shape
     o, d, hit = np.empty(3), np.empty(3), np.empty(HIT_SLOTS)
@@ -145,11 +150,14 @@ def trace_pixels(origin, direction, solids, depth, kind, place):  # type: ignore
 def _point_colour(  # type: ignore[no-untyped-def]
     x, y, rays, scale, sun, shadow, penumbra, solids, size, style, palette, key, o, d, hit, more, out
 ):
-    """Set out (3,) to the colour (BGR, grey levels) seen through the image point (x, y) px.
+    """Set out (3,) to the colour (BGR, grey levels) seen through the image point (x, y) px, shaded by solid things and
+    hazy.
 
     Returns the share of direct sun in its light, the share covered by plants (both 0 to 1), and a whole number that is
     equal for points of one surface lit alike. For sky they are 0, 0, 0. o, d (3,), hit (6,), more (4, 6): scratch,
-    overwritten. The other arguments are as for `paint_pixels`.
+    overwritten. rays: origin and direction, each (3, 3), of PixelRays. The other arguments are as for `paint_pixels`:
+    scale (px per m at 1 m depth, or minus px per m from above), sun (3,), shadow (share), penumbra (m), solids, size
+    (2,) m, style (4,), palette (6, 3), key.
     """
     at_pixel(rays[0], x, y, o)
     at_pixel(rays[1], x, y, d)
@@ -188,13 +196,16 @@ def _point_colour(  # type: ignore[no-untyped-def]
 def paint_pixels(  # type: ignore[no-untyped-def]
     rays, scale, sun, shadow, penumbra, solids, size, style, palette, key, colour, direct, plants
 ):
-    """Set colour (H, W, 3) BGR in grey levels, direct (H, W) and plants (H, W) of the empty scene; see `EmptyScene`.
+    """Set colour (H, W, 3) BGR in grey levels, direct (H, W), the share of direct sun, and plants (H, W), the share of
+    plants.
 
-    A pixel takes the ray through its centre, as patterns are no finer than pixels. Where surfaces meet, it takes the
-    mean of 2 x 2 rays. rays: origin and direction, each (3, 3), of PixelRays. scale: see `raycast.signed_scale`. sun
-    (3,): unit vector to the sun. shadow: the sun's share of the light, 0 to 1. penumbra: width of a shadow's soft edge,
-    m. solids: a `raycast.Solids`. size (2,) m: of the world. style (4,): CONTRAST, SLAB_WIDTH (m), PLANT_KEY,
-    PLANT_LEVEL (inf without plants). palette (6, 3): rows GREY … SKY. key: of the random patterns. Returns nothing.
+    A pixel takes the ray through its centre, as patterns are no finer than pixels. Where it differs from a neighbour in
+    surface or sunlight, it takes the mean of 2 x 2 rays. rays: origin and direction, each (3, 3), of PixelRays. scale:
+    px per m at a depth of 1 m, or minus px per m for a camera from above. sun (3,): unit vector to the sun. shadow: the
+    sun's share of the light, 0 to 1. penumbra: width of a shadow's soft edge, m. solids: a `raycast.Solids`. size (2,)
+    m: of the world. style (4,): contrast (0 to 1), slab width (m), key of the plant pattern, level above which plants
+    grow (inf: no plants). palette (6, 3): BGR of paving, grass, bricks, stone, steps, sky. key: of the random patterns.
+    Returns nothing.
     """
     height, width = direct.shape
     o, d, hit, more, c = np.empty(3), np.empty(3), np.empty(HIT_SLOTS), np.empty((4, HIT_SLOTS)), np.empty(3)

@@ -1,11 +1,12 @@
 """Blur and noise of a camera's image: the weights of the lens blur, and where each frame's noise comes from.
 
 Noise is normal and independent in each pixel and colour; part of its variance grows with brightness. At grey level x
-its variance is sd² (1 - shot + shot x / MID_GREY): the read noise of the circuits, and the shot noise of the light.
+its variance is sd² (1 - shot + shot x / MID_GREY). sd is the scenario's standard deviation in grey levels, at MID_GREY
+= 128. shot is the share (0 to 1) of shot noise, that of the light; the rest is the read noise of the circuits.
 
 Fresh normal numbers for each frame would cost more than all the rest. A long pool is therefore drawn once, and each row
 of each image reads a stretch of it that begins at a random offset. Any two pixels, rows or frames are independent
-unless they begin at the same offset, which has a chance of one in POOL.
+unless they begin at the same offset, which has a chance of one in POOL = 2^20.
 """
 
 from __future__ import annotations
@@ -36,9 +37,9 @@ def blur_weights(sd: float) -> NDArray[np.float32]:
 
 @cache
 def _normals() -> NDArray[np.float32]:
-    """Return the pool (POOL + LONGEST,) float32 of standard normals; its beginning is repeated at the end.
+    """Return the pool (POOL + LONGEST,) float32 of standard normals; its first LONGEST numbers are repeated at the end.
 
-    It is the same for all seeds, and kept.
+    It is the same for all seeds, and kept: do not change it.
     """
     normals = rng(0, "noise").standard_normal(POOL, dtype=np.float32)
     return np.concatenate([normals, normals[:LONGEST]])
@@ -47,7 +48,8 @@ def _normals() -> NDArray[np.float32]:
 def noise_pool(sd: float, unit: float) -> NDArray[np.int16]:
     """Return a pool (POOL + LONGEST,) int16 of normal numbers with standard deviation `sd` grey levels, times `unit`.
 
-    They are rounded, and clipped to the range of int16. The pool is the same for all seeds.
+    unit: canvas value of one grey level. The numbers are rounded, and clipped to the range of int16. The underlying
+    normal numbers are the same for all seeds; sd 0 gives zeros.
     """
     return np.asarray(np.clip(np.rint(_normals() * np.float32(sd * unit)), -32768, 32767), np.int16)
 
@@ -61,7 +63,7 @@ def noise_offsets(rows: int, seed: int, side: int, frame: int, repeat: int = 0) 
     """Return the index in the noise pool, 0 to POOL - 1, at which the noise of each image row begins: (rows,) int64.
 
     side: 0 the left camera, 1 the right one. frame: number of the frame, background frames included, from 0 on. seed,
-    repeat (number of the suite entry's copy, 0 without copies): name the random stream. Raises ValueError if seed, side
-    or frame is negative.
+    repeat (number of the suite entry's copy, 0 without copies): name the random stream. The result is a view of kept
+    numbers: do not change it. Raises ValueError if seed, side or frame is negative.
     """
     return np.asarray(_offsets_of_frames(rows, seed, side, frame // FRAMES_PER_DRAW, repeat)[frame % FRAMES_PER_DRAW])

@@ -1,6 +1,7 @@
 """Compiled finish of an image: blur of what was drawn, brightness, noise, rounding to eight bits.
 
-Inner loops run over whole rows from index 0, so that the compiler can use vector instructions.
+Input: a canvas in int16, BGR grey levels times UNIT = 64. Output: the image in uint8. Inner loops run over whole rows
+from index 0, so that the compiler can use vector instructions.
 """
 
 from __future__ import annotations
@@ -33,9 +34,11 @@ def _blur_five_lines(a, b, c, d, e, w, x, y, many, out):  # type: ignore[no-unty
 
 @njit(cache=True)
 def _with_noise(x, grain, read, slope):  # type: ignore[no-untyped-def]
-    """Return the grey level (uint8, 0 to 255) of canvas value x (grey level times UNIT) with noise.
+    """Return the grey level (uint8, 0 to 255) of canvas value x (grey level times UNIT = 64) with noise.
 
-    The noise is `grain`, a number of the pool, times sqrt(read + slope x). The level is rounded and clipped.
+    The noise is grain * sqrt(read + slope x). grain: a number of the noise pool, in canvas values. read: share of its
+    variance that does not depend on x. slope: increase of that share per canvas value. The level is rounded and
+    clipped.
     """
     x = (x + np.float32(grain) * np.sqrt(read + slope * x)) * SCALE + HALF
     x = x if x > LOW else LOW
@@ -68,9 +71,11 @@ def _show_line_by_gains(line, gain, grain, shot, many, out):  # type: ignore[no-
 
 @njit(cache=True)
 def brightness_row(nodes, step, v, width, out):  # type: ignore[no-untyped-def]
-    """Set out (W * 3,) to the brightness of image row v, three equal numbers per pixel, linear between nodes.
+    """Set the first 3 W numbers of out to the brightness of image row v, three equal numbers per pixel, linear between
+    nodes.
 
-    nodes (J, I): brightness at every `step`-th pixel, at least 2 x 2; the first node is at (0, 0) px. width: W.
+    nodes (J, I): brightness at every `step`-th pixel, at least 2 x 2; the first node is at (0, 0) px. width: W, px.
+    Pixels to the right of the last node are not set; rows below the last are extrapolated. Returns nothing.
     """
     y = (v + np.float32(0.5)) / np.float32(step)
     j = min(int(y), nodes.shape[0] - 2)
@@ -87,8 +92,8 @@ def brightness_row(nodes, step, v, width, out):  # type: ignore[no-untyped-def]
 def _blur_block(canvas, top, left, rows, cols, weights, edge, wide, out):  # type: ignore[no-untyped-def]
     """Set out (rows, cols * 3) to the blur of the block of rows x cols px at row `top`, column `left` of a canvas.
 
-    canvas (H, W * 3) int16; pixels beyond its edges repeat the edge. weights (2 r + 1,): the same across and down.
-    edge, wide: scratch, a padded line, and lines blurred across.
+    canvas (H, W * 3) int16, not changed; pixels beyond its edges repeat the edge. weights (2 r + 1,): the same across
+    and down. edge, wide: scratch, overwritten: a padded line, and lines blurred across. Returns nothing.
     """
     height, width = canvas.shape[0], canvas.shape[1] // 3
     radius, many = len(weights) // 2, 3 * cols
@@ -150,13 +155,15 @@ def blur_all(canvas, weights, out):  # type: ignore[no-untyped-def]
 
 @njit(cache=True)
 def finish_image(canvas, empty, dirty, weights, nodes, step, noise, shot, offsets, out):  # type: ignore[no-untyped-def]
-    """Set out (H, W * 3) uint8 to the image: the blurred canvas times brightness, plus noise. Returns nothing.
+    """Set out (H, W * 3) uint8 to the image: the blurred canvas times brightness, plus noise, rounded, clipped to 0 …
+    255.
 
-    canvas (H, W * 3) int16, grey levels times UNIT: the sharp scene, of which only dirty tiles and their surroundings
-    are read. empty (H, W * 3) int16: the blurred empty scene, for clean tiles. dirty (rows, columns): 1 for tiles of 8
-    x 16 px to blur anew. weights (2 r + 1,): of the blur. nodes (J, I): brightness at every `step`-th pixel, or (1, 1)
-    if it is the same everywhere. noise (n,) int16: the pool; row v reads it from offsets[v] on. shot: share of the
-    noise's variance that grows with brightness, 0 to 1.
+    canvas (H, W * 3) int16, grey levels times UNIT = 64: the sharp scene, of which only dirty tiles and their
+    surroundings are read. empty (H, W * 3) int16: the blurred empty scene, for clean tiles. dirty (rows, columns): 1
+    for tiles of 8 x 16 px to blur anew. weights (2 r + 1,): of the blur. nodes (J, I): brightness at every `step`-th
+    pixel, or (1, 1) if it is the same everywhere. noise (n,) int16: pool of normal numbers in canvas values; row v
+    reads it from offsets[v] on. shot: share of the noise's variance that grows with brightness, 0 to 1. Returns
+    nothing.
     """
     height, width = canvas.shape[0], canvas.shape[1] // 3
     edge, wide, tile = _scratch(len(weights) // 2, width)

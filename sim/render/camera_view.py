@@ -31,8 +31,9 @@ OCCLUDER = -2  # id of walls and pillars in id maps
 class CameraView:
     """The empty scene as one camera sees it; each part is computed when first needed, and kept.
 
-    Parts: depth, kind and place of each pixel, colours, ids, and canvases to draw on; also brightness and wind in the
-    image at any time. plants is None without plants. Canvases that were returned are kept ready for the next frame.
+    Parts: depth, kind and place of each pixel, colours, ids, and canvases (working images) to draw on; also brightness
+    and wind in the image at any time. width, height: of the image, px. rays: the camera's lines of sight. solids:
+    walls, pillars and stairs. plants is None without plants. Canvases that were given back are kept for the next frame.
     """
 
     def __init__(
@@ -75,13 +76,17 @@ class CameraView:
 
     @cached_property
     def empty_scene(self) -> EmptyScene:
-        """The painted EmptyScene under steady light, with unmoved plants: colour, shares of sun and of plants."""
+        """The painted EmptyScene under steady light, with unmoved plants: colour, shares of sun and of plants.
+
+        The first access raises ValueError if the Motion's seed is negative.
+        """
         m = self.motion
         return paint_empty_scene(self.camera, m.scene, self.light, self.picture.texture, self.plants, m.seed, m.repeat)
 
     @cached_property
     def empty_canvas(self) -> NDArray[np.int16]:
-        """Colours (H, W, 3) BGR of the empty scene as int16: grey levels times UNIT (64), not blurred."""
+        """Colours (H, W, 3) BGR of the empty scene as int16: grey levels times UNIT (64), not blurred, rounded, clipped
+        at 32767."""
         return np.asarray(np.clip(np.rint(self.empty_scene.colour * np.float32(UNIT)), 0, MOST), np.int16)
 
     @cached_property
@@ -126,7 +131,7 @@ class CameraView:
         return (o + t * d)[:2].T, spread
 
     def _grid(self, field: Array) -> NDArray[np.float32]:
-        """Return the values (J * I,) at the nodes as a float32 grid (J, I), row by row."""
+        """Return the values `field` (J * I,) at the nodes, every 16th pixel, as a float32 grid (J, I), row by row."""
         return field.reshape(-(-self.height // NODE_STEP) + 1, -1).astype(np.float32)
 
     @cached_property
@@ -134,10 +139,11 @@ class CameraView:
         return self.light.clouds.sampled(*self._nodes)
 
     def brightness(self, t: float, key: int) -> NDArray[np.float32]:
-        """Return the brightness, a factor about 1, at time t (s) at the nodes (J, I), which are 16 px apart.
+        """Return the brightness at time t (s) at the nodes (J, I), which are 16 px apart: factors above 0, about 1.
 
-        It is (1, 1) if the brightness is the same everywhere. key: number of the frame, background frames included,
-        which names the random stream of the flicker (see `Illumination.gain`).
+        It is (1, 1) if the brightness is the same everywhere, without clouds. key: number of the frame, background
+        frames included; it names the random stream of the flicker. Raises ValueError for a negative key if there is
+        flicker.
         """
         gain = self.light.gain(t, key)
         if self.light.clouds.amplitude == 0:

@@ -17,7 +17,7 @@ from sim.scene.body import XX, XY, YY
 def ellipse_row(y, a, b, d):  # type: ignore[no-untyped-def]
     """Return the ends x0 <= x1 of row y of the ellipse a x² + 2 b x y + d y² <= 1, measured from its centre.
 
-    The result is (1, -1), x0 > x1, if the row misses the ellipse, or for nan.
+    The result is (1, -1), x0 > x1, if the row misses the ellipse, if a is not above 0, or for nan.
     """
     root = b * b * y * y - a * (d * y * y - 1.0)
     if not (root >= 0.0 and a > 0.0):
@@ -31,8 +31,9 @@ def outline_columns(v, i, e, middle, inverse, width):  # type: ignore[no-untyped
     """Return the first column and the last column + 1 of image row v whose pixel centres lie in an outline and in the
     image.
 
-    The outline is part e (0 body, 1 head) of person i: middle (N, 2, 2) px, inverse (N, 2, 3) packed as entries 11, 12,
-    22. width: of the image, px. The two numbers are equal if there are no such pixels.
+    The outline is the ellipse of part e (0 body, 1 head) of person i (row from 0). middle (N, 2, 2): centres u, v in
+    px. inverse (N, 2, 3): entries 11, 12, 22 of the inverse shape matrices, 1/px². width: of the image, px. The two
+    numbers are equal if there are no such pixels, or for nan.
     """
     x0, x1 = ellipse_row(v + 0.5 - middle[i, e, 1], inverse[i, e, XX], inverse[i, e, XY], inverse[i, e, YY])
     if x0 > x1:

@@ -18,7 +18,7 @@ def empty_scene_disparities(left: CameraView, right: CameraView) -> Array:
     pixels.
 
     A disparity is u_left - u_right, above 0. It is nan for sky and for points that the right camera does not see:
-    outside its image on the left, or hidden by a solid thing.
+    beyond the left edge of its image, or hidden by a solid thing.
     """
     from sim.render import disparity_kernels as kernels
 
@@ -38,11 +38,13 @@ def frame_disparities(
     in_left: ProjectedPeople,
     in_right: ProjectedPeople,
 ) -> Array:
-    """Return the disparities (H, W) in px of a frame with people, at the left view's pixels, as a new array.
+    """Return the disparities u_left - u_right (H, W) in px of a frame with N people, at the left view's pixels, as a
+    new array.
 
-    nan for sky and for points that the right camera does not see. empty (H, W) px: disparities of the empty scene.
-    canvas: the left view's, with people drawn. ids (H, W): person id where a person is visible in the left view.
-    people: the N people of the frame. in_left, in_right: the same people as each camera sees them.
+    nan for sky and for points that the right camera does not see, as people, walls or the image's edge hide them. empty
+    (H, W) px: disparities of the empty scene. canvas: the left view's, with people drawn; its depth is used. ids (H,
+    W): person id where a person is visible in the left view. people: the people of the frame. in_left, in_right: the
+    same people as each camera sees them.
     """
     from sim.render import disparity_kernels as kernels
 

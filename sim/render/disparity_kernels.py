@@ -23,9 +23,9 @@ def empty_scene_disparities(depth, scale, origin, direction, solids, out):  # ty
     """Set out (H, W) px to the disparities u_left - u_right of the empty scene, scale / depth, at the left camera's
     pixels.
 
-    nan where the right camera does not see the point, and for sky. depth (H, W) m: of the left view, inf for sky.
-    scale: focal length times baseline, px m. origin, direction (3, 3): PixelRays of the right camera. solids: a
-    `raycast.Solids`. Returns nothing.
+    nan for sky and for points that the right camera does not see: left of its image, or more than 1 mm behind a solid
+    thing. depth (H, W) m: of the left view, inf for sky. scale: focal length times baseline, px m. origin, direction
+    (3, 3): PixelRays of the right camera. solids: a `raycast.Solids`. Returns nothing.
     """
     height, width = depth.shape
     any_solid = len(solids.walls) + len(solids.pillars) + len(solids.flights) > 0
@@ -61,11 +61,13 @@ def _part_is_before(x, i, e, start, step, row, z):  # type: ignore[no-untyped-de
 
 @njit(cache=True, error_model="numpy")
 def _set_people(depth, ids, bounds, id, scale, right_depth, origin, direction, solids, out):  # type: ignore[no-untyped-def]
-    """Set out (H, W) px to the disparity at the pixels that show people; other pixels are left. Returns nothing.
+    """Set out (H, W) px to the disparity at the pixels that show one of N people; other pixels are left. Returns
+    nothing.
 
     nan where the point is outside the right image, or solid things hide it from the right camera. depth (H, W) m, ids
-    (H, W), bounds (N, 4): of the left image, with people. id (N,). scale: focal length times baseline, px m.
-    right_depth (H, W) m: of the empty scene in the right view. origin, direction (3, 3): PixelRays of the right camera.
+    (H, W) and bounds (N, 4): of the left image, with people. Columns of bounds: first row, last row + 1, first column,
+    last column + 1. id (N,): person ids. scale: focal length times baseline, px m. right_depth (H, W) m: of the empty
+    scene in the right view. origin, direction (3, 3): PixelRays of the right camera. solids: a `raycast.Solids`.
     """
     width = depth.shape[1]
     any_solid = len(solids.walls) + len(solids.pillars) + len(solids.flights) > 0
@@ -93,11 +95,13 @@ def add_people(  # type: ignore[no-untyped-def]
 ):
     """Add N people to out (H, W) px, on entry the disparities of the empty scene, at the left camera's pixels.
 
-    Pixels that people hide from the right camera become nan. depth (H, W) m, ids (H, W), bounds (N, 4) (first row, last
-    row + 1, first column, last column + 1), id (N,): of the left image, with people. scale: focal length times
-    baseline, px m. The rest is the right camera's: start, step (N, 2, 3, 3), middle (N, 2, 2), inverse (N, 2, 3),
-    nearest (N, 2) m: see `people.ProjectedPeople`; right_depth (H, W) m: of the empty scene; origin, direction (3, 3):
-    PixelRays; solids: a `raycast.Solids`. Returns nothing.
+    Pixels that show people get their disparity; pixels that people hide from the right camera become nan. depth (H, W)
+    m, ids (H, W), bounds (N, 4) (first row, last row + 1, first column, last column + 1), id (N,): of the left image,
+    with people. scale: focal length times baseline, px m. The rest is the right camera's. start, step (N, 2, 3, 3):
+    matrices of ray origins and directions in the axes of body and head. middle (N, 2, 2) px, inverse (N, 2, 3): centres
+    and packed inverse shapes of the outlines; a part with a nan outline hides nothing. nearest (N, 2) m: least depths
+    of the parts. right_depth (H, W) m: of the empty scene. origin, direction (3, 3): PixelRays. solids: a
+    `raycast.Solids`. Returns nothing.
     """
     height, width = depth.shape
     row = np.empty(6)

@@ -32,10 +32,10 @@ PLACE, ACROSS, DOWN, STRENGTH = range(4)  # keys of the random role "wind"
 class Foliage:
     """The plants of a sequence, and the wind that moves them.
 
-    key     key of the pattern `texture_kernels.plant_pattern`
+    key     key (whole number) of the random pattern `texture_kernels.plant_pattern`
     level   plants grow where the pattern is above it, no unit
-    sway    two fields: movement in px across and px down at a strength of 1
-    gusts   field, the same everywhere: logarithm of the wind's strength
+    sway    two random fields over ground and time: movement in px across and px down at a strength of 1
+    gusts   field, the same everywhere: natural logarithm of the wind's strength, plus a constant
     """
 
     key: int

@@ -20,10 +20,11 @@ from sim.scene.raycast_kernels import at_pixel, first_hit
 def sample_plants(rays, scale, step, solids, size, key, pattern, cover):  # type: ignore[no-untyped-def]
     """Set pattern (J, I) and cover (J, I) to samples of the plant pattern at every `step`-th pixel of an image.
 
-    pattern: `plant_pattern` on level ground, -inf elsewhere. cover: share of the pixel, 0 to 1, that plants would cover
-    if they grew everywhere; 0 where leaves are too far away to show. rays: origin and direction, each (3, 3), of
-    PixelRays. scale: see `raycast.signed_scale`. solids: a `raycast.Solids`. size (2,) m: of the world. key: of the
-    pattern. Returns nothing.
+    pattern: `plant_pattern` (no unit; plants grow where it is high) on level ground, -inf elsewhere. cover: share of
+    the pixel, 0 to 1, that plants would cover if they grew everywhere; 0 where leaves are too far away to show, and off
+    the ground. rays: origin and direction, each (3, 3), of PixelRays. scale: px per m at a depth of 1 m, or minus px
+    per m for a camera from above. solids: a `raycast.Solids`. size (2,) m: of the world. key: of the pattern. Returns
+    nothing.
     """
     o, d, hit = np.empty(3), np.empty(3), np.empty(HIT_SLOTS)
     for j in range(pattern.shape[0]):
@@ -59,8 +60,8 @@ def sway(empty, share, runs, nodes, step, colour, dirty, margin):  # type: ignor
 
     colour, empty (H, W, 3) int16: canvas to draw on and that of the empty scene. share (H, W): share of each pixel that
     shows plants. runs (S, 3): row, first column, last column + 1 of the pixels that show plants; no others are drawn.
-    nodes (2, J, I): wind, px across and px down, at every `step`-th pixel. dirty: tiles, set to 1 up to `margin` px
-    round the runs. Places outside the image are moved to its edge. Returns nothing.
+    nodes (2, J, I): wind, px across and px down, at every `step`-th pixel. dirty (rows, columns): tiles of 8 x 16 px,
+    set to 1 up to `margin` px round the runs. Places outside the image are moved to its edge. Returns nothing.
     """
     height, width = share.shape
     for s in range(len(runs)):

@@ -1,7 +1,8 @@
 """The light of a sequence through time: where the sun stands, and how bright the scene is at any moment.
 
-Brightness is a pure function of time and place: exp(drift + flicker + cloud) times the gains of the switches that have
-happened. Drift has the correlation exp(-|lag| / drift_time). Clouds move over the ground (`sim.render.random_fields`).
+Brightness is a pure function of time and place: exp(drift + flicker + cloud) times the gains (factors) of the switches
+that have happened. Drift is slow and has the correlation exp(-|lag| / drift_time), both in s. Flicker is fresh in each
+frame. Clouds move over the ground (`sim.render.random_fields`).
 """
 
 from __future__ import annotations
@@ -25,16 +26,16 @@ SUN, DRIFT, FLICKER, SWITCH, CLOUD = range(5)  # keys of the random role "light"
 
 @dataclass(frozen=True)
 class Illumination:
-    """The light of one sequence.
+    """The light of one sequence. Logarithms are natural ones.
 
     sun (3,)       unit vector to the sun, x, y, z
     shadow         the sun's share of the light on level ground, 0 to 1; 0: people cast no shadows
     penumbra       width of a shadow's soft edge, m
-    drift          slow changes of the logarithm of brightness, the same everywhere
-    clouds         patches of the logarithm of brightness that move over the ground
+    drift          random field: slow changes of the logarithm of brightness, the same everywhere
+    clouds         random field: patches of the logarithm of brightness that move over the ground
     flicker        standard deviation of the logarithm of brightness from frame to frame
     switches       sudden changes: (start s, end s, gain) each; gain is the factor of brightness from the end on
-    seed, repeat   name the random stream of the flicker
+    seed, repeat   seed and number of the suite entry's copy (0: none); they name the random stream of the flicker
     """
 
     sun: Array
@@ -52,7 +53,7 @@ class Illumination:
 
         It combines drift, flicker and switches. key: number of the frame, background frames included, 0 or more; it
         names the random stream of the flicker. The logarithm of a switch's gain rises linearly from its start to its
-        end. Raises ValueError for a negative key if there is flicker.
+        end; a switch without duration acts at once. Raises ValueError for a negative key or seed if there is flicker.
         """
         log = self.drift.at_origin(t)
         if self.flicker > 0:

@@ -22,10 +22,10 @@ T = TypeVar("T")
 class DrawnPeople:
     """N people of one frame, or of several frames one after the other.
 
-    id (N,)             person id = column of the Motion + 1
+    id (N,)             person id = column of the Motion (from 0) + 1
     pos3 (N, 3)         feet: x, y, z in m
     height (N,)         body height, m
-    shapes              Ellipsoids of body and head
+    shapes              Ellipsoids of body and head in the world: centres (N, 2, 3) m and shape matrices (N, 2, 3, 3) m²
     half (N, 2, 3)      half axes of body and head in m: across, along the heading, up
     turn (N, 3, 3)      rotation from the world to a person's own axes: across (to the right), along the heading, up
     """
@@ -43,9 +43,9 @@ class ImageOutlines:
     """Ellipses of N people in the image, two each; the second axis is body, head.
 
     middle (N, 2, 2)    centres, u and v in px; nan if not wholly in front of the camera
-    inverse (N, 2, 3)   inverse shapes in 1/px²: entries 11, 12, 22; nan likewise
+    inverse (N, 2, 3)   inverse shapes in 1/px²: matrix entries 11, 12, 22; nan likewise
     bounds (N, 4)       first row, last row + 1, first column, last column + 1 of the pixels that either ellipse may
-                        cover, clipped to the image; empty if an ellipse is nan
+                        cover, clipped to the image; no rows or no columns if an ellipse is nan or outside
     """
 
     middle: Array
@@ -90,7 +90,7 @@ def people_of_frames(motion: Motion, first: int, last: int) -> tuple[DrawnPeople
 def take_rows(value: T, rows: slice) -> T:
     """Return a copy of a dataclass with these rows of all its arrays, those of nested dataclasses included.
 
-    Every field must be an array or such a dataclass. The arrays are views of the given ones.
+    value: every field must be an array or such a dataclass. The arrays of the copy are views of the given ones.
     """
     kept = {
         f.name: v[rows] if isinstance(v := getattr(value, f.name), np.ndarray) else take_rows(v, rows)

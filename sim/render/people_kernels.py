@@ -1,8 +1,9 @@
 """Compiled drawing of people on a canvas, row by row of their outlines. The tests hold a slow twin.
 
 A body part is a ball of radius 1 in its own axes (across, along, up, each over its half axis). There the ray of pixel
-(u, v) is q = P (u, v, 1) + t D (u, v, 1). It meets the ball at the smaller root t of |q| = 1, which is the depth along
-the camera's axis; the nearest t is drawn. Only pixels inside the part's outline (`sim.scene.body.outlines`) are tested.
+(u, v) is q = P (u, v, 1) + t D (u, v, 1), with P, D (3, 3) the matrices of ray origins and directions and t the depth
+in m along the camera's axis. It meets the ball at the smaller root t of |q| = 1; the nearest t is drawn. Only pixels
+inside the part's outline (`sim.scene.body.outlines`) are tested.
 """
 
 from __future__ import annotations
@@ -40,7 +41,8 @@ def _row_of_rays(i, e, v, start, step, ray):  # type: ignore[no-untyped-def]
 def _hit_depths(ray, left, many, t):  # type: ignore[no-untyped-def]
     """Set t (many,) to the depths in m at which the rays of a row's pixels meet a ball of radius 1 round the origin.
 
-    ray (3, 4): see `_row_of_rays`. left: column of the first of `many` pixels. A ray that misses the ball gets the
+    ray (3, 4): rows are the part's axes x, y, z; columns are ray origin at column 0, its change per column, direction
+    at column 0, its change per column. left: column of the first of `many` pixels. A ray that misses the ball gets the
     depth of its nearest point. Returns nothing.
     """
     px0, px1, dx0, dx1 = ray[X, P_AT_0], ray[X, P_PER_COLUMN], ray[X, D_AT_0], ray[X, D_PER_COLUMN]
@@ -63,7 +65,8 @@ def _texture_and_light(  # type: ignore[no-untyped-def]
     """Set where on a texture page the points at depths t (many,) m are, and how they are lit. Returns nothing.
 
     place (many,): index of the lower left of four texels, in the page. across, up (many,), 0 to 1: how far beyond that
-    texel the point is. light (many,): brightness times UNIT. ray (3, 4): see `_row_of_rays`; left: column of the first
+    texel the point is. light (many,): brightness times UNIT = 64. ray (3, 4): rows are the part's axes; columns are ray
+    origin at column 0, its change per column, direction at column 0, its change per column. left: column of the first
     pixel. half (3,) m: half axes. sun (3,): unit vector to the sun, in own axes. shadow: the sun's share of the light.
     sunlit (3,): share of the sun at feet, waist and head. head: True for a head. Numbers are float32, exact to 1e-4 of
     a page.
@@ -109,15 +112,17 @@ def draw_people(  # type: ignore[no-untyped-def]
 ):  # fmt: skip
     """Draw N people by depth, in this `order` of rows; from near to far is fastest, the result does not depend on it.
 
-    start, step (N, 2, 3, 3): matrices of ray origins and directions in the axes of each part. half (N, 2, 3) m: half
-    axes. middle (N, 2, 2) px, inverse (N, 2, 3), bounds (N, 4): see `people.ImageOutlines`. id (N,). sun (N, 3): unit
-    vector to the sun in each person's axes. shadow: the sun's share of the light. sunlit (N, 3): share of the sun at
-    feet, waist and head. pages (N,): pages of the atlas (P, 2, texels), see `clothing.clothing_atlas`.
+    start, step (N, 2, 3, 3): matrices of ray origins and directions in the axes of body and head. half (N, 2, 3) m:
+    half axes. middle (N, 2, 2) px, inverse (N, 2, 3) 1/px²: centres and packed inverse shapes of the outlines. bounds
+    (N, 4): first row, last row + 1, first column, last column + 1 of each person's pixels. id (N,): person ids. sun (N,
+    3): unit vector to the sun in each person's axes. shadow: the sun's share of the light. sunlit (N, 3): share of the
+    sun at feet, waist and head. pages (N,): index of each person's page in the atlas (P, 2, texels) uint8, BGR.
 
-    depth (H, W) m: on entry that of the empty scene, on return that of everything. Changed tiles, with a margin in px,
-    are marked in dirty. With `label`, ids (H, W) gets the person's id where a person is visible, and amodal (N,) is
-    raised by the pixels of each silhouette in the image. With `shade`, colour (H, W, 3) int16 is drawn. Light is the
-    sky's, more from above than from the side, and the sun's by Lambert's law. Returns nothing.
+    depth (H, W) m: on entry that of the empty scene, on return that of everything; points at depth 0 or less are not
+    drawn. Changed tiles, with a margin in px, are set to 1 in dirty (rows, columns). With `label`, ids (H, W) gets the
+    person's id where a person is visible, and amodal (N,) is raised by the pixels of each silhouette in the image. With
+    `shade`, colour (H, W, 3) int16 is drawn. Light is the sky's, more from above than from the side, and the sun's by
+    Lambert's law. Returns nothing.
     """
     height, width = depth.shape
     t, ray = np.empty(width), np.empty((3, 4))

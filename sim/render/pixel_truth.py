@@ -13,12 +13,14 @@ from sim.types import Array, Bools, Camera, Ints, Motion, PixelTruth
 
 
 def pixel_truth(ids: Ints, bounds: Ints, id: Ints, amodal: Ints, disparity: Array | None) -> PixelTruth:
-    """Return the PixelTruth of an id map, with visible pixels, box and connected region of each of N people.
+    """Return the PixelTruth of an id map, with visible pixels, box and connected region of each of N people, in the
+    order of id.
 
     ids (H, W): person id where a person is visible, 0 or negative elsewhere. id (N,): of the people; every positive id
     in the map must be among them. bounds (N, 4): first row, last row + 1, first column, last column + 1 outside which
     each person is not visible. amodal (N,): pixels of the whole silhouettes in the image. disparity (H, W) px is passed
-    through, None included. A person without visible pixels has count 0, a nan box and blob -1.
+    through, None included. A person without visible pixels has count 0, a nan box (left, top, width, height in px) and
+    region number -1.
     """
     from sim.render.pixel_truth_kernels import count_pixels
 
@@ -32,8 +34,10 @@ def pixel_truth(ids: Ints, bounds: Ints, id: Ints, amodal: Ints, disparity: Arra
 
 
 def modal_mask(pixels: PixelTruth, person: int) -> Bools:
-    """Return the mask (H, W), True at the pixels in which the person with this id is visible; all False if hidden or
-    absent."""
+    """Return the mask (H, W), True at the pixels in which the person with this id (from 1 on) is visible.
+
+    All False if the person is hidden or absent.
+    """
     return np.asarray(pixels.ids == person)
 
 
@@ -42,7 +46,7 @@ def amodal_mask(motion: Motion, camera: Camera, index: int, person: int) -> Bool
 
     index: from 1 on. person: id, from 1 on. All False if the person is absent in that frame, or outside the image. A
     body or head that is not wholly in front of the camera is left out. Raises IndexError for a frame behind the last or
-    an id above the number of people.
+    an id above the number of people; 0 and negative numbers are not refused, but count from the end.
     """
     t, p = np.array([index - 1]), np.array([person - 1])
     width, height = camera.image

@@ -1,8 +1,9 @@
 """Random fields over ground and time, for slow changes of light and for wind; each a pure function of place and time.
 
-A field is a sum of WAVES plane waves, amplitude Σ sin(k·x + ω t + φ). It is stationary, nearly Gaussian, and has the
-wanted standard deviation. With k drawn from N(0, 1/length²) per axis, its correlation over all draws is
-exp(-r² / 2 length²) at distance r; likewise over time.
+A field is a sum of WAVES = 24 plane waves, amplitude Σ sin(k·x + ω t + φ): x the place in m, t the time in s, k the
+wave vector in rad/m, ω the angular frequency in rad/s, φ a random phase. It is stationary, nearly Gaussian, and has the
+wanted standard deviation. With k drawn from N(0, 1/length²) per axis, its correlation over all draws is exp(-r² / 2
+length²) at distance r; likewise over time.
 """
 
 from __future__ import annotations
@@ -57,8 +58,8 @@ class PlaneWaves:
         """Return the field at places (N, 2), x and y in m, each smoothed by a Gaussian of standard deviation spread
         (N,) m.
 
-        Smoothing multiplies wave k by exp(-|k|² spread² / 2). With a spread of inf the field vanishes at that place,
-        unless a wave vector is 0, which gives nan.
+        Smoothing multiplies the wave of wave vector k (rad/m) by exp(-|k|² spread² / 2). With a spread of inf the field
+        vanishes at that place, unless a wave vector is 0, which gives nan.
         """
         amplitude = self.amplitude * np.exp(-0.5 * (self.k**2).sum(axis=1) * spread[:, None] ** 2)
         at = places @ self.k.T + self.phase
@@ -74,7 +75,8 @@ def _with_random_phases(source: np.random.Generator, sd: float, k: Array, omega:
 def uniform_drift(source: np.random.Generator, sd: float, time: float) -> PlaneWaves:
     """Return a random field that is the same everywhere, with standard deviation sd and correlation exp(-|lag| / time).
 
-    time: time constant in s, above 0. The field is 0 if sd is 0. Its frequencies are Cauchy with scale 1 / time.
+    source: generator that draws it. time: time constant in s, above 0; lag in s, too. The field is 0 if sd is 0. Its
+    angular frequencies have a Cauchy distribution of scale 1 / time.
     """
     omega = np.tan(np.pi * (source.uniform(size=WAVES) - 0.5)) / time
     return _with_random_phases(source, sd, np.zeros((WAVES, 2)), omega)
@@ -83,7 +85,8 @@ def uniform_drift(source: np.random.Generator, sd: float, time: float) -> PlaneW
 def moving_pattern(source: np.random.Generator, sd: float, length: float, speed: float) -> PlaneWaves:
     """Return a random pattern that moves unchanged over the ground at `speed` (m/s) in a random direction.
 
-    sd: its standard deviation; 0 gives the field 0. length: distance in m, above 0, at which its correlation is 0.6.
+    source: generator that draws it. sd: its standard deviation; 0 gives the field 0. length: distance in m, above 0, at
+    which its correlation is 0.6.
     """
     angle = source.uniform(0, 2 * np.pi)
     k = source.normal(size=(WAVES, 2)) / length
@@ -93,6 +96,7 @@ def moving_pattern(source: np.random.Generator, sd: float, length: float, speed:
 def oscillation(source: np.random.Generator, sd: float, length: float, time: float) -> PlaneWaves:
     """Return a random field with standard deviation sd and correlation exp(-r² / 2 length²) exp(-lag² / 2 time²).
 
-    r: distance on the ground; length in m, above 0. lag: in s; time in s, above 0. The field is 0 if sd is 0.
+    source: generator that draws it. r: distance on the ground; length in m, above 0. lag: in s; time in s, above 0. The
+    field is 0 if sd is 0.
     """
     return _with_random_phases(source, sd, source.normal(size=(WAVES, 2)) / length, source.normal(size=WAVES) / time)

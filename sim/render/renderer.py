@@ -2,8 +2,7 @@
 
 A frame starts from the empty scene (`sim.render.background`). Wind moves its plants, shadows darken it, and people are
 drawn over it by depth. The result is blurred, multiplied by the brightness of the moment, given noise and, if the
-scenario wants it, compressed as JPEG.
-"""
+scenario wants it, compressed as JPEG."""
 
 from __future__ import annotations
 
@@ -47,9 +46,9 @@ class RenderedFrame:
 class Renderer:
     """Draws the frames of one Motion as one camera, or a stereo pair, sees them. Frames count from 1.
 
-    The constructor raises InputError if the camera's lens distorts (radial not 0). State: everything that is the same
-    in all frames, computed when first needed; and the people of the 16 frames drawn last.
-    """
+    The constructor raises InputError if the camera's lens distorts (radial not 0). light, picture: settings as in a
+    scenario; their random values are drawn with the Motion's seed. State: everything that is the same in all frames,
+    computed when first needed; and the people of the batch of up to 16 frames drawn last."""
 
     def __init__(self, motion: Motion, camera: Camera, light: Light, picture: Picture) -> None:
         if camera.radial != 0:
@@ -69,16 +68,16 @@ class Renderer:
     def left_view(self) -> CameraView:
         """The CameraView of the empty scene as the camera itself sees it; computed once.
 
-        Raises InputError if the drawn light or share of plants is impossible.
-        """
+        Raises InputError if the drawn light or share of plants is impossible, ValueError if a distribution never draws
+        within its clip."""
         return CameraView(self.camera, self.motion, self.illumination, self.picture, self._plants)
 
     @cached_property
     def right_view(self) -> CameraView:
         """The CameraView of the empty scene from the right camera of the pair, `baseline` m to the right.
 
-        Raises InputError if there is no right camera (kind "top", or a baseline of 0), or as `left_view`.
-        """
+        Raises InputError if there is no right camera (kind "top", or a baseline of 0) or the drawn light or share of
+        plants is impossible, ValueError if a distribution never draws within its clip."""
         self.check_pair()
         right = cameras.right_camera(self.camera)
         return CameraView(right, self.motion, self.illumination, self.picture, self._plants)
@@ -117,45 +116,46 @@ class Renderer:
         return empty_scene_disparities(self.left_view, self.right_view)
 
     def frame(self, index: int) -> Image:
-        """Return the image (H, W, 3) uint8, BGR, of frame `index`, from 1 on; the same index always gives the same
-        image.
+        """Return the image (H, W, 3) uint8 BGR of frame `index`, from 1 on; the same index gives the same image.
 
         Raises IndexError for frame 0 or one behind the last, InputError if the drawn light or share of plants is
-        impossible.
-        """
+        impossible, ValueError if a distribution never draws within its clip."""
         return self._draw(index, LEFT, shade=True, label=False)[0]
 
     def right(self, index: int) -> Image:
         """Return the right camera's image (H, W, 3) uint8, BGR, of frame `index`, from 1 on.
 
-        Raises InputError if there is no right camera (kind "top", or a baseline of 0); else errors as `frame`.
-        """
+        Raises InputError if there is no right camera (kind "top", or baseline 0) or drawn light or plants are
+        impossible, ValueError if a distribution never draws within its clip, IndexError for frame 0 or one behind the
+        last."""
         return self._draw(index, RIGHT, shade=True, label=False)[0]
 
     def pixels(self, index: int, *, disparity: bool = False) -> PixelTruth:
         """Return the PixelTruth of frame `index`, from 1 on; its disparities are None unless `disparity` is True.
 
-        Raises InputError if disparities are asked for and there is no right camera; else errors as `frame`.
-        """
+        Raises InputError if disparities are asked for without a right camera, or the drawn light or plants are
+        impossible; ValueError if a distribution never draws within its clip; IndexError for frame 0 or one behind the
+        last."""
         truth = self._draw(index, LEFT, shade=False, label=True, disparity=disparity)[1]
         assert truth is not None
         return truth
 
     def draw(self, index: int, *, right: bool = False, pixels: bool = False, disparity: bool = False) -> RenderedFrame:
-        """Return the image of frame `index` (from 1 on) and the parts asked for, without drawing anything twice.
+        """Return the left image of frame `index` (from 1 on) and the parts asked for; parts not asked for are None.
 
         right: the right camera's image. pixels: the pixel truth. disparity: disparities in the pixel truth; no effect
         without `pixels`. Raises InputError if `right` or disparities are asked for and there is no right camera (kind
-        "top", or a baseline of 0); else errors as `frame`.
-        """
+        "top", or a baseline of 0), or the drawn light or plants are impossible; ValueError if a distribution never
+        draws within its clip; IndexError for frame 0 or one behind the last."""
         image, truth = self._draw(index, LEFT, shade=True, label=pixels, disparity=disparity and pixels)
         return RenderedFrame(image, self.right(index) if right else None, truth)
 
     def background(self, k: int) -> Image:
         """Return image k = 0 … BACKGROUNDS - 1 (49), (H, W, 3) uint8, BGR, of the scene without people.
 
-        Its time is (k - BACKGROUNDS) / fps s, before frame 1. Raises InputError as `frame`.
-        """
+        Its time is (k - BACKGROUNDS) / fps s, before frame 1. Other k are not refused, except that k < -1 raises
+        ValueError. Raises InputError if the drawn light or plants are impossible, ValueError if a distribution never
+        draws within its clip."""
         view, index = self.left_view, k - BACKGROUNDS + 1
         canvas = self._moved_canvas(view, index)
         image = self._finish(view, canvas, index, LEFT)
@@ -171,7 +171,8 @@ class Renderer:
         return self._last_batch
 
     def _moved_canvas(self, view: CameraView, index: int) -> FrameCanvas:
-        """Return a canvas of the empty scene with its plants where the wind of frame `index` moves them."""
+        """Return a canvas of the empty scene in `view` with its plants where the wind of frame `index` (from 1) moves
+        them."""
         canvas = view.take_canvas()
         if view.plants is not None:
             from sim.render.foliage_kernels import sway
@@ -185,11 +186,12 @@ class Renderer:
     def _draw(
         self, index: int, side: int, *, shade: bool, label: bool, disparity: bool = False
     ) -> tuple[Image, PixelTruth | None]:
-        """Return the image (H, W, 3) uint8 of one view of a frame and its pixel truth; side: LEFT or RIGHT.
+        """Return the image (H, W, 3) uint8 of one view of frame `index` (from 1) and its pixel truth; side: LEFT or
+        RIGHT.
 
         shade: draw the image; else it has shape (0, 0, 3). label: make the pixel truth; else it is None. disparity:
-        with disparities; no effect without `label`. Raises InputError if the right view is needed and there is none.
-        """
+        with disparities; no effect without `label`. Raises InputError if the right view is needed and there is none, or
+        drawn light or plants are impossible; ValueError if a clip has no draw; IndexError if there is no such frame."""
         view, batch = self.right_view if side else self.left_view, self._batch(index)
         people, seen = batch.people(index), batch.in_view(view, side, index)
         canvas = self._moved_canvas(view, index) if shade else view.take_canvas()
@@ -250,8 +252,8 @@ class Renderer:
         )  # fmt: skip
 
     def _finish(self, view: CameraView, canvas: FrameCanvas, index: int, side: int) -> Image:
-        """Return the image (H, W, 3) uint8 of a canvas: blurred, times the brightness, with noise and JPEG artefacts,
-        if wanted."""
+        """Return the image (H, W, 3) uint8 of a view's canvas: blurred, times brightness, with noise, as JPEG if
+        wanted."""
         from sim.render.blur_noise_kernels import finish_image
 
         image = np.empty((view.height, view.width, 3), np.uint8)
@@ -280,8 +282,7 @@ def make_renderer(
     """Return a Renderer of a Motion as this camera sees it; light and picture as in a scenario, defaults if None.
 
     Raises InputError if the camera's lens distorts (radial not 0). Impossible drawn values of light and plants raise
-    InputError only when the first frame is drawn.
-    """
+    InputError or ValueError only when the first frame is drawn."""
     from scenarios.schema.picture import Light, Picture
 
     return Renderer(motion, camera, light or Light(), picture or Picture())
@@ -293,8 +294,7 @@ def render(
     """Return frame `index` (from 1 on) as a Frame with the left image, without right image and detections.
 
     light, picture: as in a scenario, defaults if None. For many frames, keep one `make_renderer`. Raises InputError if
-    the lens distorts (radial not 0) or drawn light or plants are impossible; IndexError for frame 0 or one behind the
-    last.
-    """
+    the lens distorts (radial not 0) or drawn light or plants are impossible, ValueError if a distribution never draws
+    within its clip, IndexError for frame 0 or one behind the last."""
     image = make_renderer(motion, camera, light, picture).frame(index)
     return Frame(index, (index - 1) / motion.fps, image)

@@ -34,12 +34,13 @@ class PeopleShadows:
 
 
 def people_shadows(camera: Camera, people: DrawnPeople, sun: Array, penumbra: float, level: bool) -> PeopleShadows:
-    """Return the PeopleShadows of N people as a camera sees them.
+    """Return the PeopleShadows of N people as a camera sees them: shapes on the ground, softness and outlines in the
+    image.
 
     An ellipsoid with centre c and shape S casts on the plane at height z an ellipse with centre c - s (c_z - z)/s_z and
-    shape P S Pᵀ. Here s is the unit vector `sun` (3,) to the sun, and P = I - s e_zᵀ/s_z. The sun must stand above the
-    horizon. penumbra: width of the soft edge, m. level: True if shadows can fall on level ground only. Else the bounds
-    also cover walls and stairs up to the height of the head.
+    shape P S Pᵀ. Here s is the unit vector `sun` (3,) to the sun, e_z the upward unit vector, and P = I - s e_zᵀ/s_z.
+    The sun must stand above the horizon. penumbra: width of the soft edge, m. level: True if shadows can fall on level
+    ground only. Else the bounds also cover walls and stairs up to the height of the head.
     """
     along = np.eye(3) - np.outer(sun / sun[2], [0.0, 0.0, 1.0])
     shape = along @ people.shapes.shape @ along.T

@@ -54,7 +54,8 @@ def grain(x, y, key, footprint, coarsest):  # type: ignore[no-untyped-def]
     """Return noise at (x, y) m, of standard deviation about 0.5 where no scale is lost.
 
     It has equal contrast at each of up to nine scales, from `coarsest` m down to the pixel. footprint: size of a pixel
-    on the surface, m. It is 0 if even the coarsest scale is finer than pixels. key: first of nine keys of the pattern.
+    on the surface, m, above 0. It is 0 if even the coarsest scale is finer than two pixels. key: first of nine keys
+    (whole numbers) of the pattern.
     """
     total, wavelength = 0.0, coarsest
     x, y = x / coarsest, y / coarsest
@@ -73,9 +74,9 @@ def slabs(x, y, width, depth, joint, key, footprint):  # type: ignore[no-untyped
     """Return the brightness at (x, y) m of slabs in a running bond: a value in [-1, 1] by slab, down to -1.5 in the
     joints.
 
-    width, depth: of a slab along x and y, joint: width of a joint, m. Every second row is shifted by half a slab.
-    footprint: size of a pixel on the surface, m; the contrast vanishes as slabs get finer than pixels. key: of the
-    slabs' brightness.
+    width, depth: of a slab along x and y; joint: width of a joint; m, above 0. Every second row is shifted by half a
+    slab. footprint: size of a pixel on the surface, m; the contrast vanishes as slabs get finer than two pixels. key:
+    of the slabs' brightness.
     """
     row = np.floor(y / depth)
     shift = (int(row) % 2) * 0.5 * width
