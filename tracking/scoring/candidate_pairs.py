@@ -1,8 +1,9 @@
 """Candidate pairs: which true and estimated rows of the same frame are similar at all, and how similar.
 
-All matching in scoring starts from `Pairs`. Inputs are two `FrameRows` and a similarity: IoU of boxes (`box_pairs`),
-distance of positions (`point_pairs`), given matrices (`matrix_pairs`) or any function (`compare`). All frames are
-processed at once. A pair of similarity 0 is never stored.
+All matching in scoring starts from `Pairs`. Inputs are two `FrameRows` (frame number and id of each person or group)
+and a similarity: IoU, intersection over union, of boxes (`box_pairs`), distance of positions (`point_pairs`), given
+matrices (`matrix_pairs`) or any function (`compare`). All frames are processed at once. A pair of similarity 0 is not
+stored, unless the function given to `compare` keeps it.
 """
 
 from __future__ import annotations
@@ -102,13 +103,14 @@ def compare(
 ) -> Pairs:
     """Returns the pairs of rows of one frame that a similarity function keeps.
 
-    true, est: R true and S estimated rows. similarity(i, j) gets row indices i (P,) of `true` and j (P,) of `est` of
-    equal frame. It returns the positions (Q,) of the pairs to keep, and their similarities (Q,), which are stored
-    unchanged. It is called once per portion of about 200 000 pairs.
+    true, est: R true and S estimated rows, sorted by frame. similarity(i, j) gets row indices i (P,) of `true` and j
+    (P,) of `est` of equal frame. It returns the positions (Q,), ascending, of the pairs to keep among these P, and
+    their similarities (Q,), which are stored unchanged. It is called once per portion of about 200 000 pairs.
 
     within = (low, high, at) limits the pairs that the function is called for: low, high (R,) belong to the true rows,
     at (S,) to the estimated ones. Every pair with low[i] <= at[j] <= high[i] is passed, and a few others close to these
-    limits. A true row with a nan or infinite limit gets no pairs. None passes all pairs of equal frame.
+    limits. A true row with a nan or infinite limit, or an estimated row with such an `at`, gets no pairs. None passes
+    all pairs of equal frame.
     """
     found = [(np.zeros(0, np.int64), np.zeros(0, np.int64), np.zeros(0))]
     for i, j in same_frame(true.frame, est.frame) if within is None else _near(true, est, *within):
@@ -147,9 +149,10 @@ def _near(a: FrameRows, b: FrameRows, low: Array, high: Array, at: Array) -> Ite
     """Yields arrays of row indices i of a and j of b of equal frame with low[i] <= at[j] <= high[i], and a few pairs
     just outside these limits.
 
-    low, high (R,): limits of the rows of a; a row with a nan or infinite limit gets no pairs. at (S,): values of the
-    rows of b. Rows of b are sorted by frame * span + at, where span exceeds the range of `at`. One binary search over
-    this axis then finds the partners of every row of a in its own frame.
+    low, high (R,): limits of the R rows of a; at (S,): values of the S rows of b. A row with a nan or infinite limit or
+    value gets no pairs. Rows of b are sorted by frame * span + at, where span exceeds the range of `at`. One binary
+    search over this axis then finds the partners of every row of a in its own frame. Pairs are in ascending order of i;
+    a portion has about 200 000.
     """
     finite = at[np.isfinite(at)]
     least, most = (float(finite.min()), float(finite.max())) if len(finite) else (0.0, 0.0)
@@ -195,7 +198,7 @@ def point_pairs(true: FrameRows, est: FrameRows, true_pos: Array, est_pos: Array
     """Returns the pairs of positions of one frame closer than `reach`, with 1 - distance / reach as similarity.
 
     true_pos (R, 2), est_pos (S, 2): x, y of each row of `true` and `est`, in the unit of `reach` (m or px). A position
-    with a nan has no pairs. A nan reach gives no pairs.
+    with a nan or infinity has no pairs. reach: above 0; nan gives no pairs.
     """
     ax, ay, bx, by = (np.ascontiguousarray(pos[:, k]) for pos in (true_pos, est_pos) for k in (0, 1))
 

@@ -27,10 +27,11 @@ MOSTLY, LOST = 0.8, 0.2
 def clear(pairs: Pairs) -> dict[str, float]:
     """Returns a dict of the CLEAR scores: MOTA, MOTP, TP, FN, FP, IDSW, MT, PT, ML, Frag; all values are floats.
 
-    Pairs of similarity 0.5 or more are matched one to one in each frame; a match of the previous frame is kept. TP, FN,
-    FP count matches, true rows without one and estimated rows without one. IDSW counts how often a true id is matched
-    to another estimated id than in its previous match. Frag counts how often a true id's matches resume after a pause.
-    MT, PT, ML count true ids matched in more than 80 %, in 20 to 80 %, in less than 20 % of their frames.
+    pairs: candidate pairs of people (or groups) of any similarity; a row is one of them in one frame, no id twice in a
+    frame. Pairs of similarity 0.5 or more are matched one to one in each frame; a match of the previous frame is kept.
+    TP, FN, FP count matches, true rows without one and estimated rows without one. IDSW counts how often a true id is
+    matched to another estimated id than in its previous match. Frag counts how often a true id's matches resume after a
+    pause. MT, PT, ML count true ids matched in more than 80 %, in 20 to 80 %, in less than 20 % of their frames.
 
     MOTA = 1 - (FN + FP + IDSW) / true rows, or 0 if either side has no rows. MOTP is the mean similarity of the
     matches, 0 without matches. The counts are 0 where there is nothing to count.
@@ -64,7 +65,8 @@ def turns(pairs: Pairs) -> Ints:
     """Returns for each frame number 0 … last how many frames up to and including it have rows on both sides, (last +
     1,).
 
-    last: the last frame with a row on either side of `pairs`; 0 if there is none.
+    pairs: candidate pairs with all true and estimated rows. last: the last frame with a row on either side; 0 if there
+    is none.
     """
     end = 1 + max((int(rows.frame[-1]) for rows in (pairs.true, pairs.est) if len(rows)), default=0)
     true, est = (np.bincount(rows.frame, minlength=end) > 0 for rows in (pairs.true, pairs.est))
@@ -74,9 +76,10 @@ def turns(pairs: Pairs) -> Ints:
 def follow(near: Pairs, turn: Ints) -> Bools:
     """Returns which of the K pairs of `near` are matched, (K,) bool, where matches of the previous frame are kept.
 
-    In each frame the matching is one to one, with all kept pairs and then the greatest total similarity. The previous
-    frame is the last one with rows on both sides. near: pairs of similarity 0.5 or more; turn: from `turns`, of all
-    pairs: the number of such frames up to each frame number.
+    In each frame the matching is one to one: first all pairs whose two ids were matched in the previous frame, then the
+    greatest total similarity. The previous frame is the last one with rows on both sides. near: the candidate pairs of
+    similarity 0.5 or more. turn: from `turns`, for each frame number the number of frames up to it with rows on both
+    sides.
     """
     i, j, frame = near.i, near.j, near.frame
     before = _before(near.links[2], turn[frame])

@@ -39,12 +39,14 @@ Similarity = Literal["boxes", "ground", "image"]
 
 
 class IncomparableError(ValueError):
-    """Raised if the truth or the tracks have people but lack the boxes or positions that are to be compared."""
+    """Raised if the truth or the tracks have people but lack the boxes or positions that are to be compared. By boxes
+    also if the truth has no boxes at all. It is a ValueError.
+    """
 
 
 @dataclass(frozen=True, eq=False)
 class Scores(Mapping[str, float]):
-    """A read-only mapping from key to score (float), with every key of the catalogue in its order.
+    """A read-only mapping from key to score (float), with every key of the catalogue in its order; KeyError for others.
 
     - by_key: the scores. nan: not labelled, not comparable, or a denominator of 0.
     - similarity: how people were compared, by "boxes" (IoU) or by positions on the "ground" or in the "image".
@@ -83,10 +85,13 @@ def evaluate(
     is nan.
 
     tracks: the tracker's `Tracks`, one per frame, in any order; of two with equal frame the later is used. similarity:
-    compares people by IoU ("boxes") or by max(0, 1 - d / 2 m) ("ground", "image"). None: boxes if both sides have them,
-    else the plane of the tracks. group_match: matches groups by IoU of their hulls ("hull") or Jaccard index of their
-    members ("members"). frames: a number n scores frames 1 … n, a range only its frames, None all frames. A frame
-    without tracks counts as empty. Tracks without groups get groups and events by the baseline rule.
+    compares people by IoU ("boxes") or by max(0, 1 - d / 2 m) ("ground", "image"), d being their distance. None: boxes
+    if both sides have them, else the plane of the tracks. group_match: matches groups by IoU of their hulls ("hull") or
+    Jaccard index of their members ("members"). frames: a number n scores frames 1 … n, a range only its frames, None
+    all frames. A frame without tracks counts as empty.
+
+    Groups and events that the tracks lack come from the baseline rule. Scores of people are nan for a tracker of whole
+    groups, scores of groups and events if no scored frame has group labels.
 
     Raises IncomparableError if boxes or positions to be compared are missing, ValueError if an id occurs twice in one
     frame, and InputError if groups must be derived in the image and `truth.px_per_m` is 0 or less.
@@ -115,7 +120,7 @@ class Scorer:
         """Returns the true groups of two or more people in all labelled frames; members are row indices of `people`.
 
         surface: "ground" (m) or "image" (px). If the truth has groups on the other surface only, their shapes do not
-        count: `comparable` is False. At least one frame must be labelled, else an error may be raised.
+        count: `comparable` is False. Raises AssertionError if the truth has groups on neither.
         """
         if surface not in self._groups:
             self._groups[surface] = true_groups(self.truth, self.labelled, self.people.rows, surface)
@@ -202,9 +207,9 @@ def labelled_frames(truth: Truth) -> Bools:
 def _in_order(tracks: Iterable[Tracks], inside: Bools) -> list[Tracks]:
     """Returns one tracker's `Tracks` sorted by frame, from frame 1 to the last chosen frame.
 
-    inside (length + 1,): which frame numbers are chosen. Frames before the last chosen one are kept even if not chosen;
-    later ones are dropped, as they must not influence the scores. Of two `Tracks` with equal frame the later in the
-    input is kept. Empty if no frame is chosen.
+    tracks: in any order. inside (length + 1,): which frame numbers are chosen. Frames before the last chosen one are
+    kept even if not chosen; later ones are dropped, as they must not influence the scores. Of two `Tracks` with equal
+    frame the later in the input is kept. Empty if no frame is chosen.
     """
     last = int(np.flatnonzero(inside)[-1]) if inside.any() else 0
     by_frame = {t.index: t for t in tracks if 1 <= t.index <= last}
@@ -212,10 +217,10 @@ def _in_order(tracks: Iterable[Tracks], inside: Bools) -> list[Tracks]:
 
 
 def plane_of(truth: Truth, tracks: Sequence[Tracks]) -> str:
-    """Returns the plane of a tracker's positions: "ground", "space" or "image".
+    """Returns the plane of one tracker's positions: "ground", "space" or "image".
 
-    It is that of the first `Tracks` with people, else of the first `Tracks`. Without any it is the truth's: "image" if
-    the truth has no positions on the ground, else "ground".
+    It is that of the first `Tracks` with people, else of the first `Tracks`. If `tracks` is empty it is the truth's:
+    "image" if the truth has no positions on the ground, else "ground".
     """
     own = "image" if truth.pos is None else "ground"
     return next((t.plane for t in tracks if len(t.id)), tracks[0].plane if tracks else own)
@@ -237,9 +242,10 @@ def usual_similarity(truth: Truth, tracks: Iterable[Tracks]) -> Similarity:
 def people_pairs(sides: ComparedSides, similarity: Similarity) -> Pairs:
     """Returns the candidate pairs of true and tracked people of one frame, with a similarity in (0, 1].
 
-    similarity: "boxes" takes the IoU; "ground" and "image" take 1 - distance / 2 m, the image by `truth.px_per_m`.
-    Without people on a side there are no pairs. Raises IncomparableError if a side has people but not the boxes or
-    positions to be compared. With "boxes" it is also raised if the truth has no boxes at all.
+    sides: both sides' people in the scored frames. similarity: "boxes" takes the IoU; "ground" and "image" take 1 -
+    distance / 2 m, the image by `truth.px_per_m` (no pairs if that is nan). Without people on a side there are no
+    pairs. Raises IncomparableError if a side has people but not the boxes or positions to be compared. With "boxes" it
+    is also raised if the truth has no boxes at all.
     """
     true, est = sides.true, sides.est
     if similarity == "boxes":
@@ -271,8 +277,8 @@ def people_scores(pairs: Pairs) -> dict[str, float]:
     """Returns the scores of HOTA, CLEAR and Identity as one dict by key.
 
     pairs: all people of both sides and their candidate pairs of any similarity in (0, 1]. CLEAR and Identity use pairs
-    of 0.5 or more. Without people on a side scores are 0, and LocA is 1. Raises ValueError if an id occurs twice in one
-    frame on a side.
+    of 0.5 or more. Without people on a side all scores are 0, except LocA, which is 1, and the counts FN and ML, or FP,
+    of the other side's people. Raises ValueError if an id occurs twice in one frame on a side.
     """
     pairs.true.require_unique_ids("truth")
     pairs.est.require_unique_ids("tracks")

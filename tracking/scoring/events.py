@@ -38,8 +38,8 @@ class EventMembers:
     unmatched: int = 0
 
     def jaccard(self, other: EventMembers) -> float:
-        """Returns common people / all members of both, between 0 and 1; unmatched members are never common. 0 if both
-        are empty.
+        """Returns common people / all members of this and `other`, between 0 and 1; unmatched members are never common.
+        0 if both are empty.
         """
         common = len(self.people & other.people)
         whole = len(self.people | other.people) + self.unmatched + other.unmatched
@@ -109,9 +109,9 @@ def match_events(
 def _similarity(true: Sequence[ComparableEvent], est: Sequence[ComparableEvent], fps: float, scale: float) -> Array:
     """Returns the similarity of N true and M estimated events, (N, M); 0 if they cannot be matched.
 
-    It is the Jaccard index of the members (0 below 0.5), or 1 - distance / 3 m if a side names no members (0 beyond 1.5
-    m). Starts more than 1 s apart give 0. Up to 0.001 is added for near starts, to decide between equals. scale: units
-    of `pos` per metre.
+    It is the Jaccard index of the members (0 below 0.5). If either event names no members, it is 1 - distance / 3 m
+    instead (0 beyond 1.5 m, or if a position is nan). Starts more than 1 s apart give 0. Up to 0.001 is added for near
+    starts, to decide between equals. fps: frames per second; scale: units of `pos` per metre.
     """
     starts = [np.array([e.start for e in side], float) for side in (true, est)]
     late = np.abs(starts[0][:, None] - starts[1][None]) / fps
@@ -148,11 +148,12 @@ def _one_to_one(
 def event_scores(matched: Sequence[MatchedEvents], fps: float) -> dict[str, float]:
     """Returns a dict of the event scores of each kind, and of merge and split together.
 
-    matched: from `match_events`. Keys: "<kind>_F1", "_precision", "_recall", "_TP", "_FP", "_FN" and "_latency" for
-    each entry of `matched`; "event_F1", "event_precision", "event_recall" and "event_latency". Event F1, precision and
-    recall are means of the values of merge and split that are not nan. Latency is the mean of (emitted - true start) /
-    fps over matched events, in s; event_latency pools the matched merges and splits. A share is nan if its denominator
-    is 0, a latency if nothing matched.
+    matched: from `match_events`, one entry per kind; fps: frames per second. Keys: "<kind>_F1", "_precision",
+    "_recall", "_TP", "_FP", "_FN" and "_latency" for each entry of `matched`; "event_F1", "event_precision",
+    "event_recall" and "event_latency". Event F1, precision and recall are means of the values of merge and split that
+    are not nan. Latency is the mean of (emitted - true start) / fps over matched events, in s, those with emitted None
+    left out; event_latency pools the matched merges and splits. A share is nan if its denominator is 0, a latency if
+    nothing matched.
     """
     out: dict[str, float] = {}
     for m in matched:
@@ -184,12 +185,13 @@ def _latencies(matched: Sequence[MatchedEvents], fps: float) -> list[float]:
 
 def lineage_scores(matched: Sequence[MatchedEvents]) -> dict[str, float]:
     """Returns a dict with lineage_accuracy and lineage_accuracy_found: shares of true merges and splits with right
-    lineage.
+    lineage (groups before and after the event).
 
     matched: from `match_events`. A matched event is right if both sides have equally many parents, each true parent has
-    a Jaccard index above 0.5 with some estimated one, and the same holds for children. lineage_accuracy divides by all
-    true merges and splits, lineage_accuracy_found by the matched ones. True events with unknown parents or children are
-    left out of both (labels that never change say nothing about lineage). nan if no event is left.
+    a Jaccard index above 0.5 with some estimated one, and the same holds for children. It is wrong if the tracker's
+    parents or children are unknown (None). lineage_accuracy divides by all true merges and splits,
+    lineage_accuracy_found by the matched ones. True events with unknown parents or children are left out of both
+    (labels that never change say nothing about lineage). nan if no event is left.
     """
     head = [m for m in matched if m.kind in HEADLINE]
     n_true = sum(event.has_lineage for m in head for event in m.true)
@@ -209,8 +211,8 @@ def _same_lineage(true: ComparableEvent, est: ComparableEvent) -> bool:
 
 
 def _same_parts(true: Sequence[EventMembers], est: Sequence[EventMembers]) -> bool:
-    """True if both sides have equally many parts, and each true part has a Jaccard index above 0.5 with some estimated
-    part.
+    """True if both sides have equally many parts (groups of members), and each true part has a Jaccard index above 0.5
+    with some estimated part. True if both have none.
     """
     return len(true) == len(est) and all(any(a.jaccard(b) > SAME_PART for b in est) for a in true)
 

@@ -1,7 +1,8 @@
 """Converts events of the truth and of a tracker into `ComparableEvent`s, so that members on both sides are true people.
 
 `true_events` converts events of the truth, `tracked_events` those that a tracker reports with members,
-`events_of_hulls` events that name no members. An event belongs to the frame in which it starts.
+`events_of_hulls` events judged by who is inside the hulls of groups, for trackers that name no members. An event
+belongs to the frame in which it starts.
 """
 
 from __future__ import annotations
@@ -151,8 +152,9 @@ def events_of_hulls(
     """Returns a tracker's events of known kinds that start in a frame f where frames[f] is true; `members` is None.
 
     without_members: if True, only events that name no members; else all. tracks: of the scored frames. groups: the
-    tracker's groups, whose members are rows of `true` (from `people_inside`). frames (length + 1,): bool by frame
-    number. fps: frames per second.
+    tracker's groups, whose members are rows of `true` (from `people_inside`). true: rows of the true people. frames
+    (length + 1,): bool by frame number. fps: frames per second. `emitted` is the frame of the `Tracks` that hold the
+    event.
 
     Parents are the people inside the hulls of the groups in `event.before`, children those inside the groups in
     `event.after`. Children are judged in the 2 s from the report on. Parents are judged in the 2 s before the event's
@@ -204,6 +206,7 @@ def _contained(groups: GroupRows, person: Ints, ids: Sequence[int], span: range)
 def _reports(tracks: Sequence[Tracks], frames: Bools) -> list[tuple[GroupEvent, int]]:
     """Returns pairs (event, frame number of the `Tracks` that hold it), whatever the event's `emitted` is.
 
-    Events of unknown kinds, or that start in a frame f where frames[f] is false, are left out.
+    tracks: one tracker's; the pairs keep their order. Events of unknown kinds, or that start in a frame f where
+    frames[f] is false or outside `frames`, are left out.
     """
     return [(event, t.index) for t in tracks for event in t.events if _counts(event, frames)]

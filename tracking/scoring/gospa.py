@@ -6,8 +6,9 @@ one-to-one assignments theta of some x to some y:
 
     d(x, y)^p = min over theta of  sum over (i, j) in theta of |x_i - y_j|^p  +  c^p / 2 (|x| + |y| - 2 |theta|)
 
-c is the cut-off distance. A pair farther apart than c counts as one missed person and one false track. The parts are
-localisation (the sum over pairs), missed (c^p / 2 per missed person) and false (c^p / 2 per false track).
+c is the cut-off distance, p the exponent; |x|, |y| and |theta| are the numbers of positions and of assigned pairs. A
+pair farther apart than c counts as one missed person and one false track. The parts are localisation (the sum over
+pairs), missed (c^p / 2 per missed person) and false (c^p / 2 per false track).
 """
 
 from __future__ import annotations
@@ -25,10 +26,10 @@ def gospa(pairs: Pairs, cutoff: float, frames: int, power: float = POWER) -> dic
     """Returns a dict of GOSPA, GOSPA_localisation, GOSPA_missed and GOSPA_false over a sequence, in the unit of
     `cutoff`.
 
-    pairs: from `point_pairs` with reach = cutoff. cutoff: distance (m or px) from which a pair counts as one missed
-    person and one false track. frames: number of scored frames, empty ones included. power: the exponent p. Each value
-    is the p-th root of a mean over frames, 0 for a perfect tracker. So GOSPA^p = localisation^p + missed^p + false^p,
-    and p = 2 gives root mean squares. All values are nan if frames = 0.
+    pairs: true and estimated people of the scored frames, from `point_pairs` with reach = cutoff. cutoff: distance (m
+    or px) from which a pair counts as one missed person and one false track. frames: number of scored frames, empty
+    ones included. power: the exponent p. Each value is the p-th root of a mean over frames, 0 for a perfect tracker. So
+    GOSPA^p = localisation^p + missed^p + false^p, and p = 2 gives root mean squares. All values are nan if frames = 0.
     """
     if frames == 0:
         return dict.fromkeys(("GOSPA", "GOSPA_localisation", "GOSPA_missed", "GOSPA_false"), float("nan"))

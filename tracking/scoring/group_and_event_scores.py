@@ -1,4 +1,8 @@
-"""Coordinates the scores that need labelled groups: groups (strict and core), pairwise membership, events, lineage."""
+"""Coordinates the scores that need labelled groups: groups, pairwise membership, events, lineage.
+
+Scores of groups come twice: strict (all labelled frames) and core (without frames up to 1 s from a true merge or
+split). Inputs are both sides' people and groups in the scored frames; the result is one dict of scores.
+"""
 
 from __future__ import annotations
 
@@ -36,7 +40,8 @@ class ComparedSides:
     """The truth's and one tracker's data in the scored frames.
 
     - truth: all of it.
-    - tracks: those of all scored frames, labelled or not (an event may be reported in an unlabelled one), sorted.
+    - tracks: one `Tracks` per scored frame, labelled or not (an event may be reported in an unlabelled one), sorted by
+      frame.
     - frames (length + 1,): bool by frame number: scored, and with labelled groups.
     - true, est: the R true and S tracked people in the scored frames.
     - mapping (S,): row of `true` that each row of `est` is mapped to, -1 none.
@@ -110,11 +115,11 @@ def group_and_event_scores(sides: ComparedSides, true: TrueGroups, by: GroupMatc
 def tracked_groups(sides: ComparedSides) -> TrackedGroups:
     """Returns the tracker's groups in labelled frames, and which of them are scored.
 
-    If the tracker names members, groups of two or more members are scored. Otherwise, and for a tracker of whole
-    groups, the true people inside the hull or at most 0.3 m from it are the members. A hull with one person inside is
-    not scored, as a person alone is no group. A hull with nobody inside is scored, as a false group. If the truth has
-    no positions on the surface, the members named (if any) stay. `Tracks` whose `groups` is None count as having no
-    groups.
+    sides: both sides' people in the scored frames. If the tracker names members, groups of two or more members are
+    scored. Otherwise, and for a tracker of whole groups, the true people inside the hull or at most 0.3 m from it are
+    the members. A hull with one person inside is not scored, as a person alone is no group. A hull with nobody inside
+    is scored, as a false group. If the truth has no positions on the surface, the members named (if any) stay. `Tracks`
+    whose `groups` is None count as having no groups.
     """
     tracks = [t for t in sides.tracks if sides.frames[t.index]]
     frames = np.array([t.index for t in tracks], np.int64)
@@ -153,8 +158,8 @@ def strict_and_core(sides: ComparedSides, compared: GroupComparison) -> dict[str
 
 
 def near_changes(truth: Truth) -> Bools:
-    """Returns which frame numbers 0 … length are at most 1 s from the start of a true merge or split, (length + 1,)
-    bool.
+    """Returns which frame numbers 0 … length of a truth are at most 1 s from the start of a true merge or split,
+    (length + 1,) bool.
 
     `form` and `dissolve` count as merge and split. Without events no frame is near one.
     """
@@ -166,7 +171,8 @@ def near_changes(truth: Truth) -> Bools:
 
 
 def _event_scores(sides: ComparedSides, tracked: TrackedGroups) -> dict[str, float]:
-    """Returns a dict of the scores of events ("merge_F1" …) and of lineage. The truth must have events.
+    """Returns a dict of the scores of events ("merge_F1" …) and of lineage. Fails an assertion if the truth has no
+    events.
 
     sides: both sides' people; tracked: the tracker's groups. For a tracker of whole groups, scores of crossings and
     queues are nan unless it reports events of this kind itself: they are derived from people otherwise.

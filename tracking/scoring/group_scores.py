@@ -54,8 +54,9 @@ class SharedMembers:
 def shared_members(true: GroupRows, est: GroupRows, person: Ints, people: int) -> SharedMembers:
     """Returns the numbers of common members of all true and estimated groups.
 
-    true.member: rows of true people. person (K,): row of the true person that each membership of `est` is mapped to, -1
-    none (never common). people: number of rows of true people. A true person counts for one true group only.
+    true.member: rows of true people. person (K,): row of the true person that each of the K memberships of `est` is
+    mapped to, -1 none (never common). people: number of rows of true people. A true person counts for one true group
+    only, the last that lists the person.
     """
     i = group_of_person(true, people)[person]  # -1 selects the last element, which is -1
     known = i >= 0
@@ -87,8 +88,8 @@ def hull_iou(true: Sequence[Array], est: Sequence[Array]) -> Callable[[Ints, Int
 
 
 def hull_pairs(true: GroupRows, est: GroupRows) -> Pairs:
-    """Returns the pairs of true and estimated groups of one frame whose hulls overlap; similarity: their IoU. A group
-    without a hull has no pairs.
+    """Returns the pairs of true and estimated groups of one frame whose hulls (convex polygons) overlap; similarity:
+    the intersection over union of the hulls. A group without a hull has no pairs.
     """
     iou = hull_iou(true.hull, est.hull)
 
@@ -152,7 +153,7 @@ def compare_groups(true: GroupRows, est: GroupRows, shared: SharedMembers, by: G
     """Returns both sides' groups with their matchings, by IoU of hulls ("hull") or Jaccard index of members
     ("members").
 
-    shared: numbers of common people, from `shared_members`.
+    true, est: groups in frames. shared: numbers of their common people, from `shared_members`.
     """
     pairs = hull_pairs(true, est) if by == "hull" else member_pairs(true, est, shared)
     chosen, found = (matched_groups(true.pos, est.pos, pairs, least) for least in (0.0, FOUND))
@@ -181,12 +182,13 @@ def nearest_distances(true: GroupRows, est: GroupRows) -> Array:
 
 
 def group_scores(compared: GroupComparison, frames: Bools) -> dict[str, float]:
-    """Returns a dict of the group scores over the frames f where frames[f] is true; keys as in the catalogue without
-    "group_".
+    """Returns a dict of the group scores over the frames f where frames[f] is true.
 
-    compared: both sides' groups with their matchings. frames (length + 1,): bool by frame number. MOTP and errors are
-    in m or px (MSE squared). A score with a denominator of 0, or a mean of nothing, is nan. The keys of HOTA are
-    missing if neither side has a group in these frames.
+    Keys: 1-FP, 1-FN, 1-FP_frames, 1-FN_frames, GDSR, GDSR2, MOTP, MSE, MOTP_ungated, MOTA, IDSW, TP, FP, FN, F1,
+    precision, recall, the eight of `hota`, size_error, extent_error. The catalogue explains them with "group_" in
+    front. compared: both sides' groups with their matchings. frames (length + 1,): bool by frame number. MOTP,
+    MOTP_ungated and extent_error are in m or px, MSE squared, size_error in people. A score with a denominator of 0, or
+    a mean of nothing, is nan. The keys of `hota` are missing if neither side has a group in these frames.
     """
     true, est, chosen = compared.true, compared.est, compared.chosen
     kept = frames[true.rows.frame[chosen.i]]
@@ -233,7 +235,7 @@ def _correct(compared: GroupComparison, i: Ints, j: Ints) -> tuple[Bools, Bools]
     GDSR2.
 
     GDSR: at least 60 % of the true group's members are in the estimated group. GDSR2: in addition, at least 60 % of the
-    estimated members are in the true group.
+    estimated members are in the true group. compared: both sides' groups, whose row indices i and j are.
     """
     common = compared.shared.of(i, j)
     part, whole = CORRECT

@@ -2,8 +2,9 @@
 
 Luiten et al. (2021), "HOTA: A Higher Order Metric for Evaluating Multi-object Tracking". One matching serves all
 thresholds alpha. In each frame it maximises the sum of A(i, j) s(i, j), where s is the similarity of two rows and A the
-alignment of their two ids over the sequence. Matches with s >= alpha count as true positives (TP). For a match c of
-true id i and estimated id j, TPA(c) is the number of matches of these two ids, n_i and m_j their numbers of frames:
+alignment of their two ids over the sequence. Matches with s >= alpha count as true positives (TP). Other true rows are
+false negatives (FN), other estimated rows false positives (FP). For a match c of true id i and estimated id j, TPA(c)
+is the number of matches of these two ids, n_i and m_j their numbers of frames:
 
     DetA = TP / (TP + FN + FP),  AssA = mean over c of TPA(c) / (n_i + m_j - TPA(c)),  HOTA = sqrt(DetA AssA)
 """
@@ -20,11 +21,12 @@ ALPHAS = np.arange(0.05, 0.99, 0.05)
 
 
 def hota(pairs: Pairs) -> dict[str, float]:
-    """Returns a dict of HOTA, DetA, AssA, DetRe, DetPr, AssRe, AssPr and LocA, each the mean over the 19 thresholds
-    `ALPHAS`.
+    """Returns a dict of HOTA, DetA, AssA, DetRe, DetPr, AssRe, AssPr and LocA, each the mean over the 19 similarity
+    thresholds `ALPHAS` = 0.05, 0.10 … 0.95.
 
-    pairs: candidate pairs of true and estimated rows of any similarity above 0, no id twice in a frame. At a threshold
-    without matches LocA is 1 and all others are 0; so all are 0 and LocA is 1 if a side is empty.
+    Det: detection, Ass: association, Loc: localisation; A: accuracy, Re: recall, Pr: precision; all between 0 and 1.
+    pairs: candidate pairs of true and estimated rows of any similarity above 0, no id twice in a frame (not checked).
+    At a threshold without matches LocA is 1 and all others are 0; so all are 0 and LocA is 1 if a side is empty.
     """
     return {name: float(curve.mean()) for name, curve in curves(pairs).items()}
 
@@ -33,7 +35,8 @@ def curves(pairs: Pairs) -> dict[str, Array]:
     """Returns a dict of HOTA, DetA, AssA, DetRe, DetPr, AssRe, AssPr and LocA, each an array (19,) over the similarity
     thresholds `ALPHAS` = 0.05, 0.10 … 0.95.
 
-    pairs: candidate pairs of any similarity above 0. At a threshold without matches LocA is 1 and all others are 0.
+    Det: detection, Ass: association, Loc: localisation; A: accuracy, Re: recall, Pr: precision. pairs: candidate pairs
+    of any similarity above 0, no id twice in a frame. At a threshold without matches LocA is 1 and all others are 0.
     """
     true_id, est_id, link = pairs.links
     n = np.bincount(pairs.true_ids[1], minlength=len(pairs.true_ids[0]))[true_id]  # n_i of each link (pair of ids)

@@ -94,8 +94,9 @@ def _settle(i: Ints, j: Ints, weight: Array, strict: bool) -> tuple[Bools, Ints]
 def _settled(i: Ints, j: Ints, w: Array, strict: bool) -> Bools:
     """Returns which of K pairs one pass settles, (K,) bool; no two settled pairs share i or j.
 
-    i, j (K,): row indices of both sides; w (K,): weights. The weight of a settled pair is at least (strict: by a factor
-    above 1 more than) the sum of the best other weight of its i and the best other weight of its j.
+    i, j (K,): row indices of both sides; w (K,): weights above 0. The weight of a settled pair is at least the sum of
+    the best other weight of its i and the best other weight of its j. With `strict` it exceeds (1 + 1e-9) times this
+    sum. Without, of several such pairs of one i or one j only the first is settled.
     """
     best_i, rival_i = _leaders(i, w)
     best_j, rival_j = _leaders(j, w)

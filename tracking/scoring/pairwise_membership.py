@@ -14,10 +14,12 @@ from tracking.scoring.rows import FrameRows
 def pairwise_scores(true: GroupRows, est: GroupRows, person: Ints) -> dict[str, float]:
     """Returns a dict of pairwise_F1, pairwise_precision and pairwise_recall over pairs of people in one group.
 
-    Pairs of all frames are counted together. true.member: rows of true people. person (K,): row of the true person that
-    each membership of `est` is mapped to, -1 none. An estimated pair is right if both persons are in one true group. An
-    estimated pair with an unmapped member is false. A true pair with a person whom no track is mapped to is missed. A
-    pair inside several estimated groups counts once. A score whose denominator is 0 is nan.
+    Pairs of all frames are counted together. true, est: true and estimated groups in frames; true.member holds row
+    indices of the true people. person (K,): row of the true person that each membership of `est` is mapped to, -1 none.
+
+    An estimated pair is right if both persons are in one true group. An estimated pair with an unmapped member, or with
+    both members mapped to one person, is false. A true pair with a person whom no track is mapped to is missed. A pair
+    inside several estimated groups counts once. A score whose denominator is 0 is nan.
     """
     n_true = _pairs_in(true)
     group = group_of_person(true, int(max(true.member.max(initial=-1), person.max(initial=-1))) + 1)

@@ -63,17 +63,17 @@ class PersonRows:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class GroupRows:
-    """G rows, one per group and frame, sorted by frame, and K memberships.
+    """G rows, one per group and frame, sorted by frame, and K memberships; len() gives G.
 
     - rows: frame number and id of each group row.
     - pos (G, 2): centre x, y. nan unknown.
     - size (G,): number of people as reported, nan unknown.
-    - extent (G, 2, 2): covariance of the shape, nan unknown.
-    - hull: G polygons (V, 2), counter-clockwise; (0, 2) unknown.
+    - extent (G, 2, 2): covariance of the members' positions, nan unknown.
+    - hull: G convex polygons (V, 2) round the members, counter-clockwise; (0, 2) unknown.
     - of (K,), member (K,): membership k says that the person in row member[k] (-1: not among the people) belongs to the
       group in row of[k].
 
-    pos, extent and hull are in m on the ground (extent m²), in px in the image.
+    pos, extent and hull are in m on the ground (extent m²), in px in the image (extent px²).
     """
 
     rows: FrameRows
@@ -89,7 +89,9 @@ class GroupRows:
 
     @property
     def count(self) -> Ints:
-        """Number of members of each of the G groups, (G,) int64; 0 for a group without members."""
+        """Number of memberships of each of the G groups, (G,) int64; 0 for a group without members. A member who is not
+        among the people (-1) counts.
+        """
         return np.bincount(self.of, minlength=len(self)).astype(np.int64)
 
     def keep(self, mask: Bools) -> GroupRows:
@@ -108,7 +110,7 @@ def true_people(truth: Truth, frames: Bools) -> PersonRows:
     """Returns the truth's people in the frames f where frames[f] is true, sorted by frame; frames (length + 1,): bool
     by frame number.
 
-    pos is in m on the ground; pos, vel or box is None if the truth has none.
+    pos is in m and vel in m/s on the ground, box in px; pos, vel or box is None if the truth has none.
     """
     every = PersonRows(FrameRows(truth.frame, truth.id), truth.group, truth.pos, truth.vel, truth.box)
     return every.keep(frames[truth.frame])
@@ -136,8 +138,9 @@ def tracked_people(tracks: Sequence[Tracks]) -> PersonRows:
 def group_rows(frames: Ints, groups: Sequence[Groups], people: FrameRows) -> GroupRows:
     """Returns the groups of F frames as rows and memberships.
 
-    frames (F,): frame numbers, ascending; groups: one `Groups` per frame. people: rows in which members are looked up
-    by frame and id. A member without a row there gets member -1. Groups that list no members have no memberships.
+    frames (F,): frame numbers, ascending; groups: one `Groups` per frame. people: rows (frame, id) in which members are
+    looked up; a membership holds the index of the member's row. A member without a row in this frame gets index -1.
+    Groups that list no members have no memberships.
     """
     count = [len(g.id) for g in groups]
     none = np.zeros(0, np.int64)
@@ -216,9 +219,10 @@ def bare_groups(rows: FrameRows, pos: Array, hull: tuple[Array, ...]) -> GroupRo
 def people_inside(groups: GroupRows, people: FrameRows, positions: Array, scale: float) -> GroupRows:
     """Returns the groups with new members: the people of the same frame inside the hull or at most 0.3 m from it.
 
-    `member` then holds row indices of `people`; former members are dropped. positions (R, 2): x, y of `people`, in the
-    unit of the hulls. scale: this unit per metre. One person may become a member of several groups. A group without a
-    hull, and a person whose position is nan, is in no membership.
+    groups: their hulls are in m or px. `member` of the result holds row indices of `people`; former members are
+    dropped. positions (R, 2): x, y of the R rows of `people`, in the unit of the hulls. scale: units of the hulls per
+    metre; nan makes nobody a member. One person may become a member of several groups. A group without a hull, and a
+    person whose position is nan, is in no membership.
     """
     hulls, points = pack(groups.hull), pack_padded(positions[:, None])
     low, high = hulls.box[:, :2] - INSIDE * scale, hulls.box[:, 2:] + INSIDE * scale

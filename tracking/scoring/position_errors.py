@@ -1,7 +1,8 @@
 """Errors of positions, velocities and group extents: RMSE of mapped people, GOSPA, Wasserstein distance of extents.
 
-RMSE counts mapped people only. It rewards a tracker that drops difficult people, so read it together with GOSPA, which
-also counts missed people and false tracks.
+RMSE, the root mean square error, counts only people of the tracker that are mapped (matched one to one) to true people.
+It rewards a tracker that drops difficult people. So read it together with GOSPA, a distance between sets of positions
+that also counts missed people and false tracks.
 """
 
 from __future__ import annotations
@@ -19,13 +20,16 @@ REACH = 2.0  # m: distance from which the similarity of two positions is 0; also
 def position_scores(
     true: PersonRows, est: PersonRows, mapping: Ints, surface: Surface, plane: str, scale: float, frames: int
 ) -> dict[str, float]:
-    """Returns a dict of RMSE_pos, RMSE_vel, GOSPA, GOSPA_localisation, GOSPA_missed, GOSPA_false.
+    """Returns a dict: RMSE_pos, RMSE_vel (root mean square errors of mapped people), GOSPA and its three parts
+    GOSPA_localisation, GOSPA_missed and GOSPA_false.
 
-    Lengths are in m on the ground or px in the image, RMSE_vel in m/s. mapping (S,): row of `true` of each row of
-    `est`, -1 none. surface: "ground" or "image", where positions are compared. plane: of the tracks' positions. scale:
-    units of the surface per metre. frames: number of scored frames. RMSE_vel is nan in the image and where a side has
-    no velocities. GOSPA's cut-off is 2 m; its scores are nan if frames is 0. The result is empty if one side has no
-    positions on the surface, or if the scale is not finite.
+    true, est: the R true and S tracked people in frames. mapping (S,): index of the row of `true` that each row of
+    `est` is mapped to, -1 none. surface: "ground" or "image", where positions are compared. plane: of `est.pos`,
+    "ground", "space" or "image". scale: units of the surface per metre. frames: number of scored frames.
+
+    Lengths are in m on the ground or px in the image, RMSE_vel in m/s. RMSE_vel is nan in the image and where a side
+    has no velocities; both RMSE are nan without mapped people. GOSPA's cut-off distance is 2 m; its four values are nan
+    if frames is 0. The result is empty if one side has no positions on the surface, or if the scale is not finite.
     """
     true_pos, est_pos = true.positions_on(surface, "ground"), est.positions_on(surface, plane)
     if true_pos is None or est_pos is None or not np.isfinite(scale):
@@ -38,11 +42,11 @@ def position_scores(
 def people_errors(
     mapping: Ints, true_pos: Array, est_pos: Array, true_vel: Array | None = None, est_vel: Array | None = None
 ) -> dict[str, float]:
-    """Returns a dict of RMSE_pos and RMSE_vel over mapped people, in the units of the inputs.
+    """Returns a dict of RMSE_pos and RMSE_vel, root mean square errors over mapped people, in the units of the inputs.
 
-    mapping (S,): true row of each estimated row, -1 none. true_pos, true_vel (R, 2) and est_pos, est_vel (S, 2): x, y
-    of one plane, in one unit. Rows with a nan are left out. A score is nan if no mapped person has both values;
-    RMSE_vel also if a velocity array is None.
+    mapping (S,): index of the true row that each estimated row is mapped to, -1 none. true_pos, true_vel (R, 2) and
+    est_pos, est_vel (S, 2): x, y of one plane, in one unit. Rows with a nan or infinity are left out. A score is nan if
+    no mapped person has both values; RMSE_vel also if a velocity array is None.
     """
     j = np.flatnonzero(mapping >= 0)
     i = mapping[j]
@@ -66,13 +70,13 @@ def root_mean_square(errors: Array) -> float:
 def gaussian_wasserstein(pos: Array, extent: Array, other_pos: Array, other_extent: Array) -> Array:
     """Returns the 2-Wasserstein distances (K,) of K pairs of two-dimensional Gaussians, nan where an input is nan.
 
-    Means pos, other_pos (K, 2), covariances extent, other_extent (K, 2, 2), symmetric and without negative eigenvalues.
-    The distance has the unit of the means. Givens & Shortt (1984):
+    Means pos, other_pos (K, 2), covariances extent, other_extent (K, 2, 2), symmetric and without negative eigenvalues,
+    in the squared unit of the means. The distance has the unit of the means. Givens & Shortt (1984):
 
         d^2 = |m1 - m2|^2 + tr(S1 + S2 - 2 (S1^1/2 S2 S1^1/2)^1/2)
 
-    with means m and covariances S. A symmetric 2 x 2 matrix M >= 0 has tr M^1/2 = (tr M + 2 (det M)^1/2)^1/2. Here tr M
-    = tr(S1 S2) and det M = det S1 det S2.
+    with means m, covariances S and the trace tr. A symmetric 2 x 2 matrix M >= 0 has tr M^1/2 = (tr M + 2 (det
+    M)^1/2)^1/2. Here M = S1^1/2 S2 S1^1/2, with tr M = tr(S1 S2) and det M = det S1 det S2.
     """
     inner = np.einsum("kab,kba->k", extent, other_extent)
     det = np.maximum(_det(extent), 0) * np.maximum(_det(other_extent), 0)

@@ -33,7 +33,11 @@ class FrameRows:
         return FrameRows(self.frame[mask], self.id[mask])
 
     def require_unique_ids(self, side: str) -> None:
-        """Raises ValueError if an id occurs twice in one frame; `side` ("truth" or "tracks") begins the message."""
+        """Raises ValueError if an id occurs twice in one frame, else returns None.
+
+        side: "truth" or "tracks", begins the message. The message names the first such frame, and in it the lowest such
+        id.
+        """
         frame, number = self.frame, numbered(self.id)[1]
         key = np.sort(frame * (int(number.max()) + 1 if len(number) else 1) + number)
         if (key[1:] == key[:-1]).any():
@@ -80,10 +84,11 @@ def find_rows(rows: FrameRows, wanted: FrameRows) -> Ints:
 
 
 class RowLookup:
-    """Finds the row of one id that is last before, next after or nearest to a frame, by single lookups.
+    """Finds the row of one id that is last up to a frame, first from a frame on, or nearest to it, by single lookups.
 
     State, as Python lists, because single lookups in lists are faster than in arrays: row, the row indices sorted by id
-    and frame; frame, their frame numbers; span, the range (low, high) that each id occupies in both lists.
+    and frame; frame, their frame numbers; span, a dict from id to the range (low, high), high excluded, that it
+    occupies in both lists.
     """
 
     def __init__(self, rows: FrameRows, only: Bools | None = None) -> None:
@@ -98,22 +103,30 @@ class RowLookup:
         self.span = dict(zip(ids.tolist(), pairwise(cuts), strict=True))
 
     def last(self, id: int, frame: int, reach: int) -> int:
-        """Returns the index of the id's row with the latest frame in [frame - reach, frame]; -1 if there is none."""
+        """Returns the index, in the rows given at creation, of the id's row with the latest frame in [frame - reach,
+        frame].
+
+        -1 if there is none or the id is unknown. reach: number of frames.
+        """
         low, high = self.span.get(id, NO_ROWS)
         at = bisect_right(self.frame, frame, low, high) - 1
         return self.row[at] if at >= low and frame - self.frame[at] <= reach else -1
 
     def next(self, id: int, frame: int, reach: int) -> int:
-        """Returns the index of the id's row with the earliest frame in [frame, frame + reach]; -1 if there is none."""
+        """Returns the index, in the rows given at creation, of the id's row with the earliest frame in [frame, frame +
+        reach].
+
+        -1 if there is none or the id is unknown. reach: number of frames.
+        """
         low, high = self.span.get(id, NO_ROWS)
         at = bisect_left(self.frame, frame, low, high)
         return self.row[at] if at < high and self.frame[at] - frame <= reach else -1
 
     def nearest(self, id: int, frame: int, reach: int) -> int:
-        """Returns the index of the id's row nearest to `frame`, at most `reach` frames before or after; -1 if there is
-        none.
+        """Returns the index, in the rows given at creation, of the id's row nearest to `frame`, at most `reach` frames
+        before or after.
 
-        Of two equally near rows the earlier one is returned.
+        -1 if there is none or the id is unknown. Of two equally near rows the earlier one is returned.
         """
         low, high = self.span.get(id, NO_ROWS)
         at = bisect_left(self.frame, frame, low, high)

@@ -32,23 +32,23 @@ def score_arrays(
     """Returns every score of the catalogue for a truth and tracks given as tables of columns, one row per person and
     frame.
 
-    A table maps column names to arrays of R rows, in any order: frame (R,), whole numbers from 1; id (R,), whole
-    numbers; pos (R, 2), x, y on the ground in m; box (R, 4): left, top, width, height in px; group (R,), group id, -1
-    alone. frame, id and one of pos and box are required. Groups are compared on the ground if both tables have pos,
-    else in the image. An empty table fits both.
+    A table is a mapping from column names to arrays of R rows, in any order: frame (R,), whole numbers from 1; id (R,),
+    whole numbers; pos (R, 2), x, y on the ground in m; box (R, 4): left, top, width, height in px; group (R,), group
+    id, -1 alone. frame, id and one of pos and box are required. Groups are compared on the ground if both tables have
+    pos, else in the image. A table whose columns have 0 rows fits both.
 
     Without a group column in the truth only people are scored. Without one in the tracks they get groups by the
-    baseline rule. Merges, splits, crossings and queues of both sides are derived from groups and positions. A score
-    that cannot be computed is nan.
+    baseline rule. Events of both sides (merges, splits, crossings, queues …) are derived from groups and positions. A
+    score that cannot be computed is nan.
 
     fps: frames per second. px_per_m: pixels per metre, for boxes only; None takes the median height of the true boxes
-    for 1.7 m. similarity: compares people by "boxes", "ground" or "image"; None: by boxes if both have them.
-    group_match: matches groups by "hull" or "members".
+    for 1.7 m. similarity: compares people by "boxes", "ground" or "image"; None: by boxes if both have them, else by
+    positions. group_match: matches groups by "hull" or "members".
 
-    Raises ValueError if a column is unknown, missing, of a wrong shape or not finite, if ids, frames or groups are not
-    whole, if a frame is below 1, if fps is not above 0, if both tables lack a common kind of position or the one of
-    `similarity`, or if an id occurs twice in one frame. Raises InputError if groups must be derived in the image and
-    px_per_m is not above 0, or unknown because there are no true boxes.
+    Raises ValueError if a column is unknown, missing, of a wrong shape or not finite, if columns differ in length, if
+    ids, frames or groups are not whole, if a frame is below 1, if fps is not a finite number above 0, if both tables
+    lack a common kind of position or the one of `similarity`, or if an id occurs twice in one frame. Raises InputError
+    if groups must be derived in the image and px_per_m is not above 0, or unknown because there are no true boxes.
     """
     if not (np.isfinite(fps) and fps > 0):
         raise ValueError(f"fps: got {fps}, expected a number above 0")
@@ -64,10 +64,12 @@ def score_arrays(
 
 
 def _table(columns: Mapping[str, ArrayLike], side: str) -> Table:
-    """Returns a dict of all columns (`COLUMNS`) as arrays, rows sorted by frame, then id; a missing column is None.
+    """Returns a dict of all columns (frame, id, pos, box, group) as arrays, rows sorted by frame, then id; a missing
+    column is None.
 
-    side ("truth" or "tracks") begins the error messages. Raises ValueError if a column is unknown, missing or invalid,
-    if the columns differ in length, or if a frame is below 1.
+    columns: as given by the user. side ("truth" or "tracks") begins the error messages. Raises ValueError if a column
+    is unknown, missing or invalid, if frame, id, or both pos and box are missing, if the columns differ in length, or
+    if a frame is below 1.
     """
     for name in columns:
         if name not in COLUMNS:
@@ -89,8 +91,9 @@ def _column(given: ArrayLike, name: str, side: str) -> Any:
     """Returns one column as float64 (pos, box) or int64 (frame, id, group); empty input gives 0 rows of the right
     shape.
 
-    name: of the column; side ("truth" or "tracks") begins the error messages. Raises ValueError if the shape is wrong,
-    a value is not finite, or a frame, id or group is not whole.
+    given: the user's values; name: of the column; side ("truth" or "tracks") begins the error messages. Raises
+    ValueError if the shape is wrong, a value is not finite, or a frame, id or group is not whole. Raises TypeError for
+    values that are no numbers.
     """
     values, shape = np.asarray(given), COLUMNS[name]
     values = values if values.size else values.reshape(0, *shape)
@@ -107,17 +110,20 @@ def _column(given: ArrayLike, name: str, side: str) -> Any:
 
 
 def _scale(box: Any) -> float:
-    """Returns pixels per metre: the median height (px) of the boxes (R, 4) ltwh divided by 1.7 m; nan if box is None or
-    empty.
+    """Returns pixels per metre: the median height of the boxes divided by 1.7 m; nan if box is None or empty.
+
+    box (R, 4): left, top, width, height in px.
     """
     return float("nan") if box is None or not len(box) else float(np.median(box[:, 3])) / PERSON_HEIGHT
 
 
 def _tracks(table: Table, length: int, fps: float, px_per_m: float, plane: Plane) -> list[Tracks]:
-    """Returns one `Tracks` per frame 1 … length, with velocities and covariances nan.
+    """Returns one `Tracks` of people per frame 1 … length, with velocities and covariances nan and scores 1; [] if
+    length is 0.
 
-    table: checked columns, sorted by frame; plane: "ground" takes pos, "image" the centres of the boxes. With a group
-    column groups and events are derived from it. Then InputError is raised if the plane is "image" and px_per_m is not
+    table: checked columns, sorted by frame; fps: frames per second; plane: "ground" takes pos, "image" the centres of
+    the boxes. With a group column groups and events are derived from it, and px_per_m (px per metre) scales image
+    positions. Then InputError is raised if the plane is "image", there are rows and px_per_m is not a finite number
     above 0.
     """
     box, group, rows = table["box"], table["group"], len(table["frame"])
@@ -141,8 +147,9 @@ def _truth(table: Table, length: int, fps: float, px_per_m: float, plane: Plane)
     """Returns the rows of the table as a truth of frames 1 … length; all frames are labelled if there is a group
     column, else none.
 
-    With a group column groups (on the ground or in the image, by `plane`) and events are derived from it. Then
-    InputError is raised if the plane is "image" and px_per_m is not above 0.
+    table: checked columns, sorted by frame; fps: frames per second; px_per_m: px per metre. With a group column groups
+    (on the ground or in the image, by `plane`) and events are derived from it. Then InputError is raised if the plane
+    is "image", there are rows and px_per_m is not a finite number above 0.
     """
     frame, group, rows = table["frame"], table["group"], len(table["frame"])
     truth = Truth(
