@@ -1,7 +1,9 @@
 """Fits the errors of detected boxes: mean and standard deviation, growth with occlusion, tails, and memory over time.
 
-Errors are the four of `sim.detector.box_noise.box_errors`: middle, foot and top in box heights, and the logarithm of
-the width. Their standard deviation is sd (1 + occluded (1 - visibility)).
+Input: recordings whose detections are matched to labelled people. Errors are the four of
+`sim.detector.box_noise.box_errors`: of a box's middle (to the right), foot and top (downwards), in heights of the
+labelled box, and the logarithm of detected over labelled width. Their standard deviation is sd (1 + occluded (1 -
+visibility)): sd that of a person in full view, occluded its growth with the hidden share, visibility the visible share.
 """
 
 from __future__ import annotations
@@ -30,10 +32,10 @@ class ErrorSpread:
     """A model of the four errors of a detected box: mean + sd (1 + occluded (1 - visibility)) n, n random with variance
     1.
 
-    - mean (4,), sd (4,): of the errors middle, foot, top (box heights) and logarithm of the width, for a visible
-      person; sd is a standard deviation.
-    - occluded: growth of the standard deviation with the hidden share, 0 or more.
-    - likelihood: log likelihood of the data, up to a constant.
+    - mean (4,): mean error of middle, foot, top (box heights) and logarithm of the width, the same at any visibility.
+    - sd (4,): standard deviation of the same errors for a person in full view (visibility 1).
+    - occluded: growth of the standard deviation with the hidden share 1 - visibility, 0 or more.
+    - likelihood: log likelihood of the data the model was fitted to, up to a constant; 0 without data.
     """
 
     mean: Array
@@ -45,13 +47,14 @@ class ErrorSpread:
 def fit_box_noise(recordings: Sequence[MatchedRecording]) -> tuple[Literal["visible", "amodal"], BoxNoise]:
     """Returns "visible" or "amodal", and the errors of the detected boxes against boxes of this kind.
 
-    "visible": detected boxes enclose the visible part of a person; "amodal": the whole person. The errors are middle,
-    foot and top in box heights and the logarithm of the width, each with (mean, standard deviation). Further fields:
-    `occluded` (growth with the hidden share), `tails` (excess kurtosis), `memory` (parts that persist over time, None
-    if there are none).
+    "visible": detected boxes enclose the visible part of a person; "amodal": the whole person. The errors across
+    (middle), foot and top are in box heights, width is the logarithm of the width; each is (mean, standard deviation),
+    rounded to 4 digits. Further fields: `occluded` (growth of the standard deviation with the hidden share), `tails`
+    (excess kurtosis, 0 to 20), `memory` (parts that persist over time, None if there are none).
 
-    recordings: at least one, with labelled boxes. Without detected rows that are at least a quarter visible all errors
-    are 0. Raises ValueError if there is no recording.
+    Detected rows (people in frames) less than a quarter visible count for tails and memory only. Without other detected
+    rows all means, standard deviations and `occluded` are 0, and `memory` is None. recordings: matched. Raises
+    ValueError if there is no recording, AssertionError if one has no labelled boxes.
     """
     kind: Literal["visible", "amodal"] = "visible" if _of_visible_part(recordings) else "amodal"
     best = _fit_spread(recordings, kind)
@@ -73,10 +76,10 @@ def fit_box_noise(recordings: Sequence[MatchedRecording]) -> tuple[Literal["visi
 
 
 def _tails(z: Array) -> float:
-    """Returns the excess kurtosis of `TAILS` that is likeliest for Student-t errors of variance 1; 0 means normal
-    errors.
+    """Returns the excess kurtosis, out of the 12 values TAILS (0 to 20), that is likeliest for Student-t errors of
+    variance 1; 0 means normal errors.
 
-    z: standardised errors, of any shape, without nan. Of equals the smallest; 0 without errors.
+    z: standardised errors, of any shape, without nan. Of equally likely values the smallest; 0 without errors.
     """
     from scipy.special import gammaln
 
@@ -93,8 +96,10 @@ def _tails(z: Array) -> float:
 def _of_visible_part(recordings: Sequence[MatchedRecording]) -> bool:
     """True if the detected boxes of half hidden people are nearer to their visible part than to their whole box.
 
-    Half hidden: visibility between 0.3 and 0.9. Errors of middle, foot and top are compared in px, after subtracting
-    the median error of people in full view. False if there are fewer than 20 half hidden detected rows.
+    Half hidden: visibility between 0.3 and 0.9, both excluded. Compared are the mean absolute errors of middle, foot
+    and top in px, less the recording's median error of detected people in full view (visibility 0.9 or more; nothing if
+    there are none). False if both are equal, or with fewer than 20 half hidden detected rows. Raises ValueError without
+    recordings, AssertionError without labelled boxes.
     """
     away: dict[str, list[Array]] = {"visible": [], "amodal": []}
     for m in recordings:
@@ -112,16 +117,19 @@ def _errors(m: MatchedRecording, kind: str) -> Array:
     """Returns the errors (H, 4) of the H detected rows against their labelled boxes: middle, foot, top, logarithm of
     width.
 
-    kind: "visible" compares with the visible part where known, "amodal" with the whole box. Middle, foot and top are in
-    heights of the labelled box.
+    kind: "visible" compares with the visible part where known, "amodal" with the whole box. Middle (to the right), foot
+    and top (downwards) are in heights of the labelled box. Order: that of the labelled rows. Raises AssertionError
+    without labelled boxes.
     """
     return box_errors(m.box[m.match[m.hit]], _true(m, kind))
 
 
 def _true(m: MatchedRecording, kind: str) -> Array:
-    """Returns the labelled boxes (H, 4), left, top, width, height in px, of the H detected rows.
+    """Returns the labelled boxes (H, 4), left, top, width, height in px, of the H detected rows, in the order of the
+    labels.
 
     kind: "visible" returns the visible part where it is known, else the whole box; "amodal" always the whole box.
+    Raises AssertionError without labelled boxes.
     """
     assert m.truth.box is not None
     true = m.truth.box
@@ -131,10 +139,11 @@ def _true(m: MatchedRecording, kind: str) -> Array:
 
 
 def _fit_spread(recordings: Sequence[MatchedRecording], kind: str) -> ErrorSpread:
-    """Returns the likeliest `ErrorSpread` of the detected rows, `occluded` being chosen from `GROWTH`.
+    """Returns the likeliest `ErrorSpread` of the detected rows; `occluded` is 0 or one of 40 values from 0.1 to 6.
 
     kind: "visible" or "amodal", the labelled boxes that errors are measured against. Rows less than a quarter visible
-    are left out. `occluded` is 0 if fewer than 20 rows are more than 10 % hidden. All values are 0 without usable rows.
+    are left out. `occluded` is 0 if fewer than 20 of the others are more than 10 % hidden. All values are 0 without
+    usable rows. Raises ValueError without recordings, AssertionError without labelled boxes.
     """
     e = np.concatenate([_errors(m, kind) for m in recordings])
     hidden = np.concatenate([1.0 - m.truth.visibility[m.hit] for m in recordings])
@@ -149,8 +158,9 @@ def _fit_spread(recordings: Sequence[MatchedRecording], kind: str) -> ErrorSprea
 def _spread_of_growth(e: Array, hidden: Array, k: float) -> ErrorSpread:
     """Returns the `ErrorSpread` of errors e (H, 4), H above 0, if `occluded` is k; hidden (H,): 1 - visibility.
 
-    Columns of e: middle, foot, top, logarithm of width. mean and sd are weighted moments. The likelihood is that of a
-    Laplace distribution, which large errors influence little.
+    Columns of e: middle, foot, top (box heights), logarithm of width. mean and sd (standard deviation) are moments with
+    the weights 1 / (1 + k hidden)^2. The log likelihood is that of a Laplace distribution, which large errors influence
+    little.
     """
     growth = 1.0 + k * hidden
     weight = 1.0 / growth**2

@@ -1,9 +1,9 @@
 """Matches a recording's detections to its labelled people: the data that a detector's profile is fitted to.
 
-In each frame detections and people are matched one to one, with the greatest sum of overlaps of at least `GATE`. An
-overlap is the IoU with the whole box or with the box of the visible part, whichever is greater. A detector whose boxes
-are all too wide or too high would lose matches by this alone. So the median error of a first matching is applied to the
-labelled boxes, and the matching is repeated.
+In each frame detections and people are matched one to one, with the greatest sum of overlaps of at least 0.3. An
+overlap is the IoU (intersection over union) with the whole box or with the box of the visible part, whichever is
+greater. A detector whose boxes are all too wide or too high would lose matches by this alone. So the median error of a
+first matching is applied to the labelled boxes, and the matching is repeated.
 """
 
 from __future__ import annotations
@@ -32,15 +32,15 @@ class MatchedRecording:
     """A recording with R labelled rows (people in frames) and M detections, both sorted by frame, matched to each
     other.
 
-    - truth: the labels, with boxes and visibilities.
+    - truth: the labels, with boxes and visibilities (visible shares, 0 to 1).
     - size: image width and height in px.
     - camera: of the recording, None if unknown.
     - frame (M,): frame number of each detection, from 1.
     - box (M, 4): left, top, width, height of each detection in px.
-    - score (M,): of each detection.
-    - pos (M, 2): the detections' positions on the ground in m, None if they have none.
+    - score (M,): the detector's score of each detection.
+    - pos (M, 2): the detections' positions x, y on the ground in m; None if they or the labels have none.
     - match (R,): index of the detection of each labelled row, -1 missed.
-    - owner (M,): labelled row of each detection, -1 false alarm.
+    - owner (M,): index of the labelled row of each detection, -1 false alarm.
     """
 
     truth: Truth
@@ -72,10 +72,11 @@ class MatchedRecording:
 def match_sequence(sequence: Sequence) -> MatchedRecording:
     """Returns the labels and detections of a recording, matched one to one in each frame.
 
-    A match needs an IoU of at least 0.3. Rows of a MOT folder's gt/gt.txt that MOTChallenge does not score are no
-    labels. An unmatched detection that overlaps such a row by an IoU of at least 0.5 is dropped. Raises InputError if
-    there are no labelled people, labels without boxes, no detections, or detections
-    without boxes. Errors of reading the files are raised too.
+    A match needs an IoU (intersection over union) of at least 0.3. Rows of a MOT folder's gt/gt.txt that MOTChallenge
+    does not score are no labels. An unmatched detection that overlaps such a row by an IoU of at least 0.5 is dropped.
+
+    Raises InputError if there are no labelled people, labels without boxes, no detections, or detections without boxes.
+    Reading raises InputError if a file is invalid, and WorkError if an order of a simulated script was not fulfilled.
     """
     file, truth = sequence.source.get("path", sequence.name), sequence.truth
     missing = (
@@ -102,16 +103,17 @@ def match_detections(
     camera: Camera | None = None,
     left_out: tuple[Ints, Array] | None = None,
 ) -> MatchedRecording:
-    """Returns the labels and detections, matched one to one in each frame; both must have boxes.
+    """Returns the labels and detections, matched one to one in each frame; both must have boxes, and detections scores.
 
-    A match needs an IoU of at least 0.3 with the whole or the visible labelled box. The matching is done twice; the
-    second time the labelled boxes are shifted by the median error of the first. Visibilities are estimated from the
-    boxes if the truth has none.
+    A match needs an IoU (intersection over union) of at least 0.3 with the whole or the visible labelled box. The
+    matching is done twice; the second time the labelled boxes are shifted and scaled by the median error of the first.
+    Visibilities are estimated from the boxes if the truth has none.
 
     found: the detections, one per frame, sorted. size: image width and height in px; None takes the extent of all
     boxes. camera: stored in the result. left_out: frame numbers (L,) and boxes (L, 4; left, top, width, height in px)
-    of labelled rows that are not scored. A detection that covers one of them by an IoU of 0.5 is dropped unless it
-    matches a person. Fails an assertion if the truth has no boxes.
+    of labelled rows that are not scored. A detection that covers one of them by an IoU of 0.5 or more is dropped unless
+    it matches a person. Raises AssertionError if the truth has no boxes; IndexError if detections have no scores;
+    ValueError if size is None and a box is nan.
     """
     assert truth.box is not None
     box = np.concatenate([np.zeros((0, 4)), *(d.box for d in found if d.box is not None)])
@@ -137,9 +139,10 @@ def match_detections(
 def _pairs(truth: Truth, frame: Ints, box: Array, usual: Array | None = None) -> tuple[Ints, Ints]:
     """Returns the matched pairs: indices of labelled rows (K,) and of detections (K,), sorted by frame.
 
-    frame (M,), box (M, 4): frame number and left, top, width, height (px) of the detections. usual (4,): errors
-    (middle, foot, top in box heights, logarithm of the width) that are applied to the labelled boxes first; None
-    applies none. A pair needs an IoU of at least 0.3 with the whole or the visible labelled box.
+    In each frame the sum of IoU is greatest; a pair needs an IoU of at least 0.3 with the whole or the visible labelled
+    box. frame (M,), box (M, 4): frame number, sorted, and left, top, width, height (px) of the detections. usual (4,):
+    errors (middle, foot, top in box heights, logarithm of the width) that are applied to the labelled boxes first; None
+    applies none. K may be 0. Raises AssertionError if the truth has no boxes.
     """
     assert truth.box is not None
     whole = truth.box
@@ -162,7 +165,7 @@ def _pairs(truth: Truth, frame: Ints, box: Array, usual: Array | None = None) ->
 def box_iou(a: Array, b: Array) -> Array:
     """Returns the intersection over union (N, M) of boxes a (N, 4) and b (M, 4): left, top, width, height in one unit.
 
-    0 where a box is nan or where both have no area.
+    0 where a box is nan, or, with a numpy warning, where both have no area.
     """
     inner = box_intersections(a, b)
     area = (a[:, 2] * a[:, 3])[:, None] + (b[:, 2] * b[:, 3])[None]
@@ -197,8 +200,9 @@ def _left_out(sequence: Sequence) -> tuple[Ints, Array] | None:
     """Returns frame numbers (L,) and boxes (L, 4; left, top, width, height in px) of the rows of gt/gt.txt that
     MOTChallenge does not score.
 
-    These are the rows with flag 0 or, with 8 or 9 columns, a class of `DISTRACTORS`. None if the source is no MOT
-    folder with a gt/gt.txt that has such columns. Raises InputError if the file is invalid.
+    These are the rows with 0 in column 7 (with an id of 0 or more) or, with 8 or 9 columns, one of the classes 2, 7, 8,
+    12 in column 8. None if the source is no MOT folder, has no gt/gt.txt, or the file has only 6 columns. Raises
+    InputError if the file is invalid.
     """
     path = Path(str(sequence.source.get("path", ""))) / "gt" / "gt.txt"
     if sequence.source.get("kind") != "mot" or not path.is_file():

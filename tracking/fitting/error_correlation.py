@@ -1,9 +1,9 @@
 """Correlation of a detector's errors over time, and the sum of exponentials that fits it.
 
-The correlation at a lag is that of two errors of one person, this lag apart. Lags go from one frame to `REACH` seconds,
-evenly spaced in their logarithm. For misses, which are yes or no, it is the tetrachoric correlation: a miss occurs
-where a standard normal number is below a threshold, and rho is the correlation of two such numbers that gives the
-observed number of pairs with both missed.
+The correlation at a lag is that of two errors of one person, this lag apart. Lags go from one frame to 10 s, evenly
+spaced in their logarithm. The fit is a sum of share · exp(-lag / time): share of the variance, time constant in s. For
+misses, which are yes or no, it is the tetrachoric correlation: a miss occurs where a standard normal number is below a
+threshold, and rho is the correlation of two such numbers that gives the observed number of pairs with both missed.
 """
 
 from __future__ import annotations
@@ -27,11 +27,11 @@ FEW = 20  # a lag with fewer pairs is left out
 
 @dataclass(frozen=True)
 class Correlations:
-    """Correlations of errors over time at K lags.
+    """Correlations of errors over time at K lags, K may be 0.
 
-    - lag (K,): time between two errors of one person, s.
+    - lag (K,): time between two errors of one person, s, ascending.
     - rho (K,): their correlation.
-    - pairs (K,): number of pairs of errors behind each value.
+    - pairs (K,): number of pairs of errors (from rows of the labels) behind each value.
     """
 
     lag: Array
@@ -42,9 +42,10 @@ class Correlations:
 def pairs_by_lag(truth: Truth, keep: Bools) -> list[tuple[float, Ints, Ints]]:
     """Returns a list of (lag in s, i (P,), j (P,)): indices of labelled rows of one person, row j this lag after row i.
 
-    Lags go from one frame to 10 s at most, evenly spaced in their logarithm, in ascending order. keep (R,): bool, which
-    labelled rows (people in frames) are used. Lags with fewer than 20 pairs are left out. Of more than 12 000 pairs a
-    regular selection is returned.
+    keep (R,): bool, which labelled rows (people in frames) are used. The up to 14 lags are whole frames, evenly spaced
+    in their logarithm, ascending, from one frame to 10 s or the recording's length. Lags with fewer than 20 pairs are
+    left out; the list may be empty. Pairs are sorted by person, then frame. From 12 000 pairs on, only every second
+    (third, …) is returned.
     """
     rows = np.flatnonzero(keep)
     people, column = np.unique(truth.id[rows], return_inverse=True)
@@ -64,8 +65,9 @@ def pairs_by_lag(truth: Truth, keep: Bools) -> list[tuple[float, Ints, Ints]]:
 def correlations(truth: Truth, z: Array, keep: Bools) -> Correlations:
     """Returns the correlations over time of errors z (R, D) of one person, pooled over the D columns.
 
-    z: one row per labelled row of the truth, with mean 0 and variance 1; it may be nan where keep (R,) is false. keep:
-    bool, which rows are used. Lags with fewer than 20 pairs are left out; without any the arrays are empty.
+    rho is the mean product of two errors. z: one row per labelled row of the truth, with mean 0 and variance 1; it may
+    be nan where keep (R,) is false. keep: bool, which rows are used. Lags, of one frame to 10 s, with fewer than 20
+    pairs of rows are left out; without any the arrays are empty.
     """
     rows = [(lag, float((z[i] * z[j]).mean()), len(i)) for lag, i, j in pairs_by_lag(truth, keep)]
     return _table(rows)
@@ -76,7 +78,8 @@ def miss_correlations(truth: Truth, missed: Bools, p_miss: Array) -> Correlation
 
     A miss is taken as a standard normal number below a threshold; rho is the correlation of two such numbers that
     explains how often both are missed. missed (R,): bool, p_miss (R,): probability of a miss, clipped to [0.001,
-    0.999]; one per labelled row of the truth. Lags with fewer than 20 pairs are left out.
+    0.999]; one per labelled row of the truth. Lags, of one frame to 10 s, with fewer than 20 pairs are left out;
+    without any the arrays are empty.
     """
     from scipy.special import ndtri
 
@@ -95,10 +98,11 @@ def _table(rows: list[tuple[float, float, int]]) -> Correlations:
 
 
 def bivariate_normal_cdf(a: Array, b: Array, rho: float) -> Array:
-    """Returns P(x < a, y < b), (P,), for standard normals x, y with correlation rho, |rho| < 1; a, b (P,): thresholds.
+    """Returns P(x < a, y < b), (P,), for standard normals x, y with correlation rho, |rho| < 1; a, b (P,): finite
+    thresholds.
 
     It is Φ(a) Φ(b) + 1 / 2π ∫ exp(-(a² + b² - 2 a b sin θ) / (2 cos² θ)) dθ from 0 to asin(rho), by 16 Gauss-Legendre
-    nodes.
+    nodes. Φ: distribution function of the standard normal.
     """
     from scipy.special import ndtr
 
@@ -112,7 +116,7 @@ def _tetrachoric(a: Array, b: Array, both: float) -> float:
     """Returns the correlation rho with which the expected number of pairs below both thresholds equals `both`.
 
     a, b (P,): thresholds of the P pairs of standard normal numbers. both: observed number of pairs below both. The
-    result is limited to [-0.5, 0.995].
+    result is -0.5 if even that expects as many pairs or more, 0.995 if even that expects as many or fewer.
     """
     from scipy.optimize import brentq
 
@@ -127,12 +131,13 @@ def _tetrachoric(a: Array, b: Array, both: float) -> float:
 
 
 def fit_memory(found: Sequence[Correlations]) -> tuple[Memory, ...]:
-    """Returns at most two parts of an error's memory, each with share and time (s), whose sum of exponentials is
-    nearest to the correlations.
+    """Returns at most two parts of an error's memory, each with share and time (s), whose sum of share · exp(-lag /
+    time) is nearest to the correlations.
 
     found: correlations of several recordings, pooled. The squared distance, weighted by the numbers of pairs, is
-    minimised. Shares are at least 0 and at most 1 in total. A part with a share below 0.03 is left out. The result is
-    () without correlations, if no part is left, or if no exponential is nearer than 0.
+    minimised over 26 times from 0.05 to 20 s, up to twice the longest lag. Shares are at least 0 and at most 1 in
+    total. A part with a share below 0.03 is left out. The shorter time comes first. The result is () without
+    correlations, if no part is left, or if no sum is nearer to the correlations than 0 is.
     """
     lag, rho, pairs = (np.concatenate([getattr(c, name) for c in found] or [[]]) for name in ("lag", "rho", "pairs"))
     if not len(lag):

@@ -21,19 +21,28 @@ LAGS = (0.2, 1.0)  # s: lags of the error correlation
 def simulated_detections(m: MatchedRecording, sensor: Sensor, seed: int) -> MatchedRecording:
     """Returns the recording with its detections replaced by those of a simulated sensor, matched to the labels.
 
-    seed: of the random draws. Raises InputError if `sensor.hide` names a group.
+    seed: of the random draws; negative raises ValueError. Raises InputError if `sensor.hide` names a group, or if
+    `sensor.box` is "visible" and the labels have no visible boxes.
     """
     found = sense(m.truth, sensor, seed, m.camera, m.size)
     return match_detections(m.truth, found, m.size, m.camera)
 
 
 def error_statistics(recordings: Sequence[MatchedRecording]) -> dict[str, float]:
-    """Returns a dict of statistics of a detector's errors, all recordings pooled; keys are texts such as "missed".
+    """Returns a dict of 26 statistics of a detector's errors, all recordings pooled. Keys, in order:
 
-    They are: share of misses (all, by visibility), misses in runs, false alarms, overlap quantiles, mean and standard
-    deviation of the box errors and their correlation over time, median scores. Shares lie between 0 and 1, times are in
-    s, errors of boxes in box heights (of the width: its logarithm). A value is nan where nothing was observed. Raises
-    ValueError without recordings.
+    - "missed": share of labelled rows (people in frames) that are not detected; "missed, visibility 0-0.25",
+      "0.25-0.5", "0.5-0.75", "0.75-0.95", "0.95-1": the same by visible share, upper limits except 1 excluded.
+    - "misses: mean run, s"; "misses in runs over 1 s": share of the missed time.
+    - "false alarms per frame"; "false alarms: at people": share; "false alarms: mean stay, s".
+    - "overlap, 10% quantile", 50%, 90%: of the IoU with the whole labelled box.
+    - "error across: mean", "error across: sd" (standard deviation), and so for foot, top (all in box heights) and log
+      width.
+    - "error correlation after 0.2 s", "error correlation after 1 s".
+    - "score of true, median", "score of false, median".
+
+    nan where nothing was observed. Raises ValueError without recordings, ZeroDivisionError without frames,
+    AssertionError without labelled boxes.
     """
     hit = np.concatenate([m.hit for m in recordings])
     visibility = np.concatenate([m.truth.visibility for m in recordings])
@@ -81,9 +90,11 @@ def miss_runs(m: MatchedRecording) -> Ints:
 
 
 def _iou_and_errors(m: MatchedRecording) -> tuple[Array, Array]:
-    """Returns two arrays of the H detected rows against their whole labelled boxes: IoU (H,), errors (H, 4).
+    """Returns two arrays of the H detected rows, in order of the labels: IoU with the whole labelled box (H,), errors
+    (H, 4).
 
-    Errors: middle, foot, top in box heights, logarithm of width.
+    Errors: middle, foot, top in heights of the labelled box, logarithm of width. Raises AssertionError without labelled
+    boxes.
     """
     assert m.truth.box is not None
     true, box = m.truth.box[m.hit], m.box[m.match[m.hit]]
@@ -97,8 +108,8 @@ def _correlation(recordings: Sequence[MatchedRecording], e: Array, lag: float) -
     """Returns the correlation of one person's errors about `lag` s apart (half to one and a half times), nan without
     any.
 
-    e (H, 4): errors of the detected rows of all recordings, one recording after the other. The four kinds of error are
-    standardised and pooled.
+    e (H, 4): errors of the detected rows of all recordings, one recording after the other. The four kinds of error
+    (middle, foot, top, logarithm of the width) are standardised over all recordings and pooled.
     """
     total, count, first = 0.0, 0, 0
     mean, sd = e.mean(axis=0), np.maximum(e.std(axis=0), 1e-9)

@@ -1,8 +1,9 @@
 """Fits false alarms: how many, how long each lasts, whether it moves with a person, and its position and size.
 
 Unmatched detections are linked over time to alarm tracks. Of the alarms detected in a frame, the share detected again n
-frames later is seen · exp(-n / (fps life)). A line fitted to the logarithm of this share gives both parameters. An
-alarm that mostly lies on people belongs to one person; all others stand or drift on their own.
+frames later is seen · exp(-n / (fps life)): seen is the probability that an alarm that still lasts is detected in a
+frame, life its mean life in s, fps the frames per s. A line fitted to the logarithm of this share gives seen and life.
+An alarm that mostly lies on people belongs to one person; all others stand or drift on their own.
 """
 
 from __future__ import annotations
@@ -56,9 +57,10 @@ def fit_false_alarms(recordings: Sequence[MatchedRecording]) -> tuple[float, Fal
     """Returns the mean number of false alarms per frame, and their profile; None if there are fewer than 5 alarm
     tracks.
 
-    An alarm track is a series of unmatched detections of one false alarm. Fields about alarms at people, or elsewhere,
-    keep their defaults if there are fewer than 5 alarm tracks of this kind. recordings: matched; at least one frame in
-    all, else ZeroDivisionError is raised.
+    An alarm track is a series of unmatched detections of one false alarm. Fields about alarms at people (across, foot,
+    near_height), or elsewhere (height, drift, at), keep their defaults if there are fewer than 5 alarm tracks of this
+    kind. recordings: matched. Raises ZeroDivisionError without any frame, AssertionError if there are false alarms and
+    the labels have no boxes.
     """
     tracks = [track for m in recordings for track in alarm_tracks(m)]
     frames = sum(m.truth.length for m in recordings)
@@ -78,11 +80,12 @@ def fit_false_alarms(recordings: Sequence[MatchedRecording]) -> tuple[float, Fal
 
 
 def alarm_tracks(m: MatchedRecording) -> list[AlarmTrack]:
-    """Returns the false alarms of a recording as tracks, in the order of their first detection.
+    """Returns the false alarms of a recording as tracks over time, in the order of their first detection.
 
-    In each frame unmatched detections continue the open tracks, greatest IoU first, if the IoU with a track's last
-    detection is at least 0.3. The others begin new tracks. A track that is not detected for more than 0.5 s ends. Empty
-    without false alarms.
+    In each frame unmatched detections continue the open tracks, greatest IoU first, one each, if the IoU with a track's
+    last detection is at least 0.3. The others begin new tracks. A track that is not detected for more than 0.5 s (at
+    least one frame) ends. Empty without false alarms. Raises AssertionError if there are some and the labels have no
+    boxes.
     """
     pause = max(1, round(PAUSE * m.truth.fps))
     found: list[list[int]] = []
@@ -105,9 +108,10 @@ def alarm_tracks(m: MatchedRecording) -> list[AlarmTrack]:
 def _person_of_alarm(m: MatchedRecording, rows: list[int]) -> int:
     """Returns the id of the labelled person that an alarm belongs to, -1 none.
 
-    rows: indices of the alarm's detections, not empty. People must cover half of its box, in the median over its
-    detections. Candidates cover at least 0.6 of what the person who covers most does. The candidate with the steadiest
-    offset to the alarm is chosen.
+    rows: indices of the alarm's detections, not empty. All people together must cover at least half of its box, in the
+    median over its detections. Candidates cover at least 0.6, summed over the detections, of what the person who covers
+    most does. Chosen is the candidate whose feet have the steadiest offset to the alarm's, then the one who covers
+    more. Raises AssertionError without labelled boxes.
     """
     assert m.truth.box is not None
     share: dict[int, float] = {}
@@ -133,8 +137,9 @@ def _life_and_seen(recordings: Sequence[MatchedRecording], tracks: Sequence[Alar
     """Returns the mean life of a false alarm in s, and the probability that an alarm that still lasts is detected in a
     frame.
 
-    (0, 1) if less than 5 % of the alarms are detected again after any lag up to 1.5 s. With one lag only the second
-    value is 1. The life is at most 60 s, and the probability at least 0.2. tracks: the alarm tracks of all recordings.
+    (0, 1) if less than 5 % of the alarms are detected again after any lag below 1.5 s. If only one lag of one recording
+    has alarms detected again, the probability is 1. Else the life is at most 60 s, and the probability from 0.2 to 1.
+    tracks: the alarm tracks of all recordings.
     """
     lag, share, weight = [], [], []
     for m in recordings:
@@ -162,8 +167,9 @@ def _life_and_seen(recordings: Sequence[MatchedRecording], tracks: Sequence[Alar
 def _robust_spread(values: Sequence[float], tracks: Sequence[AlarmTrack]) -> tuple[float, float]:
     """Returns the weighted median, and half the width of the middle 68 %, in place of mean and standard deviation.
 
-    values: one per alarm track, not empty. tracks: the same alarm tracks; the weight of a track is the root of its
-    number of detections. Quantiles are used because some alarms are assigned to a person wrongly.
+    Both are rounded to 4 digits. values: one per alarm track, not empty. tracks: the same alarm tracks in the same
+    order; the weight of a track is the root of its number of detections. Quantiles are used because some alarms are
+    assigned to a person wrongly.
     """
     order = np.argsort(values, kind="stable")
     w, v = np.sqrt([len(t.rows) for t in tracks])[order], np.array(values)[order]
@@ -172,15 +178,16 @@ def _robust_spread(values: Sequence[float], tracks: Sequence[AlarmTrack]) -> tup
 
 
 def _aspect(tracks: Sequence[AlarmTrack]) -> tuple[float, float]:
-    """Returns median and spread (half the middle 68 %) of the logarithm of width / height of the alarms' boxes.
+    """Returns median and spread (half the middle 68 %) of the natural logarithm of width / height of the alarms' boxes.
 
-    The logarithm is averaged over each alarm track first.
+    The logarithm is averaged over each alarm track first; tracks must not be empty. A track weighs the root of its
+    number of detections.
     """
     return _robust_spread([float(np.log(t.box[:, 2] / t.box[:, 3]).mean()) for t in tracks], tracks)
 
 
 def _jitter(tracks: Sequence[AlarmTrack]) -> float:
-    """Returns the standard deviation of an alarm box's edge from frame to frame, in box heights.
+    """Returns the standard deviation of an alarm box's edge from frame to frame, in the alarm's mean box height.
 
     It is estimated from second differences x(t-1) - 2 x(t) + x(t+1) of left, top, right and lower edge, which steady
     motion leaves at 0: 1.4826 times their median absolute value, divided by sqrt 6. 0 if no alarm is detected in three
@@ -199,9 +206,10 @@ def _fit_at_people(tracks: Sequence[AlarmTrack]) -> dict[str, tuple[float, float
     """Returns a dict of the fields across, foot and near_height of `FalseAlarms`, each (median, spread) over alarm
     tracks.
 
-    They are relative to the alarm's person: middle to the right and foot downwards, in heights of the person's box, and
-    the logarithm of the alarm's height / the person's. tracks: alarms that belong to a person, not empty; frames
-    without the person are left out.
+    They are relative to the alarm's person: middle to the right (across) and foot downwards, in heights of the person's
+    box, and the logarithm of the alarm's height / the person's (near_height). The spread is half the middle 68 %.
+    tracks: alarms that belong to a person, not empty; frames without the person are left out. Raises AssertionError
+    without labelled boxes.
     """
     rows = []
     for t in tracks:
@@ -223,9 +231,9 @@ def _fit_at_people(tracks: Sequence[AlarmTrack]) -> dict[str, tuple[float, float
 def _fit_elsewhere(tracks: Sequence[AlarmTrack]) -> dict[str, object]:
     """Returns a dict of the fields height, drift and at of `FalseAlarms`, for alarms that belong to no person.
 
-    height: median and spread of the logarithm of the height relative to a person standing there. drift: root mean
-    square speed per axis in box heights per s, from tracks of four or more detections; 0 without any. at: up to 32 foot
-    points x, y as shares (0 to 1) of the visible ground.
+    height: median and spread (half the middle 68 %) of the logarithm of the height relative to a person standing there.
+    drift: root mean square speed per axis in box heights per s, from tracks of four or more detections; 0 without any.
+    at: up to 32 foot points x, y as shares (0 to 1, clipped) of the visible ground, evenly selected. tracks: not empty.
     """
     height, place, velocity = [], [], []
     for t in tracks:

@@ -1,9 +1,10 @@
 """Fits the probability of detection, by visibility and box height, and how long misses persist.
 
-p = P · c(visibility) · min(1, height / (2 small)). c is piecewise linear over `NODES` evenly spaced visibilities and
-rises to c(1) = 1. P and c have the greatest likelihood for each candidate of `small`. Misses of one person persist, so
-successive rows carry little new information. `small` is therefore used only if the log likelihood gains more than
-`GAIN` times the number of rows that carry as much information as one independent row.
+p = P · c(visibility) · min(1, height / (2 small)). P is the probability for a large person in full view. The factor c
+is piecewise linear over 5 evenly spaced visibilities and rises to c(1) = 1. small is half the height in px below which
+detection becomes less likely. P and c have the greatest likelihood for each candidate of `small`. Misses of one person
+persist, so successive rows (people in frames) carry little new information. `small` is therefore used only if the log
+likelihood gains more than 4 times the number of rows that carry as much information as one independent row.
 """
 
 from __future__ import annotations
@@ -27,10 +28,10 @@ FEW_MISSES = 10  # with fewer misses in all, no memory is fitted
 
 @dataclass(frozen=True)
 class DetectionProbability:
-    """Probability that a person is detected, by visibility and box height.
+    """Probability that a person is detected, by visibility (visible share, 0 to 1) and box height.
 
-    - best: probability P for a person in full view.
-    - curve: factors c at the `NODES` visibilities 0, 0.25 … 1, linear between them; the last is 1.
+    - best: probability P for a large person in full view, 0 to 1.
+    - curve: factors c at the visibilities 0, 0.25, 0.5, 0.75 and 1, linear between them; ascending, the last is 1.
     - small: half the box height in px below which detection becomes less likely; 0: height has no effect.
     """
 
@@ -50,8 +51,12 @@ class DetectionProbability:
 def fit_misses(recordings: Sequence[MatchedRecording]) -> tuple[DetectionProbability, tuple[Memory, ...]]:
     """Returns the probability of detection, and the parts of the misses' memory (each with share and time in s).
 
-    recordings: matched, with at least one labelled row in all, else an exception is raised (ValueError or IndexError).
-    The second result is () if there are fewer than 10 misses or no correlation over time.
+    `small` is the best of 16 candidates, from half the 1 % quantile to half the 90 % quantile of the heights, or 0 if
+    none raises the log likelihood enough. The second result is () if there are fewer than 10 misses or no correlation
+    over time.
+
+    recordings: matched. Raises ValueError without recordings, IndexError without labelled rows, AssertionError without
+    labelled boxes.
     """
     hit = np.concatenate([m.hit for m in recordings])
     visibility = np.concatenate([m.truth.visibility for m in recordings])
@@ -75,8 +80,8 @@ def fit_misses(recordings: Sequence[MatchedRecording]) -> tuple[DetectionProbabi
 def _heights(m: MatchedRecording) -> Array:
     """Returns the heights (R,) in px of the labelled rows that decide on detection.
 
-    They are the heights of the boxes; for a camera seen from above (kind "top"), the longer side of the box /
-    `SHOULDER_SHARE`.
+    They are the heights of the whole boxes; for a camera seen from above (kind "top"), the longer side of the box /
+    SHOULDER_SHARE (0.27: shoulders over body height). Raises AssertionError without labelled boxes.
     """
     assert m.truth.box is not None
     from sim.scene.body import SHOULDER_SHARE
@@ -117,8 +122,9 @@ def _fit_probability(hit: Bools, visibility: Array, height: Array, small: float)
 def _rows_per_independent_row(recordings: Sequence[MatchedRecording], probability: DetectionProbability) -> float:
     """Returns how many labelled rows carry as much information as one independent row, at least 1.
 
-    It is 1 + 2 Σ rho over the lags in frames, rho being the correlation of one person's misses, clipped to [0, 1]. The
-    greatest of all recordings is returned. probability: of detection, by which misses are standardised.
+    It is 1 + 2 Σ rho over the lags in frames, up to 10 s, rho being the correlation of one person's misses, clipped to
+    [0, 1]. The greatest of all recordings is returned; 1 if none has enough pairs of rows. probability: of detection,
+    by which misses are standardised. Raises AssertionError without labelled boxes.
     """
     found = []
     for m in recordings:

@@ -1,7 +1,8 @@
 """From links between two people to groups over time: the group id of each person in each frame, and the events.
 
-A group is a connected component of linked people. People are columns of the
-tables, frames count from 0. Ids follow the identity rule of the truth (sim.truth.identity).
+A group is a connected component of linked people. People are numbered as columns of arrays by frame and person, from 0;
+frames count from 0. Ids follow the identity rule of the truth (sim.truth.identity): a group that changes keeps its id
+where it shares most members.
 """
 
 from __future__ import annotations
@@ -22,11 +23,11 @@ from tracking.grouping.merge_split_events import LinkSwitch, event_of_change
 
 @dataclass
 class _LinkedPeople:
-    """Who is present and linked to whom at one moment. People are columns of the tables, from 0.
+    """Who is present and linked to whom at one moment. People are numbers of columns of arrays, from 0.
 
     present: dict by person (column): the frame (from 0) since which the person has been present; a person who is missed
-    stays present for `memory` s. linked: by person, the people with a link to the person, present or not. identities:
-    the groups of the last step and their ids.
+    stays present for `memory` s (of LinkRule). linked: dict by person, the set of people with a link to the person,
+    present or not. identities: the groups of the last step, with members and ids.
     """
 
     present: dict[int, int] = field(default_factory=dict)
@@ -37,7 +38,7 @@ class _LinkedPeople:
         """Returns the connected components of the present people under their links, as sets of columns, in order of
         least column.
 
-        People alone are left out. Links to people who are not present do not count.
+        People alone are left out. Links to people who are not present do not count. No links give an empty list.
         """
         found, seen = [], set[int]()
         for p in sorted(self.present.keys() & self.linked.keys()):
@@ -62,12 +63,14 @@ def label_people(
 ) -> tuple[Ints, list[GroupEvent]]:
     """Return the group id of each row (R,), -1 for a person alone, and the membership events in order of `emitted`.
 
-    A row is one person in one frame. frame (R,): from 0, sorted; column (R,): the person; pos (T, P, 2): positions in m
-    by frame and column, nan where absent; links: all switches of links of the sequence; fps: frames per second.
+    A row is one person in one frame. frame (R,): from 0, sorted; column (R,): the person, from 0; pos (T, P, 2):
+    positions in m by frame and column, nan where absent; links: all switches of links of the sequence; fps: frames per
+    second.
 
-    A member who is not seen stays in the group for `rule.memory` s. In a frame in which only one member of a group is
-    seen, that member's label is -1. Kinds of events: merge, split, form, dissolve, enter, leave. In them members are
-    columns + 1, positions are in m and frames count from 1.
+    Ids count from 1 and last as long as the group. A member who is not seen stays in the group for `rule.memory` s. In
+    a frame in which only one member of a group is seen, that member's label is -1. Kinds of events: merge, split, form,
+    dissolve, enter, leave. In them members are columns + 1, positions are in m and frames count from 1. Groups that
+    enter within `rule.arrival` s of the first frame have no event.
     """
     spells = _spells(frame, column, frames_of(rule.memory, fps), len(pos))
     state, events = _LinkedPeople(), []
@@ -90,10 +93,12 @@ def label_people(
 
 
 def _spells(frame: Ints, column: Ints, memory: int, length: int) -> dict[int, list[tuple[int, int | None]]]:
-    """Returns, by frame from 0, who comes, as (column, frame), and whose memory ends, as (column, None), in that frame.
+    """Returns a dict from a frame (from 0) to a list of who comes, as (column, frame), and whose spell ends, as
+    (column, None), in that frame.
 
-    frame, column (R,): frame and person of each row. memory: frames. length: of the sequence, in frames. A gap of at
-    most `memory` frames does not end a person's spell. Spells that last to the end of the sequence have no end.
+    A spell is the time from a person's first row until `memory` frames after the last. frame, column (R,): frame and
+    person of each row. length: of the sequence, in frames. A gap of at most `memory` frames does not end a spell.
+    Spells that last to the end of the sequence have no end.
     """
     order = np.lexsort((frame, column))
     found: dict[int, list[tuple[int, int | None]]] = {}
@@ -115,7 +120,8 @@ def _entered(state: _LinkedPeople, switched: Iterable[LinkSwitch], arrival: int)
     """Returns the people (columns) who count as entering with their group instead of joining it later.
 
     They are present and in no group yet, and a link of theirs that is set in this frame began at most `arrival` frames
-    after the frame since which they have been present. switched: (a, b, on, since) of the links switched in this frame.
+    after the frame since which they have been present. switched: (a, b, on, since) of the links switched in this frame:
+    both people, True if set, and the first frame of what caused the switch.
     """
     grouped = {p for people in state.identities.groups.values() for p in people}
     return frozenset(

@@ -40,10 +40,12 @@ def with_groups(
 ) -> tuple[Tracks, ...]:
     """Return the tracks of a sequence with groups and events filled in by `derive`; in order, one `Tracks` per frame.
 
-    fps: frames per second. px_per_m: scale if tracks are in the image. rule: None stands for the default rule.
+    tracks: one tracker's, one `Tracks` per frame, from frame 1. fps: frames per second. px_per_m: scale, px per m, if
+    they are in the image. rule: None stands for the default rule.
 
-    They are returned unchanged if there are none, if all are marked as derived, or if they are in the image and
-    px_per_m is nan or infinite. Raises InputError if they are in the image and px_per_m is 0 or below.
+    The tracks are returned unchanged if there are none, if all are marked as derived, if one has unit "group", or if
+    they are in the image and px_per_m is nan or infinite. Raises InputError if they are in the image and px_per_m is 0
+    or below.
     """
     if all(t.derived for t in tracks) or (tracks[0].plane == "image" and not math.isfinite(px_per_m)):
         return tuple(tracks)
@@ -62,9 +64,9 @@ def names_groups(tracks: Sequence[Tracks]) -> bool:
 def derive(tracks: Iterable[Tracks], fps: float, px_per_m: float = 1.0, rule: LinkRule | None = None) -> list[Tracks]:
     """Return the tracks with `group`, `groups` and `events` filled in where the tracker left them empty.
 
-    tracks: of a whole sequence, in order, one per frame from frame 1; the result has as many, marked as derived. fps:
-    frames per second. px_per_m: px per m, used only if the tracks are in the image. rule: None stands for the default
-    rule.
+    tracks: one tracker's, of a whole sequence, in order, one per frame from frame 1; the result has as many, marked as
+    derived. fps: frames per second. px_per_m: px per m, used only if the tracks are in the image. rule: None stands for
+    the default rule.
     - A tracker that names groups, in `group` or in the members of its `groups`, keeps them. Else the rule forms groups.
     - Membership events (all kinds but cross and queue) are derived unless the tracker reported any of them.
     - Crossings are derived unless it reported a crossing, queues unless it reported a queue.
@@ -87,11 +89,12 @@ def derive(tracks: Iterable[Tracks], fps: float, px_per_m: float = 1.0, rule: Li
 
 
 def _grouped(table: TracksTable, named: bool, fps: float, rule: LinkRule) -> tuple[TracksTable, list[GroupEvent]]:
-    """Returns the table with groups filled in, and the membership events (people are columns + 1, frames count from 1).
+    """Returns the table with group ids filled in, and the membership events (people are columns + 1, frames count from
+    1).
 
     named: the tracker reports groups itself. Its groups are kept. If they equal those of the rule, the rule's events
     are used, as their onsets are exact. Else the events follow from the changes of the tracker's labels. If it reports
-    groups but none of its people has one, the table is returned as it is, without events.
+    groups but none of its people has one, the table is returned as it is, without events. fps: frames per second.
     """
     if named and (table.group < 0).all():
         return table, []
@@ -106,7 +109,8 @@ def _crossings_and_queues(table: TracksTable, fps: float) -> list[GroupEvent]:
     """Returns the crossings, then the queues, of the whole recording; `emitted` is the frame (from 1) in which each is
     known.
 
-    An event that is not known by the end is emitted in the last frame. People are columns + 1, positions are in m.
+    A crossing is known 2 s after its end, a queue 6 s after its start. An event that is not known by the end is emitted
+    in the last frame. Members are columns + 1, positions are in m. table: all tracks; fps: frames per second.
     """
     pos, vel, label = table.positions(), table.velocities(), table.labels()
     present: Bools = np.isfinite(pos[..., 0])
@@ -122,7 +126,8 @@ def _filled(given: Sequence[Tracks], table: TracksTable, events: Sequence[GroupE
     """Returns the tracks with the table's group ids, groups where `groups` is None, and these events after their own.
 
     events: members are columns + 1 and positions are in m; in the result both are the tracks' own ids and unit. An
-    event is added to the frame in which it is emitted (or, without one, starts). The result is marked as derived.
+    event is added to the frame in which it is emitted (or, without one, starts); those of a frame are sorted by start,
+    end, kind, members. given: one `Tracks` per frame, in order. The result is marked as derived.
     """
     groups = _groups_of_frames(given, table)
     cuts = np.searchsorted(table.frame, np.arange(table.length + 1))
@@ -146,10 +151,11 @@ def _with_track_ids(event: GroupEvent, table: TracksTable) -> GroupEvent:
 
 
 def _groups_of_frames(given: Sequence[Tracks], table: TracksTable) -> list[Groups]:
-    """Returns the Groups of every frame of the sequence, in the tracks' unit (m or px); empty Groups for a frame
-    without any.
+    """Returns a list of the Groups of every frame 1, 2, … of the sequence, in the tracks' unit (m or px); empty Groups
+    for a frame without any.
 
-    Hulls go round footprints, or round boxes if the tracks are in the image and all have boxes.
+    Hulls go round footprints, or round boxes if the tracks are in the image and all have boxes. given: the tracks, at
+    least one `Tracks` (else IndexError); table: the same as rows.
     """
     pos, vel, box = table.pos * table.scale, table.vel * table.scale, boxes_of_rows(given)
     if box is not None:

@@ -1,9 +1,9 @@
 """The baseline rule that links two tracked people into one group: distance, velocity difference, share of time.
 
-A pair is linked once it has been near, with like velocities, in at least `share` of the frames of the last `window` s
-in which both were seen. The link breaks once the pair has been apart for `patience` s. The rule never looks ahead.
-`LinkRule` holds the parameters, `find_links` returns the switches of all links of a sequence. Constants that are also
-the truth's merge and split rule come from sim.truth.merge_split_rules.
+A pair is linked once it has been near, with like velocities, in at least the share `share` of the frames of the last
+`window` s in which both were seen. The link breaks once the pair has been apart for `patience` s. The rule never looks
+ahead. `LinkRule` holds the parameters, `find_links` returns the switches of all links of a sequence. Constants that are
+also the truth's merge and split rule come from sim.truth.merge_split_rules.
 """
 
 from __future__ import annotations
@@ -86,9 +86,9 @@ class LinkRule(Config):
 class Links:
     """All switches of links (setting or removing one) of a sequence: L rows, sorted by frame, then pair.
 
-    frame (L,): in which the link is switched, from 0. a, b (L,): columns of the two people in the table, a < b. on
-    (L,): True if the link is set, False if it is removed. since (L,): first frame, from 0, of the stretch that caused
-    the switch (of being near and alike, or of being apart).
+    frame (L,): in which the link is switched, from 0. a, b (L,): numbers of the two people, from 0, a < b: indices of
+    their ids in the sorted ids of the sequence. on (L,): True if the link is set, False if it is removed. since (L,):
+    first frame, from 0, of the stretch that caused the switch (of being near and alike, or of being apart).
     """
 
     frame: Ints
@@ -99,11 +99,12 @@ class Links:
 
 
 def find_links(frame: Ints, column: Ints, pos: Array, vel: Array, length: int, fps: float, rule: LinkRule) -> Links:
-    """Return all switches of links in a sequence of `length` frames, sorted by frame, then pair.
+    """Return all switches of links (setting or removing one) in a sequence of `length` frames, sorted by frame, then
+    pair.
 
-    A row is one person in one frame: frame (R,) from 0, sorted; column (R,) of the person; pos, vel (R, 2): x, y in m
-    and m/s. fps: frames per second. A pair with an unknown (nan) velocity counts as moving alike. No rows give no
-    switches.
+    A row is one person in one frame: frame (R,) from 0, sorted; column (R,): number of the person, from 0; pos, vel (R,
+    2): x, y in m and m/s. fps: frames per second. rule: distances, velocities and times that decide. A pair with an
+    unknown (nan) velocity counts as moving alike. No rows, or no pair that is ever near, give no switches.
     """
     i, j = close_pairs(frame, pos, max(rule.apart, rule.near))
     swap = column[i] > column[j]
@@ -146,8 +147,9 @@ def _switches(
 
     pairs (K,): a * P + b, with a < b columns of people. frame, place, near, within (Q,): a row for each pair and frame
     in which the two are close; place is the index in `pairs`; near: they are near and move alike; within: they are not
-    apart. present (T, P): True where a person is seen. `since` is the first frame of the stretch that caused the
-    switch.
+    apart. present (T, P): True where a person is seen. fps: frames per second; rule: share and times that decide.
+    `since` is the first frame of the stretch (of being near, or of being apart) that caused the switch. Sorted by
+    frame, then pair.
     """
     people = present.shape[1]
     both = present[:, pairs // people] & present[:, pairs % people]
@@ -184,7 +186,8 @@ def _onset(together: Bools, window: int) -> Ints:
     """Returns the first frame (T, K), from 0, with a True flag among the last `window` frames, the present one
     included.
 
-    together (T, K): flags by frame and pair. Without a True flag in the window it is the next frame with one, or T.
+    together (T, K): flags by frame and pair. Without a True flag in the window it is the next frame with one, or T, the
+    number of frames, if there is none.
     """
     t = np.arange(len(together))[:, None]
     after = np.minimum.accumulate(np.where(together, t, len(together))[::-1], axis=0)[::-1]

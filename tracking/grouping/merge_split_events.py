@@ -28,14 +28,15 @@ def event_of_change(
 ) -> GroupEvent | None:
     """Return the event of one change of groups that became known in frame t (from 0), or None.
 
-    change: of a group, in columns. switched: the links switched in frame t. pos (T, P, 2): x, y in m by frame and
-    column, nan where absent. arrival: frames. In the event people are columns + 1, frames count from 1, the position is
-    in m.
+    change: of a group; its members are columns. switched: the links switched in frame t, as (a, b, True if set, first
+    frame of the cause). pos (T, P, 2): x, y in m by frame and column, nan where absent. arrival: frames. In the event
+    people are columns + 1, frames count from 1, the position is in m.
 
     `start` is the first onset among the switches that caused the change: links set (merge, form, enter) or removed
     (split, dissolve, leave) between two of its people; t if there is none. For a leave it is the last frame in which
-    two of its people were seen. `end` equals `start` for enter and leave, else t. Returns None for an enter that starts
-    in the first `arrival` frames: that group was there from the beginning.
+    two of its people were seen (IndexError if there is none). `end` equals `start` for enter and leave, else t. Returns
+    None for an enter that starts in frame `arrival` (from 0) or before: that group was there from the beginning. Raises
+    ValueError if no member was seen from 20 frames before the start to t.
     """
     people = set(change.members)
     joins = change.kind in ("merge", "form", "enter")
@@ -54,9 +55,9 @@ def events_of_labels(group: Ints, pos: Array) -> list[GroupEvent]:
     """Return the membership events (merge, split, form, dissolve, enter, leave) in a tracker's group labels, by time.
 
     group (T, P): label by frame and column, -1 for a person alone. pos (T, P, 2): x, y in m, nan where a person is
-    absent. T is at least 1. A label that only one person carries in a frame counts as alone. `start`, `end` and
-    `emitted` are the frame of the change; a leave starts and ends in the frame before it. In the events people are
-    columns + 1, frames count from 1.
+    absent. T is at least 1 (else IndexError). A label that only one person carries in a frame counts as alone. Groups
+    of the first frame have no event. `start`, `end` and `emitted` are the frame of the change; a leave starts and ends
+    in the frame before it. In the events people are columns + 1, frames count from 1.
     """
     there = np.isfinite(pos).all(axis=2)
     state = np.where(there, group, ABSENT)

@@ -23,8 +23,8 @@ class TracksTable:
 
     frame (R,): from 0. id (R,): of the track. column (R,): index of the id in `ids`. ids (P,): the ids, sorted. pos,
     vel (R, 2): x, y in m and m/s; vel is nan if unknown. group (R,): the tracker's own group id, -1 for a person alone.
-    length: frames T of the sequence. scale: px per m by which pos and vel were divided if the tracks are in the image,
-    else 1.
+    length: frames T of the sequence, the number of the last. scale: px per m by which pos and vel were divided if the
+    tracks are in the image, else 1.
     """
 
     frame: Ints
@@ -63,8 +63,9 @@ def tabulate(tracks: Sequence[Tracks], fps: float, px_per_m: float, rule: LinkRu
     IndexError).
 
     fps: frames per second. px_per_m: px per m, used only if the tracks are in the image. Of positions in space z is
-    dropped. Velocities are the tracker's own. Unknown ones (nan) are replaced by chords over the last 0.5 s. If
-    `rule.smooth` (s) is above 0, all are replaced by chords over that time. A chord is nan in a person's first frame.
+    dropped. Velocities are the tracker's own. Unknown ones (nan) are replaced by chords (mean velocities) over the last
+    0.5 s. If `rule.smooth` (s) is above 0, all are replaced by chords over that time. A chord is nan in a person's
+    first frame, and where the person was not seen within that time before.
 
     Raises InputError if the tracks are in the image and px_per_m is not a finite number above 0.
     """
@@ -89,10 +90,11 @@ def tabulate(tracks: Sequence[Tracks], fps: float, px_per_m: float, rule: LinkRu
 
 
 def _named_groups(tracks: Sequence[Tracks]) -> list[Ints]:
-    """Returns for each frame the tracker's group id of each track, (N,), -1 for a person alone.
+    """Returns a list with, for each frame, the tracker's group id of each track, (N,), in order of the tracks; -1 for a
+    person alone.
 
     It is `Tracks.group`, or, if that is -1 in the whole sequence, the group in `Tracks.groups` that lists the track as
-    a member.
+    a member; of several the last.
     """
     if any((t.group >= 0).any() for t in tracks):
         return [t.group for t in tracks]
@@ -124,10 +126,11 @@ def backward_velocity(frame: Ints, column: Ints, pos: Array, fps: float, window:
 
 
 def boxes_of_rows(tracks: Sequence[Tracks]) -> Array | None:
-    """Return the boxes (R, 4) left, top, width, height, px, of the table's rows (by frame, then id), or None.
+    """Return the boxes (R, 4) left, top, width, height, px, of all tracks of a sequence, sorted by frame, then id, or
+    None.
 
-    None if group hulls are not drawn round boxes: the tracks (at least one) are not in the image, a frame has tracks
-    but no boxes, or there are no tracks in any frame.
+    tracks: one `Tracks` per frame, in order; none raises IndexError. None if group hulls are not drawn round boxes: the
+    tracks are not in the image, a frame has tracks but no boxes, or there are no tracks in any frame.
     """
     if tracks[0].plane != "image" or any(t.box is None for t in tracks if len(t.id)):
         return None

@@ -25,12 +25,13 @@ FROM_LEFT = np.roll(FOOTPRINT, -int(FOOTPRINT[:, 0].argmin()), axis=0)
 def derived_outlines(tracks: Sequence[Tracks], fps: float, px_per_m: float, labelled: Bools) -> GroupOutlines:
     """Returns the hulls of groups of two or more people in the frames f where labelled[f] is true, sorted by frame.
 
-    tracks: not empty, of one tracker, of people, without `groups`, sorted by frame. If any track has a group id, these
-    ids define the groups, else the baseline rule does. Hulls are drawn round boxes if the tracks are in the image and
-    every track has a box, else round footprints. Unit: m on the ground, px in the image. px_per_m: used only in the
-    image. labelled (length + 1,): bool by frame number. Group ids of the result are only row numbers.
+    tracks: of one tracker, of people, without `groups`, sorted by frame; none raises IndexError. If any track has a
+    group id, these ids define the groups, else the baseline rule does. Hulls are drawn round boxes if the tracks are in
+    the image and every track has a box, else round footprints. Unit: m on the ground, px in the image. fps: frames per
+    second. px_per_m: px per m, used only in the image. labelled (length + 1,): bool by frame number, from 1. Group ids
+    of the result are only row numbers. Without groups it has no rows.
 
-    Raises InputError if the tracks are in the image and px_per_m is not above 0.
+    Raises InputError if the tracks are in the image and px_per_m is not a finite number above 0.
     """
     table = tabulate(tracks, fps, px_per_m, LinkRule())
     order, first = _grouped_rows(table, _group_of_rows(table, fps), labelled)
@@ -47,8 +48,8 @@ def _group_of_rows(table: TracksTable, fps: float) -> Ints:
     """Returns a label for each of the R table rows (tracks in frames), (R,): equal for members of one group in a frame,
     -1 alone.
 
-    If any row has a group id of the tracker, these ids are returned, else the components that the baseline rule links.
-    fps: frames per second.
+    If any row has a group id of the tracker, these ids are returned, else the components that the baseline rule links:
+    the label is the least column of the group, and a group of which one member is seen has -1. fps: frames per second.
     """
     from tracking.objective import derived_outlines_kernels as kernels
 
@@ -68,7 +69,7 @@ def _grouped_rows(table: TracksTable, group: Ints, labelled: Bools) -> tuple[Int
     the index in this list at which each of the G groups begins, (G,).
 
     group (R,): label of each table row, -1 alone. labelled: bool by frame number from 1; groups in other frames are
-    left out. Groups are sorted by frame, then label.
+    left out. Groups are sorted by frame, then label. Both results are empty without groups.
     """
     order = np.lexsort((group, table.frame))
     order = order[(group[order] >= 0) & labelled[table.frame[order] + 1]]
@@ -84,7 +85,8 @@ def flat_convex_hulls(points: Array, ends: Ints) -> tuple[Array, Ints]:
     (G,).
 
     points (N, 2): the sets one after the other; ends (G,): index at which each set ends (exclusive). Each hull is
-    counter-clockwise from its leftmost point. A set with a nan has a hull without vertices.
+    counter-clockwise from its leftmost point, the lowest of several. An empty set, or one with a nan, has a hull
+    without vertices. A set of one point repeated gives that point twice.
     """
     from sim.geometry.hull_kernels import monotone_chains
 
@@ -98,8 +100,9 @@ def flat_footprint_hulls(pos: Array, ends: Ints, scale: float) -> tuple[Array, I
     """Returns the convex hulls of the footprints of G groups of people: all vertices (V, 2), and where each hull ends,
     (G,).
 
-    pos (M, 2): people's x, y, group after group; ends (G,): index at which each group ends (exclusive). scale: units of
-    pos per metre. A footprint is a polygon of 16 vertices round the position.
+    pos (M, 2): people's x, y, not nan, group after group; ends (G,): index at which each group, not empty, ends
+    (exclusive). scale: units of pos per metre. A footprint is a polygon of 16 vertices round the position. Hulls are
+    counter-clockwise and may repeat vertices.
     """
     from tracking.objective import derived_outlines_kernels as kernels
 
@@ -112,7 +115,7 @@ def _box_hulls(box: Array, ends: Ints) -> tuple[Array, Ints]:
     (G,).
 
     box (M, 4): left, top, width, height in px, group after group; ends (G,): index at which each group ends
-    (exclusive).
+    (exclusive). A group with a nan box has a hull without vertices.
     """
     left, top, wide, high = box.T
     corners = np.stack([left, top, left + wide, top, left + wide, top + high, left, top + high], 1).reshape(-1, 2)

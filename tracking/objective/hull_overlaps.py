@@ -25,10 +25,10 @@ FLAT = 1e-12  # share of a polygon's squared size: a right turn smaller than thi
 class GroupOutlines:
     """G groups in frames, sorted by frame, with their hulls in flat arrays, in m on the ground or px in the image.
 
-    - rows: frame number and id of each group.
+    - rows: frame number (from 1) and id of each group.
     - pos (G, 2): centres x, y.
     - vertex (V, 2), ends (G,): polygon g is vertex[ends[g - 1] : ends[g]] (polygon 0 begins at 0), counter-clockwise.
-    - area (G,): signed area.
+    - area (G,): signed area, above 0 if counter-clockwise, 0 without vertices.
     - box (G, 4): min x, min y, max x, max y, nan without vertices.
     - regular (G,): True if the polygon has a positive area and is convex up to rounding.
     """
@@ -55,7 +55,8 @@ class GroupOutlines:
 
     @classmethod
     def of(cls, groups: GroupRows) -> GroupOutlines:
-        """Returns the outlines of G groups in their order. A group without a hull gets a polygon without vertices."""
+        """Returns the outlines of G groups in their order, which must be by frame. A group without a hull gets a
+        polygon without vertices."""
         ends = np.cumsum(np.array([len(h) for h in groups.hull], np.int64))
         return cls.measured(groups.rows, groups.pos, np.concatenate([np.zeros((0, 2)), *groups.hull]), ends)
 
@@ -81,9 +82,10 @@ class GroupOutlines:
 def found_pairs(true: GroupOutlines, est: GroupOutlines) -> Pairs:
     """Returns the pairs of groups of one frame that may have an IoU of 0.5 or more, with their IoU as similarity.
 
-    true, est: outlines in one unit. Pairs below 0.5 - 1e-6 are left out, unless a polygon is not regular (convex with
-    positive area). An IoU is exact where it decides about 0.5 or competes with another pair of the same group;
-    elsewhere it may differ from the exact value by rounding.
+    true, est: outlines in one unit. Pairs are sorted by row of `true`, then of `est`. Pairs below 0.5 - 1e-6 are left
+    out, unless a polygon is not regular (convex with positive area); a polygon without area is in no pair. An IoU is
+    exact where it decides about 0.5 or competes with another pair of the same group; elsewhere it may differ from the
+    exact value by rounding.
     """
     from tracking.objective import hull_overlaps_kernels as kernels
 
@@ -106,8 +108,8 @@ def count_inside(outlines: GroupOutlines, groups: GroupRows, people: FrameRows, 
     """Returns how many people of the frame are inside each of G hulls or within 0.3 m of it, (G,); 2 stands for two or
     more.
 
-    outlines, groups: the same G groups twice. people, positions (R, 2): the people in frames and their x, y in the unit
-    of the hulls. scale: this unit per metre. A group without a hull has 0.
+    outlines, groups: the same G groups twice. people, positions (R, 2): the people in frames, sorted by frame, and
+    their x, y in the unit of the hulls. scale: this unit per metre. A group without a hull has 0.
     """
     from tracking.objective import hull_overlaps_kernels as kernels
 

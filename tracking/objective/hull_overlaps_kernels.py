@@ -20,9 +20,10 @@ def _turn(a, b, c):  # type: ignore[no-untyped-def]
 def measure(vertex, ends, slack):  # type: ignore[no-untyped-def]
     """Returns three arrays of G polygons: signed area (G,); box (G, 4): min x, min y, max x, max y; regular (G,) bool.
 
-    Polygon g is vertex[ends[g - 1] : ends[g]] (polygon 0 begins at 0); vertex (V, 2), ends (G,). regular: the area is
-    positive and no turn is to the right by more than `slack` times the squared size (width + height) of the box.
-    Without vertices the area is 0, the box nan and regular False.
+    Polygon g is vertex[ends[g - 1] : ends[g]] (polygon 0 begins at 0); vertex (V, 2), ends (G,). The area is positive
+    if the polygon is counter-clockwise. regular: the area is positive and no turn is to the right by more than `slack`
+    times the squared size (width + height) of the vertices up to it. Without vertices the area is 0, the box nan and
+    regular False.
     """
     area, box, regular = np.zeros(len(ends)), np.full((len(ends), 4), np.nan), np.zeros(len(ends), np.bool_)
     first = 0
@@ -78,8 +79,9 @@ def candidates(frame_a, box_a, area_a, frame_b, box_b, area_b, least):  # type: 
 def overlaps(vertex_a, ends_a, area_a, vertex_b, ends_b, area_b, i, j):  # type: ignore[no-untyped-def]
     """Returns the IoU (K,) of the convex polygons i[k] of side a and j[k] of side b, by Sutherland-Hodgman clipping.
 
-    vertex_a (V, 2), ends_a (G,): polygon g of a is vertex_a[ends_a[g - 1] : ends_a[g]], counter-clockwise; side b
-    likewise. area_a (G,), area_b (H,): their areas. i, j (K,). 0 if the polygons share no area.
+    vertex_a (V, 2), ends_a (G,): polygon g of a is vertex_a[ends_a[g - 1] : ends_a[g]] (polygon 0 begins at 0),
+    counter-clockwise; vertex_b (W, 2), ends_b (H,): side b likewise. area_a (G,), area_b (H,): their areas. i, j (K,):
+    indices of polygons. 0 if the polygons share no area.
     """
     out = np.empty(len(i))
     longest = _longest(ends_a) + _longest(ends_b) + 2
@@ -178,7 +180,8 @@ def inside(frame, vertex, ends, box, regular, people, place, reach, slack):  # t
 
 @njit(cache=True)
 def _gap(p, x, y):  # type: ignore[no-untyped-def]
-    """Returns the distance of the point (x, y) from a convex polygon p (V, 2), counter-clockwise; 0 inside."""
+    """Returns the distance of the point (x, y) from a convex polygon p (V, 2), V at least 1, counter-clockwise; 0
+    inside or on its edge."""
     within, least = True, np.inf
     for k in range(len(p)):
         a, b = p[k], p[(k + 1) % len(p)]

@@ -29,7 +29,8 @@ from tracking.scoring.rows import FrameRows
 class ObjectiveScorer:
     """Computes the objective (mean of HOTA and group_F1_hull) of any number of trackers against one truth.
 
-    State: a `Scorer` of the truth, and the outlines of the true groups on each surface used so far.
+    State: scorer, a `Scorer` of the truth, which must not change; _outlines, a dict of the outlines of the true groups
+    by surface ("ground" or "image") used so far, None where the truth has no group shapes.
     """
 
     def __init__(self, truth: Truth) -> None:
@@ -39,10 +40,11 @@ class ObjectiveScorer:
     def scores(self, tracks: Sequence[Tracks], px_per_m: float) -> dict[str, float]:
         """Returns a dict of HOTA, group_F1_hull and objective over the frames 1 … last, the frame of the last `Tracks`.
 
-        tracks: one tracker's, sorted by frame; without any, HOTA and objective are 0. px_per_m: scale for deriving
-        groups in the image; nan takes the truth's. The result equals `evaluate(truth, with_groups(tracks, fps,
-        px_per_m), frames=last)` under these keys. A score is nan where it is nan there: HOTA for a tracker of whole
-        groups, group_F1_hull without labelled groups or shapes.
+        The objective is the mean of the other two; if one is nan the other, if both are nan nan. tracks: one tracker's,
+        sorted by frame, no id twice in a frame (not checked); without any, HOTA and objective are 0 and group_F1_hull
+        is nan. px_per_m: scale for deriving groups in the image; nan takes the truth's. The result equals
+        `evaluate(truth, with_groups(tracks, fps, px_per_m), frames=last)` under these keys. A score is nan where it is
+        nan there: HOTA for a tracker of whole groups, group_F1_hull without labelled groups or shapes.
 
         Raises IncomparableError if boxes or positions to be compared are missing, and InputError if groups must be
         derived in the image and the scale is 0 or less.
@@ -61,8 +63,7 @@ class ObjectiveScorer:
 
     def _true_outlines(self, surface: Surface) -> GroupOutlines | None:
         """Returns the outlines of all true groups of labelled frames, None if the truth has no group shapes on the
-        surface. Computed once per surface.
-        """
+        surface. Computed once per surface ("ground" or "image") and kept."""
         if surface not in self._outlines:
             true = self.scorer.groups(surface)
             self._outlines[surface] = GroupOutlines.of(true.groups) if true.comparable else None
@@ -73,8 +74,9 @@ def _tracked_outlines(sides: ComparedSides, px_per_m: float) -> GroupOutlines:
     """Returns the outlines of the tracker's groups that are scored, in labelled frames; groups are derived if the
     tracker reports none.
 
-    px_per_m: scale for deriving groups in the image; if not finite the truth's is taken. Derived groups have two or
-    more people.
+    sides: the truth's and the tracker's data in the scored frames. px_per_m: scale for deriving groups in the image; if
+    not finite the truth's is taken. Derived groups have two or more people. Raises InputError if groups must be derived
+    in the image and the scale is 0 or less.
     """
     tracks, fps = sides.tracks, sides.truth.fps
     px_per_m = px_per_m if np.isfinite(px_per_m) else sides.truth.px_per_m
@@ -91,8 +93,9 @@ def _tracked_outlines(sides: ComparedSides, px_per_m: float) -> GroupOutlines:
 def _whole_outlines(sides: ComparedSides) -> GroupOutlines:
     """Returns the outlines of groups that are tracked as wholes (unit "group"), in labelled frames.
 
-    Groups with exactly one true person inside the hull or within 0.3 m of it are left out; groups with nobody inside
-    stay. If the truth has no positions on the surface, all groups stay.
+    sides: the truth's and the tracker's data in the scored frames. Groups with exactly one true person inside the hull
+    or within 0.3 m of it are left out; groups with nobody inside stay. If the truth has no positions on the surface,
+    all groups stay.
     """
     reported = [(t.index, t.groups) for t in sides.tracks if sides.frames[t.index] and t.groups is not None]
     frame = np.repeat(np.array([index for index, _ in reported], np.int64), [len(g.id) for _, g in reported])
