@@ -9,11 +9,12 @@ from typing import ClassVar
 
 
 class FlockscopeError(Exception):
-    """An error message for users; `str()` is exactly one line. Exit code 1 unless a subclass says otherwise.
+    """An error message for users; `str()` is exactly one line. exit_code: 1 unless a subclass says otherwise
+    (InputError: 2).
 
     - file: the file read or written, "" if there is none. place: the line, key, row or frame in it, "" if there is
       none.
-    - got: what was found there. expected: what should be there. remedy: what the user can do.
+    - got: what was found there. expected: what should be there. remedy: what the user can do. All are kept as text.
     """
 
     exit_code: ClassVar[int] = 1

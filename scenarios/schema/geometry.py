@@ -44,7 +44,8 @@ def door_fits(door: DoorSpec, wall: WallSegment) -> bool:
 def walls_without_doors(world: WorldSpec) -> Iterator[WallSegment]:
     """Yields the pieces of all walls, x1, y1, x2, y2 in m, that remain when the openings of the doors are cut out.
 
-    A door that does not lie wholly on a wall is not cut out of it.
+    They come wall by wall, each from its first end. A wall without doors is one piece. A door that does not lie wholly
+    on a wall is not cut out of it. A wall that doors cover wholly gives no piece.
     """
     for wall in world.walls:
         length = math.dist(wall[:2], wall[2:])
@@ -74,7 +75,11 @@ def clearance(point: FixedPoint, world: WorldSpec) -> tuple[float, str]:
 
 
 def queue_places(event: QueueOrder, count: int) -> tuple[FixedPoint, ...]:
-    """Returns the first `count` places (x, y) of a queue, m, head first; they may lie outside the world."""
+    """Returns the first `count` places (x, y) of a queue, m, head first; they may lie outside the world.
+
+    The head is at `event.at`; the others follow `event.spacing` m apart in direction `event.direction_deg` (0 = +x, 90
+    = +y). count 0: ().
+    """
     angle = math.radians(event.direction_deg)
     (x, y), step = event.at, event.spacing
     return tuple((x + k * step * math.cos(angle), y + k * step * math.sin(angle)) for k in range(count))

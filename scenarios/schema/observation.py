@@ -22,8 +22,9 @@ from scenarios.schema.values import Model, NonNegative, Positive
 
 
 class ObservationSpec(Model):
-    """Camera, sensor, light and picture, with the keys that they have in a scenario; an absent table has
-    all defaults.
+    """Camera, sensor, light and picture, with the keys that they have in a scenario; an absent table has all defaults.
+
+    schema_: version of the format, 1. Unknown keys and wrong values raise pydantic.ValidationError.
     """
 
     schema_: Literal[1] = Field(1, alias="schema")
@@ -36,11 +37,12 @@ class ObservationSpec(Model):
 class ReplayOrigin(Model):
     """The recording whose motion a replay shows.
 
-    - kind, name: of the recording. real: it shows real people, so nothing may be tuned on it.
+    - kind, name: format ("biwi", "mot", …) and name of the recording. real: it shows real people, so nothing may be
+      tuned on it.
     - people: the recording's ids of persons 1, 2, … of the replay, in this order.
     - start, duration: the part that is replayed, s. shift: positions in the replay minus those in the recording, x, y,
       m.
-    - smoothing: movements of the labels that are quicker than this are removed as jitter, s.
+    - smoothing: movements of the labels that are quicker than this are removed as jitter, s; 0: none.
     - motion: SHA-256 of the recording's labelled positions, ids and groups.
     """
 
@@ -56,8 +58,10 @@ class ReplayOrigin(Model):
 
 
 class ReplaySpec(ObservationSpec):
-    """A replay with all defaults filled in, as stored in its scenario.toml: name of the sequence, `replay`,
-    observation.
+    """A replay with all defaults filled in, as stored in its scenario.toml.
+
+    name: of the sequence. replay: which part of which recording it shows. schema_ (1), camera, sensor, light, picture:
+    how it is observed.
     """
 
     name: str

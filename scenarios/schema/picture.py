@@ -1,5 +1,5 @@
-"""The `[light]` and `[picture]` tables: light, texture, noise, blur and plants. They change pictures only, never the
-truth.
+"""The `[light]` and `[picture]` tables of a scenario: sun and shadows, changes of brightness; texture, noise, blur and
+plants. They change pictures only, never the truth.
 """
 
 from __future__ import annotations
@@ -14,7 +14,8 @@ from scenarios.schema.values import Distribution, Model, NonNegative, Positive, 
 class LightSwitch(Model):
     """A sudden change of brightness, as of a lamp or a cloud.
 
-    - at: time of the change, s. gain: factor of the brightness from then on, above 0. Either may be a distribution.
+    - at: time of the change, s. gain: factor of the brightness from then on, above 0. Either may be a distribution,
+      drawn once per seed.
     - ramp: duration of the change, s.
     """
 
@@ -24,13 +25,15 @@ class LightSwitch(Model):
 
 
 class Light(Model):
-    """The light on the scene; it changes pictures only. Brightness changes are relative standard deviations.
+    """The light on the scene; it changes pictures only. Brightness changes are relative standard deviations; 0 = none.
 
-    - sun_azimuth_deg (from where the light comes; 0 = from +x, 90 = from +y), sun_elevation_deg: degrees.
+    - sun_azimuth_deg (from where the light comes; 0 = from +x, 90 = from +y), sun_elevation_deg (above the ground):
+      degrees. Both may be distributions.
     - shadow: share of the brightness lost in a cast shadow; 0 = no shadows. penumbra: width of a shadow's soft edge, m.
-    - drift, drift_time: slow changes, and their time constant, s. flicker: changes from frame to frame.
-    - cloud, cloud_size (m), cloud_speed (m/s): soft patches that move over the ground.
-    - switch: sudden changes of brightness.
+    - drift, drift_time: size of slow changes, and their time constant, s. flicker: changes from frame to frame.
+    - cloud, cloud_size (distance at which the correlation is 0.6, m), cloud_speed (m/s): soft patches that move over
+      the ground.
+    - switch: sudden changes of brightness, empty for none.
     """
 
     sun_azimuth_deg: Value = Field(

@@ -18,8 +18,10 @@ MeanAndSd = tuple[float, NonNegative]
 
 
 class Hide(Model):
-    """Artificial occlusion from `start` to `end`, s: no person of the group named `group` is detected; None: no person
-    at all.
+    """Artificial occlusion of a group, or of everybody, for some time: the sensor does not detect these people.
+
+    start, end: s, from start on and before end. group: name of the group in the script; None: no person at all is
+    detected.
     """
 
     start: NonNegative = Field(description="start of the occlusion, s")
@@ -30,7 +32,7 @@ class Hide(Model):
 class Memory(Model):
     """A part of an error that changes slowly from frame to frame.
 
-    share: its share of the error's variance, 0 to 1. time: time after which its correlation is 0.37, s.
+    share: its share of the error's variance, 0 to 1. time: time after which its correlation is 0.37 (1/e), s.
     """
 
     share: Share = Field(description="share of the error's variance")
@@ -46,9 +48,9 @@ class BoxNoise(Model):
     - across: middle, to the right; foot, top: lower and upper edge, downwards; all in box heights.
     - width: logarithm of the width.
     - occluded: each standard deviation is multiplied by 1 + this × hidden share of the box.
-    - tails: excess kurtosis of the errors; 0 = normal.
-    - memory: parts that change slowly; None: all errors are drawn anew in each frame. Shares above 1 in sum are an
-      error.
+    - tails: excess kurtosis of the errors, 0 to 30; 0 = normal.
+    - memory: parts that change slowly; None: all errors are drawn anew in each frame. Shares above 1 in sum raise
+      pydantic.ValidationError.
     """
 
     across: MeanAndSd = Field(
@@ -132,15 +134,21 @@ class FalseAlarms(Model):
 class Sensor(Model):
     """The synthetic detector that makes the points and boxes of det/det.txt.
 
-    - detect_prob; clutter_rate: mean false alarms per frame; noise_px, noise_m: standard deviation of box edges and
-      points.
-    - occlusion_power, min_visibility, small_px (box height, px), persistence: what lowers or correlates detection.
-    - box: "visible" or "amodal". hide: artificial occlusions.
-    - by_visibility, miss_memory, box_noise: measured, they replace occlusion_power, persistence, noise_px; None: they
-      do not.
-    - points, false_alarms, true_scores, false_scores: measured; None: not measured.
+    - detect_prob: probability that a fully visible person of usual size is detected. It is multiplied by visibility ^
+      occlusion_power. Below min_visibility it is 0. At a box height of small_px (px) it is halved; 0 = no effect.
+    - persistence: correlation of misses from frame to frame. clutter_rate: mean number of false alarms per frame.
+    - noise_px: standard deviation of each box edge, px. noise_m: of points along each axis, m.
+    - box: "visible" (boxes of the visible parts) or "amodal" (of whole people). hide: artificial occlusions.
+    - by_visibility: factors at evenly spaced visibilities from 0 to 1, for occlusion_power. miss_memory: slow parts of
+      the misses, for persistence. box_noise: errors in box heights, for noise_px. These three are measured and replace
+      the simpler key; None: they do not.
+    - points: "foot" (below the noisy box) or "own" (true position with noise_m); None: as "own". false_alarms: life,
+      places and sizes; None: one frame, anywhere.
+    - true_scores, false_scores: evenly spaced quantiles of the scores of true detections and false alarms; None: not
+      measured.
 
-    Raises pydantic.ValidationError for unknown keys and keys that exclude each other.
+    Raises pydantic.ValidationError for unknown keys, miss_memory together with persistence, quantiles that decrease, or
+    shares of miss_memory above 1 in sum.
     """
 
     detect_prob: Share = Field(0.95, description="probability that a fully visible person of usual size is detected")
@@ -198,6 +206,6 @@ class Sensor(Model):
 
 
 def _check_shares(memory: Memories | None) -> None:
-    """Raises ValueError if the shares of the parts add up to more than 1; None and no part are fine."""
+    """Raises ValueError if the shares of variance of the parts add up to more than 1; None and no part are fine."""
     if sum(part.share for part in memory or ()) > 1 + 1e-9:
         raise ValueError("shares whose sum is at most 1")

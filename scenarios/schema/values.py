@@ -36,10 +36,11 @@ class Model(BaseModel):
 class Distribution(BaseModel):
     """One of five distributions of a number: exactly one of the keys besides `clip` is given, the rest is None.
 
-    - normal: mean, standard deviation. uniform: least, greatest. exponential, poisson: mean.
-    - choice: values of equal probability. clip: least and greatest value kept; draws outside are drawn again.
+    - normal: mean, standard deviation. uniform: least, greatest. exponential, poisson: mean, above 0.
+    - choice: values of equal probability. clip: least and greatest value kept, both included; draws outside are drawn
+      again; None: all are kept.
 
-    Any other combination, or bounds in the wrong order, raises pydantic.ValidationError.
+    Any other combination, a bound that is above its upper bound, or unknown keys raise pydantic.ValidationError.
     """
 
     model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
@@ -53,8 +54,8 @@ class Distribution(BaseModel):
 
     @model_validator(mode="after")
     def _one_kind(self) -> Self:
-        """Returns the model; raises ValueError unless exactly one kind is given, and the bounds of uniform and clip are
-        in order.
+        """Returns the model; raises ValueError unless exactly one of normal, uniform, exponential, poisson and choice
+        is given, and the bounds of uniform and clip are in order (equal bounds are allowed).
         """
         kinds = [name for name in ("normal", "uniform", "exponential", "poisson", "choice") if getattr(self, name)]
         if len(kinds) != 1:
@@ -108,7 +109,8 @@ def bounds(value: Value) -> tuple[float, float]:
     """Returns the least and greatest number that a value can take, `clip` included; -inf or inf where there is no
     bound.
 
-    A number gives itself twice. Without clip, normal gives -inf and inf, exponential and poisson 0 and inf.
+    A number gives itself twice. Without clip, normal gives -inf and inf, exponential and poisson 0 and inf, choice its
+    least and greatest entry. If no draw can lie within the clip, the first may be above the second.
     """
     if not isinstance(value, Distribution):
         return float(value), float(value)

@@ -46,14 +46,16 @@ def cluster_workers(address: str, workers: int = 1) -> Iterator[RunItems]:
     """Give the RunItems (run a function over items) of the dask cluster whose scheduler listens at `address`.
 
     address: "tcp://HOST:PORT". workers: least number of items under way. As many items are under way as the cluster has
-    worker threads, but at least `workers`, plus the `ahead` of the call. The end of the block closes the connection;
-    the cluster itself keeps running.
+    worker threads, but at least `workers`, plus the `ahead` of the call. Results come in the order in which they
+    arrive. The end of the block closes the connection; the cluster itself keeps running. Side effect: dask's logger
+    "distributed" is silenced up to CRITICAL.
 
     Entering the block raises InputError if the address is malformed or dask.distributed is not installed, and WorkError
-    if no scheduler answers within CONNECT_TIMEOUT (10 s). Reading results raises WorkError if the connection is lost,
-    or if a worker has other versions, sources or CPU instructions than this process, has several threads, or cannot
-    import flockscope. An item that killed too many workers raises WorkError unless `on_loss` is given. A cluster
-    without workers causes a warning after 20 s.
+    if no scheduler answers within CONNECT_TIMEOUT (10 s). Reading results raises the exception of the function, and
+    WorkError if the connection is lost, or if a worker has other versions, sources or CPU instructions than this
+    process, has several threads, or cannot import flockscope. An item that killed too many workers raises WorkError
+    unless `on_loss` is given; then on_loss(item, error) is its result. A cluster without workers causes a warning after
+    20 s.
     """
     client = _connect(address)
 
@@ -109,9 +111,9 @@ def _connect(address: str) -> Any:
 class _ClusterCapacity:
     """How many items the cluster can run at a time.
 
-    State: the number of the cluster's worker threads at the last count, the time of that count, and since when there
-    are no threads (None while there are some, or after the warning about that). `least`: the smallest capacity
-    reported.
+    client: the dask client. address: of the scheduler, for messages. State: the number of the cluster's worker threads
+    at the last count, the time of that count, and since when there are no threads (None while there are some, or after
+    the warning about that). `least`: the smallest capacity reported.
     """
 
     def __init__(self, client: Any, address: str, least: int) -> None:
@@ -180,10 +182,12 @@ def run_on_worker(call: bytes, required: tuple[tuple[str, str], ...]) -> bytes:
     """Run a call on the dask worker that this process is; returns a pickled WorkResult.
 
     It holds the call's value or exception, so an exception of the function itself is not raised. call: a pickled
-    (function, item). required: (name, value) pairs of the runtime that the worker must have. Sets each of
-    THREAD_VARIABLES to 1 in this process unless it is set already. Before Python 3.11.9 it stops dask's profiler.
+    (function, item). required: (name, value) pairs of the runtime that the worker must have, as ("numpy", "2.1.0").
+    Sets each of THREAD_VARIABLES (OMP_NUM_THREADS and others) to 1 in this process unless it is set already. Before
+    Python 3.11.9 it stops dask's profiler.
 
-    Raises WorkError if the worker has more than one thread, or if its runtime differs from `required`.
+    Raises WorkError if the worker has more than one thread, or if its runtime differs from `required`; ValueError if
+    this process is no dask worker.
     """
     from distributed import get_worker
 
@@ -240,7 +244,8 @@ def _drain(finished: queue.SimpleQueue[str]) -> Iterator[str]:
 def _fetchers(client: Any, futures: list[Any]) -> list[Callable[[], bytes]]:
     """Return for each finished future, in order, a call that returns the future's bytes or raises its error.
 
-    Several futures are gathered in one request. If one of them failed, each call fetches its own future instead.
+    Several futures are gathered in one request, at once. If one of them failed, each call fetches its own future
+    instead. A single future is fetched when its call is made. client: the dask client.
     """
     if len(futures) > 1:
         with suppress(Exception):  # one of them failed: its own result() raises the error

@@ -21,10 +21,11 @@ from sim.workers.protocol import MAX_LOSSES, THREAD_VARIABLES, R, RunItems, T, w
 def process_pool(workers: int) -> Iterator[RunItems]:
     """Give the RunItems (run a function over items) of `workers` local worker processes for the length of the block.
 
-    A process is spawned when it gets its first item, and again after its death. The block sets THREAD_VARIABLES to 1 in
-    this process's environment, so that the workers inherit them, and restores them at its end. The end of the block
-    terminates the processes, also in the middle of a call. Exceptions are raised while results are read, as RunItems
-    says.
+    workers: 1 or more; with 0 no item is run. A process is spawned when it gets its first item, and again after its
+    death. The block sets THREAD_VARIABLES (OMP_NUM_THREADS and others) to 1 in this process's environment, so that the
+    workers inherit them, and restores them at its end. The end of the block terminates the processes, also in the
+    middle of a call. Reading results raises the exception of the function, the pickling error of an item, and WorkError
+    for an item of which three processes died unless `on_loss` is given. `ahead` is ignored.
     """
     before = {name: os.environ.get(name) for name in THREAD_VARIABLES}
     os.environ.update(dict.fromkeys(THREAD_VARIABLES, "1"))
@@ -69,10 +70,11 @@ def _run_items(
 ) -> Iterator[tuple[T, R]]:
     """Yield (item, function(item)) for every item, in the order in which the results arrive.
 
-    Each of `processes` runs one item at a time, so the death of a process is the loss of one item. The item is run
-    again until MAX_LOSSES (3) processes have died of it. Then on_loss(item, error) becomes its result; if `on_loss` is
-    None, the WorkError is raised. It is raised in spite of `on_loss` after more than MAX_LOSSES × (number of processes
-    + 1) deaths without a result in between. Raises the exception of the function. When the iteration ends early, busy
+    items: read one whenever a process is idle; items to repeat come first. Each of `processes` runs one item at a time,
+    so the death of a process is the loss of one item. The item is run again until MAX_LOSSES (3) processes have died of
+    it. Then on_loss(item, error) becomes its result; if `on_loss` is None, the WorkError is raised. It is raised in
+    spite of `on_loss` after more than MAX_LOSSES × (number of processes + 1) deaths without a result in between. Raises
+    the exception of the function, and the pickling error of a function or item. When the iteration ends early, busy
     processes are terminated.
     """
     from multiprocessing.connection import wait

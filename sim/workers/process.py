@@ -50,10 +50,10 @@ class WorkResult:
 
 
 class WorkerProcess:
-    """A worker process that runs one call at a time.
+    """A worker process that runs one call at a time; it is started by its first item, and again after its death.
 
-    State: the process (None before its first item and after its end), the pipe to it, and `ended`, a text that says how
-    the last process ended: "exit code 3" or "signal 9 (SIGKILL)"; "" if none has ended.
+    State: the process (None before its first item and after its end was noticed), the pipe to it, and `ended`, a text
+    that says how the last process ended: "exit code 3" or "signal 9 (SIGKILL)"; "" if none has ended.
     """
 
     def __init__(self) -> None:
@@ -127,10 +127,11 @@ class WorkerProcess:
 
 
 def _serve(pipe: Any) -> None:
-    """Run in the worker process: run each pickled call from `pipe` and send back its WorkResult, until the parent
-    closes it.
+    """Run in the worker process: run each pickled call from `pipe` and send back its pickled WorkResult, until the
+    parent closes it.
 
-    Ignores Ctrl-C. The worker exits with code 1 when its parent exits.
+    A closed or broken pipe ends it without an error. Ignores Ctrl-C. The worker exits with code 1 when its parent
+    exits; a thread waits for that.
     """
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     threading.Thread(target=_exit_with_parent, daemon=True).start()

@@ -46,9 +46,10 @@ class RunItems(Protocol):
         it. on_loss: called with the item and the error if an item killed too many workers (3 local ones); its return
         value becomes the item's result. This process ignores it.
 
-        Raises the exception of the function, which ends the iteration. Raises WorkError in three cases: an item killed
-        too many workers and `on_loss` is None; local workers die again and again without any result in between, also
-        with `on_loss`; a cluster is lost or a worker of it cannot take part.
+        Raises the exception of the function, which ends the iteration, and the pickling error of a function or item for
+        other processes. Raises WorkError in three cases: an item killed too many workers and `on_loss` is None; local
+        workers die again and again without any result in between, also with `on_loss`; a cluster is lost or a worker of
+        it cannot take part.
         """
 
 

@@ -35,8 +35,9 @@ def start_workers(workers: int = 1, cluster: str | None = None) -> AbstractConte
     cluster None: this process for one worker, else `workers` spawned processes. Otherwise the address of a dask
     scheduler, "tcp://HOST:PORT"; its workers are used, and `workers` is then the least number of items under way.
 
-    Raises InputError if `workers` is below 1. Entering the block raises InputError if the address is malformed or
-    dask.distributed is not installed, and WorkError if no scheduler answers. Results raise as RunItems says.
+    Raises InputError at once if `workers` is below 1. Entering the block raises InputError if the address is malformed
+    or dask.distributed is not installed, and WorkError if no scheduler answers. Reading results raises the exception of
+    the function, and WorkError if workers die again and again, the cluster is lost, or one of its workers does not fit.
     """
     if workers < 1:
         raise InputError(place="workers", got=workers, expected="1 or more", remedy="correct --workers")
@@ -49,8 +50,8 @@ def results_in_order(run: RunItems, function: Callable[[T], R], items: Sequence[
     """Yield function(item) in the order of `items`, with `run` (a RunItems) doing the work.
 
     No object may stand twice among the items. Results that arrive early are kept in memory until their turn. When the
-    caller closes the generator, no further item is started, and items under way are waited for. Raises what `run`
-    raises: the exception of the function, or WorkError for lost workers.
+    caller closes the generator, or an exception ends it, no further item is started, and items under way are waited
+    for. Raises what `run` raises: the exception of the function, or WorkError for lost workers.
     """
     wanted, found = True, dict[int, R]()
     arriving = run(function, (item for item in items if wanted))
