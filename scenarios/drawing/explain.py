@@ -20,8 +20,8 @@ ROW = 30.0  # px between the lines of groups in the drawing of the script
 def text(scenario: Scenario) -> str:
     """Returns a description of a scenario for people, as lines of text.
 
-    In order: name, about, setting, plan in characters, people, orders, sensor. The scenario must be one that `load`
-    accepts.
+    In order: name, about (if any), setting, plan in characters, people, orders (numbered from 1, or "none"), sensor.
+    The scenario must be one that `load` accepts.
     """
     lines = [scenario.name, *([scenario.about] if scenario.about else []), "", *describe.setting(scenario), ""]
     lines += [character_plan(scenario), "", "People"]
@@ -34,10 +34,10 @@ def text(scenario: Scenario) -> str:
 
 
 def svg(scenario: Scenario) -> str:
-    """Returns an SVG drawing of a scenario, which must be one that `load` accepts.
+    """Returns an SVG drawing, as text, of a scenario, which must be one that `load` accepts.
 
     It has the plan with starts, ways and goals of all groups, and beneath it the script: one line for each group, which
-    joins and divides at the orders.
+    joins and divides at the orders, and each order in words. The about line is cut to 140 characters, orders to 128.
     """
     plan = SvgPlan(scenario.world)
     ways, orders = group_routes(scenario), order_marks(scenario)
@@ -67,7 +67,7 @@ def svg(scenario: Scenario) -> str:
 def _colours(ways: list[GroupRoute], orders: list[OrderMark]) -> dict[str, str]:
     """Returns the colour (#rrggbb) of each group name, also of groups that orders make; ten colours in turn.
 
-    All groups of a `repeat` have the same one.
+    ways: one per entry of `group`. All groups of a `repeat` have the same colour.
     """
     named: dict[str, str] = {}
     for course in ways:
@@ -88,7 +88,8 @@ def _script(
     """Returns the SVG elements of the script, and the y of their lower end, px: lines of groups, then the orders in
     words.
 
-    ways, orders: groups and orders to draw. colour: by group name. top: y of the title, px.
+    ways, orders: groups and orders to draw. colour: #rrggbb by group name; KeyError for a group without one. top: y of
+    the title, px. Words of an order are cut to 128 characters.
     """
     parts = [f'<text x="{MARGIN}" y="{top:.0f}" style="font-weight:700">Script</text>']
     rows, x0 = {course.id: k for k, course in enumerate(ways)}, MARGIN + 60
@@ -131,11 +132,12 @@ ScriptLine = tuple[str, int, float, float, float]
 def _lines(
     rows: dict[str, int], row_of: dict[str, str], orders: list[OrderMark]
 ) -> tuple[list[ScriptLine], dict[int, list[int]]]:
-    """Returns the lines of groups to draw, and for each order number the rows that the order concerns.
+    """Returns the lines of groups to draw, and for each order number the rows (0 = top) that the order concerns.
 
     A line is (group name, row, order number where it starts, order number where it ends, row at its end); numbers count
-    from 1, 0 is the start. rows: row of each entry of `group`; rows of new groups are added to it. row_of: id of the
-    entry by name of each of its groups. One group of a `repeat` branches off; the line of the others goes on.
+    from 1, 0 is the start, fractions lie between two orders. rows: row of each entry of `group`; rows of new groups are
+    added to it. row_of: id of the entry by name of each of its groups. One group of a `repeat` branches off; the line
+    of the others goes on. Raises KeyError for an order of an unknown group.
     """
     since = dict.fromkeys(rows, 0.0)
     lines: list[ScriptLine] = []

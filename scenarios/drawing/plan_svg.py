@@ -20,9 +20,10 @@ text { font: 13px system-ui, sans-serif; fill: #1b1f24 } .small { font-size: 11.
 
 
 class SvgPlan:
-    """Draws in world metres (y up) on a picture in px (y down).
+    """Draws in world metres (y up) on a picture in px (y down), 900 px wide; the methods return SVG elements as text.
 
-    State: world; scale, px per m; left, top: px of the world's upper left corner; bottom: lower end of the plan, px.
+    State: world; scale, px per m, such that the plan is at most 848 px wide and 620 px high; left, top: px of the
+    world's upper left corner; bottom: lower end of the plan, px.
     """
 
     def __init__(self, world: WorldSpec) -> None:
@@ -82,7 +83,10 @@ class SvgPlan:
         return parts
 
     def _stairs(self, stairs: StairsSpec) -> list[str]:
-        """Returns SVG elements of a flight of stairs: outline with landing, a line per step, and its rise in words."""
+        """Returns SVG elements of a flight of stairs: outline with landing, a line per step, and its rise in words.
+
+        Its foot and head must be different places: else ZeroDivisionError.
+        """
         (fx, fy), (hx, hy) = stairs.foot, stairs.head
         length = math.dist(stairs.foot, stairs.head)
         ex, ey = (hx - fx) / length, (hy - fy) / length
@@ -101,9 +105,10 @@ class SvgPlan:
         ]
 
     def route(self, route: GroupRoute, colour: str) -> list[str]:
-        """Returns SVG elements of a group's way and goal, and the range of the goal if the goal is drawn at random.
+        """Returns SVG elements of a group's way and goal, and a rectangle over the range of the goal if that is drawn
+        at random.
 
-        colour: #rrggbb.
+        colour: #rrggbb. The arrow head is a marker of that colour, which the picture must define (`marker`).
         """
         end = route.points[-1]
         u, v = self(end)
@@ -116,7 +121,7 @@ class SvgPlan:
     def _spread(self, at: XY, half: XY, colour: str) -> list[str]:
         """Returns a rectangle over the range of a random place, as a list of one SVG element; [] if half is (0, 0).
 
-        at: its middle, m. half: half its width and height, m. colour: #rrggbb.
+        at: its middle, m. half: half its width and height, m; each half is drawn at least 3 px long. colour: #rrggbb.
         """
         if half == (0, 0):
             return []
@@ -128,10 +133,11 @@ class SvgPlan:
         ]
 
     def start(self, route: GroupRoute, colour: str, lift: int = 0) -> list[str]:
-        """Returns SVG elements of a group's start: 1 to 12 people, the range of a random start, name, copies and mean
-        size.
+        """Returns SVG elements of a group's start: its people as discs, the range of a random start, and name, copies
+        and mean size.
 
-        colour: #rrggbb. lift: number of text lines by which the words stand higher.
+        The number of discs is the mean size, rounded, 1 to 12. colour: #rrggbb. lift: number of text lines by which the
+        words stand higher.
         """
         at, parts = route.points[0], self._spread(route.points[0], route.spread[0], colour)
         n = min(max(round(route.people), 1), 12)
@@ -168,8 +174,9 @@ class SvgPlan:
         return parts
 
     def numbers(self, orders: list[OrderMark]) -> list[str]:
-        """Returns SVG elements with the number of each order at its place; orders at nearly the same place stand side
-        by side.
+        """Returns SVG elements with the number of each order at its place.
+
+        Orders whose places fall into one square of 24 px stand side by side, in the order given.
         """
         parts, used = [], dict[tuple[int, int], int]()
         for mark in orders:

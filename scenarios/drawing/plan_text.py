@@ -16,10 +16,10 @@ LEGEND = "A start of a   ◎ goal   · way   ① order   ○ queue   █ wall   
 
 
 class CharacterPlan:
-    """A grid of characters over the world, the y axis pointing up.
+    """A grid of characters over the world, the y axis pointing up; blank at first.
 
     State: cells: rows of characters, top row first; scale: columns per m; columns, rows: size of the grid, at least 4
-    rows; size: of the world, x, y, m.
+    rows; a row is as high in m as two columns are wide; size: of the world, x, y, m.
     """
 
     def __init__(self, size: XY, columns: int) -> None:
@@ -31,7 +31,8 @@ class CharacterPlan:
     def put(self, at: XY, text: str, over: str = "") -> None:
         """Writes text to the right of a point (x, y), m; with `over`, only where the grid has one of its characters.
 
-        A point outside the grid is moved to its edge. Text that would pass the right edge is moved to the left.
+        A point outside the grid is moved to its edge. Text that would pass the right edge is moved to the left. It must
+        not be longer than the grid is wide.
         """
         column = min(max(int(at[0] * self.scale), 0), self.columns - len(text))
         row = min(max(int((self.size[1] - at[1]) / self.size[1] * self.rows), 0), self.rows - 1)
@@ -42,8 +43,8 @@ class CharacterPlan:
     def name(self, at: XY, text: str) -> None:
         """Writes a name to the right of a point (x, y), m.
 
-        It takes the nearest of five rows where the name covers only blanks and ways (·); the point's own row if there
-        is none.
+        It takes the nearest of five rows (the point's own, then one and two below or above) where the name covers only
+        blanks and ways (·); the point's own row if there is none.
         """
         column = min(max(int(at[0] * self.scale), 0), self.columns - len(text))
         step = self.size[1] / self.rows
@@ -67,7 +68,7 @@ class CharacterPlan:
             self.put((a[0] + (b[0] - a[0]) * k / steps, a[1] + (b[1] - a[1]) * k / steps), character, over)
 
     def text(self) -> str:
-        """Returns the grid as lines of text with a frame around it."""
+        """Returns the grid as lines of text with a frame around it, joined by line breaks, without one at the end."""
         rows = ["│" + "".join(row) + "│" for row in self.cells]
         return "\n".join(["┌" + "─" * self.columns + "┐", *rows, "└" + "─" * self.columns + "┘"])
 
@@ -76,8 +77,8 @@ def character_plan(scenario: Scenario, columns: int = 64) -> str:
     """Returns the plan of a scenario as lines of text, `columns` characters wide plus a frame, with its size and
     legend.
 
-    Later things cover earlier ones: stairs, ways, queues, walls, pillars, service points, goals, names of groups,
-    orders.
+    Later things cover earlier ones: stairs, ways (on blanks only), queues, walls, pillars, service points, goals, names
+    of groups (first 8 letters, in capitals), orders (① to ⑳, then again from ①).
     """
     world = scenario.world
     plan = CharacterPlan(world.size, columns)

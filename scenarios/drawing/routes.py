@@ -36,8 +36,8 @@ class GroupRoute:
 
 @dataclass(frozen=True)
 class Arrow:
-    """A way that an order opens. id: name of the group, "served" for groups after a queue. points: x, y in
-    m, in order.
+    """A way that an order opens. id: name of the group that walks it, "served" for groups after a queue. points: x, y
+    in m, in order.
     """
 
     id: str
@@ -46,11 +46,12 @@ class Arrow:
 
 @dataclass(frozen=True)
 class OrderMark:
-    """An order on the plan.
+    """An order of the script as drawn on the plan.
 
     - number: of the order in the file, from 1. event: the order. at: x, y of where it happens, m.
-    - before, after: names of its groups; the same for a queue.
-    - arrows: the ways it opens. slots: x, y of the places of a queue, m; empty for other orders.
+    - before, after: names of its groups before and after it; the same for a queue.
+    - arrows: the ways it opens; empty if groups stay or keep their goals. slots: x, y of the places of a queue, m;
+      empty for other orders.
     """
 
     number: int
@@ -98,7 +99,10 @@ def spread(value: Value) -> float:
 
 
 def group_routes(scenario: Scenario) -> list[GroupRoute]:
-    """Returns the ways of all entries of `group`, in order; an entry with `repeat` gives one."""
+    """Returns the ways of all entries of `group`, in order; an entry with `repeat` gives one.
+
+    Points drawn from a distribution are replaced by their means.
+    """
     made = []
     for group in scenario.group:
         points = (group.start, *group.via, group.goal)
@@ -110,7 +114,8 @@ def group_routes(scenario: Scenario) -> list[GroupRoute]:
 def order_marks(scenario: Scenario) -> list[OrderMark]:
     """Returns the orders as drawn on the plan, in the order of the file, numbered from 1; empty without orders.
 
-    Merges and splits are taken to happen half-way. Raises KeyError for an order of a group that does not exist.
+    Merges and splits are taken to happen half-way. Raises KeyError for a merge or split of a group that does not exist
+    at that point of the script.
     """
     places = {}
     for group in scenario.group:
@@ -131,7 +136,8 @@ def _mark(number: int, event: ScriptOrder, places: dict[str, tuple[XY, XY]], wor
     """Returns one order as drawn on the plan.
 
     number: of the order, from 1. places: start and goal (x, y, m) by name of existing group; it is updated. world: its
-    size (x, y), m; places of a queue outside it are left out. Raises KeyError for a group that does not exist.
+    size (x, y), m; places of a queue outside it are left out, and at most SLOTS (6) are drawn. Raises KeyError for a
+    merge or split of a group that does not exist.
     """
     if isinstance(event, MergeOrder):
         return _merge(number, event, places)
@@ -145,7 +151,9 @@ def _mark(number: int, event: ScriptOrder, places: dict[str, tuple[XY, XY]], wor
 def _merge(number: int, event: MergeOrder, places: dict[str, tuple[XY, XY]]) -> OrderMark:
     """Returns a merge on the plan, at the mean of its groups' half-way points between start and goal.
 
-    places: start and goal (x, y, m) by group; the merged groups are removed and the new one is added.
+    number: of the order, from 1. places: start and goal (x, y, m) by group; the merged groups are removed and the new
+    one is added. A new group that stays where the groups meet has no arrow. Raises KeyError for a group that does not
+    exist.
     """
     ways = [places.pop(name) for name in event.groups]
     meeting = _mean([_mean([start, goal]) for start, goal in ways])
@@ -158,7 +166,8 @@ def _merge(number: int, event: MergeOrder, places: dict[str, tuple[XY, XY]]) -> 
 def _split(number: int, event: SplitOrder, places: dict[str, tuple[XY, XY]]) -> OrderMark:
     """Returns a split on the plan, half-way between the start and goal of its group.
 
-    places: start and goal (x, y, m) by group; the group is removed and its parts are added.
+    number: of the order, from 1. places: start and goal (x, y, m) by group; the group is removed and its parts are
+    added. Raises KeyError for a group that does not exist.
     """
     start, goal = places.pop(event.group)
     at = _mean([start, goal])
@@ -170,7 +179,8 @@ def _split(number: int, event: SplitOrder, places: dict[str, tuple[XY, XY]]) -> 
 def _served(event: QueueOrder, names: tuple[str, ...], places: dict[str, tuple[XY, XY]]) -> tuple[Arrow, ...]:
     """Returns the common way of all groups after a queue, as a tuple of one; () where they go to their own goals.
 
-    names: of the groups. places: start and goal (x, y, m) by group, is updated if the queue has a goal.
+    names: of the groups. places: start and goal (x, y, m) by group; if the queue has a goal, they become the head of
+    the queue and that goal.
     """
     if event.goal is None:
         return ()

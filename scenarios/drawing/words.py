@@ -43,12 +43,17 @@ def place(point: Point) -> str:
 
 
 def count(n: Value, one: str, many: str) -> str:
-    """Returns a number or distribution with its noun, `one` only for exactly 1: `1 person`, `3 people`."""
+    """Returns a number or distribution with its noun: `one` (the singular) only for exactly 1, else `many`: `1 person`,
+    `3 people`.
+    """
     return f"{number(n)} {one if n == 1 else many}"
 
 
 def setting(scenario: Scenario) -> list[str]:
-    """Returns three lines in words: duration and how the script is placed; size and content of the world; camera."""
+    """Returns three lines in words: duration and how the script is placed; size and content of the world; camera.
+
+    The second says "empty" for a world without things, the first leaves out a turn and a lead of 0.
+    """
     world, camera = scenario.world, scenario.camera
     things = {"wall": world.walls, "door": world.doors, "pillar": world.pillars, "flight of stairs": world.stairs}
     things["service point"] = world.service
@@ -85,7 +90,9 @@ def people(group: GroupSpec) -> str:
 
 
 def trigger(when: When) -> str:
-    """Returns in words when an order fires: its trigger, and the delay after it unless that is 0."""
+    """Returns in words when an order fires: its trigger (a time, a group's arrival, another order, nearness), and the
+    delay after it unless that is 0.
+    """
     if when.time is not None:
         text = f"at {number(when.time, 's')}"
     elif when.reach is not None:

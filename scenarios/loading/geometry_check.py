@@ -25,7 +25,7 @@ def check(scenario: Scenario, file: str | Path = "") -> None:
     """Raises InputError, naming `file`, for the first thing in the scenario that cannot work; returns nothing.
 
     Checked in this order: walls, doors and stairs; groups; hidden groups of the sensor; places inside the world and
-    clear of walls; the orders of the script.
+    clear of walls; the orders of the script. file: the scenario's, for the message only; "" names none.
     """
     try:
         _check_world(scenario)
@@ -38,7 +38,9 @@ def check(scenario: Scenario, file: str | Path = "") -> None:
 
 
 def _check_world(scenario: Scenario) -> None:
-    """Raises InputError for a wall or stairs without length, or for a door that does not lie on one wall."""
+    """Raises InputError for a wall or stairs without length, or for a door whose opening does not lie wholly on one
+    wall.
+    """
     world = scenario.world
     for k, wall in enumerate(world.walls):
         if wall[:2] == wall[2:]:
@@ -98,8 +100,9 @@ def _check_sensor(scenario: Scenario) -> None:
 def _check_points(scenario: Scenario) -> None:
     """Raises InputError for a place that can lie outside the world, or is less than 0.2 m (BODY) from a wall or pillar.
 
-    Places drawn from a distribution are checked against the world by their finite bounds only, and not against walls. A
-    script that may be mirrored is checked both ways. A script that may be turned is not checked.
+    Places are those where people start or are sent. Places drawn from a distribution are checked against the world by
+    their finite bounds only, and not against walls. A script that may be mirrored is checked both ways against walls. A
+    script that may be turned (turn_deg not 0) is not checked.
     """
     if bounds(scenario.turn_deg) != (0.0, 0.0):
         return
@@ -119,10 +122,12 @@ def _check_points(scenario: Scenario) -> None:
 
 
 def points(scenario: Scenario) -> Iterator[tuple[str, Point]]:
-    """Yields (key, point in m) for every place where people start or are sent, groups first, then orders.
+    """Yields (key, point in m) for every place in the script: where people start, pass, are sent, or trigger an order.
 
-    Coordinates are numbers or distributions. Of a queue these are the first 3 places, all with the key `event.ID.at`,
-    and its goal if it has one.
+    Groups come first: start, goal, via. Then orders: the place `reach.at` of the trigger, if given; goal and via of
+    each part of a split; via and goal of a merge; of a queue the first 3 places, all with the key `event.ID.at`, and
+    its goal. A missing goal and "meet" are left out. Coordinates are numbers or distributions. Keys are as
+    "group.ID.via.0".
     """
     for group in scenario.group:
         yield f"group.{group.id}.start", group.start

@@ -24,9 +24,10 @@ def apply_settings(table: Table, settings: Iterable[str], file: object = "") -> 
     """Returns a copy of the table with each `key=value` applied in turn, and the text of each setting by path of its
     key.
 
-    A path has indices where the key has ids. A key of a table that does not exist is added, so a misspelt key is found
-    only by `validate`. Raises InputError, naming `file`, if a setting is not of the form key=value, its value is not
-    TOML, or its key leads into a plain value or to a row that an array does not have.
+    A path is a tuple of keys and indices; it has indices from 0 where the key has ids. A key of a table that does not
+    exist is added, so a misspelt key is found only by `validate`. Raises InputError if a setting is not of the form
+    key=value, its value is not TOML, or its key leads into a plain value or to a row that an array does not have. file:
+    named in the last two messages.
     """
     table = copy.deepcopy(table)
     places: dict[KeyPath, str] = {}
@@ -70,10 +71,11 @@ def parse_value(value: str, text: str) -> Any:
 
 
 def _put(table: Table, steps: list[str], value: Any, text: str, file: object) -> KeyPath:
-    """Sets the value in the table, which is modified; returns the path of its key, with ids replaced by indices.
+    """Sets the value in the table, which is modified; returns the path of its key, with ids replaced by indices from 0.
 
-    steps: of the key. text: the whole setting, for messages. Missing tables on the way are created. Raises InputError
-    if the key leads into a plain value or to a row that an array does not have.
+    steps: of the key, as ["group", "a", "size"]. text: the whole setting, and file: that of the table, for messages.
+    Missing tables on the way are created. A table that replaces a row keeps the row's id. Raises InputError if the key
+    leads into a plain value or to a row that an array does not have.
     """
     here: Any = table
     path: list[str | int] = []
@@ -103,10 +105,12 @@ def _put(table: Table, steps: list[str], value: Any, text: str, file: object) ->
 
 
 def _index(rows: list[Any], steps: list[str], value: Any, text: str, file: object) -> tuple[int, list[str]]:
-    """Returns the index in `rows` that the first steps name, by index or id, and the steps after them.
+    """Returns the index in the array `rows` that the first steps name, by index from 0 or by id, and the steps after
+    them.
 
-    Ids may have dots; the longest id wins. A table set on a new id gives the index after the last row, and gets that
-    id. Raises InputError if there is no such row. text: the whole setting, for the message.
+    Ids may have dots; the longest id wins; an existing index wins over an id. A table `value` set on a new id gives the
+    index after the last row, if the array has ids; `id` is added to that table, which is modified. Raises InputError if
+    there is no such row. text: the whole setting, and file: that of the table, for the message.
     """
     if steps[0].isdigit() and int(steps[0]) < len(rows):
         return int(steps[0]), steps[1:]

@@ -23,9 +23,9 @@ __all__ = ["Entry", "dump", "load", "load_observation", "names", "resolve", "sui
 
 @dataclass(frozen=True)
 class Entry:
-    """One sequence to make.
+    """One sequence to make for every seed.
 
-    - name: unique. scenario: what to simulate, checked.
+    - name: unique among the entries of a suite. scenario: what to simulate, checked.
     - repeat: number of the copy, from 1, where a suite's entry has `repeat`, else 0.
     - file: the scenario's file, or the suite's file and the entry, for messages; not compared.
     """
@@ -37,11 +37,12 @@ class Entry:
 
 
 def load(name_or_path: str | Path, set: Iterable[str] = ()) -> Scenario:
-    """Returns the checked scenario of a catalogue name or a *.toml file.
+    """Returns the checked scenario of a catalogue name or a *.toml file (relative to the working folder, else the
+    catalogue).
 
     `extends` is applied first, then each `key=value` of `set` in turn. Raises InputError for everything that can be
-    found wrong without simulating: an unknown name, an unreadable file, a wrong key or value, a place in a wall, an
-    order for a group that does not exist.
+    found wrong without simulating: an unknown name, an unreadable file, a wrong key or value, a malformed setting, a
+    place in a wall, an order for a group that does not exist.
     """
     path = toml_files.find(name_or_path)
     return _build(path, tuple(set))
@@ -50,8 +51,8 @@ def load(name_or_path: str | Path, set: Iterable[str] = ()) -> Scenario:
 def load_observation(path: str | Path | None = None, set: Iterable[str] = ()) -> ObservationSpec:
     """Returns camera, sensor, light and picture of a TOML file, with each `key=value` of `set` applied in turn.
 
-    path None: all defaults. `extends` is not supported. Raises InputError if the file does not exist, is not TOML, or a
-    key or value is wrong.
+    path None: all defaults. `extends` is not supported: it is an unknown key. Raises InputError if the file does not
+    exist, is not TOML, or a key, value or setting is wrong.
     """
     if path is not None and not Path(path).is_file():
         raise InputError(
@@ -117,8 +118,10 @@ def _load_entry(entry: suites.SuiteEntry, path: Path, settings: tuple[str, ...])
 
 
 def _build(path: Path, settings: tuple[str, ...]) -> Scenario:
-    """Returns the scenario of a file with `key=value` settings applied; raises InputError if it is wrong or cannot
-    work.
+    """Returns the scenario of a file, with `extends` and then each `key=value` setting applied.
+
+    Raises InputError, naming the file, if it is unreadable, if a key, value or setting is wrong, or if the scenario
+    cannot work.
     """
     table, places = overrides.apply_settings(toml_files.read(path), settings, path)
     scenario = validate(table, path, places, model=Scenario)

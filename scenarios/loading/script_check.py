@@ -18,7 +18,10 @@ QUEUE_PEOPLE = 3
 
 
 def fail(place: str, got: str, expected: str, remedy: str) -> NoReturn:
-    """Always raises the InputError with these texts. It has no file; `check` adds it."""
+    """Always raises an InputError with these texts; its `file` is "", and the caller `check` fills that in.
+
+    place: key in the scenario, as "event.ID.when".
+    """
     raise InputError(place=place, got=got, expected=expected, remedy=remedy)
 
 
@@ -26,8 +29,8 @@ def check_script(scenario: Scenario) -> None:
     """Raises InputError, without a file, for the first order of the script that cannot work; returns nothing.
 
     Orders are taken in the order of the file. Each merge and split ends its groups and makes new groups, whose possible
-    sizes follow. Checked are unique ids, triggers, existing groups, new names, sizes of parts, and enough people in
-    queues.
+    sizes follow. Checked are unique ids, triggers (their groups, earlier orders and times), existing groups, new names,
+    sizes of parts, and at least 3 people in queues.
     """
     alive = {name: _people(bounds(group.size)) for group in scenario.group for name in group_names(group)}
     gone: dict[str, str] = {}
@@ -42,7 +45,7 @@ def check_script(scenario: Scenario) -> None:
 
 
 def _people(size: SizeRange) -> SizeRange:
-    """Returns the least and greatest number of people for the bounds of a group's `size`.
+    """Returns the least and greatest number of people for the bounds (least, greatest) of a group's `size`.
 
     The least is rounded and at least 1; the greatest is not rounded and may be inf.
     """
@@ -55,8 +58,8 @@ def _check_when(
     """Raises InputError for a trigger of an order that names what does not exist, or that is too early or too late.
 
     key: `event.ID`. orders: ids of earlier orders; `after` must be one of them. alive, gone: existing groups with their
-    sizes, and for each ended group the order that ended it. The least delay and time must not be negative, and their
-    sum must be below duration, s.
+    (least, greatest) sizes, and for each ended group the order that ended it. The least possible delay, and the least
+    delay plus the least time, must be 0 or more, and that sum must be below duration, s.
     """
     when = event.when
     if when.after is not None and when.after not in orders:
@@ -79,7 +82,8 @@ def _check_when(
 def _exists(name: str, place: str, alive: dict[str, SizeRange], gone: dict[str, str]) -> None:
     """Raises InputError unless the group `name` exists at this point of the script.
 
-    place: key for the message. alive: sizes by existing group. gone: for each ended group the order that ended it.
+    place: key for the message. alive: (least, greatest) size by name of existing group. gone: for each ended group the
+    id of the order that ended it.
     """
     if name in gone:
         expected = "a group that still exists: " + ", ".join(alive)
@@ -89,7 +93,8 @@ def _exists(name: str, place: str, alive: dict[str, SizeRange], gone: dict[str, 
 
 
 def _add_group(name: str, size: SizeRange, place: str, alive: dict[str, SizeRange], gone: dict[str, str]) -> None:
-    """Adds a new group with its range of sizes to `alive`; raises InputError if its name is or was another group's.
+    """Adds a new group with its (least, greatest) size to `alive`; raises InputError if its name is or was another
+    group's.
 
     place: key for the message. gone: for each ended group the order that ended it.
     """
@@ -110,7 +115,9 @@ def _apply(event: ScriptOrder, key: str, alive: dict[str, SizeRange], gone: dict
 def _merge(event: MergeOrder, key: str, alive: dict[str, SizeRange], gone: dict[str, str]) -> None:
     """Checks a merge, moves its groups from `alive` to `gone`, and adds the new group, whose size is their sum.
 
-    Raises InputError for a group that does not exist or is named twice, or a new name that is taken. key: `event.ID`.
+    alive: (least, greatest) size by name of existing group. gone: for each ended group the order that ended it. Both
+    are modified. key: `event.ID`. Raises InputError for a group that does not exist or is named twice, or a new name
+    that is or was taken.
     """
     for k, name in enumerate(event.groups):
         _exists(name, f"{key}.groups.{k}", alive, gone)
@@ -124,9 +131,10 @@ def _merge(event: MergeOrder, key: str, alive: dict[str, SizeRange], gone: dict[
 def _split(event: SplitOrder, key: str, alive: dict[str, SizeRange], gone: dict[str, str]) -> None:
     """Checks a split, moves its group from `alive` to `gone`, and adds the parts with their ranges of sizes.
 
-    Raises InputError for a group that does not exist, a part's name that is taken, and sizes that do not fit every
-    possible size of the group: parts without a size need one person each; if all have sizes, the sum must be exact.
-    key: `event.ID`.
+    alive: (least, greatest) size by name of existing group. gone: for each ended group the order that ended it. Both
+    are modified. key: `event.ID`. Raises InputError for a group that does not exist, a part's name that is or was
+    taken, and sizes that do not fit every possible size of the group: parts without a size need one person each; if all
+    have sizes, the sum must be exact.
     """
     _exists(event.group, f"{key}.group", alive, gone)
     low, high = alive.pop(event.group)
@@ -148,7 +156,7 @@ def _queue(event: QueueOrder, key: str, alive: dict[str, SizeRange], gone: dict[
     sum.
 
     key: `event.ID`. alive: least and greatest size by existing group. gone: for each ended group the order that ended
-    it.
+    it. A group that several patterns name counts once.
     """
     queued: list[str] = []
     for k, pattern in enumerate(event.groups):

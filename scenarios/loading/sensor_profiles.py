@@ -28,7 +28,7 @@ class SensorFile(Model):
 def sensor_settings(path: str | Path) -> tuple[str, ...]:
     """Returns a setting `sensor.key=value` for each key given in the file's `[sensor]` table, in its order.
 
-    Raises InputError if the file does not exist, is not TOML, or a key or value is wrong.
+    Raises InputError if the file does not exist or is not TOML, if it has no `[sensor]`, or if a key or value is wrong.
     """
     return tuple(f"sensor.{key}={toml_value(v)}" for key, v in sensor_table(path).items())
 

@@ -43,7 +43,11 @@ class SuiteEntry:
 
 
 def find_suite(name: str) -> Path:
-    """Returns the file of a suite, given an existing *.toml path or a name in the catalogue; else raises InputError."""
+    """Returns the file of a suite, given the path of an existing *.toml file or a name in the catalogue; it is not
+    read.
+
+    Raises InputError for anything else.
+    """
     if name.endswith(".toml") and Path(name).is_file():
         return Path(name)
     if name in suite_names():
@@ -85,8 +89,9 @@ def read_entries(path: Path) -> list[SuiteEntry]:
 
 
 def about(path: Path) -> str:
-    """Returns the `about` text of a suite file; "" if it has none. InputError if the file cannot be read or is not
-    TOML.
+    """Returns the `about` text (what the suite is for) of a suite file; "" if it has none.
+
+    Another value is turned into text. InputError if the file cannot be read or is not TOML.
     """
     return str(parse(path).get("about", ""))
 

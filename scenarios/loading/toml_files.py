@@ -64,8 +64,8 @@ def closest(word: str, known: Iterable[str]) -> str:
 def find(name: str | Path, beside: Path | None = None) -> Path:
     """Returns the file of a scenario; it is not read.
 
-    name: a catalogue name, or a path that ends in .toml, relative to the folder `beside` (the working folder if None),
-    else to the catalogue. Raises InputError if there is no such scenario or file.
+    name: a catalogue name, or a path that ends in .toml. The path is sought in the folder `beside` (the working folder
+    if None), then in the catalogue. Raises InputError if there is no such scenario or file.
     """
     text = str(name)
     if not text.endswith(".toml"):
@@ -117,10 +117,11 @@ def parse(path: Path) -> Table:
 
 
 def read(path: Path, chain: tuple[Path, ...] = ()) -> Table:
-    """Returns the content of a TOML file merged over all files it extends.
+    """Returns the content of a TOML file merged over all files it extends; the key `extends` itself is left out.
 
     `name` is the file's stem where the file itself has none. chain: the files that extend this one. Raises InputError
-    if a file cannot be found or read, if `extends` is no text, or if files extend each other in a circle.
+    if a file cannot be found or read or is not TOML, if `extends` is no text, or if files extend each other in a
+    circle.
     """
     chain = (*chain, path.resolve())
     table = parse(path)
@@ -145,8 +146,10 @@ def read(path: Path, chain: tuple[Path, ...] = ()) -> Table:
 
 
 def _base(path: Path, base: str) -> Path:
-    """Returns the file that `extends = base` means in the file `path`: beside it, else in the catalogue. Else
-    InputError.
+    """Returns the file that `extends = base` means in the file `path`: beside it, else in the catalogue; it is not
+    read.
+
+    Raises InputError, naming `path`, if there is no such file.
     """
     try:
         return find(base, beside=path.parent)
@@ -159,8 +162,8 @@ def _base(path: Path, base: str) -> Path:
 def merge(below: Table, above: Table) -> Table:
     """Returns a new table: `above`, of the extending file, merged over `below`, of the extended file; changes neither.
 
-    Tables are merged key by key. Lists of tables that all have an `id` are merged by id; rows with a new id are
-    appended. A distribution, a `when` and any other value replace the value of `below`.
+    Tables are merged key by key; an empty table changes nothing. Lists of tables that all have an `id` are merged by
+    id; rows with a new id are appended. A distribution, a `when` and any other value replace the value of `below`.
     """
     merged = dict(below)
     for key, value in above.items():
@@ -177,7 +180,9 @@ def _merge_value(key: str, below: Any, above: Any) -> Any:
 
 
 def _is_value(key: str, table: Table) -> bool:
-    """True for a table that replaces the base's value as a whole: under the key `when`, or a non-empty distribution."""
+    """True for a table that replaces the base's value as a whole: under the key `when`, or a non-empty table whose keys
+    are all those of a distribution (normal, uniform, exponential, poisson, choice, clip).
+    """
     return key == "when" or (bool(table) and table.keys() <= DISTRIBUTION_KEYS)
 
 
@@ -231,7 +236,10 @@ def _lines(table: dict[str, Any]) -> str:
 
 
 def toml_value(v: Any) -> str:
-    """Returns a bool, text, number, list, tuple or dict as TOML on one line. Keys of dicts are not quoted."""
+    """Returns a bool, text, number, list, tuple or dict as TOML on one line.
+
+    Keys of dicts are not quoted. None, which TOML does not have, gives the invalid text None.
+    """
     if isinstance(v, bool):
         return str(v).lower()
     if isinstance(v, str):

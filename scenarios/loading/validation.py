@@ -23,9 +23,9 @@ M = typing.TypeVar("M", bound=BaseModel)
 def validate(table: Table, file: object = "", places: dict[KeyPath, str] | None = None, *, model: type[M]) -> M:
     """Returns the table as a model: a Scenario or one of its tables.
 
-    Types are strict: no text for a number. Raises InputError with the first problem: the file, the key and what was
-    expected there. places: texts of `--set` by path, as overrides.apply_settings returns them; an error at such a path
-    names the setting.
+    Types are strict: no text for a number. Raises InputError with the first problem: the file, the key, what was
+    expected there, and how many more problems there are. file: for the message. places: texts of `--set` by path of
+    keys and indices, as overrides.apply_settings returns them; an error at or below such a path names the setting.
     """
     try:
         return model.model_validate(_tuples(table), strict=True)
@@ -46,8 +46,9 @@ def input_error(
     """Returns, without raising it, the InputError for the first problem of a pydantic error, and says how many more
     there are.
 
-    Unknown keys come first, because a misspelt key explains a missing one. table: what was validated. places: texts of
-    `--set` by path of their keys.
+    Unknown keys come first, because a misspelt key explains a missing one. Errors of union branches that do not fit the
+    kind of value are left out. table: what was validated, as which model; file: its file. places: texts of `--set` by
+    path of their keys.
     """
     found = [e for e in error.errors() if _branch_fits(e["loc"], table)] or list(error.errors())
     first = min(found, key=lambda e: (e["type"] != "extra_forbidden", e["type"] == "too_short" and len(found) > 1))
@@ -112,7 +113,8 @@ def _branch_fits(loc: tuple[int | str, ...], table: Table) -> bool:
 def _words(error: Any, path: KeyPath, table: Table, model: type[BaseModel]) -> tuple[str, str, str]:
     """Returns the texts got, expected and remedy for one error of pydantic's list.
 
-    path: of the wrong value in the table; its last step is the unknown or missing key, if it is one.
+    path: of the wrong value in the table; its last step is the unknown or missing key, if it is one. table, model: what
+    was validated, as what; they give the keys to suggest for an unknown one.
     """
     kind, message = error["type"], str(error["msg"])
     if kind == "extra_forbidden":
@@ -148,7 +150,10 @@ def _expectation(message: str) -> str:
 
 
 def _show(value: Any) -> str:
-    """Returns a value as a user writes it in TOML; tables and plain values are cut to 80 characters."""
+    """Returns a value as a user writes it in TOML; tables and plain values are cut to 80 characters, lists are not.
+
+    Keys of a table that are None are left out.
+    """
     if isinstance(value, tuple):
         return "[" + ", ".join(map(_show, value)) + "]"
     if isinstance(value, dict):
@@ -166,6 +171,8 @@ def _cut(text: str) -> str:
 def _place(path: KeyPath, table: Table, places: dict[KeyPath, str]) -> str:
     """Returns where a path is set, for messages: `--set …` if a setting set it or a table around it, else its dotted
     key.
+
+    path: keys and indices from 0. places: texts of settings by path. The innermost setting counts.
     """
     for n in range(len(path), 0, -1):
         if path[:n] in places:
@@ -174,8 +181,10 @@ def _place(path: KeyPath, table: Table, places: dict[KeyPath, str]) -> str:
 
 
 def key_text(path: KeyPath, table: Table) -> str:
-    """Returns a path as a dotted key for `--set`: a row that has an `id` appears by its id, any other row
-    by its index.
+    """Returns a path of keys and indices from 0 as a dotted key for `--set`, as "group.a.size".
+
+    A row that has a text `id` appears by its id, any other row by its index. Steps that the table does not have are
+    kept.
     """
     here: Any = table
     steps = []
@@ -213,7 +222,8 @@ def known_keys(path: KeyPath, table: Table, form: type[BaseModel] = Scenario) ->
 def _event_keys(models: list[type[BaseModel]], path: KeyPath, table: Table) -> list[str]:
     """Returns the keys known at a path inside a row of `event`, whose model follows from its `type`.
 
-    models: of the kinds of orders; the first if `type` is absent or wrong. Empty where the model has no table there.
+    path: begins with "event" and the index of the row. models: of the kinds of orders; the first if `type` is absent or
+    wrong. Empty where the model has no table there; KeyError for a key it does not know.
     """
     row = table["event"][path[1]]
     kind = next((m for m in models if row.get("type") in typing.get_args(m.model_fields["type"].annotation)), models[0])

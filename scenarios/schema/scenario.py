@@ -2,8 +2,7 @@
 
 `flockscope scenarios --schema` and docs/reference/scenario-files.md print the descriptions of the fields. A class whose
 subject has another class in `sim` ends in Spec. Where a value may be a number or a distribution
-(scenarios.schema.values), it is drawn once for each seed.
-"""
+(scenarios.schema.values), it is drawn once for each seed."""
 
 from __future__ import annotations
 
@@ -40,8 +39,8 @@ class DoorSpec(Model):
 class StairsSpec(Model):
     """A flight of stairs; its height rises from 0 at `foot` to `rise` at `head`, the middles of its ends (x, y in m).
 
-    width, rise, landing (level ground behind the head): m. steps: number. slowdown: share of the walking speed kept.
-    """
+    width, rise, landing (length of the level ground behind the head): m. steps: number. slowdown: share of the walking
+    speed kept on the stairs."""
 
     foot: FixedPoint = Field(description="middle of the lowest edge, m")
     head: FixedPoint = Field(description="middle of the highest edge, m")
@@ -55,11 +54,11 @@ class StairsSpec(Model):
 
 
 class WorldSpec(Model):
-    """The immobile parts of the scene, in m.
+    """The immobile parts of the scene, in m; by default an empty world of 16 × 10 m.
 
-    size: x, y. walls: x1, y1, x2, y2. pillars: x, y, radius. stairs. doors: openings in walls. service: x, y of
-    counters.
-    """
+    size: extent in x and y, from the origin. walls: x1, y1, x2, y2 of their ends. pillars: x, y, radius. stairs:
+    flights. doors: openings in walls. service: x, y of counters. wall_height, pillar_height: heights of walls and
+    pillars."""
 
     size: tuple[Positive, Positive] = Field((16.0, 10.0), description="extent in x and y, m")
     walls: tuple[tuple[float, float, float, float], ...] = Field(
@@ -76,11 +75,13 @@ class WorldSpec(Model):
 
 
 class CameraSpec(Model):
-    """Place, direction and lens of the camera; size (px) and rate (fps) of its images.
+    """Place, direction and lens of the camera; size and rate of its images.
 
-    px_per_m (kind top), height (m) and position (x, y, m) None: chosen so that all people are in view. Angles in
-    degrees. crop False: people who walk out of view are an error.
-    """
+    kind: "pinhole" (perspective) or "top" (orthographic from above). image: width, height, px. fps: frames per second.
+    focal_px: focal length, px, and baseline: distance of the right camera, m (both pinhole). tilt_deg: by how much it
+    looks down, 90 = straight down. yaw_deg: 0 looks along +y, positive turns left. px_per_m (kind top), height above
+    the ground (m) and position (x, y, m): None: chosen so that all people are in view. crop: True accepts people who
+    walk out of view; False: they are an InputError."""
 
     kind: Literal["pinhole", "top"] = Field("pinhole", description="perspective, or orthographic from above")
     image: tuple[Annotated[int, Field(ge=16, le=8192)], Annotated[int, Field(ge=16, le=8192)]] = Field(
@@ -108,9 +109,8 @@ class CameraSpec(Model):
 class CrowdSpec(Model):
     """How people walk; the defaults are measured values (docs/experiments/realism.md).
 
-    free_speed (m/s), spacing in a group (m), body height (m): numbers or distributions. slowdown_per_member: m/s for
-    each member after the first.
-    """
+    free_speed (of a person alone, m/s), spacing between neighbours in a group (m), body height (m): numbers or
+    distributions. slowdown_per_member: a group of n people is slower by this times (n - 1), m/s."""
 
     free_speed: Value = Field(FREE_SPEED, description="walking speed of a person alone, m/s")
     spacing: Value = Field(SPACING, description="distance between neighbours in a group, m")
@@ -121,11 +121,12 @@ class CrowdSpec(Model):
 
 
 class GroupSpec(Model):
-    """A group of people who belong together from the start; a person alone is a group of one. `repeat` makes n such
-    groups.
+    """A group of people who belong together from the start; a person alone is a group of one.
 
-    start, goal, via: points in m. speed: m/s, None: follows from the members. enter: s. size: number of people.
-    """
+    id: its name; repeat = n above 1 makes n such groups, id-1 … id-n. size: number of people, rounded, at least 1.
+    start, goal, via (points to pass): in m. speed: m/s, None: follows from the members. enter: time of entry, s, 0 =
+    there from the first frame. at_goal: "stand" there, "leave" the scene or "walk" straight on. Numbers except `repeat`
+    may be distributions."""
 
     id: Name = Field(description="name in the script; repeat = n makes the groups id-1 … id-n")
     size: Value = Field(GROUP_SIZE, description="number of people; rounded, at least 1")
@@ -154,12 +155,10 @@ class Reach(Model):
 
 
 class When(Model):
-    """An order fires `delay` s after its trigger: exactly one of the other fields, else ValidationError; the rest is
-    None.
+    """An order fires `delay` s after its trigger: exactly one of the other fields, else pydantic.ValidationError.
 
-    time: s. reach: a group comes near a place. distance_lt: every two of the order's groups are nearer than this, m.
-    after: id of an order whose rule has come true.
-    """
+    time: s. reach: a group comes near a place. distance_lt: of every two of the order's groups the nearest members are
+    closer than this, m. after: id of an order whose rule has come true. The other three are None."""
 
     time: Value | None = Field(None, description="the order fires at this time, s")
     reach: Reach | None = None
@@ -181,10 +180,10 @@ class When(Model):
 
 
 class SplitPart(Model):
-    """One part of a group that splits. id: of the new group. goal, via: points in m. at_goal: stand, leave or walk on.
+    """One part of a group that splits. id: of the new group. goal, via: points in m. at_goal: "stand", "leave" or
+    "walk" on.
 
-    size: number of people; None: an equal share of the people left over.
-    """
+    size: number of people; None: an equal share of the people left over."""
 
     id: Name = Field(description="name of the new group")
     size: Annotated[int, Field(ge=1)] | None = Field(
@@ -198,8 +197,8 @@ class SplitPart(Model):
 class MergeOrder(Model):
     """An order: the groups named in `groups` (two or more) become the new group `into`. when: its trigger.
 
-    The new group walks past `via` to `goal` (m). Goal "meet": it stands in conversation where the groups meet.
-    """
+    id: of the order. type: "merge". The new group walks past the points `via` to `goal` (m), and there stands, leaves
+    or walks on (at_goal). Goal "meet": it stands in conversation where the groups meet."""
 
     id: Name = Field(description="name of the order")
     type: Literal["merge"] = Field(description="several groups become one")
@@ -215,7 +214,9 @@ class MergeOrder(Model):
 
 
 class SplitOrder(Model):
-    """An order: the group named `group` divides into two or more parts with goals of their own. when: its trigger."""
+    """An order: the group named `group` divides into two or more `parts`, each a new group with a goal of its own.
+
+    id: of the order. type: "split". when: its trigger."""
 
     id: Name = Field(description="name of the order")
     type: Literal["split"] = Field(description="a group divides into parts")
@@ -225,12 +226,11 @@ class SplitOrder(Model):
 
 
 class QueueOrder(Model):
-    """An order: groups line up at the point `at` (m), are served one group after the other, and walk on. when: its
-    trigger.
+    """An order: groups line up, are served one group after the other, and walk on. when: its trigger.
 
-    groups: names, or patterns such as `g-*`. spacing: m. service: time per group, s. goal: m, None: each group's own
-    goal.
-    """
+    id: of the order. type: "queue". groups: names, or patterns such as `g-*`. at: place of the head, x, y, m.
+    direction_deg: from head to tail, 0 = +x, 90 = +y. spacing: between neighbours, m. service: time per group, s. goal:
+    m, None: each group's own goal. at_goal: there they "stand", "leave" or "walk" on."""
 
     id: Name = Field(description="name of the order")
     type: Literal["queue"] = Field(description="groups line up and are served one by one")
@@ -252,12 +252,13 @@ ScriptOrder = Annotated[MergeOrder | SplitOrder | QueueOrder, Field(discriminato
 
 
 class Scenario(Model):
-    """A whole scenario with all defaults, after `extends` has been applied: the form that is stored. Unknown keys are
-    errors.
+    """A whole scenario with all defaults, after `extends` has been applied: the form that is stored. Unknown keys raise
+    pydantic.ValidationError.
 
-    duration, warmup, lead: s. turn_deg: degrees. group: at least one. event: the orders, in order; empty without a
-    script.
-    """
+    schema_: version, 1. name, about: texts. duration: recorded time, warmup: unrecorded time before it, s. turn_deg:
+    turns the script, not the world. lead: time by which walking groups start further on, s. mirror: True mirrors the
+    script with probability 0.5. world, camera, sensor, light, picture, crowd: their settings. group: at least one.
+    event: the orders, in order; () without a script."""
 
     schema_: Literal[1] = Field(alias="schema", description="version of the file format")
     name: Name = Field("scenario", description="name of the sequences made from it; absent: the file's name")
@@ -292,9 +293,8 @@ def group_names(group: GroupSpec) -> list[str]:
 
 
 def expand(pattern: str, names: list[str]) -> list[str]:
-    """Returns the names of groups that a pattern means: for `g-*` all of `names` that begin with `g-`, in order, maybe
-    none.
+    """Returns the names of groups that a pattern means: for `g-*` all of `names` that begin with `g-`, in their order,
+    maybe none.
 
-    A pattern without `*` is returned as the only name, whether or not it is in `names`.
-    """
+    A pattern without `*` is returned as the only name, whether or not it is in `names`."""
     return [n for n in names if n.startswith(pattern[:-1])] if pattern.endswith("*") else [pattern]
