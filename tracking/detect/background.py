@@ -115,9 +115,10 @@ class Background:
         """Change the model's mean and variance in place towards a frame (H, W, 3) BGR uint8.
 
         classes (H, W): the result of the last `classify`, which must have been of this frame, as it set the gain.
-        BACKGROUND pixels move with the time constant background_time, all others with foreground_time (mean only).
-        Pixels where `protected` (H, W) is True do not change; None protects no pixel. Each call changes every fourth
-        row only; four calls change all rows.
+        BACKGROUND pixels move with the time constant background_time (s), all others with foreground_time (s; mean
+        only). The mean stays at 1 or above, the variance at 4 squared grey levels or above. A colour channel at 255
+        does not count where the model expects 255 or more. Pixels where `protected` (H, W) is True do not change; None
+        protects no pixel. Each call changes every fourth row only; four calls change all rows.
 
         Raises InputError if the frame's size or dtype is not the sample's.
         """
@@ -134,8 +135,9 @@ class Background:
         """Returns the brightness factor (3,) of a frame (H, W, 3) uint8 relative to the model's mean, one per colour
         channel.
 
-        It is estimated on a grid of pixels that were not foreground in the last frame. If these are too few to use, all
-        valid pixels of the grid are used. If these are too few as well, the last gain is returned.
+        It is estimated on a grid of pixels that were not foreground in the last classified frame. If these are too few
+        to use, all valid pixels of the grid are used. If these are too few as well, the last gain is returned. The
+        model does not change.
         """
         seen = np.moveaxis(image[self._grid], -1, 0).astype(np.float32)
         mean = self.mean[:, *self._grid]

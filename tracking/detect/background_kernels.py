@@ -32,13 +32,14 @@ CLIPPED = 255
 def classify(
     i0: Image, i1: Image, i2: Image, E: Floats, V: Floats, s: Floats, b: Floats, g: Floats, limits: Floats, out: Image
 ) -> None:
-    """Write the class of each of N pixels, 0 to 4 (see BACKGROUND …), into `out` (N,) uint8. Returns nothing.
+    """Write the class of each of N pixels into `out` (N,) uint8. Returns nothing.
 
-    i0, i1, i2 (N,) uint8: the frame's colour planes in the order of E. E, V (3, N) float32: mean colour at gain 1 in
-    grey levels, and variance. s, b (N,): normalisers of brightness and of chromaticity distortion CD; inf makes the
-    pixel BACKGROUND. g (3,): the frame's gain per channel; E times gain is cut at 255. limits (5,): threshold of CD /
+    Classes: 0 BACKGROUND, 1 FOREGROUND, 2 DARK (dark foreground), 3 SHADOW, 4 HIGHLIGHT. i0, i1, i2 (N,) uint8: the
+    frame's colour planes in the order of E. E, V (3, N) float32: mean colour at gain 1 in grey levels, and variance
+    (above 0). s, b (N,): normalisers of brightness and of chromaticity distortion CD; inf makes the pixel BACKGROUND. g
+    (3,): the frame's gain (brightness factor) per channel; E times gain is cut at 255. limits (5,): threshold of CD /
     b, lower and upper threshold of (alpha - 1) / a, alpha below which a pixel is DARK, alpha above which it is
-    FOREGROUND.
+    FOREGROUND. alpha is the pixel's brightness over the model's; a = s / |E / sigma|.
 
     The paper tests CD first, then dark, highlight, shadow. Here the test that the paper makes first is made last, and
     overwrites the others. The result is the same.
@@ -78,10 +79,10 @@ def adapt(
     slow: float,
     least: float,
 ) -> None:
-    """Change mean E and variance V, (3, H, W) float32, in place towards a frame (H, W, 3) uint8.
+    """Change mean E and variance V, (3, H, W) float32, in place towards a frame (H, W, 3) uint8. Returns nothing.
 
     Only the rows first, first + step, first + 2 step, … change. classes (H, W): the frame's pixel classes. g (3,): the
-    frame's gain per channel. Pixels where `protected` (H, W) is True stay as they are.
+    frame's gain (brightness factor) per channel. Pixels where `protected` (H, W) is True stay as they are.
 
     E moves towards I / g (I the frame's grey level) by the share `fast` where the class is BACKGROUND, by `slow`
     elsewhere. It stays at 1 or above, as the brightness of a black pixel is undefined. V moves towards the squared

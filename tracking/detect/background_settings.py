@@ -16,9 +16,10 @@ from tracking.config import Config, param
 class BackgroundSettings(Config):
     """The parameters of the five-class background model; each field states its own default, range and unit.
 
-    detection_rate (probability): sets the thresholds of a pixel's noise. dark, bright (brightness relative to the
-    background): limits of shadow and highlight. background_time, foreground_time (s): time constants of adaptation.
-    gain: "global" or "none", whether the brightness of each frame is corrected.
+    detection_rate (probability): share of background pixels that each noise threshold leaves background. dark, bright
+    (brightness relative to the background): a darker pixel than `dark` is dark foreground, not shadow; a brighter one
+    than `bright` is foreground, not highlight. background_time, foreground_time (s): time constants with which
+    background pixels and all others adapt. gain: "global" or "none", whether the brightness of each frame is corrected.
 
     Raises InputError if a value is not allowed or foreground_time is shorter than background_time.
     """

@@ -1,14 +1,16 @@
 """Robust training of the background model from a sample of frames; people may walk through the sample.
 
-Input: a sample (K, H, W, 3) BGR uint8 of a still camera. Output: `Trained`. Equations: Horprasert et al. (2000).
+Input: a sample (K, H, W, 3) BGR uint8 of a still camera. Output: `Trained`. Equations: Horprasert et al. (2000). E,
+sigma: mean colour and standard deviation of a pixel. alpha: its brightness in a frame over E's. CD: chromaticity
+distortion, its colour's distance from the line through E in sigmas.
 
 1. E and sigma of each pixel and colour channel (eqs 3, 4). The paper takes all frames; here the inliers only (ours).
    The first inliers are the shortest interval of grey levels that holds SHARE of the frames. Then inliers, E and sigma
    are computed in turn until they settle. Median and MAD would fail where people stand about half of the time.
-2. a_i and b_i of each pixel: the RMS of alpha - 1 and of CD over the inliers (eqs 7, 8). a_i is kept as
+2. a_i and b_i of each pixel i: the RMS of alpha - 1 and of CD over the inliers (eqs 7, 8). a_i is kept as
    s_i = a_i sqrt(sum (E / sigma)^2), which is 1 for independent Gaussian noise and holds at any gain (ours).
 3. Thresholds: quantiles of the normalised distortions at the detection rate (Gonzalez et al. 2006, Fig. 2), over
-   pixels that were background in all frames of the sample.
+   pixels that were background in all frames of the sample; over all inliers if these pixels are too few.
 """
 
 from __future__ import annotations
@@ -54,9 +56,10 @@ class Trained:
 
     mean, sigma (H, W, 3): mean colour E at gain 1, and its standard deviation, BGR grey levels. s, b (H, W):
     normalisers of brightness and of chromaticity distortion CD, no unit. valid (H, W): False where the sample shows no
-    background; there the other arrays have no meaning. thresholds: of CD / b, then lower and upper of (alpha - 1) / a.
-    counts (2, BINS): histograms over [-SPAN, SPAN] of the normalised brightness (row 0) and chromaticity distortions
-    (row 1), from which thresholds for another detection rate can be computed.
+    background; there the other arrays have no meaning. thresholds: of CD / b, then lower and upper of (alpha - 1) / a,
+    alpha the brightness over E's, a = s / |E / sigma|. counts (2, BINS): histograms over [-SPAN, SPAN] of the
+    normalised brightness (row 0) and chromaticity distortions (row 1), from which thresholds for another detection rate
+    can be computed.
     """
 
     mean: Floats
@@ -71,8 +74,9 @@ class Trained:
 def train(sample: Image, rate: float, follow_gain: bool) -> Trained:
     """Returns the background model of a sample of frames (K, H, W, 3) BGR uint8.
 
-    rate: the detection rate, the share of background pixels (0 to 1) that each threshold leaves background.
-    follow_gain: if True, each frame is first divided by its brightness factor relative to the median frame.
+    rate: the detection rate, the share of background pixels that each threshold leaves background, between 0 and 1; 0
+    or 1 raises statistics.StatisticsError. follow_gain: if True, each frame is first divided by its brightness factor
+    relative to the median frame.
 
     Raises InputError if the sample has a wrong shape or dtype, has fewer than LEAST_FRAMES = 10 frames, or if fewer
     than half of its pixels show a background.
@@ -129,8 +133,10 @@ def thresholds(counts: Ints, rate: float) -> tuple[float, float, float]:
     """Returns 3 thresholds at a detection rate: of CD / b, lower of (alpha - 1) / a (below 0), upper of (alpha - 1) /
     a.
 
-    counts (2, BINS): histograms over [-SPAN, SPAN] of normalised brightness (row 0) and chromaticity distortion CD (row
-    1). rate: share of the histogram, between 0 and 1, that each threshold leaves background; 0 or 1 raises an error.
+    CD / b: normalised chromaticity distortion; (alpha - 1) / a: normalised brightness, 0 where as bright as the model.
+    counts (2, BINS): histograms over [-SPAN, SPAN] of brightness (row 0) and chromaticity distortion (row 1). rate:
+    share of the histogram, between 0 and 1, that each threshold leaves background; 0 or 1 raises
+    statistics.StatisticsError.
 
     No threshold is nearer to the background than that of Gaussian noise with unit RMS, as a still sample has no tails.
     An empty histogram gives just these Gaussian thresholds. The brightness of such noise is normal, and its CD has P(CD

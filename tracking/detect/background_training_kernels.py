@@ -51,11 +51,11 @@ def inliers(value: Floats, m: Array, sd: Array, inlier: Bools, rules: tuple[floa
 
     value (K, 3): the pixel's grey levels at gain 1 in K frames. m, sd (3,): E and sigma of each channel; they hold
     first guesses on entry. inlier (K,) bool: overwritten; True for a frame whose channels all lie within so many sigmas
-    of E. rules: least sigma; sigmas within which a frame is an inlier; sigmas within which a frame is clean; most
-    rounds.
+    of E. rules: least sigma (grey levels); sigmas within which a frame is an inlier; sigmas within which a frame is
+    clean; most rounds (at least 1).
 
-    Returns True if all frames of the pixel are clean. E stays at 1 or above, sigma at the least sigma, also if no frame
-    is an inlier.
+    Returns True if all frames of the pixel are clean. E stays at 1 or above, sigma at the least sigma or above, also if
+    no frame is an inlier.
     """
     least, inside, untouched, rounds = rules
     clean = True
@@ -130,14 +130,16 @@ def learn(
 ) -> None:
     """Train on a sample (K, H, W, 3) uint8 and write the model into the last six arguments. Returns nothing.
 
-    gains (K, 3): gain of each frame and channel, by which grey levels are divided. held: frames in the shortest
-    interval. rules: sigma over half the interval's length; least sigma, grey levels; widest sigma of a valid pixel,
-    grey levels; sigmas of an inlier; sigmas of a clean frame; most rounds. bins: number and span of the histograms,
-    which reach from -span to span; values beyond are counted in the end bins.
+    gains (K, 3): gain (brightness factor) of each frame and channel, by which grey levels are divided. held: number of
+    frames in the shortest interval of a channel's grey levels, whose middle is the first guess of the mean. rules:
+    sigma over half the interval's length; least sigma, grey levels; widest sigma of a valid pixel, grey levels; sigmas
+    of an inlier; sigmas of a clean frame; most rounds. bins: number and span of the histograms, which reach from -span
+    to span; values beyond are counted in the end bins.
 
-    Written: mean, sigma (H, W, 3), mean colour and its standard deviation in grey levels; s, b (H, W), normalisers;
-    valid (H, W), False where no background shows. counts (2, 2, number): the values of valid pixels are added; first
-    axis inliers or all frames of clean pixels, second axis brightness or chromaticity.
+    Written: mean, sigma (H, W, 3), mean colour and its standard deviation in grey levels; s, b (H, W), normalisers of
+    brightness and chromaticity distortion; valid (H, W), False where no background shows. counts (2, 2, number): the
+    values of valid pixels are added; first axis inliers or all frames of clean pixels, second axis normalised
+    brightness or chromaticity distortion.
     """
     as_sigma, least, widest, inside, untouched, rounds = rules
     number, span = bins

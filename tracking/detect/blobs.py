@@ -51,7 +51,8 @@ class Blobs(Frozen):
     def contour(self, row: int) -> Array:
         """Returns the outer contour of blob `row` (from 0), (V, 2) x, y in px, through the centres of its edge pixels.
 
-        Points on straight runs are left out; a blob of one pixel has V = 1. Raises IndexError if there is no such row.
+        Points on straight runs are left out; a blob of one pixel has V = 1. Raises IndexError if `row` is the number of
+        blobs or more.
         """
         left, top, wide, high = self.box[row].astype(int)
         part = (self.label[top : top + high, left : left + wide] == row + 1).astype(np.uint8)
@@ -63,7 +64,8 @@ class Blobs(Frozen):
         """Returns the convex hull of the contour of blob `row` (from 0), (V, 2) x, y in px, counter-clockwise in (x,
         y).
 
-        It goes through pixel centres, so a blob of one pixel has V = 1. Raises IndexError if there is no such row.
+        It goes through pixel centres, so a blob of one pixel has V = 1. Raises IndexError if `row` is the number of
+        blobs or more.
         """
         return np.asarray(cv2.convexHull(self.contour(row).astype(np.float32), clockwise=False), float).reshape(-1, 2)
 
@@ -76,11 +78,12 @@ class Blobs(Frozen):
 
 
 def clean(foreground: Bools, px_per_m: float) -> Bools:
-    """Returns a foreground mask (H, W) after majority, opening and closing, in this order; the argument is not changed
-    (3.3).
+    """Returns a foreground mask (H, W) bool after majority, opening and closing, in this order; the argument is not
+    changed (3.3).
 
-    px_per_m: scale of the image, px per m. The windows are 0.08, 0.05 and 0.15 m wide, rounded to an odd number of px,
-    at least 3, 1 and 3. Raises ValueError if the scale is nan.
+    Majority: a pixel is foreground if more than half of a square window round it is. Opening removes narrow parts,
+    closing fills narrow gaps. px_per_m: scale of the image, px per m. The windows are 0.08, 0.05 and 0.15 m wide,
+    rounded to an odd number of px, at least 3, 1 and 3. Raises ValueError if the scale is nan.
     """
     mask: NDArray[Any] = foreground.astype(np.uint8)
     size = odd(MAJORITY_M * px_per_m, 3)
@@ -93,7 +96,8 @@ def clean(foreground: Bools, px_per_m: float) -> Bools:
 def odd(size: float, least: int) -> int:
     """Returns the odd whole number nearest to `size` (px), but at least `least` (an odd number of px).
 
-    Raises ValueError if `size` is nan.
+    Of two equally near ones it is the one that is 1 above a multiple of 4: 4 gives 5, 6 gives 5. Raises ValueError if
+    `size` is nan.
     """
     return max(least, 2 * round((size - 1) / 2) + 1)
 
@@ -145,7 +149,7 @@ def ellipses(n: Array, centre: Array, cov: Array) -> tuple[Array, Array]:
     """Returns the ellipses (M, 5) of M regions: centre x, y, full axes h >= w (px), theta (rad); and theta's variance
     (M,).
 
-    n (M,): number of pixels; centre (M, 2) px; cov (M, 2, 2): covariance of the pixels, px^2 (3.3). theta is the
+    n (M,): number of pixels; centre (M, 2): x, y, px; cov (M, 2, 2): covariance of the pixels, px^2 (3.3). theta is the
     direction of h from the abscissa, v down, from -pi/2 to pi/2. Its variance, rad^2, is inf where both axes are equal.
     """
     half, differ = (cov[:, 0, 0] + cov[:, 1, 1]) / 2, (cov[:, 0, 0] - cov[:, 1, 1]) / 2

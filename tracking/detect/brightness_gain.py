@@ -47,8 +47,9 @@ def _one_channel(seen: Floats, mean: Floats) -> float | None:
     """Returns the median of seen / mean over the usable pixels, None if these are fewer than FEWEST = 50.
 
     seen, mean (N,): grey levels of one channel in the frame and in the background model. A pixel is usable if its mean
-    is above DARKEST and its expected grey level, factor * mean, lies between DARKEST and BRIGHTEST. A first pass, which
-    chooses by the seen grey level, guesses the factor; alone it would be biased, as noise decides which pixels pass.
+    is above DARKEST = 16 and its expected grey level, factor * mean, lies between DARKEST and BRIGHTEST = 235. A first
+    pass, which chooses by the seen grey level, guesses the factor; alone it would be biased, as noise decides which
+    pixels pass.
     """
     usable = (mean > DARKEST) & (seen > DARKEST) & (seen < BRIGHTEST)
     for _ in range(2):
@@ -68,10 +69,12 @@ def _median(values: Floats) -> float:
 
 
 def frame_gains(sample: Image) -> Floats:
-    """Returns the gain of each frame of a sample (K, H, W, 3) uint8, (K, 3) float32, one factor per colour channel.
+    """Returns the gain of each frame of a sample (K, H, W, 3) uint8, (K, 3) float32: a brightness factor per colour
+    channel.
 
-    It is relative to the median frame, the median over time of each pixel. The gain of a frame that has too few usable
-    pixels (neither near black nor clipped) is 1 in all channels.
+    It is relative to the median frame, the median over time of each pixel. A channel with fewer than 50 usable pixels
+    (neither near black nor clipped) gets the mean factor of the other channels. If no channel has enough, all three
+    factors are 1.
     """
     rows, columns = grid(*sample.shape[1:3])
     values = np.moveaxis(sample[:, rows, columns], -1, 1).astype(np.float32)

@@ -35,9 +35,10 @@ SAMPLED = 25
 class Segmented:
     """One picture of H x W px after `Foreground.segment`.
 
-    image (H, W, 3): the picture, BGR uint8. classes (H, W) uint8: class of each pixel, as in background_kernels (0
-    BACKGROUND, 1 FOREGROUND, …). mask (H, W) bool: the foreground after cleaning. plausible: False if more than the
-    share most_foreground of the mask is foreground: then a light was switched or the camera moved.
+    image (H, W, 3): the picture, BGR uint8. classes (H, W) uint8: class of each pixel: 0 BACKGROUND, 1 FOREGROUND, 2
+    DARK (dark foreground), 3 SHADOW, 4 HIGHLIGHT. mask (H, W) bool: the foreground (1 and 2) after cleaning. plausible:
+    False if a larger share of the mask is foreground than the limit most_foreground: then a light was switched or the
+    camera moved.
     """
 
     image: Image
@@ -50,7 +51,8 @@ class Foreground:
     """The pipeline from a picture to foreground blobs: classify the pixels, clean the mask, find blobs, adapt.
 
     State: model, the background model (`Background` or `Mog2`); px_per_m, the scale of the image, nan or 0 while it is
-    unknown; most_foreground, the largest plausible share of foreground, 0 to 1.
+    unknown; most_foreground, the largest plausible share of foreground, 0 to 1. The constructor raises InputError for
+    an unusable background sample, AssertionError for none.
     """
 
     def __init__(
@@ -99,8 +101,8 @@ class Foreground:
     def segment(self, image: Image) -> Segmented:
         """Returns the pixel classes and the cleaned foreground mask of a picture (H, W, 3) BGR uint8 (3.2, 3.3).
 
-        The background model does not learn from the picture; only its estimate of the picture's brightness changes. The
-        result also states whether the share of foreground is plausible.
+        The background model does not learn from the picture; only its estimate of the picture's brightness changes.
+        `plausible` of the result is False if the share of foreground is above most_foreground.
 
         Raises InputError if the picture's size or dtype is not that of the background sample.
         """
@@ -111,7 +113,8 @@ class Foreground:
     def adapt(self, seen: Segmented, protected: Bools) -> None:
         """Let the background model learn from a segmented picture, except at pixels where `protected` (H, W) is True.
 
-        seen: the result of the last `segment`, as that call also set the brightness of the model.
+        seen: the result of the last `segment`, as that call also set the brightness of the model. The five-class model
+        changes every fourth row per call. Returns nothing.
         """
         self.model.adapt(seen.image, seen.classes, protected)
 
@@ -126,9 +129,9 @@ class Foreground:
     def learn_person_size(self, size: PersonSize, sample: Image) -> None:
         """Let `size` learn, in place, from the blobs of a background sample (K, H, W, 3) BGR uint8.
 
-        About 25 evenly spaced frames are used. Blobs that the image's edge cuts are left out; `size` itself chooses
-        those that may be one person. Raises InputError if the size or dtype of the frames is not that of the model's
-        own sample.
+        All frames of fewer than 50 are used, else 25 to 37 evenly spaced ones. Blobs that the image's edge cuts are
+        left out; `size` itself chooses those that may be one person. The model's estimate of brightness changes. Raises
+        InputError if the size or dtype of the frames is not that of the model's own sample.
         """
         for image in sample[:: max(len(sample) // SAMPLED, 1)]:
             found = self.person_blobs(self.segment(image).mask)
@@ -138,8 +141,8 @@ class Foreground:
 def convex_areas(shape: tuple[int, ...], outlines: list[Array]) -> Bools:
     """Returns an (H, W) bool mask, True inside and on the convex hull of each outline.
 
-    shape: (H, W). outlines: arrays (V, 2) x, y in px, V at least 1; coordinates are rounded to whole px, and parts
-    outside the image are cut off. No outlines: False everywhere.
+    shape: (H, W). outlines: arrays (V, 2) x, y in px, V at least 1, no nan; coordinates are rounded to whole px, and
+    parts outside the image are cut off. No outlines: False everywhere.
     """
     inside = np.zeros(shape, np.uint8)
     for outline in outlines:

@@ -28,7 +28,8 @@ class Mog2Settings(Config):
     """The parameters of `Mog2`; the defaults of `variance` and `shadow` are OpenCV's.
 
     variance: squared Mahalanobis distance beyond which a pixel is foreground. shadow: brightness relative to the
-    background (0 to 1) below which a pixel is no shadow. background_time: time constant of adaptation, s.
+    background (0 to 1) below which a pixel is no shadow. background_time: time constant of adaptation, s. Raises
+    InputError if a value is not in its range.
     """
 
     tracker: ClassVar[str] = "mog2"
@@ -52,8 +53,9 @@ class Mog2Settings(Config):
 class Mog2:
     """A mixture of Gaussians per pixel (OpenCV's MOG2) with the interface of `background.Background`.
 
-    State: OpenCV's model; settings; fps, frames per second; valid (H, W) bool, True everywhere. Classes are BACKGROUND,
-    FOREGROUND and SHADOW; DARK and HIGHLIGHT do not occur.
+    State: OpenCV's model; settings; fps, frames per second; valid (H, W) bool, True everywhere. Classes are 0
+    BACKGROUND, 1 FOREGROUND and 3 SHADOW; DARK and HIGHLIGHT do not occur. The constructor raises InputError if the
+    sample has a wrong shape or dtype, or fewer than 10 frames.
     """
 
     def __init__(self, sample: Image, fps: float, settings: Mog2Settings | None = None) -> None:
@@ -80,8 +82,8 @@ class Mog2:
         self._model.setShadowThreshold(settings.shadow)
 
     def classify(self, image: Image) -> Image:
-        """Returns the class of each pixel of a frame (H, W, 3) BGR uint8, as (H, W) uint8: BACKGROUND, SHADOW or
-        FOREGROUND.
+        """Returns the class of each pixel of a frame (H, W, 3) BGR uint8, as (H, W) uint8: 0 BACKGROUND, 1 FOREGROUND
+        or 3 SHADOW.
 
         The model does not learn from the frame. Raises InputError if the frame's size or dtype is not the sample's.
         """

@@ -49,14 +49,14 @@ class PersonSize:
 
     State ("lone blobs" may be one person each; "from above": the camera is straight above):
     table (2, V, U)         with a pinhole camera: height and width at the nodes of a grid, px; else None
+    low (2,)                u, v of the grid's first node, px; only with a table
     axes_above (2,)         from above: longer and shorter axis of a person's ellipse, px; else None
     lone (K, 4)             the last lone blobs, at most 400: foot u, v, height, width, px (from above: the axes)
     since_fit, agreed       numbers of lone blobs: since the last fit; of heights that agree with line and factor
     line                    a (px), b of h = a + b v, v the foot's row; used without a camera; a is nan before a fit
     factor (2,)             height and width of the lone blobs over the expected ones; 1 before the first fit
     box_ratios (K, 2)       height and width of the lone blobs' boxes over those of the boxes round their ellipses
-    box_over_ellipse (2,)   their median; 1 from above
-    """
+    box_over_ellipse (2,)   their median (with a prior of 1.0, 1.1); 1 from above"""
 
     def __init__(self, context: Context) -> None:
         self.table: Array | None = None
@@ -91,17 +91,16 @@ class PersonSize:
         """Returns height and width (N, 2), px, of the box of a person who stands at image points `foot` (N, 2) u, v,
         px.
 
-        nan where the size is unknown or smaller than 12 px (6 px from above). From above it is the box of a person
-        turned by 45 degrees. Beyond the camera's table the size is that at its edge.
-        """
+        nan where the size is unknown or its height is below 12 px (longer axis below 6 px from above). From above it is
+        the box of a person turned by 45 degrees. Beyond the camera's table the size is that at its edge."""
         size = self._expected(foot)
         return np.sqrt(np.square(size).mean(1, keepdims=True) * np.ones(2)) if self.above else size
 
     def axes(self, foot: Array) -> Array:
         """Returns height and width (N, 2), px, of the ellipse of a person who stands at `foot` (N, 2) u, v, px.
 
-        From above: the axes of the ellipse, the longer first. nan where the size is unknown or too small, as in `at`.
-        """
+        From above: the axes of the ellipse, the longer first. nan where the size is unknown or the height (from above
+        the longer axis) of the box is below 12 px (6 px)."""
         return self._expected(foot) if self.above else self._expected(foot) / self.box_over_ellipse
 
     def _expected(self, foot: Array) -> Array:
@@ -114,10 +113,9 @@ class PersonSize:
     def one_person(self, box: Array, ellipse: Array) -> Bools:
         """Returns True for each blob (M,) that has the size of one person; False where a person's size is unknown.
 
-        box (M, 4): left, top, width, height, px; ellipse (M, 5): x, y, h, w (px), theta (rad). The box's sides, from
-        above the ellipse's axes, may be 0.8 (from above 0.6) to 1.25 times the expected height and 0.5 to 1.6 times the
-        width.
-        """
+        box (M, 4): left, top, width, height, px; ellipse (M, 5): x, y, full axes h, w (px), theta (rad). The box's
+        sides, from above the ellipse's axes, may be 0.8 (from above 0.6) to 1.25 times the expected height and 0.5 to
+        1.6 times the width."""
         size = ellipse[:, 2:4] if self.above else box[:, :1:-1]
         with np.errstate(invalid="ignore"):
             tall, wide = (size / self._expected(_feet(box))).T
@@ -136,17 +134,20 @@ class PersonSize:
 
     @property
     def px_per_m(self) -> float:
-        """Scale of the image, px per m: the median height of the remembered lone blobs over 1.7 m; nan without lone
-        blobs."""
+        """Scale of the image, px per m: the median height of the remembered lone blobs (each may be one person) over
+        1.7 m.
+
+        nan without lone blobs. From above their longer axis is taken for the height."""
         return float(np.median(self.lone[:, 2])) / PERSON_HEIGHT if len(self.lone) else float("nan")
 
     def learn(self, box: Array, ellipse: Array, whole: Bools) -> None:
         """Change the size in place by the blobs of a picture that may be one person; the others are ignored.
 
-        box (M, 4): left, top, width, height, px; ellipse (M, 5): x, y, h, w (px), theta (rad); whole (M,): False for a
-        blob that must not be used. A blob may be one person if it is not too small and its width over height is within
-        a factor 2 of a person's; with a camera its height must be within a factor 1.4 of the expected one, too.
-        """
+        box (M, 4): left, top, width, height, px; ellipse (M, 5): x, y, full axes h, w (px), theta (rad); whole (M,):
+        False for a blob that must not be used. A blob may be one person if it is at least 12 px high (from above 6 px
+        long) and its width over height is within a factor 2 of a person's; with a camera its height must be within a
+        factor 1.4 of the expected one, too. The last 400 are kept. Line and factors change only when 5 % of the kept
+        ones are new."""
         foot, size = _feet(box), ellipse[:, 2:4] if self.above else box[:, :1:-1]
         expected = np.divide(*self._unscaled(foot).T[::-1]) if self.from_camera else SLIM
         with np.errstate(invalid="ignore"):
@@ -169,11 +170,10 @@ class PersonSize:
             self._fit()
 
     def _plausible_height(self, foot: Array, size: Array) -> Bools:
-        """Returns True for each blob (M,) whose height is within the factor HEIGHT_FACTOR of the camera's; all without
-        a camera.
+        """Returns True for each blob (M,) whose height is within the factor HEIGHT_FACTOR = 1.4 of the camera's; all
+        without a camera.
 
-        foot (M, 2): u, v, px; size (M, 2): height, width, px. False where the camera gives nan.
-        """
+        foot (M, 2): u, v, px; size (M, 2): height, width, px. False where the camera gives nan."""
         if not self.from_camera:
             return np.ones(len(size), bool)
         with np.errstate(invalid="ignore"):
@@ -233,8 +233,8 @@ def _line(v: Array, h: Array, weight: Array) -> tuple[float, float]:
     """Returns a (px) and b of the line h = a + b v on which most heights agree; N must be at least 1.
 
     v, h, weight (N,): rows of the feet, px, heights, px, and weights. The best of LEVELS x SLOPES lines is refined
-    three times by least squares of relative errors among the heights that agree with it; a weak prior holds its slope.
-    """
+    three times by least squares of relative errors among the heights that agree with it (differ by at most 12 %); a
+    weak prior holds its slope. Raises LinAlgError if no height agrees."""
     middle, typical = max(float(np.median(v)), 1.0), float(np.median(h))
     at = v / middle - 1
     level, slope = (a.ravel() for a in np.meshgrid(LEVELS, SLOPES))
@@ -267,9 +267,9 @@ def _table(camera: Camera, low: Array) -> Array:
     """Returns height and width (2, V, U), px, of a person's box whose foot is at each node of a grid; nan where nobody
     stands.
 
-    low (2,): u, v of the first node, px; nodes are STEP = 8 px apart and reach MARGIN image sizes beyond the image. The
-    ground point is not at the box's lower edge unless seen from the side, so it is corrected twice.
-    """
+    The person is 1.7 m high, on z = 0; boxes are averaged over four headings. low (2,): u, v of the first node, px;
+    nodes are STEP = 8 px apart and reach MARGIN = 0.25 image sizes beyond the image. The ground point is not at the
+    box's lower edge unless seen from the side, so it is corrected twice."""
     from sim.scene.body import person_boxes
     from sim.scene.camera import to_ground
 

@@ -10,7 +10,7 @@ from sim.types import Array
 
 @njit(cache=True)
 def look_up(table: Array, at: Array) -> Array:
-    """Returns bilinearly interpolated values (N, C) of a table (C, V, U) at N points.
+    """Returns bilinearly interpolated values (N, C) of a table (C, V, U) at N points; V and U must be at least 2.
 
     at (N, 2): u, v in grid steps from the table's first node. A coordinate outside the table is moved to its edge; a
     nan coordinate counts as 0. A nan among the four nodes round a point gives nan.
