@@ -33,7 +33,11 @@ from tracking.app.shared_options import (
 
 @dataclass(frozen=True, kw_only=True)
 class ScenariosOptions:
-    """Options of `scenarios`. All are None, empty or False if absent: the command then lists scenarios and suites."""
+    """Options of the command `scenarios`, which lists scenarios and suites, or explains one.
+
+    name: scenario, *.toml file or suite to explain; None: list all. settings: texts "key=value" for it, [] if absent.
+    out: SVG file for a drawing; None: no drawing. schema: list every key of a scenario file instead.
+    """
 
     name: Annotated[str | None, typer.Argument(help="Scenario, *.toml file or suite to explain.")] = None
     settings: Set = field(default_factory=list)
@@ -143,7 +147,16 @@ class FitSensorOptions:
 
 @dataclass(frozen=True, kw_only=True)
 class ReplayCommandOptions:
-    """Options of `replay`."""
+    """Options of the command `replay`, which renders recorded trajectories with a simulated camera and stores a
+    dataset.
+
+    source: recording or dataset. out: folder to write. camera: TOML file with [camera], [sensor], [light], [picture];
+    None: all defaults. seeds: "A:B" (A to B - 1) or one number. start: second at which to begin. duration: seconds to
+    replay; None: to the end. settings: texts "key=value". sensor: file of a detector profile, None if not given.
+    streams: names of the pictures to store, with commas, or "none". images: format of pictures; None: jpg. fps: frames
+    per second; None: the recording's own. calibration: file of a camera, for a recording that has boxes only; None if
+    not given.
+    """
 
     source: Source
     out: Out
@@ -220,7 +233,13 @@ class SheetOptions:
 
 @dataclass(frozen=True, kw_only=True)
 class OverlayOptions:
-    """Options of `overlay`."""
+    """Options of the command `overlay`, which writes a video with tracks or truth drawn over the pictures.
+
+    source: sequence or dataset. tracks: stored tracks; None: only the truth. out: MP4 file, or a folder for several
+    sequences. truth: drawn "beside" the tracks, "over" the same picture, or "only" it; None: not drawn if there are
+    tracks. fps: frames per second; None: the recording's own. px_per_m: pixels per metre, camera: calibration file;
+    None if not given.
+    """
 
     source: Source
     tracks: Tracks = None

@@ -43,8 +43,9 @@ class CommandResult:
 def print_result(result: CommandResult, as_json: bool) -> int:
     """Prints the result of a command on stdout and returns its exit code, 0 or 1.
 
-    as_json: print one JSON object, "status" ("ok" or "failed") and then result.data; else result.text. Raises OSError
-    if stdout cannot be written, as with a closed pipe or a full disk.
+    as_json: print one JSON object, "status" ("ok" or "failed") and then result.data, with nan and infinity as null;
+    else result.text. Raises OSError if stdout cannot be written, as with a closed pipe or a full disk, and TypeError
+    for data that JSON cannot hold.
     """
     if as_json:
         _print_json({"status": STATUS[result.code], **result.data})
@@ -55,7 +56,8 @@ def print_result(result: CommandResult, as_json: bool) -> int:
 
 
 def _rendered(tables: Any) -> str:
-    """What rich prints of `tables`: as wide as the terminal and coloured there, else WIDTH columns of plain text."""
+    """Returns what the library rich prints of `tables`, anything it can print: as wide as the terminal and coloured
+    there, else 160 columns of plain text."""
     from rich.console import Console
 
     console = Console(width=None if sys.stdout and sys.stdout.isatty() else WIDTH, highlight=False)
@@ -65,10 +67,10 @@ def _rendered(tables: Any) -> str:
 
 
 def print_error(error: FlockscopeError, as_json: bool) -> int:
-    """Prints an error and returns its exit code, 2 for wrong input, 1 if the work failed.
+    """Prints an error and returns its exit code, 2 for wrong input (InputError), 1 if the work failed.
 
-    as_json: print one JSON object with "status" and "error" on stdout; else one line "error: ..." on stderr. Raises
-    OSError if that cannot be written.
+    as_json: print one JSON object with "status" ("refused" or "failed") and "error" (file, place, got, expected,
+    remedy) on stdout; else one line "error: ..." on stderr. Raises OSError if that cannot be written.
     """
     if as_json:
         _print_json({"status": STATUS[error.exit_code], "error": error.as_dict()})
@@ -78,7 +80,11 @@ def print_error(error: FlockscopeError, as_json: bool) -> int:
 
 
 def print_interrupted(as_json: bool) -> int:
-    """Prints that Ctrl-C ended the command, as one line on stderr or one JSON object on stdout; returns 130."""
+    """Prints that Ctrl-C ended the command and that the same command continues; returns 130.
+
+    as_json: print one JSON object with "status" ("interrupted") and "error" on stdout; else one line on stderr. Raises
+    OSError if that cannot be written.
+    """
     remedy = "run the same command again: completed parts are kept"
     error = WorkError(got="an interruption", expected="to finish", remedy=remedy)
     if as_json:

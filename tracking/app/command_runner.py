@@ -30,7 +30,12 @@ HELP = {"-h", "--help", "--version"}
 def run_command(app: typer.Typer, arguments: list[str]) -> int:
     """Runs the command that the arguments name, prints its result or error, and returns its exit code.
 
-    Raises only an unexpected exception, and only if the environment variable FLOCKSCOPE_DEBUG is set.
+    app: the commands. arguments: the words after `flockscope`; with "--json" one JSON object is printed on stdout.
+    Beside --help or --version, "--json" is not passed on. Each UserWarning's text is printed once on stderr. Exit
+    codes: 0 done; 1 the work failed; 2 wrong input or usage; 130 Ctrl-C.
+
+    Raises only an error that stems from another exception, and only if the environment variable FLOCKSCOPE_DEBUG is
+    set.
     """
     as_json = "--json" in arguments
     if as_json and not HELP.isdisjoint(arguments):  # some levels of the command line know --help but not --json
@@ -50,7 +55,13 @@ def run_command(app: typer.Typer, arguments: list[str]) -> int:
 
 
 def _run_quietly(app: typer.Typer, arguments: list[str]) -> CommandResult | int:
-    """As `_run`, but leaves stdout to the JSON object: a help text becomes the result, other text goes to stderr."""
+    """As `_run`, but leaves stdout to the JSON object: a help text becomes the result, other printed text goes to
+    stderr.
+
+    If the command printed itself (as --help) with exit code 0, returns a CommandResult whose data is {"text": what it
+    printed}. Raises FlockscopeError for everything that goes wrong, KeyboardInterrupt for Ctrl-C; printed text goes to
+    stderr then, too.
+    """
     printed = io.StringIO()
     try:
         with redirect_stdout(printed):
@@ -64,9 +75,10 @@ def _run_quietly(app: typer.Typer, arguments: list[str]) -> CommandResult | int:
 
 
 def _run(app: typer.Typer, arguments: list[str]) -> CommandResult | int:
-    """The command's result, or the exit code of a command that printed itself, as --help does.
+    """Returns the command's result, or the exit code of a command that printed itself, as --help does.
 
-    Raises FlockscopeError for everything that goes wrong, KeyboardInterrupt for Ctrl-C.
+    app: the commands. arguments: the words after `flockscope`. Raises FlockscopeError for everything that goes wrong
+    (InputError for wrong usage, see as_flockscope_error for other exceptions), KeyboardInterrupt for Ctrl-C.
     """
     command: Any = typer.main.get_command(app)
     usage_error: Any = typer.BadParameter.__base__  # the class of all usage errors, typer's own or click's
@@ -103,9 +115,10 @@ def _usage(error: Any) -> InputError:
 
 
 def _print(result: CommandResult, as_json: bool) -> int:
-    """Prints the result and returns its exit code. A closed pipe is no error.
+    """Prints the result and returns its exit code, 0 or 1. A closed pipe is no error.
 
-    Any other failure to write, as a full disk, is printed on stderr, and 1 is returned.
+    as_json: one JSON object, else text. Any other failure to write, as a full disk, is printed on stderr, and 1 is
+    returned. After a failure stdout leads nowhere (os.devnull).
     """
     try:
         return print_result(result, as_json)
@@ -119,7 +132,8 @@ def _print(result: CommandResult, as_json: bool) -> int:
 
 
 def _print_warnings_once() -> Callable[..., None]:
-    """A replacement for `warnings.showwarning` that prints each text once on stderr."""
+    """Returns a replacement for `warnings.showwarning` that prints each different text once, as "warning: TEXT" on
+    stderr."""
     printed: set[str] = set()
 
     def warn(message: Warning | str, *_: object) -> None:

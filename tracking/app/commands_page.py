@@ -40,7 +40,8 @@ def _section(name: str, command: Any) -> str:
 
 
 def _cell(text: str) -> str:
-    """Text for a cell of a table: on one line, without the sign that ends a cell."""
+    """Returns text for a cell of a Markdown table: on one line, white space as single spaces, "|" with a backslash
+    before it."""
     return " ".join(text.split()).replace("|", "\\|")
 
 

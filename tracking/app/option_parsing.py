@@ -39,8 +39,8 @@ def settings(texts: Iterable[str], default: str, subjects: Iterable[str]) -> lis
 
 
 def _setting(text: str, default: str, subjects: tuple[str, ...]) -> tuple[str, str]:
-    """(subject, "key=value") of one `--set` text: the subject is "tracker", "sensor" or "scenario" if the key starts
-    with that word and a dot, else `default`.
+    """Returns (subject, "key=value") of one `--set` text: the subject is "tracker", "sensor" or "scenario" if the key
+    starts with that word and a dot, which are removed; else it is `default`.
 
     Raises InputError if "=" or the key is missing, or the subject is not in `subjects`.
     """
@@ -73,9 +73,9 @@ def scenario_settings(texts: Iterable[str]) -> list[str]:
 
 
 def sensor_settings(file: Path | None) -> tuple[str, ...]:
-    """The texts "sensor.key=value" of the file of `--sensor`; empty for None.
+    """Returns the texts "sensor.key=value" of the file of `--sensor`, a detector profile in TOML; () for None.
 
-    Raises InputError if the file is missing or is no sensor profile.
+    Raises InputError if the file is missing, is no TOML with a table [sensor], or has a wrong key or value.
     """
     if file is None:
         return ()

@@ -30,10 +30,11 @@ T = TypeVar("T")
 def options_from(options: type[T]) -> Callable[[Callable[[T], CommandResult]], Callable[..., CommandResult]]:
     """Returns a decorator for a command function that takes one instance of the dataclass `options`.
 
-    The decorated function takes one keyword argument per field, in the order of the fields, and builds the instance.
-    A field without a default is a required option, or a required argument if it is annotated with `typer.Argument`.
-    A field may have a `default_factory`; Typer gets a fresh value of it. Every command also takes `--json`, which
-    needs no field: `tracking.app.command_runner` reads it from the command line.
+    The decorated function takes one keyword argument per field, in the order of the fields, and builds the instance. A
+    field without a default is a required option, or a required argument if it is annotated with `typer.Argument`. A
+    `default_factory` is called once, when `options_from` is; Typer gets that value. Every command also takes `--json`,
+    which needs no field: `tracking.app.command_runner` reads it from the command line. Name and docstring stay those of
+    the command.
     """
     parameters = _parameters(options)
 

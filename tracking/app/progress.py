@@ -21,9 +21,9 @@ PAUSE = 10.0
 class ProgressMeter:
     """Counts finished items of a long work and shows them on stderr. A context manager; leaving it removes the bar.
 
-    On a terminal a bar appears after 2 s; elsewhere `update` prints a line, at most every 10 s and not in the first 2
-    s. what: name of the work. total: number of all items, None if unknown. done: items finished. item: name of the
-    current item, "" for none.
+    On a terminal a bar appears 2 s after entering, from a thread; elsewhere `update` prints a line, at most every 10 s
+    and not in the first 2 s. what: name of the work. total: number of all items, None if unknown. done: items finished,
+    0 at first. item: name of the current item, "" for none. An instance can be entered once.
     """
 
     def __init__(self, what: str, total: int | None = None) -> None:
@@ -62,7 +62,8 @@ class ProgressMeter:
             print(f"{self.what}: {done}{'' if total is None else f' of {total}'} {item}".rstrip(), file=sys.stderr)
 
     def _show(self) -> None:
-        """Shows the bar if stderr is a terminal. Runs in the timer's thread."""
+        """Shows the bar if stderr is a terminal and the meter has not been left meanwhile. Runs in the
+        timer's thread."""
         if not sys.stderr.isatty():
             return
         from rich.console import Console

@@ -35,10 +35,11 @@ class StoredTracks:
     info: dict[str, Any]
 
     def read(self, sequence: Sequence) -> TrackingRun:
-        """Reads the tracks at the sequence's frame rate.
+        """Reads the tracks at the sequence's frame rate; returns them, one `Tracks` per frame, with `info`.
 
-        Raises InputError if run.json states another frame rate, if there are no tracks, if a file is damaged, or if a
-        MOTChallenge text has a frame beyond the sequence's length.
+        Raises InputError if run.json states another frame rate, if there are no tracks, if a file is damaged, if a
+        MOTChallenge text has a frame beyond the sequence's length, or an event's frame is outside the tracks. Warns
+        about a text without rows.
         """
         fps = self.info.get("fps")
         if fps is not None and abs(fps - sequence.fps) > 1e-9 * sequence.fps:
@@ -84,7 +85,7 @@ def _below(folder: Path, depth: int) -> list[StoredTracks]:
 def _run_info(path: Path) -> dict[str, Any]:
     """Returns the content of the run.json at `path`, an empty dictionary if there is no such file.
 
-    Raises InputError if the file is no JSON object.
+    Raises InputError if the file is no JSON object, OSError if it cannot be read.
     """
     if not path.is_file():
         return {}
@@ -100,11 +101,11 @@ def _run_info(path: Path) -> dict[str, Any]:
 
 
 def match_tracks(sequences: list[Sequence], stored: list[StoredTracks]) -> list[tuple[Sequence, StoredTracks]]:
-    """Returns each sequence with the stored tracks of the same name, in the order of `sequences`.
+    """Returns each sequence with the stored tracks of the same name, in the order of `sequences`; [] without sequences.
 
-    A single text file that was given itself matches a single sequence whatever their names. Tracks of other sequences
-    are ignored. Raises InputError if a sequence has no tracks, or if two of `stored` have the same name. `stored` must
-    not be empty if there is a sequence.
+    A single text file that was given itself matches a single sequence whatever their names; otherwise its name is that
+    of the file without suffix. Tracks of other sequences are ignored. Raises InputError if a sequence has no tracks, or
+    if two of `stored` have the same name. `stored` must not be empty if there is a sequence.
     """
     if len(sequences) == len(stored) == 1 and not stored[0].name:
         return [(sequences[0], stored[0])]

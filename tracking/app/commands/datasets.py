@@ -11,9 +11,12 @@ from tracking.app.progress import ProgressMeter
 
 
 def generate(options: GenerateOptions) -> CommandResult:
-    """Stores one sequence for every named scenario or suite entry and every seed; returns their folders.
+    """Stores one sequence for every named scenario or suite entry and every seed, all seeds of an entry together.
 
-    Raises InputError for wrong options, and WorkError if a sequence could not be made.
+    The result's data: "sequences", the folders, and "folder", their parent. Stored sequences that are intact are kept.
+
+    Raises InputError for wrong options or scenarios, a folder with another sequence, or if all failures are wrong
+    input. Raises WorkError if another sequence could not be made, after the others, or the disk is full.
     """
     from sim.dataset.generate import generate as make
     from sim.workers.start import WorkerOptions
@@ -33,7 +36,12 @@ def generate(options: GenerateOptions) -> CommandResult:
 
 
 def validate(folder: Path) -> CommandResult:
-    """Checks a sequence or dataset; returns its content hash, or with exit code 1 one line for each problem."""
+    """Checks a generated sequence or dataset at the path `folder`; changes nothing.
+
+    Without problems the result's data are "problems" ([]) and "content_hash" (64 hex digits), else "problems" (a
+    dictionary each) and "error" (the first of them). Then the exit code is 1 and the text has a line for each problem.
+    Raises InputError if the folder does not exist or holds no sequence.
+    """
     from sim.io.store.validate import content_hash
     from sim.io.store.validate import validate as check
 
@@ -48,7 +56,11 @@ def validate(folder: Path) -> CommandResult:
 
 
 def export_coco(source: Path, out: Path) -> CommandResult:
-    """Writes one COCO file of all labelled sequences of the source; returns its path."""
+    """Writes one COCO file, the JSON file `out`, of all sequences with labelled boxes at the path `source`.
+
+    The result's data: "file", its path. An existing file is replaced. Raises InputError if the source cannot be opened,
+    no sequence has labelled boxes, or `out` cannot be written; WorkError if the disk is full.
+    """
     from sim.io.export.coco import coco
 
     path = coco(source, out)
@@ -56,7 +68,12 @@ def export_coco(source: Path, out: Path) -> CommandResult:
 
 
 def export_webdataset(options: WebdatasetOptions) -> CommandResult:
-    """Writes tar shards of all sequences of the source; returns their paths, total bytes and content hash."""
+    """Writes tar shards of all sequences of a generated dataset into the folder of --out, and an index.json.
+
+    The result's data: "shards", their paths, "bytes", their total, and "content_hash". Complete shards of an earlier
+    run are kept. Raises InputError if --out or --shard-size is wrong, the source is no intact generated dataset, or the
+    folder holds shards of another export; WorkError if the disk is full.
+    """
     from sim.io.export.webdataset import size_of, webdataset
 
     out = option_parsing.output_folder(options.out)

@@ -32,9 +32,13 @@ MODES: tuple[DetectionMode, ...] = ("image", "file")
 
 
 def demo(out: Path, *, quick: bool) -> CommandResult:
-    """Writes data, tracks and pages into `out`; returns the mean scores by tracker and the path of the page to open.
+    """Writes simulated scenes, tracks and pages into the folder `out`; scenes that are already there are kept.
 
-    Raises InputError if `out` is a file, or holds sequences of other scenarios.
+    quick: one short scene and one seed, else eight scenes and three seeds. The result's data: "sequences" (number),
+    "scores" (mean scores with intervals, by tracker and input) and "page", the path of the page to open.
+
+    Raises InputError if `out` is a file, cannot be written or holds sequences of other scenarios; WorkError if the disk
+    is full.
     """
     from sim.dataset.generate import generate
     from sim.io.files.atomic import write_file
@@ -67,9 +71,11 @@ def demo(out: Path, *, quick: bool) -> CommandResult:
 
 
 def _pixel_scene(sequence: Sequence, out: Path) -> PixelScene:
-    """Tracks one sequence from its pictures and from its stored detections; writes replays and overlay videos.
+    """Tracks one sequence from its pictures and from its stored detections; returns scores, pages and videos.
 
-    All replays share one video file.
+    Every tracker that takes pixels runs in both ways. Tracks, replay pages and overlay videos of the tracks from
+    pictures are written into `out`. All replays share one video file. Raises InputError if a file cannot be read or
+    written, WorkError if the disk is full.
     """
     from tracking.app.pictures.overlay import write_overlay
     from tracking.app.replay_page.video import page_video
@@ -92,12 +98,20 @@ def _pixel_scene(sequence: Sequence, out: Path) -> PixelScene:
 
 
 def _input_word(tracker: str, mode: DetectionMode) -> str:
-    """What the tracker gets in this mode: "pixels", "boxes" or "points"."""
+    """Returns what the tracker gets in this mode: "pixels" in mode "image", else "boxes" if it takes boxes, else
+    "points".
+
+    tracker: name; InputError if unknown.
+    """
     return "pixels" if mode == "image" else "boxes" if "boxes" in tracker_registry.find(tracker).needs else "points"
 
 
 def _section(tracker: str, sequences: list[Sequence], out: Path, meter: ProgressMeter) -> ResultSection:
-    """Tracks all sequences with one tracker from their stored detections, and writes their replays."""
+    """Tracks all sequences with one tracker from the detections that it takes by default; returns scores and pages.
+
+    Writes tracks and replay pages into `out`. meter: advanced by one for each sequence. The title names stored
+    detections. Raises InputError if a file cannot be read or written, WorkError if the disk is full.
+    """
     section = ResultSection(f"{tracker}, from {_input_word(tracker, 'file')}")
     for sequence in sequences:
         run = TrackerSetup(tracker).run(sequence)
@@ -127,7 +141,8 @@ def _write_page(
 
 
 def _line(title: str, rows: list[SequenceScores]) -> str:
-    """The means of the SHOWN scores that are known, in one line."""
+    """Returns "title: " and the means over `rows` of the SHOWN scores that are known, in one line. rows: at
+    least one."""
     means = summary(rows)
     return f"{title}: " + ", ".join(
         f"{key} {number(key, means[key]['mean'], mean=True)}" for key in SHOWN if math.isfinite(means[key]["mean"])

@@ -44,7 +44,11 @@ WITHOUT_PEOPLE = "<p>This tracker reports groups without people, so people canno
 
 @dataclass(frozen=True)
 class ResultSection:
-    """The scores under one heading: for each row of scores its replay page and the name that links to it."""
+    """The scores under one heading; three lists of equal length that `add` extends.
+
+    title: the heading. rows: the scores of one sequence each. pages: the replay page of each row. names: the text that
+    links to it.
+    """
 
     title: str
     rows: list[SequenceScores] = field(default_factory=list)
@@ -60,9 +64,10 @@ class ResultSection:
 
 @dataclass(frozen=True)
 class PixelScene:
-    """The scene that was tracked from its pictures: scores, a video for each tracker, its frames and seconds.
+    """The scene that was tracked from its pictures.
 
-    The names in `section` begin with the tracker's name.
+    section: its scores, one row for each tracker and input; its names begin with the tracker's name. videos: path of
+    the overlay video by tracker. frames: number of frames. seconds: duration.
     """
 
     section: ResultSection
@@ -72,7 +77,11 @@ class PixelScene:
 
 
 def demo_page(root: Path, scene: PixelScene, sections: list[ResultSection]) -> str:
-    """The page as HTML. root: the folder that will hold the page; all its links are relative to it."""
+    """Returns the page as HTML: videos and scores of the scene with pictures, then a table for each section.
+
+    root: the folder that will hold the page and holds everything it links to; links are relative to it. Raises
+    ValueError for a page or video outside it.
+    """
     head = f'<!doctype html><html lang="en"><meta charset="utf-8"><title>flockscope demo</title><style>{STYLE}</style>'
     first = FROM_PIXELS.format(frames=scene.frames) + _videos(root, scene) + _table(scene.section, root)
     rest = "\n".join(_section(section, root) for section in sections)
@@ -80,7 +89,11 @@ def demo_page(root: Path, scene: PixelScene, sections: list[ResultSection]) -> s
 
 
 def _videos(root: Path, scene: PixelScene) -> str:
-    """The videos side by side, each beginning at 40 % of the scene."""
+    """Returns the videos side by side as HTML, each beginning at 40 % of the scene, with a caption.
+
+    root: the folder that links are relative to; ValueError for a video outside it. The caption says whether the tracker
+    tracks people or only groups.
+    """
     section = scene.section
     with_people = {name.split()[0] for name, row in zip(section.names, section.rows, strict=True) if _has_people(row)}
     shown = []
@@ -96,7 +109,7 @@ def _section(section: ResultSection, root: Path) -> str:
 
 
 def _has_people(row: SequenceScores) -> bool:
-    """True if people are scored, False if only groups are."""
+    """Returns True if people are scored (HOTA is known), False if only groups are. row: the scores of one sequence."""
     return math.isfinite(row.scores["HOTA"])
 
 
@@ -105,7 +118,11 @@ def _link(path: Path, root: Path) -> str:
 
 
 def _table(section: ResultSection, root: Path) -> str:
-    """A table of the SHOWN scores that some row has; for several sequences, their mean with its interval below."""
+    """Returns an HTML table of the SHOWN scores that some row has; for several sequences, their mean with its interval
+    below.
+
+    Each row's name links to its page, relative to `root`; ValueError for a page outside it.
+    """
     keys = [key for key in SHOWN if any(math.isfinite(row.scores[key]) for row in section.rows)]
     rows = []
     for row, page, name in zip(section.rows, section.pages, section.names, strict=True):
@@ -122,7 +139,10 @@ def _table(section: ResultSection, root: Path) -> str:
 
 
 def _heading(key: str) -> str:
-    """A column's heading with its unit; its meaning is shown when the mouse rests on it."""
+    """Returns a column's heading as HTML, the key with its unit; its meaning is shown when the mouse rests on it.
+
+    Units "1" and "count" are left out. Raises KeyError for a key that is not in the catalogue.
+    """
     score = CATALOGUE[key]
     unit = f" [{score.unit}]" if score.unit not in ("1", "count") else ""
     return f'<th title="{escape(score.meaning)}">{escape(key)}{unit}</th>'

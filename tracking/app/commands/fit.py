@@ -23,10 +23,14 @@ SHOWN = (
 
 
 def fit_sensor(options: FitSensorOptions) -> CommandResult:
-    """Writes the profile of the detector behind the recordings, pooled over all of them, and returns it.
+    """Writes the profile of the detector behind the recordings, pooled over all of them, as a TOML file.
 
-    Measured statistics stand beside those of detections simulated with the profile. Raises InputError if --out is no
-    .toml file, or if a source is missing or has no labels or detections.
+    The result's data: "file", "sensor" (the profile's keys), "measured" and "drawn", each a dictionary of statistics by
+    name. "drawn" are means over 8 seeds of detections simulated with the profile; nan where nothing was observed.
+
+    Raises InputError if --out is no .toml file or cannot be written, if a source is missing or has no labels,
+    detections or boxes of both, or if there are fewer than 50 labelled people (rows of all frames) or 25 of them
+    detected. Raises WorkError if the disk is full.
     """
     from scenarios.loading.sensor_profiles import dump_sensor
     from sim.io.files.atomic import write_file
@@ -60,6 +64,6 @@ def _open(sources: Sequence[Path], fps: float | None) -> list[Recording]:
 
 
 def _mean(values: list[float]) -> float:
-    """The mean of the finite values, nan if there is none."""
+    """Returns the mean of the finite values, nan if there is none."""
     known = [v for v in values if np.isfinite(v)]
     return float(np.mean(known)) if known else float("nan")

@@ -14,7 +14,11 @@ Node = dict[str, Any]
 
 
 def list_keys() -> CommandResult:
-    """Every key with its type, default and meaning. `[]` after a key stands for every element of its array."""
+    """Returns every key of a scenario file with its type, default and meaning, a line each.
+
+    The result's data: "keys", a list of dictionaries with "key", "type", "default" and "meaning". Keys of inner tables
+    have dots. `[]` after a table's key stands for every element of its array, a word in brackets for one kind of table.
+    """
     schema = Scenario.model_json_schema(by_alias=True)
     rows = list(_keys(schema, schema["$defs"], ""))
     width = max(len(row["key"]) for row in rows)
@@ -23,7 +27,12 @@ def list_keys() -> CommandResult:
 
 
 def _keys(table: Node, known: Node, prefix: str) -> Iterator[dict[str, str]]:
-    """The keys of a table and of the tables in it. known: the schema's named tables. prefix: of the keys' names."""
+    """Yields a dictionary with "key", "type", "default" and "meaning", all texts, of each key of a table and of tables
+    in it.
+
+    table: part of a JSON schema. known: the schema's named tables. prefix: written before each key, "" or with a dot at
+    the end. default: "required" if the key has none. A key that holds tables is replaced by their keys.
+    """
     required = table.get("required", [])
     for name, node in table["properties"].items():
         many = "[]" if any("items" in each for each in (node, *node.get("anyOf", ()))) else ""
@@ -39,7 +48,11 @@ def _keys(table: Node, known: Node, prefix: str) -> Iterator[dict[str, str]]:
 
 
 def _tables(node: Node, known: Node) -> Iterator[Node]:
-    """The tables that a key can hold, directly or in an array; none for a plain value. A distribution is a value."""
+    """Yields the tables (parts of a JSON schema) that a key can hold, directly or in an array; none for a plain value.
+
+    node: the key's part of the schema. known: the schema's named tables. A distribution of random numbers counts as a
+    plain value.
+    """
     ref = node.get("$ref", "").rpartition("/")[2]
     if ref and ref != "Distribution":
         yield known[ref]
@@ -49,7 +62,11 @@ def _tables(node: Node, known: Node) -> Iterator[Node]:
 
 
 def _type(node: Node) -> str:
-    """The type of a value in words: its choices, alternatives, elements, or its JSON type."""
+    """Returns the type of a value in words. node: the value's part of a JSON schema.
+
+    It is the name of a named type in lower case, the choices as JSON ("a" | "b"), the alternatives ("x or y", null left
+    out), the elements ("[x, …]"), or the JSON type; "value" if there is none.
+    """
     if "$ref" in node:
         return str(node["$ref"]).rpartition("/")[2].lower()
     for choices in (node.get("enum"), [node["const"]] if "const" in node else None):
@@ -63,7 +80,10 @@ def _type(node: Node) -> str:
 
 
 def _default(node: Node) -> str:
-    """The default in words; "absent" if it is None. Keys of a default table that are None are left out."""
+    """Returns the default in words, "default" and the value as JSON; "absent" if there is none or it is None.
+
+    node: the value's part of a JSON schema. Keys of a default table that are None are left out.
+    """
     value = node.get("default")
     if isinstance(value, dict):
         value = {key: v for key, v in value.items() if v is not None}

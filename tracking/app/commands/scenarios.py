@@ -20,7 +20,8 @@ if TYPE_CHECKING:
 def scenarios(options: ScenariosOptions) -> CommandResult:
     """Explains the named scenario or suite; without a name lists all, or with --schema the keys of a scenario file.
 
-    Raises InputError if NAME, --out or --set is given together with --schema, or --out or --set without NAME.
+    Raises InputError if NAME, --out or --set is given together with --schema, or --out or --set without NAME; also if
+    the name, a setting or the drawing's file is wrong.
     """
     if options.name is not None and not options.schema:
         return explain(options.name, options.settings, options.out)
@@ -37,7 +38,11 @@ def scenarios(options: ScenariosOptions) -> CommandResult:
 
 
 def catalogue() -> CommandResult:
-    """Every scenario and suite with its line of description."""
+    """Returns every scenario and suite of the catalogue with its line of description, sorted by name.
+
+    The result's data: "scenarios" and "suites", each a dictionary from name to description. Raises InputError if a file
+    of the catalogue is wrong.
+    """
     scenarios = {name: load(name).about for name in names()}
     suites = {name: suite.about(suite.find_suite(name)) for name in suite_names()}
     text = ["Scenarios", *_rows(scenarios), "", "Suites", *_rows(suites)]
@@ -45,10 +50,14 @@ def catalogue() -> CommandResult:
 
 
 def explain(name: str, settings: list[str], drawing: Path | None) -> CommandResult:
-    """A scenario in words with a text drawing of its plan, or the entries of a suite.
+    """Returns a scenario in words with a text drawing of its plan, or the entries of a suite with their descriptions.
 
-    drawing: the SVG file to write, None for none. Raises InputError for a name or setting that is wrong, for a drawing
-    of a suite, and for a `drawing` that does not end in .svg.
+    settings: texts "key=value". drawing: the SVG file to write, None for none. Data of a scenario: "name", "about"
+    (description), "text", "toml", and "drawing" if written. Data of a suite: "name" and "entries", a dictionary from
+    name to description.
+
+    Raises InputError for a name or setting that is wrong, for a drawing of a suite, and for a `drawing` that does not
+    end in .svg or cannot be written; WorkError if the disk is full.
     """
     entries = resolve(name, scenario_settings(settings))
     if not _is_suite(name):
@@ -61,7 +70,10 @@ def explain(name: str, settings: list[str], drawing: Path | None) -> CommandResu
 
 
 def _is_suite(name: str) -> bool:
-    """True for a suite's file, for "suite:NAME", and for every name that is no scenario."""
+    """Returns True for a suite's TOML file, for "suite:NAME", and for every name that is no scenario in the catalogue.
+
+    Raises InputError if a name ends in .toml and there is no such file, or it is no TOML.
+    """
     if name.endswith(".toml"):
         return not name.startswith("suite:") and "entry" in toml_files.parse(toml_files.find(name))
     return name.startswith("suite:") or name not in names()

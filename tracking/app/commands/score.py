@@ -31,7 +31,11 @@ INDICATIVE = f"intervals are indicative under {SURE:g} s: the recording lasts {{
 
 @dataclass(frozen=True)
 class ComparisonMethod:
-    """How tracks are compared with the truth. similarity: of people; None: by what both sides have."""
+    """How tracks are compared with the truth.
+
+    similarity: of people, "boxes" (overlap), "ground" or "image" (distance); None: boxes if both sides have them, else
+    the plane of the tracks. group_match: of groups, by "hull" (overlap) or "members" (common people).
+    """
 
     similarity: Similarity | None = None
     group_match: GroupMatch = "hull"
@@ -41,10 +45,15 @@ DEFAULT = ComparisonMethod()
 
 
 def score(options: ScoreOptions) -> CommandResult:
-    """Scores every sequence of the truth with its tracks; with --against also the differences to other tracks.
+    """Scores every sequence of the truth with its tracks; with --against also the differences, these minus the other
+    tracks.
 
-    Raises InputError if a sequence has no tracks or no labels, if truth and tracks cannot be compared as asked, or if
-    --blocks is given for several sequences.
+    The result's data: "sequences" (scores of each); "means" (of each set of equal detections: "given", "sequences",
+    "mean"); "mean" (the only one of them, else None); "notes". With --against also "difference" by key and "against"
+    (the others' detections).
+
+    Raises InputError if a file is wrong, if a sequence has no tracks or no labels, if truth and tracks cannot be
+    compared as asked, or if --blocks is given for several sequences.
     """
     sequences = open_source(options.truth, fps=options.fps, px_per_m=options.px_per_m, images=False)
     method = ComparisonMethod(options.similarity, options.group_match)
@@ -62,7 +71,12 @@ def score(options: ScoreOptions) -> CommandResult:
 def _score_in_blocks(
     sequences: list[Sequence], paths: list[Path], method: ComparisonMethod, draws: int
 ) -> CommandResult:
-    """Scores of a single recording, with intervals by moving blocks. paths: its tracks, and the other tracks if any."""
+    """Returns the scores of a single recording, with 95 % intervals by moving blocks of frames, drawn `draws` times.
+
+    paths: its tracks, and the other tracks if any; then the differences, first minus second in the same frames, are
+    added. Raises InputError for several sequences, missing labels or tracks, or tracks that cannot be compared as
+    asked.
+    """
     if len(sequences) > 1:
         raise InputError(
             place="--blocks", got=f"{len(sequences)} sequences", expected="a single recording",
@@ -80,14 +94,23 @@ def _score_in_blocks(
 
 
 def _resampled_scorer(sequence: Sequence, tracks: Path, method: ComparisonMethod) -> Callable[[Ints], Array]:
-    """A function from frames (drawn with repetition) of the recording to its scores, in the catalogue's order."""
+    """Returns a function from frame indices (N,), from 0 and drawn with repetition, to the recording's scores (K,).
+
+    The K scores are in the catalogue's order, nan where unknown. tracks: path of the stored tracks. Raises InputError
+    if there are none or a file is wrong, AssertionError without truth.
+    """
     ((_, stored),) = match_tracks([sequence], find_tracks(tracks))
     assert sequence.truth is not None
     return resampled_scorer(sequence.truth, stored.read(sequence), method.similarity, method.group_match)
 
 
 def _block_intervals(sequence: Sequence, draws: int, resampled: Callable[[Ints], Array], values: Array) -> Means:
-    """Values (K,) by key with intervals by moving blocks; nan ends for core and event scores, which need true time."""
+    """Returns values (K,) by key, as "mean", with the ends of their 95 % intervals by moving blocks of frames.
+
+    The ends are nan for core and event scores, which need true time. draws: number of samples. resampled: a function
+    from frame indices (N,), from 0, to scores (K,). values, scores: in the catalogue's order. Shows progress on stderr.
+    AssertionError without truth.
+    """
     assert sequence.truth is not None
     with ProgressMeter("draw", draws + 1) as meter:
 
@@ -100,7 +123,11 @@ def _block_intervals(sequence: Sequence, draws: int, resampled: Callable[[Ints],
 
 
 def _score_all(sequences: list[Sequence], tracks: Path, method: ComparisonMethod) -> list[SequenceScores]:
-    """The scores of every sequence with its tracks at or below the path `tracks`."""
+    """Returns the scores of every sequence, in order, with its stored tracks at or below the path `tracks`.
+
+    Raises InputError if a sequence has no tracks or no labels, a file is wrong, or the two cannot be compared as asked.
+    Shows progress on stderr.
+    """
     matched = match_tracks(sequences, find_tracks(tracks))
     rows = []
     with ProgressMeter("score", len(matched)) as meter:
@@ -111,7 +138,11 @@ def _score_all(sequences: list[Sequence], tracks: Path, method: ComparisonMethod
 
 
 def score_run(sequence: Sequence, run: TrackingRun, method: ComparisonMethod = DEFAULT) -> SequenceScores:
-    """The scores of one run. Raises InputError if the sequence has no labels or cannot be compared in this way."""
+    """Returns the scores of one run: a tracker's tracks of one sequence.
+
+    Raises InputError if the sequence has no labels or cannot be compared in this way, or the scale in px per m is not
+    above 0 where groups are derived in the image. Raises ValueError if an id occurs twice in one frame.
+    """
     if sequence.truth is None:
         raise InputError(
             file=sequence.source.get("path", sequence.name), got="no labels", expected="a sequence with truth",
@@ -128,24 +159,36 @@ def score_run(sequence: Sequence, run: TrackingRun, method: ComparisonMethod = D
 
 
 def _notes(sequence: Sequence) -> list[str]:
-    """A note if the recording is too short for its intervals to be more than an indication."""
+    """Returns a list with one note if the recording lasts less than 60 s, so that its intervals are only indicative;
+    else [].
+
+    AssertionError without truth.
+    """
     assert sequence.truth is not None
     seconds = sequence.truth.length / sequence.fps
     return [INDICATIVE.format(seconds=seconds)] if seconds < SURE else []
 
 
 def _by_detections(rows: list[SequenceScores]) -> list[list[SequenceScores]]:
-    """The rows grouped by the detections that the tracker got; scores from different detections share no mean."""
+    """Returns the rows, each the scores of one sequence, in lists of equal detections given to the tracker.
+
+    Lists are in order of first appearance. Scores from different detections share no mean.
+    """
     return [[row for row in rows if row.given == given] for given in _givens(rows)]
 
 
 def _givens(rows: list[SequenceScores]) -> list[str]:
-    """The different detections that trackers got, in order of first appearance."""
+    """Returns the different texts on the detections that trackers got, in order of first appearance; "" if unknown."""
     return list(dict.fromkeys(row.given for row in rows))
 
 
 def _result(parts: list[tuple[list[SequenceScores], Means]], notes: list[str] | None = None) -> CommandResult:
-    """Tables and JSON data of all parts; each part holds rows from the same detections, and their means."""
+    """Returns tables and JSON data of all parts, each a pair (rows, means) of the same detections.
+
+    Rows are scores of one sequence each; means are by key. notes: lines below each table; None: none. Data:
+    "sequences", "mean" (None if there are several parts), "means" (of each part: "given", "sequences", "mean"),
+    "notes".
+    """
     from rich.console import Group
 
     notes = notes or []
@@ -167,7 +210,11 @@ def _row_data(row: SequenceScores) -> dict[str, Any]:
 
 
 def _with_differences(result: CommandResult, differences: Means, sequences: int, against: list[str]) -> CommandResult:
-    """The result with differences to other tracks added. against: the detections that the other trackers got."""
+    """Returns the result with differences to other tracks added, as a table and as "difference" and "against" of the
+    data.
+
+    differences: by key, with interval. sequences: number of pairs. against: the detections that the other trackers got.
+    """
     from rich.console import Group
 
     return CommandResult(
@@ -180,16 +227,22 @@ def _with_differences(result: CommandResult, differences: Means, sequences: int,
 
 
 def summary(rows: list[SequenceScores]) -> Means:
-    """Mean over sequences of each score, with its 95 % bootstrap interval; nan ends for a single sequence."""
+    """Returns the mean over sequences of each score by key, with its 95 % bootstrap interval.
+
+    rows: at least one. nan values are left out; the ends are nan for fewer than two numbers, the mean without any.
+    """
     return _by_key(bootstrap(_values(rows)))
 
 
 def _values(rows: list[SequenceScores]) -> Array:
-    """(sequences, K) scores in the catalogue's order."""
+    """Returns the scores as an array (sequences, K), columns in the catalogue's order, nan where unknown."""
     return np.array([[row.scores[key] for key in CATALOGUE] for row in rows])
 
 
 def _by_key(ends: tuple[Array, Array, Array]) -> Means:
-    """Means of (mean, low, high), each (K,) in the catalogue's order."""
+    """Returns, by key, "mean", "low" and "high" of the arrays (mean, low, high), each (K,) in the catalogue's order.
+
+    Raises ValueError for another length.
+    """
     columns = zip(CATALOGUE, *(end.tolist() for end in ends), strict=True)
     return {key: {"mean": mean, "low": low, "high": high} for key, mean, low, high in columns}

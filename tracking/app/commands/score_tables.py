@@ -50,7 +50,8 @@ Means = dict[str, dict[str, float]]
 
 @dataclass(frozen=True)
 class SequenceScores:
-    """The scores of one sequence. given: what detections the tracker got, in words; "" if there is no run.json."""
+    """The scores of one sequence. sequence: its name. scores: by key, nan where unknown. given: what detections the
+    tracker got, in words; "" if there is no run.json."""
 
     sequence: str
     scores: Scores
@@ -58,10 +59,12 @@ class SequenceScores:
 
 
 def tables(rows: list[SequenceScores], means: Means, notes: Sequence[str] = (), total: int = 0) -> Any:
-    """A rich renderable: one table per family that has a known score, then how people and groups were compared.
+    """Returns something rich can print: one table per family of scores that has a known mean, then how people and
+    groups were compared.
 
-    rows: sequences whose trackers got the same detections. total: the number of all scored sequences; if it is larger
-    than the number of rows, a heading says which detections these rows belong to. notes: further lines.
+    rows: at least one sequence, all trackers given the same detections. means: by key, with interval. total: the number
+    of all scored sequences; if it is larger than the number of rows, a heading says which detections these rows belong
+    to. notes: further lines below.
     """
     from rich.console import Group
 
@@ -83,7 +86,7 @@ def _any_known(keys: Sequence[str], means: Means) -> bool:
 
 
 def detections_words(given: Sequence[str]) -> str:
-    """The detections that trackers got, in words, separated by commas."""
+    """Returns the detections that trackers got, in words, separated by commas; "unknown (no run.json)" for ""."""
     return ", ".join(words or "unknown (no run.json)" for words in given)
 
 
@@ -108,7 +111,8 @@ def _empty_table() -> Any:
 
 
 def _with_title(title: str, table: Any) -> Any:
-    """The title above the table, not wrapped to the table's width."""
+    """Returns, for rich to print, the title above the table, not wrapped to the table's width, and an empty
+    line below."""
     from rich.console import Group
     from rich.text import Text
 
@@ -116,7 +120,11 @@ def _with_title(title: str, table: Any) -> Any:
 
 
 def _comparison_lines(rows: list[SequenceScores], people: bool, groups: bool) -> list[str]:
-    """What people and groups were compared by, or that they are not tracked or not labelled."""
+    """Returns two lines: what people and groups were compared by, or that they are not tracked or not labelled.
+
+    people, groups: whether any score of these is known. Different ways in `rows` are all named, in order of first
+    appearance.
+    """
 
     def each(words: dict[str, str], name: str) -> str:
         return ", ".join(words[kind] for kind in dict.fromkeys(getattr(row.scores, name) for row in rows))
@@ -128,7 +136,11 @@ def _comparison_lines(rows: list[SequenceScores], people: bool, groups: bool) ->
 
 
 def difference_table(differences: Means, sequences: int) -> Any:
-    """A rich table of the differences to other tracks, with a star where the interval does not hold zero."""
+    """Returns a rich table of the differences to other tracks, with a star where the interval does not hold zero.
+
+    differences: by key, with "mean", "low" and "high" of the 95 % interval. Keys with an unknown mean are left out.
+    sequences: number of pairs; 1 stands for one recording in blocks of frames. The title calls 2 to 99 an indication.
+    """
     over = "the same frames" if sequences == 1 else f"{sequences} sequences"
     title = f"these tracks minus --against, in pairs over {over}"
     title += "" if sequences >= ENOUGH or sequences == 1 else f" (fewer than {ENOUGH}: an indication)"
@@ -144,7 +156,11 @@ def difference_table(differences: Means, sequences: int) -> Any:
 
 
 def number(key: str, value: float, *, mean: bool = False) -> str:
-    """A score as text: three decimals, none for a count, one for the mean of a count; a dash for nan and infinity."""
+    """Returns a score as text: three decimals, none for a count, one for the mean of a count; a dash for nan and
+    infinity.
+
+    key: of the catalogue, KeyError for another. mean: True for a mean over sequences.
+    """
     if not math.isfinite(value):
         return "–"
     return f"{value:.3f}" if CATALOGUE[key].unit != "count" else f"{value:.{int(mean)}f}"

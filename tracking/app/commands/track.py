@@ -29,8 +29,10 @@ ROW_KEYS = (
 class TrackerSetup:
     """A tracker with its parameters and inputs, as `tracking.track` takes them.
 
-    config: None for a tracker's own defaults. detections: None for the first mode that works. sensor: settings that
-    degrade detections of mode "truth". grouping: the rule for trackers that report no groups; None for the default.
+    tracker: name, "file.py:Class" or "module:Class". config: its parameters; None for its own defaults. detections:
+    "image", "file" or "truth"; None for the first of these that works. sensor: settings that degrade detections of mode
+    "truth", {} for none. seed: of the tracker's and the sensor's random numbers. grouping: the rule for trackers that
+    report no groups; None for the default.
     """
 
     tracker: str
@@ -41,7 +43,12 @@ class TrackerSetup:
     grouping: LinkRule | None = None
 
     def run(self, sequence: Sequence, progress: Callable[[int], None] | None = None) -> TrackingRun:
-        """Tracks the sequence. `progress` is called with each frame's index when that frame is done."""
+        """Tracks the sequence and returns its tracks, with groups and events. Nothing is written.
+
+        progress: called with each frame's number, from 1, when that frame is done; None: not called. Raises InputError
+        if tracker, parameters, settings and sequence do not fit, or a picture or detection cannot be used; WorkError if
+        the tracker fails.
+        """
         from tracking.run import track
 
         return track(
@@ -51,12 +58,17 @@ class TrackerSetup:
 
 
 def track(options: TrackOptions) -> CommandResult:
-    """Tracks every sequence of the source and stores the tracks; returns a line for each run.
+    """Tracks every sequence of the source and stores the tracks, one sequence after the other; returns a line for each
+    run.
 
     The tracks of a source that is one sequence go to --out, those of a dataset's sequences to --out/<sequence name>.
+    The result's data: "tracker", and "runs", a dictionary for each with keys of its run.json, "tracks" (number of ids)
+    and "folder".
 
-    Raises InputError before the first frame if an option is wrong, if the tracker cannot work on one of the sequences,
-    or if two sequences have the same name.
+    Raises InputError before the first frame if an option is wrong, if the source cannot be opened, if the tracker
+    cannot work on one of the sequences, or if two sequences have the same name; later if a picture or detection cannot
+    be used or a folder cannot be written. Raises WorkError if the tracker fails or the disk is full. Tracks stored
+    before an error stay.
     """
     from sim.io.source import open_source
     from sim.io.store.track_files import write_tracks
@@ -82,7 +94,11 @@ def track(options: TrackOptions) -> CommandResult:
 
 
 def _setup(options: TrackOptions) -> TrackerSetup:
-    """Raises InputError for settings that the tracker or the sensor does not know."""
+    """Returns the tracker with the parameters, detections, sensor settings and grouping rule that the options name.
+
+    Raises InputError if the tracker is unknown or a file is wrong, or for a setting that is wrong or belongs to a
+    scenario. Values of the sensor are checked later.
+    """
     texts = [*option_parsing.sensor_settings(options.sensor), *options.settings]
     found = option_parsing.settings(texts, "tracker", ("tracker", "sensor"))
     own = [text for subject, text in found if subject == "tracker"]
@@ -93,7 +109,12 @@ def _setup(options: TrackOptions) -> TrackerSetup:
 
 
 def _config(tracker: str, params: Path | None, settings: list[str]) -> Config | None:
-    """The tracker's config with parameters and settings applied; None for a tracker without parameters."""
+    """Returns the tracker's config with the TOML file `params` and then `settings` ("name=value") applied; None for a
+    tracker without parameters.
+
+    Raises InputError if the tracker is unknown, if the file or a setting is wrong, or if either is given for a tracker
+    without parameters.
+    """
     from tracking.tracker_registry import find
 
     kind: type[Config] | None = getattr(find(tracker), "config_class", None)
@@ -113,7 +134,12 @@ def _config(tracker: str, params: Path | None, settings: list[str]) -> Config | 
 def _check_modes(
     setup: TrackerSetup, needs: tuple[str, ...], sequences: list[Sequence], background: str | None
 ) -> None:
-    """Raises InputError if the tracker cannot work on one of the sequences, or if `background` would have no effect."""
+    """Raises InputError if the tracker cannot work on one of the sequences, or if `background` would have no effect;
+    else returns nothing.
+
+    needs: what the tracker can work with. background: the text of --background; it has no effect if no sequence is
+    tracked from its pictures. None: not given.
+    """
     from tracking.detection_mode import choose_mode
 
     modes = [choose_mode(needs, sequence, setup.detections) for sequence in sequences]
@@ -129,7 +155,12 @@ def _total_frames(sequences: list[Sequence]) -> int | None:
 
 
 def _output_folders(sequences: list[Sequence], source: Path, out: Path) -> list[Path]:
-    """The folder for each sequence's tracks: `out` itself if the source is one sequence, else out/<sequence name>."""
+    """Returns the folder for each sequence's tracks: `out` itself if the source is one sequence, else out/<sequence
+    name>.
+
+    A dataset that holds a single sequence folder is no single sequence. Raises InputError if two sequences have the
+    same name.
+    """
     own = Path(sequences[0].source.get("path", source))
     if len(sequences) == 1 and (own == source or source.is_file() or own.is_file()):
         return [out]

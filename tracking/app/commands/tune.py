@@ -27,7 +27,11 @@ NO_CHECK = "none"
 
 
 def _command_field(option: Field[Any]) -> tuple[str, Any, Any]:
-    """Name, annotation and default of the option on the command line, for `make_dataclass`."""
+    """Returns (name, annotation, dataclass field) of a field of TuneOptions on the command line, for `make_dataclass`.
+
+    The dataclass field holds the default: none for a required option, an empty list for one that may be repeated, None
+    for one that is text (also a comma-separated list) or absent, else the default in TuneOptions.
+    """
     default = MISSING if option.name in REQUIRED else option.default
     text = default is None or default == "" or option.name in COMMA_SEPARATED
     several = isinstance(default, tuple) and not text
@@ -45,7 +49,10 @@ def _command_field(option: Field[Any]) -> tuple[str, Any, Any]:
 
 
 def _command_fields() -> list[tuple[str, Any, Any]]:
-    """The fields of TuneOptions that the command line has, and `--sensor` after `--set`."""
+    """Returns (name, annotation, dataclass field) of each option of the command line, for `make_dataclass`.
+
+    They are the fields of TuneOptions in order, without "progress", and "sensor" after "set".
+    """
     found = [_command_field(option) for option in fields(TuneOptions) if option.name != "progress"]
     after = [name for name, *_ in found].index("set") + 1
     return [*found[:after], ("sensor", Detector, field(default=None)), *found[after:]]
