@@ -30,11 +30,14 @@ RING_MARGIN = 0.7
 
 
 def write_sheet(sequence: Sequence, out: str | Path, frames: int = 8) -> Path:
-    """Writes the PNG and returns its path. The file is complete, or is not written at all.
+    """Writes the contact sheet as PNG and returns its path. The file is complete, or is not written at all.
 
-    The sheet has `frames` panels, four to a row, and a timeline below. A panel has the frame's pictures if the sequence
-    has any, and a plan if people's places on the ground are labelled; without pictures, boxes are drawn in place of the
-    plan. Raises InputError if there are neither pictures nor labelled people.
+    The sheet has `frames` panels (at least one, at most one per frame of the sequence), four to a row, and a timeline
+    below. A panel has the frame's pictures if the sequence has any, and a plan if people's places on the ground are
+    labelled; without pictures, boxes are drawn in place of the plan.
+
+    Raises InputError if there are neither pictures nor labelled people, if truth or a picture cannot be read, or the
+    file cannot be written. Raises WorkError if the disk is full, or an order of a simulated script was not fulfilled.
     """
     truth = sequence.truth
     if (truth is None or not len(truth.frame)) and not sequence.has_images:
@@ -51,7 +54,10 @@ def write_sheet(sequence: Sequence, out: str | Path, frames: int = 8) -> Path:
 
 
 def empty_truth(sequence: Sequence) -> Truth:
-    """A truth without people, of the sequence's length, for a sequence without labels."""
+    """Returns a truth without people, of the sequence's length, for a sequence without labels.
+
+    The frames are read and counted if the length is unknown. Positions are None and boxes (0, 4).
+    """
     length = sequence.length or sum(1 for _ in sequence.without_pictures())
     none, nan = np.zeros(0, np.int64), float("nan")
     return Truth(sequence.name, sequence.fps, length, nan, none, none, none, None, None, np.zeros((0, 4)), np.zeros(0))
@@ -72,7 +78,11 @@ class PanelLayout:
 
 
 def sheet_picture(sequence: Sequence, truth: Truth, frames: int = 8) -> Image:
-    """The sheet as an (H, W, 3) BGR picture."""
+    """Returns the contact sheet as an (H, W, 3) BGR uint8 picture; its size follows from the panels.
+
+    truth: may be without people, but has at least one frame. frames: number of panels, at least 1, at most one per
+    frame; their frames are chosen by `choose_frames`. Raises InputError if a picture cannot be read.
+    """
     chosen = choose_frames(truth, frames)
     pictures = PanelPictures(sequence, truth, chosen)
     low, high = sheet_area(sequence, truth)
@@ -99,7 +109,11 @@ def sheet_picture(sequence: Sequence, truth: Truth, frames: int = 8) -> Image:
 
 
 def _places(truth: Truth) -> Array:
-    """(R, 2) where people are drawn: on the ground, else the centres of their boxes."""
+    """Returns (R, 2) where people are drawn, by row of the truth: on the ground, m, else the centres of their boxes,
+    px.
+
+    AssertionError if it has neither positions nor boxes.
+    """
     if truth.pos is not None:
         return truth.pos
     assert truth.box is not None, "labels have positions or boxes"
@@ -107,7 +121,12 @@ def _places(truth: Truth) -> Array:
 
 
 def sheet_area(sequence: Sequence, truth: Truth) -> tuple[Array, Array]:
-    """Smallest and largest x and y (2,) of a panel's plan: m on the ground, px if only boxes are labelled."""
+    """Returns the smallest and the largest x and y, (2,) each, of a panel's plan: m on the ground, px if only boxes are
+    labelled.
+
+    Without positions it is the whole image, or, if the image size is unknown, the extent of the boxes. It is (0, 0) and
+    (1, 1) if no place is known. AssertionError if positions, image size and boxes are all missing.
+    """
     if truth.pos is None and sequence.image_size is not None:
         return np.zeros(2), np.array(sequence.image_size, float)
     if truth.pos is not None:
@@ -119,7 +138,11 @@ def sheet_area(sequence: Sequence, truth: Truth) -> tuple[Array, Array]:
 
 
 def _draw_plan(canvas: Canvas, sequence: Sequence, truth: Truth, index: int) -> None:
-    """People from above with rings round the members of events; boxes without rings if there is no ground."""
+    """Draws people of frame `index` (from 1) from above with rings round the members of events, on the canvas in place.
+
+    With no ground (y downwards on the canvas) boxes are drawn, without rings and scene. Ids are left out with more than
+    40 people. Also drawn are trails and the hulls of groups.
+    """
     on_ground = canvas.upwards
     places, boxes = _places(truth), None if on_ground else truth.box
     canvas.image[:] = FLOOR
@@ -135,7 +158,11 @@ def _draw_plan(canvas: Canvas, sequence: Sequence, truth: Truth, index: int) -> 
 
 
 def _draw_title(area: Image, truth: Truth, index: int) -> None:
-    """The time and the events near it; a frame round the panel in the colour of the first event."""
+    """Draws the time and the events near it into the panel `area`, in place; and a frame round the panel.
+
+    index: frame from 1. The words are cut after 62 characters. Words and frame have the colour of the first event, grey
+    without one.
+    """
     events = _events_near(truth, index)
     words = f"{(index - 1) / truth.fps:.1f} s" + "".join(f"   {event_words(event)}" for event in events)
     ink = kind_colour(events[0].kind) if events else QUIET
@@ -145,15 +172,20 @@ def _draw_title(area: Image, truth: Truth, index: int) -> None:
 
 
 def _events_near(truth: Truth, index: int) -> list[GroupEvent]:
-    """Events that begin within a second of the frame, in the order of SHOWN_KINDS; no enter or leave."""
+    """Returns events that begin at most a second from frame `index` (from 1); no enter or leave. [] if events are
+    unknown.
+
+    Order: merges and splits, crossings and queues, then form and dissolve; equal ones as in the truth.
+    """
     near = [event for event in truth.events or () if is_close(event.start, index, truth.fps)]
     return sorted((event for event in near if event.kind in SHOWN_KINDS), key=lambda event: SHOWN_KINDS[event.kind])
 
 
 def event_ring(event: GroupEvent, ids: Ints, places: Array) -> tuple[Array, float]:
-    """Centre (2,) and radius (m) of a ring round the event's members; round its place if none of them is present.
+    """Returns centre (2,) and radius (m) of a ring round the event's members, with 0.7 m to spare.
 
-    ids: (N,) and places: (N, 2) of the people in the frame.
+    If no member is present, it is round the event's place (nan if unknown) with a radius of 1 m. ids: (N,) and places:
+    (N, 2), m, of the people in the frame.
     """
     members = places[np.isin(ids, event.members)]
     if not len(members):
@@ -163,7 +195,11 @@ def event_ring(event: GroupEvent, ids: Ints, places: Array) -> tuple[Array, floa
 
 
 def _draw_head(sheet: Image, sequence: Sequence, truth: Truth) -> None:
-    """The sequence's name, number of people and frames, frame rate, and size of the world, image or plan."""
+    """Draws the sequence's name, number of people and frames, frame rate, and size of the world, image or plan on the
+    sheet, in place.
+
+    Without people their number is left out.
+    """
     text(sheet, sequence.name, (GAP, 48), 1.3, INK, 3)
     width = cv2.getTextSize(sequence.name, cv2.FONT_HERSHEY_SIMPLEX, 1.3, 3)[0][0]
     unit = "m" if truth.pos is not None else "px"
@@ -177,7 +213,11 @@ def _draw_head(sheet: Image, sequence: Sequence, truth: Truth) -> None:
 
 
 def _draw_foot(area: Image, truth: Truth, chosen: list[int]) -> None:
-    """A timeline with a tick for each chosen frame and a dot for each event, and the colours of the events' kinds."""
+    """Draws a timeline with a tick for each chosen frame and a dot for each event into `area`, in place.
+
+    chosen: frames from 1. Dots are at the events' first frames, of every kind; events that begin outside the sequence
+    are left out. Below are the colours of the events' kinds.
+    """
     width, line = area.shape[1], 34
     left, right = GAP + 10, width - GAP - 60
     last = max(truth.length - 1, 1)

@@ -14,16 +14,18 @@ CLOSE_SECONDS = 1.0
 
 
 def is_close(frame: int, other: int, fps: float) -> bool:
-    """True if two frames are at most CLOSE_SECONDS apart."""
+    """Returns True if two frames, given by number, are at most one second apart. fps: frames per second."""
     return abs(frame - other) <= CLOSE_SECONDS * fps
 
 
 def choose_frames(truth: Truth, count: int) -> list[int]:
-    """The indices of `count` frames in ascending order; every frame if the sequence has no more, at least one.
+    """Returns the numbers, from 1, of `count` frames in ascending order; at least one, and every frame if there are no
+    more.
 
-    First frames of events are taken rank by rank, those less than a second from a frame taken before left out. If there
-    are more of one rank than there is room for, they are thinned evenly. The widest gaps are then halved until
-    `count` is reached, with preference for frames with many people.
+    First frames of events are taken in order of rank: merge and split, cross and queue, form and dissolve. Those at
+    most a second from a frame taken before are left out. If there are more of one rank than there is room for, they are
+    thinned evenly. The widest gaps are then divided until `count` is reached, with preference for frames with many
+    people. Raises StopIteration for a truth of length 0.
     """
     count = max(1, min(count, truth.length))
     chosen: list[int] = []
@@ -39,7 +41,11 @@ def choose_frames(truth: Truth, count: int) -> list[int]:
 
 
 def _apart(starts: set[int], chosen: list[int], fps: float) -> list[int]:
-    """The starts that are close neither to a chosen frame nor to an earlier start that was kept."""
+    """Returns, ascending, the starts (frame numbers) that are more than a second from each chosen frame and each
+    earlier start that was kept.
+
+    fps: frames per second. The arguments are not changed.
+    """
     kept: list[int] = []
     for start in sorted(starts):
         if not any(is_close(start, other, fps) for other in (*chosen, *kept)):
@@ -48,15 +54,18 @@ def _apart(starts: set[int], chosen: list[int], fps: float) -> list[int]:
 
 
 def _evenly(n: int, k: int) -> list[int]:
-    """k of the indices 0 to n - 1, evenly spaced."""
+    """Returns k of the indices 0 to n - 1, evenly spaced, ends included; [0] for k = 1, [] for k = 0. k must not exceed
+    n."""
     return [round(place) for place in np.linspace(0, n - 1, k)] if k > 1 else [0][:k]
 
 
 def _in_widest_gap(chosen: list[int], people: Ints) -> int:
-    """The frame with most people in the middle half of the widest gap; of several, the nearest to the gap's middle.
+    """Returns the frame, from 1, with most people in the middle half of the widest gap between chosen frames.
 
-    people: (T,) counts by frame. Both ends of the sequence count as an eighth of its length further out, so that frames
-    near the ends are chosen, too. If no gap has room, the first frame that is not chosen.
+    Of several, the nearest to the gap's middle, then the earliest. people: (T,) counts by frame. Both ends of the
+    sequence count as an eighth of its length further out, so that frames near the ends are chosen, too. A gap without
+    room is passed over for the next widest; if none has room, the first frame that is not chosen. StopIteration if all
+    are.
     """
     length = len(people)
     marks = np.array([1 - length // 8, *sorted(chosen), length + length // 8])

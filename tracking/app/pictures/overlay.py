@@ -49,10 +49,15 @@ def write_overlay(
 ) -> Path:
     """Writes the MP4 and returns its path. The file is complete, or is not written at all.
 
-    tracks: None to draw the truth alone. truth: draw the truth in a second picture `beside` the tracks, as thin white
-    boxes `over` the same picture, or draw `only` the truth; None: tracks only. step: called with the sequence's name
-    after each frame. Raises InputError if the sequence has no pictures, if the truth is wanted and there is none, or if
-    `out` is the file that the sequence is read from.
+    tracks: one tracker's `Tracks`, one per frame; None to draw the truth alone. Groups and events that the tracker did
+    not report are derived. truth: draw the truth in a second picture `beside` the tracks, as thin white boxes `over`
+    the same picture, or draw `only` the truth; None: tracks only. step: called with the sequence's name after each
+    frame.
+
+    Raises InputError if the sequence has no pictures or one cannot be read, if the truth is wanted and there is none or
+    it cannot be read, if groups must be derived and the scale is not above 0, or if `out` is the file that the sequence
+    is read from or cannot be written. Raises WorkError if the disk is full, or an order of a simulated script was not
+    fulfilled.
     """
     if not sequence.has_images:
         raise InputError(
@@ -69,10 +74,11 @@ def write_overlay(
 
 
 def _panels(sequence: Sequence, tracks: SequenceOf[Tracks] | None, placement: TruthPlacement | None) -> list[Panel]:
-    """Returns the panels from left to right, each a list of layers with their styles.
+    """Returns the panels from left to right, each a list of layers with their styles, the lowest layer first.
 
     placement None: one panel of tracks. "beside": truth, then tracks. "over": one panel, plain truth below tracks.
-    "only", or tracks None: one panel of truth. Raises InputError if truth is needed and nothing is labelled.
+    "only", or tracks None: one panel of truth. Raises InputError if truth is needed and nothing is labelled or it
+    cannot be read, or if groups must be derived and the scale in px per m is 0 or below.
     """
     if tracks is None or placement is not None:
         if sequence.truth is None:
@@ -102,9 +108,12 @@ def _write(path: Path, sequence: Sequence, panels: list[Panel], step: Callable[[
 
 
 def overlay_pictures(sequence: Sequence, panels: list[Panel]) -> Iterator[Image]:
-    """The video's pictures, one per frame, of even width and height: a banner above the panels side by side.
+    """Yields the video's pictures, BGR uint8, one per frame, of even width and height: a banner above the panels side
+    by side.
 
-    A frame without a picture shows the last picture before it, or grey if there is none.
+    A frame without a picture shows the last picture before it, or grey if there is none. Pictures less than 400 px high
+    are shown at twice their size; the banner is 32 px high. While iterating raises InputError if a picture cannot be
+    read, AssertionError if the image size is unknown.
     """
     last: Image | None = None
     for frame in sequence:
@@ -134,7 +143,8 @@ def _draw_panel(picture: Image | None, sequence: Sequence, index: int, panel: Pa
 
 
 def banner_words(sequence: Sequence, frame: Frame, panels: list[Panel]) -> str:
-    """The banner's text: sequence, frame, time, and how many people or groups each layer has in this frame."""
+    """Returns the banner's text: sequence, frame (from 1) and number of frames if known, time in s, and how many people
+    or groups each layer ("true", "tracked") has in this frame."""
     of = "" if sequence.length is None else f" of {sequence.length}"
     marks = {layer.name: layer.at(frame.index) for panel in panels for layer, _ in panel}
     count = "".join(f"   {name} {len(m.id)}{' groups' * m.whole_groups}" for name, m in marks.items())
@@ -142,7 +152,8 @@ def banner_words(sequence: Sequence, frame: Frame, panels: list[Panel]) -> str:
 
 
 def _warnings(sequence: Sequence, frame: Frame) -> list[str]:
-    """What the frame lacks: its picture, or detections in a sequence that has them."""
+    """Returns what the frame lacks, in words: "lost frame" without a picture, "no detections" in a sequence that has
+    some; [] if nothing."""
     lost = ["lost frame"] if frame.image is None else []
     empty = frame.detections is None or not len(frame.detections.pos)
     return lost + (["no detections"] if sequence.has_detections and empty else [])

@@ -17,9 +17,10 @@ Json = dict[str, Any]
 
 
 def deltas(column: NDArray[np.float64]) -> list[int]:
-    """The column (N,) rounded, as its first value and the difference of each value from the one before.
+    """Returns the column (N,) rounded to whole numbers, as its first value and the difference of each value from the
+    one before.
 
-    nan counts as NIL. A cumulative sum restores the rounded column.
+    nan and infinity count as -99999. A cumulative sum restores the rounded column. [] for an empty column.
     """
     whole = np.where(np.isfinite(column), np.rint(column), NIL).astype(np.int64)
     listed: list[int] = np.diff(whole, prepend=0).tolist()
@@ -27,7 +28,7 @@ def deltas(column: NDArray[np.float64]) -> list[int]:
 
 
 def run_lengths(column: Ints) -> list[int]:
-    """The column (N,) as value, count, value, count, … of its runs of equal values."""
+    """Returns the column (N,) as value, count, value, count, … of its runs of equal values; [] for an empty column."""
     if not len(column):
         return []
     first = np.flatnonzero(np.r_[True, np.diff(column) != 0])
@@ -36,9 +37,9 @@ def run_lengths(column: Ints) -> list[int]:
 
 
 def stints(ids: Ints, frame: Ints) -> list[list[int]]:
-    """[id, first frame, number of frames] of each stint: one id in consecutive frames.
+    """Returns [id, first frame, number of frames] of each stint: one id in consecutive frames. [] without rows.
 
-    ids, frame: (R,), sorted by id and then by frame.
+    ids, frame: (R,), sorted by id and then by frame; the stints have the same order.
     """
     if not len(ids):
         return []

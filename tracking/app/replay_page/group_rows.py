@@ -24,9 +24,9 @@ SPEED_SCALE = {"ground": 10, "image": 1}
 
 @dataclass(frozen=True, eq=False)
 class PageGroupRows:
-    """R groups, one per row; nan where unknown.
+    """What a tracker of whole groups says of R groups, one per row, in m or px; nan where unknown.
 
-    hull: R polygons (V, 2), without vertices where unknown. extent: (R, 2, 2), the covariance of where the group's
+    hull: R polygons (V, 2) x, y, without vertices where unknown. extent: (R, 2, 2), the covariance of where the group's
     people are. size: (R,), estimated number of people. speed: (R,), m/s or px/s.
     """
 
@@ -37,7 +37,11 @@ class PageGroupRows:
 
 
 def rows_of_groups(tracks: SequenceOf[Tracks]) -> PageGroupRows:
-    """The groups of all rows of `tracks`, in their order. A row that its frame's `groups` lacks is unknown."""
+    """Returns the groups of all rows of `tracks` (one `Tracks` per frame), in their order.
+
+    A row whose id its frame's `groups` lacks has no hull, and nan as extent and size. Speeds are those of the rows'
+    velocities.
+    """
     rows = [row for t in tracks for row in _rows(t)]
     speed = [np.hypot(t.vel[:, 0], t.vel[:, 1]) for t in tracks]
     extent, size = [row[1] for row in rows], [row[2] for row in rows]
@@ -50,7 +54,8 @@ def rows_of_groups(tracks: SequenceOf[Tracks]) -> PageGroupRows:
 
 
 def _rows(tracks: Tracks) -> list[tuple[Array, Array, float]]:
-    """Hull, extent and size of each row of one frame."""
+    """Returns (hull (V, 2), extent (2, 2), size) of each row of one frame; no vertices and nan where its `groups` lacks
+    the id."""
     groups, no_hull = tracks.groups or Groups.none(), np.zeros((0, 2))
     hulls = groups.hull or (no_hull,) * len(groups.id)
     known = dict(zip(groups.id.tolist(), zip(hulls, groups.extent, groups.size, strict=True), strict=True))
@@ -58,10 +63,13 @@ def _rows(tracks: Tracks) -> list[tuple[Array, Array, float]]:
 
 
 def encode_groups(rows: PageGroupRows, order: Ints, plane: str, scale: int) -> dict[str, Any]:
-    """The rows in the order `order` as encoded columns; scale: encoded steps per m or px.
+    """Returns the rows in the order `order` as encoded columns.
 
-    size: in tenths. speed: by SPEED_SCALE. ellipse: long and short standard deviation, and direction in degrees. hull:
-    for each row the first corner and the steps to each next corner, as x, y, x, y, ….
+    order: (R,) indices of rows. plane: "ground" or "image", KeyError for another. scale: encoded steps per m or px.
+    Keys: size, in tenths. speed: tenths of m/s, or px/s. ellipse: three columns, long and short standard deviation in
+    steps, and direction in degrees. hull: for each row the first corner and the steps to each next corner, as x, y, x,
+    y, …; [] where unknown. Corners that stand out by less than 0.02 m or 1 px are left out. Columns hold their first
+    value, then differences; nan is -99999.
     """
     axes = ellipses(rows.extent[order])
     hulls = [simplified(rows.hull[k], LEAST_CORNER[plane]) for k in order]
@@ -74,9 +82,10 @@ def encode_groups(rows: PageGroupRows, order: Ints, plane: str, scale: int) -> d
 
 
 def ellipses(extent: Array) -> Array:
-    """(R, 3) of covariances (R, 2, 2): long and short standard deviation, direction of the long axis in [0, π) rad.
+    """Returns (R, 3) of covariances (R, 2, 2): long and short standard deviation, direction of the long axis in [0, π)
+    rad.
 
-    nan where an entry of the covariance is not finite.
+    nan where an entry of the covariance is not finite. A negative eigenvalue counts as 0.
     """
     known: Bools = np.asarray(np.isfinite(extent).all(axis=(1, 2)))
     values, vectors = np.linalg.eigh(np.where(known[:, None, None], extent, np.eye(2)))
@@ -86,10 +95,10 @@ def ellipses(extent: Array) -> Array:
 
 
 def simplified(hull: Array, least: float) -> Array:
-    """A convex polygon (V, 2) without the corners that stand out by less than `least` over their neighbours.
+    """Returns a convex polygon (V, 2) without the corners that stand out by less than `least` over their neighbours.
 
-    Two passes remove every other corner at most, so that no two neighbours go at once. Of a polygon that then still has
-    more than MAX_CORNERS corners every k-th is kept, with the least k that suffices.
+    Two passes remove every other corner at most, so that no two neighbours go at once; three corners stay. Of a polygon
+    that then still has more than 24 corners every k-th is kept, with the least k that suffices. `hull` is not modified.
     """
     for odd in (1, 0):
         n = len(hull)

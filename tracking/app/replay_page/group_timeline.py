@@ -12,7 +12,11 @@ from sim.types import Array, GroupEvent, Ints
 
 @dataclass(frozen=True)
 class Bar:
-    """One unbroken life of a group id. start, end: frames, both inclusive. lane: from 0. size: most people in it."""
+    """One unbroken life of a group id, a bar of the timeline.
+
+    start, end: frames from 1, both inclusive. lane: line of the timeline, from 0. size: most people in it in one of its
+    frames, rounded.
+    """
 
     id: int
     start: int
@@ -23,7 +27,10 @@ class Bar:
 
 @dataclass(frozen=True)
 class Link:
-    """Group `a` becomes or joins group `b`. frame: when a tracker reported it; for truth the event's first frame."""
+    """Group `a` becomes or joins group `b`, a link between their bars; both are ids.
+
+    frame: from 1, when a tracker reported it; for truth the event's first frame.
+    """
 
     frame: int
     a: int
@@ -31,11 +38,12 @@ class Link:
 
 
 def bars(frame: Ints, group: Ints, least: int = 2, gap: int = 1, people: Array | None = None) -> list[Bar]:
-    """The bars of the groups in rows of (frame, group), (R,) each, by first frame. Rows with group -1 are left out.
+    """Returns the bars, unbroken lives, of the groups in rows of (frame, group), (R,) each, sorted by first frame.
 
-    least: a group with fewer people in a frame is absent from it. gap: frames may differ by so much within one bar.
-    people: (R,), how many people each row stands for; None: one. A bar takes the lane of the last bar of its id if that
-    is free, else the lowest free lane.
+    Rows may have any order; those with group -1 are left out. [] if none remain. least: a group with fewer people in a
+    frame is absent from it. gap: frames may differ by so much within one bar. people: (R,), how many people each row
+    stands for; None: one. A bar takes the lane of the last bar of its id if that is free, else the lowest free lane. A
+    lane is free from the frame after its last bar's end.
     """
     rows = group >= 0
     pairs, place = np.unique(np.stack([group[rows], frame[rows]], axis=1), axis=0, return_inverse=True)
@@ -50,7 +58,11 @@ def bars(frame: Ints, group: Ints, least: int = 2, gap: int = 1, people: Array |
 
 
 def _in_lanes(lives: list[tuple[int, int, int, int]]) -> list[Bar]:
-    """Bars of (start, end, id, size) sorted by start."""
+    """Returns Bars of (start, end, id, size), in the given order, which must be by start; start and end are frames.
+
+    A bar takes the lane of the last bar of its id if that is free, else the lowest free lane. A lane is free after the
+    end of its last bar.
+    """
     free_from: list[int] = []
     last: dict[int, int] = {}
     made = []
@@ -66,7 +78,11 @@ def _in_lanes(lives: list[tuple[int, int, int, int]]) -> list[Bar]:
 
 
 def links(events: Iterable[GroupEvent]) -> list[Link]:
-    """A link for each pair of different groups before and after a merge or split; other kinds of events have none."""
+    """Returns a link for each pair of different groups before and after a merge or split; other kinds of events have
+    none.
+
+    Links have the order of the events, then of the ids. People alone (-1) have none.
+    """
     return [
         Link(event.start if event.emitted is None else event.emitted, a, b)
         for event in events

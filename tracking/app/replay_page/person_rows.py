@@ -29,11 +29,11 @@ MOVING = 0.1
 
 @dataclass(frozen=True, eq=False)
 class PageRows:
-    """Truth or tracks as R rows in any order; nan where unknown.
+    """Truth or one tracker's tracks as R rows in any order, one per person or group and frame; nan where unknown.
 
-    plane: "ground" (m) or "image" (px). frame, id, group: (R,). pos: (R, 2). angle: (R,) rad, direction of view or of
-    movement. box: (R, 4) ltwh px. visibility: (R,), 0 to 1. groups: what is known of rows that are groups, None if the
-    rows are people.
+    plane: "ground" (m) or "image" (px). frame: from 1, (R,). id: (R,). group: (R,) id of the group, -1 for alone. pos:
+    (R, 2) x, y. angle: (R,) rad, direction of view or of movement. box: (R, 4) left, top, width, height, px.
+    visibility: (R,), 0 to 1. groups: what is known of rows that are groups, None if the rows are people.
     """
 
     plane: str
@@ -48,7 +48,10 @@ class PageRows:
 
 
 def rows_of_truth(truth: Truth) -> PageRows:
-    """The truth's rows: on the ground if places there are labelled, else the centres of the boxes in the image."""
+    """Returns the truth's rows: on the ground if places there are labelled, else the centres of the boxes in the image.
+
+    The angle is the labelled heading, else the direction of a velocity above 0.1 m/s. What is not labelled is nan.
+    """
     n = len(truth.frame)
     pos = truth.pos if truth.pos is not None else _centres(truth.box, n)
     angle = truth.heading if truth.heading is not None else _directions(truth.vel, n)
@@ -58,7 +61,12 @@ def rows_of_truth(truth: Truth) -> PageRows:
 
 
 def rows_of_tracks(tracks: SequenceOf[Tracks]) -> PageRows:
-    """A tracker's rows, in the order of `tracks`; in the image if one frame's tracks are, else on the ground."""
+    """Returns a tracker's rows, in the order of `tracks`; in the image if one frame's tracks are, else on the ground.
+
+    tracks: one `Tracks` per frame. Of positions only x, y are kept. The angle is the direction of a velocity above 0.1
+    m/s or px/s, else nan; boxes are nan if the frame has none; the visibility is 1. `groups` is set if one frame's
+    tracks are groups.
+    """
     count = np.array([len(t.id) for t in tracks], np.int64)
     box = [t.box if t.box is not None else np.full((len(t.id), 4), np.nan) for t in tracks]
     vel = np.concatenate([np.zeros((0, 2)), *(t.vel[:, :2] for t in tracks)])
@@ -81,7 +89,10 @@ def _centres(box: Array | None, n: int) -> Array:
 
 
 def _directions(vel: Array | None, n: int) -> Array:
-    """The direction (R,) rad of each velocity (R, 2); nan where it is unknown or slower than MOVING."""
+    """Returns the direction (n,) rad of each velocity (n, 2), m/s or px/s; nan where unknown or not faster than 0.1.
+
+    vel None: n times nan.
+    """
     if vel is None:
         return np.full(n, np.nan)
     moving = np.hypot(vel[:, 0], vel[:, 1]) > MOVING
@@ -89,9 +100,14 @@ def _directions(vel: Array | None, n: int) -> Array:
 
 
 def encode_rows(rows: PageRows, events: Iterable[GroupEvent]) -> Json:
-    """The rows as encoded columns, with events from frame 1 on, and with the bars and links of the group timeline.
+    """Returns the rows as encoded columns, with events, and with the bars and links of the group timeline, as a JSON
+    object.
 
-    Angles are in degrees, visibility in tenths, boxes in half px.
+    Rows are sorted by id and frame. Keys: plane; scale (steps per m or px); stints ([id, first frame, frames] of
+    consecutive frames); x and y; a (angle, degrees); box (four columns in half px, [] if all unknown); group and vis
+    (visibility in tenths, unknown as 10), as value, count, …; wholes (columns of groups, None for people); events
+    (those that start in frame 1 or later); bars ([id, start, end, lane, size]); links ([frame, a, b]). Other columns
+    hold their first value, then differences.
     """
     events = list(events)
     order = np.lexsort((rows.frame, rows.id))
@@ -122,6 +138,10 @@ def _bars(rows: PageRows) -> list[Bar]:
 
 
 def _event(event: GroupEvent) -> list[Any]:
-    """[kind, start, end, emitted, before, after, members, [x, y]]; x and y are None where unknown."""
+    """Returns [kind, start, end, emitted, before, after, members, [x, y]] of an event.
+
+    start, end: frames from 1. emitted: frame of the report, None for truth. before, after: group ids. x and y are
+    rounded to 0.01 (m or px), None where unknown.
+    """
     pos = [round(v, 2) if math.isfinite(v) else None for v in event.pos]
     return [event.kind, event.start, event.end, event.emitted, event.before, event.after, event.members, pos]

@@ -29,10 +29,10 @@ GREY = 128
 
 @dataclass(frozen=True)
 class PageVideo:
-    """A video with one picture per frame. address: relative to the page, "" if the video is inside it.
+    """A video with one picture per frame.
 
-    content: the video's bytes in base64 if it is inside the page, else "". lost: frames without a picture, which show
-    the picture before.
+    address: relative to the page, "" if the video is inside it. content: the video's bytes in base64 if it is inside
+    the page, else "". fps: frames per second. lost: frames (from 1) without a picture, which show the picture before.
     """
 
     address: str
@@ -41,17 +41,21 @@ class PageVideo:
     lost: tuple[int, ...] = ()
 
     def facts(self) -> dict[str, Any]:
-        """The video's entry in the page's data."""
+        """Returns the video's entry in the page's data: "src" (address, "" if inside), "fps" and "lost" (frames from 1
+        without a picture). The content is not in it."""
         return {"src": self.address, "fps": self.fps, "lost": self.lost}
 
 
 def page_video(
     sequence: Sequence, page: Path, placement: VideoPlacement = "auto", step: Callable[[str], None] = lambda _: None
 ) -> PageVideo | None:
-    """The video for the page FILE.html; a video beside it is written as FILE.view.mp4.
+    """Makes the video for the page FILE.html and returns it; a video beside the page is written as FILE.view.mp4.
 
-    Returns None if the placement is "none" or the sequence has no pictures. step: called with the sequence's name after
-    each picture. Raises InputError if FILE.view.mp4 is the file that the sequence is read from.
+    placement: "inside" the page, "beside" it, "none", or "auto": beside from 12 MB on. Returns None if it is "none" or
+    the sequence has no pictures. step: called with the sequence's name after each frame.
+
+    Raises InputError if FILE.view.mp4 is the file that the sequence is read from, a picture cannot be read or the
+    folder cannot be written; WorkError if the disk is full.
     """
     if placement == "none" or not sequence.has_images:
         return None
@@ -67,14 +71,22 @@ def page_video(
 
 
 def refuse_source(sequence: Sequence, path: Path) -> None:
-    """Raises InputError if `path` is the file that the sequence is read from."""
+    """Raises InputError if `path` is the existing file that the sequence is read from; else returns nothing.
+
+    A sequence without a path in its `source` passes.
+    """
     source = sequence.source.get("path")
     if source is not None and path.exists() and path.samefile(source):
         raise InputError(file=path, place="--out", got="the source itself", expected="another file", remedy="rename it")
 
 
 def _encode(sequence: Sequence, path: Path, step: Callable[[str], None]) -> tuple[int, ...]:
-    """Writes the pictures as MP4 and returns the frames without a picture, which show the one before, or grey."""
+    """Writes the pictures as MP4 at `path` and returns the frames (from 1) without a picture; they show the one before,
+    or grey.
+
+    Odd widths and heights are made even. step: called with the sequence's name after each frame. Raises InputError if a
+    picture cannot be read, OSError if `path` cannot be written.
+    """
     assert sequence.image_size is not None, "pictures have a size"
     width, height = sequence.image_size
     last: Image = np.full((height, width, 3), GREY, np.uint8)
@@ -91,6 +103,9 @@ def _encode(sequence: Sequence, path: Path, step: Callable[[str], None]) -> tupl
 
 
 def even_size(picture: Image) -> Image:
-    """The picture (H, W, 3) with its last row or column repeated where H or W is odd: H.264 needs even sizes."""
+    """Returns the picture (H, W, 3) with its last row or column repeated where H or W is odd: H.264 needs even sizes.
+
+    A picture of even size is returned itself.
+    """
     odd = [(0, picture.shape[axis] % 2) for axis in (0, 1)]
     return np.pad(picture, (*odd, (0, 0)), mode="edge") if any(more for _, more in odd) else picture
