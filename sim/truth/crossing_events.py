@@ -31,18 +31,18 @@ ROWS = 500_000  # frames of encounters handled together: bounds memory
 def crossings(pos: Array, vel: Array, present: Bools, group: Ints, fps: float) -> list[GroupEvent]:
     """Returns a cross event for each crossing of two groups of two or more people, in order of first and last frame.
 
-    pos, vel (T, P, 2): m, m/s. present (T, P): flags. group (T, P): group ids, -1 = alone or absent. A person with a
-    nan position counts as absent. The id of a person is the column + 1; frames of events count from 1. No group gives
-    no event.
+    pos, vel (T, P, 2): x, y in m and m/s. present (T, P): flags. group (T, P): group ids, -1 = alone or absent. fps:
+    frames per s. A person with a nan position counts as absent. The id of a person is the column + 1; frames of events
+    count from 1. No frames or no groups give [].
 
-    An encounter is a stretch in which the hulls of two groups are within 1.0 m; breaks of at most 0.5 s do not end it.
-    It is a crossing if all of this holds:
+    An encounter is a stretch in which the hulls of two groups (of discs of 0.25 m round the members) are within 1.0 m;
+    breaks of at most 0.5 s do not end it. It is a crossing if all of this holds:
 
-    - the mean over the encounter of their relative velocity is at least CROSS_VELOCITY (0.6 m/s) long;
+    - the mean over the encounter of their relative velocity is known, and at least CROSS_VELOCITY (0.6 m/s) long;
     - they change sides: the direction from one middle to the other turns by more than 90° from the first to the last
       frame, or the paths of the middles cross, not counting crossings back, from SAME_BEFORE (2 s) before the encounter
-      to SAME_BEFORE after it;
-    - in that time both groups keep their members.
+      to SAME_BEFORE after it, as far as recorded;
+    - in that time both groups keep their members; members who leave the scene do not matter.
 
     The event lasts as long as the encounter. Its `before` and `after` are both group ids, its members those in the
     first frame. Its position is the mean of both middles where these are closest.
@@ -58,9 +58,11 @@ def crossings(pos: Array, vel: Array, present: Bools, group: Ints, fps: float) -
 
 
 def _portions(met: Encounters, margin: int) -> Iterator[Encounters]:
-    """Yields the encounters in portions, so that the frames of a portion add up to about ROWS (500,000).
+    """Yields the encounters `met` in portions, in their order, so that the frames of a portion add up to about ROWS
+    (500,000).
 
-    `margin` frames before and after each encounter count, too.
+    `margin` frames before and after each encounter count, too. An encounter is never divided. Nothing is yielded
+    without encounters.
     """
     total = np.cumsum(met.last - met.first + 1 + 2 * margin)
     return (met[total // ROWS == k] for k in np.unique(total // ROWS))
@@ -100,8 +102,8 @@ def _crossed(
 def _relative_speed(a: GroupPath, b: GroupPath, k: Ints, during: Bools, count: int) -> Array:
     """Returns the length in m/s of the mean relative velocity during each of `count` encounters, shape (count,).
 
-    a, b: paths of the two groups, R rows. k (R,): encounter of each row, ascending. during (R,): True for rows that
-    count. nan for an encounter in which no velocity is known.
+    a, b: paths of the two groups; their R rows are frames of encounters. k (R,): encounter of each row, ascending.
+    during (R,): True for rows that count. nan for an encounter in which no velocity is known.
     """
     relative = b.vel - a.vel
     known = during & np.isfinite(relative).all(axis=1)
@@ -111,10 +113,11 @@ def _relative_speed(a: GroupPath, b: GroupPath, k: Ints, during: Bools, count: i
 
 
 def _closest(apart: Array, k: Ints, during: Bools) -> Ints:
-    """Returns for each encounter that has rows the index of the row in which the middles are closest.
+    """Returns for each encounter that has rows the index of the row in which the middles are closest; of several the
+    first.
 
-    apart (R, 2): vector between the middles, m, nan if unknown. k (R,): encounter of each row, ascending. during (R,):
-    rows outside the encounter are False and are chosen only if no row of it is known.
+    apart (R, 2): vector between the two groups' middles, m, nan if unknown. k (R,): encounter of each row, ascending.
+    during (R,): rows outside the encounter are False and are chosen only if no row of it is known.
     """
     distance = np.where(during & np.isfinite(apart).all(axis=1), np.hypot(*apart.T), np.inf)
     order = np.lexsort((distance, k))

@@ -1,6 +1,8 @@
-"""Finds encounters of groups, stretches in which two hulls are within CROSS_GAP, and the paths of the groups that meet.
+"""Finds encounters of groups, stretches in which two hulls are within 1.0 m (CROSS_GAP), and the paths of the groups
+that meet.
 
-All encounters are handled at once. Ragged tables are flat: the rows of one encounter follow those of another.
+They are computed from people's positions and group ids. A hull is the convex outline of discs round the members. All
+encounters are handled at once. Ragged tables are flat: the rows of one encounter follow those of another.
 """
 
 from __future__ import annotations
@@ -21,9 +23,11 @@ BRIDGE_TIME = 0.5  # s for which hulls may be further apart within one encounter
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Encounters:
-    """E encounters of two groups, sorted by first frame, last frame and group ids.
+    """E encounters (stretches in which two groups are near each other), sorted by first frame, last frame and group
+    ids.
 
-    first, last (E,): frames from 0, both inclusive. a, b (E,): group ids, a < b.
+    first, last (E,): frames from 0, both inclusive. a, b (E,): group ids, a < b. Indexing with a slice, indices or
+    flags gives Encounters of these rows; len() gives E.
     """
 
     first: Ints
@@ -95,11 +99,11 @@ def members_by_frame(group: Ints) -> MembersByFrame:
 
 
 def encounters(pos: Array, rows: MembersByFrame, fps: float) -> Encounters:
-    """Returns all encounters of two groups of two or more people each, sorted by first and last frame.
+    """Returns all encounters of two groups of two or more people each, sorted by first frame, last frame and group ids.
 
-    An encounter is a stretch in which the hulls of the members' footprints are within CROSS_GAP (1.0 m). Breaks of at
-    most BRIDGE_TIME (0.5 s) do not end it. pos (T, P, 2): m, finite for all members. rows: the members of all groups by
-    frame.
+    An encounter is a stretch in which the hulls of the members' footprints (polygons of 0.25 m round each person) are
+    within CROSS_GAP (1.0 m). Breaks of at most BRIDGE_TIME (0.5 s) do not end it. pos (T, P, 2): x, y in m, finite for
+    all members. rows: the members of all groups by frame; without rows there is no encounter. fps: frames per s.
     """
     if not len(rows.t):
         return Encounters(rows.t, rows.t, rows.t, rows.t)
@@ -116,8 +120,9 @@ def _within_reach(t: Ints, places: Array, count: Ints) -> tuple[Ints, Ints]:
     """Returns the pairs (i, j), i < j, of rows of one frame whose hulls are within CROSS_GAP (1.0 m), each of shape
     (K,).
 
-    A row is one group in one frame; only rows of two or more people count. t, count (G,): frame, ascending, and number
-    of people of each row. places (R, 2): x, y of the members of row after row, m.
+    A row is one group in one frame; only rows of two or more people count. A hull is that of the members' footprints
+    (0.25 m round each). t, count (G,): frame, ascending, and number of people of each row. places (R, 2): x, y of the
+    members of row after row, m. Raises ValueError without rows.
     """
     start = np.cumsum(count) - count
     middle = np.add.reduceat(places, start) / count[:, None]
@@ -145,10 +150,10 @@ class GroupPath:
     """The path of one of the two groups of each encounter, in R rows: frames around the encounters, one encounter after
     another.
 
-    - middle, vel (R, 2): mean position, m, and mean velocity, m/s, of the members at the meeting who are present in the
-      row's frame; nan if none of them is.
+    - middle, vel (R, 2): mean position x, y, m, and mean velocity, m/s, of the members at the meeting who are present
+      in the row's frame; nan if none of them is.
     - same_members (R,): True if the group has no other members than at the meeting, and the present ones all belong to
-      it.
+      it. One who alone is still present need not belong to it.
     """
 
     middle: Array
@@ -162,9 +167,9 @@ def group_paths(
     """Returns the path of one group of each of E encounters, with the members that it had at the meeting.
 
     pos, vel (T, P, 2): m, m/s, nan while absent. group (T, P): group ids. rows: the members by frame. name (E,): group
-    id in each encounter. met (E,): frame, from 0, whose members count. encounter, frame (R,): the rows wanted,
-    encounters ascending, frames from 0. A single member who stays after the other members have left the scene counts as
-    the same group.
+    id in each encounter. met (E,): frame, from 0, whose members count; the group must exist in it. encounter, frame
+    (R,): the rows wanted, encounters ascending, frames from 0; none give a path without rows. A single member who stays
+    after the other members have left the scene counts as the same group.
     """
     first, count = rows.find(met, name)
     row, place = runs(first[encounter], (first + count)[encounter])
@@ -184,8 +189,7 @@ def _mean(values: Array, there: Bools, start: Ints) -> Array:
     """Returns the means (R, 2) of R consecutive runs of values (N, 2); the runs begin at the indices start (R,).
 
     A row counts if both its numbers are finite and its flag in `there` (N,) is True; nan for a run without such rows.
-    Without runs: (0,
-    2).
+    No runs give shape (0, 2).
     """
     known = there & np.isfinite(values[:, 0]) & np.isfinite(values[:, 1])
     if not len(start):
@@ -199,9 +203,9 @@ def net_crossings(a: Array, b: Array, encounter: Ints, count: int) -> Ints:
     """Returns how often path b crosses path a from left to right, minus right to left, for each encounter, shape
     (count,).
 
-    a, b (R, 2): points of both paths in m, encounter after encounter; points with nan are left out. encounter (R,):
-    number of each row's encounter, from 0, ascending. An encounter without points gives 0. The two need not be at the
-    crossing at the same time.
+    Left is as seen along path a. a, b (R, 2): points of both paths in m, encounter after encounter; points with nan are
+    left out. encounter (R,): number of each row's encounter, from 0, ascending. An encounter without points gives 0.
+    The two need not be at the crossing at the same time.
 
     Let s and t be times on a and b. The difference b(t) - a(s) winds round zero once for each crossing as (s, t) goes
     round the square of all times. The turns along the four sides of the square are summed. Paths that meet in a vertex
@@ -212,10 +216,12 @@ def net_crossings(a: Array, b: Array, encounter: Ints, count: int) -> Ints:
 
 
 def _turns(path: Array, other: Array, encounter: Ints, count: int) -> Array:
-    """Returns a difference of two turning angles for each encounter, in radians, shape (count,).
+    """Returns a difference of two turning angles for each of `count` encounters, in radians, counter-clockwise, shape
+    (count,).
 
     It is by how much the direction to `path` turns, seen from the first point of `other`, minus the same seen from its
-    last point. path, other (R, 2): m; points with nan are left out. encounter (R,): encounter of each row, ascending.
+    last point. path, other (R, 2): m; points with nan are left out. encounter (R,): encounter of each row, from 0,
+    ascending. An encounter without points gives 0.
     """
     known = np.isfinite(path).all(axis=1)
     point, own = path[known], encounter[known]

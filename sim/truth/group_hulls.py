@@ -20,10 +20,10 @@ __all__ = ["box_groups", "frame_groups", "groups_over_time"]
 
 @dataclass(frozen=True, eq=False)
 class _MemberRows:
-    """R rows, one for each person in a group of two or more, sorted by (frame, group, id).
+    """R rows, one for each person in a group of two or more in one frame, sorted by (frame, group, id).
 
-    frame, id, group (R,). pos, vel (R, D): position and velocity, in the caller's unit. starts: index of the first row
-    of each group in each frame.
+    frame, id, group (R,): frame number, person id, group id. pos, vel (R, D): position and velocity, in the caller's
+    unit. starts (S,): index of the first row of each group in each frame.
     """
 
     frame: Ints
@@ -44,7 +44,8 @@ def frame_groups(id: Ints, group: Ints, pos: Array, vel: Array) -> Groups:
 
     id (N,): person ids. group (N,): group ids, -1 = alone. pos, vel (N, D): m, m/s, D = 2 or 3. Of each group: members:
     sorted person ids; pos, vel (D,): means over the members; extent (2, 2): covariance of their x and y (divided by the
-    number of members), m²; size: number of members; hull: convex hull of their footprints on the ground, m.
+    number of members), m²; size: number of members; hull: convex hull of their footprints (polygons of 0.25 m round
+    each person) on the ground, m.
     """
     return groups_over_time(np.zeros(len(id), np.int64), id, group, pos, vel, 0, 1)[0]
 
@@ -52,12 +53,13 @@ def frame_groups(id: Ints, group: Ints, pos: Array, vel: Array) -> Groups:
 def groups_over_time(
     frame: Ints, id: Ints, group: Ints, pos: Array, vel: Array, first: int, length: int, px_per_m: float = 1.0
 ) -> list[Groups]:
-    """Returns the Groups of each of the frames first … first + length - 1, as `frame_groups` does for one frame.
+    """Returns a list of the Groups of each of the frames first … first + length - 1, in order; groups by ascending id.
 
     Rows are people in frames, in any order: frame, id, group (R,), group -1 = alone; pos, vel (R, D), D = 2 or 3: m,
     m/s. Only groups of two or more people of one frame count; a frame without one gives empty Groups. Rows of other
-    frames are ignored. px_per_m other than 1: pos and vel are in px and px/s, footprints are discs of that scale in the
-    image, and all results are in px.
+    frames are ignored. Of each group: sorted members, their number, means of pos and vel, covariance of x and y (m²),
+    and as hull the convex hull of their footprints (polygons of 0.25 m round each person). px_per_m other than 1: pos
+    and vel are in px and px/s, footprints have that scale in the image, and all results are in px.
     """
     rows, order = _member_rows(frame, id, group, pos, vel)
     hulls = footprint_hulls(pos[order, :2] / px_per_m, rows.counts)
@@ -67,11 +69,13 @@ def groups_over_time(
 def box_groups(
     frame: Ints, id: Ints, group: Ints, pos: Array, vel: Array, box: Array, first: int, length: int
 ) -> list[Groups]:
-    """Returns the Groups in the image of each of the frames first … first + length - 1.
+    """Returns a list of the Groups in the image of each of the frames first … first + length - 1, in order; groups by
+    ascending id.
 
     Rows are people in frames, in any order: frame, id, group (R,), group -1 = alone; pos, vel (R, 2): px, px/s; box (R,
-    4): left, top, width, height in px. Of each group of two or more people: means of pos and vel, covariance of pos
-    (px²), and as hull the convex hull of the members' boxes. A frame without a group gives empty Groups.
+    4): left, top, width, height in px, finite. Of each group of two or more people in one frame: sorted members, their
+    number, means of pos and vel, covariance of pos (px²), and as hull the convex hull of the members' boxes. A frame
+    without a group gives empty Groups; rows of other frames are ignored.
     """
     rows, order = _member_rows(frame, id, group, pos, vel)
     low, high = box[:, :2], box[:, :2] + box[:, 2:]
@@ -82,10 +86,10 @@ def box_groups(
 
 
 def _member_rows(frame: Ints, id: Ints, group: Ints, pos: Array, vel: Array) -> tuple[_MemberRows, Ints]:
-    """Returns the rows of people in groups of two or more, sorted by (frame, group, id), and their indices in the
-    arrays.
+    """Returns the rows of people in groups of two or more in one frame, sorted by (frame, group, id), and their indices
+    (K,) in the given arrays.
 
-    frame, id, group (R,), group -1 = alone. pos, vel (R, D).
+    frame, id, group (R,), group -1 = alone. pos, vel (R, D). Both results may be without rows.
     """
     rows = np.lexsort((id, group, frame))
     rows = rows[group[rows] >= 0]
@@ -99,7 +103,9 @@ def _member_rows(frame: Ints, id: Ints, group: Ints, pos: Array, vel: Array) -> 
 def _assemble(rows: _MemberRows, hulls: Sequence[Array], first: int, length: int) -> list[Groups]:
     """Returns one Groups for each of the frames first … first + length - 1; empty Groups for a frame without groups.
 
-    hulls: polygon (V, 2) of each group in each frame, in the order of rows.starts.
+    rows: the people of all groups; other frames than these are ignored. hulls: polygon (V, 2) of each group in each
+    frame, in the order of rows.starts. Extents are covariances of the first two coordinates, divided by the number of
+    members.
     """
     starts, counts = rows.starts, rows.counts
     if not len(starts):

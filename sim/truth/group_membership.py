@@ -48,8 +48,12 @@ def partitions(
     0.
 
     parts: disjoint sets of columns (person id - 1) that make up all people present; a set of one is a person alone.
-    They are valid until the next t. pos, vel (T, P, 2): m, m/s. present (T, P): flags. intent (T, P): index of the
-    group a person is meant to belong to, -1 while absent. Yields nothing for a motion without frames.
+    They are valid until the next t. Parts meant to be one group join in the first frame from which they are less than
+    1.5 m apart, with velocities differing by less than 0.5 m/s, for 2 s. A part meant to be several groups divides
+    likewise: more than 2.5 m apart, or 1.5 m with a difference above 0.7 m/s.
+
+    pos, vel (T, P, 2): m, m/s. present (T, P): flags. intent (T, P): index of the group a person is meant to belong to,
+    -1 while absent. fps: frames per s. Yields nothing for a motion without frames.
     """
     there = present[..., None]
     pos, vel = np.where(there, pos, np.nan), np.where(there, vel, np.nan)
@@ -84,7 +88,8 @@ def _turns(present: Bools, intent: Ints) -> Ints:
 def _enter_and_leave(parts: list[PersonSet], motion: MeasuredMotion, t: int) -> list[PersonSet]:
     """Returns the parts (sets of columns) in frame t, without people who have left and with people who have entered.
 
-    People who enter form one new part for each group that they are meant to belong to. They join no existing part here.
+    Parts with nobody left are dropped; the others keep their order. People who enter come last and form one new part
+    for each group that `motion.intent` means them to belong to. They join no existing part here.
     """
     here = frozenset(np.flatnonzero(motion.present[t]).tolist())
     stay = [part & here for part in parts if part & here]
@@ -92,8 +97,10 @@ def _enter_and_leave(parts: list[PersonSet], motion: MeasuredMotion, t: int) -> 
 
 
 def _by_intent(people: Iterable[int], motion: MeasuredMotion, t: int) -> dict[int, PersonSet]:
-    """Returns sets of the given columns, keyed by the index of the group that they are meant to belong to
-    in frame t.
+    """Returns sets of the given columns `people`, keyed by the index of the group that they are meant to belong to in
+    frame t; -1 for absent people.
+
+    The keys are in the order of each group's least column.
     """
     found: dict[int, set[int]] = {}
     for p in sorted(people):
@@ -102,10 +109,10 @@ def _by_intent(people: Iterable[int], motion: MeasuredMotion, t: int) -> dict[in
 
 
 class _RuleTimes:
-    """When parts (sets of columns) will join or divide in one motion.
+    """When parts (sets of columns, person id - 1) will join or divide in one motion.
 
-    State: for each rule ("merge" or "split") and two parts, the frames from which the rule will hold long enough. They
-    are measured once, when both parts exist for the first time, and remain valid while the parts stay the same.
+    State: for each rule ("merge" or "split") and two parts, the frames from which the rule will hold long enough (2 s).
+    They are measured once, when both parts exist for the first time, and remain valid while the parts stay the same.
     """
 
     def __init__(self, motion: MeasuredMotion) -> None:
@@ -113,9 +120,10 @@ class _RuleTimes:
         self._known: dict[tuple[Rule, PersonSet, PersonSet], Ints] = {}
 
     def join_and_divide(self, parts: list[PersonSet], t: int) -> list[PersonSet]:
-        """Returns the parts (sets of columns) after all joins and divisions that are due in frame t.
+        """Returns the parts (sets of columns) after all joins and divisions that are due in frame t, which counts from
+        0.
 
-        It divides and joins again until nothing changes.
+        It divides, then joins, and repeats this until nothing changes. If nothing is due, `parts` itself is returned.
         """
         while True:
             divided = [piece for part in parts for piece in self._divide(part, t)]

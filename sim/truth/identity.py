@@ -35,10 +35,10 @@ class GroupChange:
 def identify(old: Members, parts: Iterable[PersonSet], born: Mapping[int, int]) -> dict[PersonSet, int | None]:
     """Returns for each new group of two or more people the id that it keeps, or None if it needs a new id.
 
-    old: members of each group before, by id. parts: the new partition; sets of one person are ignored. born: time at
-    which each old id began. A group with the same members keeps its id. The remaining old and new groups are matched
-    greedily, most common members first; ties go to the older, then the smaller id, then the new group with the smallest
-    person. Fewer than two common members never match.
+    old: members of each group before, by id. parts: the new partition, disjoint sets; sets of one person are ignored.
+    born: time at which each id in `old` began; a missing one raises KeyError. A group with the same members keeps its
+    id. The remaining old and new groups are matched greedily, most common members first; ties go to the older, then the
+    smaller id, then the new group with the smallest person. Fewer than two common members never match.
     """
     new = sorted((p for p in parts if len(p) > 1), key=min)
     same = {people: g for g, people in old.items()}  # mostly nothing has changed: no need to compare all with all
@@ -73,7 +73,8 @@ def lineage(
     - enter: all people of a new group have just entered, or all but one who was alone.
     - leave: all people of an old group have left, or all but one who is now alone.
 
-    A group that only grows or shrinks by people who enter or leave gives no change.
+    `members` of a split or dissolve are the old group's people present now, of a leave all its old people, else all
+    people of the new group. A group that only grows or shrinks by people who enter or leave gives no change.
     """
     stay = (before & now) - entered
     was, is_ = _unit_of(old, before), _unit_of(new, now)
@@ -89,6 +90,8 @@ def lineage(
 def _unit_of(groups: Members, everybody: PersonSet) -> dict[int, int]:
     """Returns the group id of each person of `everybody`; a person alone gets a negative number that no other person
     has.
+
+    groups: members by group id; they are in the result even if not in `everybody`.
     """
     unit = {p: -1 - k for k, p in enumerate(sorted(everybody))}
     return unit | {p: g for g, people in groups.items() for p in people}
@@ -102,7 +105,7 @@ def _names(units: Iterable[int]) -> tuple[int, ...]:
 def _changes_of_old(
     g: int, people: PersonSet, stay: PersonSet, is_: dict[int, int], now: PersonSet
 ) -> list[GroupChange]:
-    """Returns the split, dissolve or leave of the old group g as a list of one, or [].
+    """Returns the split, dissolve or leave of the old group g as a list of one, or [] if it goes on or only merges.
 
     people: its members before. stay: people present before and now. is_: group id of each person now, negative if
     alone. now: all people present now.
@@ -118,7 +121,7 @@ def _changes_of_old(
 
 
 def _changes_of_new(g: int, people: PersonSet, stay: PersonSet, was: dict[int, int]) -> list[GroupChange]:
-    """Returns the merge, form or enter of the new group g as a list of one, or [].
+    """Returns the merge, form or enter of the new group g as a list of one, or [] if it only continues one old group.
 
     people: its members now. stay: people present before and now. was: group id of each person before, negative if
     alone.

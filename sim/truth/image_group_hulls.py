@@ -1,7 +1,7 @@
 """Groups in the image: hulls of their members' silhouettes, mean positions, extents, all frames at once.
 
-A silhouette is two polygons of POINTS vertices, inscribed in the ellipses of body and head. The hull of these polygons
-is exact.
+They are computed from the groups on the ground, the people's bodies and the camera. A silhouette is two polygons of
+POINTS (24) vertices, inscribed in the ellipses of body and head. The hull of these polygons is exact.
 """
 
 from __future__ import annotations
@@ -21,10 +21,11 @@ INSTANT = 0.02  # s: half the step by which ground velocities become image veloc
 def image_groups(truth: Truth, ground: tuple[Groups, ...], camera: Camera, shapes: Ellipsoids) -> tuple[Groups, ...]:
     """Returns the Groups of each frame as the camera sees them, with the ids, members and sizes of the ground groups.
 
-    truth: with boxes and velocities (else AssertionError). ground: Groups of each frame on the ground. shapes:
-    ellipsoids of body and head of the people, in the order of the truth's rows. Of each group: pos (px) and extent
-    (px²): mean and covariance of the middles of the members' boxes; vel: mean velocity of their bodies' centres in the
-    image, px/s; hull: of their silhouettes, px. A group with a member behind the camera has nan and an empty hull.
+    truth: with boxes and velocities (else AssertionError). ground: Groups of each frame from frame 1, on the ground.
+    shapes: ellipsoids of body and head of the people, in the order of the truth's rows. Of each group: pos (px) and
+    extent (px²): mean and covariance of the middles of the members' boxes; vel: mean velocity of their bodies' centres
+    in the image, px/s; hull: of their silhouettes, px. A group with a member behind the camera has nan and an empty
+    hull. A frame without groups gives empty Groups.
     """
     assert truth.box is not None
     assert truth.vel is not None
@@ -45,7 +46,8 @@ def image_groups(truth: Truth, ground: tuple[Groups, ...], camera: Camera, shape
 def _members(truth: Truth, ground: tuple[Groups, ...]) -> tuple[Ints, Ints]:
     """Returns the indices of the truth's rows of all groups' members, group after group, frame after frame.
 
-    Also returns where each of the G groups begins in them, shape (G + 1,), the end last. ground: Groups of each frame.
+    Also returns where each of the G groups begins in them, shape (G + 1,), the end last. ground: Groups of each frame
+    from frame 1; their members must be in the truth. Without groups: no rows, and [0].
     """
     starts = np.searchsorted(truth.frame, np.arange(1, len(ground) + 1))
     rows, sizes = [np.zeros(0, np.int64)], [0]
@@ -82,7 +84,8 @@ def hulls(ellipses: Outlines, cuts: Ints) -> list[Array]:
 def image_velocities(camera: Camera, middle: Array, vel: Array) -> Array:
     """Returns the velocities (N, 2) in px/s in the image of points middle (N, 3), m, that move at vel (N, 2), m/s.
 
-    They move at constant height. nan where the camera does not project the point, for example behind it.
+    They move at constant height; the step is 0.02 s back and forth. nan where the camera does not project the point,
+    for example behind it.
     """
     step = INSTANT * np.column_stack([vel, np.zeros(len(vel))])
     return np.asarray((project(camera, middle + step)[0] - project(camera, middle - step)[0]) / (2 * INSTANT))

@@ -20,16 +20,19 @@ from sim.types import Camera, GroupEvent, Groups, Ints, Motion, Truth
 def bodies(motion: Motion, camera: Camera | None) -> Truth:
     """Returns a Truth with positions, boxes and visibility of every person in every frame, but without groups.
 
-    group is -1 in every row; groups, events, near and labelled are None. camera None: no camera; boxes, truncation and
-    visible boxes are then None, visibility is 1 and px_per_m nan.
+    Its rows are people present in a frame, sorted by (frame, id); frames count from 1, the id is the column + 1. group
+    is -1 in every row; groups, groups_px, events, near and labelled are None. The motion's orders are taken over.
+    camera None: no camera; boxes, truncation and visible boxes are then None, visibility is 1 and px_per_m nan.
     """
     return _bodies(motion, camera, recorded_bodies(motion))
 
 
 def _bodies(motion: Motion, camera: Camera | None, people: RecordedBodies) -> Truth:
-    """Returns a Truth with positions, boxes and visibility of every person in every frame, but without groups.
+    """Returns a Truth with positions, boxes and visibility of every person in every frame, but without groups (group is
+    -1).
 
-    people: rows and shapes as recorded_bodies(motion) returns them. camera None: no boxes, visibility 1, px_per_m nan.
+    people: rows and shapes as recorded_bodies(motion) returns them. camera None: boxes, truncation and visible boxes
+    are None, visibility is 1 and px_per_m nan.
     """
     t, p = people.frame - 1, people.id - 1
     seen = None if camera is None else measure_visibility(
@@ -59,8 +62,9 @@ def _bodies(motion: Motion, camera: Camera | None, people: RecordedBodies) -> Tr
 def label(motion: Motion, camera: Camera | None) -> Truth:
     """Returns the whole Truth: bodies, and groups, events and hard negatives measured from motion and intent.
 
-    All frames count as labelled. camera None: no camera; there are then no boxes and no groups in the image, visibility
-    is 1 and px_per_m nan.
+    Hard negatives: pairs of strangers who walk like a group. All frames count as labelled. The motion's orders are
+    taken over; whether they came true is not checked. camera None: no camera; boxes, truncation, visible boxes and
+    groups in the image are then None, visibility is 1 and px_per_m nan.
     """
     from sim.truth.merge_split_events import groups_and_events
 

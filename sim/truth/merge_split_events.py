@@ -23,8 +23,10 @@ class GroupsAndEvents:
     """What is measured of the groups in a motion of T frames and P people.
 
     - group (T, P): id of each person's group, from 1; -1 for a person who is alone or absent.
-    - events: all kinds but cross and queue, in order of the frame in which the group changed.
-    - near: pairs of people who satisfy the merge rule but are strangers (hard negatives).
+    - events: merge, split, form, dissolve, enter and leave, in order of the frame in which the group changed; () if
+      none.
+    - near: pairs of people who satisfy the merge rule (less than 1.5 m apart, velocities differing by less than 0.5
+      m/s, for 2 s) but are strangers (hard negatives).
     """
 
     group: Ints
@@ -57,10 +59,12 @@ def groups_and_events(pos: Array, vel: Array, present: Bools, intent: Ints, fps:
 
 
 def _event(change: GroupChange, t: int, hold: int, pos: Array) -> GroupEvent:
-    """Returns the event of a change in frame t, which counts from 0; `members` of the change are columns.
+    """Returns the event of a change in frame t, which counts from 0; `members` of the change are columns (person id -
+    1).
 
-    hold: length in frames of all kinds but enter and leave (one frame). pos (T, P, 2): m, nan while absent. The event's
-    position is the mean of its people who are present in its first frame.
+    Frames of the event count from 1. A leave is in the last frame before t, all other kinds start in t. hold: length in
+    frames of all kinds but enter and leave (one frame). pos (T, P, 2): m, nan while absent. The event's position is the
+    mean of its people who are present in its first frame; nan if none is.
     """
     start = t if change.kind == "leave" else t + 1
     end = start if change.kind in ("enter", "leave") else start + hold - 1

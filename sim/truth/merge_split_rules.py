@@ -1,7 +1,8 @@
 """The rules that say when two parts of a crowd have merged or split: the one home of their distances, speeds and times.
 
-`separation` measures two parts over time; its methods apply the rules frame by frame; `holds_for` finds the frames from
-which a rule holds long enough.
+Merged: nearest members less than 1.5 m apart, mean velocities differing by less than 0.5 m/s. Split: more than 2.5 m
+apart, or 1.5 m with velocities differing by more than 0.7 m/s. Both must hold for 2 s. `separation` measures two parts
+over time; its methods apply the rules frame by frame; `holds_for` finds the frames from which a rule holds long enough.
 """
 
 from __future__ import annotations
@@ -21,7 +22,7 @@ HOLD_TIME = 2.0  # s for which either rule must hold
 
 
 def frames_of(seconds: float, fps: float) -> int:
-    """Returns the number of frames that last `seconds` at fps frames per s, rounded up; at least 1."""
+    """Returns the number of frames that last `seconds` (s) at fps frames per s, rounded up; at least 1."""
     return max(1, math.ceil(seconds * fps - 1e-9))
 
 
@@ -29,8 +30,8 @@ def holds_for(holds: Bools, frames: int) -> Bools:
     """Returns for each frame whether `holds` (T, ...) is True in it and the next frames - 1 frames, same shape as
     `holds`.
 
-    The last frames - 1 frames are always False: a stretch that the end of the recording cuts off does not count. With
-    fewer than `frames` frames all are False.
+    frames: 1 or more. The last frames - 1 frames are always False: a stretch that the end of the recording cuts off
+    does not count. With fewer than `frames` frames all are False.
     """
     if len(holds) < frames:
         return np.zeros_like(holds)
@@ -70,8 +71,8 @@ class Separation:
 
 
 def separation(pos: Array, vel: Array, a: Ints, b: Ints) -> Separation:
-    """Returns the distance and velocity difference, in each frame, between the people in columns a and those in columns
-    b.
+    """Returns the distance (nearest members, m) and difference of mean velocities (m/s), in each frame, of the people
+    in columns a and in columns b.
 
     pos, vel (T, P, 2): m, m/s, nan while absent. Absent members are left out; both values are inf if a part has nobody.
     """

@@ -33,9 +33,10 @@ WORDS = {
 def check_orders(motion: Motion, truth: Truth) -> dict[str, int]:
     """Returns for each order id the index in `truth.events` of the event that fulfils the order.
 
-    Raises WorkError for the first order, in the script's order, that no event fulfils; the error says how close the
-    motion came to the rule. Raises WorkError for a queue whose people did not all leave from the same end. A motion
-    without orders gives {}.
+    motion: with its orders. truth: measured from that motion. Raises WorkError for the first order, in the script's
+    order, that no event fulfils (an order that never fired included); the error says how close the motion came to the
+    rule. Raises WorkError for a queue whose people did not all leave from the same end. A motion without orders gives
+    {}.
     """
     group = dense_groups(truth, motion.present.shape)
     fulfilled = {}
@@ -52,7 +53,8 @@ def check_orders(motion: Motion, truth: Truth) -> dict[str, int]:
 def _check_fifo(order: Order, motion: Motion, event: GroupEvent) -> None:
     """Raises WorkError if the people of the queue that is `event` did not all leave it from the same end.
 
-    Does nothing if no queue detected in the motion has the event's frames and members.
+    order: gives its id for the message. Queues are detected in the motion anew. Does nothing if none of them has the
+    event's frames and members.
     """
     for queue in detect_queues(motion.pos, motion.vel, motion.present, motion.fps):
         people = {p + 1 for p in queue.order}
@@ -68,7 +70,11 @@ def _check_fifo(order: Order, motion: Motion, event: GroupEvent) -> None:
 
 
 def dense_groups(truth: Truth, shape: tuple[int, ...]) -> Ints:
-    """Returns the group id of each person in each frame, shape (T, P): -1 = alone, -2 = absent. shape: (T, P)."""
+    """Returns the group id of each person in each frame, shape (T, P): -1 = alone, -2 = absent.
+
+    truth: frames from 1, person ids from 1, one row per person and frame. shape: (T, P); raises IndexError if the truth
+    has a frame or id beyond it.
+    """
     group = np.full(shape, -2, np.int64)
     group[truth.frame - 1, truth.id - 1] = truth.group
     return group
@@ -93,9 +99,10 @@ def fulfilment(order: Order, truth: Truth, group: Ints) -> int | None:
 def _concerns(event: GroupEvent, order: Order, group: Ints) -> bool:
     """Returns True if an event of the right kind and time has the people and the effect that the order asks for.
 
-    Queue: at least 3 (QUEUE_PEOPLE) of the order's people, or all if they are fewer, are members. Merge and split: one
-    of the order's people is a member, and the groups that the order plans exist in the event's first frame but not in
-    the frame before. group (T, P): group ids, -1 = alone, -2 = absent.
+    Queue: at least 3 (QUEUE_PEOPLE) of the order's people, or all if they are fewer, are members. Merge: one of the
+    order's people is a member, and in the event's first frame, but not in the frame before, all of them are in one
+    group (others may be, too). Split: likewise, and no group has people of two of the planned parts. An event in frame
+    1 fulfils no merge or split. group (T, P): group ids, -1 = alone, -2 = absent.
     """
     if order.kind == "queue":
         people = {p for part in order.before for p in part}
@@ -127,7 +134,8 @@ def _apart(wanted: list[Ints], group: Ints) -> bool:
 def _unfulfilled(order: Order, motion: Motion, length: int) -> WorkError:
     """Returns, without raising it, the WorkError for an order that no event fulfils.
 
-    It says that the order never fired, or how close the motion came to its rule. length: frames of the recording.
+    It says that the order never fired, or how close the motion came to its rule within 10 s (PATIENCE) of the firing.
+    length: frames of the recording.
     """
     place = f"event {order.id} (seed {motion.seed})"
     if order.fired is None:
@@ -184,12 +192,12 @@ def _longest(holds: Bools) -> int:
 
 
 def _gaps(columns: list[Ints], pos: Array, vel: Array, present: Bools, widest: bool) -> tuple[Array, Array]:
-    """Returns two arrays (T,) about one part and all other parts: distance of the nearest members, m; velocity
-    difference, m/s.
+    """Returns two arrays (T,) about one part and all other parts: distance of the nearest members, m; difference of the
+    mean velocities, m/s.
 
     In each frame the part with the widest gap is taken (`widest`, for merges) or the one with the narrowest gap (for
-    splits). nan where no two parts are present. columns: of the people of each part. pos, vel (T, P, 2): m, m/s, nan
-    while absent. present (T, P): flags.
+    splits). The distance is nan where no two parts are present, or there is one part only. columns: of the people of
+    each part. pos, vel (T, P, 2): m, m/s, nan while absent. present (T, P): flags.
     """
     gaps, differences = [], []
     for i, a in enumerate(columns):

@@ -20,7 +20,8 @@ def close_pairs(frame: Ints, pos: Array, reach: float) -> tuple[Ints, Ints]:
     """Returns all pairs of rows i < j of the same frame that are less than `reach` apart, as two arrays (K,), sorted by
     (i, j).
 
-    frame (R,): ascending. pos (R, 2): finite, in the unit of reach. No rows give no pairs.
+    A row is one position in one frame. frame (R,): ascending. pos (R, 2): finite, in the unit of reach. reach: above 0.
+    No rows give no pairs.
     """
     found = [_pairs_of(frame, pos, low, high, reach) for low, high in _portions(frame)]
     i, j = (np.concatenate([np.zeros(0, np.int64), *(f[k] for f in found)]) for k in (0, 1))
@@ -41,10 +42,12 @@ def _portions(frame: Ints) -> Iterator[tuple[int, int]]:
 
 
 def _pairs_of(frame: Ints, pos: Array, low: int, high: int, reach: float) -> tuple[Ints, Ints]:
-    """Returns the pairs (i, j), i < j, of rows low … high - 1 of one frame that are less than `reach` apart, unsorted.
+    """Returns the pairs (i, j), i < j, of rows low … high - 1 that are in the same frame and less than `reach` apart,
+    unsorted.
 
-    frame (R,): ascending. pos (R, 2): in the unit of reach. Rows are sorted by frame and by the cells of a grid as wide
-    as `reach`; all neighbours of a row then lie in two runs of rows behind it.
+    There must be at least one row; the rows hold whole frames. frame (R,): ascending. pos (R, 2): in the unit of reach.
+    Rows are sorted by frame and by the cells of a grid as wide as `reach`; all neighbours of a row then lie in two runs
+    of rows behind it.
     """
     f, p = frame[low:high] - frame[low], pos[low:high]
     cell = np.floor((p - p.min(axis=0)) / reach).astype(np.int64) + 1
@@ -62,7 +65,8 @@ def _pairs_of(frame: Ints, pos: Array, low: int, high: int, reach: float) -> tup
 
 
 def runs(first: Ints, end: Ints) -> tuple[Ints, Ints]:
-    """Returns all pairs (k, first[k]), (k, first[k] + 1) … (k, end[k] - 1) for k = 0, 1, …, as two arrays.
+    """Returns all pairs (k, first[k]), (k, first[k] + 1) … (k, end[k] - 1) for k = 0, 1, …, as two arrays of equal
+    length.
 
     first, end (K,). Where end[k] ≤ first[k] there is no pair.
     """
@@ -74,9 +78,9 @@ def runs(first: Ints, end: Ints) -> tuple[Ints, Ints]:
 def stretches(pair: Ints, frame: Ints, least: int, bridge: int = 1) -> tuple[Ints, Ints, Ints]:
     """Returns (pair, first frame, last frame), both inclusive, of each stretch that is at least `least` frames long.
 
-    pair, frame (K,): rows sorted by (pair, frame). A stretch is a run of rows of one pair whose frames are at most
-    `bridge` apart; 1 means without a gap. Its length counts from the first to the last frame, gaps included. No rows
-    give no stretch.
+    Three arrays (S,), sorted by (pair, first frame). pair, frame (K,): rows sorted by (pair, frame); pair is any number
+    that names two people, or one. A stretch is a run of rows of one pair whose frames are at most `bridge` apart; 1
+    means without a gap. Its length counts from the first to the last frame, gaps included. No rows give no stretch.
     """
     if not len(pair):
         return pair, frame, frame
@@ -90,10 +94,11 @@ def stretches(pair: Ints, frame: Ints, least: int, bridge: int = 1) -> tuple[Int
 def strangers(pos: Array, vel: Array, present: Bools, intent: Ints, group: Ints, fps: float) -> Near:
     """Returns the hard negatives: stretches in which two people satisfy the merge rule but do not belong together.
 
-    pos, vel (T, P, 2): m, m/s. present (T, P): flags. intent (T, P): index of the group a person is meant to belong to.
-    group (T, P): measured group ids, -1 = alone. The rule (less than 1.5 m apart, velocities differing by less than 0.5
-    m/s) holds for at least HOLD_TIME (2 s) without a gap. Two people of one measured group, which has not split yet,
-    are no strangers. Frames count from 1; a person's id is the column + 1. Sorted by first frame, then by the ids.
+    pos, vel (T, P, 2): m, m/s, finite where present. present (T, P): flags. intent (T, P): index of the group a person
+    is meant to belong to; it must differ. group (T, P): measured group ids, -1 = alone. fps: frames per s. The rule
+    (less than 1.5 m apart, velocities differing by less than 0.5 m/s) holds for at least HOLD_TIME (2 s) without a gap.
+    Two people of one measured group, which has not split yet, are no strangers. Frames count from 1; a person's id is
+    the column + 1. Sorted by first frame, then by the ids. Nobody near gives no rows.
     """
     t, p = np.nonzero(present)
     i, j = close_pairs(t, pos[t, p], MERGE_DISTANCE)

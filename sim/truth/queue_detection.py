@@ -34,13 +34,14 @@ Vector = tuple[float, float]
 class DetectedQueue:
     """A queue found in measured motion. People are columns (person id - 1).
 
-    - first, last: frames from 0, both inclusive.
+    - first: first frame with 3 people in line; last: last frame in which the line was seen. Frames from 0, both
+      inclusive.
     - order: members from one end of the line to the other; either end may be the head. People who joined later are
       inserted between those they stood between. Empty if nobody was in line for MEMBER_TIME (1 s).
-    - left: members who left before the end, in the order of leaving.
+    - left: members who left before the end, in the order of leaving; () if none.
     - middle: x, y of the line's middle when it was first followed, m; this may be before frame `first`.
-    - fifo: True if everyone who left did so from the same end of the line. A person may leave up to MEMBER_TIME before
-      people nearer to that end.
+    - fifo: True if everyone who left did so from the same end of the line, or nobody left. A person may leave up to
+      MEMBER_TIME before people nearer to that end.
     """
 
     first: int
@@ -95,10 +96,12 @@ class _FollowedLine:
 def queues(pos: Array, vel: Array, present: Bools, group: Ints, fps: float) -> list[GroupEvent]:
     """Returns a queue event for each queue, in order of first and last frame.
 
-    pos, vel (T, P, 2): m, m/s. present (T, P): flags. group (T, P): group ids, -1 = alone. A person with a nan position
-    counts as absent. A queue is a line of waiting people (see queue_shapes) that has 3 people (QUEUE_PEOPLE) for at
-    least QUEUE_TIME (3 s); a line may be lost for 1.5 s. Waiting means slower than WAITING_SPEED (0.4 m/s), except when
-    advancing. A line that moves sideways, faster than 0.1 m/s and than along itself, is no queue.
+    pos, vel (T, P, 2): m, m/s. present (T, P): flags. group (T, P): group ids, -1 = alone. fps: frames per s. A person
+    with a nan position counts as absent. A line is people who wait behind one another: 0.4 to 1.5 m apart along a
+    straight line, at most 0.5 m off it, turning by at most 60°, and two thirds of those who stand close. A queue is a
+    line that has 3 people (QUEUE_PEOPLE) for at least QUEUE_TIME (3 s); a line may be lost for 1.5 s. Waiting means
+    slower than WAITING_SPEED (0.4 m/s), except for up to 3 s when advancing. A line that moves sideways, on average
+    faster than 0.1 m/s and than along itself, is no queue.
 
     The event starts in the first frame with 3 people and ends in the last frame with two in line. Its members are all
     people who were in line for MEMBER_TIME (1 s); a queue without a member gives no event. Its position is the middle
@@ -126,8 +129,9 @@ def _groups_of(label: Ints) -> tuple[int, ...]:
 def detect_queues(pos: Array, vel: Array, present: Bools, fps: float) -> list[DetectedQueue]:
     """Returns all queues, sorted by first frame, last frame and members, also queues without members (empty `order`).
 
-    pos, vel (T, P, 2): m, m/s. present (T, P): flags. A person with a nan position counts as absent. At most about 10
-    frames per second (MAX_RATE) are examined.
+    A queue is a line of waiting people that has at least 3 for 3 s. pos, vel (T, P, 2): m, m/s. present (T, P): flags.
+    fps: frames per s. A person with a nan position counts as absent. At most about 10 frames per second (MAX_RATE) are
+    examined, from frame 0. No frames give [].
     """
     there = present & np.isfinite(pos).all(axis=2)
     stride = max(1, round(fps / MAX_RATE))
@@ -148,7 +152,8 @@ def waiting_people(vel: Array, there: Bools, fps: float) -> Bools:
     """Returns for each person and frame whether the person waits, shape (T, P); False while absent.
 
     A person waits who is slower than WAITING_SPEED (0.4 m/s), or who was and will be so at two times at most
-    ADVANCE_TIME (3 s) apart. vel (T, P, 2): m/s. there (T, P): the person is present.
+    ADVANCE_TIME (3 s) apart. vel (T, P, 2): m/s; nan is not slow. there (T, P): the person is present. fps: frames per
+    s.
     """
     with np.errstate(invalid="ignore"):
         slow = there & (np.hypot(vel[..., 0], vel[..., 1]) < WAITING_SPEED)
@@ -199,9 +204,10 @@ def _of_table(c: QueueShapes, t: Ints, p: Ints, vel: Array, kept: Bools) -> Iter
 def _follow(following: list[_FollowedLine], now: _LineNow, hold: int, bridge: int) -> None:
     """Adds the line `now` to the line in `following` that shares most people with it, or appends it as a new one.
 
-    A followed line fits if it was last seen earlier and shares at least two people, in the same order. A line of fewer
-    than 3 people (QUEUE_PEOPLE) that fits none is dropped. hold: frames for which a queue needs 3 people. The record of
-    a followed line starts anew if it had fewer than 3 people for more than `bridge` frames before it reached `hold`.
+    A followed line fits if it was last seen earlier and shares at least two people, in the same order; ties go to the
+    older. `now` is turned so that both run the same way. A line of fewer than 3 people (QUEUE_PEOPLE) that fits none is
+    dropped. hold: frames for which a queue needs 3 people. The record of a followed line starts anew if it had fewer
+    than 3 people for more than `bridge` frames before it reached `hold`. Modifies `following`; returns nothing.
     """
     people, long = set(now.order), len(now.order) >= QUEUE_PEOPLE
     fits = [f for f in following if f.now.t < now.t and len(people.intersection(f.now.order)) > 1]
@@ -247,11 +253,11 @@ def _record_people(f: _FollowedLine) -> None:
 
 
 def _finished(f: _FollowedLine, hold: int, stride: int, fps: float) -> list[DetectedQueue]:
-    """Returns the queue that a followed line was, as a list of one; [] if it was too short or moved sideways.
+    """Returns the queue that a followed line f was, as a list of one; [] if it was too short or moved sideways.
 
-    Too short: the first and last frame with 3 people are less than `hold` - `stride` frames apart. Sideways: faster
-    than 0.1 m/s, and faster than along itself. stride: frames between two moments. People in line for less than 1 s are
-    no members.
+    Too short: the first and last frame with 3 people are less than `hold` - `stride` frames apart. Sideways: on average
+    faster than 0.1 m/s, and faster than along itself. stride: frames between two moments. fps: frames per s. People in
+    line for less than 1 s are no members; the queue may have none.
     """
     along, aside = (abs(v) / f.moments for v in f.drift)
     if f.three - f.since + stride < hold or (aside > SIDEWAYS_SPEED and aside > along):
@@ -262,7 +268,8 @@ def _finished(f: _FollowedLine, hold: int, stride: int, fps: float) -> list[Dete
 
 
 def _from_one_end(f: _FollowedLine, left: list[int], late: float) -> bool:
-    """Returns True if all people in `left` left the followed line from the same end.
+    """Returns True if all people (columns) in `left` left the followed line f from the same end; True if `left` is
+    empty.
 
     For a person who left, all people between that person and the end must have left at most `late` frames later.
     """

@@ -30,8 +30,9 @@ MAX_CELLS = 2_000_000  # numbers handled together: bounds memory
 class QueueShapes:
     """M lines of people who stand behind one another.
 
-    - rows (M, n): row numbers of the people, in order along the line; only the first count (M,) of each are valid.
-    - u (M, 2): unit vector along the line from the first person towards the last. middle (M, 2): mean position, m.
+    - rows (M, n): row numbers, in the table of positions, of the people in order along the line; only the first count
+      (M,) of each are valid.
+    - u (M, 2): unit vector along the line from the first person towards the last. middle (M, 2): mean position x, y, m.
     """
 
     rows: Ints
@@ -43,10 +44,11 @@ class QueueShapes:
 def queue_shapes(pos: Array, i: Ints, j: Ints) -> Iterator[QueueShapes]:
     """Yields tables of the lines of all crowds, at most one line for each crowd; a table holds crowds of equal size.
 
-    pos (N, 2): m. i, j (K,): pairs of rows that stand close to each other. A crowd is a set of two or more rows
-    connected by such pairs. The line holds the whole crowd if that passes the three tests: spacing 0.4 to 1.5 m along
-    the straight line, at most 0.5 m off it, turns of at most 60°. Else it is the longest line of at least three people
-    and two thirds of the crowd that passes them, if any. A table may be empty.
+    pos (N, 2): x, y in m. i, j (K,): pairs of rows of pos that stand close to each other. A crowd is a set of two or
+    more rows connected by such pairs. The line holds the whole crowd if that passes the three tests: neighbours 0.4 to
+    1.5 m apart along the straight line, nobody more than 0.5 m off it, turns of at most 60°. Else it is the longest
+    line of at least three people and two thirds of the crowd that passes them, if any; of several, the straightest. A
+    table may be empty. Nothing is yielded without pairs.
     """
     for crowd in _crowds(len(pos), i, j):
         portion = max(1, MAX_CELLS // crowd.shape[1] ** 3)
@@ -151,9 +153,9 @@ def _lines_through_pairs(p: Array, least: int) -> tuple[Ints, Ints, Ints, Array]
     """Returns lines of `least` or more people in crowds p (C, n, 2), m: at most one for each two people 0.4 to 1.5 m
     apart.
 
-    Each is sought along the straight line through the two. Four arrays for M lines: crowd (M,); order (M, n) of the
-    people in the crowd, of which the first `length` are valid; length (M,); root of the sum of squared distances (M,),
-    m.
+    Each is sought along the straight line through the two and passes the tests of a line. Four arrays for M lines:
+    crowd (M,), from 0; order (M, n) of the people in the crowd, of which the first `length` are valid; length (M,);
+    root of the sum of squared distances from the line (M,), m.
     """
     i, j = np.triu_indices(p.shape[1], 1)
     crowd, seed = np.nonzero(_steps_fit(np.stack([np.zeros((len(p), len(i))), _lengths(p, i, j)], axis=1))[:, 0])
