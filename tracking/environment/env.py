@@ -1,12 +1,11 @@
 """The Gymnasium environment `flockscope/Tuning-v0`: actions set a tracker's parameters, the score is the reward.
 
-An episode tracks one sequence from the first frame to the last. An action sets the parameters to search, each in
-[-1, 1] (tracking.parameter_space). With decision_every=None one action before the first frame sets them all, and the
-episode is one step long. Else an action sets those that may change between frames, every `decision_every` frames.
-Observations are statistics of the run. The reward of a step is S(frames so far) - S(frames before it), where S is the
-objective of `tracking.evaluate` and 0 for no frames; so the rewards sum to the objective. `import tracking` registers
-the environment.
-"""
+An episode tracks one whole sequence. An action sets the parameters to search, each in [-1, 1] (see
+tracking.parameter_space). With decision_every=None one action before the first frame sets them all, and the episode is
+one step long. Else an action sets those that may change between frames, every `decision_every` frames. Observations are
+statistics of the run. A step's reward is S(frames so far) - S(frames before it), S being the objective of
+`tracking.evaluate` (mean of HOTA and group_F1_hull), 0 for no frames; the rewards sum to it. `import tracking`
+registers it."""
 
 from __future__ import annotations
 
@@ -42,7 +41,8 @@ Floats = NDArray[np.float32]
 
 @dataclass(frozen=True, kw_only=True)
 class TuningEnvOptions:
-    """The keyword arguments of the environment. InputError if observation, detections or render_mode is unknown."""
+    """The keyword arguments of the environment; the fields' metadata hold help texts. InputError if observation,
+    detections or render_mode is unknown; other values are checked when used."""
 
     tracker: AnyTracker = field(metadata=option('Registered name, "file.py:Class", "module:Class" or a class.'))
     suite: SourceSpec | Source = field(
@@ -77,19 +77,19 @@ class TuningEnvOptions:
 
 
 class TuningEnv(gymnasium.Env[Floats, Floats]):
-    """The environment: an episode is one run of a tracker, an action sets its parameters, the reward is the gain in
-    score.
+    """An episode is one run of a tracker, an action sets its parameters, the reward is the gain in score.
 
-    Keyword arguments are the fields of TuningEnvOptions. State: sources and their cache; config, rollout, score of the
-    episode. Raises InputError if an argument is unknown or wrong, the tracker has no parameters to search, or a source
-    lacks the detections.
-    """
+    Keyword arguments are the fields of TuningEnvOptions. State: sources and their cache; config, rollout (the run, None
+    before it) and score of the episode. Raises InputError if an argument is unknown or wrong, the tracker has no
+    parameters to search, or a source lacks the detections."""
 
     metadata = METADATA
 
     @documented(TuningEnvOptions, positional=2)
     def __init__(self, tracker: AnyTracker, suite: SourceSpec | Source = "quick", **options: Any) -> None:
-        """Makes the environment; the first episode begins with `reset`."""
+        """Makes the environment; the first episode begins with `reset`. tracker: a name, "file.py:Class",
+        "module:Class" or class. suite: what is played. options: other fields of TuningEnvOptions. Raises InputError if
+        an argument is unknown or wrong, no parameter can be searched, or a source is unreadable or lacks detections."""
         given = from_keywords(TuningEnvOptions, "TuningEnv", {"tracker": tracker, "suite": suite, **options})
         self.tracker: type[Tracker] = find(tracker) if isinstance(tracker, str) else checked(tracker, str(tracker))
         self.tracker_seed, self.decision_every = given.tracker_seed, given.decision_every
@@ -120,7 +120,8 @@ class TuningEnv(gymnasium.Env[Floats, Floats]):
         return names[self.observation]
 
     def _metadata(self, fps: float) -> dict[str, Any]:
-        """Returns metadata with "render_fps": one picture per action at the speed of a sequence of `fps`."""
+        """Returns a copy of METADATA with "render_fps": one picture per action at the speed of a sequence of `fps`, at
+        least 1."""
         return {**METADATA, "render_fps": max(round(fps / (self.decision_every or 1)), 1)}
 
     def _clear_episode(self) -> None:
@@ -129,14 +130,14 @@ class TuningEnv(gymnasium.Env[Floats, Floats]):
         self.config, self.score, self.scores, self.refused = self.base, 0.0, dict[str, float](), ""
 
     def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> tuple[Floats, dict[str, Any]]:
-        """Begins an episode on a source that the env's own generator draws; returns observation (float32) and an info
-        dict.
+        """Begins an episode on a source that the env's generator draws; returns observation (float32) and info dict.
 
         seed: reseeds the generator, None goes on with it. options: "scenario" and "seed" restrict the draw to sources
-        of this name and seed; "params" are the parameters that the episode begins with. Raises InputError if an option
-        is unknown, no source fits, the tracker refuses the parameters, or the source has no labels; the running episode
-        then goes on.
-        """
+        of this name and seed; "params" are the parameters that the episode begins with. Info keys: scenario, seed,
+        frame (number of frames tracked), objective, scores, names (of the action's parameters), params, refused. Raises
+        InputError if an option is unknown, no source fits, the source cannot be opened or has no labels, the parameters
+        are wrong, or, with `decision_every`, the tracker refuses them or keeps no `config`; then also WorkError if its
+        `reset` fails. The running episode goes on after an error."""
         super().reset(seed=seed)
         options = options or {}
         for name in options:
@@ -158,12 +159,12 @@ class TuningEnv(gymnasium.Env[Floats, Floats]):
     def step(self, action: Any) -> tuple[Floats, float, bool, bool, dict[str, Any]]:
         """Sets the parameters and tracks on, to the end or for `decision_every` frames.
 
-        Returns observation, reward (gain of the objective), True at the end of the sequence, False (never truncated),
-        info dict. action: (P,) numbers, clipped to [-1, 1]. Refused parameters are moved towards those that the episode
-        began with. If the tracker refuses a config between frames it keeps the one before, and `info["refused"]` holds
-        the error. Raises InputError before `reset`, or if the action has another shape or is not finite. Errors of the
-        tracker are raised.
-        """
+        Returns observation, reward (gain of the objective, which is 0 while unknown), True at the end of the sequence,
+        False (never truncated), info dict as of `reset`. action: (P,) numbers, clipped to [-1, 1]. Refused parameters
+        are moved towards those that the episode began with. If the tracker refuses a config between frames it keeps the
+        one before, and `info["refused"]` holds the error. Raises InputError before `reset`, or if the action has
+        another shape or is not finite; IncomparableError if the tracks cannot be compared with the truth; and the
+        tracker's errors."""
         if self._observer is None:
             raise InputError(place="step", got="no episode", expected="one that was begun", remedy="call reset() first")
         if self.decision_every is None:
@@ -185,7 +186,8 @@ class TuningEnv(gymnasium.Env[Floats, Floats]):
         )
 
     def _advance(self, upto: int | None) -> bool:
-        """Tracks to frame number `upto`, None: to the last frame. Returns True if the sequence has ended."""
+        """Tracks to frame number `upto`, None: the last. Returns True if the sequence has ended. Raises the tracker's
+        errors."""
         assert self.rollout is not None
         for frame, tracks in self.rollout.advance(upto):
             if self.observation != "none":
@@ -195,10 +197,9 @@ class TuningEnv(gymnasium.Env[Floats, Floats]):
         return done == self.rollout.length or upto is None or done < upto
 
     def _advance_with(self, config: Config) -> bool:
-        """Tracks `decision_every` frames with this config, or with the last one if the tracker refuses it.
-
-        True if the sequence has ended. Errors of the tracker are raised if it fails with both.
-        """
+        """Tracks `decision_every` frames with this config, or with the last one if the tracker refuses it (InputError).
+        Returns True if the sequence has ended. Sets `config`, and `refused` to the error's text or "". Raises the
+        tracker's other errors, and its InputError if it refuses both."""
         assert self.rollout is not None
         assert self.decision_every is not None
         upto = len(self.rollout.tracks) + self.decision_every
@@ -215,7 +216,8 @@ class TuningEnv(gymnasium.Env[Floats, Floats]):
             return self._advance(upto)
 
     def render(self) -> Image | None:
-        """Returns the last frame with detections and tracks, uint8 (H, W, 3) RGB; None without a render_mode."""
+        """Returns the last frame with detections and tracks, uint8 (H, W, 3) RGB; None without a render_mode. Before
+        the first frame only the scene or an empty picture is drawn. InputError if the source has no labels."""
         if self.render_mode is None:
             return None
         from tracking.environment.picture import episode_picture
@@ -261,11 +263,9 @@ class TuningEnv(gymnasium.Env[Floats, Floats]):
 
 
 def _detection_mode(tracker: type[Tracker], among: Iterable[Source], wanted: DetectionMode | None) -> DetectionMode:
-    """Returns the input of the tracker, "image", "file" or "truth", the same in all episodes: `wanted` if given.
-
-    Else the first recording decides; without recordings "image" or "file", by what the tracker takes. InputError if a
-    recording does not have it.
-    """
+    """Returns the input of the tracker, "image", "file" or "truth", the same in all episodes: `wanted` if given. Else
+    the first recording among the sources `among` decides; without recordings "image" or "file", by what the tracker
+    takes. InputError if a recording does not have it or cannot be opened."""
     among = tuple(among)
     for source in among:
         if not source.simulated:
@@ -277,10 +277,9 @@ def _detection_mode(tracker: type[Tracker], among: Iterable[Source], wanted: Det
 
 
 def _action_parameters(kind: type[Config], mode: DetectionMode, every: int | None) -> Space:
-    """The parameters that an action sets. every: frames between actions, None: one action per episode.
-
-    InputError if there are none, or if `every` is no whole number above 0.
-    """
+    """Returns the parameters that an action sets: tunable ones of the config class `kind` with an effect in this
+    `mode`. every: frames between actions, which leaves only parameters that may change then; None: one action per
+    episode. InputError if there are none, or if `every` is no whole number above 0."""
     if every is not None and (not isinstance(every, int | np.integer) or isinstance(every, bool) or every < 1):
         got, expected = repr(every), "a number of frames, 1 or more, or None"
         raise InputError(place="decision_every", got=got, expected=expected, remedy="correct it")

@@ -1,4 +1,8 @@
-"""Keeps opened sequences between episodes on the same sources: motions, truths, detections; bounded by bytes."""
+"""Keeps opened sequences between episodes on the same sources, so that motions, truths and detections are computed
+once.
+
+The memory is bounded by the bytes of the arrays that they hold.
+"""
 
 from __future__ import annotations
 
@@ -28,8 +32,11 @@ TIMES_COUNTED = 2
 class OpenedSource:
     """A source whose sequence is open. Its detections, truth and background are kept once used.
 
-    source: what is opened. streams: the pictures that are drawn if the source is simulated ("left", "right",
-    "background"); () draws none. Raises InputError if the source cannot be opened.
+    - source: what is opened. streams: the pictures that are drawn if the source is simulated ("left", "right",
+      "background"); () draws none.
+    - sequence: the opened Sequence; it keeps its frames without pictures, and its background.
+
+    Raises InputError if the source cannot be opened.
     """
 
     def __init__(self, source: Source, streams: tuple[str, ...] = ()) -> None:
@@ -48,7 +55,7 @@ class OpenedSource:
 
     @cached_property
     def truth(self) -> Truth:
-        """The truth (labels) of the sequence. Raises InputError if the sequence has no labels."""
+        """The truth (labels) of the sequence. Raises InputError if the sequence has no labels or they cannot be read."""
         truth = self._opened.truth
         if truth is None:
             remedy = "give a sequence with labels: there is nothing to score by"
@@ -79,11 +86,11 @@ def _computed_once(compute: Callable[[], T]) -> Callable[[], T]:
 
 
 class SourceCache:
-    """Opened sources for reuse; the least recently used one is dropped first.
+    """Opened sources for reuse; the least recently used one is dropped first. len() gives their number.
 
-    limit: bytes of arrays that all opened sources may hold together; the source in use is kept whatever its size. The
-    bytes of a source are counted when the next source is opened, and again after its second use. Raises InputError if
-    `limit` is negative. State: the opened sources and their bytes.
+    limit: bytes of arrays that all opened sources may hold together (256 MiB by default); the source in use is kept
+    whatever its size. The bytes of a source are counted when the next source is opened, and again after its second use.
+    Raises InputError if `limit` is negative. State: the opened sources and their bytes.
     """
 
     def __init__(self, limit: int = DEFAULT_LIMIT) -> None:
@@ -107,8 +114,9 @@ class SourceCache:
     def open(self, source: Source, streams: tuple[str, ...] = ()) -> OpenedSource:
         """Returns the opened source; it is opened now, or was opened earlier with the same `streams` and is still kept.
 
-        streams: the pictures that are drawn if the source is simulated ("left", "right", "background"). Other sources
-        are dropped if they exceed the limit. Raises InputError if the source cannot be opened.
+        streams: the pictures that are drawn if the source is simulated ("left", "right", "background"). Before a source
+        is opened anew, the least recently used ones are dropped while all together exceed the limit. Raises InputError
+        if the source cannot be opened.
         """
         key = (*source.key, streams)
         if self._opened and next(reversed(self._opened)) == key:
@@ -134,8 +142,8 @@ class SourceCache:
 
 
 def array_bytes(root: object) -> int:
-    """Returns the bytes of all numpy arrays that can be reached from an object; each array counts once, a view as its
-    base.
+    """Returns the bytes of all numpy arrays that can be reached from the object `root`; each array counts once, a view
+    as its base.
 
     Containers, functions, methods and objects of the packages sim and tracking are searched; other objects are not.
     """
@@ -157,7 +165,10 @@ def array_bytes(root: object) -> int:
 
 
 def _parts(one: Any) -> list[Any]:
-    """Returns the objects in a container, an object of sim or tracking, or a function's closure; else []."""
+    """Returns the objects that `one` holds: items of a tuple or list, values of a dict, the object of a bound method,
+    what a function's closure refers to and the function that it wraps, fields and attributes of an object of sim or
+    tracking. Else [].
+    """
     if isinstance(one, tuple | list):
         return list(one)
     if isinstance(one, dict):

@@ -1,6 +1,8 @@
-"""Whole episodes for searches: a tracker with its parameters plays a source and is scored.
+"""Whole episodes for searches: a tracker with its parameters plays a source (one sequence) and is scored against its
+truth.
 
-`play` plays an episode at once, `Rollout` frame by frame. With a `SourceCache` later episodes on a source are cheap.
+`play` plays an episode at once and returns an `Episode`, `Rollout` plays frame by frame. With a `SourceCache`, which
+keeps opened sequences, later episodes on a source are cheap.
 """
 
 from __future__ import annotations
@@ -60,8 +62,8 @@ def play(
     takes neither boxes nor points. The objective equals that of `tracking.evaluate(sequence.truth, tracking.track(…))`
     up to that frame.
 
-    Raises InputError if an argument is wrong, tracker and source do not fit, or the source has no labels, and WorkError
-    if the tracker fails.
+    Raises InputError if an argument is wrong, tracker and source do not fit, or the source has no labels, WorkError if
+    the tracker fails, and IncomparableError if its tracks lack the boxes or positions to compare.
     """
     rollout = Rollout(tracker, source, config, detections=detections, tracker_seed=tracker_seed, cache=cache)
     for _ in rollout.advance(upto):
@@ -72,9 +74,13 @@ def play(
 class Rollout:
     """An episode that is played frame by frame; the arguments are those of `play`.
 
-    State: the prepared tracker; tracks, those of the frames so far; last, the last frame; seconds spent on tracking and
-    scoring. Raises InputError if an argument is wrong, tracker and source do not fit, or the source has no labels, and
-    WorkError if the tracker's `reset` fails.
+    - tracker: name, file.py:Class, module:Class or class; config: its parameters, None for the defaults.
+    - source: what is played; cache: keeps it opened, None keeps nothing.
+    - detections: the tracker's input, None chooses one that works; tracker_seed: of its random numbers.
+
+    State: the prepared tracker; tracks, one `Tracks` per frame so far; last, the last frame, None before the first;
+    seconds spent on tracking and scoring. Raises InputError if an argument is wrong, tracker and source do not fit, or
+    the source has no labels, and WorkError if the tracker's `reset` fails.
     """
 
     def __init__(
@@ -134,7 +140,8 @@ class Rollout:
         """Returns the result of the frames so far; objective is nan if there is nothing to score.
 
         every_score: compute the whole catalogue, else the objective and its two parts. Raises IncomparableError if the
-        tracks lack the boxes or positions to compare.
+        tracks lack the boxes or positions to compare, and InputError if groups must be derived in the image and the
+        image scale is 0 or less.
         """
         scores = self.scores(every_score)
         return Episode(
@@ -151,7 +158,8 @@ class Rollout:
         """Returns a dict of the scores of the frames so far by key, without those that are nan.
 
         every: the whole catalogue; else objective, HOTA and group_F1_hull. The time is added to `seconds_scoring`.
-        Raises IncomparableError if the tracks lack the boxes or positions to compare.
+        Raises IncomparableError if the tracks lack the boxes or positions to compare, and InputError if groups must be
+        derived in the image and the image scale is 0 or less.
         """
         start = time.perf_counter()
         px_per_m = self.prepared.px_per_m(self.tracks)
@@ -169,9 +177,9 @@ class Rollout:
 def streams_for(tracker: AnyTracker, detections: DetectionMode | None) -> tuple[str, ...]:
     """Returns the pictures that a simulated sequence needs for this tracker, () if it needs none.
 
-    They are needed if `detections` is "image", or is None and the tracker takes neither boxes nor points. They are
-    "left" and "background", and "right" if the tracker takes stereo. Raises InputError if the name of a tracker is
-    unknown.
+    tracker: name, file.py:Class, module:Class or class. Pictures are needed if `detections` is "image", or is None and
+    the tracker takes neither boxes nor points. They are "left" and "background", and "right" if the tracker takes
+    stereo. Raises InputError if a tracker given by name cannot be found or imported.
     """
     from tracking.tracker_registry import find
 

@@ -1,8 +1,7 @@
 """The observation of the environment: statistics of detections, tracks and pictures, without any truth.
 
 Each statistic is about the frames since the last decision and lies in [0, 1]. A share is itself. Another quantity
-x >= 0 is x / (x + half), so 0.5 stands for `half` in the unit of the statistic. A statistic that is not known is 0.
-"""
+x >= 0 is x / (x + half), so 0.5 stands for `half` in the unit of the statistic. A statistic that is not known is 0."""
 
 from __future__ import annotations
 
@@ -38,8 +37,7 @@ class Statistic:
     """One number of the observation: its name and its meaning in words.
 
     half: the value that 0.5 stands for, in `unit`; None for a share, which stands for itself. unit: "" for plain
-    numbers.
-    """
+    numbers."""
 
     name: str
     half: float | None
@@ -90,8 +88,7 @@ class Observer:
     """Collects frames and tracks between two decisions, for the statistics of the observation. fps: frames per second.
 
     State: frames and tracks since the last decision, the tracks of the frame before them, the first frame of each id,
-    the brightness of the pictures.
-    """
+    the brightness of the pictures."""
 
     def __init__(self, fps: float) -> None:
         self.fps = fps
@@ -102,7 +99,8 @@ class Observer:
         self._brightness: list[float] = []
 
     def add(self, frame: Frame, tracks: Tracks) -> None:
-        """Adds the next frame, as the tracker got it, and its tracks. Of a picture only the brightness is kept."""
+        """Adds the next frame, as the tracker got it, and its tracks (one `Tracks`). Of a picture only the brightness
+        is kept."""
         self._tracks.append(tracks)
         self._frames.append(Frame(frame.index, frame.t, detections=frame.detections))
         for id in tracks.id.tolist():
@@ -113,9 +111,9 @@ class Observer:
     def statistics(self, px_per_m: float) -> NDArray[np.float32]:
         """Returns the statistics (K,) float32 in [0, 1] of the frames since the last call, in the order of STATISTICS.
 
-        px_per_m: scale of tracks in the image; nan or 0 if unknown, then lengths and speeds are 0. A statistic that is
-        not known is 0; all are 0 if no frame was added. Frames so far are forgotten, apart from the last tracks.
-        """
+        px_per_m: scale of tracks in the image; nan or 0 if unknown, then all statistics of lengths, speeds and of
+        tracks against detections are 0. A statistic that is not known is 0; all are 0 if no frame was added. Frames so
+        far are forgotten, apart from the last tracks, the last brightness and the first frame of each id."""
         values = self._values(px_per_m) if self._tracks else {}
         self._before, self._tracks, self._frames = self._tracks[-1:] or self._before, [], []
         self._brightness = self._brightness[-1:]
@@ -125,8 +123,8 @@ class Observer:
         """Returns a dict of the known statistics by name, before they are mapped to [0, 1]. At least one frame must be
         added.
 
-        px_per_m: scale of tracks in the image; without it (nan or 0) statistics in m or m/s are missing.
-        """
+        px_per_m: scale of tracks in the image; without it (nan or 0) density and all statistics of `_movement` are
+        missing."""
         last = self._tracks[-1]
         seconds = len(self._tracks) / self.fps
         known = last.plane != "image" or px_per_m > 0
@@ -152,11 +150,11 @@ class Observer:
         }
 
     def _movement(self, rows: TrackRows, found: DetectionRows) -> dict[str, float]:
-        """Returns a dict of the statistics of speeds and distances, and of tracks against detections if any are known.
+        """Returns a dict: speed, speed_spread (m/s), acceleration (m/s²), crowding, gate, correction (m),
+        correction_sigma; and those of `_innovations` if any detections are known.
 
         rows: tracks in m, the frame before the window included (with number 0 if there is one); found: detections of
-        the window in m.
-        """
+        the window in m. A statistic without values is 0."""
         now = rows.frame >= len(self._before)
         before, after = consecutive_rows(rows)
         expected = rows.pos + rows.vel / self.fps
@@ -177,12 +175,11 @@ class Observer:
 
 
 def _innovations(rows: TrackRows, expected: Array, found: DetectionRows) -> dict[str, float]:
-    """Returns a dict: orphans, missed, innovation, innovation_sigma, residual; of expected positions against
-    detections.
+    """Returns a dict: orphans, missed (shares), innovation, residual (m), innovation_sigma; of expected positions
+    against detections.
 
     expected (R, 2), m: where each row of `rows` (tracks in frames) is expected one frame later. found: the detections,
-    m. Only rows whose next frame has known detections count. A statistic without values is 0.
-    """
+    m. Only rows whose next frame has known detections count. A statistic without values is 0."""
     looked = np.isin(rows.frame + 1, found.frames)
     here = np.flatnonzero(looked)
     owner = nearest_expected(expected[here], rows.frame[here] + 1, rows.reach[here], found)
@@ -207,7 +204,10 @@ def _innovations(rows: TrackRows, expected: Array, found: DetectionRows) -> dict
 
 
 def _group_values(tracks: Sequence[Tracks], seconds: float) -> dict[str, float]:
-    """Returns a dict: merges, splits (1/min), grouped (share), group_size (people), as the tracker reports them."""
+    """Returns a dict: merges, splits (1/min), grouped (share), group_size (people), as the tracker reports them.
+
+    tracks: one `Tracks` per frame, at least one; seconds: their duration. Of a tracker of whole groups, grouped is the
+    share of groups of size 1.5 or more. Without tracks or groups a value is 0."""
     kinds = [e.kind for t in tracks for e in t.events]
     merges, splits = (sum(kind in pair for kind in kinds) for pair in (("merge", "form"), ("split", "dissolve")))
     values = {"merges": 60 * merges / seconds, "splits": 60 * splits / seconds}
@@ -224,8 +224,8 @@ def _group_values(tracks: Sequence[Tracks], seconds: float) -> dict[str, float]:
 def _detection_values(found: DetectionRows, rows: TrackRows, frames: int) -> dict[str, float]:
     """Returns a dict: seen, detections, flicker, score, weak, surplus; {} if no frame has known detections.
 
-    found: detections of a window of `frames` frames; rows: the tracks.
-    """
+    found: detections of a window of `frames` frames; rows: the tracks. Without a detection the values are 0, except
+    seen."""
     count = np.bincount(found.frame - found.first, minlength=frames)[[f - found.first for f in found.frames]]
     if not len(count):
         return {}
@@ -242,8 +242,7 @@ def _detection_values(found: DetectionRows, rows: TrackRows, frames: int) -> dic
 def _picture_values(brightness: Sequence[float]) -> dict[str, float]:
     """Returns a dict: brightness of the last picture, and lights, the mean relative change from picture to picture.
 
-    brightness: of consecutive pictures, each in [0, 1]. {} without pictures; lights is 0 with one picture.
-    """
+    brightness: of consecutive pictures, each in [0, 1]. {} without pictures; lights is 0 with one picture."""
     if not brightness:
         return {}
     level = np.array(brightness)
@@ -252,10 +251,9 @@ def _picture_values(brightness: Sequence[float]) -> dict[str, float]:
 
 
 def _squared_sigmas(shift: Array, cov: Array) -> Array:
-    """Returns d' C^-1 d / 2 of shifts d (N, 2) in m with covariances C (N, 2, 2) in m².
+    """Returns d' C^-1 d / 2 of N shifts d (`shift` (N, 2), m) with covariances C (`cov` (N, 2, 2), m²).
 
-    Rows without a positive determinant are left out, so the result may be shorter than N.
-    """
+    Rows without a positive determinant are left out, so the result may be shorter than N."""
     det = cov[:, 0, 0] * cov[:, 1, 1] - cov[:, 0, 1] * cov[:, 1, 0]
     good = det > 0
     (x, y), c = shift[good].T, cov[good]
@@ -277,8 +275,7 @@ def squashed(statistic: Statistic, value: float) -> float:
     """Returns the value of a statistic mapped to [0, 1]: a share is clipped, another value x becomes x / (x + half).
 
     half: the statistic's value that 0.5 stands for. Negative values and nan become 0, infinity becomes 1; a share that
-    is nan or infinite becomes 0.
-    """
+    is nan or infinite becomes 0."""
     if not np.isfinite(value):
         return 0.0 if statistic.half is None else float(value > 0)
     if statistic.half is None:
@@ -289,8 +286,7 @@ def squashed(statistic: Statistic, value: float) -> float:
 def table() -> str:
     """Returns the statistics as the Markdown table of docs/reference/environment.md.
 
-    Columns: number from 0, name, value that is shown as 0.5, meaning.
-    """
+    Columns: number from 0, name, value that is shown as 0.5, meaning."""
     lines = [
         f"| {k} | `{s.name}` | {'share' if s.half is None else f'{s.half:g} {s.unit}'.strip()} | {s.meaning} |"
         for k, s in enumerate(STATISTICS)

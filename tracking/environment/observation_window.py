@@ -1,6 +1,7 @@
 """Tracks and detections of a few frames as rows of arrays, in metres, and the matches between them.
 
-The rows are what tracking.environment.observation computes its statistics from. Nothing here knows the truth.
+`track_rows` and `detection_rows` build the rows, from which tracking.environment.observation computes its statistics.
+Other functions find rows of one track in consecutive frames, and nearest neighbours. Nothing here knows the truth.
 """
 
 from __future__ import annotations
@@ -22,7 +23,7 @@ EXTENT_SIGMAS = 2.0
 
 @dataclass(frozen=True, eq=False)
 class TrackRows:
-    """R reported tracks in frames, frame by frame.
+    """R reported tracks in frames, frame by frame; len() gives R.
 
     - frame (R,): counted from 0 at the first frame given.
     - id (R,): of the track.
@@ -44,11 +45,11 @@ class TrackRows:
 
 @dataclass(frozen=True, eq=False)
 class DetectionRows:
-    """D detections, frame by frame.
+    """D detections, frame by frame; len() gives D.
 
     - frame (D,): counted like the frames of the TrackRows, from 0.
     - pos (D, 2): x, y in m.
-    - score (D,): 1 if unknown.
+    - score (D,): the detector's, in [0, 1]; 1 if unknown.
     - frames: numbers of the frames whose detections are known, frames without a detection included.
     - first: number of the first frame of the window.
     """
@@ -63,7 +64,9 @@ class DetectionRows:
         return len(self.frame)
 
     def neighbours(self, reach: float) -> float:
-        """Returns the mean number of other detections of a frame within `reach` (m) of a detection, 0 if empty."""
+        """Returns the mean number of other detections of the same frame within `reach` (m) of a detection, 0 without
+        detections.
+        """
         if not len(self):
             return 0.0
         tree = _tree(self.pos, self.frame)
@@ -87,7 +90,8 @@ def track_rows(tracks: Sequence[Tracks], scale: float) -> TrackRows:
 
 
 def _reach(t: Tracks) -> Array:
-    """Returns the distance (N,) in m within which detections belong to each of the N tracks of a frame.
+    """Returns the distance (N,) in m within which detections belong to each of the N tracks of a frame; t: its
+    `Tracks`.
 
     It is 1 m for a person. For a group (unit "group") 2 standard deviations of its extent are added, root mean square
     over x and y, 0 if unknown.
@@ -103,9 +107,9 @@ def _reach(t: Tracks) -> Array:
 def detection_rows(detections: Sequence[Detections | None], plane: str, scale: float, first: int) -> DetectionRows:
     """Returns the detections of consecutive frames as rows in m; entry k of the list gets frame number first + k.
 
-    Frames without detections (None), or with detections in another plane than `plane`, are left out; frames with 0
-    detections are kept. A detection without score has score 1. scale: units of the plane per metre (px per m in the
-    image, else 1).
+    Frames without detections (None), or with detections in another plane than `plane` ("ground", "space" or "image"),
+    are left out; frames with 0 detections are kept. A detection without score has score 1. scale: units of the plane
+    per metre (px per m in the image, else 1).
     """
     known = [(first + k, d) for k, d in enumerate(detections) if d is not None and (d.plane == plane or not len(d.pos))]
     frame = np.repeat([f for f, _ in known], [len(d.pos) for _, d in known]).astype(np.int64)
@@ -139,10 +143,10 @@ def nearest_distances(pos: Array, frame: Ints) -> Array:
 
 def nearest_expected(expected: Array, frame: Ints, reach: Array, detections: DetectionRows) -> Ints:
     """Returns for each of D detections the index of the nearest expected position of its frame, (D,), -1 if there is
-    none near.
+    none within that position's reach.
 
     expected (N, 2): x, y in m; frame (N,): number of their frame; reach (N,): greatest distance in m at which a
-    detection belongs to the position.
+    detection belongs to the position. A position farther away is never taken, even if its reach is greater.
     """
     if not len(expected) or not len(detections):
         return np.full(len(detections), -1)
@@ -151,7 +155,7 @@ def nearest_expected(expected: Array, frame: Ints, reach: Array, detections: Det
 
 
 def _with_frame(pos: Array, frame: Ints) -> Array:
-    """Returns positions (N, 2) in m with a third column that keeps frames (N,) apart, (N, 3)."""
+    """Returns positions pos (N, 2) in m with a third column, frame (N,) times 1e6, that keeps frames apart: (N, 3)."""
     return np.column_stack([pos, frame * FRAME_DISTANCE])
 
 
