@@ -55,7 +55,7 @@ class OpenedSource:
 
     @cached_property
     def truth(self) -> Truth:
-        """The truth (labels) of the sequence. Raises InputError if the sequence has no labels or they cannot be read."""
+        """The truth (labels) of the sequence. Raises InputError if it has no labels or they cannot be read."""
         truth = self._opened.truth
         if truth is None:
             remedy = "give a sequence with labels: there is nothing to score by"
