@@ -3,21 +3,23 @@
 The grouping function of measurements (3.3, 4.2.1), which `group-pda` and its kernels use:
     G_0  points y_i, y_j are linked (y_i R_0 y_j) if regions of radius r round them overlap: at most 2 r apart;
          G_0 are the connected components
-    G_x  components whose search regions (y - m)' S^-1 (y - m) < gate overlap are joined (3.1)
+    G_x  components whose search regions (y - m)' S^-1 (y - m) < gate overlap are joined (3.1); m is a component's
+         mean, S its covariance, gate a squared Mahalanobis radius
     G_y  G_x of the components of G_0; points satisfy the group constraint if |G_y| = 1 (3.3)
 In G_y velocities have no part: all fresh components are at rest with the same covariance.
 
-Ours: S is shrunk to (N S + n0 S0) / (N + n0), S the covariance with 1/N, as one or two points have none. G_x is
-repeated until nothing changes, since the region of joined components may overlap one that none of them did. Points have
-weights (the share of a person that a pixel is). A component below a least weight is noise.
+Ours: S is shrunk to (N S + n0 S0) / (N + n0), as one or two points have none. N is the component's weight, S its
+covariance with 1/N, S0 a prior covariance and n0 the prior's weight. G_x is repeated until nothing changes, since the
+region of joined components may overlap one that none of them did. Points have weights (the share of a person that a
+pixel is). A component below a least weight is noise.
 
 Two regions overlap by the exact test of Gilitschenski & Hanebeck, "A robust computational test for overlap of two
 arbitrary-dimensional ellipsoids in fault-detection of Kalman filters" (2012); Gennari & Hager do not say how they test.
 
-`prefixes` decides the group constraint for all associations of a group at once. The sets Y_ns + the first j of the
-shared points grow by one point each, and G_0 grows with them (4.2.1), with running moments of each component. A point
-is compared with the 20 grid cells around it, and M > 1 components are compared with each other: n points cost
-O(n log n + n M^2). The least weight bounds M.
+`prefixes` decides the group constraint for all associations of a group at once. The sets Y_ns (points of the group
+alone) + the first j of the shared points grow by one point each, and G_0 grows with them (4.2.1), with running moments
+of each component. A point is compared with the 20 grid cells around it, and M > 1 components are compared with each
+other: n points cost O(n log n + n M^2). The least weight bounds M.
 """
 
 from __future__ import annotations
@@ -35,9 +37,10 @@ from tracking.filters import ellipse_overlap_kernels
 class Constraint:
     """The rule by which points are one group; lengths in the points' unit (m or px).
 
-    link: 2 r, largest distance of linked points. gate: squared Mahalanobis radius of a component's search region. prior
-    (2, 2): S0, the covariance to which a component's covariance S is shrunk. strength: n0, the weight of S0, in units
-    of the points' weights. least: a component whose points have less total weight is noise; 0 (default): none is.
+    link: 2 r, largest distance of linked points, above 0. gate: squared Mahalanobis radius of the search region of a
+    component (set of linked points). prior (2, 2): S0, the covariance (squared unit) to which a component's covariance
+    S is shrunk. strength: n0, the weight of S0, in units of the points' weights. least: a component whose points have
+    less total weight is noise; 0 (default): none is.
     """
 
     link: float
@@ -55,8 +58,8 @@ class Constraint:
 def linked(points: Array, link: float) -> Ints:
     """Returns the component of each point, (M,), numbered 0, 1, … in the order of the components' first points.
 
-    points (M, 2): x, y. Two points are in one component if they are at most `link` apart, directly or through other
-    points (G_0). No points give an empty array.
+    points (M, 2): x, y. Two points are in one component if they are at most `link` (above 0, same unit) apart, directly
+    or through other points. No points give an empty array.
     """
     return kernels.components(points, np.ones(len(points)), link)[0]
 
@@ -64,9 +67,9 @@ def linked(points: Array, link: float) -> Ints:
 def partition(points: Array, weights: Array, rule: Constraint) -> Ints:
     """Returns the group of each point, (M,), numbered 0, 1, … in the order of the groups' first points; -1 for noise.
 
-    points (M, 2): x, y; weights (M,): people that each point stands for. rule: linked points are components; components
-    of less than the least weight are noise; components whose search regions overlap are one group (G_y). No points give
-    an empty array.
+    points (M, 2): x, y; weights (M,): people that each point stands for. rule: linked points (at most rule.link apart)
+    are components; components of less total weight than rule.least are noise. Components whose search regions (ellipses
+    round their means) overlap, also through others, are one group. No points give an empty array.
     """
     label, sums = kernels.components(points, weights, rule.link)
     parts = np.flatnonzero(sums[:, kernels.WEIGHT] >= rule.least)
@@ -81,9 +84,9 @@ def prefixes(points: Array, weights: Array, start: int, rule: Constraint) -> Boo
     """Returns flags (M - start + 1,): True if the first start, start + 1, … M points satisfy the group constraint
     `rule`.
 
-    points (M, 2): x, y; weights (M,): people that each point stands for. They satisfy it if they form exactly one group
-    (|G_y| = 1), where components of less than the least weight are left out. False for no point, and where all
-    components are noise.
+    points (M, 2): x, y; weights (M,): people that each point stands for. start: 0 to M. Points satisfy the rule if they
+    form exactly one group: components of linked points whose search regions overlap. Components of less than the least
+    weight are left out. False for no point, and where all components are left out.
     """
     return kernels.prefixes(
         points, weights, start, rule.link, rule.gate, rule.prior_entries, rule.strength, rule.least
@@ -95,6 +98,6 @@ def regions_overlap(mean: Array, covariance: Array, gate: float) -> Bools:
     point.
 
     mean (G, 2): x, y; covariance (G, 2, 2), positive definite, squared unit of the means; gate: squared Mahalanobis
-    radius. Regions that touch overlap. The diagonal is True.
+    radius, above 0. Regions that touch overlap. The diagonal is True; no regions give (0, 0).
     """
     return ellipse_overlap_kernels.overlaps(np.ascontiguousarray(mean), gate * covariance)

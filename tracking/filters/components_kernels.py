@@ -1,11 +1,11 @@
 """Kernels of tracking.filters.components: linked points by a grid of cells, and regions joined until none overlap.
 
-The diagonal of a cell is `link`, so that points of one cell are linked, and other points can be linked only from the 20
-cells around. A new point is compared with the points of those cells that are not of its component yet and whose
-bounding box is near enough. At the first linked point the two components are joined, and so are their moments.
-Columns of `sums` (K, 6): weight N, mean x, y, and N times the covariance xx, xy, yy. Moments are joined without raw
-sums, in which precision would cancel. Slow twins: tests/reference_components.py.
-"""
+The diagonal of a cell is `link`, the largest distance of linked points, so that points of one cell are linked, and
+other points can be linked only from the 20 cells around. A new point is compared with the points of those cells that
+are not of its component yet and whose bounding box is near enough. At the first linked point the two components are
+joined, and so are their moments. Columns of `sums` (K, 6), a component's moments: weight N, mean x, y, and N times the
+covariance xx, xy, yy. Moments are joined without raw sums, in which precision would cancel. Slow twins:
+tests/reference_components.py."""
 
 from __future__ import annotations
 
@@ -33,7 +33,8 @@ FAR = 2.0**40
 @njit(cache=True)
 def cells(points: Array, link: float) -> tuple[Ints, Ints]:
     """Returns the cell of each point (M,), 0, 1, …, and the 20 cells around each cell (C, 20), -1 for an empty one.
-    points (M, 2), M at least 1. A cell's diagonal is `link`, in the points' unit."""
+    points (M, 2), M at least 1. A cell's diagonal is `link`, in the points' unit, above 0. Cells are numbered by
+    column, then row of the grid; points 2^40 cells or more from the first count as at that distance."""
     m = len(points)
     side = link / np.sqrt(2.0) * (1 - 1e-12)
     place = np.empty((m, 2), np.int64)
@@ -63,7 +64,7 @@ def cells(points: Array, link: float) -> tuple[Ints, Ints]:
 
 @njit(cache=True)
 def _sorted(place: Ints) -> Ints:
-    """Returns the indices (M,) that sort places (M, 2) by x, then y; equal places keep their order."""
+    """Returns the indices (M,) that sort places (M, 2), grid column x and row y, by x, then y (stable)."""
     by_y = np.argsort(place[:, 1], kind="mergesort")
     return by_y[np.argsort(place[by_y, 0], kind="mergesort")]
 
@@ -91,13 +92,12 @@ def insert(
     k: int, points: Array, weight: float, link: float, cell: Ints, around: Ints,
     parent: Ints, head: Ints, after: Ints, box: Array, sums: Array, work: Ints,
 ) -> None:  # fmt: skip
-    """Add point k to the components of the points before it, in place: G_0(Y + {y}) from G_0(Y) (4.2.1).
-
-    points (M, 2); link: largest distance of linked points; cell (M,), around (C, 20): from `cells`. Changed: parent
-    (M,), union-find forest of the points; head (C,), after (M,), the first point of each cell and the next one of each
-    point, -1 at the end; box (C, 4), bounds of each cell's points: least x, y, largest x, y; sums (M, 6), a component's
-    weight, mean x, y, weight times covariance xx, xy, yy, at its root; work (2,): comparisons, number of components.
-    """
+    """Add point k to the components (sets of linked points) of the points before it, in place. Returns nothing (4.2.1).
+    points (M, 2): x, y; weight: of point k; link: largest distance of linked points; cell (M,): cell of each point;
+    around (C, 20): cells round each cell, -1 if empty. Changed: parent (M,), union-find forest of the points; head
+    (C,), after (M,), the last added point of each cell and the one before it of each point, -1 at the end; box (C, 4),
+    bounds of each cell's points: least x, y, largest x, y; sums (M, 6), a component's weight, mean x, y, weight times
+    covariance xx, xy, yy, at its root; work (2,): comparisons, number of components."""
     c = cell[k]
     x, y = points[k, 0], points[k, 1]
     parent[k] = k
@@ -134,7 +134,8 @@ def insert(
 @njit(cache=True)
 def _join(parent: Ints, sums: Array, a: int, b: int, work: Ints) -> None:
     """Join the components of points a and b under the older root, so that roots depend only on the order of points.
-    Changes parent (M,), sums (M, 6), work (2,) as in `insert`; nothing if the points are in one component already."""
+    Changed: parent (M,), union-find forest; sums (M, 6), moments at the roots; work (2,), whose second number, the
+    components, falls by 1. Nothing changes if the points are in one component already."""
     a, b = find_root(parent, a), find_root(parent, b)
     if a == b:
         return
@@ -162,12 +163,11 @@ def pool(into: Array, other: Array) -> None:
 
 @njit(cache=True)
 def components(points: Array, weights: Array, link: float) -> tuple[Ints, Array]:
-    """Returns the component of each point (M,), numbered in the order of first points, and the moments (K, 6) of
+    """Returns the component of each point (M,), numbered in the order of first points, and the moments (K, 6) of K
     components.
 
-    Points (M, 2) at most `link` apart, also through others, are one component, G_0 (3.3). Moments: weight N, mean x, y,
-    N times the covariance xx, xy, yy. No points give no components.
-    """
+    Points (M, 2) at most `link` (above 0) apart, also through others, are one component (3.3). weights (M,): of the
+    points. Moments: weight N, mean x, y, N times the covariance xx, xy, yy. No points give no components."""
     m = len(points)
     parent, sums = np.empty(m, np.int64), np.empty((m, 6))
     label, count = np.empty(m, np.int64), 0
@@ -191,12 +191,12 @@ def components(points: Array, weights: Array, link: float) -> tuple[Ints, Array]
 
 @njit(cache=True)
 def closure(sums: Array, gate: float, prior: Array, strength: float) -> Ints:
-    """Returns G_x (3.1) of K components: for each the index of the first component it is joined with, or its own, (K,).
+    """Returns for each of K components the index of the first component it is joined with, or its own, (K,) (G_x, 3.1).
 
     sums (K, 6): weight N, mean x, y, N times the covariance xx, xy, yy; not changed. Components whose search regions
     overlap, also through others, are joined; then the joined ones are compared, until no two overlap: a joined region
-    may overlap one that none of its parts did. gate, prior (3,), strength: see `fit`.
-    """
+    may overlap one that none of its parts did. gate: squared Mahalanobis radius of a region. prior (3,), strength:
+    covariance xx, xy, yy to which a component's own is shrunk, and its weight."""
     k = len(sums)
     label = np.arange(k)
     if k < 2:
@@ -233,10 +233,9 @@ def closure(sums: Array, gate: float, prior: Array, strength: float) -> Ints:
 @njit(cache=True)
 def fit(sums: Array, gate: float, prior: Array, strength: float, shape: Array) -> None:
     """Write a component's search region, an ellipse, into `shape` (5,): mean x, y, entries xx, xy, yy of its matrix A.
-
-    sums (6,): weight N, mean x, y, N S as xx, xy, yy. A is `gate` times the shrunk covariance (N S + n0 S0) / (N + n0),
-    S the covariance with 1/N, S0 the `prior` (3,) xx, xy, yy, n0 the `strength`.
-    """
+    The region is (y - mean)' A^-1 (y - mean) <= 1. sums (6,): weight N, mean x, y, N S as xx, xy, yy. A is `gate`
+    (squared radius) times the shrunk covariance (N S + n0 S0) / (N + n0), S the covariance with 1/N, S0 the `prior`
+    (3,) xx, xy, yy, n0 the `strength`. Returns nothing."""
     shape[MEAN_X], shape[MEAN_Y] = sums[X], sums[Y]
     scale = gate / (sums[WEIGHT] + strength)
     shape[A_XX] = scale * (sums[XX] + strength * prior[0])
@@ -248,12 +247,12 @@ def fit(sums: Array, gate: float, prior: Array, strength: float, shape: Array) -
 def prefixes(
     points: Array, weights: Array, start: int, link: float, gate: float, prior: Array, strength: float, least: float
 ) -> tuple[Bools, int]:
-    """Returns flags (M - start + 1,): True if the first start, start + 1, … M points are one group; and the comparisons
+    """Returns flags (M - start + 1,), True if the first start, start + 1, … M points are one group, and the comparisons
     made.
 
-    One group is |G_y| = 1: points (M, 2) at most `link` apart are components, components lighter than `least` are left
-    out, the others are joined by `closure` with gate, prior (3,), strength. False for no point and if all are left out.
-    """
+    points (M, 2), weights (M,). Points at most `link` apart are components, and those lighter than `least` are left
+    out. The others are joined by `closure` with gate (squared radius), prior (3,), strength; one must be left. False
+    for no point and if all are left out. start: 0 to M."""
     m = len(points)
     one = np.zeros(m - start + 1, np.bool_)
     if m == 0:
@@ -286,7 +285,8 @@ def _whole(
     sums: Array, tops: Ints, part: Array, gate: float, prior: Array, strength: float, least: float, work: Ints
 ) -> bool:
     """Returns True if the components with roots `tops` (K,) are one group, leaving out those lighter than `least`. sums
-    (M, 6): moments at the roots. part (M, 6) and work (2,) are changed: working space, number of comparisons."""
+    (M, 6): moments at the roots. gate, prior (3,), strength: as in `fit`, of the search regions. False if all are left
+    out. part (M, 6) and work (2,) are changed: working space, number of comparisons."""
     if len(tops) == 1:
         return bool(sums[tops[0], WEIGHT] >= least)
     count = 0

@@ -72,7 +72,8 @@ def overlap(dx: float, dy: float, axx: float, axy: float, ayy: float, bxx: float
 def overlaps(mean: Array, shape: Array) -> Bools:
     """Returns flags (G, G): True where two of G filled ellipses have a common point; the diagonal is True.
 
-    mean (G, 2): centres; shape (G, 2, 2): matrices A of (y - mean)' A^-1 (y - mean) <= 1, positive definite.
+    mean (G, 2): centres x, y; shape (G, 2, 2): matrices A of (y - mean)' A^-1 (y - mean) <= 1, positive definite,
+    squared unit of the centres. Ellipses that touch overlap.
     """
     count = len(mean)
     found = np.ones((count, count), np.bool_)

@@ -64,8 +64,8 @@ def constant_velocity(dt: float, axes: int) -> tuple[Array, Array]:
 def born(place: Array, var: Array | float, rate_var: Array | float) -> Array:
     """Returns the state (5, N, D) of N new filters of D coordinates at `place` (N, D), with rate 0.
 
-    Rows of the state: place, rate, variance of the place, covariance, variance of the rate. var, rate_var: variances of
-    place and rate, (D,) or a number. The covariance is 0.
+    Rows of the state: place, rate (per s), variance of the place, covariance, variance of the rate. var, rate_var:
+    variances of place and rate, (D,), (N, D) or a number. The covariance is 0.
     """
     state = np.zeros((5, *place.shape))
     state[PLACE], state[VAR], state[RATE_VAR] = place, var, rate_var
@@ -89,11 +89,12 @@ def predict(state: Array, dt: float, q: Array) -> None:
 def update(state: Array, rows: Ints, z: Array, noise: Array | float) -> Array:
     """Update the filters `rows` (K,) of a bank with measurements z (K, D), in place; each row may occur once at most.
 
-    state (5, N, D): rows place, rate, variance of the place, covariance, variance of the rate. noise: variances of the
-    measurements, (K, D) or (D,), in the covariances' unit. No rows change nothing.
+    state (5, N, D): rows place, rate, variance of the place, covariance, variance of the rate; N filters of D
+    coordinates. noise: variances of the measurements, (K, D), (D,) or a number, in the covariances' unit. No rows
+    change nothing.
 
-    Returns y^2 / S of each coordinate, (K, D): squared innovation over its variance before the update. The sum over the
-    coordinates is d^2 (eq. 9). Its unit is the squared unit of z per unit of covariance.
+    Returns y^2 / S of each coordinate, (K, D): squared innovation y = z - place over its variance S before the update.
+    The sum over the coordinates is d^2 (eq. 9). Its unit is the squared unit of z per unit of covariance.
     """
     new = state.take(rows, 1)
     place, rate, var, cov, rate_var = new
@@ -113,9 +114,10 @@ def distances(state: Array, z: Array, noise: Array | float, scale: Array | float
     """Returns squared Mahalanobis distances y' S^-1 y (N, M) of N predicted filters and M measurements z (M, D) (eq.
     9).
 
-    state (5, N, D): rows place, rate, variance of the place, covariance, variance of the rate. noise: variances of the
-    measurements, (M, D) or (D,), in the covariances' unit. scale: units of z per square root of the covariances' unit
-    (px per m), (N,) or a number.
+    y: measurement minus predicted place; S: variance of y, diagonal. state (5, N, D): rows place, rate, variance of the
+    place, covariance, variance of the rate. noise: variances of the measurements, (M, D), (D,) or a number, in the
+    covariances' unit. scale: units of z per square root of the covariances' unit (px per m), (N,) or a number. No
+    filters or measurements give an empty array.
     """
     place, spread = state[PLACE], np.reshape(np.square(scale), (-1, 1))
     if np.ndim(noise) < 2:
@@ -145,10 +147,10 @@ def _common_noise(place: Array, z: Array, w: Array) -> Array:
 def asymptote(dt: float, sigma: Array | float, noise: Array | float) -> Array:
     """Returns the innovation variance S to which a filter converges that is measured in every frame.
 
-    dt: s between frames. sigma: standard deviation of the acceleration, unit per s^2; noise: variance of a measurement,
-    unit squared, above 0; arrays of one shape or numbers, and so is the result. It solves one coordinate's Riccati
-    equation in closed form (Kalata 1984): with l = sigma dt^2 / sqrt(noise), r = (4 + l - sqrt(8 l + l^2)) / 4 and S =
-    noise / r^2.
+    S is the variance of measurement minus predicted place. dt: s between frames. sigma: standard deviation of the
+    acceleration, unit per s^2, 0 or more; noise: variance of a measurement, unit squared, above 0. Both are arrays of
+    one shape or numbers, and so is the result. It solves one coordinate's Riccati equation in closed form (Kalata
+    1984): with l = sigma dt^2 / sqrt(noise), r = (4 + l - sqrt(8 l + l^2)) / 4 and S = noise / r^2.
     """
     index = np.asarray(sigma) * dt**2 / np.sqrt(noise)
     r = (4 + index - np.sqrt(8 * index + index**2)) / 4
@@ -176,8 +178,9 @@ def directed(noise: Array) -> Bools:
 def angle_update(angle: Array, rows: Ints, z: Array, noise: Array) -> None:
     """Update the directions `rows` (K,) of `angle` (2, N) with measured directions z (K,) rad, in place.
 
-    Rows of angle: direction, rad modulo pi, and its variance, rad^2. noise (K,): variances of the measurements, rad^2.
-    A measurement with a variance of (30 degrees)^2 or more is left out.
+    Rows of angle: direction, rad modulo pi, and its variance, rad^2. An updated direction is in [0, pi). rows: indices,
+    each once at most. noise (K,): variances of the measurements, rad^2. A measurement with a variance of (30 degrees)^2
+    or more is left out. Returns nothing.
     """
     usable = directed(noise)
     rows, z, noise = rows[usable], z[usable], noise[usable]

@@ -1,9 +1,9 @@
 """The uncertainty of a track, rho = sqrt(det S) / its asymptote, and the values of rho that decide about tracks.
 
-Gonzalez et al. (2006, 4.5, 5) manage tracks by sqrt|S|, S the innovation covariance (eq. 6): it falls towards an
-asymptote while measurements are associated and rises while they are missed. It does not depend on measured values. This
-module computes rho and its thresholds; tracking.papers.blob.track_management starts, confirms and deletes tracks by
-them.
+Gonzalez et al. (2006, 4.5, 5) manage tracks by sqrt|S|, S the innovation covariance (of measurement minus predicted
+place; eq. 6). It falls towards an asymptote while measurements are associated and rises while they are missed. It does
+not depend on measured values. This module computes rho and its thresholds; tracking.papers.blob.track_management
+starts, confirms and deletes tracks by them.
 
 The paper prints no numbers. It confirms "below a certain percentage" of the asymptote; as rho falls towards 1 from
 above, the percentage is above 100. It deletes at the value that "a certain number" of misses gives. The value at birth
@@ -11,9 +11,9 @@ depends on the first covariance, too. Rules, ours where the paper has none:
 - A track is confirmed if rho <= confirm_ratio (above 1) and the measurement of that frame is near.
 - A new track must start above confirm_ratio, so that one measurement never confirms it (`check_birth`).
 - A confirmed track is deleted if rho reaches the value after k misses from the steady state. A track that is not yet in
-  the steady state gets there after fewer misses.
-- A tentative track is deleted if rho, while the track is missed, reaches its value at birth, or after a time limit. The
-  time limit is at least the time that confirmation takes (`time_to_confirm`).
+the steady state gets there after fewer misses.
+- A tentative (not confirmed) track is deleted if rho, while the track is missed, reaches its value at birth, or after a
+time limit. The time limit is at least the time that confirmation takes (`time_to_confirm`).
 """
 
 from __future__ import annotations
@@ -31,8 +31,8 @@ from tracking.filters import kalman
 class Dynamics:
     """The nominal Kalman filter of one track with D coordinates (constant velocity in each); lengths in m.
 
-    dt: step, s. sigma (D,): standard deviation of the acceleration, m/s^2. noise (D,): variance of a measurement, m^2.
-    birth_rate_var (D,): variance of a new track's rate, (m/s)^2; the variance of its place is `noise`.
+    dt: step, s. sigma (D,): standard deviation of the acceleration, m/s^2. noise (D,): variance of a measurement, m^2,
+    above 0. birth_rate_var (D,): variance of a new track's rate, (m/s)^2; the variance of its place is `noise`.
     """
 
     dt: float
@@ -47,8 +47,11 @@ class Dynamics:
 
     @property
     def asymptote(self) -> Array:
-        """Innovation variance S of each coordinate, (D,) m^2, to which a track converges that is measured in every
-        frame."""
+        """Innovation variance S (of measurement minus prediction) of each coordinate, (D,) m^2, of a track in the
+        steady state.
+
+        That is what S converges to if the track is measured in every frame.
+        """
         return kalman.asymptote(self.dt, self.sigma, self.noise)
 
     def newborn(self) -> Array:
@@ -76,26 +79,30 @@ class Dynamics:
 
 
 def rho(state: Array, noise: Array, asymptote: Array) -> Array:
-    """Returns rho (N,) of predicted filters: sqrt|S| over its asymptote, S the innovation covariance (4.5, eq. 6).
+    """Returns rho (N,) of N predicted filters: sqrt|S| over its asymptote, S the innovation covariance (4.5, eq. 6).
 
-    state (5, N, D): a bank after `predict`. noise, asymptote (D,): variance of a measurement, and S of a track measured
-    in every frame, in the covariances' unit. As S is diagonal, |S| is a product over the coordinates. rho is 1 in the
-    steady state and grows with each miss.
+    state (5, N, D): a bank after `predict`; rows place, rate, variance of the place, covariance, variance of the rate.
+    noise, asymptote (D,): variance of a measurement, and S of a track measured in every frame, in the covariances'
+    unit. As S (of measurement minus predicted place) is diagonal, |S| is a product over the D coordinates. rho is 1 in
+    the steady state and grows with each miss.
     """
     return np.asarray(np.sqrt(np.multiply.reduce((state[kalman.VAR] + noise) / asymptote, 1)))
 
 
 def after_misses(dynamics: Dynamics, misses: int) -> float:
-    """Returns rho (sqrt|S| over its asymptote) at the prediction after `misses` frames without a measurement.
+    """Returns rho (sqrt|S| over its asymptote, S the innovation covariance) at the prediction after `misses` frames
+    without a measurement.
 
-    The track was in the steady state before. misses = 0 gives 1, up to rounding.
+    The track was in the steady state (measured in every frame for long) before. misses = 0 gives 1, up to rounding.
     """
     return _rho_after(dynamics, dynamics.steady(), misses + 1)
 
 
 def at_birth(dynamics: Dynamics) -> float:
-    """Returns rho (sqrt|S| over its asymptote) at the first prediction of a new track, one step after its first
-    measurement."""
+    """Returns rho of a new track at its first prediction, one step after its first measurement.
+
+    rho is sqrt|S| over its asymptote, S the innovation covariance.
+    """
     return _rho_after(dynamics, dynamics.newborn(), 1)
 
 
@@ -103,8 +110,8 @@ def hits_to_confirm(dynamics: Dynamics, confirm_ratio: float, limit: int = 1000)
     """Returns how many frames with a measurement in a row, the first included, bring a new track's rho down to
     confirm_ratio.
 
-    rho is sqrt|S| over its asymptote, at the prediction for the last of these frames; so the result is at least 2.
-    Returns `limit` if that many frames or more are needed.
+    rho is sqrt|S| over its asymptote, S the innovation covariance, at the prediction for the last of these frames; so
+    the result is at least 2. Returns `limit` if that many frames or more are needed, or if they never do.
     """
     state, q = dynamics.newborn(), dynamics.q
     for hits in range(1, limit):
@@ -127,10 +134,11 @@ def _rho_after(dynamics: Dynamics, state: Array, steps: int) -> float:
 
 
 def check_birth(dynamics: Dynamics, confirm_ratio: float) -> None:
-    """Raises InputError if rho of a new track (sqrt|S| over its asymptote) is at or below confirm_ratio, else returns
+    """Raises InputError if rho of a new track at its first prediction is at or below confirm_ratio, else returns
     nothing.
 
-    Its first measurement would confirm such a track.
+    rho is sqrt|S| over its asymptote, S the innovation covariance. Its first measurement after birth would confirm such
+    a track.
     """
     start = at_birth(dynamics)
     if start <= confirm_ratio:
