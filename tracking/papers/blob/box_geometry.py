@@ -65,8 +65,9 @@ def fuse_pieces(pieces: Array) -> Array:
     """Returns one centred box (4,) with the area-weighted mean and variance of several filled boxes, pieces (K, 4), K
     >= 1.
 
-    Centred boxes are centre x, y, height, width, px; at least one piece must have an area. A filled box of side L has
-    variance L^2 / 12 along it, and the spread of the centres is added. So two halves of a box give the box itself.
+    Centred boxes are centre x, y, height, width, px; at least one piece must have an area, else the result is nan. A
+    filled box of side L has variance L^2 / 12 along it, and the spread of the centres is added. So two halves of a box
+    give the box itself.
     """
     centre, side = pieces[:, :2], pieces[:, :1:-1]
     w = np.prod(side, 1)
@@ -79,7 +80,8 @@ def fuse_pieces(pieces: Array) -> Array:
 def covered_share(place: Array, others: Array) -> Array:
     """Returns the share (N, M), 0 to 1, of each box of `place` (N, 4) that lies in each box of `others` (M, 4).
 
-    All are centred boxes: centre x, y, height, width, px. The share is of the area of the box of `place`.
+    All are centred boxes: centre x, y, height, width, px. The share is of the area of the box of `place`; 0 for a box
+    without area.
     """
     shared = np.ones((len(place), len(others)))
     for centre, side in ((0, 3), (1, 2)):
@@ -103,7 +105,7 @@ def hull_iou(places: Array, box: Array) -> float:
     """Returns the IoU, 0 to 1, of the bounding box of several boxes `places` (K, 4), K at least 1, with another `box`
     (4,).
 
-    All are centred boxes: centre x, y, height, width, px.
+    All are centred boxes: centre x, y, height, width, px. Raises ZeroDivisionError if both have no area.
     """
     low = (places[:, :2] - places[:, :1:-1] / 2).min(0)
     high = (places[:, :2] + places[:, :1:-1] / 2).max(0)

@@ -181,8 +181,10 @@ class BlobConfig(BackgroundSettings):
         """Returns the nominal filter of the coordinates x, y, h, w (centre, height, width), lengths in m, at `fps`
         frames per s.
 
-        The acceleration noises are roots of spectral densities, so sigma = noise / sqrt(dt) (ours). Raises InputError
-        if the first measurement of a new track would confirm it (rho at birth at or below confirm_ratio).
+        The acceleration noises are roots of spectral densities, so sigma = noise / sqrt(dt) (ours): sigma is the
+        standard deviation of the acceleration in a step, dt = 1 / fps s. Raises InputError if the first measurement of
+        a new track would confirm it: its uncertainty rho at birth, relative to the steady state, is at or below
+        confirm_ratio.
         """
         root = np.sqrt(fps)
         accel, size = self.accel_noise * root, self.size_accel_noise * root

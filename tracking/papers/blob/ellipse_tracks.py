@@ -28,8 +28,9 @@ class TrackedEllipses(TrackedPeople):
     """The table of N tracks from pixels: filters of ellipses, with a direction and a nominal covariance for each track.
 
     State, beside that of TrackedPeople: angle (2, N), direction of the first axis (rad) and its variance (rad^2);
-    nominal (5, N, 4), a bank of filters as `bank`, updated with the nominal noise, from which rho follows. In `bank`
-    the coordinates are x, y, h, w: centre and full axes of the ellipse.
+    nominal (5, N, 4), a bank of filters as `bank`, updated with the nominal noise, from which the uncertainty rho
+    follows; angle_var_per_step, growth of the direction's variance in a frame. In `bank` the coordinates are x, y, h,
+    w: centre and full axes of the ellipse.
     """
 
     def __init__(self, config: BlobConfig, dynamics: track_uncertainty.Dynamics, context: Context) -> None:
@@ -44,14 +45,15 @@ class TrackedEllipses(TrackedPeople):
         self.angle_var_per_step = np.radians(rate) ** 2 * dynamics.dt
 
     def predict(self) -> None:
-        """Predict all tracks one frame ahead, in place (eqs 1, 2), and compute rho; directions stay, their variances
-        grow."""
+        """Predict all tracks one frame ahead, in place (eqs 1, 2), and compute their uncertainty rho; directions stay,
+        their variances grow."""
         kalman.predict(self.nominal, self.dynamics.dt, self.q)
         self.angle[kalman.DIRECTION_VAR] += self.angle_var_per_step
         super().predict()
 
     def compute_rho(self) -> Array:
-        """Returns rho (N,) of all tracks, sqrt|S| over its asymptote, from the nominal covariance of x, y, h, w."""
+        """Returns rho (N,) of all tracks: sqrt|S| over its asymptote, S the innovation covariance by the nominal
+        covariance of x, y, h, w; 1 in the steady state."""
         return track_uncertainty.rho(self.nominal, self.noise, self.asymptote)
 
     def upright_boxes(self) -> Array:
@@ -64,10 +66,12 @@ class TrackedEllipses(TrackedPeople):
         super().keep_only(rows)
 
     def start_tracks(self, z: Array, score: Array, t: float) -> None:
-        """Append a tentative track at rest for each ellipse z (K, 5): centre x, y, axes h, w (px), theta (rad).
+        """Append a tentative track at rest for each ellipse z (K, 5): centre x, y, full axes h, w (px), direction theta
+        (rad).
 
-        score (K,): 0 to 1; t: time of the frame, s. No ellipse changes nothing. The variance of the direction starts at
-        kalman.VAGUE, so that the next measured direction counts for more.
+        score (K,): 0 to 1; t: time of the frame, s. No ellipse changes nothing. The tracks get fresh ids, in order, and
+        count as measured. The variance of the direction starts at (30 degrees)^2, so that the next measured direction
+        counts for more.
         """
         super().start_tracks(z[:, :4], score, t)
         new = np.stack([z[:, 4], np.full(len(z), kalman.VAGUE)])
@@ -77,8 +81,9 @@ class TrackedEllipses(TrackedPeople):
     def direction_distances(self, z: Array, angle_var: Array) -> Array:
         """Returns the direction's part y^2 / S of the squared distance d^2 (eq. 9) of N tracks and M ellipses, (N, M).
 
-        z (M,): measured directions, rad; angle_var (M,): their variances, rad^2. The part is 0 for an ellipse whose
-        variance is (30 degrees)^2 or more, as its direction carries no information.
+        y: measured less predicted direction, modulo pi; S: the sum of both variances. z (M,): measured directions, rad;
+        angle_var (M,): their variances, rad^2. The part is 0 for an ellipse whose variance is (30 degrees)^2 or more,
+        as its direction carries no information.
         """
         s = self.angle[kalman.DIRECTION_VAR][:, None] + angle_var
         turn = kalman.angle_innovation(z, self.angle[kalman.DIRECTION][:, None])
@@ -101,9 +106,9 @@ class TrackedEllipses(TrackedPeople):
     def relax_axes(self, rows: Ints, axes: Array, var: float) -> None:
         """Move the axes h, w of the tracks at positions `rows` (K,) towards expected axes (K, 2), px, in place (ours).
 
-        var: variance of people's axes about the expected ones, m^2. An Ornstein-Uhlenbeck step: s = exp(-dt /
-        RELAXATION), x = s x + (1 - s) expected, P = s^2 P + (1 - s^2) var. It is no measurement, as the expectation is
-        the same in every frame. rho does not change.
+        var: variance of people's axes about the expected ones, m^2. An Ornstein-Uhlenbeck step: s = exp(-dt / 0.5 s),
+        dt the frame's s; axes x = s x + (1 - s) expected; their variance P = s^2 P + (1 - s^2) var; their covariance
+        with the rate times s. It is no measurement, as the expectation is the same in every frame. rho does not change.
         """
         stay = np.exp(-self.dynamics.dt / RELAXATION)
         bank = self.bank[:, rows, 2:]

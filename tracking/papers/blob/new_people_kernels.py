@@ -27,9 +27,9 @@ ROUNDING = 1e-9  # added to an upper bound, so that rounding excludes nothing
 def part_feet(label: Labels, which: int, box: Ints, most: int) -> Array:
     """Returns where the parts of a region stand, (1 + 2 + … + most, 2): x and foot, px, of the 1, 2, … `most` parts.
 
-    The region has the label `which` in label (H, W) and the box (4,) left, top, width, height. It is cut into parts of
-    as many pixels each, from left to right. x is the mean of a part's columns, foot the 0.98 quantile of its rows, both
-    at the pixels' centres or lower edges.
+    The region has the label `which` in label (H, W), the box (4,) left, top, width, height, px, and at least `most`
+    pixels. It is cut into parts of as many pixels each (the first ones have one more), from left to right. x is the
+    mean of a part's columns at the pixels' centres, foot the 0.98 quantile of its rows at their lower edges.
     """
     left, top, wide, high = box
     per_row = np.zeros(high, np.int64)
@@ -91,9 +91,10 @@ def fit_new_people(
 
     foreground (H, W) bool; cover (H, W): painted templates per pixel, changed in place. guesses (1 + 2 + … + most, 4):
     first places for 1, 2, … people, one number after the other; from there fit_places moves them, with `spread` (one
-    row per guess: standard deviation of x and foot, px) and `nats` of evidence. person: area of a person, px. The best
-    number has the largest joint support in units of `person`, less `support` for each person. Each template must have
-    the share `support` of its own. Numbers that cannot be better than the best so far are not tried.
+    row per guess: standard deviation of x and foot, px) and `nats`, the log-likelihood of full support. person: area of
+    a person, px^2. The best number has the largest joint support in units of `person`, less `support` for each person.
+    Joint support: covered pixels, 1 for foreground, -1/2 for background. Each template must have the share `support` of
+    its own. Numbers that cannot be better than the best so far are not tried.
     """
     best, worth = np.zeros((0, 4)), 0.0
     first, bound = 0, unexplained_within_reach(foreground, cover, guesses) / person + ROUNDING
@@ -136,8 +137,8 @@ def joint_support(foreground: Bools, cover: Cover, templates: Array) -> float:
     """Returns the sum over the pixels that at least one of the templates (K, 4) x, foot, h, w covers, in foreground
     pixels.
 
-    A pixel counts 1 if it is foreground, -1/2 if not, 0 if something else is painted there. The templates must not be
-    painted; `cover` (H, W) is the same afterwards.
+    A pixel counts 1 if it is foreground, -1/2 if not, 0 if something else is painted there. A template of which less
+    than 0.3 is inside the image counts less. The templates must not be painted; `cover` (H, W) is the same afterwards.
     """
     total = 0.0
     for k in range(len(templates)):

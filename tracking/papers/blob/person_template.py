@@ -25,8 +25,9 @@ class ExplainedForeground:
     """One frame's foreground, and what explains it: templates (upright ellipses x, foot, h, w, px) and blobs of one
     person.
 
-    State: foreground (H, W) bool. cover (H, W) int16: the number of templates painted over each pixel, plus
-    kernels.EXPLAINED = 1000 where a blob of one person explains the pixel; 0 at first.
+    A template fills a box h high and w wide round column x, with its lower edge at row foot. State: foreground (H, W)
+    bool. cover (H, W) int16: the number of templates painted over each pixel, plus kernels.EXPLAINED = 1000 where a
+    blob of one person explains the pixel; 0 at first.
     """
 
     def __init__(self, foreground: Bools) -> None:
@@ -49,20 +50,23 @@ class ExplainedForeground:
     def fit_places(self, templates: Array, spread: Array, evidence: float) -> Array:
         """Returns the templates (K, 4) x, foot, h, w, px, at the places where they explain most together; paints them.
 
-        templates (K, 4): at their expected places, not painted, not changed. Sizes stay. Those with low feet (near
-        people) move first. spread (K, 2): standard deviation, px, of the expected x and foot. evidence: log-likelihood
-        of a template with full support.
+        templates (K, 4): at their expected places, not painted, not changed. Sizes stay. Each in turn moves to the
+        largest evidence * support - d^2 / 2, those with low feet (near people) first. d: distance from its expected
+        place in standard deviations; support: at most 1, the foreground that it alone covers, less half the background,
+        over its area. spread (K, 2): standard deviation, px, of the expected x and foot. evidence: log-likelihood of a
+        template with full support.
         """
         return search.fit_places(self.foreground, self.cover, templates, spread, evidence)
 
     def prune(self, templates: Array, least: float, *, pieces: bool = False) -> Ints:
-        """Returns the rows, ascending, of painted templates (K, 4) that have enough support; erases the others, weakest
-        first.
+        """Returns the rows, ascending, of painted templates (K, 4) x, foot, h, w, px, that have enough support; erases
+        the others, weakest first.
 
-        The support of the remaining templates is computed anew after each removal. least: the support needed, a share
-        of the template's area. pieces: compare instead the share of foreground among the pixels that the template alone
-        covers, so that a visible piece of a person is enough; 0 if these are less than kernels.BARE of the template. Of
-        two templates on one person either share is low, and one template is erased.
+        The support of a template: the pixels that it alone covers, 1 for foreground, -1/2 for background, over its
+        area. That of the remaining ones is computed anew after each removal. least: the support needed. pieces: compare
+        instead the share of foreground among the pixels that the template alone covers, so that a visible piece of a
+        person is enough; 0 if these are less than kernels.BARE = 0.1 of the template. Of two templates on one person
+        either share is low, and one template is erased.
         """
         return np.flatnonzero(kernels.prune(self.foreground, self.cover, templates, least, pieces))
 

@@ -60,7 +60,8 @@ def row_range(foot: float, h: float, high: int) -> tuple[int, int]:
 
 @kernel
 def area(template: Array, high: int, wide: int) -> float:
-    """Returns the area, px, of a template (4,) x, foot, h, w inside an image of high x wide px.
+    """Returns the area, px^2, of a template (4,) x, foot, h, w (px; upright ellipse, lower edge at row foot) inside an
+    image of high x wide px.
 
     The share inside is taken to be that of the template's box. It is at least LEAST_INSIDE = 0.3 of the whole ellipse.
     """
@@ -172,10 +173,11 @@ def piece_support(foreground: Bools, cover: Cover, template: Array) -> float:
 
 @kernel
 def piece_supports(foreground: Bools, cover: Cover, templates: Array) -> Array:
-    """Returns for each painted template (K, 4) x, foot, h, w the share of foreground, (K,), among the pixels it alone
-    covers.
+    """Returns for each painted template (K, 4) x, foot, h, w the share of foreground, (K,), 0 to 1, among the pixels it
+    alone covers.
 
-    0 for a template of which less than BARE = 0.1 is free of others.
+    foreground (H, W) bool; cover (H, W): number of templates per pixel. 0 for a template of which less than BARE = 0.1
+    is free of others.
     """
     found = np.zeros(len(templates))
     for k in range(len(templates)):
@@ -224,10 +226,12 @@ def visible_share(cover: Cover, templates: Array) -> Array:
 
 @kernel
 def prune(foreground: Bools, cover: Cover, templates: Array, least: float, by_pieces: bool) -> Bools:
-    """Returns flags (K,): True for each painted template that stays; erases the others from `cover` (H, W), in place.
+    """Returns flags (K,): True for each painted template (x, foot, h, w, px) that stays; erases the others from `cover`
+    (H, W), in place.
 
-    The weakest template is erased, and the support of its neighbours computed anew, until the weakest has `least`: of
-    support, or of piece support (share of foreground among the pixels that it alone covers) if `by_pieces`.
+    The weakest template is erased, and the support of its neighbours computed anew, until the weakest has `least`.
+    Support: the pixels that it alone covers, 1 for foreground, -1/2 for background, over its area. If `by_pieces`: the
+    share of foreground among these pixels. Without templates the flags are empty.
     """
     stays = np.ones(len(templates), np.bool_)
     worth = piece_supports(foreground, cover, templates) if by_pieces else supports(foreground, cover, templates, 1)
@@ -248,7 +252,7 @@ def prune(foreground: Bools, cover: Cover, templates: Array, least: float, by_pi
 
 @kernel
 def boxes_touch(one: Array, other: Array) -> bool:
-    """Returns True if the boxes of two templates (4,) x, foot, h, w overlap or are at most 1 px apart in both
+    """Returns True if the boxes of two templates (4,) x, foot, h, w, px, overlap or are at most 1 px apart in both
     directions."""
     aside = abs(one[X] - other[X]) <= (one[WIDTH] + other[WIDTH]) / 2 + 1
     top, other_top = one[FOOT] - one[HEIGHT], other[FOOT] - other[HEIGHT]

@@ -106,9 +106,10 @@ def best_place(
     """Returns x and foot, px, on the grid round template `at` (4,) x, foot, h, w with the largest evidence * support -
     d^2 / 2.
 
-    d is the distance from the expected place in standard deviations. at: not painted. expected (4,): template at its
-    expected place; spread (2,): standard deviation of its x and foot, px. evidence: log-likelihood of full support.
-    fine: use the fine grid. Returns the place of `at` unless another one is better.
+    d is the distance from the expected place in standard deviations. Support: the pixels that nothing covers, 1 for
+    foreground, -1/2 for background, over the template's area. foreground, cover (H, W). at: not painted. expected (4,):
+    template at its expected place; spread (2,): standard deviation of its x and foot, px. evidence: log-likelihood of
+    full support. fine: use the fine grid. Returns the place of `at` unless another one is better.
     """
     step, steps = max(at[HEIGHT] / STEPS_PER_HEIGHT, 1.0), FINE_STEPS
     if fine:

@@ -35,7 +35,7 @@ class TrackedPeople:
         bank (5, N, 4)      Kalman filters of x, y, h, w (tracking.filters.kalman); places px, covariances m^2
         id (N,)             never used again; next_id: that of the next track, from 1
         scale (N,)          px per m
-        rho (N,)            sqrt|S| over its asymptote at the last prediction
+        rho (N,)            uncertainty: sqrt|S| (innovation covariance) over its asymptote at the last prediction
         born (N,)           time of the first measurement, s
         score (N,)          score of the last measurement, 0 to 1
         hits (N,)           frames with a measurement
@@ -43,7 +43,9 @@ class TrackedPeople:
         confirmed (N,)      True once confirmed; else the track is tentative
         measured (N,)       True if measured in this frame
         miss_explained (N,) True if another track or a merged box explained a miss since the last measurement
-        view_low, view_high (2,)   corners x, y of the field of view, px
+        view_low, view_high (2,)   corners x, y of the field of view, px; inf and -inf before it is known
+    Also config, context, dynamics (the nominal filter), top (True from straight above), and thresholds of rho by
+    `follow`.
     """
 
     def __init__(self, config: BlobConfig, dynamics: track_uncertainty.Dynamics, context: Context) -> None:
@@ -78,8 +80,8 @@ class TrackedPeople:
         self.confirmed, self.measured, self.miss_explained = flags
 
     def _rho_after(self, seconds: float) -> float:
-        """Returns rho (sqrt|S| over its asymptote) in the frame that ends `seconds` without measurement, from the
-        steady state.
+        """Returns rho (sqrt|S|, S the innovation covariance, over its asymptote) in the frame that ends `seconds`
+        without measurement, from the steady state.
 
         Seconds are rounded up to whole frames.
         """
@@ -134,9 +136,10 @@ class TrackedPeople:
     def associate(self, cost: Array, gate: float) -> tuple[Ints, Ints]:
         """Returns rows and columns (K,) of associated tracks and measurements, one to one.
 
-        cost (N, M): d^2 of track and measurement inside the gates, inf outside; gate: the widest gate, a d^2.
-        association = "nearest" (4.4): each measurement chooses its nearest track, and each track keeps the nearest of
-        these. "optimal" (ours): least total d^2 + 2 ln rho; a lone pair inside a gate is always associated.
+        cost (N, M): d^2 (squared Mahalanobis distance) of track and measurement inside the gates, inf outside; gate:
+        the widest gate, a d^2. association = "nearest" (4.4): each measurement chooses its nearest track, and each
+        track keeps the nearest of these. "optimal" (ours): least total d^2 + 2 ln rho (rho: the track's uncertainty); a
+        lone pair inside a gate is always associated. K may be 0.
         """
         if self.config.association == "nearest":
             return assignment.cheapest_per_track(*assignment.nearest(cost), cost)
@@ -184,10 +187,10 @@ class TrackedPeople:
     def delete_tracks(self, t: float) -> None:
         """Delete tracks from the table at time t, s (5, and ours).
 
-        Deleted are: missed confirmed tracks whose rho reached the value after coast_time (the longer of it and
-        merged_time if the miss is explained); missed tentative tracks whose rho reached its value at birth; tentative
-        tracks older than their time limit; missed tracks whose centre is outside the image, if the image's size is
-        known.
+        rho is a track's uncertainty, which grows with misses. Deleted are: missed confirmed tracks whose rho reached
+        the value after coast_time (the longer of it and merged_time if the miss is explained); missed tentative tracks
+        whose rho reached its value at birth; tentative tracks older than tentative_time, or than a confirmation takes
+        if that is longer; missed tracks whose centre is outside the image, if the image's size is known.
         """
         lost = (~(self.measured & self.confirmed)).nonzero()[0]
         if not len(lost):
@@ -239,9 +242,9 @@ class TrackedPeople:
         """Returns the table positions (K,), ascending, of the tracks to report at time t, s (ours).
 
         Reported are measured tracks that are confirmed or at least report_delay old. A missed confirmed track is
-        reported until rho passes the value after report_coast (the longer of it and report_hidden if the miss is
-        explained), for at most report_credit times the frames in which it was measured, and not while it leaves the
-        field of view.
+        reported until its uncertainty rho passes the value after report_coast (the longer of it and report_hidden if
+        the miss is explained), while its misses since the last measurement are at most report_credit times the frames
+        in which it was measured, and not while it leaves the field of view.
         """
         reported = self.measured & (self.confirmed | (t - self.born >= self.config.report_delay - 1e-6))
         lost = (self.confirmed & ~self.measured).nonzero()[0]

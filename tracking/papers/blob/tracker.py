@@ -114,8 +114,11 @@ class Blob:
         return self._report(frame)
 
     def _report(self, frame: Frame) -> Tracks:
-        """Returns the Tracks to report in this frame. With a camera a track above the horizon has no ground position:
-        left out."""
+        """Returns the Tracks to report in this frame, each `group` -1: in the image (px), or with a camera on the
+        ground (m).
+
+        With a camera a track above the horizon has no ground position and is left out.
+        """
         people = self.people
         rows = people.rows_to_report(frame.t)
         state, scale = people.bank.take(rows, 1), people.scale[rows]

@@ -22,8 +22,9 @@ INSIDE = 0.8  # share of a box that must lie in a larger predicted box to be a p
 class BoxUpdater:
     """Updates the tracks of `people` from the boxes of each frame.
 
-    State: people, the table of tracks; config; noise, asymptote (4,), variance of a measurement and asymptotic S of x,
-    y, h, w, m^2; gate, orphan_gate, confirm_gate: largest d^2 (squared Mahalanobis distance) at the config's shares.
+    State: people, the table of tracks; config; noise (4,): variance of a measurement of x, y, h, w, m^2; asymptote
+    (4,): innovation variance S of a track measured in every frame, m^2; gate, orphan_gate, confirm_gate: largest d^2
+    (squared Mahalanobis distance) at the config's shares.
     """
 
     def __init__(self, config: BlobConfig, people: TrackedPeople) -> None:
@@ -42,8 +43,9 @@ class BoxUpdater:
     def step(self, frame: Frame, detections: Detections | None) -> None:
         """Update the tracks with a frame's detections: predict, associate, update, confirm, delete, start.
 
-        None, detections without boxes and no detection are a frame without measurement. Raises InputError if there are
-        usable boxes and the scale (px per m) is unknown; then nothing is changed.
+        detections: boxes and scores; None, detections without boxes and no detection are a frame without measurement.
+        Boxes without area or below score_continue are ignored. Raises InputError if there are usable boxes and the
+        scale (px per m) is unknown, zero or negative; then nothing is changed.
         """
         z, score = self._measurements(detections)
         people = self.people
@@ -86,8 +88,10 @@ class BoxUpdater:
         """Returns rows and columns (K,) of associated tracks and measurements, flags (M,) of free measurements, and d^2
         (N, M).
 
-        z (M, 4): centred boxes, px; score (M,). d^2: squared Mahalanobis distance, eq. 9; gates: eq. 10. Measurements
-        below score_start choose after all others (ours).
+        z (M, 4): centred boxes: centre x, y, height, width, px; score (M,), 0 to 1. Pairs are one to one; free are
+        measurements in no pair. d^2: squared Mahalanobis distance of each of N tracks and M measurements, eq. 9; gates:
+        eq. 10. Measurements below score_start choose after all others (ours). Without tracks or measurements K = 0, all
+        are free and d^2 is 0.
         """
         people, free = self.people, np.ones(len(z), bool)
         if not len(z) or not len(people.id):
@@ -105,11 +109,12 @@ class BoxUpdater:
         return rows, columns, free, d2
 
     def _weak_pairs(self, cost: Array, taken: Ints) -> tuple[Ints, Ints]:
-        """Returns rows and columns (K,) of pairs of weak measurements (below score_start) and tracks that are not
-        `taken`.
+        """Returns rows and columns (K,) of pairs of tracks that are not `taken` and weak measurements (below
+        score_start).
 
-        cost (N, M): d^2 inside the gates, inf outside and for strong measurements; it may be changed. taken: positions
-        of tracks that have a measurement. With "nearest" a measurement whose nearest track is taken has no pair.
+        cost (N, M): d^2 (squared Mahalanobis distance) inside the gates, inf outside and for strong measurements; it
+        may be changed. taken: positions of tracks that have a measurement. With "nearest" a measurement whose nearest
+        track is taken has no pair.
         """
         if self.config.association == "optimal":
             cost[taken] = np.inf
@@ -122,9 +127,9 @@ class BoxUpdater:
         """Returns the pairs rows, columns (K,) of tracks and boxes z (M, 4) without those whose box covers several
         people (ours).
 
-        The wide gate of a long-missed track would let such a box in. Only boxes whose size is outside the gate of a
-        track that is measured in every frame are examined; if all tracks are associated, none is. Missed tracks in such
-        a box get miss_explained.
+        z: centre x, y, height, width, px. The wide gate of a long-missed track would let such a box in. Only boxes
+        whose size is outside the gate of a track that is measured in every frame are examined; if all tracks are
+        associated, none is. Missed tracks in such a box get miss_explained: they survive longer.
         """
         people = self.people
         if len(rows) == len(people.id):
@@ -144,10 +149,11 @@ class BoxUpdater:
         """Returns positions (K,), scores (K,) and measurements (K, 4) of the tracks with pieces fused, and free flags
         (M,).
 
-        rows, columns: associated tracks and measurements z (M, 4): centre x, y, height, width, px; free (M,) bool,
-        changed in place; d2 (N, M). Free measurements that are pieces of a track (`_owners`) are fused, together with
-        the track's own measurement if it has one. The fused box updates the track if it is nearer than the own
-        measurement, or, without one, inside the gate. A piece is no longer free in any case.
+        rows, columns: associated tracks and measurements z (M, 4): centre x, y, height, width, px; score (M,); free
+        (M,) bool, changed in place; d2 (N, M): squared Mahalanobis distances. Free measurements that are pieces of a
+        track's person (`_owners`) are fused into one box, with the track's own measurement if it has one. The fused box
+        updates the track if it is nearer than the own measurement, or, without one, inside the gate. A piece is no
+        longer free in any case. The score is that of the own measurement, else the best of the pieces.
         """
         people, measured, best = self.people, z[columns], score[columns]
         left = free.nonzero()[0]
@@ -177,9 +183,10 @@ class BoxUpdater:
         (ours).
 
         rows: positions of the measured tracks. pieces (K, 4): centre x, y, height, width, px. d2 (N, K): squared
-        distances. A piece belongs to the nearest measured track if it lies in that track's orphan_gate, by the S of a
-        track measured in every frame. Otherwise it belongs to the confirmed track that covers most of it, if it is
-        smaller than the predicted box, its centre lies inside and INSIDE = 0.8 of it is covered.
+        Mahalanobis distances of N tracks. A piece belongs to the nearest measured track if it lies in that track's
+        orphan_gate, by the variance S of a track measured in every frame. Otherwise it belongs to the confirmed track
+        that covers most of it, if it is smaller than the predicted box, its centre lies inside and INSIDE = 0.8 of it
+        is covered.
         """
         people = self.people
         place, owner = people.bank[kalman.PLACE], np.full(len(pieces), -1)
@@ -219,7 +226,8 @@ class BoxUpdater:
         """Returns the columns (K,), ascending, of the measurements that start tracks.
 
         They are free, have at least score_start and do not cover several people. z (M, 4): centre x, y, height, width,
-        px; score, free (M,). Tracks hidden in a box that covers several get miss_explained.
+        px; score, free (M,): score and whether no track has it. Missed confirmed tracks in a box that covers several
+        get miss_explained.
         """
         left, people = (free & (score >= self.config.score_start)).nonzero()[0], self.people
         if not len(left):

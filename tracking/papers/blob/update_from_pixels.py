@@ -42,9 +42,9 @@ LEAST_SHOWN = 0.2  # a person of whom a smaller share is visible is measured as 
 class Measured(NamedTuple):
     """Measurements of K tracks, one row each.
 
-    rows (K,): table positions of the tracks. z (K, 5): ellipse: centre x, y, axes h, w (px), theta (rad). noise (K, 4):
-    variances of x, y, h, w, m^2. angle_var (K,): variance of theta, rad^2, inf if it is not measured. support (K,), 0
-    to 1: how well the template is filled with foreground; 1 for a blob of one person.
+    rows (K,): table positions of the tracks, from 0. z (K, 5): ellipse: centre x, y, full axes h, w (px), direction
+    theta of h (rad). noise (K, 4): variances of x, y, h, w, m^2. angle_var (K,): variance of theta, rad^2, inf if it is
+    not measured. support (K,), 0 to 1: how well the template is filled with foreground; 1 for a blob of one person.
     """
 
     rows: Ints
@@ -62,9 +62,9 @@ class PixelUpdater:
     """Updates the tracks of `people` from the picture of each frame.
 
     State: foreground, the pipeline with its background model; size, the size of a person at each place; people, the
-    table of tracks; config; gates, confirm_gates (2,): largest squared Mahalanobis distance d^2, without and with
-    direction, of an association and of a measurement that may confirm a track; angle_noise: variance of a measured
-    direction, rad^2.
+    table of tracks; config; context, of the sequence; gates, confirm_gates (2,): largest squared Mahalanobis distance
+    d^2, without and with direction, of an association and of a measurement that may confirm a track; angle_noise:
+    variance of a measured direction, rad^2; upright_var: that of an upright template, inf from straight above.
     """
 
     def __init__(self, config: BlobConfig, people: TrackedEllipses, context: Context) -> None:
@@ -87,13 +87,14 @@ class PixelUpdater:
         self._set(config)
 
     def follow(self, config: BlobConfig) -> None:
-        """Replace the config, which `people` must follow already; background and person size stay as learned."""
+        """Replace the config, which `people` must follow already; background and person size stay as learned. Gates are
+        computed anew."""
         self.foreground.follow(config, config.most_foreground)
         self._set(config)
 
     def _set(self, config: BlobConfig) -> None:
-        """Keep the config and compute from it the gates (largest d^2, squared Mahalanobis distance) and the direction's
-        variance."""
+        """Keep the config and compute from it the gates (largest d^2, squared Mahalanobis distance, without and with
+        direction) and angle_noise, the variance of a measured direction, rad^2."""
         from scipy.special import chdtri
 
         self.config = config
@@ -103,7 +104,11 @@ class PixelUpdater:
         self.angle_noise = np.radians(config.angle_noise) ** 2
 
     def _take_scale(self) -> None:
-        """If the context has no scale (nan), use the learned one, px per m, for foreground and tracks."""
+        """If the context has no scale (nan), use the learned one, px per m, for foreground and tracks; the context
+        stays nan.
+
+        While none is learned, the tracks get that of an image 18 m high.
+        """
         if np.isnan(self.context.px_per_m):
             self.foreground.px_per_m = self.size.px_per_m
             self.people.context = self.context.replace(px_per_m=self.foreground.scale)
@@ -145,7 +150,8 @@ class PixelUpdater:
         people.delete_tracks(t)
 
     def _protected(self) -> Bools:
-        """Returns a mask (H, W), True at the places of confirmed tracks: there the background must not adapt."""
+        """Returns a mask (H, W), True in ellipses at the places of confirmed tracks: there the background must not
+        adapt."""
         boxes = self._person_boxes(self.people.upright_boxes()[self.people.confirmed])
         return template_mask(self.foreground.shape, box_geometry.standing(boxes))
 
@@ -157,8 +163,9 @@ class PixelUpdater:
     def _measure(self, t: float, mask: Bools, found: Blobs) -> None:
         """Update, confirm, delete and start tracks with the foreground of a frame at time t, s.
 
-        mask (H, W) bool: the cleaned foreground; found: its blobs. Blobs of one person are associated; with `split`,
-        and once the size of people is reliable, other foreground is divided among the tracks by templates.
+        mask (H, W) bool: the cleaned foreground; found: its blobs, connected regions. Blobs of one person are
+        associated; with `split`, and once the size of people is reliable, other foreground is divided among the tracks
+        by templates (upright ellipses). Else all blobs are associated. Foreground that no track explains starts tracks.
         """
         people, c = self.people, self.config
         expected = people.upright_boxes()
@@ -187,18 +194,20 @@ class PixelUpdater:
         people.start_tracks(unexplained, np.ones(len(unexplained)), t)
 
     def _relax_sizes(self) -> None:
-        """Move the axes of all tracks, in place, towards those of a person at their places; a track stays where these
-        are unknown."""
+        """Move the axes of all tracks, in place, a step towards those of a person at their places.
+
+        Axes do not change where a person's size is unknown. `person_noise` (m) is the spread of people about it.
+        """
         at = box_geometry.standing(self.people.upright_boxes())
         axes = self.size.axes(at[:, :2])
         rows = np.flatnonzero(np.isfinite(axes).all(1))
         self.people.relax_axes(rows, -np.sort(-axes[rows]), self.config.person_noise**2)
 
     def _lone_people(self, found: Blobs, expected: Array) -> Bools:
-        """Returns flags (M,): True for each blob that is taken for one person.
+        """Returns flags (M,): True for each blob of `found` that is taken for one person.
 
-        It has one person's size, the image's edge does not cut it, and at most one confirmed track is expected in it.
-        expected (N, 4): boxes of all tracks: centre x, y, height, width, px.
+        It has one person's size (so False where that is unknown), the image's edge does not cut it, and at most one
+        confirmed track is expected in it. expected (N, 4): boxes of all tracks: centre x, y, height, width, px.
         """
         one = self.size.one_person(found.box, found.ellipse)
         return np.asarray(one & ~found.cut() & ~self._several_expected(found.box, expected))
@@ -206,7 +215,8 @@ class PixelUpdater:
     def _person_boxes(self, upright: Array) -> Array:
         """Returns the boxes (N, 4) of people whose ellipses have the bounding boxes `upright` (N, 4).
 
-        Both are centre x, y, height, width, px. A person's box differs from its ellipse's by the learned factors.
+        Both are centre x, y, height, width, px. Height and width are multiplied by learned factors, the median ratios
+        of a person's box to its ellipse's; the centre stays.
         """
         return np.concatenate([upright[:, :2], upright[:, 2:] * self.size.box_over_ellipse], 1)
 
@@ -229,12 +239,12 @@ class PixelUpdater:
         return np.asarray((box_geometry.covered_share(sure, blobs) >= SHARED).sum(0) > 1)
 
     def _associate(self, z: Array, angle_var: Array) -> tuple[Ints, Ints, Bools]:
-        """Returns rows and columns (K,) of associated tracks and ellipses, and flags (M,) of the ellipses that are in
-        any gate.
+        """Returns rows and columns (K,) of associated tracks and ellipses, one to one, and flags (M,) of the ellipses
+        that are in any gate.
 
-        z (M, 5): centre x, y, axes h, w (px), theta (rad); angle_var (M,): variance of theta, rad^2. The gate has 5
-        degrees of freedom if the ellipse has a direction, else 4 (eqs 9, 10). Seen from straight above it always has 4,
-        as people turn on the spot.
+        z (M, 5): centre x, y, axes h, w (px), theta (rad); angle_var (M,): variance of theta, rad^2. The gate, a limit
+        of the squared Mahalanobis distance, has 5 degrees of freedom if the ellipse has a direction, else 4 (eqs 9,
+        10). Seen from straight above it always has 4, as people turn on the spot. Without ellipses or tracks K = 0.
         """
         people = self.people
         if not len(z) or not len(people.id):
@@ -254,10 +264,11 @@ class PixelUpdater:
         """Returns template measurements of the confirmed (or, if `confirmed` is False, of the tentative) tracks not in
         `rows`.
 
-        scene: the frame's foreground; the templates are painted into it. expected (N, 4): boxes of all tracks: centre
-        x, y, height, width, px. rows: positions of tracks measured already. A track whose template has too little
-        support is left out. The variances grow with the inverse square of the visible share; those of h and w are BLIND
-        times larger still, as the template keeps the track's own size.
+        A template is an upright ellipse; it keeps the track's size, within 0.75 to 1.3 of a person's, and moves to
+        where it explains most foreground. scene: the frame's foreground; the templates are painted into it. expected
+        (N, 4): boxes of all tracks: centre x, y, height, width, px. rows: positions of tracks measured already. A track
+        whose template has too little support (foreground of its own) is left out. The variances grow with the inverse
+        square of the visible share; those of h and w are BLIND = 25 times larger still.
         """
         people, c = self.people, self.config
         open_rows = np.setdiff1d(np.flatnonzero(people.confirmed == confirmed), rows)
