@@ -41,8 +41,8 @@ def generate(
     """Write OUT/flockscope-<split>/<name>-s<seed>/ for every entry and seed, and OUT/seqmaps; returns the sequence
     folders.
 
-    The folders come in the order of entries, all seeds of an entry together. Stored sequences of the same scenario,
-    seed, version and pictures are kept if all their files are intact, else made again.
+    The folders come in the order of entries, all seeds of an entry together; no entries give []. Stored sequences of
+    the same scenario, seed, version and pictures are kept if all their files are intact, else made again.
 
     entries: resolved entries, or names of scenarios, suites or TOML files. set: "key=value" settings for entries given
     by name. seeds: inside one split (train from 0, val from 10,000, test from 20,000, fit from 30,000, demo from
@@ -54,8 +54,9 @@ def generate(
     Raises InputError before anything is simulated if an option or scenario is wrong, two entries share a name, a folder
     holds another sequence, or another process writes to `out`. If sequences fail, the others are made, and then an
     error is raised with the text of the first failure and the number of failures: InputError if all failures are
-    InputErrors, else WorkError. An error that would hit every sequence, as a full disk, ends the work at once. Also
-    raises as `start_workers`.
+    InputErrors, else WorkError. It is a WorkError, too, if a sequence that a worker made is not found here. An error
+    that would hit every sequence, as a full disk, ends the work at once. Also raises as `start_workers`: InputError for
+    a wrong address of a cluster, WorkError if the cluster does not answer or workers are lost.
     """
     if workers.count < 1:
         raise InputError(place="workers", got=workers.count, expected="1 or more", remedy="correct --workers")
@@ -95,8 +96,9 @@ def _run_jobs(
     jobs.
 
     workers: which workers to use, never more than jobs. done: called with each finished job, also a failed one, but not
-    with the job of the fatal error. Jobs without error have no entry. Raises as `start_workers`, and WorkError if the
-    workers are lost.
+    with the job of the fatal error. Jobs without error have no entry. Raises as `start_workers`: InputError for a wrong
+    address of a cluster, WorkError if it does not answer. Raises WorkError if the workers are lost, and InputError or
+    WorkError if the marker file that a cluster needs cannot be written.
     """
     errors: dict[str, FlockscopeError] = {}
     with start_workers(min(workers.count, max(1, len(jobs))), workers.cluster) as run:
@@ -143,9 +145,10 @@ def _not_visible(job: SequenceJob) -> WorkError:
 def write_seqmap(root: Path, split: str) -> set[str]:
     """Write ROOT/seqmaps/flockscope-<split>.txt, TrackEval's list of sequences; returns the names in it.
 
-    It lists, sorted, every folder below ROOT/flockscope-<split> that has a manifest; folders whose names begin with a
-    dot are left out. Without such a folder no file is written and the result is empty; an existing file stays. Raises
-    InputError if the file cannot be written, WorkError if the disk is full.
+    After a first line "name" it lists, sorted, every folder below ROOT/flockscope-<split> that has a manifest.json;
+    folders whose names begin with a dot are left out. The manifests are not read. Without such a folder no file is
+    written and the result is empty; an existing file stays. Raises InputError if the file cannot be written, WorkError
+    if the disk is full.
     """
     folder = root / f"flockscope-{split}"
     complete = sorted(p.parent.name for p in folder.glob(f"*/{MANIFEST}") if not p.parent.name.startswith("."))

@@ -35,7 +35,8 @@ FLAT = ("caviar",)  # recordings whose image, divided by its scale, is taken as 
 class Cut:
     """The part of a recording to replay.
 
-    start: s after the recording's frame 1. duration: s; None means to the recording's end.
+    start: s after the recording's frame 1, 0 or more. duration: s; None means to the recording's end. A duration beyond
+    the end is cut off there.
     """
 
     start: float = 0.0
@@ -60,14 +61,16 @@ def replay(
     its TOML file; None for the default. seed: for bodies, looks and sensor. cut: the part to replay; default all.
     calibration: camera, or file of a camera, of a recording that has boxes but no ground positions; it maps the boxes'
     feet to the ground. streams: pictures as for sim.simulate, some of "left", "right", "disparity", "ids",
-    "background". The result's `source["origin"]` describes the recording. Without group labels in the recording, the
+    "background". The ground is moved so that the least x and y are 1 m, unless a simulated source has a scene, which is
+    then kept. The result's `source["origin"]` describes the recording. Without group labels in the recording, the
     result's truth has no group labels either.
 
     Raises InputError if the source is invalid, holds several sequences, has no labelled people or no way to positions
     on the ground; if a calibration is given for labels that are on the ground, is invalid or has another aspect ratio
     than the recording; if the cut is outside the recording, longer than an hour, or empty of people; if `camera` is
-    invalid, people leave its view, a stream is unknown, or "right" or "disparity" is wanted without a baseline. Reading
-    detections raises InputError if the sensor is to hide a group by name, since replays have none.
+    invalid, people leave its view, a stream is unknown, or "right" or "disparity" is wanted without a baseline. Raises
+    ValueError for a negative seed. Reading detections raises InputError if the sensor is to hide a group by name, since
+    replays have none.
     """
     from sim.io.source import open_source
 
@@ -96,7 +99,8 @@ def resolve_replay(
 
     The specification has all defaults filled in. It takes the place of the scenario in stored files and hashes. source:
     a sequence with truth. view: camera, sensor, light and picture. seed, cut, calibration: as for `replay`. streams:
-    pictures, by default none. Raises InputError as `replay`.
+    pictures, by default none. Raises InputError as `replay`, for instance for a source without labelled people or
+    ground positions, a cut outside the recording, or people outside the camera's view; ValueError for a negative seed.
     """
     truth = _labels(source)
     places = on_ground(truth, source, _calibrated(calibration, source))
@@ -128,11 +132,12 @@ def _labels(source: Sequence) -> Truth:
 def on_ground(truth: Truth, source: Sequence, calibration: Camera | None = None) -> Array:
     """Return the positions on the ground (R, 2) m, x and y, of the R rows of a truth, nan where unknown.
 
-    They are the truth's own positions if it has some. Otherwise they are the feet of its boxes, projected with
-    `calibration` or, if that is None, the source's camera onto the ground z = 0. Without a camera, a CAVIAR recording
-    gives the boxes' centres divided by the image scale px_per_m, with y upwards.
+    They are the truth's own positions if it has some. Otherwise they are the feet of its boxes (middle of the lower
+    edge), projected with `calibration` or, if that is None, the source's camera onto the ground z = 0. Without a
+    camera, a CAVIAR recording gives the boxes' centres divided by the image scale px_per_m, with y upwards.
 
-    Raises InputError if none of these is known, or if a calibration is given for a truth with positions.
+    Raises InputError if none of these is known, or if a calibration is given for a truth with positions. Raises
+    AssertionError for a truth with neither positions nor boxes.
     """
     if truth.pos is not None:
         if calibration is not None:
@@ -169,8 +174,9 @@ def _calibrated(calibration: Camera | str | Path | None, source: Sequence) -> Ca
 def _moving(places: Array, truth: Truth, source: Sequence, fps: float, cut: Cut) -> Trajectories:
     """Return the trajectories of the people of `source` in the cut, resampled at `fps` frames/s.
 
-    places (R, 2) m: ground positions of the rows of `truth`, rows with nan are ignored. Raises InputError if the cut
-    begins before 0 s or after the end, lasts more than an hour, or has nobody in it.
+    places (R, 2) m: ground positions of the rows of `truth`, rows with nan are ignored. A cut beyond the recording's
+    end is shortened. Raises InputError if the cut begins before 0 s or after the end, is shorter than a frame, lasts
+    more than an hour, or has nobody in it.
     """
     file, whole = source.source.get("path", source.name), (truth.length - 1) / truth.fps
     last = whole if cut.duration is None else min(whole, cut.start + cut.duration - 1 / fps)
@@ -234,8 +240,9 @@ def _intent(moving: Trajectories, truth: Truth, fps: float, cut: Cut) -> Ints:
     """Return the number of the group that each person is meant to be in, (T, P): frame × person of `moving`, from frame
     1.
 
-    It is the person's group label nearest in time; a person alone gets a number of its own; -1 while absent. fps:
-    frames/s of `moving`. cut: its start in s is the time of frame 1.
+    It is the group in the person's row of `truth` that is nearest in time, of two equally near ones the earlier. A
+    person alone gets a number of its own, above all groups; -1 while absent. fps: frames/s of `moving`. cut: its start
+    in s is the time of frame 1.
     """
     t = cut.start + np.arange(len(moving.present)) / fps
     label = truth.group[nearest_row(truth.frame, truth.id, moving.id, truth.fps, t)]
@@ -246,8 +253,8 @@ def _intent(moving: Trajectories, truth: Truth, fps: float, cut: Cut) -> Ints:
 def _heights(people: Ints, truth: Truth, seed: int) -> Array:
     """Return the body heights (P,) m of `people`, ids (P,) of the truth.
 
-    A person's height is that of its first row in the truth. Where it is unknown, it is drawn as in simulated crowds,
-    from seed and id.
+    A person's height is that of its first row in the truth. Where it is unknown (nan, or no heights in the truth), it
+    is drawn as in simulated crowds, from seed and id. Raises ValueError for a negative seed or id.
     """
     from scenarios.schema.scenario import CrowdSpec
     from scenarios.schema.values import draw
@@ -274,7 +281,9 @@ def _name(name: str, cut: Cut) -> str:
 def _without_groups(sequence: Sequence) -> Callable[[], Truth]:
     """Return a function that loads the sequence's truth without groups, for a recording without group labels.
 
-    In that truth everybody is alone (-1), groups, events and near are None, and no frame counts as labelled.
+    In that truth everybody is alone (group -1); groups, groups_px, events and near (pairs of strangers who came near
+    each other) are None, and no frame counts as labelled. The function raises AssertionError for a sequence without
+    truth, else what loading the truth raises.
     """
 
     def truth() -> Truth:

@@ -29,8 +29,9 @@ class ReplayOptions:
     """Options that all replays of a dataset share.
 
     view: camera, sensor, light and picture. cut: the part of each recording to replay, default all. calibration:
-    camera, or its file, of recordings with boxes only; None if not needed. streams: pictures to store, some of "left",
-    "right", "disparity", "ids", "background". images: their file type, "jpg", "png" or "mp4".
+    camera, or its file, of recordings that have boxes but no ground positions; None if not needed; an error for others.
+    streams: pictures to store, some of "left", "right", "disparity", "ids", "background"; () for none. images: their
+    file type, "jpg", "png" or "mp4".
     """
 
     view: ObservationSpec
@@ -46,13 +47,16 @@ def store_replays(
     """Write OUT/flockscope-<split>/<recording>-s<seed>/ for every source and seed, and OUT/seqmaps; returns the
     folders.
 
-    All seeds of the first source come first. A stored replay with the same options is kept if its files are intact.
-    progress: called as progress(replays done, replays in all, name of the last one) after each replay. The first error
-    ends the work; replays stored before it are kept and listed in OUT/seqmaps.
+    All seeds of the first source come first; no sources give []. <recording> is the recording's name, with "-" for
+    characters other than letters, digits, "_", "." and "-", and with "-t<start in s>" for a cut that begins later. A
+    stored replay with the same options is kept if its files are intact. progress: called as progress(replays done,
+    replays in all, name of the last one) after each replay. The first error ends the work; replays stored before it are
+    kept and listed in OUT/seqmaps.
 
     Raises InputError if `seeds` is empty or spans two splits, two recordings share a name, a recording of real motion
     is given with seeds below 20,000 (the tuning splits), a stream or file type is unknown, a folder holds another
-    sequence, or another process writes to `out`; otherwise as sim.replay. Raises WorkError if the disk is full.
+    sequence, or another process writes to `out`. Also raises InputError as sim.replay, as for a source without labelled
+    people or a cut outside it. Raises WorkError if the disk is full.
     """
     recordings, split, root = list(sources), split_of(seeds), Path(out)
     _check(recordings, seeds, split)

@@ -25,9 +25,9 @@ class SequenceJob:
     """One sequence to make.
 
     folder: where it is stored; its last part is the sequence's name. entry: the scenario to simulate. seed: the random
-    seed. streams: pictures to store, some of sim.io.store.streams.STREAMS, () for none. images: their file type, "jpg",
-    "png" or "mp4". marker: a file that a worker must see before it starts, because it would otherwise write to another
-    file system; None for local workers.
+    seed. streams: pictures to store, some of "left", "right", "disparity", "ids", "background"; () for none. images:
+    their file type, "jpg", "png" or "mp4". marker: a file that a worker must see before it starts, because it would
+    otherwise write to another file system; None for local workers.
     """
 
     folder: Path
@@ -99,8 +99,9 @@ def stored_manifest(job: SequenceJob) -> dict[str, Any] | None:
 def is_stored(job: SequenceJob) -> bool:
     """Return True if the folder holds the job's sequence and every file has the hash that its manifest names.
 
-    Returns False if the folder or a valid manifest is missing, or a file is missing or altered. Raises InputError if
-    the folder holds another sequence.
+    Returns False if the folder or a valid manifest is missing, or a file is missing or altered. Files that the manifest
+    does not name are ignored. Raises InputError if the folder holds another sequence, or a stream or the file type of
+    the job is unknown.
     """
     manifest = stored_manifest(job)
     return manifest is not None and next(damaged_files(job.folder, manifest), None) is None
@@ -109,9 +110,10 @@ def is_stored(job: SequenceJob) -> bool:
 def simulate_and_store(job: SequenceJob) -> None:
     """Simulate the job's scenario and write its folder, replacing a damaged one.
 
-    If another process has stored the same sequence meanwhile, that one stays. Raises InputError (impossible scenario)
-    or WorkError (unfulfilled order), with the scenario's file in the error. Any other exception becomes a WorkError. An
-    InputError or WorkError that an OSError caused, as a full disk, is raised unchanged.
+    If another process has stored the same sequence meanwhile, that one stays. Raises InputError (impossible scenario or
+    pictures, another sequence in the folder) or WorkError (unfulfilled order), with the scenario's file in the error.
+    Any other exception becomes a WorkError. An InputError or WorkError that an OSError caused, as a full disk, is
+    raised unchanged.
     """
     from scenarios.loading.resolve import dump
     from sim.sequence import simulate

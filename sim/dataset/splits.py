@@ -44,8 +44,8 @@ def split_of(seeds: range) -> str:
 def is_real(sequence: Sequence) -> bool:
     """Return True if the sequence shows real motion: a recording, or a replay of a recording.
 
-    Decided by `sequence.source`: its "origin" (of a replay) says whether it is real; else its "kind" is compared with
-    the simulated kinds. A sequence with neither counts as simulated.
+    Decided by `sequence.source`: its "origin" (of a replay) says whether it is real. Without one, a "kind" other than
+    "simulated", "generated" and "replayed" is a recording. A sequence with neither counts as simulated.
     """
     kind, origin = sequence.source.get("kind"), sequence.source.get("origin")
     return bool(origin["real"]) if origin is not None else kind is not None and kind not in SIMULATED

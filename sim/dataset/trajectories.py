@@ -1,9 +1,10 @@
 """Smooth labelled positions of people and resample them to another frame rate.
 
-Each gap-free segment of a person's positions y becomes the smoothing spline f that minimises
-Σ |y - f|² + (tau⁴ / dt) ∫ |f''|², with dt the time between labels. It keeps motion slower than tau and removes faster
-motion, that is, label jitter. tau is the smallest of TIMES for which the 99 % quantile of accelerations is at most
-LIMIT, since people do not walk with more; the largest of TIMES if none satisfies it.
+Each gap-free segment of a person's positions y (m) becomes the smoothing spline f that minimises Σ |y - f|² + (tau⁴ /
+dt) ∫ |f''|², with dt the time between labels in s and tau a time constant in s. It keeps motion slower than tau and
+removes faster motion, that is, label jitter. tau is the smallest of TIMES (0.05 to 1 s) for which the 99 % quantile of
+all accelerations is at most LIMIT (2.5 m/s²), since people do not walk with more; the largest of TIMES if none
+satisfies it.
 """
 
 from __future__ import annotations
@@ -46,8 +47,8 @@ def resample(frame: Ints, id: Ints, pos: Array, rate: float, fps: float, first: 
     frame (from 1), id (R,), pos (R, 2) m, finite: labelled rows in any order, each id once in a frame. rate: label
     frames per second; frame 1 is time 0. A person is absent in gaps of more than 2 s between labels, before the first
     and after the last label. Segments with a single label are dropped, and so are people who are absent at all of the
-    times. Without rows the result has no people. The smoothing time is the smallest of TIMES that keeps the 99 %
-    quantile of accelerations within 2.5 m/s².
+    times. Without rows the result has no people. One smoothing time serves all people: the smallest of 0.05 to 1 s
+    (TIMES) that keeps the 99 % quantile of accelerations within 2.5 m/s²; 1 s if none does.
     """
     t = first + np.arange(int(np.floor((last - first) * fps + 1e-6)) + 1) / fps
     for tau in TIMES:
@@ -92,10 +93,11 @@ def _segments(frame: Ints, id: Ints, pos: Array, one: int, rate: float, tau: flo
 def smoothing_spline(t: Array, y: Array, weight: float) -> Array:
     """Return the smoothing spline f (N, 2) at its knots t (N,): the minimum of Σ |y - f|² + weight ∫ |f''|².
 
-    t (N,): ascending times, no two equal. y (N, 2): finite values at t. weight: 0 returns y; a large one gives a
-    straight line. Fewer than 3 rows are returned unchanged. f is a natural cubic spline.
+    t (N,): ascending times, no two equal. y (N, 2): finite values at t. weight: 0 or more; 0 returns y; a large one
+    gives a straight line. Fewer than 3 rows are returned unchanged, as `y` itself. f is a natural cubic spline.
 
-    Reinsch (1967): f = y - weight Q γ with (R + weight Qᵀ Q) γ = Qᵀ y, γ being f'' at the inner knots.
+    Reinsch (1967): f = y - weight Q γ with (R + weight Qᵀ Q) γ = Qᵀ y. γ (N - 2,) is f'' at the inner knots. Qᵀ forms
+    differences of slopes at the inner knots; R holds the integrals of products of hat functions there.
     """
     from scipy.linalg import solveh_banded
 
@@ -118,7 +120,10 @@ def smoothing_spline(t: Array, y: Array, weight: float) -> Array:
 
 
 def _acceleration(segments: list[Segment], fps: float) -> float:
-    """Return the 99 % quantile of the segments' accelerations in m/s², sampled `fps` times per s; 0 if none."""
+    """Return the 99 % quantile of the segments' accelerations in m/s², sampled `fps` times per s; 0 without segments.
+
+    An acceleration is the length of the difference of two successive velocities times fps. One 0 is always among them.
+    """
     size = [np.zeros(1)]
     for _, times, _, velocity in segments:
         t = np.arange(times[0], times[-1], 1 / fps)

@@ -34,11 +34,11 @@ def open_source(
     recording.
 
     path: a generated sequence or dataset, a MOTChallenge folder or text, a BIWI folder, a CAVIAR XML, a video, or a
-    folder that holds some of these at most 3 levels down. fps: frames per second; px_per_m: image scale; camera:
-    calibration or the path of its file. These three replace what a recording lacks or states; None: as the recording
-    states, else unknown. images False leaves out the pictures of MOTChallenge folders; other formats ignore it.
-    background: frames for background models, "first:N" or "spread:N"; None: spread:50, or the stored empty frames of a
-    generated sequence.
+    folder that holds some of these at most 3 levels down (names that begin with a dot are skipped; so are MOT texts).
+    fps: frames per second; px_per_m: image scale; camera: calibration or the path of its file. These three replace what
+    a recording lacks or states; None: as the recording states, else unknown. images False leaves out the pictures of
+    MOTChallenge folders; other formats ignore it. background: frames for background models, "first:N" or "spread:N";
+    None: spread:50, or the stored empty frames of a generated sequence.
 
     Raises InputError if the path does not exist or holds no known format, a file is invalid, or an option is wrong or
     has no effect on the format. Generated sequences reject fps, px_per_m and camera. Warns about recordings without a
@@ -62,10 +62,11 @@ def open_source(
 
 
 def sequence_folders(path: Path, kind: str) -> list[Path]:
-    """Return the sequence folders at a path or at most 3 levels below it, sorted.
+    """Return the sequence folders at a path or at most 3 levels below it, sorted by path.
 
-    kind: "generated", "biwi" or "mot". Raises InputError if there is none, if one is of another kind, or if there is a
-    video or CAVIAR file among them.
+    kind: "generated", "biwi" or "mot"; all must be of it. Folders inside a sequence folder, and names that begin with a
+    dot, are not searched. Raises InputError if there is none (as for a path that is no folder), if one is of another
+    kind, or if there is a video or CAVIAR file among them.
     """
     found = _find(path, DEPTH) if path.is_dir() else []
     other = next((p for p in found if p.is_file() or _kind(p) != kind), None)
@@ -85,8 +86,8 @@ def split_and_name(folder: Path) -> str:
 class RecordingOptions:
     """The user's options for a recording; None: not given.
 
-    fps: frames per second. px_per_m: image scale. camera: calibration. images: False leaves out the pictures of
-    MOTChallenge folders. background: sample of frames for background models.
+    fps: frames per second. px_per_m: image scale. camera: its calibration. images: False leaves out the pictures of
+    MOTChallenge folders, True is the default. background: which frames are the sample for background models.
     """
 
     fps: float | None

@@ -35,9 +35,10 @@ def write_error(path: Path, error: OSError) -> FlockscopeError:
 def staged_path(target: Path) -> Iterator[Path]:
     """Give a temporary path beside the target for the length of the block, then delete what is left there.
 
-    The block creates a file or folder at that path and renames it to the target. The target's parents are created, and
-    removed again if they stay empty. The name is random, since writers on two machines may share a process id. An
-    OSError inside the block is raised as WorkError if the disk is full, else as InputError (write_error).
+    The block creates a file or folder at that path and renames it to the target. The target's missing parents are
+    created, and removed again if they stay empty. The name is random, since writers on two machines may share a process
+    id. An OSError inside the block, or on creating the parents, is raised as WorkError if the disk is full, else as
+    InputError (write_error).
     """
     partial = target.parent / f"{PARTIAL}{target.name}-{uuid4().hex[:12]}"
     made = [p for p in (target.parent, *target.parent.parents) if not p.exists()]
@@ -68,9 +69,9 @@ def write_file(target: Path, content: bytes) -> None:
 def new_file(target: Path) -> Iterator[Path]:
     """Give a temporary path for the block to write a file to; the file replaces the target when the block ends.
 
-    The block must create the file. If it ends with an exception, the temporary file is deleted and the target stays as
-    it was. Missing parent folders are created. An OSError is raised as WorkError if the disk is full, else as
-    InputError.
+    If the block ends with an exception, the temporary file is deleted and the target stays as it was. Missing parent
+    folders are created. An OSError is raised as WorkError if the disk is full, else as InputError; so is a block that
+    has created no file.
     """
     with staged_path(target) as partial:
         yield partial
@@ -105,10 +106,10 @@ def new_folder(target: Path, keep: Callable[[], bool] = lambda: False) -> Iterat
 
 
 def write_folder(target: Path, files: Mapping[str, bytes]) -> None:
-    """Write a folder of files, complete or not at all; an existing folder is deleted with all that it holds.
+    """Write a folder of files, complete or not at all; an existing `target` is deleted with all that it holds.
 
-    files: content by name relative to the folder; a name may have subfolders. Raises WorkError if the disk is full,
-    InputError if the folder cannot be written.
+    files: content by name relative to the folder; a name may have subfolders. No files give an empty folder. Raises
+    WorkError if the disk is full, InputError if the folder cannot be written.
     """
     with new_folder(target) as partial:
         for name, content in files.items():
@@ -128,9 +129,10 @@ def replace_files(target: Path, files: Mapping[str, bytes], stale: tuple[str, ..
     """Write files into the folder `target`, which may hold other files; all are synced before the first replaces its
     target.
 
-    files: content by relative name. They appear one by one, in the order of `files`, so a killed run may leave only the
-    first of them. stale: names that are deleted first unless `files` has them. Other files stay. Raises WorkError if
-    the disk is full, InputError if the folder cannot be written.
+    files: content by relative name; a name may have subfolders. They appear one by one, in the order of `files`, so a
+    killed run may leave only the first of them. stale: names that are deleted first unless `files` has them. Other
+    files stay. A missing folder is created. Raises WorkError if the disk is full, InputError if the folder cannot be
+    written.
     """
     with staged_path(target) as partial:
         _write_synced_files(partial, files)
@@ -161,9 +163,9 @@ def _write_synced_files(folder: Path, files: Mapping[str, bytes]) -> None:
 
 
 def _sync_tree(folder: Path) -> None:
-    """Sync a folder and all files and folders below it to disk; files in parallel, which is faster than one by one.
+    """Sync a folder and all files and folders below it to disk; files in 8 threads, which is faster than one by one.
 
-    Raises OSError if a file cannot be synced.
+    Raises OSError if a file cannot be synced; folders that cannot be synced are ignored.
     """
     within = sorted(folder.rglob("*"))
     with ThreadPoolExecutor(SYNC_THREADS) as pool:
@@ -185,7 +187,7 @@ def _write_synced(path: Path, content: bytes) -> None:
 
 
 def _sync_folder(path: Path) -> None:
-    """Sync a folder's list of entries to disk; does nothing on systems that cannot."""
+    """Sync the list of entries of the folder `path` to disk; does nothing on systems that cannot. Raises nothing."""
     with suppress(OSError):
         descriptor = os.open(path, os.O_RDONLY)
         try:

@@ -16,11 +16,11 @@ from sim.io.files.atomic import write_error
 
 @contextmanager
 def lock_folder(root: Path) -> Iterator[None]:
-    """Create the folder `root` and hold its lock for the length of the block.
+    """Create the folder `root` and hold its lock for the length of the block; the block gets None.
 
     Folders that it created are removed at the end if they are empty. Raises InputError at once, without waiting, if
-    another process holds the lock. An OSError inside the block is raised as WorkError if the disk is full, else as
-    InputError. Systems and file systems without such locks, as NFS, run unlocked.
+    another process, or another block of this one, holds the lock. An OSError inside the block is raised as WorkError if
+    the disk is full, else as InputError. Systems and file systems without such locks, as NFS, run unlocked.
     """
     made = [p for p in (root, *root.parents) if not p.exists()]
     try:

@@ -19,7 +19,8 @@ from sim.types import Array, Bools, Ints
 class NumericTable:
     """The N rows of a numeric text file with C columns.
 
-    file: its path, for errors. values (N, C): the numbers. line (N,): line number of each row in the file, from 1.
+    file: its path, for errors. values (N, C): the numbers, float64. line (N,): line number of each row in the file,
+    from 1.
     """
 
     file: Path
@@ -29,7 +30,8 @@ class NumericTable:
     def reject(self, wrong: Bools | np.bool_, expected: str, remedy: str) -> None:
         """Raise InputError about the first row where `wrong` is True; do nothing if there is none.
 
-        wrong: flags (N,), one per row. expected, remedy: texts of the error: what should be there, and what to do.
+        wrong: flags (N,), one per row; a single True means the first row. expected, remedy: texts of the error: what
+        should be there, and what to do. The error also names the file, the row's line and its numbers.
         """
         if np.any(wrong):
             k = int(np.argmax(wrong))
@@ -48,7 +50,8 @@ class NumericTable:
 
 
 def read_text(path: Path) -> str:
-    """Return the text of a UTF-8 file without byte order mark. Raises InputError if it is unreadable or not UTF-8."""
+    """Return the text of the UTF-8 file `path`, without byte order mark. Raises InputError if it is unreadable or not
+    UTF-8."""
     try:
         return path.read_text(encoding="utf-8-sig")
     except UnicodeDecodeError as error:
@@ -65,7 +68,8 @@ def read_numbers(path: Path, columns: tuple[int, int]) -> NumericTable:
     """Read all non-empty lines of a text file as rows of numbers, separated by commas if the first has one, else by
     blanks.
 
-    columns: (least, greatest) number of columns. A file without lines gives a table of shape (0, columns[0]).
+    columns: (least, greatest) number of columns. A file without lines gives a table of shape (0, columns[0]). Comments
+    and headers are not allowed.
 
     Raises InputError if the file is unreadable or not UTF-8. Raises InputError with the line if a cell is not a finite
     number, the lines differ in their number of columns, or that number is outside `columns`.

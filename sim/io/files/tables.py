@@ -27,8 +27,8 @@ REDO = "run the command that made it again"
 class Column:
     """A column of a Parquet table to write.
 
-    values: an array (R,), or R arrays of any lengths for a column of lists. unit: its unit as a text, "1" for none.
-    kind: number type of the arrays of a column of lists; ignored otherwise.
+    name: of the column. values: an array (R,), or R arrays of any lengths for a column of lists. unit: its unit as a
+    text, "1" for none. kind: number type of the arrays of a column of lists; ignored otherwise.
     """
 
     name: str
@@ -39,10 +39,10 @@ class Column:
 
 @dataclass(frozen=True)
 class StoredTable:
-    """A Parquet table as read from `file`.
+    """A Parquet table of R rows as read from `file`.
 
-    columns: by name an array (R,), or for a column of lists the pair (all values in one array, end of each list in it).
-    facts: the metadata that was stored with the table, by name, and "format".
+    columns: by name an array (R,), or for a column of lists the pair (all values in one array, (R,) index in it after
+    the end of each list). facts: the metadata that was stored with the table, by name, and "format".
     """
 
     file: Path
@@ -54,16 +54,18 @@ class StoredTable:
         return name in self.columns
 
     def floats(self, *names: str) -> Array:
-        """Return one column as (R,), or n > 1 columns as (R, n), float64. Raises InputError if a column is missing."""
+        """Return the columns `names` as float64: one as (R,), n > 1 as (R, n). Raises InputError if a column is
+        missing."""
         found = [np.asarray(self._get(name), np.float64) for name in names]
         return found[0] if len(found) == 1 else np.stack(found, axis=1)
 
     def ints(self, name: str) -> Ints:
-        """Return a column as (R,), int64; fractions are cut off. Raises InputError if it is missing."""
+        """Return column `name` as (R,), int64; fractions are cut off. Raises InputError if it is missing."""
         return np.asarray(self._get(name), np.int64)
 
     def lists(self, name: str, kind: type) -> list[NDArray[Any]]:
-        """Return a column of lists as R arrays of number type `kind`. Raises InputError if the column is missing."""
+        """Return column `name`, a column of lists, as R arrays of number type `kind`; no rows give []. Raises
+        InputError if the column is missing."""
         values, ends = self._get(name)
         return [np.asarray(v, kind) for v in np.split(values, ends[:-1])] if len(ends) else []
 
@@ -82,8 +84,8 @@ class StoredTable:
 def table_bytes(columns: Iterable[Column], facts: dict[str, Any]) -> bytes:
     """Return a Parquet file as bytes; equal content gives equal bytes.
 
-    columns: all of equal length. facts: metadata, stored as JSON in the schema together with our "format". Raises
-    ValueError if `facts` holds NaN or infinity, TypeError if it holds what JSON cannot.
+    columns: all of equal length. facts: metadata, stored as JSON in the schema together with our "format" (1). Raises
+    ValueError if columns differ in length or `facts` holds NaN or infinity, TypeError if it holds what JSON cannot.
     """
     import pyarrow as pa
     import pyarrow.parquet as pq
@@ -146,7 +148,7 @@ def _numpy(column: Any) -> Any:
 
 
 def json_text(value: Any) -> str:
-    """Return a value as JSON on one line, keys in their order.
+    """Return a value as JSON on one line, keys in their order; characters beyond ASCII stay as they are.
 
     Raises ValueError for NaN and infinity, TypeError for a type that JSON does not have.
     """
@@ -162,7 +164,7 @@ def json_document(value: dict[str, Any]) -> bytes:
 
 
 def json_list(name: str, items: Iterable[dict[str, Any]]) -> bytes:
-    """Return the JSON file {"format": 1, name: [items]} as UTF-8 bytes, with one item per line.
+    """Return the JSON file {"format": 1, name: [items]} as UTF-8 bytes, with one item per line; no items give [].
 
     Raises ValueError for NaN and infinity, TypeError for a type that JSON does not have.
     """
@@ -172,7 +174,8 @@ def json_list(name: str, items: Iterable[dict[str, Any]]) -> bytes:
 
 
 def read_json(path: Path) -> dict[str, Any]:
-    """Read a file that holds one JSON object, as a dict. Raises InputError if it is unreadable or no JSON object."""
+    """Read the file `path`, which holds one JSON object, as a dict. Raises InputError if it is unreadable or no JSON
+    object."""
     from sim.io.files.numeric_text import read_text
 
     try:
@@ -200,7 +203,7 @@ def read_document(path: Path) -> dict[str, Any]:
 
 
 def nan_to_none(value: float) -> float | None:
-    """Return the number as it stands in JSON: None for nan, else a float. Infinity stays infinity."""
+    """Return the number `value` as it stands in JSON: None for nan, else a float. Infinity stays infinity."""
     return None if value != value else float(value)
 
 

@@ -15,9 +15,9 @@ from sim.types import Array, Camera, Scene, Stairs
 def camera_document(camera: Camera) -> dict[str, Any]:
     """Return the content of camera.json as a dict for JSON.
 
-    Keys: format, kind ("pinhole" or "top"), image [width, height] px, focal_px [fx, fy], centre_px [cx, cy], position
-    [x, y, z] m, rotation 3x3 (world to camera), baseline m, px_per_m (null if unknown, as for a pinhole), and radial
-    (distortion) unless it is 0.
+    Keys: format (1), kind ("pinhole" or "top"), image [width, height] px, focal_px [fx, fy], centre_px [cx, cy],
+    position [x, y, z] m, rotation 3x3 (world to camera), baseline m (0 without a right camera), px_per_m (None if
+    unknown, as for a pinhole), and radial (Tsai's distortion, 1) unless it is 0.
     """
     distortion = {"radial": camera.radial} if camera.radial else {}
     return {
@@ -37,8 +37,9 @@ def camera_document(camera: Camera) -> dict[str, Any]:
 def read_camera(path: Path) -> Camera:
     """Read a camera.json as Camera; missing baseline and radial are 0, a missing or null px_per_m is nan.
 
-    Raises InputError if the file is unreadable or no JSON object, a key is missing, a value has the wrong type or shape
-    or is not finite, or px_per_m is missing for kind "top". The format number is not checked.
+    Fractions of the image size are cut off. Raises InputError if the file is unreadable or no JSON object, a key is
+    missing, a value has the wrong type or shape or is not finite, or px_per_m is missing for kind "top". The format
+    number, and whether sizes are above 0, are not checked.
     """
     d = tables.read_json(path)
     kind = _key(path, d, "kind")
@@ -62,8 +63,10 @@ def read_camera(path: Path) -> Camera:
 def scene_document(scene: Scene) -> dict[str, Any]:
     """Return the content of scene.json as a dict for JSON, all lengths in m.
 
-    Keys: format, size [x, y], walls and doors [[x1, y1], [x2, y2]], pillars [x, y, radius], service [x, y], stairs
-    (foot, head [x, y], width, rise, steps, landing), wall_height, pillar_height.
+    Keys: format (1), size [x, y], and lists, empty if there are none: walls and doors, each [[x1, y1], [x2, y2]];
+    pillars, each [x, y, radius]; service (service points), each [x, y]; stairs, each a dict of foot and head [x, y],
+    width, rise, steps (their number), landing (length of the plateau behind the head). Also wall_height and
+    pillar_height.
     """
     stairs = [
         {"foot": s.foot.tolist(), "head": s.head.tolist(), "width": s.width, "rise": s.rise, "steps": s.steps,
@@ -79,7 +82,8 @@ def read_scene(path: Path) -> Scene:
     """Read a scene.json as Scene.
 
     Raises InputError if the file is unreadable or no JSON object, a key is missing, or a value has the wrong type or
-    shape or is not finite. The format number is not checked.
+    shape or is not finite. The format number, and the shape of foot and head of stairs, are not checked. "stairs" must
+    be a list of JSON objects, else AttributeError or TypeError is raised.
     """
     d = tables.read_json(path)
 

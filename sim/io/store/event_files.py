@@ -21,8 +21,11 @@ NEAR_COLUMNS = "start,end,a,b"
 
 
 def event_dict(event: GroupEvent) -> dict[str, Any]:
-    """Return an event as a dict for JSON, with the fields of GroupEvent as keys; unknown (nan) coordinates of `pos` are
-    None.
+    """Return an event as a dict for JSON, with the fields of GroupEvent as keys.
+
+    Keys: kind, start and end (frames from 1, inclusive), emitted (frame in which a tracker reported it, None in a
+    truth), before and after (lists of group ids, -1 for a person alone), members (list of person ids), pos [x, y].
+    Unknown (nan) coordinates of `pos` are None.
     """
     return {
         "kind": event.kind, "start": int(event.start), "end": int(event.end),
@@ -33,7 +36,11 @@ def event_dict(event: GroupEvent) -> dict[str, Any]:
 
 
 def events_bytes(events: Iterable[GroupEvent]) -> bytes:
-    """Return the events.json of a truth, as bytes, with one event per line in the given order."""
+    """Return the events.json of a truth, as bytes, with one event per line in the given order; no events give an empty
+    list.
+
+    It is the JSON object {"format": 1, "events": [...]}. Raises ValueError for an infinite coordinate.
+    """
     return json_list("events", map(event_dict, events))
 
 
@@ -86,7 +93,10 @@ def _bad(path: Path, k: int, got: str, expected: str) -> InputError:
 
 
 def near_bytes(near: Near) -> bytes:
-    """Return near.csv as bytes: a header and the columns start, end (frames from 1, inclusive), a, b (person ids)."""
+    """Return near.csv as bytes: a header and the columns start, end (frames from 1, inclusive), a, b (person ids).
+
+    A row is a pair of strangers who satisfy the merge rule. No rows give the header alone.
+    """
     rows = zip(near.start, near.end, near.a, near.b, strict=True)
     return "".join([NEAR_COLUMNS + "\n", *(f"{s},{e},{a},{b}\n" for s, e, a, b in rows)]).encode()
 
@@ -94,8 +104,9 @@ def near_bytes(near: Near) -> bytes:
 def read_near(path: Path) -> Near:
     """Read a near.csv (frames start, end and person ids a, b); a file with the header alone gives no rows.
 
-    Raises InputError if the file is unreadable, its header is another one, or a line is not four integers. Ranges are
-    not checked.
+    A row is a pair of strangers who satisfy the merge rule from frame start to end (from 1, inclusive). Raises
+    InputError if the file is unreadable, its header is another one, or a line is not four integers. Ranges are not
+    checked.
     """
     lines = read_text(path).splitlines()
     if lines[:1] != [NEAR_COLUMNS]:
@@ -112,10 +123,11 @@ def read_near(path: Path) -> Near:
 
 
 def script_bytes(orders: Iterable[Order], fulfilled: Iterable[int | None]) -> bytes:
-    """Return script.json as bytes, with one order of the script per line.
+    """Return script.json as bytes, with one order of the script per line; no orders give an empty list.
 
     orders: the script's orders. fulfilled: for each order the index (from 0) in events.json of the event that fulfilled
-    it, or None; stored as the key "event". Raises ValueError if the two differ in length.
+    it, or None; stored as the key "event". The other keys are id, kind, fired (frame from 1, or null), before, after
+    (lists of person ids of each group). Raises ValueError if the two differ in length.
     """
     rows = (
         {"id": o.id, "kind": o.kind, "fired": o.fired, "before": o.before, "after": o.after, "event": event}
@@ -127,8 +139,8 @@ def script_bytes(orders: Iterable[Order], fulfilled: Iterable[int | None]) -> by
 def read_script(path: Path) -> tuple[Order, ...]:
     """Read the orders of a script.json, in the order of the file; the key "event" is ignored, a missing list gives ().
 
-    Raises InputError if the file is unreadable, no JSON object or of another format number, or if an order lacks a key
-    or has a person id that is no integer.
+    Raises InputError if the file is unreadable, no JSON object or of another format number, if "orders" is no list, or
+    if an order lacks a key or has a person id that is no integer. The frame "fired" is not checked.
     """
     found = read_document(path).get("orders")
     try:

@@ -31,7 +31,8 @@ def groups_bytes(frames: Series[Groups | None], first: int, unit: str) -> bytes:
     unit: "m" or "px", that of positions and hulls. An item of `frames` may be None (groups unknown), which is stored
     apart from a frame without groups. One row per frame and group; columns: frame, group (id), members (person ids), x,
     y, (z), vx, vy, (vz), extent_xx, extent_xy, extent_yx, extent_yy (covariance of the members' positions), size
-    (people), hull (x1, y1, x2, …).
+    (people), hull (x1, y1, x2, …). Frames whose groups have no lists of members are noted as such; missing hulls are
+    stored as hulls without vertices. Positions of all frames have equally many columns, else ValueError.
     """
     known = [g for g in frames if g is not None]
     axes = AXES[: known[0].pos.shape[1]] if known else AXES[:2]
@@ -72,8 +73,9 @@ def _stack(parts: list[Array], width: int) -> Array:
 def read_groups(table: StoredTable) -> list[Groups | None]:
     """Return the groups of each frame of a groups.parquet that was read as a table, in the order of frames.
 
-    An item is None for a frame whose groups are unknown, and Groups without rows for a frame without groups. Raises
-    InputError if a column or a value of the metadata is missing.
+    An item is None for a frame whose groups are unknown, and Groups without rows for a frame without groups. Members
+    are () in a frame that was stored without them. The first item is the first frame stored, which need not be 1.
+    Raises InputError if a column or a value of the metadata is missing.
     """
     first, count = int(table.fact("first")), int(table.fact("frames"))
     missing, memberless = set(table.fact("missing")), set(table.fact("memberless"))
@@ -121,9 +123,11 @@ def groups_csv(ground: Series[Groups | None] | None, image: Series[Groups | None
     """Return groups.csv as bytes, for consecutive frames, the first of which has index `first`.
 
     ground: groups of each frame in the plane of their tracks or truth, None if unknown. image: groups of each frame in
-    px. Columns: frame, group (id), members (ids separated by blanks), x, y, hull (WKT, 3 decimals), size, and, if
-    `image` is given, hull_px (WKT, 2 decimals) of the group with the same id. Where the ground groups of a frame are
-    unknown, its rows are the image's groups, and x, y and hull are empty. Unknown numbers (nan) are empty, too.
+    px, as long as `ground` if both are given; None if unknown. Columns: frame, group (id), members (ids separated by
+    blanks), x, y, hull (WKT, 3 decimals), size, and, if `image` is given, hull_px (WKT, 2 decimals) of the group with
+    the same id, empty without one. Where the ground groups of a frame are unknown, its rows are the image's groups, and
+    x, y and hull are empty. Unknown numbers (nan) are empty, too. Without both, or without groups, there is the header
+    alone.
     """
     text = io.StringIO()
     writer = csv.writer(text, lineterminator="\n")
@@ -160,7 +164,8 @@ def read_groups_csv(path: Path, length: int) -> list[Groups]:
 
     The columns frame, group, members (ids separated by blanks), x, y and hull (WKT) must exist; size may be missing,
     and further columns are ignored. Empty x, y and size become nan, an empty hull has no vertices. Velocities are 0,
-    extents nan. Groups are sorted by id. Whether members exist is not checked.
+    extents nan. Groups are sorted by id, the members of each by id and named once. A frame without lines has Groups
+    without rows. Whether members exist is not checked.
 
     Raises InputError if the file is unreadable, and, with the line, if a column is missing, a cell is invalid, a frame
     is outside 1 to `length`, a group id is negative, or a group stands twice in a frame.

@@ -30,10 +30,11 @@ def is_sequence(folder: Path) -> bool:
 def identity(scenario: str, seed: int, repeat: int, streams: Iterable[str] = (), images: str = "jpg") -> dict[str, Any]:
     """Return the fields of a manifest that identify a sequence, by name.
 
-    Keys: format, schema, engine, seed, repeat, scenario_hash, streams (in the usual order, "background" added to "left"
-    or "right"), images (None if no stream depends on it). scenario: TOML text of the resolved scenario. repeat: number
-    of the suite entry's copy, 0 without copies. streams: stored pictures. images: their file type, "jpg", "png" or
-    "mp4". Raises InputError for an unknown stream or file type.
+    Keys: format, schema, engine (numbers of versions), seed, repeat, scenario_hash, streams (in the order left, right,
+    disparity, ids, background; "background" is added to "left" or "right"), images (None if no stream depends on it).
+    scenario: TOML text of the resolved scenario. repeat: number of the suite entry's copy, 0 without copies. streams:
+    stored pictures. images: their file type, "jpg", "png" or "mp4". Raises InputError for an unknown stream or file
+    type.
     """
     wanted = check_streams(streams, images)
     return {
@@ -51,7 +52,7 @@ def identity(scenario: str, seed: int, repeat: int, streams: Iterable[str] = (),
 def with_hash(manifest: dict[str, Any]) -> dict[str, Any]:
     """Return a copy of the manifest with the field `sha256`, the canonical hash of all its other fields.
 
-    An old `sha256` is replaced.
+    An old `sha256` is replaced; `manifest` is not changed. Raises TypeError for one that cannot be hashed, as a set.
     """
     body = {key: value for key, value in manifest.items() if key != "sha256"}
     return {**body, "sha256": hashing.canonical_hash(body)}
@@ -81,10 +82,11 @@ def read_manifest(folder: Path) -> dict[str, Any]:
 
 
 def damaged_files(folder: Path, manifest: dict[str, Any], *, pictures: bool = True) -> Iterator[InputError]:
-    """Yield (not raise) an InputError for each file of the manifest that is missing or whose hash differs.
+    """Yield (not raise) an InputError for each file of the manifest that is missing, unreadable or whose hash differs.
 
-    pictures: True compares the hash of every file. False compares only the size of pictures; a picture of another size
-    is reported. Files that the manifest does not name are ignored.
+    folder: the sequence folder. Files are read while iterating, in the order of the manifest. pictures: True compares
+    the hash of every file. False compares only the size of pictures; a picture of another size is reported. Files that
+    the manifest does not name are ignored.
     """
     for name, facts in manifest["files"].items():
         path = folder / name

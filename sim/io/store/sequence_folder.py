@@ -44,12 +44,14 @@ def write_sequence(
 
     scenario: TOML text of the resolved scenario. seed: that of the simulation. repeat: number of the suite entry's
     copy, 0 without copies. streams: pictures to store, "left", "right", "disparity", "ids", "background"; by default
-    none. images: their file type, "jpg", "png" or "mp4". One picture per stream is in memory at a time. keep: called
-    before an existing folder is replaced; if it returns True, that folder stays.
+    none; "background" is added to "left" or "right". images: their file type, "jpg", "png" or "mp4". One picture per
+    stream is in memory at a time. keep: called before an existing folder is replaced; if it returns True, that folder
+    stays.
 
     Raises InputError if a stream or file type is unknown, the sequence lacks a stream, a video would have an odd width
     or height, or the folder cannot be written. Raises WorkError if an order of the script was not fulfilled, the stream
-    ids has a person id above 999, or the disk is full.
+    ids has a person id above 999, or the disk is full. Raises AssertionError if truth and sequence differ in length, or
+    only some frames have detections.
     """
     wanted = check_streams(streams, images)
     with atomic.new_folder(folder, keep) as partial:
@@ -67,9 +69,11 @@ def sequence_files(
 ) -> dict[str, bytes]:
     """Return all files of a sequence except its pictures: content by name relative to its folder, the manifest last.
 
-    scenario: TOML text of the resolved scenario. seed, repeat: of the simulation; repeat 0 without copies. pictures:
-    what has been written of its pictures, for the manifest; by default nothing. Raises WorkError if an order of the
-    script was not fulfilled.
+    Always scenario.toml, seqinfo.ini and manifest.json; camera.json, scene.json, those of the truth (gt/…) and of the
+    detections (det/…) where the sequence has them. scenario: TOML text of the resolved scenario. seed, repeat: of the
+    simulation; repeat 0 without copies. pictures: what has been written of its pictures, for the manifest; by default
+    nothing. Raises WorkError if an order of the script was not fulfilled, InputError if `sensor.hide` names an unknown
+    group, AssertionError if only some frames have detections.
     """
     frames = list(sequence.without_pictures())
     found = [f.detections for f in frames if f.detections is not None]
@@ -123,7 +127,9 @@ def _seqinfo(sequence: Sequence, length: int, pictures: WrittenPictures) -> byte
     """Return seqinfo.ini as bytes: name, imDir, frameRate, seqLength, and, if the image size is known, imWidth,
     imHeight, imExt.
 
-    Without JPG or PNG pictures it names the folder img1 and .jpg, so that MOTChallenge tools accept it.
+    length: number of frames. The name, frame rate and image size are the sequence's. With PNG pictures imExt is .png;
+    otherwise, also for videos or without pictures, it is .jpg. imDir is always img1, so that MOTChallenge tools accept
+    it.
     """
     width, height = sequence.image_size or (0, 0)
     folder, _, name = file_name("left", "png" if pictures.images == "png" else "jpg", 1).partition("/")
@@ -141,10 +147,13 @@ def _seqinfo(sequence: Sequence, length: int, pictures: WrittenPictures) -> byte
 def open_sequence(folder: Path, *, background: BackgroundChoice | None = None) -> Sequence:
     """Return the stored sequence in a folder, equal to the one that was written, except for its `source`.
 
-    background: sample of frames for background models, instead of the stored empty frames; None takes those. Raises
-    InputError if the manifest is invalid, a file is missing or altered, `background` is given for a sequence without
-    left pictures, or it asks for more frames than there are. Pictures are checked against their hash when they are
-    read; a damaged one raises InputError then.
+    background: sample of frames for background models, instead of the stored empty frames; None takes those. `source`
+    has kind "generated", path, seed, repeat, truth_hash, streams, images, and, if known, background and origin (of a
+    replay).
+
+    Raises InputError if the manifest is invalid, a file is missing or altered, `background` is given for a sequence
+    without left pictures, or it asks for more frames than there are. Of pictures only the size in bytes is compared at
+    once; their hash is checked when they are read, and a damaged one raises InputError then.
     """
     manifest = read_manifest(folder)
     for error in damaged_files(folder, manifest, pictures=False):
@@ -195,8 +204,9 @@ def _background(
     """Return (loader of background pictures, entry for `Sequence.source` that names them); (None, {}) if there are
     none.
 
-    choice: sample of frames of the left pictures; None takes the stored empty frames. length: frames of the sequence.
-    Raises InputError if a choice is given without left pictures, or asks for more frames than there are.
+    The loader takes nothing and returns pictures (K, H, W, 3) BGR uint8; it raises InputError if a picture is missing
+    or damaged. choice: sample of frames of the left pictures; None takes the stored empty frames. length: frames of the
+    sequence. Raises InputError if a choice is given without left pictures, or asks for more frames than there are.
     """
     if choice is not None:
         if "left" not in pictures.streams:
@@ -212,8 +222,8 @@ def _background(
 def _people(folder: Path, manifest: dict[str, Any]) -> dict[str, tuple[int, ...]]:
     """Return the person ids of each group that the script names, by group name.
 
-    They are computed again from the stored scenario, scene, seed and orders. Raises InputError if one of these files is
-    unreadable or invalid.
+    They are computed again from the stored scenario.toml, scene.json and gt/script.json in `folder`, and from seed and
+    repeat in `manifest`. Raises InputError if one of these files is unreadable or invalid.
     """
     from scenarios import load
     from sim.sequence import named_people

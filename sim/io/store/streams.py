@@ -63,8 +63,9 @@ def file_name(stream: str, images: str, index: int) -> str:
     """Return the name of a picture's file relative to the sequence folder: "img1/000001.jpg" or "left.mp4", for
     instance.
 
-    images: file type, "jpg", "png" or "mp4"; disparity and ids are always PNG. index: the frame, from 1; for
-    "background" the picture's number, from 1. An mp4 holds all pictures of a stream, so `index` is then ignored.
+    stream: "left", "right", "disparity", "ids" or "background", else KeyError unless it is a video. images: file type,
+    "jpg", "png" or "mp4"; disparity and ids are always PNG. index: the frame, from 1; for "background" the picture's
+    number, from 1. An mp4 holds all pictures of a stream, so `index` is then ignored.
     """
     kind = suffix(stream, images)
     return f"{stream}.mp4" if kind == "mp4" else f"{FOLDERS[stream]}/{index:06d}.{kind}"
@@ -92,7 +93,7 @@ def encode_ids(ids: Ints) -> Codes:
 
 
 def decode_ids(codes: Codes) -> Ints:
-    """Return the ids (H, W) int64 of MOTS codes, the inverse of encode_ids.
+    """Return the ids (H, W) int64 of MOTS codes (H, W) uint16, the inverse of encode_ids.
 
     Code 3000 gives -2 (walls and pillars), any other above 2000 gives code - 2000 (person id), the rest 0.
     """
@@ -101,7 +102,10 @@ def decode_ids(codes: Codes) -> Ints:
 
 
 def encode_disparity(disparity: Array) -> Codes:
-    """Return disparities (H, W) px as uint16: round(64 d), clipped to 1 … 65535, 0 where d is nan or infinite."""
+    """Return disparities (H, W) px as uint16: round(64 d), clipped to 1 … 65535, 0 where d is nan or infinite.
+
+    d is the disparity of a pixel; negative ones and 0 become 1, those above 1024 px become 65535.
+    """
     known = np.isfinite(disparity)
     steps = np.clip(np.rint(np.where(known, disparity, 0.0) * STEPS), 1, 65535)
     return np.where(known, steps, 0).astype(np.uint16)

@@ -34,7 +34,8 @@ def upright_boxes(camera: Camera, pos: Array) -> Array:
     """Return the boxes (N, 4) left, top, width, height in px of upright cylinders that stand at `pos`.
 
     A cylinder is 1.7 m high and 0.5 m across. pos: (N, 3) m, or (N, 2) m on the ground z = 0. Boxes are not clipped to
-    the image. A cylinder that is partly behind the camera has a box of nan.
+    the image. A box is nan for a cylinder of which a part is behind the camera or, for a pinhole, less than 0.05 m in
+    front of it, and for a nan position.
     """
     from sim.scene.camera import project
 

@@ -41,12 +41,13 @@ def write_tracks(
 
     Files: tracks.parquet, tracks.txt, tracks.mot.txt, groups.parquet and groups.csv if there are groups, events.json,
     and run.json last. Files of these names from an earlier run are replaced or deleted, others stay. tracks: one Tracks
-    per frame, all of one plane and unit. fps: frames/s. camera: if the tracker gives no boxes, tracks of people on the
-    ground get the boxes of upright people in the texts; None: no such boxes. scene: gives the height of the ground
-    under 2-D positions; None: 0. info: content of run.json, to which "format" and "boxes" (where the boxes come from)
-    are added.
+    per frame, all of one plane and unit (else AssertionError). fps: frames/s. camera: if the tracker gives no boxes,
+    tracks of people on the ground or in space get the boxes of upright people in the texts; None: no such boxes. scene:
+    gives the height of the ground under 2-D positions; None: 0. info: content of run.json, to which "format" and
+    "boxes" (where the boxes come from: "measured", "projected" or "none") are added.
 
-    Raises InputError if the folder cannot be written, WorkError if the disk is full, ValueError if `info` holds NaN.
+    Raises InputError if the folder cannot be written, WorkError if the disk is full, ValueError if `info` holds NaN or
+    infinity, TypeError if it holds what JSON cannot.
     """
     folder = Path(folder)
     replace_files(folder, tracks_files(tracks, fps=fps, camera=camera, scene=scene, info=info), stale=NAMES)
@@ -61,10 +62,15 @@ def tracks_files(
     scene: Scene | None = None,
     info: dict[str, Any] | None = None,
 ) -> dict[str, bytes]:
-    """Return the files that `write_tracks` writes: content by name, run.json last; arguments are those of write_tracks.
+    """Return the files of one tracker's tracks, as `write_tracks` writes them: content by name, run.json last.
 
-    Nothing is written. No tracks give tables without rows, in the plane "ground". Raises ValueError if `info` holds
-    NaN.
+    Names: tracks.parquet, tracks.txt, tracks.mot.txt, groups.parquet and groups.csv if a frame has groups, events.json,
+    run.json. tracks: one Tracks per frame, of consecutive frames, all of one plane and unit (else AssertionError). fps:
+    frames/s. camera: gives people without boxes those of upright people; None: no such boxes. scene: gives the height
+    of the ground; None: 0. info: content of run.json, to which "format" and "boxes" are added.
+
+    Nothing is written. No tracks give tables without rows, in the plane "ground". Raises ValueError if `info` holds NaN
+    or infinity, TypeError if it holds what JSON cannot.
     """
     every = list(tracks)
     rows, boxes = _flatten(every, fps), box_source(every, camera)
@@ -91,10 +97,10 @@ def tracks_files(
 class _Rows:
     """The tracks of all frames of one tracker, R rows in the order of frames.
 
-    plane, unit: of all tracks. frame (R,): from the tracks' index. id, group (R,). pos, vel (R, D) m or px (per s), D =
-    3 in the plane "space", else 2. cov (R, 2D, 2D): covariance of position and velocity. box (R, 4): left, top, width,
-    height in px, nan in a frame without boxes. boxless (R,): True in such a frame. score (R,): 1 if the tracker gives
-    none.
+    plane, unit: of all tracks. frame (R,): from the tracks' index, from 1. id, group (R,): of the track and of its
+    group, -1 for alone. pos, vel (R, D) m or px (per s), D = 3 in the plane "space", else 2. cov (R, 2D, 2D):
+    covariance of position and velocity. box (R, 4): left, top, width, height in px, nan in a frame without boxes.
+    boxless (R,): True in such a frame. score (R,): 1 if the tracker gives none.
     """
 
     plane: str
@@ -183,7 +189,9 @@ def read_tracks(path: str | Path, *, fps: float | None = None, length: int | Non
     Returns one Tracks per frame. tracks.parquet is read if it exists, and is exact. From text, velocities are
     differences over 0.5 s, covariances nan, and everybody is alone; beside our own tracks.txt, groups and events are
     those of groups.csv and events.json, and boxes are left out if run.json says that they were projected. fps (None:
-    25) and length (None: to the last frame in the file) apply to text only; `length` adds empty frames at the end.
+    25) and length (None: to the last frame in the file) apply to text only; `length` adds empty frames at the end. An
+    event belongs to the frame that reported it; if that is not stored, to the frame in which it was emitted, else to
+    its end.
 
     Raises InputError if there are no tracks, a file is unreadable or invalid, a frame is beyond `length`, or an event's
     frame is outside the tracks. Warns about a text without rows if `length` is given.
@@ -209,7 +217,7 @@ def read_tracks(path: str | Path, *, fps: float | None = None, length: int | Non
 
 
 def _boxes(path: Path) -> Any:
-    """Return the value "boxes" of a run.json ("measured", "projected" or "none"), None if missing.
+    """Return the value "boxes" of the run.json `path` ("measured", "projected" or "none"), None if missing.
 
     Raises InputError if the file is unreadable, no JSON object or of another format number.
     """

@@ -21,10 +21,11 @@ from sim.types import Array, Plane, Tracks
 def read_track_text(path: Path, fps: float, length: int | None, *, projected: bool = False) -> list[Tracks]:
     """Return the tracks of a MOTChallenge text, one Tracks per frame from 1 to `length`; frames without rows are empty.
 
-    length: None: to the last frame in the file. fps: frames/s. Positions are on the ground (m) if the file has them,
-    else box centres in the image (px). Velocities are differences over 0.5 s, covariances nan, and everybody is alone
-    (group -1). Boxes are None if a row lacks one. Scores outside [0, 1] are scaled to it (unit_scores). projected: True
-    leaves the boxes out if there are ground positions, since they were computed from these.
+    length: None: to the last frame in the file. fps: frames/s. Tracks of a frame are sorted by id. Positions are on the
+    ground (m) if the file has them, else box centres in the image (px). Velocities are differences over 0.5 s,
+    covariances nan, and everybody is alone (group -1). Boxes are None if a row lacks one. Scores are 1 if the file has
+    none; if one is outside [0, 1], all are scaled so that the lowest is 0 and the highest 1. projected: True leaves the
+    boxes out if there are ground positions, since they were computed from these.
 
     Raises InputError if the file is unreadable, a line is invalid, a frame is beyond `length`, an id is negative or
     stands twice in a frame, only some lines have a ground position, a line has neither box nor ground position, or the

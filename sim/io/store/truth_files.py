@@ -27,8 +27,9 @@ SINGLE = (("z", "m"), ("heading", "rad"), ("height", "m"), ("truncation", "1"))
 def truth_files(truth: Truth) -> dict[str, bytes]:
     """Return the files under gt/ of a truth: content as bytes by name, as "gt/truth.parquet".
 
-    Always truth.parquet and script.json. Where the truth has boxes, gt.txt (MOTChallenge); where it has groups,
-    groups.parquet, groups_px.parquet (in the image) and groups.csv; where it has them, events.json and near.csv.
+    Always truth.parquet and script.json (the orders of the script). Where the truth has boxes, gt.txt (MOTChallenge).
+    groups.parquet where it has groups on the ground, groups_px.parquet where it has groups in the image, groups.csv
+    with either. Where it has them, events.json and near.csv (pairs of strangers who came near each other).
     """
     files = {"gt/truth.parquet": _table(truth), "gt/script.json": script_bytes(truth.orders, _fulfilled(truth))}
     if truth.box is not None:
@@ -49,6 +50,8 @@ def truth_files(truth: Truth) -> dict[str, bytes]:
 def _fulfilled(truth: Truth) -> list[int | None]:
     """Return for each order of the script the index (from 0) in `truth.events` of the event that fulfilled it, None
     without one.
+
+    A truth without orders gives [].
     """
     if not truth.orders:
         return []
@@ -114,7 +117,7 @@ def read_truth(folder: Path) -> Truth:
 
     A frame whose groups are unknown comes back as a frame without groups. Raises InputError if gt/truth.parquet or
     gt/script.json is missing, a file is damaged or invalid, or rows are not sorted by (frame, id), stand twice or lie
-    outside the sequence.
+    outside the sequence's frames 1 to length.
     """
     gt = folder / "gt"
     table = read_table(gt / "truth.parquet")
@@ -160,10 +163,11 @@ def _groups(path: Path) -> tuple[Groups, ...] | None:
 def detection_files(detections: list[Detections], fps: float, scene: Scene | None = None) -> dict[str, bytes]:
     """Return det/det.parquet (exact) and det/det.txt (MOT text with 10 columns), content by name.
 
-    detections: one Detections per frame, from frame 1, all of one plane, and all with or without boxes and velocities.
-    fps: frames/s. scene: gives the height of the ground, which is the z of ground points (x, y) in det.txt; None: 0.
-    Missing scores are written as 1. In det.txt the id is -1, a missing box -1,-1,-1,-1, and the position of a detection
-    in the image -1,-1,-1.
+    detections: one Detections per frame, from frame 1, all of one plane, and all with or without boxes and velocities
+    (else AssertionError); none give tables without rows. fps: frames/s. scene: gives the height of the ground, which is
+    the z of ground points (x, y) in det.txt; None: 0. Missing scores are written as 1. Columns of det.txt: frame, id,
+    left, top, width, height, score, x, y, z. There the id is -1, a missing box -1,-1,-1,-1, the position of a detection
+    in the image -1,-1,-1, and a width or height below 0.01 px 0.01.
     """
     plane, boxed, moving = _form(detections)
     axes = ("x", "y", "z")[: detections[0].pos.shape[1]] if detections else ("x", "y")
@@ -190,7 +194,8 @@ def detection_files(detections: list[Detections], fps: float, scene: Scene | Non
 def _form(detections: list[Detections]) -> tuple[str, bool, bool]:
     """Return (plane, whether there are boxes, whether there are velocities), which must be equal in all frames.
 
-    Without frames: ("image", True, False). Frames that differ fail an assertion.
+    detections: one Detections per frame. Without frames: ("image", True, False). Raises AssertionError if frames
+    differ.
     """
     forms = {(d.plane, d.box is not None, d.vel is not None) for d in detections}
     assert len(forms) <= 1, f"detections of one sequence differ in kind: {sorted(forms)}"
@@ -226,7 +231,9 @@ def _det_text(frame: Any, box: Array | None, score: Array, ground: Array | None)
 def read_detections(path: Path) -> list[Detections]:
     """Read a det.parquet: one Detections per frame, from frame 1; frames without rows have none.
 
-    Raises InputError if the file is missing or damaged, or a column or a value of the metadata is missing.
+    Velocities and boxes are None if the file has no such columns; a third position column z makes positions (M, 3).
+    Rows must be sorted by frame; those outside the stored number of frames are left out. Raises InputError if the file
+    is missing or damaged, or a column or a value of the metadata is missing.
     """
     table = read_table(path)
     axes = [a for a in ("x", "y", "z") if table.has(a)]

@@ -73,7 +73,9 @@ def _seqmaps(root: Path) -> Iterator[InputError]:
     """Yield a problem for each sequence that is in a split's seqmap or folder but not in both, and for a missing
     seqmap.
 
-    root: the folder of a dataset, or of one split of it.
+    A seqmap is the text seqmaps/<split>.txt that lists the split's sequences. root: the folder of a dataset, or of one
+    split of it. Within a split, missing sequences come first, then those not listed, each sorted by name. A split
+    without folders needs no seqmap. Problems are InputErrors, not raised.
     """
     base = root if (root / "seqmaps").is_dir() else root.parent
     for split in sorted(root.glob("flockscope-*")) if base == root else [root]:
@@ -109,7 +111,8 @@ def _extra(folder: Path, manifest: dict[str, Any]) -> Iterator[InputError]:
 def _content(folder: Path, manifest: dict[str, Any]) -> Iterator[FlockscopeError]:
     """Yield a problem for each stored hash, length, text, group, event or picture that contradicts the other files.
 
-    folder: a sequence all of whose files have the hashes of `manifest`. Raises InputError if a file is invalid.
+    folder: a sequence all of whose files have the hashes of `manifest`. Problems are FlockscopeErrors, not raised.
+    Raises InputError, while iterating, if a file is invalid.
     """
     text = (folder / "scenario.toml").read_text(encoding="utf-8")
     if hashing.scenario_hash(text) != manifest["scenario_hash"]:
@@ -135,8 +138,9 @@ def _content(folder: Path, manifest: dict[str, Any]) -> Iterator[FlockscopeError
 def _pictures(folder: Path, manifest: dict[str, Any], length: int) -> Iterator[FlockscopeError]:
     """Yield a problem for pictures that are missing, unreadable, of another size or beyond the last frame.
 
-    Streams stored as PNG are also compared with the hash of their raw pixels. length: frames of the sequence. One
-    problem at most is reported for each stream, but every surplus picture.
+    folder, manifest: of the sequence. length: its number of frames. Streams stored as PNG are also compared with the
+    hash of their raw pixels. One problem at most is reported for each stream, but every surplus picture. Problems are
+    errors that are not raised.
     """
     stored = StoredPictures(folder, manifest)
     named = {name for name in manifest["files"] if is_picture(name)}
@@ -173,9 +177,11 @@ def _truth(folder: Path, truth: Truth, length: int) -> Iterator[InputError]:
 
 
 def _text(path: Path, wanted: bytes) -> Iterator[InputError]:
-    """Yield a problem at the first line where a text file differs from `wanted`, or if it is missing; nothing if equal.
+    """Yield a problem at the first line where the text file `path` differs from `wanted`, or if it is missing; nothing
+    if equal.
 
-    wanted: the bytes that the exact Parquet table gives.
+    wanted: the bytes that the exact Parquet table gives. The problem is an InputError, not raised; lines count from 1.
+    Raises OSError if the file cannot be read.
     """
     if not path.is_file():
         yield _problem(path, "missing", "the text of the exact table")
@@ -190,7 +196,8 @@ def _text(path: Path, wanted: bytes) -> Iterator[InputError]:
 def _groups(path: Path, truth: Truth, groups: tuple[Groups, ...] | None) -> Iterator[InputError]:
     """Yield a problem for the first frame with a group whose member is absent or has another group in the truth.
 
-    path: the file of the groups, for the message. groups: one Groups per frame, from frame 1; None yields nothing.
+    path: the file of the groups, for the message. groups: one Groups per frame, from frame 1; None yields nothing. The
+    problem is an InputError, not raised; later frames are not checked.
     """
     for index, some in enumerate(groups or (), 1):
         here = truth.rows(index)
