@@ -15,10 +15,10 @@ demo: $(ENVIRONMENT)
 	$(BIN)/flockscope demo $(DEMO)
 
 test: $(ENVIRONMENT)
-	$(BIN)/python -m pytest -q -n auto -m "not slow" $(TESTS)
+	$(BIN)/python -m pytest -q -n auto --durations=5 -m "not slow" $(TESTS)
 
 test-slow: $(ENVIRONMENT)
-	$(BIN)/python -m pytest -q -n auto -m slow $(TESTS)
+	$(BIN)/python -m pytest -q -n auto --durations=5 -m slow $(TESTS)
 
 lint: $(ENVIRONMENT)
 	$(BIN)/ruff check .

@@ -23,6 +23,7 @@ from tracking.app.command_result import (
     print_interrupted,
     print_result,
 )
+from tracking.interrupts import recorded_interrupts
 
 HELP = {"-h", "--help", "--version"}
 
@@ -40,7 +41,7 @@ def run_command(app: typer.Typer, arguments: list[str]) -> int:
     as_json = "--json" in arguments
     if as_json and not HELP.isdisjoint(arguments):  # some levels of the command line know --help but not --json
         arguments = [argument for argument in arguments if argument != "--json"]
-    with warnings.catch_warnings():
+    with warnings.catch_warnings(), recorded_interrupts():
         warnings.simplefilter("always", UserWarning)
         try:
             warnings.showwarning = _print_warnings_once()

@@ -8,6 +8,8 @@ import time
 from types import TracebackType
 from typing import TYPE_CHECKING, Self
 
+from tracking.interrupts import raise_if_interrupted
+
 if TYPE_CHECKING:
     from rich.progress import Progress
 
@@ -52,8 +54,9 @@ class ProgressMeter:
     def update(self, done: int, total: int | None, item: str = "") -> None:
         """Sets the number of finished items, `done`, and of all items, `total` (None if unknown), and shows them.
 
-        item: name to show, "" for none.
+        item: name to show, "" for none. Raises KeyboardInterrupt if the user has pressed Ctrl-C and Python lost it.
         """
+        raise_if_interrupted()
         self.done, self.total, self.item = done, total, item
         if self._bar is not None:
             self._bar.update(self._bar.task_ids[0], completed=done, total=total, item=item)

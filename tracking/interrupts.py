@@ -1,0 +1,46 @@
+"""Ctrl-C that cannot get lost: SIGINT is recorded before KeyboardInterrupt is raised.
+
+Python drops an exception that is raised inside a destructor or a callback of a C library, KeyboardInterrupt included.
+A command records SIGINT here, and its loops ask `raise_if_interrupted` between two items.
+"""
+
+from __future__ import annotations
+
+import signal
+import threading
+from collections.abc import Iterator
+from contextlib import contextmanager
+from types import FrameType
+
+_received = threading.Event()
+
+
+@contextmanager
+def recorded_interrupts() -> Iterator[None]:
+    """While the block runs, record SIGINT and raise KeyboardInterrupt for it, as Python does; then forget the record.
+
+    Does nothing outside the main thread, or where SIGINT has another handler than Python's own, which then stays.
+    """
+    own = threading.current_thread() is threading.main_thread()
+    if not own or signal.getsignal(signal.SIGINT) is not signal.default_int_handler:
+        yield
+        return
+    _received.clear()
+    signal.signal(signal.SIGINT, _record)
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGINT, signal.default_int_handler)
+        _received.clear()
+
+
+def _record(number: int, frame: FrameType | None) -> None:
+    """The handler of SIGINT: raises KeyboardInterrupt after it has recorded the signal."""
+    _received.set()
+    signal.default_int_handler(number, frame)
+
+
+def raise_if_interrupted() -> None:
+    """Raise KeyboardInterrupt if SIGINT was recorded, which its own KeyboardInterrupt did not end; else do nothing."""
+    if _received.is_set():
+        raise KeyboardInterrupt
