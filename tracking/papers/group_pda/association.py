@@ -26,10 +26,10 @@ FASTEST = 2.0
 class PointClaims:
     """Which of M points each of G groups may have. Groups are rows of the bank, from 0; points are in m or px.
 
-    points (M, 2): x, y; weights (M,): people that each stands for; last_seen (M,): time, s, when it was measured; d2
-    (G, M): squared Mahalanobis distances of points from groups, inf outside a group's search region; owner (M,): row of
-    the one group that may have the point although it is in no region, or -1; claimants (M,): number of groups that may
-    have the point.
+    points (M, 2): x, y; weights (M,): people that each stands for; last_seen (M,): time, s, when it was measured,
+    before this frame for a missed member; d2 (G, M): squared Mahalanobis distances of points from groups, inf outside a
+    group's search region; owner (M,): row of the one group that may have the point although it is in no region, or -1;
+    claimants (M,): number of groups that may have the point.
     """
 
     points: Array
@@ -58,8 +58,9 @@ def gated_distances(bank: GroupBank, points: Array, scaled: ScaledParameters, t:
     """Return squared Mahalanobis distances (G, M) of the points (M, 2) from the groups, inf outside a search region
     (eq. 2.2).
 
-    t: time of the frame, s. Lost groups have no region. Tentative groups have no points that lie in a confirmed group's
-    region. The region of a group without feasible associations widens at `split_speed`.
+    bank: of the G groups, predicted; t: time of the frame, s. Lost groups (not measured for `coast_time`) have no
+    region. Tentative groups have no points that lie in a confirmed group's region. The region of a group without
+    feasible associations widens at `split_speed`.
     """
     config = scaled.config
     lost = bank.confirmed & (t - bank.last_seen > max(config.coast_time, scaled.dt) + 1e-9)
@@ -77,9 +78,10 @@ def attached(points: Array, d2: Array, bank: GroupBank, scaled: ScaledParameters
     """Return for each point (M,) the row of the group that it is attached to, or -1 (ours).
 
     points (M, 2); d2 (G, M): inf outside the search regions. A point in no region is attached to a group if it is
-    linked (at most 2 r apart, R_0), directly or through others, to a point in the group's region; of several groups, to
-    the one whose point is nearest. From points, a confirmed group takes only points within walking distance of its
-    members: the others are newcomers or false alarms. A point in a region gets -1.
+    linked (at most 2 r apart, the config's radius), directly or through others, to a point in the group's region; of
+    several groups, to the one whose point is nearest. From points, a confirmed group takes only points within walking
+    distance (2 m/s for a frame, and 3 standard deviations) of its members: the others are newcomers or false alarms. A
+    point in a region gets -1.
     """
     link, owner = scaled.constraint.link, np.full(len(points), -1)
     taken = np.isfinite(d2).any(0) if len(d2) else np.zeros(len(points), bool)
@@ -127,10 +129,11 @@ def associate(bank: GroupBank, claims: PointClaims, log_ratio: Array, scaled: Sc
     """Update the groups of the bank in place by their associations (sec. 4.1 to 4.3) and return the points that they
     have.
 
-    log_ratio (G, M): log p(colour | group) - log p(colour | other groups) of each point, or (G, 0) without colours. t:
-    time of the frame, s. A group counts as measured if its association has a point of this frame. `null_time` grows by
-    a frame for a group without feasible associations, and shrinks by a frame, down to 0, for a measured one. last_seen,
-    measured_time and own_people are updated, too.
+    claims: which points each group may have. log_ratio (G, M): log p(colour | group) - log p(colour | other groups) of
+    each point, or (G, 0) without colours. t: time of the frame, s. A group counts as measured if its association has a
+    point of this frame. `null_time` grows by a frame for a group without feasible associations (points that form one
+    group), and shrinks by a frame, down to 0, for a measured one. last_seen, measured_time and own_people are updated,
+    too.
     """
     weighted = scaled.config.appearance * log_ratio
     state, chosen, report = kernels.associate(
@@ -156,8 +159,9 @@ def associate(bank: GroupBank, claims: PointClaims, log_ratio: Array, scaled: Sc
 def nearest_claims(claimed: Bools, d2: Array, log_ratio: Array) -> Bools:
     """Return a copy of the claims (G, M) bool with each point at one group only: the nearest of those that claim it.
 
-    d2 (G, M): squared distances from the centroids. log_ratio (G, M) of the points' colours, or (G, 0): twice its value
-    is subtracted from d2. Of equal distances the first row wins. A point that no group claims stays so.
+    claimed: True where a group claims a point. d2 (G, M): squared Mahalanobis distances from the centroids. log_ratio
+    (G, M) of the points' colours, or (G, 0): twice its value is subtracted from d2. Of equal distances the first row
+    wins. A point that no group claims stays so.
     """
     one, shared = claimed.copy(), np.flatnonzero(claimed.sum(0) > 1)
     if len(shared):

@@ -49,7 +49,8 @@ def search(points: Array, x: Array, P: Array, extent: Array, noise: float, wider
 
     x (G, 4): centroid x, y, velocity; P (G, 4, 4): its covariance; extent (G, 2, 2): Sigma, covariance of the members.
     The region is d^2 < gate. Departure: the covariance is Sigma + (H P H' + (noise + wider) I), because the centroid is
-    uncertain. noise: variance of a point; wider (G,): further variance of each group.
+    uncertain; H P H' is the part of P for the centroid, I the unit matrix. noise: variance of a point; wider (G,):
+    further variance of each group. All are in the (squared) unit of the points.
     """
     d2 = np.full((len(x), len(points)), np.inf)
     for g in range(len(x)):
@@ -101,17 +102,19 @@ def associate(
 ) -> tuple[Ints, Bools, Array]:  # fmt: skip
     """Update the groups x (G, 4), P (G, 4, 4), extent (G, 2, 2), size (G,) in place by the points (sec. 4.1 to 4.3).
 
-    points (M, 2); weights (M,): people each stands for. d2 (G, M): from `search`. log_ratio (G, M): what a point adds
-    to the log mass per person by its colour, or (G, 0) without colours. owner (M,): the row of the only group that may
-    have the point outside its region, or -1. claimants (M,): number of groups that may have the point. rest (G,): True
-    for groups whose extent and size must not change. rules: see association_mass_kernels.
+    x: centroid and velocity; P: its covariance. points (M, 2); weights (M,): people each stands for. d2 (G, M): from
+    `search`. log_ratio (G, M): what a point adds to the log mass per person by its colour, or (G, 0) without colours.
+    owner (M,): the row of the only group that may have the point outside its region, or -1. claimants (M,): number of
+    groups that may have the point. rest (G,): True for groups whose extent and size must not change. rules: see
+    association_mass_kernels.
 
     Returns the state (G,) of each group, the points (G, M) bool of its likeliest association, and the report (G, 6):
-    innovation x, y, its covariance xx, xy, yy, normalised mass of the miss.
-    - NOTHING: the group has no points, only noise, or the miss has at least the mass of all associations. No points are
-      chosen. The group is updated by the mixture if it has a feasible association.
-    - NULL: it has points, more than noise, but no feasible association. All its points are chosen; it is not updated.
-    - MEASURED: else.
+    innovation x, y, its covariance xx, xy, yy, normalised mass (weight) of the miss; 0 without a feasible association.
+    - NOTHING = 0: the group has no points, only noise, or the miss has at least the mass of all associations. No points
+      are chosen. The group is updated by the mixture if it has a feasible association.
+    - NULL = 1: it has points, more than noise, but no feasible association (points that form one group). All its points
+      are chosen; it is not updated.
+    - MEASURED = 2: else.
     """
     groups, m = d2.shape
     state, chosen = np.zeros(groups, np.int64), np.zeros((groups, m), np.bool_)
@@ -147,8 +150,9 @@ def associate(
 def _ordered_points(d2: Array, log_ratio: Array, owner: Ints, claimants: Ints, g: int) -> tuple[Ints, int]:
     """Returns the indices of the points of group g, and the number of unshared ones, which come first (sec. 4.1).
 
-    The shared points follow by distance less twice the colour evidence. d2, log_ratio (M,): of this group (log_ratio
-    may be empty); owner, claimants (M,): as in `associate`.
+    The shared points, which other groups may have, too, follow by distance less twice the colour evidence. d2,
+    log_ratio (M,): of this group, d2 inf outside its region (log_ratio may be empty); owner (M,): group that alone may
+    have a point in no region, -1 none; claimants (M,): number of groups that may have the point.
     """
     inside = np.flatnonzero((d2 < np.inf) | (owner == g))
     shared = claimants[inside] > 1
@@ -168,9 +172,11 @@ def _estimate(
     """Update one group (x, P, extent, size, report) in place by its associations: the first start, start + 1, … of its
     points.
 
-    points (M, 2), weights, colour (M,): ordered; the first `start` are unshared. feasible (J,): which associations
-    satisfy the group constraint (m_g, eq. 4.1), at least one. rest: extent and size must not change. Returns the number
-    of shared points in the likeliest association, or -1 if the miss has at least the mass of all associations together.
+    points (M, 2), weights (people each stands for), colour (what each adds to the log mass) (M,): ordered; the first
+    `start` are unshared. x (4,), P (4, 4), extent (2, 2), size (1,), report (6,). feasible (J,): which associations
+    satisfy the group constraint (m_g, eq. 4.1), at least one. rest: extent and size must not change; nor do they if the
+    shared points stand for more than the share FREEZE_SHARE (in `rules`) of the size. Returns the number of shared
+    points in the likeliest association, or -1 if the miss has at least the mass of all associations together.
     """
     people, mean, cov = running_moments(points, weights, x[0], x[1], start)
     S = np.empty((len(people), 3))

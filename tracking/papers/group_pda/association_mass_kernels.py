@@ -114,8 +114,9 @@ def log_miss(points: Array, weights: Array, start: int, extent: Array, P: Array,
     """Return the log mass of the miss hypothesis (ours): no point is the group's; -inf if MISS_PROB is 0 (no
     hypothesis).
 
-    points (M, 2); weights (M,): people each stands for; start: number of unshared points; extent (2, 2), P (4, 4),
-    size: of the group. The points' centroid is uniform over the search region. The number of the unshared points is
+    The mass is the hypothesis' relative weight. points (M, 2); weights (M,): people each stands for; start: number of
+    unshared points; extent (2, 2), P (4, 4), size: of the group: covariance of the members, of the state, and people.
+    The points' centroid is uniform over the search region. The number of the unshared points, if there are any, is
     uniform up to twice the size.
     """
     if rules[MISS_PROB] <= 0:

@@ -28,7 +28,8 @@ RECAPTURE_GATE = 13.28
 class ExpectedMembers:
     """Where K members of confirmed groups should be, in the unit of the points (m on the ground, px in the image).
 
-    place (K, 2): predicted x, y; reach (K,): how far from there a member may be; group (K,): id of the member's group.
+    place (K, 2): predicted x, y; reach (K,): how far from there a member may be, growing with the time since its last
+    measurement; group (K,): id of the member's group.
     """
 
     place: Array
@@ -56,9 +57,10 @@ def add_newborns(
 ) -> None:
     """Append to the bank the tentative groups that the unclaimed points form under the group constraint G_y (sec. 3.3).
 
-    points (M, 2), weights (M,): people each stands for; t: s. expected: the members before the groups were updated. A
-    newborn group with a point within their reach is the child of the nearest member's group (ours). Noise forms no
-    group.
+    G_y: linked points are one group, and such components whose regions overlap. points (M, 2), weights (M,): people
+    each stands for; t: s. expected: the members before the groups were updated. A newborn group with a point within
+    their reach is the child of the nearest member's group (ours). Components with too few people (noise) form no group.
+    No points change nothing.
     """
     if not len(points):
         return
@@ -117,8 +119,8 @@ def _recaptured(bank: GroupBank, new: Ints, old: Ints, scaled: ScaledParameters)
     """Yields pairs (row of a new group, row of an unmeasured old group) that are the same group, nearest first.
 
     new, old: rows of the bank to compare. The new state lies in the old group's predicted region of position and
-    velocity, the velocities differ by no more than `merge_velocity` and a standard deviation, and the old group was
-    last measured before the new one's birth. No row occurs twice.
+    velocity (squared Mahalanobis distance at most 13.28), the velocities differ by no more than `merge_velocity` and a
+    standard deviation, and the old group was last measured before the new one's birth. No row occurs twice.
     """
     d = bank.x[new][:, None] - bank.x[old]
     S = bank.P[new][:, None] + bank.P[old]

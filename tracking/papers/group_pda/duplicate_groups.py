@@ -23,7 +23,7 @@ def may_be_one(bank: GroupBank, i: int, j: int) -> bool:
     """Return True if so few people of the groups in rows i and j of the bank are measured that the two may be one
     group.
 
-    Few are less than LEAST_MEASURED = 55 % of the sum of their sizes.
+    Few are less than LEAST_MEASURED = 55 % of the sum of their sizes. Measured people count at the nearer group only.
     """
     return bool(LEAST_MEASURED * (bank.size[i] + bank.size[j]) > bank.own_people[i] + bank.own_people[j])
 
@@ -31,8 +31,9 @@ def may_be_one(bank: GroupBank, i: int, j: int) -> bool:
 class DuplicateGroups:
     """Finds pairs of groups that follow the same people.
 
-    State: clock, a dict: the time, s, by pair of ids of groups whose search regions overlap. A time grows in frames in
-    which the two may be the same group and falls in the others; at 0 the pair is dropped.
+    State: clock, a dict: the time, s, by pair of ids (in the order of the bank) of groups whose search regions overlap.
+    A time grows in frames in which the two may be the same group and falls in the others; at 0, or once the regions do
+    not overlap, the pair is dropped.
     """
 
     def __init__(self) -> None:
@@ -42,9 +43,9 @@ class DuplicateGroups:
         """Advance the clocks by a frame, at time t (s), and make one group lost of each pair whose clock has passed
         `coast_time`.
 
-        Only confirmed groups measured in this frame take part. Lost is the group with the smaller share of people of
-        its own; if equal, the younger one. A lost group claims no points until it is recaptured; `last_seen` is set
-        back in the bank.
+        Only confirmed groups measured in this frame take part; other pairs lose their clock. Lost is the group with the
+        smaller share of people of its own (nearer to no other group); if equal, the younger one. A lost group claims no
+        points until it is recaptured; `last_seen` is set back in the bank.
         """
         rows = np.flatnonzero(bank.confirmed & (bank.last_seen >= t))
         pairs = {(int(bank.id[i]), int(bank.id[j])): (i, j) for i, j in _overlapping(bank, rows, scaled.config.gate)}

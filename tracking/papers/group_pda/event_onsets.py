@@ -51,11 +51,13 @@ class PairHistory:
     moments: list[PairMoment]
 
     def merge_onset(self, merge_velocity: float) -> tuple[float, Array]:
-        """Return when, in s, the groups came to be near with like velocities, and where (2,), in the points' unit.
+        """Return when, in s, the groups came to be near with like velocities, and where (2,), in the points' unit:
+        half-way between the centroids.
 
-        merge_velocity: m/s. The onset is the moment after the last one in which the gap was above 1.5 m, or the chord's
-        velocity difference was above 1.2 merge_velocity at a time up to `alike_since`; the first moment if there is
-        none. It is the last moment at the latest.
+        merge_velocity: m/s. The onset is the moment after the last one in which the gap between nearest people was
+        above 1.5 m, or the velocity difference, by chords from 0.7 s before to 0.7 s after, was above 1.2
+        merge_velocity at a time up to `alike_since`; the first moment if there is none. It is the last moment at the
+        latest. There must be a moment (else TypeError).
         """
         t, d = np.array([m.t for m in self.moments]), np.array([m.difference for m in self.moments])
         before = (chords(t, d, MERGE_CHORD) > MERGE_CHORD_MARGIN * merge_velocity) & (t <= self.alike_since)
@@ -68,8 +70,9 @@ def chords(t: Array, d: Array, half: float, *, full_length: bool = False) -> Arr
     """Return speeds (K,) of the positions d (K, 2) at the times t (K,), s, ascending: chords from `half` s before to
     after.
 
-    A chord spans at least one frame to each side if there is one. At both ends of the series chords are shorter. With
-    full_length they are as long there as elsewhere, but not centred on their times. A single position has speed 0.
+    Unit: that of d per s. A chord spans at least one frame to each side if there is one. At both ends of the series
+    chords are shorter. With full_length they are as long there as elsewhere, but not centred on their times. A single
+    position has speed 0. None give an empty array, or IndexError with full_length.
     """
     k, middle = np.arange(len(t)), t
     if full_length:

@@ -91,8 +91,11 @@ def sine_tilt(camera: Camera | None) -> float:
 
 
 def _learned(foreground: Foreground, context: Context) -> float:
-    """Returns the scale, px per m, learned from people who are alone in the background sample; nan if there
-    are none."""
+    """Returns the scale, px per m, learned from people who are alone in the background sample; nan if there are none.
+
+    foreground: the pipeline with its background model; context: of the sequence, with a background sample (else
+    AssertionError).
+    """
     assert context.background is not None
     size = PersonSize(context)
     foreground.learn_person_size(size, context.background)

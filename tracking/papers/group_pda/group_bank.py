@@ -110,7 +110,7 @@ class GroupBank:
             setattr(self, f.name, new)
 
     def remove(self, row: int) -> None:
-        """Remove the group in `row`, in place; later rows move up by one."""
+        """Remove the group in `row` (from 0; another row changes nothing), in place; later rows move up by one."""
         self.keep(np.arange(len(self)) != row)
 
     def add(self, other: GroupBank) -> None:
@@ -130,7 +130,8 @@ def newborn(points: Array, weights: Array, group: Ints, scaled: ScaledParameters
 
     points (M, 2); weights (M,): people that each point stands for; group (M,): 0, 1, … without gaps, or -1 for no
     group; t: time of the frame, s. Centroid and size are the weighted mean and sum. The extent is the covariance,
-    shrunk towards the prior and divided by the gate factor (both ours). The bank is empty if no point has a group.
+    shrunk towards the prior and divided by the gate factor (both ours). The centroid's variance is point_sd^2 (1 + 1 /
+    size), that of the velocity speed_prior^2. No member is `known` yet. The bank is empty if no point has a group.
     """
     count = int(group.max(initial=-1)) + 1
     if not count:

@@ -1,9 +1,10 @@
 """Merging of `group-pda`'s groups (sec. 3.1, 3.2): which are near with like velocities, for how long, and their union.
 
-The relation R_x holds for two groups whose search regions overlap and whose velocities are alike. G_x are the connected
-components of groups under R_x; each becomes one group. Departures: the velocity test is a physical difference
-(`merge_velocity`), R_x must hold for `merge_time`, and only groups whose velocity is known well take part (see
-`GroupMerging.step`).
+Input: the bank of groups after the update of a frame; output: the bank with merged groups, and the events. The relation
+R_x holds for two groups whose search regions (ellipses about the centroids) overlap and whose velocities are alike. G_x
+are the connected components of groups under R_x; each becomes one group. Departures: the velocity test is a physical
+difference (`merge_velocity`), R_x must hold for `merge_time`, and only groups whose velocity is known well take part
+(see `GroupMerging.step`).
 """
 
 from __future__ import annotations
@@ -40,11 +41,11 @@ Pair = tuple[int, int]
 
 
 class NearPair(NamedTuple):
-    """Two groups whose search regions overlap or whose points are linked in this frame.
+    """Two groups whose search regions (ellipses about the centroids) overlap or whose points are linked in this frame.
 
     ids: of the two groups, the smaller first. alike: True if their velocities are alike and, from pixels, their people
-    are not far apart. moment: the pair in this frame: time (s), difference of centroids (m), gap between nearest people
-    (m).
+    are at most 2.5 m apart. moment: the pair in this frame: time (s), difference of centroids (m), place half-way, gap
+    between nearest people (m).
     """
 
     ids: Pair
@@ -55,7 +56,8 @@ class NearPair(NamedTuple):
 class GroupMerging:
     """Merges groups that stay near with like velocities.
 
-    State: histories, by pair of ids (the smaller first): the past of each pair of groups that are near each other.
+    State: histories, a dict by pair of ids (the smaller first): the `PairHistory` of each pair of groups that are near
+    each other, or were within the last 1.5 s while one of them could not merge.
     """
 
     def __init__(self) -> None:
@@ -66,10 +68,10 @@ class GroupMerging:
         s.
 
         The bank holds updated states and is changed in place. A group takes part if it is confirmed, was measured in
-        this frame, has no `null_time`, and at least 20 % of its people are nearer to no other group: else its velocity
-        is unknown or another group's. An event is a merge if at least two of the groups were there for more than 1 s
-        before the onset or are children of another group. Else it is an enter. It is a generator: groups merge only
-        while it is read.
+        this frame, has no `null_time` (time without a feasible association), and at least 20 % of its people are nearer
+        to no other group: else its velocity is unknown or another group's. An event is a merge if at least two of the
+        groups were there for more than 1 s before the onset or are children of another group. Else it is an enter. It
+        is a generator: nothing, not even the histories, changes before it is read.
         """
         able = np.flatnonzero(
             bank.confirmed & (bank.last_seen >= t) & (bank.null_time <= 0) & (bank.own_people >= LEAST_OWN * bank.size)
@@ -101,7 +103,7 @@ class GroupMerging:
         """Give the histories of the merged groups `ids` with other groups to `heir`, the id of their union in the bank.
 
         The differences of centroids are shifted, so that they do not jump. Of two histories with the same other group,
-        the one that has been alike for longer is kept.
+        the one that has been alike for longer is kept. Histories among the merged groups are dropped.
         """
         histories = {p: h for p, h in self.histories.items() if not set(p) & set(ids)}
         for p, history in self.histories.items():
@@ -128,9 +130,10 @@ class GroupMerging:
 def merged(bank: GroupBank, rows: Ints) -> GroupBank:
     """Return a bank of one row, the union (eq. 3.1) of the groups in `rows` (at least one); `bank` is not changed.
 
-    Centroid and velocity are means weighted by size, the extent contains the spread of the centroids. P is that of a
-    weighted mean of independent centroids, sum w^2 P_i (ours): the spread of the centroids is no estimation error. The
-    group with most people (rounded), then the oldest, then the least id, gives the id.
+    Centroid and velocity are means weighted by size, sizes and colours sums; the extent contains the spread of the
+    centroids. P is that of a weighted mean of independent centroids, sum w^2 P_i (ours; w: shares of the size): the
+    spread of the centroids is no estimation error. The group with most people (rounded), then the oldest, then the
+    least id, gives the id. Times are the earliest first and the latest last measurement; recent points are empty.
     """
     size = np.asarray(bank.size[rows].sum())
     w = bank.size[rows] / size
@@ -154,7 +157,8 @@ def merged(bank: GroupBank, rows: Ints) -> GroupBank:
 def _near_pairs(bank: GroupBank, rows: Ints, scaled: ScaledParameters, t: float) -> Iterator[NearPair]:
     """Yields the pairs of groups, out of the bank's `rows`, whose search regions overlap or whose points are linked.
 
-    From points, pairs that may be one group are left out. From pixels they are not, as bodies hide each other. t: s.
+    The search regions are those of 0.9 gate, by the extents alone. From points, pairs that may be one group (too few of
+    their people are measured) are left out. From pixels they are not, as bodies hide each other. t: s.
     """
     close = regions_overlap(bank.x[rows, :2], bank.extent[rows], GATE_MARGIN * scaled.config.gate)
     close |= _linked(bank, rows, scaled)
@@ -202,11 +206,11 @@ def _people_sd(bank: GroupBank, row: int, way: Array, scaled: ScaledParameters) 
 
 
 def _linked(bank: GroupBank, rows: Ints, scaled: ScaledParameters) -> Bools:
-    """Returns flags (K, K): True if the groups in rows i and j have points within the link distance of each other
-    (ours).
+    """Returns flags (K, K): True if the groups in rows[i] and rows[j] of the bank have points within the link distance
+    of each other (ours).
 
-    From pixels the hulls of the points are compared. The diagonal is True. This finds near groups whose extents lag
-    because they rest while points are shared.
+    From pixels the hulls of the points are compared (their bounding boxes, if a hull has fewer than 3 vertices). The
+    diagonal is True. This finds near groups whose extents lag because they rest while points are shared.
     """
     found = np.eye(len(rows), dtype=bool)
     place, link = [bank.positions(r) for r in rows.tolist()], scaled.constraint.link

@@ -27,8 +27,9 @@ RECENT_POINTS = 64
 def with_missed_members(claims: PointClaims, bank: GroupBank, scaled: ScaledParameters, t: float) -> PointClaims:
     """Return new claims with the members missed at time t (s) appended as points that only their own group may have.
 
-    Only groups with any points in this frame (in their region or attached) get them. Each counts as one person, with
-    the time of its last measurement.
+    claims: which points each group may have; not changed. Only groups with any points in this frame (in their region or
+    attached) get missed members. Each counts as one person, with the time of its last measurement, and lies at its
+    predicted place. From pixels nobody is appended.
     """
     has_points = np.asarray(np.isfinite(claims.d2).any(axis=1))
     has_points[claims.owner[claims.owner >= 0]] = True
@@ -49,9 +50,9 @@ def missed_members(bank: GroupBank, points: Array, scaled: ScaledParameters, t: 
     """Return the places (K, 2), rows of the bank (K,) and last measurements (K,) in s of the members missed at time t
     (s).
 
-    points (M, 2): of this frame. A member is missed if no point is within `carry_reach` of its predicted place. Only
-    `known` members (measured near their place before) that were measured within the last `carry_time` count. There are
-    none from pixels, or if carry_time is 0.
+    points (M, 2): of this frame. A member is missed if no point is within `carry_reach` of its predicted place (its
+    place relative to the centroid when last measured). Only `known` members (measured near their place before) that
+    were measured within the last `carry_time` count. There are none from pixels, or if carry_time is 0.
     """
     c, recent = scaled.config, []
     if c.carry_time > 0 and not scaled.from_pixels:
@@ -68,11 +69,12 @@ def missed_members(bank: GroupBank, points: Array, scaled: ScaledParameters, t: 
 
 
 def remember(bank: GroupBank, claims: PointClaims, exclusive: Bools, scaled: ScaledParameters, t: float) -> None:
-    """Store each group's points of this frame, exclusive (G, M) bool, as its members and recent points, in the bank.
+    """Store each group's points of this frame as its members and recent points, in the bank, in place.
 
-    t: s. A group without points keeps its old ones. A member is `known` if, relative to the centroid, one of the
-    group's previous members was within `carry_reach` of it. From pixels only the vertices of the points' convex hull
-    are kept as members, all known.
+    exclusive (G, M) bool: each group's points, a point at one group only; claims: the points with their times; t: s. A
+    group without points keeps its old ones. Else recent points of 3 s and older are dropped, and at most 64 of this
+    frame are added. A member is `known` if, relative to the centroid, one of the group's previous members was within
+    `carry_reach` of it. From pixels only the vertices of the points' convex hull are kept as members, all known.
     """
     for row in np.flatnonzero(exclusive.any(1)).tolist():
         mine, last_seen = claims.points[exclusive[row]], claims.last_seen[exclusive[row]]

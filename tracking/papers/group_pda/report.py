@@ -21,8 +21,9 @@ from tracking.papers.group_pda.scaled_parameters import ScaledParameters
 class BankEvent:
     """A change of the set of confirmed groups.
 
-    kind: "merge", "split", "enter" or "leave". onset: time, s, when it began. before, after: ids (tuples) of the
-    groups concerned before and after the change, sorted. pos: x, y in the unit of the points.
+    kind: "merge", "split", "enter" or "leave". onset: time, s, when it began. before, after: ids (tuples) of the groups
+    concerned before and after the change, sorted; () before an enter of one group and after a leave. pos: x, y in the
+    unit of the points (m or px).
     """
 
     kind: str
@@ -36,9 +37,9 @@ class BankEvent:
 class ReportFrame:
     """The frame that is reported.
 
-    index: its number, from 1; t: time, s; plane: "ground" or "image"; fps: frames per second.
-    outline (V, 2): a polygon round the origin, in the plane's unit, that stands for what covers the ground or the image
-    about one member's place: a footprint, a usual box, or a cell of the pixel grid.
+    index: its number, from 1; t: time, s; plane: "ground" (m) or "image" (px); fps: frames per second. outline (V, 2):
+    a polygon round the origin, in the plane's unit, that stands for what covers the ground or the image about one
+    member's place: a footprint, a usual box, or a cell of the pixel grid.
     """
 
     index: int

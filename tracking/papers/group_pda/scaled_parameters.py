@@ -47,8 +47,9 @@ def scale_parameters(
 ) -> ScaledParameters:
     """Return the parameters for a frame rate `fps` (frames per s) and a scale in units of the points per metre.
 
-    body_cov (2, 2): covariance of one person's pixels in px^2; None if the points are people. sine_tilt: sine of the
-    camera's tilt, above 0, the factor by which lengths in depth are shortened in the image.
+    config: lengths in m, times in s. body_cov (2, 2): covariance of one person's pixels in px^2; None if the points are
+    people. sine_tilt: sine of the camera's tilt, above 0, the factor by which lengths in depth are shortened in the
+    image.
     """
     c, dt, pixels = config, 1 / fps, body_cov is not None
     point_sd = scale * (c.pixel_noise if pixels else c.point_noise)
@@ -78,10 +79,12 @@ def scale_parameters(
 def _kernel_rules(
     c: GroupPdaConfig, fps: float, constraint: Constraint, point_sd: float, factor: float, pixels: bool
 ) -> Array:
-    """Returns the array `rules` (RULES,) of the kernels; its slots are explained in association_mass_kernels.
+    """Returns the array `rules` (19,) of the kernels; its slots are named in association_mass_kernels.
 
-    c: the config. point_sd: standard deviation of a measured position. factor: share of its covariance that a Gaussian
-    keeps inside the gate, 1 without gate_correction. pixels: the points are foreground pixels.
+    c: the config; fps: frames per s. constraint: by which points are one group. point_sd: standard deviation of a
+    measured position. factor: share of its covariance that a Gaussian keeps inside the gate, 1 without gate_correction.
+    pixels: the points are foreground pixels: then a member is always detected. With association "none" there is no miss
+    hypothesis and no freezing.
     """
     rules = np.zeros(kernels.RULES)
     rules[kernels.GATE], rules[kernels.LINK] = constraint.gate, constraint.link

@@ -1,9 +1,10 @@
 """Splitting of `group-pda`'s groups (sec. 3.3): a group without feasible associations falls apart.
 
-An association is feasible if its points form one group under the group constraint G_y (tracking.filters.components).
-`split` partitions the points (M, 2) of a group without feasible associations by G_y and replaces its row of the bank by
-one row per part. A group of one part stays, one of noise only is removed.
-`children` makes the rows of the parts. Lengths are in the unit of the points (m on the ground or px), times in s.
+An association (a set of points that may be a group's) is feasible if its points form one group under the group
+constraint G_y (tracking.filters.components). `split` partitions the points (M, 2) of a group without feasible
+associations by G_y and replaces its row of the bank by one row per part. A group of one part stays, one of noise only
+is removed. `children` makes the rows of the parts. Lengths are in the unit of the points (m on the ground or px), times
+in s.
 """
 
 from __future__ import annotations
@@ -24,11 +25,12 @@ def split(
 ) -> BankEvent | None:
     """Replace the group in `row` by those that its points (M, 2) form under G_y; return the event of a confirmed group.
 
-    weights (M,): people each point stands for; t: s; ids: gives fresh ids. The bank is changed in place.
+    G_y: linked points are one group, and such components whose regions overlap. weights (M,): people each point stands
+    for; t: s; ids: gives fresh ids. The bank is changed in place.
     - Several groups: they are appended to the bank and the old row is removed. The largest (then the one nearest to the
-      old centroid) keeps the id, the others get fresh ids. The event is a split.
+      old centroid) keeps the id, the others get fresh ids. The event is a split, from its measured onset.
     - One group: it stays, and its `null_time` becomes 0. None is returned.
-    - No group, only noise: it is removed. The event is a leave.
+    - No group, only noise or no point: it is removed. The event is a leave.
 
     None is returned for a tentative group, whose parts stay tentative.
     """
@@ -60,8 +62,9 @@ def children(
     """Return a bank of the groups into which the group in `row` splits; `bank` is not changed.
 
     points (M, 2), weights (M,): people each stands for; group (M,): part 0, 1, … of each point, -1 none; t: s. The
-    parts are newborn from their points. Departures: they keep the parent's age and colours, and, with
-    `inherit_velocity`, its velocity, with `split_speed` as further standard deviation.
+    parts are newborn from their points, without ids. Departures: they keep the parent's age and colours (a tentative
+    parent's `parent` and `origin`, too), and, with `inherit_velocity`, its velocity, with `split_speed` as further
+    standard deviation.
     """
     c = scaled.config
     parts = newborn(points, weights, group, scaled, t)

@@ -165,7 +165,9 @@ class GroupPda:
         """Returns the frame's points (M, 2) x, y and the people (M,) that each stands for; None and (0,) without
         information.
 
-        From pixels it also lets the background learn and sets `colours`; from points it sets `plane`.
+        From pixels the points are grid pixels u, v; there is no information without an image or with too much
+        foreground. It lets the background learn and sets `colours`; InputError if the picture's size or dtype is not
+        the sample's. From points they are `detections.pos`, None without detections; it sets `plane`.
         """
         if self.pixels is not None:
             found = None if frame.image is None else self.pixels.points(frame.image, self.outlines())
@@ -226,7 +228,8 @@ class GroupPda:
     def _measure(self, points: Array, weights: Array, scaled: ScaledParameters, t: float) -> list[BankEvent]:
         """Gate, associate and update (sec. 4), split, and add newborn groups (sec. 3.3); returns the events of splits.
 
-        points (M, 2); weights (M,): people each stands for; t: s. The bank and `innovation` are changed.
+        points (M, 2) in m or px; weights (M,): people each stands for; t: s. The bank and `innovation` are changed. An
+        event is a split, or a leave of a group that has only noise.
         """
         bank = self.bank
         d2 = gated_distances(bank, points, scaled, t)
@@ -250,8 +253,8 @@ class GroupPda:
         """Split the groups that had no feasible association for `split_time`, each by the points nearest to it; returns
         events.
 
-        chosen (G, M) bool: points of each group; log_ratio (G, M) of colours, or (G, 0); t: s. An event may be a split,
-        or a leave of a group that has only noise.
+        claims: which points each group may have. chosen (G, M) bool: points of each group; log_ratio (G, M) of colours,
+        or (G, 0); t: s. An event may be a split, or a leave of a group that has only noise; tentative groups give none.
         """
         bank, events = self.bank, []
         due = np.flatnonzero((bank.null_time >= self.config.split_time - 1e-9) & (bank.null_time > 0))
