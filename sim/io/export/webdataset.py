@@ -43,13 +43,14 @@ def webdataset(
     """Pack a generated dataset into OUT/shard-000000.tar, …, and write OUT/index.json; returns the index as a dict.
 
     shard_size: bytes that a shard may have. A sequence is never divided, so a shard of a single sequence may be larger.
-    samples: "sequence" (all files of a sequence) or "frame" (one frame's labels and pictures). Complete shards of an
-    earlier run are kept. progress: called as progress(shards done, shards in all, name of the last one) after each
-    shard. Keys of the index: format, samples, content_hash, and shards, the content of each shard's .json.
+    samples: "sequence" (all files of a sequence) or "frame" (one frame's labels and pictures). A .json beside each
+    shard describes it. Complete shards of an earlier run are kept. progress: called as progress(shards done, shards in
+    all, name of the last one) after each shard. Keys of the index: format, samples, content_hash, and shards, the
+    content of each shard's .json.
 
     Raises InputError if the source is not a generated dataset or a file of it is missing or altered, two sequences
-    share a name, OUT holds shards of another export, another process writes to OUT, or samples are frames and the
-    pictures are videos. Raises WorkError if the disk is full.
+    share a name, OUT holds shards of another export, another process writes to OUT, OUT cannot be written, or samples
+    are frames and the pictures are videos. Raises WorkError if the disk is full.
     """
     items, root = _items(Path(source), samples), Path(out)
     shards = list(_shards(items, shard_size))
@@ -85,8 +86,9 @@ def size_of(text: str) -> int:
 def _items(source: Path, samples: str) -> list[SequenceItem]:
     """Return the sequences to pack, sorted by their names <split>/<sequence>.
 
-    samples: "sequence" or "frame". Raises InputError if the source is not a generated dataset, a manifest is invalid,
-    two sequences share a name, or samples are "frame" and a sequence has videos.
+    source: path of a dataset or sequence. samples: "sequence" or "frame". Raises InputError if the source is not a
+    generated dataset or holds no sequence, a manifest is invalid, two sequences share a name, or samples are "frame"
+    and a sequence has videos.
     """
     found = sorted(map(read_item, sequence_folders(source, "generated")), key=lambda item: item.name)
     twice = next((a.name for a, b in pairwise(found) if a.name == b.name), None)
@@ -120,8 +122,9 @@ def _shards(items: list[SequenceItem], size: int) -> Iterator[list[SequenceItem]
 def _facts(samples: str, number: int, items: list[SequenceItem]) -> dict[str, Any]:
     """Return what the .json of a shard holds before its tar is written.
 
-    Keys: name, samples, manifests (hash of the sequences' manifests), sequences (content hash by <split>/<sequence>).
-    The size and hash of the tar are added later. number: of the shard, from 0.
+    Keys: name ("shard-000000.tar" for number 0), samples, manifests (one hash of the manifests' hashes, in order),
+    sequences (content hash by <split>/<sequence>). The size and hash of the tar are added later. number: of the shard,
+    from 0. items: its sequences.
     """
     manifests = hashing.canonical_hash([item.manifest for item in items])
     hashes = {item.name: item.content for item in items}
@@ -132,7 +135,8 @@ def _reject_other_shards(root: Path, plan: list[dict[str, Any]]) -> None:
     """Raise InputError if OUT (`root`) holds a shard of another export; do nothing otherwise.
 
     plan: the facts of each shard to write. A shard-*.tar is of another export if the plan does not name it or its .json
-    contradicts the plan. A tar without .json is accepted, as an interrupted run leaves it.
+    contradicts the plan. A tar without .json is accepted, as an interrupted run leaves it. Also raises InputError if a
+    .json is unreadable or no JSON object.
     """
     wanted = {facts["name"]: facts for facts in plan}
     for path in sorted(root.glob("shard-*.tar")):
@@ -149,7 +153,8 @@ def _complete_shard(root: Path, facts: dict[str, Any]) -> dict[str, Any] | None:
     """Return the .json of a shard in OUT (`root`) that is complete: its tar has the hash that the .json names; else
     None.
 
-    facts: give the shard's name. Raises InputError if the .json is no JSON object.
+    facts: its "name" is the shard's file name. None, too, if the tar or its .json is missing. Raises InputError if the
+    .json is unreadable or no JSON object.
     """
     path = root / facts["name"]
     if not path.is_file() or not path.with_suffix(".json").is_file():

@@ -66,10 +66,10 @@ def read_item(folder: Path) -> SequenceItem:
 def tar_members(item: SequenceItem, samples: str) -> Iterator[Member]:
     """Yield the tar members of a stored sequence as (name, function that reads the content), in the order of packing.
 
-    samples "sequence": every file of the sequence, the manifest first. Otherwise, for each frame, its JSON labels and
-    then its stored pictures (left, right, disparity, ids). Raises InputError if the manifest is invalid; for frames
-    also if a file of labels or detections differs from it. The reading functions raise InputError if their file is
-    missing or differs from the manifest.
+    item: the sequence; names begin with its key. samples "sequence": every file of the sequence, the manifest first.
+    Otherwise, for each frame, its JSON labels and then its stored pictures (left, right, disparity, ids). Iterating
+    raises InputError if the manifest is invalid; for frames also if a file of labels or detections differs from it. The
+    reading functions raise InputError if their file is missing or differs from the manifest.
     """
     manifest = read_manifest(item.folder)
     stored = StoredPictures(item.folder, manifest)
@@ -91,10 +91,11 @@ def frame_labels(folder: Path, manifest: dict[str, Any]) -> Iterator[bytes]:
 
     manifest: that of the folder. Keys: sequence (name), fps, image_size [width, height] px, frame (from 1), t in s.
     people, where the truth is stored: id, group (-1 for alone), box (left, top, width, height in px, amodal), x, y in
-    m, vx, vy in m/s, visibility. groups, likewise: id, members, hull in m. detections, where they are stored: score,
-    box, plane, and x, y, (z) in m or px by the plane.
+    m, vx, vy in m/s, visibility. groups, likewise: id, members (person ids), hull (list of [x, y]) in m; null if
+    unknown. detections, where they are stored: score, box, plane, and x, y, (z) in m or px by the plane.
 
-    Raises InputError if a file of the sequence is missing or altered.
+    Iterating raises InputError if a file of the sequence is missing or altered, AssertionError for a truth without
+    positions.
     """
     sequence = open_sequence(folder)
     truth = sequence.truth
@@ -133,5 +134,5 @@ def _detections(found: Detections) -> Iterator[dict[str, Any]]:
 
 
 def _numbers(row: Array) -> list[float | None]:
-    """Return the values of an array (N,) as a list of JSON numbers, None for nan."""
+    """Return the values of `row`, an array (N,), as a list of JSON numbers, None for nan."""
     return [tables.nan_to_none(value) for value in row.tolist()]

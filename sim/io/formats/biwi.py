@@ -1,8 +1,9 @@
 """Reader for BIWI walking pedestrians (Pellegrini 2009): the files obsmat.txt and groups.txt of a folder.
 
 obsmat.txt has lines `frame id x z y vx vz vy` in m and m/s; its z is the height, which is 0. Its frames are numbers of
-video frames, annotated at a fixed step, with gaps where nobody was there. groups.txt has one group per line, as ids
-that belong together for the whole recording.
+video frames, annotated at a fixed step (2.5 per s), with gaps where nobody was there. groups.txt has one group per
+line, as ids that belong together for the whole recording. The results are a Truth and a Sequence without pictures,
+whose frames count the annotated ones from 1.
 """
 
 from __future__ import annotations
@@ -37,11 +38,11 @@ def frame_numbers(raw: Ints) -> Ints:
 
 
 def read_groups(path: Path) -> dict[int, int]:
-    """Return the group label of each person in a BIWI groups.txt, by person id; people alone have no entry.
+    """Return the group label of each person in the BIWI groups.txt `path`, by person id; people alone have no entry.
 
-    A line lists the ids of one group; labels count from 1 in the order of the lines. Lines with fewer than two
-    different ids are no group. Lines that share a person become one group with the lowest label, with a warning. Raises
-    InputError if the file is unreadable, or, with the line, if a word is no integer.
+    A line lists the ids of one group, separated by blanks or commas; labels count from 1 in the order of the lines.
+    Lines with fewer than two different ids are no group. Lines that share a person become one group with the lowest
+    label, with a warning. Raises InputError if the file is unreadable, or, with the line, if a word is no integer.
     """
     label: dict[int, int] = {}
     for number, line in enumerate(read_text(path).splitlines(), 1):
@@ -72,11 +73,11 @@ def _ids(path: Path, number: int, line: str) -> list[int]:
 
 
 def _table(folder: Path) -> tuple[NumericTable, Ints, Ints]:
-    """Return (rows of obsmat.txt, our frames from 1 (R,), person ids (R,)), all sorted by (frame, id).
+    """Return (rows of obsmat.txt in `folder`, our frames from 1 (R,), person ids (R,)), all sorted by (frame, id).
 
-    A row is frame, id, x, z, y, vx, vz, vy in m and m/s, frame being the file's own number. Raises InputError if the
-    file is unreadable, a line is not 8 finite numbers, a frame or id is no integer, an id is negative, or an id stands
-    twice in a frame.
+    A row is frame, id, x, z, y, vx, vz, vy in m and m/s, frame being the file's own number. A file without lines gives
+    no rows. Raises InputError if the file is unreadable, a line is not 8 finite numbers, a frame or id is no integer,
+    an id is negative, or an id stands twice in a frame.
     """
     rows = read_numbers(folder / "obsmat.txt", (8, 8))
     frame, id = frame_numbers(rows.integers(0, "frame")), rows.integers(1, "id")
@@ -91,10 +92,10 @@ def _table(folder: Path) -> tuple[NumericTable, Ints, Ints]:
 def read_truth(folder: Path, fps: float = FPS) -> Truth:
     """Return the truth of the BIWI recording in `folder`: positions m and velocities m/s on the ground, no boxes.
 
-    Groups are those of groups.txt; their hulls and events are measured from the motion. Without groups.txt everybody is
-    alone, no frame counts as labelled, and groups and events are None. fps: annotated frames per second, default 2.5.
-    Raises InputError if obsmat.txt or groups.txt is unreadable or invalid; warns if two lines of groups.txt share a
-    person.
+    Groups are those of groups.txt, the same in all frames, and every frame counts as labelled; their hulls and events
+    are measured from the motion. Without groups.txt everybody is alone, no frame counts as labelled, and groups and
+    events are None. fps: annotated frames per second, default 2.5. Raises InputError if obsmat.txt or groups.txt is
+    unreadable or invalid; warns if two lines of groups.txt share a person.
     """
     rows, frame, id = _table(folder)
     pos, vel = rows.values[:, (2, 4)], rows.values[:, (5, 7)]
@@ -112,10 +113,10 @@ def read_truth(folder: Path, fps: float = FPS) -> Truth:
 
 
 def open_folder(folder: Path, *, fps: float | None = None) -> Sequence:
-    """Return the BIWI recording in `folder` as Sequence, without pictures and detections.
+    """Return the BIWI recording in `folder` as Sequence, without pictures and detections; its length is the last frame.
 
-    fps: annotated frames per second, above 0; None: 2.5. Raises InputError if obsmat.txt is unreadable or invalid. An
-    invalid groups.txt raises InputError when the truth is read.
+    fps: annotated frames per second, above 0, which is not checked; None: 2.5. Raises InputError if obsmat.txt is
+    unreadable or invalid. An invalid groups.txt raises InputError when the truth is read.
     """
     rate = FPS if fps is None else fps
     length = int(_table(folder)[1].max(initial=0))

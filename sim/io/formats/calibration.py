@@ -15,9 +15,10 @@ SHAPE_TOLERANCE = 0.01  # relative difference allowed between the aspect ratios 
 
 
 def read_calibration(path: Path) -> Camera:
-    """Return the Camera of a calibration file: Tsai's XML if its name ends in .xml, else our camera.json.
+    """Return the Camera of the calibration file `path`: Tsai's XML if its name ends in .xml, else our camera.json.
 
-    Raises InputError if there is no such file, or if a value is missing, not finite, or of the wrong kind or shape.
+    Raises InputError if there is no such file, it is no XML or JSON object, or if a value is missing, not finite, or of
+    the wrong kind or shape.
     """
     if not path.is_file():
         expected = "a camera.json, or Tsai's calibration as .xml"

@@ -30,9 +30,10 @@ CHORD = 1.0  # s, for velocities: labels rest for some frames and then jump by p
 class CaviarRecording:
     """The content of a CAVIAR file: R boxes sorted by (frame, id), and `length` frames.
 
+    name: that in the file, else the file's name without suffix. length: the last frame in the file, 0 without frames.
     frame (R,): from 1. id (R,): the person's id. label (R,): the id of the person's group, -1 for alone. centre (R, 2):
-    x, y of the box's centre, px. size (R, 2): width, height, px. labelled: True if the file has a list of groups in any
-    frame.
+    x, y of the box's centre, px. size (R, 2): width, height, px. labelled: True if the file has a list of groups,
+    perhaps empty, in any frame.
     """
 
     name: str
@@ -51,11 +52,12 @@ class CaviarRecording:
 
 
 def read_xml(path: Path) -> CaviarRecording:
-    """Read the people and groups of a CAVIAR file (CVML). Our frame is the file's frame number + 1.
+    """Read the people and groups of the CAVIAR file (CVML) `path`. Our frame is the file's frame number + 1.
 
     A list of fewer than two members is no group. A person in two groups of a frame stays in the first, with a warning.
-    Raises InputError if the file is unreadable or no CVML, and, with the file's frame number, if an object has no box
-    or a box without area, a number is missing or wrong, or an id stands twice in a frame.
+    A file without people gives no rows. Raises InputError if the file is unreadable or no CVML, and, with the file's
+    frame number, if an object has no box or a box without area, a number is missing or wrong, or an id stands twice in
+    a frame.
     """
     root = _root(path)
     rows: list[tuple[float, ...]] = []
@@ -112,9 +114,9 @@ def _number(path: Path, place: str, element: ET.Element, key: str) -> float:
 def _labels(path: Path, index: int, element: ET.Element) -> dict[int, int]:
     """Return the group id of each person in one frame by person id; people alone have no entry.
 
-    element: the XML of the frame. index: our frame, from 1; messages name index - 1. Groups with fewer than two members
-    are ignored; a person in two groups keeps the first, with a warning. Raises InputError if a member or group id is no
-    number.
+    path: the file, for messages. element: the XML of the frame. index: our frame, from 1; messages name index - 1.
+    Groups with fewer than two members are ignored; a person in two groups keeps the first, with a warning. Raises
+    InputError if a member or group id is no number.
     """
     label: dict[int, int] = {}
     for group in element.iterfind("grouplist/group"):
@@ -157,12 +159,12 @@ def read_truth(path: Path, fps: float = FPS, px_per_m: float | None = None) -> T
     """Return the truth of a CAVIAR file in the image: boxes (left, top, width, height in px), no positions on the
     ground.
 
-    Groups are those of the file, one hull around their members' boxes (groups_px); events are measured from the motion
-    of the boxes' centres. If the file has no group lists or no boxes, no frame counts as labelled, and groups and
-    events are None. fps: frames per second, default 25. px_per_m: image scale; None: the median of the boxes' longer
-    sides / 1.7 m.
+    Groups are those of the file, one hull around their members' boxes (groups_px), and every frame counts as labelled;
+    events are measured from the motion of the boxes' centres. If the file has no group lists or no boxes, no frame
+    counts as labelled, and groups and events are None. Visibility is 1. fps: frames per second, default 25. px_per_m:
+    image scale; None: the median of the boxes' longer sides / 1.7 m.
 
-    Raises InputError if the file is unreadable or invalid (see read_xml).
+    Raises InputError if the file is unreadable, no CVML or invalid (see read_xml). Warns about a person in two groups.
     """
     found = read_xml(path)
     scale = found.px_per_m if px_per_m is None else px_per_m
@@ -184,10 +186,11 @@ def read_truth(path: Path, fps: float = FPS, px_per_m: float | None = None) -> T
 
 
 def open_file(path: Path, *, fps: float | None = None, px_per_m: float | None = None) -> Sequence:
-    """Return a CAVIAR file as Sequence, without pictures and detections; image size 384 × 288 px.
+    """Return the CAVIAR file `path` as Sequence, without pictures and detections; image size 384 × 288 px.
 
     fps: frames per second; None: 25. px_per_m: image scale; None: the median of the boxes' longer sides / 1.7 m, nan
-    without boxes. Raises InputError at once if the file is unreadable or invalid (see read_xml).
+    without boxes. Raises InputError at once if the file is unreadable, no CVML or invalid (see read_xml). The file is
+    read again when the truth is asked for.
     """
     rate, found = FPS if fps is None else fps, read_xml(path)
     scale = found.px_per_m if px_per_m is None else px_per_m

@@ -17,8 +17,8 @@ from sim.types import Array, GroupEvent, Groups, Ints
 def rows_to_grid(frame: Ints, id: Ints, values: Array, length: int) -> Array:
     """Return rows (R, …) as an array (T, P, …) with T = length frames and P people, nan where a person has no row.
 
-    frame (R,): from 1. id (R,): person ids; the people's columns are in ascending order of id. values (R, …): any
-    numbers per row. Each id stands once in a frame.
+    frame (R,): from 1 to `length`, else IndexError. id (R,): person ids; the people's columns are in ascending order of
+    id. values (R, …): any numbers per row. Each id stands once in a frame; of two rows the later one holds.
     """
     out = np.full((length, len(np.unique(id)), *values.shape[1:]), np.nan)
     out[frame - 1, np.searchsorted(np.unique(id), id)] = values
@@ -31,11 +31,13 @@ def labelled_truth_fields(
     """Return the fields groups, events, near and labelled of a Truth, by name, for a recording with group labels.
 
     frame (from 1), id, label (R,), sorted by (frame, id); label is the id of the person's group, -1 for alone. pos, vel
-    (R, 2): m and m/s, or px and px/s if px_per_m is not 1. fps: frames/s. length: number of frames.
+    (R, 2): m and m/s, or px and px/s if px_per_m is not 1. fps: frames/s. length: number of frames, at least the last
+    of `frame`, else IndexError.
 
-    groups: one Groups per frame, as labelled. Merge, split, form, dissolve, enter and leave events are those of groups
-    measured from motion and labels; such a group gets the label of its members as id. Cross and queue events are those
-    of the labelled groups. near: strangers that came near each other, by person id. labelled: all True. Places and
+    groups: one Groups per frame, as labelled; a label counts as a group in frames where two or more people have it.
+    Merge, split, form, dissolve, enter and leave events are those of groups measured from motion and labels; such a
+    group gets the label of its members as id. Cross and queue events are those of the labelled groups. Events are
+    sorted by start, end, kind. near: strangers that came near each other, by person id. labelled: all True. Places and
     hulls are in the unit of `pos`.
     """
     from sim.truth.crossing_events import crossings
@@ -76,8 +78,9 @@ def _names(measured: Ints, label: Ints) -> dict[int, int]:
 def _named(event: GroupEvent, names: dict[int, int], people: Ints, px_per_m: float) -> GroupEvent:
     """Return a copy of the event with the recording's person ids, group labels and unit.
 
-    names: label by measured group id; ids without a label stay. people (P,): person id of each column; the event's
-    member m is column m - 1. The event's place, in m, is multiplied by px_per_m.
+    names: label by measured group id; ids without a label stay. Ids before and after are sorted again. people (P,):
+    person id of each column, ascending; the event's member m is column m - 1. The event's place, in m, is multiplied by
+    px_per_m.
     """
     return replace(
         event,

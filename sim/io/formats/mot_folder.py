@@ -24,8 +24,8 @@ class SeqInfo:
     """The content of a seqinfo.ini.
 
     name: the folder's name if missing. fps: frames per second, None if missing. length: number of frames, None if
-    missing. image_size: (width, height) px, None if one is missing. image_dir: the folder of the pictures, "img1" if
-    missing.
+    missing. image_size: (width, height) px, None if one is missing. image_dir: the folder of the pictures, relative to
+    the sequence's, "img1" if missing.
     """
 
     name: str
@@ -36,10 +36,10 @@ class SeqInfo:
 
 
 def read_seqinfo(path: Path) -> SeqInfo:
-    """Read the section [Sequence] of a seqinfo.ini; without that section every key counts as missing.
+    """Read the section [Sequence] of the seqinfo.ini `path`; without that section every key counts as missing.
 
-    Raises InputError if the file is unreadable or no ini file, or if a number in it is not above 0 and below
-    10,000,000.
+    Fractions of the length and the image size are cut off; other keys are ignored. Raises InputError if the file is
+    unreadable or no ini file, or if a number in it is not above 0 and below 10,000,000.
     """
     parser = configparser.ConfigParser(interpolation=None)
     try:
@@ -95,13 +95,14 @@ def open_folder(
     images: bool = True,
     background: BackgroundChoice | None = None,
 ) -> Sequence:
-    """Return a MOTChallenge folder (seqinfo.ini, img1/, gt/gt.txt, det/det.txt, each optional) as Sequence.
+    """Return the MOTChallenge folder `path` (seqinfo.ini, img1/, gt/gt.txt, det/det.txt, each optional) as Sequence.
 
     fps: frames per second instead of those of seqinfo.ini; with neither, 25 with a warning. px_per_m: image scale;
     None: unknown (nan; the truth then takes the boxes' median height / 1.7 m). camera: its calibration, scaled to the
     picture size; None: unknown. images False leaves the pictures out; otherwise they are decoded one by one while
     iterating. A frame without a readable picture has none, with a warning. background: sample of frames for background
-    models; None for 50 frames spread over the recording, fewer if it is shorter.
+    models; None for 50 frames spread over the recording, fewer if it is shorter. The length is that of seqinfo.ini,
+    else the last frame of gt.txt, det.txt and the pictures.
 
     Raises InputError if seqinfo.ini, det.txt or an option is invalid, two pictures are the same frame, nothing tells
     the length, the pictures differ from seqinfo.ini in size, the calibration has another aspect ratio, or `background`
@@ -165,15 +166,16 @@ def _picture_size(ini: Path, stated: tuple[int, int] | None, seen: tuple[int, in
 def open_text(
     path: Path, *, fps: float | None = None, px_per_m: float | None = None, camera: Camera | None = None
 ) -> Sequence:
-    """Return a single MOT text file as Sequence without pictures: its rows are detections if every id is -1, else
+    """Return the MOT text file `path` as Sequence without pictures: its rows are detections if every id is -1, else
     truth.
 
     fps: frames per second; None: 25 with a warning. px_per_m: image scale; None: unknown (nan; the truth then takes the
     boxes' median height / 1.7 m). camera: calibration, None if unknown; it is not scaled. The length is the last frame
-    in the file.
+    in the file; the name is the file's, without suffix.
 
-    Raises InputError if `fps` is not above 0, or if the file is unreadable, invalid or has no row. Reading the truth
-    raises InputError for an id twice in a frame, a row without box, or an invalid visibility.
+    Raises InputError if `fps` is not above 0, or if the file is unreadable, invalid or has no row, or a row has neither
+    box nor ground position. Reading the truth raises InputError for an id twice in a frame, a row without box, or an
+    invalid visibility.
     """
     rate = frame_rate(fps, None)
     scale = float("nan") if px_per_m is None else px_per_m

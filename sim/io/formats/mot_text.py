@@ -37,7 +37,8 @@ class MotTable:
     rest: Array
 
     def without_box(self) -> Bools:
-        """Return flags (N,), True for rows whose box is -1,-1,-1,-1, which means that the row has no box."""
+        """Return flags (N,), True for rows whose box is -1,-1,-1,-1, which means that the row has no box. Raises
+        nothing."""
         return np.asarray((self.box == -1).all(axis=1))
 
     def ground(self) -> Array | None:
@@ -52,12 +53,13 @@ class MotTable:
 
 
 def read_table(path: Path, *, length: int | None = None, boxless: bool = False) -> MotTable:
-    """Read a MOTChallenge text file of 6 to 10 columns: frame, id, left, top, width, height, and up to four more.
+    """Read the MOTChallenge text file `path` of 6 to 10 columns: frame, id, left, top, width, height, and up to four
+    more.
 
-    length: the last frame allowed; None: 10,000,000. boxless: allow -1,-1,-1,-1 for "no box". A file without lines
-    gives a table without rows. Raises InputError if the file is unreadable, and, with the line, if a cell is no finite
-    number, the number of columns is wrong, a frame is outside 1 to `length`, a frame or id is no integer, or a box has
-    no area.
+    length: the last frame allowed; None: 10,000,000. boxless: True allows -1,-1,-1,-1 for "no box". A file without
+    lines gives a table without rows. Rows stay in the order of the file. Raises InputError if the file is unreadable,
+    and, with the line, if a cell is no finite number, the number of columns is wrong, a frame is outside 1 to `length`,
+    a frame or id is no integer, or a box has no area.
     """
     rows = read_numbers(path, (6, 10))
     frame, id = rows.integers(0, "frame"), rows.integers(1, "id")
@@ -86,10 +88,11 @@ def reject_duplicate_ids(table: MotTable, keep: Bools) -> None:
 
 @dataclass(frozen=True)
 class DetectionTable:
-    """The content of a det.txt, N rows sorted by frame.
+    """The content of a det.txt, N rows sorted by frame, those of a frame in the order of the file.
 
-    frame (N,): from 1. id (N,). plane: "ground" (pos in m) or "image" (pos in px). pos (N, 2): x, y on the ground, or
-    the box's centre. box (N, 4): left, top, width, height in px, None if any row has none. score (N,): in [0, 1].
+    frame (N,): from 1. id (N,): as in the file, usually -1. plane: "ground" (pos in m) or "image" (pos in px). pos (N,
+    2): x, y on the ground, or the box's centre. box (N, 4): left, top, width, height in px, None if any row has none.
+    score (N,): in [0, 1].
     """
 
     frame: Ints
@@ -111,11 +114,13 @@ class DetectionTable:
 def read_detections(path: Path, length: int | None) -> DetectionTable:
     """Read a det.txt: points on the ground (m) if every row has one, else the centres of the boxes in the image (px).
 
-    length: the last frame allowed, None for any. The boxes are None if any row lacks one. Scores outside [0, 1] are
-    scaled by unit_scores; they are 1 if the file has none. A file without lines gives no rows.
+    path: the file. length: the last frame allowed, None for any. The boxes are None if any row lacks one. Scores are 1
+    if the file has none; if one is outside [0, 1], all are scaled so that the lowest is 0 and the highest 1. A file
+    without lines gives no rows.
 
-    Raises InputError as read_table: the file is unreadable, or a line is invalid. Also raises InputError for a row
-    without box if any row lacks a ground point.
+    Raises InputError if the file is unreadable, or, with the line, if a cell is no finite number, the number of columns
+    is not 6 to 10, a frame is outside 1 to `length`, or a box has no area. Also raises InputError for a row without box
+    if any row lacks a ground point.
     """
     table = read_table(path, length=length, boxless=True)
     ground, boxless = table.ground(), table.without_box()
@@ -139,10 +144,10 @@ def ground_cells(xyz: Sequence[float]) -> str:
 
 
 def unit_scores(score: Array) -> Array:
-    """Return the scores (N,) brought into [0, 1].
+    """Return the scores (N,), finite, brought into [0, 1].
 
-    They are returned unchanged if all lie in [0, 1] or there are none. Otherwise the lowest becomes 0, the highest 1,
-    and the others are scaled linearly; if all are equal they become 1.
+    `score` itself is returned if all its values lie in [0, 1] or there are none. Otherwise the lowest becomes 0, the
+    highest 1, and the others are scaled linearly; if all are equal they become 1.
     """
     if len(score) == 0 or (score.min() >= 0 and score.max() <= 1):
         return score
@@ -153,13 +158,14 @@ def unit_scores(score: Array) -> Array:
 def read_truth(path: Path, name: str, fps: float, length: int | None = None, px_per_m: float = float("nan")) -> Truth:
     """Read a gt.txt as truth of people, without group labels: everybody is alone (-1), and no frame counts as labelled.
 
-    Rows with flag 0 or a class other than 1 are left out, as in MOTChallenge's own scoring; so are negative ids. name:
-    of the sequence. length: number of frames; None: up to the last frame kept. px_per_m: image scale; nan: the median
-    height of the boxes / 1.7 m. Positions and velocities are None without ground positions, nan in rows where they are
-    unknown; velocities are differences over 0.5 s. Visibility is 1 where the file has none or -1.
+    Rows with flag 0 or a class other than 1 are left out, as in MOTChallenge's own scoring; so are negative ids. The
+    rest is sorted by (frame, id). name, fps (frames/s): of the sequence. length: number of frames; None: up to the last
+    frame kept. px_per_m: image scale; nan: the median height of the boxes / 1.7 m. Positions and velocities are None
+    without ground positions, nan in rows where they are unknown; velocities are differences over 0.5 s. Visibility is 1
+    where the file has none or -1.
 
-    Raises InputError as read_table (unreadable file, invalid line, row without box), for an id twice in a frame, and
-    for a visibility outside [0, 1] other than -1.
+    Raises InputError as read_table (unreadable file, invalid line, frame beyond `length`, row without box), for an id
+    twice in a frame, and for a visibility outside [0, 1] other than -1.
     """
     table = read_table(path, length=length)
     keep = table.id >= 0

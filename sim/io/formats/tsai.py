@@ -1,8 +1,10 @@
 """Reader for Tsai's camera calibration as XML (as in PETS 2009): elements Geometry, Intrinsic, Extrinsic.
 
-Model: x_cam = R X + T in mm with R = Rz Ry Rx; ideal sensor position (f x/z, f y/z) in mm; distorted position Xd with
-Xd (1 + kappa1 |Xd|²) = ideal; pixel Xf = sx Xd/dpx + cx, Yf = Yd/dpy + cy. Tsai's pixel coordinates begin at the middle
-of the first pixel, ours at its corner.
+Model: a world point X becomes x_cam = (x, y, z) = R X + T in mm, with R = Rz Ry Rx of the angles rx, ry, rz (rad) and T
+= (tx, ty, tz). Ideal sensor position: (f x/z, f y/z) in mm, f the focal length. Distorted position Xd (2-vector, mm):
+Xd (1 + kappa1 |Xd|²) = ideal. Pixel: u = sx Xd_x/dpx + cx, v = Xd_y/dpy + cy, where dpx, dpy are the size of a sensor
+element in mm, sx a scale factor and (cx, cy) the image centre in px. Tsai's pixel coordinates begin at the middle of
+the first pixel, ours at its corner, half a pixel further up and left.
 """
 
 from __future__ import annotations
@@ -28,8 +30,9 @@ POSITIVE = ("width", "height", "dpx", "dpy", "focal", "sx")
 def read_tsai(path: Path) -> Camera:
     """Return the Camera (kind "pinhole") of Tsai's calibration as XML; lengths in m, focal lengths and centre in px.
 
-    Raises InputError if the file is unreadable or no XML, or if a number is missing, not finite, or not above 0 where
-    it must be (image size, pixel size, focal length, sx).
+    path: the file, whose lengths are in mm. Its elements Geometry, Intrinsic and Extrinsic hold the numbers as
+    attributes. Raises InputError if the file is unreadable or no XML, or if a number is missing, not finite, or not
+    above 0 where it must be (image size, pixel size, focal length, sx).
     """
     v = _values(path)
     rotation = _rotation(v["rx"], v["ry"], v["rz"])

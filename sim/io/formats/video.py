@@ -38,7 +38,8 @@ def open_video(
     camera: Camera | None = None,
     background: BackgroundChoice = ANY,
 ) -> Sequence:
-    """Return a video file as Sequence; its pictures are decoded while iterating, and it has no detections or truth.
+    """Return the video file `path` as Sequence; its pictures are decoded while iterating, and it has no detections or
+    truth.
 
     fps: frames per second; None: found in the file (frame_rate). px_per_m: image scale, None if unknown. camera:
     calibration, scaled to the picture size, None if unknown. background: sample of frames for background models,
@@ -47,7 +48,8 @@ def open_video(
 
     Warns if the video is shorter than its header says, has gaps in time, or states no credible frame rate. Raises
     InputError if the file is no video or no picture can be decoded, the calibration has another aspect ratio, or more
-    background frames are asked for than there are. Iterating raises InputError for a picture of another size.
+    background frames are asked for than there are. Raises FileNotFoundError if there is no file. Iterating raises
+    InputError for a picture of another size.
     """
     index = video_decoding.index_packets(path)
     length = len(index.stamps)
@@ -101,9 +103,9 @@ def missing(index: video_decoding.PacketIndex) -> Iterator[str]:
 def frame_rate(name: str, given: float | None, index: video_decoding.PacketIndex) -> tuple[float, str]:
     """Return (frames per second, text that says where they come from).
 
-    The first of these is taken: `given` by the user; the container's rate, if it is from 0.1 to 300 and within 2 % of
-    the time stamps' rate or that one is implausible; the rate of the time stamps; 25. The last two cause a warning.
-    name: the video's name in the warning. index: the video's packets.
+    The first of these is taken: `given` by the user, unchecked; the container's rate, if it is from 0.1 to 300 and
+    within 2 % of the time stamps' rate or that one is implausible (outside 0.1 to 300); the rate of the time stamps, if
+    plausible; 25. The last two cause a warning. name: the video's name in the warning. index: the video's packets.
     """
     if given is not None:
         return given, f"{given:g}, as given"
@@ -127,7 +129,8 @@ def _plausible(rate: float) -> bool:
 def stamped_rate(index: video_decoding.PacketIndex) -> float:
     """Return the frames per second by the time stamps of the packets, rounded to 0.001; 0 with fewer than two stamps.
 
-    Only steps within half of the median step count, so gaps are left out.
+    index: the video's packets. It is 1 over the mean step between successive stamps in s. Only steps within half of the
+    median step of it count, so gaps are left out.
     """
     step = np.diff(index.times())
     if not len(step):

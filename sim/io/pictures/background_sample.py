@@ -19,8 +19,8 @@ from sim.types import BACKGROUNDS, Image
 class BackgroundChoice:
     """Which frames of a recording are the sample for a background model.
 
-    how: "first" for the first `count` frames, "spread" for `count` frames spread evenly over the recording. asked: True
-    if the user gave --background, False for the default.
+    how: "first" for the first `count` frames, "spread" for `count` frames spread evenly over the recording. count: 1 or
+    more, by default 50. asked: True if the user gave --background, False for the default.
     """
 
     how: Literal["first", "spread"] = "spread"
@@ -30,7 +30,8 @@ class BackgroundChoice:
     def __str__(self) -> str:
         """Return the text that run.json holds, as "first 50 frames (causal from frame 50)".
 
-        "causal" means that no frame of the sample follows the frame that is tracked.
+        "causal" means that no frame of the sample follows the frame that is tracked. For "spread" the text is "50
+        frames spread over the recording (not causal)".
         """
         if self.how == "first":
             return f"first {self.count} frames (causal from frame {self.count})"
@@ -39,8 +40,8 @@ class BackgroundChoice:
     def of(self, length: int, path: Path) -> BackgroundChoice:
         """Return the choice for a recording of `length` frames: itself if there are enough frames.
 
-        A default choice is reduced to all frames of a shorter recording. Raises InputError, naming the recording
-        `path`, if the user asked for more frames than there are.
+        A default choice is reduced to all `length` frames of a shorter recording. Raises InputError, naming the
+        recording `path`, if the user asked for more frames than there are.
         """
         if length >= self.count:
             return self
@@ -93,8 +94,8 @@ class BackgroundSample:
     def __call__(self) -> Image:
         """Return the pictures (K, H, W, 3) BGR uint8 in the order of frames; frames that cannot be read are left out.
 
-        Warns if a default sample covers the whole recording, because that is shorter than 50 frames. Raises InputError
-        if no picture can be read or their sizes differ.
+        K is at most `choice.count`. Warns if a default sample covers the whole recording, because that is shorter than
+        50 frames. Raises InputError if no picture can be read or their sizes differ.
         """
         wanted, count = self.choice.indices(self.length), 0
         for count, (_, picture) in enumerate(self.pictures(wanted), 1):  # no second copy: 0.3 GB at 1920×1080

@@ -23,8 +23,9 @@ SPARSE = 100  # numbers in file names that use less than 1 of 100 values are tim
 def fill_gaps(pairs: Iterable[tuple[int, Image]], length: int | None, place: str) -> Iterator[Image | None]:
     """Yield a picture for each frame from 1 on, None for a frame that `pairs` leave out.
 
-    pairs: (frame, picture), frames from 1 and ascending. length: number of frames; None: up to the last pair. The first
-    missing frame is reported by a warning with the recording's name `place`; further ones are not.
+    pairs: (frame, picture), frames from 1 and ascending; read while iterating. length: number of frames; None: up to
+    the last pair; pairs beyond it are yielded, too. The first missing frame is reported by a warning with the
+    recording's name `place`; further ones are not.
     """
     shown, warned = 0, False
     for number, picture in pairs:
@@ -61,9 +62,11 @@ def require_size(picture: Picture, size: tuple[int, int], path: Path, place: str
 
 
 def read_picture(path: Path) -> Image | None:
-    """Return a picture file as (H, W, 3) BGR uint8; None if it is missing, unreadable, truncated or no picture.
+    """Return the picture file `path` as (H, W, 3) BGR uint8; None if it is missing, unreadable, truncated or no
+    picture.
 
-    Grey pictures become BGR, 16-bit pictures keep their upper 8 bits, transparency is dropped. Raises nothing.
+    Grey pictures become BGR, 16-bit pictures keep their upper 8 bits, transparency is dropped. OpenCV's messages are
+    silenced meanwhile. Raises nothing.
     """
     import cv2
 
@@ -86,7 +89,8 @@ def read_picture(path: Path) -> Image | None:
 def is_complete(body: bytes) -> bool:
     """Return False if `body`, the bytes of a picture file, is empty, or a JPEG or PNG without its end mark; else True.
 
-    Checked before decoding, because some decoders return half a picture of a truncated file, or print to stderr.
+    Other bytes, also those of no picture, count as complete. Checked before decoding, because some decoders return half
+    a picture of a truncated file, or print to stderr.
     """
     if body.startswith(b"\xff\xd8"):
         return body.rfind(b"\xff\xd9") > body.rfind(b"\xff\xda") > 0
@@ -110,7 +114,8 @@ class PictureFolder:
         return max(self.files, default=0)
 
     def first_size(self) -> tuple[int, int] | None:
-        """Return (width, height) in px of the first picture that can be read; None if none can."""
+        """Return (width, height) in px of the first picture, in the order of `files`, that can be read; None if none
+        can."""
         found = (read_picture(path) for path in self.files.values())
         return next((size_of(picture) for picture in found if picture is not None), None)
 
@@ -118,8 +123,9 @@ class PictureFolder:
         """Yield (frame, picture) for those of `frames` (from 1) whose picture can be read; pictures are (H, W, 3) BGR
         uint8.
 
-        size: (width, height) px of all pictures; None means that no file can be read. Raises InputError for None, and
-        for a picture of another size.
+        Pictures come in the order of `frames`, read one by one while iterating. size: (width, height) px of all
+        pictures; None means that no file can be read. Iterating raises InputError for None, and for a picture of
+        another size.
         """
         if size is None:
             raise InputError(
@@ -135,13 +141,13 @@ class PictureFolder:
 def find_pictures(folder: Path, length: int | None, labelled: bool) -> PictureFolder:
     """Return the picture files of a folder by frame (from 1); a missing folder gives no files.
 
-    length: number of frames, None if unknown. labelled: True if labels or detections define the frames. The number at
-    the end of a file's name is its frame. Numbers are shifted so that the lowest becomes 1 if the lowest is 0, if the
-    highest exceeds `length`, or if `length` is None and `labelled` False. Files are numbered from 1 in the order of
-    their names instead if one has no number, the rest of their names differs, or the numbers use less than 1 of 100
-    values.
+    length: number of frames, None if unknown. labelled: True if labels or detections define the frames. Files ending in
+    .jpg, .jpeg, .png, .bmp, .tif and .tiff count. The number at the end of a file's name is its frame. Numbers are
+    shifted so that the lowest becomes 1 if the lowest is 0, if the highest exceeds `length`, or if `length` is None and
+    `labelled` False. Files are numbered from 1 in the order of their names instead if one has no number, the rest of
+    their names differs, or the numbers use less than 1 of 100 values.
 
-    Raises InputError if two files are the same frame.
+    Raises InputError if two files are the same frame, as 1.jpg and 01.jpg.
     """
     found = sorted(p for p in folder.iterdir() if p.suffix.lower() in SUFFIXES) if folder.is_dir() else []
     numbers = [_number(path) for path in found]

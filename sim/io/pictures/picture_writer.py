@@ -50,8 +50,11 @@ NO_PICTURES = WrittenPictures()
 class StreamWriter:
     """Writes one stream as picture files or as one video below `folder`; used as a context manager.
 
-    State: the hash of the raw pixels so far (`pixels`), the open video if there is one, and `files`: {"sha256",
-    "bytes"} of each complete file, by name. Entering the block raises InputError if a video's width or height is odd.
+    stream: its name, "left", "right", "disparity", "ids" or "background". images: file type, "jpg", "png" or "mp4"
+    (disparity and ids are always PNG). size: (width, height) in px; fps: frames/s; both for a video only. State: the
+    hash of the raw pixels so far (`pixels`), the open video if there is one, and `files`: {"sha256", "bytes"} of each
+    complete file, by name relative to `folder`. A video is listed when the block ends without exception. Entering the
+    block raises InputError if a video's width or height is odd, OSError if it cannot be opened.
     """
 
     def __init__(self, folder: Path, stream: str, images: str, size: tuple[int, int], fps: float):
@@ -65,7 +68,8 @@ class StreamWriter:
         """Write the next picture of the stream: (H, W, 3) BGR uint8, or (H, W) uint16 for the streams ids and
         disparity.
 
-        Frames count from 1 in the order of the calls. Raises OSError if the file cannot be written.
+        Frames count from 1 in the order of the calls. It also adds to `pixels`, and to `files` unless the stream is a
+        video. Raises OSError if the file cannot be written.
         """
         self.pixels.add(picture)
         if self._movie is not None:
@@ -92,7 +96,8 @@ class StreamWriter:
 def encoded(picture: NDArray[Any], kind: str) -> bytes:
     """Return a picture as the bytes of a file of type `kind`: "jpg" (quality 95) or "png" (lossless).
 
-    picture: (H, W, 3) BGR uint8, or (H, W) uint16 for "png" only.
+    picture: (H, W, 3) BGR uint8, or (H, W) uint16 for "png" only. Raises cv2.error for a picture or type that OpenCV
+    cannot encode.
     """
     import cv2
 
@@ -105,9 +110,9 @@ def encoded(picture: NDArray[Any], kind: str) -> bytes:
 def write_pictures(folder: Path, sequence: Sequence, wanted: tuple[str, ...], images: str) -> WrittenPictures:
     """Draw the streams `wanted` of a sequence and write them into a folder; returns what was written.
 
-    One picture per stream is in memory at a time. images: file type, "jpg", "png" or "mp4". If the sequence has exact
-    pixels and truth, gt/pixels.parquet is written too. An empty `wanted` writes nothing. The sequence needs an image
-    size.
+    wanted: some of "left", "right", "disparity", "ids", "background". One picture per stream is in memory at a time.
+    images: file type, "jpg", "png" or "mp4". If the sequence has exact pixels and truth, gt/pixels.parquet is written
+    too. An empty `wanted` writes nothing. The sequence needs an image size, else AssertionError.
 
     Raises InputError if the sequence lacks a stream, or its width or height is odd for "mp4"; WorkError if the stream
     ids has a person id above 999; OSError if a file cannot be written. Also raises what drawing raises.
@@ -144,8 +149,9 @@ def _background(sequence: Sequence) -> Image:
 def _add(outputs: dict[str, StreamWriter], sequence: Sequence, frame: Frame, known: list[PixelTruth]) -> None:
     """Add one frame to each open stream (`outputs`, by name), and append its PixelTruth without the images to `known`.
 
-    `known` stays as it is for a sequence without exact pixels. Raises InputError if the sequence lacks a stream,
-    WorkError if the stream ids has a person id above 999.
+    `known` is changed; it stays as it is for a sequence without exact pixels. The stream "background" gets nothing.
+    Raises InputError if the sequence lacks a stream, WorkError if the stream ids has a person id above 999, OSError if
+    a file cannot be written.
     """
     for name, picture in (("left", frame.image), ("right", frame.right)):
         if name in outputs:
@@ -177,9 +183,10 @@ def pixel_table(truth: Truth, known: list[PixelTruth]) -> bytes:
     """Return the table of visible pixels as Parquet bytes: one row per person and frame, in the order of the truth's
     rows.
 
-    known: the PixelTruth of every frame, from frame 1. Columns: frame (from 1), id, visible_px and amodal_px (px²),
-    visibility_px (their ratio), modal_left, modal_top, modal_width, modal_height (px; box of the visible pixels, nan if
-    hidden), blob (number of the connected region, -1 if hidden).
+    known: the PixelTruth of every frame, from frame 1, at least one (else ValueError). Columns: frame (from 1), id,
+    visible_px and amodal_px (numbers of pixels that show the person, and that would without occlusion), visibility_px
+    (their ratio, 0 for 0 of 0), modal_left, modal_top, modal_width, modal_height (px; box of the visible pixels, nan if
+    hidden), blob (number of the connected region of people, -1 if hidden).
     """
 
     def joined(name: str) -> NDArray[Any]:

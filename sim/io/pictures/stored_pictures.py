@@ -65,8 +65,9 @@ class StoredPictures:
         """Return picture number `index` (from 1; the frame, except for "background") of a stream that is stored as
         picture files.
 
-        Shape (H, W, 3) BGR uint8, or (H, W) uint16 for the streams ids and disparity. Raises InputError if the file is
-        missing or altered, no picture, or of another size than the sequence's.
+        Shape (H, W, 3) BGR uint8, or (H, W) uint16 for the streams ids and disparity (coded: see decode_ids,
+        decode_disparity). Raises InputError if the file is missing, altered or not named by the manifest, is no
+        picture, or is of another size than the sequence's.
         """
         import cv2
 
@@ -86,8 +87,8 @@ class StoredPictures:
         """Yield the pictures of a stream in order: `count` in all, or only the numbers `wanted` (ascending, from 1).
 
         Shape (H, W, 3) BGR uint8, or (H, W) uint16 for the streams ids and disparity. None or an empty `wanted` yields
-        all, except that an empty one yields none of a video. Raises InputError if a file is missing or altered, no
-        picture, or of another size, and if a video holds another number of pictures.
+        all, except that an empty one yields none of a video. Iterating raises InputError if a file is missing or
+        altered, no picture, or of another size, and, at its end, if a video holds another number of pictures.
         """
         if streams.suffix(stream, self.images) != "mp4":
             yield from (self.one(stream, k) for k in wanted or range(1, count + 1))
@@ -111,18 +112,20 @@ class StoredPictures:
         return zip(wanted, self.all("left", self.manifest["sequence"]["length"], wanted), strict=True)
 
     def table(self) -> StoredTable:
-        """Return the table of visible pixels, gt/pixels.parquet: one row per person and frame (columns: see
-        pixel_table).
+        """Return the table of visible pixels, gt/pixels.parquet: one row per person and frame.
 
-        Raises InputError if the file is missing or damaged. Its hash is not checked.
+        Columns: frame (from 1), id, visible_px, amodal_px, visibility_px, modal_left, modal_top, modal_width,
+        modal_height, blob (see pixel_table). Raises InputError if the file is missing or damaged. Its hash is not
+        checked.
         """
         return read_table(self.folder / TABLE)
 
     def pixel_loader(self) -> Callable[[int], PixelTruth]:
         """Return a function that maps a frame (from 1) to its PixelTruth, read from the streams ids and disparity.
 
-        The stream ids must be stored. Disparities are rounded to steps of 1/64 px, so they are off by 1/128 px at most;
-        the field is None if the stream is not stored. The function raises InputError if a file is missing or damaged.
+        The stream ids must be stored. People without visible pixels are included, in the order of ids. Disparities are
+        rounded to steps of 1/64 px, so they are off by 1/128 px at most; the field is None if the stream is not stored.
+        The function raises InputError if a file is missing or damaged, as for a frame beyond the last.
         """
 
         @cache

@@ -31,10 +31,11 @@ REMEDY = "give a video that a player plays to its end"
 class PacketIndex:
     """The packets of a video stream, in the order of the file.
 
-    stamps: when each packet is shown, in units of time_base (s), None if unknown. keys: True where a group of packets
-    begins that can be decoded by itself. rate: frames per second; promised: number of frames; seconds: duration; these
-    three by the header, 0 if missing. broken: why reading stopped before the end of the file, "" if it did not. codec:
-    libav's name of the codec. reorders: True if packets are not stored in the order in which they are shown.
+    stamps: when each packet is shown, in units of time_base (a fraction of a second), None if unknown. keys: True where
+    a group of packets begins that can be decoded by itself. rate: frames per second; promised: number of frames;
+    seconds: duration; these three by the header, 0 if missing. broken: why reading stopped before the end of the file,
+    "" if it did not. codec: libav's name of the codec. reorders: True if packets may be stored in another order than
+    they are shown.
     """
 
     stamps: tuple[int | None, ...]
@@ -82,7 +83,7 @@ def open_stream(path: Path) -> Iterator[tuple[Any, Any]]:
     """Give (libav container, first video stream) of a file for the length of the block, set to decode in one thread.
 
     Cover pictures are no video stream. Raises InputError if the file is empty or no video, has no video stream, or uses
-    an unknown codec.
+    an unknown codec; FileNotFoundError if there is no file `path`.
     """
     import av
 
@@ -107,10 +108,11 @@ def _reason(error: Exception) -> str:
 
 
 def index_packets(path: Path) -> PacketIndex:
-    """Return the packet index of a video file: time stamps, key packets and header, read without decoding.
+    """Return the packet index of the video file `path`: time stamps, key packets and header, read without decoding.
 
     A damaged file is indexed up to the damage, and `broken` says why. Empty and discarded packets do not count. Raises
-    InputError if the file is empty or no video, has no video stream, or uses an unknown codec.
+    InputError if the file is empty or no video, has no video stream, or uses an unknown codec; FileNotFoundError if it
+    is missing.
     """
     import av
 
@@ -142,8 +144,11 @@ def _seconds(stream: Any) -> float:
 
 
 def _demuxed(container: Any, stream: Any) -> Iterator[Any]:
-    """Yield the packets of the video stream up to the first that cannot be read, which is where index_packets stops
-    too.
+    """Yield the packets of a libav container's video stream, in the order of the file, up to the first that cannot be
+    read.
+
+    index_packets stops there, too. The last packet is empty and makes the decoder give what it still holds. Raises
+    nothing for a damaged file.
     """
     import av
 
@@ -162,9 +167,9 @@ def decode_frames(path: Path, index: PacketIndex, wanted: list[int] | None = Non
     """Yield (frame, picture (H, W, 3) BGR uint8) in the order in which frames are shown, of all frames or those
     `wanted`.
 
-    Frames count from 1. index: the packet index of the same file. wanted: frames in any order; None for all. Frames
-    that cannot be decoded, and frames beyond the end, are left out. Raises InputError if the file is empty or no video,
-    has no video stream, or uses an unknown codec.
+    Frames count from 1. index: the packet index of the same file `path`. wanted: frames in any order; None for all, []
+    for none. Frames that cannot be decoded, and frames beyond the end, are left out. Iterating raises InputError if the
+    file is empty or no video, has no video stream, or uses an unknown codec; FileNotFoundError if it is missing.
     """
     ranks, last, count = index.ranks(), max(wanted or [0]), 0
     some = None if wanted is None else set(wanted)
@@ -180,9 +185,10 @@ def decode_frames(path: Path, index: PacketIndex, wanted: list[int] | None = Non
 
 
 def _decoded(container: Any, stream: Any, groups: set[int] | None) -> Iterator[Any]:
-    """Yield the decoded libav frames in order, None for a packet that cannot be decoded.
+    """Yield the decoded libav frames in the order in which they are shown, None for a packet that cannot be decoded.
 
-    groups: numbers (from 1) of the packet groups to decode; the others are skipped. None decodes all.
+    container, stream: of libav, as open_stream gives them. groups: numbers (from 1) of the packet groups to decode; the
+    others are skipped. None decodes all. Raises nothing for a damaged file.
     """
     group, running = 0, False
     for packet in _demuxed(container, stream):

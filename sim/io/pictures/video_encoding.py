@@ -30,9 +30,9 @@ def write_video(path: Path, size: tuple[int, int], fps: float, quality: int = QU
     """Give a VideoWriter for an H.264 mp4 file `path`, which is complete after the block; an existing file is
     overwritten.
 
-    size: (width, height) px of all pictures. fps: frames per second. quality: x264's constant rate factor, lower is
-    better, default 18. If the block raises, an incomplete file stays. Raises InputError if width or height is odd,
-    OSError if the file cannot be opened.
+    size: (width, height) px of all pictures. fps: frames per second, rounded to a fraction with a denominator up to
+    1001. quality: x264's constant rate factor, lower is better, default 18. If the block raises, an incomplete file
+    stays. Raises InputError if width or height is odd, OSError if the file cannot be opened.
     """
     if size[0] % 2 or size[1] % 2:
         raise InputError(
@@ -53,7 +53,8 @@ def write_video(path: Path, size: tuple[int, int], fps: float, quality: int = QU
 class VideoWriter:
     """A video that is being written; made by `write_video`, which also ends and closes it.
 
-    State: libav's open container and stream.
+    file: the open binary file to write to. size: (width, height) of all pictures in px, both even. fps: frames per
+    second. quality: x264's constant rate factor, lower is better. State: libav's open container and stream.
     """
 
     def __init__(self, file: Any, size: tuple[int, int], fps: float, quality: int):
