@@ -1,2 +1,2 @@
-"""Geometry of what a camera sees: cameras, people's bodies as ellipsoids, ground and stairs, ray casting,
-visibility."""
+"""Geometry of what a camera sees, from a scene, people's positions and a camera: people's bodies as ellipsoids, ground
+and stairs, projection into the image, ray casting, visibility."""

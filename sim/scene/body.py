@@ -1,10 +1,11 @@
 """The shape of a person, and its exact outline in an image. Home of the body's proportions and of the 1.7 m person.
 
 A person of height h is two upright ellipsoids, body and head (BODY, HEAD), turned by the heading. An ellipsoid with
-centre c and shape S = A diag(a²) Aᵀ, in camera coordinates, is the dual quadric [[S - ccᵀ, -c], [-cᵀ, -1]]. A pinhole
-camera maps it to the dual conic C* = K (S - c cᵀ) Kᵀ: an ellipse with centre m = (C*₁₃, C*₂₃)/C*₃₃ and shape E = m mᵀ -
-C*₁..₂/C*₃₃ (Hartley & Zisserman, Multiple View Geometry, 8.3). Its points obey (u - m)ᵀ E⁻¹ (u - m) <= 1, and its box
-is m ± sqrt(diag E). All outlines are closed-form; nothing is sampled.
+centre c and shape S = A diag(a²) Aᵀ (half axes a, axis directions the columns of A), in camera coordinates, is the dual
+quadric [[S - ccᵀ, -c], [-cᵀ, -1]]. A pinhole camera with matrix K (focal lengths, image centre) maps it to the dual
+conic C* = K (S - c cᵀ) Kᵀ: an ellipse with centre m = (C*₁₃, C*₂₃)/C*₃₃ and shape E = m mᵀ - C*₁..₂/C*₃₃ (Hartley &
+Zisserman, Multiple View Geometry, 8.3). Its points u obey (u - m)ᵀ E⁻¹ (u - m) <= 1, and its box is m ± sqrt(diag E).
+All outlines are closed-form; nothing is sampled.
 """
 
 from __future__ import annotations
@@ -125,10 +126,10 @@ def bodies_at(motion: Motion, t: Ints, p: Ints) -> tuple[Array, Ellipsoids]:
     """Return the feet (N, 3), x, y, z in m, and the Ellipsoids of N people of a Motion.
 
     t (N,): time rows of the Motion, from 0 on (frame - 1). p (N,): columns of the Motion, from 0 on (id - 1). The feet
-    are on the ground of the scene, stairs included. A person who is absent at that time has nan x, y, height 0 and a
+    are on the ground of the scene, stairs included. A person who is absent at that time has nan x and y, z = 0 and a
     nan ellipsoid.
 
-    Raises IndexError for a row or column that the Motion does not have.
+    Raises IndexError for a row or column that the Motion does not have; negative ones count from the end.
     """
     xy = motion.pos[t, p]
     pos3 = np.column_stack([xy, height_at(motion.scene, xy)])
@@ -139,7 +140,7 @@ def recorded_bodies(motion: Motion) -> RecordedBodies:
     """Return the bodies of all people in all frames in which they are present, as RecordedBodies sorted by frame, then
     id.
 
-    It has no rows if nobody is ever present.
+    Frames count from 1; a person's id is the column of the Motion + 1. It has no rows if nobody is ever present.
     """
     t, p = np.nonzero(motion.present)
     return RecordedBodies(t + 1, p + 1, *bodies_at(motion, t, p))

@@ -18,12 +18,15 @@ from sim.types import Array, Truth
 def with_visibility(truth: Truth, image_size: tuple[int, int] | None) -> Truth:
     """Return a copy of the truth with visibility, truncation and visible boxes estimated from its boxes, row by row.
 
-    Of two people, the one whose box ends lower in the image hides the other. Nothing but people hides people. The truth
-    itself is returned if it has no boxes (None or no rows), or has visible boxes already. If any of its visibilities is
-    below 1, all its visibilities are kept; truncation and visible boxes are estimated all the same.
+    Each box is taken for an upright person (ellipses of body and head) who fills it, sampled on 16 x 32 points. Of two
+    people of a frame, the one whose box ends lower in the image hides the other; of equally low ones the earlier row
+    does. Nothing but people hides people. The truth itself is returned if it has no boxes (None or no rows), or has
+    visible boxes already. If any of its visibilities is below 1, all its visibilities are kept; truncation and visible
+    boxes are estimated all the same.
 
     image_size: width, height in px. If None, the image ends at the furthest right and lower edges of the boxes; then a
-    nan box raises ValueError. With a size given, a nan box has visibility 0, truncation 1 and a nan visible box.
+    nan box raises ValueError. With a size given, a nan box has visibility 0, truncation 1 and a nan visible box, as has
+    a box without width or height in any case.
     """
     if truth.box is None or truth.visible_box is not None or not len(truth.box):
         return truth

@@ -1,9 +1,10 @@
 """Camera projection: world to image, image to ground with its Jacobian, lines of sight, disparity, image scale.
 
-World: x right, y away, z up (m). Camera: x right, y down, z forward; x_cam = R (X - C).
-Pinhole: u = fx x/z + cx, v = fy y/z + cy. Top (orthographic, R looks down): u = s x + cx, v = s y + cy, s = px_per_m.
-The lens of a pinhole camera may distort (`radial`, of calibrated recordings): `sim.scene.lens` then changes x/z, y/z
-before they become px. `sim.scene.camera_placement` finds where a scenario's camera stands.
+World: x right, y away, z up (m). Camera: x right, y down, z forward; x_cam = R (X - C) with rotation R and the camera's
+position C. Pinhole: u = fx x/z + cx, v = fy y/z + cy with focal lengths fx, fy and image centre cx, cy in px. Top
+(orthographic, R looks down): u = s x + cx, v = s y + cy, s = px_per_m. The lens of a pinhole camera may distort
+(`radial`, of calibrated recordings): `sim.scene.lens` then changes x/z, y/z before they become px.
+`sim.scene.camera_placement` finds where a scenario's camera stands.
 """
 
 from __future__ import annotations
@@ -66,7 +67,8 @@ def to_ground(camera: Camera, uv: Array, z: float = 0.0) -> Array:
     """Return the points (N, 2), x and y in m, of the plane at height z (m) that are seen at image points uv (N, 2) px.
 
     A row is nan where the line of sight does not meet the plane in front of the camera: at and above the horizon, or
-    for a plane above a camera that looks down. Walls and stairs are ignored. uv may lie outside the image.
+    for a plane above a camera that looks down; also where uv is nan. Lens distortion is undone. Walls and stairs are
+    ignored. uv may lie outside the image.
     """
     origin, direction = rays(camera, uv)
     with np.errstate(divide="ignore", invalid="ignore"):
@@ -78,8 +80,9 @@ def to_ground(camera: Camera, uv: Array, z: float = 0.0) -> Array:
 def ground_jacobian(camera: Camera, uv: Array, z: float = 0.0) -> Array:
     """Return the derivative of `to_ground` at image points uv (N, 2) px, d(x, y)/d(u, v), as (N, 2, 2) in m/px.
 
-    Rows are x, y on the plane at height z (m); columns are u, v. Kind "pinhole": with the ray X = O + s D and s = (z -
-    O_z)/D_z, dX = s dD + D ds and ds = -s dD_z/D_z. Kind "top": the same read-only matrix in every row, for any z.
+    Rows are x, y on the plane at height z (m); columns are u, v. Kind "pinhole": the ray X = O + s D has origin O and
+    direction D; it meets the plane at s = (z - O_z)/D_z. Then dX = s dD + D ds and ds = -s dD_z/D_z. Kind "top": the
+    same read-only matrix in every row, for any z.
 
     Special cases: the matrix is inf or nan at the horizon, with a numpy warning. Above the horizon it has no meaning.
     """

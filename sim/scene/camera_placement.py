@@ -1,10 +1,10 @@
 """Where a scenario's camera stands: the closest place from which every body is in view, in closed form.
 
 With the rotation given, the image's four edges are planes through the camera's centre C with fixed inward normals n. A
-body (ellipsoid with centre c and shape S) is in view if and only if n·C <= n·c - sqrt(nᵀ S n) for each edge. Only the
-least right-hand side b over all bodies and frames matters. C is solved in camera coordinates (right, down, forward):
-the left and right planes limit (right, forward), the upper and lower planes limit (down, forward). A height or position
-that the scenario gives fixes coordinates of C first.
+body (ellipsoid with centre c and shape matrix S) is in view if and only if n·C <= n·c - sqrt(nᵀ S n) for each edge.
+Only the least right-hand side b over all bodies and frames matters. C is solved in camera coordinates (right, down,
+forward): the left and right planes limit (right, forward), the upper and lower planes limit (down, forward). A height
+or position that the scenario gives fixes coordinates of C first.
 """
 
 from __future__ import annotations
@@ -56,7 +56,7 @@ def _select(bodies: RecordedBodies, keep: Bools) -> RecordedBodies:
 
 def _bodies_to_fit(bodies: RecordedBodies, motion: Motion, crop: bool) -> RecordedBodies:
     """Return the bodies to keep in view: all of `bodies` or, with `crop`, those whose feet are in the world's
-    rectangle.
+    rectangle, edges included.
 
     If there are none, the result is four bodies of standard people (1.7 m) in the world's corners, with frame 0 and id
     0. motion: gives the scene's size.
@@ -94,8 +94,8 @@ def _edges(rotation: Array, slopes: tuple[float, float]) -> Array:
     """Return the inward normals (4, 3), in the world, of the planes through the left, right, upper and lower image
     edge.
 
-    rotation (3, 3): world to camera. slopes: half the view's width and half its height per m of depth. The normals are
-    not unit vectors.
+    rotation (3, 3): world to camera. slopes: half the view's width and half its height, in m per m of depth. The
+    normals are not unit vectors.
     """
     k, m = slopes
     return np.array([[1, 0, k], [-1, 0, k], [0, 1, m], [0, -1, m]]) @ rotation
@@ -104,8 +104,9 @@ def _edges(rotation: Array, slopes: tuple[float, float]) -> Array:
 def _pinhole(spec: CameraSpec, bodies: RecordedBodies) -> Camera:
     """Return a pinhole camera with all bodies in view: at the given position or height, else at the closest place.
 
-    A solved height is at least 0.3 m. If the given values leave no such place, bodies may be out of view; nothing is
-    raised. There must be at least one body.
+    spec: camera settings; its tilt, yaw, focal length and image size are used as they are. A margin of 2 % of the
+    image's shorter side is kept free. A solved height is at least 0.3 m. If the given values leave no such place,
+    bodies may be out of view; nothing is raised. There must be at least one body.
     """
     rotation = camera_rotation(float(np.deg2rad(spec.tilt_deg)), float(np.deg2rad(spec.yaw_deg)))
     slopes = _slopes(spec, MARGIN * min(spec.image))
@@ -132,8 +133,9 @@ def _closest(rotation: Array, slopes: tuple[float, float], b: Array) -> Array:
     """Return the camera centre (3,) in m, in the world, that is furthest forward with all bodies in view.
 
     rotation (3, 3): world to camera. slopes: half the view's width and half its height per m of depth. b (4,): least
-    reach of the bodies against the left, right, upper and lower edge's normal, m. Two opposite planes meet at forward =
-    (b1 + b2) / (2 slope). The pair that meets first limits; the other pair is centred.
+    reach (n·X over all their points X) of the bodies against the left, right, upper and lower edge's inward normal n,
+    m. Two opposite planes with the reaches b1 and b2 meet at forward = (b1 + b2) / (2 slope). The pair that meets first
+    limits; the other pair is centred.
     """
     forward = min((b[0] + b[1]) / (2 * slopes[0]), (b[2] + b[3]) / (2 * slopes[1]))
     return np.asarray(np.array([(b[0] - b[1]) / 2, (b[2] - b[3]) / 2, forward]) @ rotation)
@@ -143,9 +145,9 @@ def _at_height(height: float, rotation: Array, slopes: tuple[float, float], b: A
     """Return the camera centre (3,) in m at this height (m), as far ahead over the ground as the image edges allow.
 
     rotation (3, 3): world to camera. slopes: half the view's width and half its height per m of depth. b (4,): least
-    reach of the bodies against the left, right, upper and lower edge's normal, m. If the edges contradict each other,
-    the middle between the contradicting limits is taken. A camera that looks straight down is put in the middle of both
-    limits.
+    reach (n·X over all their points X) of the bodies against the left, right, upper and lower edge's inward normal n,
+    m. If the edges contradict each other, the middle between the contradicting limits is taken. A camera that looks
+    straight down is put in the middle of both limits.
     """
     k, m = slopes
     ahead = np.cross([0.0, 0.0, 1.0], rotation[0])
@@ -177,8 +179,9 @@ def _largest(limits: list[tuple[float, float]]) -> float:
 def _height_at_position(spec: CameraSpec, normals: Array, b: Array) -> float:
     """Return the camera's height in m: the given one, or the lowest at the given position with all bodies in view.
 
-    normals (4, 3), b (4,): inward normals of the left, right, upper and lower image edge, and the bodies' least reach
-    against each, m. A solved height is at least 0.3 m. If no height fits, the middle between the limits is returned.
+    spec: camera settings with a position. normals (4, 3), b (4,): inward normals n of the left, right, upper and lower
+    image edge, and the bodies' least reach (n·X over all their points X) against each, m. A solved height is at least
+    0.3 m. If no height fits, the middle between the limits is returned.
     """
     if spec.height is not None:
         return spec.height
@@ -190,8 +193,8 @@ def _height_at_position(spec: CameraSpec, normals: Array, b: Array) -> float:
 def _top(spec: CameraSpec, bodies: RecordedBodies) -> Camera:
     """Return a camera of kind "top": over the middle of the bodies' extent, at the largest scale that shows all bodies.
 
-    A given position, px_per_m or height is used as it is. A height that is not given is 20 m. There must be at least
-    one body.
+    A margin of 2 % of the image's shorter side is kept free. spec: camera settings; a given position, px_per_m or
+    height is used as it is. A height that is not given is 20 m. There must be at least one body.
     """
     rotation = camera_rotation(np.pi / 2, float(np.deg2rad(spec.yaw_deg)))
     sides = np.concatenate([rotation[:2], -rotation[:2]])
@@ -206,10 +209,11 @@ def _top(spec: CameraSpec, bodies: RecordedBodies) -> Camera:
 
 
 def _check_all_in_view(camera: Camera, spec: CameraSpec, bodies: RecordedBodies, motion: Motion) -> None:
-    """Return nothing; raise InputError, naming the first body that is not wholly inside the image, if there is one.
+    """Return nothing; raise InputError, naming the first body (by frame, then id) that is not wholly inside the image,
+    if there is one.
 
-    A body may reach out of the view by at most 1e-6 m. Without bodies nothing is raised. motion: gives scenario name
-    and seed for the message.
+    A body may reach out of the view by at most 1e-6 m. Without bodies nothing is raised. spec: camera settings, for the
+    focal length and the message. motion: gives scenario name and seed for the message.
     """
     if camera.kind == "top":
         sides = np.concatenate([camera.rotation[:2], -camera.rotation[:2]])

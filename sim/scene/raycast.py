@@ -67,8 +67,9 @@ def unprojection(camera: Camera) -> Array:
     """Return the matrix Rᵀ K⁻¹ (3, 3) that maps (u, v, 1), u and v in px, to the direction of the line of sight in the
     world.
 
-    The direction has depth 1 along the optical axis. For pinhole cameras only; kind "top" is not refused, but the
-    result has no meaning. Lens distortion is ignored.
+    R is the camera's rotation (world to camera), K its matrix of focal lengths and image centre. The direction has
+    depth 1 along the optical axis. For pinhole cameras only; kind "top" is not refused, but the result has no meaning.
+    Lens distortion is ignored.
     """
     (fx, fy), (cx, cy) = camera.focal_px, camera.centre_px
     inverse = np.array([[1 / fx, 0, -cx / fx], [0, 1 / fy, -cy / fy], [0, 0, 1]])

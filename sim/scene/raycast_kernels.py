@@ -1,8 +1,8 @@
 """Compiled ray casting: the first thing that a ray meets among the ground, walls, pillars and stairs.
 
-A ray is o + t d. Stairs are drawn as steps: tread k of n lies at z = k rise/n, from (k - 1/2)/n to (k + 1/2)/n of the
-way; the last tread reaches to the end of the landing. In the middle of a tread, the smooth height of
-`sim.scene.terrain` equals the tread's.
+A ray is o + t d: origin o, direction d, t above 0. Stairs are drawn as steps: tread k of n lies at z = k rise/n, from
+(k - 1/2)/n to (k + 1/2)/n of the way; the last tread reaches to the end of the landing. In the middle of a tread, the
+smooth height of `sim.scene.terrain` equals the tread's.
 """
 
 from __future__ import annotations

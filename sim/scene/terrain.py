@@ -15,8 +15,9 @@ FOOT_X, FOOT_Y, AXIS_X, AXIS_Y, LENGTH, HALF_WIDTH, RISE, STEPS, LANDING = range
 def height_at(scene: Scene, xy: Array) -> Array:
     """Return the ground's height in m at points xy (..., 2) m, shape (...): 0 off the stairs, and 0 where xy is nan.
 
-    On stairs the height rises smoothly over each step; on a landing it is the flight's whole rise. Where two flights
-    overlap, the height further from 0 counts. A flight of length 0 counts nowhere.
+    scene: gives the stairs; without any all heights are 0. On stairs the height rises smoothly over each step; on a
+    landing it is the flight's whole rise. Where two flights overlap, the height further from 0 counts. A flight of
+    length 0 counts nowhere.
     """
     xy = np.asarray(xy, dtype=float)
     z = np.zeros(xy.shape[:-1])

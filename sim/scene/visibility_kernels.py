@@ -175,15 +175,15 @@ def sample_visibility(  # type: ignore[no-untyped-def]
     """Return visibility (R,), truncation (R,) and visible boxes (R, 4), left, top, width, height in px, of R people.
 
     visibility: visible share of a silhouette. truncation: its share outside the image. Both are 0 to 1, measured on 16
-    x 32 samples of the box. A row whose box is nan or empty has visibility 0, truncation 1 and a nan visible box. A
-    visible box is nan if nothing is visible.
+    x 32 samples of the box. A row whose box is nan or empty, or whose ellipses hold no sample, has visibility 0,
+    truncation 1 and a nan visible box. A visible box is nan if nothing is visible.
 
     Arguments, people sorted by frame: starts (F + 1,): first row of each frame, then R. box (R, 4): left, top, width,
     height in px, amodal. centre (R, 2, 2) px, inverse (R, 2, 3): centres and packed inverse shapes (entries 11, 12, 22)
-    of the ellipses of body and head. distance (R,): occlusion order, nearest lowest. pos (R, 2) m: feet. image_size
-    (2,): width, height in px. has_eye: False for a camera from above, for which solids and stairs hide nobody. eye (3,)
-    m: the camera's position. unproject (3, 3): see `raycast.unprojection`. solids: a `raycast.Solids`, of which walls
-    and pillars count. stairs: a `raycast.Solids` that holds flights only.
+    of the ellipses of body and head. distance (R,): occlusion order, nearest lowest; of equal ones the lower row is
+    nearer. pos (R, 2) m: feet. image_size (2,): width, height in px. has_eye: False for a camera from above, for which
+    solids and stairs hide nobody. eye (3,) m: the camera's position. unproject (3, 3): see `raycast.unprojection`.
+    solids: a `raycast.Solids`, of which walls and pillars count. stairs: a `raycast.Solids` that holds flights only.
     """
     rows = len(box)
     seen, cut, part = np.zeros(rows), np.ones(rows), np.full((rows, 4), np.nan)
