@@ -24,7 +24,7 @@ class Frozen:
 
     A field declared Array becomes float64, Ints int64, Bools bool, Image uint8; so do the items of a tuple of arrays.
     None and other values are left as they are. An array that already has the type is not copied: the field is a
-    read-only view, and the original stays writable. An array whose conversion could lose values (floats where ids are
+    read-only view, and the original stays writable. An array of another kind of number (floats where ids or flags are
     declared) keeps its type and raises nothing, so that the check of a tracker's answer can report it.
     """
 
@@ -66,7 +66,8 @@ def _array_fields(kind: Any) -> tuple[tuple[str, np.dtype[Any], bool], ...]:
 def _settled(a: NDArray[Any], kind: np.dtype[Any]) -> NDArray[Any]:
     """Return a read-only view of `a`, or a read-only copy converted to the number type `kind`.
 
-    It keeps its number type if the conversion could lose values (floats as ids). `a` itself stays writable.
+    It keeps its number type if numpy's casting rule "same_kind" forbids the conversion (floats to ids). `a` itself
+    stays writable.
     """
     if a.dtype is not kind and a.dtype != kind and np.can_cast(a.dtype, kind, "same_kind"):
         a = a.astype(kind)

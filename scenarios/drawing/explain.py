@@ -1,4 +1,6 @@
-"""Explains a scenario in words with a plan in characters (`text`), and draws plan and script as SVG (`svg`)."""
+"""Explains a scenario without simulating it: `text` describes it in words, with a plan in characters; `svg` draws its
+plan and its script (groups that merge, split and queue) as SVG.
+"""
 
 from __future__ import annotations
 

@@ -78,7 +78,7 @@ def character_plan(scenario: Scenario, columns: int = 64) -> str:
     legend.
 
     Later things cover earlier ones: stairs, ways (on blanks only), queues, walls, pillars, service points, goals, names
-    of groups (first 8 letters, in capitals), orders (① to ⑳, then again from ①).
+    of groups (first 8 characters, in capitals), orders (① to ⑳, then again from ①).
     """
     world = scenario.world
     plan = CharacterPlan(world.size, columns)

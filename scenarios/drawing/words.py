@@ -9,9 +9,10 @@ AT_GOAL = {"stand": "stand there", "leave": "leave", "walk": "walk on"}
 
 
 def number(value: Value, unit: str = "") -> str:
-    """Returns a value in words, with its unit and, except for uniform and choice, its clip.
+    """Returns a value in words, with its unit and, except for uniform and choice, its clip in brackets.
 
-    `1.2` a number, `1.2 ± 0.1` normal, `0 to 5` uniform, `about 3` exponential or Poisson, `1 or 2` choice.
+    `1.2` a number, `1.2 ± 0.1` normal (mean, standard deviation), `0 to 5` uniform, `about 3` exponential or Poisson
+    (mean), `1 or 2` choice.
     """
     tail = f" {unit}" if unit else ""
     if not isinstance(value, Distribution):
@@ -52,7 +53,8 @@ def count(n: Value, one: str, many: str) -> str:
 def setting(scenario: Scenario) -> list[str]:
     """Returns three lines in words: duration and how the script is placed; size and content of the world; camera.
 
-    The second says "empty" for a world without things, the first leaves out a turn and a lead of 0.
+    The first names a turn and a lead that are not 0, and a mirror. The second says "empty" for a world without things.
+    The third says ", placed to see everybody" if neither height nor px_per_m is given.
     """
     world, camera = scenario.world, scenario.camera
     things = {"wall": world.walls, "door": world.doors, "pillar": world.pillars, "flight of stairs": world.stairs}
@@ -74,9 +76,10 @@ def setting(scenario: Scenario) -> list[str]:
 
 
 def people(group: GroupSpec) -> str:
-    """Returns in words the number of groups, size, start, way, goal, speed and time of entry of an entry of `group`.
+    """Returns in words the number of groups, size, start, way, goal, speed and time of entry of an entry of `group`,
+    and what they do at the goal.
 
-    An absent speed, an entry at time 0 and an empty way are left out.
+    An absent speed, an entry at time 0, an empty way and a single group are left out.
     """
     words = [count(group.size, "person", "people")]
     words[0] = f"{group.repeat} groups of {words[0]}" if group.repeat > 1 else words[0]
@@ -108,6 +111,8 @@ def trigger(when: When) -> str:
 def order(event: ScriptOrder) -> str:
     """Returns in words what an order does: kind, groups before and after, goals; of a queue its place and service time,
     too.
+
+    A part without a size is "rest". A goal that is not given is left out.
     """
     if isinstance(event, MergeOrder):
         goal = "to meet and stand" if isinstance(event.goal, str) else f"to {place(event.goal)}"
@@ -120,8 +125,10 @@ def order(event: ScriptOrder) -> str:
 
 
 def sensor(scenario: Scenario) -> list[str]:
-    """Returns lines in words about the sensor: detection and false alarms; noise; visibility; one line per
+    """Returns lines in words about the scenario's sensor: detection and false alarms; noise; visibility; one line per
     occlusion.
+
+    These are three lines, and then one for each entry of `sensor.hide`.
     """
     s = scenario.sensor
     edges = f"{s.noise_px:g} px on the edges of boxes" if s.box_noise is None else "in proportion to boxes"

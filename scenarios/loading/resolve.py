@@ -89,10 +89,10 @@ def resolve(name: str, set: Iterable[str] = ()) -> list[Entry]:
 
 
 def _entries(path: Path, settings: tuple[str, ...]) -> list[Entry]:
-    """Returns all entries of a suite file, loaded; settings are applied after each entry's own.
+    """Returns all entries of a suite file, in order, loaded; settings are applied after each entry's own.
 
-    Copies of an entry share one load. Each scenario gets its entry's name. Raises InputError if the suite or a scenario
-    is wrong.
+    Copies of an entry are loaded once. Each scenario gets its entry's name. Raises InputError if the suite or a
+    scenario is wrong.
     """
     loaded: dict[tuple[str, tuple[str, ...]], Scenario] = {}
     entries = []
@@ -108,7 +108,8 @@ def _entries(path: Path, settings: tuple[str, ...]) -> list[Entry]:
 def _load_entry(entry: suites.SuiteEntry, path: Path, settings: tuple[str, ...]) -> Scenario:
     """Returns the scenario of an entry of the suite file `path`, with the entry's settings, then `settings`.
 
-    A scenario file is sought beside the suite first. An InputError names the suite and the entry.
+    A scenario file is sought beside the suite first, then in the catalogue. Raises InputError, naming the suite and the
+    entry, if there is no such scenario, it is wrong, or it cannot work.
     """
     try:
         return _build(toml_files.find(entry.scenario, beside=path.parent), entry.settings + settings)

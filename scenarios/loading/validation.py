@@ -1,4 +1,6 @@
-"""Validates a plain table as a Scenario or another model, and reports the first problem in one clear line."""
+"""Validates a plain table as a Scenario or another pydantic model, and reports the first problem as an InputError of
+one line.
+"""
 
 from __future__ import annotations
 
@@ -142,7 +144,10 @@ def _words(error: Any, path: KeyPath, table: Table, model: type[BaseModel]) -> t
 
 
 def _expectation(message: str) -> str:
-    """Returns what pydantic expected, in words for users, from the message of its error."""
+    """Returns what pydantic expected, in words for users, from the message of its error.
+
+    Leading words ("Input should be ", "Value error, ") are cut off, tuples are called lists, and dictionaries tables.
+    """
     for start in ("Input should be ", "Value error, "):
         message = message.removeprefix(start)
     message = re.sub(r"^.* exactly one of (.*), not \[.*\]$", r"exactly one of \1", message)
@@ -200,10 +205,11 @@ def key_text(path: KeyPath, table: Table) -> str:
 
 
 def known_keys(path: KeyPath, table: Table, form: type[BaseModel] = Scenario) -> list[str]:
-    """Returns the keys that a model knows at a path of a table; empty where the model has no table there.
+    """Returns the keys that a model knows at a path (keys and indices from 0) of a table; empty where the model has no
+    table there.
 
-    form: model of the whole table. A row of `event` gives the keys of its `type`. Raises KeyError or IndexError if the
-    table does not have the path.
+    form: model of the whole table. A row of `event` gives the keys of its `type`. Keys have the names used in files
+    (`schema`). Raises KeyError or IndexError if the table does not have the path.
     """
     model: type[BaseModel] | None = form
     here: Any = table

@@ -80,8 +80,8 @@ class CameraSpec(Model):
     kind: "pinhole" (perspective) or "top" (orthographic from above). image: width, height, px. fps: frames per second.
     focal_px: focal length, px, and baseline: distance of the right camera, m (both pinhole). tilt_deg: by how much it
     looks down, 90 = straight down. yaw_deg: 0 looks along +y, positive turns left. px_per_m (kind top), height above
-    the ground (m) and position (x, y, m): None: chosen so that all people are in view. crop: True accepts people who
-    walk out of view; False: they are an InputError."""
+    the ground (m) and position (x, y, m): None: chosen so that all people are in view (height of "top": 20 m). crop:
+    True accepts people who walk out of view; False: they are an InputError."""
 
     kind: Literal["pinhole", "top"] = Field("pinhole", description="perspective, or orthographic from above")
     image: tuple[Annotated[int, Field(ge=16, le=8192)], Annotated[int, Field(ge=16, le=8192)]] = Field(

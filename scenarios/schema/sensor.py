@@ -1,4 +1,5 @@
-"""The `[sensor]` table: the errors of the synthetic detector that makes det/det.txt.
+"""The `[sensor]` table: the errors of the synthetic detector that makes det/det.txt (misses, false alarms, noise,
+scores).
 
 The keys from `by_visibility` on are the measured profile of a detector (`flockscope fit sensor`). They are absent where
 nothing was measured; the simpler keys above them then apply.
@@ -193,8 +194,8 @@ class Sensor(Model):
 
     @model_validator(mode="after")
     def _consistent(self) -> Self:
-        """Returns the model; raises ValueError for miss_memory together with persistence, quantiles of scores that
-        decrease, or shares of miss_memory that add up to more than 1.
+        """Returns the model; raises ValueError for miss_memory together with persistence, true_scores or false_scores
+        that decrease, or shares of miss_memory that add up to more than 1.
         """
         if self.miss_memory is not None and self.persistence:
             raise ValueError("either miss_memory or persistence, not both")

@@ -1,8 +1,9 @@
 """Hulls of footprints: the ground that groups of people cover, for all groups of a sequence at once.
 
 The footprint of a person is FOOTPRINT, a regular 16-gon on a circle of 0.25 m. The hull of a group is the convex hull
-of its members' footprints. It equals the Minkowski sum of the 16-gon Q and the hull P of the members' positions:
-p_i + q_k is a vertex of the sum where the normal cones of p_i and q_k share an angle.
+of its members' footprints. It equals the Minkowski sum of the 16-gon Q and the hull P of the members' positions. Let
+p_i be a vertex of P and q_k one of Q. p_i + q_k is a vertex of the sum where their normal cones (directions in which
+each is the furthest point) share an angle.
 """
 
 from __future__ import annotations

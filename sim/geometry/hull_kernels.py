@@ -18,8 +18,8 @@ def convex_hulls(sets: Sequence[Array]) -> tuple[Array, ...]:
     sets.
 
     Vertices are counter-clockwise from the leftmost point, the lowest of several. Points on an edge and repeated points
-    are dropped, but a set of one point repeated gives that point twice. The hull of an empty set, and of a set that
-    contains a nan, has shape (0, 2). Without sets the result is ().
+    are dropped: points on one line give its two ends. But a set of one point repeated gives that point twice. The hull
+    of an empty set, and of a set that contains a nan, has shape (0, 2). Without sets the result is ().
     """
     count = np.array([len(points) for points in sets], np.int64)
     if not count.any():

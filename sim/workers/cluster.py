@@ -1,4 +1,4 @@
-"""The workers of a dask.distributed cluster.
+"""Runs a function over items on the workers of a dask.distributed cluster.
 
 The scheduler is given bytes only, so it needs none of our code. A worker refuses an item unless it has the same
 versions, sources and CPU instructions as this process, because its results could differ in their bytes otherwise

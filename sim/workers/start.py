@@ -49,9 +49,10 @@ def start_workers(workers: int = 1, cluster: str | None = None) -> AbstractConte
 def results_in_order(run: RunItems, function: Callable[[T], R], items: Sequence[T]) -> Generator[R, None, None]:
     """Yield function(item) in the order of `items`, with `run` (a RunItems) doing the work.
 
-    No object may stand twice among the items. Results that arrive early are kept in memory until their turn. When the
-    caller closes the generator, or an exception ends it, no further item is started, and items under way are waited
-    for. Raises what `run` raises: the exception of the function, or WorkError for lost workers.
+    Items are told apart by identity, so no object may stand twice among them. Results that arrive early are kept in
+    memory until their turn. When the caller closes the generator, or an exception ends it, no further item is started,
+    and items under way are waited for. Raises what `run` raises: the exception of the function, or WorkError for lost
+    workers.
     """
     wanted, found = True, dict[int, R]()
     arriving = run(function, (item for item in items if wanted))
