@@ -56,8 +56,8 @@ class Source:
 
     @property
     def fps(self) -> float:
-        """Frames per second. The sequence is opened for it, unless the scenario has a camera; then `open`'s errors can
-        occur."""
+        """Frames per second: of the scenario's camera if there is one; else the sequence is opened for it, which raises
+        as `open`."""
         camera = self.entry.scenario.camera if self.entry is not None else None
         return self.open().fps if camera is None else camera.fps
 

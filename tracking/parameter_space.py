@@ -55,9 +55,9 @@ def decode(
     """Return the config at the vector `action` (P,), which is clipped to [-1, 1]; other parameters are those of `base`.
 
     space: the P parameters, in the vector's order. allowed: a function of a config that raises InputError to refuse it.
-    A config is not allowed if its own `check` or `allowed` raises InputError. Then six bisections look for an allowed
-    config on the line from `base`, which must be allowed, to the action, and the farthest one found is returned; `base`
-    if none is.
+    A config is not allowed if its own `check` or `allowed` raises InputError. If the action's config is not allowed,
+    six bisections look for an allowed one on the line from `base`, which must be allowed, to the action. The farthest
+    one found is returned; `base` itself if none is.
 
     Raises InputError if the action has another shape or is not finite.
     """
@@ -76,9 +76,10 @@ def decode(
 def decode_and_build(space: Space, action: ArrayLike, base: Config, build: Callable[[Config], T]) -> tuple[Config, T]:
     """Return the config at the vector `action` (P,), clipped to [-1, 1], and the result of `build` for it.
 
-    As `decode`: a config for which its own check or `build` raises InputError is not allowed, and the farthest allowed
-    one on the line from `base` is taken. Raises InputError if the action has another shape or is not finite, or if only
-    `base` is left and `build` refuses it.
+    space: the P parameters, in the vector's order; other parameters are those of `base`. A config for which its own
+    check or `build` raises InputError is not allowed. Then the farthest allowed one that six bisections find on the
+    line from `base` to the action is taken, so that `build` may be called several times. Raises InputError if the
+    action has another shape or is not finite, or if only `base` is left and `build` refuses it.
     """
     made: dict[Config, T] = {}
 

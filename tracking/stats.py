@@ -81,11 +81,11 @@ def moving_blocks(
     """Return the scores (K,) of one recording, and the low and the high ends (K,) of their 95 % intervals.
 
     score: takes indices (frames,) of frames, from 0, some more than once, and returns scores (K,), nan where undefined.
-    It is called 1 + draws times, first with every frame once. frames: number in the recording; fps: frames per second;
-    draws: number of samples. Frames are resampled in moving blocks (Künsch 1989): whole stretches of consecutive
-    frames. For an interval of a difference let `score` return the difference of two trackers in the same frames. nan
-    and infinite scores of samples are left out; the ends are nan if none remains, and without frames. The random
-    numbers are fixed. Under SURE = 60 seconds the intervals are indicative.
+    It is called 1 + draws times (once without frames), first with every frame once. frames: number in the recording;
+    fps: frames per second; draws: number of samples. Frames are resampled in moving blocks (Künsch 1989): whole
+    stretches of consecutive frames. For an interval of a difference let `score` return the difference of two trackers
+    in the same frames. nan and infinite scores of samples are left out; the ends are nan if none remains, and without
+    frames. The random numbers are fixed. Under SURE = 60 seconds the intervals are indicative.
     """
     whole = np.asarray(score(np.arange(frames)), float)
     r = np.random.default_rng(0)

@@ -83,9 +83,10 @@ def _with_frames(event: Any, index: int) -> Any:
 
 
 def _fault(tracks: Any, index: int, history: ReportHistory) -> Fault | None:
-    """Returns the first fault of what a tracker returned for frame `index`, as (got, expected), or None.
+    """Returns the first fault of what a tracker returned for frame `index` (from 1), as (got, expected), or None.
 
-    Plane and unit of the first frame, and ids, are added to the history, in place.
+    Plane and unit of the first frame, and ids that are right, are added to the history, in place, also if a later check
+    finds a fault.
     """
     if not isinstance(tracks, Tracks):
         return type(tracks).__name__, "sim.types.Tracks"
@@ -166,8 +167,11 @@ def _id_fault(tracks: Tracks) -> Fault | None:
 
 
 def _ids_fault(id: Any, name: str) -> Fault | None:
-    """Returns the fault, as (got, expected), of ids that are negative or not unique, or None; `name` is their name in
-    it."""
+    """Returns the fault, as (got, expected), of an array of ids (N,) with a negative one or the same one twice, or
+    None.
+
+    name: what the ids are called in the message.
+    """
     if len(id) and id.min() < 0:
         return f"{name} {id.min()}", f"non-negative {name}s"
     if len(set(id.tolist())) != len(id):
@@ -179,8 +183,8 @@ def _groups_fault(groups: Any, d: int, people: Iterable[int]) -> Fault | None:
     """Returns the first fault, as (got, expected), in `Tracks.groups`, or None.
 
     d: columns of pos and vel, 2 or 3; people: ids that may be members. For G groups: id (G,) int64, unique and
-    non-negative, pos and vel (G, d), extent (G, 2, 2), size (G,). nan is allowed in vel, extent and size, where it
-    means unknown. Without groups the other columns are not checked.
+    non-negative, pos (finite) and vel (G, d), extent (G, 2, 2), size (G,). nan is allowed in vel, extent and size,
+    where it means unknown. For G = 0 only the first number of each shape is checked.
     """
     if not isinstance(groups, Groups):
         return f"groups of type {type(groups).__name__}", "sim.types.Groups or None"
@@ -221,8 +225,8 @@ def _ragged_fault(groups: Groups, n: int, people: Iterable[int]) -> Fault | None
 
 
 def _members_fault(members: Iterable[Any], people: Iterable[int], name: str) -> Fault | None:
-    """Returns the fault, as (got, expected), of the first member that is no whole number or not among `people`, or
-    None.
+    """Returns the fault, as (got, expected), of the first member that is no whole number (a bool is none) or not among
+    `people`, or None.
 
     name: what the members are called in the message.
     """

@@ -34,8 +34,9 @@ MODES: tuple[DetectionMode, ...] = ("image", "file")
 def demo(out: Path, *, quick: bool) -> CommandResult:
     """Writes simulated scenes, tracks and pages into the folder `out`; scenes that are already there are kept.
 
-    quick: one short scene and one seed, else eight scenes and three seeds. The result's data: "sequences" (number),
-    "scores" (mean scores with intervals, by tracker and input) and "page", the path of the page to open.
+    quick: one short scene and one seed, else eight scenes and three seeds. One scene more is rendered and tracked from
+    its pictures. The result's data: "sequences" (number, without the rendered one), "scores" (mean scores with
+    intervals, by tracker and input) and "page", the path of the page to open.
 
     Raises InputError if `out` is a file, cannot be written or holds sequences of other scenarios; WorkError if the disk
     is full.

@@ -97,8 +97,9 @@ def ellipses(extent: Array) -> Array:
 def simplified(hull: Array, least: float) -> Array:
     """Returns a convex polygon (V, 2) without the corners that stand out by less than `least` over their neighbours.
 
-    Two passes remove every other corner at most, so that no two neighbours go at once; three corners stay. Of a polygon
-    that then still has more than 24 corners every k-th is kept, with the least k that suffices. `hull` is not modified.
+    Two passes remove every other corner at most, so that no two neighbours go at once; a pass leaves up to three
+    corners as they are. Of a polygon that then still has more than 24 corners every k-th is kept, with the least k that
+    suffices. `hull` is not modified.
     """
     for odd in (1, 0):
         n = len(hull)

@@ -43,7 +43,7 @@ def bars(frame: Ints, group: Ints, least: int = 2, gap: int = 1, people: Array |
     Rows may have any order; those with group -1 are left out. [] if none remain. least: a group with fewer people in a
     frame is absent from it. gap: frames may differ by so much within one bar. people: (R,), how many people each row
     stands for; None: one. A bar takes the lane of the last bar of its id if that is free, else the lowest free lane. A
-    lane is free from the frame after its last bar's end.
+    lane is free for a bar that starts at least two frames after the end of its last bar.
     """
     rows = group >= 0
     pairs, place = np.unique(np.stack([group[rows], frame[rows]], axis=1), axis=0, return_inverse=True)
@@ -60,8 +60,8 @@ def bars(frame: Ints, group: Ints, least: int = 2, gap: int = 1, people: Array |
 def _in_lanes(lives: list[tuple[int, int, int, int]]) -> list[Bar]:
     """Returns Bars of (start, end, id, size), in the given order, which must be by start; start and end are frames.
 
-    A bar takes the lane of the last bar of its id if that is free, else the lowest free lane. A lane is free after the
-    end of its last bar.
+    A bar takes the lane of the last bar of its id if that is free, else the lowest free lane. A lane is free for a bar
+    that starts at least two frames after the end of its last bar.
     """
     free_from: list[int] = []
     last: dict[int, int] = {}
