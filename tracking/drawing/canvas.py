@@ -36,7 +36,7 @@ def colour(identity: int) -> Colour:
     """Returns the BGR colour (blue, green, red, 0 to 255) of an id: one of ten, by the id modulo 10; grey for a
     negative id.
 
-    It is the same as on the replay page.
+    It is the same as on the replay page. identity: of a person or group.
     """
     if identity < 0:
         return THING
@@ -48,9 +48,9 @@ def colour(identity: int) -> Colour:
 class Canvas:
     """A picture with a mapping from drawing coordinates to its pixels.
 
-    image: (H, W, 3) uint8 BGR, drawn on in place. scale: px per drawing unit (m on a plan, px over a picture).
-    low, high: (2,) drawing coordinates of the picture's smallest and largest x and y. upwards: y grows upwards, as on
-    a plan; else downwards, as in a picture.
+    image: (H, W, 3) uint8 BGR, drawn on in place. scale: px per drawing unit (m on a plan, px over a picture). low,
+    high: (2,) drawing coordinates, x and y, of the image's edges: the smallest and the largest. upwards: True if y
+    grows upwards, as on a plan; else downwards, as in a picture.
     """
 
     image: Image
@@ -88,7 +88,8 @@ class Canvas:
         """Draws a polyline in place. points: (N, 2) in drawing coordinates (m on a plan, px over a picture); ink: BGR;
         width: px.
 
-        closed: join the last point to the first. Points must not be nan.
+        closed: join the last point to the first. Points must not be nan; N at least 1. Parts outside the image are left
+        out.
         """
         cv2.polylines(self.image, [fixed_point(self.map(points))], closed, ink, width, cv2.LINE_AA, SHIFT)
 
@@ -117,7 +118,7 @@ class Canvas:
         """Fills a polygon in place. polygon: (V, 2) x, y in pixel coordinates of the image, not in drawing coordinates;
         V >= 1.
 
-        ink: BGR. opacity: 0 (invisible) to 1. What lies outside the image is not drawn.
+        ink: BGR. opacity: 0 (invisible) to 1. What lies outside the image is not drawn. nan is not allowed.
         """
         low = np.maximum(np.floor(polygon.min(axis=0)).astype(int) - 1, 0)
         high = np.ceil(polygon.max(axis=0)).astype(int) + 2
@@ -141,7 +142,10 @@ def fixed_point(points: Array) -> np.ndarray:
 
 
 def box_corners(box: Array) -> Array:
-    """The corners (4, 2) of a box (left, top, width, height): upper left, upper right, lower right, lower left."""
+    """The corners (4, 2), x and y, of a box (4,): left, top, width, height; results are in its unit.
+
+    Order: upper left, upper right, lower right, lower left, where y grows downwards.
+    """
     x, y, w, h = box
     return np.array([[x, y], [x + w, y], [x + w, y + h], [x, y + h]])
 

@@ -1,8 +1,8 @@
-"""What to draw over a picture or plan: a layer holds boxes, trails, ellipses, groups and events of truth or tracks.
+"""What to draw over a picture or plan: a layer holds boxes, trails, ellipses, groups and events of truth or of one
+tracker.
 
-Layers are computed from `Truth` or `Tracks` here, in drawing coordinates (px, or m on a plan); `layer_painting` draws
-them.
-"""
+Layers are computed from `Truth` or `Tracks` here, in drawing coordinates (px over a picture, m on a plan);
+`layer_painting` draws them."""
 
 from __future__ import annotations
 
@@ -39,12 +39,12 @@ NO_POINTS = np.zeros((0, 2))
 
 @dataclass(frozen=True, eq=False)
 class GroupMark:
-    """One group in one frame, in drawing coordinates. hull: (V, 2) polygon; no vertex where it is unknown or unseen.
+    """One group in one frame, in drawing coordinates (px over a picture, m on a plan).
 
-    The other fields are known only of a group that is tracked as a whole. extent: (32, 2), the ellipse that holds 99 %
-    of the group by its extent. motion: (2, 2), its centre now and in 1 s. size: its estimated number of people. Unknown
-    arrays have no rows; an unknown size is nan.
-    """
+    id: of the group. hull: (V, 2) polygon round the members. The other fields are known only of a group that is tracked
+    as a whole. extent: (32, 2), points of the ellipse that holds 99 % of the group by the covariance of its members.
+    motion: (2, 2), its centre now and in 1 s. size: its estimated number of people. Unknown or unseen arrays have no
+    rows; an unknown size is nan."""
 
     id: int
     hull: Array
@@ -58,11 +58,10 @@ class FrameMarks:
     """What is drawn of one layer in one frame: N people, or N groups if `whole_groups`, in drawing coordinates (px, or
     m on a plan).
 
-    id: (N,) of people or groups. box: (N, 4) left, top, width, height. at: (N, 2), the point that trails follow.
+    id: (N,) of people or groups. box: (N, 4) left, top, width, height. at: (N, 2) x, y, the point that trails follow.
     ellipse: (N, 32, 2), points of the ellipse that holds the position with 95 % probability. Rows of these three are
     nan where unknown. hidden: (N,) True for true people of whom less than 20 % is visible. groups: marks of the groups
-    in the frame. whole_groups: True if the tracker tracks groups, not people.
-    """
+    in the frame. whole_groups: True if the tracker tracks groups, not people."""
 
     id: Ints
     box: Array
@@ -74,7 +73,7 @@ class FrameMarks:
 
     @classmethod
     def none(cls) -> FrameMarks:
-        """A frame without people and groups."""
+        """Returns the marks of a frame without people and groups: zero rows."""
         return cls(np.zeros(0, np.int64), np.zeros((0, 4)), NO_POINTS, np.zeros((0, 32, 2)), np.zeros(0, bool))
 
 
@@ -99,12 +98,12 @@ class Layer:
         return self.frames.get(index, FrameMarks.none())
 
     def trails(self, index: int, past: int) -> Iterator[tuple[int, Array]]:
-        """Yields (id, points) of each trail that ends in frame `index`, counted from 1; points (K, 2) in drawing
-        coordinates.
+        """Returns an iterator of (id, points) of each trail that ends in frame `index`, counted from 1; points (K, 2)
+        in drawing coordinates.
 
         The newest point is first, K >= 2; shorter trails are left out. past: number of earlier frames that a trail
-        reaches back at most. A trail ends before a frame that lacks the id or in which its point is nan.
-        """
+        reaches back at most. A trail begins after the last frame that lacks the id or in which its point is nan. Ids
+        come in no particular order."""
         trails: dict[int, list[Array]] = {}
         unbroken = set(self.at(index).id.tolist())
         for k in range(index, max(index - past, 1) - 1, -1):
@@ -116,10 +115,10 @@ class Layer:
         return ((i, np.array(points)) for i, points in trails.items() if len(points) > 1)
 
     def recent_events(self, index: int, frames: float) -> list[GroupEvent]:
-        """Returns the events that became known in frame `index` or less than `frames` frames before it, newest first.
+        """Returns the events that became known in frame `index` (from 1) or less than `frames` frames before it, newest
+        first.
 
-        Kinds "enter" and "leave" are left out.
-        """
+        Kinds "enter" and "leave" are left out. Events of one frame keep their order in the layer."""
         recent = [(known, e) for known, e in self.events if 0 <= index - known < frames and e.kind not in NOT_CAPTIONED]
         return [event for _, event in sorted(recent, key=lambda pair: -pair[0])]
 
@@ -130,8 +129,7 @@ def layer_of_truth(truth: Truth) -> Layer:
 
     A frame without people, and every frame of a truth without boxes, has no marks. Ellipses are nan. Boxes of people of
     whom less than 20 % is visible are marked hidden. A group's hull holds its members' boxes and 5 px round them;
-    groups with fewer than two boxes have none.
-    """
+    groups with fewer than two boxes have no mark. A truth whose events are None gives none."""
     frames = {}
     for index in range(1, truth.length + 1):
         now = truth.at(index)
@@ -144,32 +142,38 @@ def layer_of_truth(truth: Truth) -> Layer:
 
 
 def layer_of_tracks(tracks: SequenceOf[Tracks], camera: Camera | None, scene: Scene | None) -> Layer:
-    """A tracker's layer over pictures, in px.
+    """Returns the layer of one tracker's output over pictures, in px: boxes, trail points, 95 % ellipses, groups,
+    events.
 
-    Ellipses and groups of tracks on the ground are projected through `camera`, and people without boxes get the box of
-    an upright person. Without a camera only people's own boxes are known. scene: gives the ground's height; None: 0.
-    """
+    tracks: one Tracks per frame. Positions on the ground are projected through `camera`; people of a Tracks without
+    boxes get the box of an upright person. Without a camera, tracks on the ground show only their own boxes and the
+    groups round these. What the camera cannot see is nan. scene: gives the ground's height; None: 0."""
     frames = {t.index: _marks_in_picture(t, camera, scene) for t in tracks}
     return Layer("tracked", "T", frames, _emitted(tracks))
 
 
 def plan_layer_of_tracks(tracks: SequenceOf[Tracks]) -> Layer:
-    """Returns the layer of a tracker's output on a plan, in m: positions, 95 % ellipses, hulls of groups, events; boxes
-    are nan.
+    """Returns the layer of one tracker's output on a plan, in m: positions, 95 % ellipses, hulls of groups, events;
+    boxes are nan.
 
-    tracks: one entry per frame, with positions on the ground; this is not checked.
-    """
+    tracks: one Tracks per frame, with positions on the ground; this is not checked. An ellipse is nan if its covariance
+    is not finite."""
     return Layer("tracked", "T", {t.index: _marks_on_plan(t) for t in tracks}, _emitted(tracks))
 
 
 def _emitted(tracks: SequenceOf[Tracks]) -> tuple[tuple[int, GroupEvent], ...]:
-    """Returns pairs (frame, event) of all events of a tracker's output; frame: that in which the event was emitted, or
-    its first frame if that is None."""
+    """Returns pairs (frame, event) of all events in one tracker's output `tracks`, in their order.
+
+    frame: that in which the event was emitted (reported), from 1; the event's first frame if that is None."""
     return tuple((e.start if e.emitted is None else e.emitted, e) for t in tracks for e in t.events)
 
 
 def _marks_in_picture(t: Tracks, camera: Camera | None, scene: Scene | None) -> FrameMarks:
-    """The marks of one frame's tracks in px. Trails follow the feet, or the position in the image without a box."""
+    """Returns the marks in px of one frame's tracks `t`, over a picture.
+
+    Trails follow the middle of a box's lower edge; without a box the position of tracks in the image plane, else nan.
+    Tracks on the ground without boxes get boxes of upright people through `camera`, nan if it is None. scene: gives the
+    ground's height; None: 0. Rows that are groups have no boxes and ellipses."""
     if t.unit == "group":
         return _whole_groups_in_picture(t, camera, scene)
     n = len(t.id)
@@ -191,7 +195,10 @@ def _whole_groups_in_picture(t: Tracks, camera: Camera | None, scene: Scene | No
 
 
 def _marks_on_plan(t: Tracks) -> FrameMarks:
-    """The marks of one frame's tracks in m, without boxes. Trails follow the positions."""
+    """Returns the marks of one frame's tracks `t` on a plan, in m; boxes are nan. Trails follow the positions.
+
+    Ellipses are nan where the covariance is not finite. Without groups in `t` there are no group marks, unless its rows
+    are groups."""
     n, groups, at = len(t.id), t.groups or Groups.none(), t.pos[:, :2]
     if t.unit == "group":
         marks = _whole_groups(t, lambda points: points[:, :2])
@@ -207,9 +214,9 @@ def _marks_on_plan(t: Tracks) -> FrameMarks:
 def _whole_groups(t: Tracks, to_drawing: Callable[[Array], Array]) -> tuple[GroupMark, ...]:
     """Returns one mark per row of tracks `t` whose rows are groups, in order.
 
-    to_drawing: maps points (K, 2 or 3) to drawing coordinates (K, 2), or to no rows if they cannot be seen. A row
-    without an entry in t.groups has no hull and extent, and its size is nan.
-    """
+    to_drawing: maps points (K, 2 or 3) to drawing coordinates (K, 2), or to no rows if they cannot be seen. motion is
+    the row's position now and in 1 s at its velocity. A row whose id is not in t.groups has no hull and extent, and its
+    size is nan."""
     groups = t.groups or Groups.none()
     rows = dict(zip(groups.id.tolist(), range(len(groups.id)), strict=True))
 
@@ -225,7 +232,8 @@ def _whole_groups(t: Tracks, to_drawing: Callable[[Array], Array]) -> tuple[Grou
 
 
 def _feet(box: Array) -> Array:
-    """The middles (N, 2) of the lower edges of boxes (N, 4) ltwh."""
+    """Returns the middles (N, 2), x and y, of the lower edges of boxes (N, 4): left, top, width, height in px. nan
+    stays nan."""
     return np.asarray(box[:, :2] + box[:, 2:] * np.array([0.5, 1.0]))
 
 
@@ -247,7 +255,10 @@ def _all_corners(box: Array) -> Array:
 
 
 def _in_picture(points: Array, plane: str, camera: Camera | None, scene: Scene | None) -> Array:
-    """Points (K, 2 or 3) of a tracker's plane as (K, 2) px; (0, 2) if a point off the image plane cannot be seen."""
+    """Returns points (K, 2 or 3) of a tracker's plane as (K, 2) px, or (0, 2) if one of them cannot be seen.
+
+    plane: "image" points are returned unchanged, others (m) are projected; (0, 2) if `camera` is None, or a point is
+    behind it or nan. scene: gives the height of points with 2 columns; None: 0. No points are returned unchanged."""
     if plane == "image" or not len(points):
         return points
     if camera is None:

@@ -11,11 +11,11 @@ MARGIN = 1.0
 
 
 def plan_area(scene: Scene | None, places: Array) -> tuple[Array, Array] | None:
-    """Lower left and upper right corner (2,), in m, of the ground to show.
+    """Returns the lower left and upper right corner, x and y (2,) each in m, of the ground to show.
 
-    places: (N, 2) m; rows with nan are ignored. With a scene the area holds places, pillars, doors, service points and
-    stairs; without any of these it is the whole world. Without a scene it is the places' bounding box plus MARGIN, or
-    None if no place is known.
+    places: (N, 2) m; rows with nan or inf are ignored. With a scene the area holds places, pillars, doors, service
+    points and stairs, with a margin of 2 m, cut at the world's border to not less than 1 m. Without any of these it is
+    the whole world. Without a scene it is the places' bounding box plus 1 m on each side, or None if no place is known.
     """
     places = _finite(places)
     if scene is not None:

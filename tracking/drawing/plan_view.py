@@ -37,7 +37,8 @@ def draw_scene(canvas: Canvas, scene: Scene | None) -> None:
     """Draws grid lines, and of a scene its border, stairs, walls with gaps for doors, pillars and service points, in
     place.
 
-    Grid lines are 1 m apart on plans up to 30 m long, 5 m up to 120 m, else 20 m. scene: None: only the grid.
+    canvas: a plan in m, drawn on. Grid lines are 1 m apart on plans up to 30 m long, 5 m up to 120 m, else 20 m. scene:
+    None: only the grid.
     """
     span = float((canvas.high - canvas.low).max())
     step = 1.0 if span <= 30 else 5.0 if span <= 120 else 20.0
@@ -74,8 +75,8 @@ def draw_trails(canvas: Canvas, truth: Truth, index: int, places: Array) -> None
     """Draws in place where each person of frame `index` (counted from 1) was during the last 3 s, in a pale colour of
     the id.
 
-    places: (R, 2) drawing coordinates of the truth's R rows (one row per person and frame), not nan. A trail stops at
-    the last frame without that person; one of a single point is not drawn.
+    places: (R, 2) drawing coordinates of the truth's R rows (one row per person and frame), not nan. A trail begins
+    after the last frame without that person; one of a single point is not drawn.
     """
     present = truth.id[truth.rows(index)]
     first = truth.rows(max(index - round(TRAIL_SECONDS * truth.fps), 1)).start
@@ -96,8 +97,9 @@ def _pale(ink: Colour) -> Colour:
 def draw_group_hulls(canvas: Canvas, truth: Truth, index: int, places: Array, boxes: Array | None) -> None:
     """Draws in place the hull and id of each true group that has two or more members in frame `index`, counted from 1.
 
-    places: (R, 2) drawing coordinates of the truth's R rows (one row per person and frame). boxes: (R, 4) left, top,
-    width, height, whose corners the hull holds; None: it holds a circle round each place, of 0.3 m and at least 9 px.
+    The hull is the convex polygon round the members. places: (R, 2) drawing coordinates of the truth's R rows (one row
+    per person and frame), not nan. boxes: (R, 4) left, top, width, height, whose corners the hull holds; None: it holds
+    a circle round each place, of radius 0.3 m and at least 9 px.
     """
     rows = truth.rows(index)
     group = truth.group[rows]
@@ -115,7 +117,12 @@ def draw_group_hulls(canvas: Canvas, truth: Truth, index: int, places: Array, bo
 
 
 def _outlines(canvas: Canvas, places: Array, boxes: Array | None) -> Array:
-    """Pixel coordinates of the boxes' corners, or of 16 points on a circle round each place."""
+    """Returns pixel coordinates (4 N, 2) of the corners of N boxes, or (16 N, 2) of 16 points on a circle round each of
+    N places.
+
+    places: (N, 2) drawing coordinates. boxes: (N, 4) left, top, width, height; None: circles of radius 0.3 m, at least
+    9 px.
+    """
     if boxes is not None:
         corners = [boxes[:, :2] + boxes[:, 2:] * np.array(c) for c in ((0, 0), (1, 0), (0, 1), (1, 1))]
         return canvas.map(np.concatenate(corners))
@@ -129,8 +136,8 @@ def draw_people(canvas: Canvas, truth: Truth, index: int, places: Array, boxes: 
     given.
 
     places: (R, 2) drawing coordinates of the truth's R rows (one row per person and frame); people with nan are
-    skipped. boxes: (R, 4) left, top, width, height; None: discs. ids: also write ids. There is no heading line without
-    velocities or below 0.1 m/s.
+    skipped. boxes: (R, 4) left, top, width, height, known where the place is; None: discs. ids: also write ids. The
+    heading line is 0.5 drawing units (m on a plan) long; there is none without velocities or below 0.1 m/s.
     """
     rows, radius = truth.rows(index), max(0.22 * canvas.scale, 6.0)
     for row in range(rows.start, rows.stop):
@@ -157,7 +164,8 @@ def draw_ids(canvas: Canvas, ids: Ints, places: Array, radius: float) -> None:
     """Writes each id into the canvas's image, in place, beside the disc at its place.
 
     ids: (N,). places: (N, 2) in drawing coordinates; those with nan are skipped. radius: of the discs in px. Of eight
-    positions round its disc an id takes the one that covers the least of all discs and of the ids written before.
+    positions round its disc an id takes the one that covers the least of all discs and of the ids written before; of
+    equal ones the first.
     """
     discs = canvas.map(places)
     taken = np.concatenate([discs - radius, discs + radius], axis=1)
@@ -177,7 +185,10 @@ def draw_ids(canvas: Canvas, ids: Ints, places: Array, radius: float) -> None:
 
 
 def _overlap_area(box: Array, others: Array) -> float:
-    """The summed area that a box (left, top, right, bottom) shares with each of `others` (N, 4)."""
+    """Returns the summed area that a box (4,) shares with each of `others` (N, 4), in the squared unit of the boxes.
+
+    Columns: left, top, right, bottom. Rows with nan count as 0.
+    """
     wide = np.minimum(box[2], others[:, 2]) - np.maximum(box[0], others[:, 0])
     high = np.minimum(box[3], others[:, 3]) - np.maximum(box[1], others[:, 1])
     return float(np.nansum(np.maximum(wide, 0) * np.maximum(high, 0)))
