@@ -52,7 +52,8 @@ class _LinkedPeople:
         return found
 
     def switch(self, a: int, b: int, on: bool) -> None:
-        """Set (`on`) or remove the link between two people, columns a and b; no effect if it is so already."""
+        """Set (`on` True) or remove the link between two people, columns a and b of arrays; no effect if it is so
+        already."""
         for p, q in ((a, b), (b, a)):
             partners = self.linked.setdefault(p, set())
             (partners.add if on else partners.discard)(q)
@@ -131,7 +132,7 @@ def _entered(state: _LinkedPeople, switched: Iterable[LinkSwitch], arrival: int)
 
 
 def _without_singles(frame: Ints, group: Ints) -> Ints:
-    """Returns the labels (R,) with -1 wherever a group has only one row in a frame.
+    """Returns the labels (R,) with -1 wherever a group has only one row in a frame; a row is one person in one frame.
 
     frame, group (R,): frame and group id (-1 alone) of each row; not changed.
     """

@@ -145,7 +145,8 @@ def _filled(given: Sequence[Tracks], table: TracksTable, events: Sequence[GroupE
 
 
 def _with_track_ids(event: GroupEvent, table: TracksTable) -> GroupEvent:
-    """Returns the event with track ids as members instead of columns + 1, and with its position in the tracks' unit."""
+    """Returns a copy of the event with track ids as members instead of columns + 1, and with its position in the
+    tracks' unit (m or px) instead of m."""
     x, y = (v * table.scale for v in event.pos)
     return replace(event, members=tuple(int(table.ids[p - 1]) for p in event.members), pos=(x, y))
 

@@ -91,9 +91,10 @@ def _event(change: GroupChange, start: int, end: int, t: int, pos: Array) -> Gro
 
 
 def _members(state: Ints) -> dict[int, PersonSet]:
-    """Returns the columns of the people of each group of two or more, by label, in one frame's labels (P,).
+    """Returns a dict from label to the people (a frozenset of columns, from 0) of each group of two or more, in one
+    frame.
 
-    Labels below 0 (-1 alone, -2 absent) are no groups.
+    state (P,): label of each person. Labels below 0 (-1 alone, -2 absent) are no groups.
     """
     found: dict[int, set[int]] = {}
     for p in np.flatnonzero(state >= 0).tolist():

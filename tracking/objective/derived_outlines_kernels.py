@@ -11,7 +11,8 @@ def connected_people(frame, column, length, people, memory, when, a, b, on):  # 
     """Returns a label for each of R rows (people in frames) that connected people of a frame share, -1 alone: (R,).
 
     Two people are connected by a link that is on, directly or through others. The label is the least column of the
-    connected people. The groups are those of tracking.grouping.group_labels.label_people, without its ids.
+    connected people seen in the frame; someone connected only to people not seen now is alone. The groups are those of
+    tracking.grouping.group_labels.label_people, without its ids.
 
     frame (R,): from 0, sorted; column (R,): number of the person, from 0; length: number of frames; people: number of
     columns; memory: frames for which a missed person still connects others. Links switch on or off in frame when (L,),

@@ -150,11 +150,12 @@ def inside(frame, vertex, ends, box, regular, people, place, reach, slack):  # t
     """Returns how many people of the frame are inside each of G polygons or within `reach` of it, (G,), counted up to
     2.
 
-    -1: unsure, because the polygon is not regular (convex with positive area), or because a person's distance is within
-    `slack` of `reach`. A polygon without vertices has 0.
+    -1: unsure, because the polygon is not regular (convex with positive area), or because the distance of a person,
+    before two were counted, is within `slack` of `reach`. A polygon without vertices has 0.
 
-    frame (G,), vertex (V, 2), ends (G,), box (G, 4: min x, min y, max x, max y), regular (G,): of the polygons. people
-    (R,): frame number of each position in place (R, 2). frame and people are sorted.
+    frame (G,), vertex (V, 2), ends (G,), box (G, 4: min x, min y, max x, max y), regular (G,): of the polygons; polygon
+    g is vertex[ends[g - 1] : ends[g]]. people (R,): frame number of each position x, y in place (R, 2). frame and
+    people are sorted. reach, slack: in the unit of the polygons.
     """
     count, start = np.zeros(len(frame), np.int64), 0
     for g in range(len(frame)):

@@ -118,8 +118,9 @@ def walking_reach(scaled: ScaledParameters, elapsed: Array) -> Array:
 def claimed(points: Array, weights: Array, d2: Array, owner: Ints, t: float) -> PointClaims:
     """Return the claims on the points (M, 2) of the frame at time t, s: who may have each point.
 
-    weights (M,): people that each point stands for; d2 (G, M): squared distances, inf outside the search regions; owner
-    (M,): from `attached`, or -1 for all points. All points are measured at t.
+    weights (M,): people that each point stands for; d2 (G, M): squared Mahalanobis distances from G groups, inf outside
+    the search regions; owner (M,): row of the group that a point in no region is attached to, or -1. All points are
+    measured at t. An owned point has one claimant, any other as many as regions it lies in.
     """
     claimants = np.where(owner >= 0, 1, np.isfinite(d2).sum(0))
     return PointClaims(points, weights, np.full(len(points), t), d2, owner, claimants)

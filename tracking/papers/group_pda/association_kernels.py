@@ -243,9 +243,10 @@ def _adapt(beta: Array, people: Array, cov: Array, extent: Array, size: Array, r
     """Update extent (2, 2) and size (1,) in place by eq. 2.4, as means over J associations; the miss leaves them as
     they are.
 
-    beta (J,): normalised masses; people (J,), cov (J, 3): number and covariance xx, xy, yy of each association's
-    people. Departures: covariances of few people are shrunk to the prior, and divided by GATE_FACTOR to restore what
-    the edge of the search region cuts off.
+    Each becomes keep · old + (1 - keep) · new, with the decay per frame KEEP_EXTENT or KEEP_SIZE of `rules`. beta (J,):
+    normalised masses; people (J,), cov (J, 3): number and covariance xx, xy, yy of each association's people.
+    Departures: covariances of few people are shrunk to the prior, and divided by GATE_FACTOR to restore what the edge
+    of the search region cuts off.
     """
     target, count = np.zeros(3), 0.0
     total = beta.sum()

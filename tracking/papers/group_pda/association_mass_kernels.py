@@ -76,10 +76,10 @@ def centroid_noise(seen: float, cov: Array, extent: Array, size: float, rules: A
     """Return R (xx, xy, yy), the covariance of the centroid of m = `seen` people about that of all n people there.
 
     n = size / DETECT_PROB, size: people of the group that are measured on average. cov (3,): covariance xx, xy, yy of
-    the seen people; extent (2, 2): Sigma, covariance of the members; r: POINT_SD.
+    the seen people; extent (2, 2): Sigma, covariance of the members; rules: parameters; r: its POINT_SD.
     - REDRAWN, eq. 2.1 read literally: Sigma / m.
     - Members keep their places (ours): r^2 / m + (1 - m / n) n / (n - 1) Sigma / m, the variance of a mean of m drawn
-      out of n without replacement, with Sigma less r^2.
+      out of n without replacement, with Sigma less r^2 (at least 0). m is at least 1, or n if that is less.
     - More are seen than are there: the same with the roles exchanged and `cov` for Sigma.
 
     n - 1 is at least LEAST_OTHERS: 1 from points, where a size between one and two means doubt about which of the two.

@@ -78,7 +78,8 @@ def add_newborns(
 def _set_parent(born: GroupBank, k: int, bank: GroupBank, row: int, scaled: ScaledParameters) -> None:
     """Make group k of the bank `born` a child of the group in `row` of `bank`; changes `born` in place.
 
-    Its origin is the common centroid of both. With `inherit_velocity` it starts with the parent's velocity.
+    Its origin is the common centroid of both, weighted by their people. With `inherit_velocity` it starts with the
+    parent's velocity, with `split_speed` as further standard deviation.
     """
     share = bank.size[row] / (bank.size[row] + born.size[k])
     born.parent[k] = bank.id[row]
@@ -91,9 +92,10 @@ def _set_parent(born: GroupBank, k: int, bank: GroupBank, row: int, scaled: Scal
 def confirm(bank: GroupBank, scaled: ScaledParameters, t: float, ids: GroupIds) -> Iterator[BankEvent]:
     """Give ids to tentative groups that were measured for longer than `confirm_time`; yield their events. t: s.
 
-    A group that fits a confirmed group not measured in this frame takes over its id, without an event, if `recapture`
-    is on; the old row becomes tentative and is dropped later. Any other group gets a fresh id, with a split event if
-    its parent still exists, else an enter event. It is a generator: the bank changes only while it is read.
+    A group that fits a confirmed group not measured in this frame takes over its id and age, without an event, if
+    `recapture` is on; the old row becomes tentative and is dropped later. Any other group gets a fresh id from `ids`,
+    with a split event if its parent (the group it has left) still exists, else an enter event. Onset: its first
+    measurement. It is a generator: the bank changes only while it is read.
     """
     c = scaled.config
     new = np.flatnonzero(~bank.confirmed & (bank.measured_time > c.confirm_time + 1e-9))

@@ -43,8 +43,8 @@ class PairMoment(NamedTuple):
 class PairHistory:
     """The past of two groups that are near each other.
 
-    alike_since: time, s, since which they have also had like velocities; inf if the velocities differ now. moments:
-    the pair in each frame of the last 5 s in which it was near, oldest first.
+    alike_since: time, s, since which they have also had like velocities; inf if the velocities differ now. moments: a
+    `PairMoment` (distances and places) for each frame of the last 5 s in which the two were near, oldest first.
     """
 
     alike_since: float
@@ -94,8 +94,9 @@ def split_onset(
 
     Going back from `known`, each moment's points are divided between the two centroids, which follow them. The nearest
     people of the parts are taken to be nearer than the centroids by the same distance as now. The onset is the moment
-    after the last one in which the parts were together by the split rule (1.5 m; 2.5 m if slower than 0.7 m/s). Without
-    two earlier moments the onset is `known`.
+    after the last one in which the parts were together by the split rule (at most 1.5 m apart; 2.5 m if slower than 0.7
+    m/s); the first moment if there is none. With fewer than two moments the onset is `known`, and the place that
+    moment's centroid, or that of the first part.
     """
     before = [(t, y * metres_per_unit) for t, y in recent if t <= known + 1e-9]
     if len(before) < 2:

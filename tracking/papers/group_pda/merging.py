@@ -120,8 +120,10 @@ class GroupMerging:
         self.histories = histories
 
     def _extended(self, pair: NearPair) -> PairHistory:
-        """Returns the pair's history with this frame's moment added and moments older than 5 s dropped;
-        stores nothing."""
+        """Returns the pair's history with this frame's moment added and moments older than 5 s dropped; stores nothing.
+
+        `alike_since` is kept while the pair stays alike, this time if it is alike for the first time, inf if it is not.
+        """
         before, now = self.histories.get(pair.ids, PairHistory(np.inf, [])), pair.moment
         moments = [m for m in before.moments if m.t > now.t - HISTORY_TIME]
         return PairHistory(min(before.alike_since, now.t) if pair.alike else np.inf, [*moments, now])
@@ -183,7 +185,7 @@ def _gap(bank: GroupBank, a: int, b: int, d: Array, scaled: ScaledParameters) ->
     centroids, m.
 
     From points it is that of the nearest members' places. From pixels, which are parts of bodies, it is the distance of
-    the centroids less how far people stand from them in this direction; it may be negative.
+    the centroids less 1.1 standard deviations of either group's people in this direction; it may be negative.
     """
     if not scaled.from_pixels:
         here, there = (bank.positions(k) for k in (a, b))
@@ -226,8 +228,8 @@ def _linked(bank: GroupBank, rows: Ints, scaled: ScaledParameters) -> Bools:
 
 
 def _connected(pairs: list[Pair]) -> list[list[int]]:
-    """Returns the connected components of the graph whose edges are `pairs` of ids, each as a sorted list
-    of ids (G_x)."""
+    """Returns the connected components of the graph whose edges are `pairs` of ids, each as a sorted list of ids (G_x);
+    their order has no meaning."""
     parts: list[set[int]] = []
     for pair in pairs:
         touched = [p for p in parts if p & set(pair)]

@@ -90,10 +90,11 @@ SQUARE = np.array([[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]])
 class GroupPda:
     """The tracker `group-pda`: groups of people tracked as wholes, from points or from foreground pixels.
 
-    State: config, which may be replaced between two frames; the bank of groups, the next id, the histories of pairs
-    that may merge, the clocks of duplicate groups, and, from pixels, the background model. All but config exist after
-    `reset` only. innovation: (id, y (2,), S (2, 2)) of each confirmed group measured in the last step: innovation of
-    its likeliest association and its covariance, in the unit of the points.
+    State: config, which may be replaced between two frames; bank, the groups; ids, which gives the next id; merging,
+    the histories of pairs that may merge; duplicates, the clocks of duplicate groups; pixels: grid points and
+    background model, None from points; plane: "ground" or "image"; context. All but config exist after `reset` only.
+    innovation: a list of (id, y (2,), S (2, 2)) of each confirmed group measured in the last step: innovation (measured
+    less predicted centroid) of its likeliest association and its covariance, in the unit of the points.
     """
 
     needs: ClassVar[tuple[str, ...]] = ("pixels", "points")
@@ -133,12 +134,12 @@ class GroupPda:
         """Return the groups and events of the frame, as Tracks with unit "group"; updates all groups.
 
         Order: predict; gate, associate, update, split (Fig. 1), births; duplicates; merge; confirm; remove lost groups.
-        From points `detections.pos` is used, from pixels `frame.image`. A frame without them (None), and from pixels
-        one with too much foreground, is predicted only. A config that has replaced `config` since the last frame holds
-        from this frame on; the groups stay.
+        From points `detections.pos` is used (x, y), from pixels `frame.image`. A frame without them (None), and from
+        pixels one with too much foreground, is predicted only; before the first detections the Tracks are empty. A
+        config that has replaced `config` since the last frame holds from this frame on; the groups stay.
 
-        Raises InputError if points are in the image and the context has no scale, or if the picture's size or dtype is
-        not the background sample's.
+        Raises InputError if points are in the image and the context has no scale above 0, or if the picture's size or
+        dtype is not the background sample's.
         """
         if self.pixels is not None and self.pixels.config is not self.config:
             self.pixels.follow(self.config)
@@ -211,7 +212,7 @@ class GroupPda:
     def _scaled_parameters(self) -> ScaledParameters:
         """Returns the present config's parameters in the unit of the points; computed anew if the config was replaced.
 
-        Raises InputError if points are in the image and the context has no scale.
+        Raises InputError if points are in the image and the context's scale is unknown, zero or negative.
         """
         if self.scaled is not None and self.scaled.config is self.config:
             return self.scaled
