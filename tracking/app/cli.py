@@ -57,7 +57,8 @@ def _start(
         bool, typer.Option("--version", callback=_version, is_eager=True, help="Show the version and exit.")
     ] = False,
 ) -> None:
-    """Options of the command itself."""
+    """Takes the options of the command itself: --version prints the version and ends the command line with
+    exit code 0."""
 
 
 @app.command()

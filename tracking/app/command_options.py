@@ -75,9 +75,9 @@ class TrackOptions:
     tracker: its name, file.py:Class or module:Class. source, out: paths. params: file of the tracker's parameters;
     None: its defaults. settings: texts "key=value". detections: "image", "truth" or "file"; None: the first of image,
     file, truth that tracker and source allow. sensor: file of a detector profile, None if not given. grouping: file of
-    a rule that derives groups, None if not given. seed: the tracker's. fps: frames per second; None: the recording's
-    own. px_per_m: pixels per metre, camera: calibration file; None if not given. background: "first:N" or "spread:N",
-    the frames that a background model is trained on; None if not given.
+    a rule that derives groups, None if not given. seed: of the tracker's and the sensor's random numbers. fps: frames
+    per second; None: the recording's own. px_per_m: pixels per metre, camera: calibration file; None if not given.
+    background: "first:N" or "spread:N", the frames that a background model is trained on; None if not given.
     """
 
     tracker: Tracker

@@ -17,7 +17,8 @@ def list_keys() -> CommandResult:
     """Returns every key of a scenario file with its type, default and meaning, a line each.
 
     The result's data: "keys", a list of dictionaries with "key", "type", "default" and "meaning". Keys of inner tables
-    have dots. `[]` after a table's key stands for every element of its array, a word in brackets for one kind of table.
+    have dots. `[]` after a table's key stands for every element of its array. A word in parentheses names one of the
+    kinds of table that the key can hold.
     """
     schema = Scenario.model_json_schema(by_alias=True)
     rows = list(_keys(schema, schema["$defs"], ""))

@@ -98,6 +98,9 @@ def _list_entries(name: str, entries: list[Entry]) -> CommandResult:
 
 
 def _rows(about: dict[str, str]) -> list[str]:
-    """One indented line for each name with its description, the descriptions aligned; "none" if there is no name."""
+    """Returns one indented line for each name with its description, the descriptions aligned; one line "none" for {}.
+
+    about: description by name.
+    """
     width = max(map(len, about), default=0)
     return [f"  {name:<{width}}  {words}".rstrip() for name, words in about.items()] or ["  none"]

@@ -149,7 +149,8 @@ def _check_modes(
 
 
 def _total_frames(sequences: list[Sequence]) -> int | None:
-    """The number of frames of all sequences, None if one of them does not know its length."""
+    """Returns the number of frames of all sequences together, None if one of them does not know its length;
+    0 for none."""
     lengths = [sequence.length for sequence in sequences]
     return None if None in lengths else sum(length or 0 for length in lengths)
 

@@ -87,5 +87,5 @@ def tune(options: Any) -> CommandResult:
 
 
 def _short(value: Any) -> str:
-    """The value as text, a float with four digits; the file has all digits."""
+    """Returns the value as text, a float with four significant digits; the file that tune writes has all digits."""
     return f"{value:.4g}" if isinstance(value, float) else str(value)

@@ -27,8 +27,8 @@ def view(options: ViewOptions) -> CommandResult:
     paths.
 
     A video of the pictures lies in the page or beside it. Raises InputError if a source, --out or the tracks are wrong,
-    a sequence has no tracks though --tracks are given, or a file would replace the source; WorkError if the disk is
-    full. Pages written before an error stay.
+    a sequence has no tracks though TRACKS is given, or a file would replace the source; WorkError if the disk is full.
+    Pages written before an error stay.
     """
     from tracking.app.replay_page.page import write_page
     from tracking.app.replay_page.video import page_video

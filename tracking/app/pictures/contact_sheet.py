@@ -65,7 +65,11 @@ def empty_truth(sequence: Sequence) -> Truth:
 
 @dataclass(frozen=True)
 class PanelLayout:
-    """Heights in px of what a panel has below its title: large picture, small pictures, plan; 0 for what is absent."""
+    """What a panel of a contact sheet has below its title.
+
+    picture, small, plan: heights in px of the large picture, the row of small pictures and the plan; 0 for what is
+    absent.
+    """
 
     picture: int
     small: int
@@ -73,7 +77,7 @@ class PanelLayout:
 
     @property
     def height(self) -> int:
-        """px of the whole panel with its title."""
+        """Height in px of the whole panel with its title, which has 40 px."""
         return TITLE + self.picture + self.small + self.plan
 
 

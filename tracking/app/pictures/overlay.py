@@ -49,15 +49,15 @@ def write_overlay(
 ) -> Path:
     """Writes the MP4 and returns its path. The file is complete, or is not written at all.
 
-    tracks: one tracker's `Tracks`, one per frame; None to draw the truth alone. Groups and events that the tracker did
-    not report are derived. truth: draw the truth in a second picture `beside` the tracks, as thin white boxes `over`
-    the same picture, or draw `only` the truth; None: tracks only. step: called with the sequence's name after each
-    frame.
+    tracks: one tracker's `Tracks`, one per frame; None to draw the truth alone, whatever `truth` says. Groups and
+    events that the tracker did not report are derived. truth: draw the truth in a second picture `beside` the tracks,
+    as thin white boxes `over` the same picture, or draw `only` the truth; None: tracks only. step: called with the
+    sequence's name after each frame.
 
     Raises InputError if the sequence has no pictures or one cannot be read, if the truth is wanted and there is none or
-    it cannot be read, if groups must be derived and the scale is not above 0, or if `out` is the file that the sequence
-    is read from or cannot be written. Raises WorkError if the disk is full, or an order of a simulated script was not
-    fulfilled.
+    it cannot be read, if groups must be derived in the image and the scale is not above 0, or if `out` is the file that
+    the sequence is read from or cannot be written. Raises WorkError if the disk is full, or an order of a simulated
+    script was not fulfilled.
     """
     if not sequence.has_images:
         raise InputError(

@@ -39,7 +39,8 @@ def write_page(
     name. video: the pictures, drawn below the boxes; None: none. An existing file is replaced.
 
     Raises InputError if the truth or detections cannot be read, groups must be derived in the image and the scale is
-    not above 0, or the file cannot be written; WorkError if the disk is full.
+    not above 0, or the file cannot be written; WorkError if the disk is full or an order of a simulated script was not
+    fulfilled.
     """
     shown = page_data(sequence, tracks, scores) | {"video": None if video is None else video.facts()}
     data = json.dumps(shown, separators=(",", ":"), allow_nan=False)
