@@ -16,7 +16,7 @@ from tracking.tuning.goals import Goal
 
 @dataclass(frozen=True)
 class TrialRecord:
-    """A finished trial of a search, for plots and tables.
+    """A finished trial of a search (one set of parameters, played on the training scenes), for plots and tables.
 
     - number: its place in the search, 0 for the defaults.
     - values: one per goal, from training; an estimate if the trial was pruned, empty if its parameters are impossible.
@@ -39,9 +39,9 @@ class Comparison:
     """One score of the defaults and of a tuned config on the same sequences, in the unit of the score.
 
     - scenes: name of the suite, or "validation".
-    - key: the score; higher: True if greater values are better.
+    - key: the name of the score; higher: True if greater values are better.
     - before, after: means of the defaults and of the config over the sequences where both have the score.
-    - difference: mean of after - before; low, high: its 95 % interval, nan if not known.
+    - difference: mean of after - before; low, high: its 95 % interval, nan with fewer than two sequences.
     - sequences: number of these sequences.
     """
 
@@ -91,10 +91,12 @@ class Candidate:
 
 
 def compare_episodes(scenes: str, goal: Goal, before: Sequence[Episode], after: Sequence[Episode]) -> Comparison | None:
-    """Returns the comparison of a goal between `before` and `after`, paired by sequence.
+    """Returns the comparison of a goal between `before` and `after`, paired by sequence, with a 95 % bootstrap
+    interval.
 
-    scenes: name for the result. before, after: episodes of the same sequences in the same order (not checked).
-    Sequences where either side lacks the score are left out; None if that leaves no sequence.
+    scenes: name for the result. before, after: episodes of the same sequences in the same order (not checked;
+    ValueError if their numbers differ). Sequences where either side lacks the score are left out; None if that leaves
+    no sequence. With one sequence the interval is nan.
     """
     a, b = (np.array([goal.of(e) for e in episodes]) for episodes in (before, after))
     known = np.isfinite(a) & np.isfinite(b)
@@ -112,7 +114,8 @@ def pareto_front(candidates: Sequence[Candidate], goals: Sequence[Goal]) -> list
     first.
 
     A candidate dominates another if it is no worse in any goal and better in one. Of candidates with equal values the
-    first stays. Every candidate needs one validation value per goal, else ValueError is raised.
+    first stays. Every candidate needs one validation value per goal, else ValueError is raised; for nan values the
+    result is undefined. No candidates give [].
     """
 
     def dominates(one: Candidate, other: Candidate) -> bool:

@@ -40,8 +40,8 @@ class Goal:
         return episode.scores.get(self.key, float("nan"))
 
     def mean(self, episodes: Sequence[Episode]) -> float:
-        """Returns the mean over the episodes that have the score, nan if none has. For SPEED it is all frames / all
-        seconds.
+        """Returns the mean over the episodes that have the score, nan if none has. For SPEED (frames/s) it is all
+        frames / all seconds in the tracker, nan for 0 s.
         """
         if self.key == SPEED:
             seconds = sum(e.seconds_tracking for e in episodes)

@@ -35,8 +35,8 @@ STORED = "judged "
 class HeldOutEvaluator:
     """Plays configs on the validation and test scenes, which the search did not use.
 
-    plan: the search; play: function that plays episodes; report: called with a text before each set of scenes, does
-    nothing by default.
+    plan: the search. play: function play(sources, values, every_score) that yields episodes. report: called with a text
+    before each set of scenes, does nothing by default.
     """
 
     plan: SearchPlan
@@ -48,7 +48,8 @@ class HeldOutEvaluator:
         one.
 
         The first candidate must be the defaults; a FlockscopeError of theirs is raised. Another candidate with an error
-        on a validation scene is left out. Errors of the workers are raised.
+        on a validation scene is left out. `gain` compares the first goal; it is None if no scene has its score. Errors
+        of the workers are raised.
         """
         found = list[Candidate]()
         defaults: Sequence[Episode] = ()
@@ -69,9 +70,9 @@ class HeldOutEvaluator:
         """Returns the config with needless changes reset to the defaults, and its value by the first goal on the
         validation scenes.
 
-        value: that of `config` on these scenes. order: names of parameters, tried one after the other; unchanged ones
-        are skipped. A parameter is reset if that does not lower the value and causes no error. Errors of the workers
-        are raised.
+        value: that of `config` on these scenes. order: names of searched parameters (others raise KeyError or
+        AttributeError), tried one after the other; unchanged ones are skipped. A parameter is reset if that does not
+        lower the value or make it unknown, and causes no error. Errors of the workers are raised.
         """
         goal = self.plan.goals[0]
         changed = [name for name in order if getattr(config, name) != self.plan.defaults[name]]
@@ -92,9 +93,9 @@ class HeldOutEvaluator:
     def compared(self, config: Config) -> tuple[list[Comparison], list[str]]:
         """Returns the comparisons of the config with the defaults on every test suite, and notes (texts).
 
-        Compared are the goals and COMPARED_KEYS, without scores that no sequence has. A suite on which the config
-        causes an error has a note instead of comparisons. An error of the defaults, and errors of the workers, are
-        raised.
+        Compared are the goals, objective, HOTA, group_F1_hull, pairwise_F1 and event_F1, without scores that no
+        sequence has. A suite on which the config causes an error has a note instead of comparisons. An error of the
+        defaults, errors of the workers, and InputError for a test suite that cannot be read are raised.
         """
         found, notes = list[Comparison](), list[str]()
         for name, sources in self.plan.tests.items():
@@ -117,8 +118,8 @@ class HeldOutEvaluator:
     def _episodes(
         self, sources: Sequence[Source], config: Config, every_score: bool
     ) -> list[Episode] | FlockscopeError:
-        """Returns the episodes of all sources, or the first FlockscopeError that the parameters cause; errors of the
-        workers are raised.
+        """Returns the episodes of all sources with this config, or the first FlockscopeError that its parameters cause;
+        errors of the workers are raised.
 
         every_score: compute the whole catalogue of scores.
         """
@@ -133,8 +134,10 @@ class HeldOutEvaluator:
 def stored_in_study(study: SearchStudy, play: PlayEpisodes) -> PlayEpisodes:
     """Returns a function like `play` that stores complete sets of episodes in the study and takes them from there.
 
-    A set is known by its sources, parameters and `every_score`. A set with an error, or one that its taker did not read
-    to the end, is not stored. Stored episodes have only the goals and COMPARED_KEYS as scores.
+    play: play(sources, values, every_score) yields one result per source, the episode or the error of these parameters.
+    A set is known by its sources, parameters and `every_score`. A set with an error, which ends with it, or one that
+    its taker did not read to the end, is not stored. New and stored episodes have only the goals and COMPARED_KEYS as
+    scores.
     """
     kept = {*COMPARED_KEYS, *(goal.key for goal in study.plan.goals)}
 

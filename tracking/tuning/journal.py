@@ -31,7 +31,9 @@ HEAD = b'{"op_code":'
 class TrialLocks:
     """Locks on single bytes of the file `path`, shared by the processes of a search; the file is created if missing.
 
-    State: the open file; closing it releases every lock. Raises OSError if the file cannot be opened for writing.
+    Byte 0: a trial is chosen; 1: lines are written; 2 + n: trial n is played. State: the open file; closing it, or the
+    end of the process, releases every lock. Needs a system with fcntl. Raises OSError if the file cannot be opened for
+    writing.
     """
 
     def __init__(self, path: Path) -> None:
@@ -103,7 +105,11 @@ class LockedJournal(JournalFileBackend):
             self._remove_incomplete_line()
 
     def append_logs(self, logs: list[dict[str, Any]]) -> None:
-        """Appends one JSON line per log (a dict); removes an incomplete last line first. OSError if writing fails."""
+        """Appends one JSON line per log (a dict); removes an incomplete last line first. No logs append nothing.
+
+        Waits for the lock on writing. Raises OSError if writing fails, and TypeError if a log cannot be written as
+        JSON.
+        """
         text = "".join(json.dumps(log, separators=(",", ":")) + "\n" for log in logs)
         with self._locks.locked(WRITING):
             self._remove_incomplete_line()

@@ -15,15 +15,18 @@ if TYPE_CHECKING:
 Scenes = str | Path | Sequence[str | Path]
 """A suite, a scenario, a TOML file, or a list of these."""
 Progress = Callable[[int, int | None, str], None]
-"""progress(finished, trials, text)."""
+"""progress(finished, trials, text): called with the number of finished trials, the number planned (None if unknown),
+and what is done now.
+"""
 
 
 @dataclass(frozen=True, kw_only=True)
 class TuneOptions:
     """The options of a search; the metadata of each field hold its help text and range.
 
-    Raises InputError if a number lies outside its range. check: in Python "" is the default suite and None no second
-    suite. Where a help text names an option as --name, the Python argument of that name is meant.
+    Raises InputError if a number with a declared range lies outside it; everything else is checked by the search.
+    check: in Python "" is the default suite and None no second suite. Where a help text names an option as --name, the
+    Python argument of that name is meant.
     """
 
     tracker: str | type[Tracker] = field(

@@ -27,7 +27,7 @@ class EpisodeTask:
 
     - tracker: a name, file.py:Class, module:Class or class.
     - source: the scene with its seed.
-    - values: parameters by name.
+    - values: the tracker's parameters by name; others have their defaults.
     - detections: the tracker's input, "image", "file" or "truth".
     - every_score: True to compute the whole catalogue of scores.
     - code: hash of the tracker's file where the search runs, "" if there is no file.
@@ -52,9 +52,10 @@ def episode_player(
 ) -> Iterator[PlayEpisodes]:
     """Opens the workers for the time of the context and returns the function play(sources, values, every_score).
 
-    That function yields one result per source in order: the episode, or the FlockscopeError of these parameters. When
-    its taker stops, no further episode is begun. workers: number of processes, 1 for this process; cluster: address of
-    a dask scheduler, None for no cluster.
+    That function yields one result per source in order: the episode, or the FlockscopeError of these parameters (by
+    name). Nothing is played before its first result is taken. When its taker stops, no further episode is begun.
+    detections: the tracker's input, "image", "file" or "truth". workers: number of processes, 1 for this process;
+    cluster: address of a dask scheduler, None for no cluster.
 
     Raises InputError if a class is to be played by other processes, if `workers` is below 1, or if the address is wrong
     or dask is missing. Raises WorkError if no scheduler answers. The function raises WorkError if workers are lost or
@@ -81,10 +82,10 @@ def episode_player(
 
 
 def play_task(task: EpisodeTask) -> EpisodeOrError:
-    """Plays an episode in a worker, which keeps its sources for later episodes.
+    """Plays an episode in a worker, which keeps the tracker class and its opened sources for later tasks.
 
-    Returns the episode, or the FlockscopeError that the parameters cause. Raises WorkError if the worker's tracker file
-    differs from that of the search, and InputError if it cannot be found.
+    Returns the episode, or the FlockscopeError that the task's parameters cause. Raises WorkError if the worker's
+    tracker file differs from that of the search, and InputError if the tracker cannot be found there.
     """
     return _attempt(task, *_tracker_and_cache(task.tracker, task.code))
 

@@ -28,7 +28,8 @@ BLUE, ORANGE, RED = "#0b6bcb", "#d4600a", "#b42318"
 @dataclass(frozen=True)
 class Axes:
     """Axes of a plot. x, y: each the range (low, high) of the data that fills the plot, in the data's unit, low below
-    high."""
+    high (not checked).
+    """
 
     x: tuple[float, float]
     y: tuple[float, float]
@@ -43,7 +44,11 @@ class Axes:
         return LEFT + across * (WIDTH - LEFT - RIGHT), HEIGHT - BOTTOM - up * (HEIGHT - TOP - BOTTOM)
 
     def elements(self, x_label: str, y_label: str) -> list[str]:
-        """Returns the SVG elements of grid lines, tick labels and the two axis labels, one text each."""
+        """Returns the SVG elements of grid lines, tick labels and the two axis labels, one text each.
+
+        x_label stands below the x axis, y_label above the y axis. Grid lines are horizontal. Raises ZeroDivisionError
+        if a range is empty, and ValueError if its low end is above the high one.
+        """
         (left, bottom), (right, top) = self.to_page(self.x[0], self.y[0]), self.to_page(self.x[1], self.y[1])
         made = []
         for value in ticks(*self.y):
@@ -59,9 +64,10 @@ class Axes:
 def history_plot(plan: SearchPlan, records: Sequence[TrialRecord]) -> str:
     """Returns an SVG text: plot of the first goal's training value of every trial, in the order of the search.
 
-    records: finished trials; trials without values (impossible) are not drawn but counted in the title. Pruned trials
-    are hollow: their values are estimates. The defaults are a dashed line, the best value so far a stepped line. Values
-    far outside the range of the unpruned trials are ticks at the edge. Raises ValueError if no trial has a value.
+    plan: gives the goal, the title and the defaults. records: finished trials; trials without values (impossible) are
+    not drawn but counted in the title. Pruned trials are hollow: their values are estimates. The defaults are a dashed
+    line, the best unpruned value so far a stepped line. Values far on the worse side of the unpruned trials' range are
+    ticks at the edge. Raises ValueError if no trial has a value.
     """
     goal, trials = plan.goals[0], [t for t in records if t.values]
     unpruned = [t for t in trials if not t.pruned]
@@ -97,8 +103,9 @@ def history_plot(plan: SearchPlan, records: Sequence[TrialRecord]) -> str:
 def importance_plot(plan: SearchPlan, importance: Mapping[str, float], config: Config) -> str:
     """Returns an SVG text: bar plot of the share of each parameter in the first goal's training values, greatest first.
 
-    importance: share by parameter name; at least one must be above 0, else ValueError or ZeroDivisionError is raised.
-    Beside each bar stand the default and, if the winner `config` changed it, the new value.
+    plan: gives the title, defaults and units. importance: share by name of a searched parameter; at least one must be
+    above 0, else ValueError (no parameter) or ZeroDivisionError is raised. Beside each bar stand the default and, if
+    the winner `config` changed it, the new value; such bars are orange, others blue.
     """
     ranked = sorted(importance.items(), key=lambda pair: -pair[1])
     most, body = max(importance.values()), []
@@ -121,7 +128,8 @@ def pareto_plot(plan: SearchPlan, candidates: Sequence[Candidate], front: Sequen
     """Returns an SVG text: plot of the first two goals of the candidates on the validation scenes, the front joined by
     a line.
 
-    candidates: each with a value of every goal; front: those of them that no other dominates. Raises ValueError if the
+    plan: gives the goals, the title and the defaults. candidates: each with a validation value of every goal; front:
+    those of them that no other dominates (is at least as good in all goals and better in one). Raises ValueError if the
     plan has one goal only.
     """
     one, two = plan.goals[:2]
@@ -140,7 +148,7 @@ def pareto_plot(plan: SearchPlan, candidates: Sequence[Candidate], front: Sequen
 
 
 def ticks(low: float, high: float) -> list[float]:
-    """Returns round numbers in [low, high] at equal distances (1, 2 or 5 times a power of ten), two to eleven of them.
+    """Returns round numbers in [low, high] at equal distances (1, 2 or 5 times a power of ten), two to six of them.
 
     low must be below high, else ValueError is raised.
     """

@@ -1,4 +1,5 @@
-"""Stops a trial early when it surely loses to the best trial on the scenes that both were played on.
+"""Stops a trial early when it surely loses to the best trial on the scenes that both were played on: the p-value of a
+paired test lies below a limit.
 
 Wilcoxon's signed-rank test (1945), one-sided, as in Optuna's WilcoxonPruner. *Ours*: p-values are exact with ties and
 zeros, too. Parameters that change nothing in most scenes give zeros and ties; scipy then draws permutations, which
@@ -22,8 +23,8 @@ class SignedRankPruner(BasePruner):
     """Prunes a trial if its values on the scenes played so far are surely worse than those of the best trial on the
     same scenes.
 
-    p: a trial is pruned at p-values below this. Values must be reported with the number of the scene as step. For
-    studies with one goal.
+    p: a trial is pruned if the one-sided p-value of Wilcoxon's signed-rank test is below this; 0 never prunes. Values
+    must be reported with the number of the scene as step. For studies with one goal.
     """
 
     def __init__(self, p: float) -> None:

@@ -33,12 +33,12 @@ class TuningResult:
     - plan: the search.
     - config: the winner, all its parameters.
     - front: with several goals the candidates that no other dominates, best first goal first; else ().
-    - candidates: the defaults and the best trials, with their values on the validation scenes.
-    - trials: all finished ones in the order of the search.
-    - importance: share (0 to 1) of each parameter in the training values.
+    - candidates: the defaults first, then the best trials, with their values on the validation scenes.
+    - trials: all finished ones in the order of the search, pruned and impossible ones included.
+    - importance: share (0 to 1) of each parameter, by name, in the first goal's training values.
     - comparisons: winner and defaults on the test scenes; () if the defaults won.
     - taken_back: names of parameters that the best trial changed and the winner does not.
-    - validation: values by goal of the defaults and of the winner on the validation scenes.
+    - validation: two tuples, values by goal of the defaults and of the winner on the validation scenes.
     - notes: remarks for the reader; study: name of the study.
     """
 
@@ -89,8 +89,8 @@ class TuningResult:
     def lines(self, chosen: Candidate | None = None) -> list[str]:
         """Returns lines of text: settings, counts, validation values, and the comparisons and notes on the winner.
 
-        chosen: a candidate of the front, whose validation values are shown instead of the winner's, and no comparisons;
-        None for the winner. Training values are never shown, as the search has optimised them.
+        chosen: a candidate of the front, whose validation values are shown instead of the winner's, and no comparisons
+        and notes; None for the winner. Training values are never shown, as the search has optimised them.
         """
         plan, seeds = self.plan, self.plan.seeds
         names = ", ".join(goal.key for goal in plan.goals)
@@ -165,10 +165,11 @@ class TuningResult:
 
     def write(self, path: str | Path) -> list[Path]:
         """Writes the parameters to `path` (TOML), and beside it all figures (.json) and the plots (.svg); returns all
-        paths written.
+        paths written, `path` first.
 
-        With several goals each candidate of the front gets a file, too (.front-1.toml …, best first goal first).
-        Existing files are replaced. Raises OSError if a file cannot be written.
+        The other names are `path` with another suffix. With several goals each candidate of the front gets a file, too
+        (.front-1.toml …, best first goal first). Existing files are replaced. Raises OSError if a file cannot be
+        written.
         """
         target = Path(path)
         files = {".json": json.dumps(_without_nan(self.as_dict()), indent=1, allow_nan=False) + "\n", **self.plots()}
@@ -213,9 +214,9 @@ def versions() -> dict[str, str]:
 
 
 def _without_nan(value: Any) -> Any:
-    """Returns a copy of nested dicts, lists and tuples with None for nan and infinity, which JSON lacks.
+    """Returns a copy of `value`, nested dicts, lists and tuples, with None for nan and infinity, which JSON lacks.
 
-    Tuples become lists.
+    Tuples become lists; anything else stays as it is.
     """
     if isinstance(value, dict):
         return {key: _without_nan(v) for key, v in value.items()}

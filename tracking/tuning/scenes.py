@@ -39,8 +39,8 @@ def chosen_seeds(seeds: range | None, split: str, scenes: int) -> range:
     """Returns the seeds, or the default of the split if they are None.
 
     split: "train", "val" or "test". scenes: number of scenes that each seed is played with, 1 or more. The default
-    begins at the first seed of the split and makes at least EPISODES[split] episodes, with at least LEAST_SEEDS (2)
-    seeds.
+    begins at the first seed of the split (0, 10000 or 20000). It makes at least 16, 48 or 100 episodes, with at least
+    two seeds.
 
     Raises InputError if `seeds` is no range, is empty, or reaches out of the range of the split.
     """
@@ -67,7 +67,8 @@ def count_scenes(names: Sequence[str], settings: Sequence[str], option: str) -> 
     """Returns the number of scenes that the suites, scenarios and files `names` contain, each counted with one seed.
 
     settings: "key=value" overrides of every scene. option: the option that the error messages name. Raises InputError
-    if a name is a recording or stored data, is unknown, or contains no scene, and if a setting does not fit.
+    if a name is a recording or stored data, is unknown, or contains no scene, if a file is unreadable, and if a setting
+    does not fit.
     """
     for name in names:
         if not name.endswith(".toml") and not _is_known(name) and Path(name).exists():
@@ -83,18 +84,20 @@ def count_scenes(names: Sequence[str], settings: Sequence[str], option: str) -> 
 
 
 def episode_sources(names: Sequence[str], seeds: range, settings: Sequence[str]) -> tuple[Source, ...]:
-    """Returns one source for every scene of the suites `names` with every seed. settings: "key=value" overrides of the
-    scenes.
+    """Returns one source for every scene of the suites `names` with every seed: scene by scene, each with its seeds in
+    order.
 
-    Raises InputError if a name is unknown, there is no scene, or a setting does not fit.
+    settings: "key=value" overrides of the scenes. Raises InputError if a name is unknown, a file is wrong, there is no
+    scene or seed, or a setting does not fit.
     """
     return sources(list(names), seeds, tuple(settings))
 
 
 def default_check_suite(names: Sequence[str]) -> str | None:
-    """Returns the first of CHECK_SUITES that shares no scenario with the suites `names`, None if there is none.
+    """Returns the first of friends-meet and crossing that shares no scenario with the suites `names`, None if there is
+    none.
 
-    Raises InputError if a name is unknown.
+    Raises InputError if a name is unknown or a file unreadable.
     """
     return next((suite for suite in CHECK_SUITES if not shared_scenarios(names, (suite,))), None)
 
@@ -111,7 +114,8 @@ def shared_scenarios(names: Sequence[str], others: Sequence[str]) -> list[str]:
 def _files(name: str) -> list[str]:
     """Returns the absolute paths of the scenario files that the name of a suite, a scenario or a *.toml file refers to.
 
-    A suite gives one path per entry. Raises InputError if the name is unknown.
+    A suite gives one path per entry. The text "suite:" before a name forces a suite. Raises InputError if the name is
+    unknown or a file is missing or wrong.
     """
     bare = name.removeprefix("suite:")
     if bare != name or (bare in toml_files.suite_names() and bare not in toml_files.names()) or _is_suite(bare):

@@ -37,10 +37,14 @@ JOURNAL = ".journal"
 def tune(tracker: str | type[Tracker], suite: Scenes, trials: int = TuneOptions.trials, **options: Any) -> TuningResult:
     """Returns the parameters that a search found on simulated scenes, and what they gain on other scenes.
 
-    The tracker plays whole episodes. The same call resumes a search that was interrupted, if `out` or `storage` is
-    given. A class as tracker needs workers=1. Raises InputError before anything is played if an option is unknown or
-    wrong, if options contradict each other, if a study in the storage is about another search, and if Optuna is not
-    installed. Errors that the tracker raises with the default parameters are raised.
+    tracker: a name, file.py:Class, module:Class or class, or "grouping". suite: names or TOML files of what to tune on.
+    trials: sets of parameters to play, the defaults included. The tracker plays whole episodes. The same call resumes a
+    search that was interrupted, if `out` or `storage` is given. With `out` the result is written to files. A class as
+    tracker needs workers=1.
+
+    Raises InputError before anything is played if an option is unknown or wrong, if options contradict each other, if a
+    study in the storage is about another search, and if Optuna is not installed. Errors that the tracker raises with
+    the default parameters are raised, WorkError if workers are lost, and OSError if a file cannot be written.
     """
     given = {"tracker": tracker, "suite": suite, "trials": trials, **options}
     return _search(from_keywords(TuneOptions, "tracking.tune", given))
@@ -89,9 +93,10 @@ def _evaluated(plan: SearchPlan, study: SearchStudy, play: PlayEpisodes, report:
     """Returns the result of a finished study: the winner is chosen and simplified on validation scenes, then compared
     on test scenes.
 
-    With one goal the winner is the candidate of best value among those surely better than the defaults, else the
-    defaults. With several goals it is the one of the Pareto front that is best in the first goal, not simplified.
-    report: called with a text before each set of scenes. Errors of the defaults and of the workers are raised.
+    With one goal the winner is the candidate of best value among those surely better than the defaults (the 95 %
+    interval of the gain excludes 0), else the defaults. With several goals it is the one of the Pareto front that is
+    best in the first goal, not simplified. play: plays episodes. report: called with a text before each set of scenes.
+    Errors of the defaults and of the workers are raised.
     """
     evaluator = HeldOutEvaluator(plan, play, report)
     candidates = evaluator.validated(_candidates(plan, study))
@@ -117,7 +122,8 @@ def _evaluated(plan: SearchPlan, study: SearchStudy, play: PlayEpisodes, report:
 def _why_defaults(candidates: list[Candidate], goal: Goal) -> list[str]:
     """Returns a list of one line that says why the defaults are the result.
 
-    candidates: the defaults first, then the others with their gains on the validation scenes.
+    candidates: the defaults first, then the others with their gains on the validation scenes, of which the greatest is
+    named. goal: the first goal.
     """
     gains = [c.gain for c in candidates[1:] if c.gain is not None]
     if not gains:
@@ -130,10 +136,12 @@ def _why_defaults(candidates: list[Candidate], goal: Goal) -> list[str]:
 
 
 def _candidates(plan: SearchPlan, study: SearchStudy) -> list[Candidate]:
-    """Returns the defaults, and the best unpruned trials in training, at most `finalists` of them; no config twice.
+    """Returns the defaults first, then the best unpruned trials in training, at most `finalists` of them, best first
+    goal first; no config twice.
 
-    They are sorted by the first goal, best first. With several goals the trials come from the Pareto front of training,
-    spread over it. The defaults must be finished, else StopIteration is raised.
+    Impossible trials are left out. With several goals the trials come from the Pareto front of training, spread over
+    it. The defaults must be finished, else StopIteration is raised. Raises InputError if the config refuses a trial's
+    parameters.
     """
     played = [t for t in study.records() if not t.pruned and not t.error]
     defaults, goal = next(t for t in played if t.params == plan.defaults), plan.goals[0]
@@ -152,9 +160,9 @@ def _candidates(plan: SearchPlan, study: SearchStudy) -> list[Candidate]:
 
 
 def _spread(ranked: list[TrialRecord], count: int) -> list[TrialRecord]:
-    """Returns `count` of the trials at even distances from the first to the last, in the same order.
+    """Returns `count` of the ranked trials at even distances from the first to the last, in the same order.
 
-    All are returned if there are no more than `count`.
+    All are returned if there are no more than `count`, only the first if `count` is 1.
     """
     if len(ranked) <= count:
         return ranked

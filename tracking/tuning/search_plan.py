@@ -50,10 +50,11 @@ class SearchPlan:
     """A search whose options fit together.
 
     - options: as given.
-    - tracker: what is tuned; base: its config with the values that `--set` fixed; space: the parameters to search.
+    - tracker: what is tuned; base: its config with the values that the option `set` fixed; space: the parameters to
+      search.
     - suite: names of what is tuned on; check: a second suite to test on, or None.
     - seeds: of training, validation and tests.
-    - goals: scores to improve, the first decides.
+    - goals: scores to improve, at least one; the first decides.
     - detections: the tracker's input, "image", "file" or "truth".
     - scene_settings: "key=value" overrides of the scenes.
     """
@@ -81,7 +82,9 @@ class SearchPlan:
 
     @property
     def defaults(self) -> dict[str, Value]:
-        """The values of the searched parameters in the first trial, a dict by parameter name."""
+        """The values of the searched parameters in the first trial, a dict by parameter name: those of `base`, the
+        tracker's defaults.
+        """
         return {p.name: getattr(self.base, p.name) for p in self.space}
 
     @property
@@ -98,12 +101,19 @@ class SearchPlan:
 
     @cached_property
     def training(self) -> tuple[Source, ...]:
-        """The sources (scene and seed) of the training episodes of each trial."""
+        """The sources of the training episodes of each trial: every scene of the suite with every training seed.
+
+        Raises InputError at first use if a scene cannot be read.
+        """
         return episode_sources(self.suite, self.seeds.training, self.scene_settings)
 
     @cached_property
     def validation(self) -> tuple[Source, ...]:
-        """The sources (scene and seed) of the episodes that choose among the best trials."""
+        """The sources of the episodes that choose among the best trials: every scene of the suite with every validation
+        seed.
+
+        Raises InputError at first use if a scene cannot be read.
+        """
         return episode_sources(self.suite, self.seeds.validation, self.scene_settings)
 
     @cached_property
@@ -112,7 +122,7 @@ class SearchPlan:
 
         It has the suite that is tuned on and, if there is one, the second suite. The second suite keeps its own scenes;
         only settings that begin with "sensor." apply to it. Raises InputError if a setting does not fit the second
-        suite.
+        suite, or a scene cannot be read.
         """
         found = {self.suite_name: episode_sources(self.suite, self.seeds.test, self.scene_settings)}
         if self.check is not None:
@@ -124,7 +134,8 @@ class SearchPlan:
         """Returns a dict of everything that the value of a trial depends on; a study is resumed only if it is the same.
 
         Keys: tracker, code, versions, suite, seeds, motions, detections, objective, searched, ranges, fixed, prune,
-        seed. Long lists are given as hashes.
+        seed. Long lists are given as hashes. Validation and test seeds, and the number of trials, are not part of it.
+        Raises InputError if a training scene cannot be read.
         """
         return {
             "tracker": self.tracker_name,
@@ -216,9 +227,9 @@ def _space(base: Config, settings: Sequence[str], only: tuple[str, ...], mode: D
     """Returns the parameters to search: tunable, not fixed, with an effect on this input, and in `only` unless it is
     empty.
 
-    settings: "name=value" texts of fixed parameters. only: names of parameters. mode: the tracker's input; "image"
-    leaves out parameters about points, other modes those about pixels. Raises InputError if a name in `only` is unknown
-    or no such parameter, or if no parameter is left.
+    base: config of the tracker, which declares them. settings: "name=value" texts of fixed parameters. only: names of
+    parameters. mode: the tracker's input; "image" leaves out parameters about points, other modes those about pixels.
+    Raises InputError if a name in `only` is unknown or no such parameter, or if no parameter is left.
     """
     fixed = {setting.removeprefix("tracker.").partition("=")[0].strip() for setting in settings}
     unused = "points" if mode == "image" else "pixels"

@@ -28,10 +28,11 @@ FINISHED = (TrialState.COMPLETE, TrialState.PRUNED)
 
 
 class SearchStudy:
-    """An open study of a search, which several processes can share. A new study gets the defaults as its first trial.
+    """An open study of a search (Optuna's record of its trials), which several processes can share.
 
-    plan: the search; study (kept as `optuna`): Optuna's study; locks: locks by which processes share its journal, None
-    without them; storage: names it in errors. Raises InputError if the study is about another search.
+    A new study gets the defaults as its first trial. plan: the search; study (kept as `optuna`): Optuna's study; locks:
+    locks by which processes share its journal file, None without them; storage: names it in errors. Raises InputError
+    if the study is about another search.
     """
 
     def __init__(self, plan: SearchPlan, study: optuna.Study, locks: TrialLocks | None, storage: object = None) -> None:
@@ -159,11 +160,12 @@ class SearchStudy:
 
 @contextmanager
 def open_study(plan: SearchPlan, storage: str | Path | None, name: str) -> Iterator[SearchStudy]:
-    """Opens or creates the study `name` for the time of the context, and yields it as a `SearchStudy`.
+    """Opens or creates the study `name` for the time of the context, and yields it as a `SearchStudy`; then releases
+    its locks.
 
-    storage: a journal file, the URL of an Optuna storage, or None for memory. The folder of a journal is created.
-    Raises InputError if the storage cannot be used, or holds a study of this name that is about another search; OSError
-    if a file cannot be opened.
+    plan: the search. storage: a journal file, the URL of an Optuna storage, or None for memory. The folder and the lock
+    file of a journal are created. Optuna's messages are silenced meanwhile. Raises InputError if the storage cannot be
+    used, or holds a study of this name that is about another search; OSError if a file cannot be opened.
     """
     with _quiet_optuna():
         place = storage if storage is None or "://" in str(storage) else Path(storage)
@@ -191,8 +193,8 @@ def _pruner(plan: SearchPlan) -> optuna.pruners.BasePruner:
 
 
 def _check_identity(plan: SearchPlan, study: optuna.Study, storage: object) -> None:
-    """Raises InputError if the study was begun with other settings; a study without trials and settings fits every
-    plan.
+    """Raises InputError if the study was begun with other settings than the plan's; a study without trials and settings
+    fits every plan.
 
     storage: names the study's place in the error.
     """
@@ -224,9 +226,10 @@ def _trial_locks(journal: Path) -> TrialLocks | None:
 
 
 def _optuna_storage(place: str | Path | None, locks: TrialLocks | None) -> BaseStorage | str | None:
-    """Returns Optuna's storage for a journal file (Path), a URL (str) or memory (None, which is returned).
+    """Returns Optuna's storage for `place`: a journal file (Path), a URL (str) or memory (None, which is returned).
 
-    Raises InputError if Optuna cannot open it, OSError if a file cannot be opened.
+    locks: under which the journal is written, None for Optuna's own lock file. Raises InputError if Optuna cannot open
+    it, OSError if a file cannot be opened.
     """
     from optuna.storages import GrpcStorageProxy, JournalStorage
     from optuna.storages.journal import JournalFileBackend, JournalFileOpenLock, JournalRedisBackend

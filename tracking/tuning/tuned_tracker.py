@@ -46,9 +46,11 @@ class TunedTracker:
         return "file" if {"boxes", "points"} & {*self.needs} else "image"
 
     def check_input(self, source: Source, detections: DetectionMode) -> None:
-        """Raises InputError if it cannot work on this source with these detections, or if the source cannot be opened.
+        """Raises InputError if the tracker cannot work on this source with these detections, or if the source cannot be
+        opened.
 
-        The baseline rule of groups works with "truth" only; its source is not opened.
+        detections: "image", "file" or "truth". The baseline rule of groups works with "truth" only; its source is not
+        opened. Otherwise returns None.
         """
         from tracking.detection_mode import choose_mode
 
@@ -65,9 +67,11 @@ class TunedTracker:
         """Returns one episode with the parameters `values` (by name, defaults for others), from the first frame to the
         last.
 
-        The tracker's own seed is the seed of the source. cache: keeps the opened source. every_score: compute the whole
-        catalogue of scores. The baseline rule ignores `detections` and `every_score`. Raises InputError if the tracker
-        refuses the parameters or the source has no labels, and WorkError if it fails with them.
+        The tracker's own seed is the seed of the source. detections: the tracker's input. cache: keeps the opened
+        source. every_score: compute the whole catalogue of scores. The baseline rule ignores `detections` and
+        `every_score`. Raises InputError if the parameters are refused, tracker and source do not fit, or the source has
+        no labels; WorkError if the tracker fails; IncomparableError if its tracks lack the boxes or positions to
+        compare.
         """
         if self.name == RULE:
             from tracking.tuning.grouping_episodes import play_rule
