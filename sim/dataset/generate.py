@@ -115,8 +115,9 @@ def _run_jobs(
 def _with_marker(jobs: list[SequenceJob]) -> list[SequenceJob]:
     """Write an empty marker file into OUT and return the jobs with that file as their `marker`; needs at least one job.
 
-    A worker starts such a job only if it sees the file, so that it writes to the same file system. remove_partials
-    deletes the file. Raises InputError or WorkError if it cannot be written.
+    OUT is the folder above that of the jobs' split. A worker starts such a job only if it sees the file, so that it
+    writes to the same file system. remove_partials deletes the file. Raises InputError if it cannot be written,
+    WorkError if the disk is full, IndexError without jobs.
     """
     marker = jobs[0].folder.parents[1] / f"{PARTIAL}{uuid4().hex}"
     write_file(marker, b"")

@@ -1,9 +1,10 @@
 """Replay a recording: its people as the motion of a simulated sequence, so real motion with exact labels.
 
-The labelled positions are smoothed and resampled to the camera's frame rate (sim.dataset.trajectories). Each person
-gets a body drawn from the seed. The given camera and sensor then observe the motion like a simulated one. Groups are
-those that the recording labels; when they merge and split is measured from the motion. The scene has no walls and
-obstacles, unless the source is a simulated sequence with a scene.
+The labelled positions on the ground (m) are smoothed and resampled to the camera's frame rate
+(sim.dataset.trajectories). Boxes without positions are first projected to the ground by a calibration. Each person gets
+a body drawn from the seed. The given camera and sensor then observe the motion like a simulated one. Groups are those
+that the recording labels; when they merge and split is measured from the motion. The scene has no walls and obstacles,
+unless the source is a simulated sequence with a scene.
 """
 
 from __future__ import annotations

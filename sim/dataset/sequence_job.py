@@ -137,7 +137,7 @@ def simulate_and_store(job: SequenceJob) -> None:
 
 
 def run_job(job: SequenceJob) -> JobOutcome:
-    """Make the job's sequence unless it is already stored; returns how that ended.
+    """Make the job's sequence unless it is already stored undamaged; returns how that ended.
 
     InputError and WorkError are returned in the JobOutcome, not raised. The outcome is fatal if an OSError caused the
     error, as a full disk or a marker file that the worker cannot see within 5 s. The fatal error of a job with a marker

@@ -92,10 +92,12 @@ def _true_detections(
 
 
 def _foot_points_or(otherwise: Array, box: Array, truth: Truth, seen: Bools, camera: Camera) -> Array:
-    """Return the ground points (N, 2) in m under the boxes (N, 4), left, top, width, height in px.
+    """Return the ground points (N, 2) in m under the boxes (N, 4), left, top, width, height in px, as `camera` sees
+    them.
 
-    A coordinate is taken from `otherwise` (N, 2) where a box shows no ground. seen (R,): True for the N rows of the
-    truth to which the boxes belong; their ground height counts, 0 if the truth has none.
+    A point is that of the middle of the lower edge; of the box's middle for a camera of kind "top". It is taken from
+    `otherwise` (N, 2) where a box shows no ground. seen (R,): True for the N rows of the truth to which the boxes
+    belong; their ground height counts, 0 if the truth has none.
     """
     z = np.zeros(len(box)) if truth.z is None else truth.z[seen]
     pos = foot_points(box, z, camera)
@@ -187,8 +189,8 @@ def _visibility_factor(visible: Array, sensor: Sensor) -> Array:
 def _artificially_hidden(truth: Truth, sensor: Sensor, people: Mapping[str, tuple[int, ...]]) -> Bools:
     """Return True (R,) for the rows of the truth that an entry of `sensor.hide` covers: start <= t < end, in s.
 
-    people: ids of the people of each group that the script names. An entry without a group hides everybody. Raises
-    InputError if an entry names a group that is not in `people`.
+    t is 0 in frame 1. people: ids of the people of each group that the script names. An entry without a group hides
+    everybody; without entries all are False. Raises InputError if an entry names a group that is not in `people`.
     """
     t = (truth.frame - 1) / truth.fps
     hidden = np.zeros(len(t), dtype=np.bool_)

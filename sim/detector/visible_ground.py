@@ -72,8 +72,8 @@ class VisibleGround:
     def ground_points(self, u: Array, v: Array, otherwise: Array) -> Array:
         """Return the ground points (L, 2), x and y in m, seen at image points u, v (L,) px.
 
-        Coordinates from `otherwise` (L, 2) replace points where no ground is seen. `otherwise` itself is returned if
-        there is no camera. Image points above the ground part are moved down to its upper edge.
+        Walls and stairs are ignored. Points from `otherwise` (L, 2) replace those where no ground is seen. `otherwise`
+        itself is returned if there is no camera. Image points above the ground part are moved down to its upper edge.
         """
         if self.camera is None:
             return otherwise
@@ -126,7 +126,8 @@ def height_line(foot: Array, height: Array) -> Array:
     """Return (a, b) of the least-squares line height = a + b foot through box heights (N,) and rows of the feet (N,),
     px.
 
-    b is 0 if all feet are in one row. Without boxes (N = 0) the result is (nan, 0), with a numpy warning.
+    If all feet are in one row, b is 0 and a the mean height. Without boxes (N = 0) the result is (nan, 0), with a numpy
+    warning.
     """
     spread = foot - foot.mean()
     b = float(spread @ height / (spread @ spread)) if spread @ spread > 1e-9 * len(foot) else 0.0

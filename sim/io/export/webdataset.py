@@ -72,7 +72,8 @@ def webdataset(
 def size_of(text: str) -> int:
     """Return the number of bytes that a text names: `500MB`, `1.5 GB`, `3 kB`, `20000000`; units are powers of 1000.
 
-    Fractions of a byte are rounded. Raises InputError if the text is no such size (a unit needs its B) or rounds to 0.
+    Units are B, kB, MB and GB, spelt so; blanks around are ignored. Fractions of a byte are rounded. Raises InputError
+    if the text is no such size (as `500M` or `3 KB`) or rounds to 0.
     """
     found = re.fullmatch(r"(\d{1,12}(?:\.\d{1,6})?)\s*(?:([kMG])?B)?", text.strip())
     size = 0 if found is None else round(float(found[1]) * UNITS[found[2] or ""])

@@ -29,9 +29,9 @@ Member = tuple[str, Callable[[], bytes]]
 class SequenceItem:
     """A stored sequence to pack.
 
-    folder: where it is stored. bytes: its approximate size in a tar. content: its content hash. manifest: the hash of
-    its manifest. images: file type of its pictures ("jpg", "png" or "mp4"), None without pictures or with 16-bit
-    streams only.
+    folder: where it is stored. bytes: its approximate size in a tar. content: its content hash, which names truth,
+    detections and pixels. manifest: the hash of its manifest. images: file type of its pictures ("jpg", "png" or
+    "mp4"), None without pictures or with 16-bit streams only.
     """
 
     folder: Path

@@ -1,4 +1,8 @@
-"""Atomic writing: a file or folder is written under a temporary name, synced to disk, then renamed to its target."""
+"""Atomic writing: a file or folder is written under a temporary name, synced to disk, then renamed to its target.
+
+It therefore appears complete or not at all. An OSError becomes a WorkError if the disk is full, else an InputError.
+Killed runs leave files whose names begin with .partial-, which `remove_partials` deletes.
+"""
 
 from __future__ import annotations
 

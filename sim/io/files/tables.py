@@ -41,8 +41,8 @@ class Column:
 class StoredTable:
     """A Parquet table of R rows as read from `file`.
 
-    columns: by name an array (R,), or for a column of lists the pair (all values in one array, (R,) index in it after
-    the end of each list). facts: the metadata that was stored with the table, by name, and "format".
+    columns: by name an array (R,). For a column of lists it is the pair (all values in one array; array (R,) of the
+    index after each list's last value). facts: the metadata that was stored with the table, by name, and "format".
     """
 
     file: Path

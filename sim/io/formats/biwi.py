@@ -26,8 +26,8 @@ def frame_numbers(raw: Ints) -> Ints:
     """Return our frame numbers from 1, round((raw - first) / step) + 1, shape of `raw` (N,), int64.
 
     raw (N,): numbers of video frames, in any order; first is the lowest. step: the most frequent difference between
-    successive distinct raw numbers, the smallest if several are as frequent. If all are equal the result is ones; an
-    empty `raw` gives an empty result.
+    successive distinct raw numbers, the smallest if several are as frequent. Two raw numbers nearer than a step may get
+    the same frame. If all are equal the result is ones; an empty `raw` gives an empty result.
     """
     steps = np.diff(np.unique(raw))
     if len(steps) == 0:

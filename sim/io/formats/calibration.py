@@ -29,8 +29,9 @@ def read_calibration(path: Path) -> Camera:
 def scaled_to_image(camera: Camera, image: tuple[int, int] | None, path: Path) -> Camera:
     """Return the camera for pictures of `image` = (width, height) px, if it was calibrated at another size.
 
-    Focal lengths, image centre and px_per_m are scaled. With `image` None or equal to the camera's size, the camera is
-    returned unchanged. path: the recording, for the error.
+    Focal lengths and image centre are scaled per axis, px_per_m by the geometric mean of both factors; position,
+    rotation and distortion stay. With `image` None or equal to the camera's size, the camera is returned unchanged.
+    path: the recording, for the error.
 
     Raises InputError if the aspect ratios differ by more than SHAPE_TOLERANCE (1 %).
     """

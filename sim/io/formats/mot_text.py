@@ -1,7 +1,8 @@
 """Strict reader for MOTChallenge text: gt.txt and det.txt.
 
-The number of columns tells two kinds of gt.txt apart: 9 (from MOT16 on: flag, class, visibility) and 10 (MOT15:
-confidence and the ground position x, y, z in m, unknown where z is -1). Frames begin at 1. Boxes are ltwh px.
+Lines have 6 to 10 columns, the first of which are frame (from 1), id, and the box's left, top, width, height in px.
+Column 7 is a confidence or flag. 8 or 9 columns go on with class and visibility (from MOT16 on), 10 columns with the
+ground position x, y, z in m, unknown where z is -1 (MOT15). A wrong line raises InputError that names it.
 """
 
 from __future__ import annotations
@@ -25,9 +26,9 @@ MAX_FRAME = 10_000_000
 class MotTable:
     """A MOTChallenge text file, N rows in the order of the file.
 
-    rows: the numbers as read, with their lines for errors. frame (N,): from 1. id (N,). box (N, 4): left, top, width,
-    height in px. rest (N, 0 to 4): the columns after the box: confidence or flag; then class and visibility, or x, y, z
-    in m.
+    rows: the numbers as read, with their lines for errors. frame (N,): from 1. id (N,): of the person or track, usually
+    -1 for detections. box (N, 4): left, top, width, height in px, all -1 for no box. rest (N, 0 to 4): the columns
+    after the box: confidence or flag; then class and visibility, or x, y, z in m.
     """
 
     rows: NumericTable

@@ -1,7 +1,7 @@
 """Reader for video files, as Sequences: every frame has a number, also one that cannot be decoded.
 
 A frame that cannot be decoded has no picture. The container's frame rate is often wrong, so it is used only if the time
-stamps agree with it. Sound is ignored.
+stamps agree with it or tell no plausible rate. Sound is ignored.
 """
 
 from __future__ import annotations
@@ -81,8 +81,10 @@ def missing(index: video_decoding.PacketIndex) -> Iterator[str]:
     """Yield a text for each part of a video that is missing, made from the index of its packets; nothing if it is
     whole.
 
-    Its end is missing if reading broke off, or if the video is shorter than its header promises. A gap is a time
-    without frames of more than 1 s and more than 5 usual steps; one text reports the first gap and counts the others.
+    Its end is missing if reading broke off, or if it has fewer frames than its header promises. If the header names no
+    number of frames, the video must be shorter than the promised duration by more than 1 s and 5 usual steps. A gap is
+    a time without frames of more than 1 s and more than 5 usual steps (the median); one text reports the first gap and
+    counts the others.
     """
     times, length = index.times(), len(index.stamps)
     step = np.diff(times)

@@ -55,8 +55,8 @@ class BackgroundChoice:
     def indices(self, length: int) -> list[int]:
         """Return the frames of the sample, from 1 and ascending, for a recording of `length` frames.
 
-        A recording with at most `count` frames gives all of them. "spread" takes the middle frame of each of `count`
-        equal parts.
+        A recording with at most `count` frames gives all of them. "first" takes the frames 1 to `count`, "spread" the
+        middle frame of each of `count` equal parts.
         """
         if self.how == "first" or length <= self.count:
             return list(range(1, min(self.count, length) + 1))

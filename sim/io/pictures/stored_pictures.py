@@ -1,6 +1,7 @@
-"""Reads the pictures of a stored sequence one by one.
+"""Reads the pictures of a stored sequence one by one, and from them the truth of the pixels.
 
-The bytes of each file are compared with their hash in the sequence's manifest.json; a difference raises InputError.
+The bytes of each picture file are compared with their hash in the sequence's manifest.json; a difference raises
+InputError. The hash of the table of visible pixels is not checked.
 """
 
 from __future__ import annotations

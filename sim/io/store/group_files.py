@@ -164,7 +164,7 @@ def read_groups_csv(path: Path, length: int) -> list[Groups]:
 
     The columns frame, group, members (ids separated by blanks), x, y and hull (WKT) must exist; size may be missing,
     and further columns are ignored. Empty x, y and size become nan, an empty hull has no vertices. Velocities are 0,
-    extents nan. Groups are sorted by id, the members of each by id and named once. A frame without lines has Groups
+    extents nan. Groups are sorted by id; members of each are sorted, each once. A frame without lines has Groups
     without rows. Whether members exist is not checked.
 
     Raises InputError if the file is unreadable, and, with the line, if a column is missing, a cell is invalid, a frame

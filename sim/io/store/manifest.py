@@ -61,8 +61,8 @@ def with_hash(manifest: dict[str, Any]) -> dict[str, Any]:
 def read_manifest(folder: Path) -> dict[str, Any]:
     """Read the manifest.json of a sequence folder, as a dict.
 
-    Raises InputError if it is missing, unreadable or no JSON object, has another format number, lacks a key, or was
-    altered, that is, its fields do not have the hash that it names.
+    Raises InputError if it is missing, unreadable or no JSON object, has another format number or none, lacks a key, or
+    was altered, that is, its fields do not have the hash in its key sha256. The files that it names are not read.
     """
     path = folder / MANIFEST
     if not path.is_file():

@@ -28,11 +28,10 @@ Codes = NDArray[np.uint16]
 
 
 def check_streams(streams: Iterable[str], images: str) -> tuple[str, ...]:
-    """Return the streams in the order of STREAMS, each once, with "background" added if "left" or "right" is among
-    them.
+    """Return the streams in the order left, right, disparity, ids, background, each once.
 
-    streams: names, () for none. images: file type. Raises InputError if a stream is unknown, or `images` is not "jpg",
-    "png" or "mp4".
+    "background" is added if "left" or "right" is among them. streams: names, () for none. images: file type. Raises
+    InputError if a stream is unknown, or `images` is not "jpg", "png" or "mp4", also without streams.
     """
     wanted = set(streams)
     unknown = sorted(wanted - set(STREAMS))
@@ -82,7 +81,8 @@ def is_picture(name: str) -> bool:
 def encode_ids(ids: Ints) -> Codes:
     """Return ids (H, W) as uint16 in the style of MOTS: 2000 + id for people, 3000 for walls and pillars, 0 elsewhere.
 
-    ids: person id (from 1), negative for walls and pillars, 0 elsewhere. Raises WorkError for an id above 999.
+    ids: person id (from 1), negative for walls and pillars, 0 elsewhere. Raises WorkError if a person's id is above
+    999.
     """
     if ids.max(initial=0) > PEOPLE:
         raise WorkError(

@@ -82,9 +82,9 @@ def _centres(table: MotTable) -> Array:
 def with_groups(found: list[Tracks], path: Path) -> list[Tracks]:
     """Return copies of one tracker's tracks with the groups of a groups.csv; each member's `group` is its group's id.
 
-    found: one Tracks per frame, from frame 1. path: the groups.csv. People in no group keep their group; of a person in
-    two groups the one with the higher id counts. Members without a track are ignored. Raises InputError if the file is
-    unreadable or invalid, or names a frame beyond the tracks.
+    found: one Tracks per frame, from frame 1; not changed. path: the groups.csv. People in no group keep their group;
+    of a person in two groups the one with the higher id counts. Members without a track are ignored, but stay in the
+    groups. Raises InputError if the file is unreadable or invalid, or names a frame beyond the tracks.
     """
     every = read_groups_csv(path, len(found))
     answers = []

@@ -100,8 +100,9 @@ def _flags(spans: list[list[int]], length: int) -> Bools:
 def _mot_text(truth: Truth, box: Array) -> bytes:
     """Return gt.txt as bytes, with a row per person and frame: frame, id, left, top, width, height, 1, 1, visibility.
 
-    box: (R, 4) left, top, width, height in px of the truth's rows. People without a finite box of positive size have no
-    row. Widths and heights below 0.01 px are written as 0.01.
+    The two ones are flag and class. Boxes have 2 decimals, visibility 3. box: (R, 4) left, top, width, height in px of
+    the truth's rows, whose order is kept. People without a finite box of positive size have no row. Widths and heights
+    below 0.01 px are written as 0.01.
     """
     lines = []
     rows = zip(truth.frame.tolist(), truth.id.tolist(), box.tolist(), truth.visibility.tolist(), strict=True)
