@@ -175,8 +175,8 @@ def fit_point_noise(recordings: Sequence[MatchedRecording]) -> float | None:
     """Returns the standard deviation (root mean square error) per axis, in m, of the detections' positions on the
     ground.
 
-    Errors are taken against the labelled positions of the detected rows of all recordings. None if the detections or
-    the labels have no positions on the ground, or nobody is detected.
+    Errors are taken against the labelled positions of the detected rows of all recordings; a recording whose detections
+    or labels have no ground positions is left out. None if nothing is left, or nobody is detected.
     """
     errors = [
         m.pos[m.match[m.hit]] - m.truth.pos[m.hit] for m in recordings if m.pos is not None and m.truth.pos is not None

@@ -157,9 +157,11 @@ def fit_memory(found: Sequence[Correlations]) -> tuple[Memory, ...]:
 
 
 def _shares(curves: Array, target: Array) -> Array:
-    """Returns the least-squares shares (1,) or (2,) of one or two curves, at least 0 and at most 1 in total.
+    """Returns the least-squares shares (1,) or (2,) of one or two curves, in their order, at least 0 and at most 1 in
+    total.
 
     curves (K, 1 or 2): value of each curve at K lags; target (K,): the values to approach. Both are weighted already.
+    Two curves must differ if their best shares exceed 1 in total.
     """
     from scipy.optimize import nnls
 

@@ -94,8 +94,9 @@ def _heights(m: MatchedRecording) -> Array:
 def _fit_probability(hit: Bools, visibility: Array, height: Array, small: float) -> tuple[DetectionProbability, float]:
     """Returns the likeliest probability of detection for a given `small`, and its log likelihood, prior included.
 
-    hit (R,): bool, which labelled rows are detected; visibility (R,), 0 to 1; height (R,): of boxes in px. small: half
-    the height in px below which detection becomes less likely; 0: no effect.
+    The prior, worth 2 rows at each of the 5 visibilities, is that the factor c equals the visibility. hit (R,): bool,
+    which labelled rows are detected; visibility (R,), 0 to 1; height (R,): of boxes in px. small: half the height in px
+    below which detection becomes less likely; 0: no effect.
     """
     from scipy.optimize import minimize
 

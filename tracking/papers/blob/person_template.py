@@ -82,7 +82,8 @@ class ExplainedForeground:
         """Returns the share (K,), 0 to 1, of each template (K, 4) that no template with a lower foot and no explained
         blob covers.
 
-        A template's columns are x, foot (row of the lower edge), h, w, px. What lies outside the image is not visible.
+        A template's columns are x, foot (row of the lower edge), h, w, px. Of equal feet the earlier template hides the
+        later. The share is of the area inside the image, but at least of 0.3 of the ellipse.
         """
         return kernels.visible_share(self.cover, templates)
 

@@ -136,10 +136,10 @@ def count_pixels(foreground: Bools, cover: Cover, template: Array, covered: int)
 
 @kernel
 def support(foreground: Bools, cover: Cover, template: Array, covered: int) -> float:
-    """Returns the support of a template (4,) x, foot, h, w: at most 1, may be negative.
+    """Returns the support of a template (4,) x, foot, h, w, px: at most 1, may be negative.
 
-    It is the sum over its pixels whose cover (H, W) is `covered`, 1 for foreground and -1/2 for background, divided by
-    its area. covered: 1 for a painted template, 0 for one that is not painted.
+    It is the sum over its pixels whose cover (H, W), the number of templates there, is `covered`: 1 for foreground and
+    -1/2 for background, divided by its area. covered: 1 for a painted template, 0 for one that is not painted.
     """
     bare, seen = count_pixels(foreground, cover, template, covered)
     halves = HALVES * seen + EMPTY * (bare - seen)
@@ -148,10 +148,11 @@ def support(foreground: Bools, cover: Cover, template: Array, covered: int) -> f
 
 @kernel
 def supports(foreground: Bools, cover: Cover, templates: Array, covered: int) -> Array:
-    """Returns the support (K,) of each of the templates (K, 4) x, foot, h, w, from the pixels whose cover is `covered`.
+    """Returns the support (K,) of each of the templates (K, 4) x, foot, h, w, px, from the pixels whose cover is
+    `covered`.
 
-    Support: 1 for each foreground pixel, -1/2 for each background pixel, divided by the area; at most 1. covered: 1 if
-    the templates are painted, 0 if not.
+    Support: 1 for each such foreground pixel, -1/2 for each such background pixel, divided by the template's area; at
+    most 1, may be negative. foreground, cover (H, W). covered: 1 if the templates are painted into the cover, 0 if not.
     """
     found = np.zeros(len(templates))
     for k in range(len(templates)):
@@ -204,8 +205,9 @@ def visible_share(cover: Cover, templates: Array) -> Array:
     """Returns the share (K,), 0 to 1, of each template that no template with a lower foot and no explained pixel
     covers.
 
-    templates (K, 4): x, foot, h, w, px. cover (H, W): at least EXPLAINED where a pixel is explained; not changed. The
-    share is of the area inside the image.
+    templates (K, 4): x, foot, h, w, px. Of equal feet the earlier one hides the later. cover (H, W): at least EXPLAINED
+    = 1000 where a pixel is explained; not changed. The share is of the area inside the image, but at least of 0.3 of
+    the ellipse.
     """
     hidden = np.zeros(cover.shape, np.bool_)
     share = np.zeros(len(templates))

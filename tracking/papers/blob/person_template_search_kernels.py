@@ -2,9 +2,8 @@
 
 Templates are upright ellipses x (middle), foot (lower edge), h, w, px. foreground (H, W) bool; cover (H, W) int16: the
 number of templates over each pixel, plus EXPLAINED = 1000 where a blob of one person explains it. Slow twins for tests:
-tests/reference_templates.py. A template moves on
-a grid round its place while the others stay. The sum over one of its rows is a difference of the image row's running
-sum, so that a place costs one difference per row.
+tests/reference_templates.py. A template moves on a grid round its place while the others stay. The sum over one of its
+rows is a difference of the image row's running sum, so that a place costs one difference per row.
 """
 
 from __future__ import annotations
@@ -136,9 +135,10 @@ def fit_places(foreground: Bools, cover: Cover, templates: Array, spread: Array,
     """Returns the templates (K, 4) x, foot, h, w, px, at the places where they explain most, and paints them into
     `cover`.
 
-    templates: at their expected places, not painted, not changed; sizes stay. Each in turn moves to its best place
-    while the others stay, those with low feet first, in at most SWEEPS = 3 sweeps. spread (K, 2): standard deviation,
-    px, of the expected x and foot. evidence: log-likelihood of full support.
+    templates: at their expected places, not painted, not changed; sizes stay. Each in turn moves to the largest
+    evidence * support - d^2 / 2 (see `best_place`) while the others stay, those with low feet first, in at most SWEEPS
+    = 3 sweeps; a sweep without a move is the last. foreground, cover (H, W). spread (K, 2): standard deviation, px, of
+    the expected x and foot. evidence: log-likelihood of full support.
     """
     found, order = templates.copy(), near_first(templates)
     paint_all(cover, found, 1)

@@ -60,7 +60,8 @@ class TrackedPeople:
         """Replace the config and its nominal filter `dynamics` (of the config at the frame rate); the tracks stay as
         they are.
 
-        The limits of rho for deletion and reporting are computed anew.
+        The limits of rho (uncertainty: sqrt|S|, S the innovation covariance, over its asymptote) for deletion and
+        reporting are computed anew.
         """
         self.config, self.dynamics = config, dynamics
         self.q, self.noise, self.asymptote = dynamics.q, dynamics.noise, dynamics.asymptote
@@ -74,7 +75,8 @@ class TrackedPeople:
         self.explained_silence_rho = max(self.silence_rho, self._rho_after(config.report_hidden))
 
     def _bind(self, numbers: Array, flags: Bools) -> None:
-        """Use `numbers` (6, N) and `flags` (3, N) as the tables, and bind their rows to scale, rho, … as views."""
+        """Use `numbers` (6, N) and `flags` (3, N) as the tables, and bind their rows as views to attributes: scale,
+        rho, born, score, hits, misses; confirmed, measured, miss_explained."""
         self.numbers, self.flags = numbers, flags
         self.scale, self.rho, self.born, self.score, self.hits, self.misses = numbers
         self.confirmed, self.measured, self.miss_explained = flags
@@ -89,12 +91,13 @@ class TrackedPeople:
         return track_uncertainty.after_misses(self.dynamics, frames - 1)
 
     def predict(self) -> None:
-        """Predict all tracks one frame ahead, in place (eqs 1, 2), and compute their rho."""
+        """Predict all tracks one frame ahead, in place (eqs 1, 2), and compute their uncertainty rho."""
         kalman.predict(self.bank, self.dynamics.dt, self.q)
         self.rho[:] = self.compute_rho()
 
     def compute_rho(self) -> Array:
-        """Returns rho (N,) of all tracks as predicted: sqrt|S| over its asymptote, S the innovation covariance."""
+        """Returns rho (N,) of all tracks as predicted: sqrt|S| over its asymptote, S the innovation covariance; 1 in
+        the steady state."""
         return track_uncertainty.rho(self.bank, self.noise, self.asymptote)
 
     def upright_boxes(self) -> Array:
@@ -108,8 +111,9 @@ class TrackedPeople:
         """Record that the tracks at positions `rows` (K,) were measured in this frame and all others missed; confirm
         tracks.
 
-        A measured track is confirmed if its rho is at most confirm_ratio and `near` (K,) is True: its d^2 is inside
-        confirm_gate. score (K,): scores of the measurements, 0 to 1. Counts, flags and scales are changed in place.
+        A measured track is confirmed if its uncertainty rho is at most confirm_ratio and `near` (K,) is True: the
+        squared Mahalanobis distance of its measurement is inside confirm_gate. score (K,): scores of the measurements,
+        0 to 1. Counts, flags and scales are changed in place; a measured track's miss_explained becomes False.
         """
         self.measured[:] = False
         self.measured[rows] = True
@@ -125,7 +129,7 @@ class TrackedPeople:
         """Returns px per m (N,) at people in centred boxes `place` (N, 4): centre x, y, height, width, px.
 
         It is the longer side / 1.7 m, limited to half to twice the sequence's scale. Seen from straight above it is the
-        sequence's scale.
+        sequence's scale. nan if that is unknown.
         """
         whole = self.context.px_per_m
         if self.top:

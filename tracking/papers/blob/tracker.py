@@ -100,11 +100,12 @@ class Blob:
 
         They are boxes in the image (plane "image", px). With a camera they are on the ground (plane "ground", m) with
         boxes, and a track above the horizon is left out. detections: used from boxes only; None is a frame without
-        measurement. From pixels a frame without image is one. If `config` was replaced since the last frame, all tracks
-        go on with the new one.
+        measurement. From pixels a frame without image, or with too much foreground, is one. If `config` was replaced
+        since the last frame, all tracks go on with the new one.
 
         Raises InputError if the new config is invalid at this frame rate (nothing is changed then), if the picture's
-        size or dtype is not the background sample's, or if there are boxes and the scale px_per_m is unknown.
+        size or dtype is not the background sample's, or if there are boxes and the scale px_per_m is unknown, zero or
+        negative.
         """
         if self.config is not self.people.config:
             dynamics = self.config.dynamics(self.context.fps)
@@ -177,9 +178,10 @@ def _foot(camera: Camera, state: Array, scale: Array) -> tuple[Array, Array, Arr
     """Returns place (N, 2) px, velocity (N, 2) px/s and covariance (N, 4, 4) of the image point projected to the
     ground.
 
-    state (5, N, 4): a bank of x, y, h, w; scale (N,): px per m. For a pinhole the point is (x, y + h / 2), else (x, y).
-    Covariances are of u, v, u', v'. The place of `state` is the reported box; its variances of h are those of the bank,
-    taken for the box's height.
+    state (5, N, 4): a bank of x, y, h, w (rows place, rate, variance of the place, covariance, variance of the rate);
+    scale (N,): px per m. For a pinhole the point is (x, y + h / 2), else (x, y). Covariances are of u, v and their
+    velocities, px and s. The place of `state` is the reported box; its variances of h are those of the bank, taken for
+    the box's height.
     """
     place, rate = state[kalman.PLACE, :, :2].copy(), state[kalman.RATE, :, :2].copy()
     cov = image_covariance(state, scale)

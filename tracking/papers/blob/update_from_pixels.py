@@ -143,8 +143,8 @@ class PixelUpdater:
         return None
 
     def _measure_nobody(self, t: float) -> None:
-        """Record a miss of all tracks at time t, s, and delete those missed for too long; the others keep the
-        prediction (4.4)."""
+        """Record a miss of all tracks at time t, s, and delete those missed for too long or outside the image; the
+        others keep the prediction (4.4)."""
         people = self.people
         people.record_measured(np.zeros(0, np.int64), np.zeros(0, bool), np.zeros(0))
         people.delete_tracks(t)
@@ -221,10 +221,11 @@ class PixelUpdater:
         return np.concatenate([upright[:, :2], upright[:, 2:] * self.size.box_over_ellipse], 1)
 
     def _person_ellipses(self, box: Array) -> Array:
-        """Returns the ellipses (N, 5) centre x, y, axes h, w (px), theta (rad), of upright people in the boxes `box`
-        (N, 4).
+        """Returns the ellipses (N, 5) centre x, y, full axes h, w (px, the longer first), theta (rad), of upright
+        people in the boxes `box` (N, 4).
 
-        Boxes are centre x, y, height, width, px.
+        Boxes are centre x, y, height, width, px; their sides are divided by the learned factors of a person's box over
+        its ellipse. theta, the direction of h, is pi / 2 if h is vertical, else 0.
         """
         return box_geometry.inscribed_ellipses(np.concatenate([box[:, :2], box[:, 2:] / self.size.box_over_ellipse], 1))
 

@@ -143,8 +143,8 @@ def remove_lost(bank: GroupBank, scaled: ScaledParameters, t: float) -> Iterator
     """Remove the groups that were not measured for too long, at time t (s); yield a leave event for each confirmed one.
 
     Too long is `confirm_time` for a tentative group, `coast_time` for a confirmed one, or `recapture_time` if that is
-    longer and recapture is on. The event's onset and position are those of the last measurement. It is a generator: the
-    groups are removed when it has been read to its end.
+    longer and recapture is on. The event's onset is the last measurement, its position the centroid moved back to that
+    time. It is a generator: the groups are removed when it has been read to its end.
     """
     c = scaled.config
     patience = np.where(bank.confirmed, max(c.coast_time, c.recapture_time if c.recapture else 0.0), c.confirm_time)

@@ -61,9 +61,10 @@ class DuplicateGroups:
 
 
 def _overlapping(bank: GroupBank, rows: Ints, gate: float) -> Iterator[tuple[int, int]]:
-    """Yields pairs (i, j) of rows of the bank, out of `rows`, whose search regions overlap.
+    """Yields pairs (i, j), i before j in `rows`, of rows of the bank whose search regions overlap.
 
-    gate: squared Mahalanobis radius of a region, whose covariance is the group's extent.
+    gate: squared Mahalanobis radius of a region, an ellipse about the group's centroid, whose covariance is the group's
+    extent.
     """
     near = regions_overlap(bank.x[rows, :2], bank.extent[rows], gate)
     return ((int(rows[i]), int(rows[j])) for i, j in np.argwhere(np.triu(near, 1)).tolist())

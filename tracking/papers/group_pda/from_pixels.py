@@ -41,7 +41,8 @@ class ForegroundPoints:
         self.person = _person(context.camera, self.scale)
 
     def follow(self, config: GroupPdaConfig) -> None:
-        """Replace the config: settings and grid step change; the background model and the scale stay as they are."""
+        """Replace the config: settings of the background model and grid step change; what the model learned and the
+        scale stay."""
         self.config = config
         self.foreground.follow(config, config.most_foreground)
         self.step = max(1, round(config.grid * self.scale))

@@ -22,10 +22,11 @@ class ScaledParameters:
 
     config: the GroupPdaConfig they come from. dt: s between frames. scale: units per metre (1 on the ground).
     constraint: the rule G_y by which points are one group (sec. 3.3). point_sd: standard deviation of one person's
-    measured position. kernel_rules (RULES,): the array `rules` of the kernels. F, Q (4, 4): transition and process
-    noise of x, y, vx, vy, eq. 2.3. from_pixels: True if the points are foreground pixels, not people. metres_per_unit
-    (2,): metres on the ground per unit along x and along y (depth in an image). body_cov (2, 2): covariance of one
-    person's pixels, 0 from points. colour_bins: bins of colour histograms, 0 if colours are not used.
+    measured position. kernel_rules (19,): the array `rules` of the kernels (gates, priors, noises). F, Q (4, 4):
+    transition and process noise covariance of x, y, vx, vy, eq. 2.3. from_pixels: True if the points are foreground
+    pixels, not people. metres_per_unit (2,): metres on the ground per unit along x and along y (depth in an image).
+    body_cov (2, 2): covariance of one person's pixels, zeros from points. colour_bins: bins of colour histograms (64),
+    0 if colours are not used.
     """
 
     config: GroupPdaConfig

@@ -107,9 +107,10 @@ class GroupPda:
         """Forget everything and start a sequence. With a background sample in the context pixels are tracked, else
         points.
 
-        `seed` has no effect: nothing is random. If pixels are tracked, raises InputError if the scale px_per_m is zero
-        or negative, or neither known nor learned from the sample, or if the sample has a wrong shape, too few frames or
-        shows no background.
+        `seed` has no effect: nothing is random. Until the first detections `plane` is "image" from pixels, or with a
+        scale but no camera, else "ground". If pixels are tracked, raises InputError if the scale px_per_m is zero or
+        negative, or neither known nor learned from the sample, or if the sample has a wrong shape or dtype, too few
+        frames or shows no background.
         """
         self.context = context
         self.bank, self.ids = GroupBank.empty(), GroupIds()
