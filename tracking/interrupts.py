@@ -17,9 +17,11 @@ _received = threading.Event()
 
 @contextmanager
 def recorded_interrupts() -> Iterator[None]:
-    """While the block runs, record SIGINT and raise KeyboardInterrupt for it, as Python does; then forget the record.
+    """While the block runs, record SIGINT (Ctrl-C) and raise KeyboardInterrupt for it, as Python does; then forget the
+    record.
 
-    Does nothing outside the main thread, or where SIGINT has another handler than Python's own, which then stays.
+    Does nothing outside the main thread, or where SIGINT has another handler than Python's own, which then stays. After
+    the block Python's own handler is set again.
     """
     own = threading.current_thread() is threading.main_thread()
     if not own or signal.getsignal(signal.SIGINT) is not signal.default_int_handler:
@@ -35,12 +37,17 @@ def recorded_interrupts() -> Iterator[None]:
 
 
 def _record(number: int, frame: FrameType | None) -> None:
-    """The handler of SIGINT: raises KeyboardInterrupt after it has recorded the signal."""
+    """The handler of SIGINT: raises KeyboardInterrupt after it has recorded the signal. number: of the signal. frame:
+    ignored."""
     _received.set()
     signal.default_int_handler(number, frame)
 
 
 def raise_if_interrupted() -> None:
-    """Raise KeyboardInterrupt if SIGINT was recorded, which its own KeyboardInterrupt did not end; else do nothing."""
+    """Raise KeyboardInterrupt if SIGINT was recorded in the present block of `recorded_interrupts`; else do nothing.
+
+    That happens if Python lost the KeyboardInterrupt of the signal itself. The record is kept, so that a further call
+    raises again.
+    """
     if _received.is_set():
         raise KeyboardInterrupt

@@ -128,10 +128,10 @@ def prepare(
     can work. sensor: settings that degrade mode "truth", None or {} for none; seed: of their random numbers. Stored
     detections or labels are read here, and in mode "image" the background pictures.
 
-    Raises InputError if `sequence` is no Sequence, if the tracker, its parameters or the sensor settings are wrong, if
-    parameters are given to an instance or to a tracker without any, if tracker and sequence do not fit, if sensor
-    settings are given with a mode other than "truth", or if files of the sequence cannot be read. Raises WorkError if
-    the tracker cannot be created, or in mode "truth" if an order of a simulated script was not fulfilled.
+    Raises InputError if `sequence` is no Sequence, if the tracker, its parameters or the sensor settings are wrong, or
+    if tracker and sequence do not fit. Also if parameters are given to an instance or to a tracker without any, sensor
+    settings with a mode other than "truth", or files of the sequence cannot be read. Raises WorkError if the tracker
+    cannot be created, or in mode "truth" if an order of a simulated script was not fulfilled.
     """
     if not isinstance(sequence, Sequence):
         remedy = "open it: sim.io.source.open_source(path), or sim.simulate(scenario, seed)"

@@ -33,7 +33,7 @@ def run_command(app: typer.Typer, arguments: list[str]) -> int:
 
     app: the commands. arguments: the words after `flockscope`; with "--json" one JSON object is printed on stdout.
     Beside --help or --version, "--json" is not passed on. Each UserWarning's text is printed once on stderr. Exit
-    codes: 0 done; 1 the work failed; 2 wrong input or usage; 130 Ctrl-C.
+    codes: 0 done; 1 the work failed or a check found problems; 2 wrong input or usage; 130 Ctrl-C.
 
     Raises only an error that stems from another exception, and only if the environment variable FLOCKSCOPE_DEBUG is
     set.

@@ -48,7 +48,10 @@ class ProgressMeter:
                 self._bar.stop()
 
     def step(self, item: str = "", amount: int = 1) -> None:
-        """Adds `amount` finished items (1 by default) and shows the count. item: name to show, "" for none."""
+        """Adds `amount` finished items (1 by default) and shows the count. item: name to show, "" for none.
+
+        Raises KeyboardInterrupt if the user has pressed Ctrl-C and Python lost it; then nothing is added.
+        """
         self.update(self.done + amount, self.total, item)
 
     def update(self, done: int, total: int | None, item: str = "") -> None:

@@ -37,7 +37,7 @@ class StoredTracks:
     def read(self, sequence: Sequence) -> TrackingRun:
         """Reads the tracks at the sequence's frame rate; returns them, one `Tracks` per frame, with `info`.
 
-        Raises InputError if run.json states another frame rate, if there are no tracks, if a file is damaged, if a
+        Raises InputError if run.json states another frame rate, there are no tracks, or a file is damaged. Also if a
         MOTChallenge text has a frame beyond the sequence's length, or an event's frame is outside the tracks. Warns
         about a text without rows.
         """

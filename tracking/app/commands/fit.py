@@ -28,8 +28,8 @@ def fit_sensor(options: FitSensorOptions) -> CommandResult:
     The result's data: "file", "sensor" (the profile's keys), "measured" and "drawn", each a dictionary of statistics by
     name. "drawn" are means over 8 seeds of detections simulated with the profile; nan where nothing was observed.
 
-    Raises InputError if --out is no .toml file or cannot be written, if a source is missing or has no labels,
-    detections or boxes of both, or if there are fewer than 50 labelled people (rows of all frames) or 25 of them
+    Raises InputError if --out is no .toml file or cannot be written, or if a source is missing or has no labels,
+    detections or boxes of both. Also for fewer than 50 labelled people (rows of all frames), or fewer than 25 of them
     detected. Raises WorkError if the disk is full.
     """
     from scenarios.loading.sensor_profiles import dump_sensor

@@ -54,10 +54,10 @@ def write_overlay(
     as thin white boxes `over` the same picture, or draw `only` the truth; None: tracks only. step: called with the
     sequence's name after each frame.
 
-    Raises InputError if the sequence has no pictures or one cannot be read, if the truth is wanted and there is none or
-    it cannot be read, if groups must be derived in the image and the scale is not above 0, or if `out` is the file that
-    the sequence is read from or cannot be written. Raises WorkError if the disk is full, or an order of a simulated
-    script was not fulfilled.
+    Raises InputError if the sequence has no pictures or one cannot be read, or if the truth is wanted and is missing or
+    cannot be read. Also if groups must be derived in the image and the scale is not above 0, or if `out` cannot be
+    written or is the file that the sequence is read from. Raises WorkError if the disk is full, or an order of a
+    simulated script was not fulfilled.
     """
     if not sequence.has_images:
         raise InputError(
