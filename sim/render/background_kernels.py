@@ -112,7 +112,8 @@ def _sunlit(point, normal, sun, penumbra, solids, spare, hit):  # type: ignore[n
     """Return the share, 0 to 1, of four points across the penumbra from which no solid thing hides the sun.
 
     point, normal (3,): place in m and unit normal of the surface. sun (3,): unit vector to the sun. penumbra: width of
-    a shadow's soft edge, m. spare, hit (6,): scratch, overwritten. 1 without solids.
+    a shadow's soft edge, m. solids: a `raycast.Solids` (walls, pillars, stairs). spare (3,) or longer, hit (6,):
+    scratch, overwritten. 1 without solids.
     """
     if len(solids.walls) + len(solids.pillars) + len(solids.flights) == 0:
         return 1.0

@@ -91,7 +91,8 @@ class CameraView:
 
     @cached_property
     def blurred_canvas(self) -> NDArray[np.int16]:
-        """Colours (H, W, 3) BGR of the empty scene as int16: grey levels times UNIT (64), blurred."""
+        """Colours (H, W, 3) BGR of the empty scene as int16: grey levels times UNIT (64), blurred as the picture
+        settings say."""
         from sim.render.blur_noise_kernels import blur_all
 
         out, flat = np.empty_like(self.empty_canvas), (self.height, 3 * self.width)

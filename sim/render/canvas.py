@@ -1,7 +1,7 @@
 """The working image that a frame is drawn on: its number format, its tiles, and the arrays that go with it.
 
-A canvas holds grey levels times UNIT as int16, in BGR. Drawing marks the tiles it changes as dirty. Only dirty tiles
-are blurred anew when the frame is finished, and only they are restored to the empty scene afterwards.
+A canvas holds grey levels times UNIT = 64 as int16, in BGR. Drawing marks the tiles (8 x 16 px) it changes as dirty.
+Only dirty tiles are blurred anew when the frame is finished, and only they are restored to the empty scene afterwards.
 """
 
 from __future__ import annotations

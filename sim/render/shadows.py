@@ -23,7 +23,7 @@ LIT_HEIGHTS = (0.12, 0.5, 0.95)  # of the height: feet (they stand a step deep i
 class PeopleShadows:
     """Shadows of N people on the ground at their feet, two each; the second axis is body, head.
 
-    shape (N, 2, 3)    inverse shape of each shadow's ellipse, 1/m²: entries 11, 12, 22 (inverse of P S Pᵀ)
+    shape (N, 2, 3)    inverse of each shadow ellipse's 2 x 2 shape matrix, 1/m²: entries 11, 12, 22, in x and y
     softness (N, 2)    half the penumbra's width over the ellipse's mean radius, no unit
     outlines           ImageOutlines of the shadows with their soft edges, and of the pixels on which they can fall
     """

@@ -49,12 +49,13 @@ class Background:
         mean (3, H, W)        E: mean of each colour channel at gain 1, grey levels 0 to 255; changed by `adapt`
         var (3, H, W)         variance of each channel in the image, squared grey levels; changed by `adapt`
         gain (3,)             brightness of the last classified frame relative to `mean`, 1 at first; set by `classify`
-        s, b (H, W)           normalisers, no unit: of brightness (s = a |E / sigma|) and of chromaticity distortion CD;
-                              inf where `valid` is False
+        s, b (H, W)           normalisers, no unit: of brightness (s = a |E / sigma|, sigma^2 the variance) and of
+                              chromaticity distortion CD (distance from the line through E); inf where `valid` is False
         valid (H, W)          bool; False where the sample showed no background: classified as BACKGROUND always
         thresholds            3 numbers: of CD / b, lower of (alpha - 1) / a, upper of (alpha - 1) / a
-        bounds                2 limits of alpha (pixel brightness over the model's): darker than the first is dark
-                              foreground, brighter than the second is foreground; (1, 1) if the whole sample is grey
+        bounds                2 limits of alpha (pixel brightness over the model's): of pixels beyond the thresholds
+                              those darker than the first are dark foreground, not shadow, those brighter than the
+                              second are foreground, not highlight; (1, 1) if the whole sample is grey
         settings, fps         the BackgroundSettings in use; frames per second
     """
 
@@ -96,7 +97,7 @@ class Background:
 
         The classes: 0 BACKGROUND, 1 FOREGROUND, 2 DARK (dark foreground), 3 SHADOW, 4 HIGHLIGHT. A pixel whose `valid`
         is False is always BACKGROUND. With the setting gain = "global" the model's `gain` is first estimated from this
-        frame and kept; else it stays 1. Mean and variance do not change.
+        frame and kept; else it stays as it was, 1 at first. Mean and variance do not change.
 
         Raises InputError if the frame's size or dtype is not the sample's.
         """

@@ -22,7 +22,8 @@ FEWEST = 50
 def grid(high: int, wide: int) -> tuple[slice, slice]:
     """Returns two slices, of rows and of columns, that select a regular grid of pixels from an image of high x wide px.
 
-    The grid has about POINTS = 6000 pixels; in a smaller image it has all of them.
+    In a large image the grid has about POINTS = 6000 pixels or somewhat more. An image of fewer than 24,000 pixels is
+    taken whole.
     """
     step = max(1, int(np.sqrt(high * wide / POINTS)))
     return slice(step // 2, None, step), slice(step // 2, None, step)
@@ -33,8 +34,9 @@ def gain(image: Floats, mean: Floats, where: Bools) -> Floats | None:
     pixels.
 
     image, mean (3, h, w): grey levels of the frame and of the background model on a grid. where (h, w) bool: the pixels
-    to use. A factor is the median of image / mean over usable pixels (expected grey level from 16 to 235). A channel
-    with fewer than FEWEST = 50 usable pixels, as blue under sodium lamps, gets the mean factor of the other channels.
+    to use. A factor is the median of image / mean over usable pixels: mean above 16, and expected grey level (factor
+    times mean) between 16 and 235. A channel with fewer than FEWEST = 50 usable pixels, as blue under sodium lamps,
+    gets the mean factor of the other channels.
     """
     found = [_one_channel(i[where], e[where]) for i, e in zip(image, mean, strict=True)]
     known = [factor for factor in found if factor is not None]

@@ -218,9 +218,9 @@ def _densest(value: Array, weight: Array, least: float = 1.0) -> tuple[float, Bo
     """Returns the weighted mean of the values that agree with the most popular one, and flags (N,) of these values.
 
     value, weight (N,): ratios and their votes. Two values agree if they differ by at most AGREEMENT = 12 %. The most
-    popular value has the most votes near it. The value 1 has the weight PRIOR_COUNT in advance and counts in the mean.
-    least < 1: instead the smallest value with this share of the most votes (one person is narrower than two).
-    """
+    popular value has the most votes near it. The value 1 has the weight PRIOR_COUNT = 2 in advance and counts in the
+    mean, but has no flag. least < 1: instead of the most popular value the smallest one with at least this share of its
+    votes (one person is narrower than two)."""
     value, weight = np.append(value, 1.0), np.append(weight, PRIOR_COUNT)
     near = np.abs(value / np.maximum(value[:, None], 1e-9) - 1) <= AGREEMENT
     votes = near @ weight

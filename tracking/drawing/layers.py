@@ -147,7 +147,8 @@ def layer_of_tracks(tracks: SequenceOf[Tracks], camera: Camera | None, scene: Sc
 
     tracks: one Tracks per frame. Positions on the ground are projected through `camera`; people of a Tracks without
     boxes get the box of an upright person. Without a camera, tracks on the ground show only their own boxes and the
-    groups round these. What the camera cannot see is nan. scene: gives the ground's height; None: 0."""
+    groups round these. Tracks whose rows are groups give marks of groups only. What the camera cannot see is left out
+    (nan, or no points). scene: gives the ground's height; None: 0."""
     frames = {t.index: _marks_in_picture(t, camera, scene) for t in tracks}
     return Layer("tracked", "T", frames, _emitted(tracks))
 

@@ -1,9 +1,10 @@
 """Assignment of measurements to tracks: gated nearest neighbour, or least total cost.
 
-Input: a cost matrix (N, M), one row per track, one column per measurement, inf outside a track's gate. Output: two
-index arrays (K,), rows and columns of the assigned pairs. No measurement is assigned twice. A track can have several
-measurements with `nearest` only: there each measurement goes to the track of least d^2 in whose gate it lies (Gonzalez
-et al. 2006, 4.4), and one person may be detected in several pieces. `optimal` is ours.
+Input: a cost matrix (N, M), one row per track, one column per measurement, inf outside a track's gate (region where its
+measurements may lie). Output: two index arrays (K,), rows and columns of the assigned pairs. No measurement is assigned
+twice. A track can have several measurements with `nearest` only: there each measurement goes to the track of least cost
+(squared Mahalanobis distance d^2) in whose gate it lies (Gonzalez et al. 2006, 4.4), and one person may be detected in
+several pieces. `optimal` is ours.
 """
 
 from __future__ import annotations

@@ -2,8 +2,8 @@
 
 The model is filterpy's: kinematics of order 1 (`filterpy.common.kinematic_kf`, constant velocity) driven by
 `filterpy.common.Q_discrete_white_noise`, a white acceleration of standard deviation sigma held over a step dt. filterpy
-is imported where a model is made, as its import takes 0.65 s. A bank
-is equal to as many `filterpy.kalman.KalmanFilter` to 1e-9, and faster.
+is imported where a model is made, as its import takes 0.65 s. A bank is equal to as many `filterpy.kalman.KalmanFilter`
+to 1e-9, and faster.
 
 Each of D measured coordinates (for example x, y, h, w) has a filter of its own with state x = (place, rate), A = [[1,
 dt], [0, 1]], C = [1, 0]. As the coordinates are independent, a bank of N filters is one array `state` (5, N, D) with
@@ -13,7 +13,9 @@ rows
 
     predict  x = A x,  P = A P A' + Q          (Gonzalez et al. 2006, eqs 1, 2; eq. 8: C A x is the predicted place)
     update   y = z - C x,  S = P11 + R,  K = (P11, P12) / S,  x += K y,  P = (I - K C) P      (eqs 5, 6, 7, 3, 4)
-Eq. 4 is printed without the brackets. Eq. 9 is printed with row and column exchanged.
+A is the transition of a step, C selects the place, Q is the process noise, z a measurement, R its variance, y the
+innovation, S its variance, K the gain. Eq. 4 is printed without the brackets. Eq. 9 is printed with row and column
+exchanged.
 
 Places may be in another unit (px) than covariances (m^2): gains have no unit, so that only distances need the scale
 (N,) between the two units.

@@ -11,9 +11,9 @@ depends on the first covariance, too. Rules, ours where the paper has none:
 - A track is confirmed if rho <= confirm_ratio (above 1) and the measurement of that frame is near.
 - A new track must start above confirm_ratio, so that one measurement never confirms it (`check_birth`).
 - A confirmed track is deleted if rho reaches the value after k misses from the steady state. A track that is not yet in
-the steady state gets there after fewer misses.
+  the steady state gets there after fewer misses.
 - A tentative (not confirmed) track is deleted if rho, while the track is missed, reaches its value at birth, or after a
-time limit. The time limit is at least the time that confirmation takes (`time_to_confirm`).
+  time limit. The time limit is at least the time that confirmation takes (`time_to_confirm`).
 """
 
 from __future__ import annotations
@@ -65,8 +65,9 @@ class Dynamics:
         """Returns the state (5, 1, D) of a track at place 0 just after a measurement in the steady state, in closed
         form.
 
-        Rows: place, rate, variance of the place (P11), covariance (P12), variance of the rate (P22); m and s. With K =
-        1 - R / S the posterior P11 is K R. P12 and P22 follow from the Riccati equation.
+        Rows: place, rate, variance of the place (P11), covariance (P12), variance of the rate (P22); m and s. With the
+        gain K = 1 - R / S, R the variance of a measurement and S the innovation variance, the posterior P11 is K R. P12
+        and P22 follow from the Riccati equation.
         """
         s = self.asymptote
         k = 1 - self.noise / s
