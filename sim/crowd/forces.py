@@ -6,12 +6,13 @@ Forces on a person, in the order in which they are computed:
 - away from other people, other groups, walls and pillars: `forces_avoidance_kernels`.
 
 `sim.crowd.world.accelerate` adds them up. A body weighs 1 kg, so a force is an acceleration in m/s². The sum of the
-avoidance forces and the goal force is capped at `Steering.max_acceleration`. Forces turn and move with the scene. The
-order of people changes them by rounding only.
+avoidance forces and the goal force is capped at `Steering.max_acceleration`. If the whole scene is turned or moved, the
+forces turn or move with it. The order of people changes them by rounding only.
 
-Model: boids inside a group (separation, alignment, cohesion), and a power law of the time to collision between
-strangers (Karamouzas, Skinner & Guy 2014). *Ours*: groups also avoid each other as wholes, so strangers walk round a
-group and seldom through it. A group waits at its gathering point until all members are there.
+Model: boids inside a group (separation: members repel each other; alignment: they take up the group's velocity;
+cohesion: they keep their places), and a power law of the time to collision between strangers (Karamouzas, Skinner & Guy
+2014). *Ours*: groups also avoid each other as wholes, so strangers walk round a group and seldom through it. A group
+waits at its gathering point until all members are there.
 
 numba bakes the integers below into the compiled kernels, and its cache does not notice a change in this file. Delete
 `sim/crowd/__pycache__` after changing one.
@@ -152,7 +153,8 @@ class GroupArrays(NamedTuple):
     def empty(cls, g: int, w: int) -> GroupArrays:
         """Returns arrays for g groups with room for w waypoints each.
 
-        Every heading is +x, `arrived` is False, everything else is 0: ways of length 0 and speed 0.
+        Every heading is +x, `arrived` is False, everything else is 0: ways of length 0, kind PASS, finish STAND, speed
+        0.
         """
         return cls(
             np.zeros((g, w, 2)),

@@ -104,7 +104,9 @@ def _avoid_groups(status, rules, push):  # type: ignore[no-untyped-def]
 def _near_discs(rows, s, last, reach, radius, found):  # type: ignore[no-untyped-def]
     """Write to `found` the groups s + 1 … last - 1 within `reach` m of group s, on collision course; return how many.
 
-    rows (6, G'): COUNT … RADIUS, groups sorted by x. radius: m per person. Two groups of one person each are left out.
+    rows (6, G'): number of people, mean x, y (m), mean vx, vy (m/s) and radius (m) of groups, sorted by x. radius:
+    added to each disc, m. Two groups of one person each are left out. Entries of `found` behind the number returned
+    mean nothing.
     """
     count, x, y = rows[COUNT], rows[MEAN_X], rows[MEAN_Y]
     vx, vy, disc = rows[MEAN_VX], rows[MEAN_VY], rows[RADIUS]
@@ -160,8 +162,8 @@ def _pair(state, tag, i, j, dx, dy, d2, rules, out):  # type: ignore[no-untyped-
 def _cells(state, reach):  # type: ignore[no-untyped-def]
     """Sort the people of state (N, 4), columns x, y, vx, vy, into square grid cells at least `reach` m wide.
 
-    Returns order (N,): indices of people, cell after cell; start (C + 1,): where each of the C cells begins in `order`;
-    the number of cells along x. Up to BRUTE (48) people, also none, share one cell.
+    Returns order (N,): indices of people, cell after cell, along x first; start (C + 1,): where each of the C cells
+    begins in `order`, then N; the number of cells along x. Up to BRUTE (48) people, also none, share one cell.
     """
     n = len(state)
     if n <= BRUTE:
@@ -192,8 +194,8 @@ def _cells(state, reach):  # type: ignore[no-untyped-def]
 def _candidates(rows, s, first, last, reach, touch, radius, found, m):  # type: ignore[no-untyped-def]
     """Append to found[m:] the indices t in first … last - 1 that may act on person s; return the new length.
 
-    rows (4, N): x, y, vx, vy by cell. t counts if its squared distance is below `reach` (m²), and either below `touch`
-    (m²) or on collision course for discs whose radii add up to `radius` m.
+    rows (4, N): x, y, vx, vy of people, sorted by cell; s and t are columns of it. t counts if its squared distance is
+    below `reach` (m²), and either below `touch` (m²) or on collision course for discs whose radii add up to `radius` m.
     """
     x, y, vx, vy = rows[X], rows[Y], rows[VX], rows[VY]
     for t in range(first, last):

@@ -1,8 +1,8 @@
 """Where the members of a group walk and stand, where groups meet, and how a group divides into parts.
 
 Places in a formation are (forward, left) of the group's middle in metres; their mean is zero. Walking: pairs abreast,
-triads in a V whose middle member is slightly behind, larger groups in rows of pairs and triads (Zanlungo & Kanda 2013).
-Standing: a circle.
+triads in a V whose middle member is slightly behind, larger groups in rows of triads, then pairs (Zanlungo & Kanda
+2013). Standing: a circle.
 """
 
 from __future__ import annotations

@@ -1,4 +1,5 @@
-"""The state of groups while the simulation runs: who belongs to which group, and each group's way.
+"""The state of groups while the simulation runs: who belongs to which group, each group's way, and people's places in
+formations and queues.
 
 Nothing here touches a position, a velocity or a force. The physics reads this state through `fill` and the kernels'
 arrays.
@@ -48,7 +49,7 @@ class GroupState:
     """
 
     def __init__(self, entering: list[EnteringGroup], new: int, navigator: Navigator, slowdown: float) -> None:
-        """Starts with nobody present and the script's groups alive.
+        """Starts with nobody present, the script's groups alive, and all people in no queue.
 
         entering: groups of the script with their people. new: greatest number of groups that orders may still make.
         navigator: finds ways round walls. slowdown: m/s by which a group is slower for each member after the first.
@@ -79,8 +80,8 @@ class GroupState:
     def enter(self, group: EnteringGroup) -> None:
         """Marks the group's members as present, starts the group's way and sets the members' places in the formation.
 
-        A group whose goal is at most 0.3 m from its start stands in a circle and counts as settled; any other group
-        gets the walking formation.
+        group: as drawn, with start, goal and members. A group whose goal is at most 0.3 m from its start stands in a
+        circle and counts as settled; any other group gets the walking formation.
         """
         g = group.index
         self.go(g, group.start, group.via, group.goal, group.finish, group.speed)
@@ -93,7 +94,7 @@ class GroupState:
         self.places[columns] = places
 
     def remove_leaving(self, columns: Ints) -> list[int]:
-        """Returns the columns of people who leave now, in the given order, and marks them as absent.
+        """Returns the columns (person id - 1) of people who leave now, in the given order, and marks them as absent.
 
         columns (N,): people present. A person leaves if the group has reached the end of its way and its finish is
         LEAVE. People in a queue stay. Empty if nobody leaves.

@@ -1,6 +1,7 @@
 """Ways round walls and through doors: the shortest path over wall ends and door middles.
 
-Also turns a scenario's world into the arrays of a Scene, with the doors' openings cut out of the walls.
+From a start and a goal it computes the points to walk to. Also turns a scenario's world into the arrays of a Scene,
+with the doors' openings cut out of the walls.
 """
 
 from __future__ import annotations
@@ -44,7 +45,8 @@ def cut_walls(walls: Array, doors: list[tuple[Array, float]]) -> tuple[Array, Ar
 def scene_of(world: WorldSpec) -> Scene:
     """Returns the world of a scenario as the arrays of a Scene, in m; its walls leave out the openings of doors.
 
-    Absent things give empty arrays. Raises ValueError if the world has doors but no walls.
+    Absent things give empty arrays. Cut walls come after uncut ones. Raises ValueError if the world has doors but no
+    walls.
     """
     walls = np.array(world.walls, dtype=float).reshape(-1, 2, 2)
     doors = [(np.array(d.at, dtype=float), d.width) for d in world.doors]
@@ -94,9 +96,11 @@ def blocked(a: Array, b: Array, walls: Array) -> Bools:
 class Navigator:
     """Finds the shortest ways round walls and through doors in one scene.
 
-    - nodes (N, 2), m: the middles of all doors, then points CLEARANCE (0.6 m) beyond the ends of walls.
+    - nodes (N, 2), m: x, y of the middles of all doors, then points CLEARANCE (0.6 m) beyond the ends of walls, inside
+      the world and clear of walls.
     - edges (N, N), m: distances between nodes, inf where a wall or door lies between.
-    - walls, doors, closed (…, 2, 2), m: wall pieces, door openings, and both together. size (2,): of the world, m.
+    - walls, doors, closed (…, 2, 2), m: wall pieces, door openings, and both together; two ends x, y each. size (2,):
+      of the world, m.
 
     Doors block segments like walls, so every way through a door leads over its middle.
     """

@@ -21,7 +21,7 @@ from sim.types import Array, Order
 
 
 def groups_made(scenario: Scenario) -> int:
-    """Returns the greatest number of new groups that the orders of a scenario make.
+    """Returns an upper bound of the number of new groups that the orders of a scenario make; 0 without orders.
 
     A merge counts 1 and a split its parts. A queue makes none but counts 1, too.
     """
@@ -202,8 +202,8 @@ class OrderExecution:
             groups.places[columns] = walking(len(columns), groups.spacing[g])
 
     def record(self) -> tuple[Order, ...]:
-        """Returns all orders of the script, in the order of the file, with the person ids (column + 1) before and
-        after.
+        """Returns all orders of the script, in the order of the file, with the person ids (column + 1) of each group
+        before and after.
 
         `fired` is the 1-based frame. Of an order that never fired it is None, and before and after are empty.
         """

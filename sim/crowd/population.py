@@ -1,4 +1,5 @@
-"""Draws who takes part: groups with sizes, starts and goals, and each person's height, speed and gait.
+"""Draws who takes part: groups with sizes, starts and goals, and each person's height, speed and gait (fluctuation of
+the wanted velocity).
 
 Every person draws from streams of their own, so one person more changes nobody else. A start from a distribution is
 drawn again, for this group alone, until the group has room there.
@@ -64,8 +65,8 @@ class ScriptPlacement:
 class Person:
     """One person of a crowd.
 
-    - column: in the arrays of a Motion; the person's id is column + 1.
-    - key: (entry of `group`, its copy, member), each from 0; keys the person's random streams.
+    - column: in the arrays of a Motion, from 0; the person's id is column + 1.
+    - key: (entry of the scenario's `group` list, its copy, member), each from 0; keys the person's random streams.
     - free_speed: walking speed alone, m/s. height: of the body, m.
     """
 
@@ -228,9 +229,11 @@ def _find_room(draws: _Draws, group: EnteringGroup, spec: GroupSpec, key: tuple[
 
 
 def _is_free(pos: Array, scene: Scene, taken: list[Array]) -> bool:
-    """Returns True if all of pos (n, 2), m, are 0.55 m clear of the taken places and 0.2 m clear of walls and pillars.
+    """Returns True if all of pos (n, 2), m, n ≥ 1, are 0.55 m clear of the taken places and 0.2 m clear of walls and
+    pillars.
 
-    taken: places (K, 2), m, of each earlier group; may be empty.
+    Distances are measured from the points to places, wall lines and pillar edges; exactly that far is clear. taken:
+    places (K, 2), m, of each earlier group; may be empty.
     """
     if taken:
         others = np.concatenate(taken)

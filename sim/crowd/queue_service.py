@@ -35,9 +35,8 @@ class ServiceQueue:
     busy_until: float | None = None
 
     def slot(self, k: int) -> Array:
-        """Returns the place (2,), m, with index k in the queue; 0 is the head's. k is not limited by the queue's
-        length.
-        """
+        """Returns the place (2,), x, y in m, with index k in the queue; 0 is the head's. k is not limited by the
+        queue's length."""
         return self.head + k * self.spacing * self.along
 
     def advance(self, t: float, members: dict[int, list[int]], pos: Array) -> tuple[dict[int, Array], list[int]]:

@@ -105,10 +105,11 @@ class PendingOrder:
 
 
 def concerned(order: MergeOrder | SplitOrder | QueueOrder, alive: list[str]) -> list[str]:
-    """Returns the names of the groups that an order concerns, in its own order.
+    """Returns the names of the groups that an order concerns, in the order in which the order names them.
 
-    alive: names of all existing groups. `g-*` stands for all existing names that begin with `g-`. A plain name is
-    returned even if no such group exists; a name that two patterns match is returned twice.
+    A split concerns one group. alive: names of all existing groups. `g-*` stands for all existing names that begin with
+    `g-`, in the order of alive; there may be none. A plain name is returned even if no such group exists; a name that
+    two patterns match is returned twice.
     """
     if isinstance(order, SplitOrder):
         return [order.group]
@@ -146,14 +147,18 @@ def rule_holds(pending: PendingOrder, state: Array, targets: Array) -> bool:
 
 
 def _nearest(state: Array, a: list[int], b: list[int]) -> float:
-    """Returns the distance in m of the nearest two people, one of columns a and one of columns b; state (P, 4): x, y,
-    vx, vy.
+    """Returns the distance in m of the nearest two people, one of columns a and one of columns b; nan if one of them is
+    absent.
+
+    state (P, 4): x, y, vx, vy, m, m/s, nan while absent.
     """
     return float(np.linalg.norm(state[a, None, :2] - state[None, b, :2], axis=2).min())
 
 
 def _velocity_difference(state: Array, a: list[int], b: list[int]) -> float:
-    """Returns the length in m/s of the difference of the mean velocities of columns a and b; state (P, 4): x, y, vx,
-    vy.
+    """Returns the length in m/s of the difference of the mean velocities of columns a and b; nan if one of them is
+    absent.
+
+    state (P, 4): x, y, vx, vy, m, m/s, nan while absent.
     """
     return float(np.linalg.norm(state[a, 2:].mean(axis=0) - state[b, 2:].mean(axis=0)))

@@ -42,7 +42,8 @@ def run(scenario: Scenario, seed: int, repeat: int = 0, steering: Steering | Non
 
 
 def steps_per_frame(fps: float) -> int:
-    """Returns the least number (≥ 1) of physics steps per frame that keeps a step within MAX_STEP (0.02 s)."""
+    """Returns the least number (≥ 1) of physics steps per frame that keeps a step within MAX_STEP (0.02 s); fps above
+    0."""
     return max(1, math.ceil(1 / (fps * MAX_STEP) - 1e-9))
 
 

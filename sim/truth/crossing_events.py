@@ -1,7 +1,8 @@
 """Makes cross events: two groups that pass through each other, or closely round each other, and stay the same groups.
 
-For truth and trackers alike. Arrays are dense, (T, P, ...), one column for each person. A person is absent where a
-position is nan or `present` is False. The id of a person is the column + 1; frames of events count from 1.
+They are found from positions, velocities and group ids, for truth and trackers alike. Arrays are dense, (T, P, ...),
+one column for each person. A person is absent where a position is nan or `present` is False. The id of a person is the
+column + 1; frames of events count from 1.
 """
 
 from __future__ import annotations
@@ -73,9 +74,9 @@ def _crossed(
 ) -> list[GroupEvent]:
     """Returns a cross event for each of the encounters `met` that is a crossing, in their order.
 
-    pos, vel (T, P, 2): m, m/s, nan while absent. group (T, P): group ids, -1 = alone or absent. rows: members of all
-    groups by frame. margin: number of frames before and after the encounter in which the groups must keep their
-    members.
+    A crossing: mean relative velocity of at least 0.6 m/s, a change of sides, and the same members all the time. pos,
+    vel (T, P, 2): m, m/s, nan while absent. group (T, P): group ids, -1 = alone or absent. rows: members of all groups
+    by frame. margin: number of frames before and after the encounter, as far as there are, that count, too.
     """
     low, high = np.maximum(met.first - margin, 0), np.minimum(met.last + margin + 1, len(pos))
     k, frame = runs(low, high)

@@ -47,9 +47,9 @@ class MembersByFrame:
     """The members of each group in each frame: G rows, one for each group and frame, sorted by (frame, group id).
 
     - t (G,): frame from 0. name (G,): group id. key (G,): t * width + name, ascending, for look-ups.
-    - width: greatest group id + 1.
+    - width: greatest group id + 1; 1 without groups.
     - first, count (G,): the members of a row are person[first : first + count].
-    - person: columns (person id - 1) of the members of row after row, ascending within a row.
+    - person (R,): columns (person id - 1) of the members of row after row, ascending within a row.
     """
 
     t: Ints
@@ -64,7 +64,7 @@ class MembersByFrame:
         """Returns (first, count), both (K,), of the groups with ids name (K,) in frames t (K,), which count from 0.
 
         The members are person[first : first + count]. count is 0 where the group does not exist in that frame; `first`
-        then means nothing. Ids must be from 0 to width - 1.
+        then means nothing. Ids must be from 0 to width - 1, else wrong groups may be found.
         """
         if not len(self.t):
             return np.zeros_like(t), np.zeros_like(t)
@@ -86,8 +86,8 @@ class MembersByFrame:
 def members_by_frame(group: Ints) -> MembersByFrame:
     """Returns the members of all groups in all frames.
 
-    group (T, P): group id of each person in each frame, -1 = alone or absent. A group of one member gets a row, too. No
-    group gives a result without rows.
+    group (T, P): group id of each person in each frame, -1 (or less) = alone or absent. A group of one member gets a
+    row, too. No group gives a result without rows.
     """
     t, person = np.nonzero(group >= 0)
     order = np.lexsort((person, group[t, person], t))

@@ -1,6 +1,7 @@
 """Hulls, mean positions and extents (covariances of positions) of groups in each frame.
 
-They are computed from positions of people whose group ids are known, of the truth or of a tracker's tracks.
+They are computed from positions of people whose group ids are known, of the truth or of a tracker's tracks. On the
+ground a hull encloses discs of 0.25 m round the members, in the image their boxes or such discs.
 """
 
 from __future__ import annotations

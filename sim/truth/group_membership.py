@@ -1,11 +1,14 @@
 """Finds who is in one group in each frame, from motion and intent: the truth of group membership.
 
-In every frame the crowd is divided into parts: groups, and people alone. Two parts that are meant to be one are joined
-in the first frame of the first stretch in which the merge rule holds between them. A part whose people are meant to be
-in different groups is divided in the first frame of the first stretch in which the split rule holds between those
-people. People who enter in the same frame and are meant to be together form one part from that frame on.
+Intent is the group that the script means a person to belong to. In every frame the crowd is divided into parts: groups,
+and people alone. Two parts that are meant to be one are joined in the first frame of the first stretch in which the
+merge rule holds between them. A part whose people are meant to be in different groups is divided in the first frame of
+the first stretch in which the split rule holds between those people. People who enter in the same frame and are meant
+to be together form one part from that frame on.
 
-Stretches are found by looking ahead. The times at which the script gave orders are not used.
+Merge rule: less than 1.5 m apart, velocities differing by less than 0.5 m/s. Split rule: more than 2.5 m apart, or 1.5
+m with velocities differing by more than 0.7 m/s. Both for 2 s. Stretches are found by looking ahead. The times at which
+the script gave orders are not used.
 """
 
 from __future__ import annotations
@@ -77,7 +80,8 @@ def _turns(present: Bools, intent: Ints) -> Ints:
     That is the first frame of a person, the first frame without a person who has left, and the first frame in which a
     person is meant to be in another group.
 
-    present, intent (T, P). Empty for a motion without frames.
+    present (T, P): flags. intent (T, P): index of the group each person is meant to belong to, -1 while absent. Empty
+    for a motion without frames.
     """
     if not len(present):
         return np.zeros(0, np.int64)
@@ -135,6 +139,8 @@ class _RuleTimes:
     def next_change(self, parts: list[PersonSet], t: int) -> int:
         """Returns the first frame after t in which parts join or may divide; NEVER (the largest int64) if there is
         none.
+
+        parts: disjoint sets of columns. Frames count from 0.
         """
         times = [_first(frames, t + 1) for _, frames in self._meant_to_join(parts, t)]
         for part in parts:
@@ -142,10 +148,11 @@ class _RuleTimes:
         return min(times, default=NEVER)
 
     def _meant_to_join(self, parts: list[PersonSet], t: int) -> Iterator[tuple[tuple[PersonSet, PersonSet], Ints]]:
-        """Yields ((a, b), frames) for each two parts that are meant to be one group in frame t.
+        """Yields ((a, b), frames) for each two of the parts (sets of columns) that are meant to be one group in frame
+        t.
 
-        frames: ascending, those from which the merge rule will hold long enough. A part counts only if more than half
-        of its people are meant to be in that group; the rule is measured between these people.
+        frames: ascending, from 0, those from which the merge rule will hold long enough. A part counts only if more
+        than half of its people are meant to be in that group; the rule is measured between these people.
         """
         meant: dict[int, list[tuple[PersonSet, PersonSet]]] = {}
         for part in parts:
@@ -160,16 +167,16 @@ class _RuleTimes:
         return [pair for pair, frames in self._meant_to_join(parts, t) if _first(frames, t) == t]
 
     def _meant_to_divide(self, part: PersonSet, t: int) -> Iterator[tuple[PersonSet, PersonSet]]:
-        """Returns an iterator over each two subsets of a part that are meant to be different groups in frame t; may be
-        empty.
-        """
+        """Returns an iterator over each two subsets of a part (a set of columns) that are meant to be different groups
+        in frame t; may be empty."""
         return combinations(_by_intent(part, self.motion, t).values(), 2) if len(part) > 1 else iter(())
 
     def _divide(self, part: PersonSet, t: int) -> list[PersonSet]:
-        """Returns the pieces into which a part divides in frame t; the part itself, in a list, if it does not divide.
+        """Returns the pieces (sets of columns) into which a part divides in frame t; the part itself, in a list, if it
+        does not divide.
 
         The pieces are its subsets by intended group. Two subsets stay together unless frame t is one from which the
-        split rule holds between them for `hold` frames.
+        split rule holds between them for 2 s, or if a third one connects them.
         """
         if len(part) == 1:
             return [part]
@@ -177,11 +184,11 @@ class _RuleTimes:
         return _connected(list(_by_intent(part, self.motion, t).values()), unsplit)
 
     def _onsets(self, rule: Rule, a: PersonSet, b: PersonSet, t: int) -> Ints:
-        """Returns the frames, ascending, from which the rule ("merge" or "split") will hold long enough between parts a
-        and b.
+        """Returns the frames (from 0), ascending, from which the rule ("merge" or "split") will hold long enough
+        between parts a and b.
 
-        They are measured at the first call for this rule and these parts, from frame t on; later calls return the same
-        array.
+        a, b: sets of columns. The frames are measured at the first call for this rule and these parts, from frame t on;
+        later calls return the same array.
         """
         key = (rule, a, b)
         if key not in self._known:
@@ -189,9 +196,11 @@ class _RuleTimes:
         return self._known[key]
 
     def _measure(self, rule: Rule, a: Ints, b: Ints, t: int) -> Ints:
-        """Returns the frames from t on, ascending, from which the rule holds between columns a and b for `hold` frames.
+        """Returns the frames from t on (from 0), ascending, from which the rule holds between columns a and b for
+        `hold` frames.
 
-        The intent must agree in these frames, too. Empty if a and b are never both present from t on.
+        rule: "merge" or "split". The intent must agree in these frames, too. Empty if a and b are never both present
+        from t on.
         """
         motion = self.motion
         both = motion.present[t:, a].any(axis=1) & motion.present[t:, b].any(axis=1)
@@ -205,11 +214,11 @@ class _RuleTimes:
         return np.flatnonzero(holds_for(holds, motion.hold)) + t
 
     def _intended(self, rule: Rule, window: slice, a: Ints, b: Ints) -> Bools:
-        """Returns for each frame of the window whether intent agrees with the rule between columns a and b, shape
-        (frames,).
+        """Returns for each frame of the window (a slice of frames) whether intent agrees with the rule between columns
+        a and b, shape (frames,).
 
-        merge: all people of a and b who are present are meant to be in one group. split: no person of a is meant to be
-        in the group of a person of b. Absent people are ignored.
+        merge: each person of a is meant to be in the same group as each person of b. split: no person of a is meant to
+        be in the group of a person of b. Absent people are ignored; a frame in which a or b has nobody agrees.
         """
         intent, present = self.motion.intent[window], self.motion.present[window]
         same = intent[:, a, None] == intent[:, None, b]

@@ -1,9 +1,10 @@
 """Keeps group ids through merges and splits, and names the change between two partitions. For truth and trackers alike.
 
-A merge keeps the id of the parent with most members; a split gives it to the child with most members. To this end pairs
-of an old and a new group are matched greedily, the pair with most people in common first. Ties go to the older group,
-then to the smaller group id, then to the new group with the smallest person id. Groups with fewer than two people in
-common are never the same group. New groups without a match get new ids.
+A partition divides the people of one moment into groups and people alone. A merge keeps the id of the parent with most
+members; a split gives it to the child with most members. To this end pairs of an old and a new group are matched
+greedily, the pair with most people in common first. Ties go to the older group, then to the smaller group id, then to
+the new group with the smallest person id. Groups with fewer than two people in common are never the same group. New
+groups without a match get new ids.
 """
 
 from __future__ import annotations
@@ -137,10 +138,10 @@ def _changes_of_new(g: int, people: PersonSet, stay: PersonSet, was: dict[int, i
 
 @dataclass
 class Identities:
-    """Gives groups ids that last through time.
+    """Gives groups ids that last through time: a new object for each sequence, then one `step` for each partition.
 
-    State: next_id: the next new id. groups: members of each present group, by id. born: time at which each id began, of
-    ended groups, too. people: all people present at the last time.
+    State: next_id: the next new id, from 1. groups: members of each present group, by id. born: time at which each id
+    began, of ended groups, too. people: all people present at the last time.
     """
 
     next_id: int = 1
@@ -151,12 +152,13 @@ class Identities:
     def step(
         self, t: int, people: PersonSet, parts: Iterable[PersonSet], entered: PersonSet = frozenset()
     ) -> list[GroupChange]:
-        """Takes the partition of time t and returns what has changed since the last call; updates groups, born and
-        people.
+        """Takes the partition of time t and returns what has changed since the last call; updates groups, born, people
+        and next_id.
 
-        people: all people present. parts: the partition; people alone may be left out. entered: people who count as
-        having just entered although they were present before. t must not fall from call to call. At the first call all
-        groups enter.
+        people: all people present. parts: the partition, disjoint sets; people alone may be left out. entered: people
+        who count as having just entered although they were present before. t must not fall from call to call. At the
+        first call all groups enter. The changes of old groups come first, each in order of group id; [] if nothing
+        changed.
         """
         new: dict[int, PersonSet] = {}
         for part, kept in identify(self.groups, parts, self.born).items():

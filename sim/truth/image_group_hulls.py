@@ -59,20 +59,20 @@ def _members(truth: Truth, ground: tuple[Groups, ...]) -> tuple[Ints, Ints]:
 
 
 def _means(values: Array, cuts: Ints) -> Array:
-    """Returns the mean (G, ...) of values (R, ...) over each group's rows; empty if there is no group.
+    """Returns the mean (G, ...) of values (R, ...) over each group's rows; shape (0, ...) if there is no group.
 
-    cuts (G + 1,): index at which each group begins, the end last.
+    cuts (G + 1,): index of the row at which each group begins, the end last; each group has at least one row.
     """
     count = np.diff(cuts).reshape(-1, *[1] * (values.ndim - 1))
     return np.asarray(np.add.reduceat(values, cuts[:-1], axis=0) / count) if len(count) else values[:0]
 
 
 def hulls(ellipses: Outlines, cuts: Ints) -> list[Array]:
-    """Returns the convex hull (V, 2) of each group of silhouettes, px, counter-clockwise in (u, v).
+    """Returns the convex hull (V, 2) of each group of silhouettes, px, counter-clockwise in (u, v) coordinates.
 
-    ellipses: outlines of body and head of all members, group after group. cuts (G + 1,): index of the member at which
-    each group begins, the end last. A group with a silhouette that is nan, or without members, gets an empty hull (0,
-    2).
+    ellipses: outlines of body and head of all members, group after group; each gives 24 points. cuts (G + 1,): index of
+    the member at which each group begins, the end last. A group with a silhouette that is nan, or without members, gets
+    an empty hull (0, 2).
     """
     from sim.geometry import hull_kernels
 

@@ -1,7 +1,7 @@
 """Makes the truth of a motion: bodies as the camera sees them, and groups and events as they are measured.
 
-`bodies` gives the part that sensors need; `label` adds groups, events and hard negatives. The times of orders are not
-used; sim.truth.order_fulfilment checks afterwards whether the orders came true.
+`bodies` gives the part that sensors need; `label` adds groups, events and hard negatives (strangers who walk like a
+group). The times of orders are not used; sim.truth.order_fulfilment checks afterwards whether the orders came true.
 """
 
 from __future__ import annotations
@@ -83,7 +83,7 @@ def label(motion: Motion, camera: Camera | None) -> Truth:
 
 
 def _events(motion: Motion, group: Ints, changes: tuple[GroupEvent, ...]) -> tuple[GroupEvent, ...]:
-    """Returns all events of a motion, sorted by start, end, kind, members and groups after.
+    """Returns all events of a motion, sorted by start frame, end frame, kind, members and groups after.
 
     changes: its merge, split, form, dissolve, enter and leave events; crossings and queues are measured here. group (T,
     P): group id of each person, -1 = alone or absent.

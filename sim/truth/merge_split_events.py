@@ -1,7 +1,8 @@
 """Makes the merge, split, form, dissolve, enter and leave events of a crowd, and the group id of each person.
 
-Steps: sim.truth.group_membership says who is together in each frame, sim.truth.identity which group keeps its id and
-what kind of event a change is. Crossings and queues: sim.truth.crossing_events, sim.truth.queue_detection.
+It takes positions, velocities and intent (the group that the script means a person to belong to). Steps:
+sim.truth.group_membership says who is together in each frame, sim.truth.identity which group keeps its id and what kind
+of event a change is. Crossings and queues: sim.truth.crossing_events, sim.truth.queue_detection.
 """
 
 from __future__ import annotations
@@ -38,12 +39,13 @@ def groups_and_events(pos: Array, vel: Array, present: Bools, intent: Ints, fps:
     """Returns the group ids, the events (all kinds but cross and queue) and the near strangers of a motion.
 
     pos, vel (T, P, 2): m, m/s. present (T, P): flags. intent (T, P): index of the group a person is meant to belong to.
-    pos and vel are nan, intent is -1 where a person is absent. The id of a person is the column + 1; frames of events
-    count from 1.
+    pos and vel are nan, intent is -1 where a person is absent. fps: frames per s. The id of a person is the column + 1;
+    frames of events count from 1. Without frames there are no events.
 
     A merge, split, form or dissolve event starts in the first frame in which its rule holds, and ends when the rule has
-    held for HOLD_TIME (2 s). An enter event lies in the group's first frame, a leave event in the last frame before the
-    change. Groups that are there in frame 1 have no enter event.
+    held for HOLD_TIME (2 s). Rules: together if less than 1.5 m apart with velocities differing by less than 0.5 m/s;
+    apart if beyond 2.5 m, or 1.5 m with a difference above 0.7 m/s. An enter event lies in the group's first frame, a
+    leave event in the last frame before the change. Groups that are there in frame 1 have no enter event.
     """
     group = np.full(present.shape, -1, np.int64)
     identities, events = Identities(), []

@@ -1,8 +1,8 @@
 """Checks whether the orders of the script came true, from the finished truth, which is measured without the orders.
 
-An order is fulfilled by a measured event of its kind, with the right people, that starts no earlier than the order
-fired. The event's rule must have held for its whole time within PATIENCE of the firing. Orders are carried out by
-sim.crowd.order_execution.
+An order (merge, split or queue) is fulfilled by a measured event of its kind, with the right people, that starts no
+earlier than the order fired. The event's rule must have held for its whole time (2 s; queues 3 s) within PATIENCE (10
+s) of the firing. Orders are carried out by sim.crowd.order_execution.
 """
 
 from __future__ import annotations
@@ -83,9 +83,10 @@ def dense_groups(truth: Truth, shape: tuple[int, ...]) -> Ints:
 def fulfilment(order: Order, truth: Truth, group: Ints) -> int | None:
     """Returns the index in `truth.events` of the first event that fulfils an order, None if no event does.
 
-    group (T, P): group ids, -1 = alone, -2 = absent. The event has the right kind and people. It starts no earlier than
-    the order fired, and so that its rule has held long enough within PATIENCE (10 s) of the firing. An order that never
-    fired is not fulfilled; nor is any order if the truth has no events.
+    group (T, P): group ids, -1 = alone, -2 = absent. The event has the right kind (merge or form, split or dissolve,
+    queue) and people. It starts no earlier than the order fired, and early enough that its rule (2 s; queues 3 s) has
+    held within PATIENCE (10 s) of the firing. An order that never fired is not fulfilled; nor is any order if the truth
+    has no events.
     """
     if order.fired is None:
         return None
@@ -115,9 +116,10 @@ def _concerns(event: GroupEvent, order: Order, group: Ints) -> bool:
 
 
 def _together(wanted: list[Ints], group: Ints) -> bool:
-    """Returns True if the people of each part are in one group; a part of one person always is.
+    """Returns True if the people of each part are in one group; a part of one person always is. Two parts may be in one
+    group, too.
 
-    wanted: columns of each part. group (P,): group ids in one frame, negative = alone or absent.
+    wanted: columns (person id - 1) of each part. group (P,): group ids in one frame, negative = alone or absent.
     """
     return all(group[w[0]] >= 0 and bool((group[w] == group[w[0]]).all()) for w in wanted if len(w) > 1)
 
@@ -125,7 +127,7 @@ def _together(wanted: list[Ints], group: Ints) -> bool:
 def _apart(wanted: list[Ints], group: Ints) -> bool:
     """Returns True if no group has people of two parts; people alone or absent are ignored.
 
-    wanted: columns of each part. group (P,): group ids in one frame, negative = alone or absent.
+    wanted: columns (person id - 1) of each part. group (P,): group ids in one frame, negative = alone or absent.
     """
     ids = [set(group[w][group[w] >= 0].tolist()) for w in wanted]
     return sum(map(len, ids)) == len(set().union(*ids))
@@ -159,10 +161,11 @@ def closest(order: Order, motion: Motion, window: slice) -> str:
     """Returns in words how close the motion came to an order's rule within a window (slice) of frames that count from
     0.
 
-    Queue: the greatest number of people who waited at once, and the longest stretch with 3 of them. Merge: the smallest
-    distance of the most distant part from the others. Split: the greatest distance of the nearest part from the others.
-    Both with the velocity difference at that time. Says so if the window is empty or the parts were never there
-    together.
+    - Queue: the greatest number of its people slower than 0.4 m/s at once, and the longest stretch in s with 3 of them.
+    - Merge: in each frame the part furthest from the others counts; the least such distance, m. Split: the part nearest
+      to the others counts; the greatest such distance. Both with the velocity difference at that time, m/s.
+
+    If the window is empty, or the parts were never there together, it says that.
     """
     pos, vel, present = motion.pos[window], motion.vel[window], motion.present[window]
     if not len(pos):

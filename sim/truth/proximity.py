@@ -1,7 +1,8 @@
-"""Searches for people near each other in a motion.
+"""Searches for people near each other in a motion (positions and velocities of people in frames).
 
 Finds pairs of people closer than a distance, stretches of frames in which a condition holds for a pair, and strangers:
-pairs who satisfy the merge rule but do not belong to one group (hard negatives).
+pairs who satisfy the merge rule (less than 1.5 m apart, velocities differing by less than 0.5 m/s, for 2 s) but do not
+belong to one group (hard negatives).
 """
 
 from __future__ import annotations
@@ -30,9 +31,10 @@ def close_pairs(frame: Ints, pos: Array, reach: float) -> tuple[Ints, Ints]:
 
 
 def _portions(frame: Ints) -> Iterator[tuple[int, int]]:
-    """Yields half-open ranges (low, high) of rows that hold whole frames, of about CHUNK (200,000) rows each.
+    """Yields half-open ranges (low, high) of rows that hold whole frames, of about CHUNK (200,000) rows each; none
+    without rows.
 
-    frame (R,): ascending frame of each row.
+    frame (R,): ascending frame of each row. A range ends with the frame that its 200,000th row belongs to.
     """
     low = 0
     while low < len(frame):

@@ -76,10 +76,11 @@ class _FollowedLine:
     """A line of waiting people that is followed through time. Frames count from 0; people are columns (person id - 1).
 
     - now: the line when last seen. since, three: first and last frame with at least 3 people (QUEUE_PEOPLE).
-    - middle: x, y of the line in the frame in which following began, m.
-    - seen: by person, number of moments in the line. gone: by person, the line in the last of these moments.
+    - middle: x, y of the line's middle in the frame in which following began, m.
+    - seen: by person, number of moments (examined frames) in the line. gone: by person, the line in the last of these
+      moments.
     - ranks: all people seen, in order along the line.
-    - drift: sum over `moments` moments of the velocity along the line and to its left, m/s.
+    - drift: sum over `moments` moments of the line's mean velocity along itself and to its left, m/s.
     """
 
     now: _LineNow
@@ -187,7 +188,7 @@ def _lines(pos: Array, vel: Array, waits: Bools, stride: int) -> list[_LineNow]:
 
 
 def _of_table(c: QueueShapes, t: Ints, p: Ints, vel: Array, kept: Bools) -> Iterator[_LineNow]:
-    """Yields those lines of the table c whose flag in kept (M,) is True.
+    """Yields those lines of the table c (M ordered sets of people) whose flag in kept (M,) is True.
 
     t, p: frame (from 0) and column of the person in each row that c.rows refers to. vel (T, P, 2): m/s; nan counts as
     0.
@@ -235,14 +236,20 @@ def _dot(a: Vector, b: Vector) -> float:
 
 
 def _same_order(before: _LineNow, now: _LineNow) -> bool:
-    """Returns True if the people who are in both lines stand in the same order, whichever end each line starts from."""
+    """Returns True if the people who are in both lines stand in the same order; `now` is read backwards if it points
+    the other way.
+
+    With fewer than two people in both lines the answer is True.
+    """
     order = now.order if _dot(before.u, now.u) >= 0 else now.order[::-1]
     return [p for p in order if p in before.order] == [p for p in before.order if p in order]
 
 
 def _record_people(f: _FollowedLine) -> None:
-    """Counts the people of f.now in `seen` and `gone`, and inserts new people in `ranks` behind all who stand before
+    """Counts the people of f.now in `seen`, sets `gone`, and inserts new people in `ranks` behind all who stand before
     them.
+
+    A new person with nobody before comes first. Modifies f.
     """
     for k, p in enumerate(f.now.order):
         f.seen[p] = f.seen.get(p, 0) + 1

@@ -1,9 +1,9 @@
 """Finds lines of people who stand behind one another, each in one moment: the shape of a queue.
 
 People of one moment who stand close to each other form a crowd. A line is an ordered set of people of a crowd for which
-three tests hold along the straight line that fits them best: neighbours are MIN_SPACING to MAX_SPACING apart, nobody is
-more than MAX_OFFSET off the straight line, and the direction from one person to the next turns by at most 60°. A circle
-of people in conversation can pass the first two tests, but not the third.
+three tests hold along the straight line that fits them best: neighbours are 0.4 to 1.5 m apart (MIN_SPACING,
+MAX_SPACING), nobody is more than 0.5 m (MAX_OFFSET) off the straight line, and the direction from one person to the
+next turns by at most 60°. A circle of people in conversation can pass the first two tests, but not the third.
 
 All moments are handled at once. Tables of positions (M, n, 2) hold M ordered sets; only the first `count` (M,)
 positions of each set count.
@@ -61,7 +61,8 @@ def queue_shapes(pos: Array, i: Ints, j: Ints) -> Iterator[QueueShapes]:
 
 
 def _crowds(people: int, i: Ints, j: Ints) -> Iterator[Ints]:
-    """Yields for each size n > 1, ascending, the rows (C, n) of the C crowds of n people.
+    """Yields for each size n > 1 that occurs, ascending, the rows (C, n) of the C crowds of n people, ascending in each
+    crowd.
 
     people: number of rows. i, j (K,): pairs of rows that stand close; a crowd is a set of rows that pairs connect.
     """
@@ -80,9 +81,10 @@ def _crowds(people: int, i: Ints, j: Ints) -> Iterator[Ints]:
 def _best(p: Array) -> tuple[Ints, Ints]:
     """Returns the order (C, n) of the people along the line in each crowd, and the number of people in the line (C,).
 
-    The number is 0 for a crowd without a line; only that many entries of the order are valid. p (C, n, 2): positions,
-    m. Unless the whole crowd is a line, the longest line is taken; of several, the one with the smallest squared
-    distances.
+    The order holds indices into the crowd; only the first `number` entries are valid. The number is 0 for a crowd
+    without a line. p (C, n, 2): positions, m. Unless the whole crowd is a line, the longest line of at least 3 people
+    and two thirds of the crowd is taken; of several, the one with the smallest squared distances from its straight
+    line.
     """
     n = p.shape[1]
     whole_crowd = np.full(len(p), n)
