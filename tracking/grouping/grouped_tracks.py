@@ -43,8 +43,8 @@ def with_groups(
     tracks: one tracker's, one `Tracks` per frame, from frame 1. fps: frames per second. px_per_m: scale, px per m, if
     they are in the image. rule: None stands for the default rule.
 
-    The tracks are returned unchanged if there are none, if all are marked as derived, if one has unit "group", or if
-    they are in the image and px_per_m is nan or infinite. Raises InputError if they are in the image and px_per_m is 0
+    The tracks are returned unchanged if there are none, if all are marked as derived, or if one has unit "group". So
+    are tracks in the image if px_per_m is nan or infinite. Raises InputError if they are in the image and px_per_m is 0
     or below.
     """
     if all(t.derived for t in tracks) or (tracks[0].plane == "image" and not math.isfinite(px_per_m)):

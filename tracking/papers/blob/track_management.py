@@ -169,8 +169,8 @@ class TrackedPeople:
         unseen.
 
         z: centre x, y, height, width, px. unseen (N,): flags of tracks without a measurement. A box covers several
-        tracks if it holds their centres, and if the hull of their boxes fits it (IoU) at least as well as the best
-        single box, and at least SAME = 0.5. Also sets miss_explained of the unseen tracks in such a box.
+        tracks if it holds their centres and fits the hull of their boxes: with an IoU of at least SAME = 0.5, and not
+        below that with the best single box. Also sets miss_explained of the unseen tracks in such a box.
         """
         found = np.zeros(len(z), bool)
         if not len(z) or not unseen.any():
@@ -246,9 +246,11 @@ class TrackedPeople:
         """Returns the table positions (K,), ascending, of the tracks to report at time t, s (ours).
 
         Reported are measured tracks that are confirmed or at least report_delay old. A missed confirmed track is
-        reported until its uncertainty rho passes the value after report_coast (the longer of it and report_hidden if
-        the miss is explained), while its misses since the last measurement are at most report_credit times the frames
-        in which it was measured, and not while it leaves the field of view.
+        reported while all of this holds:
+        - its uncertainty rho is at most the value after report_coast (the longer of it and report_hidden if the miss is
+          explained);
+        - its misses since the last measurement are at most report_credit times the frames in which it was measured;
+        - it does not leave the field of view.
         """
         reported = self.measured & (self.confirmed | (t - self.born >= self.config.report_delay - 1e-6))
         lost = (self.confirmed & ~self.measured).nonzero()[0]

@@ -78,8 +78,8 @@ class Blob:
         """Delete all tracks and start a sequence: from pixels if the context has a background sample, else from boxes.
 
         `seed` is not used. If the image's size is unknown, it is taken from the background sample. Raises InputError if
-        the config's noises confirm new tracks at once, if the background sample has a wrong shape, too few frames or
-        shows no background, or, from pixels, if the scale px_per_m is zero or negative (nan: it is learned).
+        the config's noises confirm new tracks at once. From pixels it is also raised if the sample has a wrong shape or
+        dtype, too few frames or shows no background, or if the scale px_per_m is zero or negative (nan: it is learned).
         """
         c = self.config
         if context.image_size is None and context.background is not None:

@@ -77,11 +77,11 @@ def gated_distances(bank: GroupBank, points: Array, scaled: ScaledParameters, t:
 def attached(points: Array, d2: Array, bank: GroupBank, scaled: ScaledParameters) -> Ints:
     """Return for each point (M,) the row of the group that it is attached to, or -1 (ours).
 
-    points (M, 2); d2 (G, M): inf outside the search regions. A point in no region is attached to a group if it is
-    linked (at most 2 r apart, the config's radius), directly or through others, to a point in the group's region; of
-    several groups, to the one whose point is nearest. From points, a confirmed group takes only points within walking
-    distance (2 m/s for a frame, and 3 standard deviations) of its members: the others are newcomers or false alarms. A
-    point in a region gets -1.
+    points (M, 2); d2 (G, M): inf outside the search regions. A point in a region gets -1. A point in no region is
+    attached to a group if it is linked to a point in the group's region, directly or through others. Linked points are
+    at most 2 r apart (r: the config's radius). Of several groups it gets the one whose point is nearest. From points, a
+    confirmed group takes only points within walking distance (2 m/s for a frame, and 3 standard deviations) of its
+    members. The others are newcomers or false alarms.
     """
     link, owner = scaled.constraint.link, np.full(len(points), -1)
     taken = np.isfinite(d2).any(0) if len(d2) else np.zeros(len(points), bool)

@@ -120,9 +120,11 @@ def confirm(bank: GroupBank, scaled: ScaledParameters, t: float, ids: GroupIds) 
 def _recaptured(bank: GroupBank, new: Ints, old: Ints, scaled: ScaledParameters) -> Iterator[tuple[int, int]]:
     """Yields pairs (row of a new group, row of an unmeasured old group) that are the same group, nearest first.
 
-    new, old: rows of the bank to compare. The new state lies in the old group's predicted region of position and
-    velocity (squared Mahalanobis distance at most 13.28), the velocities differ by no more than `merge_velocity` and a
-    standard deviation, and the old group was last measured before the new one's birth. No row occurs twice.
+    new, old: rows of the bank to compare. No row occurs twice. A pair satisfies all of this:
+    - The new state lies in the old group's predicted region of position and velocity (squared Mahalanobis distance at
+      most 13.28).
+    - The velocities differ by no more than `merge_velocity` and a standard deviation.
+    - The old group was last measured before the new one's birth.
     """
     d = bank.x[new][:, None] - bank.x[old]
     S = bank.P[new][:, None] + bank.P[old]

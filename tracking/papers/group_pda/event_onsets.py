@@ -54,10 +54,10 @@ class PairHistory:
         """Return when, in s, the groups came to be near with like velocities, and where (2,), in the points' unit:
         half-way between the centroids.
 
-        merge_velocity: m/s. The onset is the moment after the last one in which the gap between nearest people was
-        above 1.5 m, or the velocity difference, by chords from 0.7 s before to 0.7 s after, was above 1.2
-        merge_velocity at a time up to `alike_since`; the first moment if there is none. It is the last moment at the
-        latest. There must be a moment (else TypeError).
+        merge_velocity: m/s. The onset is the moment after the last one in which the pair was not yet near and alike;
+        the first moment if there is none, the last moment at the latest. Not near: the gap between nearest people is
+        above 1.5 m. Not alike: the velocity difference, by chords from 0.7 s before to 0.7 s after, is above 1.2
+        merge_velocity; only moments up to `alike_since` count. There must be a moment (else TypeError).
         """
         t, d = np.array([m.t for m in self.moments]), np.array([m.difference for m in self.moments])
         before = (chords(t, d, MERGE_CHORD) > MERGE_CHORD_MARGIN * merge_velocity) & (t <= self.alike_since)
