@@ -15,8 +15,9 @@ def generate(options: GenerateOptions) -> CommandResult:
 
     The result's data: "sequences", the folders, and "folder", their parent. Stored sequences that are intact are kept.
 
-    Raises InputError for wrong options or scenarios, a folder with another sequence, or if all failures are wrong
-    input. Raises WorkError if another sequence could not be made, after the others, or the disk is full.
+    Raises InputError before anything is simulated for wrong options or scenarios, or a folder with another sequence. If
+    sequences fail, the others are made first; then InputError is raised if all failures are wrong input, else
+    WorkError. A full disk ends the work at once with WorkError.
     """
     from sim.dataset.generate import generate as make
     from sim.workers.start import WorkerOptions

@@ -138,10 +138,11 @@ def _score_all(sequences: list[Sequence], tracks: Path, method: ComparisonMethod
 
 
 def score_run(sequence: Sequence, run: TrackingRun, method: ComparisonMethod = DEFAULT) -> SequenceScores:
-    """Returns the scores of one run: a tracker's tracks of one sequence.
+    """Returns the scores of one run: a tracker's tracks of one sequence, with the words of run.json on its detections.
 
-    Raises InputError if the sequence has no labels or cannot be compared in this way, or the scale in px per m is not
-    above 0 where groups are derived in the image. Raises ValueError if an id occurs twice in one frame.
+    method: how people and groups are compared. Raises InputError if the sequence has no labels or cannot be compared in
+    this way, or the scale in px per m is not above 0 where groups are derived in the image. Raises ValueError if an id
+    occurs twice in one frame.
     """
     if sequence.truth is None:
         raise InputError(
