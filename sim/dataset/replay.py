@@ -134,8 +134,9 @@ def on_ground(truth: Truth, source: Sequence, calibration: Camera | None = None)
     """Return the positions on the ground (R, 2) m, x and y, of the R rows of a truth, nan where unknown.
 
     They are the truth's own positions if it has some. Otherwise they are the feet of its boxes (middle of the lower
-    edge), projected with `calibration` or, if that is None, the source's camera onto the ground z = 0. Without a
-    camera, a CAVIAR recording gives the boxes' centres divided by the image scale px_per_m, with y upwards.
+    edge; of the box for a camera of kind "top"), projected with `calibration` or, if that is None, the source's camera
+    onto the ground z = 0. Without a camera, a CAVIAR recording gives the boxes' centres divided by the image scale
+    px_per_m, with y upwards.
 
     Raises InputError if none of these is known, or if a calibration is given for a truth with positions. Raises
     AssertionError for a truth with neither positions nor boxes.

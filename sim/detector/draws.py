@@ -45,8 +45,9 @@ def poisson_counts(rate: float, u: Array) -> Ints:
     """Return the quantiles (N,) int64 of a Poisson distribution of mean `rate` at uniforms u (N,); zeros if the rate is
     0.
 
-    A quantile is the smallest number whose cumulative probability is at least u. For a fixed u it never falls when the
-    rate rises. Raises ValueError for a negative or nan rate.
+    A quantile is the smallest number whose cumulative probability is at least u; it is at most rate + 12 √rate + 20,
+    also at u = 1. For a fixed u below 1 it never falls when the rate rises. Raises ValueError for a negative or nan
+    rate.
     """
     if not rate:
         return np.zeros(len(u), np.int64)

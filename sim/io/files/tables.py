@@ -164,7 +164,8 @@ def json_document(value: dict[str, Any]) -> bytes:
 
 
 def json_list(name: str, items: Iterable[dict[str, Any]]) -> bytes:
-    """Return the JSON file {"format": 1, name: [items]} as UTF-8 bytes, with one item per line; no items give [].
+    """Return the JSON file {"format": 1, name: [items]} as UTF-8 bytes, with one item per line; without items the list
+    is empty.
 
     Raises ValueError for NaN and infinity, TypeError for a type that JSON does not have.
     """

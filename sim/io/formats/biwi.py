@@ -94,8 +94,9 @@ def read_truth(folder: Path, fps: float = FPS) -> Truth:
 
     Groups are those of groups.txt, the same in all frames, and every frame counts as labelled; their hulls and events
     are measured from the motion. Without groups.txt everybody is alone, no frame counts as labelled, and groups and
-    events are None. fps: annotated frames per second, default 2.5. Raises InputError if obsmat.txt or groups.txt is
-    unreadable or invalid; warns if two lines of groups.txt share a person.
+    events are None. Visibility is 1, the ground's height 0, the image scale nan. fps: annotated frames per second,
+    default 2.5. Raises InputError if obsmat.txt or groups.txt is unreadable or invalid; warns if two lines of
+    groups.txt share a person.
     """
     rows, frame, id = _table(folder)
     pos, vel = rows.values[:, (2, 4)], rows.values[:, (5, 7)]

@@ -166,9 +166,12 @@ def detection_files(detections: list[Detections], fps: float, scene: Scene | Non
 
     detections: one Detections per frame, from frame 1, all of one plane, and all with or without boxes and velocities
     (else AssertionError); none give tables without rows. fps: frames/s. scene: gives the height of the ground, which is
-    the z of ground points (x, y) in det.txt; None: 0. Missing scores are written as 1. Columns of det.txt: frame, id,
-    left, top, width, height, score, x, y, z. There the id is -1, a missing box -1,-1,-1,-1, the position of a detection
-    in the image -1,-1,-1, and a width or height below 0.01 px 0.01.
+    the z of ground points (x, y) in det.txt; None: 0. Missing scores are written as 1.
+
+    Columns of det.parquet: frame (from 1), x, y, (z), score, and, where known, vx, vy, (vz), box_left, box_top,
+    box_width, box_height. Columns of det.txt: frame, id, left, top, width, height, score, x, y, z. There the id is -1,
+    a missing box -1,-1,-1,-1, the position of a detection in the image -1,-1,-1, and a width or height below 0.01 px
+    0.01.
     """
     plane, boxed, moving = _form(detections)
     axes = ("x", "y", "z")[: detections[0].pos.shape[1]] if detections else ("x", "y")
