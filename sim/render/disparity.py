@@ -58,5 +58,5 @@ def frame_disparities(
 
 
 def _scale(left: CameraView, right: CameraView) -> float:
-    """Return the horizontal focal length (px) times the distance of the two cameras (m), in px m."""
+    """Return the left view's horizontal focal length (px) times the distance of the two views' cameras (m), in px m."""
     return left.camera.focal_px[0] * float(np.linalg.norm(right.camera.position - left.camera.position))

@@ -16,7 +16,7 @@ Eqs 5, 6, 9, 10 are in background_kernels, eqs 3, 4, 7, 8 in background_training
 Departures (ours; all of them: docs/reference/foreground.md). `dark` is a limit of alpha instead of a normalised
 threshold, and a pixel within the noise is never dark foreground. `bright` is a limit of alpha, too. The model adapts,
 and follows the gain of each frame. If all frames of the sample are grey (R = G = B), chromaticity is not available:
-every darker pixel is dark foreground and every brighter one is foreground.
+every pixel beyond the brightness thresholds is foreground, dark foreground if it is darker.
 """
 
 from __future__ import annotations
@@ -46,7 +46,7 @@ class Background:
     """The background model of a still camera, H x W px; colours are BGR.
 
     State, float32 unless noted:
-        mean (3, H, W)        E: mean of each colour channel at gain 1, grey levels 0 to 255; changed by `adapt`
+        mean (3, H, W)        E: mean of each colour channel at gain 1, grey levels, 1 or more; changed by `adapt`
         var (3, H, W)         variance of each channel in the image, squared grey levels; changed by `adapt`
         gain (3,)             brightness of the last classified frame relative to `mean`, 1 at first; set by `classify`
         s, b (H, W)           normalisers, no unit: of brightness (s = a |E / sigma|, sigma^2 the variance) and of

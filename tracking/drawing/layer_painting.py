@@ -41,8 +41,8 @@ KIND_COLOUR = {"merge": 0, "split": 1, "cross": 3, "queue": 2, "form": 4, "disso
 class LayerStyle:
     """How a layer is drawn.
 
-    plain: thin white boxes (and discs for people without a box) only, no trails, ellipses, ids or groups; for the
-    truth under tracks. rim: boxes have a light edge; without effect on plain and dashed boxes.
+    plain: thin white boxes (and rings for people without a box) only, no trails, ellipses, ids or groups; for the truth
+    under tracks. rim: boxes have a light edge; without effect on plain and dashed boxes.
     """
 
     plain: bool = False

@@ -284,11 +284,10 @@ def ellipse(centre: Array, cov: Array, sigmas: float) -> Array:
 
 
 def _ellipses(t: Tracks, camera: Camera | None, scene: Scene | None) -> Array:
-    """Returns the 95 % ellipses of the people's positions in a picture, (N, 32, 2) px.
+    """Returns the 95 % ellipses of the positions of the N people of one frame's tracks `t` in a picture, (N, 32, 2) px.
 
     A row is nan where the covariance is not finite, or a point of the ellipse cannot be seen by the camera. camera:
-    None: rows of tracks on the ground are nan. scene: gives the ground's height; None: 0.
-    """
+    None: rows of tracks on the ground are nan. scene: gives the ground's height; None: 0."""
     found = np.full((len(t.id), len(UNIT_CIRCLE), 2), np.nan)
     for k, cov in enumerate(t.cov[:, :2, :2]):
         points = _in_picture(ellipse(t.pos[k, :2], cov, SIGMA_95), t.plane, camera, scene)

@@ -67,9 +67,9 @@ def linked(points: Array, link: float) -> Ints:
 def partition(points: Array, weights: Array, rule: Constraint) -> Ints:
     """Returns the group of each point, (M,), numbered 0, 1, … in the order of the groups' first points; -1 for noise.
 
-    points (M, 2): x, y; weights (M,): people that each point stands for. rule: linked points (at most rule.link apart)
-    are components; components of less total weight than rule.least are noise. Components whose search regions (ellipses
-    round their means) overlap, also through others, are one group. No points give an empty array.
+    points (M, 2): x, y; weights (M,): people that each point stands for, above 0. rule: linked points (at most
+    rule.link apart) are components; components of less total weight than rule.least are noise. Components whose search
+    regions (ellipses round their means) overlap, also through others, are one group. No points give an empty array.
     """
     label, sums = kernels.components(points, weights, rule.link)
     parts = np.flatnonzero(sums[:, kernels.WEIGHT] >= rule.least)

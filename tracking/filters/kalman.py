@@ -75,10 +75,10 @@ def born(place: Array, var: Array | float, rate_var: Array | float) -> Array:
 
 
 def predict(state: Array, dt: float, q: Array) -> None:
-    """Predict a bank of filters one step of dt s ahead, in place; returns nothing.
+    """Predict a bank of N filters of D coordinates one step of dt s ahead, in place; returns nothing.
 
     state (5, N, D): rows place, rate, variance of the place, covariance, variance of the rate. q (3, N, D) or (3, D):
-    process noise of the step, from `white_acceleration`.
+    process noise of the step, entries place, covariance, rate, from `white_acceleration`.
     """
     place, rate, var, cov, rate_var = state
     place += dt * rate  # eq. 1

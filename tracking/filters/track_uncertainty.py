@@ -112,7 +112,7 @@ def hits_to_confirm(dynamics: Dynamics, confirm_ratio: float, limit: int = 1000)
     confirm_ratio.
 
     rho is sqrt|S| over its asymptote, S the innovation covariance, at the prediction for the last of these frames; so
-    the result is at least 2. Returns `limit` if that many frames or more are needed, or if they never do.
+    the result is at least 2. Returns `limit` (above 1) if that many frames or more are needed, or if they never do.
     """
     state, q = dynamics.newborn(), dynamics.q
     for hits in range(1, limit):
