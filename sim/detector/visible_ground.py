@@ -56,9 +56,10 @@ class VisibleGround:
     def usual_height(self, u: float, v: float) -> float:
         """Return the height in px of the box of a standard person (1.7 m) whose feet are at image point (u, v) px.
 
-        Without a camera it is estimated from the labelled boxes, within half the least and 1.5 times the greatest
-        labelled height; 1 px without boxes. Where the camera gives no box, as right under it, it is 1.7 m at a depth
-        that equals the camera's height, at least 1 m.
+        With a camera it is that of the person's projection. Where the camera gives no box, as right under it or where
+        no ground is seen, it is 1.7 m at a depth that equals the camera's height, at least 1 m. Without a camera it is
+        estimated from the labelled boxes, within half the least and 1.5 times the greatest labelled height; 1 px
+        without boxes.
         """
         if self.camera is None:
             return float(np.clip(self.line @ [1.0, v], *self.limits))

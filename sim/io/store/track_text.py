@@ -24,8 +24,8 @@ def read_track_text(path: Path, fps: float, length: int | None, *, projected: bo
     length: None: to the last frame in the file. fps: frames/s. Tracks of a frame are sorted by id. Positions are on the
     ground (m) if the file has them, else box centres in the image (px). Velocities are differences over 0.5 s,
     covariances nan, and everybody is alone (group -1). Boxes are None if a row lacks one. Scores are 1 if the file has
-    none; if one is outside [0, 1], all are scaled so that the lowest is 0 and the highest 1. projected: True leaves the
-    boxes out if there are ground positions, since they were computed from these.
+    none; if one is outside [0, 1], all are scaled so that the lowest is 0 and the highest 1 (all 1 if equal).
+    projected: True leaves the boxes out if there are ground positions, since they were computed from these.
 
     Raises InputError if the file is unreadable, a line is invalid, a frame is beyond `length`, an id is negative or
     stands twice in a frame, only some lines have a ground position, a line has neither box nor ground position, or the
