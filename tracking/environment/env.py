@@ -226,7 +226,7 @@ class TuningEnv(gymnasium.Env[Floats, Floats]):
         return episode_picture(opened, self.rollout, self.score)
 
     def close(self) -> None:
-        """Ends the episode and empties the cache of sources. `reset` may follow."""
+        """Ends the episode and replaces the cache of sources by an empty one. `reset` may follow."""
         self._clear_episode()
         self.cache = SourceCache(self.cache.limit)
 

@@ -25,8 +25,8 @@ AnyTracker = str | type[Tracker]
 class Episode:
     """The result of an episode: one tracker on one sequence.
 
-    - name, seed: of the source.
-    - objective: mean of HOTA and group_F1_hull; nan if there is nothing to score.
+    - name, seed: of the source, a scenario or recording.
+    - objective: mean of HOTA and group_F1_hull, or the one that is known; nan if there is nothing to score.
     - scores: by key of the catalogue, without those that are nan.
     - frames: number of frames played.
     - seconds_tracking: time in the tracker, s.

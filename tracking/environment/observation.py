@@ -36,8 +36,9 @@ TWO_PEOPLE = 1.5
 class Statistic:
     """One number of the observation: its name and its meaning in words.
 
-    half: the value that 0.5 stands for, in `unit`; None for a share, which stands for itself. unit: "" for plain
-    numbers."""
+    half: the value that 0.5 stands for, in `unit`; None for a share, which stands for itself. unit: such as "s" or
+    "m/s", "" for plain numbers, "share" for shares.
+    """
 
     name: str
     half: float | None
@@ -242,7 +243,9 @@ def _detection_values(found: DetectionRows, rows: TrackRows, frames: int) -> dic
 def _picture_values(brightness: Sequence[float]) -> dict[str, float]:
     """Returns a dict: brightness of the last picture, and lights, the mean relative change from picture to picture.
 
-    brightness: of consecutive pictures, each in [0, 1]. {} without pictures; lights is 0 with one picture."""
+    brightness: of consecutive pictures, each in [0, 1]. A change is divided by the earlier brightness, at least 0.001.
+    {} without pictures; lights is 0 with one picture.
+    """
     if not brightness:
         return {}
     level = np.array(brightness)

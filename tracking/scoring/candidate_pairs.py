@@ -216,9 +216,9 @@ def matrix_pairs(
 ) -> Pairs:
     """Returns the pairs of similarity above 0, from lists with one entry per frame; entry 0 becomes frame 0.
 
-    true_ids: ids (N,) of each frame; est_ids: ids (M,); similarity: a matrix (N, M) of each frame, rows as true_ids,
-    columns as est_ids. N and M may differ between frames and may be 0. All three lists must have equal length and
-    fitting shapes; this is not checked.
+    true_ids: whole-number ids (N,) of each frame; est_ids: ids (M,); similarity: a matrix (N, M) of each frame, rows as
+    true_ids, columns as est_ids. N and M may differ between frames and may be 0. A similarity of 2.2e-16 or less, or
+    nan, gives no pair. All three lists must have equal length and fitting shapes; this is not checked.
     """
     true, est = _stack_ids(true_ids), _stack_ids(est_ids)
     flat = np.concatenate([np.zeros(0), *(np.asarray(m, float).ravel() for m in similarity)])

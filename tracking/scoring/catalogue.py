@@ -22,8 +22,9 @@ class Score:
     """One score of the catalogue.
 
     - key: its name in the results, such as "HOTA".
-    - family: name of the group of scores that are shown together.
-    - unit: "1" for a share; "m | px" for a length in m on the ground or in px in the image; "count", "s", "people".
+    - family: name of the group of scores that are shown together, such as "people".
+    - unit: "1" for a share; "m | px" for a length in m on the ground or in px in the image ("m² | px²" squared); "m/s",
+      "count", "s", "people".
     - low, high: range of possible values; may be infinite.
     - better: whether "higher" or "lower" values are better, or "neither".
     - meaning: definition in words.
@@ -272,7 +273,11 @@ CATALOGUE = MappingProxyType({score.key: score for score in ALL})
 
 
 def table() -> str:
-    """Returns the catalogue as a Markdown table, without the core scores, whose keys end in `_core`."""
+    """Returns the catalogue as a Markdown table with the columns key, unit, range, better, meaning, source, one line
+    per score.
+
+    Core scores, whose keys end in `_core`, are left out.
+    """
     lines = ["| key | unit | range | better | meaning | source |", "| --- | --- | --- | --- | --- | --- |"]
     for score in ALL:
         if score.family != CORE:

@@ -102,8 +102,8 @@ def evaluate(
 class Scorer:
     """Scores any number of trackers against one truth.
 
-    State: truth; labelled (length + 1,), which frame numbers have labelled groups; the true people and groups as rows
-    of arrays, built at first use and kept. The truth must not change meanwhile.
+    State: truth; labelled (length + 1,), bool by frame number: the frame has labelled groups; the true people and
+    groups as rows of arrays, built at first use and kept. The truth must not change meanwhile.
     """
 
     def __init__(self, truth: Truth) -> None:
@@ -148,10 +148,11 @@ class Scorer:
     ) -> Scores:
         """Returns every score of the catalogue for one tracker against this truth, as the function `evaluate` does.
 
-        tracks: one `Tracks` per frame, any order. similarity: "boxes", "ground", "image" or None (boxes if both sides
-        have them, else the tracks' plane). group_match: "hull" or "members". frames: n for frames 1 … n, a range, or
-        None for all. Scores of people are nan for a tracker of whole groups. Scores of groups and events are nan if no
-        chosen frame is labelled.
+        tracks: one `Tracks` per frame, any order; of two with equal frame the later is used. similarity: "boxes",
+        "ground", "image" or None (boxes if both sides have them, else the tracks' plane). group_match: "hull" or
+        "members". frames: n for frames 1 … n, a range, or None for all. A frame without tracks counts as empty. Groups
+        and events that the tracks lack come from the baseline rule. Scores of people are nan for a tracker of whole
+        groups. Scores of groups and events are nan if no chosen frame is labelled.
 
         Raises IncomparableError if boxes or positions are missing, ValueError if an id occurs twice in one frame,
         InputError if groups must be derived in the image and `truth.px_per_m` is 0 or less.

@@ -50,12 +50,12 @@ class EventMembers:
 class ComparableEvent:
     """An event whose members are true people, so that a true and a tracker's event can be compared.
 
-    - kind: one of `KINDS`, or "form" or "dissolve".
+    - kind: "merge", "split", "cross", "queue", "enter", "leave", "form" or "dissolve".
     - start: frame number from 1 in which the event begins.
     - emitted: frame number of the `Tracks` that report it; None in the truth.
-    - members: None if the tracker names no people.
-    - pos: x, y, in m on the ground or px in the image.
-    - parents, children: the groups (or single people) before and after the event; None if unknown.
+    - members: the people concerned; None if the tracker names no people.
+    - pos: x, y, in m on the ground or px in the image; nan unknown.
+    - parents, children: one `EventMembers` per group (or single person) before and after the event; None if unknown.
     """
 
     kind: str
@@ -76,7 +76,8 @@ class ComparableEvent:
 class MatchedEvents:
     """All events of one kind in a sequence, of the truth and of a tracker, and which of them match.
 
-    - kind: one of `KINDS`; "form" is among the merges, "dissolve" among the splits.
+    - kind: "merge", "split", "cross", "queue", "enter" or "leave"; "form" is among the merges, "dissolve" among the
+      splits.
     - true, est: the true events and the tracker's events of this kind, matched or not.
     - pairs: the matched events, each (true event, tracker's event); an event is in one pair at most.
     """
@@ -176,9 +177,10 @@ def event_scores(matched: Sequence[MatchedEvents], fps: float) -> dict[str, floa
 
 
 def _latencies(matched: Sequence[MatchedEvents], fps: float) -> list[float]:
-    """Returns the delays of matched events in s: frame of the report minus the true start, divided by fps.
+    """Returns the delays of matched events in s: frame of the report (`emitted`) minus the true start, divided by fps.
 
-    Negative if reported before the true start. Reports without `emitted` are left out.
+    matched: matched events of one or more kinds, whose delays come one after the other. Negative if reported before the
+    true start. Reports without `emitted` are left out.
     """
     return [(b.emitted - a.start) / fps for m in matched for a, b in m.pairs if b.emitted is not None]
 
@@ -204,7 +206,10 @@ def lineage_scores(matched: Sequence[MatchedEvents]) -> dict[str, float]:
 
 
 def _same_lineage(true: ComparableEvent, est: ComparableEvent) -> bool:
-    """True if parents agree and children agree, as `_same_parts` defines it; False if any of the four is None."""
+    """True if the parents of both events agree and the children agree; False if any of the four is None.
+
+    They agree if both sides have equally many, and each true one has a Jaccard index above 0.5 with some estimated one.
+    """
     if true.parents is None or true.children is None or est.parents is None or est.children is None:
         return False
     return _same_parts(true.parents, est.parents) and _same_parts(true.children, est.children)

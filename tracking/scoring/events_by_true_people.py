@@ -26,9 +26,10 @@ def true_events(
 ) -> list[ComparableEvent]:
     """Returns the truth's events of known kinds that start in a frame f where frames[f] is true, in the order given.
 
-    Known kinds are those of `KINDS`, form and dissolve. frames (length + 1,): bool by frame number. people: the R true
-    people in frames. positions (R, 2): their x, y on the surface of comparison, in m or px; None if `GroupEvent.pos` is
-    on it already. With positions, an event lies at the mean of its members at its start (nan if none is present).
+    Known kinds are merge, split, cross, queue, enter, leave, form and dissolve. frames (length + 1,): bool by frame
+    number. people: the R true people in frames. positions (R, 2): their x, y on the surface of comparison, in m or px;
+    None if `GroupEvent.pos` is on it already. With positions, an event lies at the mean of its members at its start
+    (nan if none is present).
 
     Parents are the groups of the members one frame before the start, children are the groups at the start; a member
     alone or absent is a part of its own. If both are equal, form and dissolve take parents and children from the kind.
@@ -51,7 +52,10 @@ def true_events(
 
 
 def _counts(event: GroupEvent, frames: Bools) -> bool:
-    """True if the event's kind is scored, and frames[event.start] is true; False if the start is outside `frames`."""
+    """True if the event's kind is scored, and frames[event.start] is true; False if the start is outside `frames`.
+
+    Scored kinds are merge, split, cross, queue, enter, leave, form and dissolve. frames: bool by frame number.
+    """
     known = event.kind in KINDS or event.kind in COUNTS_AS
     return known and 0 <= event.start < len(frames) and bool(frames[event.start])
 
@@ -62,9 +66,9 @@ def _group_by_row(group: Ints) -> list[int]:
 
 
 def _by_group(members: Sequence[int], group: Callable[[int], int]) -> list[list[int]]:
-    """Returns the members (ids) as lists, one per group, in the order of first appearance.
+    """Returns the members (person ids) as lists, one per group, in the order of the groups' first member.
 
-    group(id): the member's group, -1 for none. A member without a group is a list of its own.
+    group(id): the member's group, -1 for none. A member without a group is a list of its own. No members give [].
     """
     parts: dict[tuple[int, int], list[int]] = {}
     for m in members:
@@ -105,9 +109,9 @@ def tracked_events(
 ) -> list[ComparableEvent]:
     """Returns a tracker's events with members, of known kinds, that start in a frame f where frames[f] is true.
 
-    tracks: of the scored frames. people: the R tracked people in frames. mapping (R,): the row of `true` that each is
-    mapped to, -1 none. true: rows of the true people. frames (length + 1,): bool by frame number. fps: frames per
-    second.
+    Known kinds are merge, split, cross, queue, enter, leave, form and dissolve. tracks: of the scored frames. people:
+    the R tracked people in frames. mapping (R,): the row of `true` that each is mapped to, -1 none. true: rows of the
+    true people. frames (length + 1,): bool by frame number. fps: frames per second.
 
     A member becomes the person it is mapped to at the event's start, or in the nearest frame within 1 s of it. A member
     that is never mapped in this time, or to a person already listed, is unmatched. Parents are the groups of the
@@ -151,10 +155,10 @@ def events_of_hulls(
 ) -> list[ComparableEvent]:
     """Returns a tracker's events of known kinds that start in a frame f where frames[f] is true; `members` is None.
 
-    without_members: if True, only events that name no members; else all. tracks: of the scored frames. groups: the
-    tracker's groups, whose members are rows of `true` (from `people_inside`). true: rows of the true people. frames
-    (length + 1,): bool by frame number. fps: frames per second. `emitted` is the frame of the `Tracks` that hold the
-    event.
+    Known kinds are merge, split, cross, queue, enter, leave, form and dissolve. without_members: if True, only events
+    that name no members; else all. tracks: of the scored frames. groups: the tracker's groups, whose members are rows
+    of `true` (from `people_inside`). true: rows of the true people. frames (length + 1,): bool by frame number. fps:
+    frames per second. `emitted` is the frame of the `Tracks` that hold the event.
 
     Parents are the people inside the hulls of the groups in `event.before`, children those inside the groups in
     `event.after`. Children are judged in the 2 s from the report on. Parents are judged in the 2 s before the event's
@@ -185,10 +189,11 @@ def _last_appearance(rows: FrameRows, ids: Sequence[int]) -> int:
 def _contained(groups: GroupRows, person: Ints, ids: Sequence[int], span: range) -> tuple[EventMembers, ...]:
     """Returns the people of each group id in `ids` during the frames `span`, one `EventMembers` per id, in order.
 
-    groups: the tracker's groups in frames; person (K,): true id of each of their memberships. A person belongs to the
-    one group that contained the person in most frames (of equals the lowest id), and only if these are more than half
-    of the frames in which the group was reported. One frame is not enough, because the hulls of people behind each
-    other overlap in the image. A group without people gives an empty `EventMembers`.
+    groups: the tracker's groups in frames; person (K,): true id of each of their memberships; span: frame numbers, only
+    its start and stop (excluded) count. A person belongs to the one group that contained the person in most frames (of
+    equals the lowest id), and only if these are more than half of the frames in which the group was reported. One frame
+    is not enough, because the hulls of people behind each other overlap in the image. A group without people gives an
+    empty `EventMembers`.
     """
     rows, now = groups.rows, (groups.rows.frame >= span.start) & (groups.rows.frame < span.stop)
     reported = Counter(rows.id[now].tolist())

@@ -88,14 +88,15 @@ class TrackedGroups:
 
 
 def group_and_event_scores(sides: ComparedSides, true: TrueGroups, by: GroupMatch) -> dict[str, float]:
-    """Returns a dict of all scores of groups, pairwise membership, events and lineage, keys as in the catalogue.
+    """Returns a dict of all scores of groups ("group_…", "group_…_core"), pairwise membership ("pairwise_…"), events
+    ("merge_F1" …, "event_…") and lineage ("lineage_…"), keys as in the catalogue.
 
     sides: both sides in the scored frames, with people mapped. true: the true groups in these frames. by: matches
     groups by "hull" (IoU) or by "members" (Jaccard index).
 
     Keys are missing if the truth lacks data. group_F1_hull, and with by = "hull" all group scores, are missing if
-    `true` is not comparable. Scores of events and lineage are missing if the truth has no events. A score with a
-    denominator of 0 is nan.
+    `true` is not comparable (has no shapes on the surface). Scores of events and lineage are missing if the truth has
+    no events. A score with a denominator of 0 is nan.
     """
     tracked = tracked_groups(sides)
     found = pairwise_scores(true.groups, tracked.counted, tracked.person)

@@ -1,8 +1,9 @@
 """Scores of groups: one-to-one matching in every frame by hulls or by members, then detection and tracking scores.
 
-Detection (1-FP, 1-FN, GDSR) follows Bazzani, Cristani & Murino (2012), "Decentralized Particle Filter for Joint
-Individual-Group Tracking"; MOTP and MOTA follow Bernardin & Stiefelhagen (2008). Sums run over labelled frames. A score
-whose denominator is 0 is nan.
+Detection follows Bazzani, Cristani & Murino (2012), "Decentralized Particle Filter for Joint Individual-Group
+Tracking": 1-FP and 1-FN (1 - false or missed / true groups), GDSR (share of true groups whose match holds 60 % of their
+members). MOTP (mean distance of centres) and MOTA follow Bernardin & Stiefelhagen (2008). Sums run over labelled
+frames. A score whose denominator is 0 is nan.
 """
 
 from __future__ import annotations
@@ -248,8 +249,9 @@ def _by_frame(compared: GroupComparison, frames: Bools, i: Ints) -> dict[str, fl
     """Returns a dict with 1-FP_frames and 1-FN_frames: 1 - the mean over frames of false (missed) groups / max(true
     groups, 1).
 
-    frames: bool by frame number, the frames that count. i: rows of the true groups that are matched in these frames.
-    Both are nan if no frame counts. Bazzani et al. (2012) leave open whether they mean these or the ratios of sums.
+    compared: both sides' groups. frames: bool by frame number, the frames that count. i: rows of the true groups that
+    are matched in these frames. Both are nan if no frame counts. Bazzani et al. (2012) leave open whether they mean
+    these or the ratios of sums.
     """
     size = len(frames)
     n, m = (np.bincount(side.rows.frame, minlength=size)[frames] for side in (compared.true, compared.est))
@@ -275,11 +277,11 @@ def count_switches(frame: Ints, true: Ints, est: Ints) -> int:
 
 
 def detection(compared: GroupComparison, frames: Bools) -> dict[str, float]:
-    """Returns a dict with F1, precision and recall of groups at similarity 0.5, over the frames f where frames[f] is
-    true.
+    """Returns a dict with F1, precision and recall of groups over the frames f where frames[f] is true.
 
-    compared: both sides' groups with their matchings. frames: bool by frame number. nan if the denominator is 0:
-    precision without estimated groups, recall without true groups, F1 without both.
+    A hit is a match of similarity 0.5 or more. Precision is hits / estimated groups, recall hits / true groups, F1 2
+    hits / both together; nan if the denominator is 0. compared: both sides' groups with their matchings. frames: bool
+    by frame number.
     """
     f = compared.found
     hits = int(frames[f.true.frame[f.i]].sum())
@@ -293,7 +295,5 @@ def f1(hits: int, n_true: int, n_est: int) -> float:
 
 
 def _sizes(groups: GroupRows) -> Array:
-    """Returns the number of people in each of G groups, (G,) float: the reported size, or if that is nan the number of
-    members.
-    """
+    """Returns the number of people in each of G groups, (G,) float: reported size, or if nan the number of members."""
     return np.where(np.isfinite(groups.size), groups.size, groups.count)

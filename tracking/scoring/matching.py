@@ -40,8 +40,9 @@ def match_as_table(pairs: Pairs, weight: Array) -> Bools:
     """Returns which of the K pairs are matched, (K,) bool: the greatest sum of weights in each frame, ties broken as
     TrackEval does.
 
-    weight (K,): above 0, one per pair, in place of its similarity. Of several best matchings of a frame the result is
-    the one that scipy finds in the table of all the frame's rows.
+    pairs: candidate pairs. weight (K,): above 0, one per pair, used in place of its similarity. Of several best
+    matchings of a frame the result is the one that scipy finds in the table of all the frame's rows, cells without a
+    pair being 0.
     """
     chosen, left = _settle(pairs.i, pairs.j, weight, strict=True)
     frame = pairs.frame
@@ -72,7 +73,8 @@ def solve_frame(pairs: Pairs, start: int, end: int, weight: Array) -> Bools:
 
 
 def _settle(i: Ints, j: Ints, weight: Array, strict: bool) -> tuple[Bools, Ints]:
-    """Returns a bool mask (K,) of the pairs that need no solver, and the indices of the pairs that still compete.
+    """Returns a bool mask (K,) of the pairs that are matched without a solver, and the indices of the pairs that a
+    solver must still decide.
 
     i, j (K,): row indices of both sides; weight (K,): above 0. A settled pair weighs at least as much as the best rival
     of i and of j together; with `strict` clearly more, so that it is in every best matching. Pairs in neither result

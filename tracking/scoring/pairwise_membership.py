@@ -1,4 +1,7 @@
-"""Pairwise membership: F1 over pairs of people who are in one group, independent of group ids and shapes."""
+"""Pairwise membership: F1 over pairs of people who are in one group, independent of group ids and shapes.
+
+Estimated pairs are pairs of tracked people, mapped to true people; a pair is right if the two are in one true group.
+"""
 
 from __future__ import annotations
 

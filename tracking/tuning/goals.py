@@ -23,8 +23,8 @@ FAST_KEYS = ("objective", "HOTA", "group_F1_hull")
 class Goal:
     """One score to improve.
 
-    key: its name in the catalogue of scores, or SPEED (frames per second of the tracker). higher: True if greater
-    values are better.
+    key: its name in the catalogue of scores, or "frames/s" for the tracker's speed. higher: True if greater values are
+    better.
     """
 
     key: str
@@ -33,14 +33,14 @@ class Goal:
     def of(self, episode: Episode) -> float:
         """Returns the score of one episode, nan if the episode does not have it.
 
-        For SPEED it is frames / seconds in the tracker, nan if that is 0 s.
+        For the key "frames/s" it is frames / seconds in the tracker, nan if that is 0 s.
         """
         if self.key == SPEED:
             return episode.frames / episode.seconds_tracking if episode.seconds_tracking else float("nan")
         return episode.scores.get(self.key, float("nan"))
 
     def mean(self, episodes: Sequence[Episode]) -> float:
-        """Returns the mean over the episodes that have the score, nan if none has. For SPEED (frames/s) it is all
+        """Returns the mean over the episodes that have the score, nan if none has. For the key "frames/s" it is all
         frames / all seconds in the tracker, nan for 0 s.
         """
         if self.key == SPEED:

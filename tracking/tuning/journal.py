@@ -124,7 +124,10 @@ class LockedJournal(JournalFileBackend):
             raise ValueError("no journal of Optuna")
 
     def _remove_incomplete_line(self) -> None:
-        """Removes a last line without line end from the file, the whole content if it has no line end."""
+        """Removes a last line without line end from the file, the whole content if it has no line end.
+
+        A file that is empty or ends with a line end stays as it is. The lock on writing must be held.
+        """
         with open(self._path, "r+b") as file:
             size = file.seek(0, os.SEEK_END)
             if size == 0:

@@ -37,7 +37,7 @@ class Axes:
     def to_page(self, x: float, y: float) -> tuple[float, float]:
         """Returns the place (u, v) of the data point (x, y) on the page, px from the left and px from the top.
 
-        Points outside the ranges lie outside the axes.
+        Points outside the ranges lie outside the axes. Raises ZeroDivisionError if a range is empty.
         """
         across = (x - self.x[0]) / (self.x[1] - self.x[0])
         up = (y - self.y[0]) / (self.y[1] - self.y[0])

@@ -201,7 +201,9 @@ def _candidate(candidate: Candidate) -> dict[str, Any]:
 
 
 def versions() -> dict[str, str]:
-    """Returns a dict from each name of PACKAGES to its installed version, "unknown" if it is not installed."""
+    """Returns a dict of installed versions by package name: flockscope, optuna, numpy, scipy, numba; "unknown" if it is
+    not installed.
+    """
     from importlib.metadata import PackageNotFoundError, version
 
     found = {}

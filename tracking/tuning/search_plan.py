@@ -89,7 +89,9 @@ class SearchPlan:
 
     @property
     def needs_every_score(self) -> bool:
-        """True if a goal is none of objective, HOTA, group_F1_hull and frames/s: all scores are then computed."""
+        """True if some goal is other than objective, HOTA, group_F1_hull and frames/s: all scores must then be
+        computed.
+        """
         return any(goal.key not in (*FAST_KEYS, SPEED) for goal in self.goals)
 
     def config(self, values: dict[str, Any]) -> Config:
@@ -157,8 +159,10 @@ class SearchPlan:
 def search_plan(options: TuneOptions) -> SearchPlan:
     """Returns the plan that follows from the options, with defaults for everything that the options leave open.
 
-    Raises InputError if the tracker, a parameter, a suite, a seed or a score is unknown or not allowed, if the options
-    contradict each other, if no parameter is left to search, and if the tracker cannot work with the detections.
+    Raises InputError if the tracker, a parameter, a suite, a seed or a score is unknown or not allowed, if a file is
+    wrong, if the options contradict each other (such as sensor settings without detections from files), if the second
+    suite shares a scenario with the first, if no parameter is left to search, and if the tracker cannot work with the
+    detections.
     """
     tracker = tuned_tracker(options.tracker)
     fixed, scene_settings = _split_settings(options.set)
@@ -210,7 +214,8 @@ def _split_settings(settings: Iterable[str]) -> tuple[list[str], tuple[str, ...]
 def _count_check_scenes(suite: Sequence[str], check: str | None) -> int:
     """Returns the number of scenes of the second suite `check`, 1 if it is None.
 
-    Raises InputError if it shares a scenario with `suite`, is unknown, or holds no scenes to simulate.
+    suite: names of what is tuned on. Raises InputError if `check` shares a scenario with them, is unknown or
+    unreadable, or holds no scenes to simulate.
     """
     if check is None:
         return 1

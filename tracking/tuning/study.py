@@ -46,7 +46,9 @@ class SearchStudy:
                 study.enqueue_trial(dict(plan.defaults))
 
     def trials(self) -> list[FrozenTrial]:
-        """Returns all trials in the order of their numbers; running, waiting and abandoned ones are included."""
+        """Returns all of Optuna's trials in the order of their numbers; running, waiting, failed and abandoned ones are
+        included.
+        """
         return self.optuna.get_trials(deepcopy=False)
 
     def finished(self) -> list[FrozenTrial]:
@@ -59,8 +61,9 @@ class SearchStudy:
     def ask(self, retry_unfinished: bool = False) -> optuna.Trial | None:
         """Returns the next trial to play, locked for this process; None if as many as planned are finished or running.
 
-        With a journal, an abandoned trial is repeated first. Without one it is not known which trials are abandoned:
-        running ones count as played by others, or, with `retry_unfinished`, as abandoned.
+        With locks, an abandoned trial (running, but its process is gone) is repeated first. Without locks it is not
+        known which trials are abandoned: running ones count as played by others, or, with `retry_unfinished`, as
+        abandoned. Abandoned trials are marked as failed.
         """
         with self._choosing():
             for t in self.trials():
@@ -78,7 +81,7 @@ class SearchStudy:
 
     def tell(self, trial: optuna.Trial, values: Sequence[float] | None) -> None:
         """Stores the values of a trial, one per goal, and releases its lock; None means that its parameters are
-        impossible.
+        impossible (state PRUNED).
 
         A trial that is finished already keeps its values. Raises ValueError if the number of values differs from that
         of the goals or a value is nan.
@@ -124,7 +127,8 @@ class SearchStudy:
         """Returns the share (0 to 1) of each parameter in the first goal's training values (PED-ANOVA), a dict by name,
         greatest first.
 
-        All shares are 0 if fewer than two trials have values, or all values are equal.
+        Estimates of pruned trials take part. All shares are 0 if fewer than two trials have values, or all values are
+        equal.
         """
         from optuna.importance import get_param_importances
 
@@ -149,7 +153,9 @@ class SearchStudy:
         return nullcontext() if self._locks is None else self._locks.choosing()
 
     def _repeat(self, abandoned: FrozenTrial) -> None:
-        """Marks an abandoned trial as failed and queues it again, once, with its parameters and place."""
+        """Marks an abandoned trial as failed and queues its parameters again under its place; only marks it if that was
+        done before.
+        """
         number = abandoned.user_attrs.get(AGAIN, abandoned.number)
         repeated = any(t.user_attrs.get(AGAIN) == number and t.number > abandoned.number for t in self.trials())
         if not repeated:

@@ -18,10 +18,10 @@ RULE = LinkRule.tracker
 class TunedTracker:
     """A tracker with parameters, or the baseline rule of groups, as a search tunes it.
 
-    - tracker: as `tracking.track` takes it: name, file.py:Class, module:Class or class.
+    - tracker: as `tracking.track` takes it: name, file.py:Class, module:Class or class; "grouping" for the rule.
     - name: for messages and files.
     - config_class: declares its parameters.
-    - needs: inputs that it can use, such as "boxes", "points", "stereo".
+    - needs: inputs of which it can use any one: "pixels", "stereo", "boxes", "points".
     - code: hash of the file that defines the tracker, "" if there is none.
     """
 
@@ -40,7 +40,9 @@ class TunedTracker:
 
     @property
     def detections(self) -> DetectionMode:
-        """Its input by default: "truth" for the rule of groups, "file" if it takes boxes or points, else "image"."""
+        """The tracker's input by default: "truth" for the rule of groups, "file" if it takes boxes or points, else
+        "image".
+        """
         if self.name == RULE:
             return "truth"
         return "file" if {"boxes", "points"} & {*self.needs} else "image"
