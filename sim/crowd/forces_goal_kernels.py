@@ -101,8 +101,8 @@ def _lead_groups(groups, status, dt, rules):  # type: ignore[no-untyped-def]
     status.
 
     - A PASS waypoint is passed within pass_radius + 0.3 × the group's radius; a GATHER one once all members are within
-      gather_radius of their places. At most one is passed in a call. The end of the way counts as arrived within 0.25 m
-      (STAND) or pass_radius (LEAVE).
+      gather_radius of their places. At most one is passed in a call. A group has arrived at the end within 0.25 m
+      (STAND) or pass_radius (LEAVE), or when it has gathered at the last waypoint.
     - The heading turns towards the waypoint, but not within 0.3 m of it, while gathering, or after arrival.
     - Wanted velocity: speed × heading; slower shortly before an end where the group stands. A group that has arrived
       and stands drifts back to the end of its way at 0.3 m/s at most.
@@ -152,9 +152,9 @@ def _lead_groups(groups, status, dt, rules):  # type: ignore[no-untyped-def]
 
 @njit(cache=True)
 def _turn(heading, g, ex, ey, share):  # type: ignore[no-untyped-def]
-    """Turn row g of heading (G, 2), unit vectors, in place towards the unit vector (ex, ey).
+    """Turn row g of heading (G, 2), unit vectors, in place towards the unit vector (ex, ey), the shorter way round.
 
-    It turns by `share` of the angle between them, at most the whole angle.
+    It turns by `share` of the angle between them, at most the whole angle. Returns nothing.
     """
     hx, hy = heading[g, 0], heading[g, 1]
     angle = np.arctan2(hx * ey - hy * ex, hx * ex + hy * ey) * min(share, 1.0)

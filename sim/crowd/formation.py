@@ -31,9 +31,9 @@ def rows_of(n: int) -> list[int]:
 def walking(n: int, spacing: float) -> Array:
     """Returns the places (n, 2) of a walking group of n ≥ 1 people, m: forward and left of the group's middle.
 
-    Front row first, left to right within a row; the mean is zero. Rows have 3 people, the last one or two 2; up to 3
-    people form one row. Neighbours in a row are `spacing` m apart, rows 1.15 × spacing. The middle person of a row of
-    three is 0.3 × spacing behind the two beside.
+    Front row first, left to right within a row; the mean is zero. Up to 3 people form one row. Else rows have 3 people,
+    and the last one or two rows have 2 if n is no multiple of 3. Neighbours in a row are `spacing` m apart, rows 1.15 ×
+    spacing. The middle person of a row of three is 0.3 × spacing behind the two beside.
     """
     rows = []
     for k, size in enumerate(rows_of(n)):

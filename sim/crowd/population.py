@@ -43,9 +43,8 @@ class ScriptPlacement:
     lead: float = 0.0
 
     def point(self, p: Array) -> Array:
-        """Returns where a point (2,) of the script, m, lies in the world (2,), m: mirrored, then turned about the
-        middle.
-        """
+        """Returns where a point p (2,) of the script, m, lies in the world (2,), m: mirrored in x about the middle of
+        the world, then turned about it."""
         d = (p - self.middle) * np.array([self.flip, 1.0])
         return self.middle + self.vector(d, flip=False)
 
@@ -201,10 +200,11 @@ def _find_room(draws: _Draws, group: EnteringGroup, spec: GroupSpec, key: tuple[
     """Sets group.start and group.pos so that the members stand clear of walls, pillars and, at entry time 0, of
     `taken`.
 
-    The group faces its first via point, else its goal. The script's `lead` (s) moves the start of a group that walks by
-    lead × speed in that direction, at most half-way. key: index of the entry and of its copy. taken: positions (n, 2),
-    m, of the people of each earlier group. A drawn start is drawn up to TRIES (400) times, a fixed one tried once.
-    Raises InputError if no try finds room, ValueError if no draw lies within its clip.
+    The group faces its first via point, else its goal; the script's +x if it starts there. The script's `lead` (s)
+    moves the start of a group that walks by lead × speed in that direction, at most half-way. key: index of the entry
+    `spec` and of its copy. taken: positions (n, 2), m, of the people of each earlier group. draws: random streams. A
+    drawn start is drawn up to TRIES (400) times, a fixed one tried once. Raises InputError if no try finds room,
+    ValueError if no draw lies within its clip.
     """
     placement, drawn = draws.placement, any(isinstance(v, Distribution) for v in spec.start)
     r = draws.rng("group", *key, 1)

@@ -51,8 +51,9 @@ class PendingOrder:
 
         An order fires `delay` seconds after its trigger was first met, even if the trigger is no longer met. It fires
         only while every group it concerns exists and is wholly in the scene; until then the trigger is not examined
-        either. A queue whose names match no group concerns none and may fire. state (P, 4): x, y, vx, vy by column, m,
-        m/s. groups: the running groups, with their members and goals. come_true: ids of the orders that have come true.
+        either. A queue whose patterns match no group concerns none and may fire. state (P, 4): x, y, vx, vy by column,
+        m, m/s. groups: the running groups, with their members and goals. come_true: ids of the orders that have come
+        true.
 
         Raises KeyError for a `reach` trigger without a place if its group was made by an order and has no goal
         recorded.

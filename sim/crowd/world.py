@@ -248,7 +248,8 @@ class World:
         self.groups.fill(self.people, self.columns)
 
     def _motion(self, record: Array, intent: Any) -> Motion:
-        """Returns the Motion of record (T, P, 4): x, y, vx, vy, nan while absent, and intent (T, P): group indices."""
+        """Returns the Motion of T recorded frames and P people, with headings, body sizes and the script's orders.
+        record (T, P, 4): x, y, vx, vy, m, m/s, nan while absent. intent (T, P): group indices, -1 while absent."""
         height = np.array([m.height for m in self.members])
         pos, vel = record[:, :, :2], record[:, :, 2:]
         present = np.isfinite(pos[:, :, 0])

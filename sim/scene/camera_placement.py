@@ -193,8 +193,9 @@ def _height_at_position(spec: CameraSpec, normals: Array, b: Array) -> float:
 def _top(spec: CameraSpec, bodies: RecordedBodies) -> Camera:
     """Return a camera of kind "top": over the middle of the bodies' extent, at the largest scale that shows all bodies.
 
-    A margin of 2 % of the image's shorter side is kept free. spec: camera settings; a given position, px_per_m or
-    height is used as it is. A height that is not given is 20 m. There must be at least one body.
+    A margin of 2 % of the image's shorter side is kept free. Half the extent counts as at least 0.1 m. spec: camera
+    settings; a given position, px_per_m or height is used as it is. A height that is not given is 20 m. There must be
+    at least one body.
     """
     rotation = camera_rotation(np.pi / 2, float(np.deg2rad(spec.yaw_deg)))
     sides = np.concatenate([rotation[:2], -rotation[:2]])

@@ -36,7 +36,7 @@ class _MemberRows:
 
     @property
     def counts(self) -> Ints:
-        """Number of members of each group in each frame, in the order of `starts`."""
+        """Returns the number of members of each group in each frame, shape (S,), in the order of `starts`."""
         return np.diff(np.append(self.starts, len(self.id)))
 
 

@@ -215,7 +215,10 @@ def _gaps(columns: list[Ints], pos: Array, vel: Array, present: Bools, widest: b
 
 
 def _mean_velocity(vel: Array, present: Bools, columns: Ints) -> Array:
-    """Returns the mean velocity (T, 2), m/s, of the people in these columns who are present; nan if none is."""
+    """Returns the mean velocity (T, 2), m/s, of the people in these columns who are present; nan if none is.
+
+    vel (T, P, 2): m/s. present (T, P): flags.
+    """
     n = present[:, columns].sum(axis=1)[:, None]
     total = np.where(present[:, columns, None], vel[:, columns], 0.0).sum(axis=1)
     return np.where(n > 0, total / np.maximum(n, 1), np.nan)

@@ -54,9 +54,10 @@ class DetectedQueue:
 
 @dataclass(frozen=True, slots=True)
 class _LineNow:
-    """A line of waiting people in frame t, which counts from 0.
+    """A line of waiting people in one moment.
 
-    - order: columns (person id - 1) from one end to the other. u: unit vector from the first person towards the last.
+    - t: frame, from 0. order: columns (person id - 1) from one end to the other. u: unit vector x, y from the first
+      person towards the last.
     - middle: x, y of their mean position, m. drift: their mean velocity along u and to the left of u, m/s.
     """
 
