@@ -105,8 +105,9 @@ def read_near(path: Path) -> Near:
     """Read a near.csv (frames start, end and person ids a, b); a file with the header alone gives no rows.
 
     A row is a pair of strangers who satisfy the merge rule from frame start to end (from 1, inclusive). Raises
-    InputError if the file is unreadable, its header is another one, or a line is not four integers. Ranges are not
-    checked.
+    InputError if the file is unreadable, its header is another one, a cell is no integer, or lines differ in length or
+    have not four cells; eight cells in every line count as two rows. Raises OverflowError for an integer beyond 64
+    bits. Ranges are not checked.
     """
     lines = read_text(path).splitlines()
     if lines[:1] != [NEAR_COLUMNS]:
