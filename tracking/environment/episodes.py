@@ -121,8 +121,8 @@ class Rollout:
         """Plays to frame number `upto` (from 1), or to the last one; yields each frame and the tracker's tracks.
 
         The frame is as the tracker got it. A frame is played when the iterator is asked for it, and none if `upto` is
-        reached already. Raises InputError if the tracker refuses a frame and WorkError if it fails. The next call then
-        begins with the same frame.
+        reached already. Raises InputError if the tracker refuses a frame or a picture cannot be read, and WorkError if
+        the tracker fails. The next call then begins with the same frame.
         """
         last = self.length if upto is None else min(upto, self.length)
         while len(self.tracks) < last:

@@ -212,7 +212,7 @@ LINEAGE = (
 
 
 def _of_events(name: str, what: str) -> Iterable[Score]:
-    """Yields the scores of one kind of event: F1, precision, recall, TP, FP, FN, latency.
+    """Yields the scores of one kind of event: F1, precision, recall, TP, FP, FN, latency (in s, -1 or more).
 
     name: the kind, which begins the keys ("merge" gives merge_F1); "event" yields no TP, FP and FN. what: the events as
     a plural noun for the meanings. The scores have no family yet.

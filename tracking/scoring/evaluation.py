@@ -90,8 +90,9 @@ def evaluate(
     Jaccard index of their members ("members"). frames: a number n scores frames 1 … n, a range only its frames, None
     all frames. A frame without tracks counts as empty.
 
-    Groups and events that the tracks lack come from the baseline rule. Scores of people are nan for a tracker of whole
-    groups, scores of groups and events if no scored frame has group labels.
+    Groups and events that the tracks lack come from the baseline rule, in the image only if `truth.px_per_m` is known.
+    Scores of people are nan for a tracker of whole groups, scores of groups and events if no scored frame has group
+    labels.
 
     Raises IncomparableError if boxes or positions to be compared are missing, ValueError if an id occurs twice in one
     frame, and InputError if groups must be derived in the image and `truth.px_per_m` is 0 or less.

@@ -76,7 +76,8 @@ class ComparedSides:
 class TrackedGroups:
     """One tracker's groups in the labelled frames.
 
-    - every: all groups; memberships are rows of the true people, members mapped to nobody are left out.
+    - every: all groups; memberships hold rows of the true people. Members mapped to nobody are left out. If the tracker
+      names no members, they are the true people inside the hull.
     - counted: the groups that are scored. Members are rows of the tracked people if the tracker names members, else
       rows of the true people inside the hull.
     - person (K,): for each of the K memberships of `counted`, the row of the true person, -1 none.

@@ -134,11 +134,11 @@ def matched_groups(true_pos: Array, est_pos: Array, pairs: Pairs, least: float =
 
 @dataclass(frozen=True, eq=False)
 class GroupComparison:
-    """G true and H estimated groups in frames, with the numbers of their common people (`shared`) and their matchings.
+    """G true and H estimated groups in frames, with their matchings.
 
-    pairs: all candidate pairs; chosen: the one-to-one matching of all pairs; found: that of pairs of similarity 0.5 or
-    more. nearest (G,): distance (m or px) of each true group to the group matched by distance alone, nan if it has
-    none.
+    true, est: the groups; shared: numbers of their common people. pairs: all candidate pairs; chosen: the one-to-one
+    matching of all pairs; found: that of pairs of similarity 0.5 or more. nearest (G,): distance (m or px) of each true
+    group to the group matched by distance alone, nan if it has none.
     """
 
     true: GroupRows

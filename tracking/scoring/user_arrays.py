@@ -1,4 +1,8 @@
-"""`score_arrays`: scores of your own arrays, one row per person and frame on each side, without files or our types."""
+"""`score_arrays`: scores of your own arrays, one row per person and frame on each side, without files or our types.
+
+Columns are frame, id, position or box, and group. They are checked, turned into a `Truth` and `Tracks`, and scored as
+those.
+"""
 
 from __future__ import annotations
 

@@ -132,8 +132,9 @@ class TuningResult:
     def as_dict(self) -> dict[str, Any]:
         """Returns everything as nested dicts and lists for JSON; an unknown number is nan.
 
-        Keys: settings, counts, params, changed, taken_back, validation, comparisons, candidates, front (empty with one
-        goal), importance, notes, versions.
+        Keys: settings, counts (trials, episodes, pruned, impossible), params, changed, taken_back, validation,
+        comparisons, candidates, front (empty with one goal), importance, notes, versions. `changed` (by parameter) and
+        `validation` (by goal) hold dicts of default and tuned value.
         """
         plan, seeds = self.plan, self.plan.seeds
         return {

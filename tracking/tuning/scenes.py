@@ -1,7 +1,7 @@
 """Which scenes a search may use for what.
 
-Training, validation and test seeds come from ranges that do not overlap. The second test suite shares no scenario with
-the suite that is tuned on. Recordings are refused.
+Training, validation and test seeds come from ranges that do not overlap: 0:10000, 10000:20000 and 20000:30000. The
+second test suite shares no scenario with the suite that is tuned on. Recordings are refused.
 """
 
 from __future__ import annotations

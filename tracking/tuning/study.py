@@ -1,4 +1,7 @@
-"""The study: Optuna's record of all trials in a storage, which a search can resume and several processes can share."""
+"""The study: Optuna's record of all trials in a storage, which a search can resume and several processes can share.
+
+`open_study` opens it as a `SearchStudy`, which gives the next trial to play, stores values, and lists finished trials.
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,9 @@
-"""The loop of a search: one trial after the other, each played on the training scenes until it surely loses."""
+"""The loop of a search: one trial (set of parameters) after the other, each played on the training scenes until it
+surely loses.
+
+It surely loses if the p-value of a paired test against the best trial, after any scene, is below a limit. It then gets
+an estimate of its value.
+"""
 
 from __future__ import annotations
 
