@@ -274,10 +274,11 @@ def _walls(state, walls, pillars, rules, out):  # type: ignore[no-untyped-def]
 
 @njit(cache=True)
 def avoid(state, tag, status, walls, pillars, rules, push, out):  # type: ignore[no-untyped-def]
-    """Add all avoidance accelerations to out (N, 2), m/s², then shorten each row of `out` to MAX_ACCELERATION. state
-    (N, 4): x, y, vx, vy. tag (N, 4): group, mode, queue, waypoint. status (G, 10): as `drive` left it. walls (W, 4):
-    x1, y1, x2, y2; pillars (P, 3): x, y, radius; m. rules (21,): Steering.array(). push (G, 2): scratch, overwritten.
-    People in a queue do not take part in the avoidance of their group as a whole."""
+    """Add all avoidance accelerations (of people, groups, walls, pillars) to out (N, 2), m/s², then shorten each row of
+    `out` to MAX_ACCELERATION. `out` holds the accelerations towards goals before. state (N, 4): x, y, vx, vy. tag (N,
+    4): group, mode, queue, waypoint. status (G, 10): as `drive` left it. walls (W, 4): x1, y1, x2, y2; pillars (P, 3):
+    x, y, radius; m. rules (21,): Steering.array(). push (G, 2): scratch, overwritten. People in a queue do not take
+    part in the avoidance of their group as a whole."""
     _avoid_groups(status, rules, push)
     _pairs(state, tag, rules, out)
     _walls(state, walls, pillars, rules, out)

@@ -252,7 +252,8 @@ def _pace_on_stairs(x, y, stairs):  # type: ignore[no-untyped-def]
 def _mark_avoided(groups):  # type: ignore[no-untyped-def]
     """Overwrite column AVOIDED of groups.status (G, 10) with 1.0 if others avoid the group as a whole, else 0.0.
 
-    A group is avoided if it has members present, its RADIUS is at most LOOSE (2.2 m) and it is not at a door.
+    A group is avoided if it has members present, none further than LOOSE (2.2 m) from their mean position, and is not
+    at a door.
     """
     status = groups.status
     for g in range(len(status)):

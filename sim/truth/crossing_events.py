@@ -62,8 +62,8 @@ def _portions(met: Encounters, margin: int) -> Iterator[Encounters]:
     """Yields the encounters `met` in portions, in their order, so that the frames of a portion add up to about ROWS
     (500,000).
 
-    `margin` frames before and after each encounter count, too. An encounter is never divided. Nothing is yielded
-    without encounters.
+    An encounter is a stretch of frames in which two groups are close. `margin` frames before and after each count, too.
+    An encounter is never divided. Nothing is yielded without encounters.
     """
     total = np.cumsum(met.last - met.first + 1 + 2 * margin)
     return (met[total // ROWS == k] for k in np.unique(total // ROWS))
@@ -103,8 +103,9 @@ def _crossed(
 def _relative_speed(a: GroupPath, b: GroupPath, k: Ints, during: Bools, count: int) -> Array:
     """Returns the length in m/s of the mean relative velocity during each of `count` encounters, shape (count,).
 
-    a, b: paths of the two groups; their R rows are frames of encounters. k (R,): encounter of each row, ascending.
-    during (R,): True for rows that count. nan for an encounter in which no velocity is known.
+    An encounter is a stretch of frames in which two groups are close. a, b: paths of the two groups; their R rows are
+    frames of encounters. k (R,): encounter of each row, ascending. during (R,): True for rows that count. nan for an
+    encounter in which no velocity is known.
     """
     relative = b.vel - a.vel
     known = during & np.isfinite(relative).all(axis=1)
@@ -117,8 +118,9 @@ def _closest(apart: Array, k: Ints, during: Bools) -> Ints:
     """Returns for each encounter that has rows the index of the row in which the middles are closest; of several the
     first.
 
-    apart (R, 2): vector between the two groups' middles, m, nan if unknown. k (R,): encounter of each row, ascending.
-    during (R,): rows outside the encounter are False and are chosen only if no row of it is known.
+    An encounter is a stretch of frames in which two groups are close; a row is one frame in or near it. apart (R, 2):
+    vector between the two groups' middles, m, nan if unknown. k (R,): encounter of each row, ascending. during (R,):
+    rows outside the encounter are False and are chosen only if no row of it is known.
     """
     distance = np.where(during & np.isfinite(apart).all(axis=1), np.hypot(*apart.T), np.inf)
     order = np.lexsort((distance, k))

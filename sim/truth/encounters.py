@@ -147,8 +147,9 @@ def _within_reach(t: Ints, places: Array, count: Ints) -> tuple[Ints, Ints]:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class GroupPath:
-    """The path of one of the two groups of each encounter, in R rows: frames around the encounters, one encounter after
-    another.
+    """The path of one of the two groups of each encounter (a stretch in which two groups are near each other).
+
+    R rows: frames in and around the encounters, one encounter after another.
 
     - middle, vel (R, 2): mean position x, y, m, and mean velocity, m/s, of the members at the meeting who are present
       in the row's frame; nan if none of them is.
@@ -164,12 +165,13 @@ class GroupPath:
 def group_paths(
     pos: Array, vel: Array, group: Ints, rows: MembersByFrame, name: Ints, met: Ints, encounter: Ints, frame: Ints
 ) -> GroupPath:
-    """Returns the path of one group of each of E encounters, with the members that it had at the meeting.
+    """Returns the path of one group of each of E encounters (stretches in which two groups are near each other).
 
-    pos, vel (T, P, 2): m, m/s, nan while absent. group (T, P): group ids. rows: the members by frame. name (E,): group
-    id in each encounter. met (E,): frame, from 0, whose members count; the group must exist in it. encounter, frame
-    (R,): the rows wanted, encounters ascending, frames from 0; none give a path without rows. A single member who stays
-    after the other members have left the scene counts as the same group.
+    Its means are over the members that the group had at the meeting, frame `met`. pos, vel (T, P, 2): m, m/s, nan while
+    absent. group (T, P): group ids. rows: the members by frame. name (E,): group id in each encounter. met (E,): frame,
+    from 0; the group must exist in it. encounter, frame (R,): the rows wanted, encounters ascending, frames from 0;
+    none give a path without rows. A single member who stays after the other members have left the scene counts as the
+    same group.
     """
     first, count = rows.find(met, name)
     row, place = runs(first[encounter], (first + count)[encounter])
@@ -203,9 +205,10 @@ def net_crossings(a: Array, b: Array, encounter: Ints, count: int) -> Ints:
     """Returns how often path b crosses path a from left to right, minus right to left, for each encounter, shape
     (count,).
 
-    Left is as seen along path a. a, b (R, 2): points of both paths in m, encounter after encounter; points with nan are
-    left out. encounter (R,): number of each row's encounter, from 0, ascending. An encounter without points gives 0.
-    The two need not be at the crossing at the same time.
+    Left is as seen along path a. An encounter is a stretch in which two groups are near each other. a, b (R, 2): points
+    of both paths in m, encounter after encounter; points with nan are left out. encounter (R,): number of each row's
+    encounter, from 0, ascending. An encounter without points gives 0. The two need not be at the crossing at the same
+    time.
 
     Let s and t be times on a and b. The difference b(t) - a(s) winds round zero once for each crossing as (s, t) goes
     round the square of all times. The turns along the four sides of the square are summed. Paths that meet in a vertex

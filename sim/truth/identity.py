@@ -108,8 +108,12 @@ def _changes_of_old(
 ) -> list[GroupChange]:
     """Returns the split, dissolve or leave of the old group g as a list of one, or [] if it goes on or only merges.
 
-    people: its members before. stay: people present before and now. is_: group id of each person now, negative if
-    alone. now: all people present now.
+    - Two or more of its people who stay are apart now: dissolve if all of them are alone, else split. Its `members` are
+      the people present now.
+    - Nobody stays, or one person who is alone now: leave. Its `members` are all old people.
+
+    people: its members before. stay: people present before and now. is_: group id of each person now, negative if alone
+    (each another number). now: all people present now.
     """
     left = people & stay
     targets = {is_[p] for p in left}
@@ -124,8 +128,11 @@ def _changes_of_old(
 def _changes_of_new(g: int, people: PersonSet, stay: PersonSet, was: dict[int, int]) -> list[GroupChange]:
     """Returns the merge, form or enter of the new group g as a list of one, or [] if it only continues one old group.
 
-    people: its members now. stay: people present before and now. was: group id of each person before, negative if
-    alone.
+    - Two or more of its people who stayed were apart: form if all of them were alone, else merge.
+    - Nobody was there before, or only one person who was alone: enter.
+
+    `members` are always all people of the new group. people: its members now. stay: people present before and now. was:
+    group id of each person before, negative if alone (each another number).
     """
     sources = {was[p] for p in people & stay}
     if len(sources) > 1:

@@ -208,8 +208,9 @@ def _follow(following: list[_FollowedLine], now: _LineNow, hold: int, bridge: in
 
     A followed line fits if it was last seen earlier and shares at least two people, in the same order; ties go to the
     older. `now` is turned so that both run the same way. A line of fewer than 3 people (QUEUE_PEOPLE) that fits none is
-    dropped. hold: frames for which a queue needs 3 people. The record of a followed line starts anew if it had fewer
-    than 3 people for more than `bridge` frames before it reached `hold`. Modifies `following`; returns nothing.
+    dropped. hold: frames for which a queue needs 3 people. bridge: frames for which a line may be lost. The record of a
+    followed line starts anew if it had fewer than 3 people for more than `bridge` frames before it reached `hold`.
+    Modifies `following`; returns nothing.
     """
     people, long = set(now.order), len(now.order) >= QUEUE_PEOPLE
     fits = [f for f in following if f.now.t < now.t and len(people.intersection(f.now.order)) > 1]
