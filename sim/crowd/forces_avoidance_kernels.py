@@ -33,10 +33,10 @@ PILLAR_MARGIN = 1.2  # person radii that are added to a pillar's radius in the p
 @njit(cache=True, inline="always")
 def _power_law(dx, dy, wx, wy, radius, strength, horizon, cap):  # type: ignore[no-untyped-def]
     """Returns the avoidance acceleration (fx, fy) in m/s² of one of two discs whose radii add up to `radius` (m). (dx,
-    dy) = own - other position, m; (wx, wy) = own - other velocity, m/s. Minus the gradient of strength exp(-tau /
-    horizon) / tau² over the relative position, tau being the time to collision in s (Karamouzas 2014, eq. 2-3), cut to
-    length `cap`. Zero where no collision lies ahead within 4 horizon, and where the discs overlap. *Ours*: tau ≥ 0.05
-    s."""
+    dy) = own - other position, m; (wx, wy) = own - other velocity, m/s. It is minus the gradient of strength exp(-tau /
+    horizon) / tau² over the relative position, tau being the time to collision and horizon a time constant in s
+    (Karamouzas 2014, eq. 2-3), cut to length `cap`. Zero where no collision lies ahead within 4 horizon, where the
+    discs overlap, and below 0.001 m/s of relative speed. *Ours*: tau ≥ 0.05 s."""
     a = wx * wx + wy * wy
     c = dx * dx + dy * dy - radius * radius
     b = -(dx * wx + dy * wy)
@@ -126,9 +126,9 @@ def _near_discs(rows, s, last, reach, radius, found):  # type: ignore[no-untyped
 @njit(cache=True, inline="always")
 def _pair(state, tag, i, j, dx, dy, d2, rules, out):  # type: ignore[no-untyped-def]
     """Add the forces between persons i and j, m/s², to out (N, 2); (dx, dy) = position i - position j, m; d2 = its
-    square. Same group or same queue: linear repulsion at short range. Strangers: linear where closer than two person
-    radii, else the power law. j gets the opposite force. state (N, 4): x, y, vx, vy. tag (N, 4): group, mode, queue,
-    waypoint. rules (21,): Steering.array()."""
+    square. Same group or same queue: linear repulsion, up to separation_range or 0.5 m, none beyond. Strangers: linear
+    where closer than two person radii, else the power law. j gets the opposite force. state (N, 4): x, y, vx, vy. tag
+    (N, 4): group, mode, queue, waypoint. rules (21,): Steering.array()."""
     if tag[i, GROUP] == tag[j, GROUP]:
         if d2 >= rules[SEPARATION_RANGE] * rules[SEPARATION_RANGE]:
             return

@@ -43,16 +43,16 @@ class ScriptPlacement:
     lead: float = 0.0
 
     def point(self, p: Array) -> Array:
-        """Returns where a point p (2,) of the script, m, lies in the world (2,), m: mirrored in x about the middle of
-        the world, then turned about it."""
+        """Returns where a point p (2,) of the script, m, lies in the world (2,), m: mirrored in x about the world's
+        middle if flip is -1, then turned about it."""
         d = (p - self.middle) * np.array([self.flip, 1.0])
         return self.middle + self.vector(d, flip=False)
 
     def vector(self, d: Array, *, flip: bool = True) -> Array:
-        """Returns a direction d (2,) of the script as a direction (2,) of the world: mirrored, then turned; the length
-        is kept.
+        """Returns a direction d (2,) of the script as a direction (2,) of the world: mirrored in x if `self.flip` is
+        -1, then turned; the length is kept.
 
-        flip=False leaves out the mirror.
+        The argument flip=False leaves out the mirror.
         """
         if flip:
             d = d * np.array([self.flip, 1.0])
