@@ -100,10 +100,13 @@ def fulfilment(order: Order, truth: Truth, group: Ints) -> int | None:
 def _concerns(event: GroupEvent, order: Order, group: Ints) -> bool:
     """Returns True if an event of the right kind and time has the people and the effect that the order asks for.
 
-    Queue: at least 3 (QUEUE_PEOPLE) of the order's people, or all if they are fewer, are members. Merge: one of the
-    order's people is a member, and in the event's first frame, but not in the frame before, all of them are in one
-    group (others may be, too). Split: likewise, and no group has people of two of the planned parts. An event in frame
-    1 fulfils no merge or split. group (T, P): group ids, -1 = alone, -2 = absent.
+    - Queue: at least 3 (QUEUE_PEOPLE) of the order's people, or all if they are fewer, are members.
+    - Merge: one of the order's people is a member. In the event's first frame, but not in the frame before, all of them
+      are in one group (others may be, too).
+    - Split: one of the order's people is a member. In the event's first frame, but not in the frame before, no group
+      has people of two of the planned parts.
+
+    An event in frame 1 fulfils no merge or split. group (T, P): group ids, -1 = alone, -2 = absent.
     """
     if order.kind == "queue":
         people = {p for part in order.before for p in part}
