@@ -37,8 +37,7 @@ class Statistic:
     """One number of the observation: its name and its meaning in words.
 
     half: the value that 0.5 stands for, in `unit`; None for a share, which stands for itself. unit: such as "s" or
-    "m/s", "" for plain numbers, "share" for shares.
-    """
+    "m/s", "" for plain numbers, "share" for shares."""
 
     name: str
     half: float | None
@@ -151,8 +150,10 @@ class Observer:
         }
 
     def _movement(self, rows: TrackRows, found: DetectionRows) -> dict[str, float]:
-        """Returns a dict: speed, speed_spread (m/s), acceleration (m/s²), crowding, gate, correction (m),
-        correction_sigma; and those of `_innovations` if any detections are known.
+        """Returns a dict of medians: speed, speed_spread (interquartile range; m/s), acceleration (m/s²), crowding
+        (distance to the nearest other track), gate (standard deviation of the position), correction (reported from
+        expected position; m), correction_sigma (squared, in covariances); and those of `_innovations` if any detections
+        are known.
 
         rows: tracks in m, the frame before the window included (with number 0 if there is one); found: detections of
         the window in m. A statistic without values is 0."""
@@ -176,8 +177,9 @@ class Observer:
 
 
 def _innovations(rows: TrackRows, expected: Array, found: DetectionRows) -> dict[str, float]:
-    """Returns a dict: orphans, missed (shares), innovation, residual (m), innovation_sigma; of expected positions
-    against detections.
+    """Returns a dict: orphans (share of detections near no track, frame 0 left out), missed (share of tracks without
+    detections), innovation, residual (median distance in m of a track's expected and reported position from the mean of
+    its detections), innovation_sigma (median of the squared innovation in units of the track's covariance).
 
     expected (R, 2), m: where each row of `rows` (tracks in frames) is expected one frame later. found: the detections,
     m. Only rows whose next frame has known detections count. A statistic without values is 0."""
@@ -223,7 +225,9 @@ def _group_values(tracks: Sequence[Tracks], seconds: float) -> dict[str, float]:
 
 
 def _detection_values(found: DetectionRows, rows: TrackRows, frames: int) -> dict[str, float]:
-    """Returns a dict: seen, detections, flicker, score, weak, surplus; {} if no frame has known detections.
+    """Returns a dict; {} if no frame has known detections. Keys: seen (share of frames with known detections),
+    detections (mean number), flicker (standard deviation / (mean + 1) of it), score (mean), weak (share of scores below
+    0.5), surplus (detections / (detections + tracks) in these frames).
 
     found: detections of a window of `frames` frames; rows: the tracks. Without a detection the values are 0, except
     seen."""
@@ -244,8 +248,7 @@ def _picture_values(brightness: Sequence[float]) -> dict[str, float]:
     """Returns a dict: brightness of the last picture, and lights, the mean relative change from picture to picture.
 
     brightness: of consecutive pictures, each in [0, 1]. A change is divided by the earlier brightness, at least 0.001.
-    {} without pictures; lights is 0 with one picture.
-    """
+    {} without pictures; lights is 0 with one picture."""
     if not brightness:
         return {}
     level = np.array(brightness)

@@ -69,7 +69,9 @@ class Scores(Mapping[str, float]):
         return len(self.by_key)
 
     def __str__(self) -> str:
-        """Returns one line "key value" per score that is not nan, values with four significant digits."""
+        """Returns one line per score that is not nan: key, padded to 28 characters, and value with four significant
+        digits.
+        """
         return "\n".join(f"{key:28} {value:.4g}" for key, value in self.items() if not math.isnan(value))
 
 

@@ -186,10 +186,11 @@ def group_scores(compared: GroupComparison, frames: Bools) -> dict[str, float]:
     """Returns a dict of the group scores over the frames f where frames[f] is true.
 
     Keys: 1-FP, 1-FN, 1-FP_frames, 1-FN_frames, GDSR, GDSR2, MOTP, MSE, MOTP_ungated, MOTA, IDSW, TP, FP, FN, F1,
-    precision, recall, the eight of `hota`, size_error, extent_error. The catalogue explains them with "group_" in
-    front. compared: both sides' groups with their matchings. frames (length + 1,): bool by frame number. MOTP,
-    MOTP_ungated and extent_error are in m or px, MSE squared, size_error in people. A score with a denominator of 0, or
-    a mean of nothing, is nan. The keys of `hota` are missing if neither side has a group in these frames.
+    precision, recall, those of `hota` (HOTA, DetA, AssA, DetRe, DetPr, AssRe, AssPr, LocA), size_error, extent_error.
+    The catalogue explains them with "group_" in front. compared: both sides' groups with their matchings. frames
+    (length + 1,): bool by frame number. MOTP, MOTP_ungated and extent_error are in m or px, MSE squared, size_error in
+    people. A score with a denominator of 0, or a mean of nothing, is nan. The keys of `hota` are missing if neither
+    side has a group in these frames.
     """
     true, est, chosen = compared.true, compared.est, compared.chosen
     kept = frames[true.rows.frame[chosen.i]]

@@ -95,8 +95,9 @@ def _evaluated(plan: SearchPlan, study: SearchStudy, play: PlayEpisodes, report:
 
     With one goal the winner is the candidate of best value among those surely better than the defaults (the 95 %
     interval of the gain excludes 0), else the defaults. With several goals it is the one of the Pareto front that is
-    best in the first goal, not simplified. play: plays episodes. report: called with a text before each set of scenes.
-    Errors of the defaults and of the workers are raised.
+    best in the first goal, not simplified. If the defaults win, nothing is compared and a note says why. play: plays
+    episodes. report: called with a text before each set of scenes. Errors of the defaults and of the workers are
+    raised.
     """
     evaluator = HeldOutEvaluator(plan, play, report)
     candidates = evaluator.validated(_candidates(plan, study))
