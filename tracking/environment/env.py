@@ -41,8 +41,11 @@ Floats = NDArray[np.float32]
 
 @dataclass(frozen=True, kw_only=True)
 class TuningEnvOptions:
-    """The keyword arguments of the environment; the fields' metadata hold help texts. InputError if observation,
-    detections or render_mode is unknown; other values are checked when used."""
+    """The keyword arguments of the environment. tracker; suite: what is played; seeds, set: seeds and "key=value"
+    settings of scenarios; detections: the tracker's input, None chooses it; params: to begin with, None the defaults;
+    decision_every: frames between actions, None for one action per episode; observation: "statistics", "parameters"
+    (both) or "none"; cache: bytes of sequences kept; tracker_seed; render_mode: "rgb_array" or None. InputError if
+    observation, detections or render_mode is unknown; other values are checked when used."""
 
     tracker: AnyTracker = field(metadata=option('Registered name, "file.py:Class", "module:Class" or a class.'))
     suite: SourceSpec | Source = field(
@@ -77,11 +80,10 @@ class TuningEnvOptions:
 
 
 class TuningEnv(gymnasium.Env[Floats, Floats]):
-    """An episode is one run of a tracker, an action sets its parameters, the reward is the gain in score.
-
-    Keyword arguments are the fields of TuningEnvOptions. State: sources and their cache; config, rollout (the run, None
-    before it) and score of the episode. Raises InputError if an argument is unknown or wrong, the tracker has no
-    parameters to search, or a source lacks the detections."""
+    """An episode is one run of a tracker, an action sets its parameters, the reward is the gain in score. Keyword
+    arguments are the fields of TuningEnvOptions. State: sources and their cache; config, rollout (the run, None before
+    it) and score of the episode. Raises InputError if an argument is unknown or wrong, the tracker has no parameters to
+    search, or a source lacks the detections."""
 
     metadata = METADATA
 
@@ -131,7 +133,6 @@ class TuningEnv(gymnasium.Env[Floats, Floats]):
 
     def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> tuple[Floats, dict[str, Any]]:
         """Begins an episode on a source that the env's generator draws; returns observation (float32) and info dict.
-
         seed: reseeds the generator, None goes on with it. options: "scenario" and "seed" restrict the draw to sources
         of this name and seed; "params" are the parameters that the episode begins with. Info keys: scenario, seed,
         frame (number of frames tracked), objective, scores, names (of the action's parameters), params, refused. Raises

@@ -24,9 +24,23 @@ and what is done now.
 class TuneOptions:
     """The options of a search; the metadata of each field hold its help text and range.
 
-    Raises InputError if a number with a declared range lies outside it; everything else is checked by the search.
-    check: in Python "" is the default suite and None no second suite. Where a help text names an option as --name, the
-    Python argument of that name is meant.
+    - tracker: a name, file.py:Class, module:Class, a class, or "grouping"; suite: what to tune on.
+    - trials: number to finish, the defaults included; seed: of the search; finalists: number of best trials that
+      validation chooses from.
+    - prune: p-value below which a losing trial is stopped, 0 never.
+    - seeds, validation, test: ranges of seeds for training, validation and test; None makes 16, 48 and 100 episodes.
+    - check: second suite to test on; "" takes friends-meet or crossing, None takes none.
+    - objective: scores to improve; () takes the tracker's own. detections: the tracker's input; None takes "file" if
+      the tracker takes boxes or points, else "image" ("truth" for grouping).
+    - set: "key=value" settings that stay fixed; only: parameters to search, () takes all tunable ones.
+    - out: TOML file for the result, None writes none.
+    - storage: journal file or Optuna URL of the study, None for a journal beside `out` (memory without `out`); study:
+      its name, None for that of `out`.
+    - workers: number of processes; cluster: address of a dask scheduler or None.
+    - progress: called as progress(finished, trials, text), or None.
+
+    Raises InputError if a number with a declared range lies outside it; everything else is checked by the search. Where
+    a help text names an option as --name, the Python argument of that name is meant.
     """
 
     tracker: str | type[Tracker] = field(
