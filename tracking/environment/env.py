@@ -122,8 +122,8 @@ class TuningEnv(gymnasium.Env[Floats, Floats]):
         return names[self.observation]
 
     def _metadata(self, fps: float) -> dict[str, Any]:
-        """Returns a copy of METADATA with "render_fps": one picture per action at the speed of a sequence of `fps`, at
-        least 1."""
+        """Returns the environment's metadata: "render_modes", and "render_fps" for one picture per action at speed
+        `fps`, at least 1."""
         return {**METADATA, "render_fps": max(round(fps / (self.decision_every or 1)), 1)}
 
     def _clear_episode(self) -> None:

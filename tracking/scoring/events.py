@@ -191,9 +191,11 @@ def lineage_scores(matched: Sequence[MatchedEvents]) -> dict[str, float]:
 
     matched: from `match_events`. A matched event is right if both sides have equally many parents, each true parent has
     a Jaccard index above 0.5 with some estimated one, and the same holds for children. It is wrong if the tracker's
-    parents or children are unknown (None). lineage_accuracy divides by all true merges and splits,
-    lineage_accuracy_found by the matched ones. True events with unknown parents or children are left out of both
-    (labels that never change say nothing about lineage). nan if no event is left.
+    parents or children are unknown (None).
+
+    lineage_accuracy divides by all true merges and splits, lineage_accuracy_found by the matched ones. True events with
+    unknown parents or children are left out of both (labels that never change say nothing about lineage). nan if no
+    event is left.
     """
     head = [m for m in matched if m.kind in HEADLINE]
     n_true = sum(event.has_lineage for m in head for event in m.true)

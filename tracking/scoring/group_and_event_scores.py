@@ -148,11 +148,11 @@ def _true_rows(groups: GroupRows, mapping: Ints) -> Ints:
 
 
 def strict_and_core(sides: ComparedSides, compared: GroupComparison) -> dict[str, float]:
-    """Returns a dict of the group scores over all labelled frames as "group_…", and over the core frames as
-    "group_…_core".
+    """Returns a dict of the scores of `group_scores` (1-FP, MOTA, F1 …) over all labelled frames as "group_…", and over
+    the core frames as "group_…_core".
 
     Core frames are the labelled frames more than 1 s away from the start of every true merge, split, form or dissolve.
-    compared: both sides' groups with their matchings.
+    sides: gives the truth and the labelled frames. compared: both sides' groups with their matchings.
     """
     strict = group_scores(compared, sides.frames)
     core = group_scores(compared, sides.frames & ~near_changes(sides.truth))

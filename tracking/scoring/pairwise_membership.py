@@ -15,7 +15,8 @@ from tracking.scoring.rows import FrameRows
 
 
 def pairwise_scores(true: GroupRows, est: GroupRows, person: Ints) -> dict[str, float]:
-    """Returns a dict of pairwise_F1, pairwise_precision and pairwise_recall over pairs of people in one group.
+    """Returns a dict of pairwise_precision (right / estimated pairs), pairwise_recall (right / true pairs) and
+    pairwise_F1 (2 right / both together). A pair is two people of one frame in one group.
 
     Pairs of all frames are counted together. true, est: true and estimated groups in frames; true.member holds row
     indices of the true people. person (K,): row of the true person that each membership of `est` is mapped to, -1 none.

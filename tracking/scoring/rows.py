@@ -86,9 +86,9 @@ def find_rows(rows: FrameRows, wanted: FrameRows) -> Ints:
 class RowLookup:
     """Finds the row of one id that is last up to a frame, first from a frame on, or nearest to it, by single lookups.
 
-    State, as Python lists, because single lookups in lists are faster than in arrays: row, the row indices sorted by id
-    and frame; frame, their frame numbers; span, a dict from id to the range (low, high), high excluded, that it
-    occupies in both lists.
+    rows: people or groups in frames; only: bool mask of the rows to find, None for all. State, as Python lists, because
+    single lookups in lists are faster than in arrays: row, the row indices sorted by id and frame; frame, their frame
+    numbers; span, a dict from id to the range (low, high), high excluded, that it occupies in both lists.
     """
 
     def __init__(self, rows: FrameRows, only: Bools | None = None) -> None:
