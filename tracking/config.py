@@ -2,14 +2,15 @@
 
 A field is declared as `gate: float = param(0.99, (0.9, 0.9999), "probability", "share of ...")`. Parameters are
 seconds, metres and rates, never frame counts. The search space of `tune`, the action space of the environment and the
-table in the docs are read from the declarations.
+table in the docs are read from the declarations. Sets of values with a name (first defaults, presets) are TOML files:
+tracking.parameter_files.
 """
 
 from __future__ import annotations
 
 import dataclasses
 import inspect
-import tomllib
+import re
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -17,11 +18,10 @@ from typing import Any, ClassVar, Literal, Self, TypedDict, Unpack
 
 from scenarios.errors import InputError
 from scenarios.loading.toml_files import closest
+from tracking.parameter_files import file_of, first_defaults, preset_file, presets, read, toml_text
 
 Scale = Literal["linear", "log", "int", "categorical"]
 Value = float | int | str | bool
-FROZEN = Path(__file__).parent / "frozen"
-"""Folder of the first defaults of each tracker, NAME.toml."""
 
 
 @dataclass(frozen=True)
@@ -47,6 +47,11 @@ class Param:
     tunable: bool = True
     before: Value | None = None
     sees: str = ""
+
+    @property
+    def ours(self) -> bool:
+        """True if the meaning says "ours": the parameter belongs to a departure from the tracker's paper."""
+        return re.search(r"\bours\b", self.meaning) is not None
 
     @property
     def expected(self) -> str:
@@ -187,7 +192,7 @@ class Config:
         Raises InputError if the file cannot be read, is no TOML, is of another tracker, or has unknown keys, or values
         that are not allowed or contradict each other.
         """
-        return cls.from_dict(cls._values(path), path)
+        return cls.from_dict(read(path, cls.tracker), path)
 
     @classmethod
     def frozen(cls) -> Self:
@@ -197,34 +202,30 @@ class Config:
         and its default if it is inherited. Raises AssertionError if a lacking parameter that the class declares has no
         `before`. Raises InputError if the file is missing or wrong.
         """
-        path = FROZEN / f"{cls.tracker}.toml"
-        first = cls._values(path)
+        path = first_defaults(cls.tracker)
+        first = read(path, cls.tracker)
         own = inspect.get_annotations(cls)
         later = {n: p.before if n in own else p.default for n, p in cls.params().items() if n not in first}
         assert None not in later.values(), f"a parameter that {path.name} lacks declares what it was before: {later}"
         return cls.from_dict(first | later, path)
 
     @classmethod
-    def _values(cls, path: str | Path) -> dict[str, object]:
-        """Returns the table [params] of a TOML file, unchecked; {} if there is none.
+    def preset(cls, name: str) -> Self:
+        """Return the preset of this name; "paper" switches every departure from the tracker's paper off.
 
-        Raises InputError if the file cannot be read, is no TOML, is of another tracker, or has other keys than tracker
-        and [params].
+        It is the file tracking/presets/NAME/TRACKER.toml; parameters that the file lacks have their defaults. Raises
+        InputError, with the known names, if the tracker has no such preset.
         """
-        text = _read(path)
-        try:
-            content = tomllib.loads(text)
-        except tomllib.TOMLDecodeError as error:
-            raise InputError(file=path, got=str(error), expected="TOML", remedy="correct the file") from None
-        name = content.pop("tracker", cls.tracker)
-        if name != cls.tracker:
-            remedy = "give the file to the tracker it was made for"
-            raise InputError(file=path, place="tracker", got=name, expected=cls.tracker, remedy=remedy)
-        values = content.pop("params", {})
-        if content or not isinstance(values, dict):
-            got, remedy = ", ".join(content) or "params", "put the parameters under [params]"
-            raise InputError(file=path, got=got, expected="tracker and [params]", remedy=remedy)
-        return values
+        return cls.from_toml(preset_file(cls.tracker, name))
+
+    @classmethod
+    def load(cls, source: str | Path) -> Self:
+        """Return the preset of the name `source` if the tracker has one, else the config in the TOML file `source`.
+
+        A file that has the name of a preset is given with a folder, as ./paper. Raises InputError if there is neither,
+        or as `from_toml`.
+        """
+        return cls.from_toml(file_of(cls.tracker, source))
 
     def with_set(self, *assignments: str) -> Self:
         """Return a copy with assignments "name=value" applied, from left to right, and checked as a whole at the end.
@@ -252,37 +253,27 @@ class Config:
 
         Quotes and backslashes inside texts are not escaped.
         """
-        lines = [f"{name} = {_toml(value)}" for name, value in self.as_dict().items()]
-        return "\n".join([f'tracker = "{self.tracker}"', "", "[params]", *lines, ""])
+        return toml_text(self.tracker, self.as_dict())
 
     @classmethod
     def table(cls) -> str:
         """Return all parameters as a Markdown table for the docs: parameter, default, range, unit, meaning.
 
-        The range of a categorical parameter lists its choices; " (log)" follows the range if scale is "log".
+        The range of a categorical parameter lists its choices; " (log)" follows the range if scale is "log". A column
+        for each preset of the tracker follows the default; it is empty where the preset leaves the default.
         """
-        rows = [_row(p) for p in cls.params().values()]
-        return "\n".join(["| parameter | default | range | unit | meaning |", "|---|---|---|---|---|", *rows, ""])
+        named = {name: cls.preset(name).as_dict() for name in presets(cls.tracker)}
+        head = ["parameter", "default", *(f"preset `{name}`" for name in named), "range", "unit", "meaning"]
+        rows = [head, ["---"] * len(head)]
+        for p in cls.params().values():
+            changed = [values[p.name] for values in named.values()]
+            cells = ["" if value == p.default else str(value) for value in changed]
+            rows.append([f"`{p.name}`", str(p.default), *cells, _range(p), p.unit, p.meaning])
+        return "\n".join("|---" * len(r) + "|" if r[0] == "---" else "| " + " | ".join(r) + " |" for r in rows) + "\n"
 
 
-def _row(p: Param) -> str:
-    """Returns a parameter's row of the Markdown table: parameter, default, range or choices, unit, meaning. " (log)"
-    follows the range if scale is "log"."""
+def _range(p: Param) -> str:
+    """Returns the range of a parameter, or its choices, as a cell of a Markdown table; " (log)" follows if scale is
+    "log"."""
     span = ", ".join(f"`{c}`" for c in p.choices) if p.choices else f"{p.low:g} to {p.high:g}"
-    note = " (log)" if p.scale == "log" else ""
-    return f"| `{p.name}` | {p.default} | {span}{note} | {p.unit} | {p.meaning} |"
-
-
-def _toml(value: Value) -> str:
-    """Returns a value as TOML text: true or false, a number, or a quoted string (quotes inside are not escaped)."""
-    if isinstance(value, bool):
-        return str(value).lower()
-    return f'"{value}"' if isinstance(value, str) else repr(value)
-
-
-def _read(path: str | Path) -> str:
-    try:
-        return Path(path).read_text(encoding="utf-8")
-    except (OSError, UnicodeDecodeError) as error:
-        got = getattr(error, "strerror", None) or "no UTF-8 text"
-        raise InputError(file=path, got=got, expected="a parameter file", remedy="check the path") from None
+    return span + (" (log)" if p.scale == "log" else "")

@@ -20,7 +20,7 @@ from tracking.detection_mode import check_detections, choose_mode, frames_with_d
 from tracking.tracks_check import ReportHistory, check_tracks
 
 Params = Config | Mapping[str, Any] | str | Path | None
-"""A config, parameter values by name, the path of a TOML file, or None for the defaults."""
+"""A config, parameter values by name, the name of a preset, the path of a TOML file, or None for the defaults."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -124,9 +124,9 @@ def prepare(
     """Return the tracker ready to be reset for the sequence.
 
     tracker: a registered name, "file.py:Class", "module:Class", a class or an instance. params: a config, values by
-    name or a TOML file; None for the defaults. detections: "image", "file" or "truth"; None for the first of them that
-    can work. sensor: settings that degrade mode "truth", None or {} for none; seed: of their random numbers. Stored
-    detections or labels are read here, and in mode "image" the background pictures.
+    name, a preset's name or a TOML file; None for the defaults. detections: "image", "file" or "truth"; None for the
+    first of them that can work. sensor: settings that degrade mode "truth", None or {} for none; seed: of their random
+    numbers. Stored detections or labels are read here, and in mode "image" the background pictures.
 
     Raises InputError if `sequence` is no Sequence, if the tracker, its parameters or the sensor settings are wrong, or
     if tracker and sequence do not fit. Also if parameters are given to an instance or to a tracker without any, sensor
@@ -191,13 +191,13 @@ def _instance(name: str, tracker_class: Any, *arguments: Any) -> Tracker:
 def config_of(kind: type[Config], params: Params) -> Config:
     """Return `params` as a config of the class `kind`; the default config if `params` is None.
 
-    params: a config of this class, values by name, or the path of a TOML file. Raises InputError for unknown names,
-    values out of range or in contradiction, an unreadable file, or a config of another class.
+    params: a config of this class, values by name, the name of a preset, or the path of a TOML file. Raises InputError
+    for unknown names, values out of range or in contradiction, an unreadable file, or a config of another class.
     """
     if params is None:
         return kind()
     if isinstance(params, str | Path):
-        return kind.from_toml(params)
+        return kind.load(params)
     if isinstance(params, Mapping):
         return kind.from_dict(params)
     if not isinstance(params, kind):

@@ -57,11 +57,12 @@ def track(
     """Return the tracker's tracks of every frame of the sequence, completed with groups and events.
 
     tracker: a registered name, "file.py:Class", "module:Class", a class or an instance. params: a config, values by
-    name, or a TOML file; None for the tracker's defaults. detections: "image", "file" or "truth"; None for the first of
-    them that can work. sensor: settings as in a scenario's [sensor] that degrade "truth" (misses, clutter, noise,
-    hiding); None: perfect. seed: for the tracker's and the sensor's random numbers. grouping: the rule, or its TOML
-    file, that groups people if the tracker names no groups; None: the default rule. If the tracker names groups, it has
-    no effect, with a UserWarning. progress: called with each frame's number, from 1, when the frame is done.
+    name, the name of a preset, or a TOML file; None for the tracker's defaults. detections: "image", "file" or "truth";
+    None for the first of them that can work. sensor: settings as in a scenario's [sensor] that degrade "truth" (misses,
+    clutter, noise, hiding); None: perfect. seed: for the tracker's and the sensor's random numbers. grouping: the rule,
+    or its TOML file, that groups people if the tracker names no groups; None: the default rule. If the tracker names
+    groups, it has no effect, with a UserWarning. progress: called with each frame's number, from 1, when the frame is
+    done.
 
     Raises InputError before the first frame if the arguments are wrong or tracker and sequence do not fit; later for a
     frame whose detections are not finite or whose picture cannot be read; after the last frame if tracks in the image

@@ -7,8 +7,10 @@ import dataclasses
 import pytest
 
 from scenarios.errors import InputError
+from tracking import parameter_files
 from tracking.config import Config, param
 from tracking.papers.blob.config import BlobConfig
+from tracking.tracker_registry import find, names
 
 
 @dataclasses.dataclass(frozen=True)
@@ -101,7 +103,7 @@ def test_frozen_first_defaults_still_load():
 
 
 def test_a_parameter_younger_than_the_frozen_file_says_what_was_before(tmp_path, monkeypatch):
-    monkeypatch.setattr("tracking.config.FROZEN", tmp_path)
+    monkeypatch.setattr("tracking.parameter_files.FROZEN", tmp_path)
     (tmp_path / "small.toml").write_text('[params]\ncount = 5\nkind = "b"\non = false\n')
 
     @dataclasses.dataclass(frozen=True)
@@ -112,3 +114,49 @@ def test_a_parameter_younger_than_the_frozen_file_says_what_was_before(tmp_path,
     assert Later.from_toml(tmp_path / "small.toml").rate == 1.0
     with pytest.raises(AssertionError, match="rate"):
         Small.frozen()
+
+
+WITH_PRESETS = [find(name).config_class for name in names()]
+
+
+@pytest.mark.parametrize("kind", WITH_PRESETS, ids=names())
+def test_the_paper_preset_names_every_parameter_that_is_ours(kind):
+    """A parameter whose meaning says "ours" has its off value in the file, or a value without effect."""
+    given = parameter_files.read(parameter_files.preset_file(kind.tracker, "paper"), kind.tracker)
+    ours = {name for name, p in kind.params().items() if p.ours}
+    assert ours
+    assert not ours - given.keys(), "give them their off values in tracking/presets/paper"
+    paper = kind.preset("paper")
+    assert all(getattr(paper, name) == value for name, value in given.items())
+
+
+def test_ours_is_read_from_the_meaning():
+    def meaning(text):
+        return dataclasses.replace(Small.params()["rate"], meaning=text).ours
+
+    assert meaning("a rate (ours)")
+    assert meaning("a rate (ours, in place of R)")
+    assert not meaning("hours of colours")
+
+
+def test_a_preset_is_found_by_name_beside_files(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "paper").write_text("[params]\ngate = 0.5\n")
+    assert BlobConfig.load("paper") == BlobConfig.preset("paper") != BlobConfig()
+    assert BlobConfig.load("./paper") == BlobConfig.load(tmp_path / "paper") == BlobConfig(gate=0.5)
+    with pytest.raises(InputError, match="preset of blob: paper"):
+        BlobConfig.load("papers")
+    with pytest.raises(InputError, match="one of paper"):
+        BlobConfig.preset("first")
+    with pytest.raises(InputError, match="small has no presets"):
+        Small.preset("paper")
+    with pytest.raises(InputError, match="No such file"):
+        Small.load("paper2")
+
+
+def test_the_table_shows_what_a_preset_changes():
+    rows = [row.split("|") for row in BlobConfig.table().splitlines()]
+    assert rows[0][3].strip() == "preset `paper`"
+    cells = {row[1].strip(): row[3].strip() for row in rows[2:]}
+    assert (cells["`association`"], cells["`gate`"]) == ("nearest", "")
+    assert Small.table().startswith("| parameter | default | range |")

@@ -72,20 +72,22 @@ class GenerateOptions:
 class TrackOptions:
     """Options of the command `track`, which runs a tracker on a sequence or dataset and stores its tracks.
 
-    tracker: its name, file.py:Class or module:Class. source, out: paths. params: file of the tracker's parameters;
-    None: its defaults. settings: texts "key=value". detections: "image", "truth" or "file"; None: the first of image,
-    file, truth that tracker and source allow. sensor: file of a detector profile, None if not given. grouping: file of
-    a rule that derives groups, None if not given. seed: of the tracker's and the sensor's random numbers. fps: frames
-    per second; None: the recording's own. px_per_m: pixels per metre, camera: calibration file; None if not given.
-    background: "first:N" or "spread:N", the frames that a background model is trained on; None if not given.
+    tracker: its name, file.py:Class or module:Class. source, out: paths. params: file of the tracker's parameters, or
+    name of a preset; None: its defaults. settings: texts "key=value". detections: "image", "truth" or "file"; None: the
+    first of image, file, truth that tracker and source allow. sensor: file of a detector profile, None if not given.
+    grouping: file of a rule that derives groups, None if not given. seed: of the tracker's and the sensor's random
+    numbers. fps: frames per second; None: the recording's own. px_per_m: pixels per metre, camera: calibration file;
+    None if not given. background: "first:N" or "spread:N", the frames that a background model is trained on; None if
+    not given.
     """
 
     tracker: Tracker
     source: Source
     out: Out
-    params: Annotated[Path | None, typer.Option("--params", metavar="FILE.toml", help="The tracker's parameters.")] = (
-        None
-    )
+    params: Annotated[
+        str | None,
+        typer.Option("--params", metavar="FILE.toml|PRESET", help="The tracker's parameters: a file, or paper."),
+    ] = None
     settings: Set = field(default_factory=list)
     detections: Detections = None
     sensor: Detector = None

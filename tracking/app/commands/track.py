@@ -108,9 +108,9 @@ def _setup(options: TrackOptions) -> TrackerSetup:
     return TrackerSetup(options.tracker, config, options.detections, sensor, options.seed, rule)
 
 
-def _config(tracker: str, params: Path | None, settings: list[str]) -> Config | None:
-    """Returns the tracker's config with the TOML file `params` and then `settings` ("name=value") applied; None for a
-    tracker without parameters.
+def _config(tracker: str, params: str | None, settings: list[str]) -> Config | None:
+    """Returns the tracker's config with `params` (the name of a preset or a TOML file) and then `settings`
+    ("name=value") applied; None for a tracker without parameters.
 
     Raises InputError if the tracker is unknown, if the file or a setting is wrong, or if either is given for a tracker
     without parameters.
@@ -119,7 +119,7 @@ def _config(tracker: str, params: Path | None, settings: list[str]) -> Config | 
 
     kind: type[Config] | None = getattr(find(tracker), "config_class", None)
     if kind is not None:
-        config = kind() if params is None else kind.from_toml(params)
+        config = kind() if params is None else kind.load(params)
         return config.with_set(*settings)
     if params is None and not settings:
         return None
