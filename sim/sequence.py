@@ -158,7 +158,8 @@ class _Pictures:
 
         Its exact pixels are drawn too, and kept for `pixels`, if "left" and one of "ids" and "disparity" are requested,
         else None. Raises InputError for impossible values of light and picture, or if there is no right camera for
-        "right" or "disparity"; IndexError for a frame that does not exist.
+        "right" or "disparity"; IndexError for a frame that does not exist; ValueError if a
+        distribution of light or picture has no value within its clip.
         """
         if not self.has_image:
             return RenderedFrame(right=self.renderer.right(index) if self.has_right else None)

@@ -375,7 +375,7 @@ class Sequence:
         return self.frames()
 
     def without_pictures(self) -> Iterator[Frame]:
-        """Return a new iterator over Frame, from frame 1, without pictures if `bare` is given, else with them."""
+        """Return a new iterator over Frame, without pictures if `bare` is given. InputError: detections are invalid."""
         return self.frames() if self.bare is None else self.bare()
 
     def frame_truth(self, index: int) -> FrameTruth | None:

@@ -128,7 +128,9 @@ def _sources_of(
 
 
 def _stored(path: Path) -> list[Source]:
-    """Returns the sources of all sequences in a folder, dataset or recording, sorted by path; pictures are not read.
+    """Returns the sources of all sequences in a folder, dataset or recording; pictures are not read.
+
+    In each folder its subfolders come first, then its files, both sorted by name.
 
     Raises InputError if the path holds no known format or a file is invalid.
     """

@@ -82,7 +82,8 @@ def print_error(error: FlockscopeError, as_json: bool) -> int:
 def print_interrupted(as_json: bool) -> int:
     """Prints that Ctrl-C ended the command and that the same command continues; returns 130.
 
-    as_json: print one JSON object with "status" ("interrupted") and "error" on stdout; else one line on stderr. Raises
+    as_json: print one JSON object with "status" ("interrupted") and "error" (file, place, got, expected,
+    remedy) on stdout; else one line on stderr. Raises
     OSError if that cannot be written.
     """
     remedy = "run the same command again: completed parts are kept"

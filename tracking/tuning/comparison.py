@@ -94,8 +94,8 @@ def compare_episodes(scenes: str, goal: Goal, before: Sequence[Episode], after: 
     """Returns the comparison of a goal between `before` and `after`, paired by sequence, with a 95 % bootstrap
     interval.
 
-    scenes: name for the result. before, after: episodes of the same sequences in the same order (not checked;
-    ValueError if their numbers differ). Sequences where either side lacks the score are left out; None if that leaves
+    scenes: name for the result. before, after: episodes of the same sequences in the same order, equally many
+    (not checked). Sequences where either side lacks the score are left out; None if that leaves
     no sequence. With one sequence the interval is nan.
     """
     a, b = (np.array([goal.of(e) for e in episodes]) for episodes in (before, after))

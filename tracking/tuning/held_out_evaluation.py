@@ -118,8 +118,10 @@ class HeldOutEvaluator:
     def _episodes(
         self, sources: Sequence[Source], config: Config, every_score: bool
     ) -> list[Episode] | FlockscopeError:
-        """Returns the episodes of all sources with this config, or the first FlockscopeError that its parameters cause;
-        errors of the workers are raised.
+        """Returns the episodes of all sources with this config, or the first FlockscopeError that one of them raises.
+
+        Its cause may be the parameters or a source, as one without labels. The order is that of `sources`. Errors of
+        the workers themselves (one that dies, a lost cluster) are raised.
 
         every_score: compute the whole catalogue of scores.
         """

@@ -83,7 +83,7 @@ class TuningResult:
         return sum(bool(trial.error) for trial in self.trials)
 
     def __str__(self) -> str:
-        """Returns the lines of `lines()` (settings, counts, values, comparisons) as one text."""
+        """Returns the lines of `lines()` (settings, counts, values, comparisons, notes) as one text."""
         return "\n".join(self.lines())
 
     def lines(self, chosen: Candidate | None = None) -> list[str]:

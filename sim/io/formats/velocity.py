@@ -18,7 +18,8 @@ def differentiate(frame: Ints, id: Ints, pos: Array, fps: float, window: float =
     A row's velocity is the difference between the last and the first position of its id inside the window, divided by
     the time between them. It is 0 if the id has no other row there, nan if one of the two positions is nan. frame, id
     (R,), pos (R, D) float: rows in any order, each id once in a frame. fps: frames per second. window: length in s,
-    default 0.5, centred on the row; it covers at least one frame to each side. Without rows the result has none.
+    default 0.5, centred on the row. Half of it is rounded to whole frames, at least one, to each side; both end frames
+    count. Without rows the result has none.
     """
     if len(frame) == 0:
         return np.zeros_like(pos)

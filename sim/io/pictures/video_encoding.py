@@ -32,7 +32,8 @@ def write_video(path: Path, size: tuple[int, int], fps: float, quality: int = QU
 
     size: (width, height) px of all pictures. fps: frames per second, rounded to a fraction with a denominator up to
     1001. quality: x264's constant rate factor, lower is better, default 18. If the block raises, an incomplete file
-    stays. Raises InputError if width or height is odd, OSError if the file cannot be opened.
+    stays; if it adds no picture, an empty file. Raises InputError if width or height is
+    odd, OSError if the file cannot be opened.
     """
     if size[0] % 2 or size[1] % 2:
         raise InputError(
