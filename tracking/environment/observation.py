@@ -153,10 +153,9 @@ class Observer:
         """Returns a dict of medians: speed, speed_spread (interquartile range; m/s), acceleration (m/s²), crowding
         (distance to the nearest other track), gate (standard deviation of the position), correction (d, reported from
         expected position; m), correction_sigma (d' C^-1 d / 2, C the covariance of d); and the values of `_innovations`
-        if any detections are known.
+        if any detections are known. A statistic without values is 0.
 
-        rows: tracks in m, the frame before the window included (number 0 if there is one); found: detections of the
-        window in m. A statistic without values is 0.
+        rows: tracks in m, with the frame before the window (number 0). found: detections of the window in m.
         """
         now = rows.frame >= len(self._before)
         before, after = consecutive_rows(rows)
