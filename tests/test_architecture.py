@@ -136,6 +136,20 @@ def test_trackers_and_detectors_see_neither_truth_nor_scores():
         assert read.isdisjoint(TRUTH), f"{name} reads {read & set(TRUTH)}"
 
 
+def test_one_function_makes_paths_of_names():
+    """Names of sequences are labels; `sim.io.files.output_paths` alone turns one into a part of a path."""
+    paths_of_paths = {"sim.io.files.atomic", "sim.io.store.validate"}  # target.name, split.name: of a Path
+    found = [
+        f"{name}, line {node.lineno}: {ast.unparse(node)}"
+        for name in modules().keys() - paths_of_paths
+        for node in ast.walk(tree(name))
+        if isinstance(node, ast.BinOp) and isinstance(node.op, ast.Div)
+        for inner in ast.walk(node.right)
+        if isinstance(inner, ast.Attribute) and inner.attr == "name"
+    ]
+    assert found == []
+
+
 def test_papers_do_not_lean_on_each_other():
     """One package a paper; nothing goes from one to another."""
     papers = sorted({name.split(".")[2] for name in of("tracking.papers") if name != "tracking.papers"})

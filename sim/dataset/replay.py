@@ -109,7 +109,7 @@ def resolve_replay(
     low, whole = np.nanmin(moving.pos, axis=(0, 1)), source.scene if not is_real(source) else None
     shift = np.zeros(2) if whole is not None else MARGIN - low
     origin = _origin(source, truth, places, moving, cut, view.camera.fps, shift)
-    motion = _motion(moving, truth, _name(source.name, cut), view.camera.fps, cut, seed, shift)
+    motion = _motion(moving, truth, replay_name(source.name, cut), view.camera.fps, cut, seed, shift)
     made = observe(view, motion if whole is None else motion.replace(scene=whole), people={}, streams=streams)
     if truth.labelled is None or not truth.labelled.any():
         made = replace(made, load_truth=_without_groups(made))
@@ -268,7 +268,7 @@ def _heights(people: Ints, truth: Truth, seed: int) -> Array:
     return np.where(np.isfinite(truth.height[first]), truth.height[first], drawn)
 
 
-def _name(name: str, cut: Cut) -> str:
+def replay_name(name: str, cut: Cut) -> str:
     """Return the replay's name: `name` of the recording with "-" for every character other than letters, digits, "_",
     "." and "-".
 

@@ -12,11 +12,12 @@ from scenarios.loading.resolve import Entry
 from scenarios.loading.toml_files import dump
 from scenarios.schema.observation import ObservationSpec, ReplaySpec
 from sim.dataset.generate import write_seqmap
-from sim.dataset.replay import WHOLE, Cut, resolve_replay
+from sim.dataset.replay import WHOLE, Cut, replay_name, resolve_replay
 from sim.dataset.sequence_job import SequenceJob, is_stored
 from sim.dataset.splits import TUNING_SPLITS, is_real, split_of
 from sim.io.files.atomic import remove_partials
 from sim.io.files.lock import lock_folder
+from sim.io.files.output_paths import output_path, output_paths
 from sim.io.store import sequence_folder
 from sim.io.store.streams import check_streams
 from sim.types import Camera, Sequence
@@ -59,8 +60,8 @@ def store_replays(
     people or a cut outside it. Raises WorkError if the disk is full.
     """
     recordings, split, root = list(sources), split_of(seeds), Path(out)
-    _check(recordings, seeds, split)
     folder = root / f"flockscope-{split}"
+    _check(recordings, folder, options.cut, seeds, split)
     options = replace(options, streams=tuple(check_streams(options.streams, options.images)))
     made: list[Path] = []
     with lock_folder(root):
@@ -77,11 +78,8 @@ def store_replays(
     return made
 
 
-def _check(recordings: list[Sequence], seeds: range, split: str) -> None:
-    names = [recording.name for recording in recordings]
-    twice = next((name for k, name in enumerate(names) if name in names[:k]), None)
-    if twice is not None:
-        raise InputError(got=f"two recordings named {twice}", expected="unique names", remedy="give one at a time")
+def _check(recordings: list[Sequence], folder: Path, cut: Cut, seeds: range, split: str) -> None:
+    output_paths(folder, [replay_name(recording.name, cut) for recording in recordings], source="recordings")
     if split in TUNING_SPLITS and any(is_real(recording) for recording in recordings):
         raise InputError(
             place="--seeds", got=f"{seeds.start} ({split})", expected="seeds from 20000 (test) on, for real motion",
@@ -109,4 +107,4 @@ def _job(form: ReplaySpec, seed: int, folder: Path, options: ReplayOptions) -> S
     streams and images.
     """
     entry = Entry(form.name, cast(Any, form))
-    return SequenceJob(folder / f"{form.name}-s{seed:05d}", entry, seed, options.streams, options.images)
+    return SequenceJob(output_path(folder, form.name, f"-s{seed:05d}"), entry, seed, options.streams, options.images)

@@ -14,6 +14,7 @@ from typing import Any
 
 from scenarios.errors import FlockscopeError, InputError, WorkError
 from scenarios.loading.resolve import Entry
+from sim.io.files.output_paths import output_path, output_paths
 from sim.io.store import sequence_folder
 from sim.io.store.manifest import MANIFEST, damaged_files, identity, read_manifest
 
@@ -59,15 +60,10 @@ def plan_jobs(entries: list[Entry], seeds: range, folder: Path) -> list[Sequence
     """Return one job per entry and seed, all seeds of the first entry first; the jobs store no pictures.
 
     folder: OUT/flockscope-<split>; each job's folder is <entry>-s<seed, 5 digits> in it. No entries give no jobs.
-    Raises InputError if two entries have the same name, since they would share a folder.
+    Raises InputError if two entries would share a folder.
     """
-    names = [e.name for e in entries]
-    twice = next((n for k, n in enumerate(names) if n in names[:k]), None)
-    if twice is not None:
-        raise InputError(
-            place="entries", got=f"{twice} twice", expected="unique names", remedy="give it once, or rename one"
-        )
-    return [SequenceJob(folder / f"{e.name}-s{seed:05d}", e, seed) for e in entries for seed in seeds]
+    output_paths(folder, [e.name for e in entries], source="entries")
+    return [SequenceJob(output_path(folder, e.name, f"-s{seed:05d}"), e, seed) for e in entries for seed in seeds]
 
 
 def stored_manifest(job: SequenceJob) -> dict[str, Any] | None:

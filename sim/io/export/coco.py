@@ -15,6 +15,7 @@ import numpy as np
 
 from scenarios.errors import InputError
 from sim.io.files.atomic import write_file
+from sim.io.files.output_paths import output_paths
 from sim.io.files.tables import json_text
 from sim.io.source import open_source
 from sim.io.store.streams import file_name
@@ -30,11 +31,12 @@ def coco(source: str | Path, out: str | Path) -> Path:
     source: path of a dataset or recording. out: the JSON file, replaced if it exists. Each frame is an image, each
     sequence a video, both numbered from 1. Annotations have bbox [left, top, width, height] px (amodal, unclipped),
     track_id (the person's id), group_id (-1 for alone) and visibility; rows with an unknown box are left out. file_name
-    is the frame's picture or video, also where none is stored. An unknown image size is replaced by the extent of the
-    boxes. info has the content hash if all exported sequences are generated. The same dataset gives the same bytes.
+    is the frame's picture or video, also where none is stored, in a folder named for the sequence. An unknown image
+    size is replaced by the extent of the boxes. info has the content hash if all exported sequences are generated. The
+    same dataset gives the same bytes.
 
-    Raises InputError if the source cannot be opened, a file of it is invalid, no sequence has labelled boxes, or `out`
-    cannot be written; WorkError if the disk is full.
+    Raises InputError if the source cannot be opened, a file of it is invalid, no sequence has labelled boxes, two
+    sequences would share a folder, or `out` cannot be written; WorkError if the disk is full.
     """
     sequences = [s for s in open_source(source, images=False) if s.truth is not None and s.truth.box is not None]
     if not sequences:
@@ -43,7 +45,8 @@ def coco(source: str | Path, out: str | Path) -> Path:
         )
     starts = np.cumsum([0, *(s.length or 0 for s in sequences)]).tolist()
     videos = [_video(k, s) for k, s in enumerate(sequences, 1)]
-    images = chain.from_iterable(_images(k, s, starts[k - 1]) for k, s in enumerate(sequences, 1))
+    folders = output_paths("", [s.name for s in sequences], source=source)
+    images = chain.from_iterable(_images(k, s, folders[k - 1], starts[k - 1]) for k, s in enumerate(sequences, 1))
     rows = chain.from_iterable(_annotations(k, s, starts[k - 1]) for k, s in enumerate(sequences, 1))
     numbered = ({"id": k, **row} for k, row in enumerate(rows, 1))
     ours = all(s.source.get("kind") == "generated" for s in sequences)
@@ -81,11 +84,11 @@ def _video(k: int, sequence: Sequence) -> dict[str, Any]:
     return {"id": k, "name": sequence.name, "fps": sequence.fps, "length": sequence.length, **_size(sequence)}
 
 
-def _images(k: int, sequence: Sequence, before: int) -> Iterator[dict[str, Any]]:
+def _images(k: int, sequence: Sequence, folder: Path, before: int) -> Iterator[dict[str, Any]]:
     size = _size(sequence)
     images = sequence.source.get("images") or "jpg"
     for index in range(1, (sequence.length or 0) + 1):
-        name = f"{sequence.name}/{file_name('left', images, index)}"
+        name = f"{folder.name}/{file_name('left', images, index)}"
         yield {"id": before + index, "file_name": name, **size, "video_id": k, "frame": index}
 
 

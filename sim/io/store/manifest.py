@@ -7,7 +7,7 @@ time, host or path, so the same seed, scenario and versions give the same bytes.
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
-from pathlib import Path
+from pathlib import Path, PurePosixPath
 from typing import Any
 
 from scenarios.errors import InputError
@@ -61,8 +61,9 @@ def with_hash(manifest: dict[str, Any]) -> dict[str, Any]:
 def read_manifest(folder: Path) -> dict[str, Any]:
     """Read the manifest.json of a sequence folder, as a dict.
 
-    Raises InputError if it is missing, unreadable or no JSON object, has another format number or none, lacks a key, or
-    was altered, that is, its fields do not have the hash in its key sha256. The files that it names are not read.
+    Raises InputError if it is missing, unreadable or no JSON object, has another format number or none, lacks a key,
+    names a file outside the folder, or was altered, that is, its fields do not have the hash in its key sha256. The
+    files that it names are not read.
     """
     path = folder / MANIFEST
     if not path.is_file():
@@ -78,6 +79,9 @@ def read_manifest(folder: Path) -> dict[str, Any]:
         raise InputError(file=path, got=f"no {', '.join(sorted(missing))}", expected="all keys", remedy=REDO)
     if manifest["sha256"] != with_hash(manifest)["sha256"]:
         raise InputError(file=path, got="altered fields", expected="those that its sha256 names", remedy=REDO)
+    for name in manifest["files"]:
+        if PurePosixPath(name).is_absolute() or ".." in PurePosixPath(name).parts:
+            raise InputError(file=path, place="files", got=name, expected="files of its own folder", remedy=REDO)
     return manifest
 
 

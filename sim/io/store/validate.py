@@ -84,7 +84,7 @@ def _seqmaps(root: Path) -> Iterator[InputError]:
             if any(split.glob("*/")):
                 yield _problem(path, "missing", "the list of the split's sequences")
             continue
-        listed = set(path.read_text(encoding="utf-8").split()[1:])
+        listed = set(path.read_text(encoding="utf-8").splitlines()[1:])
         there = {p.name for p in split.iterdir() if p.is_dir() and not p.name.startswith(PARTIAL)}
         for name in sorted(listed - there):
             yield _problem(split / name, "missing", f"a sequence, as {path.name} says")

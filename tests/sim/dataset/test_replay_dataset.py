@@ -83,5 +83,5 @@ def test_real_motion_stays_out_of_what_is_tuned_on(walk: Sequence, tmp_path: Pat
     (made,) = store_replays([own], ReplayOptions(SMALL, streams=()), range(1), tmp_path)
     assert made.parent.name == "flockscope-train"
     assert not is_real(open_source(made)[0])
-    with pytest.raises(InputError, match="two recordings"):
+    with pytest.raises(InputError, match="unique names"):
         store_replays([walk, walk], ReplayOptions(SMALL, streams=()), range(20_000, 20_001), tmp_path)

@@ -7,6 +7,7 @@ import os
 import time
 from pathlib import Path
 
+from sim.io.files.output_paths import output_path
 from sim.types import DetectionMode, Sequence
 from tracking import tracker_registry
 from tracking.app import option_parsing
@@ -82,7 +83,7 @@ def _pixel_scene(sequence: Sequence, out: Path) -> PixelScene:
     from tracking.app.replay_page.video import page_video
 
     folder = out / "pages" / "pictures"
-    video = page_video(sequence, folder / f"{sequence.name}.html", "beside")
+    video = page_video(sequence, output_path(folder, sequence.name, ".html"), "beside")
     section, overlays = ResultSection(f"{sequence.name}, from its pictures"), {}
     for tracker in [name for name in tracker_registry.names() if "pixels" in tracker_registry.find(name).needs]:
         for mode in MODES:
@@ -117,7 +118,7 @@ def _section(tracker: str, sequences: list[Sequence], out: Path, meter: Progress
     for sequence in sequences:
         run = TrackerSetup(tracker).run(sequence)
         row = score_run(sequence, run)
-        page = out / "pages" / tracker / f"{sequence.name}.html"
+        page = output_path(out / "pages" / tracker, sequence.name, ".html")
         _write_tracks(sequence, run, out / "tracks" / tracker)
         _write_page(tracker, sequence, run, row, page, None)
         section.add(row, page, sequence.name)
@@ -129,7 +130,8 @@ def _write_tracks(sequence: Sequence, run: TrackingRun, folder: Path) -> None:
     from sim.io.store.track_files import write_tracks
 
     write_tracks(
-        folder / sequence.name, run, fps=sequence.fps, camera=sequence.camera, scene=sequence.scene, info=run.info
+        output_path(folder, sequence.name), run, fps=sequence.fps, camera=sequence.camera, scene=sequence.scene,
+        info=run.info,
     )  # fmt: skip
 
 

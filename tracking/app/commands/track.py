@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from scenarios.errors import InputError
+from sim.io.files.output_paths import output_paths
 from sim.types import DetectionMode, Sequence
 from tracking.app import option_parsing
 from tracking.app.command_options import TrackOptions
@@ -157,22 +158,15 @@ def _total_frames(sequences: list[Sequence]) -> int | None:
 
 def _output_folders(sequences: list[Sequence], source: Path, out: Path) -> list[Path]:
     """Returns the folder for each sequence's tracks: `out` itself if the source is one sequence, else out/<sequence
-    name>.
+    name>, as a file name.
 
-    A dataset that holds a single sequence folder is no single sequence. Raises InputError if two sequences have the
-    same name.
+    A dataset that holds a single sequence folder is no single sequence. Raises InputError if two sequences would share
+    a folder.
     """
     own = Path(sequences[0].source.get("path", source))
     if len(sequences) == 1 and (own == source or source.is_file() or own.is_file()):
         return [out]
-    names = [sequence.name for sequence in sequences]
-    for k, name in enumerate(names):
-        if name in names[:k]:
-            raise InputError(
-                file=source, got=f"two sequences named {name}", expected="unique names",
-                remedy="track them one at a time",
-            )  # fmt: skip
-    return [out / name for name in names]
+    return output_paths(out, [sequence.name for sequence in sequences], source=source)
 
 
 def _row(run: TrackingRun, folder: Path) -> dict[str, Any]:

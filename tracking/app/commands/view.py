@@ -6,6 +6,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 from scenarios.errors import InputError
+from sim.io.files.output_paths import output_paths
 from sim.io.source import open_source
 from sim.types import Sequence
 from tracking.app import option_parsing
@@ -126,8 +127,8 @@ def _write_each(
 def _files(sequences: list[Sequence], out: Path, suffix: str) -> list[Path]:
     """Returns the file for each sequence, in order: `out` itself for a single one, else out/<sequence name><suffix>.
 
-    Raises InputError if `out` ends in `suffix` and there are several sequences, or for a single one if it ends
-    otherwise or is a folder.
+    The sequence name becomes a file name. Raises InputError if `out` ends in `suffix` and there are several sequences,
+    or two of them would share a file; for a single one if `out` ends otherwise or is a folder.
     """
     if len(sequences) == 1:
         return [option_parsing.output_file(out, suffix)]
@@ -136,4 +137,4 @@ def _files(sequences: list[Sequence], out: Path, suffix: str) -> list[Path]:
             file=out, place="--out", got=f"one file for {len(sequences)} sequences", expected="a folder",
             remedy="give a folder, or one sequence",
         )  # fmt: skip
-    return [out / f"{sequence.name}{suffix}" for sequence in sequences]
+    return output_paths(out, [sequence.name for sequence in sequences], suffix)

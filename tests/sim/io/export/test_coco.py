@@ -1,4 +1,5 @@
 import json
+from dataclasses import replace
 
 import pytest
 
@@ -10,7 +11,7 @@ from sim.io.store.validate import content_hash
 
 def test_coco_has_every_box(tmp_path, make_sequence):
     for k, name in enumerate(("a", "b")):
-        live = make_sequence(k)
+        live = replace(make_sequence(k), name=name)
         sequence_folder.write_sequence(tmp_path / "data" / name, live, scenario="schema = 1\n", seed=k)
     coco(tmp_path / "data", tmp_path / "coco.json")
     first = (tmp_path / "coco.json").read_bytes()

@@ -1,0 +1,96 @@
+"""A sequence may be called anything: no command writes outside --out, and the name stays what tables show."""
+
+from __future__ import annotations
+
+import json
+import shutil
+from pathlib import Path
+
+import cv2
+import numpy as np
+import pytest
+
+from sim.io.store.manifest import read_manifest, with_hash
+from tracking.app.cli import run
+
+ROWS = "1,1,10,10,20,40,1,1,1\n2,1,11,10,20,40,1,1,1\n3,1,12,10,20,40,1,1,1\n"
+NAMES = ("../../escaped", "{outside}/absolute", "..", "con", "x" * 300, "a/b\\c", "\u202egpj")
+
+
+def recording(folder: Path, name: str) -> Path:
+    for part, text in (("gt/gt.txt", ROWS), ("seqinfo.ini", f"[Sequence]\nname={name}\nframeRate=5\n")):
+        (folder / part).parent.mkdir(parents=True, exist_ok=True)
+        (folder / part).write_text(text, encoding="utf-8")
+    (folder / "img1").mkdir()
+    for k in (1, 2, 3):
+        cv2.imwrite(str(folder / "img1" / f"{k:06d}.png"), np.full((96, 128, 3), 90, np.uint8))
+    return folder
+
+
+def tree(folder: Path) -> set[str]:
+    return {str(p.relative_to(folder)) for p in folder.rglob("*")}
+
+
+def commands(source: Path, out: Path) -> list[list[str]]:
+    tracks = out / "tracks"
+    return [
+        ["track", "blob", str(source), "--detections", "truth", "--px-per-m", "20", "--out", str(tracks)],
+        ["view", str(source), str(tracks), "--video", "beside", "--out", str(out / "pages")],
+        ["sheet", str(source), "--out", str(out / "sheets")],
+        ["overlay", str(source), str(tracks), "--out", str(out / "films")],
+        ["export", "coco", str(source), "--out", str(out / "coco.json")],
+    ]
+
+
+def test_no_command_leaves_out(tmp_path: Path, capsys) -> None:
+    inside = tmp_path / "deep" / "down"
+    names = [name.format(outside=tmp_path) for name in NAMES]
+    for k, name in enumerate(names):
+        recording(inside / "data" / str(k), name)
+    before = tree(tmp_path)
+    for line in commands(inside / "data", inside / "out"):
+        assert run(line) == 0, capsys.readouterr().err
+    made = tree(tmp_path) - before
+    assert {name for name in made if not name.startswith("deep/down/out")} == set()
+    parts = {path.name for path in (inside / "out" / "tracks").iterdir()}
+    assert len(parts) == len(names)
+    listed = json.loads((inside / "out" / "coco.json").read_text())
+    assert {image["file_name"].split("/")[0] for image in listed["images"]} == parts
+    assert [video["name"] for video in listed["videos"]] == names
+    capsys.readouterr()
+    assert run(["score", str(inside / "data"), str(inside / "out" / "tracks"), "--json"]) == 0
+    assert [row["name"] for row in json.loads(capsys.readouterr().out)["sequences"]] == names
+
+
+@pytest.mark.parametrize(("one", "other"), [("same", "same"), ("a/b", "a_b"), ("Case", "case")])
+def test_two_names_of_one_file_write_nothing(tmp_path: Path, capsys, one: str, other: str) -> None:
+    recording(tmp_path / "data" / "1", one)
+    recording(tmp_path / "data" / "2", other)
+    data, truth = str(tmp_path / "data"), ["--detections", "truth", "--px-per-m", "20"]
+    for words in (["track", "blob", data, *truth], ["view", data], ["sheet", data], ["export", "coco", data]):
+        assert run([*words, "--out", str(tmp_path / "out" / "x")]) == 2, words
+        assert "unique names" in capsys.readouterr().err
+    assert not (tmp_path / "out").exists()
+
+
+def test_the_name_in_a_manifest_is_a_label(tmp_path: Path, capsys) -> None:
+    line = ["generate", "quick", "--seeds", "40000:40002", "--streams", "none", "--out"]
+    assert run([*line, str(tmp_path / "deep" / "data")]) == 0
+    folder = min((tmp_path / "deep" / "data" / "flockscope-demo").iterdir())
+    manifest = read_manifest(folder)
+    manifest["sequence"]["name"] = "../../../escaped"
+    (folder / "manifest.json").write_text(json.dumps(with_hash(manifest)))
+    before = tree(tmp_path)
+    assert run(["track", "blob", str(tmp_path / "deep" / "data"), "--out", str(tmp_path / "deep" / "out")]) == 0
+    assert {name for name in tree(tmp_path) - before if not name.startswith("deep/out")} == set()
+
+
+def test_a_manifest_names_files_of_its_own_folder_only(tmp_path: Path, capsys) -> None:
+    assert run(["generate", "quick", "--seeds", "40000", "--streams", "none", "--out", str(tmp_path / "data")]) == 0
+    folder = min((tmp_path / "data" / "flockscope-demo").iterdir())
+    manifest = read_manifest(folder)
+    shutil.move(folder / "camera.json", tmp_path / "camera.json")
+    manifest["files"]["../../../camera.json"] = manifest["files"].pop("camera.json")
+    (folder / "manifest.json").write_text(json.dumps(with_hash(manifest)))
+    assert run(["export", "webdataset", str(tmp_path / "data"), "--out", str(tmp_path / "out")]) == 2
+    assert "../../../camera.json" in capsys.readouterr().err
