@@ -16,6 +16,7 @@ from tests import reference_components
 from tracking.filters.components import Constraint
 
 H = np.eye(2, 4)
+ASSOCIATIONS = {"pda": 0, "nearest": 1, "all": 2, "none": 3}
 NEWCOMERS = 0.02  # probability that the number of people is any
 
 
@@ -32,7 +33,7 @@ class Rules:
     keep_size: float
     correct: bool  # what the gate cuts off is put back
     redrawn: bool
-    every: bool  # no association: all points in the region
+    association: str = "pda"  # or nearest, all, none
     others: float = 1.0  # people beside one, of those who are there, at least
 
     @property
@@ -43,7 +44,7 @@ class Rules:
         return np.array([
             c.gate, c.link, P[0, 0], P[0, 1], P[1, 1], c.strength, c.least, self.noise, self.count_noise,
             self.count_share, self.detect, self.miss, self.freeze, self.keep_extent, self.keep_size, cut, self.redrawn,
-            self.every, self.others,
+            ASSOCIATIONS[self.association], self.others,
         ], float)  # fmt: skip
 
 
@@ -96,12 +97,17 @@ def moments(points, weights):
     return n, mean, (weights * (points - mean).T) @ (points - mean) / n
 
 
-def associations(mine, shared, points, weights, rules):
+def associations(mine, shared, points, weights, d2, g, rules):
     """The feasible sets of points, largest last; rows of `points`."""
-    if rules.every:
-        return [mine + shared]
-    sets = [mine + shared[:j] for j in range(len(shared) + 1)]
-    return [s for s in sets if reference_components.is_group(points[s], weights[s], rules.constraint)]
+    nearest = [k for k in shared if g == d2[:, k].argmin()]
+    sets = {
+        "pda": [mine + shared[:j] for j in range(len(shared) + 1)],
+        "nearest": [mine + nearest],
+        "all": [mine + shared],
+        "none": [mine + shared],
+    }[rules.association]
+    free = rules.association == "none"
+    return [s for s in sets if free or reference_components.is_group(points[s], weights[s], rules.constraint)]
 
 
 def masses(sets, mine, shared, points, weights, x, P, extent, size, rules):
@@ -135,7 +141,7 @@ def update(g, points, weights, d2, own, hits, x, P, extent, size, hold, rules):
     same = x, P, extent, size
     if not mine + shared:
         return "nothing", [], None, None, 0.0, *same
-    sets = associations(mine, shared, points, weights, rules)
+    sets = associations(mine, shared, points, weights, d2, g, rules)
     if not sets:
         some = mine + shared
         if reference_components.partition(points[some], weights[some], rules.constraint).max() < 0:
@@ -153,7 +159,8 @@ def update(g, points, weights, d2, own, hits, x, P, extent, size, hold, rules):
     best = int(np.argmax(beta))
     middle = moments(points[sets[best]], weights[sets[best]])[1]
     new_extent, new_size = extent, size
-    frozen = hold or (not rules.every and weights[shared].sum() > rules.freeze * size)
+    all_shared = rules.association != "none" and weights[shared].sum() > rules.freeze * size
+    frozen = hold or all_shared
     if not frozen:
         new_extent, new_size = adapted(sets, share, points, weights, extent, size, rules)
     found = beta.sum() > miss

@@ -27,6 +27,7 @@ from sim.io.source import open_source
 from sim.types import Array, Ints, Tracks, Truth
 from tracking.app.pictures.overlay import write_overlay
 from tracking.grouping.grouped_tracks import with_groups
+from tracking.papers.group_pda.config import GroupPdaConfig
 from tracking.run import track
 from tracking.scoring import evaluate
 from tracking.scoring.block_resampling import resampled_scorer
@@ -67,6 +68,7 @@ def labelled_recording(given: argparse.Namespace, path: str, note: str) -> Any:
     assert truth is not None
     variants = (
         Variant(given.tracker, given.tracker),
+        Variant("preset paper", given.tracker, GroupPdaConfig.preset("paper").as_dict()),
         Variant('association="none"', given.tracker, {"association": "none"}),
     )
     answers: dict[str, Sequence[Tracks]] = {

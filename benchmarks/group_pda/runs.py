@@ -26,6 +26,7 @@ from sim.types import Sequence as Recording
 from sim.workers.pool import process_pool
 from tracking.detect import background
 from tracking.detect.background_training import Trained, train
+from tracking.papers.group_pda.config import GroupPdaConfig
 from tracking.run import TrackingRun, track
 from tracking.scoring import evaluate
 
@@ -57,10 +58,15 @@ class TrackingJob:
 
 
 def trackers(name: str, mode: DetectionMode) -> tuple[Variant, ...]:
-    """Returns the tracker, its paper's ablation, and the baseline: groups by the baseline rule over `blob`."""
+    """Returns the tracker, its preset "paper", its paper's ablation, and the baseline: groups by rule over `blob`."""
     blob = (Variant("blob + baseline rule", "blob", in_image=True),) if mode == "image" else ()
     on_ground = "blob …, on the ground" if mode == "image" else "blob + baseline rule"
-    ours = (Variant(name, name), Variant('association="none"', name, {"association": "none"}))
+    paper = GroupPdaConfig.preset("paper").as_dict()
+    ours = (
+        Variant(name, name),
+        Variant("preset paper", name, paper),
+        Variant('association="none"', name, {"association": "none"}),
+    )
     return (*ours, *blob, Variant(on_ground, "blob"))
 
 

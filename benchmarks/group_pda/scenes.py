@@ -18,6 +18,7 @@ from benchmarks.group_pda.runs import Row, TrackingJob, Variant, measure, tracke
 from benchmarks.support.options import seeds_text
 from benchmarks.support.tables import signed, table
 from scenarios.loading.resolve import Entry, resolve
+from tracking.papers.group_pda.config import GroupPdaConfig
 from tracking.stats import paired
 
 SCENES = ("merge", "split", "cross", "queue", "side-by-side")
@@ -30,7 +31,10 @@ WITHOUT: Mapping[str, Mapping[str, object]] = {
     'centroid_noise "people"': {"centroid_noise": "redrawn"},
     "inherit_velocity": {"inherit_velocity": False},
     "recapture": {"recapture": False},
-    'association "pda"': {"association": "none"},
+    "association by masses: the nearest group": {"association": "nearest"},
+    "association by masses: all points": {"association": "all"},
+    "association and group constraint": {"association": "none"},
+    "all that is ours: preset paper": GroupPdaConfig.preset("paper").as_dict(),
 }
 SCENE_COLUMNS: Mapping[str, columns.Column] = {
     "lineage, all events": columns.pooled_lineage,

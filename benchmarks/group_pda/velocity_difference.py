@@ -35,6 +35,7 @@ from sim.sequence import observe
 from sim.types import DetectionMode, Motion, Truth
 from sim.workers.pool import process_pool
 from tracking import tracker_registry
+from tracking.papers.group_pda.config import GroupPdaConfig
 from tracking.stats import wilson
 
 DIFFERENCES = (0.0, 0.2, 0.4, 0.6, 0.8, 1.0, 1.2, 1.6, 2.0)  # m/s
@@ -132,6 +133,7 @@ def difference(given: argparse.Namespace) -> Any:
     ours = given.tracker
     variants = (
         Variant("defaults", ours),
+        Variant("preset paper", ours, GroupPdaConfig.preset("paper").as_dict()),
         Variant("freeze=false", ours, {"freeze": False}),
         Variant('association="none"', ours, {"association": "none"}),
     )

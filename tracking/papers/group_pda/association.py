@@ -139,6 +139,7 @@ def associate(bank: GroupBank, claims: PointClaims, log_ratio: Array, scaled: Sc
     weighted = scaled.config.appearance * log_ratio
     state, chosen, report = kernels.associate(
         claims.points, claims.weights, claims.d2, weighted, claims.owner, claims.claimants,
+        claims.d2.argmin(0) if len(bank) else claims.owner,
         bank.x, bank.P, bank.extent, bank.size, bank.null_time > 0, scaled.kernel_rules,
     )  # fmt: skip
     has_new_point = (chosen & (claims.last_seen >= t)).any(1)  # more than missed members

@@ -15,6 +15,7 @@ from numba import njit
 from sim.types import Array, Bools, Ints
 from tracking.filters.components_kernels import WEIGHT, components, prefixes
 from tracking.papers.group_pda.association_mass_kernels import (
+    ASSOCIATION,
     COUNT_SD,
     COUNT_SHARE,
     FREEZE_SHARE,
@@ -24,10 +25,12 @@ from tracking.papers.group_pda.association_mass_kernels import (
     KEEP_SIZE,
     LEAST_WEIGHT,
     LINK,
+    NEAREST,
+    PREFIXES,
     PRIOR_WEIGHT,
     PRIOR_XX,
     PRIOR_YY,
-    TAKE_ALL,
+    UNCONSTRAINED,
     centroid_noise,
     log_count,
     log_density,
@@ -97,7 +100,7 @@ def any_within(place: Array, points: Array, reach: float) -> Bools:
 
 @njit(cache=True)
 def associate(
-    points: Array, weights: Array, d2: Array, log_ratio: Array, owner: Ints, claimants: Ints,
+    points: Array, weights: Array, d2: Array, log_ratio: Array, owner: Ints, claimants: Ints, nearest: Ints,
     x: Array, P: Array, extent: Array, size: Array, rest: Bools, rules: Array,
 ) -> tuple[Ints, Bools, Array]:  # fmt: skip
     """Update the groups x (G, 4), P (G, 4, 4), extent (G, 2, 2), size (G,) in place by the points (sec. 4.1 to 4.3).
@@ -105,8 +108,8 @@ def associate(
     x: centroid and velocity; P: its covariance. points (M, 2); weights (M,): people each stands for. d2 (G, M): from
     `search`. log_ratio (G, M): what a point adds to the log mass per person by its colour, or (G, 0) without colours.
     owner (M,): the row of the only group that may have the point outside its region, or -1. claimants (M,): number of
-    groups that may have the point. rest (G,): True for groups whose extent and size must not change. rules: see
-    association_mass_kernels.
+    groups that may have the point. nearest (M,): the group that a shared point is nearest to. rest (G,): True for
+    groups whose extent and size must not change. rules: see association_mass_kernels.
 
     Returns the state (G,) of each group, the points (G, M) bool of its likeliest association, and the report (G, 6):
     innovation x, y, its covariance xx, xy, yy, normalised mass (weight) of the miss; 0 without a feasible association.
@@ -120,11 +123,11 @@ def associate(
     state, chosen = np.zeros(groups, np.int64), np.zeros((groups, m), np.bool_)
     report = np.zeros((groups, 6))
     for g in range(groups):
-        order, start = _ordered_points(d2[g], log_ratio[g], owner, claimants, g)
+        order, start, own = _ordered_points(d2[g], log_ratio[g], owner, claimants, nearest, g, rules[ASSOCIATION])
         if len(order) == 0:
             continue
         mine, people = points[order], weights[order]
-        if rules[TAKE_ALL] > 0:
+        if rules[ASSOCIATION] == UNCONSTRAINED:
             start = len(order)
             feasible = np.ones(1, np.bool_)
         else:
@@ -132,6 +135,10 @@ def associate(
             feasible = prefixes(
                 mine, people, start, rules[LINK], rules[GATE], prior, rules[PRIOR_WEIGHT], rules[LEAST_WEIGHT]
             )[0]
+            if rules[ASSOCIATION] != PREFIXES:
+                only = feasible[own]
+                feasible[:] = False
+                feasible[own] = only
         if not feasible.any():
             if components(mine, people, rules[LINK])[1][:, WEIGHT].max() >= rules[LEAST_WEIGHT]:
                 state[g], chosen[g, order] = NULL, True
@@ -147,12 +154,16 @@ def associate(
 
 
 @njit(cache=True)
-def _ordered_points(d2: Array, log_ratio: Array, owner: Ints, claimants: Ints, g: int) -> tuple[Ints, int]:
-    """Returns the indices of the points of group g, and the number of unshared ones, which come first (sec. 4.1).
+def _ordered_points(
+    d2: Array, log_ratio: Array, owner: Ints, claimants: Ints, nearest: Ints, g: int, association: float
+) -> tuple[Ints, int, int]:
+    """Returns the indices of the points of group g, the number of unshared ones, which come first (sec. 4.1), and the
+    number of shared ones in the association that is the only one unless `association` is PREFIXES.
 
-    The shared points, which other groups may have, too, follow by distance less twice the colour evidence. d2,
-    log_ratio (M,): of this group, d2 inf outside its region (log_ratio may be empty); owner (M,): group that alone may
-    have a point in no region, -1 none; claimants (M,): number of groups that may have the point.
+    The shared points, which other groups may have, too, follow by distance less twice the colour evidence; with
+    `association` NEAREST those nearest to g precede the others. d2, log_ratio (M,): of this group, d2 inf outside its
+    region (log_ratio may be empty); owner (M,): group that alone may have a point in no region, -1 none; claimants
+    (M,): number of groups that may have the point; nearest (M,): the group that a shared point is nearest to.
     """
     inside = np.flatnonzero((d2 < np.inf) | (owner == g))
     shared = claimants[inside] > 1
@@ -160,8 +171,14 @@ def _ordered_points(d2: Array, log_ratio: Array, owner: Ints, claimants: Ints, g
     order = np.empty(len(inside), np.int64)
     order[: len(mine)] = mine
     distance = d2[others] - 2 * log_ratio[others] if len(log_ratio) else d2[others]
-    order[len(mine) :] = others[np.argsort(distance, kind="mergesort")]
-    return order, len(mine)
+    others = others[np.argsort(distance, kind="mergesort")]
+    own = len(others)
+    if association == NEAREST:
+        here = nearest[others] == g
+        own = int(here.sum())
+        others = np.concatenate((others[here], others[~here]))
+    order[len(mine) :] = others
+    return order, len(mine), own
 
 
 @njit(cache=True)

@@ -17,7 +17,8 @@ from numba import njit
 from sim.types import Array
 
 (GATE, LINK, PRIOR_XX, PRIOR_XY, PRIOR_YY, PRIOR_WEIGHT, LEAST_WEIGHT, POINT_SD, COUNT_SD, COUNT_SHARE, DETECT_PROB,
- MISS_PROB, FREEZE_SHARE, KEEP_EXTENT, KEEP_SIZE, GATE_FACTOR, REDRAWN, TAKE_ALL, LEAST_OTHERS) = range(19)  # fmt: skip
+ MISS_PROB, FREEZE_SHARE, KEEP_EXTENT, KEEP_SIZE, GATE_FACTOR, REDRAWN, ASSOCIATION,
+ LEAST_OTHERS) = range(19)  # fmt: skip
 RULES = 19
 """Slots of the array `rules`, RULES in all; tracking.papers.group_pda.scaled_parameters fills them.
 
@@ -27,10 +28,14 @@ standard deviation of one person's measured position. COUNT_SD (people), COUNT_S
 (COUNT_SHARE N)^2. DETECT_PROB: probability that a member is among the points. MISS_PROB: prior probability of the miss
 hypothesis, 0 without it. FREEZE_SHARE: share of N in shared points above which extent and size rest. KEEP_EXTENT,
 KEEP_SIZE: alpha_s, alpha_N of eq. 2.4 per frame. GATE_FACTOR: share of its covariance that a Gaussian keeps inside the
-gate. REDRAWN: 1 if members are drawn anew in each frame. TAKE_ALL: 1 if a group takes all points in its region (sec.
-5.2.1). LEAST_OTHERS: lower bound of n - 1 in the variance of a mean drawn without replacement.
+gate. REDRAWN: 1 if members are drawn anew in each frame. ASSOCIATION: one of PREFIXES, NEAREST, ALL, UNCONSTRAINED.
+LEAST_OTHERS: lower bound of n - 1 in the variance of a mean drawn without replacement.
 """
 
+PREFIXES, NEAREST, ALL, UNCONSTRAINED = range(4)
+"""Which associations a group has: the unshared points with the j nearest shared ones, for every j (sec. 4.1); with the
+shared points nearest to this group, alone; with all shared points, alone; as ALL, without the group constraint (sec.
+5.2.1)."""
 NEWCOMERS = 0.02
 """Probability that a group's number of people does not depend on its number before."""
 

@@ -14,6 +14,10 @@ from tracking.papers.group_pda.config import GroupPdaConfig
 
 COLOUR_BINS = 64
 """Bins of a group's colour histogram (tracking.papers.group_pda.colour)."""
+ASSOCIATIONS = {
+    "pda": kernels.PREFIXES, "nearest": kernels.NEAREST, "all": kernels.ALL, "none": kernels.UNCONSTRAINED
+}  # fmt: skip
+"""Slot ASSOCIATION of the kernels' rules by value of the config's `association`."""
 
 
 @dataclass(frozen=True)
@@ -101,9 +105,9 @@ def _kernel_rules(
     rules[kernels.KEEP_EXTENT], rules[kernels.KEEP_SIZE] = np.exp(-dt / np.array([c.extent_time, c.size_time]))
     rules[kernels.GATE_FACTOR] = factor
     rules[kernels.REDRAWN] = c.centroid_noise == "redrawn"
-    rules[kernels.TAKE_ALL] = c.association == "none"
+    rules[kernels.ASSOCIATION] = ASSOCIATIONS[c.association]
     rules[kernels.LEAST_OTHERS] = 1e-9 if pixels else 1.0
-    if rules[kernels.TAKE_ALL]:
+    if c.association == "none":
         rules[kernels.MISS_PROB], rules[kernels.FREEZE_SHARE] = 0.0, np.inf
     return rules
 

@@ -24,7 +24,7 @@ from tracking.papers.group_pda.splitting import split
 
 STATES = ["nothing", "null", "measured"]
 PLAIN = reference.Rules(
-    Constraint(1.5, 9.21, 0.09 * np.eye(2), 3.0), 0.06, 0.5, 0.15, 1.0, 0.0, np.inf, 0.9, 0.9, True, False, False
+    Constraint(1.5, 9.21, 0.09 * np.eye(2), 3.0), 0.06, 0.5, 0.15, 1.0, 0.0, np.inf, 0.9, 0.9, True, False
 )
 
 
@@ -34,15 +34,17 @@ def positive(r, n, scale=1.0):
 
 
 def random_rules(r):
-    """All options, each on in half of the cases."""
-    every, miss, freeze, correct, redrawn = (r.random(5) < 0.5).tolist()
+    """All options, each on in half of the cases; each kind of association in a quarter of them."""
+    miss, freeze, correct, redrawn = (r.random(4) < 0.5).tolist()
+    association = str(r.choice(list(reference.ASSOCIATIONS)))
+    every = association == "none"
     constraint = Constraint(
         r.uniform(0.6, 2), r.uniform(6, 14), positive(r, 2, 0.4), r.uniform(0.5, 4), r.choice([0, 1.2])
     )
     return reference.Rules(
         constraint, r.uniform(0.02, 0.3), r.uniform(0.2, 2), r.uniform(0.05, 0.4), r.uniform(0.6, 1),
         r.uniform(0.01, 0.5) if miss and not every else 0.0, r.uniform(0, 0.8) if freeze and not every else np.inf,
-        r.uniform(0.1, 0.99), r.uniform(0.1, 0.99), correct, redrawn, every, float(r.choice([1e-9, 1.0])),
+        r.uniform(0.1, 0.99), r.uniform(0.1, 0.99), correct, redrawn, association, float(r.choice([1e-9, 1.0])),
     )  # fmt: skip
 
 
@@ -74,13 +76,13 @@ def kernel(case, rules):
     """A copy of the case after the kernel: states, rows chosen, what is told, x, P, extent, size."""
     points, weights, d2, own, hits, x, P, extent, size, hold = case
     after = [a.copy() for a in (x, P, extent, size)]
-    found = kernels.associate(points, weights, d2, d2[:, :0], own, hits, *after, hold, rules.numbers)
+    found = kernels.associate(points, weights, d2, d2[:, :0], own, hits, d2.argmin(0), *after, hold, rules.numbers)
     return [STATES[s] for s in found[0].tolist()], *found[1:], *after
 
 
-def test_two_hundred_random_cases() -> None:
+def test_four_hundred_random_cases() -> None:
     seen = Counter()
-    for seed in range(200):
+    for seed in range(400):
         rules, case, _ = random_case(seed)
         points, weights, d2, own, hits, x, P, extent, size, hold = case
         state, chosen, told, *after = kernel(case, rules)
@@ -100,9 +102,9 @@ def test_two_hundred_random_cases() -> None:
             seen["missed"] += expected[4] > 0.5
             seen["moved"] += not np.array_equal(after[2][g], extent[g])
             seen["shared"] += bool(((hits > 1) & np.isfinite(d2[g])).any())
-            seen[rules.every, rules.miss > 0, rules.freeze < np.inf, rules.correct, rules.redrawn] += 1
+            seen[rules.association, rules.miss > 0, rules.freeze < np.inf, rules.correct, rules.redrawn] += 1
     options = [n for key, n in seen.items() if isinstance(key, tuple)]
-    assert len(options) == 4 * 5  # with all points there is neither miss nor freezing: 4 (1 + 4) combinations
+    assert len(options) == 4 * (3 * 4 + 1)  # without group constraint there is neither miss nor freezing
     assert min(seen[k] for k in ("nothing", "null", "measured", "missed", "moved", "shared")) > 5, seen
 
 

@@ -321,3 +321,25 @@ def test_the_first_defaults_stand_in_a_file() -> None:
     first = GroupPdaConfig.frozen()
     assert (first.carry_time, first.merge_velocity, first.pixel_radius) == (0.0, 0.5, 0.4)
     assert ids(track(crossing(0), first)) == {1, 2}
+
+
+def clouds(seed: int, speed: float, count: int = 40) -> list[Array]:
+    """Two clouds of points that fly through each other; speed: the difference of their velocities, m/s."""
+    r = np.random.default_rng(seed)
+    a, b = r.normal(0, 0.36, (2, count, 2))
+    way = np.array([1.0, 0.0])
+    return [noisy([a + s * way, b - s * way], r) for s in np.arange(-3, 3, speed / FPS) / 2]
+
+
+def test_clouds_that_fly_through_each_other_need_the_masses() -> None:
+    """Each point is in both regions for seconds: neither nearness nor the group constraint tells them apart."""
+    kept = dict.fromkeys(("pda", "nearest", "all", "none"), 0)
+    for seed in range(4):
+        for association in kept:
+            made = track(clouds(seed, 1.6), GroupPdaConfig(association=association))
+            before, after = made[12], made[-1]
+            same_ids = before.id.tolist() == after.id.tolist() == [1, 2]
+            kept[association] += same_ids and (np.sign(after.vel[:, 0]) == np.sign(before.vel[:, 0])).all()
+    assert kept["pda"] == 4
+    assert max(kept["nearest"], kept["all"]) <= 2
+    assert kept["none"] == 0
