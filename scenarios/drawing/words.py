@@ -39,7 +39,7 @@ def _choice(values: tuple[float, ...]) -> str:
 
 
 def place(point: Point) -> str:
-    """Returns a point in words, metres without unit: `(5, 3 to 4)`."""
+    """Returns a point in words, metres without unit, coordinates as by `number`: `(5, 3 to 4)`, `(5 ± 0.1, 1 or 2)`."""
     return f"({number(point[0])}, {number(point[1])})"
 
 

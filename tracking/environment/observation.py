@@ -123,8 +123,8 @@ class Observer:
         """Returns a dict of the known statistics by name, before they are mapped to [0, 1]. At least one frame must be
         added.
 
-        px_per_m: scale of tracks in the image; without it (nan or 0) density and all statistics of `_movement` are
-        missing."""
+        px_per_m: scale of tracks in the image. If they are in the image and it is nan or 0, density and all statistics
+        of `_movement` are missing; for tracks on the ground it has no effect."""
         last = self._tracks[-1]
         seconds = len(self._tracks) / self.fps
         known = last.plane != "image" or px_per_m > 0

@@ -1,8 +1,9 @@
-"""From links between two people to groups over time: the group id of each person in each frame, and the events.
+"""From links between two people to groups over time: group ids in each frame, and events of membership.
 
 A group is a connected component of linked people. People are numbered as columns of arrays by frame and person, from 0;
-frames count from 0. Ids follow the identity rule of the truth (sim.truth.identity): a group that changes keeps its id
-where it shares most members.
+frames count from 0. Events are form, dissolve, merge, split, enter and leave; crossings and queues are not found here.
+Ids follow the identity rule of the truth (sim.truth.identity): a group that changes keeps its id where it shares most
+members.
 """
 
 from __future__ import annotations

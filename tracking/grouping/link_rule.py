@@ -142,8 +142,8 @@ def _portions(pairs: Ints, size: int) -> Iterator[Ints]:
 def _switches(
     frame: Ints, place: Ints, near: Bools, within: Bools, pairs: Ints, present: Bools, fps: float, rule: LinkRule
 ) -> tuple[Ints, Ints, Ints, Ints]:
-    """Returns the switches of links of K pairs, (S,) each: frame (from 0), pair, on (1) or off (0), since (frame from
-    0).
+    """Returns the switches of links of K pairs, (S,) each: frame (from 0), pair (the value a * P + b), on (1)
+    or off (0), since (frame from 0).
 
     pairs (K,): a * P + b, with a < b columns of people. frame, place, near, within (Q,): a row for each pair and frame
     in which the two are close; place is the index in `pairs`; near: they are near and move alike; within: they are not

@@ -178,8 +178,8 @@ def _foot(camera: Camera, state: Array, scale: Array) -> tuple[Array, Array, Arr
     """Returns place (N, 2) px, velocity (N, 2) px/s and covariance (N, 4, 4) of the image point projected to the
     ground.
 
-    state (5, N, 4): a bank of x, y, h, w (rows place, rate, variance of the place, covariance, variance of the rate);
-    scale (N,): px per m. For a pinhole the point is (x, y + h / 2), else (x, y). Covariances are of u, v and their
+    state (5, N, 4): a bank of x, y, h, w (rows place, rate, variance of the place, covariance, variance of the rate), places and
+    rates in px and px/s, variances in m², m²/s, m²/s²; scale (N,): px per m, which turns variances into px². For a pinhole the point is (x, y + h / 2), else (x, y). Covariances are of u, v and their
     velocities, px and s. The place of `state` is the reported box; its variances of h are those of the bank, taken for
     the box's height.
     """
