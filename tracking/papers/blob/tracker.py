@@ -178,10 +178,10 @@ def _foot(camera: Camera, state: Array, scale: Array) -> tuple[Array, Array, Arr
     """Returns place (N, 2) px, velocity (N, 2) px/s and covariance (N, 4, 4) of the image point projected to the
     ground.
 
-    state (5, N, 4): a bank of x, y, h, w (rows place, rate, variance of the place, covariance, variance of the rate), places and
-    rates in px and px/s, variances in m², m²/s, m²/s²; scale (N,): px per m, which turns variances into px². For a pinhole the point is (x, y + h / 2), else (x, y). Covariances are of u, v and their
-    velocities, px and s. The place of `state` is the reported box; its variances of h are those of the bank, taken for
-    the box's height.
+    state (5, N, 4): a bank of x, y, h, w; rows: place (px), rate (px/s), variance of the place (m²), covariance (m²/s),
+    variance of the rate (m²/s²). scale (N,): px per m, which turns m² into px². For a pinhole the point is (x, y + h /
+    2), else (x, y). Covariances are of u, v and their velocities, px and s. The place of `state` is the reported box;
+    its variances of h are those of the bank, taken for the box's height.
     """
     place, rate = state[kalman.PLACE, :, :2].copy(), state[kalman.RATE, :, :2].copy()
     cov = image_covariance(state, scale)
