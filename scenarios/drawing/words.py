@@ -112,7 +112,7 @@ def order(event: ScriptOrder) -> str:
     """Returns in words what an order does: kind, groups before and after, goals; of a queue its place and service time,
     too.
 
-    A part without a size is "rest". A goal that is not given is left out.
+    A part without a size is "rest". A merge without a goal is "to meet and stand"; a queue without one names none.
     """
     if isinstance(event, MergeOrder):
         goal = "to meet and stand" if isinstance(event.goal, str) else f"to {place(event.goal)}"

@@ -36,11 +36,12 @@ class Model(BaseModel):
 class Distribution(BaseModel):
     """One of five distributions of a number: exactly one of the keys besides `clip` is given, the rest is None.
 
-    - normal: mean, standard deviation. uniform: least, greatest. exponential, poisson: mean, above 0.
+    - normal: mean, standard deviation (0 or more). uniform: least, greatest. exponential, poisson: mean, above 0.
     - choice: values of equal probability. clip: least and greatest value kept, both included; draws outside are drawn
       again; None: all are kept.
 
-    Any other combination, a bound that is above its upper bound, or unknown keys raise pydantic.ValidationError.
+    Any other combination, a lower bound above its upper bound, values out of range, or unknown keys raise
+    pydantic.ValidationError. `draw` raises ValueError if no draw falls into `clip`.
     """
 
     model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)

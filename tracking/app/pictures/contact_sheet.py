@@ -84,8 +84,9 @@ class PanelLayout:
 def sheet_picture(sequence: Sequence, truth: Truth, frames: int = 8) -> Image:
     """Returns the contact sheet as an (H, W, 3) BGR uint8 picture; its size follows from the panels.
 
-    truth: may be without people, but has at least one frame. frames: number of panels, at least 1, at most one per
-    frame; their frames are chosen by `choose_frames`. Raises InputError if a picture cannot be read.
+    truth: may be without people, but has at least one frame. frames: number of panels, at least 1 and at
+    most one per frame (other numbers are brought there); their frames are chosen by `choose_frames`.
+    Raises InputError if a picture cannot be read.
     """
     chosen = choose_frames(truth, frames)
     pictures = PanelPictures(sequence, truth, chosen)
