@@ -103,7 +103,7 @@ class Tracks(Frozen):
     plane: "ground", "space" (m) or "image" (px). unit "person": rows are people, group (N,) is the id of each person's
     group, -1 for alone. unit "group": rows are groups, group == id. pos, vel (N, D): plane's unit, and per s. cov (N,
     2D, 2D): covariance of x, y, (z), vx, vy, (vz). box (N, 4): left, top, width, height in px, or None. score (N,): in
-    [0, 1], or empty. groups None, events (): the tracker gives none. Those of people are then derived, in a copy of the Tracks
+    [0, 1], or empty. groups None, events (): the tracker gives none. Those of people are then derived, in a copy
     with `derived` True."""
 
     index: int
