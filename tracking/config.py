@@ -174,7 +174,7 @@ class Config:
         if name in declared:
             return declared[name]
         remedy = f"did you mean {closest(name, declared)}?" if declared else "it has no parameters"
-        raise InputError(file=file, place=name, got=name, expected=f"a parameter of {cls.tracker}", remedy=remedy)
+        raise InputError(file=file, place=name, got=repr(name), expected=f"a parameter of {cls.tracker}", remedy=remedy)
 
     @classmethod
     def from_dict(cls, values: Mapping[str, object], file: object = "") -> Self:
@@ -239,7 +239,7 @@ class Config:
             name, sign, text = assignment.removeprefix("tracker.").partition("=")
             if not sign:
                 remedy = "write --set tracker.NAME=VALUE"
-                raise InputError(place="--set", got=assignment, expected="name=value", remedy=remedy)
+                raise InputError(place="--set", got=repr(assignment), expected="name=value", remedy=remedy)
             changes[name.strip()] = self.known(name.strip(), "--set").parse(text.strip())
         return dataclasses.replace(self, **changes)
 
@@ -250,8 +250,6 @@ class Config:
     def to_toml(self) -> str:
         """Return the text of a TOML file, with the tracker's name and all values, from which `from_toml` reads an equal
         config.
-
-        Quotes and backslashes inside texts are not escaped.
         """
         return toml_text(self.tracker, self.as_dict())
 

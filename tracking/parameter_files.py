@@ -6,11 +6,12 @@ This module reads and writes values as they stand; tracking.config checks them.
 
 from __future__ import annotations
 
-import tomllib
+import os.path
 from collections.abc import Mapping
 from pathlib import Path
 
 from scenarios.errors import InputError
+from scenarios.loading.toml_files import parse, toml_value
 
 FROZEN = Path(__file__).parent / "frozen"
 """Folder of the first defaults of each tracker, TRACKER.toml."""
@@ -24,14 +25,11 @@ def read(path: str | Path, tracker: str) -> dict[str, object]:
     tracker: the name that the file may give as its tracker. Raises InputError if the file cannot be read, is no TOML,
     is of another tracker, or has other keys than tracker and [params].
     """
-    try:
-        content = tomllib.loads(_content(path))
-    except tomllib.TOMLDecodeError as error:
-        raise InputError(file=path, got=str(error), expected="TOML", remedy="correct the file") from None
+    content = parse(Path(path))
     name = content.pop("tracker", tracker)
     if name != tracker:
         remedy = "give the file to the tracker it was made for"
-        raise InputError(file=path, place="tracker", got=name, expected=tracker, remedy=remedy)
+        raise InputError(file=path, place="tracker", got=repr(name), expected=tracker, remedy=remedy)
     values = content.pop("params", {})
     if content or not isinstance(values, dict):
         got, remedy = ", ".join(content) or "params", "put the parameters under [params]"
@@ -40,12 +38,9 @@ def read(path: str | Path, tracker: str) -> dict[str, object]:
 
 
 def toml_text(tracker: str, values: Mapping[str, object]) -> str:
-    """Return the text of a TOML file that `read` reads: the tracker's name and all values, in their order.
-
-    Quotes and backslashes inside texts are not escaped.
-    """
-    lines = [f"{name} = {_toml(value)}" for name, value in values.items()]
-    return "\n".join([f'tracker = "{tracker}"', "", "[params]", *lines, ""])
+    """Return the text of a TOML file that `read` reads: the tracker's name and all values, in their order."""
+    lines = [f"{name} = {toml_value(value)}" for name, value in values.items()]
+    return "\n".join([f"tracker = {toml_value(tracker)}", "", "[params]", *lines, ""])
 
 
 def first_defaults(tracker: str) -> Path:
@@ -75,22 +70,7 @@ def file_of(tracker: str, source: str | Path) -> Path:
     known = presets(tracker)
     if isinstance(source, str) and source in known:
         return preset_file(tracker, source)
-    if known and not Path(source).exists():
+    if known and not os.path.exists(source):
         expected = f"a parameter file, or a preset of {tracker}: {', '.join(known)}"
         raise InputError(file=source, got="No such file or directory", expected=expected, remedy="check the path")
     return Path(source)
-
-
-def _toml(value: object) -> str:
-    """Returns a value as TOML text: true or false, a number, or a quoted string (quotes inside are not escaped)."""
-    if isinstance(value, bool):
-        return str(value).lower()
-    return f'"{value}"' if isinstance(value, str) else repr(value)
-
-
-def _content(path: str | Path) -> str:
-    try:
-        return Path(path).read_text(encoding="utf-8")
-    except (OSError, UnicodeDecodeError) as error:
-        got = getattr(error, "strerror", None) or "no UTF-8 text"
-        raise InputError(file=path, got=got, expected="a parameter file", remedy="check the path") from None

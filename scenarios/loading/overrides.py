@@ -10,12 +10,12 @@ from __future__ import annotations
 
 import copy
 import re
-import tomllib
 from collections.abc import Iterable
 from typing import Any
 
 from scenarios.errors import InputError
 from scenarios.loading.toml_files import Table, did_you_mean
+from scenarios.parsing import parse_toml
 
 KeyPath = tuple[str | int, ...]
 
@@ -58,8 +58,8 @@ def parse_value(value: str, text: str) -> Any:
     text; `text`, the whole setting, appears in its message.
     """
     try:
-        table = tomllib.loads(f"value = {value}")
-    except tomllib.TOMLDecodeError:
+        table = parse_toml(f"value = {value}")
+    except InputError:
         if re.fullmatch(r"[A-Za-z][\w.*:-]*", value):
             return value
         table = {}
@@ -112,14 +112,14 @@ def _index(rows: list[Any], steps: list[str], value: Any, text: str, file: objec
     index after the last row, if the array has ids; `id` is added to that table, which is modified. Raises InputError if
     there is no such row. text: the whole setting, and file: that of the table, for the message.
     """
-    if steps[0].isdigit() and int(steps[0]) < len(rows):
-        return int(steps[0]), steps[1:]
-    ids = [str(row["id"]) for row in rows if isinstance(row, dict) and "id" in row]
+    if (index := _position(steps[0], len(rows))) is not None:
+        return index, steps[1:]
+    ids = {str(row["id"]): k for k, row in reversed(list(enumerate(rows))) if isinstance(row, dict) and "id" in row}
     for n in range(len(steps), 0, -1):
         name = ".".join(steps[:n])
         if name in ids:
-            return next(k for k, row in enumerate(rows) if row.get("id") == name), steps[n:]
-    if isinstance(value, dict) and len(steps) == 1 and ids and not steps[0].isdigit():
+            return ids[name], steps[n:]
+    if isinstance(value, dict) and len(steps) == 1 and ids and not re.fullmatch("[0-9]+", steps[0]):
         value.setdefault("id", steps[0])
         return len(rows), []
     raise InputError(
@@ -127,8 +127,13 @@ def _index(rows: list[Any], steps: list[str], value: Any, text: str, file: objec
         place=f"--set {text}",
         got=f"{steps[0]!r} in an array of {len(rows)}",
         expected="an index from 0 or an id" if ids else "an index from 0",
-        remedy=did_you_mean(steps[0], ids or [str(k) for k in range(len(rows))]),
+        remedy=did_you_mean(steps[0], list(ids) or [str(k) for k in range(len(rows))]),
     )
+
+
+def _position(step: str, length: int) -> int | None:
+    """Returns the index that a step names in an array of `length` items; None if it is no number or beyond the end."""
+    return int(step) if re.fullmatch("[0-9]{1,9}", step) and int(step) < length else None
 
 
 def _with_id(rows: list[Any], index: int, value: Any) -> Any:

@@ -6,6 +6,7 @@ every seed.
 
 from __future__ import annotations
 
+import os.path
 from collections.abc import Iterable
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -54,7 +55,7 @@ def load_observation(path: str | Path | None = None, set: Iterable[str] = ()) ->
     path None: all defaults. `extends` is not supported: it is an unknown key. Raises InputError if the file does not
     exist, is not TOML, or a key, value or setting is wrong.
     """
-    if path is not None and not Path(path).is_file():
+    if path is not None and not os.path.exists(path):
         raise InputError(
             file=path, got="no such file", expected="a TOML file with [camera]", remedy="check --camera"
         )  # fmt: skip

@@ -6,6 +6,7 @@ profile: `scenarios.load("street", set=scenarios.sensor_settings("mine.toml"))`.
 
 from __future__ import annotations
 
+import os.path
 from pathlib import Path
 from typing import Literal
 
@@ -39,7 +40,7 @@ def sensor_table(path: str | Path) -> Table:
     Raises InputError if the file does not exist or is not TOML, if it has no `[sensor]`, or if a key or value is wrong.
     """
     path = Path(path)
-    if not path.is_file():
+    if not os.path.exists(path):
         raise InputError(
             file=path, got="no such file", expected="a file with a [sensor] table",
             remedy="check the path, or make one with `flockscope fit sensor`",

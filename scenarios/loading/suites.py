@@ -9,6 +9,7 @@ repeat = n makes the entries name-1 … name-n, whose numbers are one more key o
 
 from __future__ import annotations
 
+import os.path
 import re
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -48,7 +49,7 @@ def find_suite(name: str) -> Path:
 
     Raises InputError for anything else.
     """
-    if name.endswith(".toml") and Path(name).is_file():
+    if name.endswith(".toml") and os.path.exists(name):
         return Path(name)
     if name in suite_names():
         return SUITES / f"{name}.toml"

@@ -16,12 +16,15 @@ from __future__ import annotations
 
 import difflib
 import json
-import tomllib
+import os.path
 from collections.abc import Iterable
 from pathlib import Path
 from typing import Any, Protocol
 
 from scenarios.errors import InputError
+from scenarios.limits import TOML_BYTES
+from scenarios.parsing import parse_toml
+from scenarios.regular_file import read_regular
 
 CATALOGUE = Path(__file__).parents[1]
 SUITES = CATALOGUE / "suites"
@@ -76,7 +79,7 @@ def find(name: str | Path, beside: Path | None = None) -> Path:
             got=repr(text), expected="the name of a scenario or a *.toml file", remedy=did_you_mean(text, names())
         )
     for folder in (beside or Path(), CATALOGUE):
-        if (folder / text).is_file():
+        if os.path.exists(folder / text):
             return folder / text
     raise InputError(
         file=text, got="no such file", expected="a scenario file", remedy="check the path, or name a scenario"
@@ -86,19 +89,11 @@ def find(name: str | Path, beside: Path | None = None) -> Path:
 def parse(path: Path) -> Table:
     """Returns the content of a TOML file, without applying `extends`.
 
-    Raises InputError if the file cannot be read, is not UTF-8 or is not TOML.
+    Raises InputError if the file cannot be read, is no regular file or above 2 MB, is not UTF-8 or is not TOML.
     """
+    body = read_regular(path, TOML_BYTES, "check the path and its permissions")
     try:
-        return tomllib.loads(path.read_bytes().decode())
-    except tomllib.TOMLDecodeError as error:
-        message, _, place = str(error).rpartition(" (at ")
-        raise InputError(
-            file=path,
-            place=place.rstrip(")"),
-            got=message or str(error),
-            expected="TOML",
-            remedy="correct the line; strings need quotes, tables inside a line need { }",
-        ) from None
+        return parse_toml(body.decode(), path)
     except UnicodeDecodeError as error:
         raise InputError(
             file=path,
@@ -106,13 +101,6 @@ def parse(path: Path) -> Table:
             got="bytes that are not UTF-8",
             expected="TOML",
             remedy="save the file as UTF-8",
-        ) from None
-    except OSError as error:
-        raise InputError(
-            file=path,
-            got=error.strerror or error,
-            expected="a readable file",
-            remedy="check the path and its permissions",
         ) from None
 
 

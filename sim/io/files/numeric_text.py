@@ -6,13 +6,18 @@ A file with a wrong row raises InputError, which names the first wrong line.
 from __future__ import annotations
 
 import io
+import re
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
 from scenarios.errors import InputError
+from scenarios.limits import DETECTIONS, TEXT_BYTES
+from scenarios.regular_file import read_regular
 from sim.types import Array, Bools, Ints
+
+WHOLE = re.compile("[-+]?[0-9]{1,18}")
 
 
 @dataclass(frozen=True)
@@ -49,19 +54,34 @@ class NumericTable:
         return v.astype(np.int64)
 
 
-def read_text(path: Path) -> str:
-    """Return the text of the UTF-8 file `path`, without byte order mark. Raises InputError if it is unreadable or not
-    UTF-8."""
+def read_text(path: Path, limit: int = TEXT_BYTES) -> str:
+    """Return the text of the UTF-8 file `path`, without byte order mark; all line ends become line feeds.
+
+    limit: the greatest size in bytes, by default 256 MB. Raises InputError if the file is unreadable, no regular file,
+    larger, or not UTF-8.
+    """
     try:
-        return path.read_text(encoding="utf-8-sig")
+        text = read_regular(path, limit).decode("utf-8-sig")
     except UnicodeDecodeError as error:
         raise InputError(
             file=path, place=f"byte {error.start}", got="no UTF-8 text", expected="a text file", remedy="check the path"
         ) from None
-    except OSError as error:
-        raise InputError(
-            file=path, got=error.strerror or "no access", expected="a readable file", remedy="check the path"
-        ) from None
+    return text.replace("\r\n", "\n").replace("\r", "\n")
+
+
+def crowded(frame: Ints) -> Bools:
+    """Return flags (N,), True for rows of frames that have more than 5000 rows; frame (N,): from 1, bounded."""
+    return np.asarray(np.bincount(frame, minlength=1)[frame] > DETECTIONS)
+
+
+def whole_number(text: str) -> int:
+    """Return the whole number that a cell stands for: ASCII digits, perhaps with a sign and blanks around.
+
+    Raises ValueError for any other text, and for more than 18 digits, which may not fit into 64 bits.
+    """
+    if not WHOLE.fullmatch(text.strip()):
+        raise ValueError(f"{text[:40]!r} is no whole number")
+    return int(text)
 
 
 def read_numbers(path: Path, columns: tuple[int, int]) -> NumericTable:
@@ -114,8 +134,9 @@ def _first_bad_line(path: Path, numbered: list[tuple[int, str]], separator: str 
 
 
 def _is_number(cell: str) -> bool:
+    """Return True if numpy reads the cell as a number: unlike float(), it takes no underscore and ASCII digits only."""
     try:
         float(cell)
     except ValueError:
         return False
-    return True
+    return "_" not in cell and cell.strip().isascii()

@@ -16,6 +16,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from scenarios.errors import InputError
+from scenarios.parsing import parse_json
+from scenarios.regular_file import require_regular
 from sim.types import Array, Ints
 
 FORMAT = 1
@@ -54,20 +56,36 @@ class StoredTable:
         return name in self.columns
 
     def floats(self, *names: str) -> Array:
-        """Return the columns `names` as float64: one as (R,), n > 1 as (R, n). Raises InputError if a column is
-        missing."""
-        found = [np.asarray(self._get(name), np.float64) for name in names]
+        """Return the columns `names` as float64: one as (R,), n > 1 as (R, n).
+
+        Raises InputError if a column is missing or no numbers.
+        """
+        found = [np.asarray(self._numbers(name, "iufb"), np.float64) for name in names]
         return found[0] if len(found) == 1 else np.stack(found, axis=1)
 
     def ints(self, name: str) -> Ints:
-        """Return column `name` as (R,), int64; fractions are cut off. Raises InputError if it is missing."""
-        return np.asarray(self._get(name), np.int64)
+        """Return column `name` as (R,), int64. Raises InputError if it is missing or no whole numbers."""
+        return np.asarray(self._numbers(name, "i"), np.int64)
 
     def lists(self, name: str, kind: type) -> list[NDArray[Any]]:
-        """Return column `name`, a column of lists, as R arrays of number type `kind`; no rows give []. Raises
-        InputError if the column is missing."""
-        values, ends = self._get(name)
+        """Return column `name`, a column of lists, as R arrays of number type `kind`; no rows give [].
+
+        Raises InputError if the column is missing or no lists of such numbers.
+        """
+        column = self._get(name)
+        if not isinstance(column, tuple) or column[0].dtype.kind != np.dtype(kind).kind:
+            raise InputError(file=self.file, place=name, got="another column", expected="lists of numbers", remedy=REDO)
+        values, ends = column
         return [np.asarray(v, kind) for v in np.split(values, ends[:-1])] if len(ends) else []
+
+    def _numbers(self, name: str, kinds: str) -> NDArray[Any]:
+        """Return column `name`; raise InputError if it is missing or numpy's kind of its type is not in `kinds`."""
+        column = self._get(name)
+        if isinstance(column, tuple) or column.dtype.kind not in kinds:
+            got = "a column of lists" if isinstance(column, tuple) else f"a column of {column.dtype}"
+            expected = "whole numbers" if kinds == "i" else "numbers"
+            raise InputError(file=self.file, place=name, got=got, expected=expected, remedy=REDO)
+        return np.asarray(column)
 
     def _get(self, name: str) -> Any:
         if name not in self.columns:
@@ -79,6 +97,42 @@ class StoredTable:
         if name not in self.facts:
             raise InputError(file=self.file, place="schema", got=f"no {name}", expected="that value", remedy=REDO)
         return self.facts[name]
+
+    def count(self, name: str, limit: int) -> int:
+        """Return the value `name` of the metadata, a whole number from 0 to `limit`; raise InputError for another."""
+        value = self.fact(name)
+        fits = isinstance(value, int) and not isinstance(value, bool) and 0 <= value <= limit
+        self.reject(not fits, name, f"{value!r}", f"a whole number from 0 to {limit}")
+        return int(value)
+
+    def number(self, name: str, low: float, high: float) -> float:
+        """Return the value `name` of the metadata, a number from `low` to `high`; raise InputError for another."""
+        value = self.fact(name)
+        fits = isinstance(value, int | float) and not isinstance(value, bool) and low <= value <= high
+        self.reject(not fits, name, f"{value!r}", f"a number from {low:g} to {high:g}")
+        return float(value)
+
+    def frames(self, name: str) -> set[int]:
+        """Return the value `name` of the metadata, a list of frames; raise InputError if it is another value."""
+        value = self.fact(name)
+        fits = isinstance(value, list) and all(isinstance(v, int) for v in value)
+        self.reject(not fits, name, f"{value!r:.40}", "a list of frames")
+        return set(value)
+
+    def cuts(self, first: int, count: int) -> Ints:
+        """Return the index of the first row of each of `count` frames from `first` on, and of the end: (count + 1,).
+
+        Raises InputError if the rows are not sorted by the column frame, or one is outside these frames.
+        """
+        frame = self.ints("frame")
+        wrong = bool(len(frame)) and (frame.min() < first or frame.max() >= first + count or (np.diff(frame) < 0).any())
+        self.reject(bool(wrong), "frame", "other frames", f"frames {first} to {first + count - 1}, in order")
+        return np.searchsorted(frame, np.arange(first, first + count + 1))
+
+    def reject(self, wrong: bool, place: str, got: str, expected: str) -> None:
+        """Raise InputError about a place in this file if `wrong` is True; do nothing otherwise."""
+        if wrong:
+            raise InputError(file=self.file, place=place, got=got, expected=expected, remedy=REDO)
 
 
 def table_bytes(columns: Iterable[Column], facts: dict[str, Any]) -> bytes:
@@ -120,12 +174,16 @@ def read_table(path: Path) -> StoredTable:
     import pyarrow as pa
     import pyarrow.parquet as pq
 
+    require_regular(path, REDO)
     try:
         table = pq.read_table(path, partitioning=None)
-    except (pa.ArrowException, OSError) as error:
-        reason = "no file" if not path.exists() else f"no readable Parquet ({str(error).splitlines()[0]})"
+        metadata = (table.schema.metadata or {}).get(KEY, b"{}").decode()
+    except (pa.ArrowException, OSError, UnicodeDecodeError) as error:
+        reason = f"no readable Parquet ({(str(error).splitlines() or [type(error).__name__])[0]})"
         raise InputError(file=path, got=reason[:160], expected="a whole Parquet file", remedy=REDO) from None
-    facts = json.loads((table.schema.metadata or {}).get(KEY, b"{}"))
+    facts = parse_json(metadata, path, REDO)
+    if not isinstance(facts, dict):
+        raise InputError(file=path, place="schema", got="no JSON object", expected="a JSON object", remedy=REDO)
     if facts.get("format") != FORMAT:
         raise InputError(
             file=path, place="schema", got=f"format {facts.get('format')}", expected=f"format {FORMAT}", remedy=REDO
@@ -175,16 +233,14 @@ def json_list(name: str, items: Iterable[dict[str, Any]]) -> bytes:
 
 
 def read_json(path: Path) -> dict[str, Any]:
-    """Read the file `path`, which holds one JSON object, as a dict. Raises InputError if it is unreadable or no JSON
-    object."""
+    """Read the file `path`, which holds one JSON object, as a dict.
+
+    Raises InputError if it is unreadable, no regular file, above 256 MB or no JSON object, holds NaN, is nested deeper
+    than 32 levels, or has a whole number beyond 64 bits.
+    """
     from sim.io.files.numeric_text import read_text
 
-    try:
-        value = json.loads(read_text(path))
-    except json.JSONDecodeError as error:
-        raise InputError(
-            file=path, place=f"line {error.lineno}", got=f"no JSON ({error.msg})", expected="a JSON object", remedy=REDO
-        ) from None
+    value = parse_json(read_text(path), path, REDO)
     if not isinstance(value, dict):
         raise InputError(file=path, got=type(value).__name__, expected="a JSON object", remedy=REDO)
     return value
@@ -199,7 +255,7 @@ def read_document(path: Path) -> dict[str, Any]:
     value = read_json(path)
     found = value.get("format", FORMAT)
     if found != FORMAT or isinstance(found, bool):
-        raise InputError(file=path, place="format", got=found, expected=FORMAT, remedy="use the same version")
+        raise InputError(file=path, place="format", got=repr(found), expected=FORMAT, remedy="use the same version")
     return value
 
 

@@ -1,0 +1,39 @@
+"""Bounds of what is read, each in one place: sizes of files, frames, pictures, crowds, numbers.
+
+`python -m benchmarks.limits` measures the time and memory that each bound costs. A value beyond a bound is refused with
+an InputError. The bounds lie far above real recordings, so that a mistyped number is refused before it fills memory.
+"""
+
+from __future__ import annotations
+
+TEXT_BYTES = 256 * 2**20
+"""Bytes of a text file of rows or of a JSON file."""
+TOML_BYTES = 2 * 2**20
+"""Bytes of a TOML file."""
+XML_BYTES = 64 * 2**20
+"""Bytes of an XML file."""
+DEPTH = 32
+"""Tables and lists inside each other in a TOML or JSON file."""
+INTEGER = 2**63 - 1
+"""Largest whole number in a TOML or JSON file, also with a minus sign."""
+
+FRAMES = 1_000_000
+"""Frames of a sequence: 11 hours at 25 frames per second."""
+CELLS = 20_000_000
+"""Frames times people of a sequence that is simulated or has labelled groups, whose motion is held as an array."""
+FRAME_RATES = (0.01, 1000.0)
+"""Least and greatest number of frames per second."""
+PICTURE_SIDE = 16_384
+"""Width or height of a picture, px."""
+PICTURE_PIXELS = 40_000_000
+"""Width times height of a picture, px; 8K has 33 million."""
+SCALES = (0.01, 100_000.0)
+"""Least and greatest image scale, px per m."""
+SAMPLE_BYTES = 2 * 10**9
+"""Bytes of all pictures of a background sample together."""
+COORDINATE = 1e6
+"""Absolute value of a coordinate or length, m or px."""
+DETECTIONS = 5000
+"""Detections or people in one frame."""
+PEOPLE = 5000
+"""People in one scenario."""

@@ -1,0 +1,95 @@
+"""Parses TOML and JSON texts into plain values: every text gives a value or an InputError of one line.
+
+Besides wrong syntax, values are refused that other code could not hold: deep nesting, whole numbers beyond 64 bits, and
+in JSON the words NaN and Infinity.
+"""
+
+from __future__ import annotations
+
+import json
+import tomllib
+from typing import Any, NoReturn
+
+from scenarios.errors import InputError
+from scenarios.limits import DEPTH, INTEGER
+
+FAR = "whole numbers within 64 bits"
+
+
+def parse_toml(text: str, file: object = "") -> dict[str, Any]:
+    """Return the table that a TOML text stands for.
+
+    file: for the message, "" for none. Raises InputError if the text is no TOML, is nested deeper than 32 tables and
+    lists, or has a whole number beyond 64 bits.
+    """
+    remedy = "correct the line; strings need quotes, tables inside a line need { }"
+    try:
+        table = tomllib.loads(text)
+    except tomllib.TOMLDecodeError as error:
+        message, _, place = str(error).rpartition(" (at ")
+        raise InputError(
+            file=file, place=place.rstrip(")"), got=message or str(error), expected="TOML", remedy=remedy
+        ) from None
+    except RecursionError:
+        raise _too_deep(file) from None
+    except (ValueError, OverflowError) as error:  # of int() and of dates, which tomllib lets through
+        raise InputError(file=file, got=_reason(error), expected="TOML", remedy=remedy) from None
+    _require_plain(table, file)
+    return table
+
+
+def parse_json(text: str, file: object = "", remedy: str = "correct the file") -> Any:
+    """Return the value that a JSON text stands for.
+
+    file, remedy: for the message. Raises InputError if the text is no JSON, holds NaN or Infinity, is nested deeper
+    than 32 objects and lists, or has a whole number beyond 64 bits.
+    """
+    try:
+        value = json.loads(text, parse_constant=_constant)
+    except json.JSONDecodeError as error:
+        raise InputError(
+            file=file, place=f"line {error.lineno}", got=f"no JSON ({error.msg})", expected="JSON", remedy=remedy
+        ) from None
+    except RecursionError:
+        raise _too_deep(file) from None
+    except ValueError as error:
+        raise InputError(file=file, got=_reason(error), expected="JSON", remedy=remedy) from None
+    _require_plain(value, file)
+    return value
+
+
+def _constant(word: str) -> NoReturn:
+    raise ValueError(f"{word}, which is no number of JSON")
+
+
+def _reason(error: Exception) -> str:
+    """Return the error's words; Python's advice to raise its limit of digits is left out."""
+    text = str(error)
+    return "a number of thousands of digits" if "integer string conversion" in text else text
+
+
+def _too_deep(file: object) -> InputError:
+    expected = f"at most {DEPTH} tables and lists inside each other"
+    return InputError(file=file, got="deeper nesting", expected=expected, remedy="check that this is the right file")
+
+
+def _require_plain(value: Any, file: object) -> None:
+    """Raise InputError if a value is nested deeper than DEPTH, or has a whole number beyond 64 bits.
+
+    It works without recursion, since the nesting may be deeper than Python's stack.
+    """
+    level = [value]
+    for _ in range(DEPTH + 1):
+        for item in level:
+            if isinstance(item, int) and abs(item) > INTEGER:
+                raise InputError(file=file, got=f"{str(item)[:40]}…", expected=FAR, remedy="correct the number")
+        level = [inner for item in level for inner in _inside(item)]
+        if not level:
+            return
+    raise _too_deep(file)
+
+
+def _inside(value: Any) -> list[Any]:
+    if isinstance(value, dict):
+        return list(value.values())
+    return value if isinstance(value, list) else []

@@ -1,0 +1,72 @@
+"""TOML and JSON of strangers: every text is a value or one line."""
+
+import pytest
+
+from scenarios.errors import InputError
+from scenarios.loading.overrides import parse_value
+from scenarios.loading.toml_files import parse
+from sim.io.files.tables import read_json
+from tracking.papers.blob.config import BlobConfig
+
+TOML = {
+    "5000 digits": "a = " + "9" * 5000,
+    "beyond 64 bits": "a = 9223372036854775808",
+    "nested arrays": "a = " + "[" * 5000 + "]" * 5000,
+    "nested keys": ".".join(["a"] * 5000) + " = 1",
+    "a little too deep": "a = " + "[" * 40 + "]" * 40,
+    "a date that is none": "a = 2024-13-41",
+    "UTF-16": "a = 1".encode("utf-16"),
+    "latin-1": b"a = '\xe9'",
+    "NUL": b"a = \x00",
+}
+
+
+@pytest.mark.parametrize("name", TOML)
+def test_every_toml_reader_says_it_in_one_line(name, tmp_path):
+    path, text = tmp_path / "x.toml", TOML[name]
+    path.write_bytes(text if isinstance(text, bytes) else text.encode())
+    for read in (parse, BlobConfig.from_toml):
+        with pytest.raises(InputError) as error:
+            read(path)
+        assert error.value.file == str(path)
+        assert "\n" not in str(error.value)
+        assert len(str(error.value)) < 500
+
+
+JSON = {
+    "5000 digits": '{"a": ' + "9" * 5000 + "}",
+    "beyond 64 bits": '{"a": -9223372036854775809}',
+    "nested": '{"a": ' + "[" * 100_000 + "]" * 100_000 + "}",
+    "a little too deep": '{"a": ' + "[" * 40 + "]" * 40 + "}",
+    "NaN": '{"a": NaN}',
+}
+
+
+@pytest.mark.parametrize("name", JSON)
+def test_json(name, tmp_path):
+    (tmp_path / "x.json").write_text(JSON[name])
+    with pytest.raises(InputError) as error:
+        read_json(tmp_path / "x.json")
+    assert len(str(error.value)) < 500
+
+
+def test_values_of_settings():
+    assert parse_value("[" * 20 + "1" + "]" * 20, "a=b")
+    for text in ("9" * 5000, "[" * 5000, "9223372036854775808"):
+        with pytest.raises(InputError, match="TOML value"):
+            parse_value(text, "a=b")
+
+
+def test_texts_of_parameters_are_escaped(tmp_path):
+    from dataclasses import dataclass
+    from typing import ClassVar
+
+    from tracking.config import Config, param
+
+    @dataclass(frozen=True)
+    class Quoted(Config):
+        tracker: ClassVar[str] = "quoted"
+        mark: str = param('a"b\\c', ('a"b\\c', "x"), "", "", "categorical")
+
+    (tmp_path / "p.toml").write_text(Quoted().to_toml())
+    assert Quoted.from_toml(tmp_path / "p.toml") == Quoted()
