@@ -16,6 +16,7 @@ import numpy as np
 from scenarios.errors import InputError
 from sim.scene.body import PERSON_HEIGHT, Ellipsoids, RecordedBodies, ellipsoids, recorded_bodies
 from sim.scene.camera import camera_rotation
+from sim.scene.camera_check import require_camera
 from sim.types import Array, Bools, Camera, Motion
 
 if TYPE_CHECKING:
@@ -39,11 +40,12 @@ def place_camera(spec: CameraSpec, motion: Motion) -> Camera:
     spec: the scenario's camera settings. motion: the crowd's motion, with its scene.
 
     Raises InputError, naming the first person out of view, if `spec.crop` is false and a body is not wholly in the
-    image. That can happen where position, height or scale are given, or where the tilt allows no place.
+    image. That can happen where position, height or scale are given, or where the tilt allows no place. Also raises
+    InputError for a camera that cannot be used, as one that sees no ground (sim.scene.camera_check).
     """
     everybody = recorded_bodies(motion)
     aimed = _bodies_to_fit(everybody, motion, spec.crop)
-    camera = _top(spec, aimed) if spec.kind == "top" else _pinhole(spec, aimed)
+    camera = require_camera(_top(spec, aimed) if spec.kind == "top" else _pinhole(spec, aimed), place="camera")
     if not spec.crop:
         _check_all_in_view(camera, spec, everybody, motion)
     return camera

@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from scenarios.errors import InputError
+from scenarios.regular_file import require_regular
 from sim.io.formats.tsai import read_tsai
 from sim.io.store.camera_files import read_camera
 from sim.types import Camera
@@ -17,12 +18,10 @@ SHAPE_TOLERANCE = 0.01  # relative difference allowed between the aspect ratios 
 def read_calibration(path: Path) -> Camera:
     """Return the Camera of the calibration file `path`: Tsai's XML if its name ends in .xml, else our camera.json.
 
-    Raises InputError if there is no such file, it is no XML or JSON object, or if a value is missing, not finite, or of
-    the wrong kind or shape.
+    Raises InputError if there is no such file, it is no XML or JSON object, a value is missing or of the wrong kind or
+    shape, or the camera cannot be used (sim.scene.camera_check).
     """
-    if not path.is_file():
-        expected = "a camera.json, or Tsai's calibration as .xml"
-        raise InputError(file=path, got="no file", expected=expected, remedy="check --camera")
+    require_regular(path, "check --camera: a camera.json, or Tsai's calibration as .xml")
     return read_tsai(path) if path.suffix.lower() == ".xml" else read_camera(path)
 
 

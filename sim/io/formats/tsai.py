@@ -15,7 +15,9 @@ from xml.etree import ElementTree
 import numpy as np
 
 from scenarios.errors import InputError
+from scenarios.limits import XML_BYTES
 from sim.io.files.numeric_text import read_text
+from sim.scene.camera_check import require_camera
 from sim.types import Array, Camera
 
 MM = 1000.0  # per m
@@ -24,6 +26,7 @@ PARTS = {
     "Intrinsic": ("focal", "kappa1", "cx", "cy", "sx"),
     "Extrinsic": ("tx", "ty", "tz", "rx", "ry", "rz"),
 }
+LARGEST = 1e9  # mm or px: absolute value of a number
 POSITIVE = ("width", "height", "dpx", "dpy", "focal", "sx")
 
 
@@ -31,13 +34,14 @@ def read_tsai(path: Path) -> Camera:
     """Return the Camera (kind "pinhole") of Tsai's calibration as XML; lengths in m, focal lengths and centre in px.
 
     path: the file, whose lengths are in mm. Its elements Geometry, Intrinsic and Extrinsic hold the numbers as
-    attributes. Raises InputError if the file is unreadable or no XML, or if a number is missing, not finite, or not
-    above 0 where it must be (image size, pixel size, focal length, sx).
+    attributes. Raises InputError if the file is unreadable or no XML, or if a number is missing, beyond 1e9, or not
+    above 0 where it must be (image size, pixel size, focal length, sx). Also if the camera cannot be used
+    (sim.scene.camera_check).
     """
     v = _values(path)
     rotation = _rotation(v["rx"], v["ry"], v["rz"])
     shift = np.array([v["tx"], v["ty"], v["tz"]]) / MM
-    return Camera(
+    camera = Camera(
         kind="pinhole",
         image=(round(v["width"]), round(v["height"])),
         focal_px=(v["sx"] * v["focal"] / v["dpx"], v["focal"] / v["dpy"]),
@@ -46,12 +50,13 @@ def read_tsai(path: Path) -> Camera:
         rotation=rotation,
         radial=v["kappa1"] * v["focal"] ** 2,
     )
+    return require_camera(camera, path)
 
 
 def _values(path: Path) -> dict[str, float]:
     try:
-        root = ElementTree.fromstring(read_text(path))
-    except ElementTree.ParseError as error:
+        root = ElementTree.fromstring(read_text(path, XML_BYTES))
+    except (ElementTree.ParseError, ValueError, LookupError) as error:
         expected = "Tsai's calibration as XML, or a camera.json"
         raise InputError(file=path, got=f"no XML ({error})", expected=expected, remedy="check --camera") from None
     found = {}
@@ -63,8 +68,8 @@ def _values(path: Path) -> dict[str, float]:
                 value = float(text if text is not None else "nan")
             except ValueError:
                 value = float("nan")
-            if not np.isfinite(value) or (name in POSITIVE and value <= 0):
-                kind = "a number above 0" if name in POSITIVE else "a number"
+            if not abs(value) <= LARGEST or (name in POSITIVE and value <= 0):
+                kind = "a number above 0" if name in POSITIVE else f"a number within {LARGEST:g}"
                 raise InputError(
                     file=path, place=f"{part} {name}", got="nothing" if text is None else repr(text), expected=kind,
                     remedy="complete the calibration",

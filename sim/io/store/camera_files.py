@@ -8,7 +8,9 @@ from typing import Any
 import numpy as np
 
 from scenarios.errors import InputError
+from scenarios.limits import COORDINATE
 from sim.io.files import tables
+from sim.scene.camera_check import require_camera
 from sim.types import Array, Camera, Scene, Stairs
 
 
@@ -37,27 +39,31 @@ def camera_document(camera: Camera) -> dict[str, Any]:
 def read_camera(path: Path) -> Camera:
     """Read a camera.json as Camera; missing baseline and radial are 0, a missing or null px_per_m is nan.
 
-    Fractions of the image size are cut off. Raises InputError if the file is unreadable or no JSON object, a key is
-    missing, a value has the wrong type or shape or is not finite, or px_per_m is missing for kind "top". The format
-    number, and whether sizes are above 0, are not checked.
+    Raises InputError if the file is unreadable, no JSON object or of another format number, a key is missing, or a
+    value has the wrong type or shape or is beyond 1e6. Also if the image size has fractions, px_per_m is missing for
+    kind "top", or the camera cannot be used (sim.scene.camera_check).
     """
-    d = tables.read_json(path)
+    d = tables.read_document(path)
     kind = _key(path, d, "kind")
     if kind not in ("pinhole", "top"):
         raise InputError(file=path, place="kind", got=repr(kind), expected='"pinhole" or "top"', remedy="correct it")
     width, height = _numbers(path, d, "image", (2,))
+    if width != round(width) or height != round(height):
+        got = f"{width:g}×{height:g}"
+        raise InputError(file=path, place="image", got=got, expected="whole numbers of px", remedy="correct it")
     fx, fy = _numbers(path, d, "focal_px", (2,))
     cx, cy = _numbers(path, d, "centre_px", (2,))
     scale = d.get("px_per_m")
     if scale is None and kind == "top":
         raise InputError(file=path, place="px_per_m", got="null", expected="a scale for kind top", remedy="add it")
-    return Camera(
+    camera = Camera(
         kind=kind, image=(int(width), int(height)), focal_px=(float(fx), float(fy)), centre_px=(float(cx), float(cy)),
         position=_numbers(path, d, "position", (3,)), rotation=_numbers(path, d, "rotation", (3, 3)),
         baseline=float(_numbers(path, {"baseline": d.get("baseline", 0.0)}, "baseline", ())),
         px_per_m=float("nan") if scale is None else float(_numbers(path, d, "px_per_m", ())),
         radial=float(_numbers(path, {"radial": d.get("radial", 0.0)}, "radial", ())),
     )  # fmt: skip
+    return require_camera(camera, path)
 
 
 def scene_document(scene: Scene) -> dict[str, Any]:
@@ -81,11 +87,14 @@ def scene_document(scene: Scene) -> dict[str, Any]:
 def read_scene(path: Path) -> Scene:
     """Read a scene.json as Scene.
 
-    Raises InputError if the file is unreadable or no JSON object, a key is missing, or a value has the wrong type or
-    shape or is not finite. The format number, and the shape of foot and head of stairs, are not checked. "stairs" must
-    be a list of JSON objects, else AttributeError or TypeError is raised.
+    Raises InputError if the file is unreadable, no JSON object or of another format number, a key is missing, or a
+    value has the wrong type or shape or is beyond 1e6.
     """
-    d = tables.read_json(path)
+    d = tables.read_document(path)
+    stairs = _key(path, d, "stairs")
+    if not isinstance(stairs, list) or not all(isinstance(s, dict) for s in stairs):
+        got = str(stairs)[:80]
+        raise InputError(file=path, place="stairs", got=got, expected="a list of objects", remedy="correct it")
 
     def flight(k: int, s: dict[str, Any]) -> Stairs:
         place = f"stairs[{k}]."
@@ -93,7 +102,7 @@ def read_scene(path: Path) -> Scene:
         width, rise, steps, landing = (
             float(_numbers(path, one, place + name, ())) for name in ("width", "rise", "steps", "landing")
         )
-        foot, head = (_numbers(path, one, place + name, None) for name in ("foot", "head"))
+        foot, head = (_numbers(path, one, place + name, (2,)) for name in ("foot", "head"))
         return Stairs(foot, head, width, rise, int(steps), landing)
 
     return Scene(
@@ -102,7 +111,7 @@ def read_scene(path: Path) -> Scene:
         pillars=_numbers(path, d, "pillars", (-1, 3)),
         doors=_numbers(path, d, "doors", (-1, 2, 2)),
         service=_numbers(path, d, "service", (-1, 2)),
-        stairs=tuple(flight(k, s) for k, s in enumerate(_key(path, d, "stairs"))),
+        stairs=tuple(flight(k, s) for k, s in enumerate(stairs)),
         wall_height=float(_numbers(path, d, "wall_height", ())),
         pillar_height=float(_numbers(path, d, "pillar_height", ())),
     )
@@ -114,23 +123,23 @@ def _key(path: Path, d: dict[str, Any], key: str) -> Any:
     return d[key]
 
 
-def _numbers(path: Path, d: dict[str, Any], key: str, shape: tuple[int, ...] | None) -> Array:
+def _numbers(path: Path, d: dict[str, Any], key: str, shape: tuple[int, ...]) -> Array:
     """Return the numbers under `key` of the JSON object `d` as a float64 array.
 
-    shape: the shape they must have; -1 in front for any length, which may be 0; () for a single number; None for any
-    shape. path: the file, for the error. Raises InputError if the key is missing, or a value is not finite or of
-    another shape.
+    shape: the shape they must have; -1 in front for any length, which may be 0; () for a single number. path: the file,
+    for the error. Raises InputError if the key is missing, or a value is no number, beyond 1e6 or of another shape.
     """
     value = _key(path, d, key)
     try:
-        a = np.asarray(value, np.float64)
+        a = np.asarray(value)
+        a = a.astype(np.float64) if a.dtype.kind in "iuf" else np.array(np.nan)
     except (TypeError, ValueError):
         a = np.array(np.nan)
-    free = shape is not None and shape[:1] == (-1,)
-    if shape is not None and free and a.size == 0:
-        a = a.reshape(0, *shape[1:])
-    fits = shape is None or a.shape == shape or (free and a.ndim == len(shape) and a.shape[1:] == shape[1:])
-    if not fits or not np.isfinite(a).all():
-        wanted = "finite numbers" if shape is None else f"finite numbers of shape {shape}"
+    free = shape[:1] == (-1,)
+    if free and value == []:
+        a = np.zeros((0, *shape[1:]))
+    fits = a.shape == shape or (free and a.ndim == len(shape) and a.shape[1:] == shape[1:])
+    if not fits or not (np.abs(a) <= COORDINATE).all():
+        wanted = f"numbers of shape {shape} within {COORDINATE:g}" if shape else f"a number within {COORDINATE:g}"
         raise InputError(file=path, place=key, got=str(value)[:80], expected=wanted, remedy="correct it")
     return a

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from sim.scene.camera import camera_rotation
 from sim.types import (
     Camera,
     Detections,
@@ -79,7 +80,7 @@ def truth(r: np.random.Generator, length: int = 12, people: int = 5) -> Truth:
         groups=tuple(groups(r, id[c], group[c]) for c in cut),
         groups_px=tuple(groups(r, id[c], group[c], 100.0) for c in cut),
         labelled=labelled, events=tuple(event(r, length) for _ in range(3)),
-        near=Near(*(r.integers(1, length + 1, 4) for _ in range(4))),
+        near=Near(*np.sort(r.integers(1, length + 1, (2, 4)), axis=0), *r.integers(1, length + 1, (2, 4))),
         orders=(
             Order("m1", "merge", 1, ((1, 2), (3,)), ((1, 2, 3),)),
             Order("s1", "split", None, ((1, 2),), ((1,), (2,))),
@@ -97,7 +98,8 @@ def sequence(seed: int, length: int = 12) -> Sequence:
     r = np.random.default_rng(seed)
     found = truth(r, length)
     camera = Camera(
-        "pinhole", (640, 480), (500.1, 500.2), (320.0, 240.0), r.normal(size=3), r.normal(size=(3, 3)), 0.12
+        "pinhole", (640, 480), (500.1, 500.2), (320.0, 240.0), np.array([*r.normal(size=2), 5.1]),
+        camera_rotation(0.6, float(r.normal())), 0.12,
     )  # fmt: skip
     stairs = (Stairs(np.array([-1.0, 0.0]), np.array([1.0, 0.5]), 2.0, 1.5, 10, 4.0),)
     scene = Scene(

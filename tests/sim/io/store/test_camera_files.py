@@ -5,12 +5,13 @@ import pytest
 
 from scenarios.errors import InputError
 from sim.io.store.camera_files import camera_document, read_camera, read_scene, scene_document
+from sim.scene.camera import camera_rotation
 from sim.types import Camera, Scene
 
 
 def test_cameras_and_scenes_come_back_exactly(tmp_path, make_sequence, same):
-    r = np.random.default_rng(0)
-    top = Camera("top", (640, 480), (1.0, 1.0), (320.0, 240.0), r.normal(size=3), r.normal(size=(3, 3)), 0.0, 40.3)
+    down = camera_rotation(np.pi / 2, 0.3)
+    top = Camera("top", (640, 480), (1.0, 1.0), (320.0, 240.0), np.array([1.7, -2.3, 20.0]), down, 0.0, 40.3)
     for camera in (top, make_sequence(1).camera):
         (tmp_path / "camera.json").write_text(json.dumps(camera_document(camera)))
         same(camera, read_camera(tmp_path / "camera.json"))
