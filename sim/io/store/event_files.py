@@ -13,8 +13,9 @@ from typing import Any
 import numpy as np
 
 from scenarios.errors import InputError
-from sim.io.files.numeric_text import read_text
-from sim.io.files.tables import json_list, nan_to_none, none_to_nan, read_document
+from scenarios.limits import COORDINATE, FRAMES
+from sim.io.files.numeric_text import read_text, whole_number
+from sim.io.files.tables import json_list, nan_to_none, read_document
 from sim.types import EVENT_KINDS, GroupEvent, Near, Order
 
 NEAR_COLUMNS = "start,end,a,b"
@@ -50,7 +51,7 @@ def read_events(path: Path) -> list[tuple[GroupEvent, int | None]]:
     The frame counts from 1 and is None if the file does not store it, as in a truth. Null coordinates become nan.
     Raises InputError if the file is unreadable, no JSON object, of another format number or without a list of events.
     Also raises InputError if an event lacks a key, has an unknown kind or a value of the wrong type, starts before
-    frame 1 or ends before it starts.
+    frame 1, ends before it starts or after frame 1,000,000, or has a negative id (before and after: below -1).
     """
     found = read_document(path).get("events")
     if not isinstance(found, list):
@@ -60,32 +61,51 @@ def read_events(path: Path) -> list[tuple[GroupEvent, int | None]]:
 
 def _frame(path: Path, k: int, e: dict[str, Any]) -> int | None:
     try:
-        return None if e.get("frame") is None else _whole(e["frame"])
-    except TypeError as error:
+        return None if e.get("frame") is None else _number_from(1, e["frame"])
+    except (TypeError, ValueError) as error:
         raise _bad(path, k, f"frame {error}", "a frame, or null") from None
 
 
 def _event(path: Path, k: int, e: Any) -> GroupEvent:
     try:
+        x, y = (_coordinate(v) for v in e["pos"])
         event = GroupEvent(
-            str(e["kind"]), _whole(e["start"]), _whole(e["end"]),
-            None if e["emitted"] is None else _whole(e["emitted"]),
-            tuple(map(_whole, e["before"])), tuple(map(_whole, e["after"])), tuple(map(_whole, e["members"])),
-            (none_to_nan(e["pos"][0]), none_to_nan(e["pos"][1])),
+            str(e["kind"]), _number_from(1, e["start"]), _number_from(1, e["end"]),
+            None if e["emitted"] is None else _number_from(1, e["emitted"]),
+            _numbers_from(-1, e["before"]), _numbers_from(-1, e["after"]), _numbers_from(0, e["members"]), (x, y),
         )  # fmt: skip
-    except (KeyError, TypeError, ValueError, IndexError) as error:
-        raise _bad(path, k, f"{type(error).__name__} {error}", "an event with all its keys") from None
+    except KeyError as error:
+        raise _bad(path, k, f"no key {error}", "an event with all its keys") from None
+    except (TypeError, ValueError) as error:
+        raise _bad(path, k, str(error), "whole numbers as frames and ids, and pos [x, y]") from None
     if event.kind not in EVENT_KINDS:
         raise _bad(path, k, repr(event.kind), f"a kind out of {', '.join(EVENT_KINDS)}")
-    if not 1 <= event.start <= event.end:
-        raise _bad(path, k, f"frames {event.start} to {event.end}", "frames from 1, start not after end")
+    if not event.start <= event.end <= FRAMES:
+        expected = f"frames from 1 to {FRAMES}, start not after end"
+        raise _bad(path, k, f"frames {event.start} to {event.end}", expected)
     return event
 
 
-def _whole(value: Any) -> int:
-    if isinstance(value, bool) or not isinstance(value, int):
-        raise TypeError(f"{value!r} is no whole number")
+def _number_from(least: int, value: Any) -> int:
+    """Return the value if it is a whole number from `least` on; raise ValueError otherwise. True is no number."""
+    if isinstance(value, bool) or not isinstance(value, int) or value < least:
+        raise ValueError(f"{value!r}, which is no whole number from {least} on")
     return value
+
+
+def _numbers_from(least: int, values: Any) -> tuple[int, ...]:
+    if not isinstance(values, list):
+        raise ValueError(f"{values!r}, which is no list")
+    return tuple(_number_from(least, value) for value in values)
+
+
+def _coordinate(value: Any) -> float:
+    """Return a coordinate as float, nan for None. Raises ValueError for other types and beyond 1e6."""
+    if value is None:
+        return float("nan")
+    if isinstance(value, bool) or not isinstance(value, int | float) or not abs(value) <= COORDINATE:
+        raise ValueError(f"{value!r}, which is no coordinate within {COORDINATE:g}")
+    return float(value)
 
 
 def _bad(path: Path, k: int, got: str, expected: str) -> InputError:
@@ -105,22 +125,27 @@ def read_near(path: Path) -> Near:
     """Read a near.csv (frames start, end and person ids a, b); a file with the header alone gives no rows.
 
     A row is a pair of strangers who satisfy the merge rule from frame start to end (from 1, inclusive). Raises
-    InputError if the file is unreadable, its header is another one, a cell is no integer, or lines differ in length or
-    have not four cells; eight cells in every line count as two rows. Raises OverflowError for an integer beyond 64
-    bits. Ranges are not checked.
+    InputError if the file is unreadable or its header is another one. Also raises InputError, with the line, if a line
+    has not four whole numbers, a frame is outside 1 to 1,000,000, the end precedes the start, or an id is negative.
     """
-    lines = read_text(path).splitlines()
-    if lines[:1] != [NEAR_COLUMNS]:
+    header, *lines = read_text(path).splitlines() or [""]
+    if header != NEAR_COLUMNS:
         raise InputError(
-            file=path, place="line 1", got="".join(lines[:1])[:80], expected=NEAR_COLUMNS, remedy="restore the header"
+            file=path, place="line 1", got=repr(header[:80]), expected=NEAR_COLUMNS, remedy="restore the header"
         )
-    if len(lines) == 1:
-        return Near.none()
+    rows = [_near_row(path, k, line) for k, line in enumerate(lines, 2)]
+    return Near(*np.array(rows, np.int64).reshape(-1, 4).T.copy()) if rows else Near.none()
+
+
+def _near_row(path: Path, number: int, line: str) -> tuple[int, int, int, int]:
     try:
-        table = np.array([[int(c) for c in line.split(",")] for line in lines[1:]], np.int64).reshape(-1, 4)
-    except ValueError as error:
-        raise InputError(file=path, got=str(error), expected="four whole numbers", remedy="restore it") from None
-    return Near(*(table[:, k].copy() for k in range(4)))
+        start, end, a, b = (whole_number(cell) for cell in line.split(","))
+    except ValueError:
+        start, end, a, b = 0, 0, -1, -1
+    if not 1 <= start <= end <= FRAMES or min(a, b) < 0:
+        expected = f"frames from 1 to {FRAMES}, start not after end, and two ids from 0 on"
+        raise InputError(file=path, place=f"line {number}", got=repr(line), expected=expected, remedy="restore it")
+    return start, end, a, b
 
 
 def script_bytes(orders: Iterable[Order], fulfilled: Iterable[int | None]) -> bytes:
@@ -140,20 +165,27 @@ def script_bytes(orders: Iterable[Order], fulfilled: Iterable[int | None]) -> by
 def read_script(path: Path) -> tuple[Order, ...]:
     """Read the orders of a script.json, in the order of the file; the key "event" is ignored, a missing list gives ().
 
-    Raises InputError if the file is unreadable, no JSON object or of another format number, if "orders" is no list, or
-    if an order lacks a key or has a person id that is no integer. The frame "fired" is not checked.
+    Raises InputError if the file is unreadable, no JSON object or of another format number, or if "orders" is no list.
+    Also if an order lacks a key, or has a person id that is no whole number from 0 on, or a frame "fired" that is
+    neither null nor a whole number from 1 on.
     """
-    found = read_document(path).get("orders")
+    found = read_document(path).get("orders", [])
+    if not isinstance(found, list):
+        raise InputError(file=path, place="orders", got=type(found).__name__, expected="a list", remedy="restore it")
+    return tuple(_order(path, k, order) for k, order in enumerate(found))
+
+
+def _order(path: Path, k: int, o: Any) -> Order:
     try:
-        return tuple(
-            Order(str(o["id"]), str(o["kind"]), o["fired"], _people(o["before"]), _people(o["after"]))
-            for o in found or ()
-        )
-    except (KeyError, TypeError) as error:
-        raise InputError(
-            file=path, got=f"{type(error).__name__} {error}", expected="orders with all their keys", remedy="restore it"
-        ) from None
+        fired = None if o["fired"] is None else _number_from(1, o["fired"])
+        return Order(str(o["id"]), str(o["kind"]), fired, _people(o["before"]), _people(o["after"]))
+    except (KeyError, TypeError, ValueError) as error:
+        got = f"no key {error}" if isinstance(error, KeyError) else str(error)
+        expected = "an order with id, kind, fired, before and after"
+        raise InputError(file=path, place=f"orders[{k}]", got=got, expected=expected, remedy="restore it") from None
 
 
 def _people(groups: Any) -> tuple[tuple[int, ...], ...]:
-    return tuple(tuple(_whole(p) for p in group) for group in groups)
+    if not isinstance(groups, list):
+        raise ValueError(f"{groups!r}, which is no list")
+    return tuple(_numbers_from(0, group) for group in groups)

@@ -16,13 +16,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from scenarios.errors import InputError
-from sim.io.files.numeric_text import read_text
+from scenarios.limits import COORDINATE, FRAMES
+from sim.io.files.numeric_text import read_text, whole_number
 from sim.io.files.tables import Column, StoredTable, table_bytes
 from sim.types import Array, Groups, Ints
 
 CSV_COLUMNS = ("frame", "group", "members", "x", "y", "hull", "size")
 EXTENT = ("extent_xx", "extent_xy", "extent_yx", "extent_yy")
 AXES = ("x", "y", "z")
+_Row = tuple[int, Ints, Array, float, Array]  # group's id, members, x and y, size, hull
 
 
 def groups_bytes(frames: Series[Groups | None], first: int, unit: str) -> bytes:
@@ -75,16 +77,18 @@ def read_groups(table: StoredTable) -> list[Groups | None]:
 
     An item is None for a frame whose groups are unknown, and Groups without rows for a frame without groups. Members
     are () in a frame that was stored without them. The first item is the first frame stored, which need not be 1.
-    Raises InputError if a column or a value of the metadata is missing.
+    Raises InputError if a column or a value of the metadata is missing or wrong, a row is outside these frames, rows
+    are not sorted by frame, or a hull has half a vertex.
     """
-    first, count = int(table.fact("first")), int(table.fact("frames"))
-    missing, memberless = set(table.fact("missing")), set(table.fact("memberless"))
-    axes = [a for a in AXES if table.has(a)]
+    first, count = table.count("first", FRAMES), table.count("frames", FRAMES)
+    missing, memberless = table.frames("missing"), table.frames("memberless")
+    axes = AXES if table.has("z") else AXES[:2]
     id, size = table.ints("group"), table.floats("size")
     pos, vel = table.floats(*axes), table.floats(*(f"v{a}" for a in axes))
     extent = table.floats(*EXTENT).reshape(-1, 2, 2)
-    members, hulls = table.lists("members", np.int64), [h.reshape(-1, 2) for h in table.lists("hull", np.float64)]
-    cuts = np.searchsorted(table.ints("frame"), np.arange(first, first + count + 1))
+    members, flat = table.lists("members", np.int64), table.lists("hull", np.float64)
+    table.reject(any(len(h) % 2 for h in flat), "hull", "half a vertex", "x and y of each vertex")
+    hulls, cuts = [h.reshape(-1, 2) for h in flat], table.cuts(first, count)
     found: list[Groups | None] = []
     for k in range(count):
         r = slice(int(cuts[k]), int(cuts[k + 1]))
@@ -168,33 +172,46 @@ def read_groups_csv(path: Path, length: int) -> list[Groups]:
     without rows. Whether members exist is not checked.
 
     Raises InputError if the file is unreadable, and, with the line, if a column is missing, a cell is invalid, a frame
-    is outside 1 to `length`, a group id is negative, or a group stands twice in a frame.
+    is outside 1 to `length`, an id or size is negative, a coordinate is beyond 1e6, or a group stands twice in a frame.
     """
     reader = csv.DictReader(io.StringIO(read_text(path)))
-    wanted = [c for c in CSV_COLUMNS[:6] if c not in (reader.fieldnames or [])]
-    if wanted:
-        raise _bad(path, 1, f"no column {', '.join(wanted)}", ",".join(CSV_COLUMNS))
-    frames: list[list[tuple[int, Ints, Array, float, Array]]] = [[] for _ in range(length)]
-    for row in reader:
-        line = reader.line_num
-        try:
-            frame, id, members = int(row["frame"]), int(row["group"]), [int(m) for m in row["members"].split()]
-            pos = np.array([float(row["x"] or "nan"), float(row["y"] or "nan")])
-            size = float(row.get("size") or "nan")
-            hull = parse_wkt(row["hull"]) if row["hull"] else np.zeros((0, 2))
-        except (ValueError, TypeError, AttributeError) as error:
-            raise _bad(path, line, str(error), "frame,group,members,x,y,hull (WKT)") from None
-        if not 1 <= frame <= length or id < 0:
-            raise _bad(path, line, f"frame {frame}, group {id}", f"frames from 1 to {length}, groups from 0")
-        if any(id == other[0] for other in frames[frame - 1]):
-            raise _bad(path, line, f"group {id} twice in frame {frame}", "each group once in a frame")
-        frames[frame - 1].append((id, np.array(sorted(set(members)), np.int64), pos, size, hull))
-    return [_from_rows(sorted(rows, key=lambda r: r[0])) for rows in frames]
+    frames: dict[int, list[_Row]] = {}
+    try:
+        wanted = [c for c in CSV_COLUMNS[:6] if c not in (reader.fieldnames or [])]
+        if wanted:
+            raise _bad(path, 1, f"no column {', '.join(wanted)}", ",".join(CSV_COLUMNS))
+        for row in reader:
+            frame, group = _row(path, reader.line_num, row, length)
+            if any(group[0] == other[0] for other in frames.setdefault(frame, [])):
+                got = f"group {group[0]} twice in frame {frame}"
+                raise _bad(path, reader.line_num, got, "each group once in a frame")
+            frames[frame].append(group)
+    except csv.Error as error:
+        raise _bad(path, reader.line_num, str(error), "cells of text") from None
+    nobody = Groups.none()
+    return [_from_rows(sorted(frames[k], key=lambda r: r[0])) if k in frames else nobody for k in range(1, length + 1)]
 
 
-def _from_rows(rows: list[tuple[int, Ints, Array, float, Array]]) -> Groups:
-    if not rows:
-        return Groups.none()
+def _row(path: Path, line: int, row: dict[str, str], length: int) -> tuple[int, _Row]:
+    """Return (frame, its group) of one row; raise InputError, with the line, if a cell is wrong."""
+    try:
+        frame, id = whole_number(row["frame"]), whole_number(row["group"])
+        members = np.array(sorted({whole_number(m) for m in row["members"].split()}), np.int64)
+        pos = np.array([float(row["x"] or "nan"), float(row["y"] or "nan")])
+        size = float(row.get("size") or "nan")
+        hull = parse_wkt(row["hull"]) if row["hull"] else np.zeros((0, 2))
+    except (ValueError, TypeError, AttributeError) as error:
+        raise _bad(path, line, str(error), "frame,group,members,x,y,hull (WKT)") from None
+    if not 1 <= frame <= length or id < 0:
+        raise _bad(path, line, f"frame {frame}, group {id}", f"frames from 1 to {length}, groups from 0")
+    if members.min(initial=0) < 0 or size < 0 or (not np.isfinite(size) and row.get("size")):
+        raise _bad(path, line, f"members {row['members']}, size {row.get('size')}", "ids from 0, and a size from 0")
+    if max(abs(pos[~np.isnan(pos)]).max(initial=0), abs(hull).max(initial=0)) > COORDINATE:
+        raise _bad(path, line, "a coordinate that is too large", f"coordinates within {COORDINATE:g}")
+    return frame, (id, members, pos, size, hull)
+
+
+def _from_rows(rows: list[_Row]) -> Groups:
     id, members, pos, size, hull = zip(*rows, strict=True)
     n = len(rows)
     return Groups(

@@ -12,7 +12,9 @@ from typing import Any
 import numpy as np
 
 from scenarios.errors import InputError
-from sim.io.files.tables import REDO, Column, StoredTable, nan_to_none, none_to_nan, read_table, table_bytes
+from scenarios.limits import COORDINATE, FRAME_RATES, FRAMES
+from scenarios.regular_file import is_present
+from sim.io.files.tables import REDO, Column, StoredTable, nan_to_none, read_table, table_bytes
 from sim.io.formats.mot_text import ground_cells
 from sim.io.store.event_files import events_bytes, near_bytes, read_events, read_near, read_script, script_bytes
 from sim.io.store.group_files import groups_bytes, groups_csv, read_groups
@@ -90,10 +92,13 @@ def _spans(flags: Bools) -> list[list[int]]:
     return [[int(a) + 1, int(b)] for a, b in edges.reshape(-1, 2)]
 
 
-def _flags(spans: list[list[int]], length: int) -> Bools:
-    flags = np.zeros(length, bool)
-    for first, last in spans:
-        flags[first - 1 : last] = True
+def _flags(table: StoredTable, spans: Any, length: int) -> Bools:
+    """Return flags (length,) that are True in each span [first frame, last frame]; InputError if a span is none."""
+    flags, ends = np.zeros(length, bool), range(1, length + 1)
+    for span in spans if isinstance(spans, list) else [spans]:
+        fits = isinstance(span, list) and len(span) == 2 and all(type(v) is int and v in ends for v in span)
+        table.reject(not fits, "labelled", f"{span!r:.40}", f"[first, last] frames from 1 to {length}")
+        flags[span[0] - 1 : span[1]] = True
     return flags
 
 
@@ -122,7 +127,8 @@ def read_truth(folder: Path) -> Truth:
     """
     gt = folder / "gt"
     table = read_table(gt / "truth.parquet")
-    length, labelled = int(table.fact("length")), table.fact("labelled")
+    length, labelled = table.count("length", FRAMES), table.fact("labelled")
+    px_per_m = table.fact("px_per_m")
 
     def several(*names: str) -> Array | None:
         return table.floats(*names) if table.has(names[0]) else None
@@ -130,16 +136,16 @@ def read_truth(folder: Path) -> Truth:
     frame, id = table.ints("frame"), table.ints("id")
     _check_rows(table, length)
     return Truth(
-        name=table.fact("name"), fps=float(table.fact("fps")), length=length,
-        px_per_m=none_to_nan(table.fact("px_per_m")),
+        name=str(table.fact("name")), fps=table.number("fps", *FRAME_RATES), length=length,
+        px_per_m=float("nan") if px_per_m is None else table.number("px_per_m", 0.0, COORDINATE),
         frame=frame, id=id, group=table.ints("group"),
         pos=several("x", "y"), vel=several("vx", "vy"), box=several(*BOX), visible_box=several(*VISIBLE),
         visibility=table.floats("visibility"),
         **{name: several(name) for name, _ in SINGLE},
         groups=_groups(gt / "groups.parquet"), groups_px=_groups(gt / "groups_px.parquet"),
-        labelled=None if labelled is None else _flags(labelled, length),
-        events=tuple(e for e, _ in read_events(gt / "events.json")) if (gt / "events.json").is_file() else None,
-        near=read_near(gt / "near.csv") if (gt / "near.csv").is_file() else None,
+        labelled=None if labelled is None else _flags(table, labelled, length),
+        events=tuple(e for e, _ in read_events(gt / "events.json")) if is_present(gt / "events.json") else None,
+        near=read_near(gt / "near.csv") if is_present(gt / "near.csv") else None,
         orders=read_script(gt / "script.json"),
     )  # fmt: skip
 
@@ -156,7 +162,7 @@ def _check_rows(table: StoredTable, length: int) -> None:
 
 
 def _groups(path: Path) -> tuple[Groups, ...] | None:
-    if not path.is_file():
+    if not is_present(path):
         return None
     return tuple(g if g is not None else Groups.none() for g in read_groups(read_table(path)))
 
@@ -236,19 +242,21 @@ def read_detections(path: Path) -> list[Detections]:
     """Read a det.parquet: one Detections per frame, from frame 1; frames without rows have none.
 
     Velocities and boxes are None if the file has no such columns; a third position column z makes positions (M, 3).
-    Rows must be sorted by frame; those outside the stored number of frames are left out. Raises InputError if the file
-    is missing or damaged, or a column or a value of the metadata is missing.
+    Raises InputError if the file is missing or damaged, a column or a value of the metadata is missing or wrong, a row
+    is outside the stored number of frames, or rows are not sorted by frame.
     """
     table = read_table(path)
-    axes = [a for a in ("x", "y", "z") if table.has(a)]
-    pos, score, fps = table.floats(*axes), table.floats("score"), float(table.fact("fps"))
+    axes = ("x", "y", "z") if table.has("z") else ("x", "y")
+    pos, score, fps = table.floats(*axes), table.floats("score"), table.number("fps", *FRAME_RATES)
+    plane = table.fact("plane")
+    table.reject(plane not in ("ground", "space", "image"), "plane", f"{plane!r}", "ground, space or image")
     vel = table.floats(*(f"v{a}" for a in axes)) if table.has("vx") else None
     box = table.floats(*BOX) if table.has(BOX[0]) else None
-    count = int(table.fact("frames"))
-    cuts = np.searchsorted(table.ints("frame"), np.arange(1, count + 2))
+    count = table.count("frames", FRAMES)
+    cuts = table.cuts(1, count)
     found = []
     for k in range(count):
         r = slice(int(cuts[k]), int(cuts[k + 1]))
         cut = (pos[r], None if vel is None else vel[r], None if box is None else box[r], score[r])
-        found.append(Detections(k + 1, k / fps, table.fact("plane"), *cut))
+        found.append(Detections(k + 1, k / fps, plane, *cut))
     return found

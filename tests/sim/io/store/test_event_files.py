@@ -1,0 +1,82 @@
+"""What the small files of a truth refuse: one line that names the place."""
+
+import json
+
+import pytest
+
+from scenarios.errors import InputError
+from sim.io.store.camera_files import read_scene
+from sim.io.store.event_files import read_events, read_near, read_script
+from sim.io.store.group_files import read_groups_csv
+
+EVENT = {"kind": "merge", "start": 1, "end": 3, "emitted": None, "before": [-1, 2], "after": [2], "members": [1, 2],
+         "pos": [1.5, None]}  # fmt: skip
+ORDER = {"id": "m", "kind": "merge", "fired": 2, "before": [[1], [2]], "after": [[1, 2]]}
+SCENE = {"format": 1, "size": [16, 10], "walls": [], "pillars": [], "doors": [], "service": [], "stairs": [],
+         "wall_height": 2.5, "pillar_height": 2.5}  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        {"pos": [1.5]}, {"pos": ["1", 2]}, {"pos": [1e300, 0]}, {"pos": None}, {"start": 0}, {"start": 1.0},
+        {"end": 80_000_000}, {"emitted": -1}, {"before": [-2]}, {"members": [-1]}, {"members": 3}, {"after": "ab"},
+        {"kind": []}, {"members": [2**63]}, {"frame": 0}, {"frame": "2"},
+    ],
+)  # fmt: skip
+def test_events(change, tmp_path):
+    path = tmp_path / "events.json"
+    path.write_text(json.dumps({"format": 1, "events": [EVENT]}))
+    assert len(read_events(path)) == 1
+    path.write_text(json.dumps({"format": 1, "events": [EVENT | change]}))
+    with pytest.raises(InputError) as error:
+        read_events(path)
+    assert "\n" not in str(error.value)
+
+
+@pytest.mark.parametrize(
+    "change", [{"fired": "now"}, {"fired": 0}, {"before": [["1"]]}, {"after": 1}, {"before": [[-1]]}]
+)
+def test_orders(change, tmp_path):
+    path = tmp_path / "script.json"
+    path.write_text(json.dumps({"orders": [ORDER]}))
+    assert read_script(path)[0].fired == 2
+    for orders in ([ORDER | change], {"a": 1}, ["m"]):
+        path.write_text(json.dumps({"orders": orders}))
+        with pytest.raises(InputError, match="orders"):
+            read_script(path)
+
+
+@pytest.mark.parametrize(
+    "line", ["1,3,1,2,1,3,1,2", "1,3,1", "1,3,1,9223372036854775808", "1,3,1,²", "0,3,1,2", "3,1,1,2", "1,3,-1,2", ""]
+)
+def test_pairs(line, tmp_path):
+    path = tmp_path / "near.csv"
+    path.write_text(f"start,end,a,b\n1,3,1,2\n{line}\n1,3,1,2\n")
+    with pytest.raises(InputError, match="line 3"):
+        read_near(path)
+
+
+@pytest.mark.parametrize("stairs", [{"a": 1}, [1], "none", None, [{"foot": [1], "head": [1, 2]}], [{}]])
+def test_stairs(stairs, tmp_path):
+    path = tmp_path / "scene.json"
+    path.write_text(json.dumps(SCENE))
+    assert read_scene(path).stairs == ()
+    path.write_text(json.dumps(SCENE | {"stairs": stairs}))
+    with pytest.raises(InputError, match="stairs"):
+        read_scene(path)
+
+
+@pytest.mark.parametrize(
+    "row",
+    [
+        "1,1,1 -2,,,,2", "1,1,9223372036854775808,,,,", "1,1,1_0,,,,", "²,1,1,,,,", "1,1,1,1e200,0,,", "1,1,1,0,inf,,",
+        '1,1,1,0,0,"POLYGON ((1e200 0, 1 1, 0 1))",', "1,1,1,0,0,,-2", "1,1,1,0,0,,inf", '1,1,"1' + "x" * 200_000 + '"',
+    ],
+)  # fmt: skip
+def test_groups(row, tmp_path):
+    path = tmp_path / "groups.csv"
+    path.write_text(f"frame,group,members,x,y,hull,size\n2,1,1 2,,,,2\n{row}\n")
+    with pytest.raises(InputError) as error:
+        read_groups_csv(path, 3)
+    assert error.value.place.startswith("line ")
