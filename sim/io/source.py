@@ -5,10 +5,13 @@ SOURCE is a stored sequence or dataset, or a recording in a public format. New r
 
 from __future__ import annotations
 
+import os.path
 from dataclasses import dataclass
 from pathlib import Path
 
 from scenarios.errors import InputError
+from scenarios.limits import FRAME_RATES, SCALES
+from scenarios.regular_file import is_present, require_regular
 from sim.io.formats import biwi, caviar, mot_folder, video
 from sim.io.formats.calibration import read_calibration
 from sim.io.pictures.background_sample import BackgroundChoice, parse_choice
@@ -45,15 +48,17 @@ def open_source(
     frame rate. Truth and pictures are read later and may then raise InputError.
     """
     path = Path(path)
-    for option, value in (("--fps", fps), ("--px-per-m", px_per_m)):
-        if value is not None and not 0 < value < float("inf"):
-            raise InputError(place=option, got=value, expected="a number above 0", remedy=f"correct {option}")
+    for option, value, (low, high) in (("--fps", fps, FRAME_RATES), ("--px-per-m", px_per_m, SCALES)):
+        if value is not None and not low <= value <= high:
+            expected = f"a number from {low:g} to {high:g}"
+            raise InputError(place=option, got=value, expected=expected, remedy=f"correct {option}")
     if isinstance(camera, str | Path):
         camera = read_calibration(Path(camera))
     options = RecordingOptions(fps, px_per_m, camera, images, None if background is None else parse_choice(background))
-    if not path.exists():
+    if not os.path.exists(path):
         raise InputError(file=path, got="nothing there", expected=KINDS, remedy="check the path")
-    if path.is_file():
+    if not os.path.isdir(path):
+        require_regular(path)
         return [_open_file(path, options)]
     found = list(_find(path, DEPTH))
     if not found:
@@ -128,7 +133,7 @@ def _open_file(path: Path, options: RecordingOptions) -> Sequence:
 def _kind(folder: Path) -> str | None:
     if is_sequence(folder):
         return "generated"
-    if (folder / "obsmat.txt").is_file():
+    if is_present(folder / "obsmat.txt"):
         return "biwi"
     parts = ("seqinfo.ini", "gt/gt.txt", "det/det.txt", "img1")
     return "mot" if any((folder / part).exists() for part in parts) else None

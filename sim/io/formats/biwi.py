@@ -15,26 +15,63 @@ from pathlib import Path
 import numpy as np
 
 from scenarios.errors import InputError
-from sim.io.files.numeric_text import NumericTable, read_numbers, read_text
-from sim.io.formats.group_labels import labelled_truth_fields
-from sim.types import Frame, Ints, Sequence, Truth
+from scenarios.limits import COORDINATE, DETECTIONS, FRAMES
+from scenarios.regular_file import is_present
+from sim.io.files.numeric_text import NumericTable, crowded, read_numbers, read_text
+from sim.io.formats.group_labels import labelled_truth_fields, require_size
+from sim.types import Bools, Frame, Ints, Sequence, Truth
 
 FPS = 2.5
+LAST_ID = 2**52
+CORRECT = "correct or remove the line"
 
 
-def frame_numbers(raw: Ints) -> Ints:
-    """Return our frame numbers from 1, round((raw - first) / step) + 1, shape of `raw` (N,), int64.
+def frame_numbers(raw: Ints, id: Ints | None = None) -> Ints:
+    """Return our frame numbers from 1, round((raw - first) / step) + 1, shape of `raw` (N,), int64; halves are rounded
+    up.
 
     raw (N,): numbers of video frames, in any order; first is the lowest. step: the most frequent difference between
-    successive distinct raw numbers, the smallest if several are as frequent. Two raw numbers nearer than a step may get
-    the same frame. If all are equal the result is ones; an empty `raw` gives an empty result.
+    successive distinct raw numbers, the smallest if several are as frequent. id (N,): the person of each row; None:
+    unknown. If all are equal the result is ones; an empty `raw` gives an empty result.
+
+    Two raw numbers nearer than a step may get the same frame. If they have a person in common, as where a recording
+    changes between two grids that are shifted by a part of a step, the later one gets the next frame. So do the ones
+    after it, up to the next gap. No raw number is moved by more than one frame.
     """
-    steps = np.diff(np.unique(raw))
+    distinct, row = np.unique(raw, return_inverse=True)
+    steps = np.diff(distinct)
     if len(steps) == 0:
         return np.ones(len(raw), np.int64)
     values, counts = np.unique(steps, return_counts=True)
     step = int(values[np.argmax(counts)])
-    return np.asarray(np.round((raw - raw.min()) / step), np.int64) + 1
+    slot = (2 * (distinct - distinct[0]) + step) // (2 * step) + 1
+    if id is not None and _twice(slot[row], id).any():
+        slot = _parted(slot, [set(p.tolist()) for p in np.split(id[np.argsort(row)], np.cumsum(np.bincount(row))[:-1])])
+    return np.asarray(slot[row], np.int64)
+
+
+def _twice(frame: Ints, id: Ints) -> Bools:
+    """Return flags (N,), True for a row whose id stood in the same frame in an earlier row of the order (frame, id)."""
+    order = np.lexsort((id, frame))
+    twice = np.zeros(len(order), bool)
+    twice[order[1:]] = (np.diff(frame[order]) == 0) & (np.diff(id[order]) == 0)
+    return twice
+
+
+def _parted(slot: Ints, people: list[set[int]]) -> Ints:
+    """Return the slots (K,) of K distinct raw frames, so that frames with a common person differ where they can.
+
+    slot (K,): ascending. people: the ids in each raw frame. A slot is raised by one at most.
+    """
+    parted = slot.copy()
+    here, raised = people[0], False
+    for k in range(1, len(slot)):
+        last = int(parted[k - 1])
+        if slot[k] <= last and (raised or here & people[k]):
+            parted[k] = max(min(last + 1, int(slot[k]) + 1), last)
+        raised = bool(parted[k] > slot[k])
+        here = people[k] | here if parted[k] == last else people[k]
+    return parted
 
 
 def read_groups(path: Path) -> dict[int, int]:
@@ -63,29 +100,37 @@ def read_groups(path: Path) -> dict[int, int]:
 def _ids(path: Path, number: int, line: str) -> list[int]:
     try:
         values = [float(word) for word in line.replace(",", " ").split()]
-        if all(v == round(v) for v in values):
+        if all(0 <= v <= LAST_ID and v == round(v) for v in values):
             return [int(v) for v in values]
     except (ValueError, OverflowError):
         pass
     raise InputError(
-        file=path, place=f"line {number}", got=line.strip(), expected="ids of people", remedy="correct the line"
-    )
+        file=path, place=f"line {number}", got=line.strip(), expected="ids of people, whole numbers from 0 on",
+        remedy="correct the line",
+    )  # fmt: skip
 
 
 def _table(folder: Path) -> tuple[NumericTable, Ints, Ints]:
     """Return (rows of obsmat.txt in `folder`, our frames from 1 (R,), person ids (R,)), all sorted by (frame, id).
 
-    A row is frame, id, x, z, y, vx, vz, vy in m and m/s, frame being the file's own number. A file without lines gives
-    no rows. Raises InputError if the file is unreadable, a line is not 8 finite numbers, a frame or id is no integer,
-    an id is negative, or an id stands twice in a frame.
+    A row is frame, id, x, z, y, vx, vz, vy in m and m/s, frame being the file's own number. Raises InputError if the
+    file is unreadable or has no line, a line is not 8 finite numbers within 1e6, a frame or id is no integer, an id is
+    negative, or an id stands twice in a frame. Also for more than 1,000,000 frames, 5000 people in a frame, or
+    20,000,000 frames times people.
     """
-    rows = read_numbers(folder / "obsmat.txt", (8, 8))
-    frame, id = frame_numbers(rows.integers(0, "frame")), rows.integers(1, "id")
+    path = folder / "obsmat.txt"
+    rows = read_numbers(path, (8, 8))
+    if not len(rows.line):
+        raise InputError(file=path, got="no line", expected="people: frame id x z y vx vz vy", remedy="restore it")
+    raw, id = rows.integers(0, "frame"), rows.integers(1, "id")
     rows.reject(id < 0, "ids from 0", "correct the id")
+    rows.reject((np.abs(rows.values[:, 2:]) > COORDINATE).any(axis=1), f"numbers within {COORDINATE:g}", CORRECT)
+    frame = frame_numbers(raw, id)
+    rows.reject(frame > FRAMES, f"at most {FRAMES} frames", "correct the frame")
+    rows.reject(crowded(frame), f"at most {DETECTIONS} people in a frame", CORRECT)
+    require_size(path, int(frame.max()), id)
+    rows.reject(_twice(frame, id), "each id once in a frame, also where two frames are nearer than a step", CORRECT)
     order = np.lexsort((id, frame))
-    twice = np.zeros(len(order), bool)
-    twice[order[1:]] = (np.diff(frame[order]) == 0) & (np.diff(id[order]) == 0)
-    rows.reject(twice, "each id once in a frame", "remove one of the two lines")
     return NumericTable(rows.file, rows.values[order], rows.line[order]), frame[order], id[order]
 
 
@@ -106,7 +151,7 @@ def read_truth(folder: Path, fps: float = FPS) -> Truth:
         group=np.full(len(id), -1, np.int64), pos=pos, vel=vel, box=None, visibility=np.ones(len(id)),
         z=np.zeros(len(id)), labelled=np.zeros(length, bool),
     )  # fmt: skip
-    if not (folder / "groups.txt").is_file():
+    if not is_present(folder / "groups.txt"):
         return truth
     names = read_groups(folder / "groups.txt")
     label = np.array([names.get(int(i), -1) for i in id], np.int64)

@@ -6,6 +6,7 @@ be relied on. The image scale is the median of the longer sides / 1.7 m. Groups 
 
 from __future__ import annotations
 
+import re
 import warnings
 import xml.etree.ElementTree as ET
 from collections.abc import Iterator
@@ -15,13 +16,17 @@ from pathlib import Path
 import numpy as np
 
 from scenarios.errors import InputError
-from sim.io.formats.group_labels import labelled_truth_fields
+from scenarios.limits import COORDINATE, FRAMES, XML_BYTES
+from scenarios.regular_file import read_regular
+from sim.io.files.numeric_text import whole_number
+from sim.io.formats.group_labels import labelled_truth_fields, require_size
 from sim.io.formats.velocity import differentiate
 from sim.scene.body import PERSON_HEIGHT
 from sim.truth.group_hulls import box_groups
 from sim.types import Array, Frame, Ints, Sequence, Truth
 
 FPS = 25.0
+LAST_ID = 10**15 - 1  # ids pass through float64
 IMAGE_SIZE = (384, 288)
 CHORD = 1.0  # s, for velocities: labels rest for some frames and then jump by pixels, which shorter windows pick up
 
@@ -56,14 +61,15 @@ def read_xml(path: Path) -> CaviarRecording:
 
     A list of fewer than two members is no group. A person in two groups of a frame stays in the first, with a warning.
     A file without people gives no rows. Raises InputError if the file is unreadable or no CVML, and, with the file's
-    frame number, if an object has no box or a box without area, a number is missing or wrong, or an id stands twice in
-    a frame.
+    frame number, if an object has no box or a box without area, a number is missing or beyond 1e6, an id or frame is
+    no whole number from 0 on, or an id stands twice in a frame. Also raises it for more than 1,000,000 frames, or
+    20,000,000 frames times people.
     """
     root = _root(path)
     rows: list[tuple[float, ...]] = []
     last, labelled = 0, False
     for element in root.iter("frame"):
-        index = int(_number(path, "frame", element, "number")) + 1
+        index = _whole(path, "frame", element, "number", FRAMES - 1) + 1
         last, labelled = max(last, index), labelled or element.find("grouplist") is not None
         label = _labels(path, index, element)
         for person in element.iterfind("objectlist/object"):
@@ -77,22 +83,25 @@ def read_xml(path: Path) -> CaviarRecording:
             file=path, place=f"frame {frame[k] - 1}", got=f"object {id[k]} twice", expected="each id once in a frame",
             remedy="remove one of the two",
         )  # fmt: skip
+    require_size(path, last, id)
     name = root.get("name", path.stem)
     return CaviarRecording(name, last, frame, id, label_, table[:, 3:5], table[:, 5:7], labelled)
 
 
 def _root(path: Path) -> ET.Element:
+    """Return the root element of a CVML file; raise InputError if it is unreadable, no XML, or of another kind.
+
+    A text in another encoding than UTF-8 is decoded as its XML declaration says.
+    """
+    body = read_regular(path, XML_BYTES)
     try:
-        root = ET.parse(path).getroot()
-    except ET.ParseError as error:
+        root = ET.fromstring(body)
+    except (ET.ParseError, ValueError, LookupError) as error:  # the last two: an encoding that Python does not have
+        place = f"line {error.position[0]}" if isinstance(error, ET.ParseError) else "line 1"
         raise InputError(
-            file=path, place=f"line {error.position[0]}", got="broken XML", expected="a CAVIAR file (CVML)",
+            file=path, place=place, got=f"broken XML ({error})", expected="a CAVIAR file (CVML)",
             remedy="fetch the file again",
         ) from None  # fmt: skip
-    except OSError as error:
-        raise InputError(
-            file=path, got=error.strerror or "no access", expected="a readable file", remedy="check the path"
-        ) from None
     if root.tag != "dataset":
         raise InputError(file=path, got=f"<{root.tag}>", expected="<dataset> (CAVIAR)", remedy="give another file")
     return root
@@ -104,10 +113,26 @@ def _number(path: Path, place: str, element: ET.Element, key: str) -> float:
         value = float(text or "")
     except ValueError:
         value = float("nan")
-    if not np.isfinite(value):
+    if not abs(value) <= COORDINATE:
         raise InputError(
-            file=path, place=f"{place}: {element.tag} {key}", got=repr(text), expected="a number", remedy="correct it"
-        )
+            file=path, place=f"{place}: {element.tag} {key}", got=repr(text),
+            expected=f"a number within {COORDINATE:g}", remedy="correct it",
+        )  # fmt: skip
+    return value
+
+
+def _whole(path: Path, place: str, element: ET.Element, key: str, limit: int = LAST_ID) -> int:
+    """Return the whole number from 0 to `limit` of an attribute; raise InputError for any other text."""
+    text = element.get(key)
+    try:
+        value = whole_number(text or "")
+    except ValueError:
+        value = -1
+    if not 0 <= value <= limit:
+        raise InputError(
+            file=path, place=f"{place}: {element.tag} {key}", got=repr(text),
+            expected=f"a whole number from 0 to {limit}", remedy="correct it",
+        )  # fmt: skip
     return value
 
 
@@ -116,12 +141,12 @@ def _labels(path: Path, index: int, element: ET.Element) -> dict[int, int]:
 
     path: the file, for messages. element: the XML of the frame. index: our frame, from 1; messages name index - 1.
     Groups with fewer than two members are ignored; a person in two groups keeps the first, with a warning. Raises
-    InputError if a member or group id is no number.
+    InputError if a member or group id is no whole number from 0 on.
     """
     label: dict[int, int] = {}
     for group in element.iterfind("grouplist/group"):
         words = (group.findtext("members") or "").replace(",", " ").split()
-        if not all(w.isdigit() for w in words):
+        if not all(re.fullmatch("[0-9]{1,15}", w) for w in words):
             raise InputError(
                 file=path, place=f"frame {index - 1}: members", got=" ".join(words), expected="ids of people",
                 remedy="correct the list",
@@ -131,7 +156,7 @@ def _labels(path: Path, index: int, element: ET.Element) -> dict[int, int]:
             continue
         if members & label.keys():
             warnings.warn(f"{path}: frame {index - 1}: a person in two groups; the first holds", stacklevel=3)
-        number = int(_number(path, f"frame {index - 1}", group, "id"))
+        number = _whole(path, f"frame {index - 1}", group, "id")
         label.update({m: number for m in sorted(members) if m not in label})
     return label
 
@@ -143,7 +168,7 @@ def _row(path: Path, index: int, person: ET.Element, label: dict[int, int]) -> t
     InputError if the box is missing or has no area, or a number is missing or wrong.
     """
     place = f"frame {index - 1}"
-    id, box = int(_number(path, place, person, "id")), person.find("box")
+    id, box = _whole(path, place, person, "id"), person.find("box")
     if box is None:
         raise InputError(file=path, place=place, got="an object without box", expected="a box", remedy="add it")
     x, y, w, h = (_number(path, place, box, key) for key in ("xc", "yc", "w", "h"))

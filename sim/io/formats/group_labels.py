@@ -7,10 +7,13 @@ rules are in metres, so a recording in px is divided by its px_per_m and the res
 from __future__ import annotations
 
 from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from scenarios.errors import InputError
+from scenarios.limits import CELLS
 from sim.types import Array, GroupEvent, Groups, Ints
 
 
@@ -23,6 +26,19 @@ def rows_to_grid(frame: Ints, id: Ints, values: Array, length: int) -> Array:
     out = np.full((length, len(np.unique(id)), *values.shape[1:]), np.nan)
     out[frame - 1, np.searchsorted(np.unique(id), id)] = values
     return out
+
+
+def require_size(path: Path, length: int, id: Ints) -> None:
+    """Raise InputError if a recording is too large for arrays of all its frames and people; do nothing otherwise.
+
+    path: the recording, for the message. length: number of frames. id (R,): the person of each row. At most 20,000,000
+    frames times people are allowed, so that one mistyped frame number does not fill the memory.
+    """
+    people = len(np.unique(id))
+    if length * people > CELLS:
+        got = f"{length:,} frames with {people:,} people"
+        expected = f"at most {CELLS:,} frames times people"
+        raise InputError(file=path, got=got, expected=expected, remedy="correct the last frame, or cut the recording")
 
 
 def labelled_truth_fields(

@@ -9,6 +9,9 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from scenarios.errors import InputError
+from scenarios.limits import FRAME_RATES, FRAMES
+from scenarios.limits import PICTURE_SIDE as SIDE
+from scenarios.regular_file import is_present
 from sim.io.files.numeric_text import read_text
 from sim.io.formats import mot_text
 from sim.io.formats.calibration import scaled_to_image
@@ -38,31 +41,32 @@ class SeqInfo:
 def read_seqinfo(path: Path) -> SeqInfo:
     """Read the section [Sequence] of the seqinfo.ini `path`; without that section every key counts as missing.
 
-    Fractions of the length and the image size are cut off; other keys are ignored. Raises InputError if the file is
-    unreadable or no ini file, or if a number in it is not above 0 and below 10,000,000.
+    Other keys are ignored. Raises InputError if the file is unreadable or no ini file, the length is no whole number
+    from 1 to 1,000,000, a side of the image no whole number from 1 to 16,384, or the frame rate not from 0.01 to 1000.
     """
     parser = configparser.ConfigParser(interpolation=None)
     try:
         parser.read_string(read_text(path))
     except configparser.Error as error:
-        reason = error.message.splitlines()[0]
+        reason = (error.message.splitlines() or ["no ini file"])[0]
         raise InputError(file=path, got=reason, expected="key=value lines", remedy="correct the file") from None
     section = dict(parser["Sequence"]) if parser.has_section("Sequence") else {}
 
-    def number(key: str) -> float | None:
+    def number(key: str, low: float, high: float, whole: bool = True) -> float | None:
         text = section.get(key.lower())
         try:
             value = None if text is None else float(text)
         except ValueError:
             value = float("nan")
-        if value is not None and not 0 < value < mot_text.MAX_FRAME:
-            raise InputError(file=path, place=key, got=repr(text), expected="a positive number", remedy="correct it")
+        if value is not None and not (low <= value <= high and (not whole or value == round(value))):
+            expected = f"a {'whole ' if whole else ''}number from {low:g} to {high:g}"
+            raise InputError(file=path, place=key, got=repr(text), expected=expected, remedy="correct it")
         return value
 
-    length, w, h = number("seqLength"), number("imWidth"), number("imHeight")
+    length, w, h = (number(k, 1, high) for k, high in (("seqLength", FRAMES), ("imWidth", SIDE), ("imHeight", SIDE)))
     return SeqInfo(
         section.get("name", path.parent.name),
-        number("frameRate"),
+        number("frameRate", *FRAME_RATES, whole=False),
         None if length is None else int(length),
         None if w is None or h is None else (int(w), int(h)),
         section.get("imdir", "img1"),
@@ -72,11 +76,13 @@ def read_seqinfo(path: Path) -> SeqInfo:
 def frame_rate(given: float | None, found: float | None) -> float:
     """Return the frames per second: `given` by the user (--fps), else `found` in the recording, else 25 with a warning.
 
-    given, found: None if unknown. Raises InputError if `given` is nan or not above 0.
+    given, found: None if unknown. Raises InputError if `given` is not from 0.01 to 1000.
     """
     if given is not None:
-        if not given > 0:
-            raise InputError(place="fps", got=given, expected="a number above 0", remedy="correct --fps")
+        low, high = FRAME_RATES
+        if not low <= given <= high:
+            expected = f"a number from {low:g} to {high:g}"
+            raise InputError(place="fps", got=given, expected=expected, remedy="correct --fps")
         return given
     if found is None:
         # The text names no path, so that a command over many recordings prints it once.
@@ -111,12 +117,12 @@ def open_folder(
     sizes or none that can be read.
     """
     ini = path / "seqinfo.ini"
-    info = read_seqinfo(ini) if ini.is_file() else SeqInfo(path.name, None, None, None)
+    info = read_seqinfo(ini) if is_present(ini) else SeqInfo(path.name, None, None, None)
     rate = frame_rate(fps, info.fps)
     scale = float("nan") if px_per_m is None else px_per_m
     gt, det = path / "gt" / "gt.txt", path / "det" / "det.txt"
-    found = mot_text.read_detections(det, info.length) if det.is_file() else None
-    pictures = find_pictures(path / info.image_dir, info.length, gt.is_file() or found is not None)
+    found = mot_text.read_detections(det, info.length) if is_present(det) else None
+    pictures = find_pictures(path / info.image_dir, info.length, is_present(gt) or found is not None)
     length = info.length or max(_labelled(found, gt), pictures.last)
     if not length:
         expected = "a row in gt.txt or det.txt, a picture, or seqLength in seqinfo.ini"

@@ -13,13 +13,13 @@ from pathlib import Path
 
 import numpy as np
 
-from sim.io.files.numeric_text import NumericTable, read_numbers
+from scenarios.limits import COORDINATE, DETECTIONS, FRAMES
+from sim.io.files.numeric_text import NumericTable, crowded, read_numbers
 from sim.io.formats.velocity import differentiate
 from sim.scene.body import PERSON_HEIGHT
 from sim.types import Array, Bools, Detections, Ints, Plane, Truth
 
 PEDESTRIAN = 1
-MAX_FRAME = 10_000_000
 
 
 @dataclass(frozen=True)
@@ -57,16 +57,19 @@ def read_table(path: Path, *, length: int | None = None, boxless: bool = False) 
     """Read the MOTChallenge text file `path` of 6 to 10 columns: frame, id, left, top, width, height, and up to four
     more.
 
-    length: the last frame allowed; None: 10,000,000. boxless: True allows -1,-1,-1,-1 for "no box". A file without
+    length: the last frame allowed; None: 1,000,000. boxless: True allows -1,-1,-1,-1 for "no box". A file without
     lines gives a table without rows. Rows stay in the order of the file. Raises InputError if the file is unreadable,
     and, with the line, if a cell is no finite number, the number of columns is wrong, a frame is outside 1 to `length`,
-    a frame or id is no integer, or a box has no area.
+    a frame or id is no integer, a number is beyond 1e6, a frame has more than 5000 lines, or a box has no area.
     """
     rows = read_numbers(path, (6, 10))
     frame, id = rows.integers(0, "frame"), rows.integers(1, "id")
     table = MotTable(rows, frame, id, rows.values[:, 2:6], rows.values[:, 6:])
-    last = MAX_FRAME if length is None else length
+    last = FRAMES if length is None else length
     rows.reject((frame < 1) | (frame > last), f"frames from 1 to {last}", "correct the frame, or seqLength")
+    rows.reject(crowded(frame), f"at most {DETECTIONS} lines of one frame", "check that this is the right file")
+    far = (np.abs(rows.values[:, 2:]) > COORDINATE).any(axis=1)
+    rows.reject(far, f"numbers within {COORDINATE:g}", "remove or correct the line")
     flat = (table.box[:, 2:] <= 0).any(axis=1)
     if boxless:
         flat &= ~table.without_box()
@@ -79,11 +82,10 @@ def reject_duplicate_ids(table: MotTable, keep: Bools) -> None:
 
     keep (N,): True for the rows of the table that count. Negative ids are not checked.
     """
-    order = np.lexsort((np.arange(len(table.frame)), table.id, table.frame))
-    same = (np.diff(table.frame[order]) == 0) & (np.diff(table.id[order]) == 0)
-    counted = (keep & (table.id >= 0))[order]
-    twice = np.zeros(len(order), bool)
-    twice[order[1:]] = same & counted[1:] & counted[:-1]
+    counted = np.flatnonzero(keep & (table.id >= 0))
+    order = counted[np.lexsort((counted, table.id[counted], table.frame[counted]))]
+    twice = np.zeros(len(table.frame), bool)
+    twice[order[1:]] = (np.diff(table.frame[order]) == 0) & (np.diff(table.id[order]) == 0)
     table.rows.reject(twice, "each id once in a frame", "remove one of the two lines")
 
 

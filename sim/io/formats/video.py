@@ -48,8 +48,8 @@ def open_video(
 
     Warns if the video is shorter than its header says, has gaps in time, or states no credible frame rate. Raises
     InputError if the file is no video or no picture can be decoded, the calibration has another aspect ratio, or more
-    background frames are asked for than there are. Raises FileNotFoundError if there is no file. Iterating raises
-    InputError for a picture of another size.
+    background frames are asked for than there are, or there is no file. Iterating raises InputError for a picture of
+    another size.
     """
     index = video_decoding.index_packets(path)
     length = len(index.stamps)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os.path
 import re
 import warnings
 from collections.abc import Iterable, Iterator
@@ -13,6 +14,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from scenarios.errors import InputError
+from scenarios.limits import FRAMES
+from scenarios.regular_file import refuse_irregular
+from sim.io.pictures.picture_header import is_bearable
 from sim.types import Image
 
 SUFFIXES = (".jpg", ".jpeg", ".png", ".bmp", ".tif", ".tiff")
@@ -62,8 +66,8 @@ def require_size(picture: Picture, size: tuple[int, int], path: Path, place: str
 
 
 def read_picture(path: Path) -> Image | None:
-    """Return the picture file `path` as (H, W, 3) BGR uint8; None if it is missing, unreadable, truncated or no
-    picture.
+    """Return the picture file `path` as (H, W, 3) BGR uint8; None if it is missing, unreadable, truncated, no JPEG,
+    PNG, BMP or TIFF, or declares more than 40 million px.
 
     Grey pictures become BGR, 16-bit pictures keep their upper 8 bits, transparency is dropped. OpenCV's messages are
     silenced meanwhile. Raises nothing.
@@ -74,7 +78,7 @@ def read_picture(path: Path) -> Image | None:
         body = path.read_bytes()
     except OSError:
         return None
-    if not is_complete(body):
+    if not is_complete(body) or not is_bearable(body):
         return None
     level = cv2.utils.logging.setLogLevel(cv2.utils.logging.LOG_LEVEL_SILENT)
     try:
@@ -147,9 +151,12 @@ def find_pictures(folder: Path, length: int | None, labelled: bool) -> PictureFo
     `labelled` False. Files are numbered from 1 in the order of their names instead if one has no number, the rest of
     their names differs, or the numbers use less than 1 of 100 values.
 
-    Raises InputError if two files are the same frame, as 1.jpg and 01.jpg.
+    Raises InputError if two files are the same frame, as 1.jpg and 01.jpg, a frame is beyond 1,000,000, or one is a
+    FIFO, device, folder or other thing that is no regular file. A link to a missing file is a frame without picture.
     """
-    found = sorted(p for p in folder.iterdir() if p.suffix.lower() in SUFFIXES) if folder.is_dir() else []
+    found = sorted(p for p in folder.iterdir() if p.suffix.lower() in SUFFIXES) if os.path.isdir(folder) else []
+    for path in found:
+        refuse_irregular(path)
     numbers = [_number(path) for path in found]
     if not found or None in numbers or len({str(p.with_suffix(""))[: -len(_digits(p))] for p in found}) > 1:
         return PictureFolder(folder, dict(enumerate(found, 1)))
@@ -165,6 +172,9 @@ def find_pictures(folder: Path, length: int | None, labelled: bool) -> PictureFo
             got = f"{files[number + shift].name} and {path.name}"
             raise InputError(file=folder, got=got, expected="one picture of each frame", remedy="remove one of the two")
         files[number + shift] = path
+    if max(files) > FRAMES:
+        expected = f"frames up to {FRAMES}"
+        raise InputError(file=folder, got=files[max(files)].name, expected=expected, remedy="rename the pictures")
     return PictureFolder(folder, files)
 
 

@@ -18,6 +18,8 @@ from typing import Any
 import numpy as np
 
 from scenarios.errors import InputError
+from scenarios.limits import FRAMES, PICTURE_PIXELS, PICTURE_SIDE
+from scenarios.regular_file import require_regular
 from sim.types import Array, Image
 
 COVER = "attached_pic"
@@ -82,15 +84,16 @@ class PacketIndex:
 def open_stream(path: Path) -> Iterator[tuple[Any, Any]]:
     """Give (libav container, first video stream) of a file for the length of the block, set to decode in one thread.
 
-    Cover pictures are no video stream. Raises InputError if the file is empty or no video, has no video stream, or uses
-    an unknown codec; FileNotFoundError if there is no file `path`.
+    Cover pictures are no video stream. Raises InputError if the file is missing, no regular file, empty or no video,
+    has no video stream or pictures of more than 40 million px, or uses an unknown codec.
     """
     import av
 
+    size = require_regular(path)
     try:
         container = av.open(str(path), metadata_errors="ignore")
-    except (av.FFmpegError, OSError) as error:
-        got = "an empty file" if path.stat().st_size == 0 else f"no readable video ({_reason(error)})"
+    except (av.FFmpegError, OSError, ValueError) as error:
+        got = "an empty file" if size == 0 else f"no readable video ({_reason(error)})"
         raise InputError(file=path, got=got, expected="a whole video file", remedy=REMEDY) from None
     with container:
         streams = [s for s in container.streams.video if COVER not in str(getattr(s, "disposition", "")).lower()]
@@ -99,6 +102,10 @@ def open_stream(path: Path) -> Iterator[tuple[Any, Any]]:
         stream = streams[0]
         if stream.codec_context is None:
             raise InputError(file=path, got="an unknown codec", expected="H.264 or the like", remedy=REMEDY)
+        width, height = stream.codec_context.width, stream.codec_context.height
+        if max(width, height) > PICTURE_SIDE or width * height > PICTURE_PIXELS:
+            expected = f"at most {PICTURE_SIDE} px a side and {PICTURE_PIXELS:,} in all"
+            raise InputError(file=path, got=f"{width}×{height} px", expected=expected, remedy="give a smaller video")
         stream.codec_context.thread_count = 1
         yield container, stream
 
@@ -111,8 +118,8 @@ def index_packets(path: Path) -> PacketIndex:
     """Return the packet index of the video file `path`: time stamps, key packets and header, read without decoding.
 
     A damaged file is indexed up to the damage, and `broken` says why. Empty and discarded packets do not count. Raises
-    InputError if the file is empty or no video, has no video stream, or uses an unknown codec; FileNotFoundError if it
-    is missing.
+    InputError if the file is missing, empty or no video, has no video stream, uses an unknown codec, or has more than
+    1,000,000 frames.
     """
     import av
 
@@ -122,11 +129,14 @@ def index_packets(path: Path) -> PacketIndex:
             for p in container.demux(stream):
                 if p.size and not p.is_discard:
                     found.append((p.pts, bool(p.is_keyframe)))
+                if len(found) > FRAMES:
+                    got, expected = f"more than {FRAMES} frames", f"at most {FRAMES}"
+                    raise InputError(file=path, got=got, expected=expected, remedy="cut the video")
         except av.FFmpegError as error:
             broken = _reason(error)
         context = stream.codec_context
         return PacketIndex(
-            tuple(pts for pts, _ in found), tuple(key for _, key in found), stream.time_base,
+            tuple(pts for pts, _ in found), tuple(key for _, key in found), stream.time_base or Fraction(1, 1000),
             float(stream.average_rate or 0), int(stream.frames), _seconds(stream), broken, context.name,
             bool(context.has_b_frames),
         )  # fmt: skip
@@ -169,7 +179,7 @@ def decode_frames(path: Path, index: PacketIndex, wanted: list[int] | None = Non
 
     Frames count from 1. index: the packet index of the same file `path`. wanted: frames in any order; None for all, []
     for none. Frames that cannot be decoded, and frames beyond the end, are left out. Iterating raises InputError if the
-    file is empty or no video, has no video stream, or uses an unknown codec; FileNotFoundError if it is missing.
+    file is missing, empty or no video, has no video stream, or uses an unknown codec.
     """
     ranks, last, count = index.ranks(), max(wanted or [0]), 0
     some = None if wanted is None else set(wanted)

@@ -154,7 +154,13 @@ def test_a_caviar_of_nobody(tmp_path):
     ("frames", "tag", "word"),
     [
         ((([OBJECT.format(1, "nan")], []),), "dataset", "a number"),
-        ((([OBJECT.format("a", 1)], []),), "dataset", "a number"),
+        ((([OBJECT.format("a", 1)], []),), "dataset", "a whole number"),
+        ((([OBJECT.format("1.5", 1)], []),), "dataset", "a whole number"),
+        ((([OBJECT.format("-1", 1)], []),), "dataset", "a whole number"),
+        ((([OBJECT.format("²", 1)], []),), "dataset", "a whole number"),
+        ((([OBJECT.format(1, 1), OBJECT.format(2, 5)], [GROUP.format(-1, "1,2")]),), "dataset", "a whole number"),
+        ((([OBJECT.format(1, 1), OBJECT.format(2, 5)], [GROUP.format(1, "1,²")]),), "dataset", "ids of people"),
+        ((([OBJECT.format(1, "1e200")], []),), "dataset", "within 1e\\+06"),
         ((([OBJECT.format(1, 1).replace('"8"', '"0"')], []),), "dataset", "above 0"),
         ((([OBJECT.format(1, 1)] * 2, []),), "dataset", "once"),
         ((([], [GROUP.format(1, "a,b")]),), "dataset", "ids of people"),
@@ -167,3 +173,58 @@ def test_bad_caviar_is_one_line(tmp_path, frames, tag, word):
     with pytest.raises(InputError, match=word) as error:
         open_source(xml(tmp_path, *frames, tag=tag))
     assert "\n" not in str(error.value)
+
+
+STEP = 6
+
+
+def shifted(*grids):
+    """Rows (frame, id, x, y) of one person per grid, which is annotated every 6 frames, from its first to its last."""
+    return [(f, k, f / 10, k) for k, (first, last) in enumerate(grids, 1) for f in range(first, last, STEP)]
+
+
+def test_biwi_on_a_grid_that_is_shifted_by_half_a_step(tmp_path):
+    """Rounding half to even would put 795 and 801 into the same slot, and leave the slot between them empty."""
+    rows = shifted((780, 792), (795, 830))
+    (s,) = open_source(biwi_folder(tmp_path, "", rows))
+    assert s.truth.frame.tolist() == [1, 2, 4, 5, 6, 7, 8, 9]
+
+
+def test_biwi_that_changes_back_to_the_first_grid(tmp_path):
+    """The same person at 813 and 816: 816 gets the next slot, as do the frames after it, up to the gap."""
+    rows = [(f, 1, f / 10, 1) for f in (780, 786, 792, 801, 807, 813, 816, 822, 828, 852, 858)]
+    (s,) = open_source(biwi_folder(tmp_path, "", rows))
+    assert s.truth.frame.tolist() == [1, 2, 3, 5, 6, 7, 8, 9, 10, 13, 14]
+    assert np.all(np.abs(s.truth.frame - 1 - (np.array([r[0] for r in rows]) - 780) / STEP) <= 1)
+
+
+def test_biwi_frames_of_different_people_share_a_slot():
+    raw, id = np.array([0, 6, 12, 13, 18, 24]), np.array([1, 1, 1, 2, 1, 1])
+    assert biwi.frame_numbers(raw, id).tolist() == biwi.frame_numbers(raw).tolist() == [1, 2, 3, 3, 4, 5]
+
+
+def test_biwi_with_a_person_thrice_in_a_step_is_refused(tmp_path):
+    rows = [(f, 1, f / 10, 1) for f in (0, 6, 12, 18, 24, 30, 31, 32, 33, 42, 48)]
+    with pytest.raises(InputError, match="nearer than a step"):
+        open_source(biwi_folder(tmp_path, "", rows))
+
+
+def test_real_biwi_slots_stay(shared_data):
+    for name in ("seq_hotel", "zara01"):
+        raw = np.loadtxt(shared_data / "biwi" / name / "obsmat.txt")[:, :2].astype(np.int64)
+        wanted = np.round((raw[:, 0] - raw[:, 0].min()) / 10).astype(np.int64) + 1
+        assert np.array_equal(biwi.frame_numbers(raw[:, 0], raw[:, 1]), wanted)
+
+
+def test_biwi_bounds(tmp_path):
+    for rows, word in (
+        ([(1, 1, 0, 0), (11, 1, 0, 0), (80_000_000, 1, 0, 0)], "1000000 frames"),
+        ([(1, 1, 1e200, 0)], "within 1e"),
+        ([(1, -1, 0, 0)], "ids from 0"),
+        ([(k * 10, p, 0, 0) for k in (1, 2, 3, 900_000) for p in range(30)], "frames times people"),
+    ):
+        with pytest.raises(InputError, match=word):
+            open_source(biwi_folder(tmp_path, "", rows))
+    (tmp_path / "obsmat.txt").write_text("")
+    with pytest.raises(InputError, match="no line"):
+        open_source(tmp_path)

@@ -1,0 +1,83 @@
+"""A FIFO, a device, a socket, a folder or a circle of links in place of a file is refused before it is opened."""
+
+import os
+import shutil
+import socket
+
+import numpy as np
+import pytest
+
+from benchmarks.fuzz.readers import FILES, READERS
+from benchmarks.fuzz.specimens import TEXTS, write_texts
+from scenarios.errors import InputError
+from scenarios.regular_file import read_regular
+from sim.io.source import open_source
+
+FILE_KINDS = sorted(set(READERS) & set(TEXTS) - set(FILES) - {"setting", "tracker setting"})
+
+
+def put(path, what):
+    path.unlink()
+    if what == "FIFO":
+        os.mkfifo(path)
+    elif what == "socket":
+        with socket.socket(socket.AF_UNIX) as made:
+            made.bind(os.path.relpath(path))
+    elif what == "device":
+        path.symlink_to("/dev/zero")
+    elif what == "folder":
+        path.mkdir()
+    else:
+        path.symlink_to(path)
+
+
+@pytest.mark.parametrize("what", ["FIFO", "socket", "device", "folder", "circle"])
+@pytest.mark.parametrize("kind", FILE_KINDS)
+def test_no_reader_opens_it(kind, what, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)  # a socket's path is short
+    folder = write_texts(tmp_path)[kind]
+    put(folder / next(iter(TEXTS[kind])), what)
+    with pytest.raises(InputError) as error:
+        READERS[kind](folder)
+    assert "\n" not in str(error.value)
+
+
+@pytest.mark.parametrize("what", ["FIFO", "device", "folder", "circle"])
+def test_among_pictures(what, tmp_path):
+    import cv2
+
+    (tmp_path / "img1").mkdir()
+    for k in (1, 2, 3):
+        cv2.imwrite(str(tmp_path / "img1" / f"{k}.png"), np.zeros((8, 8, 3), np.uint8))
+    put(tmp_path / "img1" / "2.png", what)
+    with pytest.raises(InputError, match=r"2\.png"):
+        open_source(tmp_path, fps=5)
+
+
+def test_a_link_to_a_missing_picture_is_a_lost_frame(tmp_path):
+    import cv2
+
+    (tmp_path / "img1").mkdir()
+    for k in (1, 3):
+        cv2.imwrite(str(tmp_path / "img1" / f"{k}.png"), np.zeros((8, 8, 3), np.uint8))
+    (tmp_path / "img1" / "2.png").symlink_to(tmp_path / "nowhere")
+    with pytest.warns(UserWarning, match="frame 2"):
+        assert [f.image is None for f in open_source(tmp_path, fps=5)[0].frames()] == [False, True, False]
+
+
+def test_videos(tmp_path):
+    for suffix in ("mp4", "xml", "txt"):
+        os.mkfifo(tmp_path / f"a.{suffix}")
+        with pytest.raises(InputError, match="FIFO"):
+            open_source(tmp_path / f"a.{suffix}")
+    shutil.copy("/dev/null", tmp_path / "empty.mp4")
+    with pytest.raises(InputError, match="an empty file"):
+        open_source(tmp_path / "empty.mp4")
+
+
+def test_large_files_are_not_read(tmp_path):
+    path = tmp_path / "large.txt"
+    with path.open("wb") as file:
+        file.truncate(2**40)
+    with pytest.raises(InputError, match="1,099,511,627,776"):
+        read_regular(path, 2**28)
