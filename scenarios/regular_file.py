@@ -29,8 +29,7 @@ def require_regular(path: Path, remedy: str = "check the path") -> int:
     try:
         found = os.stat(path)
     except (OSError, ValueError) as error:
-        got = "no such file" if isinstance(error, FileNotFoundError) else getattr(error, "strerror", None)
-        got = got or "a path that cannot be"
+        got = getattr(error, "strerror", None) or "a path that cannot be"
         raise InputError(file=path, got=got, expected="a readable file", remedy=remedy) from None
     if not stat.S_ISREG(found.st_mode):
         got = KINDS.get(stat.S_IFMT(found.st_mode), "no regular file")

@@ -81,7 +81,7 @@ def test_a_broken_calibration_is_one_line(tmp_path, old, new, place):
     with pytest.raises(InputError, match=place) as error:
         open_source(tmp_path, camera=tmp_path / "c.xml")
     assert "\n" not in str(error.value)
-    with pytest.raises(InputError, match="no such file"):
+    with pytest.raises(InputError, match="No such file"):
         open_source(tmp_path, camera=tmp_path / "none.xml")
 
 
