@@ -43,6 +43,22 @@ class Frozen:
         """
         return replace(self, **changes)  # type: ignore[type-var]
 
+    def copy(self) -> Self:
+        """Return a copy whose arrays are its own: who changes the arrays of the original changes nothing in the copy.
+
+        The new arrays are plain numpy arrays, read-only. Fields that are themselves a Frozen are copied likewise.
+        """
+        changes: dict[str, Any] = {}
+        for f in fields(self):  # type: ignore[arg-type]
+            value = getattr(self, f.name)
+            if isinstance(value, np.ndarray):
+                changes[f.name] = _own(value)
+            elif isinstance(value, Frozen):
+                changes[f.name] = value.copy()
+            elif isinstance(value, tuple) and value and isinstance(value[0], np.ndarray):
+                changes[f.name] = tuple(map(_own, value))
+        return self.replace(**changes)
+
 
 KINDS = {"Array": np.dtype(np.float64), "Ints": np.dtype(np.int64), "Bools": np.dtype(np.bool_)}
 KINDS["Image"] = np.dtype(np.uint8)
@@ -75,6 +91,13 @@ def _settled(a: NDArray[Any], kind: np.dtype[Any]) -> NDArray[Any]:
         a = a.view()
         a.flags.writeable = False
     return a
+
+
+def _own(a: NDArray[Any]) -> NDArray[Any]:
+    """Return a copy of `a` as a plain array that is read-only itself, not a read-only view of a writable one."""
+    made = np.array(a)
+    made.flags.writeable = False
+    return made
 
 
 def no_ids() -> Ints:

@@ -24,6 +24,7 @@ ROLE = {
     "camera": 12,
     "wind": 13,
     "label": 14,
+    "delivery": 15,
 }
 
 

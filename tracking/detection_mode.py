@@ -74,7 +74,8 @@ def frames_with_detections(
 
     needs: of the tracker. sensor: settings of a scenario's [sensor] that degrade the detections of mode "truth", {} for
     none; seed: of their random numbers. Both are ignored in mode "file", where a frame's detections may be None. Frames
-    count from 1, frame k at (k - 1) / fps seconds.
+    count from 1, frame k at (k - 1) / fps seconds. The arrays of each frame are its own and read-only: none of them
+    leads to the detections of another frame.
 
     Raises InputError if there are detections, none of them has boxes and the tracker does not take points, if the
     sensor settings are wrong, or if the stored detections or the truth cannot be read. In mode "truth" raises WorkError
@@ -92,7 +93,8 @@ def frames_with_detections(
     if nonempty and "points" not in needs and all(d.box is None for d in nonempty):
         got, remedy = f"points alone, in {sequence.name}", "take a tracker that takes points"
         raise InputError(place=f"--detections {mode}", got=got, expected="boxes", remedy=remedy)
-    return tuple(Frame(k, (k - 1) / sequence.fps, detections=d) for k, d in enumerate(found, 1))
+    own = (None if d is None else d.copy() for d in found)  # a slice would show later frames as its base
+    return tuple(Frame(k, (k - 1) / sequence.fps, detections=d) for k, d in enumerate(own, 1))
 
 
 def check_detections(detections: Detections, needs: tuple[str, ...]) -> None:

@@ -2,7 +2,8 @@
 
 Input: the labels of a sequence (positions in m on the ground, or boxes in px). Output: one `Detections` per frame, in
 order from frame 1. Without settings these are the labels with score 1. The settings have the keys of a scenario's
-[sensor]; a key that is left out has the value of a perfect sensor.
+[sensor]; a key that is left out has the value of a perfect sensor. The rows of a frame are in random order, so that
+they tell nothing about who is who.
 """
 
 from __future__ import annotations
@@ -13,7 +14,8 @@ from typing import Any
 import numpy as np
 
 from scenarios.errors import InputError
-from sim.types import Detections, FrameTruth, Sequence, Truth
+from sim.rng import rng
+from sim.types import Detections, FrameTruth, Ints, Sequence, Truth
 
 _PERFECT_SENSOR = {"detect_prob": 1.0, "clutter_rate": 0.0, "noise_px": 0.0, "noise_m": 0.0, "box": "amodal"}
 _SEES_ALL = {"occlusion_power": 0.0, "min_visibility": 0.0, "small_px": 0.0}
@@ -23,8 +25,9 @@ _SEES_ALL = {"occlusion_power": 0.0, "min_visibility": 0.0, "small_px": 0.0}
 def from_truth(sequence: Sequence, sensor: Mapping[str, Any], seed: int) -> Iterator[Detections]:
     """Return an iterator over the detections of a labelled sequence, one for each frame in order, from frame 1.
 
-    sensor: settings with the keys of a scenario's [sensor]; those left out have the value of a perfect sensor. Empty:
-    the labels themselves. seed: of the sensor's random numbers.
+    The rows of a frame are in random order. sensor: settings with the keys of a scenario's [sensor]; those left out
+    have the value of a perfect sensor. Empty: the labels themselves. seed: of the order and of the sensor's random
+    numbers.
 
     Raises at once, before the first detections: InputError if the truth cannot be read, a key is unknown, a value is
     wrong, a group that is to be hidden is not in the script, or visible boxes are asked for and cannot be known;
@@ -34,12 +37,21 @@ def from_truth(sequence: Sequence, sensor: Mapping[str, Any], seed: int) -> Iter
     truth = sequence.truth
     assert truth is not None, "the mode was chosen for a source with labels"
     if not sensor:
-        return (perfect(truth.at(i)) for i in range(1, truth.length + 1))
+        return (shuffled(perfect(truth.at(i)), seed) for i in range(1, truth.length + 1))
     return _sensed(truth, sequence, sensor, seed)
 
 
+def shuffled(detections: Detections, seed: int) -> Detections:
+    """Return the detections of a frame in an order that depends on the seed and the number of the frame alone."""
+    d = detections
+    order: Ints = rng(seed, "delivery", d.index).permutation(len(d.pos))
+    vel, box = (None if a is None else a[order] for a in (d.vel, d.box))
+    return d.replace(pos=d.pos[order], vel=vel, box=box, score=d.score[order] if len(d.score) else d.score)
+
+
 def perfect(truth: FrameTruth) -> Detections:
-    """Return the labels of a frame as detections with score 1 and no velocities, a row per person.
+    """Return the labels of a frame as detections with score 1 and no velocities, a row per person, in the order of the
+    labels.
 
     They are in the plane "ground" at the labelled positions, m, with the labelled boxes if there are any. Without
     positions they are in the plane "image", at the centres of the boxes, px. Boxes are left, top, width, height in px,
