@@ -37,9 +37,10 @@ class ReportHistory:
 
 
 def check_tracks(tracks: Any, index: int, tracker: str, history: ReportHistory | None = None) -> Tracks:
-    """Return the tracks of frame `index` with optional fields filled in.
+    """Return a copy of the tracks of frame `index` with optional fields filled in.
 
-    Raises WorkError if they are wrong; the error names the tracker, the frame and the first fault.
+    The tracker may use its arrays again: nothing that it does to them later changes the copy. Raises WorkError if the
+    tracks are wrong; the error names the tracker, the frame and the first fault.
 
     Checked are type, frame index, shapes, finite numbers, ids (int64, non-negative, unique in the frame), groups and
     events. Plane and unit must be those of the first frame in `history`. Members of groups and events must be ids that
@@ -56,7 +57,7 @@ def check_tracks(tracks: Any, index: int, tracker: str, history: ReportHistory |
         got, expected = fault
         remedy = "correct the tracker's step()"
         raise WorkError(file=tracker, place=f"frame {index}", got=got, expected=expected, remedy=remedy)
-    return tracks  # type: ignore[no-any-return]
+    return tracks.copy()  # type: ignore[no-any-return]
 
 
 def _filled(tracks: Tracks) -> Tracks:
