@@ -19,6 +19,7 @@ from typing import Any, ClassVar, Literal, Self, TypedDict, Unpack
 from scenarios.errors import InputError
 from scenarios.loading.toml_files import closest
 from tracking.parameter_files import file_of, first_defaults, preset_file, presets, read, toml_text
+from tracking.user_code import tracker_failed, user_code
 
 Scale = Literal["linear", "log", "int", "categorical"]
 Value = float | int | str | bool
@@ -134,7 +135,8 @@ class Config:
     """Base class of configs. A subclass is a frozen dataclass that sets `tracker` and declares its fields with `param`.
 
     tracker: name of the tracker, for files and messages. Creating a config converts numbers to float, or to int if the
-    scale is "int". It raises InputError if a value is not allowed or if `check` refuses the values together.
+    scale is "int". It raises InputError if a value is not allowed or if `check` refuses the values together, and
+    WorkError if `check` raises anything but a FlockscopeError.
     """
 
     tracker: ClassVar[str] = ""
@@ -142,7 +144,8 @@ class Config:
     def __post_init__(self) -> None:
         for name, declared in self.params().items():
             object.__setattr__(self, name, declared.check(getattr(self, name)))
-        self.check()
+        with user_code(lambda error: tracker_failed(type(self).tracker, "check()", "its parameters", error)):
+            self.check()
 
     def check(self) -> None:
         """Raise InputError if the parameters contradict each other; a subclass overrides this. Here nothing

@@ -1,7 +1,8 @@
 """Ctrl-C that cannot get lost: SIGINT is recorded before KeyboardInterrupt is raised.
 
 Python drops an exception that is raised inside a destructor or a callback of a C library, KeyboardInterrupt included.
-A command records SIGINT here, and its loops ask `raise_if_interrupted` between two items.
+A command records SIGINT here, and its loops ask `raise_if_interrupted` between two items. The record also tells a
+KeyboardInterrupt of the user from one that a tracker's own code raises (`is_interruption`).
 """
 
 from __future__ import annotations
@@ -51,3 +52,14 @@ def raise_if_interrupted() -> None:
     """
     if _received.is_set():
         raise KeyboardInterrupt
+
+
+def is_interruption(error: BaseException) -> bool:
+    """Return True if the exception comes from Ctrl-C, False if the code that raised it did so on its own.
+
+    Any exception counts as Ctrl-C after SIGINT was recorded. Without a record a KeyboardInterrupt does, unless it
+    cannot come from Ctrl-C: SIGINT is recorded at present, or it is ignored, as in worker processes.
+    """
+    if _received.is_set():
+        return True
+    return isinstance(error, KeyboardInterrupt) and signal.getsignal(signal.SIGINT) not in (_record, signal.SIG_IGN)

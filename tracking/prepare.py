@@ -8,16 +8,18 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from collections.abc import Sequence as SequenceOf
+from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, cast
 
-from scenarios.errors import FlockscopeError, InputError, WorkError
+from scenarios.errors import FlockscopeError, InputError
 from sim.types import Context, DetectionMode, Frame, Sequence, Tracker, Tracks
 from tracking import image_scale, tracker_registry
 from tracking.config import Config
 from tracking.detection_mode import check_detections, choose_mode, frames_with_detections
 from tracking.tracks_check import ReportHistory, check_tracks
+from tracking.user_code import tracker_failed, user_code
 
 Params = Config | Mapping[str, Any] | str | Path | None
 """A config, parameter values by name, the name of a preset, the path of a TOML file, or None for the defaults."""
@@ -68,12 +70,8 @@ class PreparedTracker:
         names none. Raises WorkError for any other exception of the tracker.
         """
         self.history.clear()
-        try:
+        with self._naming("reset()", self.sequence.name):
             self.tracker.reset(self.context, seed)
-        except FlockscopeError as error:
-            raise _with_file(error, self.sequence) from error.__cause__
-        except Exception as error:
-            raise _tracker_failed(self.name, "reset", self.sequence.name, error) from error
 
     def step(self, frame: Frame) -> Tracks:
         """Return the tracker's checked tracks of the next frame; frames come in order, from `frames`.
@@ -86,13 +84,22 @@ class PreparedTracker:
         detections = frame.detections
         if detections is not None:
             check_detections(detections, self.tracker.needs)
-        try:
+        with self._naming("step()", f"{self.sequence.name}, frame {frame.index}"):
             tracks = self.tracker.step(frame, detections)
+        return check_tracks(tracks, frame.index, self.name, self.history)
+
+    @contextmanager
+    def _naming(self, part: str, place: str) -> Iterator[None]:
+        """While a part of the tracker runs, give what it raises the names of tracker, sequence and frame.
+
+        part: as "step()". place: sequence and frame, in words. A FlockscopeError that names no file gets the recording
+        as its file; any other exception becomes a WorkError.
+        """
+        try:
+            with user_code(lambda error: tracker_failed(self.name, part, place, error)):
+                yield
         except FlockscopeError as error:
             raise _with_file(error, self.sequence) from error.__cause__
-        except Exception as error:
-            raise _tracker_failed(self.name, "step", f"{self.sequence.name}, frame {frame.index}", error) from error
-        return check_tracks(tracks, frame.index, self.name, self.history)
 
 
 def _with_file(error: FlockscopeError, sequence: Sequence) -> FlockscopeError:
@@ -100,16 +107,6 @@ def _with_file(error: FlockscopeError, sequence: Sequence) -> FlockscopeError:
     its file."""
     path = sequence.source.get("path", sequence.name)
     return error if error.file else type(error)(**{**error.as_dict(), "file": path})
-
-
-def _tracker_failed(tracker: str, method: str, place: str, error: Exception) -> WorkError:
-    """Returns the WorkError for an exception raised by a tracker's own code, with the first line of its message.
-
-    tracker: its name; method: "reset", "step" or "__init__"; place: sequence and frame, in words.
-    """
-    got = f"{type(error).__name__}: {error}".partition("\n")[0]
-    remedy = f"correct the tracker's {method}(); FLOCKSCOPE_DEBUG=1 shows where"
-    return WorkError(file=tracker, place=place, got=got, expected="no exception", remedy=remedy)
 
 
 def prepare(
@@ -180,12 +177,8 @@ def _make(tracker: str | type[Tracker] | Tracker, params: Params) -> tuple[str, 
 
 
 def _instance(name: str, tracker_class: Any, *arguments: Any) -> Tracker:
-    try:
+    with user_code(lambda error: tracker_failed(name, "__init__()", "before the first frame", error)):
         return cast(Tracker, tracker_class(*arguments))
-    except FlockscopeError:
-        raise
-    except Exception as error:
-        raise _tracker_failed(name, "__init__", "before the first frame", error) from error
 
 
 def config_of(kind: type[Config], params: Params) -> Config:

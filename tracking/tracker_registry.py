@@ -19,6 +19,7 @@ from scenarios.errors import InputError
 from scenarios.loading.toml_files import closest
 from sim.types import Tracker
 from tracking.config import Config
+from tracking.user_code import tracker_failed, user_code, what_was_raised
 
 REGISTRY = {"blob": "tracking.papers.blob.tracker:Blob", "group-pda": "tracking.papers.group_pda.tracker:GroupPda"}
 NEEDS = ("pixels", "stereo", "boxes", "points")
@@ -41,7 +42,8 @@ def find(spec: str) -> type[Tracker]:
         remedy = f"did you mean {closest(spec, REGISTRY)}? Your own: file.py:Class or package.module:Class"
         raise InputError(place="tracker", got=spec, expected="one of " + ", ".join(REGISTRY), remedy=remedy)
     module = _from_file(Path(where)) if where.endswith(".py") else _from_module(where)
-    found = getattr(module, class_name, None)
+    with user_code(lambda error: _import_failed(where, error)):  # a module may have a __getattr__
+        found = getattr(module, class_name, None)
     if found is None:
         raise InputError(file=where, got=repr(class_name), expected="a class of this module", remedy="check the name")
     return checked(found, spec)
@@ -66,22 +68,21 @@ def _from_file(path: Path) -> Any:
     module = importlib.util.module_from_spec(spec)
     sys.modules[name] = module  # dataclasses of the file look their module up
     try:
-        spec.loader.exec_module(module)
-    except (Exception, SystemExit) as error:
+        with user_code(lambda error: _import_failed(path, error), passing=()):
+            spec.loader.exec_module(module)
+    except BaseException:
         del sys.modules[name]
-        raise _import_failed(path, error) from error
+        raise
     return module
 
 
 def _from_module(name: str) -> Any:
-    try:
+    with user_code(lambda error: _import_failed(name, error), passing=()):
         return importlib.import_module(name)
-    except (Exception, SystemExit) as error:
-        raise _import_failed(name, error) from error
 
 
 def _import_failed(where: object, error: BaseException) -> InputError:
-    got = f"{type(error).__name__}: {error}".partition("\n")[0]
+    got = what_was_raised(error)
     return InputError(file=where or "tracker", got=got, expected="a module that can be imported", remedy="correct it")
 
 
@@ -92,7 +93,8 @@ def checked(found: Any, spec: str) -> type[Tracker]:
     `reset(context, seed)` and `step(frame, detections)`. It is created with its config if it has a `config_class` (a
     subclass of Config), else without arguments.
     """
-    fault = _class_fault(found)
+    with user_code(lambda error: tracker_failed(spec, "class", "before the first frame", error)):
+        fault = _class_fault(found)
     if fault:
         expected = f"a class with reset(context, seed), step(frame, detections) and needs, a tuple out of {NEEDS}"
         raise InputError(file=spec, got=fault, expected=expected, remedy="see docs/guides/your-own-tracker.md")
