@@ -86,14 +86,17 @@ class Steering:
       the group's speed that a member may add.
     - turn_time: s, in which a group's heading follows its way. slow_time: s, how early a group slows down before a goal
       where it stands.
-    - avoid_person, avoid_group: strengths of the power law of the time to collision, between strangers and between
+    - avoid_person, avoid_group: strengths, m², of the power law of the time to collision, between strangers and between
       whole groups. avoid_time: its time constant, s; collisions beyond four times that are ignored.
     - person_radius: half the distance that strangers keep, m. person_range, group_range: strangers, and groups, further
       apart ignore each other, m.
-    - avoid_max: cap of one avoidance force, m/s². shove: repulsion of strangers at distance zero, m/s².
-    - wall: repulsion of a wall or pillar at contact, m/s²; it falls to 37 % over wall_range, m.
-    - gather_radius: a group has gathered when all members are this close to their places, m. pass_radius: distance at
-      which a waypoint counts as passed, m. max_acceleration: cap of the sum of all forces, m/s².
+    - avoid_max: cap of one avoidance force, m/s². shove: repulsion of strangers at distance zero, m/s², falling to 0 at
+      twice person_radius.
+    - wall: repulsion of a wall or pillar at contact (0.2 m from its line or edge), m/s²; it falls to 37 % over
+      wall_range, m.
+    - gather_radius: a group has gathered when all members are this close to their places, m. pass_radius: distance of
+      the group's middle at which a waypoint counts as passed, m; 0.3 × the group's radius is added except at the end.
+      max_acceleration: cap of the sum of all forces, m/s².
     """
 
     relaxation: float = 0.5  # s: time in which a person takes up the wanted velocity
@@ -131,8 +134,10 @@ class GroupArrays(NamedTuple):
 
     - route (G, W, 2): x, y of each group's waypoints, m. kind (G, W): PASS, NARROW (door), GATHER or END of each
       waypoint.
-    - length (G,): number of waypoints. current (G,): index, from 0, of the waypoint the group is walking to.
-    - speed (G,): m/s. heading (G, 2): unit vector. finish (G,): STAND or LEAVE at the end of the way.
+    - length (G,): number of waypoints; later entries of route and kind mean nothing. current (G,): index, from 0, of
+      the waypoint the group is walking to.
+    - speed (G,): m/s. heading (G, 2): unit vector in which the group faces. finish (G,): STAND or LEAVE at the end of
+      the way.
     - arrived (G,): True once the end of the way is reached.
     - status (G, 10), rewritten in each step: number of members present; mean position x, y, m; mean velocity x, y, m/s;
       largest distance of a member from the mean position, and from its place, m; wanted velocity x, y, m/s; 1.0 while
@@ -196,8 +201,8 @@ class Obstacles(NamedTuple):
     """What stands still in the scene, in m.
 
     - walls (W, 4): x1, y1, x2, y2 of the two ends. pillars (P, 3): x, y of the middle, radius.
-    - stairs (S, 7): foot x, y; unit vector from foot to head x, y; length; width; share of the speed kept on them (0 to
-      1).
+    - stairs (S, 7): x, y of the middle of the foot's edge; unit vector from foot to head x, y; length; width; share of
+      the speed kept on them (0 to 1).
     """
 
     walls: Array

@@ -34,9 +34,9 @@ PILLAR_MARGIN = 1.2  # person radii that are added to a pillar's radius in the p
 def _power_law(dx, dy, wx, wy, radius, strength, horizon, cap):  # type: ignore[no-untyped-def]
     """Returns the avoidance acceleration (fx, fy) in m/s² of one of two discs whose radii add up to `radius` (m). (dx,
     dy) = own - other position, m; (wx, wy) = own - other velocity, m/s. It is minus the gradient of strength exp(-tau /
-    horizon) / tau² over the relative position, tau being the time to collision and horizon a time constant in s
-    (Karamouzas 2014, eq. 2-3), cut to length `cap`. Zero where no collision lies ahead within 4 horizon, where the
-    discs overlap, and below 0.001 m/s of relative speed. *Ours*: tau ≥ 0.05 s."""
+    horizon) / tau² over the relative position, cut to length `cap`, m/s² (Karamouzas 2014, eq. 2-3). tau: time to
+    collision, s; horizon: time constant, s; strength: m². Zero where no collision lies ahead within 4 horizon, where
+    the discs overlap, and below 0.001 m/s of relative speed. *Ours*: tau ≥ 0.05 s."""
     a = wx * wx + wy * wy
     c = dx * dx + dy * dy - radius * radius
     b = -(dx * wx + dy * wy)
@@ -102,11 +102,11 @@ def _avoid_groups(status, rules, push):  # type: ignore[no-untyped-def]
 
 @njit(cache=True, inline="always")
 def _near_discs(rows, s, last, reach, radius, found):  # type: ignore[no-untyped-def]
-    """Write to `found` the groups s + 1 … last - 1 within `reach` m of group s, on collision course; return how many.
+    """Write to `found` the groups s + 1 … last - 1 that are on collision course with group s; return how many.
 
-    rows (6, G'): number of people, mean x, y (m), mean vx, vy (m/s) and radius (m) of groups, sorted by x. radius:
-    added to each disc, m. Two groups of one person each are left out. Entries of `found` behind the number returned
-    mean nothing.
+    rows (6, G'): number of people, mean x, y (m), mean vx, vy (m/s) and radius (m) of groups, sorted by x. reach:
+    greatest distance of two mean positions, m. radius: added to each disc, m. Two groups of one person each are left
+    out. found: int64, room for last - s - 1; entries behind the number returned mean nothing.
     """
     count, x, y = rows[COUNT], rows[MEAN_X], rows[MEAN_Y]
     vx, vy, disc = rows[MEAN_VX], rows[MEAN_VY], rows[RADIUS]
@@ -126,9 +126,9 @@ def _near_discs(rows, s, last, reach, radius, found):  # type: ignore[no-untyped
 @njit(cache=True, inline="always")
 def _pair(state, tag, i, j, dx, dy, d2, rules, out):  # type: ignore[no-untyped-def]
     """Add the forces between persons i and j, m/s², to out (N, 2); (dx, dy) = position i - position j, m; d2 = its
-    square. Same group or same queue: linear repulsion, up to separation_range or 0.5 m, none beyond. Strangers: linear
-    where closer than two person radii, else the power law. j gets the opposite force. state (N, 4): x, y, vx, vy. tag
-    (N, 4): group, mode, queue, waypoint. rules (21,): Steering.array()."""
+    square. Same group: linear repulsion up to separation_range; else same queue: likewise up to 0.5 m. Strangers:
+    linear where closer than two person radii, else the power law. j gets the opposite force. state (N, 4): x, y, vx,
+    vy. tag (N, 4): group, mode, queue, waypoint. rules (21,): Steering.array()."""
     if tag[i, GROUP] == tag[j, GROUP]:
         if d2 >= rules[SEPARATION_RANGE] * rules[SEPARATION_RANGE]:
             return
@@ -196,6 +196,7 @@ def _candidates(rows, s, first, last, reach, touch, radius, found, m):  # type: 
 
     rows (4, N): x, y, vx, vy of people, sorted by cell; s and t are columns of it. t counts if its squared distance is
     below `reach` (m²), and either below `touch` (m²) or on collision course for discs whose radii add up to `radius` m.
+    found: int64, room for m + last - first.
     """
     x, y, vx, vy = rows[X], rows[Y], rows[VX], rows[VY]
     for t in range(first, last):
@@ -211,8 +212,8 @@ def _candidates(rows, s, first, last, reach, touch, radius, found, m):  # type: 
 
 @njit(cache=True)
 def _pairs(state, tag, rules, out):  # type: ignore[no-untyped-def]
-    """Add the forces between people within reach of each other to out (N, 2), m/s², each pair once, both directions.
-    state (N, 4): x, y, vx, vy. tag (N, 4): group, mode, queue, waypoint. rules (21,): Steering.array()."""
+    """Add the forces between people closer than Steering.person_range to out (N, 2), m/s², each pair once, both
+    directions. state (N, 4): x, y, vx, vy. tag (N, 4): group, mode, queue, waypoint. rules (21,): Steering.array()."""
     n = len(state)
     order, start, nx = _cells(state, rules[PERSON_RANGE])
     reach, radius = rules[PERSON_RANGE] * rules[PERSON_RANGE], 2.0 * rules[PERSON_RADIUS]
@@ -239,9 +240,9 @@ def _pairs(state, tag, rules, out):  # type: ignore[no-untyped-def]
 
 @njit(cache=True)
 def _walls(state, walls, pillars, rules, out):  # type: ignore[no-untyped-def]
-    """Add the forces of walls within 1.2 m and pillars within 6 m to out (N, 2), m/s²: exponential repulsion; of
-    pillars the power law, too. state (N, 4): x, y, vx, vy. walls (W, 4): x1, y1, x2, y2. pillars (P, 3): x, y, radius;
-    all in m, m/s. rules (21,): Steering.array()."""
+    """Add the forces of walls (lines) within 1.2 m and pillars (edges) within 6 m of a person's middle to out (N, 2),
+    m/s². They are an exponential repulsion; of pillars the power law, too. state (N, 4): x, y, vx, vy. walls (W, 4):
+    x1, y1, x2, y2. pillars (P, 3): x, y, radius; all in m, m/s. rules (21,): Steering.array()."""
     strength, decay = rules[WALL], rules[WALL_RANGE]
     for i in range(len(state)):
         x, y = state[i, X], state[i, Y]
@@ -275,10 +276,10 @@ def _walls(state, walls, pillars, rules, out):  # type: ignore[no-untyped-def]
 @njit(cache=True)
 def avoid(state, tag, status, walls, pillars, rules, push, out):  # type: ignore[no-untyped-def]
     """Add all avoidance accelerations (of people, groups, walls, pillars) to out (N, 2), m/s², then shorten each row of
-    `out` to MAX_ACCELERATION. `out` holds the accelerations towards goals before. state (N, 4): x, y, vx, vy. tag (N,
-    4): group, mode, queue, waypoint. status (G, 10): as `drive` left it. walls (W, 4): x1, y1, x2, y2; pillars (P, 3):
-    x, y, radius; m. rules (21,): Steering.array(). push (G, 2): scratch, overwritten. People in a queue do not take
-    part in the avoidance of their group as a whole."""
+    `out` to at most Steering.max_acceleration. `out` holds the accelerations towards goals before. state (N, 4): x, y,
+    vx, vy. tag (N, 4): group, mode, queue, waypoint. status (G, 10): as `drive` left it. walls (W, 4): x1, y1, x2, y2;
+    pillars (P, 3): x, y, radius; m. rules (21,): Steering.array(). push (G, 2): scratch, overwritten. People in a queue
+    do not take part in the avoidance of their group as a whole."""
     _avoid_groups(status, rules, push)
     _pairs(state, tag, rules, out)
     _walls(state, walls, pillars, rules, out)

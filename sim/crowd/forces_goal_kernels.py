@@ -102,10 +102,10 @@ def _lead_groups(groups, status, dt, rules):  # type: ignore[no-untyped-def]
 
     - A PASS waypoint is passed within pass_radius + 0.3 × the group's radius; a GATHER one once all members are within
       gather_radius of their places. At most one is passed in a call. A group has arrived at the end within 0.25 m
-      (STAND) or pass_radius (LEAVE), or when it has gathered at the last waypoint.
+      (STAND) or pass_radius (LEAVE), or when it has gathered at the last waypoint; `arrived` is never reset here.
     - The heading turns towards the waypoint, but not within 0.3 m of it, while gathering, or after arrival.
-    - Wanted velocity: speed × heading; slower shortly before an end where the group stands. A group that has arrived
-      and stands drifts back to the end of its way at 0.3 m/s at most.
+    - Wanted velocity: speed × heading, at most distance / slow_time before an end where the group stands. A group that
+      has arrived and stands drifts back to the end of its way at 0.3 m/s at most.
 
     status (G, 10): columns COUNT … AVOIDED. rules (21,): Steering.array(). A group without members or way is left as it
     is.

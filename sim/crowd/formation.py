@@ -72,8 +72,8 @@ def to_world(places: Array, middle: Array, heading: Array) -> Array:
 def assign(pos: Array, points: Array) -> Ints:
     """Returns for each of n people the index of the point that the person takes, shape (n,), every point once.
 
-    The sum of the squared distances is least. pos (n, 2): people; points (n, 2): places; both in m. Raises ValueError
-    if a coordinate is nan.
+    The sum of the squared distances is least. pos (n, 2): people; points (n, 2): places; both in m. With fewer points
+    than people the result is too short and means nothing. Raises ValueError if a coordinate is nan.
     """
     from scipy.optimize import linear_sum_assignment
 
@@ -123,7 +123,7 @@ def divide(offsets: Array, ways: Array, sizes: list[int]) -> Ints:
     offsets (n, 2): members' positions relative to the group's middle, m. ways (K, 2): vectors from the middle to each
     part's goal, m. sizes: number of members of each of the K parts. Parts fill up to their sizes so that the sum of the
     members' distances ahead, in the direction of their part, is greatest. Members in excess of the sizes join the last
-    part. With too few members, some parts stay smaller. Raises ValueError for nan.
+    part. With too few members, some parts stay smaller. Raises ValueError for nan or a negative size.
     """
     from scipy.optimize import linear_sum_assignment
 

@@ -51,8 +51,9 @@ class GroupState:
     def __init__(self, entering: list[EnteringGroup], new: int, navigator: Navigator, slowdown: float) -> None:
         """Starts with nobody present, the script's groups alive, and all people in no queue.
 
-        entering: groups of the script with their people. new: greatest number of groups that orders may still make.
-        navigator: finds ways round walls. slowdown: m/s by which a group is slower for each member after the first.
+        entering: groups of the script with their people, in order of their index. new: greatest number of groups that
+        orders may still make. navigator: finds ways round walls. slowdown: m/s by which a group is slower for each
+        member after the first.
         """
         people = [m for g in entering for m in g.members]
         self.navigator, self.slowdown = navigator, slowdown
@@ -119,10 +120,11 @@ class GroupState:
     ) -> None:
         """Sets the way of group index g from start past the via points to goal, round walls and through doors.
 
-        start, goal, gather (2,) and each of via (2,): m. finish: "stand", "leave" or "walk" (straight on for 1000 m
-        beyond the goal). speed: m/s. gather: point where the group first waits for all members, None to start at once.
-        Where no way exists, the group walks straight. Waypoints after the first MAX_WAY (32) are dropped, the goal with
-        them. The group turns at once to its way, `arrived` becomes False, and its members start at the first waypoint.
+        start, goal, gather (2,) and each of via (2,): m. finish: "stand", "leave" or "walk" (straight on in the
+        direction of the last leg, for 1000 m beyond the goal). speed: m/s. gather: first waypoint, where the group
+        waits for all members; None to start at once. Where no way exists, the group walks straight. Waypoints after the
+        first MAX_WAY (32) are dropped, the goal with them; such a group never arrives. The group turns at once to its
+        way, `arrived` becomes False, and its members start at the first waypoint.
         """
         way: list[tuple[Array, int]] = [] if gather is None else [(gather, GATHER)]
         here = start if gather is None else gather
@@ -163,7 +165,8 @@ class GroupState:
         """Makes a group of the people in these columns, takes them out of queues, and returns the new group's index.
 
         name: of the group in the script. spacing: m between neighbours. The group has no way, goal or places yet. The
-        old groups keep their entries in `alive` and `members`; the caller removes them from `alive`.
+        old groups keep their entries in `alive` and `members`; the caller removes them from `alive`. More groups than
+        `new` of the constructor are not refused here; giving one a way raises IndexError.
         """
         g = self.next_group
         self.next_group += 1
@@ -183,8 +186,8 @@ class GroupState:
         """Gives each of the people in these n columns one of the places of group index g.
 
         The sum of the squared distances that they have to walk is least. places (n, 2): forward, left of the group's
-        middle, m. middle (2,), pos (n, 2): the group's middle and the people's positions in the world, m. The group's
-        heading is used. Raises ValueError if a position is nan.
+        middle, m. middle (2,), pos (n, 2): the group's middle and the people's positions in the world, m, in the order
+        of columns. The group's heading is used. Raises ValueError if a position is nan.
         """
         points = to_world(places, middle, self.arrays.heading[g])
         self.places[columns] = places[assign(pos, points)]

@@ -21,9 +21,10 @@ def headings(pos: Array, vel: Array, present: Bools, intent: Ints, fps: float) -
 
     pos, vel (T, P, 2): x, y in m and m/s. present (T, P): flags. intent (T, P): group index, -1 while absent. fps:
     frames per s. A person at WALKING_SPEED (0.25 m/s) or faster turns to the velocity, a slower one to the middle of
-    the group. A slow person who is alone, or exactly in the middle, keeps the heading. Headings follow with the time
-    constant TURN_TIME (0.3 s). A person who enters for the first time faces the wanted direction at once, +x if there
-    is none. A person who returns goes on from the last heading.
+    the group. A slow person who is alone, or exactly in the middle, keeps the heading. In each frame the facing vector
+    moves by the share 1 / (fps TURN_TIME), at most 1, towards the wanted unit vector. TURN_TIME is 0.3 s; the heading
+    is the vector's angle. A person who enters for the first time faces the wanted direction at once, +x if there is
+    none. A person who returns goes on from the last heading.
     """
     out = np.full(present.shape, np.nan)
     facing = np.zeros((present.shape[1], 2))

@@ -94,7 +94,7 @@ def blocked(a: Array, b: Array, walls: Array) -> Bools:
 
 
 class Navigator:
-    """Finds the shortest ways round walls and through doors in one scene.
+    """Finds the shortest ways round walls and through doors in one scene; made from a Scene.
 
     - nodes (N, 2), m: x, y of the middles of all doors, then points CLEARANCE (0.6 m) beyond the ends of walls, inside
       the world and clear of walls.

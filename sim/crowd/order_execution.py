@@ -37,7 +37,8 @@ class OrderExecution:
     - queues: the opened queues, by index (from 0) of their order in the file. fps: frames per s.
     - seed, repeat (the suite entry's copy, 0 for none): keys of the random draws of times, goals and service times.
 
-    Construction draws each order's delay and time. It raises ValueError if no draw lies within its distribution's clip.
+    Construction takes scenario, groups, placement, seed and repeat, and draws each order's delay and time. It raises
+    ValueError if no draw lies within its distribution's clip.
     """
 
     def __init__(
@@ -66,10 +67,11 @@ class OrderExecution:
     def advance(self, frame: int, t: float, state: Array) -> bool:
         """Fires orders that are due at time t (s), serves queues, and lets groups that have arrived stand in a circle.
 
-        frame counts from 0. state (P, 4): x, y, vx, vy by column, m, m/s, nan while absent. Orders are taken in the
-        order of the file. From the frame after firing, an order's rule is examined until it has held long enough; then
-        its id joins come_true. Returns False only if nothing has changed that `GroupState.fill` writes. It is always
-        True once a queue has opened. Raises ValueError if a goal or service time has no draw within its clip.
+        frame: recorded frame from 0, at t = frame / fps; in the warm-up nothing fires. state (P, 4): x, y, vx, vy by
+        column, m, m/s, nan while absent. Orders are taken in the order of the file. From the frame after firing, an
+        order's rule is examined until it has held long enough; then its id joins come_true. Returns False only if
+        nothing has changed that `GroupState.fill` writes. It is always True once a queue has opened. Raises ValueError
+        if a goal or service time has no draw within its clip.
         """
         changed = bool(self.queues)
         for pending in self.pending:

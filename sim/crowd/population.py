@@ -82,7 +82,8 @@ class EnteringGroup:
     - name: in the script. index: among all groups, from 0 (-1 until it has room). members: its people, in order.
     - start: the group's middle as it enters; goal (2,), via (each (2,)): points in the world, m. pos (n, 2): where the
       members start, m.
-    - speed: of the group, m/s. spacing: between neighbours, m. enter: time of entry, s (0: there from the first frame).
+    - speed: of the group, m/s. spacing: between neighbours, m. enter: time of entry, s after the first recorded frame
+      (0: there from the start of the warm-up).
     - finish: at the goal "stand", "leave" the scene or "walk" on.
     """
 
@@ -201,10 +202,10 @@ def _find_room(draws: _Draws, group: EnteringGroup, spec: GroupSpec, key: tuple[
     `taken`.
 
     The group faces its first via point, else its goal; the script's +x if it starts there. The script's `lead` (s)
-    moves the start of a group that walks by lead × speed in that direction, at most half-way. key: index of the entry
-    `spec` and of its copy. taken: positions (n, 2), m, of the people of each earlier group. draws: random streams. A
-    drawn start is drawn up to TRIES (400) times, a fixed one tried once. Raises InputError if no try finds room,
-    ValueError if no draw lies within its clip.
+    moves the start of a group that walks by lead × speed in that direction, at most half-way; a negative lead moves it
+    back without limit. key: index of the entry `spec` and of its copy. taken: positions (n, 2), m, of the people of
+    each earlier group with entry time 0. draws: random streams. A drawn start is drawn up to TRIES (400) times, a fixed
+    one tried once. Raises InputError if no try finds room, ValueError if no draw lies within its clip.
     """
     placement, drawn = draws.placement, any(isinstance(v, Distribution) for v in spec.start)
     r = draws.rng("group", *key, 1)

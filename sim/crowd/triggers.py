@@ -31,7 +31,7 @@ class PendingOrder:
     - held_for: s for which the order's rule (people are together, apart or in line, as ordered) has held without a
       break. true_at: time at which it had held long enough, s; None: not yet.
     - before, after: columns (person id - 1) of the people of each group before and after the order; empty until it
-      fires.
+      fires. Times count from the first recorded frame.
     """
 
     order: MergeOrder | SplitOrder | QueueOrder
@@ -47,7 +47,8 @@ class PendingOrder:
     after: tuple[tuple[int, ...], ...] = field(default=())
 
     def is_due(self, t: float, state: Array, groups: GroupState, come_true: set[str]) -> bool:
-        """Returns True if the order fires at time t (s); records in met_at when its trigger was first met.
+        """Returns True if the order fires at time t (s, 0 in the first recorded frame); records in met_at when its
+        trigger was first met.
 
         An order fires `delay` seconds after its trigger was first met, even if the trigger is no longer met. It fires
         only while every group it concerns exists and is wholly in the scene; until then the trigger is not examined
@@ -151,7 +152,7 @@ def _nearest(state: Array, a: list[int], b: list[int]) -> float:
     """Returns the distance in m of the nearest two people, one of columns a and one of columns b; nan if one of them is
     absent.
 
-    state (P, 4): x, y, vx, vy, m, m/s, nan while absent.
+    state (P, 4): x, y, vx, vy, m, m/s, nan while absent. Raises ValueError if a or b is empty.
     """
     return float(np.linalg.norm(state[a, None, :2] - state[None, b, :2], axis=2).min())
 

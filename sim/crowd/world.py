@@ -57,10 +57,10 @@ def accelerate(
     push: Array,
     out: Array,
 ) -> bool:
-    """Overwrites out (N, 2) with the accelerations of all people, m/s², and advances the groups' ways by dt (s). state
-    (N, 4): x, y, vx, vy in m, m/s. obstacles: walls, pillars and stairs, m. rules (21,): Steering.array(). push (G, 2):
-    scratch, overwritten. Modifies `groups`, and the tag WAYPOINT of people who pass a door. Returns True. Returns
-    False, with nothing written, if a state is not finite or 1e9 or more."""
+    """Overwrites out (N, 2) with the accelerations of all people, m/s², cut to max_acceleration, and advances the
+    groups' ways by dt (s). state (N, 4): x, y, vx, vy in m, m/s. obstacles: walls, pillars and stairs, m. rules (21,):
+    Steering.array(). push (G, 2): scratch, overwritten. Modifies `groups`, and the tag WAYPOINT of people who pass a
+    door. Returns True. Returns False, with nothing written, if a state is not finite or 1e9 or more."""
     from sim.crowd.forces_avoidance_kernels import avoid
     from sim.crowd.forces_goal_kernels import drive
 
@@ -76,9 +76,9 @@ class World:
     - scenario, seed, repeat; scene; fps; substeps: physics steps per frame, of dt s; rules: steering parameters;
       obstacles; push: scratch; members: all people by column; entering: all groups; waiting: those not entered yet;
       groups, orders: the script.
-    - `space`, `bodies` (by column): of the physics. state (N, 4): x, y, vx, vy, m, m/s, `force` and `people`: of the N
-      people present, whose columns are `columns`. states (P, 4), group_of (P,): the frame being recorded, by column,
-      nan and -1 while absent.
+    - `space`, `bodies` (by column): of the physics. state (N, 4): x, y, vx, vy, m, m/s, and `people`: of the N people
+      present, whose columns are `columns`. force: x, y, m/s², of the N people, then zeros for static bodies. states (P,
+      4), group_of (P,): frame being recorded, by column, nan and -1 while absent.
 
     Construction raises InputError if a group finds no room, ValueError if no draw of a distribution lies within its
     clip.
@@ -121,9 +121,9 @@ class World:
         return self._motion(record, intent)
 
     def frames(self, length: int) -> Iterator[tuple[Array, Ints]]:
-        """Yields `length` frames after the warm-up: states (P, 4): x, y, vx, vy in m, m/s; group indices (P,). By
-        column; nan and -1 while absent. The next frame overwrites both. While iterating it raises WorkError if a state
-        is not finite, ValueError if an order's draw has no value within its clip."""
+        """Yields `length` frames after the warm-up, the first at time 0: states (P, 4): x, y, vx, vy in m, m/s; group
+        indices (P,). By column; nan and -1 while absent. The next frame overwrites both. While iterating it raises
+        WorkError if a state is not finite, ValueError if an order's draw has no value within its clip."""
         warm = round(self.scenario.warmup * self.fps)
         noise = wander([m.key for m in self.members], warm + length, self.fps, self.seed, self.repeat)
         for f in range(-warm, length):
@@ -176,11 +176,11 @@ class World:
         return np.frombuffer(self._read_buffer.float_buf()).reshape(-1, 4)
 
     def _come_and_go(self, t: float, first: bool) -> None:
-        """Removes people who leave at time t (s) and adds groups whose entry time has come; `first`: first frame of the
-        warm-up. In that frame only groups with entry time 0 come, even without room. A walking one starts back on its
-        way by speed × warm-up time, if `_way_back_is_free`. A group that enters later waits while people stand at its
-        place; groups that enter in one frame are not checked against each other. Walking groups enter at their speed,
-        others at rest."""
+        """Removes people who leave at time t (s, negative in the warm-up) and adds groups whose entry time has come;
+        `first`: first frame of the warm-up. In that frame only groups with entry time 0 come, even without room. A
+        walking one starts back on its way by speed × warm-up time, if `_way_back_is_free`. A group that enters later
+        waits while people stand at its place; groups that enter in one frame are not checked against each other.
+        Walking groups enter at their speed, others at rest."""
         gone = self.groups.remove_leaving(self.columns)
         coming = [group for group in self.waiting if (group.enter <= 0 if first else group.enter <= t)]
         coming = [group for group in coming if first or self._has_room(group)]

@@ -33,9 +33,9 @@ def project(camera: Camera, xyz: Array) -> tuple[Array, Array]:
     """Return image points (N, 2), u right and v down in px, and depths (N,) in m of world points xyz (N, 3) in m.
 
     The depth is measured along the optical axis and is negative behind the camera. Kind "top": the image point does not
-    depend on the depth, and is never nan. Kind "pinhole": the image point is nan where the depth is at most
-    NEAREST_DEPTH (0.05 m), and where a lens with radial < 0 does not show the point. Points outside the image are not
-    clipped. A nan in a row of xyz makes that row's point and depth nan.
+    depend on the depth, and exists behind the camera, too. Kind "pinhole": the image point is nan where the depth is at
+    most NEAREST_DEPTH (0.05 m), and where a lens with radial < 0 does not show the point. Points outside the image are
+    not clipped. A nan in a row of xyz makes that row's point and depth nan.
     """
     x = (np.asarray(xyz, dtype=float) - camera.position) @ camera.rotation.T
     depth = x[:, 2]
@@ -122,9 +122,9 @@ def disparity(camera: Camera, depth: Array) -> Array:
 def px_per_m_at_centre(camera: Camera) -> float:
     """Return the scale of the image, px per m, at the ground point seen in the image centre.
 
-    Kind "top": px_per_m. Kind "pinhole": the height in px of an upright person of PERSON_HEIGHT (1.7 m) there, over
-    PERSON_HEIGHT. If the camera is tilted more than STEEP_DEG (70°), it is the vertical focal length over the depth of
-    that point.
+    Kind "top": px_per_m. Kind "pinhole": the distance in px between foot and top of an upright line of PERSON_HEIGHT
+    (1.7 m) there, over PERSON_HEIGHT. If the camera is tilted more than STEEP_DEG (70°), it is the vertical focal
+    length over the depth of that point.
 
     If the centre shows no ground, the point is taken halfway between two rows: the first below the centre that shows
     ground, and the lower edge of the image. If no row shows ground, the point is 10 m ahead of the camera.

@@ -33,9 +33,9 @@ def place_camera(spec: CameraSpec, motion: Motion) -> Camera:
     "top".
 
     It is placed so that the bodies of all frames are in view and as large as possible, with a margin of 2 % of the
-    image's shorter side. No solved height is below 0.3 m. From above, a height that is not given is 20 m. With
-    `spec.crop`, only bodies on the world's rectangle are fitted, and others may leave the view. Without bodies to fit,
-    four standard people in the world's corners are fitted.
+    image's shorter side. No solved height is below 0.3 m. Kind "top" uses the yaw and ignores tilt and baseline; a
+    height that is not given is 20 m. With `spec.crop`, only bodies on the world's rectangle are fitted, and others may
+    leave the view. Without bodies to fit, four standard people in the world's corners are fitted.
 
     spec: the scenario's camera settings. motion: the crowd's motion, with its scene.
 
@@ -196,8 +196,8 @@ def _top(spec: CameraSpec, bodies: RecordedBodies) -> Camera:
     """Return a camera of kind "top": over the middle of the bodies' extent, at the largest scale that shows all bodies.
 
     A margin of 2 % of the image's shorter side is kept free. Half the extent counts as at least 0.1 m. spec: camera
-    settings; a given position, px_per_m or height is used as it is. A height that is not given is 20 m. There must be
-    at least one body.
+    settings; a given position (x, y in the world, m), px_per_m or height is used as it is. yaw turns the picture; tilt
+    and baseline are ignored. A height that is not given is 20 m. There must be at least one body.
     """
     rotation = camera_rotation(np.pi / 2, float(np.deg2rad(spec.yaw_deg)))
     sides = np.concatenate([rotation[:2], -rotation[:2]])

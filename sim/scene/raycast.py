@@ -28,8 +28,9 @@ class Solids(NamedTuple):
     wall_height      of all walls
     pillars (P, 3)   x, y, radius
     pillar_height    of all pillars
-    flights (S, 9)   stairs: foot x, foot y (middle of the lower end), unit axis x, unit axis y (upwards), length, half
-                     width, rise of all steps together, number of steps, landing (length of the level part at the top)
+    flights (S, 9)   stairs: foot x, foot y (middle of the edge), unit axis x, unit axis y (from foot to head), length,
+                     half width, rise of all steps together (negative if they go down), number of steps, landing
+                     (length of the level part behind the head)
     """
 
     walls: Array

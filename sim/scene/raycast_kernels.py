@@ -1,8 +1,9 @@
 """Compiled ray casting: the first thing that a ray meets among the ground, walls, pillars and stairs.
 
-A ray is o + t d: origin o, direction d, t above 0. Stairs are drawn as steps: tread k of n lies at z = k rise/n, from
-(k - 1/2)/n to (k + 1/2)/n of the way; the last tread reaches to the end of the landing. In the middle of a tread, the
-smooth height of `sim.scene.terrain` equals the tread's.
+A ray is o + t d: origin o, direction d, t above 0. t counts lengths of d; for rays of a PixelRays it is the depth, m.
+Stairs are drawn as steps: tread k of n lies at z = k rise/n, from (k - 1/2)/n to (k + 1/2)/n of the way; the last tread
+reaches to the end of the landing. In the middle of a tread, the smooth height of `sim.scene.terrain` equals the
+tread's.
 """
 
 from __future__ import annotations
@@ -123,7 +124,7 @@ def _in_flight_axes(o, d, flight):  # type: ignore[no-untyped-def]
     numbers.
 
     o, d (3,): origin and direction in the world. flight (9,): a row of `terrain.flight_rows`. Along counts from the
-    foot upwards, across from the middle line to the left.
+    foot to the head, across from the middle line to the left.
     """
     ux, uy = flight[AXIS_X], flight[AXIS_Y]
     x, y = o[0] - flight[FOOT_X], o[1] - flight[FOOT_Y]
@@ -224,7 +225,8 @@ def _on_stairs(x, y, flights):  # type: ignore[no-untyped-def]
 
 @njit(cache=True)
 def first_hit(o, d, solids, hit):  # type: ignore[no-untyped-def]
-    """Return the t of the first thing that the ray o + t d meets at t > 1e-9; inf if it meets nothing.
+    """Return the t (in lengths of d) of the first thing that the ray o + t d meets at t > 1e-9; inf if it meets
+    nothing.
 
     o, d (3,): origin in m and direction, of any length. solids: a `sim.scene.raycast.Solids`. The level ground z = 0
     counts except where stairs replace it.

@@ -53,8 +53,8 @@ def _flight_height(stairs: Stairs, xy: Array) -> Array:
 def flight_rows(scene: Scene) -> Array:
     """Return the stairs of a scene as rows (S, 9) for the compiled ray casting; (0, 9) without stairs.
 
-    Columns: foot x, foot y (m), unit axis x, unit axis y (from foot to head), length, half width, rise (m), number of
-    steps, landing (m). A flight of length 0 has a nan axis, with a numpy warning.
+    Columns: foot x, foot y (m), unit axis x, unit axis y (from foot to head), length, half width, rise (m, negative if
+    it goes down), number of steps, landing (m). A flight of length 0 has a nan axis, with a numpy warning.
     """
     rows = np.zeros((len(scene.stairs), 9))
     for row, stairs in zip(rows, scene.stairs, strict=True):

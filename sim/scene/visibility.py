@@ -24,8 +24,8 @@ class BodyVisibility:
 
     box (R, 4)          left, top, width, height in px of the whole body, hidden parts included, not clipped to the
                         image; nan if the person is not wholly in front of a pinhole camera
-    visibility (R,)     visible share of the whole silhouette, 0 to 1
-    truncation (R,)     share of the silhouette outside the image, 0 to 1
+    visibility (R,)     visible share of the whole silhouette, 0 to 1; 0 where the box is nan
+    truncation (R,)     share of the silhouette outside the image, 0 to 1; 1 where the box is nan
     visible_box (R, 4)  left, top, width, height in px of the visible part; nan if nothing is visible
     """
 

@@ -45,8 +45,8 @@ def frame_groups(id: Ints, group: Ints, pos: Array, vel: Array) -> Groups:
 
     id (N,): person ids. group (N,): group ids, -1 = alone. pos, vel (N, D): m, m/s, D = 2 or 3. Of each group: members:
     sorted person ids; pos, vel (D,): means over the members; extent (2, 2): covariance of their x and y (divided by the
-    number of members), m²; size: number of members; hull: convex hull of their footprints (polygons of 0.25 m round
-    each person) on the ground, m.
+    number of members), m²; size: number of members; hull (V, 2): convex hull, counter-clockwise, of their footprints
+    (polygons of 0.25 m round each person) on the ground, m. Members' positions must not be nan.
     """
     return groups_over_time(np.zeros(len(id), np.int64), id, group, pos, vel, 0, 1)[0]
 
@@ -59,8 +59,9 @@ def groups_over_time(
     Rows are people in frames, in any order: frame, id, group (R,), group -1 = alone; pos, vel (R, D), D = 2 or 3: m,
     m/s. Only groups of two or more people of one frame count; a frame without one gives empty Groups. Rows of other
     frames are ignored. Of each group: sorted members, their number, means of pos and vel, covariance of x and y (m²),
-    and as hull the convex hull of their footprints (polygons of 0.25 m round each person). px_per_m other than 1: pos
-    and vel are in px and px/s, footprints have that scale in the image, and all results are in px.
+    and as hull (V, 2) the convex hull, counter-clockwise, of their footprints (polygons of 0.25 m round each person).
+    Members' positions must not be nan. px_per_m other than 1: pos and vel are in px and px/s, footprints have that
+    scale (px per m of ground), and all results are in px.
     """
     rows, order = _member_rows(frame, id, group, pos, vel)
     hulls = footprint_hulls(pos[order, :2] / px_per_m, rows.counts)
@@ -75,8 +76,9 @@ def box_groups(
 
     Rows are people in frames, in any order: frame, id, group (R,), group -1 = alone; pos, vel (R, 2): px, px/s; box (R,
     4): left, top, width, height in px, finite. Of each group of two or more people in one frame: sorted members, their
-    number, means of pos and vel, covariance of pos (px²), and as hull the convex hull of the members' boxes. A frame
-    without a group gives empty Groups; rows of other frames are ignored.
+    number, means of pos and vel, covariance of pos (px²), and as hull (V, 2) the convex hull of the members' boxes,
+    counter-clockwise in (u, v) coordinates. A frame without a group gives empty Groups; rows of other frames are
+    ignored.
     """
     rows, order = _member_rows(frame, id, group, pos, vel)
     low, high = box[:, :2], box[:, :2] + box[:, 2:]

@@ -147,8 +147,8 @@ def _changes_of_new(g: int, people: PersonSet, stay: PersonSet, was: dict[int, i
 class Identities:
     """Gives groups ids that last through time: a new object for each sequence, then one `step` for each partition.
 
-    State: next_id: the next new id, from 1. groups: members of each present group, by id. born: time at which each id
-    began, of ended groups, too. people: all people present at the last time.
+    State: next_id: the next new id, from 1. groups: members of each present group, by id. born: time (an integer such
+    as a frame) at which each id began, of ended groups, too. people: all people present at the last time.
     """
 
     next_id: int = 1

@@ -24,8 +24,9 @@ def image_groups(truth: Truth, ground: tuple[Groups, ...], camera: Camera, shape
     truth: with boxes and velocities (else AssertionError). ground: Groups of each frame from frame 1, on the ground.
     shapes: ellipsoids of body and head of the people, in the order of the truth's rows. Of each group: pos (px) and
     extent (px²): mean and covariance of the middles of the members' boxes; vel: mean velocity of their bodies' centres
-    in the image, px/s; hull: of their silhouettes, px. A group with a member behind the camera has nan and an empty
-    hull. A frame without groups gives empty Groups.
+    in the image, px/s; hull: of their silhouettes, px. If a member is not wholly in front of the camera, pos and extent
+    are nan and the hull is empty (0, 2). vel is nan if the centre of a member's body is not projected. A frame without
+    groups gives empty Groups.
     """
     assert truth.box is not None
     assert truth.vel is not None
@@ -47,7 +48,7 @@ def _members(truth: Truth, ground: tuple[Groups, ...]) -> tuple[Ints, Ints]:
     """Returns the indices of the truth's rows of all groups' members, group after group, frame after frame.
 
     Also returns where each of the G groups begins in them, shape (G + 1,), the end last. ground: Groups of each frame
-    from frame 1; their members must be in the truth. Without groups: no rows, and [0].
+    from frame 1; members that the truth does not have give wrong rows, not an error. Without groups: no rows, and [0].
     """
     starts = np.searchsorted(truth.frame, np.arange(1, len(ground) + 1))
     rows, sizes = [np.zeros(0, np.int64)], [0]

@@ -22,7 +22,9 @@ def bodies(motion: Motion, camera: Camera | None) -> Truth:
 
     Its rows are people present in a frame, sorted by (frame, id); frames count from 1, the id is the column + 1. group
     is -1 in every row; groups, groups_px, events, near and labelled are None. The motion's orders are taken over.
-    camera None: no camera; boxes, truncation and visible boxes are then None, visibility is 1 and px_per_m nan.
+    camera None: no camera; boxes, truncation and visible boxes are then None, visibility is 1 and px_per_m nan. Else
+    px_per_m is the scale at the image centre; a person not wholly in front of the camera has nan boxes, visibility 0
+    and truncation 1.
     """
     return _bodies(motion, camera, recorded_bodies(motion))
 
@@ -64,7 +66,7 @@ def label(motion: Motion, camera: Camera | None) -> Truth:
 
     Hard negatives: pairs of strangers who walk like a group. All frames count as labelled. The motion's orders are
     taken over; whether they came true is not checked. camera None: no camera; boxes, truncation, visible boxes and
-    groups in the image are then None, visibility is 1 and px_per_m nan.
+    groups in the image are then None, visibility is 1 and px_per_m nan. Else px_per_m is the scale at the image centre.
     """
     from sim.truth.merge_split_events import groups_and_events
 

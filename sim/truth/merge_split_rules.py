@@ -22,7 +22,8 @@ HOLD_TIME = 2.0  # s for which either rule must hold
 
 
 def frames_of(seconds: float, fps: float) -> int:
-    """Returns the number of frames that last `seconds` (s) at fps frames per s, rounded up; at least 1."""
+    """Returns the number of frames that last `seconds` (s) at fps frames per s, rounded up (1e-9 above a whole number
+    is ignored); at least 1."""
     return max(1, math.ceil(seconds * fps - 1e-9))
 
 

@@ -31,7 +31,8 @@ WORDS = {
 
 
 def check_orders(motion: Motion, truth: Truth) -> dict[str, int]:
-    """Returns for each order id the index in `truth.events` of the event that fulfils the order.
+    """Returns for each order id the index in `truth.events` of the event that fulfils the order; two orders may share
+    one.
 
     motion: with its orders. truth: measured from that motion. Raises WorkError for the first order, in the script's
     order, that no event fulfils (an order that never fired included); the error says how close the motion came to the
@@ -202,8 +203,8 @@ def _gaps(columns: list[Ints], pos: Array, vel: Array, present: Bools, widest: b
     mean velocities, m/s.
 
     In each frame the part with the widest gap is taken (`widest`, for merges) or the one with the narrowest gap (for
-    splits). The distance is nan where no two parts are present, or there is one part only. columns: of the people of
-    each part. pos, vel (T, P, 2): m, m/s, nan while absent. present (T, P): flags.
+    splits). Both are nan where no two parts are present, or there is one part only. columns: of the people of each
+    part. pos, vel (T, P, 2): m, m/s, nan while absent. present (T, P): flags.
     """
     gaps, differences = [], []
     for i, a in enumerate(columns):

@@ -35,7 +35,7 @@ class DetectedQueue:
     """A queue found in measured motion. People are columns (person id - 1).
 
     - first: first frame with 3 people in line; last: last frame in which the line was seen. Frames from 0, both
-      inclusive.
+      inclusive; only examined frames (about 10 per s) count.
     - order: members from one end of the line to the other; either end may be the head. People who joined later are
       inserted between those they stood between. Empty if nobody was in line for MEMBER_TIME (1 s).
     - left: members who left before the end, in the order of leaving; () if none.
@@ -100,10 +100,10 @@ def queues(pos: Array, vel: Array, present: Bools, group: Ints, fps: float) -> l
 
     pos, vel (T, P, 2): m, m/s. present (T, P): flags. group (T, P): group ids, -1 = alone. fps: frames per s. A person
     with a nan position counts as absent. A line is people who wait behind one another: 0.4 to 1.5 m apart along a
-    straight line, at most 0.5 m off it, turning by at most 60°, and two thirds of those who stand close. A queue is a
-    line that has 3 people (QUEUE_PEOPLE) for at least QUEUE_TIME (3 s); a line may be lost for 1.5 s. Waiting means
-    slower than WAITING_SPEED (0.4 m/s), except for up to 3 s when advancing. A line that moves sideways, on average
-    faster than 0.1 m/s and than along itself, is no queue.
+    straight line, at most 0.5 m off it, turning by at most 60°. It has at least two thirds of its crowd, the waiting
+    people linked by distances below 1.5 m. A queue is a line that has 3 people (QUEUE_PEOPLE) for at least QUEUE_TIME
+    (3 s); a line may be lost for 1.5 s. Waiting means slower than WAITING_SPEED (0.4 m/s), except for up to 3 s when
+    advancing. A line that moves sideways, on average faster than 0.1 m/s and than along itself, is no queue.
 
     The event starts in the first frame with 3 people and ends in the last frame with two in line. Its members are all
     people who were in line for MEMBER_TIME (1 s); a queue without a member gives no event. Its position is the middle
