@@ -151,7 +151,8 @@ def table_bytes(columns: Iterable[Column], facts: dict[str, Any]) -> bytes:
         metadata={KEY: json_text({"format": FORMAT, **facts}).encode()},
     )
     sink = pa.BufferOutputStream()
-    pq.write_table(pa.Table.from_arrays(arrays, schema=schema), sink, compression="zstd")
+    table = pa.Table.from_arrays(arrays, schema=schema)
+    pq.write_table(table, sink, compression="zstd", write_page_checksum=True)
     return bytes(sink.getvalue())
 
 
@@ -168,15 +169,15 @@ def _arrow(column: Column) -> Any:
 def read_table(path: Path) -> StoredTable:
     """Read a Parquet table that table_bytes wrote.
 
-    Raises InputError if the file is missing or damaged, was not written by table_bytes, has another format number, or
-    holds nulls. NaN is no null.
+    Raises InputError if the file is missing or damaged (a page differs from its checksum), was not written by
+    table_bytes, has another format number, or holds nulls. NaN is no null.
     """
     import pyarrow as pa
     import pyarrow.parquet as pq
 
     require_regular(path, REDO)
     try:
-        table = pq.read_table(path, partitioning=None)
+        table = pq.read_table(path, partitioning=None, page_checksum_verification=True)
         metadata = (table.schema.metadata or {}).get(KEY, b"{}").decode()
     except (pa.ArrowException, OSError, UnicodeDecodeError) as error:
         reason = f"no readable Parquet ({(str(error).splitlines() or [type(error).__name__])[0]})"
@@ -218,7 +219,8 @@ def json_document(value: dict[str, Any]) -> bytes:
 
     Raises ValueError for NaN and infinity, TypeError for a type that JSON does not have.
     """
-    return (json.dumps(value, ensure_ascii=False, allow_nan=False, indent=2) + "\n").encode()
+    text = json.dumps(value, ensure_ascii=False, allow_nan=False, indent=2) + "\n"
+    return text.encode("utf-8", "backslashreplace")  # of a lone surrogate (names of files), JSON's own \udcff
 
 
 def json_list(name: str, items: Iterable[dict[str, Any]]) -> bytes:
