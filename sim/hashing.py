@@ -59,6 +59,15 @@ def truth_hash(scenario: str, seed: int, repeat: int, truth: Truth | None) -> st
     return canonical_hash(("truth", scenario, seed, repeat, named))
 
 
+def labels_hash(truth: Truth) -> str:
+    """Return the SHA-256 (64 hex digits) of a recording's labels as read: frame rate, length, ids, groups, places.
+
+    Left out are the name, the image scale (an option), and what is computed from the rest, as velocities and hulls.
+    """
+    read = (truth.frame, truth.id, truth.group, truth.pos, truth.box)
+    return canonical_hash(("labels", truth.fps, truth.length, *read))
+
+
 def content_hash(truth: str, detections: Any, pixels: Mapping[str, str] | None = None) -> str:
     """Return the SHA-256 (64 hex digits) of a whole sequence: its truth, its detections, and the raw pixels of its
     streams.
@@ -113,7 +122,7 @@ def _feed(h: Any, value: Any) -> None:
         case float() | np.floating():
             h.update(f"f{'nan' if value != value else float(value).hex()};".encode())
         case str():
-            _sized(h, b"s", value.encode())
+            _sized(h, b"s", value.encode("utf-8", "surrogatepass"))
         case bytes():
             _sized(h, b"b", value)
         case np.ndarray():

@@ -43,7 +43,8 @@ def run_info(
     tracks: of the whole run, one `Tracks` per frame, possibly none. seed: of the run. sensor: settings of mode "truth",
     empty if none. px_per_m: the scale by which groups were derived; nan is stored as None.
 
-    Keys: tracker (name); config (values by name, {} without); seed; sequence (name); detections (the mode); sensor;
+    Keys: tracker (name); config (values by name, {} without); seed; sequence (name); truth_hash (of a generated
+    sequence, as its manifest states it, else None: the labels are not read); detections (the mode); sensor;
     plane (of the first tracks, None without); boxes ("measured", "projected" or "none"); fps; px_per_m; background
     (text on the sample, None without); causal (True if any frame's sample holds no later frame); causal_from (the first
     such frame, from 1, or None); frames (number); frames_per_second (the tracker's steps alone);
@@ -58,6 +59,7 @@ def run_info(
         "config": prepared.config.as_dict() if prepared.config else {},
         "seed": seed,
         "sequence": prepared.sequence.name,
+        "truth_hash": prepared.sequence.source.get("truth_hash"),
         "detections": prepared.mode,
         "sensor": dict(sensor),
         "plane": tracks[0].plane if len(tracks) else None,

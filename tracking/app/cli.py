@@ -161,9 +161,10 @@ def overlay(options: OverlayOptions) -> CommandResult:
 
 @app.command()
 def validate(
-    folder: Annotated[Path, typer.Argument(metavar="DIR", help="A generated sequence or dataset.")], json: Json = False
+    folder: Annotated[Path, typer.Argument(metavar="DIR", help="A generated sequence or dataset, or stored tracks.")],
+    json: Json = False,
 ) -> CommandResult:
-    """Check that a dataset is complete, unaltered and consistent."""
+    """Check that a dataset or stored tracks are complete, unaltered and consistent."""
     from tracking.app.commands.datasets import validate
 
     return validate(folder)

@@ -1,51 +1,77 @@
-"""Finds the stored tracks below a path and matches them with sequences by name."""
+"""Stores the tracks of a run, finds stored tracks below a path, and matches them with sequences by name."""
 
 from __future__ import annotations
 
-import json
+from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 from scenarios.errors import InputError
-from sim.io.store.track_files import read_tracks
+from sim.io.store.run_seal import AGAIN, RUN, check_run, is_run, read_run, tracked_hash
+from sim.io.store.track_files import read_tracks, write_tracks
 from sim.types import Sequence
 from tracking.run import TrackingRun
-
-TRACK_FILES = ("tracks.parquet", "tracks.txt")
-"""A folder with one of these files holds the tracks of one sequence."""
 
 DEPTH = 3
 """Tracks are looked for in this many levels of folders below the path."""
 
 EXPECTED = "a folder made by `flockscope track`, a folder of such folders, or MOTChallenge text"
 
+METHOD = ("tracker", "config", "grouping")
+"""Keys of run.json that say with what a sequence was tracked. Runs that are scored together have them in common."""
+
+SHOWN = 3
+"""Most parameters that the error on two configs names."""
+
+
+def store_run(folder: Path, sequence: Sequence, run: TrackingRun) -> None:
+    """Writes the tracks of a run of a tracker over the sequence into the folder, sealed by a run.json.
+
+    Raises InputError if the folder cannot be written or the sequence's labels cannot be read; WorkError if the disk is
+    full.
+    """
+    info = {**run.info, "truth_hash": tracked_hash(sequence)}
+    write_tracks(folder, run, fps=sequence.fps, camera=sequence.camera, scene=sequence.scene, info=info)
+
 
 @dataclass(frozen=True)
 class StoredTracks:
     """The stored tracks of one sequence, not read yet.
 
-    name: the sequence's name: from run.json, or else the name of the folder or, without suffix, of the text; "" for a
+    name: the sequence's name: from run.json, or else the name of the folder or, without suffix, of the text; None for a
     text file that the user gave itself. path: the folder with the tracks, or the text file. info: the content of
-    run.json as a dictionary, empty if there is none.
+    run.json as a dictionary, empty for tracks of another program and for a run that was not finished.
     """
 
-    name: str
+    name: str | None
     path: Path
     info: dict[str, Any]
+
+    def check(self) -> None:
+        """Raises InputError if these are tracks of a run of ours that is unfinished, damaged or mixed with another."""
+        if is_run(self.path):
+            check_run(self.path)
 
     def read(self, sequence: Sequence) -> TrackingRun:
         """Reads the tracks at the sequence's frame rate; returns them, one `Tracks` per frame, with `info`.
 
-        Raises InputError if run.json states another frame rate, there are no tracks, or a file is damaged. Also if a
-        MOTChallenge text has a frame beyond the sequence's length, or an event's frame is outside the tracks. Warns
-        about a text without rows.
+        Raises InputError if run.json states another frame rate or other labels than the sequence's, there are no
+        tracks, or a run is not whole. Also if a MOTChallenge text has a frame beyond the sequence's length, or an
+        event's frame is outside the tracks. Warns about a text without rows.
         """
         fps = self.info.get("fps")
         if fps is not None and abs(fps - sequence.fps) > 1e-9 * sequence.fps:
             raise InputError(
-                file=self.path, place="run.json", got=f"tracks at {fps:g} fps", expected=f"{sequence.fps:g} fps",
+                file=self.path, place=RUN, got=f"tracks at {fps:g} fps", expected=f"{sequence.fps:g} fps",
                 remedy=f"read the sequence with --fps {fps:g}, as `track` did",
+            )  # fmt: skip
+        tracked = self.info.get("truth_hash")
+        if tracked is not None and tracked_hash(sequence) not in (None, tracked):
+            raise InputError(
+                file=self.path, place=f"{RUN}: truth_hash", got=f"tracks of another {sequence.name}",
+                expected=f"those of {sequence.source.get('path', 'this sequence')}",
+                remedy=f"{AGAIN}: its labels, scenario or settings are others",
             )  # fmt: skip
         return TrackingRun(tuple(read_tracks(self.path, fps=sequence.fps, length=sequence.length)), self.info)
 
@@ -54,13 +80,13 @@ def find_tracks(path: Path) -> list[StoredTracks]:
     """Returns all stored tracks at or below a path, not read yet, in the order of their paths; text files of a folder
     come last.
 
-    path: a text file in MOTChallenge format, a folder with tracks.parquet or tracks.txt, or a folder that holds such
-    folders or *.txt files, at most three levels down. Hidden folders are left out. Raises InputError if the path does
-    not exist or holds no tracks, or if a run.json is no JSON object.
+    path: a text file in MOTChallenge format, a folder with a run or a tracks.txt, or a folder that holds such folders
+    or *.txt files, at most three levels down. Hidden folders are left out. Of a run only run.json is read. Raises
+    InputError if the path does not exist or holds no tracks, or if a run.json is damaged or has no seal.
     """
     if not path.exists():
         raise InputError(file=path, got="no such file or folder", expected=EXPECTED, remedy="check the path")
-    found = [StoredTracks("", path, {})] if path.is_file() else list(_below(path, DEPTH))
+    found = [StoredTracks(None, path, {})] if path.is_file() else list(_below(path, DEPTH))
     if not found:
         raise InputError(file=path, got="no tracks", expected=EXPECTED, remedy="check the path")
     return found
@@ -69,12 +95,14 @@ def find_tracks(path: Path) -> list[StoredTracks]:
 def _below(folder: Path, depth: int) -> list[StoredTracks]:
     """Returns the stored tracks in a folder and in `depth` levels of folders below it; none found: an empty list.
 
-    A folder with tracks.parquet or tracks.txt counts as one and is not searched further. Hidden folders are left out.
-    Raises InputError if a run.json is no JSON object.
+    A folder with a run or a tracks.txt counts as one and is not searched further. Hidden folders are left out. Raises
+    InputError if a run.json is damaged or has no seal.
     """
-    if any((folder / name).is_file() for name in TRACK_FILES):
-        info = _run_info(folder / "run.json")
+    if is_run(folder):
+        info = read_run(folder) if (folder / RUN).is_file() else {}
         return [StoredTracks(str(info.get("sequence", folder.name)), folder, info)]
+    if (folder / "tracks.txt").is_file():
+        return [StoredTracks(folder.name, folder, {})]
     texts = [StoredTracks(p.stem, p, {}) for p in sorted(folder.glob("*.txt"))]
     if depth == 0:
         return texts
@@ -82,47 +110,81 @@ def _below(folder: Path, depth: int) -> list[StoredTracks]:
     return [stored for p in inner for stored in _below(p, depth - 1)] + texts
 
 
-def _run_info(path: Path) -> dict[str, Any]:
-    """Returns the content of the run.json at `path`, an empty dictionary if there is no such file.
-
-    Raises InputError if the file is no JSON object, OSError if it cannot be read.
-    """
-    if not path.is_file():
-        return {}
-    try:
-        info = json.loads(path.read_text(encoding="utf-8"))
-    except ValueError:
-        info = None
-    if not isinstance(info, dict):
-        raise InputError(
-            file=path, got="no JSON object", expected="the run.json of `flockscope track`", remedy="track again"
-        )
-    return info
-
-
 def match_tracks(sequences: list[Sequence], stored: list[StoredTracks]) -> list[tuple[Sequence, StoredTracks]]:
     """Returns each sequence with the stored tracks of the same name, in the order of `sequences`; [] without sequences.
 
     A single text file that was given itself matches a single sequence whatever their names; otherwise its name is that
-    of the file without suffix. Tracks of other sequences are ignored. Raises InputError if a sequence has no tracks, or
-    if two of `stored` have the same name. `stored` must not be empty if there is a sequence.
+    of the file without suffix. Tracks of other sequences are ignored. `stored` must not be empty if there is a
+    sequence.
+
+    Raises InputError if a sequence has no tracks, two of `stored` have the same name, a matched run is not whole, or
+    two matched runs have different trackers, parameters or grouping rules.
     """
-    if len(sequences) == len(stored) == 1 and not stored[0].name:
-        return [(sequences[0], stored[0])]
-    by_name: dict[str, StoredTracks] = {}
+    if len(sequences) == len(stored) == 1 and stored[0].name is None:
+        matched = [(sequences[0], stored[0])]
+    else:
+        by_name = _by_name(stored)
+        matched = [(sequence, _named(sequence.name, by_name, stored)) for sequence in sequences]
+    for _, each in matched:
+        each.check()
+    _refuse_mixture([each for _, each in matched])
+    return matched
+
+
+def _by_name(stored: list[StoredTracks]) -> dict[str, StoredTracks]:
+    """Returns the stored tracks by the name of their sequence. Raises InputError if two have the same name."""
+    found: dict[str, StoredTracks] = {}
     for each in stored:
-        name = each.name or each.path.stem
-        if name in by_name:
+        name = each.path.stem if each.name is None else each.name
+        if name in found:
             raise InputError(
                 file=each.path, got=f"tracks of {name} a second time", expected="one result for each sequence",
-                remedy=f"the first: {by_name[name].path}; give one run at a time",
+                remedy=f"the first: {found[name].path}; give one run at a time",
             )  # fmt: skip
-        by_name[name] = each
-    for sequence in sequences:
-        if sequence.name not in by_name:
+        found[name] = each
+    return found
+
+
+def _named(name: str, by_name: dict[str, StoredTracks], stored: list[StoredTracks]) -> StoredTracks:
+    """Returns the tracks of the sequence `name`. Raises InputError if there are none; of an unfinished run among
+    `stored`, which cannot tell what it tracked, that it is unfinished."""
+    if name in by_name:
+        return by_name[name]
+    for each in stored:
+        if not each.info:
+            each.check()
+    raise InputError(
+        file=stored[0].path.parent if len(stored) > 1 else stored[0].path,
+        got="tracks of " + ", ".join(sorted(by_name)[:5]), expected=f"tracks of {name}",
+        remedy="track it first, or give the right folder",
+    )  # fmt: skip
+
+
+def _refuse_mixture(stored: Iterable[StoredTracks]) -> None:
+    """Raises InputError if two runs differ in tracker, config or grouping rule.
+
+    Tracks without run.json are left out.
+    """
+    runs = [each for each in stored if each.info]
+    for each in runs[1:]:
+        first = runs[0]
+        if _method(each) != _method(first):
+            got = f"{_method_words(first, each)} in {first.path.name}, {_method_words(each, first)} in {each.path.name}"
             raise InputError(
-                file=stored[0].path.parent if len(stored) > 1 else stored[0].path,
-                got="tracks of " + ", ".join(sorted(by_name)[:5]), expected=f"tracks of {sequence.name}",
-                remedy="track it first, or give the right folder",
+                file=each.path.parent, got=got, expected="one tracker with one config",
+                remedy="keep one folder per run: track again with another --out, and score them apart",
             )  # fmt: skip
-    return [(sequence, by_name[sequence.name]) for sequence in sequences]
+
+
+def _method(stored: StoredTracks) -> list[Any]:
+    return [stored.info.get(key) for key in METHOD]
+
+
+def _method_words(stored: StoredTracks, other: StoredTracks) -> str:
+    """Returns the tracker's name and in brackets the first parameters that differ from those of `other`, at most 3."""
+    mine, theirs = ({**(s.info.get("config") or {}), **(s.info.get("grouping") or {})} for s in (stored, other))
+    tracker = str(stored.info.get("tracker"))
+    if tracker != str(other.info.get("tracker")):
+        return tracker
+    changed = [f"{key} = {value}" for key, value in mine.items() if theirs.get(key) != value][:SHOWN]
+    return f"{tracker} ({', '.join(changed)})" if changed else tracker

@@ -9,7 +9,7 @@ from __future__ import annotations
 import errno
 import os
 import shutil
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager, suppress
 from pathlib import Path
@@ -129,24 +129,31 @@ def write_unsynced(path: Path, content: bytes) -> None:
     path.write_bytes(content)
 
 
-def replace_files(target: Path, files: Mapping[str, bytes], stale: tuple[str, ...] = ()) -> None:
-    """Write files into the folder `target`, which may hold other files; all are synced before the first replaces its
-    target.
+def replace_sealed(target: Path, files: Mapping[str, bytes], seal: str, names: Iterable[str] = ()) -> None:
+    """Write files into the folder `target`, which may hold files of others; they count as complete once `seal` is
+    there.
 
-    files: content by relative name; a name may have subfolders. They appear one by one, in the order of `files`, so a
-    killed run may leave only the first of them. stale: names that are deleted first unless `files` has them. Other
-    files stay. A missing folder is created. Raises WorkError if the disk is full, InputError if the folder cannot be
-    written.
+    files: content by name; all are synced to disk before the first replaces its target. seal: the last of their names.
+    The old seal is deleted before any other file changes, and the new one appears after all others have. A killed run
+    therefore leaves the old files whole or a folder without a seal; if it had none before, the first of `files` is the
+    first to appear. names: files that are deleted unless `files` has them. Other files stay. A missing folder is
+    created. Raises WorkError if the disk is full, InputError if the folder cannot be written.
     """
+    first, *others = (name for name in files if name != seal)
     with staged_path(target) as partial:
         _write_synced_files(partial, files)
         target.mkdir(exist_ok=True)
-        for name in stale:
+        (target / seal).unlink(missing_ok=True)
+        _sync_folder(target)
+        os.replace(partial / first, target / first)
+        _sync_folder(target)
+        for name in names:
             if name not in files:
                 (target / name).unlink(missing_ok=True)
-        for name in files:
-            (target / name).parent.mkdir(parents=True, exist_ok=True)
+        for name in others:
             os.replace(partial / name, target / name)
+        _sync_folder(target)
+        os.replace(partial / seal, target / seal)
         _sync_folder(target)
 
 

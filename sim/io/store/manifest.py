@@ -7,12 +7,14 @@ time, host or path, so the same seed, scenario and versions give the same bytes.
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
-from pathlib import Path, PurePosixPath
+from pathlib import Path
 from typing import Any
 
 from scenarios.errors import InputError
 from sim import hashing
 from sim.io.files import tables
+from sim.io.store import seal
+from sim.io.store.seal import with_hash as with_hash
 from sim.io.store.streams import check_streams, coding, is_picture
 
 SCHEMA = 1
@@ -49,15 +51,6 @@ def identity(scenario: str, seed: int, repeat: int, streams: Iterable[str] = (),
     }
 
 
-def with_hash(manifest: dict[str, Any]) -> dict[str, Any]:
-    """Return a copy of the manifest with the field `sha256`, the canonical hash of all its other fields.
-
-    An old `sha256` is replaced; `manifest` is not changed. Raises TypeError for one that cannot be hashed, as a set.
-    """
-    body = {key: value for key, value in manifest.items() if key != "sha256"}
-    return {**body, "sha256": hashing.canonical_hash(body)}
-
-
 def read_manifest(folder: Path) -> dict[str, Any]:
     """Read the manifest.json of a sequence folder, as a dict.
 
@@ -79,9 +72,7 @@ def read_manifest(folder: Path) -> dict[str, Any]:
         raise InputError(file=path, got=f"no {', '.join(sorted(missing))}", expected="all keys", remedy=REDO)
     if manifest["sha256"] != with_hash(manifest)["sha256"]:
         raise InputError(file=path, got="altered fields", expected="those that its sha256 names", remedy=REDO)
-    for name in manifest["files"]:
-        if PurePosixPath(name).is_absolute() or ".." in PurePosixPath(name).parts:
-            raise InputError(file=path, place="files", got=name, expected="files of its own folder", remedy=REDO)
+    seal.check_facts(path, manifest["files"], REDO)
     return manifest
 
 
@@ -92,16 +83,5 @@ def damaged_files(folder: Path, manifest: dict[str, Any], *, pictures: bool = Tr
     the hash of every file. False compares only the size of pictures; a picture of another size is reported. Files that
     the manifest does not name are ignored.
     """
-    for name, facts in manifest["files"].items():
-        path = folder / name
-        wanted = f"the file of {facts['bytes']} bytes that manifest.json names"
-        try:
-            if not pictures and is_picture(name) and path.stat().st_size == facts["bytes"]:
-                continue
-            body = path.read_bytes()
-        except OSError:
-            yield InputError(file=path, got="missing", expected=wanted, remedy=REDO)
-            continue
-        if hashing.file_hash(body) != facts["sha256"]:
-            kind = "truncated" if len(body) < facts["bytes"] else "altered"
-            yield InputError(file=path, got=f"{kind}: {len(body)} bytes", expected=wanted, remedy=REDO)
+    size_only = () if pictures else tuple(filter(is_picture, manifest["files"]))
+    return seal.damaged_files(folder, manifest["files"], seal=MANIFEST, remedy=REDO, size_only=size_only)

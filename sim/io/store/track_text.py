@@ -18,14 +18,13 @@ from sim.io.store.group_files import read_groups_csv
 from sim.types import Array, Plane, Tracks
 
 
-def read_track_text(path: Path, fps: float, length: int | None, *, projected: bool = False) -> list[Tracks]:
+def read_track_text(path: Path, fps: float, length: int | None) -> list[Tracks]:
     """Return the tracks of a MOTChallenge text, one Tracks per frame from 1 to `length`; frames without rows are empty.
 
     length: None: to the last frame in the file. fps: frames/s. Tracks of a frame are sorted by id. Positions are on the
     ground (m) if the file has them, else box centres in the image (px). Velocities are differences over 0.5 s,
     covariances nan, and everybody is alone (group -1). Boxes are None if a row lacks one. Scores are 1 if the file has
     none; if one is outside [0, 1], all are scaled so that the lowest is 0 and the highest 1 (all 1 if equal).
-    projected: True leaves the boxes out if there are ground positions, since they were computed from these.
 
     Raises InputError if the file is unreadable, a line is invalid, a frame is beyond `length`, an id is negative or
     stands twice in a frame, only some lines have a ground position, a line has neither box nor ground position, or the
@@ -42,7 +41,7 @@ def read_track_text(path: Path, fps: float, length: int | None, *, projected: bo
         remedy = "complete the line, or write z = -1 in all"
         table.rows.reject(np.isnan(ground[:, 0]), "a ground position (z other than -1), as in other lines", remedy)
     pos = _centres(table)[order] if ground is None else ground[order][:, :2]
-    box = None if table.without_box().any() or (projected and ground is not None) else table.box[order]
+    box = None if table.without_box().any() else table.box[order]
     score = unit_scores(table.rest[:, 0] if table.rest.shape[1] else np.ones(len(order)))[order]
     plane: Plane = "image" if ground is None else "ground"
     vel, count = differentiate(frame, id, pos, fps), length or int(frame.max(initial=0))

@@ -1,12 +1,12 @@
-"""Checks a stored sequence or dataset, and returns the problems as a list of errors.
+"""Checks a stored sequence, dataset or run of a tracker, and returns the problems as a list of errors.
 
-Every file must have the hash in its manifest.json, be readable, and agree with the other files. Files that interrupted
-runs left over are problems, too.
+Every file must have the hash in manifest.json or run.json, be readable, and agree with the other files. Files that
+interrupted runs left over are problems, too.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from itertools import zip_longest
 from pathlib import Path
 from typing import Any
@@ -20,31 +20,50 @@ from sim.io.source import sequence_folders, split_and_name
 from sim.io.store import manifest as manifests
 from sim.io.store import truth_files
 from sim.io.store.camera_files import read_scene
+from sim.io.store.run_seal import is_run, read_run, run_problems
 from sim.io.store.streams import file_name, is_picture, suffix
+from sim.io.store.track_files import read_tracks
 from sim.types import BACKGROUNDS, Detections, Groups, Truth
 
 
 def validate(folder: str | Path) -> list[FlockscopeError]:
-    """Return the problems of a generated sequence or dataset, as errors that are not raised; empty if there are none.
+    """Return the problems of a generated sequence or dataset, or of tracks that `flockscope track` stored, as errors
+    that are not raised; empty if there are none.
 
-    Checked are: files left by interrupted runs, the lists in seqmaps/, and of each sequence hashes, content, texts and
-    pictures. Problems come in that order, the sequences sorted by path. If files of a sequence are damaged, only these
-    are reported for it. A single sequence is checked without leftovers and seqmaps.
+    Checked are: files left by interrupted runs, the lists in seqmaps/, of each sequence hashes, content, texts and
+    pictures, and of each run of a tracker hashes and content. Problems come in that order, sequences and runs sorted by
+    path. If files of a sequence or run are damaged, only these are reported for it. A single sequence or run is checked
+    without leftovers and seqmaps.
 
-    Raises InputError if the folder does not exist, or holds no sequence and no other problem.
+    Raises InputError if the folder does not exist, or holds no sequence, no run and no other problem.
     """
     folder = Path(folder)
     if not folder.is_dir():
         raise InputError(
-            file=folder, got="no folder", expected="a generated dataset or sequence", remedy="check the path"
+            file=folder, got="no folder", expected="a generated dataset, a sequence, or tracks", remedy="check the path"
         )
     if manifests.is_sequence(folder):
         return _sequence(folder)
-    found = [*_left_behind(folder), *_seqmaps(folder)]
-    sequences = sorted(p for p in folder.glob("**/") if manifests.is_sequence(p) and PARTIAL not in str(p))
-    if not sequences and not found:
-        raise InputError(file=folder, got="no sequences", expected="a generated dataset", remedy="check the path")
-    return found + [problem for p in sequences for problem in _sequence(p)]
+    if is_run(folder):
+        return _run(folder)
+    sequences, runs = _inside(folder, manifests.is_sequence), _inside(folder, is_run)
+    found = [*_left_behind(folder), *(_seqmaps(folder) if sequences or not runs else ())]
+    if not sequences and not runs and not found:
+        expected = "a generated dataset, or tracks"
+        raise InputError(file=folder, got="no sequences", expected=expected, remedy="check the path")
+    checks = [*map(_sequence, sequences), *map(_run, runs)]
+    return found + [problem for problems in checks for problem in problems]
+
+
+def holds_sequences(folder: str | Path) -> bool:
+    """Return True if the folder is a generated sequence, perhaps an incomplete one, or holds one at any depth."""
+    return bool(_inside(Path(folder), manifests.is_sequence))
+
+
+def _inside(root: Path, kind: Callable[[Path], bool]) -> list[Path]:
+    """Return `root` and the folders below it for which kind(folder) is True, sorted, without those left by interrupted
+    runs."""
+    return sorted(p for p in (root, *root.glob("**/*/")) if PARTIAL not in str(p.relative_to(root)) and kind(p))
 
 
 def content_hash(folder: str | Path) -> str:
@@ -97,6 +116,17 @@ def _sequence(folder: Path) -> list[FlockscopeError]:
         manifest = manifests.read_manifest(folder)
         problems: list[FlockscopeError] = list(manifests.damaged_files(folder, manifest))
         return problems or [*_extra(folder, manifest), *_content(folder, manifest)]
+    except FlockscopeError as error:
+        return [error]
+
+
+def _run(folder: Path) -> list[FlockscopeError]:
+    try:
+        run = read_run(folder)
+        problems: list[FlockscopeError] = list(run_problems(folder, run))
+        if not problems:
+            read_tracks(folder)
+        return problems
     except FlockscopeError as error:
         return [error]
 

@@ -58,7 +58,8 @@ def made(tmp_path_factory) -> Path:
     line = ["generate", str(folder / "scene.toml"), "--out"]
     assert run([*line, str(folder / "data"), "--seeds", "40000:40002", "--streams", "none"]) == 0
     assert run([*line, str(folder / "seen"), "--seeds", "40000", "--set", "camera.image=[128,96]"]) == 0
-    assert run(["track", FAKE, str(folder / "data"), "--out", str(folder / "tracks")]) == 0
+    for name, out in (("data", "tracks"), ("seen/flockscope-demo/scene-s40000", "tracks-seen")):
+        assert run(["track", FAKE, str(folder / name), "--out", str(folder / out)]) == 0
     return folder
 
 
@@ -114,7 +115,7 @@ COMMANDS = {
         "view {seen} --video outside --out {out}/page.html",
     ),
     "overlay": (
-        "overlay {seen} {tracks}/scene-s40000 --out {out}/film.mp4",
+        "overlay {seen} {tracks}-seen --out {out}/film.mp4",
         "overlay {one} {tracks}/scene-s40000 --out {out}/film.mp4",
     ),
     "view truth": ("view {one} --out {out}/page.html", "view {scene} --out {out}/page.html"),
@@ -356,7 +357,7 @@ def test_visible_boxes_of_a_recording_without_any(tmp_path, capsys):
     assert not capsys.readouterr().err
 
 
-def test_a_tracker_on_the_ground_is_scored_there_from_text_alone(place, tmp_path, capsys):
+def test_a_tracker_on_the_ground_is_scored_there(place, tmp_path, capsys):
     """The truth as tracks without boxes: projected ones in the text are no measurement."""
     from sim.io.source import open_source
     from sim.io.store.track_files import write_tracks
@@ -370,7 +371,6 @@ def test_a_tracker_on_the_ground_is_scored_there_from_text_alone(place, tmp_path
     ]
     seen = {"camera": sequence.camera, "scene": sequence.scene}
     write_tracks(tmp_path / "t", answers, fps=sequence.fps, info={"sequence": sequence.name}, **seen)
-    (tmp_path / "t" / "tracks.parquet").unlink()
     assert run(["score", str(place.one), str(tmp_path / "t"), "--json"]) == 0
     (shown,) = json.loads(capsys.readouterr().out)["sequences"]
     assert (shown["similarity"], shown["HOTA"], shown["MOTA"]) == ("ground", 1.0, 1.0)

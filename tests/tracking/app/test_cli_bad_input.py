@@ -13,6 +13,7 @@ from pathlib import Path
 
 import pytest
 
+from tests.sealing import seal_again
 from tracking.app.cli import run
 
 ROOT = Path(__file__).resolve().parents[3]
@@ -401,8 +402,7 @@ def test_tracks_at_another_frame_rate(tmp_path, capsys):
 def test_a_sequence_without_its_tracks_is_named(made, tmp_path, capsys):
     assert run(["track", "blob", str(made / "data"), "--out", str(tmp_path / "t")]) == 0
     (tmp_path / "t" / "scene-s40000").rename(tmp_path / "t" / "other")
-    run_json = tmp_path / "t" / "other" / "run.json"
-    run_json.write_text(run_json.read_text().replace("scene-s40000", "other"))
+    seal_again(tmp_path / "t" / "other", sequence="other")
     output = refused(["score", str(made / "data"), str(tmp_path / "t")], capsys)
     assert "scene-s40000" in output
     assert "other" in output

@@ -37,19 +37,19 @@ def generate(options: GenerateOptions) -> CommandResult:
 
 
 def validate(folder: Path) -> CommandResult:
-    """Checks a generated sequence or dataset at the path `folder`; changes nothing.
+    """Checks a generated sequence or dataset, or stored tracks, at the path `folder`; changes nothing.
 
-    Without problems the result's data are "problems" ([]) and "content_hash" (64 hex digits), else "problems" (a
-    dictionary each) and "error" (the first of them). Then the exit code is 1 and the text has a line for each problem.
-    Raises InputError if the folder does not exist or holds no sequence.
+    Without problems the result's data are "problems" ([]) and "content_hash" (64 hex digits, None for tracks), else
+    "problems" (a dictionary each) and "error" (the first of them). Then the exit code is 1 and the text has a line for
+    each problem. Raises InputError if the folder does not exist or holds neither a sequence nor tracks.
     """
-    from sim.io.store.validate import content_hash
+    from sim.io.store.validate import content_hash, holds_sequences
     from sim.io.store.validate import validate as check
 
     problems = check(folder)
     if not problems:
-        content = content_hash(folder)
-        text = f"{folder}: no problems; content {content[:16]}"
+        content = content_hash(folder) if holds_sequences(folder) else None
+        text = f"{folder}: no problems" + ("" if content is None else f"; content {content[:16]}")
         return CommandResult({"problems": [], "content_hash": content}, text)
     lines = [problem.line() for problem in problems]
     listed = [problem.as_dict() for problem in problems]

@@ -18,6 +18,7 @@ from tracking.app.commands.score_tables import SHOWN, SequenceScores, number
 from tracking.app.commands.track import TrackerSetup
 from tracking.app.progress import ProgressMeter
 from tracking.app.replay_page.video import PageVideo
+from tracking.app.stored_tracks import store_run
 from tracking.run import TrackingRun
 
 SCENES = ("merge", "split", "cross", "pass-by", "queue", "side-by-side", "party", "mixed")
@@ -90,7 +91,7 @@ def _pixel_scene(sequence: Sequence, out: Path) -> PixelScene:
             run = TrackerSetup(tracker, detections=mode).run(sequence)
             row, name = score_run(sequence, run), f"{tracker} from {_input_word(tracker, mode)}"
             page = folder / f"{tracker}-{mode}.html"
-            _write_tracks(sequence, run, out / "tracks" / f"{tracker}-{mode}")
+            store_run(output_path(out / "tracks" / f"{tracker}-{mode}", sequence.name), sequence, run)
             _write_page(name, sequence, run, row, page, video)
             section.add(row, page, name)
             if mode == "image":
@@ -119,20 +120,11 @@ def _section(tracker: str, sequences: list[Sequence], out: Path, meter: Progress
         run = TrackerSetup(tracker).run(sequence)
         row = score_run(sequence, run)
         page = output_path(out / "pages" / tracker, sequence.name, ".html")
-        _write_tracks(sequence, run, out / "tracks" / tracker)
+        store_run(output_path(out / "tracks" / tracker, sequence.name), sequence, run)
         _write_page(tracker, sequence, run, row, page, None)
         section.add(row, page, sequence.name)
         meter.step(f"{tracker} on {sequence.name}")
     return section
-
-
-def _write_tracks(sequence: Sequence, run: TrackingRun, folder: Path) -> None:
-    from sim.io.store.track_files import write_tracks
-
-    write_tracks(
-        output_path(folder, sequence.name), run, fps=sequence.fps, camera=sequence.camera, scene=sequence.scene,
-        info=run.info,
-    )  # fmt: skip
 
 
 def _write_page(

@@ -14,6 +14,7 @@ from tracking.app import option_parsing
 from tracking.app.command_options import TrackOptions
 from tracking.app.command_result import CommandResult
 from tracking.app.progress import ProgressMeter
+from tracking.app.stored_tracks import store_run
 from tracking.config import Config
 from tracking.grouping.link_rule import LinkRule
 from tracking.run import TrackingRun
@@ -67,12 +68,13 @@ def track(options: TrackOptions) -> CommandResult:
     and "folder".
 
     Raises InputError before the first frame if an option is wrong, if the source cannot be opened, if the tracker
-    cannot work on one of the sequences, or if two sequences have the same name; later if a picture or detection cannot
-    be used or a folder cannot be written. Raises WorkError if the tracker fails or the disk is full. Tracks stored
-    before an error stay.
+    cannot work on one of the sequences, if two sequences would share a folder, or if a folder holds files of another
+    program with names of ours; later if a picture, a detection or labels cannot be read or a folder cannot be written.
+    Raises WorkError if the tracker fails or the disk is full.
+    Tracks stored before an error stay.
     """
     from sim.io.source import open_source
-    from sim.io.store.track_files import write_tracks
+    from sim.io.store.run_seal import reject_foreign, tracked_hash
     from tracking.tracker_registry import find
 
     setup = _setup(options)
@@ -84,12 +86,15 @@ def track(options: TrackOptions) -> CommandResult:
         background=options.background,
     )  # fmt: skip
     folders = _output_folders(sequences, options.source, options.out)
+    for folder in folders:
+        reject_foreign(folder)
     _check_modes(setup, needs, sequences, options.background)
     rows = []
     with ProgressMeter("track", _total_frames(sequences)) as meter:
         for sequence, folder in zip(sequences, folders, strict=True):
+            tracked_hash(sequence)  # labels that cannot be read are refused now, not after the last frame
             run = setup.run(sequence, lambda index, name=sequence.name: meter.step(name))  # type: ignore[misc]
-            write_tracks(folder, run, fps=sequence.fps, camera=sequence.camera, scene=sequence.scene, info=run.info)
+            store_run(folder, sequence, run)
             rows.append(_row(run, folder))
     return CommandResult({"tracker": setup.tracker, "runs": rows}, "\n".join(map(_line, rows)))
 

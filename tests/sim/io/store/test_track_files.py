@@ -5,6 +5,7 @@ import pytest
 
 from scenarios.errors import InputError
 from sim.io.store.track_files import read_tracks, tracks_files, write_tracks
+from tests.sealing import seal_again
 
 
 @pytest.mark.parametrize("plane", ["ground", "space", "image"])
@@ -32,9 +33,6 @@ def test_whether_groups_and_events_were_derived_is_kept(tmp_path, make_tracks):
     for derived in (True, False):
         write_tracks(tmp_path, [t.replace(derived=derived) for t in tracks], fps=10.0)
         assert {t.derived for t in read_tracks(tmp_path)} == {derived}
-    write_tracks(tmp_path, [t.replace(derived=True) for t in tracks], fps=10.0)
-    (tmp_path / "events.json").unlink()
-    assert not any(t.derived for t in read_tracks(tmp_path))
 
 
 def test_what_an_earlier_run_left_goes_away_but_no_more(tmp_path, make_tracks):
@@ -43,7 +41,8 @@ def test_what_an_earlier_run_left_goes_away_but_no_more(tmp_path, make_tracks):
     write_tracks(tmp_path / "t", [t.replace(groups=None) for t in make_tracks(1)], fps=10.0, info={"tracker": "blob"})
     assert not (tmp_path / "t" / "groups.parquet").exists()
     assert (tmp_path / "t" / "mine.txt").exists()
-    assert json.loads((tmp_path / "t" / "run.json").read_text()) == {
+    run = json.loads((tmp_path / "t" / "run.json").read_text())
+    assert {key: run[key] for key in run if key not in ("files", "sha256")} == {
         "format": 1,
         "tracker": "blob",
         "boxes": "measured",
@@ -125,34 +124,35 @@ EVENT = '"kind": "merge", "before": [1, 2], "after": [1], "members": [1, 2], "po
     ],
 )
 def test_events_that_no_frame_can_hold_are_one_line(tmp_path, make_tracks, body, place):
-    write_tracks(tmp_path, make_tracks(1), fps=10.0)
-    (tmp_path / "events.json").write_text(body)
-    for name in ("tracks.parquet", "tracks.txt"):
+    ours, others = write_tracks(tmp_path / "ours", make_tracks(1), fps=10.0), tmp_path / "others"
+    others.mkdir()
+    (others / "tracks.txt").write_bytes((ours / "tracks.txt").read_bytes())
+    for folder in (ours, others):
+        (folder / "events.json").write_text(body)
+    seal_again(ours)
+    for folder in (ours, others):
         with pytest.raises(InputError) as error:
-            read_tracks(tmp_path, fps=10.0, length=9)
+            read_tracks(folder, fps=10.0, length=9)
         assert error.value.place == place
         assert "\n" not in str(error.value)
-        (tmp_path / name).unlink()
 
 
 @pytest.mark.parametrize("body", ['{"events": 3}', '{"events": [{"kind": "merge"}]}', "{", "[]"])
 def test_bad_events_are_one_line(tmp_path, make_tracks, body):
     write_tracks(tmp_path, make_tracks(1), fps=10.0)
     (tmp_path / "events.json").write_text(body)
-    with pytest.raises(InputError) as error:
+    seal_again(tmp_path)
+    with pytest.raises(InputError, match="events") as error:
         read_tracks(tmp_path)
     assert "\n" not in str(error.value)
 
 
-@pytest.mark.parametrize("boxes", ["projected", "measured", None])
-def test_projected_boxes_are_no_measurement(tmp_path, boxes):
-    """As run.json beside the text says; without it the boxes of a text are what somebody measured."""
+def test_a_text_of_others_with_places_and_boxes(tmp_path):
+    """Without a run.json of ours the boxes of a text are what somebody measured."""
     (tmp_path / "tracks.txt").write_text("1,5,10,20,30,40,0.5,1,2,0\n")
-    if boxes is not None:
-        (tmp_path / "run.json").write_text(json.dumps({"format": 1, "boxes": boxes}))
+    (tmp_path / "run.json").write_text("{}")
     (only,) = read_tracks(tmp_path, fps=10.0)
-    assert (only.plane, only.pos.tolist()) == ("ground", [[1, 2]])
-    assert (only.box is None) == (boxes == "projected")
+    assert (only.plane, only.pos.tolist(), only.box.tolist()) == ("ground", [[1, 2]], [[10, 20, 30, 40]])
 
 
 def test_one_metre_below_ground_is_no_unknown_place(tmp_path, make_tracks):
@@ -193,5 +193,11 @@ def test_nothing_there(tmp_path):
     with pytest.raises(InputError, match="no tracks"):
         read_tracks(tmp_path)
     (tmp_path / "tracks.parquet").write_bytes(b"PAR1")
+    with pytest.raises(InputError, match="incomplete"):
+        read_tracks(tmp_path)
+    (tmp_path / "tracks.parquet").unlink()
+    write_tracks(tmp_path, [], fps=10.0)
+    (tmp_path / "tracks.parquet").write_bytes(b"PAR1")
+    seal_again(tmp_path)
     with pytest.raises(InputError, match="Parquet"):
         read_tracks(tmp_path)

@@ -1,0 +1,115 @@
+"""run.json, written last: the tracks of a run are complete if and only if their folder has one.
+
+It says which tracker ran and on what, and seals the run's files as manifest.json seals those of a sequence.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+from typing import Any
+
+from scenarios.errors import InputError
+from sim.hashing import labels_hash
+from sim.io.files import tables
+from sim.io.store import seal
+from sim.types import Sequence
+
+RUN = "run.json"
+TABLE = "tracks.parquet"
+NAMES = ("tracks.txt", "tracks.mot.txt", TABLE, "groups.csv", "groups.parquet", "events.json", RUN)
+"""Names of the files of a run; files of other names in its folder belong to somebody else."""
+
+MEBIBYTE = 2**20  # longer than any run.json
+AGAIN = "track again"
+OLD = "track again; if the tracks are another program's, delete run.json"
+
+
+def is_run(folder: Path) -> bool:
+    """Return True if the folder holds a run of ours, perhaps an unfinished or damaged one.
+
+    It does if it has a tracks.parquet, or a run.json with our key "boxes". Text files alone are another program's.
+    """
+    if (folder / TABLE).is_file():
+        return True
+    path = folder / RUN
+    if not path.is_file():
+        return False
+    with path.open("rb") as file:
+        return b'"boxes"' in file.read(MEBIBYTE)
+
+
+def reject_foreign(folder: Path) -> None:
+    """Raise InputError if the folder holds a file with a name of ours, but no run of ours: it would be replaced."""
+    found = [name for name in NAMES if (folder / name).exists()]
+    if found and not is_run(folder):
+        raise InputError(
+            file=folder / found[0], got="a file of another program", expected="a new folder, or one with a run",
+            remedy="choose another --out, or move the file",
+        )  # fmt: skip
+
+
+def sealed_run(info: Mapping[str, Any], files: Mapping[str, bytes]) -> bytes:
+    """Return the run.json of a run as bytes: `info` with the facts of all its other files and its own hash.
+
+    info: what ran; the keys format, files and sha256 are added. files: content by name, without run.json. Raises
+    ValueError if `info` holds NaN or infinity, TypeError if it holds what JSON cannot.
+    """
+    stated = {"format": tables.FORMAT, **info, "files": seal.file_facts(files)}
+    return tables.json_document(seal.with_hash(json.loads(tables.json_text(stated))))  # hashed as it will be read
+
+
+def read_run(folder: Path) -> dict[str, Any]:
+    """Return the content of the run.json of a folder; the files that it names are not read.
+
+    Raises InputError if it is missing, unreadable, no JSON object, of another format number, without a seal (as older
+    versions wrote it), or altered: its bytes are those that we write for its content, down to the last blank.
+    """
+    path = folder / RUN
+    if not path.is_file():
+        got, expected = f"tracks without {RUN}", "a run that was finished"
+        raise InputError(file=folder, got=got, expected=expected, remedy=f"incomplete: {AGAIN}")
+    run = tables.read_document(path)
+    if not isinstance(run.get("files"), dict) or "sha256" not in run:
+        got, expected = "a run.json without hashes, of an older version", "one that names each file with its hash"
+        raise InputError(file=path, got=got, expected=expected, remedy=OLD)
+    same_bytes = path.read_bytes() == tables.json_document(run)
+    if run["sha256"] != seal.with_hash(run)["sha256"] or not same_bytes:
+        raise InputError(file=path, got="altered fields", expected="those that its sha256 names", remedy=AGAIN)
+    seal.check_facts(path, run["files"], AGAIN)
+    return run
+
+
+def run_problems(folder: Path, run: dict[str, Any]) -> Iterator[InputError]:
+    """Yield (not raise) an InputError for each file of a run that is missing, altered, or of another run.
+
+    run: the content of its run.json. All its files are read while iterating. A file of another run has one of our
+    names, but run.json does not name it.
+    """
+    yield from seal.damaged_files(folder, run["files"], seal=RUN, remedy=AGAIN)
+    for name in NAMES:
+        if name not in run["files"] and name != RUN and (folder / name).exists():
+            got, expected = f"a file that {RUN} does not name", "the files of one run"
+            yield InputError(file=folder / name, got=got, expected=expected, remedy=AGAIN)
+
+
+def check_run(folder: Path) -> dict[str, Any]:
+    """Return the content of the run.json of a folder whose run is whole. Raises the first InputError of `read_run` and
+    `run_problems` otherwise."""
+    run = read_run(folder)
+    for problem in run_problems(folder, run):
+        raise problem
+    return run
+
+
+def tracked_hash(sequence: Sequence) -> str | None:
+    """Return the SHA-256 (64 hex digits) that tells what was tracked; None for a sequence without labels.
+
+    Of a generated sequence it is the truth_hash of its manifest, else a hash of the labels and the frame rate as read.
+    Raises InputError if the labels cannot be read, WorkError if an order of a simulated script was not fulfilled.
+    """
+    stated = sequence.source.get("truth_hash")
+    if stated is not None:
+        return str(stated)
+    return None if sequence.truth is None else labels_hash(sequence.truth)

@@ -1,0 +1,234 @@
+"""The exact tables of a run, tracks.parquet and groups.parquet, from one tracker's tracks and back, with checks."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from scenarios.errors import InputError
+from sim.io.files import tables
+from sim.io.files.tables import Column, StoredTable, table_bytes
+from sim.io.store.group_files import AXES, read_groups
+from sim.io.store.run_seal import TABLE
+from sim.io.store.truth_files import BOX, scores_or_ones
+from sim.types import Array, Groups, Tracks
+
+UNITS = ("person", "group")
+PLANES = ("ground", "space", "image")
+
+
+@dataclass(frozen=True)
+class RunRows:
+    """The tracks of all frames of one tracker, R rows in the order of frames.
+
+    plane, unit: of all tracks. frame (R,): from the tracks' index, from 1. id, group (R,): of the track and of its
+    group, -1 for alone. pos, vel (R, D) m or px (per s), D = 3 in the plane "space", else 2. cov (R, 2D, 2D):
+    covariance of position and velocity. box (R, 4): left, top, width, height in px, nan in a frame without boxes.
+    boxless (R,): True in such a frame. score (R,): 1 if the tracker gives none.
+    """
+
+    plane: Any
+    unit: Any
+    frame: Any
+    id: Any
+    group: Any
+    pos: Array
+    vel: Array
+    cov: Array
+    box: Array
+    boxless: Any
+    score: Array
+
+    def reject_faults(self, file: object, remedy: str) -> None:
+        """Raise InputError for the first fault, with its frame: a wrong id or group, or a number that is not finite.
+
+        Ids are non-negative and unique in a frame; groups are -1 or more, and the ids where the unit is "group".
+        Positions, scores, and boxes in a frame with boxes are finite. Velocities and covariances may be nan, which
+        means unknown, but not infinite. file, remedy: for the error.
+        """
+        for wrong, got, expected in self._checks():
+            row = int(np.argmax(wrong)) if wrong.any() else None
+            if row is not None:
+                place = f"frame {self.frame[row]}, id {self.id[row]}"
+                raise InputError(file=file, place=place, got=got, expected=expected, remedy=remedy)
+
+    def _checks(self) -> Iterator[tuple[Any, str, str]]:
+        order = np.lexsort((self.id, self.frame))
+        again = np.zeros(len(self.id), bool)
+        again[order[1:]] = (np.diff(self.frame[order]) == 0) & (np.diff(self.id[order]) == 0)
+        yield self.id < 0, "a negative id", "ids from 0"
+        yield again, "an id a second time in the frame", "unique ids in a frame"
+        yield self.group < -1, "a group below -1", "groups from 0, or -1 for alone"
+        if self.unit == "group":
+            yield self.group != self.id, "a group that is not the id", "group equal to id where the unit is group"
+        for name in ("pos", "score"):
+            yield _rows_with(~np.isfinite(getattr(self, name))), f"NaN or infinity in {name}", "finite numbers"
+        for name in ("vel", "cov"):
+            yield _rows_with(np.isinf(getattr(self, name))), f"infinity in {name}", "finite numbers, or nan for unknown"
+        box = ~np.isfinite(self.box).all(axis=1) & ~self.boxless
+        yield box, "NaN or infinity in box", "a box, as others of the frame have"
+
+
+def _rows_with(wrong: Any) -> Any:
+    """Return True (R,) for each row of `wrong`, (R, …) bool, that holds a True."""
+    return wrong.reshape(len(wrong), int(np.prod(wrong.shape[1:]))).any(axis=1)
+
+
+def flatten(every: list[Tracks]) -> RunRows:
+    """Return the rows of all frames of one tracker; without tracks none, in the plane "ground".
+
+    every: one Tracks per frame, all of one plane and unit, else AssertionError.
+    """
+    kinds = {(t.plane, t.unit) for t in every}
+    assert len(kinds) <= 1, f"a tracker stays in one plane and unit: {sorted(kinds)}"
+    plane, unit = next(iter(kinds), ("ground", "person"))
+    d = 3 if plane == "space" else 2
+    counts = [len(t.id) for t in every]
+
+    def join(parts: list[Any], empty: Any) -> Any:
+        return np.concatenate([empty, *parts])
+
+    ids = np.zeros(0, np.int64)
+    no_box = [np.full((len(t.id), 4), np.nan) if t.box is None else t.box for t in every]
+    return RunRows(
+        plane, unit, np.repeat(np.array([t.index for t in every], np.int64), counts),
+        join([t.id for t in every], ids), join([t.group for t in every], ids),
+        join([t.pos for t in every], np.zeros((0, d))), join([t.vel for t in every], np.zeros((0, d))),
+        join([t.cov for t in every], np.zeros((0, 2 * d, 2 * d))), join(no_box, np.zeros((0, 4))),
+        np.repeat(np.array([t.box is None for t in every], bool), counts),
+        join([scores_or_ones(t.score, len(t.id)) for t in every], np.zeros(0)),
+    )  # fmt: skip
+
+
+def _state(plane: str) -> list[str]:
+    axes = AXES[:3] if plane == "space" else AXES[:2]
+    return [*axes, *(f"v{a}" for a in axes)]
+
+
+def track_table(rows: RunRows, every: list[Tracks], fps: float) -> bytes:
+    """Return tracks.parquet as bytes. rows: those of `every`, one Tracks per frame. fps: frames/s."""
+    unit, state = "px" if rows.plane == "image" else "m", _state(rows.plane)
+    values = np.concatenate([rows.pos, rows.vel], axis=1)
+    units = [f"{unit}/s" if name.startswith("v") else unit for name in state]
+    columns = [
+        Column("frame", rows.frame),
+        Column("id", rows.id),
+        Column("group", rows.group),
+        *(Column(name, values[:, k], u) for k, (name, u) in enumerate(zip(state, units, strict=True))),
+        *(Column(name, rows.box[:, k], "px") for k, name in enumerate(BOX)),
+        Column("score", rows.score),
+        *(
+            Column(f"cov_{a}_{b}", rows.cov[:, i, j], f"{units[i]} {units[j]}")
+            for i, a in enumerate(state)
+            for j, b in enumerate(state)
+        ),
+    ]
+    facts = {
+        "plane": rows.plane, "unit": rows.unit, "fps": fps, "first": every[0].index if every else 1,
+        "frames": len(every), "boxless": [t.index for t in every if t.box is None],
+        "derived": bool(every) and all(t.derived for t in every),
+    }  # fmt: skip
+    return table_bytes(columns, facts)
+
+
+def read_track_table(folder: Path) -> list[Tracks]:
+    """Return the tracks in tracks.parquet, one Tracks per frame, with the groups of groups.parquet if it exists.
+
+    Events are not read. Raises InputError if a file is missing or damaged, a column or value is missing or of the wrong
+    type, rows are outside the frames or out of order, a number is not finite, or an id is wrong.
+    """
+    table = tables.read_table(folder / TABLE)
+    facts = _facts(table)
+    rows = _rows(table, facts)
+    first, count = facts["first"], facts["frames"]
+    groups = _groups(folder / "groups.parquet", first, count)
+    cuts = np.searchsorted(rows.frame, np.arange(first, first + count + 1))
+    found = []
+    for k in range(count):
+        index, r = first + k, slice(int(cuts[k]), int(cuts[k + 1]))
+        box = None if index in facts["boxless"] else rows.box[r]
+        found.append(
+            Tracks(
+                index, (index - 1) / facts["fps"], rows.plane, rows.unit, rows.id[r], rows.group[r], rows.pos[r],
+                rows.vel[r], rows.cov[r], box, rows.score[r], groups[k], derived=facts["derived"],
+            )
+        )  # fmt: skip
+    return found
+
+
+def _facts(table: StoredTable) -> dict[str, Any]:
+    """Return plane, unit, fps, first, frames, boxless (a set) and derived of the table's metadata.
+
+    Raises InputError if one is missing or cannot be; "derived" is False if it is missing.
+    """
+    facts = {key: table.fact(key) for key in ("plane", "unit", "fps", "first", "frames", "boxless")}
+    right = {
+        "plane": facts["plane"] in PLANES, "unit": facts["unit"] in UNITS,
+        "fps": isinstance(facts["fps"], int | float) and 0 < facts["fps"] < float("inf"),
+        "first": isinstance(facts["first"], int), "frames": isinstance(facts["frames"], int) and facts["frames"] >= 0,
+        "boxless": isinstance(facts["boxless"], list) and all(isinstance(f, int) for f in facts["boxless"]),
+    }  # fmt: skip
+    for key, fine in right.items():
+        if not fine:
+            expected = "what `flockscope track` writes"
+            raise InputError(file=table.file, place=key, got=repr(facts[key]), expected=expected, remedy=tables.REDO)
+    derived = bool(table.facts.get("derived", False))
+    return {**facts, "fps": float(facts["fps"]), "boxless": set(facts["boxless"]), "derived": derived}
+
+
+def _rows(table: StoredTable, facts: dict[str, Any]) -> RunRows:
+    """Return the checked rows of tracks.parquet. Raises InputError for the first fault."""
+    state = _state(facts["plane"])
+    d = len(state) // 2
+    values, frame = table.floats(*state), table.ints("frame")
+    _check_frames(table, frame, facts["first"], facts["frames"])
+    cov = table.floats(*(f"cov_{a}_{b}" for a in state for b in state)).reshape(-1, 2 * d, 2 * d)
+    rows = RunRows(
+        facts["plane"], facts["unit"], frame, table.ints("id"), table.ints("group"), values[:, :d], values[:, d:], cov,
+        table.floats(*BOX), np.isin(frame, list(facts["boxless"])), table.floats("score"),
+    )  # fmt: skip
+    rows.reject_faults(table.file, tables.REDO)
+    return rows
+
+
+def _check_frames(table: StoredTable, frame: Any, first: int, count: int) -> None:
+    if len(frame) and (frame.min() < first or frame.max() >= first + count or (np.diff(frame) < 0).any()):
+        wanted = f"frames {first} to {first + count - 1}, in order"
+        raise InputError(file=table.file, place="frame", got="other frames", expected=wanted, remedy=tables.REDO)
+
+
+def _groups(path: Path, first: int, count: int) -> list[Groups | None]:
+    """Return the groups of each frame in the groups.parquet `path`; None for each of `count` frames if it is missing.
+
+    Raises InputError if the file is damaged, holds other frames than those from `first` on, a negative group id, one
+    twice in a frame, or a position or hull that is not finite.
+    """
+    if not path.is_file():
+        return [None] * count
+    table = tables.read_table(path)
+    stated = table.fact("first"), table.fact("frames")
+    if stated != (first, count):
+        got, expected = f"groups of frames from {stated[0]}, {stated[1]} in all", f"from {first}, {count} in all"
+        raise InputError(file=path, place="schema", got=got, expected=expected, remedy=tables.REDO)
+    _check_frames(table, table.ints("frame"), first, count)
+    found = read_groups(table)
+    for index, some in enumerate(found, first):
+        fault = None if some is None else _group_fault(some)
+        if fault is not None:
+            expected = "unique ids from 0 and finite places"
+            raise InputError(file=path, place=f"frame {index}", got=fault, expected=expected, remedy=tables.REDO)
+    return found
+
+
+def _group_fault(groups: Groups) -> str | None:
+    """Return the first fault of the groups of one frame in words, None if there is none."""
+    if len(groups.id) and groups.id.min() < 0:
+        return f"group {groups.id.min()}"
+    if len(np.unique(groups.id)) != len(groups.id):
+        return "a group a second time"
+    places = [groups.pos, *groups.hull]
+    return None if all(np.isfinite(place).all() for place in places) else "NaN or infinity in a place or hull"

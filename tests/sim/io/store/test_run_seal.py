@@ -1,0 +1,347 @@
+"""A run is sealed: whatever happens to its files, its tracks are those that were written, or they are refused."""
+
+from __future__ import annotations
+
+import os
+import pickle
+import shutil
+import subprocess
+import sys
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from scenarios.errors import InputError
+from sim.hashing import labels_hash
+from sim.io.files import tables
+from sim.io.store import seal
+from sim.io.store.run_seal import NAMES, check_run, read_run, tracked_hash
+from sim.io.store.track_files import read_tracks, tracks_files, write_tracks
+from sim.io.store.validate import validate
+from tests.sealing import seal_again
+
+ROOT = Path(__file__).resolve().parents[4]
+INFO = {"tracker": "blob", "config": {"a": 1.5e-7}, "seed": 0, "sequence": "s", "fps": 10.0}
+
+
+def write(folder: Path, files: dict[str, bytes]) -> Path:
+    folder.mkdir()
+    for name, body in files.items():
+        (folder / name).write_bytes(body)
+    return folder
+
+
+def test_the_seal_names_every_file(tmp_path, make_tracks):
+    folder = write_tracks(tmp_path / "t", make_tracks(1), fps=10.0, info=INFO)
+    run = read_run(folder)
+    assert set(run["files"]) == {p.name for p in folder.iterdir()} - {"run.json"} == set(NAMES) - {"run.json"}
+    assert run["files"]["tracks.txt"]["bytes"] == (folder / "tracks.txt").stat().st_size
+    assert list(run)[:2] == ["format", "tracker"]
+    assert validate(folder) == validate(tmp_path) == []
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_no_flipped_bit_is_accepted(tmp_path, make_tracks, name):
+    """One bit in each of 200 places of every file, spread over the whole of it; every fifth bit of run.json."""
+    folder = write_tracks(tmp_path / "t", make_tracks(1), fps=10.0, info=INFO)
+    path, right = folder / name, (folder / name).read_bytes()
+    bits = 8 * len(right)
+    chosen = range(0, bits, 5) if name == "run.json" else np.unique(np.linspace(0, bits - 1, 200).astype(int)).tolist()
+    for bit in chosen:
+        body = bytearray(right)
+        body[bit // 8] ^= 1 << bit % 8
+        path.write_bytes(body)
+        with pytest.raises(InputError) as error:
+            check_run(folder)
+        assert error.value.file == str(path)
+    with pytest.raises(InputError):
+        read_tracks(folder)
+    assert validate(folder)
+    path.write_bytes(right)
+    assert validate(folder) == []
+
+
+@pytest.mark.parametrize("name", [name for name in NAMES if name != "run.json"])
+def test_a_deleted_or_cut_file_is_named(tmp_path, make_tracks, name):
+    folder = write_tracks(tmp_path / "t", make_tracks(1), fps=10.0, info=INFO)
+    (folder / name).write_bytes((folder / name).read_bytes()[:-1])
+    with pytest.raises(InputError, match=r"truncated.*track again") as error:
+        read_tracks(folder)
+    assert error.value.file == str(folder / name)
+    (folder / name).unlink()
+    with pytest.raises(InputError, match=r"missing.*track again") as error:
+        read_tracks(folder)
+    assert error.value.file == str(folder / name)
+
+
+@pytest.mark.parametrize("given", ["", "tracks.parquet", "tracks.txt", "tracks.mot.txt"])
+def test_whichever_file_is_given_the_whole_run_is_checked(tmp_path, make_tracks, given):
+    folder = write_tracks(tmp_path / "t", make_tracks(1), fps=10.0, info=INFO)
+    (folder / "events.json").write_bytes(b'{"format": 1, "events": []}\n')
+    with pytest.raises(InputError, match=r"events\.json: got truncated"):
+        read_tracks(folder / given, fps=10.0)
+
+
+def test_tables_without_a_seal_were_never_finished(tmp_path, make_tracks):
+    folder = write_tracks(tmp_path / "t", make_tracks(1), fps=10.0, info=INFO)
+    (folder / "run.json").unlink()
+    with pytest.raises(InputError, match="incomplete: track again"):
+        read_tracks(folder)
+    (problem,) = validate(folder)
+    assert "incomplete: track again" in problem.line()
+
+
+def test_a_run_of_an_older_version_is_one_line(tmp_path, make_tracks):
+    folder = write_tracks(tmp_path / "t", make_tracks(1), fps=10.0, info=INFO)
+    (folder / "run.json").write_bytes(tables.json_document({"format": 1, **INFO, "boxes": "measured"}))
+    for _ in range(2):
+        with pytest.raises(InputError, match=r"older version.*track again") as error:
+            read_tracks(folder)
+        assert "\n" not in str(error.value)
+        (folder / "tracks.parquet").unlink(missing_ok=True)
+
+
+def test_files_of_two_runs_are_refused(tmp_path, make_tracks):
+    """Whichever file is of the other run; and one that this run would not have."""
+    one, two = (tracks_files(make_tracks(seed), fps=10.0, info=INFO) for seed in (1, 2))
+    for name in NAMES:
+        folder = write(tmp_path / name, {**one, name: two[name]})
+        with pytest.raises(InputError, match="track again"):
+            read_tracks(folder)
+    bare = tracks_files([t.replace(groups=None) for t in make_tracks(1)], fps=10.0, info=INFO)
+    folder = write(tmp_path / "bare", {"groups.parquet": one["groups.parquet"], **bare})
+    with pytest.raises(InputError, match=r"groups\.parquet: got a file that run\.json does not name"):
+        read_tracks(folder)
+
+
+def test_files_of_others_beside_a_run_are_no_fault(tmp_path, make_tracks, same):
+    live = make_tracks(1)
+    folder = write_tracks(tmp_path / "t", live, fps=10.0)
+    (folder / "mine.txt").write_text("x")
+    (folder / "overlay.mp4").write_text("x")
+    same(live, read_tracks(folder))
+    write_tracks(folder, make_tracks(2), fps=10.0)
+    assert (folder / "mine.txt").read_text() == (folder / "overlay.mp4").read_text() == "x"
+
+
+@pytest.mark.parametrize("name", ["tracks.txt", "groups.csv", "events.json"])
+def test_files_of_others_are_not_replaced(tmp_path, make_tracks, name):
+    (tmp_path / name).write_text("mine")
+    with pytest.raises(InputError, match="another program"):
+        write_tracks(tmp_path, make_tracks(1), fps=10.0)
+    assert {p.name: p.read_text() for p in tmp_path.iterdir()} == {name: "mine"}
+
+
+FAULTS = {
+    "id": (lambda t: t.replace(id=np.where(t.id == t.id.max(), -1, t.id)), "negative id"),
+    "id twice": (lambda t: t.replace(id=np.full_like(t.id, 3)), "second time"),
+    "group": (lambda t: t.replace(group=t.group - 5), "group below -1"),
+    "pos nan": (lambda t: t.replace(pos=t.pos * np.nan), "NaN or infinity in pos"),
+    "pos inf": (lambda t: t.replace(pos=t.pos + np.inf), "NaN or infinity in pos"),
+    "vel": (lambda t: t.replace(vel=t.vel + np.inf), "infinity in vel"),
+    "score": (lambda t: t.replace(score=t.score * np.nan), "NaN or infinity in score"),
+    "box": (lambda t: t if t.box is None else t.replace(box=t.box * np.nan), "NaN or infinity in box"),
+}
+
+
+@pytest.mark.parametrize("fault", FAULTS)
+def test_a_sealed_fault_is_a_fault(tmp_path, make_tracks, monkeypatch, fault):
+    """Neither the writer nor the reader takes it, even with right hashes."""
+    spoil, words = FAULTS[fault]
+    wrong = [spoil(t.replace(id=t.id + 1)) if len(t.id) > 1 else t for t in make_tracks(1)]
+    with pytest.raises(InputError, match=words):
+        write_tracks(tmp_path / "t", wrong, fps=10.0)
+    assert not (tmp_path / "t").exists()
+    with monkeypatch.context() as patch:
+        patch.setattr("sim.io.store.track_tables.RunRows.reject_faults", lambda *_: None)
+        write_tracks(tmp_path / "t", wrong, fps=10.0)
+    with pytest.raises(InputError, match=words) as error:
+        read_tracks(tmp_path / "t")
+    assert error.value.place.startswith("frame ")
+
+
+def test_half_an_id_in_a_table(tmp_path, make_tracks, monkeypatch):
+    with monkeypatch.context() as patch:
+        patch.setattr("sim.io.store.track_tables.RunRows.reject_faults", lambda *_: None)
+        wrong = [t.replace(id=t.id.astype(float) + 0.5) for t in make_tracks(1)]
+        write_tracks(tmp_path / "t", wrong, fps=10.0)
+    with pytest.raises(InputError, match="id: got a column of float64"):
+        read_tracks(tmp_path / "t")
+
+
+def test_groups_of_other_frames_or_ids(tmp_path, make_tracks):
+    one = tracks_files(make_tracks(1), fps=10.0, info=INFO)
+    for name, groups in (
+        ("fewer", tracks_files(make_tracks(1)[:5], fps=10.0)["groups.parquet"]),
+        ("later", tracks_files([t.replace(index=t.index + 1) for t in make_tracks(1)], fps=10.0)["groups.parquet"]),
+    ):
+        folder = write(tmp_path / name, {**one, "groups.parquet": groups})
+        seal_again(folder)
+        with pytest.raises(InputError, match=r"groups\.parquet: schema: got groups of frames"):
+            read_tracks(folder)
+    spoilt = []
+    for t in make_tracks(1):
+        some = t.groups
+        spoilt.append(t if some is None else t.replace(groups=some.replace(id=some.id - 9)))
+    folder = write(tmp_path / "ids", {**one, "groups.parquet": tracks_files(spoilt, fps=10.0)["groups.parquet"]})
+    seal_again(folder)
+    with pytest.raises(InputError, match=r"groups\.parquet: frame \d+: got group -\d"):
+        read_tracks(folder)
+
+
+def test_a_page_of_a_table_has_a_checksum(tmp_path, make_tracks):
+    """Also without a seal around it: of 200 bits of the pages none flips unseen; what is left is the footer."""
+    path = tmp_path / "x.parquet"
+    right = tracks_files(make_tracks(1), fps=10.0)["tracks.parquet"]
+    footer = int.from_bytes(right[-8:-4], "little") + 8
+    path.write_bytes(right)
+    before, seen = tables.read_table(path), 0
+    for bit in np.unique(np.linspace(32, 8 * (len(right) - footer) - 1, 200).astype(int)).tolist():
+        body = bytearray(right)
+        body[bit // 8] ^= 1 << bit % 8
+        path.write_bytes(body)
+        try:
+            found = tables.read_table(path)
+        except InputError:
+            seen += 1
+            continue
+        assert all(np.array_equal(v, before.columns[k], equal_nan=True) for k, v in found.columns.items()), bit
+    assert seen > 100
+
+
+def test_what_was_tracked(make_sequence):
+    """Labels and frame rate count; name, scale and what follows from the rest do not."""
+    sequence = make_sequence(1)
+    truth, own = sequence.truth, tracked_hash(sequence)
+    assert own == labels_hash(truth)
+    assert labels_hash(truth.replace(name="other", px_per_m=9.0, vel=None, events=None)) == own
+    for change in ({"fps": 5.0}, {"length": 13}, {"pos": truth.pos + 1e-9}, {"group": truth.group + 1}):
+        assert labels_hash(truth.replace(**change)) != own
+    assert tracked_hash(replace(sequence, source={"truth_hash": "abc"})) == "abc"
+    assert tracked_hash(replace(sequence, load_truth=None)) is None
+
+
+def test_a_name_that_is_no_text_is_stored(tmp_path, make_tracks):
+    """A folder's name with bytes that are no UTF-8."""
+    name = os.fsdecode(b"caf\xe9")
+    folder = write_tracks(tmp_path / "t", make_tracks(1), fps=10.0, info={**INFO, "sequence": name})
+    assert check_run(folder)["sequence"] == name
+
+
+# A program of its own that writes the new run over a folder, killed before the k-th call that changes the disk.
+PROGRAM = """
+import os, pickle, sys
+from pathlib import Path
+from sim.io.files import atomic
+from sim.io.store.run_seal import NAMES
+
+root, files = Path(sys.argv[1]), pickle.loads(Path(sys.argv[2]).read_bytes())
+atomic.SYNC_THREADS = 1
+
+def write(folder, last):
+    count = 0
+    def dying(call):
+        def run(*arguments, **more):
+            nonlocal count
+            count += 1
+            if count == last:
+                os._exit(9)
+            return call(*arguments, **more)
+        return run
+    for name in ("fsync", "replace", "unlink", "mkdir"):
+        setattr(os, name, dying(getattr(os, name)))
+    atomic.replace_sealed(folder, files, "run.json", NAMES)
+
+for k in range(1, 200):
+    child = os.fork()
+    if child == 0:
+        write(root / str(k), k)
+        os._exit(0)
+    _, status = os.waitpid(child, 0)
+    if status == 0:
+        break
+print(k)
+"""
+
+
+@pytest.mark.parametrize("before", ["another run", "nothing"])
+def test_killed_at_any_moment(tmp_path, make_tracks, same, before):
+    """The old run is whole, or the new one is, or the folder is refused."""
+    old, new = make_tracks(1), [t.replace(groups=None) for t in make_tracks(2)]
+    (tmp_path / "program.py").write_text(PROGRAM)
+    (tmp_path / "files").write_bytes(pickle.dumps(tracks_files(new, fps=10.0, info=INFO)))
+    first = write_tracks(tmp_path / "old", old, fps=10.0, info=INFO)
+    (tmp_path / "out").mkdir()
+    for k in range(1, 60):
+        if before == "another run":
+            shutil.copytree(first, tmp_path / "out" / str(k))
+    done = subprocess.run(
+        [sys.executable, str(tmp_path / "program.py"), str(tmp_path / "out"), str(tmp_path / "files")],
+        env={**os.environ, "PYTHONPATH": str(ROOT)}, capture_output=True, text=True, timeout=120, check=False,
+    )  # fmt: skip
+    assert done.returncode == 0, done.stderr
+    last = int(done.stdout)
+    assert 15 < last < 60
+    ended = [ending(tmp_path / "out" / str(k), old, new, same) for k in range(1, last + 1)]
+    assert ended == sorted(ended, key=["nothing", "old", "refused", "new"].index)
+    assert ended[0] == ("nothing" if before == "nothing" else "old")
+    assert ended[-1] == "new"
+    assert "refused" in ended
+
+
+def ending(folder: Path, old: list, new: list, same) -> str:
+    """What a reader gets of a folder after a kill."""
+    try:
+        found = read_tracks(folder, fps=10.0)
+    except InputError as refusal:
+        line = refusal.line()
+    else:
+        kind = "new" if found[0].groups is None else "old"
+        same(found, {"old": old, "new": new}[kind])
+        return kind
+    if (folder / "tracks.parquet").exists():
+        assert "incomplete: track again" in line
+        return "refused"
+    assert "no tracks" in line
+    return "nothing"
+
+
+def test_hashes_of_files_and_of_the_seal(tmp_path):
+    (tmp_path / "a").write_bytes(b"abc")
+    facts = seal.file_facts({"a": b"abc"})
+    assert list(seal.damaged_files(tmp_path, facts, seal="s", remedy="r")) == []
+    (tmp_path / "a").write_bytes(b"abd")
+    (problem,) = seal.damaged_files(tmp_path, facts, seal="s", remedy="r")
+    assert "altered: 3 bytes" in problem.line()
+    assert list(seal.damaged_files(tmp_path, facts, seal="s", remedy="r", size_only=["a"])) == []
+    assert seal.with_hash({"x": 1, "sha256": "old"}) == seal.with_hash({"x": 1})
+
+
+RIGHT = {"sha256": "x", "bytes": 3}
+
+
+@pytest.mark.parametrize(
+    "files",
+    [
+        {"a": 3}, {"a": {"sha256": "x"}}, {"a": {"sha256": "x", "bytes": "3"}}, {"": RIGHT}, {"../a": RIGHT},
+        {"/a": RIGHT}, {"a\0": RIGHT},
+    ],
+)  # fmt: skip
+def test_a_seal_that_names_what_cannot_be(tmp_path, make_tracks, files):
+    """With a right hash of its own."""
+    folder = write_tracks(tmp_path / "t", make_tracks(1), fps=10.0, info=INFO)
+    run = {**tables.read_json(folder / "run.json"), "files": files}
+    (folder / "run.json").write_bytes(tables.json_document(seal.with_hash(run)))
+    with pytest.raises(InputError, match="files") as error:
+        read_tracks(folder)
+    assert "\n" not in str(error.value)
+
+
+def test_a_fifo_in_place_of_a_file_blocks_nobody(tmp_path, make_tracks):
+    folder = write_tracks(tmp_path / "t", make_tracks(1), fps=10.0, info=INFO)
+    (folder / "events.json").unlink()
+    os.mkfifo(folder / "events.json")
+    with pytest.raises(InputError, match="missing"):
+        read_tracks(folder)

@@ -1,0 +1,202 @@
+"""What `score`, `view`, `overlay` and `validate` make of folders of runs that are not what they seem."""
+
+from __future__ import annotations
+
+import json
+import shutil
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from tests.sealing import seal_again
+from tracking.app.cli import run
+
+SCENE = """
+schema = 1
+duration = 4.0
+warmup = 1.0
+camera = { fps = 5, image = [128, 96] }
+group = [
+  { id = "a", size = 2, start = [4, 4], goal = [12, 4] },
+  { id = "b", size = 1, start = [12, 7], goal = [4, 7] },
+]
+"""
+ROWS = "".join(f"{k},1,{10 + k},10,20,40,1,1,1\n{k},2,{40 - k},12,20,40,1,1,1\n" for k in range(1, 9))
+
+
+@pytest.fixture(scope="module")
+def made(tmp_path_factory) -> Path:
+    """Two seeds of a scene, with the tracks of both trackers."""
+    folder = tmp_path_factory.mktemp("made")
+    (folder / "scene.toml").write_text(SCENE)
+    line = ["generate", str(folder / "scene.toml"), "--seeds", "40000:40002", "--streams", "left", "--out"]
+    assert run([*line, str(folder / "data")]) == 0
+    for tracker in ("blob", "group-pda"):
+        options = ["--detections", "file", "--out", str(folder / tracker)]
+        assert run(["track", tracker, str(folder / "data"), *options]) == 0
+    return folder
+
+
+@pytest.fixture
+def tracks(made: Path, tmp_path: Path) -> Path:
+    """A copy of blob's tracks, to be spoilt."""
+    return Path(shutil.copytree(made / "blob", tmp_path / "tracks"))
+
+
+def refused(capsys, *words: object) -> str:
+    capsys.readouterr()
+    assert run([str(word) for word in words]) == 2
+    line = capsys.readouterr().err
+    assert line.count("\n") == 1
+    return line
+
+
+def readers(data: Path, tracks: Path, out: Path) -> list[list[object]]:
+    """Every command that reads tracks."""
+    return [
+        ["score", data, tracks],
+        ["score", data, tracks, "--against", tracks],
+        ["view", data, tracks, "--video", "none", "--out", out / "pages"],
+        ["overlay", data, tracks, "--out", out / "films"],
+    ]
+
+
+@pytest.mark.parametrize("name", ["groups.parquet", "events.json", "tracks.mot.txt"])
+def test_a_deleted_file_is_no_answer_without_it(made, tracks, tmp_path, capsys, name):
+    (tracks / "scene-s40001" / name).unlink()
+    for line in readers(made / "data", tracks, tmp_path / "out"):
+        text = refused(capsys, *line)
+        assert f"{name}: got missing" in text
+        assert "track again" in text
+    assert not (tmp_path / "out").exists()
+
+
+def test_an_unfinished_run(made, tracks, tmp_path, capsys):
+    (tracks / "scene-s40001" / "run.json").unlink()
+    for line in readers(made / "data", tracks, tmp_path / "out"):
+        assert "incomplete: track again" in refused(capsys, *line)
+    (one,) = (p for p in (made / "data").rglob("*s40001") if p.is_dir())
+    alone = (tracks / "scene-s40001").rename(tmp_path / "alone")
+    assert "incomplete: track again" in refused(capsys, "score", one, alone)
+
+
+def test_two_trackers_in_one_folder(made, tracks, tmp_path, capsys):
+    shutil.rmtree(tracks / "scene-s40001")
+    shutil.copytree(made / "group-pda" / "scene-s40001", tracks / "scene-s40001")
+    for line in readers(made / "data", tracks, tmp_path / "out"):
+        text = refused(capsys, *line)
+        assert "blob in scene-s40000, group-pda in scene-s40001" in text
+        assert "one folder per run" in text
+    (one,) = (p for p in (made / "data").rglob("*s40001") if p.is_dir())
+    assert run(["score", str(one), str(tracks)]) == 0
+
+
+@pytest.mark.parametrize(
+    ("option", "words"),
+    [
+        (["--set", "confirm_gate=0.9"], "blob (confirm_gate = "),
+        (["--grouping", "{folder}/rule.toml"], "blob (near = 0.7"),
+    ],
+)
+def test_two_configs_in_one_folder(made, tracks, tmp_path, capsys, option, words):
+    (tmp_path / "rule.toml").write_text("[params]\nnear = 0.7\n")
+    (one,) = (p for p in (made / "data").rglob("*s40001") if p.is_dir())
+    options = [word.format(folder=tmp_path) for word in option]
+    line = ["track", "blob", str(one), "--detections", "file", *options, "--out", str(tracks / "scene-s40001")]
+    assert run(line) == 0
+    text = refused(capsys, "score", made / "data", tracks)
+    assert words in text
+    assert "one folder per run" in text
+
+
+def test_another_sequence_of_that_name(made, tracks, tmp_path, capsys):
+    """The same seed of the same scene with other settings."""
+    line = ["generate", str(made / "scene.toml"), "--seeds", "40000:40002", "--streams", "left", "--out"]
+    assert run([*line, str(tmp_path / "other"), "--set", "crowd.free_speed=1.0"]) == 0
+    for line in readers(tmp_path / "other", tracks, tmp_path / "out"):
+        text = refused(capsys, *line)
+        assert "tracks of another scene-s40000" in text
+        assert "track again" in text
+
+
+def recording(folder: Path, rows: str) -> Path:
+    (folder / "gt").mkdir(parents=True)
+    (folder / "gt" / "gt.txt").write_text(rows)
+    return folder
+
+
+def test_another_recording_of_that_name(tmp_path, capsys):
+    one, two = (recording(tmp_path / k / "walk", rows) for k, rows in (("1", ROWS), ("2", ROWS.replace("12,", "13,"))))
+    options = ["--detections", "truth", "--fps", "5", "--out"]
+    assert run(["track", "blob", str(one), *options, str(tmp_path / "t")]) == 0
+    assert run(["score", str(one), str(tmp_path / "t"), "--fps", "5"]) == 0
+    assert run(["score", str(one), str(tmp_path / "t"), "--fps", "5", "--px-per-m", "30"]) == 0
+    assert "tracks of another walk" in refused(capsys, "score", two, tmp_path / "t", "--fps", "5")
+
+
+def test_what_was_tracked_before_anybody_labelled_it(tmp_path):
+    """Tracks of a recording without labels are scored with labels of that name."""
+    walk = tmp_path / "walk"
+    (walk / "det").mkdir(parents=True)
+    (walk / "det" / "det.txt").write_text("".join(f"{k},-1,{10 + k},10,20,40,1\n" for k in range(1, 9)))
+    line = ["track", "blob", str(walk), "--fps", "5", "--px-per-m", "24", "--out", str(tmp_path / "t")]
+    assert run(line) == 0
+    assert json.loads((tmp_path / "t" / "run.json").read_text())["truth_hash"] is None
+    recording(walk, ROWS)
+    assert run(["score", str(walk), str(tmp_path / "t"), "--fps", "5"]) == 0
+
+
+def test_labels_that_cannot_be_read_stop_track_before_the_first_frame(tmp_path, capsys):
+    walk = recording(tmp_path / "walk", ROWS + "3,1,x,10,20,40,1,1,1\n")
+    (walk / "seqinfo.ini").write_text("[Sequence]\nseqLength=8\nframeRate=5\n")
+    (walk / "det").mkdir()
+    (walk / "det" / "det.txt").write_text("1,-1,10,10,20,40,1\n")
+    text = refused(capsys, "track", "blob", walk, "--px-per-m", "24", "--out", tmp_path / "t")
+    assert "gt.txt: line 17" in text
+    assert not (tmp_path / "t").exists()
+
+
+def test_a_text_of_others_is_what_it_was(made, tmp_path, capsys):
+    """A folder of texts, one text, and a folder with a tracks.txt alone; none has a run.json."""
+    texts = tmp_path / "texts"
+    texts.mkdir()
+    for folder in (made / "blob").iterdir():
+        shutil.copy(folder / "tracks.mot.txt", texts / f"{folder.name}.txt")
+        (tmp_path / "folders" / folder.name).mkdir(parents=True)
+        shutil.copy(folder / "tracks.txt", tmp_path / "folders" / folder.name / "tracks.txt")
+    assert run(["score", str(made / "data"), str(texts)]) == 0
+    assert run(["score", str(made / "data"), str(tmp_path / "folders")]) == 0
+    (one,) = (p for p in (made / "data").rglob("*s40001") if p.is_dir())
+    assert run(["score", str(one), str(texts / "scene-s40001.txt")]) == 0
+    capsys.readouterr()
+
+
+def test_validate_says_whether_a_run_is_whole(made, tracks, capsys):
+    assert run(["validate", str(tracks), "--json"]) == 0
+    assert json.loads(capsys.readouterr().out) == {"status": "ok", "problems": [], "content_hash": None}
+    assert run(["validate", str(tracks / "scene-s40000")]) == 0
+    assert capsys.readouterr().out.endswith("scene-s40000: no problems\n")
+    path = tracks / "scene-s40000" / "tracks.parquet"
+    path.write_bytes(path.read_bytes()[:-3])
+    (tracks / "scene-s40001" / "run.json").unlink()
+    assert run(["validate", str(tracks)]) == 1
+    lines = capsys.readouterr().out.splitlines()
+    assert len(lines) == 2
+    assert f"{path}: got truncated" in lines[0]
+    assert "scene-s40001: got tracks without run.json" in lines[1]
+    assert run(["validate", str(made)]) in (0, 1)  # data and tracks together
+
+
+def test_a_sealed_fault_is_named_with_its_frame(made, tracks, tmp_path, capsys, monkeypatch):
+    """NaN in a table with right hashes, as a broken writer could make it."""
+    from sim.io.store.track_files import read_tracks, write_tracks
+
+    folder = tracks / "scene-s40000"
+    info = json.loads((folder / "run.json").read_text())
+    wrong = [t.replace(pos=t.pos * (np.nan if t.index == 7 else 1.0)) for t in read_tracks(folder)]
+    with monkeypatch.context() as patch:
+        patch.setattr("sim.io.store.track_tables.RunRows.reject_faults", lambda *_: None)
+        write_tracks(folder, wrong, fps=5.0, info=info)
+    seal_again(folder)
+    assert "tracks.parquet: frame 7, id " in refused(capsys, "score", made / "data", tracks)
