@@ -158,8 +158,7 @@ class _Pictures:
 
         Its exact pixels are drawn too, and kept for `pixels`, if "left" and one of "ids" and "disparity" are requested,
         else None. Raises InputError for impossible values of light and picture, or if there is no right camera for
-        "right" or "disparity"; IndexError for a frame that does not exist; ValueError if a
-        distribution of light or picture has no value within its clip.
+        "right" or "disparity"; IndexError for a frame that does not exist.
         """
         if not self.has_image:
             return RenderedFrame(right=self.renderer.right(index) if self.has_right else None)
@@ -212,8 +211,7 @@ def named_people(
 
     These are all groups that the scenario lists, also those that enter later, and the groups that merge orders (`into`)
     and split orders (`parts`) made. orders: the script's orders; one that never took effect (fired None) makes no
-    group. scene, seed, repeat: those of the simulation. Raises InputError if a group has no free place at its start,
-    ValueError if a distribution has no draw within its clip.
+    group. scene, seed, repeat: those of the simulation. Raises InputError if a group has no free place at its start.
     """
     from sim.crowd.population import draw_population
 

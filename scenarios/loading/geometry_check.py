@@ -13,6 +13,7 @@ from pathlib import Path
 from scenarios.errors import InputError
 from scenarios.loading.script_check import QUEUE_PEOPLE, check_script, fail
 from scenarios.loading.toml_files import did_you_mean
+from scenarios.loading.value_check import check_values
 from scenarios.schema.geometry import clearance, door_fits, queue_places
 from scenarios.schema.scenario import MergeOrder, QueueOrder, Scenario, SplitOrder, group_names
 from scenarios.schema.values import Point, bounds, fixed
@@ -24,12 +25,14 @@ BODY = 0.2
 def check(scenario: Scenario, file: str | Path = "") -> None:
     """Raises InputError, naming `file`, for the first thing in the scenario that cannot work; returns nothing.
 
-    Checked in this order: walls, doors and stairs; groups; hidden groups of the sensor; places inside the world and
-    clear of walls; the orders of the script. file: the scenario's, for the message only; "" names none.
+    Checked in this order: walls, doors and stairs; groups; ranges of values (value_check); hidden groups of the sensor;
+    places inside the world and clear of walls; the orders of the script. file: the scenario's, for the message only; ""
+    names none.
     """
     try:
         _check_world(scenario)
         _check_groups(scenario)
+        check_values(scenario)
         _check_sensor(scenario)
         _check_points(scenario)
         check_script(scenario)
@@ -57,9 +60,9 @@ def _check_world(scenario: Scenario) -> None:
 
 
 def _check_groups(scenario: Scenario) -> None:
-    """Raises InputError for a group whose name is taken, or whose size, speed or time of entry cannot be.
+    """Raises InputError for a group whose name is taken, or whose size or time of entry cannot be.
 
-    The size must be at least 0.5 in every draw, the speed above 0 in some draw, the entry before the end in some draw.
+    The size must be at least 0.5 in every draw, the entry before the end in some draw.
     """
     seen: set[str] = set()
     for group in scenario.group:
@@ -71,8 +74,6 @@ def _check_groups(scenario: Scenario) -> None:
         if low < 0.5:
             got = f"a size that can be {'any number' if math.isinf(low) else f'{low:g}'}"
             fail(f"group.{group.id}.size", got, "at least 1 person", "raise it, or add clip = [1, 6]")
-        if group.speed is not None and bounds(group.speed)[1] <= 0:
-            fail(f"group.{group.id}.speed", f"{bounds(group.speed)[1]:g} m/s at most", "more than 0", "raise it")
         if bounds(group.enter)[0] >= scenario.duration:
             got = f"{bounds(group.enter)[0]:g} s at the earliest"
             fail(f"group.{group.id}.enter", got, f"before the end, {scenario.duration:g} s", "enter earlier")

@@ -16,6 +16,7 @@ from scenarios.loading import overrides, suites, toml_files
 from scenarios.loading.geometry_check import check
 from scenarios.loading.toml_files import dump, names, suite_names
 from scenarios.loading.validation import validate
+from scenarios.loading.value_check import check_observation
 from scenarios.schema.observation import ObservationSpec
 from scenarios.schema.scenario import Scenario
 
@@ -61,7 +62,12 @@ def load_observation(path: str | Path | None = None, set: Iterable[str] = ()) ->
         )  # fmt: skip
     file = Path(path) if path is not None else ""
     table, places = overrides.apply_settings({} if path is None else toml_files.parse(Path(path)), tuple(set), file)
-    return validate(table, file, places, model=ObservationSpec)
+    spec = validate(table, file, places, model=ObservationSpec)
+    try:
+        check_observation(spec)
+    except InputError as error:
+        raise InputError(**{**error.as_dict(), "file": str(file)}) from None
+    return spec
 
 
 def resolve(name: str, set: Iterable[str] = ()) -> list[Entry]:

@@ -4,6 +4,7 @@ one line.
 
 from __future__ import annotations
 
+import math
 import re
 import typing
 from typing import Any
@@ -11,6 +12,7 @@ from typing import Any
 from pydantic import BaseModel, ValidationError
 
 from scenarios.errors import InputError
+from scenarios.limits import COORDINATE
 from scenarios.loading.overrides import KeyPath
 from scenarios.loading.toml_files import Table, did_you_mean
 from scenarios.schema.scenario import Scenario
@@ -25,14 +27,30 @@ M = typing.TypeVar("M", bound=BaseModel)
 def validate(table: Table, file: object = "", places: dict[KeyPath, str] | None = None, *, model: type[M]) -> M:
     """Returns the table as a model: a Scenario or one of its tables.
 
-    Types are strict: no text for a number. Raises InputError with the first problem: the file, the key, what was
-    expected there, and how many more problems there are. file: for the message. places: texts of `--set` by path of
-    keys and indices, as overrides.apply_settings returns them; an error at or below such a path names the setting.
+    Types are strict: no text for a number. Numbers beyond 1e6 are refused. Raises InputError with the first problem:
+    the file, the key, what was expected there, and how many more problems there are. file: for the message. places:
+    texts of `--set` by path of keys and indices, as overrides.apply_settings returns them; an error at or below such a
+    path names the setting.
     """
+    for path, number in _numbers(table):
+        if abs(number) > COORDINATE:
+            raise InputError(
+                file=file, place=_place(path, table, places or {}), got=str(number)[:40],
+                expected=f"a number within {COORDINATE:g}", remedy="correct the value",
+            )  # fmt: skip
     try:
         return model.model_validate(_tuples(table), strict=True)
     except ValidationError as error:
         raise input_error(error, table, file, places or {}, model) from None
+
+
+def _numbers(value: Any, path: KeyPath = ()) -> typing.Iterator[tuple[KeyPath, float]]:
+    """Yields every number in a table with its path; infinite ones and nan are left to the model."""
+    if isinstance(value, dict | list):
+        for key, inner in value.items() if isinstance(value, dict) else enumerate(value):
+            yield from _numbers(inner, (*path, key))
+    elif isinstance(value, int | float) and not isinstance(value, bool) and math.isfinite(value):
+        yield path, value
 
 
 def _tuples(value: Any) -> Any:

@@ -14,7 +14,10 @@ from typing import Annotated, Self
 import numpy as np
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 
-MAX_REDRAWS = 10_000
+LEAST_SHARE = 0.01
+"""Least probability that a draw lies within the clip of its distribution."""
+LARGEST_MEAN = 1000.0
+"""Largest mean of a Poisson distribution."""
 
 Positive = Annotated[float, Field(gt=0)]
 NonNegative = Annotated[float, Field(ge=0)]
@@ -49,7 +52,7 @@ class Distribution(BaseModel):
     normal: tuple[float, Annotated[float, Field(ge=0)]] | None = None
     uniform: tuple[float, float] | None = None
     exponential: Annotated[float, Field(gt=0)] | None = None
-    poisson: Annotated[float, Field(gt=0)] | None = None
+    poisson: Annotated[float, Field(gt=0, le=LARGEST_MEAN)] | None = None
     choice: Annotated[tuple[float, ...], Field(min_length=1)] | None = None
     clip: tuple[float, float] | None = None
 
@@ -67,7 +70,38 @@ class Distribution(BaseModel):
             raise ValueError("clip = [low, high] with low <= high")
         if self.uniform is not None and self.uniform[0] > self.uniform[1]:
             raise ValueError("uniform = [low, high] with low <= high")
+        if self.clip is not None and self._below(self.clip[1]) - self._below(self.clip[0], strictly=True) < LEAST_SHARE:
+            raise ValueError(f"a clip that keeps at least {LEAST_SHARE:.0%} of the draws")
         return self
+
+    def _below(self, x: float, strictly: bool = False) -> float:
+        """Returns the probability that one draw, ignoring `clip`, is at most x, or with `strictly` below x."""
+        if self.choice is not None:
+            return sum(v < x if strictly else v <= x for v in self.choice) / len(self.choice)
+        if self.poisson is not None:
+            return poisson_share(self.poisson, math.ceil(x) - 1 if strictly else math.floor(x)) if x >= 0 else 0.0
+        if self.exponential is not None:
+            return -math.expm1(-max(x, 0.0) / self.exponential)
+        low, high = self.uniform if self.uniform is not None else (0.0, 0.0)
+        if self.normal is not None and self.normal[1] > 0:
+            return math.erfc((self.normal[0] - x) / (self.normal[1] * math.sqrt(2))) / 2
+        if self.normal is not None:
+            low = high = self.normal[0]
+        if low == high:
+            return float(low < x if strictly else low <= x)
+        return min(max((x - low) / (high - low), 0.0), 1.0)
+
+    def share_within(self, low: float, high: float) -> float:
+        """Returns the probability that a value drawn within `clip` lies between low and high, both included."""
+        a, b = (-math.inf, math.inf) if self.clip is None else self.clip
+        kept = self._share(a, b)
+        return self._share(max(a, low), min(b, high)) / kept
+
+    def _share(self, low: float, high: float) -> float:
+        if low > high:
+            return 0.0
+        above = 1.0 if math.isinf(high) else self._below(high)
+        return max(0.0, above - (0.0 if math.isinf(low) else self._below(low, strictly=True)))
 
     def _draw(self, rng: np.random.Generator) -> float:
         """Returns one draw from rng, ignoring `clip`; poisson gives a whole number as float."""
@@ -85,24 +119,32 @@ class Distribution(BaseModel):
     def draw(self, rng: np.random.Generator) -> float:
         """Returns one value from rng within `clip`, bounds included; draws outside are drawn again.
 
-        Raises ValueError if none of MAX_REDRAWS (10,000) draws lies within `clip`.
+        At least 1 of 100 draws lies within a clip, so that this ends.
         """
-        for _ in range(MAX_REDRAWS):
+        while True:
             value = self._draw(rng)
             if self.clip is None or self.clip[0] <= value <= self.clip[1]:
                 return value
-        raise ValueError(f"no draw in clip {list(self.clip or ())} after {MAX_REDRAWS} tries")
 
 
 Value = float | Distribution
 Point = tuple[Value, Value]
 
 
-def draw(value: Value, rng: np.random.Generator) -> float:
-    """Returns the number itself as float, or one draw of the distribution from rng.
+def poisson_share(mean: float, k: int) -> float:
+    """Returns the probability that a Poisson distribution of this mean gives at most k; k from -1 on."""
+    last = min(k, math.ceil(mean + 40 * math.sqrt(mean) + 40))  # what lies above has no share
+    logs = (n * math.log(mean) - mean - math.lgamma(n + 1) for n in range(last + 1))
+    return min(1.0, math.fsum(map(math.exp, logs)))
 
-    Raises ValueError if none of 10,000 draws lies within the distribution's clip.
-    """
+
+def share_within(value: Value, low: float, high: float) -> float:
+    """Returns the probability that a value lies between low and high, both included; 0 or 1 for a number."""
+    return value.share_within(low, high) if isinstance(value, Distribution) else float(low <= value <= high)
+
+
+def draw(value: Value, rng: np.random.Generator) -> float:
+    """Returns the number itself as float, or one draw of the distribution from rng."""
     return value.draw(rng) if isinstance(value, Distribution) else float(value)
 
 

@@ -40,7 +40,7 @@ class GroupState:
 
     - alive: index of each existing group by name. arrays: the ways of all groups, as the kernels use them.
     - by group index, ended groups included: members (columns), spacing (m), goals (point (2,) in m; "stand", "leave" or
-      "walk"). A group that an order made has no entry in `goals` until it queues.
+      "walk").
     - settled: indices of groups that stand in a circle. next_group: index of the next group that an order makes.
     - by column: group_of (group index), queue_of (order index, -1 in no queue), present, free_speed (m/s), places (P,
       2) in the formation (forward, left, m), targets (P, 2) in a queue (x, y, m), waypoint (index of the first not

@@ -37,8 +37,7 @@ class OrderExecution:
     - queues: the opened queues, by index (from 0) of their order in the file. fps: frames per s.
     - seed, repeat (the suite entry's copy, 0 for none): keys of the random draws of times, goals and service times.
 
-    Construction takes scenario, groups, placement, seed and repeat, and draws each order's delay and time. It raises
-    ValueError if no draw lies within its distribution's clip.
+    Construction takes scenario, groups, placement, seed and repeat, and draws each order's delay and time.
     """
 
     def __init__(
@@ -57,7 +56,7 @@ class OrderExecution:
         """Returns the order with index k (from 0) in the file, ready to wait for its trigger; its delay and time are
         drawn, s.
 
-        The time is inf unless the trigger is `time`. Raises ValueError if no draw lies within its distribution's clip.
+        The time is inf unless the trigger is `time`.
         """
         when = order.when
         time = np.inf if when.time is None else draw(when.time, self._rng("event", k, 1))
@@ -70,8 +69,7 @@ class OrderExecution:
         frame: recorded frame from 0, at t = frame / fps; in the warm-up nothing fires. state (P, 4): x, y, vx, vy by
         column, m, m/s, nan while absent. Orders are taken in the order of the file. From the frame after firing, an
         order's rule is examined until it has held long enough; then its id joins come_true. Returns False only if
-        nothing has changed that `GroupState.fill` writes. It is always True once a queue has opened. Raises ValueError
-        if a goal or service time has no draw within its clip.
+        nothing has changed that `GroupState.fill` writes. It is always True once a queue has opened.
         """
         changed = bool(self.queues)
         for pending in self.pending:
@@ -102,10 +100,10 @@ class OrderExecution:
         Then it stands there in a circle (goal "meet"), or walks to the order's goal. It is no faster than its slowest
         parent; a walking group also no faster than its members' mean free speed less the slowdown. Its spacing is the
         mean of the parents'. state (P, 4): x, y, vx, vy by column, m, m/s. Sets pending.before and pending.after
-        (columns). Raises ValueError if a goal has no draw within its clip.
+        (columns).
         """
         groups, arrays = self.groups, self.groups.arrays
-        parents = [groups.alive.pop(name) for name in order.groups]
+        parents = [self._end(name) for name in order.groups]
         parts = [list(groups.members[g]) for g in parents]
         pending.before = tuple(tuple(c) for c in parts)
         columns = sorted(c for part in parts for c in part)
@@ -117,6 +115,7 @@ class OrderExecution:
         speeds = np.array([arrays.speed[p] for p in parents])
         goal = None if order.goal == "meet" else draw_point(order.goal, self.placement, r)
         meeting = meeting_point(middles, speeds, goal)
+        groups.goals[g] = (meeting, "stand") if goal is None else (goal, order.at_goal)
         if goal is None:
             groups.write_way(g, [(meeting, GATHER)], "stand", pace, meeting)
             places = standing(len(columns), groups.spacing[g])
@@ -128,15 +127,24 @@ class OrderExecution:
             places = walking(len(columns), groups.spacing[g])
         groups.take_places(columns, places, meeting, g, state[columns, :2])
 
+    def _end(self, name: str) -> int:
+        """Ends a group, which also leaves its queue, and returns its index; the caller makes new groups of its
+        people.
+        """
+        g = self.groups.alive.pop(name)
+        for queue in self.queues.values():
+            queue.remove(g)
+        return g
+
     def _split(self, pending: PendingOrder, order: SplitOrder, state: Array) -> None:
         """Divides a group, which ceases to exist, into the order's parts and gives each part a way to its own goal.
 
         Each member joins the part in whose goal's direction it is furthest ahead, as far as the parts' sizes allow.
         state (P, 4): x, y, vx, vy by column, m, m/s. Each part keeps the group's heading and spacing. Sets
-        pending.before and pending.after (columns). Raises ValueError if a goal has no draw within its clip.
+        pending.before and pending.after (columns).
         """
         groups = self.groups
-        parent = groups.alive.pop(order.group)
+        parent = self._end(order.group)
         columns = groups.members[parent]
         pending.before = (tuple(columns),)
         r = self._rng("event", pending.index, 2)
@@ -151,6 +159,7 @@ class OrderExecution:
             g = groups.new_group(part.id, own, groups.spacing[parent])
             here = state[own, :2].mean(axis=0)
             via = [draw_point(p, self.placement, r) for p in part.via]
+            groups.goals[g] = (goal, part.at_goal)
             groups.go(g, here, via, goal, part.at_goal, groups.walking_speed(own))
             groups.take_places(own, walking(len(own), groups.spacing[g]), here, g, state[own, :2])
             groups.arrays.heading[g] = groups.arrays.heading[parent]
@@ -160,12 +169,14 @@ class OrderExecution:
         """Opens a queue and sends the order's groups to it.
 
         Draws each group's service time (s). Overwrites where each group goes afterwards, if the order has a goal.
-        Without one, groups keep their own; a group that an order made has none and stands at the queue's head. Sets
-        pending.before (columns of each group) and pending.after (all columns as one part). Raises ValueError if a draw
-        has no value within its clip.
+        Without one, groups keep their own. A group that is in another queue leaves that one. Sets
+        pending.before (columns of each group) and pending.after (all columns as one part).
         """
         groups = self.groups
         queuing = [groups.alive[n] for n in concerned(order, list(groups.alive))]
+        for queue in self.queues.values():
+            for g in queuing:
+                queue.remove(g)
         r = self._rng("service", pending.index)
         service = {g: draw(order.service, r) for g in queuing}
         a = np.deg2rad(order.direction_deg)
@@ -178,7 +189,7 @@ class OrderExecution:
         pending.after = (tuple(sorted(columns)),)
         q = self._rng("event", pending.index, 2)
         for g in queuing:
-            goal, finish = groups.goals.get(g, (head, "stand"))
+            goal, finish = groups.goals[g]
             groups.goals[g] = (
                 goal if order.goal is None else draw_point(order.goal, self.placement, q),
                 finish if order.goal is None else order.at_goal,

@@ -109,8 +109,8 @@ def script_placement(scenario: Scenario, seed: int, repeat: int) -> ScriptPlacem
     """Returns the turn, mirror and lead that a seed draws for the script of a scenario.
 
     The turn is `turn_deg` in radians. If the scenario has `mirror`, the script is mirrored with probability 0.5.
-    repeat: number of the suite entry's copy, 0 for none; a further random key. Raises ValueError if no draw of
-    `turn_deg` or `lead` lies within its clip, or the seed is negative.
+    repeat: number of the suite entry's copy, 0 for none; a further random key. Raises ValueError if the seed is
+    negative.
     """
     r = rng(seed, "layout", repeat=repeat)
     turn = np.deg2rad(draw(scenario.turn_deg, r))
@@ -121,7 +121,7 @@ def script_placement(scenario: Scenario, seed: int, repeat: int) -> ScriptPlacem
 def draw_point(point: Point, placement: ScriptPlacement, r: np.random.Generator) -> Array:
     """Returns a point of the script in the world (2,), m: drawn, then mirrored and turned by `placement`.
 
-    Each coordinate that is a distribution is drawn from r; x first. Raises ValueError if no draw lies within its clip.
+    Each coordinate that is a distribution is drawn from r; x first.
     """
     return placement.point(np.array([draw(point[0], r), draw(point[1], r)]))
 
@@ -147,8 +147,7 @@ def draw_population(scenario: Scenario, scene: Scene, seed: int, repeat: int) ->
     Columns of people count from 0 through all groups. Members stand in formation at the group's start. Groups with
     entry time 0 need room among each other, groups that enter later do not; all must be clear of walls and pillars.
     seed, repeat: random keys. Raises InputError if a group has no free place at its start: a start of two numbers is
-    tried once, a drawn one TRIES (400) times. Raises ValueError if no draw of a distribution lies within its clip, or
-    the seed is negative.
+    tried once, a drawn one TRIES (400) times. Raises ValueError if the seed is negative.
     """
     draws = _Draws(scenario, scene, script_placement(scenario, seed, repeat), seed, repeat)
     taken: list[Array] = []
@@ -171,7 +170,7 @@ def _draw_group(draws: _Draws, spec: GroupSpec, name: str, key: tuple[int, int],
 
     draws: gives the random streams. spec: its entry in the scenario. name: of the group. key: index of the entry and of
     the copy, from 0. column: of the first member. The size is rounded, at least 1 person; the entry time is at least 0
-    s. An absent speed follows from the members' free speeds. Raises ValueError if no draw lies within its clip.
+    s. An absent speed follows from the members' free speeds.
     """
     r = draws.rng("group", *key, 0)
     crowd = draws.scenario.crowd
@@ -205,7 +204,7 @@ def _find_room(draws: _Draws, group: EnteringGroup, spec: GroupSpec, key: tuple[
     moves the start of a group that walks by lead × speed in that direction, at most half-way; a negative lead moves it
     back without limit. key: index of the entry `spec` and of its copy. taken: positions (n, 2), m, of the people of
     each earlier group with entry time 0. draws: random streams. A drawn start is drawn up to TRIES (400) times, a fixed
-    one tried once. Raises InputError if no try finds room, ValueError if no draw lies within its clip.
+    one tried once. Raises InputError if no try finds room.
     """
     placement, drawn = draws.placement, any(isinstance(v, Distribution) for v in spec.start)
     r = draws.rng("group", *key, 1)

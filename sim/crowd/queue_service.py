@@ -39,6 +39,16 @@ class ServiceQueue:
         queue's length."""
         return self.head + k * self.spacing * self.along
 
+    def remove(self, g: int) -> None:
+        """Takes group g out of the queue, as when it merges, splits or joins another queue; nothing if it is not in it.
+
+        If the group was being served, its service ends, and that of the next group can begin.
+        """
+        if self.joined[:1] == [g]:
+            self.busy_until = None
+        self.joined = [other for other in self.joined if other != g]
+        self.coming = [other for other in self.coming if other != g]
+
     def advance(self, t: float, members: dict[int, list[int]], pos: Array) -> tuple[dict[int, Array], list[int]]:
         """Advances the queue to time t (s): ends and begins service, and lets groups join at the tail.
 

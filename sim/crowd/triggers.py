@@ -55,9 +55,6 @@ class PendingOrder:
         either. A queue whose patterns match no group concerns none and may fire. state (P, 4): x, y, vx, vy by column,
         m, m/s. groups: the running groups, with their members and goals. come_true: ids of the orders that have come
         true.
-
-        Raises KeyError for a `reach` trigger without a place if its group was made by an order and has no goal
-        recorded.
         """
         names = concerned(self.order, list(groups.alive))
         if not all(n in groups.alive and groups.all_present(groups.alive[n]) for n in names):
@@ -75,8 +72,7 @@ class PendingOrder:
         - reach: the mean position of the trigger's group is nearer to the place than its radius; False if that group no
           longer exists or is not wholly in the scene.
 
-        state (P, 4): x, y, vx, vy by column, m, m/s. names: of the groups that the order concerns. Raises KeyError for
-        `reach` without a place if the group was made by an order and has no goal recorded.
+        state (P, 4): x, y, vx, vy by column, m, m/s. names: of the groups that the order concerns.
         """
         when = self.order.when
         if when.time is not None:
@@ -110,12 +106,12 @@ def concerned(order: MergeOrder | SplitOrder | QueueOrder, alive: list[str]) -> 
     """Returns the names of the groups that an order concerns, in the order in which the order names them.
 
     A split concerns one group. alive: names of all existing groups. `g-*` stands for all existing names that begin with
-    `g-`, in the order of alive; there may be none. A plain name is returned even if no such group exists; a name that
-    two patterns match is returned twice.
+    `g-`, in the order of alive; there may be none. A plain name is returned even if no such group exists. A name that
+    several patterns match is returned once.
     """
     if isinstance(order, SplitOrder):
         return [order.group]
-    return [n for pattern in order.groups for n in expand(pattern, alive)]
+    return list(dict.fromkeys(n for pattern in order.groups for n in expand(pattern, alive)))
 
 
 def rule_holds(pending: PendingOrder, state: Array, targets: Array) -> bool:

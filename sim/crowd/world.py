@@ -35,8 +35,8 @@ WRITE = pymunk.batch.BodyFields.FORCE
 def run(scenario: Scenario, seed: int, repeat: int = 0, steering: Steering | None = None) -> Motion:
     """Returns the whole motion of a scenario for a seed, without the warm-up. repeat: number of the suite entry's copy,
     a further random key; 0 for none. steering: None for the default parameters. Raises InputError if a group has no
-    free place at its start, ValueError if the seed is negative or no draw of a distribution lies within its clip,
-    WorkError if a position or velocity is not finite."""
+    free place at its start, ValueError if the seed is negative, WorkError if a position or velocity is not
+    finite."""
     world = World(scenario, seed, repeat, steering or Steering())
     return world.run()
 
@@ -80,8 +80,7 @@ class World:
       present, whose columns are `columns`. force: x, y, m/s², of the N people, then zeros for static bodies. states (P,
       4), group_of (P,): frame being recorded, by column, nan and -1 while absent.
 
-    Construction raises InputError if a group finds no room, ValueError if no draw of a distribution lies within its
-    clip.
+    Construction raises InputError if a group finds no room.
     """
 
     def __init__(self, scenario: Scenario, seed: int, repeat: int, steering: Steering) -> None:
@@ -112,7 +111,7 @@ class World:
 
     def run(self) -> Motion:
         """Returns the Motion of duration × fps frames (rounded, at least 1) after the warm-up. Raises WorkError if a
-        position or velocity is not finite, ValueError if an order's draw has no value within its clip."""
+        position or velocity is not finite."""
         frames = max(1, round(self.scenario.duration * self.fps))
         record = np.empty((frames, len(self.members), 4))
         intent = np.empty((frames, len(self.members)), np.int64)
@@ -122,8 +121,8 @@ class World:
 
     def frames(self, length: int) -> Iterator[tuple[Array, Ints]]:
         """Yields `length` frames after the warm-up, the first at time 0: states (P, 4): x, y, vx, vy in m, m/s; group
-        indices (P,). By column; nan and -1 while absent. The next frame overwrites both. While iterating it raises
-        WorkError if a state is not finite, ValueError if an order's draw has no value within its clip."""
+        indices (P,). By column; nan and -1 while absent. The next frame overwrites both. While iterating it
+        raises WorkError if a state is not finite."""
         warm = round(self.scenario.warmup * self.fps)
         noise = wander([m.key for m in self.members], warm + length, self.fps, self.seed, self.repeat)
         for f in range(-warm, length):

@@ -55,8 +55,7 @@ def grow_plants(picture: Picture, camera: Camera, scene: Scene, seed: int, repea
     `picture.foliage` gives the share of this camera's image that plants cover. They cover less if less ground is near
     enough. Places outside the world are preferred. repeat: number of the suite entry's copy, 0 without copies.
 
-    Raises InputError if the drawn share is not between 0 and 1, ValueError if no draw lies within a distribution's clip
-    or the seed is negative.
+    Raises InputError if the drawn share is not between 0 and 1, ValueError if the seed is negative.
     """
     source = rng(seed, "wind", PLACE, repeat=repeat)
     share = draw(picture.foliage, source)

@@ -69,8 +69,8 @@ def draw_illumination(light: Light, seed: int, repeat: int = 0) -> Illumination:
     light.
 
     repeat: number of the suite entry's copy, 0 without copies. Raises InputError if a drawn value is impossible: the
-    sun's elevation not in (0°, 90°], a negative cloud, or a switch gain that is not above 0. Raises ValueError if a
-    distribution never draws within its clip, or for a negative seed.
+    sun's elevation not in (0°, 90°], a negative cloud, or a switch gain that is not above 0. Raises ValueError for a
+    negative seed.
     """
     source = rng(seed, "light", SUN, repeat=repeat)
     azimuth, elevation = (np.deg2rad(draw(v, source)) for v in (light.sun_azimuth_deg, light.sun_elevation_deg))

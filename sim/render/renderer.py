@@ -61,15 +61,14 @@ class Renderer:
 
     @cached_property
     def illumination(self) -> Illumination:
-        """The Illumination of this seed; InputError if a draw is impossible, ValueError if a clip has no draw."""
+        """The Illumination of this seed; InputError if a draw is impossible."""
         return draw_illumination(self.light, self.motion.seed, self.motion.repeat)
 
     @cached_property
     def left_view(self) -> CameraView:
         """The CameraView of the empty scene as the camera itself sees it; computed once.
 
-        Raises InputError if the drawn light or share of plants is impossible, ValueError if a distribution never draws
-        within its clip."""
+        Raises InputError if the drawn light or share of plants is impossible."""
         return CameraView(self.camera, self.motion, self.illumination, self.picture, self._plants)
 
     @cached_property
@@ -77,7 +76,7 @@ class Renderer:
         """The CameraView of the empty scene from the right camera of the pair, `baseline` m to the right.
 
         Raises InputError if there is no right camera (kind "top", or a baseline of 0) or the drawn light or share of
-        plants is impossible, ValueError if a distribution never draws within its clip."""
+        plants is impossible."""
         self.check_pair()
         right = cameras.right_camera(self.camera)
         return CameraView(right, self.motion, self.illumination, self.picture, self._plants)
@@ -119,23 +118,21 @@ class Renderer:
         """Return the image (H, W, 3) uint8 BGR of frame `index`, from 1 on; the same index gives the same image.
 
         Raises IndexError for frame 0 or one behind the last, InputError if the drawn light or share of plants is
-        impossible, ValueError if a distribution never draws within its clip."""
+        impossible."""
         return self._draw(index, LEFT, shade=True, label=False)[0]
 
     def right(self, index: int) -> Image:
         """Return the right camera's image (H, W, 3) uint8, BGR, of frame `index`, from 1 on.
 
         Raises InputError if there is no right camera (kind "top", or baseline 0) or drawn light or plants are
-        impossible, ValueError if a distribution never draws within its clip, IndexError for frame 0 or one behind the
-        last."""
+        impossible, IndexError for frame 0 or one behind the last."""
         return self._draw(index, RIGHT, shade=True, label=False)[0]
 
     def pixels(self, index: int, *, disparity: bool = False) -> PixelTruth:
         """Return the PixelTruth of frame `index`, from 1 on; its disparities are None unless `disparity` is True.
 
         Raises InputError if disparities are asked for without a right camera, or the drawn light or plants are
-        impossible; ValueError if a distribution never draws within its clip; IndexError for frame 0 or one behind the
-        last."""
+        impossible; IndexError for frame 0 or one behind the last."""
         truth = self._draw(index, LEFT, shade=False, label=True, disparity=disparity)[1]
         assert truth is not None
         return truth
@@ -145,8 +142,8 @@ class Renderer:
 
         right: the right camera's image. pixels: the pixel truth. disparity: disparities in the pixel truth; no effect
         without `pixels`. Raises InputError if `right` or disparities are asked for and there is no right camera (kind
-        "top", or a baseline of 0), or the drawn light or plants are impossible; ValueError if a distribution never
-        draws within its clip; IndexError for frame 0 or one behind the last."""
+        "top", or a baseline of 0), or the drawn light or plants are impossible; IndexError for frame 0 or one behind
+        the last."""
         image, truth = self._draw(index, LEFT, shade=True, label=pixels, disparity=disparity and pixels)
         return RenderedFrame(image, self.right(index) if right else None, truth)
 
@@ -154,8 +151,7 @@ class Renderer:
         """Return image k = 0 … BACKGROUNDS - 1 (49), (H, W, 3) uint8, BGR, of the scene without people.
 
         Its time is (k - BACKGROUNDS) / fps s, before frame 1. Other k are not refused, except that k < -1 raises
-        ValueError. Raises InputError if the drawn light or plants are impossible, ValueError if a distribution never
-        draws within its clip."""
+        ValueError. Raises InputError if the drawn light or plants are impossible."""
         view, index = self.left_view, k - BACKGROUNDS + 1
         canvas = self._moved_canvas(view, index)
         image = self._finish(view, canvas, index, LEFT)
@@ -191,7 +187,7 @@ class Renderer:
 
         shade: draw the image; else it has shape (0, 0, 3). label: make the pixel truth; else it is None. disparity:
         with disparities; no effect without `label`. Raises InputError if the right view is needed and there is none, or
-        drawn light or plants are impossible; ValueError if a clip has no draw; IndexError if there is no such frame."""
+        drawn light or plants are impossible; IndexError if there is no such frame."""
         view, batch = self.right_view if side else self.left_view, self._batch(index)
         people, seen = batch.people(index), batch.in_view(view, side, index)
         canvas = self._moved_canvas(view, index) if shade else view.take_canvas()
@@ -294,7 +290,7 @@ def render(
     """Return frame `index` (from 1 on) as a Frame with the left image, without right image and detections.
 
     light, picture: as in a scenario, defaults if None. For many frames, keep one `make_renderer`. Raises InputError if
-    the lens distorts (radial not 0) or drawn light or plants are impossible, ValueError if a distribution never draws
-    within its clip, IndexError for frame 0 or one behind the last."""
+    the lens distorts (radial not 0) or drawn light or plants are impossible, IndexError for frame 0 or one behind the
+    last."""
     image = make_renderer(motion, camera, light, picture).frame(index)
     return Frame(index, (index - 1) / motion.fps, image)

@@ -1,0 +1,63 @@
+"""Values that no simulation can hold are refused when the scenario is loaded, by the probability of a draw."""
+
+import numpy as np
+import pytest
+
+from scenarios import load
+from scenarios.errors import InputError
+from scenarios.schema.values import Distribution
+
+
+@pytest.mark.parametrize(
+    "setting",
+    [
+        "crowd.free_speed=-5", "crowd.free_speed=100", "crowd.free_speed={normal=[-3, 0.2]}", "crowd.height=0",
+        "crowd.spacing=-1", "group.a.speed={normal=[0.5, 0.4]}", "group.a.speed=0", "group.a.size=100000",
+        "group.a.size={uniform=[10, 9000]}", "camera.fps=1e5", "camera.fps=0.001",
+        "camera.image=[8192, 8192]",
+        "sensor.clutter_rate=1e5", "world.size=[1e5, 10]", "duration=1e200", "light.sun_azimuth_deg=1e200",
+        "crowd.free_speed={normal=[1.3, 0.2], clip=[5, 6]}", "crowd.height={choice=[1.6, 1.7], clip=[1.8, 2]}",
+        "lead={uniform=[0, 1], clip=[2, 3]}", "lead={exponential=1, clip=[-2, -1]}",
+        "lead={normal=[0, 0], clip=[1, 2]}",
+        "group.a.size={poisson=2, clip=[50, 60]}", "group.a.size={poisson=1e5, clip=[1, 1e6]}",
+    ],
+)  # fmt: skip
+def test_values_out_of_range(setting):
+    with pytest.raises(InputError) as error:
+        load("merge", set=[setting])
+    assert error.value.place
+    assert "\n" not in str(error.value)
+
+
+def test_too_much_in_all():
+    for settings, word in (
+        (["camera.fps=1000", "duration=3000"], "frames"),
+        (["camera.fps=100", "duration=3000", "group.a.size=100"], "frames times people"),
+        (["group.a.size=2600", "group.b.size=2600"], "up to 5,2.. people"),
+    ):
+        with pytest.raises(InputError, match=word):
+            load("merge", set=settings)
+
+
+@pytest.mark.parametrize(
+    "given",
+    [
+        {"normal": (1.3, 0.3), "clip": (1, 1.4)}, {"poisson": 3, "clip": (1, 4)}, {"poisson": 3.0},
+        {"choice": (1, 2, 2, 5), "clip": (2, 5)}, {"uniform": (0, 4), "clip": (1, 2)}, {"normal": (1, 0)},
+        {"exponential": 3.0, "clip": (3, 8)}, {"uniform": (2, 2)}, {"poisson": 900.0}, {"exponential": 0.5},
+    ],
+)  # fmt: skip
+def test_shares_are_those_of_the_draws(given):
+    made, r = Distribution(**given), np.random.default_rng(0)
+    drawn = np.array([made.draw(r) for _ in range(4000)])
+    middle = float(np.median(drawn))
+    for low, high in ((middle, np.inf), (-np.inf, middle), (0.8 * middle, 1.1 * middle), (middle, middle)):
+        assert made.share_within(low, high) == pytest.approx(np.mean((drawn >= low) & (drawn <= high)), abs=0.04)
+
+
+def test_ids_that_are_no_text_are_no_steps_of_a_setting(tmp_path):
+    path = tmp_path / "s.toml"
+    path.write_text('schema = 1\ngroup = [{ id = 1, size = 2, start = [4, 4], goal = [9, 4] }, 5]\nlist = [1, "a"]\n')
+    for setting in ("group.1.size=3", "group.²=3", "group.x.size=1", "list.id=3", "group.99999999999999999999=1"):
+        with pytest.raises(InputError):
+            load(path, set=[setting])

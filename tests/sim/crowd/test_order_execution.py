@@ -1,0 +1,69 @@
+"""Orders about groups that other orders made, about groups named twice, and about groups in a queue."""
+
+import numpy as np
+import pytest
+
+from scenarios.loading.resolve import load
+from sim.crowd.queue_service import ServiceQueue
+from sim.crowd.triggers import concerned
+from sim.crowd.world import run
+
+HEAD = """
+schema = 1
+duration = 24.0
+camera.fps = 5
+world.size = [30, 12]
+group = [
+  { id = "a", size = 2, start = [3, 4], goal = [14, 4] },
+  { id = "b", size = 2, start = [3, 7], goal = [14, 7] },
+  { id = "q", size = 1, start = [18, { uniform = [2, 10] }], goal = [27, 6], repeat = 3 },
+]
+"""
+MERGE = '{ id = "m", type = "merge", groups = ["a", "b"], into = "ab", goal = [16, 6], when = { time = 0.5 } }'
+SPLIT = (
+    '{ id = "s", type = "split", group = "ab", when = { reach = { group = "ab", radius = 1.5 } }, '
+    'parts = [{ id = "c", size = 2, goal = [20, 2] }, { id = "d", size = 2, goal = [20, 10] }] }'
+)
+LATER = '{ id = "n", type = "merge", groups = ["c", "d"], into = "e", when = { reach = { group = "c" } } }'
+
+
+def scenario(tmp_path, *orders):
+    path = tmp_path / "scene.toml"
+    path.write_text(HEAD + "event = [\n" + ",\n".join(orders) + "\n]\n")
+    return load(path)
+
+
+def test_groups_that_orders_made_reach_their_goals(tmp_path):
+    """`reach` without a place means the group's goal, also of groups made by merge and split."""
+    motion = run(scenario(tmp_path, MERGE, SPLIT, LATER), 0)
+    assert [order.fired is not None for order in motion.orders] == [True, True, True]
+
+
+def test_a_group_that_two_patterns_match_queues_once(tmp_path):
+    queue = '{ id = "l", type = "queue", groups = ["q-*", "q-1", "q-*"], at = [24, 6], when = { time = 0.5 } }'
+    order = scenario(tmp_path, queue).event[0]
+    assert concerned(order, ["q-1", "q-2", "q-3"]) == ["q-1", "q-2", "q-3"]
+    motion = run(scenario(tmp_path, queue), 0)
+    assert sorted(p for group in motion.orders[0].before for p in group) == [5, 6, 7]
+
+
+def test_a_group_that_merges_leaves_its_queue(tmp_path):
+    """The queue goes on without it; else it would serve the old group for ever."""
+    queue = (
+        '{ id = "l", type = "queue", groups = ["q-*", "a"], at = [24, 6], direction_deg = 180, service = 1.0, '
+        'goal = [28, 10], at_goal = "stand", when = { time = 0.2 } }'
+    )
+    merge = '{ id = "m", type = "merge", groups = ["a", "b"], into = "ab", goal = [3, 10], when = { time = 3 } }'
+    motion = run(scenario(tmp_path, queue, merge), 0)
+    last = motion.pos[-1]
+    assert np.all(np.linalg.norm(last[:4] - [3, 10], axis=1) < 3.5), "the merged group goes to its goal"
+    assert np.all(np.linalg.norm(last[4:] - [28, 10], axis=1) < 3.5), "all others are served"
+
+
+@pytest.mark.parametrize("place", ["joined", "coming"])
+def test_a_queue_forgets_a_group(place):
+    queue = ServiceQueue(np.zeros(2), np.array([1.0, 0.0]), 1.0, {0: 1.0, 1: 1.0}, busy_until=5.0)
+    queue.joined, queue.coming = ([0, 1], []) if place == "joined" else ([1], [0])
+    queue.remove(0)
+    assert (queue.joined, queue.coming) == ([1], [])
+    assert (queue.busy_until is None) == (place == "joined")
