@@ -102,7 +102,7 @@ def _run_jobs(
     """
     errors: dict[str, FlockscopeError] = {}
     with start_workers(min(workers.count, max(1, len(jobs))), workers.cluster) as run:
-        marked = jobs if workers.cluster is None else _with_marker(jobs)
+        marked = _with_marker(jobs) if jobs and workers.cluster is not None else jobs
         for job, outcome in run(run_job, marked, ahead=QUEUED_JOBS, on_loss=lost_job):
             if outcome.error is not None:
                 errors[job.name] = outcome.error

@@ -38,12 +38,11 @@ class PackedPolygons:
 def pack(polygons: Sequence[Array], width: int = 1) -> PackedPolygons:
     """Return PackedPolygons of N polygons (V, 2), each padded to the most vertices of any, and to at least `width`.
 
-    A polygon without vertices becomes nan: it overlaps nothing, and its distance to anything is nan. N may be 0.
-    ValueError if `width` is 0 and no polygon has a vertex."""
+    A polygon without vertices becomes nan: it overlaps nothing, and its distance to anything is nan. N may be 0."""
     count = np.array([len(p) for p in polygons], np.int64)
     flat = np.concatenate([*(np.asarray(p, float).reshape(-1, 2) for p in polygons), [[np.nan, np.nan]]])
     first = np.cumsum(count) - count
-    width = int(count.max(initial=width))
+    width = max(1, int(count.max(initial=width)))
     place = first[:, None] + np.minimum(np.arange(width), np.maximum(count - 1, 0)[:, None])
     return pack_padded(flat[np.where(count[:, None] > 0, place, len(flat) - 1)])
 
@@ -208,7 +207,7 @@ def iou_matrix(a: Sequence[Array], b: Sequence[Array]) -> Array:
     """Return the intersection over union (N, M), 0 to 1, of each of N polygons in a with each of M polygons in b.
 
     A polygon is an array (V, 2), convex and counter-clockwise. The value is 0 if either is empty, clockwise or has no
-    area, and exactly 1 for equal polygons. N or M may be 0. ValueError if there are polygons but none has a vertex."""
+    area, and exactly 1 for equal polygons. N or M may be 0."""
     i, j = (g.ravel() for g in np.indices((len(a), len(b))))
     width = max((len(p) for p in (*a, *b)), default=1)
     return iou_pairs(pack(a, width), pack(b, width), i, j).reshape(len(a), len(b))

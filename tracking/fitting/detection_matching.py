@@ -18,6 +18,7 @@ from scenarios.errors import InputError
 from scenarios.schema.sensor import BoxNoise
 from sim.detector.box_noise import box_errors, perturb_boxes
 from sim.io.formats import mot_text
+from sim.io.store.truth_files import scores_or_ones
 from sim.scene.box_visibility import image_size_of_boxes, with_visibility
 from sim.types import Array, Bools, Camera, Detections, Ints, Sequence, Truth
 from tracking.filters.assignment import optimal
@@ -103,7 +104,7 @@ def match_detections(
     camera: Camera | None = None,
     left_out: tuple[Ints, Array] | None = None,
 ) -> MatchedRecording:
-    """Returns the labels and detections, matched one to one in each frame; both must have boxes, and detections scores.
+    """Returns the labels and detections, matched one to one in each frame; both must have boxes.
 
     A match needs an IoU (intersection over union) of at least 0.3 with the whole or the visible labelled box. The
     matching is done twice; the second time the labelled boxes are shifted and scaled by the median error of the first.
@@ -112,13 +113,13 @@ def match_detections(
     found: the detections, one per frame, sorted. size: image width and height in px; None takes the extent of all
     boxes. camera: stored in the result. left_out: frame numbers (L,) and boxes (L, 4; left, top, width, height in px)
     of labelled rows that are not scored. A detection that covers one of them by an IoU of 0.5 or more is dropped unless
-    it matches a person. Raises AssertionError if the truth has no boxes; IndexError if detections have no scores;
+    it matches a person. Detections without scores get the score 1. Raises AssertionError if the truth has no boxes;
     ValueError if size is None and a box is nan.
     """
     assert truth.box is not None
     box = np.concatenate([np.zeros((0, 4)), *(d.box for d in found if d.box is not None)])
     frame = np.concatenate([np.zeros(0, np.int64), *(np.full(len(d.pos), d.index) for d in found)])
-    score = np.concatenate([np.zeros(0), *(d.score for d in found)])
+    score = np.concatenate([np.zeros(0), *(scores_or_ones(d.score, len(d.pos)) for d in found)])
     on_ground = truth.pos is not None and any(d.plane == "ground" for d in found if len(d.pos))
     pos = np.concatenate([np.zeros((0, 2)), *(d.pos for d in found)]) if on_ground else None
     size = size if size is not None else image_size_of_boxes(box, truth.box)

@@ -41,12 +41,11 @@ def error_statistics(recordings: Sequence[MatchedRecording]) -> dict[str, float]
     - "error correlation after 0.2 s", "error correlation after 1 s".
     - "score of true, median", "score of false, median".
 
-    nan where nothing was observed. Raises ValueError without recordings, ZeroDivisionError without frames,
-    AssertionError without labelled boxes.
+    nan where nothing was observed. Raises ValueError without recordings, AssertionError without labelled boxes.
     """
     hit = np.concatenate([m.hit for m in recordings])
     visibility = np.concatenate([m.truth.visibility for m in recordings])
-    found: dict[str, float] = {"missed": 1.0 - float(hit.mean())}
+    found: dict[str, float] = {"missed": _mean(~hit)}
     for low, high in zip(VISIBILITIES, (*VISIBILITIES[1:], 1.01), strict=True):
         here = (visibility >= low) & (visibility < high)
         found[f"missed, visibility {low:g}-{min(high, 1):g}"] = _mean(~hit[here])
@@ -56,7 +55,7 @@ def error_statistics(recordings: Sequence[MatchedRecording]) -> dict[str, float]
     frames = sum(m.truth.length for m in recordings)
     alarms = [track for m in recordings for track in alarm_tracks(m)]
     seen = np.array([len(a.rows) for a in alarms], dtype=float)
-    found["false alarms per frame"] = float(seen.sum()) / frames
+    found["false alarms per frame"] = float(seen.sum()) / frames if frames else float("nan")
     found["false alarms: at people"] = _weighted(np.array([a.person >= 0 for a in alarms]), seen)
     found["false alarms: mean stay, s"] = _mean(
         np.array([(np.ptp(a.frame) + 1) / a.recording.truth.fps for a in alarms])
@@ -111,6 +110,8 @@ def _correlation(recordings: Sequence[MatchedRecording], e: Array, lag: float) -
     e (H, 4): errors of the detected rows of all recordings, one recording after the other. The four kinds of error
     (middle, foot, top, logarithm of the width) are standardised over all recordings and pooled.
     """
+    if not len(e):
+        return float("nan")
     total, count, first = 0.0, 0, 0
     mean, sd = e.mean(axis=0), np.maximum(e.std(axis=0), 1e-9)
     for m in recordings:

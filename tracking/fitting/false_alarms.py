@@ -59,12 +59,12 @@ def fit_false_alarms(recordings: Sequence[MatchedRecording]) -> tuple[float, Fal
 
     An alarm track is a series of unmatched detections of one false alarm. Fields about alarms at people (across, foot,
     near_height), or elsewhere (height, drift, at), keep their defaults if there are fewer than 5 alarm tracks of this
-    kind. recordings: matched. Raises ZeroDivisionError without any frame, AssertionError if there are false alarms and
-    the labels have no boxes.
+    kind. recordings: matched; without any frame the mean is 0. Raises AssertionError if there are false alarms and the
+    labels have no boxes.
     """
     tracks = [track for m in recordings for track in alarm_tracks(m)]
     frames = sum(m.truth.length for m in recordings)
-    rate = sum(len(t.rows) for t in tracks) / frames
+    rate = sum(len(t.rows) for t in tracks) / max(frames, 1)
     if len(tracks) < FEW:
         return rate, None
     life, seen = _life_and_seen(recordings, tracks)

@@ -48,16 +48,19 @@ def test_a_group_that_two_patterns_match_queues_once(tmp_path):
 
 
 def test_a_group_that_merges_leaves_its_queue(tmp_path):
-    """The queue goes on without it; else it would serve the old group for ever."""
+    """The queue goes on without it; else it would wait for ever for the old group to reach the head."""
     queue = (
-        '{ id = "l", type = "queue", groups = ["q-*", "a"], at = [24, 6], direction_deg = 180, service = 1.0, '
+        '{ id = "l", type = "queue", groups = ["b", "a", "q-*"], at = [24, 6], direction_deg = 180, service = 3.0, '
         'goal = [28, 10], at_goal = "stand", when = { time = 0.2 } }'
     )
-    merge = '{ id = "m", type = "merge", groups = ["a", "b"], into = "ab", goal = [3, 10], when = { time = 3 } }'
-    motion = run(scenario(tmp_path, queue, merge), 0)
-    last = motion.pos[-1]
-    assert np.all(np.linalg.norm(last[:4] - [3, 10], axis=1) < 3.5), "the merged group goes to its goal"
-    assert np.all(np.linalg.norm(last[4:] - [28, 10], axis=1) < 3.5), "all others are served"
+    merge = '{ id = "m", type = "merge", groups = ["a", "q-1"], into = "aq", goal = [3, 10], when = { time = 5 } }'
+    made = scenario(tmp_path, queue, merge)
+    path = tmp_path / "scene.toml"
+    starts = ["group.b.start=[21, 6]", "group.a.start=[18, 6]", "group.q.start=[12, { uniform = [2, 10] }]"]
+    last = run(load(path, set=[*starts, "duration=34"]), 0).pos[-1]
+    assert len(last) == len(made.group) + 4
+    assert np.all(np.linalg.norm(last[[0, 1, 4]] - [3, 10], axis=1) < 3.5), "the merged group goes to its goal"
+    assert np.all(np.linalg.norm(last[[2, 3, 5, 6]] - [28, 10], axis=1) < 3.5), "all others are served"
 
 
 @pytest.mark.parametrize("place", ["joined", "coming"])

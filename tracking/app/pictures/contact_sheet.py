@@ -84,11 +84,13 @@ class PanelLayout:
 def sheet_picture(sequence: Sequence, truth: Truth, frames: int = 8) -> Image:
     """Returns the contact sheet as an (H, W, 3) BGR uint8 picture; its size follows from the panels.
 
-    truth: may be without people, but has at least one frame. frames: number of panels, at least 1 and at
-    most one per frame (other numbers are brought there); their frames are chosen by `choose_frames`.
-    Raises InputError if a picture cannot be read.
+    truth: may be without people. frames: number of panels, at least 1 and at most one per frame (other numbers
+    are brought there); their frames are chosen by `choose_frames`. Raises InputError if there is no frame, or a
+    picture cannot be read.
     """
     chosen = choose_frames(truth, frames)
+    if not chosen:
+        raise InputError(file=sequence.name, got="no frame", expected="one or more", remedy="give a longer sequence")
     pictures = PanelPictures(sequence, truth, chosen)
     low, high = sheet_area(sequence, truth)
     plan = round(WIDTH * float(np.clip((high - low)[1] / (high - low)[0], 0.4, 1.2)))

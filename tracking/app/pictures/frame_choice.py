@@ -19,15 +19,15 @@ def is_close(frame: int, other: int, fps: float) -> bool:
 
 
 def choose_frames(truth: Truth, count: int) -> list[int]:
-    """Returns the numbers, from 1, of `count` frames in ascending order; at least one, and every frame if there are no
-    more.
+    """Returns the numbers, from 1, of `count` frames in ascending order; at least one if there is one, every frame if
+    there are no more.
 
     First frames of events are taken in order of rank: merge and split, cross and queue, form and dissolve. Those at
     most a second from a frame taken before are left out. If there are more of one rank than there is room for, they are
     thinned evenly. The widest gaps are then divided until `count` is reached, with preference for frames with many
-    people. Raises StopIteration for a truth of length 0.
+    people. A truth of length 0 has no frames.
     """
-    count = max(1, min(count, truth.length))
+    count = min(max(1, count), truth.length)
     chosen: list[int] = []
     events = [event for event in truth.events or () if 1 <= event.start <= truth.length and event.kind in SHOWN_KINDS]
     for rank in sorted(set(SHOWN_KINDS.values())):

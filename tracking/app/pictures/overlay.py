@@ -54,10 +54,10 @@ def write_overlay(
     as thin white boxes `over` the same picture, or draw `only` the truth; None: tracks only. step: called with the
     sequence's name after each frame.
 
-    Raises InputError if the sequence has no pictures or one cannot be read, or if the truth is wanted and is missing or
-    cannot be read. Also if groups must be derived in the image and the scale is not above 0, or if `out` cannot be
-    written or is the file that the sequence is read from. Raises WorkError if the disk is full, or an order of a
-    simulated script was not fulfilled.
+    Raises InputError if the sequence has no frame or no pictures, if one cannot be read, or if the truth is wanted and
+    is missing or cannot be read. Also if groups must be derived in the image and the scale is not above 0, or if `out`
+    cannot be written or is the file that the sequence is read from. Raises WorkError if the disk is full, or an order
+    of a simulated script was not fulfilled.
     """
     if not sequence.has_images:
         raise InputError(
@@ -98,7 +98,9 @@ def _panels(sequence: Sequence, tracks: SequenceOf[Tracks] | None, placement: Tr
 
 def _write(path: Path, sequence: Sequence, panels: list[Panel], step: Callable[[str], None]) -> None:
     pictures = overlay_pictures(sequence, panels)
-    first = next(pictures)
+    first = next(pictures, None)
+    if first is None:
+        raise InputError(file=sequence.name, got="no frame", expected="one or more", remedy="give a longer sequence")
     with write_video(path, (first.shape[1], first.shape[0]), sequence.fps) as video:
         video.add(first)
         step(sequence.name)
