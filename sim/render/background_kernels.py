@@ -46,11 +46,12 @@ def _tint(base, brightness, warmth, out):  # type: ignore[no-untyped-def]
 def _ground(x, y, size, footprint, style, palette, key, out):  # type: ignore[no-untyped-def]
     """Set out (3,) to the colour (BGR, grey levels) of the ground at (x, y) m under full light.
 
-    It is paving (without slabs if their width is 0) up to about 1 m outside the world, where a ragged border begins the
-    grass. Plants grow over both. Returns whether the ground is grass, not paving (bool), and the share covered by
-    plants, 0 to 1. size (2,): of the world, m. footprint: size of the pixel on the ground, m. style (4,): contrast,
-    slab width (m), key of the plant pattern, level above which plants grow (inf: no plants). palette (6, 3): BGR of
-    paving, grass, bricks, stone, steps, sky. key: of the patterns.
+    It is paving (without slabs if their width is 0) up to about 1 m outside the world, which reaches from (0, 0) to
+    `size`. There a ragged border begins the grass. Plants grow over both. Returns two values: True if the ground is
+    grass, False for paving; and the share covered by plants, 0 to 1. size (2,): of the world, m. footprint: size of the
+    pixel on the ground, m. style (4,): contrast, slab width (m), key of the plant pattern, level above which plants
+    grow (inf: no plants). palette (6, 3): BGR of paving, grass, bricks, stone, steps, sky. key: whole number that names
+    the patterns.
     """
     contrast, slab = style[CONTRAST], style[SLAB_WIDTH]
     outside = max(max(-x, x - size[0]), max(-y, y - size[1])) - 1.0 + 0.3 * value_noise(x, y, key + 90)
@@ -113,7 +114,7 @@ def _sunlit(point, normal, sun, penumbra, solids, spare, hit):  # type: ignore[n
 
     point, normal (3,): place in m and unit normal of the surface. sun (3,): unit vector to the sun. penumbra: width of
     a shadow's soft edge, m. solids: a `raycast.Solids` (walls, pillars, stairs). spare (3,) or longer, hit (6,):
-    scratch, overwritten. 1 without solids.
+    scratch, overwritten. The points lie 0.35 penumbra off along x and along y. 1 without solids.
     """
     if len(solids.walls) + len(solids.pillars) + len(solids.flights) == 0:
         return 1.0
@@ -131,9 +132,10 @@ def _sunlit(point, normal, sun, penumbra, solids, spare, hit):  # type: ignore[n
 def trace_pixels(origin, direction, solids, depth, kind, place):  # type: ignore[no-untyped-def]
     """Set depth (H, W), kind (H, W) and place (H, W, 3) to what the centre of each pixel shows of the empty scene.
 
-    origin, direction (3, 3): of the camera's PixelRays. solids: a `raycast.Solids`. depth is in m along the optical
-    axis, inf for sky. kind is NOTHING (sky), GROUND, WALL, PILLAR, TREAD or RISER. place is x, y, z in m in the world;
-    that of sky is 1e9. Returns nothing.
+    origin, direction (3, 3): of the camera's PixelRays; times (u, v, 1) they give the origin and the direction of a
+    ray. The centre of the pixel in column i and row j has u = i + 0.5, v = j + 0.5 px. solids: a `raycast.Solids`.
+    depth is in m along the optical axis, inf for sky. kind is NOTHING (sky), GROUND, WALL, PILLAR, TREAD or RISER.
+    place is x, y, z in m in the world; that of sky is 1e9. Returns nothing.
     """
     height, width = depth.shape
     o, d, hit = np.empty(3), np.empty(3), np.empty(HIT_SLOTS)
@@ -156,9 +158,10 @@ def _point_colour(  # type: ignore[no-untyped-def]
 
     Returns the share of direct sun in its light, the share covered by plants (both 0 to 1), and a whole number that is
     equal for points of one surface lit alike. For sky they are 0, 0, 0. o, d (3,), hit (6,), more (4, 6): scratch,
-    overwritten. rays: origin and direction, each (3, 3), of PixelRays. The other arguments are as for `paint_pixels`:
-    scale (px per m at 1 m depth, or minus px per m from above), sun (3,), shadow (share), penumbra (m), solids, size
-    (2,) m, style (4,), palette (6, 3), key.
+    overwritten. (0, 0) px is the upper left corner of the image. Haze begins at a depth of 25 m; there is none from
+    above. rays: origin and direction, each (3, 3), of PixelRays. The other arguments are as for `paint_pixels`: scale
+    (px per m at 1 m depth, or minus px per m from above), sun (3,), shadow (share), penumbra (m), solids, size (2,) m,
+    style (4,), palette (6, 3), key.
     """
     at_pixel(rays[0], x, y, o)
     at_pixel(rays[1], x, y, d)

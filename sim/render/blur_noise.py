@@ -39,7 +39,8 @@ def blur_weights(sd: float) -> NDArray[np.float32]:
 def _normals() -> NDArray[np.float32]:
     """Return the pool (POOL + LONGEST,) float32 of standard normals; its first LONGEST numbers are repeated at the end.
 
-    It is the same for all seeds, and kept: do not change it.
+    It is the same for all seeds, and kept: do not change it. POOL is 2^20. LONGEST is 3 x 8192, the numbers that a row
+    of the widest image needs.
     """
     normals = rng(0, "noise").standard_normal(POOL, dtype=np.float32)
     return np.concatenate([normals, normals[:LONGEST]])
@@ -48,8 +49,9 @@ def _normals() -> NDArray[np.float32]:
 def noise_pool(sd: float, unit: float) -> NDArray[np.int16]:
     """Return a pool (POOL + LONGEST,) int16 of normal numbers with standard deviation `sd` grey levels, times `unit`.
 
-    unit: canvas value of one grey level. The numbers are rounded, and clipped to the range of int16. The underlying
-    normal numbers are the same for all seeds; sd 0 gives zeros.
+    POOL is 2^20, LONGEST 3 x 8192: a row of the widest image. unit: canvas value of one grey level. The numbers are
+    rounded, and clipped to the range of int16. The underlying normal numbers are the same for all seeds; sd 0 gives
+    zeros.
     """
     return np.asarray(np.clip(np.rint(_normals() * np.float32(sd * unit)), -32768, 32767), np.int16)
 
@@ -62,8 +64,9 @@ def _offsets_of_frames(rows: int, seed: int, side: int, draw: int, repeat: int) 
 def noise_offsets(rows: int, seed: int, side: int, frame: int, repeat: int = 0) -> Ints:
     """Return the index in the noise pool, 0 to POOL - 1, at which the noise of each image row begins: (rows,) int64.
 
-    side: 0 the left camera, 1 the right one. frame: number of the frame, background frames included, from 0 on. seed,
-    repeat (number of the suite entry's copy, 0 without copies): name the random stream. The result is a view of kept
-    numbers: do not change it. Raises ValueError if seed, side or frame is negative.
+    side: 0 the left camera, 1 the right one. frame: number of the frame, from 1, plus BACKGROUNDS (50), so that
+    background images have 1 to 50. seed, repeat (number of the suite entry's copy, 0 without copies): name the random
+    stream. The result is a view of kept numbers: do not change it. Raises ValueError if seed, side or frame is
+    negative.
     """
     return np.asarray(_offsets_of_frames(rows, seed, side, frame // FRAMES_PER_DRAW, repeat)[frame % FRAMES_PER_DRAW])

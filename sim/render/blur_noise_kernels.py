@@ -36,9 +36,9 @@ def _blur_five_lines(a, b, c, d, e, w, x, y, many, out):  # type: ignore[no-unty
 def _with_noise(x, grain, read, slope):  # type: ignore[no-untyped-def]
     """Return the grey level (uint8, 0 to 255) of canvas value x (grey level times UNIT = 64) with noise.
 
-    The noise is grain * sqrt(read + slope x). grain: a number of the noise pool, in canvas values. read: share of its
-    variance that does not depend on x. slope: increase of that share per canvas value. The level is rounded and
-    clipped.
+    x: 0 or more. The noise is grain * sqrt(read + slope x). grain: a number of the noise pool, in canvas values. read:
+    share of its variance that does not depend on x. slope: increase of that share per canvas value. The level is
+    rounded and clipped.
     """
     x = (x + np.float32(grain) * np.sqrt(read + slope * x)) * SCALE + HALF
     x = x if x > LOW else LOW
@@ -50,7 +50,7 @@ def _show_line(line, gain, grain, shot, many, out):  # type: ignore[no-untyped-d
     """Set out (many,) uint8 to gain times a line of canvas values plus noise, as grey levels, clipped to 0 … 255.
 
     grain (many,): numbers of the noise pool. gain: one number. shot: share of the noise's variance that grows with
-    brightness, 0 to 1.
+    brightness, 0 to 1. The noise has the standard deviation of the pool at grey level 128.
     """
     read, slope = ONE - shot, shot * GREY
     for i in range(many):
@@ -63,6 +63,7 @@ def _show_line_by_gains(line, gain, grain, shot, many, out):  # type: ignore[no-
     255.
 
     grain (many,): numbers of the noise pool. shot: share of the noise's variance that grows with brightness, 0 to 1.
+    The noise has the standard deviation of the pool at grey level 128.
     """
     read, slope = ONE - shot, shot * GREY
     for i in range(many):
@@ -92,8 +93,9 @@ def brightness_row(nodes, step, v, width, out):  # type: ignore[no-untyped-def]
 def _blur_block(canvas, top, left, rows, cols, weights, edge, wide, out):  # type: ignore[no-untyped-def]
     """Set out (rows, cols * 3) to the blur of the block of rows x cols px at row `top`, column `left` of a canvas.
 
-    canvas (H, W * 3) int16, not changed; pixels beyond its edges repeat the edge. weights (2 r + 1,): the same across
-    and down. edge, wide: scratch, overwritten: a padded line, and lines blurred across. Returns nothing.
+    out: float32 canvas values, not rounded. The block must lie in the image and have at most TILE_H = 8 rows. canvas
+    (H, W * 3) int16, not changed; pixels beyond its edges repeat the edge. weights (2 r + 1,): the same across and
+    down. edge, wide: scratch, overwritten: a padded line, and lines blurred across. Returns nothing.
     """
     height, width = canvas.shape[0], canvas.shape[1] // 3
     radius, many = len(weights) // 2, 3 * cols
@@ -128,7 +130,8 @@ def _blur_block(canvas, top, left, rows, cols, weights, edge, wide, out):  # typ
 def _scratch(radius, width):  # type: ignore[no-untyped-def]
     """Return scratch arrays for `_blur_block` in an image `width` px wide: edge, wide, and TILE_H lines for its result.
 
-    radius: of the blur, px. Their contents are not set.
+    radius: of the blur, px. Shapes: (3 (width + 2 radius),) int16; (8 + 2 radius, 3 width) and (8, 3 width) float32.
+    Their contents are not set.
     """
     return (
         np.empty(3 * (width + 2 * radius), np.int16),
@@ -160,10 +163,10 @@ def finish_image(canvas, empty, dirty, weights, nodes, step, noise, shot, offset
 
     canvas (H, W * 3) int16, grey levels times UNIT = 64: the sharp scene, of which only dirty tiles and their
     surroundings are read. empty (H, W * 3) int16: the blurred empty scene, for clean tiles. dirty (rows, columns): 1
-    for tiles of 8 x 16 px to blur anew. weights (2 r + 1,): of the blur. nodes (J, I): brightness at every `step`-th
-    pixel, or (1, 1) if it is the same everywhere. noise (n,) int16: pool of normal numbers in canvas values; row v
-    reads it from offsets[v] on. shot: share of the noise's variance that grows with brightness, 0 to 1. Returns
-    nothing.
+    for tiles (8 rows x 16 columns of px) to blur anew. weights (2 r + 1,): of the blur. nodes (J, I): brightness at
+    every `step`-th pixel, or (1, 1) if it is the same everywhere. noise (n,) int16: pool of normal numbers in canvas
+    values; row v reads it from offsets[v] on. shot: share of the noise's variance that grows with brightness, 0 to 1;
+    at grey level 128 the noise has the standard deviation of the pool. Returns nothing.
     """
     height, width = canvas.shape[0], canvas.shape[1] // 3
     edge, wide, tile = _scratch(len(weights) // 2, width)

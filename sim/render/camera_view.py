@@ -33,7 +33,8 @@ class CameraView:
 
     Parts: depth, kind and place of each pixel, colours, ids, and canvases (working images) to draw on; also brightness
     and wind in the image at any time. width, height: of the image, px. rays: the camera's lines of sight. solids:
-    walls, pillars and stairs. plants is None without plants. Canvases that were given back are kept for the next frame.
+    walls, pillars and stairs. motion gives scene and seed, picture blur and patterns. plants is None without plants.
+    Canvases that were given back are kept for the next frame.
     """
 
     def __init__(
@@ -91,8 +92,8 @@ class CameraView:
 
     @cached_property
     def blurred_canvas(self) -> NDArray[np.int16]:
-        """Colours (H, W, 3) BGR of the empty scene as int16: grey levels times UNIT (64), blurred as the picture
-        settings say."""
+        """Colours (H, W, 3) BGR of the empty scene as int16: grey levels times UNIT (64), blurred by `picture.blur_px`,
+        rounded."""
         from sim.render.blur_noise_kernels import blur_all
 
         out, flat = np.empty_like(self.empty_canvas), (self.height, 3 * self.width)
@@ -116,10 +117,11 @@ class CameraView:
     @cached_property
     def _nodes(self) -> tuple[Array, Array]:
         """Ground points (J * I, 2), x and y in m, at every 16th pixel, and the half size (J * I,) in m of the ground
-        around each.
+        that the 16 px around each cover.
 
-        The J rows of I nodes run from (0, 0) px to the image's edges or beyond. The size is inf where a node sees no
-        ground; fields smoothed by it vanish there.
+        The J rows of I nodes run from (0, 0) px to the image's edges or beyond. The half size is measured along the
+        view, where the ground is seen at a slant. A node that sees no ground has the place of the camera and the half
+        size inf; fields smoothed by it vanish there.
         """
         u, v = np.meshgrid(*(np.arange(-(-n // NODE_STEP) + 1) * float(NODE_STEP) for n in (self.width, self.height)))
         uv1 = np.stack([u.ravel(), v.ravel(), np.ones(u.size)])
@@ -142,9 +144,9 @@ class CameraView:
     def brightness(self, t: float, key: int) -> NDArray[np.float32]:
         """Return the brightness at time t (s) at the nodes (J, I), which are 16 px apart: factors above 0, about 1.
 
-        It is (1, 1) if the brightness is the same everywhere, without clouds. key: number of the frame, background
-        frames included; it names the random stream of the flicker. Raises ValueError for a negative key if there is
-        flicker.
+        It is (1, 1) if the brightness is the same everywhere, without clouds. Nodes that see no ground have no clouds.
+        t is 0 at frame 1. key: frame number from 1 plus BACKGROUNDS (50); it names the random stream of the flicker.
+        Raises ValueError for a negative key if there is flicker.
         """
         gain = self.light.gain(t, key)
         if self.light.clouds.amplitude == 0:
@@ -161,7 +163,8 @@ class CameraView:
     def wind(self, t: float) -> NDArray[np.float32]:
         """Return the sway of plants at time t (s) at the nodes, (2, J, I): px across, px down. Nodes are 16 px apart.
 
-        It is 0 where a node sees no ground. Raises AssertionError if the view has no plants.
+        t is 0 at frame 1. A node that sees no ground has the wind of the ground under the camera. Raises AssertionError
+        if the view has no plants.
         """
         assert self.plants is not None
         strength = self.plants.strength(t)
@@ -169,7 +172,9 @@ class CameraView:
 
     @cached_property
     def plant_runs(self) -> Ints:
-        """Runs of pixels that show plants, (S, 3) int64: row, first column, last column + 1; (0, 3) without plants."""
+        """Runs of pixels that show plants, (S, 3) int64: row, first column, last column + 1.
+
+        Sorted by row, then column; (0, 3) without plants."""
         shown = np.pad(self.empty_scene.plants > 0, ((0, 0), (1, 1))).astype(np.int8)
         row, edge = np.nonzero(np.diff(shown, axis=1))
         return np.column_stack([row[::2], edge[::2], edge[1::2]])

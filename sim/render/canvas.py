@@ -1,7 +1,8 @@
 """The working image that a frame is drawn on: its number format, its tiles, and the arrays that go with it.
 
-A canvas holds grey levels times UNIT = 64 as int16, in BGR. Drawing marks the tiles (8 x 16 px) it changes as dirty.
-Only dirty tiles are blurred anew when the frame is finished, and only they are restored to the empty scene afterwards.
+A canvas holds grey levels times UNIT = 64 as int16, in BGR. Drawing marks the tiles (8 rows x 16 columns of px) it
+changes as dirty. Only dirty tiles are blurred anew when the frame is finished, and only they are restored to the empty
+scene afterwards.
 """
 
 from __future__ import annotations
@@ -26,7 +27,8 @@ class FrameCanvas:
     colour (H, W, 3)        int16, BGR: grey levels times UNIT (64)
     depth (H, W)            float32: m along the optical axis, inf for sky
     shaded (H, W)           uint8: 255 times the share of the direct sun that people's shadows take
-    dirty (rows, columns)   uint8: 1 for tiles of 8 x 16 px in which any of these changed, or near which colour did
+    dirty (rows, columns)   uint8: 1 for tiles (8 rows x 16 columns of px) in which any of these changed, or
+                            that have a change of colour within the radius of the blur
     """
 
     colour: NDArray[np.int16]

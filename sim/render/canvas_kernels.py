@@ -1,7 +1,7 @@
 """Compiled helpers for drawing on a canvas, the working image of a frame.
 
-They find the pixels of an image row that an elliptic outline covers, mark tiles (8 x 16 px) that drawing has changed as
-dirty, and restore dirty tiles to the empty scene.
+They find the pixels of an image row that an elliptic outline covers, mark tiles (8 rows x 16 columns of px) that
+drawing has changed as dirty, and restore dirty tiles to the empty scene.
 """
 
 from __future__ import annotations
@@ -47,8 +47,8 @@ def mark_dirty(dirty, v, left, right, margin, height, width):  # type: ignore[no
     """Set to 1 the tiles of `dirty` that hold columns left … right - 1 of row v, or pixels at most `margin` px away
     from them.
 
-    dirty (rows, columns): one number per tile of 8 x 16 px. height, width: of the image, px. Nothing is marked if right
-    <= left. Returns nothing.
+    dirty (rows, columns): one number per tile of 8 rows x 16 columns of px. height, width: of the image, px. Nothing is
+    marked if right <= left. Returns nothing.
     """
     if right > left:
         first, last = max(left - margin, 0) // TILE_W, (min(right + margin, width) - 1) // TILE_W
@@ -68,8 +68,8 @@ def restore(dirty, empty_colour, empty_depth, colour, depth, shaded):  # type: i
     """Restore the dirty tiles of a canvas to the empty scene, set `shaded` to 0 there, and mark all tiles clean, in
     place.
 
-    dirty (rows, columns): 1 for tiles of 8 x 16 px that changed. empty_colour, colour (H, W * 3). empty_depth, depth,
-    shaded (H, W). Clean tiles are not touched. Returns nothing.
+    dirty (rows, columns): 1 for tiles (8 rows x 16 columns of px) that changed. empty_colour, colour (H, W * 3).
+    empty_depth, depth, shaded (H, W). Clean tiles are not touched. Returns nothing.
     """
     height, width = depth.shape
     for j in range(dirty.shape[0]):

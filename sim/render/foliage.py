@@ -35,7 +35,7 @@ class Foliage:
     key     key (whole number) of the random pattern `texture_kernels.plant_pattern`
     level   plants grow where the pattern is above it, no unit
     sway    two random fields over ground and time: movement in px across and px down at a strength of 1
-    gusts   field, the same everywhere: natural logarithm of the wind's strength, plus a constant
+    gusts   field, the same everywhere: natural logarithm of the wind's strength, plus 0.25
     """
 
     key: int
@@ -44,8 +44,8 @@ class Foliage:
     gusts: PlaneWaves
 
     def strength(self, t: float) -> float:
-        """Return the wind's strength at time t (s), a factor above 0 on the plants' sway; its mean square over time is
-        1."""
+        """Return the wind's strength at time t (s), a factor above 0 on the plants' sway; t is 0 at frame 1. Its mean
+        square over time is 1."""
         return float(np.exp(self.gusts.at_origin(t) - GUST**2))
 
 

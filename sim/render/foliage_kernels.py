@@ -60,8 +60,9 @@ def sway(empty, share, runs, nodes, step, colour, dirty, margin):  # type: ignor
 
     colour, empty (H, W, 3) int16: canvas to draw on and that of the empty scene. share (H, W): share of each pixel that
     shows plants. runs (S, 3): row, first column, last column + 1 of the pixels that show plants; no others are drawn.
-    nodes (2, J, I): wind, px across and px down, at every `step`-th pixel. dirty (rows, columns): tiles of 8 x 16 px,
-    set to 1 up to `margin` px round the runs. Places outside the image are moved to its edge. Returns nothing.
+    nodes (2, J, I): wind, px across and px down, at every `step`-th pixel. dirty (rows, columns): tiles (8 rows x 16
+    columns of px), set to 1 up to `margin` px round the runs. Places outside the image are moved to its edge. Returns
+    nothing.
     """
     height, width = share.shape
     for s in range(len(runs)):

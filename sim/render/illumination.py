@@ -26,7 +26,7 @@ SUN, DRIFT, FLICKER, SWITCH, CLOUD = range(5)  # keys of the random role "light"
 
 @dataclass(frozen=True)
 class Illumination:
-    """The light of one sequence. Logarithms are natural ones.
+    """The light of one sequence. Logarithms are natural ones; times count from frame 1.
 
     sun (3,)       unit vector to the sun, x, y, z
     shadow         the sun's share of the light on level ground, 0 to 1; 0: people cast no shadows
@@ -51,9 +51,10 @@ class Illumination:
     def gain(self, t: float, key: int) -> float:
         """Return the factor of brightness at time t (s), clouds left out: about 1 before any switch, always above 0.
 
-        It combines drift, flicker and switches. key: number of the frame, background frames included, 0 or more; it
-        names the random stream of the flicker. The logarithm of a switch's gain rises linearly from its start to its
-        end; a switch without duration acts at once. Raises ValueError for a negative key or seed if there is flicker.
+        It combines drift, flicker and switches. t is 0 at frame 1. key: frame number from 1 plus BACKGROUNDS (50), 0 or
+        more; it names the random stream of the flicker. The logarithm of a switch's gain rises linearly from its start
+        to its end; a switch without duration acts at once. Raises ValueError for a negative key or seed if there is
+        flicker.
         """
         log = self.drift.at_origin(t)
         if self.flicker > 0:

@@ -55,7 +55,8 @@ class ImageOutlines:
 
 @dataclass(frozen=True, eq=False)
 class ProjectedPeople:
-    """N people as one camera sees them; the second axis is body, head.
+    """N people as one camera sees them; the second axis is body, head. u, v are in px; pixel centres are at whole
+    numbers plus 0.5.
 
     start (N, 2, 3, 3)     times (u, v, 1): origin of a pixel's ray in the part's axes, where it is a ball of radius 1
     step (N, 2, 3, 3)      times (u, v, 1): direction of that ray, depth 1 m per unit

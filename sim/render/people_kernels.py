@@ -26,8 +26,8 @@ def _row_of_rays(i, e, v, start, step, ray):  # type: ignore[no-untyped-def]
     """Set ray (3, 4) to the rays of image row v in the own axes of part e of person i, where the part is a ball of
     radius 1.
 
-    Rows of ray: across, along, up. Columns: origin at column 0, its change per column, direction at column 0, its
-    change per column. start, step (N, 2, 3, 3): matrices of ray origins and directions. e: 0 body, 1 head. Returns
+    Rows of ray: across, along, up. Columns: origin at u = 0 (the left edge), its change per column, direction at u = 0,
+    its change per column. start, step (N, 2, 3, 3): matrices of ray origins and directions. e: 0 body, 1 head. Returns
     nothing.
     """
     for k in range(3):
@@ -41,9 +41,9 @@ def _row_of_rays(i, e, v, start, step, ray):  # type: ignore[no-untyped-def]
 def _hit_depths(ray, left, many, t):  # type: ignore[no-untyped-def]
     """Set t (many,) to the depths in m at which the rays of a row's pixels meet a ball of radius 1 round the origin.
 
-    ray (3, 4): rows are the part's axes x, y, z; columns are ray origin at column 0, its change per column, direction
-    at column 0, its change per column. left: column of the first of `many` pixels. A ray that misses the ball gets the
-    depth of its nearest point. Returns nothing.
+    ray (3, 4): rows are the part's axes x, y, z; columns are ray origin at u = 0 (the left edge), its change per
+    column, direction at u = 0, its change per column. left: column of the first of `many` pixels. A ray that misses the
+    ball gets the depth of its nearest point. Returns nothing.
     """
     px0, px1, dx0, dx1 = ray[X, P_AT_0], ray[X, P_PER_COLUMN], ray[X, D_AT_0], ray[X, D_PER_COLUMN]
     py0, py1, dy0, dy1 = ray[Y, P_AT_0], ray[Y, P_PER_COLUMN], ray[Y, D_AT_0], ray[Y, D_PER_COLUMN]
@@ -66,10 +66,10 @@ def _texture_and_light(  # type: ignore[no-untyped-def]
 
     place (many,): index of the lower left of four texels, in the page. across, up (many,), 0 to 1: how far beyond that
     texel the point is. light (many,): brightness times UNIT = 64. ray (3, 4): rows are the part's axes; columns are ray
-    origin at column 0, its change per column, direction at column 0, its change per column. left: column of the first
-    pixel. half (3,) m: half axes. sun (3,): unit vector to the sun, in own axes. shadow: the sun's share of the light.
-    sunlit (3,): share of the sun at feet, waist and head. head: True for a head. Numbers are float32, exact to 1e-4 of
-    a page.
+    origin at u = 0 (the left edge), its change per column, direction at u = 0, its change per column. left: column of
+    the first pixel. half (3,) m: half axes. sun (3,): unit vector to the sun, in own axes. shadow: the sun's share of
+    the light. sunlit (3,): share of the sun at feet, waist and head. head: True for a head. Numbers are float32, exact
+    to 1e-4 of a page.
     """
     f = np.float32
     px0, px1 = f(ray[X, P_AT_0]), f(ray[X, P_PER_COLUMN])

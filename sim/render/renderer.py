@@ -148,7 +148,7 @@ class Renderer:
         return RenderedFrame(image, self.right(index) if right else None, truth)
 
     def background(self, k: int) -> Image:
-        """Return image k = 0 … BACKGROUNDS - 1 (49), (H, W, 3) uint8, BGR, of the scene without people.
+        """Return image k = 0 … 49 (BACKGROUNDS is 50), (H, W, 3) uint8, BGR, of the scene without people.
 
         Its time is (k - BACKGROUNDS) / fps s, before frame 1. Other k are not refused, except that k < -1 raises
         ValueError. Raises InputError if the drawn light or plants are impossible."""

@@ -24,7 +24,7 @@ class PeopleShadows:
     """Shadows of N people on the ground at their feet, two each; the second axis is body, head.
 
     shape (N, 2, 3)    inverse of each shadow ellipse's 2 x 2 shape matrix, 1/m²: entries 11, 12, 22, in x and y
-    softness (N, 2)    half the penumbra's width over the ellipse's mean radius, no unit
+    softness (N, 2)    half the penumbra's width over the geometric mean of the ellipse's half axes, no unit
     outlines           ImageOutlines of the shadows with their soft edges, and of the pixels on which they can fall
     """
 

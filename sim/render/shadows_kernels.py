@@ -18,8 +18,9 @@ def _shade_line(place, many, centre, shape, sx, sy, softness, shade):  # type: i
     """Raise shade (many,) to 255 times the share of the sun that one body part takes at places (many, 3) x, y, z in m.
 
     A value that is higher already is kept. The direction to the sun is (sx, sy, 1). centre (3,) m: of the ellipsoid.
-    shape (3,): inverse shape of its shadow, entries 11, 12, 22, 1/m². softness: half the penumbra over the shadow's
-    mean radius. Places at or above the height of the centre stay unshaded. Returns nothing.
+    shape (3,): inverse shape of its shadow, entries 11, 12, 22, 1/m². softness: half the penumbra over the geometric
+    mean of the shadow's half axes; 0 gives a sharp edge. Places at or above the height of the centre stay unshaded.
+    Returns nothing.
     """
     f = np.float32
     x, y, z, a, b, c = f(centre[0]), f(centre[1]), f(centre[2]), f(shape[XX]), f(2 * shape[XY]), f(shape[YY])
@@ -45,9 +46,10 @@ def draw_shadows(  # type: ignore[no-untyped-def]
     last row + 1, first column, last column + 1): pixels on which each person's shadow can fall. flat: True if only
     level ground is in view. Then the shadow of part e (0 body, 1 head) has the outline middle (N, 2, 2) px, inverse (N,
     2, 3) 1/px²; else these are not used. centre (N, 2, 3) m: of the ellipsoids. shape (N, 2, 3): inverse shapes of the
-    shadows, entries 11, 12, 22, 1/m². softness (N, 2): half the penumbra over the shadow's mean radius. sun (3,):
-    vector to the sun, above the horizon. shaded (H, W) uint8: on entry 0, on return 255 times the share of the sun that
-    is gone. Tiles of 8 x 16 px with changes, or at most `margin` px away, are set to 1 in dirty. Returns nothing.
+    shadows, entries 11, 12, 22, 1/m². softness (N, 2): half the penumbra over the geometric mean of the shadow's half
+    axes. sun (3,): vector to the sun, above the horizon. shaded (H, W) uint8: on entry 0, on return 255 times the share
+    of the sun that is gone. Tiles (8 rows x 16 columns of px) with changes, or at most `margin` px away, are set to 1
+    in dirty. Returns nothing.
     """
     height, width = direct.shape
     sx, sy = sun[0] / sun[2], sun[1] / sun[2]

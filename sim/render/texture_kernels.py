@@ -53,9 +53,9 @@ def contrast_kept(wavelength, footprint):  # type: ignore[no-untyped-def]
 def grain(x, y, key, footprint, coarsest):  # type: ignore[no-untyped-def]
     """Return noise at (x, y) m, of standard deviation about 0.5 where no scale is lost.
 
-    It has equal contrast at each of up to nine scales, from `coarsest` m down to the pixel. footprint: size of a pixel
-    on the surface, m, above 0. It is 0 if even the coarsest scale is finer than two pixels. key: first of nine keys
-    (whole numbers) of the pattern.
+    It has equal contrast at each of up to nine scales, from `coarsest` m down to the pixel, each 0.45 of the one
+    before. footprint: size of a pixel on the surface, m, above 0. It is 0 if even the coarsest scale is finer than two
+    pixels. key: first of nine keys (whole numbers) of the pattern.
     """
     total, wavelength = 0.0, coarsest
     x, y = x / coarsest, y / coarsest
@@ -93,8 +93,8 @@ def slabs(x, y, width, depth, joint, key, footprint):  # type: ignore[no-untyped
 def plant_pattern(x, y, size, key):  # type: ignore[no-untyped-def]
     """Return the pattern at (x, y) m that decides where plants grow: they grow where it is above a level.
 
-    size (2,) m: of the world. The pattern, from -2.5 to 2.5, is raised by up to 1 outside the world and lowered by up
-    to 1 inside, so that plants grow outside first. key: of the pattern.
+    size (2,) m: of the world, which begins at (0, 0). The pattern, from -2.5 to 2.5, is raised by up to 1 outside the
+    world and lowered by up to 1 inside, so that plants grow outside first. key: of the pattern.
     """
     outside = max(max(-x, x - size[0]), max(-y, y - size[1]))
     patches = value_noise(0.4 * x, 0.4 * y, key) + 0.5 * value_noise(1.1 * x, 1.1 * y, key + 1)

@@ -136,9 +136,9 @@ class Background:
         """Returns the brightness factor (3,) of a frame (H, W, 3) uint8 relative to the model's mean, one per colour
         channel.
 
-        It is estimated on a grid of pixels that were not foreground in the last classified frame. If these are too few
-        to use, all valid pixels of the grid are used. If these are too few as well, the last gain is returned. The
-        model does not change.
+        It is estimated on a grid of pixels that were not foreground in the last classified frame. If no channel has 50
+        usable ones (neither near black nor clipped), all valid pixels of the grid are tried. If no channel has 50 of
+        these, the last gain is returned. The model does not change.
         """
         seen = np.moveaxis(image[self._grid], -1, 0).astype(np.float32)
         mean = self.mean[:, *self._grid]

@@ -61,8 +61,8 @@ class Blobs(Frozen):
         return np.asarray(longest + np.array([left + 0.5, top + 0.5]))
 
     def hull(self, row: int) -> Array:
-        """Returns the convex hull of the contour of blob `row` (from 0), (V, 2) x, y in px, counter-clockwise in (x,
-        y).
+        """Returns the convex hull of the contour of blob `row` (from 0), (V, 2) x, y in px, counter-clockwise where y
+        is up.
 
         It goes through pixel centres, so a blob of one pixel has V = 1. Raises IndexError if `row` is the number of
         blobs or more.

@@ -51,8 +51,8 @@ class Foreground:
     """The pipeline from a picture to foreground blobs: classify the pixels, clean the mask, find blobs, adapt.
 
     State: model, the background model (`Background` or `Mog2`); px_per_m, the scale of the image, nan or 0 while it is
-    unknown; most_foreground, the largest plausible share of foreground, 0 to 1. The constructor raises InputError for
-    an unusable background sample, AssertionError for none.
+    unknown (first the context's; the tracker may set it later); most_foreground, the largest plausible share of
+    foreground, 0 to 1. The constructor raises InputError for an unusable background sample, AssertionError for none.
     """
 
     def __init__(
@@ -114,7 +114,8 @@ class Foreground:
         """Let the background model learn from a segmented picture, except at pixels where `protected` (H, W) is True.
 
         seen: the result of the last `segment`, as that call also set the brightness of the model. The five-class model
-        changes every fourth row per call. Returns nothing.
+        changes every fourth row per call. `seen.plausible` is not looked at: the caller leaves implausible pictures
+        out. Returns nothing.
         """
         self.model.adapt(seen.image, seen.classes, protected)
 

@@ -46,7 +46,7 @@ class Mog2Settings(Config):
 
     @classmethod
     def like(cls, settings: BackgroundSettings) -> Self:
-        """Returns Mog2Settings with shadow = settings.dark and the same background_time; `variance` has its default."""
+        """Returns Mog2Settings with shadow = settings.dark and the same background_time; `variance` is 16."""
         return cls(shadow=settings.dark, background_time=settings.background_time)
 
 

@@ -48,10 +48,10 @@ class PersonSize:
     """The size of a person in the image at every foot point: from a camera if there is one, corrected by lone blobs.
 
     State ("lone blobs" may be one person each; "from above": the camera is straight above):
-    table (2, V, U)         with a pinhole camera: height and width at the nodes of a grid, px; else None
+    table (2, V, U)         with a pinhole camera: height and width at the nodes of a grid of 8 px, px; else None
     low (2,)                u, v of the grid's first node, px; only with a table
     axes_above (2,)         from above: longer and shorter axis of a person's ellipse, px; else None
-    lone (K, 4)             the last lone blobs, at most 400: foot u, v, height, width, px (from above: the axes)
+    lone (K, 4)             the last lone blobs, at most 400: foot u, v, height + 1.3, width, px (from above: the axes)
     since_fit, agreed       numbers of lone blobs: since the last fit; of heights that agree with line and factor
     line                    a (px), b of h = a + b v, v the foot's row; used without a camera; a is nan before a fit
     factor (2,)             height and width of the lone blobs over the expected ones; 1 before the first fit
@@ -91,27 +91,29 @@ class PersonSize:
         """Returns height and width (N, 2), px, of the box of a person who stands at image points `foot` (N, 2) u, v,
         px.
 
-        nan where the size is unknown or its height is below 12 px (longer axis below 6 px from above). From above it is
-        the box of a person turned by 45 degrees. Beyond the camera's table the size is that at its edge."""
+        nan where the size is unknown (without a camera before the first fit; where a pinhole camera sees no ground) or
+        its height is below 12 px (longer axis below 6 px from above). From above it is the box of a person turned by 45
+        degrees. Beyond the camera's table the size is that at its edge."""
         size = self._expected(foot)
         return np.sqrt(np.square(size).mean(1, keepdims=True) * np.ones(2)) if self.above else size
 
     def axes(self, foot: Array) -> Array:
         """Returns height and width (N, 2), px, of the ellipse of a person who stands at `foot` (N, 2) u, v, px.
 
-        From above: the axes of the ellipse, the longer first. nan where the size is unknown or the height (from above
-        the longer axis) of the box is below 12 px (6 px)."""
+        From above: the axes of the ellipse, the longer first. nan where the size is unknown (no camera and no fit yet,
+        or no ground there) or the height (from above the longer axis) of the box is below 12 px (6 px)."""
         return self._expected(foot) if self.above else self._expected(foot) / self.box_over_ellipse
 
     def _expected(self, foot: Array) -> Array:
         """Returns the expected size (N, 2), px, of people at `foot` (N, 2) u, v: height, width (from above the longer
-        and shorter axis), with the learned factors. nan where it is unknown or smaller than 12 px high (6 px from
-        above)."""
+        and shorter axis), with the learned factors. nan where it is unknown (no camera and no fit yet, or no ground
+        there) or smaller than 12 px high (6 px from above)."""
         size = self._unscaled(foot) * self.factor
         return np.where(size[:, :1] >= (SMALLEST_FROM_ABOVE if self.above else SMALLEST), size, np.nan)
 
     def one_person(self, box: Array, ellipse: Array) -> Bools:
-        """Returns True for each blob (M,) that has the size of one person; False where a person's size is unknown.
+        """Returns True for each blob (M,) that has the size of one person; False where a person's size is unknown or
+        too small (nan).
 
         box (M, 4): left, top, width, height, px; ellipse (M, 5): x, y, full axes h, w (px), theta (rad). The box's
         sides, from above the ellipse's axes, may be 0.8 (from above 0.6) to 1.25 times the expected height and 0.5 to
@@ -124,7 +126,7 @@ class PersonSize:
 
     def _unscaled(self, foot: Array) -> Array:
         """Returns height and width (N, 2), px, from above the axes, of people at `foot` (N, 2) u, v by the camera or
-        the line, without the learned factors; nan where unknown."""
+        the line, without the learned factors; nan before a fit, or where no ground is seen."""
         if self.axes_above is not None:
             return np.tile(self.axes_above, (len(foot), 1))
         if self.table is not None:
@@ -137,7 +139,7 @@ class PersonSize:
         """Scale of the image, px per m: the median height of the remembered lone blobs (each may be one person) over
         1.7 m.
 
-        nan without lone blobs. From above their longer axis is taken for the height."""
+        nan without lone blobs. Heights include 1.3 px that cleaning cuts off. From above their longer axis is taken."""
         return float(np.median(self.lone[:, 2])) / PERSON_HEIGHT if len(self.lone) else float("nan")
 
     def learn(self, box: Array, ellipse: Array, whole: Bools) -> None:
@@ -146,8 +148,8 @@ class PersonSize:
         box (M, 4): left, top, width, height, px; ellipse (M, 5): x, y, full axes h, w (px), theta (rad); whole (M,):
         False for a blob that must not be used. A blob may be one person if it is at least 12 px high (from above 6 px
         long) and its width over height is within a factor 2 of a person's; with a camera its height must be within a
-        factor 1.4 of the expected one, too. The last 400 are kept. Line and factors change only when 5 % of the kept
-        ones are new."""
+        factor 1.4 of the expected one, too. The last 400 are kept, with 1.3 px added to the height (not from above), as
+        cleaning cuts them off. Line and factors change only when 5 % of the kept ones are new."""
         foot, size = _feet(box), ellipse[:, 2:4] if self.above else box[:, :1:-1]
         expected = np.divide(*self._unscaled(foot).T[::-1]) if self.from_camera else SLIM
         with np.errstate(invalid="ignore"):
@@ -220,7 +222,7 @@ def _densest(value: Array, weight: Array, least: float = 1.0) -> tuple[float, Bo
     value, weight (N,): ratios and their votes. Two values agree if they differ by at most AGREEMENT = 12 %. The most
     popular value has the most votes near it. The value 1 has the weight PRIOR_COUNT = 2 in advance and counts in the
     mean, but has no flag. least < 1: instead of the most popular value the smallest one with at least this share of its
-    votes (one person is narrower than two)."""
+    votes (one person is narrower than two). N = 0 gives 1."""
     value, weight = np.append(value, 1.0), np.append(weight, PRIOR_COUNT)
     near = np.abs(value / np.maximum(value[:, None], 1e-9) - 1) <= AGREEMENT
     votes = near @ weight

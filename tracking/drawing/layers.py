@@ -60,8 +60,8 @@ class FrameMarks:
 
     id: (N,) of people or groups. box: (N, 4) left, top, width, height. at: (N, 2) x, y, the point that trails follow.
     ellipse: (N, 32, 2), points of the ellipse that holds the position with 95 % probability. Rows of these three are
-    nan where unknown. hidden: (N,) True for true people of whom less than 20 % is visible. groups: marks of the groups
-    in the frame. whole_groups: True if the tracker tracks groups, not people."""
+    nan where unknown. hidden: (N,) True for true people of whom less than 20 % is visible, never for tracks. groups:
+    marks of the groups in the frame. whole_groups: True if the tracker tracks groups, not people."""
 
     id: Ints
     box: Array
@@ -129,7 +129,8 @@ def layer_of_truth(truth: Truth) -> Layer:
 
     A frame without people, and every frame of a truth without boxes, has no marks. Ellipses are nan. Boxes of people of
     whom less than 20 % is visible are marked hidden. A group's hull holds its members' boxes and 5 px round them;
-    groups with fewer than two boxes have no mark. A truth whose events are None gives none."""
+    groups with fewer than two boxes have no mark. Unknown (nan) visibility hides nobody. A truth whose events are None
+    gives none."""
     frames = {}
     for index in range(1, truth.length + 1):
         now = truth.at(index)
@@ -146,9 +147,10 @@ def layer_of_tracks(tracks: SequenceOf[Tracks], camera: Camera | None, scene: Sc
     events.
 
     tracks: one Tracks per frame. Positions on the ground are projected through `camera`; people of a Tracks without
-    boxes get the box of an upright person. Without a camera, tracks on the ground show only their own boxes and the
-    groups round these. Tracks whose rows are groups give marks of groups only. What the camera cannot see is left out
-    (nan, or no points). scene: gives the ground's height; None: 0."""
+    boxes get the box of an upright person. Groups of people are those of `group`, drawn round two or more boxes.
+    Without a camera, tracks on the ground show only their own boxes and the groups round these. Tracks whose rows are
+    groups give marks of groups only. What the camera cannot see is left out (nan, or no points). scene: gives the
+    ground's height; None: 0."""
     frames = {t.index: _marks_in_picture(t, camera, scene) for t in tracks}
     return Layer("tracked", "T", frames, _emitted(tracks))
 
@@ -157,8 +159,8 @@ def plan_layer_of_tracks(tracks: SequenceOf[Tracks]) -> Layer:
     """Returns the layer of one tracker's output on a plan, in m: positions, 95 % ellipses, hulls of groups, events;
     boxes are nan.
 
-    tracks: one Tracks per frame, with positions on the ground; this is not checked. An ellipse is nan if its covariance
-    is not finite."""
+    tracks: one Tracks per frame, with positions on the ground; this is not checked. Groups are those of a Tracks'
+    `groups`; None gives none. An ellipse is nan if its covariance is not finite."""
     return Layer("tracked", "T", {t.index: _marks_on_plan(t) for t in tracks}, _emitted(tracks))
 
 
@@ -174,7 +176,8 @@ def _marks_in_picture(t: Tracks, camera: Camera | None, scene: Scene | None) -> 
 
     Trails follow the middle of a box's lower edge; without a box the position of tracks in the image plane, else nan.
     Tracks on the ground without boxes get boxes of upright people through `camera`, nan if it is None. scene: gives the
-    ground's height; None: 0. Rows that are groups have no boxes and ellipses."""
+    ground's height; None: 0. Groups of people are those of `t.group`, drawn round two or more boxes. Rows that are
+    groups have no boxes and ellipses."""
     if t.unit == "group":
         return _whole_groups_in_picture(t, camera, scene)
     n = len(t.id)
@@ -198,8 +201,8 @@ def _whole_groups_in_picture(t: Tracks, camera: Camera | None, scene: Scene | No
 def _marks_on_plan(t: Tracks) -> FrameMarks:
     """Returns the marks of one frame's tracks `t` on a plan, in m; boxes are nan. Trails follow the positions.
 
-    Ellipses are nan where the covariance is not finite. Without groups in `t` there are no group marks, unless its rows
-    are groups."""
+    Ellipses are nan where the covariance is not finite. Group marks are `t.groups` with their hulls, or the rows if
+    these are groups; without both there are none."""
     n, groups, at = len(t.id), t.groups or Groups.none(), t.pos[:, :2]
     if t.unit == "group":
         marks = _whole_groups(t, lambda points: points[:, :2])
@@ -216,8 +219,9 @@ def _whole_groups(t: Tracks, to_drawing: Callable[[Array], Array]) -> tuple[Grou
     """Returns one mark per row of tracks `t` whose rows are groups, in order.
 
     to_drawing: maps points (K, 2 or 3) to drawing coordinates (K, 2), or to no rows if they cannot be seen. motion is
-    the row's position now and in 1 s at its velocity. A row whose id is not in t.groups has no hull and extent, and its
-    size is nan."""
+    the row's position now and in 1 s at its velocity. hull and size (number of people) are those of the row's id in
+    t.groups. extent is the 99 % ellipse of `t.groups.extent` (a covariance) round the row's position. A row whose id is
+    not in t.groups (or None) has no hull and extent, and its size is nan."""
     groups = t.groups or Groups.none()
     rows = dict(zip(groups.id.tolist(), range(len(groups.id)), strict=True))
 

@@ -98,8 +98,8 @@ def draw_group_hulls(canvas: Canvas, truth: Truth, index: int, places: Array, bo
     """Draws in place the hull and id of each true group that has two or more members in frame `index`, counted from 1.
 
     The hull is the convex polygon round the members. places: (R, 2) drawing coordinates of the truth's R rows (one row
-    per person and frame), not nan. boxes: (R, 4) left, top, width, height, whose corners the hull holds; None: it holds
-    a circle round each place, of radius 0.3 m and at least 9 px.
+    per person and frame), not nan. boxes: (R, 4) left, top, width, height, not nan, whose corners the hull holds; None:
+    it holds a circle round each place, of radius 0.3 m and at least 9 px.
     """
     rows = truth.rows(index)
     group = truth.group[rows]
@@ -136,8 +136,9 @@ def draw_people(canvas: Canvas, truth: Truth, index: int, places: Array, boxes: 
     given.
 
     places: (R, 2) drawing coordinates of the truth's R rows (one row per person and frame); people with nan are
-    skipped. boxes: (R, 4) left, top, width, height, known where the place is; None: discs. ids: also write ids. The
-    heading line is 0.5 drawing units (m on a plan) long; there is none without velocities or below 0.1 m/s.
+    skipped. boxes: (R, 4) left, top, width, height, known where the place is; None: discs of radius 0.22 drawing units,
+    at least 6 px. ids: also write ids. The heading line is 0.5 drawing units (m on a plan) long; there is none without
+    velocities or below 0.1 m/s.
     """
     rows, radius = truth.rows(index), max(0.22 * canvas.scale, 6.0)
     for row in range(rows.start, rows.stop):

@@ -34,7 +34,8 @@ def error_statistics(recordings: Sequence[MatchedRecording]) -> dict[str, float]
     - "missed": share of labelled rows (people in frames) that are not detected; "missed, visibility 0-0.25",
       "0.25-0.5", "0.5-0.75", "0.75-0.95", "0.95-1": the same by visible share, upper limits except 1 excluded.
     - "misses: mean run, s"; "misses in runs over 1 s": share of the missed time.
-    - "false alarms per frame"; "false alarms: at people": share; "false alarms: mean stay, s".
+    - "false alarms per frame": unmatched detections; "false alarms: at people": share of these that belong to a person;
+      "false alarms: mean stay, s": from an alarm's first to its last detection, both included.
     - "overlap, 10% quantile", 50%, 90%: of the IoU with the whole labelled box.
     - "error across: mean", "error across: sd" (standard deviation), and so for foot, top (all in box heights) and log
       width.

@@ -54,8 +54,8 @@ class AlarmTrack:
 
 
 def fit_false_alarms(recordings: Sequence[MatchedRecording]) -> tuple[float, FalseAlarms | None]:
-    """Returns the mean number of false alarms per frame, and their profile; None if there are fewer than 5 alarm
-    tracks.
+    """Returns the mean number of false alarms (unmatched detections) per frame, and their profile; None if there are
+    fewer than 5 alarm tracks.
 
     An alarm track is a series of unmatched detections of one false alarm. Fields about alarms at people (across, foot,
     near_height), or elsewhere (height, drift, at), keep their defaults if there are fewer than 5 alarm tracks of this
@@ -233,7 +233,9 @@ def _fit_elsewhere(tracks: Sequence[AlarmTrack]) -> dict[str, object]:
 
     height: median and spread (half the middle 68 %) of the logarithm of the height relative to a person standing there.
     drift: root mean square speed per axis in box heights per s, from tracks of four or more detections; 0 without any.
-    at: up to 32 foot points x, y as shares (0 to 1, clipped) of the visible ground, evenly selected. tracks: not empty.
+    at: up to 32 foot points, x to the right and y down, as shares (0 to 1, clipped) of the rectangle of the image that
+    shows ground (`VisibleGround.low` to `high`). They are selected evenly from all detections, alarm track after alarm
+    track. tracks: not empty.
     """
     height, place, velocity = [], [], []
     for t in tracks:

@@ -34,10 +34,11 @@ def fit_sensor(sequences: Iterable[Recording] | Recording) -> Sensor:
 def fit_matched(recordings: Sequence[MatchedRecording]) -> Sensor:
     """Returns the sensor whose errors are like those of the detector on matched recordings, pooled.
 
-    `noise_m` keeps its default, and `points` is "foot" instead of "own", without ground positions of labels and
-    detections. `true_scores` and `false_scores` are None with fewer than 20 scores, `miss_memory` and `false_alarms` if
-    nothing was found. Raises InputError if there are fewer than 50 labelled rows (people in frames) or fewer than 25 of
-    them are detected. Raises AssertionError without labelled boxes.
+    `noise_px` is the median height of the labelled boxes times the root mean square of three standard deviations: of
+    foot, top and middle. `min_visibility` is 0. `noise_m` keeps its default, and `points` is "foot" instead of "own",
+    without ground positions of labels and detections. `true_scores` and `false_scores` are None with fewer than 20
+    scores, `miss_memory` and `false_alarms` if nothing was found. Raises InputError if there are fewer than 50 labelled
+    rows (people in frames) or fewer than 25 of them are detected. Raises AssertionError without labelled boxes.
     """
     people, hits = sum(len(m.match) for m in recordings), sum(int(m.hit.sum()) for m in recordings)
     if people < LEAST or hits < LEAST // 2:

@@ -155,8 +155,8 @@ def _groups_of_frames(given: Sequence[Tracks], table: TracksTable) -> list[Group
     """Returns a list of the Groups of every frame 1, 2, … of the sequence, in the tracks' unit (m or px); empty Groups
     for a frame without any.
 
-    Hulls go round footprints, or round boxes if the tracks are in the image and all have boxes. given: the tracks, at
-    least one `Tracks` (else IndexError); table: the same as rows.
+    Hulls go round footprints (16-gons on a circle of 0.25 m round each position), or round boxes if the tracks are in
+    the image and all have boxes. given: the tracks, at least one `Tracks` (else IndexError); table: the same as rows.
     """
     pos, vel, box = table.pos * table.scale, table.vel * table.scale, boxes_of_rows(given)
     if box is not None:

@@ -34,6 +34,14 @@ class LinkRule(Config):
 
     It is a Config: it is read from TOML files and searched like a tracker's. Raises InputError if a value is not
     allowed.
+
+    near (m), alike (m/s): a pair is near and alike if its distance and its velocity difference are below these. share,
+    window (s): a pair is linked if it was so in this share of those frames of the last `window` in which both were
+    seen. acquaintance (s): least time within the window in which both were seen. apart (m): a pair farther than this is
+    apart. patience (s): time apart after which a link breaks. idle (m/s): two people both slower than this are not
+    near; 0: off. diverge (m/s): a pair farther than `near` whose velocities differ by more is apart; 10: never. smooth
+    (s): velocities are chords over this time; 0: the tracker's own. memory (s): a missed member stays so long in the
+    group. arrival (s): a link that began so soon after a track's first frame is no merge.
     """
 
     tracker: ClassVar[str] = "grouping"

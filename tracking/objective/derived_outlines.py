@@ -27,9 +27,9 @@ def derived_outlines(tracks: Sequence[Tracks], fps: float, px_per_m: float, labe
 
     tracks: of one tracker, of people, without `groups`, sorted by frame; none raises IndexError. If any track has a
     group id, these ids define the groups, else the baseline rule does. Hulls are drawn round boxes if the tracks are in
-    the image and every track has a box, else round footprints. Unit: m on the ground, px in the image. fps: frames per
-    second. px_per_m: px per m, used only in the image. labelled (length + 1,): bool by frame number, from 1. Group ids
-    of the result are only row numbers. Without groups it has no rows.
+    the image and every track has a box, else round footprints (16-gons on a circle of 0.25 m). Unit: m on the ground,
+    px in the image. fps: frames per second. px_per_m: px per m, used only in the image. labelled (length + 1,): bool by
+    frame number, from 1. Group ids of the result are only row numbers. Without groups it has no rows.
 
     Raises InputError if the tracks are in the image and px_per_m is not a finite number above 0.
     """
@@ -101,8 +101,8 @@ def flat_footprint_hulls(pos: Array, ends: Ints, scale: float) -> tuple[Array, I
     (G,).
 
     pos (M, 2): people's x, y, not nan, group after group; ends (G,): index at which each group, not empty, ends
-    (exclusive). scale: units of pos per metre. A footprint is a polygon of 16 vertices round the position. Hulls are
-    counter-clockwise and may repeat vertices.
+    (exclusive). scale: units of pos per metre. A footprint is a polygon of 16 vertices on a circle of 0.25 m round the
+    position. Hulls are counter-clockwise and may repeat vertices.
     """
     from tracking.objective import derived_outlines_kernels as kernels
 

@@ -28,7 +28,7 @@ class GroupOutlines:
     - rows: frame number (from 1) and id of each group.
     - pos (G, 2): centres x, y.
     - vertex (V, 2), ends (G,): polygon g is vertex[ends[g - 1] : ends[g]] (polygon 0 begins at 0), counter-clockwise.
-    - area (G,): signed area, above 0 if counter-clockwise, 0 without vertices.
+    - area (G,): signed area, above 0 if counter-clockwise (y up, also for px), 0 without vertices.
     - box (G, 4): min x, min y, max x, max y, nan without vertices.
     - regular (G,): True if the polygon has a positive area and is convex up to rounding.
     """

@@ -1,7 +1,7 @@
 """Compiled measures and overlaps of the groups' hulls. Exact versions: sim.geometry.polygons and tracking.scoring.
 
-Polygons follow each other in vertex (V, 2), counter-clockwise. Polygon g is vertex[ends[g - 1] : ends[g]]; polygon 0
-begins at row 0.
+Polygons follow each other in vertex (V, 2), counter-clockwise where y is up, also in px. Polygon g is vertex[ends[g -
+1] : ends[g]]; polygon 0 begins at row 0.
 """
 
 from __future__ import annotations
@@ -12,7 +12,8 @@ from numba import njit
 
 @njit(cache=True)
 def _turn(a, b, c):  # type: ignore[no-untyped-def]
-    """Returns twice the signed area of the triangle of points a, b, c (2,): above 0 for a left turn, 0 on a line."""
+    """Returns twice the signed area of the triangle of points a, b, c (2,): above 0 for a left turn (y up), 0 on a
+    line."""
     return (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0])
 
 
@@ -21,9 +22,9 @@ def measure(vertex, ends, slack):  # type: ignore[no-untyped-def]
     """Returns three arrays of G polygons: signed area (G,); box (G, 4): min x, min y, max x, max y; regular (G,) bool.
 
     Polygon g is vertex[ends[g - 1] : ends[g]] (polygon 0 begins at 0); vertex (V, 2), ends (G,). The area is positive
-    if the polygon is counter-clockwise. regular: the area is positive and no turn is to the right by more than `slack`
-    times the squared size (width + height) of the vertices up to it. Without vertices the area is 0, the box nan and
-    regular False.
+    if the polygon is counter-clockwise (y up). regular: the area is positive and no turn is to the right by more than
+    `slack` times the squared size (width + height) of the vertices up to it. Without vertices the area is 0, the box
+    nan and regular False.
     """
     area, box, regular = np.zeros(len(ends)), np.full((len(ends), 4), np.nan), np.zeros(len(ends), np.bool_)
     first = 0
@@ -118,8 +119,9 @@ def _longest(ends):  # type: ignore[no-untyped-def]
 def _cut(polygon, n, a, b, spare):  # type: ignore[no-untyped-def]
     """Clips the polygon of the first n rows to the left of the line from a to b; returns the new number of vertices.
 
-    Changes polygon (N, 2) in place: its first rows become the clipped polygon. a, b (2,): points. spare (N, 2): work
-    space. n is returned if nothing is cut off, 0 if everything is.
+    Left is meant with y up. Changes polygon (N, 2) in place: its first rows become the clipped polygon. A cut can add a
+    vertex to a convex polygon, so both arrays need room for n + 1 rows. a, b (2,): points. spare (N, 2): work space. n
+    is returned if nothing is cut off, 0 if everything is.
     """
     dx, dy = b[0] - a[0], b[1] - a[1]
     outside = False
@@ -181,8 +183,8 @@ def inside(frame, vertex, ends, box, regular, people, place, reach, slack):  # t
 
 @njit(cache=True)
 def _gap(p, x, y):  # type: ignore[no-untyped-def]
-    """Returns the distance of the point (x, y) from a convex polygon p (V, 2), V at least 1, counter-clockwise; 0
-    inside or on its edge."""
+    """Returns the distance of the point (x, y) from a convex polygon p (V, 2), V at least 1, counter-clockwise (y up);
+    0 inside or on its edge."""
     within, least = True, np.inf
     for k in range(len(p)):
         a, b = p[k], p[(k + 1) % len(p)]
