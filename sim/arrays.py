@@ -48,16 +48,10 @@ class Frozen:
 
         The new arrays are plain numpy arrays, read-only. Fields that are themselves a Frozen are copied likewise.
         """
-        changes: dict[str, Any] = {}
-        for f in fields(self):  # type: ignore[arg-type]
-            value = getattr(self, f.name)
-            if isinstance(value, np.ndarray):
-                changes[f.name] = _own(value)
-            elif isinstance(value, Frozen):
-                changes[f.name] = value.copy()
-            elif isinstance(value, tuple) and value and isinstance(value[0], np.ndarray):
-                changes[f.name] = tuple(map(_own, value))
-        return self.replace(**changes)
+        made = object.__new__(type(self))
+        for name in _names(type(self)):
+            object.__setattr__(made, name, _own(getattr(self, name)))
+        return made
 
 
 KINDS = {"Array": np.dtype(np.float64), "Ints": np.dtype(np.int64), "Bools": np.dtype(np.bool_)}
@@ -93,11 +87,23 @@ def _settled(a: NDArray[Any], kind: np.dtype[Any]) -> NDArray[Any]:
     return a
 
 
-def _own(a: NDArray[Any]) -> NDArray[Any]:
-    """Return a copy of `a` as a plain array that is read-only itself, not a read-only view of a writable one."""
-    made = np.array(a)
-    made.flags.writeable = False
-    return made
+@cache
+def _names(kind: Any) -> tuple[str, ...]:
+    return tuple(f.name for f in fields(kind))
+
+
+def _own(value: Any) -> Any:
+    """Return a copy of an array, of a tuple of arrays or of a Frozen; any other value as it is.
+
+    A copied array is a plain array that is read-only itself, not a read-only view of a writable one.
+    """
+    if isinstance(value, np.ndarray):
+        made = np.array(value)
+        made.flags.writeable = False
+        return made
+    if isinstance(value, tuple) and value and isinstance(value[0], np.ndarray):
+        return tuple(map(_own, value))
+    return value.copy() if isinstance(value, Frozen) else value
 
 
 def no_ids() -> Ints:

@@ -10,6 +10,7 @@ from collections.abc import Iterator, Mapping
 from collections.abc import Sequence as SequenceOf
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
+from functools import partial
 from pathlib import Path
 from typing import Any, cast
 
@@ -18,6 +19,7 @@ from sim.types import Context, DetectionMode, Frame, Sequence, Tracker, Tracks
 from tracking import image_scale, tracker_registry
 from tracking.config import Config
 from tracking.detection_mode import check_detections, choose_mode, frames_with_detections
+from tracking.time_limit import TimeLimited
 from tracking.tracks_check import ReportHistory, check_tracks
 from tracking.user_code import tracker_failed, user_code
 
@@ -110,7 +112,7 @@ def _with_file(error: FlockscopeError, sequence: Sequence) -> FlockscopeError:
 
 
 def prepare(
-    tracker: str | type[Tracker] | Tracker,
+    tracker: str | type[Tracker] | Tracker | TimeLimited,
     sequence: Sequence,
     *,
     params: Params = None,
@@ -120,10 +122,11 @@ def prepare(
 ) -> PreparedTracker:
     """Return the tracker ready to be reset for the sequence.
 
-    tracker: a registered name, "file.py:Class", "module:Class", a class or an instance. params: a config, values by
-    name, a preset's name or a TOML file; None for the defaults. detections: "image", "file" or "truth"; None for the
-    first of them that can work. sensor: settings that degrade mode "truth", None or {} for none; seed: of their random
-    numbers. Stored detections or labels are read here, and in mode "image" the background pictures.
+    tracker: a registered name, "file.py:Class", "module:Class", a class, an instance or a TimeLimited. params: a
+    config, values by name, a preset's name or a TOML file; None for the defaults. detections: "image", "file" or
+    "truth"; None for the first of them that can work. sensor: settings that degrade mode "truth", None or {} for
+    none; seed: of their random numbers. Stored detections or labels are read here, and in mode "image" the
+    background pictures.
 
     Raises InputError if `sequence` is no Sequence, if the tracker, its parameters or the sensor settings are wrong, or
     if tracker and sequence do not fit. Also if parameters are given to an instance or to a tracker without any, sensor
@@ -152,13 +155,15 @@ def prepare(
     return PreparedTracker(name, instance, config, context, mode, sequence, frames)
 
 
-def _make(tracker: str | type[Tracker] | Tracker, params: Params) -> tuple[str, Tracker, Config | None]:
+def _make(tracker: str | type[Tracker] | Tracker | TimeLimited, params: Params) -> tuple[str, Tracker, Config | None]:
     """Returns the tracker's name, an instance and its config (None without parameters).
 
     A class gets its config from its `config_class`. An instance has the name of its class, keeps its own config (its
     attribute `config`, None if missing) and takes no `params`. Raises InputError if tracker or params are wrong or do
     not fit, and WorkError if the tracker cannot be created. A FlockscopeError of its __init__ passes through.
     """
+    limited = tracker if isinstance(tracker, TimeLimited) else None
+    tracker = tracker.tracker if isinstance(tracker, TimeLimited) else tracker
     if not isinstance(tracker, str | type):
         if params is not None:
             got = f"an instance of {type(tracker).__name__}"
@@ -171,9 +176,9 @@ def _make(tracker: str | type[Tracker] | Tracker, params: Params) -> tuple[str, 
         if params is not None:
             remedy = "leave the parameters out, or give the class a config_class (docs/guides/your-own-tracker.md)"
             raise InputError(place="params", got=name, expected="a tracker with parameters", remedy=remedy)
-        return name, _instance(name, found), None
+        return name, _instance(name, found if limited is None else partial(limited.make, None)), None
     config = config_of(kind, params)
-    return name, _instance(name, found, config), config
+    return name, _instance(name, found if limited is None else limited.make, config), config
 
 
 def _instance(name: str, tracker_class: Any, *arguments: Any) -> Tracker:

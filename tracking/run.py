@@ -19,6 +19,7 @@ from sim.types import DetectionMode, Sequence, Tracker, Tracks
 from tracking.grouping.link_rule import LinkRule
 from tracking.prepare import Params, prepare
 from tracking.run_info import Speed, run_info
+from tracking.time_limit import TimeLimited
 
 
 @dataclass(frozen=True, eq=False)
@@ -44,7 +45,7 @@ class TrackingRun(SequenceOf[Tracks]):
 
 
 def track(
-    tracker: str | type[Tracker] | Tracker,
+    tracker: str | type[Tracker] | Tracker | TimeLimited,
     sequence: Sequence,
     *,
     params: Params = None,
@@ -56,8 +57,9 @@ def track(
 ) -> TrackingRun:
     """Return the tracker's tracks of every frame of the sequence, completed with groups and events.
 
-    tracker: a registered name, "file.py:Class", "module:Class", a class or an instance. params: a config, values by
-    name, the name of a preset, or a TOML file; None for the tracker's defaults. detections: "image", "file" or "truth";
+    tracker: a registered name, "file.py:Class", "module:Class", a class, an instance, or a TimeLimited
+    (tracking.time_limit), which stops a step that hangs. params: a config, values by name, the name of a preset, or a
+    TOML file; None for the tracker's defaults. detections: "image", "file" or "truth";
     None for the first of them that can work. sensor: settings as in a scenario's [sensor] that degrade "truth" (misses,
     clutter, noise, hiding); None: perfect. seed: for the tracker's and the sensor's random numbers. grouping: the rule,
     or its TOML file, that groups people if the tracker names no groups; None: the default rule. If the tracker names

@@ -24,6 +24,7 @@ from tracking.app.shared_options import (
     Scale,
     Set,
     Source,
+    StepTimeout,
     Streams,
     Tracker,
     Tracks,
@@ -78,7 +79,7 @@ class TrackOptions:
     grouping: file of a rule that derives groups, None if not given. seed: of the tracker's and the sensor's random
     numbers. fps: frames per second; None: the recording's own. px_per_m: pixels per metre, camera: calibration file;
     None if not given. background: "first:N" or "spread:N", the frames that a background model is trained on; None if
-    not given.
+    not given. step_timeout: seconds that each reset and step of the tracker may take; None: no limit.
     """
 
     tracker: Tracker
@@ -100,6 +101,7 @@ class TrackOptions:
         str | None,
         typer.Option("--background", metavar="first:N|spread:N", help="Frames a background model is trained on."),
     ] = None
+    step_timeout: StepTimeout = None
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -42,6 +42,14 @@ Cluster = Annotated[
     str | None,
     typer.Option("--cluster", metavar="tcp://HOST:PORT", help="Scheduler of a dask cluster that does the work."),
 ]
+StepTimeout = Annotated[
+    float | None,
+    typer.Option(
+        "--step-timeout",
+        metavar="SECONDS",
+        help="Stop a tracker whose reset or step takes longer. It then runs in a process of its own.",
+    ),
+]
 Streams = Annotated[
     str,
     typer.Option(

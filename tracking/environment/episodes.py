@@ -15,10 +15,11 @@ from sim.types import DetectionMode, Frame, Sequence, Tracker, Tracks, Truth
 from tracking.environment.episode_cache import OpenedSource, SourceCache
 from tracking.episode_source import Source, sources
 from tracking.prepare import Params, prepare
+from tracking.time_limit import TimeLimited
 
 __all__ = ["Episode", "Rollout", "Source", "SourceCache", "play", "sources", "streams_for"]
 
-AnyTracker = str | type[Tracker]
+AnyTracker = str | type[Tracker] | TimeLimited
 
 
 @dataclass(frozen=True)
@@ -55,12 +56,12 @@ def play(
 ) -> Episode:
     """Plays one episode, from the first frame to the last or to frame number `upto`, and returns its result.
 
-    tracker: name, file.py:Class, module:Class or class. config: its parameters, None for the defaults. detections: its
-    input, None chooses one that works. tracker_seed: seed of the tracker's random numbers. cache: keeps the opened
-    source, None keeps nothing. upto: from 1, None plays all. every_score: compute the whole catalogue, else the
-    objective and its two parts. A simulated source is drawn as pictures only if `detections` is "image" or the tracker
-    takes neither boxes nor points. The objective equals that of `tracking.evaluate(sequence.truth, tracking.track(…))`
-    up to that frame.
+    tracker: name, file.py:Class, module:Class, class or TimeLimited. config: its parameters, None for the defaults.
+    detections: its input, None chooses one that works. tracker_seed: seed of the tracker's random numbers. cache:
+    keeps the opened source, None keeps nothing. upto: from 1, None plays all. every_score: compute the whole
+    catalogue, else the objective and its two parts. A simulated source is drawn as pictures only if `detections` is
+    "image" or the tracker takes neither boxes nor points. The objective equals that of
+    `tracking.evaluate(sequence.truth, tracking.track(…))` up to that frame.
 
     Raises InputError if an argument is wrong, tracker and source do not fit, or the source has no labels, WorkError if
     the tracker fails, and IncomparableError if its tracks lack the boxes or positions to compare.
@@ -177,9 +178,9 @@ class Rollout:
 def streams_for(tracker: AnyTracker, detections: DetectionMode | None) -> tuple[str, ...]:
     """Returns the pictures that a simulated sequence needs for this tracker, () if it needs none.
 
-    tracker: name, file.py:Class, module:Class or class. Pictures are needed if `detections` is "image", or is None and
-    the tracker takes neither boxes nor points. They are "left" and "background", and "right" if the tracker takes
-    stereo. Raises InputError if a tracker given by name cannot be found or imported.
+    tracker: name, file.py:Class, module:Class, class or TimeLimited. Pictures are needed if `detections` is "image", or
+    is None and the tracker takes neither boxes nor points. They are "left" and "background", and "right" if the
+    tracker takes stereo. Raises InputError if a tracker given by name cannot be found or imported.
     """
     from tracking.tracker_registry import find
 

@@ -37,6 +37,7 @@ class TuneOptions:
     - storage: journal file or Optuna URL of the study, None for a journal beside `out` (memory without `out`); study:
       its name, None for that of `out`.
     - workers: number of processes; cluster: address of a dask scheduler or None.
+    - step_timeout: seconds that each `reset` and `step` may take, in a process of the tracker's own; None: no limit.
     - progress: called as progress(finished, trials, text), or None.
 
     Raises InputError if a number with a declared range lies outside it; everything else is checked by the search. Where
@@ -95,6 +96,12 @@ class TuneOptions:
     cluster: str | None = field(
         default=None,
         metadata=option("Scheduler of a dask cluster that plays the episodes.", metavar="tcp://HOST:PORT"),
+    )
+    step_timeout: float | None = field(
+        default=None,
+        metadata=option(
+            "Seconds that a reset or step may take; a longer one makes the trial impossible.", metavar="SECONDS"
+        ),
     )
     prune: float = field(
         default=0.1,

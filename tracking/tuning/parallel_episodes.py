@@ -7,7 +7,7 @@ never on the time they took, so a search finds the same with any number of worke
 from __future__ import annotations
 
 from collections.abc import Callable, Generator, Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, nullcontext
 from dataclasses import dataclass
 from functools import cache
 from typing import Any
@@ -31,6 +31,7 @@ class EpisodeTask:
     - detections: the tracker's input, "image", "file" or "truth".
     - every_score: True to compute the whole catalogue of scores.
     - code: hash of the tracker's file where the search runs, "" if there is no file.
+    - step_timeout: seconds that each `reset` and `step` may take, None for no limit.
     """
 
     tracker: str | type[Tracker]
@@ -39,6 +40,7 @@ class EpisodeTask:
     detections: DetectionMode
     every_score: bool
     code: str
+    step_timeout: float | None = None
 
 
 EpisodeOrError = Episode | FlockscopeError
@@ -72,13 +74,16 @@ def episode_player(
         def play(
             sources: Sequence[Source], values: dict[str, Any], every_score: bool
         ) -> Generator[EpisodeOrError, None, None]:
-            tasks = [EpisodeTask(tracker.tracker, s, values, detections, every_score, tracker.code) for s in sources]
+            given, limit = (values, detections, every_score, tracker.code), tracker.limited
+            timeout = None if limit is None else limit.seconds
+            tasks = [EpisodeTask(tracker.tracker, s, *given, timeout) for s in sources]
             if in_this_process:
                 yield from (_attempt(task, tracker, source_cache) for task in tasks)
             else:
                 yield from results_in_order(run, play_task, tasks)
 
-        yield play
+        with tracker.limited or nullcontext():
+            yield play
 
 
 def play_task(task: EpisodeTask) -> EpisodeOrError:
@@ -87,12 +92,14 @@ def play_task(task: EpisodeTask) -> EpisodeOrError:
     Returns the episode, or the FlockscopeError that the task's parameters cause. Raises WorkError if the worker's
     tracker file differs from that of the search, and InputError if the tracker cannot be found there.
     """
-    return _attempt(task, *_tracker_and_cache(task.tracker, task.code))
+    return _attempt(task, *_tracker_and_cache(task.tracker, task.code, task.step_timeout))
 
 
 @cache
-def _tracker_and_cache(name: str | type[Tracker], code: str) -> tuple[TunedTracker, SourceCache]:
-    tracker = tuned_tracker(name)
+def _tracker_and_cache(
+    name: str | type[Tracker], code: str, step_timeout: float | None
+) -> tuple[TunedTracker, SourceCache]:
+    tracker = tuned_tracker(name, step_timeout)
     if tracker.code != code:
         raise WorkError(
             place="tracker", got=f"another {tracker.name} in a worker", expected="the file as it is here",

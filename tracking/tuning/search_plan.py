@@ -164,7 +164,7 @@ def search_plan(options: TuneOptions) -> SearchPlan:
     suite shares a scenario with the first, if no parameter is left to search, and if the tracker cannot work with the
     detections.
     """
-    tracker = tuned_tracker(options.tracker)
+    tracker = tuned_tracker(options.tracker, options.step_timeout)
     fixed, scene_settings = _split_settings(options.set)
     suite = suite_names(options.suite)
     scenes = count_scenes(suite, scene_settings, "--suite")

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, cast
 
 from scenarios.errors import InputError
 from sim.types import DetectionMode, Tracker
 from tracking.config import Config
 from tracking.environment.episodes import Episode, Source, SourceCache, play, streams_for
 from tracking.grouping.link_rule import LinkRule
+from tracking.time_limit import TimeLimited
 
 RULE = LinkRule.tracker
 
@@ -23,6 +24,7 @@ class TunedTracker:
     - config_class: declares its parameters.
     - needs: inputs of which it can use any one: "pixels", "stereo", "boxes", "points".
     - code: hash of the file that defines the tracker, "" if there is none.
+    - limited: the tracker in a process of its own, with a limit of time for each step; None without a limit.
     """
 
     tracker: str | type[Tracker]
@@ -30,6 +32,7 @@ class TunedTracker:
     config_class: type[Config]
     needs: tuple[str, ...]
     code: str = ""
+    limited: TimeLimited | None = None
 
     @property
     def objective(self) -> str:
@@ -80,21 +83,27 @@ class TunedTracker:
 
             return play_rule(source, LinkRule.from_dict(values), cache)
         return play(
-            self.tracker, source, values, detections=detections, tracker_seed=source.seed, cache=cache,
+            self.limited or self.tracker, source, values, detections=detections, tracker_seed=source.seed, cache=cache,
             every_score=every_score,
         )  # fmt: skip
 
 
-def tuned_tracker(tracker: str | type[Tracker]) -> TunedTracker:
+def tuned_tracker(tracker: str | type[Tracker], step_timeout: float | None = None) -> TunedTracker:
     """Returns what is to be tuned: `grouping` is the baseline rule of groups, else a tracker by name, file.py:Class,
     module:Class or class.
 
-    Raises InputError if it is unknown or cannot be imported, is no tracker, or declares no parameters.
+    step_timeout: seconds that each `reset` and `step` may take, None for no limit. Raises InputError if the tracker is
+    unknown or cannot be imported, is no tracker, or declares no parameters; also if the limit is not above 0 or given
+    for a class or the rule.
     """
     from tracking.tracker_registry import checked, code_hash, config_class, find
 
     if tracker == RULE:
+        if step_timeout is not None:
+            remedy = "leave it out: the rule has no steps"
+            raise InputError(place="--step-timeout", got=step_timeout, expected="a tracker", remedy=remedy)
         return TunedTracker(RULE, RULE, LinkRule, ("points", "boxes"))
     name = tracker if isinstance(tracker, str) else getattr(tracker, "__name__", str(tracker))
     found: Any = find(tracker) if isinstance(tracker, str) else checked(tracker, name)
-    return TunedTracker(tracker, name, config_class(found, name), tuple(found.needs), code_hash(found))
+    limited = None if step_timeout is None else TimeLimited(cast(str, tracker), step_timeout)
+    return TunedTracker(tracker, name, config_class(found, name), tuple(found.needs), code_hash(found), limited)

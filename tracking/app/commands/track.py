@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from contextlib import nullcontext
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -19,6 +20,7 @@ from tracking.config import Config
 from tracking.grouping.link_rule import LinkRule
 from tracking.run import TrackingRun
 from tracking.run_info import input_summary
+from tracking.time_limit import TimeLimited
 
 ROW_KEYS = (
     "sequence", "detections", "sensor", "background", "causal", "causal_from", "plane", "boxes", "frames",
@@ -34,7 +36,7 @@ class TrackerSetup:
     tracker: name, "file.py:Class" or "module:Class". config: its parameters; None for its own defaults. detections:
     "image", "file" or "truth"; None for the first of these that works. sensor: settings that degrade detections of mode
     "truth", {} for none. seed: of the tracker's and the sensor's random numbers. grouping: the rule for trackers that
-    report no groups; None for the default.
+    report no groups; None for the default. limited: the tracker with a limit of time for each step; None without.
     """
 
     tracker: str
@@ -43,6 +45,7 @@ class TrackerSetup:
     sensor: Mapping[str, Any] = field(default_factory=dict)
     seed: int = 0
     grouping: LinkRule | None = None
+    limited: TimeLimited | None = None
 
     def run(self, sequence: Sequence, progress: Callable[[int], None] | None = None) -> TrackingRun:
         """Tracks the sequence and returns its tracks, with groups and events. Nothing is written.
@@ -54,8 +57,8 @@ class TrackerSetup:
         from tracking.run import track
 
         return track(
-            self.tracker, sequence, params=self.config, detections=self.detections, sensor=self.sensor, seed=self.seed,
-            grouping=self.grouping, progress=progress,
+            self.limited or self.tracker, sequence, params=self.config, detections=self.detections,
+            sensor=self.sensor, seed=self.seed, grouping=self.grouping, progress=progress,
         )  # fmt: skip
 
 
@@ -90,7 +93,7 @@ def track(options: TrackOptions) -> CommandResult:
         reject_foreign(folder)
     _check_modes(setup, needs, sequences, options.background)
     rows = []
-    with ProgressMeter("track", _total_frames(sequences)) as meter:
+    with setup.limited or nullcontext(), ProgressMeter("track", _total_frames(sequences)) as meter:
         for sequence, folder in zip(sequences, folders, strict=True):
             tracked_hash(sequence)  # labels that cannot be read are refused now, not after the last frame
             run = setup.run(sequence, lambda index, name=sequence.name: meter.step(name))  # type: ignore[misc]
@@ -111,7 +114,8 @@ def _setup(options: TrackOptions) -> TrackerSetup:
     sensor = option_parsing.toml_values(text for subject, text in found if subject == "sensor")
     rule = None if options.grouping is None else LinkRule.from_toml(options.grouping)
     config = _config(options.tracker, options.params, own)
-    return TrackerSetup(options.tracker, config, options.detections, sensor, options.seed, rule)
+    limited = None if options.step_timeout is None else TimeLimited(options.tracker, options.step_timeout)
+    return TrackerSetup(options.tracker, config, options.detections, sensor, options.seed, rule, limited)
 
 
 def _config(tracker: str, params: str | None, settings: list[str]) -> Config | None:

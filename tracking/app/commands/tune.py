@@ -12,10 +12,10 @@ from tracking.app import option_parsing
 from tracking.app.command_result import CommandResult
 from tracking.app.options_from_dataclass import options_from
 from tracking.app.progress import ProgressMeter
-from tracking.app.shared_options import Cluster, Detector, Set, Workers
+from tracking.app.shared_options import Cluster, Detector, Set, StepTimeout, Workers
 from tracking.tuning.options import TuneOptions
 
-SHARED = {"set": Set, "workers": Workers, "cluster": Cluster}
+SHARED = {"set": Set, "workers": Workers, "cluster": Cluster, "step_timeout": StepTimeout}
 """Options that other commands have, too."""
 TYPES = {"tracker": str, "suite": list[str], "out": Path, "detections": Literal["image", "truth", "file"] | None}
 """Types on the command line that do not follow from the default."""

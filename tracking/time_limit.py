@@ -1,0 +1,161 @@
+"""Runs a tracker in a process of its own, so that a step that hangs, or ends the process, is an error and no more.
+
+Neither a signal nor a thread can stop a call in this process that hangs in compiled code. A process can be ended from
+outside. Contexts, frames and tracks pass through a pipe as pickles.
+"""
+
+from __future__ import annotations
+
+import itertools
+import signal
+from dataclasses import fields
+from math import isfinite
+from typing import Any, Self
+
+from scenarios.errors import InputError
+from sim.arrays import Frozen
+from sim.types import Context, Detections, Frame, Tracker, Tracks
+from sim.workers.process import RemoteTraceback, WorkerProcess
+from tracking import tracker_registry
+from tracking.config import Config
+
+GRACE = 5.0
+"""s after the limit at which a process ends itself, should its parent be gone."""
+
+
+class TimeLimited:
+    """A tracker whose every `reset` and `step` must end within `seconds`. `tracking.track` takes it as its tracker.
+
+    tracker: a registered name, "file.py:Class" or "module:Class". State: the process, started with the first tracker
+    that is made, and again after its end. It runs one tracker at a time. A context manager; leaving it, or `close`,
+    ends the process. Raises InputError if the tracker is not given by name, or if the limit is not above 0.
+    """
+
+    def __init__(self, tracker: str, seconds: float) -> None:
+        if not isinstance(tracker, str):
+            expected, remedy = "a name that another process can look up", "give file.py:Class or module:Class"
+            raise InputError(place="--step-timeout", got="no name of a tracker", expected=expected, remedy=remedy)
+        if not (isfinite(seconds) and seconds > 0):
+            remedy = "correct it, or leave it out"
+            raise InputError(place="--step-timeout", got=seconds, expected="seconds, above 0", remedy=remedy)
+        self.tracker, self.seconds = tracker, seconds
+        self._process = WorkerProcess()
+        self._numbers = itertools.count()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
+    @property
+    def needs(self) -> tuple[str, ...]:
+        """The inputs that the tracker can work with, as its class states them."""
+        return tuple(tracker_registry.find(self.tracker).needs)
+
+    def close(self) -> None:
+        """End the process; does nothing without one. A tracker that is made later starts another."""
+        self._process.terminate()
+        self._process.join()
+
+    def make(self, config: Config | None) -> RemoteTracker:
+        """Return a tracker made in the process, with this config; None for a tracker without parameters.
+
+        It takes the place of the tracker made before. Raises what the tracker's `__init__` raises, and
+        ChildProcessError if the process ends.
+        """
+        made = RemoteTracker(self, next(self._numbers), config)
+        self.call("create", made.made_from, None)
+        return made
+
+    def call(self, method: str, *arguments: Any) -> Any:
+        """Return what the call returns in the process. method: "create", "reset" or "step"; "create" has no time limit.
+
+        Raises what the tracker raises there; TimeoutError, after ending the process, if it takes longer than the limit;
+        ChildProcessError if the process ends.
+        """
+        pipe = self._process.send(_call, (method, arguments, self.seconds + GRACE))
+        if method != "create" and not pipe.poll(self.seconds):
+            self.close()
+            raise TimeoutError(f"no answer within {self.seconds:g} s (--step-timeout)")
+        result = self._process.receive()
+        if result is None:
+            raise ChildProcessError(f"its process ended with {self._process.ended}")
+        if isinstance(result.error, KeyboardInterrupt):  # the process ignores Ctrl-C: it is the tracker's own
+            raise RuntimeError("KeyboardInterrupt") from RemoteTraceback(result.trace)
+        return result.result()
+
+
+class RemoteTracker:
+    """A tracker that works in the process of a TimeLimited; a `Tracker` like any other.
+
+    needs, config, px_per_m: as those attributes of the tracker itself; px_per_m is None if it has none. made_from: what
+    the process makes the tracker from.
+    """
+
+    def __init__(self, host: TimeLimited, number: int, config: Config | None) -> None:
+        self.needs, self.config = host.needs, config
+        self.px_per_m: object = None
+        self.made_from = (number, host.tracker, None if config is None else config.as_dict())
+        self._host = host
+
+    def reset(self, context: Context, seed: int) -> None:
+        """Reset the tracker. Raises what `TimeLimited.call` raises. A tracker whose process has ended is made again."""
+        self.px_per_m = self._host.call("reset", self.made_from, (context, seed))
+
+    def step(self, frame: Frame, detections: Detections | None) -> Tracks:
+        """Return the tracker's tracks of the frame, which holds the detections. Raises what `TimeLimited.call` raises,
+        and RuntimeError if the process was started again since `reset`."""
+        tracks, self.px_per_m = self._host.call("step", self.made_from, frame)
+        return tracks  # type: ignore[no-any-return]
+
+
+_made: dict[int, Tracker] = {}
+"""In the process: the tracker by its number; at most one."""
+
+
+def _call(request: tuple[str, tuple[Any, ...], float]) -> Any:
+    """Runs one call of a tracker in its process. request: method, its arguments, and seconds after which the process
+    ends itself."""
+    method, (made_from, given), limit = request
+    if method == "create":
+        return _create(*made_from)
+    signal.setitimer(signal.ITIMER_REAL, limit)  # without a handler this ends the process, also in compiled code
+    try:
+        return _reset(made_from, *given) if method == "reset" else _step(made_from[0], given)
+    finally:
+        signal.setitimer(signal.ITIMER_REAL, 0.0)
+
+
+def _create(number: int, spec: str, values: dict[str, Any] | None) -> None:
+    found: Any = tracker_registry.find(spec)
+    made = found() if values is None else found(found.config_class.from_dict(values))
+    _made.clear()
+    _made[number] = made
+
+
+def _reset(made_from: tuple[int, str, dict[str, Any] | None], context: Context, seed: int) -> object:
+    if made_from[0] not in _made:
+        _create(*made_from)
+    tracker = _made[made_from[0]]
+    tracker.reset(_frozen(context), seed)
+    return _number(tracker)
+
+
+def _step(number: int, frame: Frame) -> tuple[Tracks, object]:
+    if number not in _made:
+        raise RuntimeError("the process of this tracker was started again since its reset")
+    frame, tracker = _frozen(frame), _made[number]
+    return tracker.step(frame, frame.detections), _number(tracker)
+
+
+def _number(tracker: Tracker) -> object:
+    """Returns the tracker's attribute `px_per_m`, None if it has none or it is no number."""
+    value = getattr(tracker, "px_per_m", None)
+    return float(value) if isinstance(value, int | float) else None
+
+
+def _frozen(value: Any) -> Any:
+    """Returns a Frozen with read-only arrays, as it was before it was pickled; so are the Frozen in its fields."""
+    changes = {f.name: _frozen(part) for f in fields(value) if isinstance(part := getattr(value, f.name), Frozen)}
+    return value.replace(**changes)
