@@ -49,7 +49,7 @@ class Frozen:
         The new arrays are plain numpy arrays, read-only. Fields that are themselves a Frozen are copied likewise.
         """
         made = object.__new__(type(self))
-        for name in _names(type(self)):
+        for name in _names(type(self)):  # type: ignore[arg-type]
             object.__setattr__(made, name, _own(getattr(self, name)))
         return made
 
