@@ -44,10 +44,11 @@ def empty_scene_disparities(depth, scale, origin, direction, solids, out):  # ty
 
 @njit(cache=True, error_model="numpy")
 def _part_is_before(x, i, e, start, step, row, z):  # type: ignore[no-untyped-def]
-    """Return True if the right camera's ray at column x meets part e of person i in front of depth z (m), by over 1 mm.
+    """Return True if the right camera's ray at u = x px meets part e of person i in front of depth z (m), by over 1 mm.
 
     start, step (N, 2, 3, 3): the right camera's matrices of ray origins and directions in the part's axes. row (6,):
-    what the image row adds to the ray's origin (first three) and direction (last three). e: 0 body, 1 head.
+    what the image row adds to the ray's origin (first three) and direction (last three). e: 0 body, 1 head. Pixel
+    centres are at whole numbers plus 0.5.
     """
     a = b = c = 0.0
     for k in range(3):

@@ -18,7 +18,8 @@ from sim.scene.raycast_kernels import at_pixel, first_hit
 
 @njit(cache=True)
 def sample_plants(rays, scale, step, solids, size, key, pattern, cover):  # type: ignore[no-untyped-def]
-    """Set pattern (J, I) and cover (J, I) to samples of the plant pattern at every `step`-th pixel of an image.
+    """Set pattern (J, I) and cover (J, I) to samples of the plant pattern, one in the middle of each `step` x `step` px
+    of an image.
 
     pattern: `plant_pattern` (no unit; plants grow where it is high) on level ground, -inf elsewhere. cover: share of
     the pixel, 0 to 1, that plants would cover if they grew everywhere; 0 where leaves are too far away to show, and off
@@ -45,8 +46,8 @@ def sample_plants(rays, scale, step, solids, size, key, pattern, cover):  # type
 def _interpolate(nodes, x, y, k):  # type: ignore[no-untyped-def]
     """Return the value of nodes[k] at column x and row y of its grid, bilinear between the nodes.
 
-    nodes (K, J, I): K grids of J rows and I columns. x, y: in node steps from 0; beyond the last node the value is
-    extrapolated.
+    nodes (K, J, I): K grids of J rows and I columns, at least 2 x 2. x, y: in node steps from 0; beyond the last node
+    the value is extrapolated.
     """
     i, j = min(int(x), nodes.shape[2] - 2), min(int(y), nodes.shape[1] - 2)
     a, b = x - i, y - j

@@ -34,8 +34,8 @@ class FrameBatch:
     """The people of up to 16 (FRAMES) consecutive frames of a Motion, among them frame `index` (from 1 on).
 
     Batches begin at frames 1, 17, 33, …; `first` is the first frame's number. `index in batch` tells whether a frame
-    number belongs to it, also behind the Motion's last frame. State: all people of the batch, and what each view sees
-    of them, computed when first asked for.
+    number belongs to it, also behind the Motion's last frame. light: the Illumination, for sun and shadows. State: all
+    people of the batch, and what each view sees of them, computed when first asked for.
     """
 
     def __init__(self, motion: Motion, light: Illumination, index: int) -> None:

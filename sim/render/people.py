@@ -74,7 +74,7 @@ def people_of_frames(motion: Motion, first: int, last: int) -> tuple[DrawnPeople
     """Return the people of frames first … last - 1 (frames from 1 on), one frame after the other, each sorted by id.
 
     Also returns the row at which each frame begins, and the number of rows at the end: (last - first + 1,). A frame in
-    which nobody is present has no rows. Frames behind the Motion's last are left out of both.
+    which nobody is present has no rows. first: at least 1. Frames behind the Motion's last are left out of both.
     """
     present = motion.present[first - 1 : last - 1]
     t, p = np.nonzero(present)

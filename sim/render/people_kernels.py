@@ -64,12 +64,12 @@ def _texture_and_light(  # type: ignore[no-untyped-def]
 ):
     """Set where on a texture page the points at depths t (many,) m are, and how they are lit. Returns nothing.
 
-    place (many,): index of the lower left of four texels, in the page. across, up (many,), 0 to 1: how far beyond that
-    texel the point is. light (many,): brightness times UNIT = 64. ray (3, 4): rows are the part's axes; columns are ray
-    origin at u = 0 (the left edge), its change per column, direction at u = 0, its change per column. left: column of
-    the first pixel. half (3,) m: half axes. sun (3,): unit vector to the sun, in own axes. shadow: the sun's share of
-    the light. sunlit (3,): share of the sun at feet, waist and head. head: True for a head. Numbers are float32, exact
-    to 1e-4 of a page.
+    place (many,): index of the lower left of four texels in the page, row by row of 65 texels (3 numbers each). across,
+    up (many,), 0 to 1: how far beyond that texel the point is. light (many,): brightness times UNIT = 64. ray (3, 4):
+    rows are the part's axes; columns are ray origin at u = 0 (the left edge), its change per column, direction at u =
+    0, its change per column. left: column of the first pixel. half (3,) m: half axes. sun (3,): unit vector to the sun,
+    in own axes. shadow: the sun's share of the light. sunlit (3,): share of the sun at feet, waist and head. head: True
+    for a head. Numbers are float32, exact to 1e-4 of a page.
     """
     f = np.float32
     px0, px1 = f(ray[X, P_AT_0]), f(ray[X, P_PER_COLUMN])

@@ -47,8 +47,9 @@ class Renderer:
     """Draws the frames of one Motion as one camera, or a stereo pair, sees them. Frames count from 1.
 
     The constructor raises InputError if the camera's lens distorts (radial not 0). light, picture: settings as in a
-    scenario; their random values are drawn with the Motion's seed. State: everything that is the same in all frames,
-    computed when first needed; and the people of the batch of up to 16 frames drawn last."""
+    scenario; their random values are drawn with the Motion's seed; a negative seed raises ValueError when the first
+    frame is drawn. State: everything that is the same in all frames, computed when first needed; and the people of the
+    batch of up to 16 frames drawn last."""
 
     def __init__(self, motion: Motion, camera: Camera, light: Light, picture: Picture) -> None:
         if camera.radial != 0:
@@ -167,8 +168,8 @@ class Renderer:
         return self._last_batch
 
     def _moved_canvas(self, view: CameraView, index: int) -> FrameCanvas:
-        """Return a canvas of the empty scene in `view` with its plants where the wind of frame `index` (from 1) moves
-        them."""
+        """Return a canvas of the empty scene in `view` with its plants, if any, where the wind of frame `index` (from
+        1) moves them."""
         canvas = view.take_canvas()
         if view.plants is not None:
             from sim.render.foliage_kernels import sway
@@ -291,6 +292,6 @@ def render(
 
     light, picture: as in a scenario, defaults if None. For many frames, keep one `make_renderer`. Raises InputError if
     the lens distorts (radial not 0) or drawn light or plants are impossible, IndexError for frame 0 or one behind the
-    last."""
+    last, ValueError for a negative seed."""
     image = make_renderer(motion, camera, light, picture).frame(index)
     return Frame(index, (index - 1) / motion.fps, image)

@@ -57,9 +57,9 @@ class Trained:
     mean, sigma (H, W, 3): mean colour E at gain 1, and its standard deviation, BGR grey levels. s, b (H, W):
     normalisers of brightness and of chromaticity distortion CD, no unit. valid (H, W): False where the sample shows no
     background; there the other arrays have no meaning. thresholds: of CD / b, then lower and upper of (alpha - 1) / a,
-    alpha the brightness over E's, a = s / |E / sigma|. counts (2, BINS): histograms over [-SPAN, SPAN] of the
-    normalised brightness (row 0) and chromaticity distortions (row 1), from which thresholds for another detection rate
-    can be computed.
+    alpha the brightness over E's, a = s / |E / sigma|. counts (2, BINS = 4000): histograms over [-SPAN, SPAN], SPAN =
+    20, of the normalised brightness (row 0) and chromaticity distortions (row 1), from which thresholds for another
+    detection rate can be computed.
     """
 
     mean: Floats
@@ -134,8 +134,8 @@ def thresholds(counts: Ints, rate: float) -> tuple[float, float, float]:
     a.
 
     CD / b: normalised chromaticity distortion; (alpha - 1) / a: normalised brightness, 0 where as bright as the model.
-    counts (2, BINS): histograms over [-SPAN, SPAN] of brightness (row 0) and chromaticity distortion (row 1). rate:
-    share of the histogram, between 0 and 1, that each threshold leaves background; 0 or 1 raises
+    counts (2, BINS = 4000): histograms over [-SPAN, SPAN], SPAN = 20, of brightness (row 0) and chromaticity distortion
+    (row 1). rate: share of the histogram, between 0 and 1, that each threshold leaves background; 0 or 1 raises
     statistics.StatisticsError.
 
     No threshold is nearer to the background than that of Gaussian noise with unit RMS, as a still sample has no tails.

@@ -185,8 +185,8 @@ class PersonSize:
     def _fit(self) -> None:
         """Compute line (without a camera), factors and `agreed` from the remembered lone blobs, at least one; in place.
 
-        A blob weighs more the higher it is, and less the more lone blobs were seen at its place.
-        """
+        A blob weighs more the higher it is, and less the more lone blobs were seen at its place. Factors are limited to
+        0.9 … 1.1 (height) and 0.6 … 1.25 (width)."""
         foot, height = self.lone[:, :2], self.lone[:, 2]
         typical = float(np.median(height))
         weight = height / typical / _crowding(foot / typical)
@@ -257,8 +257,8 @@ def _line(v: Array, h: Array, weight: Array) -> tuple[float, float]:
 def _crowding(place: Array) -> Array:
     """Returns how many of the places lie in the same cell as each place, (N,), itself included; so at least 1.
 
-    place (N, 2): x, y in person heights; a cell is a quarter of a height wide. With the weight 1 / crowding a person
-    who stands still counts about once.
+    place (N, 2): x, y in person heights (px over the median height); a cell is a quarter of a height wide. With the
+    weight 1 / crowding a person who stands still counts about once.
     """
     cell = np.floor(4 * place).astype(np.int64)
     _, which, count = np.unique(cell[:, 0] * 100_003 + cell[:, 1], return_inverse=True, return_counts=True)

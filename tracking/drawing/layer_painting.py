@@ -105,7 +105,7 @@ def _paint_group(canvas: Canvas, group: GroupMark, ink: Colour) -> None:
     """Draws one group in place: its hull (outline polygon) filled, its extent dotted, an arrow from its centre to where
     it is in 1 s.
 
-    ink: BGR. Whichever of the three has no points is left out.
+    ink: BGR. The points must not be nan. Whichever of the three has no points is left out.
     """
     if len(group.hull):
         canvas.fill(canvas.map(group.hull), ink, 0.18)

@@ -166,7 +166,7 @@ def _pairs(truth: Truth, frame: Ints, box: Array, usual: Array | None = None) ->
 def box_iou(a: Array, b: Array) -> Array:
     """Returns the intersection over union (N, M) of boxes a (N, 4) and b (M, 4): left, top, width, height in one unit.
 
-    0 where a box is nan, or, with a numpy warning, where both have no area.
+    0 where the boxes do not overlap or a box is nan, or, with a numpy warning, where both have no area.
     """
     inner = box_intersections(a, b)
     area = (a[:, 2] * a[:, 3])[:, None] + (b[:, 2] * b[:, 3])[None]

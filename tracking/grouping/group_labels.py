@@ -28,7 +28,7 @@ class _LinkedPeople:
 
     present: dict by person (column): the frame (from 0) since which the person has been present; a person who is missed
     stays present for `memory` s (of LinkRule). linked: dict by person, the set of people with a link to the person,
-    present or not. identities: the groups of the last step, with members and ids.
+    present or not. identities: the groups of the last step, with members (columns) and ids (from 1).
     """
 
     present: dict[int, int] = field(default_factory=dict)

@@ -37,6 +37,10 @@ def event_of_change(
     two of its people were seen (IndexError if there is none). `end` equals `start` for enter and leave, else t. Returns
     None for an enter that starts in frame `arrival` (from 0) or before: that group was there from the beginning. Raises
     ValueError if no member was seen from 20 frames before the start to t.
+
+    Kinds: a merge joins groups, or groups and people alone; a split is its reverse. A form joins people who were all
+    alone; a dissolve leaves all alone. At enter and leave a whole group comes or goes, at most one of it excepted, who
+    is alone before or after.
     """
     people = set(change.members)
     joins = change.kind in ("merge", "form", "enter")
@@ -58,6 +62,10 @@ def events_of_labels(group: Ints, pos: Array) -> list[GroupEvent]:
     absent. T is at least 1 (else IndexError). A label that only one person carries in a frame counts as alone. Groups
     of the first frame have no event. `start`, `end` and `emitted` are the frame of the change; a leave starts and ends
     in the frame before it. In the events people are columns + 1, frames count from 1.
+
+    Kinds: a merge joins groups, or groups and people alone; a split is its reverse. A form joins people who were all
+    alone; a dissolve leaves all alone. At enter and leave a whole group comes or goes, at most one of it excepted, who
+    is alone before or after.
     """
     there = np.isfinite(pos).all(axis=2)
     state = np.where(there, group, ABSENT)

@@ -68,8 +68,8 @@ def _grouped_rows(table: TracksTable, group: Ints, labelled: Bools) -> tuple[Int
     """Returns the indices of the table rows (tracks in frames) in groups of two or more, group after group, (M,), and
     the index in this list at which each of the G groups begins, (G,).
 
-    group (R,): label of each table row, -1 alone. labelled: bool by frame number from 1; groups in other frames are
-    left out. Groups are sorted by frame, then label. Both results are empty without groups.
+    group (R,): label of each table row, -1 alone. labelled: bool by frame number from 1, to the last at least; groups
+    in other frames are left out. Groups are sorted by frame, then label. Both results are empty without groups.
     """
     order = np.lexsort((group, table.frame))
     order = order[(group[order] >= 0) & labelled[table.frame[order] + 1]]
