@@ -25,7 +25,7 @@ SHADOW_VALUE = 127
 
 @dataclass(frozen=True)
 class Mog2Settings(Config):
-    """The parameters of `Mog2`; the defaults of `variance` and `shadow` are OpenCV's.
+    """The parameters of `Mog2`; the defaults of `variance` (16) and `shadow` (0.5) are OpenCV's.
 
     variance: squared Mahalanobis distance beyond which a pixel is foreground. shadow: brightness relative to the
     background (0 to 1) below which a pixel is no shadow. background_time: time constant of adaptation, s. Raises

@@ -154,7 +154,8 @@ def _paint_box(canvas: Canvas, box: Array, ink: Colour, style: LayerStyle, dashe
 
 
 def _paint_dashes(canvas: Canvas, a: Array, b: Array, ink: Colour) -> None:
-    """Draws a line of dashes of about 4 px from a to b, (2,) each in drawing coordinates, in place. ink: BGR."""
+    """Draws a line of dashes, about 4 px long and 4 px apart, from a to b, (2,) each in drawing coordinates, in place.
+    ink: BGR."""
     count = max(int(np.hypot(*(b - a)) * canvas.scale / 8), 1)
     for k in range(count):
         ends = a + (b - a) * np.array([[k / count], [(k + 0.5) / count]])

@@ -38,7 +38,7 @@ class MatchedRecording:
     - camera: of the recording, None if unknown.
     - frame (M,): frame number of each detection, from 1.
     - box (M, 4): left, top, width, height of each detection in px.
-    - score (M,): the detector's score of each detection.
+    - score (M,): the detector's score of each detection; 1 without scores.
     - pos (M, 2): the detections' positions x, y on the ground in m; None if they or the labels have none.
     - match (R,): index of the detection of each labelled row, -1 missed.
     - owner (M,): index of the labelled row of each detection, -1 false alarm.
