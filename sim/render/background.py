@@ -43,7 +43,7 @@ class PixelGeometry:
 
 @dataclass(frozen=True)
 class EmptyScene:
-    """The painted empty scene, float32; each number is a mean over the pixel: of 2 x 2 rays at edges, else the ray through its centre.
+    """The painted empty scene, float32; per pixel the mean of 2 x 2 rays at edges, else the ray through its centre.
 
     colour (H, W, 3)   BGR in grey levels, 0 or more, not clipped at 255; lit, without plants' sway and noise
     direct (H, W)      share of direct sun in the pixel's light, 0 to 1; 0 for sky and where a solid thing hides the sun
