@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from scenarios.errors import InputError
+from scenarios.limits import FRAME_RATES, FRAMES
 from sim.io.files import tables
 from sim.io.files.tables import Column, StoredTable, table_bytes
 from sim.io.store.group_files import AXES, read_groups
@@ -142,63 +143,39 @@ def read_track_table(folder: Path) -> list[Tracks]:
     type, rows are outside the frames or out of order, a number is not finite, or an id is wrong.
     """
     table = tables.read_table(folder / TABLE)
-    facts = _facts(table)
-    rows = _rows(table, facts)
-    first, count = facts["first"], facts["frames"]
-    groups = _groups(folder / "groups.parquet", first, count)
-    cuts = np.searchsorted(rows.frame, np.arange(first, first + count + 1))
+    plane, unit = table.fact("plane"), table.fact("unit")
+    table.reject(plane not in PLANES, "plane", repr(plane), "ground, space or image")
+    table.reject(unit not in UNITS, "unit", repr(unit), "person or group")
+    first, count, fps = table.count("first", FRAMES), table.count("frames", FRAMES), table.number("fps", *FRAME_RATES)
+    boxless, derived = table.frames("boxless"), table.facts.get("derived") is True
+    cuts, groups = table.cuts(first, count), _groups(folder / "groups.parquet", first, count)
+    rows = _rows(table, plane, unit, boxless)
     found = []
     for k in range(count):
         index, r = first + k, slice(int(cuts[k]), int(cuts[k + 1]))
-        box = None if index in facts["boxless"] else rows.box[r]
+        box = None if index in boxless else rows.box[r]
         found.append(
             Tracks(
-                index, (index - 1) / facts["fps"], rows.plane, rows.unit, rows.id[r], rows.group[r], rows.pos[r],
-                rows.vel[r], rows.cov[r], box, rows.score[r], groups[k], derived=facts["derived"],
+                index, (index - 1) / fps, plane, unit, rows.id[r], rows.group[r], rows.pos[r], rows.vel[r],
+                rows.cov[r], box, rows.score[r], groups[k], derived=derived,
             )
         )  # fmt: skip
     return found
 
 
-def _facts(table: StoredTable) -> dict[str, Any]:
-    """Return plane, unit, fps, first, frames, boxless (a set) and derived of the table's metadata.
-
-    Raises InputError if one is missing or cannot be; "derived" is False if it is missing.
-    """
-    facts = {key: table.fact(key) for key in ("plane", "unit", "fps", "first", "frames", "boxless")}
-    right = {
-        "plane": facts["plane"] in PLANES, "unit": facts["unit"] in UNITS,
-        "fps": isinstance(facts["fps"], int | float) and 0 < facts["fps"] < float("inf"),
-        "first": isinstance(facts["first"], int), "frames": isinstance(facts["frames"], int) and facts["frames"] >= 0,
-        "boxless": isinstance(facts["boxless"], list) and all(isinstance(f, int) for f in facts["boxless"]),
-    }  # fmt: skip
-    for key, fine in right.items():
-        if not fine:
-            expected = "what `flockscope track` writes"
-            raise InputError(file=table.file, place=key, got=repr(facts[key]), expected=expected, remedy=tables.REDO)
-    derived = bool(table.facts.get("derived", False))
-    return {**facts, "fps": float(facts["fps"]), "boxless": set(facts["boxless"]), "derived": derived}
-
-
-def _rows(table: StoredTable, facts: dict[str, Any]) -> RunRows:
-    """Return the checked rows of tracks.parquet. Raises InputError for the first fault."""
-    state = _state(facts["plane"])
+def _rows(table: StoredTable, plane: str, unit: str, boxless: set[int]) -> RunRows:
+    """Return the checked rows of tracks.parquet. boxless: frames without boxes. Raises InputError for the first
+    fault."""
+    state = _state(plane)
     d = len(state) // 2
     values, frame = table.floats(*state), table.ints("frame")
-    _check_frames(table, frame, facts["first"], facts["frames"])
     cov = table.floats(*(f"cov_{a}_{b}" for a in state for b in state)).reshape(-1, 2 * d, 2 * d)
     rows = RunRows(
-        facts["plane"], facts["unit"], frame, table.ints("id"), table.ints("group"), values[:, :d], values[:, d:], cov,
-        table.floats(*BOX), np.isin(frame, list(facts["boxless"])), table.floats("score"),
+        plane, unit, frame, table.ints("id"), table.ints("group"), values[:, :d], values[:, d:], cov,
+        table.floats(*BOX), np.isin(frame, list(boxless)), table.floats("score"),
     )  # fmt: skip
     rows.reject_faults(table.file, tables.REDO)
     return rows
-
-
-def _check_frames(table: StoredTable, frame: Any, first: int, count: int) -> None:
-    if len(frame) and (frame.min() < first or frame.max() >= first + count or (np.diff(frame) < 0).any()):
-        wanted = f"frames {first} to {first + count - 1}, in order"
-        raise InputError(file=table.file, place="frame", got="other frames", expected=wanted, remedy=tables.REDO)
 
 
 def _groups(path: Path, first: int, count: int) -> list[Groups | None]:
@@ -211,16 +188,12 @@ def _groups(path: Path, first: int, count: int) -> list[Groups | None]:
         return [None] * count
     table = tables.read_table(path)
     stated = table.fact("first"), table.fact("frames")
-    if stated != (first, count):
-        got, expected = f"groups of frames from {stated[0]}, {stated[1]} in all", f"from {first}, {count} in all"
-        raise InputError(file=path, place="schema", got=got, expected=expected, remedy=tables.REDO)
-    _check_frames(table, table.ints("frame"), first, count)
+    got, expected = f"groups of frames from {stated[0]}, {stated[1]} in all", f"from {first}, {count} in all"
+    table.reject(stated != (first, count), "schema", got, expected)
     found = read_groups(table)
     for index, some in enumerate(found, first):
         fault = None if some is None else _group_fault(some)
-        if fault is not None:
-            expected = "unique ids from 0 and finite places"
-            raise InputError(file=path, place=f"frame {index}", got=fault, expected=expected, remedy=tables.REDO)
+        table.reject(fault is not None, f"frame {index}", str(fault), "unique ids from 0 and finite places")
     return found
 
 
