@@ -22,6 +22,8 @@ SECONDS = 20.0
 """CPU time that reading a damaged input may take."""
 MEMORY = 4 * 2**30
 """Bytes of address space that reading may add."""
+SEALS = {"dataset": "manifest.json", "run": "run.json"}
+"""The file that names the hashes of all others, by kind."""
 LINE = 20_000
 """Characters of an error's line."""
 
@@ -41,28 +43,29 @@ class Outcome:
 def damage(kind: str, specimen: Path, folder: Path, random: Random) -> str:
     """Copies the whole input `specimen` to `folder`, which must not exist, and damages one file; returns its name.
 
-    Half of the datasets get a manifest that fits the damaged file, so that the damage passes the hashes.
+    Half of the datasets and runs get a seal that fits the damaged file, so that the damage passes the hashes.
     """
     shutil.copytree(specimen, folder)
     names = sorted(str(p.relative_to(folder)) for p in folder.rglob("*") if p.is_file())
     names = [name for name in names if name.startswith(FILES.get(kind, ("",)))]
     name = random.choice(names)
     (folder / name).write_bytes(mutate((folder / name).read_bytes(), random))
-    if kind == "dataset" and random.random() < 0.5:
-        _seal_again(folder)
+    if kind in SEALS and random.random() < 0.5:
+        _seal_again(folder / SEALS[kind])
     return name
 
 
-def _seal_again(folder: Path) -> None:
+def _seal_again(path: Path) -> None:
     from sim import hashing
-    from sim.io.store.manifest import MANIFEST, with_hash
+    from sim.io.files.tables import json_document
+    from sim.io.store.seal import with_hash
 
     try:
-        manifest = json.loads((folder / MANIFEST).read_bytes())
-        for name, facts in manifest["files"].items():
-            body = (folder / name).read_bytes()
+        document = json.loads(path.read_bytes())
+        for name, facts in document["files"].items():
+            body = (path.parent / name).read_bytes()
             facts.update(sha256=hashing.file_hash(body), bytes=len(body))
-        (folder / MANIFEST).write_text(json.dumps(with_hash(manifest)), encoding="utf-8")
+        path.write_bytes(json_document(with_hash(document)))
     except (ValueError, KeyError, TypeError, AttributeError, OSError, RecursionError):
         return
 
