@@ -5,6 +5,7 @@ SOURCE is a stored sequence or dataset, or a recording in a public format. New r
 
 from __future__ import annotations
 
+import os
 import os.path
 from dataclasses import dataclass
 from pathlib import Path
@@ -83,8 +84,11 @@ def sequence_folders(path: Path, kind: str) -> list[Path]:
 
 
 def split_and_name(folder: Path) -> str:
-    """Return <split>/<name>, the last two parts of a sequence folder's absolute path, without looking at the disk."""
-    return "/".join(folder.absolute().parts[-2:])
+    """Return <split>/<name>, the last two parts of a sequence folder's absolute path, without looking at the disk.
+
+    ".." in the path is resolved, so that the way to a folder does not change its name; symbolic links are not.
+    """
+    return "/".join(Path(os.path.abspath(folder)).parts[-2:])
 
 
 @dataclass(frozen=True)

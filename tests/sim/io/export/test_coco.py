@@ -54,3 +54,10 @@ def test_coco_names_the_pictures_that_are_there(tmp_path, make_pictured, images,
     image = json.loads((tmp_path / "coco.json").read_text())["images"][1]
     assert (image["file_name"], image["frame"]) == (f"{live.name}/{name}", 2)
     assert (tmp_path / "data" / image["file_name"]).is_file()
+
+
+def test_the_way_to_a_dataset_is_no_part_of_its_names(tmp_path, make_sequence):
+    """The content hash is by <split>/<name>: the same from a path with `..` in it."""
+    live = replace(make_sequence(1), name="a")
+    sequence_folder.write_sequence(tmp_path / "train" / "a", live, scenario="schema = 1\n", seed=1)
+    assert content_hash(tmp_path / "train" / "a" / "..") == content_hash(tmp_path / "train")
