@@ -76,8 +76,8 @@ class DetectionRows:
 def track_rows(tracks: Sequence[Tracks], scale: float) -> TrackRows:
     """Returns the tracks of consecutive frames as rows in m; frame k of the list gets number k, from 0.
 
-    tracks: one `Tracks` per frame. scale: units of their plane per metre (px per m in the image, else 1), not 0.
-    Unknown velocities become 0.
+    tracks: one `Tracks` per frame. scale: units of their plane per metre (px per m in the image, else 1), not 0. Of
+    positions in space x, y remain. Unknown velocities become 0. `reach` is not divided by `scale`.
     """
     frame = np.repeat(np.arange(len(tracks)), [len(t.id) for t in tracks])
     id = np.concatenate([np.zeros(0, np.int64), *(t.id for t in tracks)])
@@ -93,8 +93,8 @@ def _reach(t: Tracks) -> Array:
     """Returns the distance (N,) in m within which detections belong to each of the N tracks of a frame; t: its
     `Tracks`.
 
-    It is 1 m for a person. For a group (unit "group") 2 standard deviations of its extent are added, root mean square
-    over x and y, 0 if unknown.
+    It is 1 m for a person. For a group (unit "group") 2 standard deviations are added, sqrt(trace of its extent / 2)
+    each, 0 if unknown. The extent is taken in the unit of the plane, also in px.
     """
     reach = np.full(len(t.id), REACH)
     if t.unit != "group" or t.groups is None or not len(t.groups.id):
@@ -108,8 +108,8 @@ def detection_rows(detections: Sequence[Detections | None], plane: str, scale: f
     """Returns the detections of consecutive frames as rows in m; entry k of the list gets frame number first + k.
 
     Frames without detections (None), or with detections in another plane than `plane` ("ground", "space" or "image"),
-    are left out; frames with 0 detections are kept. A detection without score has score 1. scale: units of the plane
-    per metre (px per m in the image, else 1).
+    are left out; frames with 0 detections are kept. Of positions in space x, y remain. A detection without score has
+    score 1. scale: units of the plane per metre (px per m in the image, else 1).
     """
     known = [(first + k, d) for k, d in enumerate(detections) if d is not None and (d.plane == plane or not len(d.pos))]
     frame = np.repeat([f for f, _ in known], [len(d.pos) for _, d in known]).astype(np.int64)

@@ -28,8 +28,8 @@ def episode_picture(opened: OpenedSource, rollout: Rollout | None, score: float)
     """Returns the last tracked frame with its detections and tracks, uint8 (H, W, 3) RGB, height and width even.
 
     opened: the source. rollout: the episode. Before the first frame, and if it is None, only the scene or an empty
-    picture is drawn. Detections are drawn only where no picture is. A text line above shows source, seed, number of
-    frames and `score`. Raises InputError if the source has no labels.
+    picture is drawn. Detections are drawn only if the frame has no image. A text line above shows source, seed, number
+    of frames and `score`, a number or "nan". Raises InputError if the source has no labels.
     """
     frame, tracks = (None, []) if rollout is None else (rollout.last, rollout.tracks)
     canvas = _canvas(opened, frame, tracks)
@@ -53,8 +53,8 @@ def _canvas(opened: OpenedSource, frame: Frame | None, tracks: list[Tracks]) -> 
 
     opened: the source; tracks: one `Tracks` per frame so far. With pictures it is the frame's image, empty if `frame`
     is None or has none. Without pictures it is a plan if the tracks (before the first frame, the truth) lie on the
-    ground, else an empty image in image coordinates. InputError if labels are needed (no tracks or no scene) and
-    missing.
+    ground, else an empty image into which the image coordinates fit. Both have a fixed size, SIZE. InputError if labels
+    are needed (no tracks or no scene) and missing.
     """
     sequence = opened.sequence
     if sequence.has_images and sequence.image_size is not None:
@@ -101,7 +101,7 @@ def _bounds(opened: OpenedSource) -> tuple[Array, Array]:
 
 
 def _draw_detections(canvas: Canvas, detections: Detections, plane: str) -> None:
-    """Draws a small grey disc on the canvas for each detection. plane: of the tracks, "ground", "space" or "image".
+    """Draws a grey disc of 2.5 px on the canvas for each detection. plane: of the tracks, "ground", "space" or "image".
 
     Nothing is drawn if one of detections and tracks is in the image and the other is not.
     """

@@ -40,7 +40,8 @@ class Comparison:
 
     - scenes: name of the suite, or "validation".
     - key: the name of the score; higher: True if greater values are better.
-    - before, after: means of the defaults and of the config over the sequences where both have the score.
+    - before, after: means of the defaults and of the config over the sequences where both have the score. That of
+      "frames/s" is the mean of the speeds of the sequences, not all frames / all seconds.
     - difference: mean of after - before; low, high: its 95 % interval, nan with fewer than two sequences.
     - sequences: number of these sequences.
     """
@@ -58,7 +59,7 @@ class Comparison:
     @property
     def verdict(self) -> str:
         """Returns "better" or "worse" if the interval of the difference excludes 0, else (or with nan) "no sure
-        difference".
+        difference". An end that is exactly 0 does not exclude it.
         """
         if not (self.low > 0 or self.high < 0):
             return "no sure difference"
@@ -80,7 +81,8 @@ class Candidate:
     - trial: number of its trial in the search, 0 for the defaults.
     - config: all parameters.
     - training, validation: its values, one per goal, on the training and validation scenes; () if not played.
-    - gain: its first goal compared with that of the defaults on the validation scenes, None if not played or unknown.
+    - gain: its first goal compared with that of the defaults on the validation scenes, None if not played or unknown;
+      for the defaults themselves the comparison with themselves, of difference 0.
     """
 
     trial: int
@@ -95,8 +97,8 @@ def compare_episodes(scenes: str, goal: Goal, before: Sequence[Episode], after: 
     interval.
 
     scenes: name for the result. before, after: episodes of the same sequences in the same order, equally many
-    (not checked). Sequences where either side lacks the score are left out; None if that leaves
-    no sequence. With one sequence the interval is nan.
+    (not checked). Sequences where either side lacks the score, or has an infinite one, are left out; None if that
+    leaves no sequence. The difference is after - before. With one sequence the interval is nan.
     """
     a, b = (np.array([goal.of(e) for e in episodes]) for episodes in (before, after))
     known = np.isfinite(a) & np.isfinite(b)

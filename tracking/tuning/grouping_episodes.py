@@ -24,10 +24,11 @@ from tracking.grouping.link_rule import LinkRule
 class LabelErrors:
     """How the labelled positions of people err.
 
-    - sd: standard deviation of a position in each coordinate, m.
-    - time: correlation time of the errors, s.
+    - sd: standard deviation of a position in each coordinate, m; for boxes it is multiplied by the true image scale.
+    - time: correlation time of the errors, s: after it their correlation is 1/e.
     - filmed: True for boxes in the image without velocities, False for positions on the ground.
-    - scale: the image scale (px per m) is wrong by a random factor between 1 / scale and scale.
+    - scale: the image scale (px per m) is multiplied by a random factor between 1 / scale and scale, whose logarithm
+      is uniform; 1 leaves it.
     """
 
     sd: float
@@ -45,8 +46,9 @@ def play_rule(source: Source, rule: LinkRule, source_cache: SourceCache) -> Epis
     """Returns the episode of the baseline rule of groups on the people of a source, whose identity is known.
 
     Simulated people get label errors: FILMED (boxes in the image, 0.06 m, wrong scale) with odd seeds, SURVEYED (ground
-    positions, 0.02 m) with even ones. Recorded people are taken as labelled. `scores` has every score of the catalogue
-    that is not nan, `seconds_tracking` is the time for groups. The opened source is kept in `source_cache`.
+    positions, 0.02 m) with even ones. Recorded people are taken as labelled, with the image scale of the recording. The
+    true groups are those of the labels without errors. `scores` has every score of the catalogue that is not nan,
+    `seconds_tracking` is the time for groups. The opened source is kept in `source_cache`.
 
     Raises InputError if the source has no labels or cannot be read, or if people are in the image without a scale.
     Fails an assertion if simulated people have no boxes.
@@ -73,9 +75,10 @@ def play_rule(source: Source, rule: LinkRule, source_cache: SourceCache) -> Epis
 def with_label_errors(truth: Truth, errors: LabelErrors, seed: int, repeat: int = 0) -> Truth:
     """Returns a copy of the truth with label errors: a first-order autoregressive process per person and coordinate.
 
-    Each person has a random stream of its own, chosen by seed, id and repeat (copy of a suite entry). With
-    `errors.filmed` the boxes are moved and `pos` and `vel` become None; else only `pos` changes. `errors.scale` is not
-    used. Fails an assertion if `truth` has no `pos` or no `box`.
+    Each person has a random stream of its own, chosen by seed, id and repeat (copy of a suite entry). The process steps
+    from row to row of the person, over frames of absence too; its standard deviation is `errors.sd` from the first row
+    on. With `errors.filmed` the boxes are moved, not resized, and `pos` and `vel` become None; else only `pos` changes.
+    `errors.scale` is not used. Fails an assertion if `truth` has no `pos` or no `box`.
     """
     assert truth.pos is not None, "simulated people have positions"
     assert truth.box is not None, "scenes have cameras"
@@ -94,8 +97,9 @@ def with_label_errors(truth: Truth, errors: LabelErrors, seed: int, repeat: int 
 def people_as_tracks(truth: Truth) -> list[Tracks]:
     """Returns the labelled people of every frame as tracks of persons without groups, one `Tracks` per frame from 1.
 
-    The tracks lie on the ground in m, or at box centres in the image in px if the truth has no positions. Velocities
-    are nan if the truth has none; covariances are 0. Fails an assertion if the truth has neither positions nor boxes.
+    The tracks lie on the ground in m, or at box centres in the image in px if the truth has no positions. Ids and boxes
+    are the labelled ones, scores 1. Velocities are nan if the truth has none; covariances are 0. A frame without people
+    has no rows. Fails an assertion if the truth has neither positions nor boxes.
     """
     plane: Plane = "image" if truth.pos is None else "ground"
     return [_tracks(truth.at(index), plane) for index in range(1, truth.length + 1)]

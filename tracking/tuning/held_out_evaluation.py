@@ -48,8 +48,8 @@ class HeldOutEvaluator:
         one.
 
         The first candidate must be the defaults; a FlockscopeError of theirs is raised. Another candidate with an error
-        on a validation scene is left out. `gain` compares the first goal; it is None if no scene has its score. Errors
-        of the workers are raised.
+        on a validation scene is left out. `gain` compares the first goal, of the first candidate with itself; it is
+        None if no scene has its score. Errors of the workers are raised.
         """
         found = list[Candidate]()
         defaults: Sequence[Episode] = ()
@@ -72,7 +72,7 @@ class HeldOutEvaluator:
 
         value: that of `config` on these scenes. order: names of searched parameters (others raise KeyError or
         AttributeError), tried one after the other; unchanged ones are skipped. A parameter is reset if that does not
-        lower the value or make it unknown, and causes no error. Errors of the workers are raised.
+        make the value worse or unknown, and causes no error. Errors of the workers are raised.
         """
         goal = self.plan.goals[0]
         changed = [name for name in order if getattr(config, name) != self.plan.defaults[name]]
@@ -91,7 +91,7 @@ class HeldOutEvaluator:
         return config, value
 
     def compared(self, config: Config) -> tuple[list[Comparison], list[str]]:
-        """Returns the comparisons of the config with the defaults on every test suite, and notes (texts).
+        """Returns the comparisons of the config with the defaults, suite by suite of the tests, and notes (texts).
 
         Compared are the goals, objective, HOTA, group_F1_hull, pairwise_F1 and event_F1, without scores that no
         sequence has. A suite on which the config causes an error has a note instead of comparisons. An error of the

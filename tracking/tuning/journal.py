@@ -92,7 +92,7 @@ class TrialLocks:
 
 class LockedJournal(JournalFileBackend):
     """Optuna's journal file at `path`, created if missing, and written under `locks`. An incomplete last line is
-    removed.
+    removed when the journal is opened, and before each writing.
 
     Raises ValueError if the file is not a journal of Optuna, and OSError if it cannot be opened.
     """

@@ -54,8 +54,9 @@ def episode_player(
 ) -> Iterator[PlayEpisodes]:
     """Opens the workers for the time of the context and returns the function play(sources, values, every_score).
 
-    That function yields one result per source in order: the episode, or the FlockscopeError of these parameters (by
-    name). Nothing is played before its first result is taken. When its taker stops, no further episode is begun.
+    That function yields one result per source in order: the episode, or the FlockscopeError that these parameters
+    (values by name) or the source caused. It goes on after an error. Nothing is played before its first result is
+    taken. When its taker stops, no further episode is begun.
     detections: the tracker's input, "image", "file" or "truth". workers: number of processes, 1 for this process;
     cluster: address of a dask scheduler, None for no cluster.
 

@@ -27,8 +27,9 @@ BLUE, ORANGE, RED = "#0b6bcb", "#d4600a", "#b42318"
 
 @dataclass(frozen=True)
 class Axes:
-    """Axes of a plot. x, y: each the range (low, high) of the data that fills the plot, in the data's unit, low below
-    high (not checked).
+    """Axes of a plot on a page of 760 × 400 px: 70 px from its left, 20 from its right, 78 from its top, 48 from its
+    bottom. x, y: each the range (low, high) of the data that fills the plot, in the data's unit, low below high (not
+    checked).
     """
 
     x: tuple[float, float]
@@ -160,7 +161,8 @@ def ticks(low: float, high: float) -> list[float]:
 
 
 def _clipped_range(values: Sequence[float], unpruned: Sequence[float]) -> tuple[float, float]:
-    """Returns the range (low, high) of the unpruned values with a margin, but no wider than all values need.
+    """Returns the range (low, high) of the unpruned values with a margin of 15 % of its width, but no wider than all
+    values need.
 
     values: all values, not empty; unpruned: those of them that are no estimates; if empty all values are used. One
     extreme trial must not flatten all others.

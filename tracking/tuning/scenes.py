@@ -105,7 +105,8 @@ def default_check_suite(names: Sequence[str]) -> str | None:
 def shared_scenarios(names: Sequence[str], others: Sequence[str]) -> list[str]:
     """Returns the names of the scenarios that both lists of suites, scenarios and files contain, sorted; [] if none.
 
-    Scenarios are equal if their files are. Raises InputError if a name is unknown or a file unreadable.
+    Scenarios are equal if they are the same file, links resolved; a copy of a file is another scenario. Raises
+    InputError if a name is unknown or a file unreadable.
     """
     common = {file for name in names for file in _files(name)} & {file for name in others for file in _files(name)}
     return sorted(Path(file).stem for file in common)

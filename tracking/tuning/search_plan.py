@@ -36,7 +36,8 @@ from tracking.tuning.tuned_tracker import TunedTracker, tuned_tracker
 class SearchSeeds:
     """The seeds that every scene is played with, as ranges with the end excluded.
 
-    training, validation, test: of the suite that is tuned on. check: test seeds of the second suite.
+    training, validation, test: of the suite that is tuned on. check: test seeds of the second suite, unused without
+    one.
     """
 
     training: range
@@ -72,7 +73,7 @@ class SearchPlan:
 
     @property
     def tracker_name(self) -> str:
-        """The name of the tracker; of a tracker given by file, file.py:Class without the folder."""
+        """The name of the tracker; of a tracker given by file, file.py:Class without the folder; that of a class."""
         return self.tracker.name.rpartition("/")[2]
 
     @property
@@ -196,10 +197,11 @@ def seeds_text(seeds: range) -> str:
 
 
 def _split_settings(settings: Iterable[str]) -> tuple[list[str], tuple[str, ...]]:
-    """Returns the "key=value" settings of the tracker (a list), and those of the scenes (a tuple).
+    """Returns the "key=value" settings of the tracker (a list), and those of the scenes (a tuple), both in the order
+    given.
 
     Scenes have keys that begin with "scenario." (removed in the result) or "sensor." (kept); all others are the
-    tracker's.
+    tracker's, and keep a "tracker." before the key. Nothing is checked.
     """
     tracker, scenes = [], []
     for setting in settings:

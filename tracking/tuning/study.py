@@ -50,7 +50,7 @@ class SearchStudy:
 
     def trials(self) -> list[FrozenTrial]:
         """Returns all of Optuna's trials in the order of their numbers; running, waiting, failed and abandoned ones are
-        included.
+        included. They are not copies: do not change them.
         """
         return self.optuna.get_trials(deepcopy=False)
 
@@ -66,7 +66,7 @@ class SearchStudy:
 
         With locks, an abandoned trial (running, but its process is gone) is repeated first. Without locks it is not
         known which trials are abandoned: running ones count as played by others, or, with `retry_unfinished`, as
-        abandoned. Abandoned trials are marked as failed.
+        abandoned (which has no effect with locks). Abandoned trials are marked as failed.
         """
         with self._choosing():
             for t in self.trials():
