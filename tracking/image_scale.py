@@ -2,19 +2,32 @@
 
 Lengths in configs are metres. A tracker that works in the image plane multiplies them by this scale once, in `reset`.
 Rules (docs/reference/formats.md): the camera's scale at the image centre, else the scale that the recording states,
-else the median height of the given boxes divided by 1.7 m.
+else the median height of the given boxes of the first frames divided by 1.7 m (sim.scene.box_scale).
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterable
 from collections.abc import Sequence as SequenceOf
+from dataclasses import dataclass
 
 import numpy as np
 
 from scenarios.errors import InputError
-from sim.scene.body import PERSON_HEIGHT
+from sim.scene.box_scale import scale_of_first_boxes
 from sim.types import DetectionMode, Detections, Frame, Sequence, Tracks
+
+
+@dataclass(frozen=True)
+class ImageScale:
+    """An image scale and what it was taken from.
+
+    px_per_m: nan if unknown. frames: the scale was taken from boxes of this many first frames; 0 if it was not taken
+    from boxes of the sequence.
+    """
+
+    px_per_m: float
+    frames: int = 0
 
 
 def required(px_per_m: float) -> float:
@@ -29,42 +42,41 @@ def required(px_per_m: float) -> float:
     )
 
 
-def from_boxes(frames: Iterable[Detections | Tracks | None]) -> float:
-    """Return the image scale, px per m: the median height of all boxes of all frames divided by 1.7 m; nan if there is
-    no box.
+def from_boxes(frames: Iterable[Detections | Tracks | None]) -> ImageScale:
+    """Return the image scale by the heights of the boxes of the first frames (sim.scene.box_scale); nan without a box.
 
     frames: detections or tracks of each frame, read to the end. The height is the last of a box's four columns, px.
-    None, and frames without boxes, are skipped; so are heights that are nan. If all are nan, so is the result.
+    None, and frames without boxes, are skipped; so are heights that are nan.
     """
-    heights = [d.box[:, 3] for d in frames if d is not None and d.box is not None and len(d.box)]
-    return float(np.nanmedian(np.concatenate(heights))) / PERSON_HEIGHT if heights else float("nan")
+    boxed = [(d.index, d.box[:, 3]) for d in frames if d is not None and d.box is not None]
+    index = np.repeat(np.array([k for k, _ in boxed], np.int64), [len(h) for _, h in boxed])
+    return ImageScale(*scale_of_first_boxes(index, np.concatenate([np.zeros(0), *(h for _, h in boxed)])))
 
 
-def from_tracks(given: float, learned: object, tracks: SequenceOf[Tracks]) -> float:
-    """Return the image scale for deriving groups from tracks, in px per m; nan if it is unknown.
+def from_tracks(given: ImageScale, learned: object, tracks: SequenceOf[Tracks]) -> ImageScale:
+    """Return the image scale for deriving groups from tracks; nan if it is unknown.
 
-    The first finite value counts: `given` (the context's scale, nan if unknown), `learned` (the tracker's own attribute
-    `px_per_m`; anything but a number is ignored), then the median height of the tracks' boxes divided by 1.7 m. Zero
-    and negative values are not refused.
+    The first finite one counts: `given` (the context's), `learned` (px per m: the tracker's own attribute `px_per_m`;
+    anything but a number is ignored), then that of the tracks' boxes. Zero and negative values are not refused.
     """
-    if np.isfinite(given):
+    if np.isfinite(given.px_per_m):
         return given
     if isinstance(learned, int | float) and np.isfinite(learned):
-        return float(learned)
+        return ImageScale(float(learned))
     return from_boxes(tracks)
 
 
-def of_sequence(sequence: Sequence, mode: DetectionMode, frames: tuple[Frame, ...] | None) -> float:
-    """Return the image scale that a tracker is given with a sequence, in px per m; nan if it is unknown.
+def of_sequence(sequence: Sequence, mode: DetectionMode, frames: tuple[Frame, ...] | None) -> ImageScale:
+    """Return the image scale that a tracker is given with a sequence; nan if it is unknown.
 
     It is the camera's scale at the image centre, else the one that the sequence states. If there is neither and `mode`
-    is not "image", it is the median box height over 1.7 m, of the boxes of `frames`, or of the sequence's stored
-    detections if `frames` is None. Raises InputError if these cannot be read.
+    is not "image", it is that of the boxes of `frames`, or of the sequence's stored detections if `frames` is None.
+    Raises InputError if these cannot be read.
     """
     if sequence.camera is not None:
         from sim.scene.camera import px_per_m_at_centre
 
-        return float(px_per_m_at_centre(sequence.camera))
+        return ImageScale(float(px_per_m_at_centre(sequence.camera)))
     if np.isfinite(sequence.px_per_m) or mode == "image":
-        return sequence.px_per_m
+        return ImageScale(sequence.px_per_m, int(sequence.source.get("px_per_m_frames", 0)))
     return from_boxes(f.detections for f in (sequence.without_pictures() if frames is None else frames))

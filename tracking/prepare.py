@@ -19,6 +19,7 @@ from sim.types import Context, DetectionMode, Frame, Sequence, Tracker, Tracks
 from tracking import image_scale, tracker_registry
 from tracking.config import Config
 from tracking.detection_mode import check_detections, choose_mode, frames_with_detections
+from tracking.image_scale import ImageScale
 from tracking.time_limit import TimeLimited
 from tracking.tracks_check import ReportHistory, check_tracks
 from tracking.user_code import tracker_failed, user_code
@@ -34,7 +35,8 @@ class PreparedTracker:
     name: as the user gave it, or of the class. tracker: the instance. config: None if the tracker has no parameters.
     context: what the tracker knows before the first frame. mode: of the detections, "image", "file" or "truth".
     sequence: the one to track. frames_given: frames with detections and without pictures; None if the sequence's own
-    frames are used (mode "image"). history: what the tracker has reported since `reset`.
+    frames are used (mode "image"). scale_frames: the context's image scale was taken from boxes of this many first
+    frames; 0 if not from boxes. history: what the tracker has reported since `reset`.
     """
 
     name: str
@@ -44,6 +46,7 @@ class PreparedTracker:
     mode: DetectionMode
     sequence: Sequence
     frames_given: tuple[Frame, ...] | None
+    scale_frames: int = 0
     history: ReportHistory = field(default_factory=ReportHistory)
 
     def frames(self) -> Iterator[Frame]:
@@ -56,14 +59,19 @@ class PreparedTracker:
             return iter(self.frames_given)
         return (replace(f, detections=None) for f in self.sequence)
 
-    def px_per_m(self, tracks: SequenceOf[Tracks]) -> float:
-        """Return the image scale, px per m, for deriving groups from these tracks of the whole sequence; nan if
-        unknown.
+    def scale(self, tracks: SequenceOf[Tracks]) -> ImageScale:
+        """Return the image scale for deriving groups from these tracks, from the first frame on; nan if unknown.
 
-        It is the first finite one of the context's, the tracker's attribute `px_per_m`, and the median height of the
-        tracks' boxes over 1.7 m.
+        It is the first finite one of the context's, the tracker's attribute `px_per_m`, and that of the tracks' boxes
+        in the first frames.
         """
-        return image_scale.from_tracks(self.context.px_per_m, getattr(self.tracker, "px_per_m", None), tracks)
+        with self._naming("px_per_m", self.sequence.name):
+            learned = getattr(self.tracker, "px_per_m", None)
+        return image_scale.from_tracks(ImageScale(self.context.px_per_m, self.scale_frames), learned, tracks)
+
+    def px_per_m(self, tracks: SequenceOf[Tracks]) -> float:
+        """Return the image scale of `scale`, px per m; nan if unknown."""
+        return self.scale(tracks).px_per_m
 
     def reset(self, seed: int) -> None:
         """Reset the tracker for this sequence and forget what it has reported. seed: of the tracker's random numbers.
@@ -144,15 +152,16 @@ def prepare(
             place="--sensor, --set sensor", got=f"--detections {mode}", expected="--detections truth", remedy=remedy
         )
     frames = frames_with_detections(instance.needs, mode, sequence, sensor or {}, seed)
+    scale = image_scale.of_sequence(sequence, mode, frames)
     context = Context(
         fps=sequence.fps,
-        px_per_m=image_scale.of_sequence(sequence, mode, frames),
+        px_per_m=scale.px_per_m,
         camera=sequence.camera,
         scene=sequence.scene,
         image_size=sequence.image_size,
         background=sequence.background() if mode == "image" else None,
     )
-    return PreparedTracker(name, instance, config, context, mode, sequence, frames)
+    return PreparedTracker(name, instance, config, context, mode, sequence, frames, scale.frames)
 
 
 def _make(tracker: str | type[Tracker] | Tracker | TimeLimited, params: Params) -> tuple[str, Tracker, Config | None]:

@@ -84,12 +84,12 @@ def track(
         if progress is not None:
             progress(frame.index)
     whole = time.perf_counter() - begun
-    px_per_m = prepared.px_per_m(reported)
-    tracks = with_groups(reported, prepared.context.fps, px_per_m, rule)
+    scale = prepared.scale(reported)
+    tracks = with_groups(reported, prepared.context.fps, scale.px_per_m, rule)
     if rule is not None and names_groups(reported):
         warnings.warn(f"{prepared.name} names groups itself: --grouping has no effect", UserWarning, stacklevel=2)
     speed = Speed(len(reported) / spent, len(reported) / whole) if reported else Speed()
-    info = run_info(prepared, tracks, seed, sensor or {}, px_per_m, speed)
+    info = run_info(prepared, tracks, seed, sensor or {}, scale, speed)
     return TrackingRun(tracks, info if rule is None else {**info, "grouping": rule.as_dict()})
 
 
@@ -97,12 +97,13 @@ def grouped(tracks: SequenceOf[Tracks], sequence: Sequence) -> tuple[Tracks, ...
     """Return one tracker's stored tracks of a sequence, one `Tracks` per frame, with groups and events filled in where
     they are empty.
 
-    The scale in px per m is the sequence's, or its truth's if the sequence states none; without any, tracks in the
-    image are returned unchanged, as are tracks marked as derived, or of groups. Raises InputError if the truth cannot
-    be read or tracks in the image have a scale of 0 or below; WorkError if an order of a simulated script was not
-    fulfilled.
+    The scale in px per m is the sequence's, or its truth's if the sequence states none or learned it from the labels of
+    the first frames; without any, tracks in the image are returned unchanged, as are tracks marked as derived, or of
+    groups. Raises InputError if the truth cannot be read or tracks in the image have a scale of 0 or below; WorkError
+    if an order of a simulated script was not fulfilled.
     """
     from tracking.grouping.grouped_tracks import with_groups
 
-    truth = None if np.isfinite(sequence.px_per_m) else sequence.truth
+    stated = np.isfinite(sequence.px_per_m) and "px_per_m_frames" not in sequence.source
+    truth = None if stated else sequence.truth
     return with_groups(tracks, sequence.fps, sequence.px_per_m if truth is None else truth.px_per_m)

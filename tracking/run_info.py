@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 
 from sim.types import Sequence, Tracks
+from tracking.image_scale import ImageScale
 from tracking.prepare import PreparedTracker
 
 SENSOR_SETTINGS_SHOWN = 6
@@ -35,25 +36,27 @@ def run_info(
     tracks: SequenceOf[Tracks],
     seed: int,
     sensor: Mapping[str, Any],
-    px_per_m: float,
+    scale: ImageScale,
     speed: Speed,
 ) -> dict[str, Any]:
     """Return the content of run.json as a dictionary. Two equal runs differ only in their speeds.
 
     tracks: of the whole run, one `Tracks` per frame, possibly none. seed: of the run. sensor: settings of mode "truth",
-    empty if none. px_per_m: the scale by which groups were derived; nan is stored as None.
+    empty if none. scale: of the image, by which groups were derived; nan is stored as None.
 
     Keys: tracker (name); config (values by name, {} without); seed; sequence (name); truth_hash (of a generated
     sequence, as its manifest states it, else None: the labels are not read); detections (the mode); sensor;
-    plane (of the first tracks, None without); boxes ("measured", "projected" or "none"); fps; px_per_m; background
-    (text on the sample, None without); causal (True if any frame's sample holds no later frame); causal_from (the first
-    such frame, from 1, or None); frames (number); frames_per_second (the tracker's steps alone);
+    plane (of the first tracks, None without); boxes ("measured", "projected" or "none"); fps; px_per_m;
+    px_per_m_frames (number of first frames whose boxes gave the scale, 0 for none); background (text on the sample,
+    None without); causal (True if there is a frame from which on no later frame is used); causal_from (the first such
+    frame, from 1, or None); frames (number); frames_per_second (the tracker's steps alone);
     whole_frames_per_second (with reading); versions (of packages, by name).
     """
     from sim.io.store.track_boxes import box_source
 
     sample = prepared.context.background
     begins = 1 if sample is None else causal_from(prepared.sequence)
+    begins = None if begins is None else max(begins, scale.frames)
     return {
         "tracker": prepared.name,
         "config": prepared.config.as_dict() if prepared.config else {},
@@ -65,7 +68,8 @@ def run_info(
         "plane": tracks[0].plane if len(tracks) else None,
         "boxes": box_source(tracks, prepared.context.camera),
         "fps": prepared.context.fps,
-        "px_per_m": None if np.isnan(px_per_m) else px_per_m,
+        "px_per_m": None if np.isnan(scale.px_per_m) else scale.px_per_m,
+        "px_per_m_frames": scale.frames,
         "background": None if sample is None else prepared.sequence.source.get("background", f"{len(sample)} frames"),
         "causal": begins is not None,
         "causal_from": begins,

@@ -10,6 +10,7 @@ from collections.abc import Iterator
 from dataclasses import fields, is_dataclass, replace
 from functools import cache
 from itertools import islice
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -17,9 +18,11 @@ import pytest
 
 from scenarios.loading.resolve import load
 from scenarios.loading.toml_files import names as scenario_names
+from sim.io.source import open_source
 from sim.sequence import simulate
-from sim.types import Frame, Sequence, Tracks, Truth
+from sim.types import DetectionMode, Frame, Sequence, Tracks, Truth
 from tracking.prepare import PreparedTracker, prepare
+from tracking.run import track
 from tracking.tracker_registry import find, names
 
 FPS = 5
@@ -155,3 +158,54 @@ def test_the_order_of_detections_tells_a_tracker_nothing(scenario: str, tracker:
     ]
     assert same_answers(runs[0], runs[1]) == ""
     assert same_answers(runs[0], runs[2]) == ""
+
+
+def without_calibration(sequence: Sequence) -> Sequence:
+    """The same people as boxes in the image of a camera that nobody knows."""
+
+    def frames() -> Iterator[Frame]:
+        for frame in sequence:
+            d = frame.detections
+            assert d is not None
+            assert d.box is not None
+            yield frame.replace(detections=d.replace(plane="image", pos=d.box[:, :2] + d.box[:, 2:] / 2))
+
+    return replace(sequence, frames=frames, bare=None, camera=None, scene=None, px_per_m=float("nan"))
+
+
+def first(sequence: Sequence, length: int) -> Sequence:
+    """The first frames of a sequence as a sequence of its own."""
+    return replace(sequence, frames=lambda: islice(sequence.frames(), length), bare=None, length=length)
+
+
+@pytest.mark.parametrize("tracker", names())
+@pytest.mark.parametrize("scenario", ["merge", "party", "mixed"])
+def test_no_look_ahead_without_a_calibration(scenario: str, tracker: str) -> None:
+    """From the frame on that the run declares, a sequence cut short gives the same tracks."""
+    whole = without_calibration(recorded(scenario, "file")[0])
+    ready = prepare(tracker, whole, detections="file")
+    assert 1 < ready.scale_frames < 40
+    tracks = run(ready)
+    for length in (ready.scale_frames, ready.scale_frames + 7):
+        short = prepare(tracker, first(whole, length), detections="file")
+        assert short.context.px_per_m == ready.context.px_per_m
+        assert content(run(short)) == content(tracks)[:length]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("tracker", names())
+@pytest.mark.parametrize("mode", ["file", "truth"])
+def test_no_look_ahead_in_a_recording(shared_data: Path, tracker: str, mode: DetectionMode) -> None:
+    """The first 30 frames of PETS09-S2L1, whose scale nobody states, have the answers of the whole recording."""
+    (pets,) = open_source(shared_data / "mot" / "PETS09-S2L1-first200", images=False)
+    whole = track(tracker, pets, detections=mode)
+    truth = pets.truth
+    assert truth is not None
+    rows = truth.frame <= 30
+    cut_truth = truth.replace(
+        length=30, labelled=None, frame=truth.frame[rows], id=truth.id[rows], group=truth.group[rows],
+        box=None if truth.box is None else truth.box[rows], visibility=truth.visibility[rows],
+    )  # fmt: skip
+    short = track(tracker, replace(first(pets, 30), load_truth=lambda: cut_truth), detections=mode)
+    assert whole.info["causal_from"] == whole.info["px_per_m_frames"] <= 30
+    assert content(list(short))[:29] == content(list(whole))[:29]

@@ -22,6 +22,7 @@ from sim.io.files.numeric_text import whole_number
 from sim.io.formats.group_labels import labelled_truth_fields, require_size
 from sim.io.formats.velocity import differentiate
 from sim.scene.body import PERSON_HEIGHT
+from sim.scene.box_scale import scale_of_first_boxes
 from sim.truth.group_hulls import box_groups
 from sim.types import Array, Frame, Ints, Sequence, Truth
 
@@ -213,12 +214,13 @@ def read_truth(path: Path, fps: float = FPS, px_per_m: float | None = None) -> T
 def open_file(path: Path, *, fps: float | None = None, px_per_m: float | None = None) -> Sequence:
     """Return the CAVIAR file `path` as Sequence, without pictures and detections; image size 384 × 288 px.
 
-    fps: frames per second; None: 25. px_per_m: image scale; None: the median of the boxes' longer sides / 1.7 m, nan
-    without boxes. Raises InputError at once if the file is unreadable, no CVML or invalid (see read_xml). The file is
-    read again when the truth is asked for.
+    fps: frames per second; None: 25. px_per_m: image scale; None: the median of the longer sides of the first 100 boxes
+    / 1.7 m, nan without boxes. `source["px_per_m_frames"]` is then the last frame of these boxes. Raises InputError at
+    once if the file is unreadable, no CVML or invalid (see read_xml). The file is read again when the truth is asked
+    for.
     """
     rate, found = FPS if fps is None else fps, read_xml(path)
-    scale = found.px_per_m if px_per_m is None else px_per_m
+    scale, learned = scale_of_first_boxes(found.frame, found.size.max(axis=1)) if px_per_m is None else (px_per_m, 0)
 
     def frames() -> Iterator[Frame]:
         return (Frame(index, (index - 1) / rate) for index in range(1, found.length + 1))
@@ -226,7 +228,7 @@ def open_file(path: Path, *, fps: float | None = None, px_per_m: float | None = 
     return Sequence(
         name=found.name, fps=rate, length=found.length, frames=frames,
         load_truth=lambda: read_truth(path, rate, px_per_m), image_size=IMAGE_SIZE, px_per_m=scale,
-        source={"kind": "caviar", "path": str(path)},
+        source={"kind": "caviar", "path": str(path), **({"px_per_m_frames": learned} if learned else {})},
     )  # fmt: skip
 
 
