@@ -18,7 +18,7 @@ from sim.types import Array, Context, Ints
 from tracking.detect.person_size import upright
 from tracking.filters import kalman, track_uncertainty
 from tracking.papers.blob.config import BlobConfig
-from tracking.papers.blob.track_management import TrackedPeople
+from tracking.papers.blob.track_management import LARGEST_SCALE, TrackedPeople
 
 RELAXATION = 0.5  # s, time constant with which axes return to the expected ones
 HEADING = 6.0  # seen from straight above, the direction turns with the heading: so many times faster than a body leans
@@ -41,6 +41,7 @@ class TrackedEllipses(TrackedPeople):
         """Replace the config and its nominal filter `dynamics` (of the config at the frame rate); the tracks stay as
         they are."""
         super().follow(config, dynamics)
+        self.largest_log_det += 2 * dynamics.noise.size * np.log(LARGEST_SCALE)
         rate = config.angle_rate * (HEADING if self.top else 1.0)
         self.angle_var_per_step = np.radians(rate) ** 2 * dynamics.dt
 
@@ -88,6 +89,24 @@ class TrackedEllipses(TrackedPeople):
         s = self.angle[kalman.DIRECTION_VAR][:, None] + angle_var
         turn = kalman.angle_innovation(z, self.angle[kalman.DIRECTION][:, None])
         return np.where(kalman.directed(angle_var), turn * turn / s, 0.0)
+
+    def log_det(self, angle_var: Array) -> Array:
+        """Returns ln |S| (N, M) of the innovations of N tracks and M ellipses, but for a constant (ours).
+
+        S is the covariance with which d^2 is computed, in px and rad: that of the bank and the nominal noise, times the
+        squared scale, with the direction's variance where the ellipse has a direction. angle_var (M,): variances of the
+        directions, rad^2; from (30 degrees)^2 on an ellipse has none.
+
+        The likelihood of an ellipse z given its track is N(z; prediction, S), so -2 ln of it is d^2 + ln |2 pi S|. An
+        ellipse without a direction has the density 1 / pi of a uniform direction under every track, -2 ln of which is 2
+        ln pi. No direction is known less than that, so ln (2 pi S) of a direction is at most 2 ln pi. The constant left
+        out is that of a track in the steady state at the sequence's scale and without a direction. rho cannot stand for
+        |S| here: it is computed from the nominal covariance, without the direction and without the scale.
+        """
+        known = np.log((self.bank[kalman.VAR] + self.noise) / self.asymptote).sum(1)
+        known += 2 * self.noise.size * np.log(self.scale / self.context.px_per_m)
+        s = self.angle[kalman.DIRECTION_VAR][:, None] + np.where(kalman.directed(angle_var), angle_var, np.inf)
+        return np.asarray(known[:, None] + np.log(np.minimum(2 * np.pi * s, np.pi**2)) - 2 * np.log(np.pi))
 
     def update(self, rows: Ints, z: Array, noise: Array, angle_var: Array) -> Array:
         """Update the tracks at table positions `rows` (K,), each at most once, with ellipses z (K, 5), in place (eqs 3

@@ -21,6 +21,7 @@ SAME = 0.5  # IoU of a box with the hull of several predicted boxes from which o
 # count as in it. With the default noises a miss adds more than this up to 60 fps. Above 60 fps the times are off by a
 # frame or two.
 SLACK = 0.02
+LARGEST_SCALE = 2.0  # largest scale of a track relative to the sequence's; the least is its inverse
 
 SCALE, RHO, BORN, SCORE, HITS, MISSES = range(6)
 """Rows of `numbers`."""
@@ -70,7 +71,7 @@ class TrackedPeople:
         self.tentative_limit = max(config.tentative_time, confirmation)
         self.death_rho = self._rho_after(config.coast_time)
         self.explained_death_rho = max(self.death_rho, self._rho_after(config.merged_time))
-        self.largest_penalty = 2 * float(np.log(max(self.explained_death_rho, self.birth_rho)))
+        self.largest_log_det = 2 * float(np.log(max(self.explained_death_rho, self.birth_rho)))
         self.silence_rho = self._rho_after(config.report_coast)
         self.explained_silence_rho = max(self.silence_rho, self._rho_after(config.report_hidden))
 
@@ -135,20 +136,24 @@ class TrackedPeople:
         if self.top:
             return np.full(len(place), whole)
         size = np.maximum(place[:, 2], place[:, 3]) / PERSON_HEIGHT
-        return np.asarray(np.minimum(np.maximum(size, whole / 2), whole * 2))
+        return np.asarray(np.clip(size, whole / LARGEST_SCALE, whole * LARGEST_SCALE))
 
-    def associate(self, cost: Array, gate: float) -> tuple[Ints, Ints]:
+    def associate(self, d2: Array, log_det: Array, gate: float) -> tuple[Ints, Ints]:
         """Returns rows and columns (K,) of associated tracks and measurements, one to one.
 
-        cost (N, M): d^2 (squared Mahalanobis distance) of track and measurement inside the gates, inf outside; gate:
-        the widest gate, a d^2. association = "nearest" (4.4): each measurement chooses its nearest track, and each
-        track keeps the nearest of these. "optimal" (ours): least total d^2 + 2 ln rho (rho: the track's uncertainty); a
+        d2 (N, M): squared Mahalanobis distance d^2 of track and measurement inside the gates, inf outside. log_det (N,
+        1) or (N, M): ln |S| of the pair but for a constant. gate: the widest gate, a d^2. association = "nearest"
+        (sec. 4.4): each measurement chooses its nearest track, and each track keeps the nearest of these. "optimal"
+        (ours): least total d^2 + ln |S|, which is -2 ln of the likelihood N(z; prediction, S) but for a constant; a
         lone pair inside a gate is always associated. K may be 0.
         """
         if self.config.association == "nearest":
-            return assignment.cheapest_per_track(*assignment.nearest(cost), cost)
-        penalty = np.minimum(2 * np.log(self.rho), self.largest_penalty)
-        return assignment.optimal(cost + penalty[:, None], gate + self.largest_penalty)
+            return assignment.cheapest_per_track(*assignment.nearest(d2), d2)
+        return assignment.optimal(d2 + np.minimum(log_det, self.largest_log_det), gate + self.largest_log_det)
+
+    def rho_log_det(self) -> Array:
+        """Returns 2 ln rho (N, 1): ln |S| of each track, in metres, less that of a track in the steady state."""
+        return np.asarray(2 * np.log(self.rho)[:, None])
 
     def explain_misses(self) -> None:
         """Set miss_explained of each missed confirmed track that is hidden: one measured track with a lower foot covers

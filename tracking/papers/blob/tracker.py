@@ -27,9 +27,11 @@ Departures, all ours:
   box being 1.7 m, but half to twice the sequence's scale. From straight above it is the sequence's. Acceleration noises
   are spectral densities.
 - rho is that of x, y, h, w. theta is not part of it.
-- association = "optimal": one to one, of least total cost d^2 + 2 ln rho, which is ln |S| in metres but for a constant.
-  So a track that was missed for long pays for its wide gate. A track left without measurement costs the gate plus the
-  largest 2 ln rho that any track can have, so that a lone pair inside a gate is always associated.
+- association = "optimal": one to one, of least total cost d^2 + ln |S|, which is -2 ln N(z; z_pred, S) but for a
+  constant. So a track that was missed for long pays for its wide gate. From boxes ln |S| is that in metres, which is 2
+  ln rho but for a constant; from pixels it is that of ellipse_tracks, with scale and direction. A track left without
+  measurement costs the gate plus the largest ln |S| that any track can have, so that a lone pair inside a gate is
+  always associated.
 - association = "nearest" (the paper's): of several measurements with the same nearest track the nearest updates it.
 - Pieces of one person: a free box in the orphan_gate of a measured track, or inside the predicted box of a confirmed
   one, starts no track. The orphan_gate is that of a track measured in every frame; the paper uses the gate itself

@@ -100,9 +100,9 @@ class BoxUpdater:
         cost = np.where(d2 <= self.gate, d2, np.inf)
         strong = score >= self.config.score_start
         if strong.all():
-            rows, columns = people.associate(cost, self.gate)
+            rows, columns = people.associate(cost, people.rho_log_det(), self.gate)
         else:
-            rows, columns = people.associate(np.where(strong, cost, np.inf), self.gate)
+            rows, columns = people.associate(np.where(strong, cost, np.inf), people.rho_log_det(), self.gate)
             more = self._weak_pairs(np.where(strong, np.inf, cost), rows)
             rows, columns = np.concatenate([rows, more[0]]), np.concatenate([columns, more[1]])
         free[columns] = False
@@ -118,8 +118,8 @@ class BoxUpdater:
         """
         if self.config.association == "optimal":
             cost[taken] = np.inf
-            return self.people.associate(cost, self.gate)
-        rows, columns = self.people.associate(cost, self.gate)
+            return self.people.associate(cost, self.people.rho_log_det(), self.gate)
+        rows, columns = self.people.associate(cost, self.people.rho_log_det(), self.gate)
         open_rows = ~np.isin(rows, taken)
         return rows[open_rows], columns[open_rows]
 

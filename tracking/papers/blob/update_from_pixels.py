@@ -250,14 +250,14 @@ class PixelUpdater:
         people = self.people
         if not len(z) or not len(people.id):
             return np.zeros(0, np.int64), np.zeros(0, np.int64), np.zeros(len(z), bool)
+        if self.size.above:
+            angle_var = np.full(len(z), np.inf)
         d2 = kalman.distances(people.bank, z[:, :4], people.noise, people.scale)
-        gate = np.tile(self.gates[0], len(z))
-        if not self.size.above:
-            d2 = d2 + people.direction_distances(z[:, 4], angle_var)
-            gate = self.gates[kalman.directed(angle_var).astype(int)]
+        d2 += people.direction_distances(z[:, 4], angle_var)
+        gate = self.gates[kalman.directed(angle_var).astype(int)]
         cost = np.where(d2 <= gate, d2, np.inf)
         gated = np.asarray(np.isfinite(cost).any(0))
-        return *people.associate(cost, self.gates[1]), gated
+        return *people.associate(cost, people.log_det(angle_var), self.gates[1]), gated
 
     def _measure_by_templates(
         self, scene: ExplainedForeground, expected: Array, rows: Ints, confirmed: bool

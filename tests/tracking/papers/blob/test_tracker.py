@@ -224,7 +224,15 @@ def associate(d2, rho):
     tracker.reset(CONTEXT, 0)
     tracker.people.start_tracks(np.tile([100.0, 200, 68, 28], (len(d2), 1)), np.ones(len(d2)), 0.0)
     tracker.people.rho[:] = rho
-    return sorted(zip(*(k.tolist() for k in tracker.people.associate(np.array(d2), tracker.updater.gate)), strict=True))
+    return sorted(
+        zip(
+            *(
+                k.tolist()
+                for k in tracker.people.associate(np.array(d2), tracker.people.rho_log_det(), tracker.updater.gate)
+            ),
+            strict=True,
+        )
+    )
 
 
 def test_a_blind_track_far_away_changes_no_pair():

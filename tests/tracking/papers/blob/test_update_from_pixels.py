@@ -89,6 +89,50 @@ def test_a_ghost_that_is_pruned_hides_nobody():
     assert made.noise[0, :2] == pytest.approx(people.noise[:2], rel=0.1)
 
 
+def two_tracks_at_one_blob(first_var, second_var):
+    """A tracker with two confirmed steady tracks, and a blob between them, nearer to the first in px. Variances are
+    those of the filters' places, m^2."""
+    last = []
+    track([[p] for p in walk(60, 180, 4, 20)], watch=lambda tracker, _: last.append(tracker))
+    people = last[-1].people
+    x, y, h, w = people.bank[kalman.PLACE, 0]
+    people.start_tracks(np.array([[x + 30, y, h, w, people.angle[0, 0]]]), np.ones(1), 2.0)
+    people.confirmed[:], people.rho[:], people.scale[:] = True, 1.0, 40.0
+    people.angle[1] = people.angle[1, 0]
+    people.bank[kalman.VAR, 0, :2], people.bank[kalman.VAR, 1, :2] = first_var, second_var
+    people.bank[kalman.VAR, 1, 2:] = people.bank[kalman.VAR, 0, 2:]
+    return last[-1], np.array([[x + 10, y, h, w, people.angle[0, 0]]])
+
+
+def test_a_blob_goes_to_the_likelier_track_not_to_the_vaguer():
+    """d^2 + ln |S|: rho is the same for both, but the second was measured by a template, with more noise."""
+    tracker, z = two_tracks_at_one_blob(0.003, 0.09)
+    people, angle_var = tracker.people, np.array([0.01])
+    d2 = kalman.distances(people.bank, z[:, :4], people.noise, people.scale)[:, 0]
+    assert d2[1] < d2[0]
+    assert d2[0] + np.log(0.003 + 0.0081) * 2 < d2[1] + np.log(0.09 + 0.0081) * 2
+    rows, columns, _ = tracker.updater._associate(z, angle_var)
+    assert (rows.tolist(), columns.tolist()) == ([0], [0])
+
+
+@pytest.mark.parametrize("directed", [True, False])
+def test_the_cost_of_a_pair_is_its_log_likelihood(directed):
+    """Differences of d^2 + ln |S| between tracks are those of -2 ln N(z; prediction, S) in px and rad."""
+    tracker, z = two_tracks_at_one_blob(0.01, 0.03)
+    people, angle_var = tracker.people, np.array([0.01 if directed else np.inf])
+    people.angle[1], people.scale[:] = [0.05, 0.2], [38.0, 44.0]
+    expected = []
+    for k in range(2):
+        y = (z[0] - np.append(people.bank[kalman.PLACE, k], people.angle[0, k]))[: 5 if directed else 4]
+        s = (people.bank[kalman.VAR, k] + people.noise) * people.scale[k] ** 2
+        s = np.append(s, people.angle[1, k] + 0.01)[: len(y)]
+        expected.append(np.sum(y * y / s + np.log(2 * np.pi * s)))
+    d2 = kalman.distances(people.bank, z[:, :4], people.noise, people.scale)
+    d2 = d2 + people.direction_distances(z[:, 4], angle_var)
+    cost = (d2 + people.log_det(angle_var))[:, 0]
+    assert cost[1] - cost[0] == pytest.approx(expected[1] - expected[0])
+
+
 def test_a_post_does_not_cut_a_person_in_two():
     way = walk(100, 180, 3, 40)
     made = track([[p] for p in way], post=160.0)
