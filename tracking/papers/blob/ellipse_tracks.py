@@ -90,23 +90,26 @@ class TrackedEllipses(TrackedPeople):
         turn = kalman.angle_innovation(z, self.angle[kalman.DIRECTION][:, None])
         return np.where(kalman.directed(angle_var), turn * turn / s, 0.0)
 
-    def log_det(self, angle_var: Array) -> Array:
-        """Returns ln |S| (N, M) of the innovations of N tracks and M ellipses, but for a constant (ours).
+    def innovations(self, z: Array, angle_var: Array) -> tuple[Array, Array]:
+        """Returns d^2 (eq. 9) and ln |S| but for a constant, (N, M) each, of N tracks and M ellipses.
 
-        S is the covariance with which d^2 is computed, in px and rad: that of the bank and the nominal noise, times the
-        squared scale, with the direction's variance where the ellipse has a direction. angle_var (M,): variances of the
-        directions, rad^2; from (30 degrees)^2 on an ellipse has none.
+        z (M, 5): centre x, y, full axes h, w (px), theta (rad). angle_var (M,): variance of theta, rad^2; from (30
+        degrees)^2 on an ellipse has no direction.
 
-        The likelihood of an ellipse z given its track is N(z; prediction, S), so -2 ln of it is d^2 + ln |2 pi S|. An
+        The likelihood of an ellipse z given its track is N(z; prediction, S), so -2 ln of it is d^2 + ln |2 pi S|, S in
+        px and rad: the variances of bank and nominal noise times the squared scale, and that of the direction. An
         ellipse without a direction has the density 1 / pi of a uniform direction under every track, -2 ln of which is 2
         ln pi. No direction is known less than that, so ln (2 pi S) of a direction is at most 2 ln pi. The constant left
-        out is that of a track in the steady state at the sequence's scale and without a direction. rho cannot stand for
-        |S| here: it is computed from the nominal covariance, without the direction and without the scale.
+        out is that of a track in the steady state, at the sequence's scale, without a direction. rho cannot stand for
+        |S| here: it is computed from the nominal covariance, without direction and scale (ours).
         """
+        d2 = kalman.distances(self.bank, z[:, :4], self.noise, self.scale) + self.direction_distances(
+            z[:, 4], angle_var
+        )
+        angle_s = self.angle[kalman.DIRECTION_VAR][:, None] + np.where(kalman.directed(angle_var), angle_var, np.inf)
         known = np.log((self.bank[kalman.VAR] + self.noise) / self.asymptote).sum(1)
         known += 2 * self.noise.size * np.log(self.scale / self.context.px_per_m)
-        s = self.angle[kalman.DIRECTION_VAR][:, None] + np.where(kalman.directed(angle_var), angle_var, np.inf)
-        return np.asarray(known[:, None] + np.log(np.minimum(2 * np.pi * s, np.pi**2)) - 2 * np.log(np.pi))
+        return d2, known[:, None] + np.log(np.minimum(2 / np.pi * angle_s, 1.0))
 
     def update(self, rows: Ints, z: Array, noise: Array, angle_var: Array) -> Array:
         """Update the tracks at table positions `rows` (K,), each at most once, with ellipses z (K, 5), in place (eqs 3

@@ -11,13 +11,12 @@ Order of a frame, with the paper's sections:
     adapt the background, except where confirmed tracks are                   ours
 
 A blob that is associated with no track starts a track. With `split` it also does so inside the gate of a track that a
-nearer blob updates, since pieces of one person have been found by templates. Without `split` a blob inside any gate
-starts no track (the paper's frame 367). Blobs do not use `orphan_gate`.
+nearer blob updates, since pieces of one person have been found by templates. Without `split` neither a blob inside any
+gate starts a track nor pieces of a person whose union is inside (blob_pieces; the paper's frame 367). Blobs do not use
+`orphan_gate`.
 """
 
 from __future__ import annotations
-
-from typing import NamedTuple
 
 import numpy as np
 
@@ -27,9 +26,10 @@ from tracking.detect.blobs import Blobs
 from tracking.detect.foreground import Foreground
 from tracking.detect.person_size import PersonSize
 from tracking.filters import kalman
-from tracking.papers.blob import box_geometry, new_people
+from tracking.papers.blob import blob_pieces, box_geometry, new_people
 from tracking.papers.blob.config import BlobConfig
 from tracking.papers.blob.ellipse_tracks import TrackedEllipses
+from tracking.papers.blob.measured_ellipses import Measured
 from tracking.papers.blob.person_template import ExplainedForeground, template_mask
 
 SHARED = 0.35  # share of a predicted box that a blob's box must cover for the track to be expected in the blob
@@ -37,25 +37,6 @@ UPRIGHT = 25.0  # deg, standard deviation of the direction of a person measured 
 EXTENT = 0.75, 1.3  # least and largest height and width of a template relative to the expected person
 BLIND = 25.0  # a template's variance of height and width relative to a lone blob's: they are predicted, not measured
 LEAST_SHOWN = 0.2  # a person of whom a smaller share is visible is measured as if this share were
-
-
-class Measured(NamedTuple):
-    """Measurements of K tracks, one row each.
-
-    rows (K,): table positions of the tracks, from 0. z (K, 5): ellipse: centre x, y, full axes h, w (px), direction
-    theta of h (rad). noise (K, 4): variances of x, y, h, w, m^2. angle_var (K,): variance of theta, rad^2, inf if it is
-    not measured. support (K,), 0 to 1: how well the template is filled with foreground; 1 for a blob of one person.
-    """
-
-    rows: Ints
-    z: Array
-    noise: Array
-    angle_var: Array
-    support: Array
-
-    def joined(self, more: Measured) -> Measured:
-        """Returns new Measured with the rows of these measurements followed by those of `more`."""
-        return Measured(*(np.concatenate(pair) for pair in zip(self, more, strict=True)))
 
 
 class PixelUpdater:
@@ -173,21 +154,23 @@ class PixelUpdater:
         lone = self._lone_people(found, expected) if split else np.ones(len(found), bool)
         columns = lone.nonzero()[0]
         z, angle_var = found.ellipse[columns], found.angle_var[columns] + self.angle_noise
-        rows, taken, gated = self._associate(z, angle_var)
-        made = Measured(rows, z[taken], np.tile(people.noise, (len(rows), 1)), angle_var[taken], np.ones(len(rows)))
-        free = ~np.isin(np.arange(len(z)), taken)
-        unexplained = z[free if split else free & ~gated]
-        if split:
+        made, taken, d2 = self._associate(z, angle_var)
+        unexplained = np.delete(z, taken, 0)
+        if not split:
+            gated = np.isfinite(self._gated(d2, angle_var)).any(0)
+            made, used = self._with_pieces(made, taken, found, d2)
+            unexplained = z[~used & ~gated]
+        else:
             scene = ExplainedForeground(mask)
             scene.mark_explained(found.label, columns)
             for confirmed in (True, False):
                 made = made.joined(self._measure_by_templates(scene, expected, made.rows, confirmed))
             entered = box_geometry.centred(new_people.find_new_people(scene, self.size, c.entry_support))
             unexplained = np.concatenate([unexplained, self._person_ellipses(entered)])
-        d2 = people.update(made.rows, made.z, made.noise, made.angle_var)
+        away = people.update(made.rows, made.z, made.noise, made.angle_var)
         if split:
             self._relax_sizes()
-        near = d2 <= self.confirm_gates[kalman.directed(made.angle_var).astype(int)]
+        near = away <= self.confirm_gates[kalman.directed(made.angle_var).astype(int)]
         people.record_measured(made.rows, near, made.support)
         people.explain_misses()
         people.delete_tracks(t)
@@ -239,25 +222,50 @@ class PixelUpdater:
         blobs = box_geometry.centred_from_ltwh(box)
         return np.asarray((box_geometry.covered_share(sure, blobs) >= SHARED).sum(0) > 1)
 
-    def _associate(self, z: Array, angle_var: Array) -> tuple[Ints, Ints, Bools]:
-        """Returns rows and columns (K,) of associated tracks and ellipses, one to one, and flags (M,) of the ellipses
-        that are in any gate.
+    def _associate(self, z: Array, angle_var: Array) -> tuple[Measured, Ints, Array]:
+        """Returns the measurements of the associated tracks, one to one, the rows (K,) of z that they use, and d^2 (N,
+        M) of all N tracks and M ellipses, inf outside the gates.
 
         z (M, 5): centre x, y, axes h, w (px), theta (rad); angle_var (M,): variance of theta, rad^2. The gate, a limit
         of the squared Mahalanobis distance, has 5 degrees of freedom if the ellipse has a direction, else 4 (eqs 9,
         10). Seen from straight above it always has 4, as people turn on the spot. Without ellipses or tracks K = 0.
         """
-        people = self.people
-        if not len(z) or not len(people.id):
-            return np.zeros(0, np.int64), np.zeros(0, np.int64), np.zeros(len(z), bool)
-        if self.size.above:
-            angle_var = np.full(len(z), np.inf)
-        d2 = kalman.distances(people.bank, z[:, :4], people.noise, people.scale)
-        d2 += people.direction_distances(z[:, 4], angle_var)
-        gate = self.gates[kalman.directed(angle_var).astype(int)]
-        cost = np.where(d2 <= gate, d2, np.inf)
-        gated = np.asarray(np.isfinite(cost).any(0))
-        return *people.associate(cost, people.log_det(angle_var), self.gates[1]), gated
+        d2, log_det = self.people.innovations(z, self._gated_direction(angle_var))
+        rows, taken = self.people.associate(self._gated(d2, angle_var), log_det, self.gates[1])
+        noise = np.tile(self.people.noise, (len(rows), 1))
+        return Measured(rows, z[taken], noise, angle_var[taken], np.ones(len(rows))), taken, d2
+
+    def _gated_direction(self, angle_var: Array) -> Array:
+        """Returns the variances (M,) of directions for the gate, rad^2: inf (none) from straight above."""
+        return np.full(len(angle_var), np.inf) if self.size.above else angle_var
+
+    def _gated(self, d2: Array, angle_var: Array) -> Array:
+        """Returns d^2 (N, M) with inf outside the gates of eq. 10; angle_var (M,): variances of directions, rad^2."""
+        directed = kalman.directed(self._gated_direction(angle_var)).astype(int)
+        return np.where(d2 <= self.gates[directed], d2, np.inf)
+
+    def _with_pieces(self, made: Measured, taken: Ints, found: Blobs, d2: Array) -> tuple[Measured, Bools]:
+        """Returns the measurements with the pieces of a person united (blob_pieces), and flags (M,) of the blobs used.
+
+        made, taken: measurements of associated tracks and the blobs that they use; d2 (N, M): squared distances of all
+        tracks and blobs. A blob in no pair may be a piece of the nearest track whose predicted box holds its centre.
+        All pieces of a track and its own blob, if it has one, are replaced by their union. They are so if the union is
+        nearer than the own blob or, without one, inside the gate.
+        """
+        used = np.isin(np.arange(len(found)), taken)
+        owner = blob_pieces.owners(found.ellipse, self.people.upright_boxes(), d2, ~used)
+        own = dict(zip(made.rows.tolist(), taken.tolist(), strict=True))
+        for row in np.unique(owner[owner >= 0]).tolist():
+            mine = (owner == row) | (np.arange(len(found)) == own.get(row, -1))
+            whole, var = blob_pieces.union(found.area[mine], found.ellipse[mine])
+            z, angle_var = whole[None], np.array([var + self.angle_noise])
+            away = self._gated(self.people.innovations(z, self._gated_direction(angle_var))[0], angle_var)[row, 0]
+            if away < (d2[row, own[row]] if row in own else np.inf):
+                used |= mine
+                rest = made.rows != row
+                made = Measured(*(part[rest] for part in made))
+                made = made.joined(Measured(np.array([row]), z, self.people.noise[None], angle_var, np.ones(1)))
+        return made, used
 
     def _measure_by_templates(
         self, scene: ExplainedForeground, expected: Array, rows: Ints, confirmed: bool

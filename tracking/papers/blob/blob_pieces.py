@@ -1,0 +1,48 @@
+"""Blobs that are pieces of one person: several measurements of one track from pixels.
+
+At frame 367 of Gonzalez et al. (2006, sec. 5) a person is segmented into several pieces, which "still lie within the
+gate" and "are assigned to the existing tracker". The paper does not say how several measurements update one filter.
+Here they are one measurement, their union: the ellipse of all their pixels. The gate holds for the union, as half a
+person alone is far from the prediction in height and centre.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from sim.types import Array, Bools, Ints
+from tracking.detect import blobs
+from tracking.papers.blob import box_geometry
+
+
+def owners(centre: Array, predicted: Array, d2: Array, free: Bools) -> Ints:
+    """Returns the row (M,) of the track of which each blob may be a piece, -1 for none.
+
+    It is the nearest track, by d^2, whose predicted box holds the blob's centre. centre (M, 2 or more): columns x, y,
+    px. predicted (N, 4): boxes of the tracks: centre x, y, height, width, px. d2 (N, M): squared Mahalanobis distances.
+    free (M,): False for a blob that is no candidate. Without tracks all are -1.
+    """
+    found = np.full(len(centre), -1)
+    if not len(predicted):
+        return found
+    inside = box_geometry.points_inside(centre, predicted).T & free
+    held = inside.any(0)
+    found[held] = np.where(inside, d2, np.inf).argmin(0)[held]
+    return found
+
+
+def union(area: Array, ellipse: Array) -> tuple[Array, float]:
+    """Returns the ellipse (5,) of all pixels of several blobs, and the variance of its direction, rad^2.
+
+    area (K,): numbers of pixels; ellipse (K, 5): centre x, y, full axes h >= w (px), theta (rad), of each blob, from
+    their moments. The moments of the union are sums, so the result is that of one blob of the same pixels.
+    """
+    share, c, s = area / area.sum(), np.cos(ellipse[:, 4]), np.sin(ellipse[:, 4])
+    axes = np.square(ellipse[:, 2:4] / 4)
+    turn = np.stack([np.stack([c, -s], 1), np.stack([s, c], 1)], 1)
+    cov = turn @ (axes[:, :, None] * turn.transpose(0, 2, 1))
+    centre = share @ ellipse[:, :2]
+    away = ellipse[:, :2] - centre
+    whole = np.tensordot(share, cov + away[:, :, None] * away[:, None], 1)
+    made, angle_var = blobs.ellipses(np.array([area.sum()]), centre[None], whole[None])
+    return made[0], float(angle_var[0])
