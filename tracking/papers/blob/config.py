@@ -69,18 +69,19 @@ class BlobConfig(BackgroundSettings):
         3.0,
         (0.0, 20.0),
         "s",
-        "replaces coast_time, if longer, for a track that is hidden or merged with others in one box (ours)",
+        "replaces coast_time, if longer, for a track that is hidden or merged with others in one box; 0: boxes of "
+        "several people are boxes like others (ours)",
     )
     score_start: float = param(0.5, (0.0, 1.0), "score", "least score of a detection that starts a track")
-    score_continue: float = param(0.1, (0.0, 1.0), "score", "least score of a detection that updates a track")
+    score_continue: float = param(0.1, (0.0, 1.0), "score", "least score of a detection that updates a track (ours)")
     report_delay: float = param(
-        0.1, (0.0, 5.0), "s", "a tentative track is reported from this age on, in frames in which it is measured"
+        0.1, (0.0, 5.0), "s", "a tentative track is reported from this age on, in frames in which it is measured (ours)"
     )
     report_coast: float = param(
         0.6,
         (0.0, 10.0),
         "s",
-        "a confirmed track is reported for this time after its last measurement, from the steady state",
+        "a confirmed track is reported for this time after its last measurement, from the steady state (ours)",
     )
     report_hidden: float = param(
         0.7,

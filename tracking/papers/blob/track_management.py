@@ -175,10 +175,11 @@ class TrackedPeople:
 
         z: centre x, y, height, width, px. unseen (N,): flags of tracks without a measurement. A box covers several
         tracks if it holds their centres and fits the hull of their boxes: with an IoU of at least SAME = 0.5, and not
-        below that with the best single box. Also sets miss_explained of the unseen tracks in such a box.
+        below that with the best single box. Also sets miss_explained of the unseen tracks in such a box. With merged_time
+        = 0 no box is taken for several people.
         """
         found = np.zeros(len(z), bool)
-        if not len(z) or not unseen.any():
+        if not self.config.merged_time or not len(z) or not unseen.any():
             return found
         place = self.bank[kalman.PLACE]
         inside = box_geometry.points_inside(place, z) & self.confirmed[:, None]

@@ -7,7 +7,7 @@ import pytest
 
 from scenarios.errors import InputError
 from sim.types import Camera, Context, Detections, Frame, Tracks
-from tracking.filters import kalman
+from tracking.filters import kalman, track_uncertainty
 from tracking.papers.blob.config import BlobConfig
 from tracking.papers.blob.tracker import Blob
 
@@ -147,6 +147,29 @@ def test_a_box_over_two_unseen_people_is_neither_born_nor_their_death():
 
     made = run([frame(k) for k in range(60)], config)
     assert len(ids(made)) == 2
+
+
+def test_in_the_papers_preset_nothing_is_known_of_merged_boxes_and_hidden_people():
+    """A box over two people starts a track, and a hidden track lives no longer than a missed one."""
+    paper = BlobConfig.preset("paper")
+
+    def merged(k):
+        return [[100 + 4 * k, 200, 73, 68]] if 20 <= k < 24 else at((100 + 4 * k, 200), (145 + 4 * k, 200))
+
+    assert people_after([merged(k) for k in range(24)], paper).next_id == 4
+    assert people_after([merged(k) for k in range(24)], BlobConfig()).next_id == 3
+
+    def behind(k):
+        return [[380, 180, 90, 160]] + ([] if k >= 20 else at((300 + 4 * k, 200)))
+
+    assert len(people_after([behind(k) for k in range(38)], paper).id) == 1
+    assert len(people_after([behind(k) for k in range(38)], BlobConfig()).id) == 2
+
+
+def test_in_the_papers_preset_confirmed_tracks_are_reported_until_they_are_deleted():
+    made = run([at((100, 200))] * 20 + [[]] * 20, BlobConfig.preset("paper"))
+    hits = track_uncertainty.hits_to_confirm(BlobConfig().dynamics(FPS), BlobConfig().confirm_ratio)
+    assert [len(t.id) for t in made] == [0] * (hits - 1) + [1] * (20 - hits + 1 + 14) + [0] * 6
 
 
 def test_two_identical_detections_are_one_person(config):

@@ -73,6 +73,19 @@ def test_pieces_of_a_person_lie_in_the_gate_and_start_no_track(config, broken):
     assert known[-1] == 1
 
 
+def test_without_splitting_the_parameters_of_templates_have_no_effect():
+    """They keep their defaults in the preset `paper`."""
+    silent = "evidence", "track_support", "entry_support", "person_noise", "orphan_gate"
+    frames = [[(60 + 4 * k, 180, TALL), (200 - 3 * k, 175, TALL)] for k in range(25)]
+    found = []
+    for end in ("default", "low", "high"):
+        changed = {name: getattr(BlobConfig.params()[name], end) for name in silent}
+        found.append(track(frames, BlobConfig.from_dict(PAPER.as_dict() | changed)))
+    for a, b, c in zip(*found, strict=True):
+        assert a.id.tolist() == b.id.tolist() == c.id.tolist()
+        assert a.box.tobytes() == b.box.tobytes() == c.box.tobytes()
+
+
 @pytest.mark.parametrize("scale", [0.0, -1.0])
 def test_a_scale_that_is_none_is_refused(scale):
     sample = painted.sample(np.random.default_rng(0))
