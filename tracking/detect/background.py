@@ -5,7 +5,7 @@ Each pixel i has a mean colour E_i and standard deviations sigma_i. A colour I i
     CD    = |(I - alpha E) / sigma|           chromaticity distortion    (eq. 6)
 Both are divided by their RMS over the training sample, so that one threshold serves the whole image:
     (alpha - 1) / a_i  (eqs 7, 9),   CD / b_i  (eqs 8, 10)
-Classes, tested in the order of Gonzalez et al., 3.2:
+Classes, tested in the order of Gonzalez et al., sec. 3.2:
     1. CD / b above its threshold: foreground
     2. (alpha - 1) / a below the lower threshold and alpha below `dark`: dark foreground
     3. (alpha - 1) / a above the upper threshold: highlight; foreground if alpha is above `bright` (ours)
@@ -150,7 +150,7 @@ class Background:
 
 def fused_foreground(classes: Image) -> Bools:
     """Returns True where the class is FOREGROUND or DARK (dark foreground), False for the others (Gonzalez et al.,
-    3.3).
+    sec. 3.3).
 
     classes: pixel classes from `classify`, any shape; the result has the same shape.
     """

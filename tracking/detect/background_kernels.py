@@ -1,6 +1,6 @@
 """Kernels of tracking.detect.background: the class of each pixel, and adaptation of the model, in one pass each.
 
-Numpy twins: tests/reference_background.py. The module also defines the five classes (Gonzalez et al. 2006, 3.2).
+Numpy twins: tests/reference_background.py. The module also defines the five classes (Gonzalez et al. 2006, sec. 3.2).
 
 Colour is the first axis of the model's arrays, so that the loop over pixels vectorises. Arrays, float32 unless noted:
     E, V   (3, N) or (3, H, W): mean colour, grey levels, and its variance, squared grey levels

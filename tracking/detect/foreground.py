@@ -1,7 +1,7 @@
 """The pipeline from a picture to foreground blobs that all trackers from pixels share.
 
 For each picture, in this order:
-    segment    classify each pixel (Gonzalez et al. 2006, 3.2), fuse the two foreground classes and clean them (3.3);
+    segment    classify each pixel (Gonzalez et al. 2006, sec. 3.2), fuse the foreground classes, clean them (sec. 3.3);
                the result is implausible if more of the image is foreground than people can cover (ours)
     ...        the tracker measures its people and says which pixels they cover (protected)
     adapt      the background model learns from all other pixels (ours)
@@ -99,7 +99,7 @@ class Foreground:
         return self.px_per_m if self.px_per_m > 0 else self.shape[0] / ASSUMED_HEIGHT
 
     def segment(self, image: Image) -> Segmented:
-        """Returns the pixel classes and the cleaned foreground mask of a picture (H, W, 3) BGR uint8 (3.2, 3.3).
+        """Returns the pixel classes and the cleaned foreground mask of a picture (H, W, 3) BGR uint8 (secs. 3.2, 3.3).
 
         The background model does not learn from the picture; only its estimate of the picture's brightness changes.
         `plausible` of the result is False if the share of foreground is above most_foreground.
@@ -123,7 +123,8 @@ class Foreground:
         """Returns the blobs of a cleaned mask (H, W) bool that are large enough to be people or parts of them, the
         largest first.
 
-        They have at least 0.0125 m^2 at the image's scale, and at least 12 pixels (3.3). No such blob gives 0 rows.
+        They have at least 0.0125 m^2 at the image's scale, and at least 12 pixels (sec. 3.3). No such blob gives 0
+        rows.
         """
         return blobs.find(mask, max(LEAST_AREA * self.scale**2, LEAST_PIXELS))
 

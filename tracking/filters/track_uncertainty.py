@@ -1,9 +1,9 @@
 """The uncertainty of a track, rho = sqrt(det S) / its asymptote, and the values of rho that decide about tracks.
 
-Gonzalez et al. (2006, 4.5, 5) manage tracks by sqrt|S|, S the innovation covariance (of measurement minus predicted
-place; eq. 6). It falls towards an asymptote while measurements are associated and rises while they are missed. It does
-not depend on measured values. This module computes rho and its thresholds; tracking.papers.blob.track_management
-starts, confirms and deletes tracks by them.
+Gonzalez et al. (2006, secs. 4.5, 5) manage tracks by sqrt|S|, S the innovation covariance (of measurement minus
+predicted place; eq. 6). It falls towards an asymptote while measurements are associated and rises while they are
+missed. It does not depend on measured values. This module computes rho and its thresholds;
+tracking.papers.blob.track_management starts, confirms and deletes tracks by them.
 
 The paper prints no numbers. It confirms "below a certain percentage" of the asymptote; as rho falls towards 1 from
 above, the percentage is above 100. It deletes at the value that "a certain number" of misses gives. The value at birth
@@ -80,7 +80,8 @@ class Dynamics:
 
 
 def rho(state: Array, noise: Array, asymptote: Array) -> Array:
-    """Returns rho (N,) of N predicted filters: sqrt|S| over its asymptote, S the innovation covariance (4.5, eq. 6).
+    """Returns rho (N,) of N predicted filters: sqrt|S| over its asymptote, S the innovation covariance (sec. 4.5, eq.
+    6).
 
     state (5, N, D): a bank after `predict`; rows place, rate, variance of the place, covariance, variance of the rate.
     noise, asymptote (D,): variance of a measurement, and S of a track measured in every frame, in the covariances'

@@ -1,11 +1,11 @@
 """The tracks of `blob` from pixels: the table of tracks, with a direction and a nominal covariance for each track.
 
 The state's h, w are the axes of the person's ellipse, the longer one first as measured, and theta is the direction of h
-from the abscissa, v down, modulo pi. theta is a random walk (Gonzalez et al. 2006, 4.1). The box of a track is the
+from the abscissa, v down, modulo pi. theta is a random walk (Gonzalez et al. 2006, sec. 4.1). The box of a track is the
 bounding box of its ellipse.
 
 The paper's rho is sqrt|S| over its asymptote, S the covariance of the innovation (measurement less prediction). It
-counts measurements by the covariance (4.5). Here the covariance also knows that a partly hidden person
+counts measurements by the covariance (sec. 4.5). Here the covariance also knows that a partly hidden person
 is measured with more noise, and that axes return to expected ones (both ours). So rho is computed from a second,
 nominal covariance, which is updated with the nominal R (variance of a measurement) only.
 """
@@ -113,7 +113,7 @@ class TrackedEllipses(TrackedPeople):
 
     def update(self, rows: Ints, z: Array, noise: Array, angle_var: Array) -> Array:
         """Update the tracks at table positions `rows` (K,), each at most once, with ellipses z (K, 5), in place (eqs 3
-        to 9).
+        to 7).
 
         z: centre x, y, axes h, w (px), theta (rad). noise (K, 4): variances of x, y, h, w, m^2; angle_var (K,):
         variances of theta, rad^2. Returns d^2 (K,), the squared Mahalanobis distance before the update, direction

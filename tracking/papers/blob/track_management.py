@@ -1,6 +1,6 @@
 """The tracks of `blob`: filters, ages and flags, and which tracks are started, confirmed, deleted and reported.
 
-Track management of Gonzalez et al. (2006), 4.5 and 5, by rho = sqrt|S| / its asymptote, S the covariance of the
+Track management of Gonzalez et al. (2006), secs. 4.5 and 5, by rho = sqrt|S| / its asymptote, S the covariance of the
 innovation: the uncertainty of a track, no unit, 1 in the steady state (tracking.filters.track_uncertainty). Association
 by cost, explained misses, the rules of reporting and the field of view are ours; see tracking.papers.blob.tracker.
 """
@@ -175,8 +175,8 @@ class TrackedPeople:
 
         z: centre x, y, height, width, px. unseen (N,): flags of tracks without a measurement. A box covers several
         tracks if it holds their centres and fits the hull of their boxes: with an IoU of at least SAME = 0.5, and not
-        below that with the best single box. Also sets miss_explained of the unseen tracks in such a box. With merged_time
-        = 0 no box is taken for several people.
+        below that with the best single box. Also sets miss_explained of the unseen tracks in such a box. With
+        merged_time = 0 no box is taken for several people.
         """
         found = np.zeros(len(z), bool)
         if not self.config.merged_time or not len(z) or not unseen.any():
@@ -195,7 +195,7 @@ class TrackedPeople:
         return found
 
     def delete_tracks(self, t: float) -> None:
-        """Delete tracks from the table at time t, s (5, and ours).
+        """Delete tracks from the table at time t, s (sec. 5, and ours).
 
         rho is a track's uncertainty, which grows with misses. Deleted are: missed confirmed tracks whose rho reached
         the value after coast_time (the longer of it and merged_time if the miss is explained); missed tentative tracks

@@ -1,9 +1,10 @@
 """The tracker `blob`: gates, association, a bank of Kalman filters and track management, on boxes or from pixels.
 
 Gonzalez, Rowe, Andrade, Villanueva, "Efficient management of multiple agent tracking through observation handling",
-2006. State of a track (4.1): (x, x', y, y', h, h', w, w'), constant speed with white acceleration; places in image px,
-covariances in m and s. The measurement is z = (x, y, h, w): centre, height and width of a box. A box has no direction;
-the paper's ninth state, the angle theta, is measured from pixels only. There h and w are the axes of a blob's ellipse.
+2006. State of a track (sec. 4.1): (x, x', y, y', h, h', w, w'), constant speed with white acceleration; places in image
+px, covariances in m and s. The measurement is z = (x, y, h, w): centre, height and width of a box. A box has no
+direction; the paper's ninth state, the angle theta, is measured from pixels only. There h and w are the axes of a
+blob's ellipse.
 
     (A, Q: transition and process noise; P: covariance of x; C: picks the measured coordinates; R: measurement noise;
     y = z - C x: innovation; S = C P C' + R its covariance; K: gain; d^2: squared Mahalanobis distance; chi2:
@@ -13,13 +14,13 @@ the paper's ninth state, the angle theta, is measured from pixels only. There h 
     gate       z_pred = C A x (x before the prediction)        eq. 8           update_from_boxes, update_from_pixels
                d^2 = (z - z_pred)' S^-1 (z - z_pred) <= q      eqs 9, 10       q: the quantile `gate` of chi2 with 4
                                                                                degrees of freedom, 5 with theta
-    associate  each measurement to its nearest gated track     4.4             track_management.associate
+    associate  each measurement to its nearest gated track     sec. 4.4        track_management.associate
     update     y, S, K, x, P                                   eqs 3 to 7      tracking.filters.kalman
-    manage     rho = sqrt|S| / asymptote: confirm, delete      4.5, 5          track_management,
+    manage     rho = sqrt|S| / asymptote: confirm, delete      secs. 4.5, 5    track_management,
                                                                                tracking.filters.track_uncertainty
-    pixels     five classes, cleaning, blobs, ellipses         3.2, 3.3        tracking.detect
+    pixels     five classes, cleaning, blobs, ellipses         secs. 3.2, 3.3  tracking.detect
 
-Readings of the paper: eq. 4 needs brackets, P = (I - K C) P; eq. 9 has row and column exchanged; 4.3 compares d^2
+Readings of the paper: eq. 4 needs brackets, P = (I - K C) P; eq. 9 has row and column exchanged; sec. 4.3 compares d^2
 with "the Mahalanobis radius", by which the quantile of chi2 is meant.
 
 Departures, all ours:

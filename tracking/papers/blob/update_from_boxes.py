@@ -1,8 +1,9 @@
 """One frame of `blob` from boxes: the cascade of Gonzalez et al. (2006) on a detector's boxes.
 
-Order of a frame, with the paper's sections: predict (4.2, eqs 1, 2), gate (4.3, eqs 8 to 10), associate (4.4), fuse the
-pieces of one person (ours), update (4.2, eqs 3 to 7), manage the tracks (4.5, 5; track_management). Departures are
-listed in tracking.papers.blob.tracker. A measurement z is a centred box (x, y, h, w), px, with a score from 0 to 1.
+Order of a frame, with the paper's sections: predict (sec. 4.2, eqs 1, 2), gate (sec. 4.3, eqs 8 to 10), associate (sec.
+4.4), fuse the pieces of one person (ours), update (sec. 4.2, eqs 3 to 7), manage the tracks (secs. 4.5, 5;
+track_management). Departures are listed in tracking.papers.blob.tracker. A measurement z is a centred box (x, y, h, w),
+px, with a score from 0 to 1.
 """
 
 from __future__ import annotations
@@ -214,7 +215,7 @@ class BoxUpdater:
         return np.asarray((y * y / (people.bank[kalman.VAR, rows] + self.noise)).sum(1))
 
     def _update(self, rows: Ints, measured: Array) -> Array:
-        """Update the tracks at positions `rows` (K,) with measurements (K, 4), in place; returns d^2 (K,) (eqs 3 to 9).
+        """Update the tracks at positions `rows` (K,) with measurements (K, 4), in place; returns d^2 (K,), eq. 9 (eqs 3 to 7).
 
         measured: centre x, y, height, width, px. d^2 is the squared Mahalanobis distance before the update.
         """
