@@ -31,6 +31,12 @@ def owners(centre: Array, predicted: Array, d2: Array, free: Bools) -> Ints:
     return found
 
 
+def hull(box: Array) -> Array:
+    """Returns the box (1, 4) round boxes (K, 4), K at least 1; left, top, width, height, px."""
+    low, high = box[:, :2].min(0), (box[:, :2] + box[:, 2:]).max(0)
+    return np.concatenate([low, high - low])[None]
+
+
 def union(area: Array, ellipse: Array) -> tuple[Array, float]:
     """Returns the ellipse (5,) of all pixels of several blobs, and the variance of its direction, rad^2.
 

@@ -1,13 +1,13 @@
 """One frame of `blob` from pixels: the cascade of Gonzalez et al. (2006) on blobs, and people who share a blob (ours).
 
 Order of a frame, with the paper's sections:
-    predict all tracks                                                        4.2, eqs 1, 2
-    classify, clean, find blobs                                               3.2, 3.3 (tracking.detect.foreground)
-    blobs of one person's size: gate, associate, update with the ellipse      4.2 to 4.4, eqs 3 to 10
+    predict all tracks                                                        sec. 4.2, eqs 1, 2
+    classify, clean, find blobs                                               secs. 3.2, 3.3 (detect.foreground)
+    blobs of one person's size: gate, associate, update with the ellipse      secs. 4.2 to 4.4, eqs 3 to 10
     other foreground: split among the tracks expected there, by templates     ours (person_template)
     foreground that no track explains, as large as a person: new tracks       ours (new_people)
     axes return towards those of a person at the track's place                ours (ellipse_tracks)
-    rho: confirm, delete, start tracks                                        4.5, 5 (track_management)
+    rho: confirm, delete, start tracks                                        secs. 4.5, 5 (track_management)
     adapt the background, except where confirmed tracks are                   ours
 
 A blob that is associated with no track starts a track. With `split` it also does so inside the gate of a track that a
@@ -125,7 +125,7 @@ class PixelUpdater:
 
     def _measure_nobody(self, t: float) -> None:
         """Record a miss of all tracks at time t, s, and delete those missed for too long or outside the image; the
-        others keep the prediction (4.4)."""
+        others keep the prediction (sec. 4.4)."""
         people = self.people
         people.record_measured(np.zeros(0, np.int64), np.zeros(0, bool), np.zeros(0))
         people.delete_tracks(t)
@@ -236,7 +236,7 @@ class PixelUpdater:
         return Measured(rows, z[taken], noise, angle_var[taken], np.ones(len(rows))), taken, d2
 
     def _gated_direction(self, angle_var: Array) -> Array:
-        """Returns the variances (M,) of directions for the gate, rad^2: inf (none) from straight above."""
+        """Returns variances (M,) of directions for the gate, rad^2: inf (none) from straight above."""
         return np.full(len(angle_var), np.inf) if self.size.above else angle_var
 
     def _gated(self, d2: Array, angle_var: Array) -> Array:
@@ -250,7 +250,7 @@ class PixelUpdater:
         made, taken: measurements of associated tracks and the blobs that they use; d2 (N, M): squared distances of all
         tracks and blobs. A blob in no pair may be a piece of the nearest track whose predicted box holds its centre.
         All pieces of a track and its own blob, if it has one, are replaced by their union. They are so if the union is
-        nearer than the own blob or, without one, inside the gate.
+        nearer than the own blob or, without one, inside the gate, and one person where a person's size is reliable.
         """
         used = np.isin(np.arange(len(found)), taken)
         owner = blob_pieces.owners(found.ellipse, self.people.upright_boxes(), d2, ~used)
@@ -259,6 +259,8 @@ class PixelUpdater:
             mine = (owner == row) | (np.arange(len(found)) == own.get(row, -1))
             whole, var = blob_pieces.union(found.area[mine], found.ellipse[mine])
             z, angle_var = whole[None], np.array([var + self.angle_noise])
+            if self.size.reliable and not self.size.one_person(blob_pieces.hull(found.box[mine]), z)[0]:
+                continue
             away = self._gated(self.people.innovations(z, self._gated_direction(angle_var))[0], angle_var)[row, 0]
             if away < (d2[row, own[row]] if row in own else np.inf):
                 used |= mine
