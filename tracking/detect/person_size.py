@@ -1,8 +1,8 @@
 """The size of a person in the image: height and width of a person's box at every foot point (ours).
 
 Three sources:
-- A pinhole camera. The box of an upright person of 1.7 m and mean build that stands at the foot point, averaged over
-  four headings.
+- A pinhole camera. The box of an upright typical person (tracking.detect.typical_person) that stands at the foot
+  point.
 - A camera straight above. Everybody is the same ellipse, turned with the heading; its axes are used instead of the box.
 - No camera. Learned from lone blobs (blobs that may be one person each): the height is a line h = a + b v over the row
   v of the foot, as in a pinhole without roll; the width is SLIM times the height. The line is the one of many on which
@@ -15,9 +15,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from sim.scene.body import PERSON_HEIGHT
 from sim.types import Array, Bools, Camera, Context
 from tracking.detect import person_size_kernels as kernels
+from tracking.detect import typical_person
 
 SLIM = 0.36  # width over height of a walking person's box: the first guess without a camera
 ASPECT_FACTOR = 2.0  # largest factor between a lone blob's width over height and the expected one
@@ -31,6 +31,7 @@ SLOPES = np.linspace(0.0, 2.4, 17)  # relative growth of the height from row 0 t
 SLOPE, SLOPE_COST = 0.7, 0.02  # expected slope, and the share of votes that a squared distance of 1 from it costs
 AGREEMENT = 0.12  # two sizes agree if they differ by at most this share
 FACTORS = np.array([0.9, 0.6]), np.array([1.1, 1.25])  # least and largest factors of height and width
+WIDEST = 1.5  # largest factor of the width with a pinhole camera: people with bags, in mid-stride
 NARROWER_SHARE = 0.7  # a smaller width wins over the most frequent one if it has this share of its votes
 PRIOR_COUNT = 2.0  # lone blobs that the factor 1 counts for
 CLEANED_AWAY = 1.3  # px of a person's height that blur and cleaning remove at the head: median over rendered scenes
@@ -41,7 +42,6 @@ SHORT, TALL, THIN, WIDE = 0.8, 1.25, 0.5, 1.6  # limits of one person's height a
 SHORT_FROM_ABOVE = 0.6  # SHORT from straight above, where half of a person can have the colour of a shadow
 STEP = 8  # px between the nodes of a camera's table
 MARGIN = 0.25  # the table reaches so far beyond the image, in image sizes
-HEADINGS = np.radians([0.0, 45.0, 90.0, 135.0])  # rad, over which a camera's boxes are averaged
 
 
 class PersonSize:
@@ -66,7 +66,7 @@ class PersonSize:
         self.box_ratios, self.box_over_ellipse = np.zeros((0, 2)), np.array(BOX_OVER_ELLIPSE)
         self.line, self.factor, self.agreed = (float("nan"), 0.0), np.ones(2), 0
         if context.camera is not None and context.camera.kind == "top":
-            self.axes_above, self.box_over_ellipse = _axes_from_above(context.camera), np.ones(2)
+            self.axes_above, self.box_over_ellipse = typical_person.axes_from_above(context.camera), np.ones(2)
         elif context.camera is not None:
             self.low = -MARGIN * np.array(context.camera.image, float)
             self.table = _table(context.camera, self.low)
@@ -140,7 +140,7 @@ class PersonSize:
         1.7 m.
 
         nan without lone blobs. Heights include 1.3 px that cleaning cuts off. From above their longer axis is taken."""
-        return float(np.median(self.lone[:, 2])) / PERSON_HEIGHT if len(self.lone) else float("nan")
+        return float(np.median(self.lone[:, 2])) / typical_person.HEIGHT if len(self.lone) else float("nan")
 
     def learn(self, box: Array, ellipse: Array, whole: Bools) -> None:
         """Change the size in place by the blobs of a picture that may be one person; the others are ignored.
@@ -197,7 +197,8 @@ class PersonSize:
         ratio, weight = ratio[known], weight[known]
         tall, agreed = _densest(ratio[:, 0], weight)
         wide, _ = _densest(ratio[agreed, 1], weight[agreed], NARROWER_SHARE)
-        self.agreed, self.factor = int(agreed.sum()), np.clip([tall, wide], *FACTORS)
+        most = FACTORS[1] if self.table is None else np.array([FACTORS[1][0], WIDEST])
+        self.agreed, self.factor = int(agreed.sum()), np.clip([tall, wide], FACTORS[0], most)
 
 
 def upright(place: Array, angle: Array) -> Array:
@@ -269,10 +270,9 @@ def _table(camera: Camera, low: Array) -> Array:
     """Returns height and width (2, V, U), px, of a person's box whose foot is at each node of a grid; nan where nobody
     stands.
 
-    The person is 1.7 m high, on z = 0; boxes are averaged over four headings. low (2,): u, v of the first node, px;
+    The person is the typical one (tracking.detect.typical_person), on z = 0. low (2,): u, v of the first node, px;
     nodes are STEP = 8 px apart and reach MARGIN = 0.25 image sizes beyond the image. The ground point is not at the
     box's lower edge unless seen from the side, so it is corrected twice."""
-    from sim.scene.body import person_boxes
     from sim.scene.camera import to_ground
 
     size = (np.array(camera.image) * (1 + 2 * MARGIN) / STEP).astype(int) + 2
@@ -284,17 +284,7 @@ def _table(camera: Camera, low: Array) -> Array:
         seen = np.isfinite(ground).all(1)
         if not seen.any():
             break
-        place = np.column_stack([ground[seen], np.zeros(int(seen.sum()))])
-        tall = np.full(len(place), PERSON_HEIGHT)
-        box = np.mean([person_boxes(camera, place, np.full(len(place), a), tall) for a in HEADINGS], 0)
+        box = typical_person.boxes(camera, ground[seen])
         found[seen] = box[:, :1:-1]
         aim[seen] += np.nan_to_num(foot[seen] - _feet(box))
     return np.asarray(found.T.reshape(2, size[1], size[0]))
-
-
-def _axes_from_above(camera: Camera) -> Array:
-    """Returns the longer and the shorter axis (2,), px, of an upright person of 1.7 m under a camera that looks
-    straight down."""
-    from sim.scene.body import person_boxes
-
-    return np.sort(person_boxes(camera, np.zeros((1, 3)), np.zeros(1), np.array([PERSON_HEIGHT]))[0, 2:])[::-1]

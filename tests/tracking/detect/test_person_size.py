@@ -7,6 +7,7 @@ import pytest
 
 from sim.scene.camera import camera_rotation, project
 from sim.types import Camera, Context
+from tracking.detect import typical_person
 from tracking.detect.person_size import ENOUGH, SMALLEST, PersonSize
 
 BARE = Context(10.0, float("nan"), image_size=(480, 360))
@@ -42,6 +43,32 @@ def test_a_camera_gives_the_projection_of_a_person(tilt):
         h, w = size.at(np.array([[u, v]]))[0]
         assert h == pytest.approx(v - head, rel=0.06)
         assert 0.15 < w / h < 0.4
+
+
+@pytest.mark.parametrize("wide", [0.36, 0.42, 0.6])
+def test_people_wider_or_narrower_than_the_typical_one_are_learned_with_a_camera(wide):
+    """Widths in m: 0.6 is that of the boxes of PETS, 0.36 what the simulator draws."""
+    r = np.random.default_rng(0)
+    seen = camera(0.4)
+    size = PersonSize(Context(10.0, 60.0, camera=seen, image_size=seen.image))
+    foot = np.column_stack([r.uniform(60, 420, 60), r.uniform(200, 340, 60)])
+    h, expected = size.at(foot).T
+    right = wide / typical_person.WIDTH * expected
+    w = right * (1 + 0.04 * r.normal(size=60))
+    box = np.column_stack([foot[:, 0] - w / 2, foot[:, 1] - h, w, h])
+    assert size.one_person(box, ellipses(box)).mean() > 0.9
+    size.learn(box, ellipses(box), np.ones(60, bool))
+    assert size.at(foot)[:, 1] == pytest.approx(right, rel=0.1)
+
+
+def test_the_simulators_body_is_not_the_trackers(monkeypatch):
+    """The shares of the drawn body change nothing that a tracker expects."""
+    context = Context(10.0, 60.0, camera=camera(0.4), image_size=(480, 360))
+    foot = np.array([[240.0, 300.0]])
+    before = PersonSize(context).at(foot)
+    monkeypatch.setattr("sim.scene.body.SHOULDER_SHARE", 0.5)
+    monkeypatch.setattr("sim.scene.body.DEPTH_SHARE", 0.5)
+    assert PersonSize(context).at(foot) == pytest.approx(before)
 
 
 def test_nobody_stands_in_the_sky():
