@@ -215,7 +215,8 @@ class BoxUpdater:
         return np.asarray((y * y / (people.bank[kalman.VAR, rows] + self.noise)).sum(1))
 
     def _update(self, rows: Ints, measured: Array) -> Array:
-        """Update the tracks at positions `rows` (K,) with measurements (K, 4), in place; returns d^2 (K,), eq. 9 (eqs 3 to 7).
+        """Update the tracks at positions `rows` (K,) with measurements (K, 4), in place (eqs 3 to 7); returns d^2 (K,)
+        (eq. 9).
 
         measured: centre x, y, height, width, px. d^2 is the squared Mahalanobis distance before the update.
         """
