@@ -32,7 +32,8 @@ def rng(seed: int, role: str, *keys: int, repeat: int = 0) -> np.random.Generato
     """Return the numpy Generator over `SeedSequence(seed, spawn_key=(ROLE[role], *keys))`.
 
     The same arguments give a generator of the same numbers. seed: 0 or more. role: a key of ROLE, as "layout",
-    "person", "noise" or "tracker". keys: what the stream belongs to, as a person's id or a frame; 0 or more. repeat:
+    "person", "noise" or "tracker". keys: what the stream belongs to, as a person's id or a frame, each 0 or more, in
+    any number. Streams of equal role and keys are equal, so each use needs keys of its own. repeat:
     number of the suite entry's copy, from 1; 0 without copies. A repeat other than 0 adds 1,000,000 + repeat as a last
     key.
 

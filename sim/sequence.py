@@ -180,7 +180,8 @@ class _Pictures:
         return self.renderer.pixels(index, disparity="disparity" in self.streams)
 
     def background(self) -> Image:
-        """Return pictures of the empty scene before frame 1, (50, H, W, 3) BGR uint8, in the order of time.
+        """Return pictures of the empty scene before frame 1, (50, H, W, 3) BGR uint8, in the order of time, 1 / fps
+        apart.
 
         Raises InputError for impossible values of light and picture.
         """

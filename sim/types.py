@@ -1,8 +1,8 @@
 """The types that modules exchange: frames, detections, tracks, groups, events, cameras, truth, sequences.
 
-Conventions (docs/reference/formats.md): on the ground metres, x right, y away from the default camera, z up; in images
-px, (0, 0) the upper left corner, u right, v down; frames are 1-based, t = (frame - 1) / fps in s; angles in radians.
-Arrays are float64 except ids (int64), flags (bool) and images (uint8); every array of these types is read-only."""
+Conventions (docs/reference/formats.md): on the ground m, x right, y away from the default camera, z up; in images px,
+(0, 0) the upper left corner of the first pixel, u right, v down; frames from 1, t = (frame - 1) / fps in s; angles rad,
+0 along +x, counter-clockwise on the ground. Arrays, all read-only: float64, ids int64, flags bool, images uint8."""
 
 from __future__ import annotations
 
@@ -59,9 +59,9 @@ class Frame(Frozen):
 class Groups(Frozen):
     """The groups of one frame, one row for each of G groups. Plane and unit (m or px) are those of the Tracks or Truth
     around it. id (G,). members: person ids of each group, () if the method knows groups only. pos (G, D): the centre;
-    vel (G, D): its velocity, unit per s. extent (G, 2, 2): covariance of the members' x and y, unit squared, nan if
-    unknown. size (G,): number of people, nan if unknown. hull: a polygon (V, 2) for each group, x, y counter-clockwise;
-    V = 0 if unknown."""
+    vel (G, D): its velocity, unit per s. extent (G, 2, 2): covariance of the members' x and y (divided by their
+    number), unit squared, nan if unknown. size (G,): number of people, nan if unknown. hull: a polygon (V, 2) for each
+    group, x, y counter-clockwise; V = 0 if unknown, () if all are. In the truth ids ascend, pos and vel are means."""
 
     id: Ints
     members: tuple[Ints, ...]
@@ -82,9 +82,9 @@ class Groups(Frozen):
 class GroupEvent:
     """One event of groups, from frame `start` to frame `end` (from 1, both inclusive). kind: merge, split, cross,
     queue, form, dissolve, enter or leave. emitted: frame in which the tracker reported the event, which may be later
-    than `start`; None in the truth. before, after: sorted ids of the groups concerned, before and after it, with -1
-    once for each person alone. members: ids of all people concerned, sorted, () if unknown. pos: the place (x, y) in
-    the unit of the plane (m or px), nan if unknown."""
+    than `start`; None in the truth. `step` may return None as end or emitted for its own frame. before, after: sorted
+    ids of the groups concerned, before and after it, with -1 once for each person alone. members: ids of all people
+    concerned, sorted, () if unknown. pos: the place (x, y) in the unit of the plane (m or px), nan if unknown."""
 
     kind: str
     start: int
@@ -246,7 +246,7 @@ class Near(Frozen):
 class FrameTruth(Frozen):
     """The truth of frame `index` (from 1) at time t (s), one row for each of N people. It never reaches a tracker. id
     (N,): persons. group (N,): id of the person's group, -1 for alone. pos (N, 2): x, y in m. vel (N, 2): m/s. box (N,
-    4): left, top, width, height in px, of the whole body, unclipped. visibility (N,): visible share. groups: on the
+    4): left, top, width, height in px, of the whole body, unclipped. visibility (N,): as in Truth. groups: on the
     ground, in m; groups_px: in the image, in px. pixels: who is in each pixel. None: unknown."""
 
     index: int
@@ -268,7 +268,7 @@ class PixelTruth(Frozen):
     walls and pillars, 0 elsewhere. disparity (H, W): px, nan where the right camera does not see the point; None if not
     computed. visible_px (N,): number of pixels that show the person; amodal_px (N,): number inside the image that would
     without occlusion. box (N, 4): left, top, width, height in px of the visible pixels, nan without any. blob (N,):
-    number of the connected region of people that shows the person, -1 if hidden."""
+    number, from 0, of the region of people who touch each other in the image, -1 if hidden."""
 
     ids: Ints
     disparity: Array | None
@@ -279,7 +279,7 @@ class PixelTruth(Frozen):
 
     @property
     def visibility(self) -> Array:
-        """The visible share of each person, visible_px / amodal_px, (N,); 0 without pixels in the image."""
+        """The visible share of each person's part in the image, visible_px / amodal_px, (N,); 0 without such a part."""
         return np.asarray(self.visible_px / np.maximum(self.amodal_px, 1.0))
 
 
@@ -288,11 +288,11 @@ class Truth(Frozen):
     """The truth of a sequence of T = `length` frames from frame 1: R rows sorted by (frame, id), one per person and
     frame. frame, id (R,). group (R,): id of the person's group, -1 for alone. pos (R, 2): x, y on the ground, m. vel
     (R, 2): m/s. box (R, 4): left, top, width, height in px, of the whole body, unclipped. visible_box (R, 4): of the
-    visible part, nan if hidden. visibility (R,): visible share. truncation (R,): share outside the image. z (R,):
-    height of the ground, m. heading (R,): rad. height (R,): of the person, m. groups, groups_px: one Groups per frame,
-    on the ground (m) and in the image (px). labelled (T,): True for frames with group labels. events, near (strangers
-    who walk like a group): measured from the motion. orders: of the script, () without. px_per_m: image scale, nan if
-    unknown. fps: frames/s. Fields that may be None are None if unknown."""
+    visible part, nan if hidden. visibility, truncation (R,): shares of the whole body that are visible (1 if unknown),
+    and outside the image. z (R,): height of the ground, m. heading (R,): rad. height (R,): of the person, m. groups,
+    groups_px: T Groups, on the ground (m) and in the image (px). labelled (T,): True for frames with group labels.
+    events, near (strangers who walk like a group): measured from the motion. orders: of the script, () without.
+    px_per_m: image scale, nan if unknown. fps: frames/s. Fields that may be None are None if unknown."""
 
     name: str
     fps: float

@@ -24,7 +24,8 @@ SENSOR_SETTINGS_SHOWN = 6
 class Speed:
     """Speed of a run in frames per second, 0 if nothing was run.
 
-    tracker: speed of the tracker's steps alone. whole: speed including the reading and decoding of frames.
+    tracker: speed of the tracker's steps alone, with their checks. whole: with the reading and decoding of frames, too;
+    without the derivation of groups.
     """
 
     tracker: float = 0.0

@@ -50,8 +50,8 @@ def shuffled(detections: Detections, seed: int) -> Detections:
 
 
 def perfect(truth: FrameTruth) -> Detections:
-    """Return the labels of a frame as detections with score 1 and no velocities, a row per person, in the order of the
-    labels.
+    """Return the labels of a frame as detections with score 1 and no velocities, a row per labelled person, hidden ones
+    included, in the order of the labels.
 
     They are in the plane "ground" at the labelled positions, m, with the labelled boxes if there are any. Without
     positions they are in the plane "image", at the centres of the boxes, px. Boxes are left, top, width, height in px,

@@ -36,7 +36,7 @@ class PackedPolygons:
 
 
 def pack(polygons: Sequence[Array], width: int = 1) -> PackedPolygons:
-    """Return PackedPolygons of N polygons (V, 2), each padded to the most vertices of any, and to at least `width`.
+    """Return PackedPolygons of N polygons (V, 2), each padded to the most vertices of any, to at least `width` and 1.
 
     A polygon without vertices becomes nan: it overlaps nothing, and its distance to anything is nan. N may be 0."""
     count = np.array([len(p) for p in polygons], np.int64)
@@ -157,8 +157,8 @@ def _clip(a: Array, b: Array, slack: Array) -> tuple[Array, Array]:
     """Return where each edge of a (K, V, 2) enters and leaves b (K, W, 2), two arrays (K, V), as shares of the edge's
     length.
 
-    Polygons are counter-clockwise. slack (K, 1, 1): tolerance of edge length times distance, within which a point is on
-    an edge. enter > leave: the edge has no part inside b.
+    0 is an edge's first vertex, 1 its second; enter is at least 0, leave at most 1. Polygons are counter-clockwise.
+    slack (K, 1, 1): of edge length times distance, within which a point is on an edge. enter > leave: none inside b.
     """
     start = _left_of_edges(a, b)
     change = np.roll(start, -1, axis=2) - start

@@ -35,8 +35,8 @@ def run_command(app: typer.Typer, arguments: list[str]) -> int:
     Beside --help or --version, "--json" is not passed on. Each UserWarning's text is printed once on stderr. Exit
     codes: 0 done; 1 the work failed or a check found problems; 2 wrong input or usage; 130 Ctrl-C.
 
-    Raises only an error that stems from another exception, and only if the environment variable FLOCKSCOPE_DEBUG is
-    set.
+    Raises nothing, unless the environment variable FLOCKSCOPE_DEBUG is set: then an error that stems from another
+    exception is raised instead of printed.
     """
     as_json = "--json" in arguments
     if as_json and not HELP.isdisjoint(arguments):  # some levels of the command line know --help but not --json

@@ -41,11 +41,11 @@ Floats = NDArray[np.float32]
 
 @dataclass(frozen=True, kw_only=True)
 class TuningEnvOptions:
-    """The keyword arguments of the environment. tracker; suite: what is played; seeds, set: seeds and "key=value"
-    settings of scenarios; detections: the tracker's input, None chooses it; params: to begin with, None the defaults;
-    decision_every: frames between actions, None for one action per episode; observation: "statistics", "parameters"
-    (both) or "none"; cache: bytes of sequences kept; tracker_seed; render_mode: "rgb_array" or None. InputError if
-    observation, detections or render_mode is unknown; other values are checked when used."""
+    """The keyword arguments of the environment. tracker; suite: what is played; seeds (0 to 99), set: seeds and
+    "key=value" settings of scenarios; detections: the tracker's input, None chooses it; params: to begin with, as for
+    `tracking.track`; decision_every: frames between actions, None: one action per episode; observation: "statistics",
+    "parameters" (both) or "none"; cache: bytes of sequences kept; tracker_seed: the same in all episodes; render_mode:
+    "rgb_array" or None. InputError if one of the three with fixed values is unknown; others are checked when used."""
 
     tracker: AnyTracker = field(metadata=option('Registered name, "file.py:Class", "module:Class" or a class.'))
     suite: SourceSpec | Source = field(
@@ -80,10 +80,10 @@ class TuningEnvOptions:
 
 
 class TuningEnv(gymnasium.Env[Floats, Floats]):
-    """An episode is one run of a tracker, an action sets its parameters, the reward is the gain in score. Keyword
-    arguments are the fields of TuningEnvOptions. State: sources and their cache; config, rollout (the run, None before
-    it) and score of the episode. Raises InputError if an argument is unknown or wrong, the tracker has no parameters to
-    search, or a source lacks the detections."""
+    """An episode is one run of a tracker; an action, float32 (P,) in [-1, 1], sets its parameters; the reward is the
+    gain in score. Observations: float32 (K,), statistics in [0, 1] and parameters in [-1, 1]. Arguments: the fields of
+    TuningEnvOptions. State: sources, cache; config, rollout (the run, None before it) and score of the episode. Raises
+    InputError if an argument is wrong, there is no parameter to search, or a source lacks the detections."""
 
     metadata = METADATA
 
@@ -122,8 +122,8 @@ class TuningEnv(gymnasium.Env[Floats, Floats]):
         return names[self.observation]
 
     def _metadata(self, fps: float) -> dict[str, Any]:
-        """Returns the environment's metadata: "render_modes", and "render_fps" for one picture per action at speed
-        `fps`, at least 1."""
+        """Returns the environment's metadata: "render_modes", and "render_fps" for one picture per action (per frame if
+        an episode is one action), rounded, at least 1. fps: frames per second."""
         return {**METADATA, "render_fps": max(round(fps / (self.decision_every or 1)), 1)}
 
     def _clear_episode(self) -> None:
@@ -134,11 +134,11 @@ class TuningEnv(gymnasium.Env[Floats, Floats]):
     def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> tuple[Floats, dict[str, Any]]:
         """Begins an episode on a source that the env's generator draws; returns observation (float32) and info dict.
         seed: reseeds the generator, None goes on with it. options: "scenario" and "seed" restrict the draw to sources
-        of this name and seed; "params" are the parameters that the episode begins with. Info keys: scenario, seed,
-        frame (number of frames tracked), objective, scores, names (of the action's parameters), params, refused. Raises
-        InputError if an option is unknown, no source fits, the source cannot be opened or has no labels, the parameters
-        are wrong, or, with `decision_every`, the tracker refuses them or keeps no `config`; then also WorkError if its
-        `reset` fails. The running episode goes on after an error."""
+        of this name and seed; "params" are the parameters to begin with. Info keys: scenario, seed, frame (number of
+        frames tracked), objective (0 while unknown), scores (by key, {} at first), names (of the action's parameters),
+        params (all, by name), refused ("" if none). InputError if an option is unknown, no source fits, the source
+        cannot be opened or has no labels, the parameters are wrong, or, with `decision_every`, the tracker refuses them
+        or keeps no `config`; then also WorkError if its `reset` fails. The running episode goes on after an error."""
         super().reset(seed=seed)
         options = options or {}
         for name in options:
@@ -163,9 +163,9 @@ class TuningEnv(gymnasium.Env[Floats, Floats]):
         Returns observation, reward (gain of the objective, which is 0 while unknown), True at the end of the sequence,
         False (never truncated), info dict as of `reset`. action: (P,) numbers, clipped to [-1, 1]. Refused parameters
         are moved towards those that the episode began with. If the tracker refuses a config between frames it keeps the
-        one before, and `info["refused"]` holds the error. Raises InputError before `reset`, or if the action has
-        another shape or is not finite; IncomparableError if the tracks cannot be compared with the truth; and the
-        tracker's errors."""
+        one before, and `info["refused"]` holds the error. After the end: the sequence is tracked anew with one action
+        per episode, else reward 0. Raises InputError before `reset`, or for an action of another shape or not finite;
+        IncomparableError if the tracks cannot be compared with the truth; and the tracker's errors."""
         if self._observer is None:
             raise InputError(place="step", got="no episode", expected="one that was begun", remedy="call reset() first")
         if self.decision_every is None:

@@ -88,7 +88,7 @@ class Observer:
     """Collects frames and tracks between two decisions, for the statistics of the observation. fps: frames per second.
 
     State: frames and tracks since the last decision, the tracks of the frame before them, the first frame of each id,
-    the brightness of the pictures."""
+    the brightness of the pictures, from 0 (black) to 1."""
 
     def __init__(self, fps: float) -> None:
         self.fps = fps
@@ -99,8 +99,8 @@ class Observer:
         self._brightness: list[float] = []
 
     def add(self, frame: Frame, tracks: Tracks) -> None:
-        """Adds the next frame, as the tracker got it, and its tracks (one `Tracks`). Of a picture only the brightness
-        is kept."""
+        """Adds the next frame, as the tracker got it, and its tracks (one `Tracks`). Of the left picture only the mean
+        brightness is kept, nothing without one."""
         self._tracks.append(tracks)
         self._frames.append(Frame(frame.index, frame.t, detections=frame.detections))
         for id in tracks.id.tolist():
@@ -151,11 +151,11 @@ class Observer:
 
     def _movement(self, rows: TrackRows, found: DetectionRows) -> dict[str, float]:
         """Returns a dict of medians: speed, speed_spread (interquartile range; m/s), acceleration (m/s²), crowding
-        (distance to the nearest other track), gate (standard deviation of the position), correction (d, reported from
-        expected position; m), correction_sigma (d' C^-1 d / 2, C the covariance of d); and the values of `_innovations`
-        if any detections are known. A statistic without values is 0.
+        (distance to the nearest other track), gate (sqrt(trace / 2) of the position's covariance), correction (d,
+        reported from expected position; m), correction_sigma (d' C^-1 d / 2, C the track's covariance before); and the
+        values of `_innovations` if any detections are known. A statistic without values is 0.
 
-        rows: tracks in m, with the frame before the window (number 0). found: detections of the window in m.
+        rows: tracks in m, with the frame before the window, if any, as number 0. found: detections of the window in m.
         """
         now = rows.frame >= len(self._before)
         before, after = consecutive_rows(rows)
@@ -177,12 +177,11 @@ class Observer:
 
 
 def _innovations(rows: TrackRows, expected: Array, found: DetectionRows) -> dict[str, float]:
-    """Returns a dict: orphans (share of detections near no track, frame 0 left out), missed (share of tracks without
-    detections), innovation, residual (median distance in m of a track's expected and reported position from the mean of
-    its detections), innovation_sigma (median of the squared innovation in units of the track's covariance).
-
-    expected (R, 2), m: where each row of `rows` (tracks in frames) is expected one frame later. found: the detections,
-    m. Only rows whose next frame has known detections count. A statistic without values is 0."""
+    """Returns a dict: orphans (share of detections near no expected position, frame 0 left out), missed (share of
+    tracks without detections), innovation, residual (median distance in m of the expected position, and of the one
+    reported in the next frame, from the mean of the track's detections there), innovation_sigma (median of
+    d' C^-1 d / 2, d the innovation, C the track's covariance before). expected (R, 2), m: where each row of `rows` is
+    expected one frame later. found: the detections, m. Only rows whose next frame has known detections count."""
     looked = np.isin(rows.frame + 1, found.frames)
     here = np.flatnonzero(looked)
     owner = nearest_expected(expected[here], rows.frame[here] + 1, rows.reach[here], found)
@@ -207,10 +206,10 @@ def _innovations(rows: TrackRows, expected: Array, found: DetectionRows) -> dict
 
 
 def _group_values(tracks: Sequence[Tracks], seconds: float) -> dict[str, float]:
-    """Returns a dict: merges, splits (1/min), grouped (share), group_size (people), as the tracker reports them.
-
-    tracks: one `Tracks` per frame, at least one; seconds: their duration. Of a tracker of whole groups, grouped is the
-    share of groups of size 1.5 or more. Without tracks or groups a value is 0."""
+    """Returns a dict: merges (with form), splits (with dissolve; 1/min), grouped (share of people in a group),
+    group_size (mean, people), as the tracker reports them. tracks: one `Tracks` per frame, at least one; seconds: their
+    duration. Of a tracker of whole groups, grouped is the share of groups of size 1.5 or more, of those of known size.
+    Without tracks or groups a value is 0."""
     kinds = [e.kind for t in tracks for e in t.events]
     merges, splits = (sum(kind in pair for kind in kinds) for pair in (("merge", "form"), ("split", "dissolve")))
     values = {"merges": 60 * merges / seconds, "splits": 60 * splits / seconds}
@@ -225,9 +224,9 @@ def _group_values(tracks: Sequence[Tracks], seconds: float) -> dict[str, float]:
 
 
 def _detection_values(found: DetectionRows, rows: TrackRows, frames: int) -> dict[str, float]:
-    """Returns a dict; {} if no frame has known detections. Keys: seen (share of frames with known detections),
-    detections (mean number), flicker (standard deviation / (mean + 1) of it), score (mean), weak (share of scores below
-    0.5), surplus (detections / (detections + tracks) in these frames).
+    """Returns a dict; {} if no frame has known detections. Keys: seen (share of frames with known detections), and over
+    these frames: detections (mean number), flicker (standard deviation / (mean + 1) of it), score (mean), weak (share
+    of scores below 0.5), surplus (detections / (detections + tracks)).
 
     found: detections of a window of `frames` frames; rows: the tracks. Without a detection the values are 0, except
     seen."""

@@ -66,8 +66,8 @@ class ResultSection:
 class PixelScene:
     """The scene that was tracked from its pictures.
 
-    section: its scores, one row for each tracker and input; its names begin with the tracker's name. videos: path of
-    the overlay video by tracker. frames: number of frames. seconds: duration.
+    section: its scores, one row for each tracker and input; its `names` begin with the tracker's name. videos: path of
+    the overlay video by the tracker's name. frames: number of frames. seconds: duration of the scene.
     """
 
     section: ResultSection

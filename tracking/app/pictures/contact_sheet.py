@@ -36,8 +36,9 @@ def write_sheet(sequence: Sequence, out: str | Path, frames: int = 8) -> Path:
     below. A panel has the frame's pictures if the sequence has any, and a plan if people's places on the ground are
     labelled; without pictures, boxes are drawn in place of the plan.
 
-    Raises InputError if there are neither pictures nor labelled people, if truth or a picture cannot be read, or the
-    file cannot be written. Raises WorkError if the disk is full, or an order of a simulated script was not fulfilled.
+    Raises InputError if there is no frame, if there are neither pictures nor labelled people, if truth or a picture
+    cannot be read, or the file cannot be written. Raises WorkError if the disk is full, or an order of a simulated
+    script was not fulfilled.
     """
     truth = sequence.truth
     if (truth is None or not len(truth.frame)) and not sequence.has_images:
@@ -131,8 +132,9 @@ def sheet_area(sequence: Sequence, truth: Truth) -> tuple[Array, Array]:
     """Returns the smallest and the largest x and y, (2,) each, of a panel's plan: m on the ground, px if only boxes are
     labelled.
 
-    Without positions it is the whole image, or, if the image size is unknown, the extent of the boxes. It is (0, 0) and
-    (1, 1) if no place is known. AssertionError if positions, image size and boxes are all missing.
+    With positions it is the area of `plan_area`, with its margin. Without them it is the whole image, or, if the image
+    size is unknown, the least rectangle that holds all boxes, y downwards. It is (0, 0) and (1, 1) if no place is
+    known. AssertionError if positions, image size and boxes are all missing.
     """
     if truth.pos is None and sequence.image_size is not None:
         return np.zeros(2), np.array(sequence.image_size, float)
@@ -165,10 +167,10 @@ def _draw_plan(canvas: Canvas, sequence: Sequence, truth: Truth, index: int) -> 
 
 
 def _draw_title(area: Image, truth: Truth, index: int) -> None:
-    """Draws the time and the events near it into the panel `area`, in place; and a frame round the panel.
+    """Draws the time and the events near it into the panel `area`, in place; and a border round the part below them.
 
-    index: frame from 1. The words are cut after 62 characters. Words and frame have the colour of the first event, grey
-    without one.
+    index: frame from 1. The words are cut after 62 characters. Words and border have the colour of the first event,
+    grey without one.
     """
     events = _events_near(truth, index)
     words = f"{(index - 1) / truth.fps:.1f} s" + "".join(f"   {event_words(event)}" for event in events)
@@ -191,8 +193,8 @@ def _events_near(truth: Truth, index: int) -> list[GroupEvent]:
 def event_ring(event: GroupEvent, ids: Ints, places: Array) -> tuple[Array, float]:
     """Returns centre (2,) and radius (m) of a ring round the event's members, with 0.7 m to spare.
 
-    If no member is present, it is round the event's place (nan if unknown) with a radius of 1 m. ids: (N,) and places:
-    (N, 2), m, of the people in the frame.
+    Its centre is the mean of the members in the frame; others do not count. If none is there, it is round the event's
+    place (nan if unknown) with a radius of 1 m. ids: (N,) and places: (N, 2), m, of the people in the frame.
     """
     members = places[np.isin(ids, event.members)]
     if not len(members):

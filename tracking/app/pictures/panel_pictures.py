@@ -29,7 +29,7 @@ class PanelPictures:
 
     size: (width, height) of the sequence's pictures, px, or None. fps: frames per second. frames: the chosen frames by
     number from 1; {} without pictures or size. pixels: the truth of their pixels by number, {} if unknown. layer: the
-    truth to draw over them.
+    truth to draw over them, empty without frames.
     """
 
     def __init__(self, sequence: Sequence, truth: Truth, chosen: Iterable[int]) -> None:
@@ -103,8 +103,8 @@ def _frames(sequence: Sequence, chosen: set[int]) -> dict[int, Frame]:
 
 
 def _draw(area: Image, kind: str, frame: Frame | None, pixels: PixelTruth | None) -> str:
-    """Fills `area` in place with one small picture, resized, and returns its caption. A picture that is missing is
-    grey.
+    """Fills `area` in place with one small picture, resized (its shape becomes that of the area), and returns its
+    caption. A picture that is missing is grey.
 
     kind: "left", "right", "ids" or "disparity". Disparity (px) is coloured from its 1 % to its 99 % quantile in this
     frame, which the caption names; 0 to 1 if none is known.

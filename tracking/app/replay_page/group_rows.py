@@ -95,7 +95,7 @@ def ellipses(extent: Array) -> Array:
 
 
 def simplified(hull: Array, least: float) -> Array:
-    """Returns a convex polygon (V, 2) without the corners that stand out by less than `least` over their neighbours.
+    """Returns a convex polygon (V, 2) without the corners nearer than `least` to the line through their neighbours.
 
     Two passes remove every other corner at most, so that no two neighbours go at once; a pass leaves up to three
     corners as they are. Of a polygon that then still has more than 24 corners every k-th is kept, with the least k that

@@ -41,9 +41,10 @@ def bars(frame: Ints, group: Ints, least: int = 2, gap: int = 1, people: Array |
     """Returns the bars, unbroken lives, of the groups in rows of (frame, group), (R,) each, sorted by first frame.
 
     Rows may have any order; those with group -1 are left out. [] if none remain. least: a group with fewer people in a
-    frame is absent from it. gap: frames may differ by so much within one bar. people: (R,), how many people each row
-    stands for; None: one. A bar takes the lane of the last bar of its id if that is free, else the lowest free lane. A
-    lane is free for a bar that starts at least two frames after the end of its last bar.
+    frame is absent from it. gap: consecutive frames of a bar differ by at most this; 1 ends it at any missing frame. An
+    id that comes back later has another bar. people: (R,), how many people each row stands for; None: one. A bar takes
+    the lane of the last bar of its id if that is free, else the lowest free lane. A lane is free for a bar that starts
+    at least two frames after the end of its last bar.
     """
     rows = group >= 0
     pairs, place = np.unique(np.stack([group[rows], frame[rows]], axis=1), axis=0, return_inverse=True)
@@ -81,7 +82,8 @@ def links(events: Iterable[GroupEvent]) -> list[Link]:
     """Returns a link for each pair of different groups before and after a merge or split; other kinds of events have
     none.
 
-    Links have the order of the events, then of the ids. People alone (-1) have none.
+    `a` is the id before, `b` the id after. Links have the order of the events, then of a, then of b. People alone (-1)
+    have none.
     """
     return [
         Link(event.start if event.emitted is None else event.emitted, a, b)

@@ -35,7 +35,7 @@ def write_page(
     """Writes the replay page, one HTML file, and returns its path. The file is complete, or is not written at all.
 
     tracks: one tracker's `Tracks`, one per frame; None for the truth alone. Groups and events that the tracker did not
-    report are derived. scores: by key; unknown ones (nan) are not shown, None: none. title: None for the sequence's
+    report are derived. scores: by key; nan and infinite ones are not shown, None: none. title: None for the sequence's
     name. video: the pictures, drawn below the boxes; None: none. An existing file is replaced.
 
     Raises InputError if the truth or detections cannot be read, groups must be derived in the image and the scale is

@@ -24,7 +24,7 @@ def page_data(sequence: Sequence, tracks: SequenceOf[Tracks] | None, scores: Map
     unknown.
 
     tracks: one `Tracks` per frame; None for the truth alone. Groups and events that the tracker did not report are
-    derived. scores: by key; nan is left out.
+    derived. scores: by key; nan, infinity and keys outside the catalogue are left out.
 
     Keys: name; tracker; fps; length (frames); image (width, height, px); bounds (x0, y0, x1, y1 of the plan, m); scene;
     camera; truth and tracks (encoded rows); detections; unlabelled ([first, last] frames); near ([first, last, id,
@@ -110,7 +110,8 @@ def _image_size(both: list[PageRows]) -> list[int] | None:
 def _bounds(sequence: Sequence, both: list[PageRows]) -> list[float] | None:
     """Returns x0, y0, x1, y1 of the plan in m, rounded to 0.01; None without a scene and without people on the ground.
 
-    both: rows of truth and tracks, if any; those in the image are left out.
+    It is the area of `plan_area` round all positions and hulls, with its margin. both: rows of truth and tracks, if
+    any; those in the image are left out.
     """
     points = [part for rows in both if rows.plane == "ground" for part in _points(rows)]
     area = plan_area(sequence.scene, np.concatenate([np.zeros((0, 2)), *points]))

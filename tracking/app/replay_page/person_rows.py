@@ -32,7 +32,8 @@ class PageRows:
     """Truth or one tracker's tracks as R rows in any order, one per person or group and frame; nan where unknown.
 
     plane: "ground" (m) or "image" (px). frame: from 1, (R,). id: (R,). group: (R,) id of the group, -1 for alone. pos:
-    (R, 2) x, y. angle: (R,) rad, direction of view or of movement. box: (R, 4) left, top, width, height, px.
+    (R, 2) x, y. angle: (R,) rad, direction of view or of movement, from +x towards +y, which in the image is
+    downwards. box: (R, 4) left, top, width, height, px.
     visibility: (R,), 0 to 1. groups: what is known of rows that are groups, None if the rows are people.
     """
 
@@ -91,7 +92,7 @@ def _centres(box: Array | None, n: int) -> Array:
 def _directions(vel: Array | None, n: int) -> Array:
     """Returns the direction (n,) rad of each velocity (n, 2), m/s or px/s; nan where unknown or not faster than 0.1.
 
-    vel None: n times nan.
+    It is atan2(vy, vx), in (-π, π]. vel None: n times nan.
     """
     if vel is None:
         return np.full(n, np.nan)
@@ -106,8 +107,8 @@ def encode_rows(rows: PageRows, events: Iterable[GroupEvent]) -> Json:
     Rows are sorted by id and frame. Keys: plane; scale (steps per m or px); stints ([id, first frame, frames] of
     consecutive frames); x and y; a (angle, degrees); box (four columns in half px, [] if all unknown); group and vis
     (visibility in tenths, unknown as 10), as value, count, …; wholes (columns of groups, None for people); events
-    (those that start in frame 1 or later); bars ([id, start, end, lane, size]); links ([frame, a, b]). Other columns
-    hold their first value, then differences.
+    (those that start in frame 1 or later); bars ([id, start, end, lane, size], of groups of two or more people, or of
+    all rows that are groups); links ([frame, a, b]). Other columns hold their first value, then differences.
     """
     events = list(events)
     order = np.lexsort((rows.frame, rows.id))

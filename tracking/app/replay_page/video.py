@@ -51,8 +51,9 @@ def page_video(
 ) -> PageVideo | None:
     """Makes the video for the page FILE.html and returns it; a video beside the page is written as FILE.view.mp4.
 
-    placement: "inside" the page, "beside" it, "none", or "auto": beside from 12 MB on. Returns None if it is "none" or
-    the sequence has no pictures. step: called with the sequence's name after each frame.
+    placement: "inside" the page, "beside" it, "none", or "auto": beside if the video has 12,000,000 bytes or more.
+    Returns None if it is "none" or the sequence has no pictures. An existing FILE.view.mp4 is replaced by a video
+    beside the page, else left. step: called with the sequence's name after each frame.
 
     Raises InputError if FILE.view.mp4 is the file that the sequence is read from, a picture cannot be read or the
     folder cannot be written; WorkError if the disk is full.
