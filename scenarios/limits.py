@@ -6,8 +6,10 @@ an InputError. The bounds lie far above real recordings, so that a mistyped numb
 
 from __future__ import annotations
 
-TEXT_BYTES = 256 * 2**20
-"""Bytes of a text file of rows or of a JSON file."""
+TEXT_BYTES = 128 * 2**20
+"""Bytes of a text file of rows."""
+JSON_BYTES = 64 * 2**20
+"""Bytes of a JSON file."""
 TOML_BYTES = 2 * 2**20
 """Bytes of a TOML file."""
 XML_BYTES = 64 * 2**20

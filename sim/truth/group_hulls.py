@@ -120,10 +120,10 @@ def _assemble(rows: _MemberRows, hulls: Sequence[Array], first: int, length: int
     members = [rows.id[a:b] for a, b in pairwise([*starts.tolist(), len(rows.id)])]
     cuts = np.searchsorted(rows.frame[starts], np.arange(first, first + length + 1))
     name = rows.group[starts]
-    size = counts.astype(float)
+    size, nobody = counts.astype(float), Groups.none()
     return [
         Groups(name[a:b], tuple(members[a:b]), middle[a:b], speed[a:b], extent[a:b], size[a:b], tuple(hulls[a:b]))
         if a < b
-        else Groups.none()
-        for a, b in pairwise(cuts)
+        else nobody
+        for a, b in pairwise(cuts.tolist())
     ]

@@ -57,7 +57,7 @@ class NumericTable:
 def read_text(path: Path, limit: int = TEXT_BYTES) -> str:
     """Return the text of the UTF-8 file `path`, without byte order mark; all line ends become line feeds.
 
-    limit: the greatest size in bytes, by default 256 MB. Raises InputError if the file is unreadable, no regular file,
+    limit: the greatest size in bytes, by default 128 MB. Raises InputError if the file is unreadable, no regular file,
     larger, or not UTF-8.
     """
     try:

@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from scenarios.errors import InputError
+from scenarios.limits import JSON_BYTES
 from scenarios.parsing import parse_json
 from scenarios.regular_file import require_regular
 from sim.types import Array, Ints
@@ -237,12 +238,12 @@ def json_list(name: str, items: Iterable[dict[str, Any]]) -> bytes:
 def read_json(path: Path) -> dict[str, Any]:
     """Read the file `path`, which holds one JSON object, as a dict.
 
-    Raises InputError if it is unreadable, no regular file, above 256 MB or no JSON object, holds NaN, is nested deeper
+    Raises InputError if it is unreadable, no regular file, above 64 MB or no JSON object, holds NaN, is nested deeper
     than 32 levels, or has a whole number beyond 64 bits.
     """
     from sim.io.files.numeric_text import read_text
 
-    value = parse_json(read_text(path), path, REDO)
+    value = parse_json(read_text(path, JSON_BYTES), path, REDO)
     if not isinstance(value, dict):
         raise InputError(file=path, got=type(value).__name__, expected="a JSON object", remedy=REDO)
     return value

@@ -132,7 +132,7 @@ def open_folder(
     if background is not None and not pictures.files:
         got, remedy = "--background", "leave it out: it has none"
         raise InputError(file=path, got=got, expected="none for a recording without pictures", remedy=remedy)
-    choice = (background or BackgroundChoice()).of(length, path) if pictures.files else None
+    choice = (background or BackgroundChoice()).of(length, path, size) if pictures.files else None
 
     def bare() -> Iterator[Frame]:
         for index in range(1, length + 1):

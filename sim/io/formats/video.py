@@ -61,7 +61,7 @@ def open_video(
         warnings.warn(f"{path.name}: {words}", stacklevel=2)
     size, known = size_of(first), None if index.codec in video_decoding.HIDDEN else length
     rate, words = frame_rate(path.name, fps, index)
-    choice = background.of(length, path)
+    choice = background.of(length, path, size)
 
     def frames() -> Iterator[Frame]:
         for k, picture in enumerate(fill_gaps(_pictures(path, index, size), known, path.name), 1):

@@ -12,6 +12,7 @@ from typing import Literal
 import numpy as np
 
 from scenarios.errors import InputError
+from scenarios.limits import SAMPLE_BYTES
 from sim.types import BACKGROUNDS, Image
 
 
@@ -37,20 +38,25 @@ class BackgroundChoice:
             return f"first {self.count} frames (causal from frame {self.count})"
         return f"{self.count} frames spread over the recording (not causal)"
 
-    def of(self, length: int, path: Path) -> BackgroundChoice:
-        """Return the choice for a recording of `length` frames: itself if there are enough frames.
+    def of(self, length: int, path: Path, size: tuple[int, int] | None = None) -> BackgroundChoice:
+        """Return the choice for a recording of `length` frames: itself if there are enough frames and they fit into 2
+        GB.
 
-        A default choice is reduced to all `length` frames of a shorter recording. Raises InputError, naming the
-        recording `path`, if the user asked for more frames than there are.
+        size: (width, height) of the pictures in px, None if unknown. A default choice is reduced to all `length` frames
+        of a shorter recording, and to as many large pictures as fit. Raises InputError, naming the recording `path`, if
+        the user asked for more frames than there are, or than fit.
         """
-        if length >= self.count:
+        width, height = size or (1, 1)
+        most = max(1, SAMPLE_BYTES // (3 * width * height))
+        if self.count <= min(length, most):
             return self
         if self.asked:
+            got = f"a recording of {length} frames" if length < self.count else f"pictures of {width}×{height} px"
             raise InputError(
-                file=path, place="--background", got=f"a recording of {length} frames",
-                expected=f"{self.count} or more", remedy=f"ask for {length} or fewer, or give a longer recording",
+                file=path, place="--background", got=got, expected=f"{self.count} or more that fit into 2 GB",
+                remedy=f"ask for {min(length, most)} or fewer, or give a longer recording",
             )  # fmt: skip
-        return replace(self, count=length)
+        return replace(self, count=min(self.count, length, most))
 
     def indices(self, length: int) -> list[int]:
         """Return the frames of the sample, from 1 and ascending, for a recording of `length` frames.
@@ -107,7 +113,7 @@ class BackgroundSample:
                 file=self.path, got="no readable picture in the background sample", expected="at least one",
                 remedy="choose other frames: --background first:N or spread:N",
             )  # fmt: skip
-        if self.choice.count < BACKGROUNDS and not self.choice.asked:
+        if self.length < BACKGROUNDS and not self.choice.asked:
             words = f"shorter than a background sample of {BACKGROUNDS} frames; all {self.length} are taken"
             warnings.warn(f"{self.path.name}: {words}", stacklevel=2)
         return found[:count]

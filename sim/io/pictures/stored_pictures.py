@@ -77,10 +77,11 @@ class StoredPictures:
         picture = cv2.imdecode(np.frombuffer(self.body(name), np.uint8), mode)
         if picture is None or picture.dtype != (np.uint16 if stream in streams.EXACT else np.uint8):
             raise InputError(file=self.folder / name, got="no readable picture", expected="a picture", remedy=REDO)
-        return require_size(picture, self._size, self.folder / name)
+        return require_size(picture, self.size, self.folder / name)
 
     @property
-    def _size(self) -> tuple[int, int]:
+    def size(self) -> tuple[int, int]:
+        """Width and height of the pictures, px."""
         width, height = self.manifest["sequence"]["image_size"]
         return width, height
 
@@ -100,7 +101,7 @@ class StoredPictures:
         for found, (_, picture) in enumerate(
             video_decoding.decode_frames(path, video_decoding.index_packets(path), wanted), 1
         ):
-            yield require_size(picture, self._size, path, f"frame {found}")
+            yield require_size(picture, self.size, path, f"frame {found}")
         if found != (count if wanted is None else len(wanted)):
             raise InputError(file=path, got=f"{found} pictures", expected=count, remedy=REDO)
 

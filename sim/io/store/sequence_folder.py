@@ -212,7 +212,7 @@ def _background(
         if "left" not in pictures.streams:
             got, remedy = "--background", "leave it out: it has none"
             raise InputError(file=pictures.folder, got=got, expected="none for one without pictures", remedy=remedy)
-        fits = choice.of(length, pictures.folder)
+        fits = choice.of(length, pictures.folder, pictures.size)
         return BackgroundSample(fits, length, pictures.folder, pictures.sample), {"background": str(fits)}
     if "background" not in pictures.streams:
         return None, {}

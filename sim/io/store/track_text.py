@@ -7,6 +7,7 @@ of the boxes (px). Velocities are differences of positions.
 from __future__ import annotations
 
 import warnings
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
@@ -15,7 +16,7 @@ from scenarios.errors import InputError
 from sim.io.formats.mot_text import MotTable, read_table, reject_duplicate_ids, unit_scores
 from sim.io.formats.velocity import differentiate
 from sim.io.store.group_files import read_groups_csv
-from sim.types import Array, Plane, Tracks
+from sim.types import Array, Ints, Plane, Tracks
 
 
 def read_track_text(path: Path, fps: float, length: int | None) -> list[Tracks]:
@@ -45,18 +46,18 @@ def read_track_text(path: Path, fps: float, length: int | None) -> list[Tracks]:
     score = unit_scores(table.rest[:, 0] if table.rest.shape[1] else np.ones(len(order)))[order]
     plane: Plane = "image" if ground is None else "ground"
     vel, count = differentiate(frame, id, pos, fps), length or int(frame.max(initial=0))
-    cuts = np.searchsorted(frame, np.arange(1, count + 2))
-    found = []
-    for k in range(count):
-        r = slice(int(cuts[k]), int(cuts[k + 1]))
-        n = int(cuts[k + 1] - cuts[k])
-        found.append(
-            Tracks(
-                k + 1, k / fps, plane, "person", id[r], np.full(n, -1, np.int64), pos[r],
-                vel[r], np.full((n, 4, 4), np.nan), None if box is None else box[r], score[r],
-            )
-        )  # fmt: skip
-    return found
+    cuts = np.searchsorted(frame, np.arange(1, count + 2)).tolist()
+
+    def arrays(a: int, b: int) -> tuple[Array | Ints | None, ...]:
+        some = (id[a:b], np.full(b - a, -1, np.int64), pos[a:b], vel[a:b], np.full((b - a, 4, 4), np.nan))
+        return *some, None if box is None else box[a:b], score[a:b]
+
+    nobody = Tracks(0, 0.0, plane, "person", *arrays(0, 0))  # type: ignore[arg-type]
+    none = (nobody.id, nobody.group, nobody.pos, nobody.vel, nobody.cov, nobody.box, nobody.score)
+    return [
+        Tracks(k + 1, k / fps, plane, "person", *(none if a == b else arrays(a, b)))  # type: ignore[arg-type]
+        for k, (a, b) in enumerate(pairwise(cuts))
+    ]
 
 
 def _reject_empty(table: MotTable, length: int | None) -> None:

@@ -172,3 +172,53 @@ def test_nothing_says_how_long_it_is(tmp_path):
         open_source(folder(tmp_path, det="", ini="frameRate=10\n"))
     (s,) = open_source(folder(tmp_path, det="", ini="frameRate=10\nseqLength=3\n"))
     assert [len(f.detections.pos) for f in s] == [0, 0, 0]
+
+
+@pytest.mark.parametrize(
+    ("line", "word"),
+    [
+        ("80000000,1,10,10,20,50,1,1,1", "1000000"),
+        ("1,1,1e200,10,20,50,1,1,1", "within 1e"),
+        ("1,1.5,10,10,20,50,1,1,1", "whole number"),
+        ("1,9007199254740993,10,10,20,50,1,1,1", "whole number"),
+        ("1,1_0,10,10,20,50,1,1,1", "'1_0'"),
+        ("1,²,10,10,20,50,1,1,1", "'²'"),
+    ],
+)
+def test_numbers_that_cannot_be(tmp_path, line, word):
+    path = tmp_path / "gt.txt"
+    path.write_text(f"1,2,10,10,20,50,1,1,1\n{line}\n")
+    with pytest.raises(InputError, match=word) as error:
+        mot_text.read_table(path)
+    assert error.value.place == "line 2"
+
+
+def test_too_many_lines_of_a_frame(tmp_path):
+    path = tmp_path / "gt.txt"
+    path.write_text("".join(f"1,{k},10,10,20,50\n" for k in range(5001)))
+    with pytest.raises(InputError, match="5000 lines of one frame"):
+        mot_text.read_table(path)
+
+
+def test_a_row_that_does_not_count_hides_no_duplicate(tmp_path):
+    """The neighbours of the sorted table are not enough: a row of flag 0 may lie between two rows of one id."""
+    path = tmp_path / "gt.txt"
+    path.write_text("1,1,10,10,20,50,1,1,1\n1,1,11,10,20,50,0,1,1\n1,1,12,10,20,50,1,1,1\n")
+    with pytest.raises(InputError, match="each id once") as error:
+        mot_text.read_truth(path, "x", 10.0)
+    assert error.value.place == "line 3"
+
+
+@pytest.mark.parametrize(
+    ("key", "value"),
+    [
+        ("seqLength", "9999999"), ("seqLength", "4.5"), ("seqLength", "²"), ("frameRate", "1e9"),
+        ("frameRate", "0.001"), ("imWidth", "60000"), ("imHeight", "480.5"), ("imWidth", "-1"),
+    ],
+)  # fmt: skip
+def test_seqinfo(tmp_path, key, value):
+    given = {"frameRate": "10", "seqLength": "4", "imWidth": "64", "imHeight": "48"} | {key: value}
+    (tmp_path / "seqinfo.ini").write_text("[Sequence]\n" + "".join(f"{k}={v}\n" for k, v in given.items()))
+    with pytest.raises(InputError) as error:
+        open_source(tmp_path)
+    assert error.value.place == key
