@@ -61,7 +61,9 @@ def run(root: Path, kinds: list[str], first: int, minutes: float) -> tuple[Count
     end, seed = time.monotonic() + 60 * minutes, first
     while time.monotonic() < end:
         words = [sys.executable, "-m", "benchmarks.fuzz", "--root", str(root), "--kinds", ",".join(kinds)]
-        child = subprocess.Popen([*words, "--worker", str(seed)], stdout=subprocess.PIPE, text=True)
+        child = subprocess.Popen(
+            [*words, "--worker", str(seed)], stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True
+        )
         assert child.stdout is not None
         last: dict[str, str | int] = {}
         for line in child.stdout:

@@ -18,6 +18,8 @@ from scenarios.loading.toml_files import Table, did_you_mean
 from scenarios.parsing import parse_toml
 
 KeyPath = tuple[str | int, ...]
+SHOWN = 120
+"""Characters of a setting that messages show."""
 
 
 def apply_settings(table: Table, settings: Iterable[str], file: object = "") -> tuple[Table, dict[KeyPath, str]]:
@@ -37,6 +39,11 @@ def apply_settings(table: Table, settings: Iterable[str], file: object = "") -> 
     return table, places
 
 
+def place_of(text: str) -> str:
+    """Returns the place of a setting for messages: `--set key=value`, cut after 120 characters."""
+    return f"--set {text if len(text) <= SHOWN else text[:SHOWN] + '…'}"
+
+
 def parse_setting(text: str) -> tuple[list[str], Any]:
     """Returns the steps of the key (`a.b` gives ["a", "b"]) and the TOML value of a setting `a.b=value`.
 
@@ -46,7 +53,7 @@ def parse_setting(text: str) -> tuple[list[str], Any]:
     steps = key.strip().split(".")
     if not equals or not all(steps):
         raise InputError(
-            place=f"--set {text}", got=repr(text), expected="key=value", remedy="write for example --set group.a.size=3"
+            place=place_of(text), got=repr(text), expected="key=value", remedy="write for example --set group.a.size=3"
         )
     return steps, parse_value(value.strip(), text)
 
@@ -65,7 +72,7 @@ def parse_value(value: str, text: str) -> Any:
         table = {}
     if list(table) != ["value"]:
         raise InputError(
-            place=f"--set {text}", got=repr(value), expected="a TOML value", remedy="quote strings, put lists in [ ]"
+            place=place_of(text), got=repr(value), expected="a TOML value", remedy="quote strings, put lists in [ ]"
         )
     return table["value"]
 
@@ -97,7 +104,7 @@ def _put(table: Table, steps: list[str], value: Any, text: str, file: object) ->
         else:
             raise InputError(
                 file=file,
-                place=f"--set {text}",
+                place=place_of(text),
                 got=f"{'.'.join(map(str, path))} = {here!r}, which has no {steps[0]!r}",
                 expected="a key that exists",
                 remedy=f"set {'.'.join(map(str, path))} itself",
@@ -124,7 +131,7 @@ def _index(rows: list[Any], steps: list[str], value: Any, text: str, file: objec
         return len(rows), []
     raise InputError(
         file=file,
-        place=f"--set {text}",
+        place=place_of(text),
         got=f"{steps[0]!r} in an array of {len(rows)}",
         expected="an index from 0 or an id" if ids else "an index from 0",
         remedy=did_you_mean(steps[0], list(ids) or [str(k) for k in range(len(rows))]),

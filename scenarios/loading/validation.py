@@ -13,7 +13,7 @@ from pydantic import BaseModel, ValidationError
 
 from scenarios.errors import InputError
 from scenarios.limits import COORDINATE
-from scenarios.loading.overrides import KeyPath
+from scenarios.loading.overrides import KeyPath, place_of
 from scenarios.loading.toml_files import Table, did_you_mean
 from scenarios.schema.scenario import Scenario
 
@@ -199,7 +199,7 @@ def _place(path: KeyPath, table: Table, places: dict[KeyPath, str]) -> str:
     """
     for n in range(len(path), 0, -1):
         if path[:n] in places:
-            return f"--set {places[path[:n]]}"
+            return place_of(places[path[:n]])
     return key_text(path, table)
 
 
