@@ -233,9 +233,9 @@ class Config:
     def with_set(self, *assignments: str) -> Self:
         """Return a copy with assignments "name=value" applied, from left to right, and checked as a whole at the end.
 
-        A literal "tracker." before a name, whatever the tracker is called, and spaces around name and value are
-        ignored. Raises InputError for an assignment without "=", an unknown name, a value that is not allowed, or
-        values that contradict each other.
+        A literal "tracker." at the very beginning, whatever the tracker is called, and spaces around name and value are
+        ignored; of two values for one name the last counts. Raises InputError for an assignment without "=", an unknown
+        name, a value that is not allowed, or values that contradict each other.
         """
         changes: dict[str, Any] = {}
         for assignment in assignments:

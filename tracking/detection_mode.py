@@ -73,9 +73,9 @@ def frames_with_detections(
     """Return the sequence's frames with the detections of `mode` and without pictures, or None if `mode` is "image".
 
     needs: of the tracker. sensor: settings of a scenario's [sensor] that degrade the detections of mode "truth", {} for
-    none; seed: of their random numbers. Both are ignored in mode "file", where a frame's detections may be None. Frames
-    count from 1, frame k at (k - 1) / fps seconds. The arrays of each frame are its own and read-only: none of them
-    leads to the detections of another frame.
+    none; seed: of their random numbers, and of the order of the rows in that mode. Both are ignored in mode "file",
+    where a frame's detections may be None. Frames count from 1, frame k at (k - 1) / fps seconds. The arrays of each
+    frame are its own and read-only: none of them leads to the detections of another frame.
 
     Raises InputError if there are detections, none of them has boxes and the tracker does not take points, if the
     sensor settings are wrong, or if the stored detections or the truth cannot be read. In mode "truth" raises WorkError

@@ -57,7 +57,7 @@ def check_ranges(options: Any) -> None:
     declared range; else returns nothing.
 
     The message names the option with two hyphens, for example `--trials`. nan lies outside every range. Options without
-    a lower limit are not checked.
+    a lower limit are not checked. Of an option with one, anything but a number (None, a text) raises TypeError.
     """
     for f in fields(options):
         low, below, value = f.metadata.get("low"), f.metadata.get("below"), getattr(options, f.name)

@@ -65,7 +65,8 @@ def preset_file(tracker: str, name: str) -> Path:
 def file_of(tracker: str, source: str | Path) -> Path:
     """Return the file of the tracker's preset that is named `source`, else the path `source` itself.
 
-    A Path names no preset. Raises InputError, with the names of the presets, if `source` is neither preset nor file.
+    A Path names no preset. Raises InputError, with the names of the presets, if the tracker has presets and `source` is
+    neither one of them nor a file. Without presets the path is not checked.
     """
     known = presets(tracker)
     if isinstance(source, str) and source in known:

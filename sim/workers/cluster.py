@@ -111,9 +111,9 @@ def _connect(address: str) -> Any:
 class _ClusterCapacity:
     """How many items the cluster can run at a time.
 
-    client: the dask client. address: of the scheduler, for messages. State: the number of the cluster's worker threads
-    at the last count, the time of that count, and since when there are no threads (None while there are some, or after
-    the warning about that). `least`: the smallest capacity reported.
+    client: the dask client. address: of the scheduler, for messages. least: the smallest capacity reported. State: the
+    number of the cluster's worker threads at the last count, the time of that count, and the time of the last count
+    with threads, at first of the construction; None after the warning that there are none, until there are some.
     """
 
     def __init__(self, client: Any, address: str, least: int) -> None:

@@ -30,7 +30,7 @@ class Episode:
     - objective: mean of HOTA and group_F1_hull, or the one that is known; nan if there is nothing to score.
     - scores: by key of the catalogue, without those that are nan.
     - frames: number of frames played.
-    - seconds_tracking: time in the tracker, s.
+    - seconds_tracking: time in the tracker with the checks of what it returns, s; `reset` included, reading frames not.
     - seconds_scoring: time for groups and scores, s.
     """
 

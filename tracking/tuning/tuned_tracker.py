@@ -24,7 +24,8 @@ class TunedTracker:
     - config_class: declares its parameters.
     - needs: inputs of which it can use any one: "pixels", "stereo", "boxes", "points".
     - code: hash of the file that defines the tracker, "" if there is none.
-    - limited: the tracker in a process of its own, with a limit of time for each step; None without a limit.
+    - limited: the tracker in a process of its own, with a limit of time for each step; None without a limit, and always
+      for a class and the rule.
     """
 
     tracker: str | type[Tracker]

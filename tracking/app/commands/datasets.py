@@ -40,8 +40,9 @@ def validate(folder: Path) -> CommandResult:
     """Checks a generated sequence or dataset, or stored tracks, at the path `folder`; changes nothing.
 
     Without problems the result's data are "problems" ([]) and "content_hash" (64 hex digits, None for tracks), else
-    "problems" (a dictionary each) and "error" (the first of them). Then the exit code is 1 and the text has a line for
-    each problem. Raises InputError if the folder does not exist or holds neither a sequence nor tracks.
+    "problems" (a dictionary each: file, place, got, expected, remedy) and "error" (the first of them). Then the exit
+    code is 1 and the text has a line for each problem. Raises InputError if the folder does not exist or holds neither
+    a sequence nor tracks.
     """
     from sim.io.store.validate import content_hash, holds_sequences
     from sim.io.store.validate import validate as check

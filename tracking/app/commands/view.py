@@ -86,8 +86,8 @@ def _open(options: ViewOptions | OverlayOptions) -> list[Sequence]:
 def _tracks_reader(sequences: list[Sequence], tracks: Path | None) -> Callable[[Sequence], TrackingRun | None]:
     """Returns a function that reads the stored tracks of one of the sequences; it returns None if `tracks` is None.
 
-    tracks: path at or below which they are stored. Raises InputError at once if a sequence has no tracks there; the
-    function raises it for a damaged file or another frame rate.
+    tracks: path at or below which they are stored. Raises InputError at once if a sequence has no tracks there or a run
+    is not whole; the function raises it for a damaged file, another frame rate or other labels.
     """
     stored = {} if tracks is None else {s.name: found for s, found in match_tracks(sequences, find_tracks(tracks))}
 

@@ -184,7 +184,7 @@ def _events_near(truth: Truth, index: int) -> list[GroupEvent]:
     """Returns events that begin at most a second from frame `index` (from 1); no enter or leave. [] if events are
     unknown.
 
-    Order: merges and splits, crossings and queues, then form and dissolve; equal ones as in the truth.
+    Order: merges and splits, crossings and queues, then form and dissolve; within each of these as in the truth.
     """
     near = [event for event in truth.events or () if is_close(event.start, index, truth.fps)]
     return sorted((event for event in near if event.kind in SHOWN_KINDS), key=lambda event: SHOWN_KINDS[event.kind])

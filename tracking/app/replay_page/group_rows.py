@@ -27,7 +27,7 @@ class PageGroupRows:
     """What a tracker of whole groups says of R groups, one per row, in m or px; nan where unknown.
 
     hull: R polygons (V, 2) x, y, without vertices where unknown. extent: (R, 2, 2), the covariance of where the group's
-    people are. size: (R,), estimated number of people. speed: (R,), m/s or px/s.
+    people are, m² or px². size: (R,), estimated number of people. speed: (R,), m/s or px/s.
     """
 
     hull: tuple[Array, ...]
