@@ -60,9 +60,11 @@ def truth_hash(scenario: str, seed: int, repeat: int, truth: Truth | None) -> st
 
 
 def labels_hash(truth: Truth) -> str:
-    """Return the SHA-256 (64 hex digits) of a recording's labels as read: frame rate, length, ids, groups, places.
+    """Return the SHA-256 (64 hex digits) of a recording's labels as read: frame rate, length, and of each row frame,
+    id, group, position and box.
 
-    Left out are the name, the image scale (an option), and what is computed from the rest, as velocities and hulls.
+    All else is left out, as the name, the image scale (an option), visibility, events, and what is computed from the
+    rest (velocities, hulls).
     """
     read = (truth.frame, truth.id, truth.group, truth.pos, truth.box)
     return canonical_hash(("labels", truth.fps, truth.length, *read))

@@ -87,7 +87,8 @@ def _import_failed(where: object, error: BaseException) -> InputError:
 
 
 def checked(found: Any, spec: str) -> type[Tracker]:
-    """Return `found` unchanged if it is a tracker class. Raises InputError otherwise; `spec` names it in the error.
+    """Return `found` unchanged if it is a tracker class. Raises InputError otherwise, and WorkError if code of the
+    class raises when its attributes are read; `spec` names it in the error.
 
     A tracker class has `needs` (a tuple or list out of "pixels", "stereo", "boxes", "points", not empty),
     `reset(context, seed)` and `step(frame, detections)`. It is created with its config if it has a `config_class` (a

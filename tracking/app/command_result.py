@@ -82,9 +82,8 @@ def print_error(error: FlockscopeError, as_json: bool) -> int:
 def print_interrupted(as_json: bool) -> int:
     """Prints that Ctrl-C ended the command and that the same command continues; returns 130.
 
-    as_json: print one JSON object with "status" ("interrupted") and "error" (file, place, got, expected,
-    remedy) on stdout; else one line on stderr. Raises
-    OSError if that cannot be written.
+    as_json: print one JSON object with "status" ("interrupted") and "error" (file, place, got, expected, remedy) on
+    stdout; else one line "interrupted: ..." on stderr. Raises OSError if that cannot be written.
     """
     remedy = "run the same command again: completed parts are kept"
     error = WorkError(got="an interruption", expected="to finish", remedy=remedy)

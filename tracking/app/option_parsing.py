@@ -104,8 +104,7 @@ def toml_values(texts: Iterable[str]) -> dict[str, Any]:
     """Returns texts "key=value" as a dictionary from key to value; of equal keys the last counts.
 
     A key with dots, as "a.b", stays one key. A value is read as TOML; a bare word (a letter, then letters, digits or
-    _ . * : -) as a string. Raises InputError for a text that cannot be
-    read so.
+    _ . * : -) as a string. Raises InputError for a text that cannot be read so.
     """
     from scenarios.loading.overrides import parse_setting
 
